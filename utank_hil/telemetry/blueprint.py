@@ -29,7 +29,8 @@ HALF_WINDOW_S: Final = 60.0
 MOST_SHADES: Final = 4
 """Most lines of a plot, and most ships that are shown side by side."""
 WATCH_SHARES: Final = {1: (5, 4), MOST_SHADES: (5, 7, 4)}
-"""Heights of ships, words and plot, for one ship and for several: no remedy of a fault is cut."""
+"""Relative heights of ships, words and plot, for one ship and for several, such that no remedy of a
+fault is cut off."""
 
 _ROLL: Final = ("Roll, °", ("roll_rad", "twin_roll_rad", "true_roll_rad"))
 _LEVEL: Final = ("Tank level, m", ("port_level_m", "starboard_level_m", "true_level_m"))
@@ -74,9 +75,9 @@ SUBJECTS: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
         ("Bus load, %", ("bus_load",)),
     ),
 }
-"""Plots of the engineer's tabs: title and columns, of which the first is shown of several runs."""
+"""Plots of the engineer's tabs: title and columns; the first column is shown for several runs."""
 
-# Okabe and Ito's colour-blind safe palette, in an order for a dark background
+# This is Okabe and Ito's colour-blind safe palette, in an order for a dark background.
 _PALETTE: Final = (
     (0xB0, 0xB0, 0xB0),
     (0xE6, 0x9F, 0x00),
@@ -98,20 +99,20 @@ def make_blueprint(
 ) -> rrb.Blueprint:
     """Lay out the views of one run, or of several on one time line.
 
-    In the first tab, for the watch, the ship's section rolls beside words and a few plots around
-    the cursor. The others, for the engineer, have every signal, by subject.
+    The first tab, for the watch, has the rolling section of the ship, words, and a few plots around
+    the cursor. The others, for the engineer, have every signal by subject.
 
     Parameters
     ----------
     runs : sequence of str
-        With several, a colour stands for a run, else for a signal.
+        Names of the runs; a colour stands for a run if there are several, else for a signal.
     span_s : (float, float), optional
         First and last time of a finished recording, shown in one tab as a whole and in another
         around the cursor. By default the view is live and follows the newest data.
     size : SceneSize, optional
-        Without it there are no scenes, and no tab for the watch.
+        Size of the scenes; without it there are no scenes and no tab for the watch.
     zero : collection of (str, str), optional
-        Run and column of the signals that are zero throughout: a line that says nothing.
+        Run and column of signals that are zero throughout and are not plotted.
     """
     boundary = rr.TimeRangeBoundary
     if span_s is None:
@@ -144,7 +145,7 @@ def make_blueprint(
 
 
 def columns_of(columns: Sequence[str], about: Mapping[str, Any] | None) -> list[str]:
-    """Columns without those of parts that the recorded ship or controller lacks."""
+    """Return the columns without those of parts that the recorded ship or controller lacks."""
     configuration = (about or {}).get("configuration", {})
     vessel = configuration.get("vessel") or {}
     missing = {
@@ -196,7 +197,7 @@ def _subjects(
     shown: range,
     zero: Collection[tuple[str, str]],
 ) -> rrb.Container:
-    """Lay out all plots of a time range, a tab for each subject; states and events below."""
+    """Lay out all plots of a time range, one tab per subject, with states and events below."""
     left = {
         column: [i for i in shown if (runs[i], column) not in zero]
         for column in columns
@@ -209,7 +210,7 @@ def _subjects(
         for title, wanted in plots:
             fields = [field_of(column) for column in wanted if column in left]
             if len(shown) > 1:
-                fields = fields[:1]  # the others have plots of their own
+                fields = fields[:1]  # The other fields have plots of their own.
             if fields:
                 views.append(_plot(title, fields, runs, left[fields[0].column], axis))
             for field in fields:
@@ -243,7 +244,7 @@ def _subjects(
 def _others(
     fields: Mapping[Field, Sequence[int]], runs: Sequence[str], axis: rrb.TimeAxis
 ) -> list[rrb.View]:
-    """Plots of the signals without a place: one a unit, or of several runs one a signal."""
+    """Return plots of the remaining signals: one per unit, or for several runs one per signal."""
     most = MOST_SHADES if len(runs) == 1 else 1
     groups = [[field for field in fields if field.unit.plot == plot]
               for plot in dict.fromkeys(unit.plot for unit in UNITS)]  # fmt: skip
@@ -255,7 +256,7 @@ def _others(
 
 
 def _phase_plane(paths: Sequence[str]) -> rrb.View:
-    """Roll to the right and its rate upwards, in the last half minute before the cursor."""
+    """Lay out the phase plane, roll rate over roll, of the last half minute before the cursor."""
     boundary = rr.TimeRangeBoundary
     trail = rrb.VisibleTimeRange(
         TIMELINE,
@@ -271,7 +272,7 @@ def _phase_plane(paths: Sequence[str]) -> rrb.View:
 
 
 def _spectra(paths: Sequence[str]) -> rrb.View:
-    """Spectra of the roll in the last minutes before the cursor."""
+    """Lay out spectra of the roll in the last minutes before the cursor."""
     return rrb.BarChartView(
         contents=[f"{path}/spectrum" for path in paths],
         name="Spectrum of the roll in the last 5 min, °²/Hz over Hz",
@@ -286,9 +287,9 @@ def _plot(
     shown: Sequence[int],
     axis: rrb.TimeAxis,
 ) -> rrb.TimeSeriesView:
-    """Plot fields of runs; the title names the colours: a legend would hide what it is about.
+    """Plot fields of runs; the title names the colours, because a legend would cover data.
 
-    With several runs a colour is a run's and there is one field, else a field's.
+    Colours stand for runs of one field if there are several runs, else for fields.
     """
     paths = run_paths(runs)
     if len(runs) > 1:
@@ -319,7 +320,7 @@ def _plot(
 
 
 def _short_labels(labels: Sequence[str]) -> list[str]:
-    """Drop the words that all labels of a plot share: its title has them."""
+    """Drop the words that all labels of a plot share; the title has them."""
     words = [label.split() for label in labels]
     shared = set(words[0]).intersection(*words)
     short = [" ".join(word for word in label if word not in shared) for label in words]
@@ -338,10 +339,10 @@ def _line(field: Field, name: str, color: tuple[int, int, int]) -> rrb.Visualize
         names=name,
         colors=color,
         widths=1.5,
-        aggregation_policy="MinMax",  # zoomed out, show the peaks, not their average
+        aggregation_policy="MinMax",  # Peaks, not averages, are shown when zoomed out.
     ).visualizer(mappings=[source])
 
 
 def run_color(number: int) -> tuple[int, int, int]:
-    """Colour of a run among several, counted from 0; the first is grey, the reference."""
+    """Return the colour of a run among several, counted from 0; the reference is grey."""
     return _PALETTE[number % MOST_SHADES]

@@ -1,8 +1,7 @@
 """Logs of the bus in other programs' formats: candump (.log), ASC (.asc) and BLF (.blf).
 
-They hold frames and the times at which they were on the bus, not what a controller was handed in
-which tick. So what is read from them has ticks on a grid of their own: from the controller's first
-frame on, or where it is silent from the log's first frame on.
+They hold frames and their times on the bus, but not which tick received them. Ticks are therefore
+placed on a grid that starts at the controller's first frame, or at the log's if it is silent.
 """
 
 import math
@@ -30,28 +29,23 @@ if TYPE_CHECKING:
 
 BUS_SUFFIXES: Final = (".log", ".asc", ".blf")
 _EARLY_NS: Final = TICK_NS // 5
-"""How much earlier in its tick a frame may be than the controller's first one was."""
+"""Largest lead of a frame in its tick over the controller's first frame in its own."""
 
 
 class BusLogError(ValueError):
-    """The file is no log of its kind, or not what is needed; the message says why."""
+    """The file is no log of its kind, or lacks what is needed; the message says why."""
 
 
 def write_bus_log(path: Path, entries: Iterable[Entry]) -> int:
-    """Write the frames of a recording; times count in seconds from its first record.
+    """Write the frames of a recording and return their number; times count from its first record.
 
     Parameters
     ----------
     path : Path
-        Overwritten; its suffix, one of `BUS_SUFFIXES`, says the format. Times of candump and ASC
-        are rounded to a microsecond.
+        File to overwrite; its suffix, one of `BUS_SUFFIXES`, selects the format. Times of candump
+        and ASC are rounded to a microsecond.
     entries : iterable of Entry
-        Frames of the controller are marked as transmitted.
-
-    Returns
-    -------
-    int
-        Number of frames.
+        Records; frames of the controller are marked as transmitted.
     """
     from can import Message
 
@@ -75,7 +69,7 @@ def write_bus_log(path: Path, entries: Iterable[Entry]) -> int:
 
 
 def read_bus_log(path: Path) -> list[Entry]:
-    """Read a log as what a controller on that bus was handed and answered.
+    """Read a log as the inputs and answers of a controller on that bus.
 
     Raises
     ------
@@ -91,7 +85,7 @@ def read_bus_log(path: Path) -> list[Entry]:
         raise BusLogError(
             f"{path}: no frame in it is one of the catalogue's (docs/can-catalogue.md)"
         )
-    # what the log's own program sent is marked, where the controller was that program
+    # Frames that the logging program sent are marked, if it was the controller.
     marked = any(not m.is_rx and m.arbitration_id in own_ids for m in messages)
     begin_s = messages[0].timestamp
     received: list[Entry] = []
@@ -116,7 +110,7 @@ def begins_with_the_controller(entries: Iterable[Entry]) -> bool:
 
 
 def _in_ticks(received: list[Entry], sent: list[tuple[int, Frame]]) -> Iterator[Entry]:
-    """Entries with the ticks between them; a tick's own frames follow it."""
+    """Return entries with the ticks between them; a tick's own frames follow it."""
     begin_ns = sent[0][0] if sent else received[0].time_ns
     by_tick: dict[int, list[Frame]] = {}
     for time_ns, frame in sent:
@@ -134,7 +128,7 @@ def _in_ticks(received: list[Entry], sent: list[tuple[int, Frame]]) -> Iterator[
         while entry is not None and entry.time_ns <= now_ns:
             yield entry
             entry = next(waiting, None)
-        # the last frames of all may be what a controller leaves behind, after its last tick
+        # The last frames may be those that a controller sends after its last tick.
         leaves = tick == last_own and _only_stops(by_tick[tick])
         yield Entry(0, b"", Kind.STOP if leaves else Kind.TICK, now_ns)
         for frame in by_tick.get(tick, ()):
@@ -142,7 +136,7 @@ def _in_ticks(received: list[Entry], sent: list[tuple[int, Frame]]) -> Iterator[
 
 
 def _only_stops(frames: list[Frame]) -> bool:
-    """Whether frames are the last commands of a controller that ends: quick stop, and no more."""
+    """Whether frames are only the last commands, quick stop, of a controller that ends."""
     pump, valve = load_catalogue().codec(PumpCommand), load_catalogue().codec(ValveCommand)
     words = [pump.decode(frame.data) for frame in frames if frame.can_id == pump.can_id]
     return {frame.can_id for frame in frames} <= {pump.can_id, valve.can_id} and any(
@@ -151,7 +145,7 @@ def _only_stops(frames: list[Frame]) -> bool:
 
 
 def _messages(path: Path) -> Iterator["can.Message"]:
-    """Messages of a log."""
+    """Yield the messages of a log."""
     from can import ASCReader, BLFReader, CanutilsLogReader
 
     readers: dict[str, Callable[[Any], Any]] = {
@@ -165,7 +159,7 @@ def _messages(path: Path) -> Iterator["can.Message"]:
             for message in readers[suffix](content):
                 yield message
                 count += 1
-        except Exception as error:  # the readers let out whatever a wrong byte makes them meet
+        except Exception as error:  # The readers raise many kinds of exception at damaged bytes.
             raise BusLogError(
                 f"{path}: can't be read as {suffix[1:]} after {count} frames"
             ) from error

@@ -1,8 +1,8 @@
-"""What a controller node was handed and what it answered, as records of one fixed layout.
+"""Inputs and answers of a controller node, as records of one fixed layout.
 
-A node without I/O is a function of what it is handed, so these records, in order, are all that its
-behaviour follows from beside its configuration: frames received and sent, ticks, bus errors, frames
-of other kinds, and the answers of retuner and estimator.
+A node without I/O is a function of its inputs, so these records, in order, and its configuration
+determine its behaviour: frames received and sent, ticks, bus errors, frames of other kinds, and
+the answers of retuner and estimator.
 """
 
 import struct
@@ -25,25 +25,22 @@ RECORD: Final = np.dtype(
         ("time_ns", "<i8"),
     ]
 )
-"""`number` is the identifier of a frame, or a count; `time_ns` is the node's time."""
+"""Type of a record: `number` is a frame's identifier or a count, `time_ns` the node's time."""
 LAYOUT: Final = struct.Struct("<I9pB2xq")
-"""The same for one record: number, data with its length, kind and time."""
+"""Layout of one packed record: number, length, data, kind and time."""
 
 Records = npt.NDArray[np.void]
 """Records, shape (n,), of type `RECORD`."""
 
 IN_A_SLOT: Final = 32
-"""Records in one slot of a ring; five ticks have some 25."""
+"""Number of records in one slot of a ring; five ticks have some 25."""
 
 
 class Kind(IntEnum):
-    """What a record says.
-
-    What comes before a TICK was handed to the node for it, or in it; what it sent comes after.
-    """
+    """Kind of a record; inputs come before their TICK and answers after it."""
 
     RECEIVED = 1
-    """A frame was handed over."""
+    """A frame was received."""
     SENT = 2
     """A frame was returned by the tick, or the stop, before."""
     TICK = 3
@@ -52,26 +49,20 @@ class Kind(IntEnum):
     LINK_ERROR = 5
     STOP = 6
     STARTED = 7
-    """First of all: whether the loop runs with a real-time policy (first byte)."""
+    """First record: the first byte says whether the loop has a real-time policy."""
     ALIVE = 8
-    """Whether the retuner lives (first byte), when the controller asked."""
+    """The controller asked whether the retuner lives; the first byte is the answer."""
     ANSWER = 9
-    """A piece of the retuner's answer of `number` bytes, when the controller took it."""
+    """The controller took this piece of the retuner's answer of `number` bytes."""
     LOST = 10
     """`number` rows were lost before they could be written."""
     ESTIMATOR_ALIVE = 11
     ESTIMATE = 12
-    """As ALIVE and ANSWER, of the estimator of sea and ship."""
+    """The estimator of sea and ship answered; ALIVE and ANSWER are the retuner's."""
 
 
 def frame_ring(slots: int) -> RingWriter:
-    """A ring for packed records.
-
-    Raises
-    ------
-    RingError
-        If there is no room in shared memory.
-    """
+    """Create a ring for packed records; raises RingError without room in shared memory."""
     return RingWriter(RingKind.FRAMES, LAYOUT.size, IN_A_SLOT, slots)
 
 
@@ -88,13 +79,7 @@ def pack(records: Records) -> bytes:
 
 
 def unpack(packed: bytes) -> Records:
-    """The inverse of `pack`.
-
-    Raises
-    ------
-    ValueError
-        If it is anything else.
-    """
+    """Invert `pack`; raises ValueError for other data."""
     count = int.from_bytes(packed[:4], "little")
     planes = np.frombuffer(packed, dtype=np.uint8, offset=4)
     if planes.size != count * (7 + 8 + PAYLOAD_BYTES):
@@ -112,6 +97,6 @@ def unpack(packed: bytes) -> Records:
 
 
 def _by_sender(head: npt.NDArray[np.uint8]) -> npt.NDArray[np.intp]:
-    """Order in which records of one kind and identifier stand together, each in its own order."""
+    """Return the order that groups records by kind and identifier; groups keep their order."""
     keys = head.astype(np.int64) @ (1 << np.arange(0, 56, 8))
     return np.argsort(keys, kind="stable")

@@ -1,4 +1,4 @@
-"""The ring of events out of the loop: a record is the JSON text of one event.
+"""The ring of events from the loop: a record is the JSON text of one event.
 
 Events are those of retuning and of the alarm list. A write takes some twenty microseconds.
 """
@@ -13,7 +13,7 @@ from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.ring import RingKind, RingReader, RingWriter
 
 _SLOTS: Final = 64
-"""A retuning has four events in four minutes; readers look every 0.5 s."""
+"""Number of slots: a retuning has four events in four minutes, and readers poll every 0.5 s."""
 _LONGEST_BYTES: Final = 8192
 _MOST_BYTES_A_CHARACTER: Final = 6
 """Length of an escaped character in JSON."""
@@ -32,14 +32,14 @@ _ALARM_WORDS: Final = {
 
 
 def warns(event: Event) -> bool:
-    """Return whether an event is more than news."""
+    """Whether an event is a warning."""
     if isinstance(event, AlarmEvent):
         return event.state in (AlarmState.ACTIVE_UNACKNOWLEDGED, None)
     return event.state in (RetuningState.REFUSED, RetuningState.UNDONE)
 
 
 def event_text(event: Event) -> str:
-    """Text of an event, such as `retuning REFUSED: the record is too short`."""
+    """Return the text of an event, such as `retuning REFUSED: the record is too short`."""
     if isinstance(event, AlarmEvent):
         return f"{_ALARM_WORDS[event.state]} in {event.mode.name}: {fault_text(event.code)}"
     text = f"retuning {event.state.name}"
@@ -47,27 +47,18 @@ def event_text(event: Event) -> str:
 
 
 class EventWriter(RingWriter):
-    """The writing end, for the loop.
-
-    Raises
-    ------
-    RingError
-        If there is no room in shared memory.
-    """
+    """Writing end for the loop; raises RingError without room in shared memory."""
 
     def __init__(self) -> None:
         super().__init__(RingKind.EVENTS, 1, _LONGEST_BYTES, _SLOTS)
 
     def write_event(self, event: Event, start_ns: int) -> None:
-        """Append one event; never blocks. Reasons too long for a record are cut.
+        """Append one event without blocking; reasons too long for a record are cut.
 
-        Parameters
-        ----------
-        start_ns : int
-            Time of the first telemetry row; readers get the time since then.
+        `start_ns` is the time of the first telemetry row, from which readers count.
         """
         if isinstance(event, RetuningEvent) and sum(map(len, event.reasons)) > _LONGEST_BYTES:
-            event = _cut(event)  # first: encoding takes long for what would be thrown away
+            event = _cut(event)  # The event is cut first, because encoding takes long.
         data = _encoded(event, start_ns)
         if len(data) > _LONGEST_BYTES and isinstance(event, RetuningEvent):
             data = _encoded(_cut(event), start_ns)
@@ -80,7 +71,7 @@ class EventReader(RingReader):
     Attributes
     ----------
     start_ns : int
-        Time of the first telemetry row on the writer's monotonic clock, once there was an event.
+        Time of the first telemetry row on the writer's monotonic clock, set by the first event.
     """
 
     def __init__(self, name: str, place: int | None = None) -> None:
@@ -88,7 +79,7 @@ class EventReader(RingReader):
         self.start_ns = 0
 
     def read_events(self) -> list[Event]:
-        """Events since the last call, oldest first, `time_ns` since the start; never blocks."""
+        """Return new events, oldest first, with `time_ns` since the start; never blocks."""
         contents = [json.loads(record) for record in self.read()]
         if contents:
             self.start_ns = contents[-1]["start_ns"]
@@ -96,7 +87,7 @@ class EventReader(RingReader):
 
 
 def _cut(event: RetuningEvent) -> RetuningEvent:
-    """The event with reasons short enough for a record, whatever their characters."""
+    """Return the event with reasons short enough for a record, whatever their characters."""
     return replace(event, reasons=("; ".join(event.reasons)[:_CUT] + " ...",))
 
 

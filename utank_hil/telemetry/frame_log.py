@@ -1,8 +1,8 @@
-"""The frame log: a file that grows by blocks and is readable up to the last whole one.
+"""The frame log: a file that grows by blocks and is readable up to its last whole block.
 
-After the mark of the file come blocks: kind, length, CRC-32, then that many bytes, compressed. The
-first block is the head, JSON that says where the log comes from; the others hold `bus_records`. A
-block is written every half second, so a file that is cut at any byte lacks less than a second.
+After the file's mark come blocks: kind, length, CRC-32, then that many compressed bytes. The first
+block is the head, JSON that describes the log's origin; the others hold `bus_records`. A block is
+written every half second, so a file cut at any byte lacks less than a second.
 """
 
 import json
@@ -26,8 +26,8 @@ BLOCK_NS: Final = 500_000_000
 _MARK: Final = b"UTANKHIL frames 1\n"
 _BLOCK: Final = struct.Struct("<4sII")
 _HEAD: Final = b"HEAD"
-_QUICK: Final = b"BUSZ"  # zlib
-_SMALL: Final = b"BUSX"  # xz
+_QUICK: Final = b"BUSZ"  # Blocks of this kind are compressed with zlib.
+_SMALL: Final = b"BUSX"  # Blocks of this kind are compressed with xz.
 _DECOMPRESS: Final[dict[bytes, Callable[[bytes], bytes]]] = {
     _QUICK: zlib.decompress,
     _SMALL: lzma.decompress,
@@ -39,26 +39,26 @@ class FrameLogError(ValueError):
 
 
 class FrameLogWriter(Closing):
-    """Writes a frame log; every call of `write` adds one block and brings it to the disk.
+    """Writes a frame log; every call of `write` adds one block and syncs it to the disk.
 
     Parameters
     ----------
     file : Path
-        Overwritten.
+        File to overwrite.
     head : mapping
-        Where the records come from, see `utank_hil.telemetry.replay_head`.
+        Origin of the records (`utank_hil.telemetry.replay_head`).
     small : bool
         Whether to compress as well as possible, for logs to be kept.
 
     Raises
     ------
     OSError
-        If it can't be written, with its name; also of `write` and `close`.
+        If the file can't be written, with its name; also raised by `write` and `close`.
     """
 
     def __init__(self, file: Path, head: Mapping[str, Any], *, small: bool = False) -> None:
         self._small = small
-        self._content = file.open("wb", buffering=0)  # what fails is not tried again on closing
+        self._content = file.open("wb", buffering=0)  # `close` repeats no failed write
         self._content.write(_MARK)
         self._append(_HEAD, zlib.compress(json.dumps(head).encode()))
 
@@ -86,14 +86,14 @@ class FrameLogWriter(Closing):
                 while left:
                     left = left[self._content.write(left) :]
                 os.fsync(self._content.fileno())
-            except OSError:  # half a block would end the reading, of the parts that follow too
+            except OSError:  # Half a block would end the reading, also of later parts.
                 self._content.truncate(before)
                 self._content.seek(before)
                 raise
 
 
 class BlockSink:
-    """Collects records of a run in simulated time into blocks; longer ones make smaller files."""
+    """Collects records of a run in simulated time into blocks; longer blocks make smaller files."""
 
     def __init__(self, writer: FrameLogWriter, block_ns: int = BLOCK_NS) -> None:
         self._writer = writer
@@ -102,7 +102,7 @@ class BlockSink:
         self._begin_ns: int | None = None
 
     def write(self, records: bytes, time_ns: int) -> None:
-        """Take packed records of one tick."""
+        """Take the packed records of one tick."""
         if self._begin_ns is None:
             self._begin_ns = time_ns
         self._waiting += records
@@ -110,7 +110,7 @@ class BlockSink:
             self.flush()
 
     def flush(self) -> None:
-        """Write what has been collected."""
+        """Write the collected records."""
         self._writer.write(np.frombuffer(self._waiting, dtype=RECORD))
         self._waiting = bytearray()
         self._begin_ns = None
@@ -122,12 +122,12 @@ class FrameLog:
     Parameters
     ----------
     path : Path
-        The first part, or another to be read from there on.
+        The first part, or another to start from.
 
     Attributes
     ----------
     first_part : bool
-        Whether it begins where the run did.
+        Whether the log begins where the run did.
     cut : str
         Where and why reading ended before the end of a file, after all `blocks` were taken; empty
         if it did not.
@@ -135,9 +135,9 @@ class FrameLog:
     Raises
     ------
     FrameLogError
-        If it is no frame log, or its head is not whole.
+        If the file is no frame log, or its head is incomplete.
     OSError
-        If it can't be read.
+        If the file can't be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -153,13 +153,13 @@ class FrameLog:
         self.head: dict[str, Any] = json.loads(zlib.decompress(payload))
 
     def blocks(self, note: Callable[[str], None] | None = None) -> Iterator[Records]:
-        """Records of one block after another; `note` is called with `cut`, if there is one."""
+        """Yield the records block by block; `note` is called with `cut`, if it is not empty."""
         self.cut = ""
         for path in self._paths:
             for kind, payload in self._read(path):
                 if kind in _DECOMPRESS:
                     yield unpack(_DECOMPRESS[kind](payload))
-            if self.cut:  # what comes after a gap is not the same run any more
+            if self.cut:  # Records after a gap do not continue the same run.
                 break
         if self.cut and note is not None:
             note(self.cut)

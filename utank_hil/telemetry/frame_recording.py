@@ -1,4 +1,4 @@
-"""The way from the ring of frames to the frame log."""
+"""Transfer of records from the ring of frames to the frame log."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,12 +20,12 @@ class FrameRecording(Closing):
     file : Path
         The recording beside which the log is written.
     place : int, optional
-        As that of a `RingReader`.
+        Place in the ring to start from (`RingReader`).
 
     Attributes
     ----------
     lost : int
-        Records that were overwritten before they were read; each slot counts as full.
+        Number of records overwritten before they were read; each lost slot counts as full.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class FrameRecording(Closing):
 
     @property
     def place(self) -> int:
-        """As that of a `RingReader`."""
+        """Place in the ring up to which records are written (`RingReader`)."""
         return self._reader.place
 
     def write(self) -> None:

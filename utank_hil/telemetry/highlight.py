@@ -26,7 +26,7 @@ def highlight_s(file: Path) -> float:
 
 
 def in_service(rows: dict[str, FloatArray]) -> npt.NDArray[np.bool_]:
-    """Rows after the start, in which a signal that is awaited counts as a fault until it comes."""
+    """Return the rows after start-up, during which a missing signal counts as a fault."""
     started: npt.NDArray[np.bool_] = (rows["mode"] != Mode.INIT) & (rows["mode"] != Mode.STANDBY)
     return started
 

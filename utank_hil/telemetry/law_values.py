@@ -1,7 +1,7 @@
-"""The numbers of a built law: kept with a recording, compared bit for bit, put back into a law.
+"""Numbers of a built law: saved with a recording, compared bit for bit, put back into a law.
 
-A design is a search or a factorization, whose last digits depend on the processor's kernels. A
-recorded run is therefore repeated with its recorded numbers, and not with a law designed anew.
+A design is a search or a factorization whose last digits depend on the processor's kernels. A
+recorded run is therefore repeated with its recorded numbers, not with a law designed anew.
 """
 
 import base64
@@ -23,15 +23,15 @@ _DEEPEST: Final = 12
 
 
 class LawValuesError(ValueError):
-    """Recorded numbers do not belong to the law that is to take them."""
+    """Recorded numbers do not fit the law."""
 
 
 @runtime_checkable
 class Derives(Protocol):
-    """A part of a controller that keeps what follows from its numbers where no number shows it."""
+    """A part of a controller with values that are derived from its numbers."""
 
     def derive(self) -> None:
-        """Make that anew from the numbers."""
+        """Recompute the derived values."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +43,9 @@ class ValueDifference:
     name : str
         Path of attributes, with the index of the first element that differs.
     recorded, designed : str
-        Of that element, in decimals that tell every bit; "missing" where there is none.
+        Exact values of that element; "missing" if there is none.
     deviation : float
-        Largest deviation of an element, relative to the largest recorded one; infinite where no
+        Largest deviation of an element, relative to the largest recorded one; infinite if no
         elements can be compared.
     """
 
@@ -60,22 +60,18 @@ class ValueDifference:
 
 
 def law_values(controller: object) -> Values:
-    """Every number that a controller at rest holds: gains, models, weights, state.
+    """Return every number that a controller at rest holds: gains, models, weights, state.
 
-    Attributes that hold no numbers, functions and the insides of compiled code are left out.
+    Attributes without numbers, functions and the insides of compiled code are left out.
     """
     return dict(_walk(controller, "", 0, set()))
 
 
 def restored(controller: Part, values: Values) -> Part:
-    """A copy of a controller at rest that holds other numbers; `law_values` of it are `values`.
+    """Return a copy of a controller at rest whose `law_values` are `values`.
 
-    Nothing of the given controller is changed, nor of the law that it shares arrays with.
-
-    Raises
-    ------
-    LawValuesError
-        If the controller has other arrays, or arrays of other shapes.
+    The given controller and the arrays of its law stay unchanged. LawValuesError is raised if the
+    controller has other arrays, or arrays of other shapes.
     """
     own = law_values(controller)
     for name in dict.fromkeys((*values, *own)):
@@ -86,7 +82,7 @@ def restored(controller: Part, values: Values) -> Part:
 
 
 def differences(recorded: Values, designed: Values) -> list[ValueDifference]:
-    """Each array that is not the same bit for bit, with its first element that differs."""
+    """Return each array that is not bit for bit the same, with its first element that differs."""
     found = []
     for name in dict.fromkeys((*recorded, *designed)):
         a, b = recorded.get(name), designed.get(name)
@@ -104,7 +100,7 @@ def differences(recorded: Values, designed: Values) -> list[ValueDifference]:
 
 
 def encoded(values: Values) -> dict[str, Any]:
-    """Values ready for JSON, exact."""
+    """Return the values exactly, ready for JSON."""
     return {
         name: [str(value.dtype), list(value.shape), _packed(value.tobytes())]
         for name, value in values.items()
@@ -112,7 +108,7 @@ def encoded(values: Values) -> dict[str, Any]:
 
 
 def decoded(content: Mapping[str, Any]) -> Values:
-    """The inverse of `encoded`."""
+    """Invert `encoded`."""
     return {
         name: np.frombuffer(zlib.decompress(base64.b85decode(data)), np.dtype(dtype)).reshape(shape)
         for name, (dtype, shape, data) in content.items()
@@ -132,7 +128,7 @@ def _kind(value: npt.NDArray[Any] | None) -> str:
 
 
 def _deviation(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> float:
-    """Largest deviation of `b` from `a`, relative to the largest element of `a`."""
+    """Return the largest deviation of `b` from `a`, relative to the largest element of `a`."""
     wide = np.complex128 if a.dtype.kind == "c" else np.float64
     a, b = a.astype(wide), b.astype(wide)
     deviation = np.abs(b - a, where=a != b, out=np.zeros(a.shape)).max()
@@ -165,14 +161,14 @@ def _walk(
 def _restored(
     value: object, values: Values, path: str, depth: int, done: dict[int, tuple[object, object]]
 ) -> object:
-    """The value itself if it holds no numbers, else a copy with those of `values`."""
+    """Return the value itself if it holds no numbers, else a copy with those of `values`."""
     if path in values:
         return _number_or_array(value, values[path])
     if depth == _DEEPEST:
         return value
     if id(value) in done:
         return done[id(value)][0]
-    # the value is kept, too, so that no other object gets its id
+    # The value is also kept, so that no other object gets its id.
     done[id(value)] = value, value
     before = dict(_parts(value))
     parts = {
@@ -202,7 +198,7 @@ def _restored(
 def _number_or_array(value: object, recorded: npt.NDArray[Any]) -> object:
     if not isinstance(value, np.ndarray):
         return recorded.item() if isinstance(value, bool | int | float | complex) else recorded[()]
-    # strides decide which kernel a product takes, and so its last bit
+    # Strides select the kernel of a product, and so its last bit.
     last = sum((size - 1) * step for size, step in zip(value.shape, value.strides, strict=True))
     memory = np.empty(max(last, 0) // value.itemsize + 1, value.dtype)
     new = np.lib.stride_tricks.as_strided(memory, value.shape, value.strides)
@@ -215,7 +211,7 @@ def _path(path: str, name: str) -> str:
 
 
 def _parts(value: object) -> Iterator[tuple[str, object]]:
-    """What an object is made of, by name."""
+    """Return the parts of an object by name."""
     if isinstance(value, str | bytes | type) or callable(value):
         return
     if isinstance(value, Mapping):

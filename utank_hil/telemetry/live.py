@@ -1,6 +1,6 @@
-"""Runs on this machine: found by their rings in shared memory, and streamed to viewers.
+"""Runs on this machine, found by their rings in shared memory and streamed to viewers.
 
-A run does not notice its viewers: a ring has any number of readers.
+A run is independent of its viewers: a ring has any number of readers.
 """
 
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ from utank_hil.telemetry.rows import RowReader
 from utank_hil.telemetry.viewer import LOOPBACK, hold_port, live_url, port_of
 
 MEMORY: Final = "64MiB"
-"""History for a viewer that connects late; bounds the memory of the stream."""
+"""History for a viewer that connects late; it bounds the memory of the stream."""
 _START_S: Final = 5.0
 """Time in which the server of a stream starts, even on a busy machine."""
 
@@ -35,9 +35,9 @@ class LiveRun:
     events : str or None
         Name of its ring of events.
     pid : int
-        Its process.
+        Id of its process.
     about : mapping
-        Where its rows come from (`utank_hil.base.provenance`); empty if it does not say.
+        Origin of its rows (`utank_hil.base.provenance`); empty if unknown.
     """
 
     ring: str
@@ -51,7 +51,7 @@ class LiveRun:
 
 
 def live_runs() -> list[LiveRun]:
-    """The runs of this machine that this user may read; left-overs of killed ones are not among."""
+    """Return the runs of this machine that this user may read, without those of killed writers."""
     found: list[tuple[str, int, Mapping[str, Any]]] = []
     events: dict[int, str] = {}
     for name in ring_names():
@@ -64,23 +64,16 @@ def live_runs() -> list[LiveRun]:
             with RowReader(name) as rows:
                 if rows.columns == SIGNALS:
                     found.append((name, rows.writer_pid, rows.about or {}))
-        except OSError:  # gone since, of another version or kind, or another user's
+        except OSError:  # It has ended, is of another version or kind, or belongs to another user.
             continue
     return [LiveRun(ring, events.get(pid), pid, about) for ring, pid, about in found]
 
 
 class LiveStream(Closing):
-    """Streams a run to viewers, those that connect late included.
+    """Streams a run to viewers, also to those that connect late.
 
-    Attributes
-    ----------
-    url : str
-        Where viewers find it, on loopback.
-
-    Raises
-    ------
-    OSError
-        If the run has ended meanwhile, or another program took the port.
+    `url` is the address for viewers, on loopback. OSError is raised if the run has ended meanwhile,
+    or another program took the port.
     """
 
     def __init__(self, run: LiveRun) -> None:
@@ -96,14 +89,14 @@ class LiveStream(Closing):
             stack.callback(stream.disconnect)
             try:
                 stream.flush(timeout_sec=_START_S)
-            except RuntimeError as error:  # or viewers would show the other program
+            except RuntimeError as error:  # Otherwise viewers would show the other program.
                 again = "start it again: it takes another"
                 raise OSError(f"port {port} of this machine was taken; {again}") from error
             self._log = live_log(stream, self._ring.columns, run.about)
             self._stack = stack.pop_all()
 
     def send(self) -> bool:
-        """Send what has come since the last call; returns whether more may come."""
+        """Send new rows and events; return whether more may come."""
         ended = self._ring.ended
         rows = self._ring.read_rows()
         if len(rows):

@@ -6,22 +6,14 @@ from utank_hil.base.arrays import FloatArray
 
 
 class MemoryLog:
-    """Keeps the rows of a run in memory.
-
-    Parameters
-    ----------
-    width : int
-        Columns of a row.
-    rows : int
-        Rows of the whole run.
-    """
+    """Keeps up to `rows` rows of a run, of `width` columns each, in memory."""
 
     def __init__(self, width: int, rows: int) -> None:
         self._kept = np.empty((rows, width))
         self._written = 0
 
     def write(self, row: FloatArray) -> None:
-        """Append a copy of one row, shape (width,); later ones than `rows` are dropped."""
+        """Append a copy of one row, shape (width,); rows beyond the capacity are dropped."""
         if self._written < len(self._kept):
             self._kept[self._written] = row
             self._written += 1

@@ -1,7 +1,7 @@
-"""Phase plane and spectra of the roll, as they are shown to the engineer.
+"""Phase plane and spectra of the roll, for the engineer.
 
-In the phase plane a dot is a sample: roll in degrees to the right, its rate in degrees a second
-upwards. Spectra are those of the last five minutes.
+The phase plane shows samples as dots, roll in degrees to the right and its rate in degrees per
+second upwards. Spectra are those of the last five minutes.
 """
 
 from collections import deque
@@ -22,7 +22,7 @@ SPECTRUM_S: Final = 20.0
 """Time between two spectra."""
 RECORD_S: Final = 300.0
 SEGMENT: Final = 500
-"""Samples of a segment, of which the squares are averaged: 0.01 Hz apart."""
+"""Length of an averaged segment in samples; the bands are 0.01 Hz apart."""
 BAND_HZ: Final = (0.02, 0.3)
 PHASE_AXES: Final = "/phase_axes"
 _CIRCLES_DEG: Final = (2.5, 5.0, 10.0)
@@ -41,7 +41,7 @@ class MotionFigures(Figure):
     columns : sequence of str
         Names of a row's values, `NEEDED` among them.
     beside : (int, int)
-        The run's number, and how many runs there are, whose bars stand beside one another.
+        Number of the run, and number of runs whose bars stand side by side.
     """
 
     def __init__(
@@ -86,17 +86,10 @@ class MotionFigures(Figure):
 
 
 def spectrum(record: FloatArray) -> FloatArray:
-    """One-sided spectral density at `band_hz`: mean of half overlapping segments, Hann windows.
+    """Return the one-sided density at `band_hz`: mean of half overlapping segments, Hann windows.
 
-    Parameters
-    ----------
-    record : ndarray, shape (n,)
-        Samples `STEP_S` apart, n at least `SEGMENT`.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        In squares of the record's unit per Hz.
+    The record, shape (n,), has at least `SEGMENT` samples `STEP_S` apart; the density, shape (m,),
+    is in squares of its unit per Hz.
     """
     half = SEGMENT // 2
     segments = np.stack(
@@ -110,7 +103,7 @@ def spectrum(record: FloatArray) -> FloatArray:
 
 
 def band_hz() -> FloatArray:
-    """Frequencies of a spectrum, shape (m,)."""
+    """Return the frequencies of a spectrum, shape (m,)."""
     frequency_hz: FloatArray = np.arange(SEGMENT // 2 + 1) / (SEGMENT * STEP_S)
     return frequency_hz[_in_band()]
 
@@ -121,7 +114,7 @@ def _in_band() -> slice:
 
 
 def _draw_axes(recording: rr.RecordingStream) -> None:
-    """Circles with their degrees, for all runs."""
+    """Draw circles labelled in degrees, for all runs."""
     turn = np.linspace(0.0, 2 * np.pi, 61)
     circle = np.column_stack([np.cos(turn), np.sin(turn)])
     far = 1.5 * _CIRCLES_DEG[-1]

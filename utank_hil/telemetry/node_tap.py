@@ -1,7 +1,7 @@
-"""Taps that record what a controller node is handed, and what it answers.
+"""Taps that record the inputs and answers of a controller node.
 
-They stand between the runner and the node, and between the controller and its retuner. Nothing
-is changed on the way, so the node does the same with them as without.
+They stand between runner and node, and between controller and retuner. They change nothing, so
+the node behaves as without them.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -16,28 +16,28 @@ from utank_hil.retuning.retuner import Request
 from utank_hil.telemetry.bus_records import IN_A_SLOT, LAYOUT, PAYLOAD_BYTES, Kind
 
 Sink = Callable[[bytes, int], None]
-"""Takes the records of ticks, packed, and the time of the last; must not wait."""
+"""Function that takes the packed records of ticks and the time of the last; it must not wait."""
 
 _FIELDS: Final = 4
-"""Fields of a record, in the order of `LAYOUT`."""
+"""Number of fields of a record, in the order of `LAYOUT`."""
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _RECEIVED, _SENT, _TICK = int(Kind.RECEIVED), int(Kind.SENT), int(Kind.TICK)
 _PACKING: Final = [
     Struct(f"<{count * LAYOUT.format.lstrip('<')}").pack for count in range(IN_A_SLOT + 1)
 ]
-"""Pack the fields of a number of records at once, which is quicker: up to a slot of the ring."""
+"""Functions that pack the fields of a number of records at once, up to a slot of the ring."""
 _AT_ONCE: Final = IN_A_SLOT * _FIELDS
 
 
 class NodeTap:
-    """A controller node whose inputs and outputs are written down.
+    """A controller node whose inputs and outputs are recorded.
 
     Parameters
     ----------
     taps : sequence of RetunerTap
-        Whose records belong among the node's.
+        Taps whose records belong among the node's.
     every : int
-        Ticks whose records are handed on together; the stop hands on the rest.
+        Number of ticks whose records are passed on together; the stop passes on the rest.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class NodeTap:
         self._pass_on = node.receive
         self._sink = sink
         self._taps = taps
-        # fields of one record after the other: packing many at once is quicker
+        # These are the fields of consecutive records, because packing many at once is quicker.
         self._fields: list[Any] = []
         self._started = False
         self._every = self._ticks_left = every
@@ -60,12 +60,12 @@ class NodeTap:
         self._pass_on(frame, now_ns)
 
     def other_frames(self, count: int) -> None:
-        """Take note of frames of other kinds on the bus."""
+        """Record frames of other kinds on the bus."""
         self._note(Kind.OTHERS, self._node.last_ns, number=count)
         self._node.other_frames(count)
 
     def link_error(self, now_ns: int, reason: str) -> None:
-        """Take note that the bus could not be read or written."""
+        """Record that the bus could not be read or written."""
         self._note(Kind.LINK_ERROR, now_ns)
         self._node.link_error(now_ns, reason)
 
@@ -111,12 +111,9 @@ class NodeTap:
 
 
 class RetunerTap:
-    """A retuner, or an estimator, whose answers are written down.
+    """A retuner, or an estimator, whose answers are recorded.
 
-    Parameters
-    ----------
-    alive, answer : Kind
-        Of its records.
+    `alive` and `answer` are the kinds of its records.
     """
 
     def __init__(
@@ -134,18 +131,18 @@ class RetunerTap:
         return self._alive[-1]
 
     def submit(self, number: int, request: Request, now_ns: int) -> None:
-        """Ask for an answer, under a new number."""
+        """Request an answer under a new number."""
         self._retuner.submit(number, request, now_ns)
 
     def answer(self, number: int, now_ns: int) -> Answer | None:
-        """The answer to request `number`, None while there is none."""
+        """Return the answer to request `number`, None while there is none."""
         answer = self._retuner.answer(number, now_ns)
         if answer is not None:
             self._answers.append(answer_bytes(answer))
         return answer
 
     def take(self, now_ns: int) -> list[Any]:
-        """Fields of the records of what was asked and answered since the last call."""
+        """Return the fields of the records of questions and answers since the last call."""
         alive_kind, answer_kind = self._kinds
         fields: list[Any] = []
         for alive in self._alive:
@@ -159,19 +156,19 @@ class RetunerTap:
 
 
 class Tapped:
-    """The desks of a controller, each with a tap if its answers are to be written down.
+    """The desks of a controller, each with a tap if its answers are recorded.
 
     Parameters
     ----------
     retuner, estimating : Retuner or None
-        As `build_controller_node` takes them.
+        Desks as for `build_controller_node`.
 
     Attributes
     ----------
     retuner, estimating : Retuner or None
-        To be handed to the controller.
+        Desks for the controller.
     taps : list of RetunerTap
-        For `NodeTap`.
+        Taps for `NodeTap`.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""The stream of a run that goes on: into one file of its recording, or to viewers."""
+"""Stream of a running recording into one of its files, or to viewers."""
 
 import os
 from collections import Counter
@@ -25,9 +25,9 @@ from utank_hil.telemetry.scene import scene_size
 Sink: TypeAlias = rr.FileSink | rr.GrpcServerSink
 
 _FLUSH_TIMEOUT_S: Final = 5.0
-"""Time for a batch of 0.5 s to reach the disk; without a limit Rerun waits on a full one."""
+"""Time for a batch of 0.5 s to reach the disk; without a limit Rerun waits on a full disk."""
 _RESERVED_BYTES: Final = 1 << 18
-"""Room for the beginning of a recording, mostly its blueprint."""
+"""Space for the beginning of a recording, mostly its blueprint."""
 _FOOTER: Final = (b"FOOT", 64)
 """Mark within the last bytes of a finished file."""
 
@@ -35,7 +35,7 @@ _FOOTER: Final = (b"FOOT", 64)
 def open_stream(
     name: str, sink: Sink, columns: Sequence[str], about: Mapping[str, Any] | None
 ) -> rr.RecordingStream:
-    """A stream of one run, with its layout, to a file or to viewers."""
+    """Open a stream of one run, with its layout, to a file or to viewers."""
     stream = rr.RecordingStream(APPLICATION, recording_id=name)
     size = scene_size(columns, about)
     layout = make_blueprint(columns_of(columns, about), [LIVE_RUN], size=size)
@@ -49,7 +49,7 @@ def live_log(
     about: Mapping[str, Any] | None,
     batch_s: float = 0.0,
 ) -> RunLog:
-    """The log of that run in its stream, after what says where it comes from."""
+    """Write the run's origin to its stream and return its log."""
     if about:
         write_about(stream, about)
     return RunLog(stream, run_paths([LIVE_RUN])[0], columns, about, batch_s)
@@ -65,7 +65,7 @@ class RecordingPart(Closing):
     columns : sequence of str
         Names of a row's values.
     about : mapping, optional
-        Where it comes from (`utank_hil.base.provenance`).
+        Origin of the rows (`utank_hil.base.provenance`).
 
     Raises
     ------
@@ -96,14 +96,14 @@ class RecordingPart(Closing):
         self._log.write_events(events)
 
     def note_lost(self, what: str, lost: int) -> None:
-        """Log a warning if more of a kind were lost in all than at the last call."""
+        """Log a warning if the total number lost of a kind has grown since the last call."""
         if more := lost - self._lost[what]:
             self._log.note(f"{more} {what} lost: the recorder was too slow")
             self._lost[what] = lost
 
     def flush(self) -> None:
-        """Bring it to the disk, so that neither a kill nor a power cut loses it."""
-        # without a timeout it would wait forever on a full disk
+        """Bring the rows to the disk, so that neither a kill nor a power cut loses them."""
+        # Without a timeout it would wait forever on a full disk.
         self._recording.flush(timeout_sec=_FLUSH_TIMEOUT_S)
         with self._file.open("rb") as written:
             os.fsync(written.fileno())
@@ -115,7 +115,7 @@ class RecordingPart(Closing):
         self._open = False
         self._log.close()
         self.flush()
-        self._recording.disconnect()  # writes the footer; reports no error
+        self._recording.disconnect()  # This writes the footer and reports no error.
         if not _is_finished(self._file):
             raise RuntimeError(
                 f"its {self._rows} rows are written, but not the end of {self._file.name}: is the "
@@ -130,7 +130,7 @@ def _reserve_file(file: Path) -> None:
 
 
 def _is_finished(file: Path) -> bool:
-    """Return whether a recording has its footer; a truncated one has none."""
+    """Whether a recording has its footer; a truncated one has none."""
     mark, length = _FOOTER
     with file.open("rb") as content:
         content.seek(0, os.SEEK_END)

@@ -1,17 +1,15 @@
-"""The recorder: a process that writes rows and events to a Rerun file.
+"""The recorder: a process that writes rows and events to a Rerun file, and the frame log beside it.
 
-Beside it, it writes the frame log: what the controller was handed and what it answered. Where Rerun
-is not installed, that is all it writes.
+Without Rerun only the frame log is written. `RecorderProcess` (recorder_process.py) starts the
+recorder; `python -m utank_hil.telemetry.recorder --ring NAME --file OUT.rrd` attaches one by hand.
+It ends when the ring is closed, when the ring's writer dies, or on SIGINT, SIGTERM or SIGHUP, with
+all rows written. The controller never waits: rows read too late are overwritten and counted as
+lost.
 
-`RecorderProcess` (recorder_process.py) starts it; `python -m utank_hil.telemetry.recorder --ring
-NAME --file OUT.rrd` attaches one by hand. It ends when the ring is closed, when the ring's writer
-dies, or on SIGINT, SIGTERM or SIGHUP, with all rows written. The controller never waits for it:
-rows that it reads too late are overwritten and counted as lost.
-
-Each file of a long recording is written by the process anew (`execv`): Rerun keeps memory and
-threads of the files that are finished. So it goes on in another file where one fails, on a full
-disk for example, as soon as there is room; the rows of 80 s wait in their ring. What it takes along
-is a `RecorderState`, as JSON on standard input.
+The process replaces itself (`execv`) for each file of a long recording, because Rerun keeps memory
+and threads of finished files. After a failure, such as a full disk, it continues in another file as
+soon as there is room; the ring holds the rows of 80 s. Its `RecorderState` passes as JSON on
+standard input.
 """
 
 import argparse
@@ -37,29 +35,24 @@ from utank_hil.telemetry.rows import RowReader
 from utank_hil.telemetry.viewer import rerun_environment
 
 BATCH_S: Final = 0.5
-"""Time between two writes: one costs 1 kB of file, and a kill loses up to two."""
+"""Time between two writes: a write costs 1 kB of file, and a kill loses up to two batches."""
 RETRY_S: Final = 10.0
-"""Time between two tries to begin a file."""
+"""Time between two attempts to begin a file."""
 _NICENESS: Final = 5
 _FULL_BYTES: Final = 1 << 20
-"""A disk with less room counts as full."""
+"""Free space below which a disk counts as full."""
 _ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def record_part(state: RecorderState) -> bool:
-    """Record into one file until the ring ends, a signal comes or it is time for the next file.
+    """Record into one file until the ring ends, a signal comes or the next file is due.
 
-    The signals have to be blocked.
+    The signals must be blocked. Returns whether there is a next part.
 
     Parameters
     ----------
     state : RecorderState
-        That after the parts before; kept up to date with what has reached the file.
-
-    Returns
-    -------
-    bool
-        Whether there is a next part.
+        State after the previous parts; updated with what has reached the file.
 
     Raises
     ------
@@ -118,7 +111,7 @@ def record_part(state: RecorderState) -> bool:
             places[RingKind.ROWS] = reader.place
             if events is not None:
                 places[RingKind.EVENTS] = events.place
-            if log is not None:  # each has its place: where one fails, the other is not repeated
+            if log is not None:  # Each has its place: a failure of one does not repeat the other.
                 log.write()
                 report.records_lost = records_lost_before + log.lost
                 places[RingKind.FRAMES] = log.place
@@ -139,7 +132,7 @@ def _main() -> None:
     if (arguments.ring is None) != (arguments.file is None):
         parser.error("--ring and --file belong together")
     os.environ.update(rerun_environment())
-    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)  # first: Rerun's threads inherit it
+    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)  # Rerun's threads inherit it
     state = (
         RecorderState.of_input()
         if arguments.ring is None
@@ -165,26 +158,26 @@ def _main() -> None:
         state.failure = reason
         if state.report.parts and state.task.rotation and not _writer_ended(state.task.rows):
             begun = part_of(file, state.report.parts + 1)
-            for suffix in SUFFIXES:  # of a part that has nothing yet
+            for suffix in SUFFIXES:  # Remove files of a part that is still empty.
                 begun.with_suffix(suffix).unlink(missing_ok=True)
-            # at once: Rerun's threads would write on as soon as there is room, after a hole
+            # Otherwise Rerun's threads would write on, after a hole, as soon as there is room.
             _go_on(state)
         _complain(state)
         _say({"error": reason})
-        os._exit(1)  # Rerun's exit hook would wait forever for a dead writer
+        os._exit(1)  # Rerun's exit hook would wait forever for a dead writer.
 
 
 def _complain(state: RecorderState, more: str = "") -> None:
-    """Say once on standard error why a file failed."""
+    """Report once on standard error why a file failed."""
     if not state.complained:
         state.complained = True
-        with suppress(OSError):  # a terminal that is gone
+        with suppress(OSError):  # The terminal may be gone.
             print(f"recording {state.task.file} failed: {state.failure}{more}", file=sys.stderr)
             sys.stderr.flush()
 
 
 def _writer_ended(ring: str) -> bool:
-    """Whether the writer of a ring has closed it or is dead, so that nothing more would come."""
+    """Whether the writer of a ring has closed it or is dead."""
     try:
         with RingReader(ring) as reader:
             return reader.ended
@@ -193,7 +186,7 @@ def _writer_ended(ring: str) -> bool:
 
 
 def _reason(error: Exception, file: Path) -> str:
-    """The reason why a recording failed; Rerun gives none for a full disk."""
+    """Return the reason why a recording failed; Rerun gives none for a full disk."""
     with suppress(OSError):
         if shutil.disk_usage(file.parent).free < _FULL_BYTES:
             return f"the disk of {file.parent} is full ({error})"
@@ -201,14 +194,14 @@ def _reason(error: Exception, file: Path) -> str:
 
 
 def _go_on(state: RecorderState) -> NoReturn:
-    """Begin the program anew in this process, for the next part; signals stay blocked."""
+    """Replace the program in this process for the next part; signals stay blocked."""
     os.dup2(state.as_input(), sys.stdin.fileno())
     os.execv(sys.executable, sys.orig_argv)
 
 
 def _say(message: Mapping[str, int | str]) -> None:
-    """Send a message to the parent, if it lives: one JSON object a line on standard output."""
-    with suppress(BrokenPipeError):  # nothing is buffered, or it would fail at the end
+    """Send a message to the parent, if alive: one JSON object per line on standard output."""
+    with suppress(BrokenPipeError):  # Nothing is buffered, which would fail at the end.
         os.write(sys.stdout.fileno(), f"{json.dumps(message)}\n".encode())
 
 

@@ -1,4 +1,4 @@
-"""The recorder as the loop's process sees it: started before the loop, asked without waiting."""
+"""The recorder's process, started before the loop and polled without waiting."""
 
 import json
 import os
@@ -20,23 +20,19 @@ _STOP_TIMEOUT_S: Final = 30.0
 """Times for Rerun to load, and for the last rows to reach the disk, on a busy machine."""
 _FIELDS: Final = {each.name for each in fields(RecorderReport)}
 _READ_BYTES: Final = 1 << 16
-"""What a pipe holds."""
+"""Capacity of a pipe."""
 
 
 class RecorderError(RuntimeError):
-    """The recorder process did not start, or ended badly."""
+    """The recorder process did not start, or failed."""
 
 
 class RecorderProcess(Closing):
-    """A recorder in a process of its own; ready when the constructor returns.
+    """A recorder in a separate process; ready when the constructor returns.
 
-    Start it before the loop: it takes about a second, mostly for importing Rerun. It runs in a
-    session of its own, so that Ctrl-C in the terminal does not end it before the loop's last rows.
-
-    Raises
-    ------
-    RecorderError
-        If the recorder does not start, with the reason.
+    Start it before the loop: it takes about a second, mostly for importing Rerun. Its session is
+    separate, so that Ctrl-C in the terminal does not end it before the loop's last rows.
+    RecorderError is raised, with the reason, if it does not start.
     """
 
     def __init__(self, task: RecordingTask) -> None:
@@ -72,7 +68,7 @@ class RecorderProcess(Closing):
 
     @property
     def pid(self) -> int:
-        """Number of the process."""
+        """Id of the process."""
         return self._process.pid
 
     @property
@@ -83,10 +79,7 @@ class RecorderProcess(Closing):
     def stop(self) -> RecorderReport:
         """Write the last rows and wait for the end of the process; idempotent.
 
-        Raises
-        ------
-        RecorderError
-            If the process failed, with the reason, or does not end.
+        RecorderError is raised, with the reason, if the process failed or does not end.
         """
         if self._end is None:
             self._end = self._ended()
@@ -95,7 +88,7 @@ class RecorderProcess(Closing):
         return self._end
 
     def close(self) -> None:
-        """Same as `stop`."""
+        """Stop the recorder (`stop`)."""
         self.stop()
 
     def _ended(self) -> RecorderReport | RecorderError:
@@ -116,18 +109,18 @@ class RecorderProcess(Closing):
         return RecorderReport(**report)
 
     def _listen(self) -> bool:
-        """Take what the process has said so far, never waiting; returns whether more may come."""
+        """Read new messages without waiting; return whether more may come."""
         try:
             heard = os.read(self._output.fileno(), _READ_BYTES)
-        except BlockingIOError:  # the pipe is open, by the process or by one that it left behind
+        except BlockingIOError:  # The pipe is open, by the process or by a child of it.
             return True
         self._said += heard
         return bool(heard)
 
     def _message(self, *keys: str) -> dict[str, Any]:
-        """The last message with one of these keys; empty if there is none.
+        """Return the last message with one of these keys; empty if there is none.
 
-        Whatever else stands on the output, as of a library or of half a line, is passed over.
+        Other output, as of a library or an incomplete line, is ignored.
         """
         for line in reversed(self._said.split(b"\n")):
             try:

@@ -1,4 +1,4 @@
-"""The recorder's task, its report, and the state that it keeps from file to file."""
+"""The recorder's task, its report, and its state between files."""
 
 import json
 import os
@@ -13,7 +13,7 @@ from utank_hil.telemetry.rotation import Rotation
 
 @dataclass(frozen=True, slots=True)
 class RecordingTask:
-    """What is recorded, and where.
+    """Sources and destination of a recording.
 
     Attributes
     ----------
@@ -22,11 +22,11 @@ class RecordingTask:
     file : str
         The first `.rrd` file; the frame log stands beside it.
     events, frames : str or None
-        Names of the rings of events and of `bus_records` that belong to it.
+        Names of the rings of events and of `bus_records`.
     head : mapping
         Head of the frame log (`replay_head`).
     rotation : Rotation or None
-        Where it goes on in another file; without it there is one.
+        Division into several files; None for a single one.
     """
 
     rows: str
@@ -37,7 +37,7 @@ class RecordingTask:
     rotation: Rotation | None = None
 
     def held(self) -> "RecordingTask":
-        """The same by names of the rings that hold for the programs that this process becomes."""
+        """Return the task with ring names that stay valid after `exec` in this process."""
         held = (None if ring is None else held_ring(ring) for ring in (self.events, self.frames))
         events, frames = held
         return replace(self, rows=held_ring(self.rows), events=events, frames=frames)
@@ -52,7 +52,7 @@ class RecorderReport:
     rows, lost : int
         Rows recorded, and rows that the ring overwrote before they were read.
     parts : int
-        Files; of the frame log, where there is no other.
+        Number of Rerun files, or of frame logs if there are none.
     records_lost : int
         Records of the frame log that its ring overwrote before they were read.
     """
@@ -65,19 +65,18 @@ class RecorderReport:
 
 @dataclass(slots=True)
 class RecorderState:
-    """All that the recorder takes from one file, and one program, to the next.
+    """State that the recorder passes from one file, and one program, to the next.
 
     Attributes
     ----------
     report : RecorderReport
-        What has reached the files.
+        Numbers of what has reached the files.
     places : dict of RingKind to int
-        Where that ends in each ring, as `RingReader.place`; a ring that is not in it is read from
-        its oldest slot on.
+        End of that in each ring (`RingReader.place`); a missing ring is read from its oldest slot.
     failure : str
-        Why the last file failed; empty if it did not.
+        Reason why the last file failed; empty if it did not.
     complained : bool
-        Whether that was said.
+        Whether the failure was reported.
     """
 
     task: RecordingTask
@@ -87,7 +86,7 @@ class RecorderState:
     complained: bool = True
 
     def as_input(self) -> int:
-        """Descriptor of a file in memory from which `of_input` reads it."""
+        """Return the descriptor of a file in memory from which `of_input` reads the state."""
         descriptor = os.memfd_create(f"recorder-part{self.report.parts + 1}")
         with open(descriptor, "w", encoding="utf-8", closefd=False) as written:
             json.dump(asdict(self), written)
@@ -96,7 +95,7 @@ class RecorderState:
 
     @classmethod
     def of_input(cls) -> "RecorderState":
-        """The state on standard input."""
+        """Read the state from standard input."""
         content = json.load(sys.stdin)
         task = content.pop("task")
         rotation = task.pop("rotation")

@@ -38,7 +38,7 @@ from utank_hil.telemetry.viewer import TIMELINE, rerun_binary, rerun_environment
 _ROWS: Final = f"{ARCHETYPE}:{COMPONENT}"
 _TEXT: Final = "TextDocument:text"
 _BLOCK_ROWS: Final = 8192
-"""Rows of a chunk, the unit in which the viewer loads a file."""
+"""Number of rows per chunk, the unit in which the viewer loads a file."""
 
 
 def write_recording(
@@ -61,7 +61,7 @@ def write_recording(
     events : mapping of str to sequence of RetuningEvent, optional
         Retuning events by run, `time_ns` on the clock of `time_s`.
     about : mapping, optional
-        Where it comes from (`utank_hil.base.provenance`).
+        Origin of the runs (`utank_hil.base.provenance`).
 
     Raises
     ------
@@ -69,7 +69,7 @@ def write_recording(
         If there is no run, a table is empty or does not fit the columns, `time_s` is missing, or a
         column is not in SI units.
     OSError
-        If the file can't be written; then there is none.
+        If the file can't be written; it is then removed.
     """
     if not runs:
         raise ValueError("a recording needs at least one run")
@@ -79,7 +79,7 @@ def write_recording(
         if len(rows) == 0:
             raise ValueError(f"run {run!r} has no rows")
     for column in columns:
-        field_of(column)  # refuses what is not in SI units before there is a file
+        field_of(column)  # A column that is not in SI units is refused before there is a file.
     time_s = np.concatenate([rows[:, time_index(columns)] for rows in runs.values()])
     blueprint = make_blueprint(
         columns_of(columns, about),
@@ -89,8 +89,8 @@ def write_recording(
         zero=_zero(columns, runs),
     )
     recording = rr.RecordingStream(APPLICATION, recording_id=path.stem)
-    memory = recording.memory_recording()  # Rerun's writer of files waits forever on a full disk
-    # active: a browser begins to show what comes first, which is the recording
+    memory = recording.memory_recording()  # Rerun's writer of files waits forever on a full disk.
+    # The recording comes first, because a browser shows what comes first.
     recording.send_blueprint(blueprint)
     if about is not None:
         write_about(recording, about)
@@ -108,7 +108,7 @@ def write_recording(
 
 
 def _zero(columns: Sequence[str], runs: Mapping[str, FloatArray]) -> set[tuple[str, str]]:
-    """Run and column of the signals that are zero, or unknown, throughout."""
+    """Return run and column of the signals that are zero, or unknown, throughout."""
     return {
         (run, column)
         for run, rows in runs.items()
@@ -146,19 +146,16 @@ def read_recording(path: Path) -> dict[str, dict[str, FloatArray]]:
 
 
 def _in_order(parts: list[dict[str, FloatArray]]) -> dict[str, FloatArray]:
-    """Blocks of rows as one table; what mends a cut file may have exchanged them."""
+    """Return blocks of rows in order of time; repair of a cut file may exchange them."""
     table = {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
     order = np.argsort(table[TIME_COLUMN], kind="stable")
     return {column: values[order] for column, values in table.items()}
 
 
 def read_about(path: Path) -> dict[str, Any]:
-    """Read where a recording comes from (`utank_hil.base.provenance`).
+    """Read a recording's origin (`utank_hil.base.provenance`).
 
-    Raises
-    ------
-    ValueError
-        If the file is no recording, or does not say.
+    ValueError is raised if the file is no recording, or has no origin.
     """
     for chunk in _chunks(path, _TEXT):
         if chunk.entity_path == f"/__properties/{ABOUT}":
@@ -171,8 +168,8 @@ def read_about(path: Path) -> dict[str, Any]:
 def _chunks(path: Path, component: str) -> list[Chunk]:
     """Return the chunks with a component; of a damaged file, those that can be read.
 
-    A killed recorder leaves a file that is cut. Any other damage, as by a disk that was full for a
-    time or by a power cut, is warned of: rows may be missing in the middle.
+    A killed recorder leaves a truncated file. A warning names any other damage, as by a temporarily
+    full disk or a power cut: rows may be missing in the middle.
     """
     try:
         return _read_chunks(path, component)
@@ -196,7 +193,7 @@ def _chunks(path: Path, component: str) -> list[Chunk]:
 
 def _read_chunks(path: Path, component: str) -> list[Chunk]:
     with warnings.catch_warnings():
-        # left by a killed recorder; the rows are intact
+        # A killed recorder leaves this; the rows are intact.
         warnings.filterwarnings("ignore", "RRD file has no footer", RerunWarning)
         reader = RrdReader(path)
     if not reader.recordings():

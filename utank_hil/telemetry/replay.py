@@ -1,7 +1,7 @@
-"""Replay: a recorded bus is handed to the controller again, and its answers are compared.
+"""Replay: recorded inputs are given to the controller again, and its answers are compared.
 
-The controller is handed each record in the order of the log and with the time that it had then, so
-nothing of the machine or of the present enters. Every frame that it returns is compared with the
+The controller gets each record in the order of the log and at its recorded time, so that the result
+does not depend on the machine or on the present. Every frame that it returns is compared with the
 recorded one, byte by byte.
 """
 
@@ -38,16 +38,17 @@ class Entry(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """The first thing that is not as recorded.
+    """First difference between a replay and the recording.
 
     Attributes
     ----------
     tick : int
         Number of the controller's tick, from 0.
     time_s : float
-        Since its first tick.
+        Time since its first tick.
     message, signal : str
-        Where; the message is "retuner" or "estimator" if the controller asked it something else.
+        Message and signal that differ; the message is "retuner" or "estimator" if the controller
+        sent it a different request.
     """
 
     tick: int
@@ -66,18 +67,18 @@ class Difference:
 
 @dataclass(slots=True)
 class ReplayResult:
-    """How a replay went.
+    """Result of a replay.
 
     Attributes
     ----------
     ticks, frames : int
         Ticks run, and recorded frames of the controller that were compared.
     different : Counter of str
-        Frames that differ, by message.
+        Number of frames that differ, by message.
     first : Difference or None
-        None if every frame is equal bit for bit.
+        First difference; None if every frame is equal bit for bit.
     lost_rows : int
-        Rows that the recorder lost: from there on nothing can be exact.
+        Rows that the recorder lost; after these an exact replay is impossible.
     """
 
     ticks: int = 0
@@ -88,7 +89,7 @@ class ReplayResult:
 
     @property
     def exact(self) -> bool:
-        """Whether all of it is as recorded."""
+        """Whether everything is as recorded."""
         return self.first is None
 
 
@@ -101,7 +102,7 @@ class LawVerdict:
     why_not_recorded : str
         Why the law designed here answered; empty if the recorded one did.
     differences : list of ValueDifference
-        Between the recorded law and the one designed here; no failure of a replay.
+        Differences between the recorded law and the one designed here; they fail no replay.
     """
 
     why_not_recorded: str
@@ -109,12 +110,12 @@ class LawVerdict:
 
     @property
     def deviation(self) -> float:
-        """The largest relative deviation in any array of the design; 0 if it is the same."""
+        """Largest relative deviation in any array of the design; 0 if the designs are equal."""
         return max((each.deviation for each in self.differences), default=0.0)
 
 
 class ReplayedLog(NamedTuple):
-    """A log replayed: what came of it, what else is not as then, and the law."""
+    """A replayed log: the result, other differences from the recording, and the law."""
 
     result: ReplayResult
     causes: list[str]
@@ -127,7 +128,7 @@ class RecordedRetuner:
     Attributes
     ----------
     astray : str
-        What the controller asked that it had not asked then; empty if nothing.
+        Request of the controller that was not recorded; empty if there is none.
     """
 
     def __init__(self) -> None:
@@ -144,10 +145,10 @@ class RecordedRetuner:
         return self._alive.popleft()
 
     def submit(self, number: int, request: Request, now_ns: int) -> None:
-        """Take a request: its answer is known."""
+        """Take a request, whose answer is known."""
 
     def answer(self, number: int, now_ns: int) -> Answer | None:  # noqa: ARG002
-        """The answer, if it was taken in this tick."""
+        """Return the answer if it was taken in this tick."""
         if not self._answer:
             return None
         answer = read_answer(bytes(self._answer))
@@ -155,14 +156,14 @@ class RecordedRetuner:
         return answer
 
     def take(self, data: bytes, *, alive: bool) -> None:
-        """Take a record for the next tick: of the life of the retuner, or of its answer."""
+        """Take a record for the next tick: the retuner's state, or a piece of its answer."""
         if alive:
             self._alive.append(bool(data[0]))
         else:
             self._answer += data
 
     def left_over(self) -> str:
-        """What was not asked in this tick though it had been; cleared."""
+        """Return, and clear, the recorded requests of this tick that were not repeated."""
         left = "took the retuner's answer" if self._answer else ""
         left = "asked whether the retuner lives" if self._alive else left
         self._alive.clear()
@@ -171,7 +172,7 @@ class RecordedRetuner:
 
 
 def entries_of(blocks: Iterable[Records]) -> Iterator[Entry]:
-    """Records one by one."""
+    """Yield the records one by one."""
     for block in blocks:
         yield from map(Entry._make, LAYOUT.iter_unpack(block.tobytes()))
 
@@ -179,13 +180,13 @@ def entries_of(blocks: Iterable[Records]) -> Iterator[Entry]:
 def replay_log(
     log: FrameLog, config: ControllerConfig, folder: Path, *, as_recorded: bool = True
 ) -> ReplayedLog:
-    """`replay` to a controller that has what the log's head says.
+    """Run `replay` with a controller as the log's head describes it.
 
     Parameters
     ----------
     as_recorded : bool
-        Whether `config` is the recorded configuration: the recorded law runs then, if that is
-        possible. Else the law runs that is designed for `config` here.
+        Whether `config` is the recorded configuration: the recorded law then runs, if possible,
+        else the law designed for `config` here.
     """
     law = build_law(config)
     differences = law_differences(log.head, law)
@@ -212,14 +213,14 @@ def replay(
     estimating: bool = False,
     commissioned: bool = True,
 ) -> ReplayResult:
-    """Hand recorded entries to a new controller and compare what it sends.
+    """Give recorded entries to a new controller and compare what it sends.
 
     Parameters
     ----------
     entries : iterable of Entry
-        Of a whole run, from the controller's start.
+        Records of a whole run, from the controller's start.
     law : BuiltLaw
-        Of the configuration.
+        Law of the configuration.
     retuner, estimating : bool
         Whether the controller had a retuner, and an estimator of sea and ship.
     commissioned : bool
@@ -276,7 +277,7 @@ def replay(
 
 
 class _Comparison:
-    """Compares the frames of one tick after another."""
+    """Compares frames tick by tick."""
 
     def __init__(self, result: ReplayResult) -> None:
         self._result = result
@@ -284,11 +285,11 @@ class _Comparison:
         self._tick, self._time_s = 0, 0.0
 
     def at(self, tick: int, time_s: float) -> None:
-        """Go on to a tick."""
+        """Advance to a tick."""
         self._tick, self._time_s = tick, time_s
 
     def retuner(self, who: str, answers: RecordedRetuner) -> None:
-        """Compare what the controller asked of its retuner, or of its estimator."""
+        """Compare the requests to the retuner or the estimator."""
         left = answers.left_over()
         if answers.astray or left:
             self._note(who, "asked", left or _NOTHING, answers.astray or _NOTHING)
@@ -326,7 +327,7 @@ class _Comparison:
         return f"{can_id:08X}" if codec is None else codec.name
 
     def _signal(self, can_id: int, data: bytes, again: bytes) -> tuple[str, str, str]:
-        """The first signal that differs, and its two values."""
+        """Return the first signal that differs, and its two values."""
         codec = self._codecs.get(can_id)
         whole = codec is not None and len(data) == len(again) == PAYLOAD_BYTES
         before = codec.decode(data) if codec and whole else None
@@ -342,5 +343,5 @@ class _Comparison:
 
 
 def _said(value: Any) -> str:
-    """A signal's value, exact."""
+    """Return a signal's exact value as text."""
     return str(getattr(value, "name", None) or repr(value))

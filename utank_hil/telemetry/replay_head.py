@@ -1,4 +1,4 @@
-"""The head of a frame log: what a replay needs beside the frames, and what it is compared by."""
+"""The head of a frame log: inputs of a replay beside the frames, and values to compare it with."""
 
 import base64
 import hashlib
@@ -23,12 +23,12 @@ from utank_hil.telemetry import law_values
 
 _PACKAGES: Final = ("numpy", "scipy", "daqp")
 _CODE: Final = "python"
-"""Kind of a law that is code of one's own."""
+"""Kind of a law that is the user's own code."""
 _SHOWN: Final = 10
 
 
 class ReplayHeadError(ValueError):
-    """What a log holds can't be run here; the message says why and what to do."""
+    """The content of a log can't be run here; the message gives reason and remedy."""
 
 
 def replay_head(
@@ -48,19 +48,19 @@ def replay_head(
     Parameters
     ----------
     command : str
-        Name of the command that runs.
+        Name of the running command.
     law : BuiltLaw
-        Of the configuration.
+        Law of the configuration.
     folder : Path
-        Where the log is written.
+        Folder of the log.
     options : mapping
-        Of the command.
+        Options of the command.
     retuner, estimating : bool
         Whether the controller has a retuner, and an estimator of sea and ship.
     commissioned : bool
         Whether it could be armed.
     seed : int, optional
-        Of waves and noise, where they are simulated.
+        Seed of simulated waves and noise.
 
     Returns
     -------
@@ -87,12 +87,9 @@ def replay_head(
 
 @contextmanager
 def recorded_config(head: Mapping[str, Any]) -> Iterator[ControllerConfig]:
-    """The configuration in a head, with its data files, for as long as the context lasts.
+    """Yield the configuration of a head, with its data files, while the context lasts.
 
-    Raises
-    ------
-    ReplayHeadError
-        If this version can't read it, or its law is code that the log names.
+    ReplayHeadError is raised if this version can't read it, or the log only names the law's code.
     """
     with tempfile.TemporaryDirectory(prefix="utank-replay-") as folder:
         places = {}
@@ -118,7 +115,7 @@ def recorded_config(head: Mapping[str, Any]) -> Iterator[ControllerConfig]:
 
 
 def _code(law: Any) -> Iterator[str]:
-    """Factories of a law, and of those that it holds at any depth, that are code of one's own."""
+    """Return the factories of a law, and of its inner laws, that are the user's own code."""
     if isinstance(law, dict):
         if law.get("kind") == _CODE:
             yield str(law.get("factory"))
@@ -131,15 +128,15 @@ def _code(law: Any) -> Iterator[str]:
 def recorded_law(
     head: Mapping[str, Any], config: ControllerConfig, law: BuiltLaw
 ) -> tuple[BuiltLaw, str]:
-    """The law that was recorded, and an empty text; else the law given, and why it is not that.
+    """Return the recorded law and an empty text, or the given law and why it replaces it.
 
     Parameters
     ----------
     config : ControllerConfig
-        The recorded one.
+        The recorded configuration.
     law : BuiltLaw
-        Designed for it here. A controller of it with the recorded numbers in their places is what
-        was recorded; its `linear`, for the analysis of its loop, stays the one designed here.
+        Law designed for `config` here. Its controller takes the recorded numbers; its `linear`, for
+        loop analysis, stays the one designed here.
     """
     if isinstance(config.law, PythonDesign):
         return law, "the law is Python code of one's own, which keeps its numbers where it likes"
@@ -153,14 +150,14 @@ def recorded_law(
 
 
 def law_differences(head: Mapping[str, Any], law: BuiltLaw) -> list[law_values.ValueDifference]:
-    """What differs between the recorded law and one designed here, array by array."""
+    """Return the differences, array by array, of the recorded law and one designed here."""
     return law_values.differences(
         law_values.decoded(head["law"]), law_values.law_values(law.controller())
     )
 
 
 def causes(head: Mapping[str, Any], config: ControllerConfig, folder: Path) -> list[str]:
-    """What else differs between a recorded run and one of `config` here: it may change frames."""
+    """Return other differences of a recorded run and one of `config` that may change frames."""
     about = head["about"]
     found = [
         f"{name}: recorded {recorded}, here {here}"
@@ -190,7 +187,7 @@ def causes(head: Mapping[str, Any], config: ControllerConfig, folder: Path) -> l
 
 
 def few(lines: list[str]) -> list[str]:
-    """The first lines, and how many there are more."""
+    """Return the first lines, and the number of further ones."""
     more = len(lines) - _SHOWN
     return [*lines[:_SHOWN], f"and {more} more"] if more > 0 else lines
 
@@ -203,7 +200,7 @@ def _packages() -> dict[str, str]:
 
 
 def _put(value: Any, places: Mapping[str, str]) -> Any:
-    """A configuration with other strings in the place of some."""
+    """Return a configuration with some strings replaced."""
     if isinstance(value, dict):
         return {name: _put(each, places) for name, each in value.items()}
     if isinstance(value, list):
@@ -212,7 +209,7 @@ def _put(value: Any, places: Mapping[str, str]) -> Any:
 
 
 def _flat(value: Any, key: str = "") -> dict[str, Any]:
-    """Values of a configuration by their dotted keys."""
+    """Yield values of a configuration by their dotted keys."""
     if isinstance(value, dict):
         parts = value.items()
     elif isinstance(value, list):

@@ -1,9 +1,9 @@
-"""Log telemetry rows to a Rerun recording.
+"""Log of telemetry rows in a Rerun recording.
 
 A run is one entity, `/<number>/<name>`, with one component: a struct with a field for each column.
 One entity for all signals makes the file two to three times smaller at a live recorder's batch
-size. Mode and fault are also logged by name, on change only, to a state lane and to a text log. The
-text log holds the events of retuning and alarms as well.
+size. Changes of mode and fault are also logged by name, to a state lane and to a text log, which
+holds the events of retuning and alarms as well.
 """
 
 import json
@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-import pyarrow as pa  # it ships no annotations
+import pyarrow as pa  # It ships no annotations.
 import rerun as rr
 
 from utank_hil.base.arrays import FloatArray
@@ -26,22 +26,24 @@ from utank_hil.telemetry.units import field_of
 APPLICATION: Final = "utank-hil"
 TIME_COLUMN: Final = "time_s"
 ABOUT: Final = "about"
-"""Property of a recording that says where it comes from (`utank_hil.base.provenance`), as JSON."""
+"""Property of a recording that holds its origin (`utank_hil.base.provenance`) as JSON."""
 LIVE_RUN: Final = "live"
-"""Name of a run while it goes on, and in what was recorded of it."""
+"""Name of a live run, also in its recordings."""
 ARCHETYPE: Final = "telemetry"
 COMPONENT: Final = "row"
 
 STATE, RETUNING, LOG = "state", "retuning", "log"
-"""Below a run's entity: lanes of its state and of retuning, and its text log."""
+"""Names, below a run's entity, of the lanes of its state and of retuning, and of its text log."""
 STATE_COLUMNS: Final = ("mode", "fault")
 """Columns that make up the state lane of a run."""
 
 PICTURES_S: Final = 60.0
 """Length of the drawings that are written to a file at once; a kill loses them, not the rows."""
 ONE_COLOR: Final = (0xE6, 0x9F, 0x00)
-"""Colour of a run that is alone."""
-_ESCAPE: Final = re.compile(r"\\u\{(?P<code>[0-9A-Fa-f]+)\}|\\(?P<mark>.)")  # of entity paths
+"""Colour of a single run."""
+_ESCAPE: Final = re.compile(
+    r"\\u\{(?P<code>[0-9A-Fa-f]+)\}|\\(?P<mark>.)"
+)  # an escape in entity paths
 
 _MODE_COLORS: Final = {
     Mode.INIT: 0x777777FF,
@@ -53,7 +55,7 @@ _MODE_COLORS: Final = {
 
 
 def _state_name(mode: float, fault: float) -> str:
-    """Name a state, such as `ACTIVE` or `FAULT: DRIVE_SILENT`; unknown values as numbers."""
+    """Return a state's name, such as `FAULT: DRIVE_SILENT`; unknown values as numbers."""
     name = Mode(int(mode)).name if mode in set(Mode) else f"mode {mode:g}"
     if fault == Fault.NONE:
         return name
@@ -61,12 +63,12 @@ def _state_name(mode: float, fault: float) -> str:
 
 
 def _retuning_name(state: float) -> str:
-    """Name a state of retuning; an unknown one as a number."""
+    """Return the name of a state of retuning; an unknown one as a number."""
     return RetuningState(int(state)).name if state in set(RetuningState) else f"{state:g}"
 
 
 def _level(mode: float, fault: float) -> rr.TextLogLevel:
-    """Log level of a state."""
+    """Return the log level of a state."""
     if mode == Mode.FAULT:
         return rr.TextLogLevel.ERROR
     return rr.TextLogLevel.INFO if fault == Fault.NONE else rr.TextLogLevel.WARN
@@ -82,13 +84,13 @@ class RunLog:
     columns : sequence of str
         Names of a row's values; `time_s` must be among them.
     about : mapping, optional
-        Where it comes from (`utank_hil.base.provenance`); with the ship in it there is a scene.
+        Origin of the run (`utank_hil.base.provenance`); if it has the ship, a scene is drawn.
     batch_s : float, optional
-        As of `Figure`; by default figures are sent at once.
+        Batch of figures (`Figure`); by default figures are sent at once.
     color : tuple of int
-        Of the run, among several.
+        Colour of the run among several.
     beside : (int, int)
-        As of `MotionFigures`.
+        Number of the run, and number of runs (`MotionFigures`).
 
     Raises
     ------
@@ -148,7 +150,7 @@ class RunLog:
             figure.write(rows)
 
     def close(self) -> None:
-        """Send the drawings that are held; idempotent."""
+        """Send the batched drawings; idempotent."""
         for figure in self._figures:
             figure.close()
 
@@ -167,7 +169,7 @@ class RunLog:
     def _write_states(
         self, lane: str, time_s: FloatArray, states: FloatArray, name: Callable[..., str]
     ) -> list[str]:
-        """Log states by name to a lane; returns the names."""
+        """Log states by name to a lane and return the names."""
         names = [name(*state) for state in states]
         if names:
             columns = rr.StateChange.columns(state=names)
@@ -183,13 +185,13 @@ class RunLog:
 
 
 def _changed(states: FloatArray, before: FloatArray) -> npt.NDArray[np.bool_]:
-    """Rows of states that differ from the row before."""
+    """Return which rows of states differ from the row before."""
     changed: npt.NDArray[np.bool_] = (np.diff(states, axis=0, prepend=before) != 0).any(axis=1)
     return changed
 
 
 def write_about(recording: rr.RecordingStream, about: Mapping[str, Any]) -> None:
-    """Keep in a recording where it comes from; the viewer shows it with the recording."""
+    """Store a recording's origin, which the viewer shows."""
     recording.send_property(ABOUT, rr.TextDocument(json.dumps(about, indent=1)))
 
 
@@ -201,7 +203,7 @@ def time_index(columns: Sequence[str]) -> int:
 
 
 def has_state(columns: Sequence[str]) -> bool:
-    """Return whether these columns make a state lane."""
+    """Whether these columns make a state lane."""
     return set(STATE_COLUMNS) <= set(columns)
 
 

@@ -51,7 +51,7 @@ _HEADER_WORDS: Final = 16
 
 
 class RingKind(StrEnum):
-    """What all records of a ring are."""
+    """Kind of all records of a ring."""
 
     ROWS = "rows"
     EVENTS = "events"
@@ -72,34 +72,34 @@ class _Word(IntEnum):
     CLOSED = 9
 
 
-# read once: in Python 3.11 a member costs eight times as much from its class as from here
+# A member is read once: in Python 3.11 its class costs eight times as much.
 _COUNT: Final = int(_Word.COUNT)
 
 
 class RingError(OSError):
-    """There is no such ring, or the segment is not one."""
+    """There is no such ring, or the segment is not a ring."""
 
 
 class RingWriter(Closing):
-    """The writing end; creates and owns the segment.
+    """Writing end; creates and owns the segment.
 
     Parameters
     ----------
     record_bytes : int
-        Length of a record; 1 where each has its own.
+        Length of a record; 1 for records of individual lengths.
     records : int
-        Records that a slot has room for; together a multiple of 8 bytes.
+        Number of records per slot; together a multiple of 8 bytes.
     slots : int
-        Two or more.
+        Number of slots, two or more.
     content : mapping, optional
-        What readers need to know of the records, ready for `json.dumps`.
+        Description of the records for readers, ready for `json.dumps`.
 
     Attributes
     ----------
     name : str
-        For readers.
+        Name of the ring for readers.
     count : int
-        Slots written so far.
+        Number of slots written so far.
 
     Raises
     ------
@@ -125,7 +125,7 @@ class RingWriter(Closing):
         stride = slot_bytes + 8
         size = first + slots * stride
         self.name = f"{_PREFIX}{os.getpid()}-{secrets.token_hex(4)}"
-        # a process group that was killed as a whole has left its own
+        # A process group that was killed as a whole leaves its segment.
         for left_over in ring_names():
             _remove_if_orphaned(left_over)
         self._shm: SharedMemory | None = SharedMemory(self.name, create=True, size=size)
@@ -136,8 +136,8 @@ class RingWriter(Closing):
             self._shm.unlink()
             raise RingError(f"no room for {size} bytes in {_SHM}: {error.strerror}") from error
         memory = self._shm.buf
-        assert memory is not None  # it is, until closed
-        memory[:size] = bytes(size)  # or the first write to each page would take longer
+        assert memory is not None  # The memory exists until it is closed.
+        memory[:size] = bytes(size)  # Otherwise the first write to each page would take longer.
         memory[8 * _HEADER_WORDS : 8 * _HEADER_WORDS + len(text)] = text
         words = memory[:size].cast("q")
         words[_Word.VERSION] = _VERSION
@@ -146,7 +146,7 @@ class RingWriter(Closing):
         words[_Word.TEXT_BYTES] = len(text)
         words[_Word.WRITER_PID] = os.getpid()
         words[_Word.WRITER_START] = _process_start(os.getpid()) or 0
-        words[_Word.MAGIC] = _MAGIC  # last: from here on readers accept the segment
+        words[_Word.MAGIC] = _MAGIC  # This is last: from here on readers accept the segment.
         self._words = words
         # Views are created once, so that a write allocates nothing permanent.
         self._slots = [memory[at : at + slot_bytes] for at in range(first, size, stride)]
@@ -155,14 +155,10 @@ class RingWriter(Closing):
         self.count = 0
 
     def write(self, records: FloatArray | bytes | bytearray) -> None:
-        """Append one or more records, over the oldest if the ring is full; never blocks.
+        """Append one or more records, overwriting the oldest if the ring is full; never blocks.
 
-        Those that a slot has no room for go into the next ones.
-
-        Raises
-        ------
-        ValueError
-            If they are none, or not whole, or the ring is closed.
+        Records that do not fit into a slot go into the next ones. ValueError is raised if there are
+        no records, incomplete ones, or the ring is closed.
         """
         data = records.tobytes() if isinstance(records, np.ndarray) else records
         if len(data) % self._record_bytes or not data:
@@ -184,31 +180,31 @@ class RingWriter(Closing):
             return
         self._words[_Word.CLOSED] = 1
         shm, self._shm = self._shm, None
-        del self._words, self._closing  # mapped memory can be released only without views
+        del self._words, self._closing  # Mapped memory can be released only without views.
         self._slots.clear()
         shm.close()
         try:
             shm.unlink()
-        except FileNotFoundError:  # removed from outside, as by systemd-logind when its user leaves
+        except FileNotFoundError:  # removed, as by systemd-logind when its user leaves
             resource_tracker.unregister(f"/{self.name}", "shared_memory")
 
 
 class RingReader(Closing):
-    """A reading end with its own cursor.
+    """Reading end with its own cursor.
 
     Parameters
     ----------
     place : int, optional
-        `place` of another reader, from where this one goes on; else it starts at the oldest slot.
+        `place` of a reader that this one continues; by default it starts at the oldest slot.
     kind : RingKind, optional
-        The only kind to be accepted.
+        The only accepted kind.
 
     Attributes
     ----------
     content : mapping
-        What the writer says of them.
+        The writer's description of the records.
     lost : int
-        Slots overwritten before they were read.
+        Number of slots overwritten before they were read.
 
     Raises
     ------
@@ -249,7 +245,7 @@ class RingReader(Closing):
         self._next: int = max(0, self._words[_COUNT] - slots) if place is None else place
 
     def read(self) -> list[bytes]:
-        """Return what was written since the last call, slot by slot, oldest first; never blocks."""
+        """Return what was written since the last call, by slot, oldest first; never blocks."""
         stop = self._words[_COUNT]
         found: list[bytes] = []
         for number in range(max(self._next, stop - self._slots), stop):
@@ -260,7 +256,7 @@ class RingReader(Closing):
             if crc32(data, number & 0xFFFFFFFF) == closing & 0xFFFFFFFF:
                 found.append(data)
             elif number > self._words[_COUNT] - self._slots:
-                stop = number  # written, but not yet visible to this processor
+                stop = number  # This slot is written, but not yet visible to this processor.
                 break
         self.lost += stop - self._next - len(found)
         self._next = stop
@@ -268,14 +264,14 @@ class RingReader(Closing):
 
     @property
     def place(self) -> int:
-        """Slots up to here are read or lost, counted from the first that was ever written."""
+        """Number of slots read or lost, counted from the first that was ever written."""
         return self._next
 
     @property
     def ended(self) -> bool:
         """Whether no more records will be written: the writer closed the ring, or is dead.
 
-        Check before reading, and stop when it was true and the read returns nothing.
+        Check before reading, and stop when this was true and the read returns nothing.
         """
         return bool(self._words[_Word.CLOSED]) or not self.writer_lives
 
@@ -285,20 +281,16 @@ class RingReader(Closing):
         return _process_start(self.writer_pid) == self._writer_start
 
     def close(self) -> None:
-        """Release the memory; idempotent. What was read stays valid."""
-        self._words.release()  # mapped memory can be released only without views
+        """Release the memory; idempotent. Data already read stays valid."""
+        self._words.release()  # Mapped memory can be released only without views.
         self._map.close()
 
 
 def held_ring(name: str) -> str:
     """Return a name of a ring for this process, and for programs that it becomes by `exec`.
 
-    It holds when the writer has closed the ring, too.
-
-    Raises
-    ------
-    RingError
-        If there is no such ring.
+    The name stays valid after the writer has closed the ring. RingError is raised without such a
+    ring.
     """
     descriptor = _opened(name)
     os.set_inheritable(descriptor, True)
@@ -306,8 +298,8 @@ def held_ring(name: str) -> str:
 
 
 def _opened(name: str) -> int:
-    """Descriptor of a ring's segment, to read."""
-    # a file of another user may be a pipe, which waits for a writer, or a link to a device
+    """Return the descriptor of a ring's segment for reading."""
+    # Another user's file may be a pipe, which waits for a writer, or a link to a device.
     flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK
     flags |= 0 if name.startswith(_HELD) else os.O_NOFOLLOW
     try:
@@ -321,12 +313,12 @@ def _opened(name: str) -> int:
 
 
 def ring_names() -> list[str]:
-    """Names of the files on this machine that may be rings, in order."""
+    """Return the names of the files on this machine that may be rings, in order."""
     return sorted(path.name for path in _SHM.glob(f"{_PREFIX}*"))
 
 
 def _first_slot_byte(text_bytes: int) -> int:
-    """Byte at which the slots begin, on a cache line."""
+    """Return the byte at which the slots begin, on a cache line."""
     return 8 * _HEADER_WORDS + 64 * -(-text_bytes // 64)
 
 
@@ -340,7 +332,7 @@ def _reserve(name: str, size: int) -> None:
 
 
 def _process_start(pid: int) -> int | None:
-    """Start time of a living process, in clock ticks since boot; None if dead or a zombie.
+    """Return the start of a living process, in clock ticks since boot; None if dead or a zombie.
 
     With the pid it identifies a process uniquely, since pids are reused.
     """
@@ -348,20 +340,20 @@ def _process_start(pid: int) -> int | None:
         status = Path(f"/proc/{pid}/stat").read_text()
     except (FileNotFoundError, ProcessLookupError):
         return None
-    fields = status.rpartition(")")[2].split()  # the command name may hold spaces, parentheses
+    fields = status.rpartition(")")[2].split()  # The command name may hold spaces and parentheses.
     return None if fields[0] in "ZX" else int(fields[19])
 
 
 def _remove_if_orphaned(name: str) -> None:
-    """Unlink a segment of that name if it is this user's and its writer died without unlinking it.
+    """Unlink a segment of this name if it is this user's and its writer died without unlinking it.
 
-    A file that belongs to another user, or that others may write to, is not even read.
+    A file that belongs to another user, or that others may write to, is not read.
     """
-    with suppress(OSError):  # none, no ring, or gone since
+    with suppress(OSError):  # There is none, it is no ring, or it has gone since.
         status = os.stat(_SHM / name, follow_symlinks=False)
         if status.st_uid != os.geteuid() or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
             return
         with RingReader(name) as left_over:
-            lives = left_over.writer_lives  # one that has closed it is about to unlink it
+            lives = left_over.writer_lives  # A writer that has closed it is about to unlink it.
         if not lives:
             os.unlink(_SHM / name)

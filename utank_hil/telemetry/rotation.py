@@ -1,7 +1,7 @@
-"""The files of a recording, one after the other; how long one is, and how many stay.
+"""Rotation of the files of a recording: their length, and how many are kept.
 
-A recording is a `.rrd` file, a frame log, or both; they have one name and come and go together. One
-that goes on has parts: `run-x.rrd`, `run-x-part002.rrd`, ...
+A recording is a `.rrd` file, a frame log, or both under one name; they come and go together. A
+long recording has parts: `run-x.rrd`, `run-x-part002.rrd`, ...
 """
 
 from collections.abc import Iterable, Iterator
@@ -12,22 +12,22 @@ from pathlib import Path
 from typing import Final
 
 _GROWTH: Final = 1.05
-"""Growth of a file over the one before: compression differs from file to file."""
+"""Allowed growth of a file over the previous one: compression differs from file to file."""
 SUFFIXES: Final = (".rrd", ".frames")
-"""Files of one recording."""
+"""Suffixes of the files of one recording."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rotation:
-    """The length of a file, and how much the folder may hold.
+    """Length of a file, and the size of its folder.
 
     Attributes
     ----------
     part_s : float
         Length of a file.
     keep_bytes : int or None
-        Before a file begins, the oldest recordings of its folder are removed until those that are
-        left and another as long as the last fit in; None removes none.
+        Size of the folder: before a file begins, the oldest recordings are removed until the others
+        and one as long as the last fit in. None removes none.
     """
 
     part_s: float
@@ -43,43 +43,38 @@ class Rotation:
 
 
 def part_of(file: Path, number: int) -> Path:
-    """Name of the part of a recording with a number; the first has the recording's own."""
+    """Return the name of a numbered part of a recording; the first has the recording's own."""
     return file if number == 1 else file.with_stem(f"{file.stem}-part{number:03d}")
 
 
 def whole_of(file: Path) -> tuple[Path, int]:
-    """Return the first part of a recording, by the name of one, and the number of that one."""
+    """Return the first part of a recording, and the number of the given part."""
     stem, mark, number = file.stem.rpartition("-part")
     return (file.with_stem(stem), int(number)) if mark and number.isdecimal() else (file, 1)
 
 
 def _found(paths: Iterable[Path]) -> Iterator[tuple[Path, stat_result]]:
-    """Files and their status; another process that clears the folder may be quicker."""
+    """Return files and their status; another process may remove some meanwhile."""
     for path in paths:
         with suppress(FileNotFoundError):
             yield path, path.stat()
 
 
 def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
-    """Remove the oldest recordings of a folder until the rest is no larger than some bytes.
+    """Remove the oldest recordings of a folder until its size is within a limit; return them.
 
     Parameters
     ----------
     file : Path
-        A recording of the folder, there or to come, which stays; other parts of it go last. Only
+        A recording of the folder, existing or not, which stays; other parts of it go last. Only
         recordings whose names begin alike, up to the first hyphen, are counted and removed.
-
-    Returns
-    -------
-    list of Path
-        What was removed.
     """
     alike: dict[str, dict[Path, stat_result]] = {}
     for suffix in SUFFIXES:
         for path, status in _found(file.parent.glob(f"{file.stem.partition('-')[0]}-*{suffix}")):
             if path.stem != file.stem:
                 alike.setdefault(path.stem, {})[path] = status
-    own, _ = whole_of(file)  # newer than all others, even by a clock that was set back
+    own, _ = whole_of(file)  # It is newer than all others, even by a clock that was set back.
 
     def age(stem: str) -> tuple[bool, int, str]:
         of_own_run = whole_of(file.with_stem(stem))[0].stem == own.stem

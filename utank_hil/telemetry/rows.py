@@ -1,4 +1,4 @@
-"""The ring of numbers: a record is one telemetry row of float64, in the order of its columns."""
+"""The ring of rows: a record is one telemetry row of float64, in the order of its columns."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,16 +10,16 @@ from utank_hil.telemetry.ring import RingError, RingKind, RingReader, RingWriter
 
 
 class RowWriter(RingWriter):
-    """The writing end of a ring of rows.
+    """Writing end of a ring of rows.
 
     Parameters
     ----------
     columns : sequence of str
-        One or more, all different.
+        One or more different names.
     slots : int
-        Rows in the ring. The default is seven minutes at 20 Hz, some 2 MB.
+        Number of rows in the ring. The default is seven minutes at 20 Hz, some 2 MB.
     about : mapping, optional
-        Where the rows come from (`utank_hil.base.provenance`).
+        Origin of the rows (`utank_hil.base.provenance`).
     """
 
     def __init__(
@@ -35,13 +35,7 @@ class RowWriter(RingWriter):
 
 
 class RowReader(RingReader):
-    """A reading end of a ring of rows.
-
-    Attributes
-    ----------
-    about : mapping or None
-        Where the rows come from, if the writer says.
-    """
+    """Reading end of a ring of rows; `about` is their origin, None if unknown."""
 
     def __init__(self, name: str, place: int | None = None) -> None:
         super().__init__(name, place, RingKind.ROWS)

@@ -1,8 +1,8 @@
-"""The ship's section rolling, with the water in its tank: what a watch-keeper sees first.
+"""The rolling section of the ship, with the water in its tank: a watch-keeper's first view.
 
-Seen from aft, starboard to the right, centred in the ship's centre of gravity, to scale. The hull
-around the tank is a sketch; tank, water, and roll are as recorded. A light outline is the passive
-twin.
+It is drawn to scale, from aft, starboard to the right, centred in the ship's centre of gravity. The
+hull around the tank is a sketch; tank, water, and roll are as recorded. A light outline is the
+passive twin.
 """
 
 from abc import ABC, abstractmethod
@@ -19,19 +19,19 @@ from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.viewer import TIMELINE
 
 PERIOD_S: Final = 0.2
-"""Time between two pictures: a roll of some seconds moves smoothly."""
+"""Time between two pictures: a roll of some seconds appears smooth."""
 WORDS_PERIOD_S: Final = 2.0
-"""Time between two texts: one can be read, and its figures are means of minutes."""
+"""Time between two texts, long enough to read; their figures are means of minutes."""
 NEEDED: Final = (
     "roll_rad", "twin_roll_rad", "port_level_m", "starboard_level_m", "pressure_actual_pa",
 )  # fmt: skip
 
 RESERVOIR, _BEYOND, _KEEL = 0.16, 0.12, 0.14
-"""Widths of reservoir and of hull beyond it, depth of keel below the duct, in tank widths."""
+"""Widths of reservoir and of hull beyond it, and depth of keel below the duct, in tank widths."""
 _ARROW: Final = 0.6
-"""Length of the arrow at the pump's greatest pressure, in widths of the tank."""
+"""Length of the arrow at the pump's greatest pressure, in tank widths."""
 LINES: Final = 8
-"""Lines that fill the water of a reservoir."""
+"""Number of lines that fill the water of a reservoir."""
 
 HULL, TWIN, WATER = (0xE0, 0xE0, 0xE0), (0x70, 0x70, 0x70), (0x56, 0xB4, 0xE9)
 LIMIT, PUMP, SEA = (0xF0, 0xE4, 0x42), (0xA0, 0x28, 0x00), (0x2A, 0x5C, 0x7A)
@@ -39,12 +39,12 @@ LIMIT, PUMP, SEA = (0xF0, 0xE4, 0x42), (0xA0, 0x28, 0x00), (0x2A, 0x5C, 0x7A)
 
 @dataclass(frozen=True, slots=True)
 class SceneSize:
-    """What is drawn, in metres below and to starboard of the centre of gravity.
+    """Dimensions of the scene, in metres below and to starboard of the centre of gravity.
 
     Attributes
     ----------
     width_m, height_m, lz_m : float
-        Of the tank, see `utank_hil.dynamics.Tank`.
+        Dimensions of the tank (`utank_hil.dynamics.Tank`).
     level_limit_m : float
         Level at which a reservoir is full or empty.
     pressure_pa : float
@@ -59,7 +59,7 @@ class SceneSize:
 
     @classmethod
     def of(cls, about: Mapping[str, Any] | None) -> "SceneSize | None":
-        """Return the size that the provenance of a recording states; None if it states none."""
+        """Return the size that a recording's provenance states; None if it states none."""
         vessel = ((about or {}).get("configuration") or {}).get("vessel")
         if vessel is None:
             return None
@@ -111,42 +111,42 @@ class SceneSize:
         )
 
     def duct(self) -> FloatArray:
-        """Middle line of the duct, upright, shape (2, 2)."""
+        """Centre line of the duct, upright, shape (2, 2)."""
         half = 0.5 * self.width_m
         return np.array([[-half, self.lz_m], [half, self.lz_m]])
 
     def water(self, port_m: FloatArray, starboard_m: FloatArray) -> FloatArray:
-        """Upright lines that fill the reservoirs to their levels, shape (n, 2 `LINES`, 2, 2)."""
+        """Return upright lines that fill the reservoirs, shape (n, 2 `LINES`, 2, 2)."""
         line = RESERVOIR * self.width_m / LINES
         across = (np.arange(LINES) - (LINES - 1) / 2) * line
         still, half = self.lz_m - self.height_m, 0.5 * self.width_m
         strips = np.empty((len(port_m), 2, LINES, 2, 2))
         strips[..., 0] = np.array([-half, half])[:, None, None] + across[:, None]
         strips[..., 0, 1] = self.lz_m
-        # a line ends in a half circle: its tip is at the level
+        # A line ends in a half circle, whose tip is at the level.
         levels = np.column_stack([port_m, starboard_m])
         strips[..., 1, 1] = (still - levels + line / 2)[:, :, None]
         return strips.reshape(len(port_m), 2 * LINES, 2, 2)
 
     def arrow(self, pressure_pa: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The pump's arrow along the duct: vectors and origins, shape (n, 2)."""
+        """Return the pump's arrow along the duct: vectors and origins, shape (n, 2)."""
         length = _ARROW * self.width_m * pressure_pa / self.pressure_pa
         vectors = np.column_stack([length, np.zeros(len(length))])
         return vectors, [0.0, self.lz_m] - vectors / 2
 
 
 class Figure(ABC):
-    """A figure that is drawn anew in even steps of time.
+    """A figure that is redrawn at even steps of time.
 
     Parameters
     ----------
     columns : sequence of str
         Names of a row's values.
     step_s : float
-        Between two drawings.
+        Time between two drawings.
     batch_s : float
-        Drawings are sent when there are as many seconds of them, the last ones by `close`: a chunk
-        of few costs a file more than its content.
+        Length of a batch of drawings, the last sent by `close`: small chunks cost a file more than
+        their content.
     """
 
     def __init__(self, columns: Sequence[str], step_s: float, batch_s: float) -> None:
@@ -156,7 +156,7 @@ class Figure(ABC):
         self._most_held = batch_s / step_s
 
     def write(self, rows: FloatArray) -> None:
-        """Take rows, of rising times, and draw what is due within them."""
+        """Take rows with increasing times, and draw what is due within them."""
         time_s = rows[:, self._at["time_s"]]
         while (at := int(np.searchsorted(time_s, self._due_s - 1e-9))) < len(time_s):
             self._held.append(rows[at])
@@ -165,7 +165,7 @@ class Figure(ABC):
             self.close()
 
     def close(self) -> None:
-        """Send what is held; idempotent."""
+        """Send the last batch; idempotent."""
         if self._held:
             rows = np.stack(self._held)
             self._held.clear()
@@ -184,7 +184,7 @@ class Scene(Figure):
     path : str
         Entity path of the run.
     alone : bool
-        Whether no other ship is shown beside, so that there is room for larger words.
+        Whether only this ship is shown, with room for larger words.
     """
 
     def __init__(
@@ -204,7 +204,7 @@ class Scene(Figure):
         self._stand()
 
     def _stand(self) -> None:
-        """Log what stays as it is: the ship's parts, upright, and how what moves looks."""
+        """Log the static content: the ship's parts, upright, and the style of moving parts."""
         size, place = self._size, f"{self._path}/scene"
         thin = 0.004 * size.width_m
         column = 0.7 * RESERVOIR * size.width_m / LINES
@@ -225,7 +225,7 @@ class Scene(Figure):
             self._recording.log(f"{place}/{name}", looks, static=True, strict=True)
 
     def _draw(self, rows: FloatArray) -> None:
-        """Send what moves: the turn of ship and twin, in the ship's axes water and pump; words."""
+        """Send the moving parts: roll of ship and twin, water and pump in ship axes, and words."""
         size = self._size
         roll, twin, port, starboard, pressure = (rows[:, self._at[name]] for name in NEEDED)
         roll = np.nan_to_num(roll)
@@ -245,7 +245,7 @@ class Scene(Figure):
             self._send("words", news, rr.TextDocument.columns(text=words, media_type=markdown))
 
     def _turn(self, name: str, rows: FloatArray, roll_rad: FloatArray) -> None:
-        """Turn a part of the scene, and what lies below it, to starboard."""
+        """Rotate a part of the scene, and its children, to starboard."""
         turns = [rr.RotationAxisAngle([0.0, 0.0, 1.0], radians=angle) for angle in roll_rad]
         self._send(f"scene/{name}", rows, rr.Transform3D.columns(rotation_axis_angle=turns))
 
@@ -262,7 +262,7 @@ class Scene(Figure):
         return True
 
     def _words(self, row: FloatArray) -> str:
-        """Mode, roll beside the twin's, and alarms."""
+        """Return mode, roll beside the twin's, and alarms as text."""
         mode, fault = int(row[self._at["mode"]]), int(row[self._at["fault"]])
         lines = [f"# {Mode(mode).name if mode in set(Mode) else mode}"]
         if fault != Fault.NONE:
@@ -293,6 +293,6 @@ def send_at(
 
 
 def scene_size(columns: Sequence[str], about: Mapping[str, Any] | None) -> SceneSize | None:
-    """The size of the ship that these columns show; None where it is not known."""
+    """Return the size of the ship in these columns; None if unknown."""
     shown = {*NEEDED, "time_s", "mode", "fault"} <= set(columns)
     return SceneSize.of(about) if shown else None

@@ -1,8 +1,8 @@
-"""Signals from any file that holds some: recordings, frame logs, logs of the bus, tables.
+"""Signals of any supported file: recordings, frame logs, logs of the bus, tables.
 
-Whatever the file, a run is a mapping of columns in SI units with the unit in their names, and
-``time_s`` among them. Tables (CSV, Parquet) may be anybody's: a column may be in another unit,
-which its name says (``roll_deg``, ``pressure_command_kpa``), and its times are checked before use.
+A run is a mapping of columns in SI units, with the unit in their names and ``time_s`` among them.
+Tables (CSV, Parquet) may have columns in other units, according to their names (``roll_deg``,
+``pressure_command_kpa``); their times are checked before use.
 """
 
 import csv
@@ -24,7 +24,7 @@ from utank_hil.telemetry.units import column_of
 
 TABLE_SUFFIXES: Final = (".csv", ".parquet")
 SUFFIXES: Final = (".rrd", SUFFIX, *BUS_SUFFIXES, *TABLE_SUFFIXES)
-"""Files with signals."""
+"""Suffixes of files with signals."""
 
 Columns = dict[str, FloatArray]
 
@@ -35,41 +35,41 @@ _OTHER_UNITS: Final = {
     "_mbar": ("_pa", 1e2),
     "_mpa": ("_pa", 1e6),
 }
-"""Units of tables beside those that are shown: ending of the column, SI value of the unit."""
+"""Other units of tables: ending of the column, and SI ending and value of the unit."""
 _LEVEL_OF_GAUGES: Final = ("port_level_m", "starboard_level_m")
 _JITTER: Final = 0.25
-"""Distance of a row from where even steps put it, in steps, up to which they are even."""
+"""Largest deviation, in steps, of a row from its place in even steps. Chosen; no study."""
 _GAP: Final = 1.5
-"""Steps from which on rows are missing between two."""
+"""Number of steps between two rows from which rows are missing."""
 _RATE: Final = 1e-3
-"""Relative error of a logger's clock that is passed over: ten times a poor quartz's."""
+"""Largest relative error of a logger's clock: ten times a poor quartz's."""
 
 
 class SignalFileError(ValueError):
-    """The file lacks what is needed, or can't be read; the message names file, line and remedy."""
+    """The file lacks something or can't be read; the message names file, line and remedy."""
 
 
 def read_signals(path: Path, note: Callable[[str], None] | None = None) -> dict[str, Columns]:
-    """Read the runs of a file, by name; a file that knows no runs has one, named by its stem.
+    """Read the runs of a file by name; a file without names has one run, named by its stem.
 
     Parameters
     ----------
     path : Path
-        One of `SUFFIXES`.
+        File with one of `SUFFIXES`.
     note : callable, optional
-        Called with the place where a frame log is cut or damaged; what follows is left out.
+        Called with the place where a frame log is cut or damaged; later rows are left out.
 
     Raises
     ------
     ValueError
-        If it can't be read, with its name, the line where there is one, and the remedy.
+        If it can't be read, with its name, the line if any, and the remedy.
     OSError
         If it can't be opened.
     """
     suffix = path.suffix.lower()
-    path.open("rb").close()  # who reads it may say less of why it can't be
+    path.open("rb").close()  # Readers may give a less precise reason.
     if suffix == ".rrd":
-        from utank_hil.telemetry.recording import read_recording  # here: Rerun
+        from utank_hil.telemetry.recording import read_recording  # This imports Rerun.
 
         return read_recording(path)
     if suffix == SUFFIX:
@@ -88,7 +88,7 @@ def read_signals(path: Path, note: Callable[[str], None] | None = None) -> dict[
 def write_signals(path: Path, columns: Mapping[str, FloatArray]) -> None:
     """Write columns as a table, exactly; NaN is an empty field of a CSV and a null of Parquet.
 
-    The suffix says which; an existing file is overwritten.
+    The suffix selects the format; an existing file is overwritten.
     """
     if path.suffix.lower() == ".parquet":
         import pyarrow
@@ -112,21 +112,16 @@ def even_rows(
     from_s: float | None = None,
     to_s: float | None = None,
 ) -> Columns:
-    """Part of a table with its rows on a grid that the sample time is a multiple of.
+    """Return a part of a table, with rows on an even grid that divides the sample time.
 
     Parameters
     ----------
     path : Path
         Source of the table, for errors.
     sample_time_s : float
-        Of the law that is to be identified for.
+        Sample time of the law for which the ship is identified.
     from_s, to_s : float, optional
-        Part to use.
-
-    Returns
-    -------
-    dict
-        ``time_s`` counts from the part's first row.
+        Part to use; the returned ``time_s`` counts from its first row.
 
     Raises
     ------
@@ -167,7 +162,7 @@ def even_rows(
     number = np.arange(len(part_s))
     step_s = sample_time_s / max(1, round(sample_time_s / usual_s))
     off_s = part_s - step_s * number
-    if np.abs(off_s - off_s.mean()).max() > _JITTER * step_s:  # or their clock is a bit off
+    if np.abs(off_s - off_s.mean()).max() > _JITTER * step_s:  # The clock is allowed a small error.
         own_step_s, begin_s = np.polyfit(number, part_s, 1)
         off_s = np.abs(part_s - begin_s - own_step_s * number)
         if off_s.max() > _JITTER * own_step_s:
@@ -188,12 +183,9 @@ def even_rows(
 
 
 def require(path: Path, columns: Mapping[str, FloatArray], *names: str) -> None:
-    """Refuse a file that lacks columns; a level may be given as that of both gauges.
+    """Raise SignalFileError, with missing and present columns, for a file that lacks columns.
 
-    Raises
-    ------
-    SignalFileError
-        Naming what is missing and what there is.
+    A level may be given as that of both gauges.
     """
     for name in names:
         both = all(each in columns for each in _LEVEL_OF_GAUGES)
@@ -214,13 +206,13 @@ def _lacks(path: Path, name: str, columns: Mapping[str, FloatArray]) -> SignalFi
 
 
 def _line(path: Path, rows: Any, index: int) -> str:
-    """Place of a row: line of a CSV, counted from 1 with the header, or row of a table."""
+    """Return the place of a row: line of a CSV, from 1 with the header, or row of a table."""
     row = int(rows[index])
     return f"line {row + 2}" if path.suffix.lower() == ".csv" else f"row {row}"
 
 
 def _read_csv(path: Path) -> Columns:
-    """Columns of a CSV: a line of names, then numbers; empty fields are not available."""
+    """Read the columns of a CSV: a line of names, then numbers; empty fields are not available."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as content:
             first = content.readline()
@@ -289,7 +281,7 @@ def _read_parquet(path: Path) -> Columns:
 
 
 def _in_si(name: str, values: FloatArray) -> list[tuple[str, FloatArray]]:
-    """A column in SI units, under the name that says so."""
+    """Return a column in SI units, and its name."""
     for suffix, (si, factor) in _OTHER_UNITS.items():
         if name.endswith(suffix):
             return [(name.removesuffix(suffix) + si, values * factor)]

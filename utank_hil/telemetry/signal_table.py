@@ -1,4 +1,4 @@
-"""Signals of the bus as columns: one row a tick, each signal as it was last heard."""
+"""Signals of the bus as columns: one row per tick with the last value of each signal."""
 
 import math
 from array import array
@@ -29,11 +29,11 @@ _NAMES: Final = {
     ("PASSIVE_TWIN", "twin_rms_rad"): "twin_roll_rms_rad",
     ("PASSIVE_TWIN", "roll_rms_rad"): "roll_rms_rad",
 }
-"""Signals that have the name of a telemetry column; others are named after their message."""
+"""Signals with the name of a telemetry column; others are named after their message."""
 
 
 class _Heard:
-    """What one message said, tick by tick."""
+    """Frames of one message, by tick."""
 
     def __init__(self, codec: Codec[Any]) -> None:
         self.decode = codec.decode
@@ -41,14 +41,14 @@ class _Heard:
         self.values = array("d")
 
     def add(self, tick: int, data: bytes) -> None:
-        """Take a frame that is to be seen from a tick on; one that is damaged says nothing."""
+        """Take a frame that is visible from a tick on; a damaged one is ignored."""
         message = self.decode(data) if len(data) == FRAME_BYTES else None
         if message is not None:
             self.ticks.append(tick)
             self.values.extend(math.nan if value is None else float(value) for value in message)
 
     def held(self, ticks: int, fields: int) -> FloatArray:
-        """What was last said in each tick, shape (ticks, fields); NaN before the first frame."""
+        """Return the last values in each tick, (ticks, fields); NaN before the first frame."""
         if not self.ticks:
             return np.full((ticks, fields), np.nan)
         values = np.asarray(self.values).reshape(-1, fields)
@@ -59,17 +59,15 @@ class _Heard:
 def signal_table(entries: Iterable[Entry]) -> dict[str, FloatArray]:
     """Decode the frames of a recording.
 
-    A frame that was received counts from the next tick on, one that the controller sent from the
-    tick in which it was. Whatever the controller thought of a frame's counter, quality or
-    plausibility, it is shown as it was on the bus.
+    A received frame counts from the next tick on, a sent one from its own. Frames appear as they
+    were on the bus, whatever the controller's checks of counter, quality or plausibility.
 
     Returns
     -------
     dict
-        Arrays (n,), one value a tick: ``time_s`` since the first tick, the telemetry's columns, and
-        every other signal as ``<message>_<signal>``, in SI units, states and flags as numbers. NaN
-        before the first frame and where it is not available; signals that are NaN throughout are
-        left out.
+        Arrays (n,), one value per tick: ``time_s`` since the first tick, the telemetry's columns,
+        and every other signal as ``<message>_<signal>``, in SI units, states and flags as numbers.
+        NaN before the first frame and where unavailable; all-NaN signals are left out.
     """
     codecs = load_catalogue().codecs
     heard = {codec.can_id: _Heard(codec) for codec in codecs.values()}

@@ -20,7 +20,7 @@ class Unit:
     scale : float
         Displayed value per SI value.
     plot : str
-        Title of the plot of those columns of this unit that have none of their own.
+        Title of the plot of columns of this unit without a plot of their own.
     """
 
     suffix: str
@@ -29,7 +29,7 @@ class Unit:
     plot: str
 
 
-# In order of matching: a suffix comes before any shorter one that it ends in.
+# The order is that of matching: a suffix comes before any shorter one that it ends in.
 UNITS = (
     Unit("_rad_s", "_deg_s", 180 / math.pi, "Angular rate, °/s"),
     Unit("_rad", "_deg", 180 / math.pi, "Angle, °"),
@@ -49,12 +49,12 @@ UNITS = (
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One column as it is recorded.
+    """A column as recorded.
 
     Attributes
     ----------
     column : str
-        Its name, in SI units.
+        Name of the column, in SI units.
     name : str
         Name in the recording, unit included.
     label : str
@@ -68,13 +68,7 @@ class Field:
 
 
 def field_of(column: str) -> Field:
-    """Return the recorded field of a column.
-
-    Raises
-    ------
-    ValueError
-        If the column's name ends in a unit that is not SI.
-    """
+    """Return the recorded field of a column; raises ValueError for a unit that is not SI."""
     unit = next(unit for unit in UNITS if column.endswith(unit.suffix))
     stem = column.removesuffix(unit.suffix)
     name = stem + unit.shown_suffix

@@ -1,4 +1,4 @@
-"""Opens the Rerun viewer on a recording or on a live stream, on this machine only."""
+"""The Rerun viewer for a recording or a live stream, on this machine only."""
 
 import importlib.util
 import os
@@ -15,7 +15,7 @@ from utank_hil.base.closing import Closing
 TIMELINE: Final = "time"
 """Name of the time line of all recordings."""
 _TRIES, _PAUSE_S = 20, 0.5
-"""A viewer that starts is asked to move its cursor every half second, for ten seconds."""
+"""Number and interval of requests to a starting viewer to move its cursor: ten seconds in all."""
 LOOPBACK: Final = "127.0.0.1"
 """Address on which viewers listen; Rerun's own default is every interface."""
 
@@ -44,9 +44,9 @@ class Viewer(Closing):
         self.ports = ports
 
     def wait(self, longest_s: float) -> bool:
-        """Wait for the end of the viewer; returns whether it ended, closed or failed.
+        """Wait for the end of the viewer and return whether it ended, closed or failed.
 
-        One in a browser goes on until `close`.
+        One in a browser runs until `close`.
         """
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(longest_s)
@@ -54,7 +54,7 @@ class Viewer(Closing):
 
     @property
     def failed(self) -> bool:
-        """Whether the viewer ended by an error, for example for want of a graphics driver."""
+        """Whether the viewer ended by an error, for example without a graphics driver."""
         return (self._process.poll() or 0) > 0
 
     def close(self) -> None:
@@ -69,21 +69,16 @@ def open_viewer(source: Path | str, at_s: float | None = None, *, window: bool =
     """Show a recording or a live stream in a window, or in a browser if there is no display.
 
     Without a display the viewer is served on loopback at `Viewer.url`, for a browser on this
-    machine or through an ssh tunnel.
+    machine or through an ssh tunnel. FileNotFoundError is raised if there is no such file.
 
     Parameters
     ----------
     source : Path or str
         A file, or the `url` of a `LiveStream`.
     at_s : float, optional
-        Where the cursor of a recording shall stand; at its beginning if not given.
+        Cursor position in a recording, by default its beginning.
     window : bool
-        Whether it may be a window.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
+        Whether a window is allowed.
     """
     if isinstance(source, Path) and not source.is_file():
         raise FileNotFoundError(f"no recording {source}")
@@ -97,7 +92,7 @@ def open_viewer(source: Path | str, at_s: float | None = None, *, window: bool =
         if at_s is not None:
             _move_cursor(viewer, port, at_s)
         return viewer
-    held.append(hold_port())  # Rerun 0.41 may hang if the page's port is taken
+    held.append(hold_port())  # Rerun 0.41 may hang if the page's port is taken.
     page_port = port_of(held[1])
     command += ["--serve-web", "--web-viewer-port", str(page_port), str(source)]
     data = live_url(port) if isinstance(source, Path) else source
@@ -113,13 +108,13 @@ def _started(command: list[str]) -> subprocess.Popen[bytes]:
 
 
 def _move_cursor(viewer: Viewer, port: int, at_s: float) -> None:
-    """Move the time cursor of a viewer that is starting; if it does not answer, it stays."""
+    """Move the time cursor of a starting viewer; without an answer it stays."""
     from rerun.experimental import ViewerClient
 
     for _ in range(_TRIES):
         if viewer.wait(_PAUSE_S):
             return
-        with suppress(Exception):  # whatever the client raises: the viewer shows its recording
+        with suppress(Exception):  # the viewer still shows its recording
             ViewerClient.connect(live_url(port)).set_time(TIMELINE, duration=at_s)
             return
 
@@ -138,15 +133,15 @@ def rerun_environment() -> dict[str, str]:
 
 
 def live_url(port: int) -> str:
-    """Return the address of a live stream that is served on a loopback port."""
+    """Return the address of a live stream on a loopback port."""
     return f"rerun+http://{LOOPBACK}:{port}/proxy"
 
 
 def hold_port() -> socket.socket:
     """Return a socket that holds a free TCP port of the loopback interface until it is closed.
 
-    It does not listen. A server that sets SO_REUSEADDR, as Rerun's do, may listen on the port; the
-    kernel chooses it for no other socket.
+    It does not listen. A server with SO_REUSEADDR, as Rerun's, may listen on the port; the kernel
+    assigns it to no other socket.
     """
     held = socket.socket()
     held.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -155,6 +150,6 @@ def hold_port() -> socket.socket:
 
 
 def port_of(held: socket.socket) -> int:
-    """Return the number of the port that a socket holds."""
+    """Return the number of a socket's port."""
     port: int = held.getsockname()[1]
     return port
