@@ -1,7 +1,7 @@
-"""The pump drive: takes pressure commands, judges them on its own, and runs the pump.
+"""Pump drive: receives pressure commands, checks them independently, and runs the pump.
 
-The drive is the last line: it goes to zero pressure when commands stop (by the timeout that came
-with the last one), and refuses a command outside its own limits, whatever the controller thinks.
+The drive is the last line of defence: it goes to zero pressure when commands stop (by the timeout
+sent with the last one), and refuses a command outside its own limits.
 """
 
 import math
@@ -30,17 +30,17 @@ if TYPE_CHECKING:
 NANOSECONDS = 1e-9
 MISCODED_COMMANDS_TO_TRIP = 5
 STOPPED_SHARE = 0.02
-"""Of the drive's pressure limit: less is as good as none."""
+"""Share of the drive's pressure limit below which the pump counts as stopped. Chosen; no study."""
 LONGEST_STOP_NS = 500_000_000
-"""A motor that can't take the pressure away in this time is switched off all the same."""
+"""Time after which a motor that has not removed the pressure is switched off. Chosen; no study."""
 WARNED_MESSAGES = 2
-"""Number of DRIVE_STATUS_2 that report one command that was not taken."""
+"""Number of DRIVE_STATUS_2 messages that report one rejected command."""
 _STOP_WORDS = (ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE, ControlWord.SHUTDOWN, None)
-"""None: an unknown word disables the voltage."""
-# read once: in Python 3.11 a member costs eight times as much from its class as from here
+"""Control words that stop the drive; None, an unknown word, disables the voltage."""
+# bound once: in Python 3.11 class access to an enum member is eight times slower
 _ENABLED = DriveState.OPERATION_ENABLED
 _NO_FAULT = DriveFault.NONE
-# half a step of the set-point on the bus: a command at the limit may have been rounded up by it
+# half a bus step of the set-point: a command at the limit may have been rounded up by it
 ROUNDING_PA = 4.0
 
 
@@ -49,19 +49,15 @@ class PumpDrive:
 
     Parameters
     ----------
-    plant : Plant
-        Whose pump to drive.
-    limits : DriveLimits
-    catalogue : Catalogue
     configuration_version : int
-        Sent in the heartbeat, for the controller to compare with its own.
+        Version sent in the heartbeat, which the controller compares with its own.
 
     Attributes
     ----------
     hears : frozenset of int
-        The pump command, see `Selective`.
+        Identifier of the pump command, see `Selective`.
     refused : int
-        Commands outside the drive's limits so far.
+        Number of commands outside the drive's limits so far.
     """
 
     name = "drive"
@@ -90,7 +86,7 @@ class PumpDrive:
         self._moving_ns = 0
         self._echo: int | None = None
         self._setpoint_pa = 0.0
-        # frames come with jitter, the set-point only every cycle: a tick of grace in all
+        # frames jitter, the set-point changes every cycle: one tick of grace in total
         self._grace_pa = limits.pressure_rate_pa_s * self.period_ns * NANOSECONDS
         self._credit_pa = self._grace_pa
         self._refused_in_a_row = 0
@@ -100,7 +96,7 @@ class PumpDrive:
         self.refused = 0
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Take a command if it is intact and inside the drive's own limits."""
+        """Accept a command if it is intact and inside the drive's own limits."""
         if frame.can_id != self._commands.can_id:
             return
         lost = self._commands.lost
@@ -108,14 +104,14 @@ class PumpDrive:
         if command is None or self._commands.lost > lost:
             self._warnings_left = WARNED_MESSAGES
         if command is None:
-            # out of sequence it may ask for nothing, but it may say stop
+            # out of sequence it may request no pressure, but it may request a stop
             intact = self._commands.intact(frame)
             if intact is not None and intact.control_word in _STOP_WORDS:
                 self._states.command(intact.control_word)
             return
         if not self._permitted(command, now_ns):
             if command.control_word in _STOP_WORDS:
-                # whatever else is wrong with it, it says stop
+                # a stop request counts whatever else is wrong with the command
                 self._states.command(command.control_word)
             self.refused += 1
             self._refused_in_a_row += 1
@@ -137,7 +133,7 @@ class PumpDrive:
 
     def _permitted(self, command: PumpCommand, now_ns: int) -> bool:
         limits, pressure_pa = self._limits, command.pressure_pa
-        # written so that NaN, not available, fails too
+        # written so that NaN (not available) fails too
         if not abs(pressure_pa) <= limits.pressure_pa + ROUNDING_PA:
             return False
         if not 0.0 < command.timeout_s <= limits.longest_timeout_ms * 1e-3:
@@ -145,25 +141,25 @@ class PumpDrive:
         if not self._acts(command):
             return True
         step_pa = self._step_away_pa(pressure_pa)
-        # both ends of a step may have been rounded away from where they were
+        # both ends of a step may have been rounded
         return step_pa == 0.0 or step_pa <= self._reach_pa(now_ns) + 2 * ROUNDING_PA
 
     def _acts(self, command: PumpCommand) -> bool:
-        """Whether the set-point follows the command's; else it stays zero, whatever that is."""
+        """Whether the set-point follows the command; otherwise it stays zero."""
         enables = command.control_word is ControlWord.ENABLE_OPERATION
         state = self._states.state
         return state is _ENABLED or (enables and state is DriveState.SWITCHED_ON)
 
     def _step_away_pa(self, pressure_pa: float) -> float:
-        """Step from the set-point, 0 if it is one toward zero."""
+        """Step away from the set-point in Pa, 0 for a step toward zero."""
         setpoint_pa = self._setpoint_pa
         toward_zero = abs(pressure_pa) <= abs(setpoint_pa) and pressure_pa * setpoint_pa >= 0.0
         return 0.0 if toward_zero else abs(pressure_pa - setpoint_pa)
 
     def _reach_pa(self, now_ns: int) -> float:
-        """Farthest step that the time since the last command and the grace that is left allow.
+        """Largest step in Pa that the time since the last command and the remaining grace allow.
 
-        No longer than that command was good for, and none of the time before it was enabled.
+        The time counts only up to the command's timeout, and only while the drive was enabled.
         """
         if self._states.state is not _ENABLED:
             return self._credit_pa
@@ -171,7 +167,7 @@ class PumpDrive:
         return self._limits.pressure_rate_pa_s * since_s + self._credit_pa
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
-        """Watch over the commands, drive the pump, report."""
+        """Check the command timeout, drive the pump and send the status."""
         states, plant = self._states, self._plant
         plant.advance(now_ns)
         states.tick(stopped=self._stopped(now_ns))
@@ -182,7 +178,7 @@ class PumpDrive:
         if not enabled:
             self._setpoint_pa = 0.0
         if states.stopping:
-            # a rotor that merely ran down would go on pressing for half a second
+            # a coasting rotor would keep up pressure for half a second
             plant.brake_pump()
         else:
             self._moving_ns = now_ns
@@ -199,23 +195,23 @@ class PumpDrive:
 
     @property
     def enabled(self) -> bool:
-        """Whether it drives the pump, be it with no pressure."""
+        """Whether the drive runs the pump, even at zero pressure."""
         return self._states.state is _ENABLED
 
     @property
     def setpoint_pa(self) -> float:
-        """Pressure that it has the pump make."""
+        """Pressure set-point of the pump in Pa."""
         return self._setpoint_pa
 
     def fail(self, fault: DriveFault) -> None:
-        """Fault to be tried out: trip, or switch off where it is `DriveFault.NONE`."""
+        """Inject a fault: trip the drive, or switch it off for `DriveFault.NONE`."""
         if fault is _NO_FAULT:
             self._states.command(ControlWord.DISABLE_VOLTAGE)
         else:
             self._states.trip(fault)
 
     def _stopped(self, now_ns: int) -> bool:
-        """Say whether a stop has taken the pressure away, or had its time."""
+        """Whether a stop has removed the pressure, or has used up its time."""
         share = abs(self._plant.pressure_pa) / self._limits.pressure_pa
         return share < STOPPED_SHARE or now_ns - self._moving_ns > LONGEST_STOP_NS
 

@@ -1,4 +1,4 @@
-"""What the pump drive takes from a command: a section of a scenario."""
+"""Limits of the pump drive: a section of a scenario."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -8,19 +8,20 @@ from utank_hil.base.parameters import Positive, Range, range_problems, refuse
 
 @dataclass(frozen=True, slots=True)
 class DriveLimits:
-    """What the drive takes from a command, set in the drive and not by the controller.
+    """Limits on commands, set in the drive and independent of the controller.
 
     Attributes
     ----------
     pressure_pa : float
         Largest set-point to either side.
     pressure_rate_pa_s : float
-        Largest change of the set-point away from zero.
+        Largest rate of the set-point away from zero.
     longest_timeout_ms : float
-        Longest command timeout the drive agrees to, 100 at most: so long after the last command
-        the safety manual has a dead controller's pressure on its way to zero.
+        Longest command timeout that the drive accepts, at most 100: by then, according to the
+        safety manual, the pressure of a dead controller is on its way to zero.
     bus_voltage_v : float
-        Direct-current bus the drive feeds from; 4 to 1000, the range of DRIVE_STATUS_2.
+        Voltage of the direct-current bus that feeds the drive; 4 to 1000, the range of
+        DRIVE_STATUS_2.
     """
 
     pressure_pa: Positive = 50e3

@@ -1,18 +1,18 @@
-"""The CiA 402 state machine of a drive (IEC 61800-7-201), as far as a pump drive needs it.
+"""CiA 402 state machine of a drive (IEC 61800-7-201), reduced to the needs of a pump drive.
 
 QUICK_STOP and a fault brake the motor before it is switched off. DISABLE_VOLTAGE and SHUTDOWN
-switch it off at once, as by the standard, and its rotor runs down.
+switch it off at once, as in the standard, and its rotor coasts.
 """
 
 from utank_hil.canbus import ControlWord, DriveFault, DriveState
 
 _S, _C = DriveState, ControlWord
 
-# read once: in Python 3.11 a member costs eight times as much from its class as from here
+# bound once: in Python 3.11 class access to an enum member is eight times slower
 _NOT_READY = DriveState.NOT_READY_TO_SWITCH_ON
 _STOPPING = (DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
 
-# state -> control word -> next state; what is not listed changes nothing
+# state -> control word -> next state; an unlisted word changes nothing
 _TRANSITIONS: dict[DriveState, dict[ControlWord, DriveState]] = {
     _S.SWITCH_ON_DISABLED: {_C.SHUTDOWN: _S.READY_TO_SWITCH_ON},
     _S.READY_TO_SWITCH_ON: {
@@ -37,14 +37,7 @@ _TRANSITIONS: dict[DriveState, dict[ControlWord, DriveState]] = {
 
 
 class DriveStates:
-    """State and fault of the drive.
-
-    Attributes
-    ----------
-    state : DriveState
-    fault : DriveFault
-        Why the drive is in FAULT; NONE otherwise.
-    """
+    """State and fault of the drive; the fault is NONE outside FAULT."""
 
     def __init__(self) -> None:
         self.state = DriveState.NOT_READY_TO_SWITCH_ON
@@ -53,17 +46,11 @@ class DriveStates:
 
     @property
     def stopping(self) -> bool:
-        """Whether a quick stop or the reaction to a fault is under way."""
+        """Whether a quick stop or a fault reaction is in progress."""
         return self.state in _STOPPING
 
     def tick(self, *, stopped: bool = True) -> None:
-        """Take the transitions that need no command.
-
-        Parameters
-        ----------
-        stopped : bool
-            Whether a stop that is under way has come to its end.
-        """
+        """Make the transitions that need no command; `stopped` ends a stop in progress."""
         if self.state is _NOT_READY:
             self.state = _S.SWITCH_ON_DISABLED
         elif self.stopping and stopped:
@@ -80,10 +67,10 @@ class DriveStates:
                 self.state, self.fault = _S.SWITCH_ON_DISABLED, DriveFault.NONE
             return
         if word is _C.FAULT_RESET:
-            word = _C.DISABLE_VOLTAGE  # which it is where there is no fault: bit 1 is not set
+            word = _C.DISABLE_VOLTAGE  # without a fault the word means this: bit 1 is not set
         self.state = _TRANSITIONS.get(self.state, {}).get(word, self.state)
 
     def trip(self, fault: DriveFault) -> None:
-        """Go to fault, by way of its reaction; the first fault stays."""
+        """Enter the fault state by way of its reaction; the first fault is kept."""
         if self.fault is DriveFault.NONE:
             self.state, self.fault = _S.FAULT_REACTION_ACTIVE, fault

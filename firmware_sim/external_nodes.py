@@ -1,8 +1,8 @@
-"""The emulated ship's pump and valve when real ones take the place of the emulated ones.
+"""Pump and valve of the emulated ship when real hardware takes the place of the emulated nodes.
 
-Each has the plant do what the hardware reports, and sends nothing. A report acts from the tick
-after its receipt until the next one, for `STALE_NS` at most. A frame that fails CRC or counter is
-no report, nor is one whose value is not available.
+Each node makes the plant follow the hardware's reports, and sends nothing. A report acts from the
+tick after its receipt until the next one, for `STALE_NS` at most. A frame with a wrong CRC or
+counter, or whose value is not available, is ignored.
 """
 
 import math
@@ -17,7 +17,7 @@ from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve
 
 STALE_NS: Final = 60_000_000
-"""Three cycles of the reports, after which the controller too calls a drive or valve silent."""
+"""Three cycles of the reports: the controller's own limit for a silent drive or valve."""
 
 
 class _ExternalNode(ABC):
@@ -32,11 +32,11 @@ class _ExternalNode(ABC):
 
     @property
     def reported_share(self) -> float:
-        """Share of the ticks so far that had a report no older than `STALE_NS`."""
+        """Share of the ticks so far with a report no older than `STALE_NS`."""
         return self._fresh_ticks / max(self._ticks, 1)
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Take the report."""
+        """Store the report."""
         if frame.can_id != self._receiver.can_id:
             return
         status = self._receiver.accept(frame)
@@ -44,7 +44,7 @@ class _ExternalNode(ABC):
             self._value, self._reported_ns = value, now_ns
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
-        """Advance the plant, and have the report act from now on."""
+        """Advance the plant, and apply the report from now on."""
         self._plant.advance(now_ns)
         fresh = now_ns - self._reported_ns <= STALE_NS
         self._ticks += 1
@@ -54,11 +54,11 @@ class _ExternalNode(ABC):
 
     @abstractmethod
     def _act(self, value: float | None) -> None:
-        """Have the plant do what was reported; None without a fresh report."""
+        """Apply a reported value to the plant; None without a fresh report."""
 
 
 class ExternalDrive(_ExternalNode):
-    """Imposes the pressure of DRIVE_STATUS_1, in every state of the drive.
+    """Node that imposes the pressure of DRIVE_STATUS_1, in every state of the drive.
 
     Without a report the rotor turns freely.
     """
@@ -76,7 +76,7 @@ class ExternalDrive(_ExternalNode):
 
 
 class ExternalValve(_ExternalNode):
-    """Sets the loss of VALVE_STATUS's opening; without a report that of the fail position."""
+    """Node that sets the loss of VALVE_STATUS's opening; without a report the fail position's."""
 
     name = "external valve"
 

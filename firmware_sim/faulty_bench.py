@@ -22,39 +22,39 @@ from utank_hil.runners import Lockstep, Node
 from utank_hil.runners.lockstep import Trace
 
 Tap = Callable[[ControllerNode], Node]
-"""What is put on the bus for a controller."""
+"""Function that wraps a controller in the node put on the bus."""
 
 
 class FaultyBench:
-    """A bench in lockstep in which faults can be placed, at the start or under way.
+    """Bench in lockstep in which faults can be placed, at the start or under way.
 
     Parameters
     ----------
     scenario : Scenario
-        Its own faults are left to the caller.
+        Scenario; its own faults are left to the caller.
     law : BuiltLaw, optional
-        Of the controller; it is designed without.
+        Law of the controller; it is designed if not given.
     script : tuple of TimedAction
-        What the operator does.
+        Actions of the operator.
     trace : callable, optional
-        As `Lockstep` takes it.
+        Trace function of `Lockstep`.
     sink : callable, optional
-        Takes the controller's telemetry, a row every `sink_every` ticks.
+        Function that takes a row of the controller's telemetry every `sink_every` ticks.
     retuner : Retuner, optional
-        Of a controller that retunes itself; its law can't be made to fail.
+        Retuner of a self-tuning controller, whose law cannot be made to fail.
     estimating : Retuner, optional
-        Who estimates sea and ship.
+        Estimator of sea and ship.
     commissioned : bool
         Whether the controller may be armed.
     tapped : Tap, optional
-        Puts something between each controller and its faults.
+        Wrapper between each controller and its faults.
 
     Attributes
     ----------
     nodes : dict of str to FaultyNode
-        Sensors, drive, valve, panel and controller, as far as there are.
+        Sensors, drive, valve, panel and controller, as far as the ship has them.
     node : ControllerNode
-        The controller that runs at present.
+        Controller that currently runs.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class FaultyBench:
         def controller() -> Controller:
             return BreakableLaw(self._law.controller(), self._law_failures)
 
-        # a controller that retunes exchanges its laws itself: a fault of one is no fault of it
+        # a self-tuning controller exchanges its laws: a fault of one would not follow
         law = self._law if self._retuner else replace(self._law, controller=controller)
         self.node = build_controller_node(
             self._config,
@@ -105,11 +105,11 @@ class FaultyBench:
         return self._tapped(self.node)
 
     def restart_controller(self) -> None:
-        """Have a new controller take the place of the old one, as after its process died."""
+        """Replace the controller by a new one, as after the death of its process."""
         self._controller.node = self._new_controller()
 
     def join(self, nodes: Sequence[Node]) -> None:
-        """Have more nodes on the bus from now on."""
+        """Add nodes to the bus from now on."""
         self.lockstep.join(nodes)
 
     def place(self, faults: Sequence[AnyFault]) -> None:

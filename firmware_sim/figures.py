@@ -1,4 +1,4 @@
-"""A bench in figures: computed once; tables, JSON, picture and page show the same ones."""
+"""Figures of a bench, computed once for tables, JSON, picture and page."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -34,7 +34,7 @@ from utank_hil.safety.faults import fault_text
 
 NO_TANK: Final = "no tank"
 LEAST_ROLL_RAD: Final = 1e-6
-"""Less roll than this is none: a share of it says nothing."""
+"""Roll below which a ratio of rolls is meaningless."""
 LEAST_IN_CHARGE: Final = 0.9
 """Least share of the time ordered by the operator in which the controller must be in charge."""
 
@@ -45,7 +45,7 @@ _OF_RUN: Final = (
     *("name", "end_s", "strikes", "max_strike_impulse_nms", "pump_speed_rad_s", "energy_j"),
     *("bus_load", "refused_commands", "fallbacks", "law_error"),
 )
-"""Figures that are those of the bench and of the run."""
+"""Figures that the bench and the run share."""
 
 _ORDERS: Final = {
     Action.ARM: Mode.ACTIVE,
@@ -58,7 +58,7 @@ _ORDERS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """Why a run is not ranked: a word for a cell of a table, and a sentence without its name."""
+    """Reason why a run is not ranked: a word for a table, and a sentence without the run's name."""
 
     word: str
     why: str
@@ -73,31 +73,31 @@ class BareShip(RollStatistics):
 
 @dataclass(frozen=True, slots=True)
 class RunFigures:
-    """One run in figures. Those of a run that is not compared are None, up to `active_share`.
+    """Figures of one run; a run that is not compared has None up to `active_share`.
 
     Attributes
     ----------
     mark : Mark or None
-        Why the run is not ranked.
+        Reason why the run is not ranked.
     rows, expected_rows : int
-        Rows in the window, and how many there are if none is left out.
+        Number of rows in the window, and of a complete run.
     end_s : float
-        The ship's time at the end of the run.
+        Ship's time at the end of the run.
     capsized_s : float or None
-        None if the ship did not capsize.
+        Time of capsizing; None if the ship did not capsize.
     strikes, max_strike_impulse_nms, pump_speed_rad_s, energy_j, bus_load, refused_commands
-        As in `Run`, of the whole run; so are `fallbacks` and `law_error`.
+        Values of `Run` over the whole run; so are `fallbacks` and `law_error`.
     rank : int or None
-        Place by roll RMS among the runs that count, from 1.
+        Rank by roll RMS among the runs that count, from 1.
     roll_below_no_tank, roll_below_passive : float or None
-        Share by which the roll RMS is less than without a tank, and than with the passive tank;
-        None where the run or the one it is compared with does not count, and on still water.
+        Relative reduction of the roll RMS against no tank, and against the passive tank; None where
+        one of the two runs does not count, and on still water.
     mode, fault : str or None
-        Of the controller at the end of the run.
+        Final state of the controller.
     active_share : float or None
         Share of the window in which the controller was in charge.
     loop : dict or None
-        How the loop kept its time; None in simulated time.
+        Timing statistics of the loop; None in simulated time.
     """
 
     name: str
@@ -130,16 +130,16 @@ class RunFigures:
 
 @dataclass(frozen=True, slots=True)
 class OnBoardFigures:
-    """What the roll means for people at a place, by run.
+    """Effect of the roll on people at a place, by run.
 
     Attributes
     ----------
     exposure_s : float
-        For which the sickness is predicted.
+        Exposure for which the sickness is predicted.
     levels_rad : tuple of float
         Single amplitudes of roll whose exceedance is stated.
     runs : dict of str to OnBoard
-        The bare ship, and the runs that can be compared with it and did not capsize.
+        Bare ship, and the compared runs that did not capsize.
     """
 
     place: Place
@@ -150,20 +150,18 @@ class OnBoardFigures:
 
 @dataclass(frozen=True, slots=True)
 class BenchFigures:
-    """A bench in figures, over its window, in SI units.
+    """Figures of a bench over its window, in SI units.
 
     Attributes
     ----------
-    scenario : str
-        Its name.
     exit_code : int
-        How the bench ended, for scripts.
+        Exit code of the command.
     endings : tuple of str
-        What is to be said of how runs ended; nothing where all went as the operator wanted.
+        Remarks on the ends of runs; empty where all went as ordered.
     limits_passed : tuple of str
         Limits of the model that were passed.
     runs : tuple of RunFigures
-        All that have a row; the passive tank first.
+        All runs with at least one row; the passive tank first.
     """
 
     scenario: str
@@ -184,21 +182,21 @@ class BenchFigures:
 
     @property
     def compared(self) -> tuple[RunFigures, ...]:
-        """The runs that have rows enough in the window."""
+        """Runs with enough rows in the window."""
         return tuple(run for run in self.runs if run.compared)
 
     @property
     def wrong(self) -> tuple[str, ...]:
-        """All that was not as it should be."""
+        """All problems of the bench."""
         return (*self.endings, *self.limits_passed)
 
     def as_json(self, files: Mapping[str, Path], about: Mapping[str, Any]) -> dict[str, Any]:
-        """The figures, ready for `json.dumps`, with where they come from and the files beside."""
+        """Figures for `json.dumps`, with provenance and the files written."""
         return {**about, **asdict(self), "files": {name: str(each) for name, each in files.items()}}
 
 
 def read_figures(content: Mapping[str, Any]) -> BenchFigures:
-    """The figures in the JSON of a bench.
+    """Read the figures from the JSON of a bench.
 
     Raises
     ------
@@ -209,7 +207,7 @@ def read_figures(content: Mapping[str, Any]) -> BenchFigures:
 
 
 def figures(result: BenchResult) -> BenchFigures:
-    """Compute what a bench comes to."""
+    """Compute the figures of a bench."""
     marks = {run.name: mark_of(result, run) for run in result.runs}
     return BenchFigures(
         **{name: getattr(result, name) for name in _OF_BENCH},
@@ -277,10 +275,7 @@ def run_figures(result: BenchResult) -> tuple[RunFigures, ...]:
 
 
 def mark_of(result: BenchResult, run: Run) -> Mark | None:
-    """Why a run is not ranked; None for one that is.
-
-    A run that capsized, failed or was idle gives no reduction.
-    """
+    """Reason why a run is not ranked (capsized, failed or idle); None for one that is."""
     if not result.compares(run):
         return Mark(
             "not compared",
@@ -308,14 +303,14 @@ def mark_of(result: BenchResult, run: Run) -> Mark | None:
 
 
 def rolls_compared(result: BenchResult) -> dict[str, FloatArray]:
-    """Roll of each run that is compared, over the window."""
+    """Roll of each compared run over the window."""
     return {run.name: _roll(result, run) for run in result.runs if result.compares(run)}
 
 
 def _orders(result: BenchResult, run: Run) -> npt.NDArray[np.int64]:
-    """The mode that the operator wanted at each row; his clock starts when the controller is ready.
+    """Mode ordered by the operator at each row, from when the controller is ready.
 
-    Of the passive run, the pump at zero: switched off, its rotor would turn with the water.
+    In the passive run it is zero pressure: a pump switched off would turn with the water.
     """
     script = PASSIVE_SCRIPT if run.name == PASSIVE else result.scenario.operator
     time_s, orders = run.column("time_s"), np.full(len(run.rows), int(Mode.STANDBY))
@@ -356,7 +351,7 @@ def _exit_code(result: BenchResult, marks: Mapping[str, Mark | None]) -> ExitCod
 
 
 def _on_board(result: BenchResult) -> OnBoardFigures:
-    """Judge the rolls; a ship that capsized lies still, and nothing on board is to be judged."""
+    """Judge the rolls for people on board; a capsized ship is left out."""
     place = result.scenario.place_on_board
     rolls = {}
     if result.without_tank_capsized_s >= result.end_s:

@@ -157,7 +157,7 @@ def _beside(first: Group, group: Group, waves: Mapping[str, str]) -> list[dict[s
 
 
 def _pair(both: list[tuple[float, float]]) -> dict[str, Figure]:
-    """Difference and ratio of paired roll values."""
+    """Mean difference of paired roll values, and mean relative reduction."""
     return {
         "roll_rms_difference_rad": figure([one - other for other, one in both]),
         "share_below": figure([1 - one / other for other, one in both if other >= LEAST_ROLL_RAD]),

@@ -1,1 +1,1 @@
-"""What differs between campaigns, or between recorded runs, with confidence intervals."""
+"""Comparison of campaigns or recorded runs, with confidence intervals."""

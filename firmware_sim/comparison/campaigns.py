@@ -1,4 +1,4 @@
-"""Campaigns side by side, case by case where the waves are the same."""
+"""Comparison of campaigns, case by case where the waves are the same."""
 
 import math
 from pathlib import Path
@@ -29,7 +29,7 @@ def compare_campaigns(reference: Path, others: list[Path]) -> list[Comparison]:
     Raises
     ------
     CompareError
-        If they vary other keys, or have no group or no run in common.
+        If the campaigns vary different keys, or share no group or no run.
     """
     first = read_results(reference)
     return [each for other in others for each in _compared(first, other)]
@@ -73,7 +73,7 @@ def _of_run(group: Group, run: str, waves: dict[str, str]) -> _Figures:
 
 
 def _of_metric(one: _Figures, two: _Figures, metric: str) -> Difference | None:
-    """The difference of a metric; None where one of both has none."""
+    """Difference of a metric; None where one side lacks it."""
     values = [
         {waves: row[metric] for waves, row in each.items() if not math.isnan(row[metric])}
         for each in (one, two)

@@ -1,4 +1,4 @@
-"""The difference of two means, paired or not."""
+"""Difference of two means, paired or independent."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,25 +12,25 @@ from utank_hil.base.arrays import FloatArray
 
 
 class CompareError(ValueError):
-    """What can't be compared; the message says why, and the remedy."""
+    """Error for inputs that cannot be compared; the message contains reason and remedy."""
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A figure of one run beside that of another.
+    """Figure of one run beside that of another.
 
     Attributes
     ----------
     reference, value : float
         Means.
     difference : float
-        `value` less `reference`.
+        `value` minus `reference`.
     half_width : float or None
-        Of the difference's 95 % confidence interval; None of too little for one.
+        Half width of the difference's 95 % confidence interval; None with too few values.
     count : int
-        Pairs, or values of the smaller side.
+        Number of pairs, or of values on the smaller side.
     paired : bool
-        Whether both are of the same waves.
+        Whether both sides met the same waves.
     """
 
     reference: float
@@ -43,16 +43,16 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """One run beside the reference's run of the same name.
+    """Run beside the reference run of the same name.
 
     Attributes
     ----------
     source : str
-        Where the run is from.
+        Origin of the run.
     parameters : dict
-        What both have in common of the keys that are varied.
+        Varied keys that both have in common.
     remarks : tuple of str
-        What is to be known of it.
+        Remarks on the validity of the comparison.
     """
 
     source: str
@@ -63,7 +63,7 @@ class Comparison:
 
 
 def paired(reference: FloatArray, values: FloatArray) -> Difference:
-    """Difference of values that belong together one by one, shape (n,)."""
+    """Difference of values paired by index, shape (n,)."""
     width = mean_interval(values - reference).half_width if len(values) > 1 else None
     return _difference(reference, values, width, paired=True)
 
@@ -95,13 +95,7 @@ def _difference(
 
 
 def same_runs(reference: Sequence[str], other: Sequence[str], source: str) -> list[str]:
-    """Names that both have.
-
-    Raises
-    ------
-    CompareError
-        If there are none.
-    """
+    """Names that both have; raise `CompareError` if there are none."""
     common = [name for name in reference if name in other]
     if not common:
         raise CompareError(
@@ -112,7 +106,7 @@ def same_runs(reference: Sequence[str], other: Sequence[str], source: str) -> li
 
 
 def differing(reference: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[str, ...]:
-    """What else than the question differs: of code and simulation."""
+    """Differences in code and simulation, which are not the subject of the comparison."""
     remarks = []
     for key, words in (("simulation", "kinds of simulation"), ("code", "versions of the program")):
         if reference.get(key) != other.get(key):

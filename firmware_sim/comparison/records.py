@@ -1,4 +1,4 @@
-"""Recorded runs side by side, by means over batches of their records."""
+"""Comparison of recorded runs by batch means."""
 
 import json
 from contextlib import suppress
@@ -25,22 +25,22 @@ from utank_hil.telemetry.recording import read_about
 from utank_hil.telemetry.signal_files import read_signals, require
 
 BATCH_PERIODS: Final = 40
-"""Mean periods of the roll in a batch: after them a lightly damped ship has forgotten.
+"""Batch length in mean roll periods: after it a lightly damped ship has no memory.
 
-With half of them, the 95 % interval of an hour holds the true difference of two ships of 2.5 % and
-5 % damping in 91 % of all hours, in waves of a peak as in white noise; with all 40 in 93 to 94 %.
-"""
+With half of it, the 95 % interval of an hour contains the true difference of two ships of 2.5 % and
+5 % damping in 91 % of all hours, in waves with a peak as in white noise; with 40 in 93 to 94 %."""
 LEAST_PERIODS: Final = 20
-"""Mean periods in a batch of a shorter record, down to `LEAST_BATCHES`."""
+"""Batch length in mean roll periods for a shorter record, down to `LEAST_BATCHES`. Chosen; no
+study."""
 MOST_BATCHES, LEAST_BATCHES = 30, 6
 _WAVES: Final = ("sea", "voyage")
-"""Of a scenario: with the seed they draw the waves, whatever ship is in them."""
+"""Sections of a scenario that draw the waves, together with the seed."""
 
 CHARGE_ALIKE: Final = 0.1
-"""Share of the time in charge by which records may differ without a word."""
+"""Difference of the share of time in charge above which a remark is made. Chosen; no study."""
 
 LEAST_KNOWN: Final = 0.9
-"""Of the values of a column, for a figure to be made from it."""
+"""Least share of known values in a column for a figure to be made from it. Chosen; no study."""
 
 Columns = dict[str, FloatArray]
 Runs = dict[str, Columns]
@@ -51,17 +51,17 @@ _FIGURES: Final = {
     "pressure_rms_pa": ("true_pressure_pa", "pressure_actual_pa"),
     "power_mean_w": ("true_shaft_power_w", "pump_power_w"),
 }
-"""Figures of a record, and the columns that each is made from: the first that both records have."""
+"""Figures of a record, each with its candidate columns; the first one in both records is used."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Record:
-    """A recording.
+    """Recording.
 
     Attributes
     ----------
     about : dict
-        Where it comes from; empty where it does not say.
+        Provenance; empty where the file has none.
     runs : dict
         Columns of each run.
     """
@@ -72,19 +72,19 @@ class Record:
 
     @property
     def waves(self) -> str | None:
-        """What the waves were, as text; None where it does not say."""
+        """Description of the waves as text; None where the record has none."""
         scenario = self.about.get("configuration", {})
         if "sea" not in scenario:
             return None
         parts = {key: scenario.get(key) for key in _WAVES}
-        # data files by what is in them: folders may differ
+        # data files count by content: folders may differ
         text = json.dumps([parts, self.about.get("seed")], sort_keys=True)
         for name, digest in self.about.get("data", {}).items():
             text = text.replace(json.dumps(name), json.dumps(digest))
         return text
 
     def columns(self, run: str) -> Columns:
-        """One run without the time that its scenario leaves out at the start."""
+        """Columns of one run without the initial time that its scenario leaves out."""
         columns = self.runs[run]
         settle_s = self.about.get("configuration", {}).get("settle_s", 0.0)
         kept = columns["time_s"] >= columns["time_s"][0] + settle_s
@@ -97,14 +97,14 @@ def read_record(path: Path) -> Record:
     Raises
     ------
     ValueError
-        If the file is none, or has no roll.
+        If the file is none of these, or has no roll.
     """
     runs = read_signals(path)
     for columns in runs.values():
         require(path, columns, "roll_rad")
     about: dict[str, Any] = {}
     if path.suffix == ".rrd":
-        with suppress(ValueError):  # one of an older version does not say
+        with suppress(ValueError):  # a file of an older version has no provenance
             about = read_about(path)
     return Record(path, about, runs)
 
@@ -115,9 +115,9 @@ def compare_records(reference: Path, others: list[Path]) -> list[Comparison]:
     Raises
     ------
     CompareError
-        If they have no run in common, or runs no column.
+        If the recordings share no run, or the runs share no column.
     ValueError
-        If a file is no recording.
+        If a file is not a recording.
     """
     first = read_record(reference)
     return [each for other in others for each in _compared(first, read_record(other))]
@@ -126,7 +126,7 @@ def compare_records(reference: Path, others: list[Path]) -> list[Comparison]:
 def _compared(first: Record, second: Record) -> list[Comparison]:
     found = []
     together = first.waves is not None and first.waves == second.waves
-    if len(first.runs) == len(second.runs) == 1:  # a log knows no names of runs
+    if len(first.runs) == len(second.runs) == 1:  # a log has no names of runs
         pairs = [(next(iter(first.runs)), next(iter(second.runs)))]
     else:
         common = same_runs(list(first.runs), list(second.runs), str(second.path))
@@ -163,7 +163,7 @@ def _compared(first: Record, second: Record) -> list[Comparison]:
 
 
 def _capsized(*records: tuple[Path, str, Columns]) -> list[str]:
-    """Runs, by name and file, in which the ship capsized: how it lies there is no roll."""
+    """Remarks on runs, by name and file, in which the ship capsized."""
     return [
         f"run {run} of {path}"
         for path, run, columns in records
@@ -172,7 +172,7 @@ def _capsized(*records: tuple[Path, str, Columns]) -> list[str]:
 
 
 def _in_charge(run: str, one: Columns, two: Columns) -> list[str]:
-    """What is to be said where the law was in charge for longer in one record than in the other."""
+    """Remark where the law was in charge for longer in one record than in the other."""
     if "mode" not in one or "mode" not in two:
         return []
     first, second = (float(np.mean(each["mode"] == Mode.ACTIVE)) for each in (one, two))
@@ -190,7 +190,7 @@ def _at_same_times(one: Columns, two: Columns) -> bool:
 def _known(
     one: Columns, two: Columns, names: tuple[str, ...]
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Of both, the first column that has few gaps in either; sensors start after the log."""
+    """First column with few gaps in both; sensors start after the log."""
     for name in names:
         if name in one and name in two:
             both = one[name], two[name]
@@ -200,7 +200,7 @@ def _known(
 
 
 def _without_gaps(one: FloatArray, two: FloatArray, same: bool) -> tuple[FloatArray, FloatArray]:
-    """Both without the rows that they do not know; if their times are the `same`, that either."""
+    """Both columns without NaN rows; with equal times (`same`), pairwise."""
     kept_one, kept_two = np.isfinite(one), np.isfinite(two)
     if same:
         kept_one = kept_two = kept_one & kept_two
@@ -212,7 +212,7 @@ def _figure(
 ) -> Difference:
     enough = min(counts) >= LEAST_BATCHES
     if name == "power_mean_w":
-        one, two = np.maximum(one, 0.0), np.maximum(two, 0.0)  # what flows back counts as nothing
+        one, two = np.maximum(one, 0.0), np.maximum(two, 0.0)  # regenerated power counts as zero
     means = batch_means if name == "power_mean_w" else rms_batches
     values = [
         means(each, count if enough else 1) for each, count in zip((one, two), counts, strict=True)
@@ -221,13 +221,13 @@ def _figure(
 
 
 def batch_count(run: Columns) -> int:
-    """Batches of a run: of `BATCH_PERIODS` rolls, or of `LEAST_PERIODS` up to `LEAST_BATCHES`."""
+    """Number of batches in a run, each of `BATCH_PERIODS` or at least `LEAST_PERIODS` rolls."""
     roll_rad = run.get("true_roll_rad", run["roll_rad"])
     roll_rad = roll_rad[np.isfinite(roll_rad)]
     if not len(roll_rad):
         return 0
     roll_rad = roll_rad - roll_rad.mean()
-    # noise crosses zero often: a roll is from well to port to well to starboard
+    # noise crosses zero often: a roll is counted from well to port to well to starboard
     sides = np.sign(roll_rad[np.abs(roll_rad) > roll_rad.std() / 2])
     rolls = int(np.count_nonzero(np.diff(sides) > 0))
     least = min(rolls // LEAST_PERIODS, LEAST_BATCHES)

@@ -1,1 +1,1 @@
-"""The fault campaign: each row of the fault table, in lockstep and on a bus; docs/faults.md."""
+"""Fault campaign: each row of the fault table, in lockstep and on a bus; docs/faults.md."""

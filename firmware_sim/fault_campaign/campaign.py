@@ -1,4 +1,4 @@
-"""The campaign as a configuration: requirements, and the rows that show that they are met."""
+"""Configuration of the fault campaign: requirements, and the rows that verify them."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,11 +18,11 @@ from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.retuning import EstimateSettings
 
 LONG_S: Final = 300.0
-"""A row that is followed for longer takes more than a minute of CPU time in one sea."""
+"""Follow-up time in s above which a row takes more than a minute of CPU time per sea."""
 _PHASES: Final = 100
-"""Ticks in a second, the slowest cycle of a message."""
+"""Number of ticks in a second, the slowest message cycle."""
 _PHASE_STRIDE: Final = 37
-"""Ticks from one seed's fault to the next one's: prime to 100 and to 5."""
+"""Ticks from one seed's fault to the next one's: coprime to 100 and to 5."""
 
 
 def _fault_name(name: str) -> str:
@@ -36,16 +36,15 @@ FaultName = Annotated[str, AfterValidator(_fault_name)]
 CountsFrom = Literal["roll_rad", "roll_rate_rad_s", "level_m", "pressure_pa", "over_roll_rad"]
 StatusFlag = Literal["degraded", "saturated"]
 Reaction = Literal["stop", "ramp", "halve", "alarm", "note", "none", "refuse", "drive"]
-"""What a row may ask for.
+"""Required reaction of a row.
 
-Zero pressure at once, latched; a ramp to zero, latched; half the pressure with an alarm; an alarm
-while control goes on; a frame discarded or counted; nothing, as of a sound ship; no arming; a drive
-or valve that stops by itself.
-"""
+In order: zero pressure at once, latched; ramp to zero, latched; half pressure with an alarm; alarm
+while control continues; frame discarded or counted; none, as for a sound ship; arming refused;
+drive or valve that stops by itself."""
 
 
 class Requirement(Section):
-    """A row of the fault table that is asked for, or a line of the trials of an earlier version."""
+    """Required row of the fault table, or a line of the trials of an earlier version."""
 
     id: str
     fault: str
@@ -53,22 +52,22 @@ class Requirement(Section):
     within: str = ""
     reaction: str = ""
     elsewhere: str = ""
-    """What shows it, where no row of the campaign does."""
+    """Test or document that verifies it, where no row of the campaign does."""
 
 
 class Setup(Section):
-    """A ship in a sea with one of the scenario's controllers.
+    """Ship in a sea with one of the scenario's controllers.
 
     Attributes
     ----------
     actual_ship : dict of str to float
-        What the ship is from the moment of the fault on, keys as in a scenario.
+        Parameters of the ship from the fault on, with the keys of a scenario.
     redundancy : Redundancy
-        What the ship has beside what the scenario's vessel has.
+        Redundancy of the ship in addition to that of the scenario's vessel.
     displacement_n, least_gm_m : float, optional
-        Of the ship, instead of the vessel's.
+        Values that replace the vessel's.
     sea_estimate : EstimateSettings, optional
-        Instead of the controller's.
+        Settings that replace the controller's.
     commissioned : bool
         Whether the controller may be armed.
     """
@@ -84,7 +83,7 @@ class Setup(Section):
 
     @property
     def equipped(self) -> Scenario:
-        """The scenario with the setup's changes in it."""
+        """Scenario with the setup's changes applied."""
         scenario, own = self.scenario, self.scenario.vessel
         weight_n = self.displacement_n or own.ship.displacement_n
         vessel = own.model_copy(
@@ -104,11 +103,11 @@ class Setup(Section):
 
     @property
     def config(self) -> ControllerConfig:
-        """The controller's."""
+        """Configuration of the controller."""
         return self.equipped.controllers[self.controller]
 
     def scenario_of(self, fault_s: float) -> Scenario:
-        """The scenario with what the ship is from the fault on."""
+        """Scenario with the ship's parameters that apply from the fault on."""
         scenario = self.equipped
         if not self.actual_ship:
             return scenario
@@ -125,20 +124,21 @@ class Setup(Section):
 
 
 class Trial(Section):
-    """What is done to a ship under way.
+    """Stimulus for a ship under way.
 
     Attributes
     ----------
     setup : str
-        One of `Campaign.setups`.
+        Name of a setup in `Campaign.setups`.
     inject : tuple
         Faults; their times count from `Campaign.fault_at_s`.
     operator : tuple of TimedAction
-        What the operator does besides; times after the fault began.
+        Additional actions of the operator; their times count from the fault.
     from_start : bool
-        The faults are there before anybody arms. Times count from when the controller is in charge.
+        Whether the faults exist before arming; times then count from the controller's being in
+        charge.
     followed_s : float
-        How long the bus is followed after the fault.
+        Time for which the bus is followed after the fault.
     """
 
     setup: str = "pump"
@@ -149,28 +149,28 @@ class Trial(Section):
 
     @property
     def on_bus(self) -> bool:
-        """Whether what it does is seen on the bus at once."""
+        """Whether the stimulus is visible on the bus at once."""
         return bool(self.inject or self.operator)
 
     @property
     def hardwired_stop(self) -> bool:
-        """Whether the pressure can only be taken away by the hard-wired stop."""
+        """Whether only the hard-wired stop can remove the pressure."""
         return any(fault.beyond_commands for fault in self.inject)
 
 
 class Expectation(Section):
-    """What is to come of a trial.
+    """Expected outcome of a trial.
 
     Attributes
     ----------
     codes : tuple of str
-        Faults that it may be called.
+        Accepted fault codes.
     also : tuple of str
-        Faults that have to be alarms as well, and flags that CTRL_STATUS has to set.
+        Faults that must also be alarms, and flags that CTRL_STATUS must set.
     may_end : tuple of str
-        Faults in which a run may end later than `Trial.followed_s`, in the minutes of the roll.
+        Faults that may end a run after `Trial.followed_s`, while the roll is compared.
     unheard : bool
-        The fault keeps the controller's frames from the bus: what they say is not judged.
+        Whether the fault keeps the controller's frames off the bus, so that they are not judged.
     """
 
     reaction: Reaction
@@ -181,25 +181,26 @@ class Expectation(Section):
 
     @property
     def latched(self) -> bool:
-        """Whether the fault has to end control for good."""
+        """Whether the fault must end control for good."""
         return self.reaction in ("stop", "ramp")
 
 
 class Limit(Section):
-    """When the expectation has to be met at the latest, and how much the ship may roll.
+    """Deadlines of an expectation, and the largest permitted roll.
 
     Attributes
     ----------
     found_ms, halved_ms, zero_ms : float, optional
-        From the fault on. `firmware_sim.fault_campaign.verdict` has what holds without the last.
+        Deadlines from the fault on; without `zero_ms`, `firmware_sim.fault_campaign.verdict` has
+        the limit.
     counts_from : dict of str to float
-        Times count from when what the controller received of this is first so far from the truth:
-        before, the fault does not show. Or from when the pump's pressure is so far from its
-        set-point and stays so, or from when the ship first rolls so far (`over_roll_rad`).
+        Deviation from which times count, because the fault is invisible before it: the first
+        deviation of a received value from the truth; a lasting deviation of the pump's pressure
+        from its set-point; or the first roll of this size (`over_roll_rad`).
     roll : float
-        Variance of the roll over the passive ship's.
+        Largest ratio of the roll variance to that of the passive ship.
     roll_window_s : float, optional
-        Over which the roll is compared, instead of what all rows have.
+        Time over which the roll is compared, instead of the one for all rows.
     """
 
     found_ms: Positive | None = None
@@ -211,7 +212,7 @@ class Limit(Section):
 
 
 class Row(Section):
-    """A fault, what is to come of it, and within which limits."""
+    """Fault with its expected outcome and its limits."""
 
     id: Annotated[str, Field(pattern=r"^[a-z0-9-]+$")]
     meets: Annotated[tuple[str, ...], Field(min_length=1)]
@@ -234,22 +235,21 @@ class Row(Section):
 
     @property
     def long(self) -> bool:
-        """Whether it takes so long that it is run in many seas, or by its name, only."""
+        """Whether the row is so slow that it is run only in many seas, or by its name."""
         return self.fault.followed_s > LONG_S
 
 
 class LiveRow(Section):
-    """A fault that needs processes and a CAN interface.
+    """Fault that needs processes and a CAN interface.
 
     Attributes
     ----------
     does : str
-        Name in `firmware_sim.fault_campaign.live.ACTIONS`; empty where it is shown
-        elsewhere.
+        Name in `firmware_sim.fault_campaign.live.ACTIONS`; empty where it is verified elsewhere.
     judged : str
-        Whether the controller's fault or the drive's end counts.
+        Whether the controller's fault or the drive's stop is judged.
     elsewhere : str
-        What shows it, where the campaign does not run it.
+        Test or document that verifies it, where the campaign does not run it.
     """
 
     id: Annotated[str, Field(pattern=r"^live-[a-z0-9-]+$")]
@@ -266,9 +266,9 @@ class Campaign(Section):
     Attributes
     ----------
     fault_s : float
-        When the faults begin, or up to a second later: see `fault_at_s`.
+        Earliest start of the faults; they begin up to a second later, see `fault_at_s`.
     arm_s : float
-        When the operator arms.
+        Time at which the operator arms.
     """
 
     fault_s: FaultTime
@@ -320,15 +320,15 @@ class Campaign(Section):
         return self
 
     def fault_at_s(self, seed: int) -> float:
-        """When the faults begin in the sea of a seed: in each at another phase of the messages.
+        """Start of the faults in the sea of a seed, at a different phase of the messages in each.
 
-        Any hundred seeds in a row have each of the hundred ticks of the slowest cycle, a second;
-        any five have each tick of a cycle of 50 ms.
+        Any hundred consecutive seeds cover each of the hundred ticks of the slowest cycle (1 s);
+        any five cover each tick of a 50 ms cycle.
         """
         return self.fault_s + TICK_S * (_PHASE_STRIDE * seed % _PHASES)
 
     def chosen(self, names: Sequence[str]) -> tuple[list[Row], list[LiveRow]]:
-        """Rows whose name, or what they meet, begins with one of the names; all without any."""
+        """Rows whose name, or requirement, begins with one of the names; all rows without names."""
 
         def matches(row: Row | LiveRow) -> bool:
             return any(_begins(own, names) for own in (row.id, *row.meets))
@@ -338,7 +338,7 @@ class Campaign(Section):
         ]
 
     def asked_by(self, row: Row | LiveRow) -> str:
-        """What a row meets, in words."""
+        """Text of the requirement that a row meets."""
         texts = []
         for each in self.requirements:
             if each.id in row.meets:
@@ -347,7 +347,7 @@ class Campaign(Section):
         return " | ".join(texts)
 
     def shown_elsewhere(self, names: Sequence[str]) -> list[Requirement]:
-        """Requirements of these names, or all, that tests show and no row does."""
+        """Requirements with these names, or all, that tests verify and no row does."""
         return [each for each in self.requirements if each.elsewhere and _begins(each.id, names)]
 
 

@@ -1,4 +1,4 @@
-"""The live rows: faults of processes and of a CAN interface, with the deployed programs."""
+"""Live rows: faults of processes and of a CAN interface, with the deployed programs."""
 
 import math
 import signal
@@ -35,53 +35,53 @@ from utank_hil.configuration.shipped import CONFIGS
 STORM: Final = CONFIGS / "scenarios" / "storm.yaml"
 CONTROLLER: Final = CONFIGS / "controllers" / "gpc.yaml"
 START_S: Final = 180.0
-"""Longest time to being in charge: in an emulated kernel imports take long."""
+"""Longest time in s until the controller is in charge: imports are slow in an emulated kernel."""
 STARTS: Final = 3
-"""Most starts: a machine that holds processes up may end a run before its fault is tried. Nothing
-else has it started anew."""
+"""Most starts: a machine that delays processes may end a run before its fault is injected, the only
+cause of a new start."""
 ATTEMPTS: Final = 3
-"""Most attempts at a row: such a machine may spoil what is judged, too."""
+"""Most attempts at a row: such a machine may also spoil what is judged."""
 DRIVEN_PA: Final = 5e3
-"""Pressure from which the pump works: a tenth of the limit of the storm's ship."""
+"""Pressure above which the pump works: a tenth of the limit of the storm's ship."""
 RESTED_S: Final = 1.0
-"""For how long a program is stopped: no timeout of the other side is longer, but the panel's."""
+"""Pause of a stopped program in s: longer than every timeout of the other side but the panel's."""
 WATCHED_S: Final = 3.0
-"""For how long the bus is watched after the fault: two seconds longer."""
+"""Time in s for which the bus is watched after the fault: two seconds more than the pause."""
 _RECENT_S: Final = 0.5
-"""Greatest age of the last CTRL_STATUS of a controller that is in charge: five cycles."""
+"""Largest age in s of the last CTRL_STATUS of a controller in charge: five cycles."""
 _LOOK_S: Final = 0.002
-"""Time between two looks: a fifth of the shortest cycle of a message."""
+"""Polling interval in s: a fifth of the shortest message cycle."""
 _EXTENDED_MASK: Final = 0x1FFFFFFF
 _BUS_OFF: Final = struct.pack("=IB3x8s", 0x20000040, 8, bytes(8))
-"""An error frame that says bus-off, as a kernel's driver hands it on."""
+"""Error frame that reports bus-off, in the form of a kernel driver."""
 
 
 Later = tuple[float, Callable[[], None]] | None
-"""A time in s after the fault, and what is to be done then."""
+"""Time in s after the fault, and the action to be done then."""
 
 
 class LiveError(Exception):
-    """The programs did not come to where a fault can be tried."""
+    """Error for programs that did not reach the state in which a fault can be injected."""
 
 
 class LiveBench:
-    """Ship and controller as processes on an interface, and a listener.
+    """Ship and controller as processes on an interface, with a listener.
 
     Parameters
     ----------
     bus : str
         SocketCAN interface.
     folder : Path
-        For the controller's files.
+        Folder for the controller's files.
 
     Attributes
     ----------
     start : int
-        How many benches it took, this one included.
+        Ordinal number of this bench among the starts.
     """
 
     def __init__(self, bus: str, folder: Path) -> None:
-        SocketCanPort(bus).close()  # says what is missing, and what to do
+        SocketCanPort(bus).close()  # fails with the reason and the remedy
         self.bus = bus
         catalogue = load_catalogue()
         self._status = catalogue.receiver(ControllerStatus)
@@ -92,7 +92,7 @@ class LiveBench:
             catalogue.codec(SensorMotion).can_id: self.log.motions,
         }
         heard = (self._status.can_id, self._drive.can_id, *self._streams)
-        # not a port of ours, since it does not tell the kernel's time of a frame
+        # python-can directly, because our port drops the kernel's time of a frame
         self._bus = SocketcanBus(
             bus,
             can_filters=[{"can_id": each, "can_mask": _EXTENDED_MASK, "extended": True}
@@ -118,7 +118,7 @@ class LiveBench:
             )
 
     def close(self) -> None:
-        """End both."""
+        """End both processes."""
         for process in (self.controller, self.ship):
             if process.poll() is None:
                 process.send_signal(signal.SIGCONT)
@@ -127,7 +127,7 @@ class LiveBench:
         self._bus.shutdown()
 
     def look(self) -> None:
-        """Hear what came."""
+        """Read the pending frames."""
         time.sleep(_LOOK_S)
         for message in self._heard():
             time_s = message.timestamp
@@ -145,20 +145,14 @@ class LiveBench:
                 self.log.states.append((time_s, drive.state))
 
     def _heard(self) -> Iterator[can.Message]:
-        """Messages since the last call; none while the interface is down."""
+        """Yield messages since the last call; none while the interface is down."""
         with suppress(can.CanError, OSError):
             while (message := self._bus.recv(0)) is not None:
                 if not message.is_error_frame:
                     yield message
 
     def wait_in_charge(self) -> None:
-        """Wait until the pump gives pressure.
-
-        Raises
-        ------
-        LiveError
-            If it does not.
-        """
+        """Wait until the pump gives pressure; raise `LiveError` if it does not."""
         end_s = time.monotonic() + START_S
         while self.mode is not Mode.ACTIVE or abs(self.pressure_pa) < DRIVEN_PA:
             for name, process in (("firmware-sim", self.ship), ("utank-hil", self.controller)):
@@ -176,11 +170,11 @@ class LiveBench:
 
     @property
     def in_charge(self) -> bool:
-        """Whether the controller says so at present."""
+        """Whether the controller currently reports that it is in charge."""
         return self.mode is Mode.ACTIVE and time.time() - self._status_s < _RECENT_S
 
     def watch(self, later: Later = None) -> float:
-        """Look on; the time at the end."""
+        """Watch the bus after the fault; return the time at the end."""
         began_s = time.monotonic()
         while (since_s := time.monotonic() - began_s) < WATCHED_S:
             self.look()
@@ -194,7 +188,7 @@ Act = Callable[[LiveBench], Later]
 
 
 def _sent(program: Literal["controller", "ship"], number: int, *, rested: bool = False) -> Act:
-    """Send a signal to a program; `rested`: and SIGCONT when the other side has long noticed."""
+    """Return an action that sends a signal; `rested` adds SIGCONT after the timeouts."""
 
     def act(bench: LiveBench) -> Later:
         process = bench.controller if program == "controller" else bench.ship
@@ -205,7 +199,7 @@ def _sent(program: Literal["controller", "ship"], number: int, *, rested: bool =
 
 
 def bus_off(bench: LiveBench) -> Later:
-    """Send an error frame that says bus-off."""
+    """Send an error frame that reports bus-off."""
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as raw:
         raw.bind((bench.bus,))
         raw.send(_BUS_OFF)
@@ -224,17 +218,17 @@ ACTIONS: Final[dict[str, tuple[Act, Stream | None]]] = {
     "ship_stopped_for_a_second": (_sent("ship", signal.SIGSTOP, rested=True), "motions"),
     "bus_off": (bus_off, None),
 }  # fmt: skip
-"""What is done, and the stream that ends with it."""
+"""Actions by name, and the stream that each ends."""
 
 
 @contextmanager
 def _in_charge(bus: str) -> Iterator[LiveBench]:
-    """A bench whose controller is in charge, if need be not the first one.
+    """Yield a bench with its controller in charge, after several starts if needed.
 
     Raises
     ------
     LiveError
-        If none came so far.
+        If no start succeeded.
     """
     for start in range(1, STARTS + 1):
         with (
@@ -254,12 +248,12 @@ def _in_charge(bus: str) -> Iterator[LiveBench]:
 
 
 def run_live(row: LiveRow, bus: str, requirement: str) -> dict[str, Any]:
-    """Do a live row and judge it; as `Result.as_json` gives it.
+    """Run and judge a live row; return the form of `Result.as_json`.
 
     Raises
     ------
     OSError
-        If the interface can't be used.
+        If the interface cannot be used.
     """
     for attempt in range(1, ATTEMPTS + 1):
         told, held_up_ms = _attempt(row, bus)
@@ -281,7 +275,7 @@ def run_live(row: LiveRow, bus: str, requirement: str) -> dict[str, Any]:
 
 
 def _attempt(row: LiveRow, bus: str) -> tuple[dict[str, Any], float]:
-    """Do a live row once: what came of it, and the ms for which processes were held up."""
+    """Run a live row once; return its result, and the ms for which processes were delayed."""
     problems = []
     times = LiveTimes(None, None, 0.0)
     code = ""

@@ -1,7 +1,7 @@
-"""What was heard on a live bus, by the kernel's time of each frame, and what follows from it.
+"""Log of a live bus by the kernel's time of each frame, and the times that follow from it.
 
-Who listens may be held up by the machine; the times of the frames are not. The streams of the
-others show whether one of them was held up: what came too late meanwhile can't be judged.
+The machine may delay the listener, but not the times of the frames. The streams of ship and
+controller show whether one of them was delayed, so that late reactions cannot be judged.
 """
 
 import math
@@ -12,17 +12,18 @@ from typing import Final, Literal
 from utank_hil.canbus import DriveState, Mode
 
 Stream = Literal["commands", "motions"]
-"""Of the controller, and of the ship's side."""
+"""Stream of the controller's commands, or of the ship's motions."""
 CYCLES_S: Final[dict[Stream, float]] = {"commands": 0.02, "motions": 0.01}
 HELD_UP_S: Final = 0.03
-"""As long as a node may be late before what is judged by it can't be."""
+"""Delay of a node in s above which reactions that depend on it cannot be judged. Chosen; no
+study."""
 SIGNALLED_S: Final = 0.005
-"""After a signal was sent, what the process had sent may still be on its way."""
+"""Time in s after a signal in which frames sent before it may still arrive. Chosen; no study."""
 
 
 @dataclass(slots=True)
 class LiveLog:
-    """Times of frames, and what they said; in s of the system's clock."""
+    """Times of frames in s of the system's clock, and their content."""
 
     commands: list[float] = field(default_factory=list)
     motions: list[float] = field(default_factory=list)
@@ -31,7 +32,7 @@ class LiveLog:
 
     @property
     def held_up_s(self) -> float:
-        """For which the machine held up one of the two, at a time."""
+        """Longest gap in s of either stream beyond its cycle."""
         return max(
             _longest_gap_s(self.stream(name), -math.inf, math.inf) - cycle_s
             for name, cycle_s in CYCLES_S.items()
@@ -44,14 +45,14 @@ class LiveLog:
 
 @dataclass(frozen=True, slots=True)
 class LiveTimes:
-    """What came of a fault.
+    """Reaction times of a fault.
 
     Attributes
     ----------
     found_ms, zero_ms : float or None
-        From the fault to the controller's FAULT, and to a drive that is not enabled any more.
+        Times from the fault to the controller's FAULT, and to the drive's being disabled.
     held_up_ms : float
-        For which the machine held up, at a time, who had to find it or to act.
+        Longest delay by the machine of the side that had to detect the fault or to act.
     """
 
     found_ms: float | None
@@ -67,16 +68,16 @@ def times_of(
     silences: Stream | None,
     judged: Literal["found", "zero"],
 ) -> LiveTimes:
-    """Times from a fault on.
+    """Return the times from a fault on.
 
     Parameters
     ----------
     fault_s, end_s : float
-        When it was made, and to when the bus was listened to.
+        Time of the fault, and end of listening.
     silences : Stream, optional
-        That it ends: times count from the last frame of it.
+        Stream that the fault ends: times count from its last frame.
     judged : str
-        Which of the times matters.
+        Time that is judged.
     """
     begin_s = fault_s
     if silences is not None:
@@ -101,5 +102,5 @@ def times_of(
 
 
 def _longest_gap_s(times_s: list[float], begin_s: float, end_s: float) -> float:
-    """Between frames of a stream that touch a span of time."""
+    """Longest gap in s between frames of a stream that overlaps a span of time."""
     return max((b - a for a, b in pairwise(times_s) if b > begin_s and a < end_s), default=0.0)

@@ -1,4 +1,4 @@
-"""A campaign's results as JSON and as a table."""
+"""Results of a campaign as JSON and as a table."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -16,16 +16,16 @@ def as_json(
     not_run: Mapping[str, str],
     about: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Everything, for `json.dumps`.
+    """Return all results for `json.dumps`.
 
     Parameters
     ----------
     on_bus : sequence of mapping
-        Live rows, as `run_live` gives them.
+        Live rows in the form of `run_live`.
     not_run : mapping of str to str
-        Rows that were not run, and why.
+        Rows that were not run, with the reason.
     about : mapping
-        Where it comes from.
+        Provenance.
     """
     rows = [*(result.as_json() for result in results), *on_bus]
     return {
@@ -38,12 +38,12 @@ def as_json(
 
 
 def milliseconds(value: float | None) -> str:
-    """A time for a table; nothing where there is none."""
+    """Time for a table; empty where there is none."""
     return "" if value is None else f"{value:.0f}"
 
 
 def table(results: Sequence[Result]) -> Table:
-    """One line a row."""
+    """Table with one line per row."""
     drawn = Table(title="Faults")
     for heading in ("row", "reaction"):
         drawn.add_column(heading, no_wrap=True)

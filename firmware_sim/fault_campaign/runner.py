@@ -1,4 +1,4 @@
-"""Runs a campaign in lockstep on all cores."""
+"""Runner of a campaign in lockstep on all cores."""
 
 import multiprocessing
 import os
@@ -20,28 +20,28 @@ from utank_hil.control import BuiltLaw
 
 POLL_S: Final = 0.1
 ROWS_A_TASK: Final = 30
-"""As many rows go on from one ship under way: few enough for the cores to end together."""
+"""Most rows that share one ship under way: few enough for the cores to end together."""
 
 Progress = Callable[[int], None]
-"""Takes the number of trials that are done."""
+"""Callback that takes the number of completed trials."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Shared:
-    """What the processes of the pool inherit."""
+    """Values that the pool's processes inherit."""
 
     campaign: Campaign
     window: Window
     recorded: bool
     done: "Synchronized[int]"
-    stop: Any  # a plain value without a lock
+    stop: Any  # plain value without a lock
 
 
 _laws: dict[str, BuiltLaw] = {}
 
 
 def _do(setup_name: str, seed: int, rows: list[Row], first: bool) -> list[Outcome]:
-    """Rows of one setup in one sea, in a process of the pool."""
+    """Run rows of one setup in one sea, in a process of the pool."""
     ours: _Shared = shared()
     setup = ours.campaign.setups[setup_name]
     if setup_name not in _laws:
@@ -80,18 +80,19 @@ def run_rows(
     Parameters
     ----------
     progress : callable
-        Called several times a second.
+        Function called several times a second.
     stopped : callable
-        Whether to end early.
+        Function that returns whether to end early.
     recorded : bool
-        Whether the outcomes of the first seed hold recordings.
+        Whether the outcomes of the first seed contain recordings.
     workers : int, optional
-        Processes; by default as many as there are cores for this one.
+        Number of processes; by default the number of cores available.
 
     Returns
     -------
     dict of str to list of Outcome
-        By row, in the order of the seeds; less where it was ended early, or a process was killed.
+        Outcomes by row in the order of the seeds; incomplete after an early end or a killed
+        process.
     """
     context = multiprocessing.get_context("spawn")
     done, stop = context.Value("i", 0), context.Value("b", 0, lock=False)
@@ -116,7 +117,7 @@ def run_rows(
                 each.done() and not each.cancelled() and each.exception() for each in futures
             )
             stop.value = stopped() or failed
-            if stop.value:  # a task that begins all the same first builds its setup
+            if stop.value:  # a task that has begun still builds its setup first
                 for future in futures:
                     future.cancel()
             progress(done.value)

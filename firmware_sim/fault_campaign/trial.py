@@ -1,7 +1,7 @@
-"""One row in one sea: a ship under way, the fault, what came of it.
+"""Trial of one row in one sea: a ship under way, the fault, and the outcome.
 
-All rows of a seed begin with the same ship in the same waves. It is simulated up to the fault
-once, and each row goes on from there in a copy of the process.
+All rows of a seed share the ship and waves up to the fault. This part is simulated once, and each
+row continues in a copy of the process.
 """
 
 import math
@@ -36,30 +36,30 @@ T = TypeVar("T")
 
 SECOND_NS: Final = 1_000_000_000
 SAMPLE_TICKS: Final = 5
-"""Ticks from sample to sample of a passive ship's roll, and of a recording: 50 ms."""
+"""Ticks between samples of a passive ship's roll and of a recording: 50 ms."""
 SAMPLE_NS: Final = SAMPLE_TICKS * TICK_NS
 COLUMNS: Final = (*SIGNALS, *TRUTH[1:])
 _LOOK_S: Final = 0.1
-"""How often Ctrl-C is looked for while a copy works."""
+"""Interval in s at which Ctrl-C is checked while a copy works."""
 REARMED_S: Final = 20.0
-"""For so long after the fault the first sea of a campaign sees whether anything arms again."""
+"""Time in s after the fault for which the campaign's first sea checks that nothing arms again."""
 COMMANDS_NS: Final = 40_000_000
 """Two cycles of PUMP_CMD."""
 FLAGS: Final = get_args(StatusFlag)
 RECORDED_S: Final = 10.0
-"""How long before the fault a recording begins."""
+"""Time in s before the fault at which a recording begins. Chosen; no study."""
 
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Over which time after the fault the roll is compared with the passive ship's.
+    """Time after the fault over which the roll is compared with the passive ship's.
 
     Attributes
     ----------
     stopped_s : float
-        Of rows that end with the pump off: from then on the ship alone is integrated.
+        Time for rows that end with the pump off, after which the ship alone is integrated.
     running_s : float
-        Of rows whose controller stays in charge.
+        Time for rows whose controller stays in charge.
     """
 
     stopped_s: float = 600.0
@@ -68,17 +68,16 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """When something first happened, in ms from when the row counts; None where it did not.
+    """First times of events in ms from the row's time zero; None where there is none.
 
     Attributes
     ----------
     found, halved, noted, alarm : float or None
-        As in `Watch.first_ns`.
+        Events of `Watch.first_ns`.
     zero : float or None
-        When drive or valve stopped for good.
+        Final stop of drive or valve.
     commanded : float
-        When the controller last sent a pressure other than zero, at the latest when the bus was
-        followed last.
+        Last command with a pressure other than zero.
     """
 
     found: float | None = None
@@ -91,7 +90,7 @@ class Times:
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """What others on the bus could know of the controller since the fault.
+    """Information about the controller that was on the bus since the fault.
 
     Attributes
     ----------
@@ -100,7 +99,7 @@ class Said:
     alarms : tuple of str
         Faults in ALARM.
     flags : tuple of str
-        Of CTRL_STATUS that were set.
+        Flags that CTRL_STATUS has set.
     """
 
     status: str = ""
@@ -110,16 +109,16 @@ class Said:
 
 @dataclass(frozen=True, slots=True)
 class Excess:
-    """Commands beyond what is allowed.
+    """Commands beyond the permitted range.
 
     Attributes
     ----------
     beyond_share_pa : float
-        How far the drive's set-point went beyond half the pressure while the pressure was halved.
+        Largest excess of the drive's set-point over the halved pressure limit.
     refused : int
-        Commands that the drive refused.
+        Number of commands that the drive refused.
     steepest_pa_s : float
-        Greatest rate of the commands, but those that cut.
+        Largest rate of the commands, cuts excepted.
     """
 
     beyond_share_pa: float = 0.0
@@ -129,7 +128,7 @@ class Excess:
 
 @dataclass(frozen=True, slots=True)
 class Rolls:
-    """Variances of the roll in rad^2, of the ship and of the passive one, over a window."""
+    """Roll variances in rad^2 of the ship and of the passive one, over a window."""
 
     variance: float = math.nan
     passive_variance: float = math.nan
@@ -138,18 +137,18 @@ class Rolls:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of a row in one sea.
+    """Outcome of a row in one sea.
 
     Attributes
     ----------
     mode, code : str
-        In the end, and the fault that was latched or shown.
+        Final mode, and the fault that was latched or shown.
     wire : str
-        The first frame that the fault changed; empty if none differs.
+        First frame that the fault changed; empty if none differs.
     error : str
-        Of the program.
+        Error of the program.
     rows : ndarray or None
-        Recording, columns `COLUMNS`, if it was asked for.
+        Recording with columns `COLUMNS`, if requested.
     """
 
     row: str
@@ -168,21 +167,21 @@ class Outcome:
 
 
 class Recorder:
-    """Telemetry with the truth beside it."""
+    """Telemetry sink that adds the truth."""
 
     def __init__(self) -> None:
         self.bench: FaultyBench | None = None
         self.rows: list[FloatArray] = []
 
     def __call__(self, row: FloatArray) -> None:
-        """Take a row of the controller's."""
+        """Store a row of the controller."""
         if self.bench is not None:
             self.rows.append(np.array([*row, *true_values(self.bench.ship.plant)]))
 
 
 @dataclass(slots=True)
 class Underway:
-    """A ship under way, up to the fault."""
+    """Ship under way, up to the fault."""
 
     bench: FaultyBench
     log: BusLog
@@ -196,13 +195,13 @@ class Sea:
     Parameters
     ----------
     law : BuiltLaw
-        Of the setup's controller.
+        Law of the setup's controller.
     recorded : bool
-        Whether the outcomes hold recordings.
+        Whether the outcomes contain recordings.
     patient : bool
-        Whether the bench goes on for `REARMED_S` where the pump is off.
+        Whether the bench runs on for `REARMED_S` after the pump is off.
     stopped : callable
-        Whether to end early, with an `InterruptedError`.
+        Function that returns whether to end early, with an `InterruptedError`.
     """
 
     def __init__(
@@ -248,7 +247,7 @@ class Sea:
         return Underway(bench, log, recorder)
 
     def prepare(self, rows: list[Row]) -> None:
-        """Make what the rows are compared with: the bus without a fault, the passive ship."""
+        """Simulate the references of the rows: the bus without a fault, and the passive ship."""
         followed_s = max((row.fault.followed_s for row in rows if row.fault.on_bus), default=0.0)
         end_ns = self._fault_ns + round(followed_s * SECOND_NS)
         log = self._underway.log
@@ -277,9 +276,9 @@ class Sea:
     def _passive_roll(
         self, seconds: float, *, enabled: bool, opening: float | None = None
     ) -> FloatArray:
-        """Roll of the ship that was passive all along, its pump enabled at zero pressure or off.
+        """Roll of a ship passive from the start, its pump enabled at zero pressure or off.
 
-        Its valve is where it goes without power, or where it stuck: `opening`.
+        The valve is in its fail position, or stuck at `opening`.
         """
         scenario = self._setup.scenario_of(self._fault_s)
         plant = build_ship_side(scenario, self._seed, ()).plant
@@ -295,14 +294,14 @@ class Sea:
         return np.array(rolls)
 
     def outcome(self, row: Row) -> Outcome:
-        """Do a row, in a copy of this process."""
+        """Run a row in a copy of this process."""
         reference = self._underway.reference
         if row.fault.operator and row.fault.inject:
             reference = in_a_copy(lambda: self._operated(row), self._stopped)
         return in_a_copy(lambda: self._outcome(row, reference), self._stopped)
 
     def _operated(self, row: Row) -> list[Heard]:
-        """The bus without the row's faults, but with what the operator does."""
+        """Bus log without the row's faults, but with the operator's actions."""
         underway = self._start() if row.fault.from_start else self._underway
         bench = underway.bench
         bench.join([Watch(bench, row)])
@@ -333,7 +332,7 @@ class Sea:
         window_s = self._window.stopped_s if stopped else self._window.running_s
         window_s = max(row.limit.roll_window_s or window_s, (alone_ns - start_ns) / SECOND_NS)
         end_ns = start_ns + round(window_s * SECOND_NS)
-        if stopped:  # nothing is left to act on the ship: it is integrated alone
+        if stopped:  # nothing acts on the ship any more: it is integrated alone
             for time_ns in range(alone_ns, end_ns, TICK_NS):
                 bench.ship.plant.advance(time_ns)
                 watch.rolls.add(bench.ship.plant.roll_rad)
@@ -358,14 +357,14 @@ class Sea:
         )
 
     def _recorded_rows(self, underway: Underway, start_ns: int) -> FloatArray | None:
-        """Rows from `RECORDED_S` before the fault on, if they were asked for."""
+        """Rows from `RECORDED_S` before the fault on, if requested."""
         if not self._recorded:
             return None
         first_s = start_ns / SECOND_NS - RECORDED_S
         return np.array([each for each in underway.recorder.rows if each[0] >= first_s])
 
     def _passive_beside(self, bench: FaultyBench, seconds: float, stopped: bool) -> FloatArray:
-        """Roll of the passive ship, whose pump and valve are as those of a bench in the end."""
+        """Roll of the passive ship with pump and valve in the final state of a bench."""
         enabled = self._pump_enabled(bench)
         valve, own = bench.ship.valve, self._setup.equipped.vessel.valve
         if stopped and valve is not None and own is not None and valve.opening != own.fail_opening:
@@ -373,14 +372,14 @@ class Sea:
         return self._passive[enabled]
 
     def _degraded_most(self, bench: FaultyBench) -> tuple[float, int]:
-        """What is allowed while the pressure is halved, and the time to come down to it."""
+        """Permitted pressure in Pa while it is halved, and the time in ns to ramp down to it."""
         monitors, limits = bench.node.safety.monitors, self._setup.config.limits
         share = 1.0 if monitors is None else monitors.thresholds.degraded_share
         ramp_s = (1 - share) * limits.pressure_pa / limits.rate_pa_s
         return share * limits.pressure_pa, round(ramp_s * SECOND_NS) + COMMANDS_NS
 
     def _stopped_at(self, bench: FaultyBench) -> bool:
-        """Whether nothing is in charge of the water any more."""
+        """Whether nothing controls the water any more."""
         return not self._pump_enabled(bench) and bench.node.mode is not Mode.ACTIVE
 
     def _pump_enabled(self, bench: FaultyBench) -> bool:
@@ -388,7 +387,7 @@ class Sea:
 
 
 def times_of(row: Row, watch: Watch, log: BusLog, start_ns: int) -> Times:
-    """Times of a row whose fault began at `start_ns`; what is found before it counts is in time."""
+    """Times of a row whose fault began at `start_ns`; earlier detection counts as in time."""
     begin_ns = start_ns
     if row.fault.from_start:
         begin_ns = watch.first_ns.get("active", start_ns)
@@ -423,7 +422,7 @@ def _said(log: BusLog, start_ns: int) -> Said:
 def write_recordings(
     folder: Path, outcomes: Mapping[str, Sequence[Outcome]], about: Mapping[str, Any]
 ) -> dict[str, Path]:
-    """Write a recording of each row that has one, and return the files by row."""
+    """Write the recordings of the rows that have one; return the files by row."""
     from utank_hil.telemetry.recording import write_recording
 
     files = {}
@@ -436,7 +435,7 @@ def write_recordings(
 
 
 def _words(there: Heard | None, here: Heard | None, start_ns: int) -> str:
-    """The first difference between two logs of the bus, for people."""
+    """Readable description of the first difference between two logs of the bus."""
 
     def frame(heard: Heard | None) -> str:
         if heard is None:
@@ -448,14 +447,14 @@ def _words(there: Heard | None, here: Heard | None, start_ns: int) -> str:
 
 
 def in_a_copy(work: Callable[[], T], stopped: Callable[[], bool] = lambda: False) -> T:
-    """Do something in a copy of this process and return what it returned.
+    """Run a function in a copy of this process and return its result.
 
     Raises
     ------
     InterruptedError
-        If `stopped` came before its end.
+        If `stopped` became true first.
     RuntimeError
-        With the traceback, if it failed.
+        If the function failed, with its traceback.
     """
     reading, writing = os.pipe()
     parent_pid = os.getpid()

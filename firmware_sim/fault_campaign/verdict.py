@@ -1,4 +1,4 @@
-"""Whether a row was passed: every seed in time, and the roll no worse than the passive ship's."""
+"""Verdict on a row: every seed in time, and the roll no worse than the passive ship's."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -12,11 +12,11 @@ from utank_hil.canbus import PumpCommand, load_catalogue
 from utank_hil.safety.faults import FAULTS, Reaction
 
 STOP_ZERO_MS: Final = 250.0
-"""Zero pressure after a stop was found, at the latest."""
+"""Latest zero pressure in ms after a stop was triggered."""
 CUT_MS: Final = 100.0
-"""Zero pressure after a fault that only ever stops: a ramp in its place would take longer."""
+"""Latest zero pressure in ms after a fault that always stops: a ramp instead would take longer."""
 RAMP_ZERO_MS: Final = 1040.0
-"""Zero pressure after a ramp began: a second, a cycle of the command and a tick of the drive."""
+"""Latest zero pressure in ms after a ramp began: 1 s, a command cycle and a tick of the drive."""
 STOPS: Final = {
     row.code.name
     for row in FAULTS
@@ -28,11 +28,11 @@ ONLY_STOPS: Final = {
     if all(condition.reaction is Reaction.STOP for condition in row.conditions)
 }
 RATE_SHARE: Final = 1.001
-"""Of the rate limit: what rounding in the limiter may add."""
+"""Share of the rate limit that commands may reach, with the limiter's rounding."""
 STATUS_MS: Final = 200.0
-"""Two cycles of CTRL_STATUS: what is so for less need not be in one."""
+"""Two cycles of CTRL_STATUS in ms: a shorter state need not appear in one."""
 ALARM_MS: Final = 100.0
-"""The list of alarms is renewed, and looked at, ten times a second."""
+"""Period in ms at which the list of alarms is updated and checked."""
 COMMAND: Final = load_catalogue().codec(PumpCommand).name
 _TIME_OF: Final[dict[Asked, str]] = {
     "stop": "found",
@@ -42,35 +42,35 @@ _TIME_OF: Final[dict[Asked, str]] = {
     "note": "noted",
     "drive": "zero",
 }
-"""Field of `Times` that says when a reaction began."""
+"""Field of `Times` with the begin of each reaction."""
 _GO_ON: Final = ("halve", "alarm", "note", "none")
-"""Reactions after which control goes on."""
+"""Reactions after which control continues."""
 
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """A row over all seeds; times are the worst of them, None where there is none.
+    """Verdict on a row over all seeds; times are the worst of them, None where there is none.
 
     Attributes
     ----------
     requirement : str
-        Its text.
+        Text of the requirement.
     found_ms, zero_ms : float or None
-        When the reaction asked for began, and when the drive's set-point was zero for good.
+        Begin of the required reaction, and final zero of the drive's set-point.
     codes : tuple of str
-        What the fault was called, over the seeds.
+        Fault codes over the seeds.
     wire : str
-        The first frame that the fault changed, in the first seed.
+        First frame that the fault changed, in the first seed.
     roll_ratio : float
-        Variance of the roll over that of the passive ship.
+        Roll variance divided by that of the passive ship.
     window_s : float
-        Over which it was taken.
+        Time over which `roll_ratio` was computed.
     problems : tuple of str
-        Why the row is not passed; empty if it is.
+        Reasons for failure; empty if passed.
     outcomes : tuple of Outcome
-        By seed.
+        Outcomes by seed.
     recording : str
-        File, if any.
+        File name of the recording, if any.
     """
 
     row: Row
@@ -88,11 +88,11 @@ class Result:
 
     @property
     def passed(self) -> bool:
-        """Whether it is."""
+        """Whether the row passed."""
         return not self.problems
 
     def as_json(self) -> dict[str, Any]:
-        """For `json.dumps`: None where a time does not apply."""
+        """Result for `json.dumps`: None where a time does not apply."""
         limit = self.row.limit
         return {
             "id": self.row.id,
@@ -117,7 +117,7 @@ class Result:
 
 
 def judged(campaign: Campaign, row: Row, outcomes: Sequence[Outcome]) -> Result:
-    """Judge a row by its outcomes, one a seed."""
+    """Judge a row by its outcomes, one per seed."""
     setup = campaign.setups[row.fault.setup]
     sound = [each for each in outcomes if not each.error]
     found = [_reaction_ms(row, each) for each in sound]
@@ -155,7 +155,7 @@ def _worst(times_ms: Sequence[float | None]) -> float | None:
 
 
 def _reaction_ms(row: Row, outcome: Outcome) -> float | None:
-    """When the reaction began that the row asks for; at once where arming was refused."""
+    """Begin of the required reaction in ms; zero where arming was refused."""
     if row.fault.from_start and row.expect.latched and not outcome.was_active:
         return 0.0 if outcome.code != "NONE" else None
     time = _TIME_OF.get(row.expect.reaction)
@@ -163,9 +163,9 @@ def _reaction_ms(row: Row, outcome: Outcome) -> float | None:
 
 
 def _zero_limit_ms(row: Row, outcome: Outcome) -> float | None:
-    """When the pressure is to be zero, of a row that latches; None where nothing was found.
+    """Deadline in ms for zero pressure of a latching row; None where nothing was found.
 
-    A stop that another fault's ramp comes before has the time that it would have had.
+    A stop after another fault's ramp has the ramp's deadline.
     """
     found_ms = _reaction_ms(row, outcome)
     if row.limit.zero_ms is not None or found_ms is None:
@@ -180,7 +180,7 @@ def _zero_limit_ms(row: Row, outcome: Outcome) -> float | None:
 
 
 def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
-    """What was not as it should be in one sea."""
+    """Yield the problems of one sea."""
     yield from _late(row, outcome)
     yield from _unsaid(row, outcome)
     yield from _ended_wrongly(row, outcome)
@@ -197,7 +197,7 @@ def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
 
 
 def _late(row: Row, outcome: Outcome) -> Iterator[str]:
-    """What came too late, or not at all."""
+    """Yield reactions that were late or missing."""
     times, limit = outcome.times, row.limit
     found_ms = _reaction_ms(row, outcome)
     if row.expect.reaction not in ("none", "refuse"):
@@ -219,7 +219,7 @@ def _late(row: Row, outcome: Outcome) -> Iterator[str]:
 
 
 def _ended_wrongly(row: Row, outcome: Outcome) -> Iterator[str]:
-    """What the controller was, did or called the fault in the end, and should not have."""
+    """Yield wrong final modes, actions and fault codes of the controller."""
     expect, times = row.expect, outcome.times
     if expect.latched and times.found is not None and outcome.mode != "FAULT":
         yield f"not latched: ended in {outcome.mode}"
@@ -240,7 +240,7 @@ def _ended_wrongly(row: Row, outcome: Outcome) -> Iterator[str]:
 
 
 def _named_in_time(row: Row, outcome: Outcome) -> bool:
-    """Whether an alarm had one of the row's names by the time that it was, or had to be, found."""
+    """Whether an alarm had one of the row's names by the time of detection, or its deadline."""
     if outcome.times.alarm is None:
         return False
     latest_ms = max(row.limit.found_ms or 0.0, _reaction_ms(row, outcome) or 0.0) + ALARM_MS
@@ -248,7 +248,7 @@ def _named_in_time(row: Row, outcome: Outcome) -> bool:
 
 
 def _unsaid(row: Row, outcome: Outcome) -> Iterator[str]:
-    """What was not said on the bus, or wrongly."""
+    """Yield missing or wrong information on the bus."""
     expect, said, times = row.expect, outcome.said, outcome.times
     if expect.unheard:
         return
@@ -261,7 +261,7 @@ def _unsaid(row: Row, outcome: Outcome) -> Iterator[str]:
     if expect.reaction in ("alarm", "halve") and expect.codes and not named:
         yield "no alarm with its name was sent"
     halved = row.limit.halved_ms is not None and times.halved is not None
-    if halved and times.found is not None:  # long enough before the latch to be in a status
+    if halved and times.found is not None:  # long enough before the latch to appear in a status
         halved = times.found - (times.halved or 0.0) > STATUS_MS
     degraded = ["degraded"] if halved or expect.reaction == "halve" else []
     for name in (*expect.also, *degraded):

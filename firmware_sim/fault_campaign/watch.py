@@ -1,4 +1,4 @@
-"""What happens on the bench after a fault: a node that looks on, and a log of the bus."""
+"""Observer of the bench after a fault: a passive node, and a log of the bus."""
 
 import math
 from collections.abc import Iterable
@@ -21,7 +21,7 @@ from utank_hil.nodes.controller import ControllerNode
 from utank_hil.safety.supervisor import Demand
 
 Heard = tuple[int, int, bytes]
-"""Time, identifier and data of a frame on the bus."""
+"""Time in ns, identifier and data of a frame on the bus."""
 
 _COMMANDS = load_catalogue().codec(PumpCommand)
 _STATUS = load_catalogue().codec(ControllerStatus)
@@ -29,23 +29,22 @@ _ALARMS = load_catalogue().codec(Alarm)
 ROUNDING_PA = 8.0
 """Resolution of the pressure in PUMP_CMD: each of two commands is rounded by half of it."""
 JITTER_S = 0.002
-"""How much later than its neighbour a command may reach a loaded bus of 250 kbit/s: four frames."""
+"""Extra delay of a command in s on a loaded bus of 250 kbit/s: four frames."""
 
 
 class BusLog:
-    """Every frame on the bus, and what the controller commanded and said.
+    """Log of every frame on the bus, and of the controller's commands and status.
 
     Attributes
     ----------
-    frames : list
     commands : list of tuple of (int, float, bool)
         Time, pressure, and whether the pressure was to be cut.
     shown : list of tuple of (int, ControllerStatus)
-        CTRL_STATUS.
+        CTRL_STATUS messages.
     told : list of tuple of (int, Fault)
-        Alarms that ALARM carried.
+        Faults sent in ALARM.
     node : ControllerNode
-        Whose commands they are; to be set before the first frame.
+        Sender of the commands; must be set before the first frame.
     """
 
     node: ControllerNode
@@ -57,7 +56,7 @@ class BusLog:
         self.told: list[tuple[int, Fault]] = []
 
     def __call__(self, time_ns: int, sender: str, frame: Frame) -> None:
-        """Take a frame."""
+        """Record a frame."""
         self.frames.append((time_ns, frame.can_id, frame.data))
         if sender != "controller" or len(frame.data) != FRAME_BYTES:
             return
@@ -76,12 +75,12 @@ class BusLog:
                 self.told.append((time_ns, alarm.code))
 
     def commanded_until(self, since_ns: int) -> int:
-        """When the last command was sent that was not zero."""
+        """Time in ns of the last command other than zero."""
         pressed = [time_ns for time_ns, pressure_pa, _ in self.commands if abs(pressure_pa) > 0]
         return max([since_ns, *pressed])
 
     def steepest_pa_s(self, since_ns: int) -> float:
-        """Greatest rate of the commands, but of a cut, rounding taken off."""
+        """Largest rate of the commands, cuts excepted, corrected for rounding."""
         commands = [each for each in self.commands if each[0] >= since_ns]
         return max(
             (
@@ -96,7 +95,7 @@ class BusLog:
 def first_difference(
     reference: list[Heard], heard: list[Heard], end_ns: int
 ) -> tuple[Heard | None, Heard | None] | None:
-    """The first frames, before a time, in which two logs differ; None if they don't."""
+    """First frames, before a time, in which two logs differ; None if there are none."""
     for there, here in zip_longest(reference, heard):
         if there != here:
             known = [each[0] for each in (there, here) if each is not None]
@@ -105,54 +104,54 @@ def first_difference(
 
 
 class Moments:
-    """Variance of a roll, sample by sample."""
+    """Running variance of a roll."""
 
     def __init__(self) -> None:
         self._sum = self._square = 0.0
         self._count = 0
 
     def add(self, roll_rad: float) -> None:
-        """Take a sample."""
+        """Add a sample."""
         self._sum += roll_rad
         self._square += roll_rad * roll_rad
         self._count += 1
 
     @property
     def variance(self) -> float:
-        """In rad^2."""
+        """Variance in rad^2."""
         mean = self._sum / self._count
         return self._square / self._count - mean * mean
 
 
 class Watch:
-    """Looks at controller, drive and ship in each tick, after all of them.
+    """Observer of controller, drive and ship in each tick, after all of them.
 
     Parameters
     ----------
     row : Row
-        Whose operator presses buttons, at times after the first tick.
+        Row whose operator acts at times after the first tick.
     degraded_most : tuple of (float, int)
-        Pressure that is allowed while the pressure is halved, and in how many ns it is reached.
+        Permitted pressure in Pa while the pressure is halved, and the time in ns to reach it.
 
     Attributes
     ----------
     first_ns : dict of str to int
-        When the controller first was in charge ("active"); latched a fault ("found"); halved the
-        pressure ("halved"); rejected, missed or discarded anything ("noted"); raised an alarm that
-        the row names ("alarm").
+        First time at which the controller was in charge ("active"), latched a fault ("found"),
+        halved the pressure ("halved"), rejected, missed or discarded a frame ("noted"), or raised
+        one of the row's alarms ("alarm").
     over_ns : int or None
-        When what `Limit.counts_from` asks for was first so; for the pressure, when it first became
-        so and stayed so until found, or for as long as the row gives time.
+        First time at which the condition of `Limit.counts_from` held; for the pressure, at which it
+        held until detection, or for the row's deadline.
     pressed_ns : int
-        When the drive's set-point last was not zero, or the valve last followed.
+        Last time at which the drive's set-point was not zero, or the valve followed.
     code : Fault
-        First one that was latched; while none is, what is shown.
+        First latched fault; while there is none, the fault shown.
     armed_again : bool
-        In charge once more after a fault.
+        Whether the controller was in charge again after a fault.
     beyond_share_pa : float
-        How far the drive's set-point went beyond `degraded_most`.
+        Largest excess of the drive's set-point over `degraded_most`.
     rolls : Moments
-        Of the true roll, every tick.
+        Variance of the true roll over every tick.
     """
 
     name = "watch"
@@ -184,17 +183,17 @@ class Watch:
         self.rolls = Moments()
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Hear nothing."""
+        """Ignore the frame."""
 
     def _count(self) -> int:
-        """All that the controller refused or missed so far."""
+        """Number of frames that the controller refused or missed so far."""
         node = self._bench.node
         inbox = node.inbox
         streams = sum(sum(each.rejected.values()) + each.lost for each in inbox.watched)
         return streams + inbox.foreign + inbox.discarded
 
     def _apart(self, name: str) -> float:
-        """How far something is from the truth, or the ship from upright."""
+        """Deviation of a received value from the truth, or of the ship from upright."""
         plant, drive = self._bench.ship.plant, self._bench.ship.drive
         if name == "over_roll_rad":
             return abs(plant.roll_rad)
@@ -206,7 +205,7 @@ class Watch:
         return abs(float(getattr(source, name)) - float(getattr(plant, name)))
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
-        """Look."""
+        """Observe one tick."""
         if self._start_ns is None:
             self._start_ns = now_ns
         ship, node, first_ns = self._bench.ship, self._bench.node, self.first_ns
@@ -224,7 +223,7 @@ class Watch:
         self._look_at_share(now_ns, degraded=mode is Mode.ACTIVE and supervisor.degraded)
         if "found" not in first_ns and (node.fault is not Fault.NONE or self._waited):
             self.code = node.fault
-        self._waited = mode is Mode.INIT  # what it waited for and has now is no fault
+        self._waited = mode is Mode.INIT  # a fault that delayed INIT and is over is no fault
         if "noted" not in first_ns and self._count() > self._noted:
             first_ns["noted"] = now_ns
         if now_ns % (10 * TICK_NS) == 0 and node.safety.alarms.codes & self._codes:
@@ -238,10 +237,10 @@ class Watch:
         return ()
 
     def _look_at_difference(self, now_ns: int) -> None:
-        """Note since when the difference that the row counts from is there."""
+        """Update the time since which the deviation in `counts_from` exists."""
         for name, limit in self._counts_from.items():
             if self._apart(name) <= limit:
-                # a pump may cross its set-point; what was there for long was to be found
+                # the pressure may cross its set-point briefly; a lasting deviation was to be found
                 long = self.over_ns is not None and now_ns - self.over_ns > self._within_ns
                 if name == "pressure_pa" and "found" not in self.first_ns and not long:
                     self.over_ns = None
@@ -249,7 +248,7 @@ class Watch:
                 self.over_ns = now_ns
 
     def _look_at_share(self, now_ns: int, *, degraded: bool) -> None:
-        """Note by how much the drive was asked for more than half the pressure allows."""
+        """Update the excess of the drive's set-point over the halved pressure limit."""
         drive, (most_pa, within_ns) = self._bench.ship.drive, self._degraded_most
         if not degraded or drive is None:
             self._degraded_ns = None

@@ -1,4 +1,4 @@
-"""A control law that fails on demand."""
+"""Control law that fails on demand."""
 
 from dataclasses import dataclass
 from typing import Any, Final
@@ -13,9 +13,9 @@ LEANING_PA: Final = 1e4
 
 @dataclass(slots=True)
 class LawFailures:
-    """What the laws of a bench do: an error, no number, the negative, the same to one side.
+    """Failures of the laws on a bench: exception, NaN, negated output, one-sided output.
 
-    Apart from the law itself, which a controller that is started anew has made for it.
+    They are separate from the law, because a restarted controller creates a new one.
     """
 
     raises: bool = False
@@ -25,20 +25,14 @@ class LawFailures:
 
 
 class BreakableLaw:
-    """A controller that can be made to fail.
-
-    Parameters
-    ----------
-    fails : LawFailures
-        What it does; looked up at each step.
-    """
+    """Controller that can be made to fail; `fails` is read at each step."""
 
     def __init__(self, law: Controller, fails: LawFailures) -> None:
         self._law = law
         self._fails = fails
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
-        """As `Controller.step`, unless it fails."""
+        """Return the law's answer, or the failure's."""
         answer, fails = self._law.step(y, reference), self._fails
         if fails.raises:
             raise ArithmeticError("injected")

@@ -1,4 +1,4 @@
-"""What every fault has."""
+"""Common base of all faults."""
 
 from abc import ABC, abstractmethod
 from functools import partial
@@ -17,7 +17,7 @@ from utank_hil.configuration.known_keys import nearest
 
 SECOND_NS: Final = 1_000_000_000
 LONGEST_FAULT_S: Final = 86_400.0
-"""A day, the longest run of a scenario: no time of a fault is greater."""
+"""Latest time of a fault: a day, the longest run of a scenario."""
 
 NODE_OF: Final = {
     Address.SENSORS: "sensors",
@@ -63,75 +63,75 @@ FaultSpan = Annotated[float, Range(above=0, most=LONGEST_FAULT_S)]
 
 
 class Fault(Section, ABC):
-    """When a fault is there: `at_s` after the start, for `for_s` or till the end."""
+    """Fault that begins `at_s` after the start and lasts `for_s` or to the end."""
 
     replayable: ClassVar[bool] = True
-    """Whether a controller without it, handed the same frames, would do the same."""
+    """Whether a controller without the fault would react in the same way to the same frames."""
     needs: ClassVar[tuple[str, ...]] = ()
-    """Nodes that must be emulated for any fault of the kind."""
+    """Nodes that must be emulated for every fault of the kind."""
 
     at_s: FaultTime = 0.0
     for_s: FaultSpan | None = None
 
     def span(self, start_ns: int) -> Span:
-        """When it is there, of a run whose faults count from `start_ns`."""
+        """Time span in a run whose faults count from `start_ns`."""
         begin_ns = start_ns + round(self.at_s * SECOND_NS)
         lasts_ns = NEVER_NS if self.for_s is None else round(self.for_s * SECOND_NS)
         return Span(begin_ns, begin_ns + lasts_ns)
 
     def node_names(self) -> tuple[str, ...]:
-        """Nodes that must be emulated for it."""
+        """Nodes that must be emulated for this fault."""
         return self.needs
 
     @property
     def beyond_commands(self) -> bool:
-        """Whether the pump presses on whatever it is commanded."""
+        """Whether the pump keeps up pressure whatever the command."""
         return False
 
     @property
     def spoiled_message(self) -> str | None:
-        """The message that it alone alters; None of one that alters none, or all."""
+        """Message that it alone alters; None if it alters none, or all."""
         return getattr(self, "message", None)
 
     @abstractmethod
     def place(self, bench: Bench, span: Span, seed: int) -> None:
-        """Place it; `seed` is of what it draws."""
+        """Place the fault in a bench; `seed` determines its random values."""
 
 
 class MessageFault(Fault):
-    """A fault of one message, at the node that sends it."""
+    """Fault of one message, at the node that sends it."""
 
     message: MessageName
 
     @property
     def named(self) -> NamedMessage:
-        """The message in the catalogue."""
+        """Message in the catalogue."""
         return load_catalogue().named(self.message)
 
     def node_names(self) -> tuple[str, ...]:
-        """The sender."""
+        """Name of the sender."""
         return (NODE_OF[self.named.source],)
 
     def spoil_frames(self, bench: Bench, span: Span, spoil: Spoil) -> None:
-        """Spoil the message's frames where they leave their node."""
+        """Spoil the message's frames at the output of their node."""
         _, source, codec = self.named
         bench.nodes[NODE_OF[source]].spoiled.append(Spoiled(span, spoil, codec.can_id))
 
 
 def whole_cycles(by_s: float, cycle_ns: int) -> int:
-    """Cycles that a delay takes: no less than it, and one at least."""
+    """Delay in whole cycles, rounded up, at least one."""
     return max(1, -(-round(by_s * SECOND_NS) // cycle_ns))
 
 
 def intact(named: NamedMessage, frame: Frame) -> Any:
-    """What a frame of the message says, None if another fault has been at it."""
+    """Content of a frame; None if another fault has damaged it."""
     return named.codec.decode(frame.data) if len(frame.data) == FRAME_BYTES else None
 
 
 def signal_problems(
     message: NamedMessage, signals: dict[str, Any] | tuple[str, ...]
 ) -> list[Problem]:
-    """Names that a message has no signal for."""
+    """Problems of names that are no signals of a message."""
     known = message.kind._fields  # type: ignore[attr-defined]  # a NamedTuple
     return [
         (

@@ -1,12 +1,12 @@
-"""The modelled bus with faults: bit errors and what CAN controllers do about them, and worse.
+"""Simulated bus with faults: bit errors, error counters and bus-off, and gateway faults.
 
-A bit error is seen at the end of the frame, the worst case. The frame is destroyed by an error
-frame and takes part in the next arbitration again. The sender's transmit error counter rises by 8
-with each and falls by 1 with each frame that gets through (ISO 11898-1); above 127 the sender is
-error-passive, above 255 it is off the bus until the fault is over.
+A bit error is detected at the end of the frame, the worst case. An error frame destroys the frame,
+which takes part in the next arbitration again. The sender's transmit error counter rises by 8 with
+each and falls by 1 with each successful frame (ISO 11898-1); above 127 the sender is error-passive,
+above 255 it is off the bus until the fault is over.
 
-What a gateway or a repeater may do besides, with no CAN controller noticing: lose, delay, double
-or swap frames.
+A gateway or repeater may also lose, delay, double or swap frames without any CAN controller
+detecting it.
 """
 
 import random
@@ -20,7 +20,7 @@ from utank_hil.canbus import Frame
 from utank_hil.runners import SimulatedBus
 
 ERROR_FRAME_BITS: Final = 17
-"""Flag and delimiter, at most 20 bits, less the end of frame that is not sent."""
+"""Error flag and delimiter, at most 20 bits, minus the end of frame that is not sent."""
 PASSIVE: Final = 128
 OFF: Final = 256
 
@@ -28,27 +28,27 @@ Arrived = tuple[int, int, Frame]
 
 
 class Destroyed(Frame):
-    """An attempt that a bit error has destroyed."""
+    """Transmission destroyed by a bit error."""
 
     __slots__ = ()
 
 
 class OtherFrame(Frame):
-    """A frame with an 11-bit identifier, or a remote frame: it uses the bus and says nothing."""
+    """Frame with an 11-bit identifier, or remote frame: it occupies the bus and has no data."""
 
     __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Disturbance:
-    """What happens to a share of the frames on the bus.
+    """Gateway fault of a share of the frames.
 
     Attributes
     ----------
     does : str
-        "loses", "delays", "doubles" or "swaps" (with the next one of its identifier).
+        "loses", "delays", "doubles" or "swaps" (with the next frame of its identifier).
     can_id : int or None
-        None for all.
+        Identifier concerned; None for all.
     by_ns : int
         Delay.
     """
@@ -61,25 +61,26 @@ class Disturbance:
 
 
 class FaultyBus:
-    """A simulated bus on which things go wrong.
+    """Simulated bus with faults.
 
     Parameters
     ----------
     seed : int
-        Of what happens by chance.
+        Seed of the random events.
 
     Attributes
     ----------
     bit_errors : list of tuple of (Span, float, int or None)
-        Share of the attempts that are destroyed, of one sender or of all.
+        Share of the transmissions that are destroyed, for one sender or for all.
     error_counts : dict of int to int
         Transmit error counter by sender.
     statistics : callable
-        As of `SimulatedBus`; destroyed attempts count as frames.
+        Method of `SimulatedBus`; destroyed transmissions count as frames.
     warn, cut_off : callable
-        Called with time and sender, when it gets error-passive and as long as it is off the bus.
+        Functions of time and sender, called when it becomes error-passive and while it is off the
+        bus.
     hear_others : callable
-        Called with each `OtherFrame` that was carried.
+        Function called with each `OtherFrame` that was carried.
     """
 
     def __init__(self, bit_rate: int = 250_000, seed: int = 1) -> None:
@@ -98,7 +99,7 @@ class FaultyBus:
         self.hear_others: Callable[[OtherFrame], None] = lambda _: None
 
     def queue(self, sender: int, frame: Frame, now_ns: int) -> None:
-        """As in `SimulatedBus`, with the attempts that will fail in front."""
+        """Queue a frame as in `SimulatedBus`, preceded by its attempts that will fail."""
         if now_ns < self._off_until_ns.get(sender, 0):
             self.cut_off(now_ns, sender)
             return
@@ -111,7 +112,7 @@ class FaultyBus:
         self._bus.queue(sender, frame, now_ns)
 
     def carry_until(self, before_ns: int) -> list[Arrived]:
-        """As in `SimulatedBus`, with what is left of the frames."""
+        """Carry frames as in `SimulatedBus`; return those that the faults leave."""
         arrived = self._bus.carry_until(before_ns)
         if self.bit_errors:
             arrived = [each for each in arrived if self._count_errors(*each)]
@@ -130,7 +131,7 @@ class FaultyBus:
         return arrived
 
     def _count_errors(self, time_ns: int, sender: int, frame: Frame) -> bool:
-        """Count an attempt; say whether it got through."""
+        """Update the error counter; return whether the frame was transmitted."""
         if time_ns < self._off_until_ns.get(sender, 0):
             return False
         count = self.error_counts.get(sender, 0)
@@ -147,14 +148,14 @@ class FaultyBus:
                     for span, _, of in self.bit_errors
                     if of in (None, sender) and span.holds(time_ns)
                 ),
-                default=time_ns,  # the fault has ended while its last attempts were under way
+                default=time_ns,  # the fault ended during its last attempts
             )
             self.error_counts[sender] = 0
             self.cut_off(time_ns, sender)
         return False
 
     def _disturbed(self, arrived: Arrived) -> list[Arrived]:
-        """What becomes of a frame that got through."""
+        """Frames that a disturbance makes of one that was transmitted."""
         time_ns, sender, frame = arrived
         before = self._swapped.pop(frame.can_id, None)
         frames = [arrived] if before is None else [arrived, (time_ns, *before[1:])]

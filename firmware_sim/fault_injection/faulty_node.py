@@ -1,4 +1,4 @@
-"""A node whose frames are spoiled, or that hangs, between two times."""
+"""Node whose frames are spoiled, or that hangs, during a time span."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -12,54 +12,54 @@ from utank_hil.runners.node import Selective
 NEVER_NS: Final = 1 << 62
 
 Spoil = Callable[[Frame, float], Iterable[Frame]]
-"""Frames that reach the bus instead of one of the node, at a time in s after the fault began."""
+"""Function of a frame and the time in s since the fault that gives the frames sent instead."""
 
 
 class Span(NamedTuple):
-    """When a fault is there, on the clock of the nodes."""
+    """Time span of a fault on the clock of the nodes."""
 
     begin_ns: int
     end_ns: int = NEVER_NS
 
     def holds(self, now_ns: int) -> bool:
-        """Whether it is there now."""
+        """Whether the span includes a time."""
         return self.begin_ns <= now_ns < self.end_ns
 
 
 @dataclass(frozen=True, slots=True)
 class Spoiled:
-    """Spoils the frames of one identifier, or of all if there is none."""
+    """Fault of the frames of one identifier, or of all if there is none."""
 
     span: Span
     spoil: Spoil
     can_id: int | None = None
 
     def frames(self, frame: Frame, now_ns: int) -> Iterable[Frame]:
-        """What leaves instead of a frame."""
+        """Frames that leave instead of one frame."""
         if self.can_id not in (None, frame.can_id) or not self.span.holds(now_ns):
             return (frame,)
         return self.spoil(frame, (now_ns - self.span.begin_ns) * 1e-9)
 
 
 class FaultyNode:
-    """A node with faults; without any it is as the node itself.
+    """Node with faults; without any it behaves as the node itself.
 
     Attributes
     ----------
     node : Node
-        The one that runs at present.
+        Node that currently runs.
     hears : frozenset of int
-        As the node's, if it has such a filter.
+        Filter of the node, if it has one.
     spoiled : list of Spoiled
-        Applied one after another.
+        Faults of its frames, applied in order.
     hangs : list of Span
-        It neither ticks nor hears.
+        Spans in which it neither ticks nor receives.
     deaf : list of Span
-        It hears nothing.
+        Spans in which it receives nothing.
     cut_off : list of tuple of (Span, str)
-        The bus can't be reached, and why.
+        Spans in which the bus is unreachable, with the reason.
     warned : list of tuple of (Span, str)
-        Its interface reports this in every tick, and carries frames all the same.
+        Spans in which its interface reports a warning in every tick and still carries frames.
     """
 
     def __init__(self, node: Node) -> None:
@@ -76,12 +76,12 @@ class FaultyNode:
         self._actions: list[tuple[int, Callable[[], object]]] = []
 
     def at(self, time_ns: int, action: Callable[[], object]) -> None:
-        """Do something before the tick at a time."""
+        """Schedule an action before the tick at a time."""
         self._actions.append((time_ns, action))
         self._actions.sort(key=lambda timed: timed[0])
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Take a frame, unless a fault keeps it away."""
+        """Pass on a frame, unless a fault blocks it."""
         for span in (*self.hangs, *self.deaf):
             if span.holds(now_ns):
                 return
@@ -89,18 +89,18 @@ class FaultyNode:
             self.node.receive(frame, now_ns)
 
     def other_frames(self, count: int) -> None:
-        """Hand on that frames of other kinds were on the bus."""
+        """Pass on the number of frames of other formats on the bus."""
         other_frames = getattr(self.node, "other_frames", None)
         if other_frames is not None:
             other_frames(count)
 
     def link_error(self, now_ns: int, reason: str) -> None:
-        """Hand on that the bus can't be reached."""
+        """Pass on an error of the link."""
         if isinstance(self.node, LinkObserver):
             self.node.link_error(now_ns, reason)
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
-        """Run a period, and spoil what it sends."""
+        """Tick the node, and spoil its frames."""
         while self._actions and now_ns >= self._actions[0][0]:
             self._actions.pop(0)[1]()
         if any(span.holds(now_ns) for span in self.hangs):

@@ -17,18 +17,18 @@ from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.canbus.e2e import data_ids, profile2_crc
 
 _FOREIGN_DATA_IDS: Final = data_ids(127)
-"""Of no message of the catalogue."""
+"""Data IDs that no message of the catalogue has."""
 
 
 class FrameFault(MessageFault):
-    """A fault of a message's frames."""
+    """Fault of a message's frames."""
 
     @abstractmethod
     def spoil(self, seed: int) -> Spoil:
-        """What becomes of a frame."""
+        """Function that spoils a frame."""
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:
-        """Spoil the frames where they leave their node."""
+        """Spoil the frames at the output of their node."""
         self.spoil_frames(bench, span, self.spoil(seed))
 
 
@@ -37,21 +37,21 @@ class Lost(FrameFault):
 
     kind: Literal["lost"]
     share: Annotated[float, Field(gt=0, le=1)] = 1.0
-    """Of the frames, by chance."""
+    """Share of the frames lost at random."""
 
     def spoil(self, seed: int) -> Spoil:
-        """As in `FrameFault`."""
+        """Return the function that loses frames."""
         draw = random.Random(seed).random
         return lambda frame, _: () if draw() < self.share else (frame,)
 
 
 class Frozen(FrameFault):
-    """The same frame again and again."""
+    """The same frame is sent again and again."""
 
     kind: Literal["frozen"]
 
     def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        """As in `FrameFault`."""
+        """Return the function that repeats the first frame."""
         first: list[Frame] = []
 
         def freeze(frame: Frame, _: float) -> Iterable[Frame]:
@@ -62,14 +62,14 @@ class Frozen(FrameFault):
 
 
 class Replayed(FrameFault):
-    """The first frames of the fault over and over, in the place of the new ones."""
+    """The first frames of the fault are repeated in place of the new ones."""
 
     kind: Literal["replayed"]
     frames: Annotated[int, Field(ge=2)]
     """Number of frames that are repeated."""
 
     def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        """As in `FrameFault`."""
+        """Return the function that replays frames."""
         kept: list[Frame] = []
         count = [0]
 
@@ -88,22 +88,22 @@ class Doubled(FrameFault):
 
     kind: Literal["doubled"]
     times: Annotated[int, Range(least=2, most=100)] = 2
-    """How often each frame is sent."""
+    """Number of times that each frame is sent."""
 
     def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        """As in `FrameFault`."""
+        """Return the function that repeats each frame."""
         return lambda frame, _: (frame,) * self.times
 
 
 class Inserted(FrameFault):
-    """Beside each new frame one of some cycles ago."""
+    """An old frame is sent beside each new one."""
 
     kind: Literal["inserted"]
     back: Annotated[int, Range(least=1, most=10_000)]
-    """Age of the frame in cycles."""
+    """Age of the old frame in cycles."""
 
     def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        """As in `FrameFault`."""
+        """Return the function that inserts old frames."""
         old: deque[Frame] = deque(maxlen=self.back + 1)
 
         def insert(frame: Frame, _: float) -> Iterable[Frame]:
@@ -114,16 +114,16 @@ class Inserted(FrameFault):
 
 
 class Counter(FrameFault):
-    """The counter steps by another number, rightly protected; by zero it stands still."""
+    """The counter has a wrong step, with a correct CRC; with step zero it stands still."""
 
     kind: Literal["counter"]
     step: Annotated[int, Field(ge=0, le=15)]
-    """From frame to frame; a sound one steps by 1."""
+    """Step of the counter from frame to frame; the correct step is 1."""
     one_of: Annotated[int, Field(ge=1)] = 1
-    """One frame in this number is sent, as by a node that is slower than its cycle."""
+    """Only one frame in this number is sent, as by a node that is slower than its cycle."""
 
     def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        """As in `FrameFault`."""
+        """Return the function that sets the counter."""
         codec = self.named.codec
         counter: list[int] = []
         left_out = [self.one_of - 1]
@@ -142,16 +142,16 @@ class Counter(FrameFault):
 
 
 class Damaged(FrameFault):
-    """A fault of one frame in `every`."""
+    """Base of faults that damage one frame in `every`."""
 
     every: Annotated[int, Field(ge=1)] = 1
 
     @abstractmethod
     def damage(self, data: bytes) -> bytes:
-        """The frame's bytes instead."""
+        """Return the damaged bytes of a frame."""
 
     def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        """As in `FrameFault`."""
+        """Return the function that damages frames."""
         count = [-1]
 
         def harm(frame: Frame, _: float) -> Iterable[Frame]:
@@ -164,14 +164,14 @@ class Damaged(FrameFault):
 
 
 class Corrupted(Damaged):
-    """Two bits of a byte are wrong, and no CAN controller has noticed."""
+    """Two bits of a byte are wrong, undetected by the CAN controllers."""
 
     kind: Literal["corrupted"]
     byte: Annotated[int, Field(ge=0, lt=FRAME_BYTES)] = 3
-    """Whose bits are wrong."""
+    """Index of the damaged byte."""
 
     def damage(self, data: bytes) -> bytes:
-        """As in `Damaged`; a frame that another fault has left too short for it stays."""
+        """Flip two bits; a frame that another fault has shortened too much is left as it is."""
         wrong = bytearray(data)
         if self.byte < len(wrong):
             wrong[self.byte] ^= 0x24
@@ -179,12 +179,12 @@ class Corrupted(Damaged):
 
 
 class WrongDataId(Damaged):
-    """The CRC is that of another message's data ID."""
+    """The CRC is computed with the data ID of another message."""
 
     kind: Literal["data_id"]
 
     def damage(self, data: bytes) -> bytes:
-        """As in `Damaged`; a frame that another fault has left too short stays."""
+        """Replace the CRC; a frame that another fault has shortened is left as it is."""
         if len(data) < FRAME_BYTES:
             return data
         return bytes([profile2_crc(data, _FOREIGN_DATA_IDS)]) + data[1:]
@@ -195,8 +195,8 @@ class WrongLength(Damaged):
 
     kind: Literal["length"]
     length: Annotated[int, Field(ge=0, lt=FRAME_BYTES)]
-    """Bytes that are left."""
+    """Number of bytes left."""
 
     def damage(self, data: bytes) -> bytes:
-        """As in `Damaged`."""
+        """Shorten the frame."""
         return data[: self.length]

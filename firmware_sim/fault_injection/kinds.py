@@ -1,4 +1,4 @@
-"""The kinds of faults that a configuration may list, and how they are placed."""
+"""Kinds of faults in a configuration, and their placement in a bench."""
 
 from collections.abc import Sequence
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""Faults of whole nodes, of pump, drive, valve and law."""
+"""Faults of nodes, pump, drive, valve and law."""
 
 import math
 from typing import Literal
@@ -14,39 +14,39 @@ from utank_hil.canbus import DriveFault
 
 
 class NodeFault(Fault):
-    """A fault of a node."""
+    """Fault of a node."""
 
     node: NodeName
 
     def node_names(self) -> tuple[str, ...]:
-        """The node."""
+        """Name of the node."""
         return (self.node,)
 
 
 class Hangs(NodeFault):
-    """The node neither hears nor sends; then it goes on where it was."""
+    """The node neither receives nor sends; afterwards it continues where it was."""
 
     kind: Literal["hangs"]
 
     @property
     def beyond_commands(self) -> bool:
-        """A drive that hangs keeps its last pressure."""
+        """Whether the node is the drive, which keeps its last pressure while it hangs."""
         return self.node == "drive"
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Hold the node."""
+        """Stop the node for the span."""
         bench.nodes[self.node].hangs.append(span)
 
 
 class Killed(Fault):
-    """The controller's process dies; one that is started anew takes its place in the end."""
+    """The controller's process dies; a restarted one replaces it at the end of the fault."""
 
     replayable = False
     needs = ("controller",)
     kind: Literal["killed"]
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Hold the controller, then build another."""
+        """Stop the controller, then start another."""
         node = bench.nodes["controller"]
         node.hangs.append(span)
         assert bench.restart is not None
@@ -59,31 +59,31 @@ class Mute(NodeFault):
     kind: Literal["mute"]
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Lose all that it sends."""
+        """Discard all frames that the node sends."""
         bench.nodes[self.node].spoiled.append(Spoiled(span, lambda *_: ()))
 
 
 class Deaf(NodeFault):
-    """The node hears nothing."""
+    """The node receives nothing."""
 
     kind: Literal["deaf"]
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Keep all frames away."""
+        """Block all frames to the node."""
         bench.nodes[self.node].deaf.append(span)
 
 
 class Link(NodeFault):
-    """The node's interface reports an error all the while.
+    """The node's interface reports an error during the whole fault.
 
-    Meanwhile it carries nothing, unless it only warns.
+    It carries no frames meanwhile, unless the error is only a warning.
     """
 
     kind: Literal["link"]
     reason: str
-    """What the interface reports."""
+    """Text of the error that the interface reports."""
     warns: bool = False
-    """Frames are carried all the same."""
+    """Whether the error is a warning and frames are still carried."""
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Cut the node off."""
@@ -92,29 +92,29 @@ class Link(NodeFault):
 
 
 class Pump(Fault):
-    """While enabled, the pump presses with `times` its set-point and `plus_pa`, after `lag_s`.
+    """While enabled, the pump gives `times` its set-point plus `plus_pa`, with a lag of `lag_s`.
 
-    With `off_too`, no command takes `plus_pa` away. Of several the one that began last is there.
+    With `off_too`, no command removes `plus_pa`. Of several such faults the latest one applies.
     """
 
     needs = ("drive",)
     kind: Literal["pump"]
     times: Finite = 1.0
-    """Share of the set-point that it gives; negative for the wrong way."""
+    """Factor on the set-point; negative for reversed pressure."""
     plus_pa: Finite = 0.0
-    """Pressure that it gives besides."""
+    """Pressure added to it."""
     lag_s: NotNegative = 0.0
-    """Time constant with which it does."""
+    """Time constant of the faulty pressure."""
     off_too: bool = False
-    """It presses while it is off, too."""
+    """Whether the pressure is present while the pump is off."""
 
     @property
     def beyond_commands(self) -> bool:
-        """As `off_too` says."""
+        """Whether the pressure is present while the pump is off."""
         return self.off_too
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Break the pump, and mend it in the end."""
+        """Break the pump, and repair it at the end."""
         share = 1.0 - math.exp(-TICK_S / self.lag_s) if self.lag_s else 1.0
         pressure_pa = [0.0]
 
@@ -129,7 +129,7 @@ class Pump(Fault):
             plant.broken_pump, plant.presses_off = broken, self.off_too
 
         def end() -> None:
-            if plant.broken_pump is broken:  # else another fault has begun since
+            if plant.broken_pump is broken:  # otherwise another fault has begun since
                 plant.broken_pump, plant.presses_off = None, False
 
         drive.at(span.begin_ns, begin)
@@ -137,12 +137,12 @@ class Pump(Fault):
 
 
 class Drive(Fault):
-    """The drive fails when the fault begins, as DRIVE_STATUS_2 names it; NONE switches it off."""
+    """The drive fails at the begin of the fault; NONE switches it off."""
 
     needs = ("drive",)
     kind: Literal["drive"]
     fault: str
-    """As DRIVE_STATUS_2 names it."""
+    """Name of the fault in DRIVE_STATUS_2."""
 
     @field_validator("fault")
     @classmethod
@@ -152,22 +152,22 @@ class Drive(Fault):
         return name
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Trip it."""
+        """Trip the drive."""
         drive = bench.drive
         assert drive is not None
         bench.nodes["drive"].at(span.begin_ns, lambda: drive.fail(DriveFault[self.fault]))
 
 
 class Valve(Fault):
-    """The valve does not move, or has no power."""
+    """The valve sticks or loses its power."""
 
     needs = ("valve",)
     kind: Literal["valve"]
     fails: Literal["stuck", "powerless"]
-    """What it does."""
+    """Kind of failure."""
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Break the valve, and mend it in the end."""
+        """Break the valve, and repair it at the end."""
         name, broken = ("stuck", True) if self.fails == "stuck" else ("powered", False)
         node = bench.nodes["valve"]
         node.at(span.begin_ns, lambda: setattr(bench.valve, name, broken))
@@ -175,19 +175,19 @@ class Valve(Fault):
 
 
 class Law(Fault):
-    """The control law raises an error, or answers no number, the opposite or one side.
+    """The control law raises an error, or returns NaN, the negated or a one-sided answer.
 
-    That of a controller that is started anew meanwhile does so, too.
+    The law of a controller that is restarted meanwhile fails in the same way.
     """
 
     replayable = False
     needs = ("controller",)
     kind: Literal["law"]
     fails: Literal["raises", "answers_nan", "opposite", "leans"]
-    """What it does."""
+    """Kind of failure."""
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Break the law, and mend it in the end."""
+        """Break the law, and repair it at the end."""
         node = bench.nodes["controller"]
         node.at(span.begin_ns, lambda: setattr(bench.law, self.fails, True))
         node.at(span.end_ns, lambda: setattr(bench.law, self.fails, False))

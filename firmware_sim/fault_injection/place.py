@@ -1,4 +1,4 @@
-"""The bench as faults see it."""
+"""Interface of the bench to faults."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -12,21 +12,21 @@ from utank_hil.runners import Node
 
 
 class Pumped(Protocol):
-    """A plant whose pump can be made to fail."""
+    """Plant whose pump can be made to fail."""
 
     broken_pump: Callable[[float], float] | None
     presses_off: bool
 
 
 class Trips(Protocol):
-    """A drive that can be made to fail."""
+    """Drive that can be made to fail."""
 
     def fail(self, fault: DriveFault) -> None:
-        """Go to fault; without one, switch off."""
+        """Enter the fault state; without a fault, switch off."""
 
 
 class Sticks(Protocol):
-    """A valve that can be made to fail."""
+    """Valve that can be made to fail."""
 
     stuck: bool
     powered: bool
@@ -34,22 +34,22 @@ class Sticks(Protocol):
 
 @dataclass(slots=True)
 class Bench:
-    """Where faults are placed.
+    """Parts of a bench in which faults are placed.
 
     Attributes
     ----------
     nodes : dict of str to FaultyNode
-        By name.
+        Nodes by name.
     version : int
-        Of the ship's configuration.
+        Version of the ship's configuration.
     bus : FaultyBus or None
-        None on a real bus.
+        Simulated bus; None on a real one.
     law : LawFailures or None
-        Of whatever controller runs; None where the controller is another process's.
+        Failures of the running controller's law; None if the controller is another process.
     restart : callable or None
-        Puts a controller in the place of the one there is.
+        Function that replaces the controller by a new one.
     joining : list of Node
-        Nodes that come with the faults.
+        Nodes that the faults add.
     """
 
     nodes: dict[str, FaultyNode]

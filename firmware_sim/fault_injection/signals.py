@@ -1,4 +1,4 @@
-"""Faults of what a message says: it stays intact, in sequence and in its cycle."""
+"""Faults of a message's signals; counter, CRC and cycle stay correct."""
 
 import random
 from abc import abstractmethod
@@ -24,11 +24,11 @@ from utank_hil.canbus.catalogue import NamedMessage
 from utank_hil.canbus.codec import field_kind
 
 Change = Callable[[Sequence[Any], float], Sequence[Any]]
-"""Makes the values of a message of the true ones and the time in s since the fault began."""
+"""Function of the true values and the time in s since the fault that gives the faulty values."""
 
 
 class SignalFault(MessageFault):
-    """A fault of some signals of a message."""
+    """Fault of some signals of a message."""
 
     signals: Annotated[tuple[str, ...], Field(min_length=1)]
 
@@ -51,10 +51,10 @@ class SignalFault(MessageFault):
 
     @abstractmethod
     def change(self, seed: int) -> Change:
-        """What becomes of the values."""
+        """Function that changes the values."""
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:
-        """Alter the message where it leaves its node."""
+        """Alter the message at the output of its node."""
         kind = self.named.kind
         places = [kind._fields.index(name) for name in self.signals]  # type: ignore[attr-defined]
         change = self.change(seed)
@@ -70,7 +70,7 @@ class SignalFault(MessageFault):
 
 
 def _altered(named: NamedMessage, change: Callable[[Any, float], Any]) -> Spoil:
-    """Change a message, which keeps its counter and is protected anew."""
+    """Return a function that changes a message, keeps its counter and computes its CRC again."""
     codec = named.codec
 
     def alter(frame: Frame, since_s: float) -> Iterable[Frame]:
@@ -84,7 +84,7 @@ def _altered(named: NamedMessage, change: Callable[[Any, float], Any]) -> Spoil:
 
 
 class Stuck(SignalFault):
-    """The signals stay as they were when the fault began."""
+    """The signals keep their values from the begin of the fault."""
 
     kind: Literal["stuck"]
 
@@ -93,7 +93,7 @@ class Stuck(SignalFault):
         return False
 
     def change(self, seed: int) -> Change:  # noqa: ARG002
-        """As in `SignalFault`."""
+        """Return the function that holds the values."""
         held: list[Sequence[Any]] = []
 
         def stay(values: Sequence[Any], _: float) -> Sequence[Any]:
@@ -104,14 +104,14 @@ class Stuck(SignalFault):
 
 
 class Offset(SignalFault):
-    """The signals are off by a constant."""
+    """The signals have a constant offset."""
 
     kind: Literal["offset"]
     by: Finite
-    """Added to each of them, in their unit."""
+    """Offset of each signal in its unit."""
 
     def change(self, seed: int) -> Change:  # noqa: ARG002
-        """As in `SignalFault`."""
+        """Return the function that adds the offset."""
         return lambda values, _: [value + self.by for value in values]
 
 
@@ -120,48 +120,48 @@ class Scale(SignalFault):
 
     kind: Literal["scale"]
     times: Finite
-    """Of each of them."""
+    """Factor on each signal."""
 
     def change(self, seed: int) -> Change:  # noqa: ARG002
-        """As in `SignalFault`."""
+        """Return the function that scales the values."""
         return lambda values, _: [value * self.times for value in values]
 
 
 class Drift(SignalFault):
-    """The signals run away."""
+    """The signals drift."""
 
     kind: Literal["drift"]
     by_per_s: Finite
-    """Added to each of them with every second."""
+    """Drift of each signal in its unit per second."""
 
     def change(self, seed: int) -> Change:  # noqa: ARG002
-        """As in `SignalFault`."""
+        """Return the function that adds the drift."""
         return lambda values, since_s: [value + self.by_per_s * since_s for value in values]
 
 
 class Noise(SignalFault):
-    """White Gaussian noise of a standard deviation comes on top."""
+    """White Gaussian noise is added to the signals."""
 
     kind: Literal["noise"]
     deviation: Positive
-    """Standard deviation, in their unit."""
+    """Standard deviation in the signals' unit."""
 
     def change(self, seed: int) -> Change:
-        """As in `SignalFault`."""
+        """Return the function that adds noise."""
         draw = random.Random(seed).gauss
         return lambda values, _: [value + draw(0.0, self.deviation) for value in values]
 
 
 class Spikes(SignalFault):
-    """One sample in `every` is off."""
+    """One sample in `every` has an offset."""
 
     kind: Literal["spikes"]
     by: Finite
-    """Added to that sample."""
+    """Offset of that sample in the signal's unit."""
     every: Annotated[int, Field(ge=2)]
 
     def change(self, seed: int) -> Change:  # noqa: ARG002
-        """As in `SignalFault`."""
+        """Return the function that adds spikes."""
         count = [-1]
 
         def strike(values: Sequence[Any], _: float) -> Sequence[Any]:
@@ -177,30 +177,30 @@ class Sign(SignalFault):
     kind: Literal["sign"]
 
     def change(self, seed: int) -> Change:  # noqa: ARG002
-        """As in `SignalFault`."""
+        """Return the function that inverts the sign."""
         return lambda values, _: [-value for value in values]
 
 
 class Swapped(SignalFault):
-    """Two signals stand in each other's place."""
+    """Two signals are exchanged."""
 
     kind: Literal["swapped"]
     signals: Annotated[tuple[str, ...], Field(min_length=2, max_length=2)]
 
     def change(self, seed: int) -> Change:  # noqa: ARG002
-        """As in `SignalFault`."""
+        """Return the function that exchanges the values."""
         return lambda values, _: values[::-1]
 
 
 class Late(SignalFault):
-    """The signals are as they were some time ago."""
+    """The signals are delayed."""
 
     kind: Literal["late"]
     by_s: FaultSpan
-    """Age of what is sent, rounded up to whole cycles of the message."""
+    """Delay, rounded up to whole cycles of the message."""
 
     def change(self, seed: int) -> Change:  # noqa: ARG002
-        """As in `SignalFault`."""
+        """Return the function that delays the values."""
         cycles = whole_cycles(self.by_s, self.named.codec.cycle_ns)
         line: deque[Sequence[Any]] = deque(maxlen=cycles + 1)
 
@@ -212,12 +212,12 @@ class Late(SignalFault):
 
 
 def value_of(hint: Any, written: float | bool | str | None) -> Any:
-    """A signal's value as a configuration writes it: a number, a name of its table, or nothing.
+    """Signal's value from its configuration: a number, a name of its table, or None.
 
     Raises
     ------
     ValueError
-        If the signal can't have it.
+        If the signal cannot have this value.
     """
     kind = field_kind(hint)
     if isinstance(written, str):
@@ -237,12 +237,12 @@ def value_of(hint: Any, written: float | bool | str | None) -> Any:
 
 
 class Value(MessageFault):
-    """The signals say this, nothing standing for "not available"."""
+    """The signals have fixed values; an empty value means "not available"."""
 
     kind: Literal["value"]
     values: Annotated[dict[str, float | bool | str | None], Field(min_length=1)]
     every: Annotated[int, Field(ge=1)] = 1
-    """One message in this number says it."""
+    """Only one message in this number has these values."""
 
     @model_validator(mode="after")
     def _known_values(self) -> "Value":
@@ -250,7 +250,7 @@ class Value(MessageFault):
         return self
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Alter the message where it leaves its node."""
+        """Alter the message at the output of its node."""
         hints = get_type_hints(self.named.kind)
         values = {name: value_of(hints[name], written) for name, written in self.values.items()}
         count = [-1]
@@ -264,7 +264,7 @@ class Value(MessageFault):
 
 
 def value_problems(named: Any, values: dict[str, Any]) -> list[tuple[str, str]]:
-    """What is wrong with values written for a message."""
+    """Problems of the values configured for a message."""
     problems = signal_problems(named, values)
     hints = get_type_hints(named.kind)
     for name, written in values.items():
@@ -272,7 +272,7 @@ def value_problems(named: Any, values: dict[str, Any]) -> list[tuple[str, str]]:
             if name in hints:
                 value = value_of(hints[name], written)
                 most = named.codec.not_available[name]
-                # a number may be none of the table's, but must fit; others are clipped in encoding
+                # a number may be outside the table, but must fit; others are clipped in encoding
                 if issubclass(field_kind(hints[name]), IntEnum) and not 0 <= (value or 0) <= most:
                     raise ValueError(f"must be 0 to {most}")
         except ValueError as error:

@@ -1,4 +1,4 @@
-"""Faults of the bus, and nodes on it that should not be there."""
+"""Faults of the bus, and foreign nodes on it."""
 
 from collections.abc import Iterable
 from typing import Annotated, Any, Final, Literal
@@ -41,7 +41,7 @@ Identifier = Annotated[str, AfterValidator(_identifier)]
 
 
 class BusFault(Fault):
-    """A fault of the modelled bus; a real one has none, and no controller beside it."""
+    """Fault of the simulated bus; it cannot be injected on a real one."""
 
     needs = ("controller",)
 
@@ -51,13 +51,13 @@ class Disturbed(BusFault):
 
     kind: Literal["gateway"]
     does: Literal["loses", "delays", "doubles", "swaps"]
-    """What becomes of the frames."""
+    """Kind of disturbance."""
     share: _SHARE = 1.0
-    """Of the frames, by chance."""
+    """Share of the frames disturbed at random."""
     message: MessageName | None = None
-    """All of them if none is named."""
+    """Message that is disturbed; all if none is named."""
     by_s: FaultSpan | None = None
-    """Delay."""
+    """Delay of a frame."""
 
     @model_validator(mode="after")
     def _delay(self) -> "Disturbed":
@@ -66,7 +66,7 @@ class Disturbed(BusFault):
         return self
 
     def node_names(self) -> tuple[str, ...]:
-        """The sender of the message, too."""
+        """Names of the required nodes, with the sender of the message."""
         if self.message is None:
             return self.needs
         return (*self.needs, NODE_OF[load_catalogue().named(self.message).source])
@@ -80,16 +80,16 @@ class Disturbed(BusFault):
 
 
 class BitErrors(BusFault):
-    """A share of the attempts to send is destroyed; of one node, as by a broken transceiver."""
+    """A share of the transmissions is destroyed; with `node`, as by a broken transceiver."""
 
     kind: Literal["bit_errors"]
     share: _SHARE
-    """Of the attempts to send, by chance."""
+    """Share of the transmissions destroyed at random."""
     node: NodeName | None = None
-    """Whose transceiver is broken; without it the frames of all nodes."""
+    """Node with the broken transceiver; without it the frames of all nodes are concerned."""
 
     def node_names(self) -> tuple[str, ...]:
-        """The one with the transceiver, too."""
+        """Names of the required nodes, with that of the broken transceiver."""
         return self.needs if self.node is None else (*self.needs, self.node)
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
@@ -108,7 +108,7 @@ class BitErrors(BusFault):
 
 
 class _Flooder:
-    """Keeps so much of the bus in use, one frame after another."""
+    """Node that occupies a share of the bus with consecutive frames."""
 
     period_ns = 1_000_000
 
@@ -120,10 +120,10 @@ class _Flooder:
         self.hears: frozenset[int] = frozenset()
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Hear nothing."""
+        """Ignore the frame."""
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
-        """Send what is due."""
+        """Send the frames that are due."""
         if not self._span.holds(now_ns):
             return ()
         self._due += self._per_tick
@@ -138,13 +138,13 @@ class Flood(Fault):
     Attributes
     ----------
     identifier : str
-        Hexadecimal, as candump writes it.
+        Identifier in hexadecimal, in candump's notation.
     share : float
-        Of a bus of 250 kbit/s; above 1 they queue up.
+        Share of a bus of 250 kbit/s; above 1 the frames queue up.
     format : str
-        "extended"; "standard" and "remote" frames are handed to no node.
+        "extended", "standard" or "remote"; the last two are not passed to any node.
     length : int
-        Data bytes.
+        Number of data bytes.
     """
 
     kind: Literal["flood"]
@@ -160,7 +160,7 @@ class Flood(Fault):
         return self
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Join the bus."""
+        """Add the node to the bus."""
         from utank_hil.runners import frame_bits
 
         # a standard identifier wins over the extended ones that begin with it
@@ -175,12 +175,12 @@ class Flood(Fault):
         bench.joining.append(_Flooder(f"flood {len(bench.joining)}", frame, span, per_s))
 
     def node_names(self) -> tuple[str, ...]:
-        """Frames of other kinds are counted by the controller in lockstep."""
+        """Names of the required nodes: in lockstep the controller counts other formats."""
         return () if self.format == "extended" else ("controller",)
 
 
 class _Sender:
-    """Sends one message in its cycle, or once if it has none."""
+    """Node that sends one message in its cycle, or once if it has none."""
 
     hears: frozenset[int] = frozenset()
 
@@ -200,16 +200,16 @@ class _Sender:
         self._done = False
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Hear nothing."""
+        """Ignore the frame."""
 
     def _follow(self, frame: Frame, after_s: float) -> Iterable[Frame]:  # noqa: ARG002
-        """Note the counter of a frame of the real sender, up to the first one of its own."""
+        """Note the counter of the real sender's frame, up to the first own frame."""
         if not self._done and self._codec.protected and len(frame.data) > 1:
             self._counter = frame.data[1] + self._ahead - 1
         return (frame,)
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
-        """Send."""
+        """Send the message when due."""
         if not self._span.holds(now_ns) or (self._once and self._done):
             return ()
         self._done = True
@@ -218,13 +218,13 @@ class _Sender:
 
 
 class Impostor(Fault):
-    """A second node sends a message as well, in the cycle, rightly protected."""
+    """A second node also sends a message, in the right cycle and with a correct CRC."""
 
     kind: Literal["impostor"]
     message: AnyMessageName
     values: dict[str, float | bool | str | None]
     ahead: Annotated[int, Field(ge=0, le=15)] = 1
-    """By so much the counter of its first frame is ahead of that of the real one before."""
+    """Lead of its first counter over the real sender's last one."""
 
     @model_validator(mode="after")
     def _known_values(self) -> "Impostor":
@@ -241,7 +241,7 @@ class Impostor(Fault):
         return self
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Join the bus."""
+        """Add the node to the bus."""
         sender = _Sender(f"impostor {len(bench.joining)}", self, span)
         real = bench.nodes.get(NODE_OF.get(load_catalogue().named(self.message).source, ""))
         if real is not None:
@@ -250,14 +250,14 @@ class Impostor(Fault):
 
 
 class SecondPanel(Fault):
-    """A second operator's station, whose times count from when it first hears the controller."""
+    """A second operator's station, whose times count from its first frame of the controller."""
 
     kind: Literal["second_panel"]
     operator: tuple[TimedAction, ...] = ()
-    """What is done there."""
+    """Actions at that station."""
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Join the bus, and leave it."""
+        """Add the station to the bus, and remove it at the end."""
         panel = OperatorPanel(
             load_catalogue(),
             configuration_version=bench.version,
