@@ -1,4 +1,4 @@
-"""High-level switches and a stop loop that a ship may have by wires of their own."""
+"""High-level switches and stop loop that a ship may have on separate wires."""
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
@@ -19,21 +19,19 @@ if TYPE_CHECKING:
 
 
 class HardwiredNode:
-    """Sends what the wires say.
+    """Node that sends the state of the wires.
 
     Parameters
     ----------
-    plant : Plant
-        The ship whose levels move the switches.
     high_level_m : float
         Level above still water at which a reservoir's switch closes.
     configuration_version : int
-        Sent in the heartbeat.
+        Version sent in the heartbeat.
 
     Attributes
     ----------
     stop_pressed : bool
-        Whether somebody holds the hard-wired stop, which opens its loop.
+        Whether the hard-wired stop is pressed, which opens its loop.
     """
 
     name = "hardwired"
@@ -57,10 +55,10 @@ class HardwiredNode:
         self.stop_pressed = False
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """It listens to no message."""
+        """Ignore the frame."""
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
-        """Read the inputs, and send them when they are due."""
+        """Read the inputs, and send them when due."""
         self._plant.advance(now_ns)
         frames: list[Frame] = []
         if self._ticks % self._cycle_ticks == 0:

@@ -1,4 +1,4 @@
-"""A run of a bench in simulated time."""
+"""Run of a bench in simulated time."""
 
 from typing import Final
 
@@ -28,13 +28,13 @@ from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import Tapped
 
 FRAME_BLOCK_NS: Final = 10 * SECOND_NS
-"""Of a frame log: each block waits for the disk."""
+"""Time span of a block in a frame log: each block waits for the disk."""
 
 
 def run_lockstep(job: Job, watch: Watch | None = None) -> Run:
-    """Run in simulated time; the same job gives the same rows, bit for bit.
+    """Run in simulated time, with the scenario's faults unless the run is passive.
 
-    The scenario's faults are in it, but for the passive run.
+    The same job gives the same rows, bit for bit.
     """
     retuner, estimating = (
         work and SimulatedRetuner(work[0], job.scenario.retuner_latency_s)
@@ -53,7 +53,7 @@ def run_lockstep(job: Job, watch: Watch | None = None) -> Run:
 
 
 def _run_with_faults(job: Job, watch: Watch | None, desks: Tapped, tapped: Tap) -> Run:
-    """A run in which the scenario's faults happen."""
+    """Run with the scenario's faults."""
     log = MemoryLog(len(SIGNALS), -(-job.ticks // ROW_TICKS))
     bench = FaultyBench(
         job.scenario, job.controller, job.law, seed=job.seed, script=job.script, sink=log.write,

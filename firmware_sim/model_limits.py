@@ -1,6 +1,6 @@
-"""Where the bench's ship, tank, sea and pump are no longer a model of real ones, in one place.
+"""Limits beyond which ship, tank, sea and pump of the bench are no longer a valid model.
 
-A bench that passes a limit still runs; what passed it is said under the tables.
+A bench that passes a limit still runs; the limit is reported under the tables.
 """
 
 import math
@@ -18,19 +18,20 @@ from utank_hil.sea import Spectrum
 MOST_ROLL_RAD: Final = math.radians(40.0)
 MOST_LINEAR_ROLL_RAD: Final = math.radians(10.0)
 OVERSPEED: Final = 1.02
-"""Share of the pump's speed limit up to which the speed loop lets the rotor pass it."""
+"""Ratio to the pump's speed limit up to which the speed loop lets the rotor overshoot."""
 
 
 @dataclass(frozen=True, slots=True)
 class ModelLimit:
-    """A limit of the model.
+    """Limit of the model.
 
     Attributes
     ----------
     limit : str
         The limit, and what is not modelled beyond it.
     passed : callable
-        What passed it in a bench, in words with the figure; nothing if nothing did.
+        Function of a bench that describes what passed the limit, with the figure; empty if nothing
+        did.
     """
 
     limit: str
@@ -38,10 +39,10 @@ class ModelLimit:
 
 
 def steepness(spectrum: Spectrum) -> tuple[float, float]:
-    """Average steepness of a sea, and the most that seas have.
+    """Average steepness of a sea, and its limit.
 
-    Significant height over the length of a wave of mean zero-up-crossing period; its limit falls
-    from 1/10 at 6 s to 1/15 at 12 s (DNV-RP-C205, section 3.5.4).
+    The steepness is the significant height divided by the length of a wave of mean zero-up-crossing
+    period; its limit falls from 1/10 at 6 s to 1/15 at 12 s (DNV-RP-C205, section 3.5.4).
     """
     period_s = spectrum.tz_s
     found = 2 * math.pi * spectrum.hs_m / (GRAVITY_M_S2 * period_s**2)
@@ -117,11 +118,11 @@ MODEL_LIMITS: Final = (
     ModelLimit("steeper sea than there is: waves are linear and do not break", _sea),
     ModelLimit("pump beyond its speed: blades neither cavitate nor burst", _pump),
 )
-"""Each limit once, in the order in which they are said."""
+"""All limits, in the order of their report."""
 
 
 def passed_limits(result: BenchResult) -> list[str]:
-    """Every limit that was passed, with who passed it by how much."""
+    """Descriptions of all limits that were passed, with run and amount."""
     return [
         f"limit of the model passed, {each.limit}: {'; '.join(found)}"
         for each in MODEL_LIMITS

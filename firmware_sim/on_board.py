@@ -1,6 +1,6 @@
-"""What the roll of a bench means for people: how often it is great, and how it feels at a place.
+"""Effect of a bench's roll on people: its exceedance, and the comfort at a place.
 
-Roll is all that the bench knows; sway, heave and pitch add to it on a real ship.
+The bench knows roll alone; sway, heave and pitch add to it on a real ship.
 """
 
 import math
@@ -20,17 +20,17 @@ LEVELS_RAD: Final = tuple(math.radians(degrees) for degrees in (2.5, 5.0, 7.5, 1
 
 @dataclass(frozen=True, slots=True)
 class OnBoard:
-    """A run, for people.
+    """Effect of a run's roll on people.
 
     Attributes
     ----------
     exceedance : tuple of float, or None
-        Shares of the single amplitudes of roll above each of `LEVELS_RAD`; None where the record
-        holds no half-cycle.
+        Shares of the single amplitudes of roll above each of `LEVELS_RAD`; None for a record
+        without a half-cycle.
     rayleigh : tuple of float
-        Shares that a narrow-banded Gaussian roll of this standard deviation has.
+        The shares for a narrow-banded Gaussian roll of the same standard deviation.
     comfort : Comfort
-        At the place.
+        Comfort at the place.
     """
 
     exceedance: tuple[float, ...] | None
@@ -39,7 +39,7 @@ class OnBoard:
 
 
 def on_board(roll_rad: FloatArray, step_s: float, place: Place) -> OnBoard:
-    """Judge a roll record, shape (n,), n of three or more."""
+    """Judge a roll record of shape (n,), n at least 3."""
     levels = np.array(LEVELS_RAD)
     try:
         above: tuple[float, ...] | None = tuple(exceedance(roll_rad, levels).tolist())

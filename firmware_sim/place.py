@@ -1,4 +1,4 @@
-"""Where on board people are, for the judgement of what they feel."""
+"""Places on board where motion comfort is judged."""
 
 from dataclasses import dataclass
 
@@ -8,14 +8,14 @@ from utank_hil.dynamics.tank import Tank
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A place on board, seen from the ship's centre of gravity.
+    """Place on board, relative to the ship's centre of gravity.
 
     Parameters
     ----------
     height_m : float
-        Above it.
+        Height above the centre of gravity.
     starboard_m : float
-        To starboard of it.
+        Distance to starboard of the centre of gravity.
     """
 
     height_m: Finite
@@ -26,5 +26,5 @@ class Place:
 
     @classmethod
     def over_reservoir(cls, tank: Tank) -> "Place":
-        """The deck over the starboard reservoir, where a scenario names no place."""
+        """Place on the deck over the starboard reservoir, the default of a scenario."""
         return cls(tank.height_m + tank.level_limit_m - tank.lz_m, tank.width_m / 2)

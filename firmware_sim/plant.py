@@ -1,4 +1,4 @@
-"""The emulated ship: ship, tank and pump in waves, integrated up to a given time."""
+"""Emulated ship: ship, tank and pump in waves, integrated up to a given time."""
 
 import math
 from collections.abc import Callable
@@ -19,13 +19,13 @@ from utank_hil.dynamics.tank import Tank
 from utank_hil.sea import Harmonics
 
 SAILING_TICKS = 100
-"""Ticks between two looks at the ship's parameters: a second."""
+"""Ticks between updates of the ship's parameters: 1 s."""
 
 
 class Plant:
     """Ship, tank and pump in waves, integrated at 1 kHz by the nonlinear equations.
 
-    The ship is upright and at rest at the first `advance`. Off-centre weight and steady wind heel
+    The ship is upright and at rest at the first `advance`; off-centre weight and steady wind heel
     it from then on. Water that reaches a limit of the level strikes it. A ship that passes 90
     degrees has capsized and stays there. The pump follows its set-point through its own pressure
     loop. Switched off, its rotor turns freely in the water.
@@ -33,21 +33,21 @@ class Plant:
     Parameters
     ----------
     ship : RollShip or callable
-        The ship, or the ship at a time in s since the start; that is asked for once a second.
+        The ship, or a function of the time in s since the start, evaluated once a second.
     pump : Pump or None
         None for a tank without one.
     waves : Waves or Harmonics
         Roll moment of the waves in N m, from the plant's start on.
     linear : bool
-        Integrate the small-angle limit instead: no quadratic loss, no limit of the level, no
-        capsizing.
+        Whether to integrate the small-angle limit: no quadratic loss, level limit or capsizing.
 
     Attributes
     ----------
     broken_pump : callable or None
-        Fault to be tried out: the pressure that an enabled pump gives instead of a set-point.
+        Injected fault: function that gives the pressure of an enabled pump instead of its
+        set-point.
     presses_off : bool
-        It does when it is not enabled, too.
+        Whether that fault also acts while the pump is not enabled.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class Plant:
         self._load(self._ship)
         self._area_m2 = tank.reservoir_area_m2
         self._has_pump = pump is not None
-        self._pump = pump or Pump.for_duct(tank.duct_area_m2)  # of no effect if there is none
+        self._pump = pump or Pump.for_duct(tank.duct_area_m2)  # without effect if there is none
         self._coefficients = tuple(self._pump.coefficients)
         self._weights = kernel.interpolation_weights()
         self._waves = SteadyWaves(waves) if isinstance(waves, Harmonics) else waves
@@ -83,7 +83,7 @@ class Plant:
         self.presses_off = False
 
     def _load(self, ship: RollShip) -> None:
-        """Take the ship's parameters."""
+        """Set the ship's parameters."""
         tank = self._tank
         self._linear_model = np.zeros((0, 7))
         if self._linear:
@@ -118,7 +118,7 @@ class Plant:
             )
             self._now_ns += TICK_NS
             self._ticks += 1
-        # as plain numbers: reading an array's elements one by one costs more than all of them
+        # plain numbers: reading array elements one by one costs more than converting all
         self._values = self._state.tolist()
 
     def _sail(self, ship: RollShip) -> None:
@@ -127,15 +127,7 @@ class Plant:
             self._load(ship)
 
     def drive_pump(self, setpoint_pa: float, *, enabled: bool) -> None:
-        """Set the pump's command from now on.
-
-        Parameters
-        ----------
-        setpoint_pa : float
-            Commanded pressure.
-        enabled : bool
-            Whether the motor is on; if not, the rotor turns freely.
-        """
+        """Set the pump's command from now on; a pump not `enabled` turns freely."""
         if self.broken_pump is not None and (enabled or self.presses_off):
             self.impose_pressure(self.broken_pump(setpoint_pa))
         elif self._has_pump:
@@ -143,7 +135,7 @@ class Plant:
             self._state[kernel.MODE] = kernel.DRIVEN if enabled else kernel.FREE
 
     def brake_pump(self) -> None:
-        """Brake as fast as the motor can, without the pressure loop's lag and rate limit."""
+        """Brake at the motor's limit, without the pressure loop's lag and rate limit."""
         self.drive_pump(0.0, enabled=True)
         self._state[kernel.REFERENCE] = 0.0
 
@@ -156,7 +148,7 @@ class Plant:
         self._state[kernel.MODE] = kernel.IMPOSED
 
     def set_valve_loss(self, loss_pa_per_m2_s2: float) -> None:
-        """Throttle the water from now on.
+        """Set the throttling of the water from now on.
 
         Parameters
         ----------
@@ -217,13 +209,13 @@ class Plant:
 
     @property
     def losses_j(self) -> float:
-        """What damping of ship and water, valve and strikes took since the start."""
+        """Energy lost in damping of ship and water, valve and strikes since the start."""
         parts = (kernel.DAMPED, kernel.DAMPED_STRIKING, kernel.STRUCK)
         return sum(self._values[part] for part in parts)
 
     @property
     def strikes(self) -> int:
-        """How often the water struck a limit of its level since the start."""
+        """Number of strikes of the water on a limit of its level since the start."""
         return int(self._values[kernel.SUMMED][STRIKES])
 
     @property
@@ -233,7 +225,7 @@ class Plant:
 
     @property
     def capsized_s(self) -> float:
-        """Time since the start at which the ship capsized, infinite for one that did not."""
+        """Time since the start at which the ship capsized; infinite if it did not."""
         return self._values[kernel.CAPSIZED]
 
     @property
@@ -248,13 +240,13 @@ class Plant:
 
     @property
     def rate_limited(self) -> bool:
-        """Whether the pump's own rate limit holds the pressure back."""
+        """Whether the pump's own rate limit acts on the pressure."""
         behind_pa = abs(self._values[kernel.SETPOINT] - self._values[kernel.REFERENCE])
         return behind_pa > self._pump.max_pressure_rate_pa_s * self._pump.reference_lag_s
 
     @property
     def speed_limited(self) -> bool:
-        """Whether the rotor turns as fast as it may, or the water drives it beyond that."""
+        """Whether the rotor is at its speed limit, or driven beyond it by the water."""
         return abs(self.pump_speed_rad_s) >= 0.999 * self._pump.max_speed_rad_s
 
     @property

@@ -1,9 +1,9 @@
-"""Compiled integration of ship, tank and pump. Imports numba: import it late.
+"""Compiled integration of ship, tank and pump; it imports numba, so import it late.
 
 One call advances the plant by one tick in steps of 1 ms: the pump and its inner pressure loop once
 a step, ship and water by the step of `utank_hil.dynamics.kernels`, with the pump's pressure held
-over the step. The wave moment is a sum of rotating phasors, summed once a tick and interpolated in
-between through four ticks' values; for a wave at 3 rad/s that is exact to 2e-8 of its amplitude.
+over the step. The wave moment is a sum of rotating phasors, computed once a tick and interpolated
+through the values of four ticks, with an error of 2e-8 of the amplitude for a wave at 3 rad/s.
 """
 
 import numpy as np
@@ -35,14 +35,14 @@ MOMENTS = slice(13, 17)  # wave moment at t - 1, t, t + 1 and t + 2 ticks
 MOMENT_NOW = 14
 VALVE_LOSS = 17  # Pa per (m/s)^2 of dh/dt
 TIME = 18  # since the start, s
-# work since the start, J: of the shaft, of the waves, of the pump on the water; what damping and
-# valve took
+# work since the start in J: of the shaft, of the waves, of the pump on the water, and losses of
+# damping and valve
 SHAFT_WORK, WAVE_WORK, PUMP_WORK, DAMPED = range(19, 23)
 SUMMED = slice(23, 23 + SUMMARY)  # summary of `utank_hil.dynamics.kernels`
 STATES = 23 + SUMMARY
 CAPSIZED, STRUCK, DAMPED_STRIKING = 23 + CAPSIZED_S, 23 + STRIKE_LOSS, 23 + DAMPED_AROUND
 
-# values of MODE: the rotor turns freely, follows the set-point, the set-point is the pressure, or
+# values of MODE: the rotor turns freely; it follows the set-point; the set-point is the pressure;
 # there is no pump
 FREE, DRIVEN, IMPOSED, ABSENT = 0, 1, 2, 3
 
@@ -52,7 +52,7 @@ pump_step, pump_coast = compile_pump(njit())
 
 
 def interpolation_weights() -> FloatArray:
-    """Lagrange weights on the four moments, for each half step of a tick; (2 STEPS + 1, 4)."""
+    """Lagrange weights of the four moments at each half step of a tick, (2 STEPS + 1, 4)."""
     nodes = np.array([-1.0, 0.0, 1.0, 2.0])
     at = np.linspace(0.0, 1.0, 2 * STEPS + 1)
     weights = np.ones((len(at), 4))
@@ -73,7 +73,7 @@ def advance_tick(
     rotations: ComplexArray,
     weights: FloatArray,
 ) -> None:
-    """Advance `state` by one tick, in place; a capsized ship stays as it is.
+    """Advance `state` by one tick, in place; a capsized ship does not move.
 
     Parameters
     ----------
@@ -81,16 +81,16 @@ def advance_tick(
     row : ndarray, shape (18,)
         `RollCoefficients`, and the pieces of the restoring moment per radian.
     restoring : ndarray, shape (pieces, powers)
-        As in `utank_hil.dynamics.restoring.Restoring`.
+        Coefficients of `utank_hil.dynamics.restoring.Restoring`.
     linear : ndarray, shape (4, 7) or (0, 7)
-        The linear model instead of the equations of `row` and `restoring`. Columns: state matrix,
-        effect of pressure, effect of wave moment, accelerations by what heels the ship steadily.
+        Linear model that replaces `row` and `restoring`. Columns: state matrix, effect of pressure,
+        effect of wave moment, accelerations by steady heeling moments.
     coefficients : tuple of float
-        `PumpCoefficients` as a plain tuple: a named one takes numba 2 us to take in.
+        `PumpCoefficients` as a plain tuple: numba needs 2 us to unbox a named one.
     phasors, rotations : ndarray, shape (n,)
-        Wave components two ticks ahead, and their turn in one tick; `phasors` moves on.
+        Wave components two ticks ahead, and their rotation per tick; `phasors` is advanced.
     weights : ndarray
-        From `interpolation_weights`.
+        Result of `interpolation_weights`.
     """
     c = unpacked(row)
     pump_coefficients = PumpCoefficients(*coefficients)
@@ -139,7 +139,7 @@ def advance_tick(
         else:
             damped_j += (damping_w(c, x, valve) + damping_w(c, after, valve)) / 2 * STEP_S
         shaft_j += pump.power_w * STEP_S
-        # as force times way, which holds in a step with an impact too
+        # force times distance, which also holds in a step with an impact
         wave_j += (first + last) / 2 * (after[0] - x[0])
         pump_j += force * (after[2] - x[2])
         x, first = after, last
@@ -164,7 +164,7 @@ def advance_tick(
 
 @njit(error_model="numpy")
 def turned_sum(phasors: ComplexArray, rotations: ComplexArray) -> float:
-    """Turn all wave components by one tick, in place, and return their sum."""
+    """Rotate all wave components by one tick, in place, and return their sum."""
     total: float = 0.0
     for n in range(len(phasors)):
         phasors[n] *= rotations[n]
@@ -174,7 +174,7 @@ def turned_sum(phasors: ComplexArray, rotations: ComplexArray) -> float:
 
 @njit(error_model="numpy")
 def _interpolated(weights: FloatArray, row: int, moments: FloatArray) -> float:
-    # written out: a product of four numbers is not worth a call of the linear algebra library
+    # explicit: a product of four numbers is not worth a call of the linear algebra library
     w, m = weights[row], moments
     return float(w[0] * m[0] + w[1] * m[1] + w[2] * m[2] + w[3] * m[3])
 
@@ -183,7 +183,7 @@ def _interpolated(weights: FloatArray, row: int, moments: FloatArray) -> float:
 def _linear_step(
     model: FloatArray, x: State, moments: tuple[float, float, float], pressure_pa: float
 ) -> State:
-    """One Runge-Kutta step of the linear model."""
+    """Advance the linear model by one Runge-Kutta step."""
     k1 = _rates(model, x, x, 0.0, pressure_pa, moments[0])
     k2 = _rates(model, x, k1, STEP_S / 2, pressure_pa, moments[1])
     k3 = _rates(model, x, k2, STEP_S / 2, pressure_pa, moments[1])

@@ -1,4 +1,4 @@
-"""The waves of a scenario for linear predictions: many realisations as one."""
+"""Waves of a scenario for linear predictions: many realisations in one sum."""
 
 import math
 from typing import Final
@@ -10,11 +10,11 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.sea import Harmonics
 
 REALISATIONS: Final = 16
-"""A lightly damped ship needs a fine spectrum."""
+"""Number of realisations: a lightly damped ship needs a fine spectrum. Chosen; no study."""
 
 
 def pooled_wave_moment(scenario: Scenario, ship: RollShip) -> Harmonics:
-    """The sea's moment on the ship, as many realisations with a share of the energy each."""
+    """Wave moment on the ship: many realisations, each with an equal share of the energy."""
     seas = [
         scenario.sea.roll_moment(scenario.sea.sea(seed), ship.stiffness_nm_rad)
         for seed in range(REALISATIONS)

@@ -1,4 +1,4 @@
-"""A run of a bench in real time: in one process, or in two on a real bus."""
+"""Run of a bench in real time: in one process, or in two on a real bus."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -45,15 +45,15 @@ from utank_hil.telemetry.rows import RowWriter
 
 
 class Meeting(Watch, Protocol):
-    """Watches a run of two processes, and has both begin together."""
+    """Watch of a run in two processes, which synchronizes their start."""
 
     def begin_ns(self) -> int:
-        """Tell that this side is ready; when both shall begin, on the monotonic clock."""
+        """Report that this side is ready; return the common start on the monotonic clock."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShipRun:
-    """The ship's half of a run on a real bus; `start_ns` on the monotonic clock."""
+    """Ship's half of a run on a real bus; `start_ns` is on the monotonic clock."""
 
     rows: FloatArray
     start_ns: int
@@ -62,7 +62,7 @@ class ShipRun:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControllerRun:
-    """The controller's half of a run on a real bus; `start_ns` on the monotonic clock."""
+    """Controller's half of a run on a real bus; `start_ns` is on the monotonic clock."""
 
     rows: FloatArray
     start_ns: int
@@ -73,7 +73,7 @@ class ControllerRun:
 
 
 def run_in_one_process(job: Job, watch: Watch | None = None) -> Run:
-    """Run with all nodes in one loop and no bus but the loop itself."""
+    """Run with all nodes in one loop, without a bus."""
     _load_kernel(job)
     ship, truth, truth_log = ship_of(job)
     statistics = LoopStatistics()
@@ -100,7 +100,7 @@ def run_controller(job: Job, channel: str, meeting: Meeting) -> ControllerRun:
 
 
 def join(name: str, ship: ShipRun, controller: ControllerRun) -> Run:
-    """Put the halves of a run on a real bus side by side, on the ship's time."""
+    """Join the halves of a run on a real bus, on the ship's time."""
     shift_s = (controller.start_ns - ship.start_ns) / SECOND_NS
     rows = side_by_side(controller.rows, ship.rows, shift_s)
     return Run(
@@ -133,14 +133,14 @@ def _controller_run(
 
 
 def _load_kernel(job: Job) -> None:
-    """Have the plant's compiled code loaded, which would cost the first ticks of a run."""
+    """Load the plant's compiled code, which would otherwise delay the first ticks of a run."""
     plant = build_ship_side(job.scenario, job.seed, ()).plant
     for now_ns in (0, TICK_NS):
         plant.advance(now_ns)
 
 
 def _ring(job: Job) -> RowWriter:
-    """The ring of a run in real time, for `utank-hil monitor`."""
+    """Ring of a run in real time, for `utank-hil monitor`."""
     about = describe("bench", job.controller, Path.cwd(), options={"run": job.name}, seed=job.seed)
     return RowWriter(SIGNALS, about=about)
 
@@ -149,10 +149,10 @@ def _ring(job: Job) -> RowWriter:
 def _real_time_controller(
     job: Job, statistics: LoopStatistics
 ) -> Iterator[tuple[ControllerNode, MemoryLog, Node]]:
-    """The controller, its rows, and the node that is put on the bus."""
+    """Yield the controller, its rows, and the node that is put on the bus."""
     with retuner_process(job.controller) as (retuner, estimating):
         desks = Tapped(retuner, estimating, wanted=job.frames is not None)
-        # the loop waits for no disk: its records are written when it has ended
+        # the loop must not wait for a disk: its records are written after its end
         block_ns = job.ticks * TICK_NS + SECOND_NS
         with frame_log(job, desks, block_ns) as tapped, _ring(job) as ring:
             controller, log = controller_of(job, desks, statistics, ring)
@@ -176,7 +176,7 @@ def _run_loop(
 
     try:
         with real_time_scheduling():
-            if begin_ns is not None:  # asked last: from here on nothing is left to load or build
+            if begin_ns is not None:  # called last: from here on nothing is loaded or built
                 MonotonicClock().sleep_until(begin_ns())
             loop.run(stop, job.ticks * TICK_NS)
     finally:

@@ -1,4 +1,4 @@
-"""The files that a bench leaves behind: figures, a picture, a recording and a page."""
+"""Files of a bench: figures, a picture, a recording and a page."""
 
 import json
 import math
@@ -28,19 +28,14 @@ REPORT_FILES: Final = (PICTURE, RECORDING, FIGURES, PAGE)
 def write_report(
     result: BenchResult, found: BenchFigures, folder: Path, about: Mapping[str, Any]
 ) -> tuple[dict[str, Path], list[str]]:
-    """Write picture, recording, figures and page of a bench, with where it comes from (`about`).
-
-    Parameters
-    ----------
-    found : BenchFigures
-        Of the result.
+    """Write picture, recording, figures and page of a bench, with their provenance `about`.
 
     Returns
     -------
     files : dict
-        Path of each that was written: "picture", "recording", "figures", "report".
+        Paths of the files written: "picture", "recording", "figures", "report".
     failures : list of str
-        What could not be written, and why.
+        Files that could not be written, with the reason.
     """
     files: dict[str, Path] = {}
     failures = []
@@ -58,7 +53,7 @@ def write_report(
     writers: tuple[tuple[str, str, Callable[[Path], None]], ...] = (
         ("picture", PICTURE, partial(_draw, result, found, about)),
         ("recording", RECORDING, partial(_record, result, about)),
-        ("figures", FIGURES, write_figures),  # after those that they name
+        ("figures", FIGURES, write_figures),  # after the files that they name
         ("report", PAGE, write_page),
     )
     for name, file, write in writers:
@@ -120,7 +115,7 @@ def _degrees(roll_rad: float) -> str:
 
 
 def _legend(run: RunFigures) -> str:
-    """Name of a run with the roll that the table shows, and what that is against the passive."""
+    """Legend of a run: its name, its roll as in the table, and the reduction against passive."""
     if run.mark is not None or run.roll is None:
         return run.name if run.mark is None else f"{run.name}: {run.mark.word}"
     below = None if run.name == PASSIVE else run.roll_below_passive

@@ -1,4 +1,4 @@
-"""The page of a bench: from its figures, or from the files that it left."""
+"""Page of a bench: from its figures, or from its files."""
 
 import json
 import math
@@ -48,16 +48,16 @@ def bench_page(
     rolls: Mapping[str, FloatArray],
     scratch: Path,
 ) -> Report:
-    """The page of a bench.
+    """Return the page of a bench.
 
     Parameters
     ----------
     about : mapping
-        Where it comes from.
+        Provenance.
     picture : bytes, optional
         PNG of all runs.
     rolls : mapping of str to ndarray, shape (n,)
-        Of each run that is compared, every `RECORD_S` in the window.
+        Roll of each compared run, every `RECORD_S` in the window.
     scratch : Path
         Folder for pictures that are made for the page.
     """
@@ -81,12 +81,12 @@ def bench_page(
 
 
 def read_bench(folder: Path, scratch: Path) -> Report:
-    """The page of a bench from the files that it left.
+    """Return the page of a bench from its files.
 
     Raises
     ------
     OSError, ValueError
-        If one is missing or is none.
+        If a file is missing or invalid.
     """
     content = json.loads((folder / FIGURES).read_text(encoding="utf-8"))
     try:
@@ -131,7 +131,7 @@ def _less(share: float) -> str:
 
 
 def sea_words(sea: Mapping[str, Any]) -> str:
-    """The section ``sea`` of a scenario, for people."""
+    """Readable description of the section ``sea`` of a scenario."""
     words = [_SEAS[sea["kind"]]]
     for key, said in _SEA_KEYS.items():
         value = sea.get(key)

@@ -1,4 +1,4 @@
-"""The tables of a bench, for the terminal and for its page."""
+"""Tables of a bench, for the terminal and for its page."""
 
 import math
 from collections.abc import Sequence
@@ -15,17 +15,17 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 _PREFIXES: Final = (("M", 1e6), ("k", 1e3), ("", 1.0))
 _SHOWN: Final = (1, 3)
-"""Of the levels whose exceedance is known: 5 and 10 degrees."""
+"""Indices of the exceedance levels in the table: 5 and 10 degrees."""
 
 
 def tables(found: BenchFigures) -> list[RichTable]:
-    """All tables of a bench, without empty ones."""
+    """All tables of a bench that have rows."""
     made = [motion_table(found), pump_table(found), on_board_table(found), retuning_table(found)]
     return [table for table in made if table.rows]
 
 
 def motion_table(found: BenchFigures) -> RichTable:
-    """Table of how much the ship rolled; runs that do not count stand at its end."""
+    """Table of the roll; runs that do not count are at its end."""
     table = new_table(
         f"{found.scenario} · {found.mode} · seed {found.seed}",
         "roll\nRMS °",
@@ -67,7 +67,7 @@ def _motion_cells(run: RunFigures) -> tuple[str, ...]:
 
 
 def pump_table(found: BenchFigures) -> RichTable:
-    """Table of what pump and bus did for it."""
+    """Table of pump and bus."""
     pumps = [(run, run.pump) for run in found.compared if run.pump is not None]
     columns = [
         (heading, *in_one_unit([getattr(pump, name) for _, pump in pumps], unit))
@@ -96,17 +96,17 @@ def pump_table(found: BenchFigures) -> RichTable:
 
 
 def in_one_unit(values: Sequence[float], unit: str) -> tuple[str, list[str]]:
-    """Values of a column in the one unit that suits the largest, which has three digits or more.
+    """Values of a column in the unit that gives the largest at most three integer digits.
 
     Parameters
     ----------
     values : sequence of float
-        Zero or more, in the unit without a prefix.
+        Non-negative values, in the unit without a prefix.
 
     Returns
     -------
     unit : str
-        With its prefix.
+        Unit with its prefix.
     cells : list of str
     """
     largest = max(values, default=0.0)
@@ -116,7 +116,7 @@ def in_one_unit(values: Sequence[float], unit: str) -> tuple[str, list[str]]:
 
 
 def on_board_table(found: BenchFigures) -> RichTable:
-    """Table of what the roll is like for people at the scenario's place."""
+    """Table of the roll's effect on people at the scenario's place."""
     judged = found.on_board
     levels, place = judged.levels_rad, judged.place
     table = new_table(
@@ -147,7 +147,7 @@ def on_board_table(found: BenchFigures) -> RichTable:
 
 
 def retuning_table(found: BenchFigures) -> RichTable:
-    """Table of what retuning found and gained; without rows where nothing retuned."""
+    """Table of retuning and its gain; empty where nothing retuned."""
     table = new_table(
         "Retuning",
         "retuned\nat s",

@@ -1,4 +1,4 @@
-"""What retuning did for a run, in figures."""
+"""Figures of a run's retuning."""
 
 import math
 from dataclasses import dataclass, replace
@@ -15,18 +15,18 @@ from utank_hil.canbus import RetuningState
 from utank_hil.retuning import ModelSummary, RetuningEvent
 
 SETTLING_S: Final = 60.0
-"""Left out after a new law came into service: five roll periods of a slow ship, 12 s."""
+"""Time left out after a new law came into service: five roll periods of a slow ship, 12 s."""
 _NEW_LAW: Final = (RetuningState.TRIAL, RetuningState.RETUNED)
 
 
 @dataclass(frozen=True, slots=True)
 class ShipInFigures:
-    """Ship and tank as they are, beside what is identified of them.
+    """True ship and tank, for comparison with the identified ones.
 
     Attributes
     ----------
     roll_period_s, damping_nms_rad : float
-        Of the ship without tank water.
+        Values of the ship without tank water.
     """
 
     roll_period_s: float
@@ -36,31 +36,31 @@ class ShipInFigures:
 
 @dataclass(frozen=True, slots=True)
 class RetuningFigures:
-    """What retuning did for a run; all times are the ship's.
+    """Figures of a run's retuning; all times are ship's time.
 
     Attributes
     ----------
     attempts : int
-        Retunings begun, with an identification or without.
+        Number of retunings begun, with an identification or without.
     retuned_at_s : float or None
-        When the last new law took charge, on trial at first; None if none did.
+        Time at which the last new law took charge, on trial at first; None if none did.
     roll_before_rad : float or None
-        Root mean square about the heel, before the first retuning; None if there is no such time.
+        Roll RMS about the heel before the first retuning; None if there is no such time.
     roll_after_rad : float or None
-        From `SETTLING_S` after the last new law took charge for as long as it stayed there and
-        nothing was identified; None if there is no such time.
+        Roll RMS from `SETTLING_S` after the last new law took charge, while it stayed in charge and
+        no identification ran; None if there is no such time.
     roll_after_below_before : float or None
-        Share by which the roll after is less than before.
+        Relative reduction of the roll.
     found : ModelSummary or None
-        What the last new law was made for.
+        Model for which the last new law was designed.
     truth : ShipInFigures
-        When the retuning began that found it, or the last one.
+        True values at the start of the retuning that found `found`, or of the last one.
     state : str
-        At the end.
+        State at the end.
     reasons : tuple of str
-        Why the last retuning began, and why it ended as it did; what was found apart.
+        Reasons of the last retuning's begin and end, without its result.
     events : tuple of dict
-        As `RetuningEvent.as_json` gives them, on the ship's time.
+        Events as by `RetuningEvent.as_json`, on ship's time.
     """
 
     attempts: int
@@ -81,10 +81,10 @@ def retuning_figures(run: Run, scenario: Scenario, settle_s: float) -> RetuningF
     Parameters
     ----------
     scenario : Scenario
-        Whose ship is the truth.
+        Scenario whose ship is the truth.
     settle_s : float
-        Left out at the start. Where the ship changes later, or under way, the time before that is
-        left out, too.
+        Time left out at the start; where the ship changes later or under way, the time before that
+        is left out, too.
     """
     if not run.retuning:
         return None
@@ -121,7 +121,7 @@ def retuning_figures(run: Run, scenario: Scenario, settle_s: float) -> RetuningF
         reasons=tuple(
             reason
             for event in last
-            if event.state is not RetuningState.TRIAL  # says what `found` does
+            if event.state is not RetuningState.TRIAL  # its text repeats `found`
             for reason in event.reasons
         ),
         events=tuple(event.as_json() for event in events),
@@ -129,19 +129,19 @@ def retuning_figures(run: Run, scenario: Scenario, settle_s: float) -> RetuningF
 
 
 def _begins(event: RetuningEvent, before: RetuningEvent | None) -> bool:
-    """Whether a retuning begins with an event: a design that no identification leads to."""
+    """Whether an event begins a retuning: a design that follows no identification."""
     if event.state is RetuningState.DESIGN:
         return before is None or before.state is not RetuningState.IDENTIFY
     return event.state is RetuningState.IDENTIFY
 
 
 def events_on_ships_time(run: Run) -> tuple[RetuningEvent, ...]:
-    """A run's events with `time_ns` as in its rows, to the time between two of those.
+    """Events of a run on the time of its rows, to within one row.
 
-    The controller counts on a clock of its own; what both know is when the state changed.
+    The controller has its own clock; the changes of state are known on both.
     """
     time_s, state = run.column("time_s"), run.column("retuning")
-    shift_ns = round(run.end_s * 1e9) - run.retuning[-1].time_ns  # of what no row shows
+    shift_ns = round(run.end_s * 1e9) - run.retuning[-1].time_ns  # for events that no row shows
     for event in run.retuning:
         seen = time_s[state == event.state]
         if event.state is not RetuningState.IDLE and len(seen):
@@ -151,7 +151,7 @@ def events_on_ships_time(run: Run) -> tuple[RetuningEvent, ...]:
 
 
 def _spans(time_s: FloatArray, here: npt.NDArray[np.bool_]) -> list[tuple[float, float]]:
-    """When each unbroken stretch of rows for which `here` is true begins and has ended."""
+    """Begin and end of each unbroken stretch of rows for which `here` is true."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], here.astype(np.int8), [0]))))
     return [
         (float(time_s[start]), float(time_s[stop - 1]) + RECORD_S)

@@ -1,6 +1,6 @@
-"""One run of a bench: a ship in a sea with one controller; what is done, and what it leaves behind.
+"""Run of a bench: a ship in a sea with one controller; its job and its results.
 
-`lockstep_run` does it in simulated time, `real_time_run` in real time.
+It is executed by `lockstep_run` in simulated time and by `real_time_run` in real time.
 """
 
 import math
@@ -40,24 +40,24 @@ COLUMNS: Final = (*SIGNALS, *TRUTH[1:])
 
 
 class Watch(Protocol):
-    """Looks on from outside while a run goes on."""
+    """Observer of a run under way."""
 
     def stopped(self, done_s: float) -> bool:
-        """Take note of the progress; say whether the run shall end now."""
+        """Record the progress; return whether the run shall end now."""
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A run to do.
+    """Run to be executed.
 
     Attributes
     ----------
     law : BuiltLaw
-        Of the controller.
+        Law of the controller.
     script : tuple of TimedAction
-        What the operator does.
+        Actions of the operator.
     frames : Path or None
-        Where the run leaves its frame log, if it is to leave one.
+        Path of the run's frame log, if any.
     """
 
     name: str
@@ -71,12 +71,12 @@ class Job:
 
     @property
     def ticks(self) -> int:
-        """Ticks of the controller in the run."""
+        """Number of the controller's ticks in the run."""
         return round(self.duration_s * SECOND_NS / TICK_NS)
 
 
 class ShipFigures(NamedTuple):
-    """Fields of `Run`, in its order."""
+    """Fields of `Run` that the ship's side gives, in order."""
 
     refused_commands: int
     energy_j: float
@@ -88,34 +88,33 @@ class ShipFigures(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """What one run left behind.
+    """Results of one run.
 
     Attributes
     ----------
     rows : ndarray, shape (n, len(COLUMNS))
-        Controller's telemetry and the truth, every `RECORD_S`, on the ship's time: `time_s` counts
-        from the start of its motion in the waves. In real time rows are left out
-        that a late ship did not write, or for which the controller said nothing.
+        Telemetry and truth every `RECORD_S`, on ship's time: `time_s` counts from the start of its
+        motion. In real time, rows that either side did not write are missing.
     bus_load : float
         Mean share of the bus in use.
     refused_commands : int
-        Commands that the drive found outside its own limits.
+        Number of commands outside the drive's own limits.
     energy_j : float
         Work of the pump's shaft.
     strikes : int
-        How often the water struck a limit of its level.
+        Number of strikes of the water on a limit of its level.
     capsized_s : float
-        The ship's time at which it capsized; infinite if it did not.
+        Ship's time of capsizing; infinite if it did not.
     max_strike_impulse_nms : float
         Greatest angular impulse of a strike on the ship.
     pump_speed_rad_s : float
         Greatest speed of the pump's rotor.
     loop : LoopStatistics or None
-        How the loop with the controller kept its time; None in simulated time.
+        Timing statistics of the controller's loop; None in simulated time.
     retuning : tuple of RetuningEvent
-        What the controller did to retune itself.
+        Events of the controller's retuning.
     law_error : str
-        As in `ControllerNode`.
+        Value of `ControllerNode.law_error`.
     """
 
     name: str
@@ -133,22 +132,22 @@ class Run:
     law_error: str = ""
 
     def column(self, name: str) -> FloatArray:
-        """One column of `rows`, shape (n,)."""
+        """Column of `rows`, shape (n,)."""
         return self.rows[:, COLUMNS.index(name)]
 
     @property
     def end_s(self) -> float:
-        """The ship's time at the end of the last row; 0 if there is none."""
+        """Ship's time of the last row; 0 if there is none."""
         return float(self.rows[-1, 0]) + RECORD_S if len(self.rows) else 0.0
 
     def between(self, start_s: float, end_s: float) -> npt.NDArray[np.bool_]:
-        """Which rows lie in a span of the ship's time, shape (n,)."""
+        """Mask of the rows in a span of ship's time, shape (n,)."""
         time_s, half_s = self.column("time_s"), RECORD_S / 2
         return (time_s > start_s - half_s) & (time_s < end_s - half_s)
 
 
 def roll_without_tank(scenario: Scenario, seed: int, count: int) -> tuple[FloatArray, float]:
-    """Roll of the ship without its tank every `RECORD_S`, shape (count,), and `capsized_s`."""
+    """Roll of the ship without tank every `RECORD_S`, shape (count,), and `capsized_s`."""
     plant = bare_plant(scenario, seed)
     roll_rad = np.empty(count)
     for row in range(count):
@@ -158,7 +157,7 @@ def roll_without_tank(scenario: Scenario, seed: int, count: int) -> tuple[FloatA
 
 
 def ship_of(job: Job) -> tuple[ShipSide, TruthRecorder, MemoryLog]:
-    """The ship's side of a run, and what records the truth."""
+    """Ship's side of a run, recorder of the truth, and its log."""
     ship = build_ship_side(job.scenario, job.seed, job.script)
     log = MemoryLog(len(TRUTH), -(-job.ticks // ROW_TICKS))
     return ship, TruthRecorder(ship.plant, log, RECORD_NS), log
@@ -170,7 +169,7 @@ def controller_of(
     statistics: LoopStatistics | None = None,
     ring: RingWriter | None = None,
 ) -> tuple[ControllerNode, MemoryLog]:
-    """The controller of a run, and its rows; a ring gets them too."""
+    """Controller of a run, and its log; the rows also go to `ring` if given."""
     log = MemoryLog(len(SIGNALS), -(-job.ticks // ROW_TICKS))
 
     def shown(row: FloatArray) -> None:
@@ -193,7 +192,7 @@ def controller_of(
 
 @contextmanager
 def frame_log(job: Job, desks: Tapped, block_ns: int) -> Iterator[Tap]:
-    """Puts a tap on the controller, if the run is to leave a frame log."""
+    """Yield the tap on the controller that writes the frame log, if the run has one."""
     if job.frames is None:
         yield lambda controller: controller
         return
@@ -208,7 +207,7 @@ def frame_log(job: Job, desks: Tapped, block_ns: int) -> Iterator[Tap]:
 
 
 def ship_figures(ship: ShipSide, truth: TruthRecorder) -> ShipFigures:
-    """What the ship's side of a run left behind, beside its rows."""
+    """Results of the ship's side of a run, without its rows."""
     plant = ship.plant
     return ShipFigures(
         ship.refused_commands,
@@ -221,12 +220,11 @@ def ship_figures(ship: ShipSide, truth: TruthRecorder) -> ShipFigures:
 
 
 def side_by_side(shown_rows: FloatArray, truth: FloatArray, shift_s: float = 0.0) -> FloatArray:
-    """Join rows of controller and ship, both of which begin with their time, on the ship's time.
+    """Join rows of controller and ship, which begin with their time, on ship's time.
 
-    Beside each row of the truth stands the controller's row that is nearest in time: not the one of
-    the same number, because in real time a late tick leaves a row out, on one side or on both. A
-    row is left out that the controller has none for within `RECORD_S`. `shift_s` is the time from
-    the ship's start to the controller's.
+    Each row of the truth is joined with the controller's row nearest in time, not that of the same
+    index, because a late tick in real time leaves out a row on one side. A row without a partner
+    within `RECORD_S` is left out. `shift_s` is the time from the ship's start to the controller's.
     """
     if len(truth) == 0 or len(shown_rows) == 0:
         return np.empty((0, len(COLUMNS)))

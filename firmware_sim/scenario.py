@@ -1,4 +1,4 @@
-"""Scenarios: what the ship's side needs to know, ``configs/scenarios``."""
+"""Scenarios (``configs/scenarios``): configuration of the ship's side."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -32,10 +32,10 @@ from utank_hil.sea import Harmonics
 from utank_hil.sea.encounter import wavenumber_rad_m
 
 MOST_CONTROLLERS = 7
-"""More runs than these and the passive one can't be distinguished in a picture."""
+"""Most controllers: more runs with the passive one cannot be distinguished in a picture."""
 
 PASSIVE = "passive"
-"""Name of the run with the tank alone."""
+"""Name of the run with the passive tank."""
 
 SAILED: Final = (
     "inertia_kg_m2",
@@ -49,19 +49,19 @@ SAILED: Final = (
 """Parameters of the ship that may differ from the vessel's; the last two heel it."""
 
 LONGEST_S: Final = 86_400.0
-"""Longest run: its rows are kept in memory."""
+"""Longest run in s, a day: its rows are kept in memory."""
 
 _TINY: Final = 1e-30
 _NO_MOMENT: Final = 1e-9
-"""Share of the waves' slope below which the ship feels nothing of it."""
+"""Share of the waves' slope below which they do not act on the ship."""
 
-# where the user sets none, drive and high-level switch are as the first ship's to its pump and tank
+# default limits of drive and high-level switch relative to pump and tank are the first ship's
 _DRIVE_RATE_PER_PRESSURE: Final = 5.0
 _HIGH_LEVEL_SHARE: Final = 4.6 / 4.88
 
 
 def missing_nodes(vessel: Vessel, faults: Sequence[AnyFault], key: str = "faults") -> list[Problem]:
-    """Faults, listed at a key, of nodes that a ship does not have."""
+    """Problems of faults, listed at a key, of nodes that the ship does not have."""
     missing = {
         "drive": vessel.pump is None,
         "valve": vessel.valve is None,
@@ -77,7 +77,7 @@ def missing_nodes(vessel: Vessel, faults: Sequence[AnyFault], key: str = "faults
 
 
 class Scenario(Section):
-    """A ship in a sea, with the controllers to try there."""
+    """Ship in a sea, with the controllers to be tested there."""
 
     noun: ClassVar = "scenario"
 
@@ -86,32 +86,31 @@ class Scenario(Section):
     sea: ScenarioSea
     sensors: Annotated[SensorErrors, Field(default_factory=dict, validate_default=True)]
     drive: Annotated[DriveLimits, Field(default_factory=dict, validate_default=True)]
-    """Limits not given follow from the vessel's pump."""
+    """Limits of the drive; those not given follow from the vessel's pump."""
     controllers: Annotated[
         dict[str, ControllerConfig], Field(default_factory=dict, max_length=MOST_CONTROLLERS)
     ]
-    """One or more; none are needed where the vessel has no pump."""
+    """Controllers to be run, at least one; optional where the vessel has no pump."""
     operator: tuple[TimedAction, ...] = ()
-    """What the operator does in the runs with a controller; in the passive run it is not armed."""
+    """Actions of the operator in the runs with a controller; the passive run is never armed."""
     duration_s: Annotated[float, Range(above=0, most=LONGEST_S)]
     settle_s: NotNegative
-    """Left out of the statistics at the start."""
+    """Time at the start that is left out of the statistics."""
     seed: Annotated[int, Range(least=0)] = 1
     place: Place | None = None
-    """Where people are judged; over the starboard reservoir if not given."""
+    """Place where comfort is judged; the deck over the starboard reservoir by default."""
     plant: Literal["nonlinear", "linear"] = "nonlinear"
-    """Equations of the emulated ship; the linear ones are their limit for small motions."""
+    """Equations of the emulated ship; the linear ones are their small-motion limit."""
     actual_ship: dict[str, Finite] = Field(default_factory=dict)
-    """Keys of the ship that differ from the vessel's, which is what the controller believes.
+    """Parameters of the actual ship that differ from the vessel's, on which the controller relies.
 
-    Those of `SAILED` only.
-    """
+    Allowed keys are those of `SAILED`."""
     actual_from_s: NotNegative = 0.0
-    """When the difference comes about: cargo moved, fuel burnt."""
+    """Time at which the difference arises, as by shifted cargo or burnt fuel."""
     voyage: tuple[Waypoint, ...] = ()
-    """How course, speed, loading and sea change under way."""
+    """Changes of course, speed, loading and sea under way."""
     faults: tuple[AnyFault, ...] = ()
-    """What fails in simulated runs with a controller, and when; the passive run is sound."""
+    """Faults in simulated runs with a controller; the passive run has none."""
     retuner_latency_s: NotNegative = 5.0
     """Time that identification and design take in simulated time."""
 
@@ -178,7 +177,7 @@ class Scenario(Section):
         return self
 
     def figures(self) -> dict[str, float]:
-        """What the sea's numbers mean to the ship."""
+        """Effect of the sea on the ship, in figures."""
         elevation, moment = self.sea.sea(self.seed).elevation, self.wave_moment(self.seed)
         moment_nm = math.sqrt(moment.variance)
         energy = elevation.amplitude**2 + _TINY  # still water has a frequency, too
@@ -191,7 +190,7 @@ class Scenario(Section):
         }
 
     def meaning(self) -> list[str]:
-        """`figures` in words."""
+        """Description of `figures` in words."""
         figures = self.figures()
         changes = self.voyage or len(self.sea.spectra) > 1
         waves = "At the start, waves" if changes else "Waves"
@@ -203,16 +202,16 @@ class Scenario(Section):
 
     @property
     def place_on_board(self) -> Place:
-        """Where people are judged."""
+        """Place where comfort is judged."""
         return self.place or Place.over_reservoir(self.vessel.tank)
 
     @property
     def sailing_ship(self) -> RollShip:
-        """The ship from `actual_from_s` on."""
+        """Ship from `actual_from_s` on."""
         return replace(self.vessel.ship, **self.actual_ship)  # type: ignore[arg-type]  # floats only
 
     def ship_at(self, time_s: float) -> RollShip:
-        """The ship at a time since the start, under way."""
+        """Ship at a time since the start, under way."""
         ship = self.sailing_ship if time_s >= self.actual_from_s else self.vessel.ship
         ship = ship_on_the_way(self.voyage, ship, time_s)
         return ship.at_speed(self._speed_m_s(time_s))
@@ -222,7 +221,7 @@ class Scenario(Section):
         return track(self.voyage, self.sea.speed_m_s, lambda point: point.speed_m_s)
 
     def turn_rad(self, time_s: float) -> float:
-        """Turn of the ship, clockwise, since the start."""
+        """Clockwise turn of the ship since the start."""
         start_deg, is_course = self.sea.turn_deg
         name = "course_deg" if is_course else "heading_deg"
         angle = track(self.voyage, start_deg, lambda point: getattr(point, name), angle=True)
@@ -230,7 +229,7 @@ class Scenario(Section):
         return math.radians(turn_deg if is_course else -turn_deg)
 
     def waves(self, seed: int) -> Waves:
-        """The waves that the ship meets."""
+        """Waves that the ship meets."""
         spectra = spectra_on_the_way(self.voyage, self.sea.spectra)
         if not self.voyage and len(spectra) <= 1:
             return SteadyWaves(self.wave_moment(seed))
@@ -242,7 +241,7 @@ class Scenario(Section):
         )
 
     def _controller_problems(self, name: str, controller: ControllerConfig) -> list[Problem]:
-        """Why a controller would never arm, or the drive would refuse what it may send."""
+        """Reasons why a controller would never arm, or the drive would refuse its commands."""
         problems = []
         if controller.vessel.version != self.vessel.version:
             problems.append(
@@ -274,7 +273,7 @@ class Scenario(Section):
         return problems
 
     def _fault_problems(self) -> list[Problem]:
-        """Faults of nodes that there are not."""
+        """Problems of faults of absent nodes."""
         problems = missing_nodes(self.vessel, self.faults)
         if any(controller.retuning is not None for controller in self.controllers.values()):
             problems += [
@@ -301,7 +300,7 @@ class Scenario(Section):
         return [(key, why) for key, ship in ships.items() for why in self._heel_problems(ship)]
 
     def _heel_problems(self, ship: RollShip) -> list[str]:
-        """Why a ship's steady heel is refused: there is none, or the water is at the roof."""
+        """Reasons why a steady heel is refused: no equilibrium, or water at the tank's roof."""
         if ship.heeling_moment_nm == 0:
             return []
         heel = steady_heel(RollModel(ship, self.vessel.tank))
@@ -327,13 +326,13 @@ class Scenario(Section):
         steep = wavenumber_rad_m(waves.omega_rad_s) @ waves.amplitude_m
         if np.abs(amplitudes).max() > _NO_MOMENT * self.vessel.ship.stiffness_nm_rad * steep:
             return []
-        # still water is a sea, too, and a ship that turns meets these waves from the side
+        # still water is a valid sea, and a ship that turns meets these waves from the side
         turns = any(point.heading_deg is not None or point.course_deg is not None
                     for point in self.voyage)  # fmt: skip
         return self.sea.without_moment() if steep > 0 and not turns else []
 
     def warnings(self) -> list[Problem]:
-        """What is unusual in vessel and sea."""
+        """Warnings of unusual values in vessel and sea."""
         parts = {"vessel": self.vessel, "sea": self.sea}
         return [
             (f"{name}.{key}", reason)
@@ -376,5 +375,5 @@ class Scenario(Section):
         return problems
 
     def wave_moment(self, seed: int) -> Harmonics:
-        """Roll moment of the sea as it is at the start, on a ship that keeps its course."""
+        """Roll moment of the initial sea on a ship that keeps its course."""
         return self.sea.roll_moment(self.sea.sea(seed), self.vessel.ship.stiffness_nm_rad)

@@ -1,7 +1,7 @@
-"""The sea of a scenario: an irregular one of any spectrum, or one regular wave.
+"""Sea of a scenario: an irregular one with any spectrum, or one regular wave.
 
-Irregular seas differ in their spectrum only; heading, speed, spreading and effective slope are the
-same keys for all of them.
+Irregular seas differ in their spectrum only; heading, speed, spreading and effective slope have the
+same keys in all.
 """
 
 import math
@@ -39,24 +39,25 @@ from utank_hil.sea.passing import PassingSea
 
 Bearing = Annotated[float, Range(least=-360, most=360)]
 Speed = Annotated[float, Range(least=0, most=40)]
-"""Of a ship, in m/s; the fastest ferries make 30."""
+"""Speed of a ship in m/s; the fastest ferries reach 30."""
 _FAST_M_S: Final = 20.0
 _STEEPEST: Final = 1 / 7
-"""Height per length at which a regular wave breaks in deep water (Michell 1893)."""
+"""Steepness (height per length) at which a regular wave breaks in deep water (Michell 1893)."""
 
 
 class SpectrumSection(Protocol):
-    """A section that names a spectrum."""
+    """Section that names a spectrum."""
 
     def spectrum(self) -> Spectrum:
-        """The spectrum."""
+        """Spectrum of the section."""
 
 
 class _AnySea(Section):
-    """How the ship meets the waves, and how much of their slope acts on it."""
+    """Encounter of ship and waves, and the share of their slope that acts on the ship."""
 
     heading_deg: Bearing = 90.0
-    """Where the waves go relative to the ship: 0 following, 180 head, 90 from port to starboard."""
+    """Direction in which the waves go relative to the ship: 0 following, 180 head, 90 from port to
+    starboard."""
     speed_m_s: Speed = 0.0
     effective_slope: EffectiveSlope = EffectiveSlope()
     roll_moment_table: Path | None = None
@@ -77,7 +78,7 @@ class _AnySea(Section):
         return self
 
     def moment(self, stiffness_nm_rad: float) -> Callable[[FloatArray, FloatArray], ComplexArray]:
-        """Complex roll moment per m of amplitude at frequencies and headings in rad."""
+        """Complex roll moment per m of amplitude, as a function of frequency and heading."""
         if self.roll_moment_table is not None:
             return MomentTable.read(self.roll_moment_table).moment
         return partial(self.effective_slope.moment, stiffness_nm_rad=stiffness_nm_rad)
@@ -89,18 +90,18 @@ class _AnySea(Section):
 
     @property
     def turn_deg(self) -> tuple[float, bool]:
-        """Where the ship points at the start, and whether that is a course."""
+        """Initial direction of the ship in degrees, and whether it is a course."""
         return self.heading_deg, False
 
     def warnings(self) -> list[Problem]:
-        """What is unusual in the sea and the way the ship meets it."""
+        """Warnings of unusual values in the sea and its encounter."""
         if self.speed_m_s <= _FAST_M_S:
             return super().warnings()
         knots = self.speed_m_s * 3600 / 1852
         return [*super().warnings(), ("speed_m_s", f"is {knots:.0f} knots: it is in m/s")]
 
     def without_moment(self) -> list[Problem]:
-        """Why these waves do not roll the ship at all."""
+        """Problems of waves that do not roll the ship at all."""
         if self.effective_slope.coefficient == 0:
             return [("sea.effective_slope.coefficient", "of 0 takes all of the waves' moment")]
         reason = (
@@ -111,21 +112,21 @@ class _AnySea(Section):
 
 
 class IrregularSea(_AnySea, ABC):
-    """A sea drawn from a spectrum."""
+    """Sea drawn from a spectrum."""
 
     spreading: NotNegative | None = None
-    """Exponent s of the spreading cos^2s(theta / 2); long-crested without it."""
+    """Exponent s of the spreading cos^2s(theta / 2); the sea is long-crested without it."""
 
     @abstractmethod
     def spectrum(self) -> Spectrum:
-        """What the waves are drawn from."""
+        """Spectrum from which the waves are drawn."""
 
     def heading_rad(self, spectrum: Spectrum) -> FloatArray | float:  # noqa: ARG002, one for all
-        """Where the waves go relative to the ship, for all or for each band."""
+        """Direction of the waves relative to the ship, for all or for each band."""
         return math.radians(self.heading_deg)
 
     def sea(self, seed: int) -> Sea:
-        """A realisation of the spectrum."""
+        """Realisation of the spectrum."""
         spectrum = self.spectrum()
         return Sea.irregular(
             spectrum,
@@ -138,7 +139,7 @@ class IrregularSea(_AnySea, ABC):
     def passing_sea(
         self, known: Sequence[tuple[float, "SpectrumSection"]], seed: int
     ) -> PassingSea:
-        """A realisation that passes from one spectrum to the next.
+        """Realisation that passes from one spectrum to the next.
 
         Parameters
         ----------
@@ -158,31 +159,32 @@ class IrregularSea(_AnySea, ABC):
 
     @property
     def spectra(self) -> list[tuple[float, SpectrumSection]]:
-        """Its spectra, and when it has them."""
+        """Spectra of the sea with their times in s."""
         return [(0.0, self)]
 
 
 class JonswapSea(JonswapSpectrum, IrregularSea):
-    """A growing sea."""
+    """Growing sea."""
 
 
 class IttcSea(IttcSpectrum, IrregularSea):
-    """A sea of given height and period."""
+    """Sea of given height and period."""
 
 
 class PiersonMoskowitzSea(PiersonMoskowitzSpectrum, IrregularSea):
-    """A fully developed sea."""
+    """Fully developed sea."""
 
 
 class MeasuredSea(MeasuredSpectrum, IrregularSea):
-    """One hour of a buoy's record, in one direction or in the directions measured."""
+    """Hour of a buoy's record, in one direction or in the directions measured."""
 
     direction_file: Path | None = None
-    """Mean direction of the same station; then `course_deg` instead of `heading_deg`."""
+    """File of the same station's mean directions; it requires `course_deg` instead of
+    `heading_deg`."""
     course_deg: Bearing | None = None
-    """The ship's course, degrees clockwise from true north."""
+    """Ship's course, degrees clockwise from true north."""
     until: datetime | None = None
-    """Start of the last record: from one to the next of those between, the sea passes linearly."""
+    """Time of the last record: the sea passes linearly from each record to the next."""
 
     @field_validator("until")
     @classmethod
@@ -230,12 +232,12 @@ class MeasuredSea(MeasuredSpectrum, IrregularSea):
         return content
 
     def spectrum(self) -> Spectrum:
-        """The hour's spectrum, with the directions where there are any."""
+        """Spectrum of the hour, with the directions if measured."""
         return read_spectra(self.file, self.direction_file).at(self.time.isoformat())
 
     @property
     def spectra(self) -> list[tuple[float, SpectrumSection]]:
-        """Those of all records from `time` to `until`."""
+        """Spectra of all records from `time` to `until`."""
         if self.until is None:
             return super().spectra
         times = read_spectra(self.file).times(self.time, self.until)
@@ -246,18 +248,18 @@ class MeasuredSea(MeasuredSpectrum, IrregularSea):
 
     @property
     def turn_deg(self) -> tuple[float, bool]:
-        """The course, if there is one."""
+        """Course, if there is one, else the heading."""
         return super().turn_deg if self.course_deg is None else (self.course_deg, True)
 
     def heading_rad(self, spectrum: Spectrum) -> FloatArray | float:
-        """As measured, or `heading_deg` for all bands."""
+        """Measured directions, or `heading_deg` for all bands."""
         if self.course_deg is None:
             return super().heading_rad(spectrum)
         return spectrum.heading_rad(self.course_deg)
 
 
 class RegularSea(_AnySea):
-    """One wave."""
+    """Regular wave."""
 
     kind: Literal["regular"]
     amplitude_m: NotNegative
@@ -275,7 +277,7 @@ class RegularSea(_AnySea):
         return self
 
     def sea(self, seed: int) -> Sea:  # noqa: ARG002, a regular sea has nothing to draw
-        """The wave."""
+        """The regular wave; it does not depend on the seed."""
         return Sea.regular(
             self.amplitude_m,
             2 * math.pi / self.period_s,
@@ -284,12 +286,12 @@ class RegularSea(_AnySea):
         )
 
     def passing_sea(self, known: Sequence[tuple[float, SpectrumSection]], seed: int) -> PassingSea:  # noqa: ARG002
-        """The wave, which stays."""
+        """The regular wave; it does not change."""
         return PassingSea.of(self.sea(seed))
 
     @property
     def spectra(self) -> list[tuple[float, SpectrumSection]]:
-        """None."""
+        """Empty list: a regular wave has no spectrum."""
         return []
 
 
@@ -297,4 +299,4 @@ ScenarioSea = Annotated[
     MeasuredSea | JonswapSea | IttcSea | PiersonMoskowitzSea | RegularSea,
     Field(discriminator="kind"),
 ]
-"""The section ``sea`` of a scenario."""
+"""Section ``sea`` of a scenario."""

@@ -16,8 +16,8 @@ class SensorErrors:
     roll_noise_rad, roll_rate_noise_rad_s : float
         Noise of the motion sensor.
     motion_delay_ms : float
-        Age of the motion sensor's sample when it is sent, a multiple of its 10 ms cycle. At most
-        1000, the longest delay that a law can be designed for.
+        Age of the motion sensor's sample when sent, a multiple of its 10 ms cycle; at most 1000,
+        the longest delay that a law can be designed for.
     level_noise_m : float
         Noise of each level gauge.
     pressure_noise_pa : float
@@ -25,7 +25,7 @@ class SensorErrors:
     high_level_m : float
         Level above still water at which a reservoir's high-level switch closes.
     roll_bias_rad : float
-        Constant error of the roll, such as that of a sensor mounted at an angle; 0.2 at most.
+        Constant error of the roll, such as that of a misaligned sensor; 0.2 at most.
 
     Raises
     ------

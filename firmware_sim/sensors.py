@@ -1,4 +1,4 @@
-"""The sensor node: motion sensor, tank level gauges, high-level switches and pump pressure."""
+"""Sensor node: motion sensor, tank level gauges, high-level switches and pump pressure."""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 NOISE_BLOCK = 4096
 
-# read once: in Python 3.11 a member costs eight times as much from its class as from here
+# bound once: in Python 3.11 class access to an enum member is eight times slower
 _GOOD = Quality.GOOD
 _CLOSED, _OPEN = Switch.ON, Switch.OFF
 # a NamedTuple's own constructor takes twice the time
@@ -36,23 +36,21 @@ _M = TypeVar("_M", bound=tuple[Any, ...])
 
 
 def standard_normal(seed: int) -> Iterator[float]:
-    """Standard normal numbers, drawn in blocks because one at a time is slow."""
+    """Yield standard normal numbers, drawn in blocks because single draws are slow."""
     generator = np.random.Generator(np.random.PCG64(seed))
     while True:
         yield from reversed(generator.standard_normal(NOISE_BLOCK).tolist())
 
 
 class SensorNode:
-    """Measures the plant and sends the measurements in the cycles of the catalogue.
+    """Node that measures the plant and sends the measurements in the cycles of the catalogue.
 
     Parameters
     ----------
-    plant : Plant
-        The ship to measure.
     configuration_version : int
-        Sent in the heartbeat, for the controller to compare with its own.
+        Version sent in the heartbeat, which the controller compares with its own.
     seed : int
-        Of the noise.
+        Seed of the noise.
     second : bool
         Whether it is the second motion sensor, which measures nothing else and has no bias.
     """
@@ -78,7 +76,7 @@ class SensorNode:
         delay_ticks = round(errors.motion_delay_ms * 1e6 / TICK_NS)
         self._motion: deque[tuple[float, float]] = deque(maxlen=delay_ticks + 1)
         self._messages: list[tuple[int, Callable[[Any], Frame], Callable[[], Any]]] = []
-        # the noise is drawn in this order: a new message goes last
+        # the noise is drawn in this order: append a new message at the end
         self._publish(catalogue.transmitter(SensorMotion, address), self._measure_motion)
         if not second:
             self._publish(catalogue.transmitter(SensorTank), self._measure_tank)
@@ -88,15 +86,15 @@ class SensorNode:
         self._ticks = 0
 
     def _publish(self, transmitter: Transmitter[_M], measure: Callable[[], _M]) -> None:
-        """Send what `measure` returns, once in the message's cycle."""
+        """Send the result of `measure` once in the message's cycle."""
         ticks = transmitter.cycle_ns // self.period_ns
         self._messages.append((ticks, transmitter.frame, measure))
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Sensors listen to no message."""
+        """Ignore the frame."""
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
-        """Measure, and send what is due."""
+        """Measure, and send the messages that are due."""
         plant = self._plant
         plant.advance(now_ns)
         self._motion.append((plant.roll_rad, plant.roll_rate_rad_s))

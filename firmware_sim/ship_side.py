@@ -1,4 +1,4 @@
-"""The ship's side of the bus, built from a scenario."""
+"""Ship's side of the bus, built from a scenario."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -18,29 +18,28 @@ from utank_hil.nodes.panel import Action, OperatorPanel, TimedAction
 from utank_hil.runners import Node
 
 NODE_NAMES: Final = ("sensors", "sensors_2", "hardwired", "drive", "valve", "panel")
-"""The emulated nodes, in the order in which they tick; hardware may take the place of each.
+"""Names of the emulated nodes, in the order of their ticks; hardware may replace each.
 
-Only a ship with a pump has a drive, and only one with a valve has that; the second motion sensor
-and the hard-wired inputs are there if the vessel's section `redundancy` says so.
-"""
+Only a ship with a pump has a drive, and only one with a valve has that node; the second motion
+sensor and the hard-wired inputs exist if the vessel's section `redundancy` lists them."""
 
-# enabled at zero pressure the pump leaves the tank alone; switched off, its rotor turns with the
+# at zero pressure an enabled pump does not affect the tank; switched off, its rotor turns with the
 # water and changes the tank
 PASSIVE_SCRIPT = (TimedAction(1.0, Action.PASSIVE),)
 
 
 @dataclass(frozen=True, slots=True)
 class ShipSide:
-    """Everything on the bus but the controller.
+    """All nodes on the bus except the controller.
 
     Attributes
     ----------
     drive : PumpDrive or None
-        If the tank has a pump.
+        Drive, if the tank has a pump.
     valve : ValveNode or None
-        If the tank has one.
+        Valve, if the tank has one.
     hardwired : HardwiredNode or None
-        If the vessel's redundancy has them.
+        Hard-wired inputs, if the vessel has them.
     """
 
     vessel: Vessel
@@ -54,7 +53,7 @@ class ShipSide:
 
     @property
     def nodes(self) -> tuple[Node, ...]:
-        """The nodes, in the order in which they tick."""
+        """Nodes in the order of their ticks."""
         optional: tuple[Node | None, ...] = (
             self.second_motion, self.hardwired, self.drive, self.valve,
         )  # fmt: skip
@@ -62,24 +61,19 @@ class ShipSide:
 
     @property
     def refused_commands(self) -> int:
-        """Commands that drive and valve found wrong or outside their own limits."""
+        """Number of commands that drive and valve rejected or found outside their limits."""
         return sum(node.refused for node in (self.drive, self.valve) if node is not None)
 
     def without(self, names: Collection[str]) -> list[Node]:
-        """The nodes that are left when hardware takes the place of some.
+        """Return the nodes that remain when hardware replaces some of `NODE_NAMES`.
 
         Without the emulated drive an `ExternalDrive` moves the plant's pump, without the emulated
         valve an `ExternalValve` its valve.
 
-        Parameters
-        ----------
-        names : collection of str
-            Some of `NODE_NAMES`.
-
         Raises
         ------
         ValueError
-            If the ship has no such node.
+            If the ship does not have a node of this name.
         """
         known = [node.name for node in self.nodes]
         for name in names:
@@ -95,13 +89,7 @@ class ShipSide:
 
 
 def bare_plant(scenario: Scenario, seed: int) -> Plant:
-    """The scenario's ship without its tank, in the same waves.
-
-    Parameters
-    ----------
-    seed : int
-        Of the sea.
-    """
+    """Ship of the scenario without its tank, in the waves of a seed."""
     tank = negligible(scenario.vessel.tank)
     return Plant(
         scenario.ship_at,
@@ -118,9 +106,9 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
     Parameters
     ----------
     seed : int
-        Of sea and sensor noise.
+        Seed of sea and sensor noise.
     script : tuple of TimedAction
-        The operator's actions.
+        Actions of the operator.
     """
     vessel, catalogue = scenario.vessel, load_catalogue()
     plant = Plant(

@@ -1,4 +1,4 @@
-"""A starter project: vessel, controller and scenario, from what a naval architect has."""
+"""Starter project: vessel, controller and scenario, from a naval architect's data."""
 
 import math
 from dataclasses import dataclass
@@ -40,31 +40,33 @@ SHIP, CONTROLLER, SCENARIO, README = "ship.yaml", "controller.yaml", "scenario.y
 FILES: Final = (SHIP, CONTROLLER, SCENARIO, README)
 
 EFFECTIVE_SLOPE: Final = 0.7
-"""Of the sea on the ship: what is left of the true wave slope."""
+"""Effective slope of the sea as a share of the true wave slope. Chosen; no study."""
 MOST_SLOPE_RAD: Final = math.radians(1.5)
-"""Significant effective slope of the starter's sea: the pump is made for no more."""
+"""Significant effective slope of the starter's sea, for which the pump is designed. Chosen; no
+study."""
 PERIODS_S: Final = (3.0, 18.0)
-"""Peak periods of seas there are; within them the starter's sea has the ship's roll period."""
+"""Peak periods in s of real seas; within them the starter's sea has the ship's roll period."""
 _HEIGHT_PER_LENGTH: Final = 1 / 40
-"""A sea in which a ship of the length works, not the worst that it survives."""
+"""Height of a working sea per length of the ship, not of a survival sea. Chosen; no study."""
 _HEIGHTS_M: Final = (0.5, 5.0)
-"""Least and greatest height: below it no tank is wanted, above it few ships are under way."""
+"""Least and greatest height in m: below it no tank is needed, above it few ships are under way."""
 _LEAST_LEVEL_CHANGE: Final = 0.01
-"""A limit that is the vessel's own to this share is not written."""
+"""Relative difference from the vessel's limit below which a level limit is not written."""
 
 
 @dataclass(frozen=True, slots=True)
 class StarterProject:
-    """A project that can be checked and benched.
+    """Project that can be checked and run on the bench.
 
     Attributes
     ----------
     demand : PumpDemand
-        What the pump was made for.
+        Demand for which the pump was designed.
     prediction : RollPrediction
-        In the scenario's sea; with the pump, of a gentle LQG law that stays within the limits.
+        Roll in the scenario's sea; with the pump, for a gentle LQG law that stays within the
+        limits.
     sea : dict
-        Of the scenario.
+        Sea of the scenario.
     texts : dict of str to str
         Contents of `FILES`.
     """
@@ -81,14 +83,12 @@ class StarterProject:
 def starter_sea(
     length_m: float, roll_period_s: float, hs_m: float | None = None, tp_s: float | None = None
 ) -> dict[str, Any]:
-    """Sea of a scenario: at the roll period, and as high as the ship's length and the pump allow.
+    """Sea at the roll period, with a height that ship's length and pump permit.
 
     Parameters
     ----------
-    length_m, roll_period_s : float
-        Of the ship.
     hs_m, tp_s : float, optional
-        Height and peak period, where they are given.
+        Given height and peak period, which take precedence.
     """
     shortest_s, longest_s = PERIODS_S
     period_s = tp_s or float(f"{min(max(roll_period_s, shortest_s), longest_s):.3g}")
@@ -116,16 +116,16 @@ def make_starter(
     Parameters
     ----------
     stability_share : float
-        That the free surface may take, as `size_tank` takes it.
+        Share of the stability that the free surface may take, see `size_tank`.
     hs_m, tp_s : float, optional
-        Of the scenario's sea.
+        Height and peak period of the scenario's sea.
 
     Raises
     ------
     TankImpossibleError, NoLawError
-        If there is none for this ship.
+        If there is no tank or no law for this ship.
     ValueError
-        If a value can't be used.
+        If a value is invalid.
     """
     written = WrittenShip(
         displacement_t=ship.displacement_t,
@@ -138,7 +138,7 @@ def make_starter(
     demand = pump_demand(bare, sized.tank, pump_level_m(bare, sized.tank))
     pump = size_pump(sized.tank, demand)
     texts = {SHIP: starter_text.ship_file(ship, written, room, sized, demand, pump)}
-    # from here on with the numbers as they stand in the files
+    # from here on with the rounded numbers of the files
     vessel = _valid(Vessel, yaml.safe_load(texts[SHIP]))
     usable_m = float(f"{usable_level_m(vessel.ship, vessel.tank):.3g}")
     limits = {}
@@ -160,7 +160,7 @@ def make_starter(
 
 
 def _valid(model: type[ModelT], content: dict[str, Any]) -> ModelT:
-    """A part of the project; an impossible value is reported at its key, as ``ship.gm_m``."""
+    """Validate a part of the project; errors are reported at their key, as ``ship.gm_m``."""
     try:
         return model.model_validate(content)
     except ValidationError as error:

@@ -1,4 +1,4 @@
-"""The ship of a starter project."""
+"""Ship of a starter project."""
 
 import math
 from dataclasses import dataclass
@@ -10,23 +10,23 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 _GYRATION_PER_BEAM: Final = (0.1, 1.2)
 _DEPTH_PER_BEAM: Final = (0.01, 1.0)
-"""Of the displaced water on a waterline of length times beam: draught times block coefficient."""
+"""Plausible ratio of displaced volume to length times squared beam."""
 
 
 @dataclass(frozen=True, slots=True)
 class StarterShip:
-    """A ship as a naval architect knows it, without the tank's water.
+    """Ship as a naval architect knows it, without the tank's water.
 
     Parameters
     ----------
     roll_period_s : float, optional
-        By the weather criterion's formula if not given; then the draught is needed.
+        Roll period; by default from the weather criterion's formula, which needs the draught.
 
     Raises
     ------
     ValueError
         If a value is out of its range, neither period nor draught is given, or displacement and
-        length, or GM and period, are not of one ship.
+        length, or GM and period, are inconsistent.
     """
 
     name: str
@@ -46,8 +46,8 @@ class StarterShip:
         refuse("ship", problems or self._shape_problems())
 
     def _shape_problems(self) -> list[Problem]:
-        """What no ship of that beam has together: displacement and length, period and GM."""
-        depth_m = self.displacement_t / (self.length_m * self.beam_m)  # of fresh water
+        """Implausible combinations for the beam: displacement and length, period and GM."""
+        depth_m = self.displacement_t / (self.length_m * self.beam_m)  # in fresh water
         least, most = _DEPTH_PER_BEAM
         if not least <= depth_m / self.beam_m <= most:
             reason = (

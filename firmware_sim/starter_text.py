@@ -1,4 +1,4 @@
-"""The files of a starter project, with comments."""
+"""Texts of a starter project's files, with comments."""
 
 import json
 import math
@@ -19,7 +19,7 @@ from utank_hil.dynamics.water import water_moments
 
 
 def number(value: float) -> str:
-    """Four digits of a number, as YAML reads it."""
+    """Number with four digits in YAML notation."""
     short = float(f"{value:.4g}")
     if short == 0 or 1e-3 <= abs(short) < 1e6:
         return repr(short)
@@ -34,7 +34,7 @@ def ship_file(
     demand: PumpDemand,
     pump: Pump,
 ) -> str:
-    """The vessel: ship, tank and pump."""
+    """File of the vessel: ship, tank and pump."""
     tank, bare = sized.tank, written.ship()
     water_t = water_moments(tank, 0.0).mass_kg / 1e3
     share, taken = water_t / ship.displacement_t, stability_taken(bare, tank)
@@ -77,7 +77,7 @@ pump:
 
 
 def controller_file(name: str, sea: dict[str, Any], limits: dict[str, float]) -> str:
-    """The controller: a law that designs itself for the scenario's sea."""
+    """File of the controller: a law that is designed for the scenario's sea."""
     level = f"level_m: {number(limits['level_m'])}, " if limits else ""
     remark = "# level_m: beyond it the water in the duct would be too fast\n" if limits else ""
     return f"""\
@@ -95,7 +95,7 @@ effective_slope: {number(sea["effective_slope"]["coefficient"])}}}
 
 
 def scenario_file(name: str, sea: dict[str, Any]) -> str:
-    """The scenario: a beam sea near the ship's roll period."""
+    """File of the scenario: a beam sea near the ship's roll period."""
     return f"""\
 # A beam sea near the roll period, where a ship rolls most.
 name: {json.dumps(f"{name} in a beam sea")}
@@ -116,7 +116,7 @@ seed: 1
 
 
 def readme(name: str) -> str:
-    """What to do with the files."""
+    """Instructions for the use of the files."""
     return f"""\
 # {_line(name)}
 

@@ -1,4 +1,4 @@
-"""What a tank is and does, as a table and as JSON: for `init` and `design tank`."""
+"""Properties of a tank as table and JSON, for `init` and `design tank`."""
 
 import math
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ _NEEDS = (
 
 
 def cost_rows(cost: TankCost) -> Rows:
-    """What a tank takes from the ship, and what it can hold."""
+    """Rows of a tank's cost to the ship, and of its capacity."""
     share, loss_m = cost.share_of_displacement, cost.gm_loss_m
     return [
         ("water", _tonnes(cost.water_t) + ("" if share is None else f", {share:.1%}")),
@@ -42,7 +42,7 @@ def cost_rows(cost: TankCost) -> Rows:
 
 
 def figure_rows(figures: TankFigures) -> Rows:
-    """What the tank's response depends on."""
+    """Rows of the parameters that determine the tank's response."""
     return [
         ("duct area", f"{figures.duct_area_m2:.2f} m²"),
         ("frequency per roll frequency", f"{figures.frequency_ratio:.3f}"),
@@ -53,7 +53,7 @@ def figure_rows(figures: TankFigures) -> Rows:
 
 
 def roll_rows(found: RollPrediction) -> Rows:
-    """Expected roll, and what the pump does for it."""
+    """Rows of expected roll, and of the pump's effect on it."""
     active = found.active
     rows = [
         ("roll RMS without tank", _degrees(found.without_tank_rad)),
@@ -83,7 +83,7 @@ def roll_rows(found: RollPrediction) -> Rows:
 
 
 def loading_table(points: Sequence[LoadingPoint]) -> Table:
-    """Roll at other loadings."""
+    """Table of the roll at other loadings."""
     title = "Other loadings: the same tank and law, roll RMS in °"
     figures = ("roll period", "without tank", "passive tank", "active tank")
     table = new_table(title, *figures, names=())
@@ -95,12 +95,12 @@ def loading_table(points: Sequence[LoadingPoint]) -> Table:
 
 
 def loading_json(points: Sequence[LoadingPoint]) -> list[dict[str, Any]]:
-    """Roll at other loadings, in SI units."""
+    """Roll at other loadings in SI units."""
     return [asdict(point) for point in points]
 
 
 def sweep_tables(points: Sequence[SweepPoint]) -> list[Table]:
-    """Roll of other tanks, passive and active: by share of stability and by frequency."""
+    """Tables of other tanks' roll, passive and active: by share of stability and by frequency."""
     tables = []
     ratios = sorted({point.frequency_ratio for point in points})
     for name in ("passive", "active"):
@@ -139,7 +139,7 @@ def sweep_json(points: Sequence[SweepPoint]) -> list[dict[str, Any]]:
 
 
 def prediction_json(found: RollPrediction) -> dict[str, Any]:
-    """A prediction in SI units."""
+    """Prediction in SI units."""
     active = found.active
     return {
         "without_tank_rad": found.without_tank_rad,
@@ -153,7 +153,7 @@ def prediction_json(found: RollPrediction) -> dict[str, Any]:
 
 
 def power(value_w: float) -> str:
-    """A power in the unit that fits."""
+    """Power with a suitable unit."""
     return f"{value_w / 1e6:.2f} MW" if abs(value_w) >= 1e6 else f"{value_w / 1e3:.3g} kW"
 
 

@@ -1,4 +1,4 @@
-"""What really happened: the plant's state, recorded beside what the controller saw."""
+"""Truth: the plant's state, recorded beside the controller's telemetry."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -20,7 +20,7 @@ TRUTH: Final = (
 
 
 def true_values(plant: Plant) -> tuple[float, ...]:
-    """The plant's state, columns `TRUTH` without the time."""
+    """State of the plant: columns `TRUTH` without the time."""
     return (
         plant.roll_rad,
         plant.level_m,
@@ -31,12 +31,12 @@ def true_values(plant: Plant) -> tuple[float, ...]:
 
 
 class TruthRecorder:
-    """Looks at the plant on a fixed grid; a node without frames.
+    """Recorder of the plant on a fixed time grid: a node without frames.
 
     Parameters
     ----------
     log : MemoryLog
-        Takes the rows, columns `TRUTH`.
+        Log that takes the rows, columns `TRUTH`.
     period_ns : int
         Time between two rows.
 
@@ -60,7 +60,7 @@ class TruthRecorder:
         self.pump_speed_rad_s = 0.0
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Hear nothing: the truth is not on the bus."""
+        """Ignore the frame: the truth is not on the bus."""
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Record one row."""

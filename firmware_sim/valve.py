@@ -1,9 +1,8 @@
-"""The valve of a semi-active tank: takes openings, judges them on its own, and moves.
+"""Valve of a semi-active tank: receives openings, checks them independently, and moves.
 
-It goes to its fail position when commands stop, by the timeout that came with the last one, and
-when its power fails; and it stays there: it follows only after it was commanded to the fail
-position once more. So neither a valve that starts anew nor one whose fault was reset follows by
-itself.
+It goes to its fail position when commands stop (by the timeout sent with the last one) or its power
+fails, and stays there until it is commanded to the fail position once more. So neither a restarted
+valve nor one after a fault reset follows commands by itself.
 """
 
 from collections.abc import Iterable
@@ -30,35 +29,35 @@ NANOSECONDS: Final = 1e-9
 LONGEST_TIMEOUT_S: Final = 0.1
 MISCODED_COMMANDS_TO_TRIP: Final = 5
 STUCK_OFF: Final = 0.05
-"""A valve that is so far from where it shall be must move."""
+"""Deviation from the target above which the valve must move. Chosen; no study."""
 STUCK_NS: Final = 200_000_000
-"""Time in which it must."""
+"""Time in ns in which it must move. Chosen; no study."""
 _AT_END: Final = 1e-3
 
 
 class ValveNode:
-    """The valve and its actuator.
+    """Valve with its actuator.
 
     Parameters
     ----------
     plant : Plant
-        Its valve loss is set.
+        Plant whose valve loss is set.
     configuration_version : int
-        Sent in the heartbeat, for the controller to compare with its own.
+        Version sent in the heartbeat, which the controller compares with its own.
 
     Attributes
     ----------
     hears : frozenset of int
-        The valve command, see `Selective`.
+        Identifier of the valve command, see `Selective`.
     opening : float
-        Where it is: 0 shut but for its leakage, 1 open.
+        Position: 0 is shut except for leakage, 1 is open.
     stuck : bool
-        Fault to be tried out: set, it does not move.
+        Injected fault: while set, the valve does not move.
     powered : bool
-        Fault to be tried out: cleared, it is silent and moves to its fail position; set again, it
-        starts anew.
+        Injected fault: while cleared, the valve is silent and moves to its fail position; set
+        again, it restarts.
     refused : int
-        Commands that it found wrong so far.
+        Number of rejected commands so far.
     """
 
     name = "valve"
@@ -89,7 +88,7 @@ class ValveNode:
         plant.set_valve_loss(valve.loss(tank, self.opening))
 
     def _start(self) -> None:
-        """Begin as newly switched on, wherever the valve stands."""
+        """Initialise as after power-on, at the present position."""
         self._commands = self._catalogue.receiver(ValveCommand)
         self._statuses = self._catalogue.transmitter(ValveStatus)
         self._status_ticks = self._statuses.cycle_ns // TICK_NS
@@ -99,7 +98,7 @@ class ValveNode:
         self._state = ValveState.FAIL_POSITION
         self._fault = ValveFault.NONE
         self._may_follow = False
-        self._resetting = True  # a bit that is set before we look is no edge
+        self._resetting = True  # a bit already set at power-on is not an edge
         self._asked = self._valve.fail_opening
         self._echo: int | None = None
         self._accepted_ns = self._timeout_ns = 0
@@ -109,20 +108,20 @@ class ValveNode:
         self._ticks = 0
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Take a command if it is intact and can be followed."""
+        """Accept a command if it is intact and can be followed."""
         if not self.powered or frame.can_id != self._commands.can_id:
             return
         command = self._commands.accept(frame)
         if command is None:
-            # out of sequence it may ask for nothing, but it may say where to go
+            # out of sequence it may not open the valve, but it may request the fail position
             intact = self._commands.intact(frame)
             if intact is not None and intact.control is ValveControl.FAIL_POSITION:
                 self._go_to_fail_position()
             return
         if command.control is ValveControl.FAIL_POSITION:
-            # whatever else is wrong with it, it says where to go
+            # a request for the fail position counts whatever else is wrong with it
             self._go_to_fail_position()
-        # written so that NaN, not available, fails too
+        # written so that NaN (not available) fails too
         if not (
             command.control is not None
             and 0.0 <= command.opening <= 1.0
@@ -141,7 +140,7 @@ class ValveNode:
         if resetting and not self._resetting and self._state is ValveState.FAULT:
             self._state, self._fault = ValveState.FAIL_POSITION, ValveFault.NONE
             self._may_follow = False
-            self._free_ns = now_ns  # it gets its time to move once more
+            self._free_ns = now_ns  # a fault reset restarts the time allowed for moving
         self._resetting = resetting
         if command.control is ValveControl.FOLLOW and self._may_follow:
             self._state = ValveState.FOLLOWING
@@ -149,7 +148,7 @@ class ValveNode:
 
     @property
     def following(self) -> bool:
-        """Whether it follows the commands, and is not on its way to the fail position."""
+        """Whether it follows the commands and is not on its way to the fail position."""
         return self._state is ValveState.FOLLOWING
 
     def _go_to_fail_position(self) -> None:
@@ -163,7 +162,7 @@ class ValveNode:
         self._may_follow = False
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
-        """Watch over the commands, move, report."""
+        """Check the command timeout, move and send the status."""
         self._plant.advance(now_ns)
         if not self.powered:
             self._start()
@@ -181,7 +180,7 @@ class ValveNode:
         return frames
 
     def _move(self, target: float, now_ns: int) -> None:
-        """Move towards the target, and look whether it can."""
+        """Move towards the target, and detect a stuck valve."""
         before = self.opening
         if not self.stuck:
             step = min(max(target - before, -self._most_step), self._most_step)

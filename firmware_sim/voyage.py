@@ -1,4 +1,4 @@
-"""The time line of a scenario: course, speed, loading and sea that change under way."""
+"""Voyage of a scenario: course, speed, loading and sea that change under way."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -17,26 +17,27 @@ from utank_hil.dynamics.ship import RollShip
 
 
 class Waypoint(Section):
-    """What the ship shall have reached at a time.
+    """State of the voyage at a time.
 
-    Between two waypoints everything passes linearly from the one to the other. What a waypoint does
-    not name is as at the one before.
+    All values pass linearly from one waypoint to the next. A value that a waypoint does not name is
+    that of the previous one.
     """
 
     time_s: Positive
     heading_deg: Bearing | None = None
-    """Where the waves go relative to the ship."""
+    """Direction in which the waves go relative to the ship."""
     course_deg: Bearing | None = None
-    """Instead of the heading, where the sea has directions: clockwise from true north."""
+    """Ship's course where the sea has directions, instead of the heading: degrees clockwise from
+    true north."""
     speed_m_s: Speed | None = None
     sea: AnySpectrum | None = None
-    """Spectrum of the sea, met as the scenario's is."""
+    """Spectrum of the sea; its other keys are the scenario's."""
     ship: dict[str, Finite] = Field(default_factory=dict)
-    """Keys of the ship, as in ``actual_ship``."""
+    """Parameters of the ship, with the keys of ``actual_ship``."""
 
 
 def waypoint_problems(voyage: Sequence[Waypoint], duration_s: float) -> list[Problem]:
-    """Times that do not increase, or lie beyond the end."""
+    """Problems of times that do not increase, or are beyond the end."""
     times = [0.0, *(point.time_s for point in voyage)]
     return [
         (
@@ -59,14 +60,14 @@ def track(
     *,
     angle: bool = False,
 ) -> Callable[[float], float]:
-    """A quantity of the voyage as a function of time in s.
+    """Return a quantity of the voyage as a function of time in s.
 
     Parameters
     ----------
     start : float
-        Its value at time 0.
+        Value at time 0.
     value : callable
-        What a waypoint says of it; None for nothing.
+        Function that gives a waypoint's value; None where it has none.
     angle : bool
         Whether it is an angle in degrees, which turns the shorter way.
     """
@@ -81,7 +82,7 @@ def track(
 
 
 def ship_on_the_way(voyage: Sequence[Waypoint], ship: RollShip, time_s: float) -> RollShip:
-    """The ship with what the waypoints say of it, at a time in s."""
+    """Ship at a time in s, with the parameters of the waypoints."""
     changed = {}
     for key in {key for point in voyage for key in point.ship}:
         values = track(voyage, getattr(ship, key), partial(_ship_value, key))
@@ -96,7 +97,7 @@ def _ship_value(key: str, point: Waypoint) -> float | None:
 def spectra_on_the_way(
     voyage: Sequence[Waypoint], first: Sequence[tuple[float, Any]]
 ) -> list[tuple[float, Any]]:
-    """When the sea has which spectrum: the scenario's own, then those of the waypoints."""
+    """Times and spectra of the sea: the scenario's own, then those of the waypoints."""
     known = list(first)
     if any(point.sea is not None for point in voyage):
         for point in voyage:

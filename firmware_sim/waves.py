@@ -1,4 +1,4 @@
-"""The waves' roll moment as rotating phasors, one for each component."""
+"""Roll moment of the waves as rotating phasors, one for each component."""
 
 from collections.abc import Callable
 from typing import Final, Protocol
@@ -12,31 +12,31 @@ from utank_hil.sea.encounter import encounter_frequency
 from utank_hil.sea.passing import PassingSea
 
 AHEAD_TICKS: Final = 2
-"""The plant interpolates the moment between four ticks, the last of which is so far ahead."""
+"""Ticks by which the last of the plant's four interpolation points is ahead."""
 RENEWED_TICKS: Final = 100
-"""Amplitude and frequency of encounter change once a second; in between the amplitude passes
-smoothly from one value to the next."""
-_LEAST: Final = 1e-12  # of the largest amplitude: from nothing no ratio leads to something
+"""Ticks between updates of amplitude and frequency of encounter, 1 s; in between the amplitude is
+interpolated smoothly."""
+_LEAST: Final = 1e-12  # share of the largest amplitude: a ratio cannot start from zero
 
 
 class Waves(Protocol):
     """Wave components at the ship."""
 
     def begin(self) -> tuple[ComplexArray, ComplexArray]:
-        """Phasors `AHEAD_TICKS` before the start, and their turn in a tick.
+        """Phasors `AHEAD_TICKS` before the start, and their rotation per tick.
 
-        The caller turns the phasors, in place, by one tick after another.
+        The caller rotates the phasors in place, tick by tick.
         """
 
     def at(self, tick: int) -> tuple[ComplexArray, ComplexArray]:
-        """Phasors `AHEAD_TICKS` after a tick, where the caller's turns have led, and their turn.
+        """Phasors `AHEAD_TICKS` after a tick, as the caller rotated them, and their rotation.
 
-        To be asked for each tick, from 0 on.
+        It must be called for each tick from 0 on.
         """
 
 
 class SteadyWaves:
-    """Components that stay as they are.
+    """Constant components.
 
     Parameters
     ----------
@@ -50,26 +50,26 @@ class SteadyWaves:
         self._phasors = moment.amplitude * np.exp(1j * (phase - AHEAD_TICKS * frequency * TICK_S))
 
     def begin(self) -> tuple[ComplexArray, ComplexArray]:
-        """As in `Waves`."""
+        """Return the phasors and rotations at the start."""
         return self._phasors, self._rotations
 
     def at(self, tick: int) -> tuple[ComplexArray, ComplexArray]:  # noqa: ARG002, always the same
-        """As in `Waves`."""
+        """Return the same phasors and rotations at every tick."""
         return self._phasors, self._rotations
 
 
 class PassingWaves:
-    """Components of a sea that changes, met by a ship that turns and changes its speed.
+    """Components of a changing sea, met by a ship that changes course and speed.
 
     The angle of each component at the ship is the integral of its frequency of encounter, so
-    neither turning nor changing speed makes the moment jump.
+    changes of course and speed cause no jump of the moment.
 
     Parameters
     ----------
     turn_rad, speed_m_s : callable
-        Turn of the ship since the start, clockwise, and its speed, at a time in s.
+        Clockwise turn of the ship since the start, and its speed, as functions of time in s.
     moment : callable
-        Complex roll moment in N m per m of amplitude at frequencies and headings.
+        Complex roll moment in N m per m of amplitude as a function of frequency and heading.
     """
 
     def __init__(
@@ -87,25 +87,25 @@ class PassingWaves:
         self._rotations = np.exp(1j * TICK_S * self._encounter_rad_s(0.0))
 
     def begin(self) -> tuple[ComplexArray, ComplexArray]:
-        """As in `Waves`."""
+        """Return the phasors and rotations at the start."""
         self._angle_rad += 2 * AHEAD_TICKS * TICK_S * self._encounter_rad_s(0.0)
         return self._phasors, self._rotations
 
     def at(self, tick: int) -> tuple[ComplexArray, ComplexArray]:
-        """As in `Waves`."""
+        """Return the phasors and rotations at a tick."""
         if tick % RENEWED_TICKS == 0:
             self._renew((tick + AHEAD_TICKS) * TICK_S)
         return self._phasors, self._rotations
 
     def _renew(self, now_s: float) -> None:
-        """Aim at amplitude and angle of each component a second later."""
+        """Set the targets of amplitude and angle of each component one second later."""
         step_s = RENEWED_TICKS * TICK_S
         first, middle, last = (
             self._encounter_rad_s(now_s + share * step_s) for share in (0.0, 0.5, 1.0)
         )
         turn_rad = step_s / 6 * (first + 4 * middle + last)
         before, after = self._amplitude, self._amplitude_nm(now_s + step_s)
-        self._phasors[:] = before * np.exp(1j * self._angle_rad)  # no rounding is handed on
+        self._phasors[:] = before * np.exp(1j * self._angle_rad)  # rounding does not accumulate
         self._rotations = np.exp((np.log(after / before) + 1j * turn_rad) / RENEWED_TICKS)
         self._angle_rad += turn_rad
         self._amplitude = after

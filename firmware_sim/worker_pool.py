@@ -1,4 +1,4 @@
-"""Processes that compute for this one, which alone decides what a signal means."""
+"""Pool of processes that leave the handling of signals to their parent."""
 
 import ctypes
 import multiprocessing
@@ -19,22 +19,22 @@ _PR_SET_PDEATHSIG: Final = 1
 
 
 class WorkerPool(ProcessPoolExecutor):
-    """A pool whose processes ignore `SIGNALS`: what they share tells them when to end.
+    """Pool whose processes ignore `SIGNALS`; shared values tell them when to end.
 
-    Ctrl-C, ``timeout`` and service managers reach all processes of a command. They end with this
-    process, if it is killed.
+    Ctrl-C, ``timeout`` and service managers signal all processes of a command. The pool's processes
+    end with this process if it is killed.
 
     Parameters
     ----------
     shared : object
-        What `shared` returns in the processes: shared values can't be sent along with a job.
+        Result of `shared` in the processes: shared values cannot be sent with a job.
     """
 
     def __init__(self, workers: int, shared: object) -> None:
         super().__init__(workers, multiprocessing.get_context("spawn"), _begin, (shared,))
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Have a process call a function; it is started if there are less than allowed."""
+        """Call a function in a process, which is started if fewer than allowed run."""
         with signals_waiting():
             return super().submit(fn, *args, **kwargs)
 
@@ -47,20 +47,20 @@ class WorkerPool(ProcessPoolExecutor):
 
 
 def shared() -> Any:
-    """What the processes of the pool share, in one of them."""
+    """Shared values of the pool, in one of its processes."""
     return _shared[0]
 
 
 def whole_first(futures: Iterable[Future[T]]) -> Iterator[T]:
-    """Results of those that are done, then the error of one that failed, if one did."""
+    """Yield the results of completed futures, then raise the error of a failed one, if any."""
     for future in sorted(futures, key=lambda each: each.exception() is not None):
         yield future.result()
 
 
 def end_with(parent_pid: int) -> None:
-    """Have this process killed when the thread that started it ends, however that does."""
+    """Kill this process when the thread that started it ends for any reason."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != parent_pid:  # it has ended already
+    if os.getppid() != parent_pid:  # the parent has already ended
         os._exit(1)
 
 

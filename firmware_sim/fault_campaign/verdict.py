@@ -42,7 +42,7 @@ _TIME_OF: Final[dict[Asked, str]] = {
     "note": "noted",
     "drive": "zero",
 }
-"""Field of `Times` with the begin of each reaction."""
+"""Field of `Times` with the start of each reaction."""
 _GO_ON: Final = ("halve", "alarm", "note", "none")
 """Reactions after which control continues."""
 
@@ -56,7 +56,7 @@ class Result:
     requirement : str
         Text of the requirement.
     found_ms, zero_ms : float or None
-        Begin of the required reaction, and final zero of the drive's set-point.
+        Start of the required reaction, and final zero of the drive's set-point.
     codes : tuple of str
         Fault codes over the seeds.
     wire : str
@@ -155,7 +155,7 @@ def _worst(times_ms: Sequence[float | None]) -> float | None:
 
 
 def _reaction_ms(row: Row, outcome: Outcome) -> float | None:
-    """Begin of the required reaction in ms; zero where arming was refused."""
+    """Start of the required reaction in ms; zero where arming was refused."""
     if row.fault.from_start and row.expect.latched and not outcome.was_active:
         return 0.0 if outcome.code != "NONE" else None
     time = _TIME_OF.get(row.expect.reaction)

@@ -137,7 +137,7 @@ class Pump(Fault):
 
 
 class Drive(Fault):
-    """The drive fails at the begin of the fault; NONE switches it off."""
+    """The drive fails at the start of the fault; NONE switches it off."""
 
     needs = ("drive",)
     kind: Literal["drive"]

@@ -84,7 +84,7 @@ def _altered(named: NamedMessage, change: Callable[[Any, float], Any]) -> Spoil:
 
 
 class Stuck(SignalFault):
-    """The signals keep their values from the begin of the fault."""
+    """The signals keep their values from the start of the fault."""
 
     kind: Literal["stuck"]
 
