@@ -1,7 +1,6 @@
 """Figures in one style; no other package except the commands imports this one.
 
-Each `draw_...` writes a `.png` file at `path`, over what is there; `about` is kept in it, as
-`style.picture` says.
+Each `draw_...` function overwrites a `.png` file at `path` and stores `about` in it (`picture`).
 """
 
 from utank_hil.pictures.bench_curves import BenchBar as BenchBar

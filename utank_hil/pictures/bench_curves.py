@@ -1,4 +1,4 @@
-"""Figure of a bench: how much less roll, at what cost, and roll, level and pressure over time."""
+"""Figure of a bench: roll reduction and its cost, and roll, level and pressure over time."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 ZOOM_S: Final = 180.0
 WINDOWS: Final = 60
-"""Of the whole run, in each of which the greatest value is shown: a curve of an hour is a block."""
+"""Number of parts of the run whose greatest values are drawn; a curve of an hour would be a block.
+"""
 _LANES: Final[dict[int, tuple[str, float]]] = {
     RetuningState.IDENTIFY: ("identification", 0.25),
     RetuningState.DESIGN: ("design", 0.4),
@@ -29,7 +30,7 @@ _LANES: Final[dict[int, tuple[str, float]]] = {
 }
 """Label and opacity of each retuning state."""
 _LETTER: Final = 0.014
-"""Width of a letter in a lane, relative to the axis: a section that is too short has no label."""
+"""Width of a letter in a lane over the axis; a section too short for its label has none."""
 _LABELS: Final = ("Roll (°)", "Tank level (m)", "Pump pressure (kPa)")
 
 
@@ -62,13 +63,13 @@ class BenchBar:
     Attributes
     ----------
     roll_rad : float or None
-        Root mean square; None for a run that gives none.
+        Root mean square, or None.
     said : str
-        Beside the bar of the roll.
+        Text beside the bar of the roll.
     power_w : float or None
-        Mean shaft power; None where there is no pump to drive.
+        Mean shaft power; None without a pump.
     cost : str
-        Beside the bar of the power.
+        Text beside the bar of the power.
     """
 
     name: str
@@ -90,9 +91,9 @@ def draw_bench(
 ) -> Path:
     """Draw the roll and cost of all runs as bars, and their roll, level and pressure over time.
 
-    Of the whole time the greatest value of each of `WINDOWS` parts is shown; three minutes are
-    shown as they were. These are around the largest roll, or around the first trial of a new law
-    if a run retuned. Lanes below show the retuning states of each run.
+    The whole run is drawn as the greatest value in each of `WINDOWS` parts, and three minutes in
+    full, around the largest roll, or around the first trial of a new law if a run retuned. Lanes
+    below show the retuning states of each run.
 
     Parameters
     ----------
@@ -100,9 +101,9 @@ def draw_bench(
         The first is the reference, the passive tank: drawn in grey, and searched for the largest
         roll.
     bars : sequence of BenchBar
-        Of the summary, those of the curves last; there is none without any.
+        Runs of the summary, those of the curves last; empty for no summary.
     wrong : sequence of str
-        What went wrong, written above the bars.
+        Problems, written above the bars.
 
     Raises
     ------
@@ -186,12 +187,12 @@ def _around(centre_s: float, whole: tuple[float, float]) -> tuple[float, float]:
 
 
 def _part_words(part_s: float) -> str:
-    """Length of a part of the run, in words."""
+    """Describe the length of a part of the run."""
     return f"{part_s:.0f} s" if part_s >= 2 else f"{part_s:.1f} s"
 
 
 def _draw_bars(figure: "SubFigure", bars: Sequence[BenchBar]) -> None:
-    """Draw how much the ship rolled in each run, and what power that took."""
+    """Draw the roll of each run and the power it took."""
     rolls, powers = figure.subplots(1, 2, sharey=True, width_ratios=[3, 2])
     places = range(len(bars))
     for axis, label, values, words in (
@@ -257,7 +258,7 @@ def _draw_column(
 def _greatest(time: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Middle of each part of a record, and the greatest absolute value in it."""
     parts = np.array_split(np.arange(len(time)), min(WINDOWS, len(time)))
-    greatest = [np.fmax.reduce(np.abs(value[part])) for part in parts]  # NaN where all are
+    greatest = [np.fmax.reduce(np.abs(value[part])) for part in parts]  # NaN if all are NaN
     return np.array([time[part].mean() for part in parts]), np.array(greatest)
 
 

@@ -1,4 +1,4 @@
-"""Figure of a campaign: means with their intervals, and how often a roll is passed."""
+"""Figure of a campaign: means with their intervals, and exceedance of roll."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ class CampaignRun:
     Attributes
     ----------
     mean_rad, half_width_rad : sequence of float
-        Roll RMS of each group; not a number where there is none.
+        Roll RMS of each group, or NaN.
     rolls_rad : sequence of float
         Roll RMS of each case.
     """
@@ -47,10 +47,8 @@ def draw_campaign(
     Parameters
     ----------
     groups : sequence
-        What each group is: numbers along an axis, or names one below the other, of which the
-        first `MOST_GROUPS` are drawn.
-    axis : str
-        What the numbers are.
+        Numbers along an axis named `axis`, or names one below the other, of which the first
+        `MOST_GROUPS` are drawn.
     """
     along = len(groups) > 1 and all(isinstance(group, float | int) for group in groups)
     height = 5.0 if along else min(2.5 + 0.3 * len(groups) * max(len(runs), 2), 16.0)
@@ -103,7 +101,7 @@ def _exceedance(axes: "Axes", run: CampaignRun, color: str, dash: Any) -> None:
     rolls = np.sort([math.degrees(roll) for roll in run.rolls_rad])
     if len(rolls):
         above = 1.0 - np.arange(len(rolls)) / len(rolls)
-        mark = "o" if rolls[0] == rolls[-1] else None  # a step has no width then
+        mark = "o" if rolls[0] == rolls[-1] else None  # a step would have no width
         axes.step(
             rolls, above, where="pre", color=color, linestyle=dash, label=run.name, marker=mark
         )

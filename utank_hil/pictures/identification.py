@@ -1,4 +1,4 @@
-"""Figure of an identification: validation of the model on data that it was not fitted to."""
+"""Figure of an identification: validation of the model on held-out data."""
 
 import math
 from collections.abc import Mapping
@@ -35,11 +35,7 @@ def draw_identification(
 ) -> Path:
     """Draw held-out roll and its prediction, responses, residuals and the stabilization diagram.
 
-    Parameters
-    ----------
-    record : ndarray, shape (N, 1 + m)
-    found : Identification
-        Result for that record.
+    `record`, shape (N, 1 + m), is the record that `found` was identified from.
     """
     measured = task.design.predictor.measured
     roll, arx = measured.index("roll_rad"), found.okid.arx

@@ -1,4 +1,4 @@
-"""A report as one HTML page that needs nothing else: texts, tables and pictures in it."""
+"""A report as one self-contained HTML page of texts, tables and pictures."""
 
 import base64
 from collections.abc import Mapping, Sequence
@@ -11,19 +11,13 @@ from utank_hil.pictures.style import DPI, TEXT_PT
 
 LEAST_TEXT_PX: Final = 9.0
 TEXT_PX: Final = TEXT_PT / 72 * DPI
-"""Of a picture's words as it was drawn."""
+"""Size of a picture's text as drawn."""
 _TEMPLATE: Final = Path(__file__).with_name("report.html.jinja")
 
 
 @dataclass(frozen=True, slots=True)
 class ReportTable:
-    """A table: the first column names the rows.
-
-    Attributes
-    ----------
-    text : bool
-        Whether the cells are sentences and not figures.
-    """
+    """A table whose first column names the rows; `text` marks sentences instead of figures."""
 
     headings: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -40,7 +34,7 @@ class ReportPicture:
     png : bytes
         Content of the `.png` file.
     says : str
-        What it shows, for who can't see it.
+        Description for readers who cannot see it.
     """
 
     png: bytes
@@ -48,24 +42,18 @@ class ReportPicture:
 
     @property
     def base64(self) -> str:
-        """The content as the page holds it."""
+        """Content of the picture in base64."""
         return base64.b64encode(self.png).decode()
 
     @property
     def least_px(self) -> int:
-        """Width below which its words would be too small: a narrow screen scrolls sideways."""
+        """Width below which the text would be too small; a narrower screen scrolls sideways."""
         return round(int.from_bytes(self.png[16:20]) * LEAST_TEXT_PX / TEXT_PX)
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What is said first of all.
-
-    Attributes
-    ----------
-    good : bool
-        Whether nothing was wrong.
-    """
+    """Result of a run, at the top of the page; `good` if nothing was wrong."""
 
     lines: Sequence[str]
     good: bool
@@ -89,21 +77,19 @@ def write_report_page(
     verdicts: Sequence[Verdict],
     sections: Sequence[ReportSection],
 ) -> Path:
-    """Write the page; return its path.
+    """Write the page over `path`, a `.html` file, and return the path.
 
     Parameters
     ----------
-    path : Path
-        The `.html` file; overwritten.
     title, about : str
         Heading, and the line below it.
     verdicts : sequence of Verdict
-        Of each run that is reported.
+        One for each reported run.
 
     Raises
     ------
     OSError
-        If the page can't be written.
+        If the page cannot be written.
     """
     from jinja2 import Environment, StrictUndefined
 

@@ -1,4 +1,4 @@
-"""Figure of rolls as statistics: at which periods, and how often it is how great."""
+"""Figure of roll statistics: spectra over the period, and exceedance of amplitudes."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,9 +11,9 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.pictures.style import COLORS, DASHES, NO_TANK, WIDEST_IN, picture
 
 SEGMENT_S: Final = 200.0
-"""Of Welch's spectra: 0.03 rad/s apart."""
+"""Length of the segments of Welch's spectra, with a resolution of 0.03 rad/s."""
 LONGEST_S, SHORTEST_S = 40.0, 3.0
-"""Periods that are shown."""
+"""Range of periods in the figure."""
 
 
 def draw_roll_statistics(
@@ -21,13 +21,8 @@ def draw_roll_statistics(
 ) -> Path:
     """Draw spectra of the roll over its period, and shares of its amplitudes above each angle.
 
-    Parameters
-    ----------
-    rolls : mapping of str to ndarray, shape (n,)
-        Rolls in radians by name, in the order of the colours; one without colour, "no tank", may
-        come first.
-    step_s : float
-        Sample time.
+    `rolls` in radians, shape (n,), are in the order of the colours; one without colour, "no tank",
+    may come first. `step_s` is their sample time.
     """
     from scipy.signal import welch
 
@@ -46,7 +41,7 @@ def draw_roll_statistics(
             levels = np.linspace(0.0, np.abs(degrees).max(), 60)
             try:
                 share = exceedance(degrees, levels)
-            except ValueError:  # no half-cycle in it
+            except ValueError:  # the record has no half-cycle
                 continue
             shares.plot(levels, np.where(share > 0, 100 * share, np.nan), **style)
         spectra.set_xscale("log")

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.typing import RcKeyType
 
-# dark grey for the reference, then Okabe and Ito's colour-blind safe palette
+# Dark grey for the reference, then Okabe and Ito's palette safe for colour-blind readers.
 COLORS: Final = (
     "#555555",
     "#0072B2",
@@ -35,13 +35,13 @@ DASHES: Final[tuple[str | tuple[float, tuple[float, ...]], ...]] = (
     (0, (4, 1, 1, 1, 1, 1)),
     "-",
 )
-"""Of the curves with these colours, so that they can be distinguished in print without them."""
+"""Strokes of the curves with these colours, which distinguish them in print without colour."""
 DPI: Final = 130
 TEXT_PT: Final = 10.0
 WIDEST_IN: Final = 10.0
-"""Of a picture: printed on A4, its words are still of seven points."""
+"""Greatest width of a picture; printed on A4, its text has seven points."""
 BELOW: "Final[dict[str, Any]]" = {"loc": "outside lower left", "ncols": 4, "frameon": False}
-"""Where a legend covers no data."""
+"""Arguments that place a legend where it covers no data."""
 NO_TANK: Final = "#BBBBBB"
 WRONG: Final = "#A40000"
 HIGHLIGHT: Final = "#F0E442"
@@ -63,7 +63,7 @@ STYLE: "Final[dict[RcKeyType, Any]]" = {
 def picture(
     path: Path, title: str, size_in: tuple[float, float], about: Mapping[str, Any] | None = None
 ) -> "Iterator[Figure]":
-    """Yield an empty figure; at the end of the block its title is set and it is written.
+    """Yield an empty figure with constrained layout; at the end its title is set and it is written.
 
     Parameters
     ----------
@@ -72,12 +72,7 @@ def picture(
     size_in : tuple of float
         Width and height in inches.
     about : mapping, optional
-        Where it comes from (`utank_hil.base.provenance`), kept in the file's text ``Description``.
-
-    Yields
-    ------
-    matplotlib.figure.Figure
-        With constrained layout.
+        Origin of the data (`utank_hil.base.provenance`), kept in the file's text ``Description``.
     """
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -85,7 +80,7 @@ def picture(
 
     with mpl.rc_context(rc=STYLE):
         figure = Figure(figsize=size_in, layout="constrained")
-        FigureCanvasAgg(figure)  # no pyplot: neither a window system nor global state
+        FigureCanvasAgg(figure)  # pyplot would need a window system and global state
         yield figure
         figure.suptitle(title, x=0.01, ha="left", fontsize=13, fontweight="bold")
         save_figure(figure, path, {} if about is None else {"Description": json.dumps(about)})

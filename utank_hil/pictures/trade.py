@@ -29,12 +29,8 @@ def draw_trade(
     """Draw roll reduction over peak sensitivity, and the cost of each law.
 
     Filled dots meet every required margin, open ones miss one, and the star is the design itself.
-    Laws that are unstable on their own ship are left out.
-
-    Parameters
-    ----------
-    pressure_limit_pa, level_limit_m : float
-        Drawn as lines. The RMS values are those of linear theory, without limits.
+    Laws that are unstable on their own ship are left out. `pressure_limit_pa` and `level_limit_m`
+    are drawn as lines; the RMS values are those of linear theory, without limits.
 
     Raises
     ------

@@ -12,18 +12,10 @@ from utank_hil.sea import Harmonics
 def roll_without_tank(
     ship: RollShip, wave_moment: Harmonics, step_s: float, count: int
 ) -> FloatArray:
-    """Linear roll from rest at time 0 under a sum of harmonics, on a uniform grid.
+    """Linear roll from rest at time 0 under a sum of harmonics in N m, exact for any step.
 
-    The sum of the steady response to each component, the steady heel, and the free decay that
-    matches rest at the start. Exact for any step.
-
-    Parameters
-    ----------
-    ship : RollShip
-        Inertia, linear damping, stiffness and steady heeling moments are used; damping ratio below
-        one.
-    wave_moment : Harmonics
-        Wave moment in N m.
+    It is the sum of the steady response to each component, the steady heel, and the free decay that
+    matches rest at the start. The ship's damping ratio must be below one.
 
     Returns
     -------
@@ -47,7 +39,7 @@ def roll_without_tank(
     steady = Harmonics(np.abs(response), omega, np.angle(response))
     steady_rate = Harmonics(np.abs(response) * omega, omega, np.angle(response) + math.pi / 2)
     heel = ship.heeling_moment_nm / ship.stiffness_nm_rad
-    angle = -heel - float(steady.at(0.0))  # of the free decay at the start
+    angle = -heel - float(steady.at(0.0))  # start of the free decay
     sine_part = (-float(steady_rate.at(0.0)) + decay * angle) / damped
     time_s = step_s * np.arange(count, dtype=float)
     free = angle * np.cos(damped * time_s) + sine_part * np.sin(damped * time_s)

@@ -1,8 +1,8 @@
-"""Means with their confidence intervals: of independent values, and of records by batch means.
+"""Confidence intervals of means: of independent values, and of records by batch means.
 
-A record's samples depend on one another. Means over batches that are long beside the time after
-which a motion has forgotten itself hardly do, so Student's t of them gives the interval of the
-record's mean (A. M. Law, Simulation Modeling and Analysis, 5th ed., section 9.5.3).
+The samples of a record are correlated. Means over batches that are long against the correlation
+time are hardly correlated, so their Student's t gives the interval of the record's mean (A. M. Law,
+Simulation Modeling and Analysis, 5th ed., section 9.5.3).
 """
 
 import math
@@ -49,7 +49,7 @@ def mean_interval(values: npt.ArrayLike, confidence: float = 0.95) -> Interval:
 
 
 def batch_means(values: FloatArray, batches: int) -> FloatArray:
-    """Means of as many equal parts of a record, shape (batches,); a rest at its end is left out.
+    """Means of equal parts of a record, shape (batches,); a remainder at its end is left out.
 
     Raises
     ------
@@ -64,10 +64,10 @@ def batch_means(values: FloatArray, batches: int) -> FloatArray:
 
 
 def rms_batches(values: FloatArray, batches: int) -> FloatArray:
-    """The root mean square of a record as the mean of one value for each batch, shape (batches,).
+    """Express the RMS of a record as the mean of one value for each batch, shape (batches,).
 
-    Linear about the mean square (the delta method), so that differences of such values of two
-    records in the same waves have the interval of the difference of their root mean squares.
+    The values are linear about the mean square (the delta method), so the differences of such
+    values of two records in the same waves have the interval of the difference of their RMS.
     """
     squares = batch_means(np.square(values), batches)
     rms = math.sqrt(float(squares.mean()))

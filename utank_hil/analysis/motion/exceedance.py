@@ -6,20 +6,10 @@ from utank_hil.base.arrays import FloatArray
 
 
 def exceedance(signal: FloatArray, levels: FloatArray) -> FloatArray:
-    """Share of single amplitudes above each level.
+    """Share of single amplitudes of a record above each level, shape (k,).
 
     A single amplitude is the largest deviation from the mean between two crossings of it, to either
     side. The parts before the first crossing and after the last are left out.
-
-    Parameters
-    ----------
-    signal : ndarray, shape (n,)
-    levels : ndarray, shape (k,)
-        In the signal's unit.
-
-    Returns
-    -------
-    ndarray, shape (k,)
 
     Raises
     ------
@@ -40,10 +30,6 @@ def rayleigh_exceedance(standard_deviation: float, levels: FloatArray) -> FloatA
     """Share exp(-x^2 / 2 s^2) of amplitudes above x, for a narrow-banded Gaussian motion.
 
     Longuet-Higgins (1952), "On the statistical distribution of the heights of sea waves".
-
-    Parameters
-    ----------
-    levels : ndarray, shape (k,)
     """
     share: FloatArray = np.exp(-np.square(levels) / (2 * standard_deviation**2))
     return share

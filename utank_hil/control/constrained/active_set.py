@@ -1,11 +1,11 @@
-"""Small dense quadratic programmes, solved again and again with new gradients and bounds.
+"""Solver of small dense quadratic programmes with constant matrices, varying gradients and bounds.
 
 ::
 
     minimize 1/2 x'H x + f'x    subject to    lower <= (x, G x) <= upper
 
-A dual active-set method (DAQP): exact to rounding, a handful of iterations when it starts from the
-active set of the last solution, and nothing allocated on the way.
+A dual active-set method (DAQP) is exact to rounding, needs few iterations when it starts from the
+active set of the last solution, and allocates no memory during a solution.
 
 References
 ----------
@@ -22,7 +22,7 @@ _OPTIMAL = 1
 
 
 class ActiveSetSolver:
-    """Solves one family of programmes, warm-started.
+    """Warm-started solver of one family of programmes.
 
     Parameters
     ----------
@@ -31,12 +31,12 @@ class ActiveSetSolver:
     rows : ndarray, shape (m, n)
         G.
     iteration_limit : int
-        Budget of a solution.
+        Limit on the iterations of a solution.
 
     Attributes
     ----------
     iterations : int
-        Taken by the last solution.
+        Iterations of the last solution.
     """
 
     def __init__(self, hessian: FloatArray, rows: FloatArray, iteration_limit: int) -> None:
@@ -54,23 +54,20 @@ class ActiveSetSolver:
 
     @property
     def iteration_limit(self) -> int:
-        """Budget of a solution."""
+        """Limit on the iterations of a solution."""
         return int(self._model.settings["iter_limit"])
 
     def forget(self) -> None:
-        """Start the next solution without the last one's active set."""
+        """Discard the active set of the last solution."""
         self._warm = False
 
     def solve(
         self, gradient: FloatArray, lower: FloatArray, upper: FloatArray
     ) -> FloatArray | None:
-        """The minimizer, or None if it was not found within the iteration limit.
+        """Return the minimizer, or None if the iteration limit was reached.
 
-        Parameters
-        ----------
-        gradient : ndarray, shape (n,)
-        lower, upper : ndarray, shape (n + m,)
-            Of the variables, then of the rows.
+        `gradient` has shape (n,); `lower` and `upper`, shape (n + m,), bound the variables, then
+        the rows.
         """
         sense = None if self._warm else self._cold
         self._model.update(f=gradient, bupper=upper, blower=lower, sense=sense)

@@ -1,10 +1,10 @@
-"""From a ship, a tank and the sea that is expected to a constrained predictive law.
+"""A constrained predictive law designed for ship, tank and expected sea.
 
 A Kalman filter on the model of ship, tank, drive, waves and heel (`sea_plant`) estimates the state;
-what it foresees of the waves is in every prediction. The cost is roll, level and pressure over the
-horizon, and what follows it for ever: roll and level with the tank passive, or what the law without
-limits, which knows the sea, pays from there on. Without either, a plan that leaves the ship
-swinging would be cheap. What a steady heel explains of the motion is taken off first.
+its wave forecast is part of every prediction. The cost is roll, level and pressure over the horizon
+plus a terminal cost: roll and level with the tank passive, or the cost of the unlimited law, which
+knows the sea, from there on. Without either, a plan that leaves the ship swinging would be cheap.
+The part of the motion due to a steady heel is subtracted first.
 """
 
 from dataclasses import dataclass
@@ -35,53 +35,54 @@ from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import LinearModel
 
-# A step must end well inside its tick, whatever is measured. With each of these at its most, a sea
+# A step must end well inside its tick for any measurement. With each of these at its limit, a sea
 # model of the greatest order, and random measurements of up to 100 times any motion, which use up
 # the iterations, the slowest of 1200 steps took 1.5 to 2.5 ms of one thread's time on a shared
 # server (AMD EPYC); with 40 knots 0.9 ms, the median 0.24 ms. The default has 19.
 MOST_KNOTS: Final = 60
 MOST_HORIZON: Final = 400
 MOST_ITERATIONS: Final = 200
-# a metre above the level limit costs as much as this roll over the whole horizon
+# A metre above the level limit costs as much as this roll over the whole horizon.
 _PENALTY_ROLL_RAD = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class ConstrainedDesign:
-    """A constrained predictive law in parameters: what a configuration file holds.
+    """Parameters of a constrained predictive law.
 
     Parameters
     ----------
     kind : {"constrained_gpc"}
     sea : SeaModel
-        The sea it expects.
+        Expected sea.
     measured : tuple of str
-        Outputs, in order, the level among them; names of `STATES`.
+        Measured outputs, in order, the level among them; names of `STATES`.
     measurement_std : tuple of float
         Standard deviation of the white noise on each, in its unit.
     pressure_noise_pa_rt_s : float
-        Root of the two-sided density of a white pressure disturbance: what the model ignores.
+        Root of the two-sided density of a white pressure disturbance, which stands for model
+        errors.
     slope_noise_rad_rt_s : float
-        The same of a white roll moment, per roll stiffness.
+        Root of the two-sided density of a white roll moment, per roll stiffness.
     knots : tuple of int
         Samples of the horizon at which the plan holds the command, increasing from 0; 60 at most.
     horizon : int
         Samples N that are planned, 400 at most.
     pressure_weight_rad2 : float
-        Greatest pressure throughout costs as much as this square of a roll angle.
+        Square of the roll angle that costs as much as the greatest pressure throughout.
     level_weight_rad2_m2 : float
-        A level of one metre costs as much as this square of a roll angle.
+        Square of the roll angle that costs as much as a level of one metre.
     level_margin_m : float or None
-        Kept from the limit on the level; None for the standard deviation of the level's forecast
-        one sample ahead, as what a plan can't know before the next one is made.
+        Distance of the plan from the limit on the level; None for the standard deviation of the
+        level's forecast one sample ahead, the error that a plan cannot know.
     heel_std_rad, heel_time_s : float
         Standard deviation and time constant of a slowly varying heel.
     heel_share : float
-        Part of that heel which the tank takes out, 0 to 1. With 0 the pump holds no steady pressure
-        and the roll about the heel is controlled; the level that the heel brings is known to the
-        level limit all the same.
+        Part of that heel which the tank removes, 0 to 1. With 0 the pump holds no steady pressure
+        and the roll about the heel is controlled; the level limit still includes the level due to
+        the heel.
     iteration_limit : int
-        Budget of a quadratic programme, 200 at most.
+        Limit on the iterations of a quadratic programme, 200 at most.
     """
 
     kind: Literal["constrained_gpc"]
@@ -125,7 +126,7 @@ class ConstrainedDesign:
         refuse("constrained design", problems)
 
     def law(self, plant: DesignPlant) -> ConstrainedLaw:
-        """The law for a plant, planning within its limits."""
+        """Design the law for a plant; it plans within the plant's limits."""
         limits = plant.limits
         whole, covariance = sea_plant(
             self.sea,
@@ -188,7 +189,7 @@ class ConstrainedDesign:
 def _cost_of_law(
     model: LinearModel, weight: FloatArray, pressure_weight: float, unit_pa: float
 ) -> FloatArray:
-    """L with |L x|^2 the least cost from the state x on, the heel, its last element, left out."""
+    """Factor L with |L x|^2 the least cost from the state x on, less the heel, its last element."""
     from scipy.linalg import solve_discrete_are
 
     n = len(model.A)
@@ -208,7 +209,7 @@ def _root(cost: FloatArray) -> FloatArray:
 
 
 def _steady(plant: LinearModel, share: float) -> tuple[FloatArray, FloatArray]:
-    """Equilibrium under the heel, the last state, with that share of it taken out by the pump."""
+    """Equilibrium under the heel, the last state, with that share of it removed by the pump."""
     n = len(plant.A)
     motion = slice(0, n - 1)
     rest = np.eye(n - 1) - plant.A[motion, motion]

@@ -1,8 +1,8 @@
-"""The cost of a plan over a receding horizon, and the motions that it leads to.
+"""Cost and predicted motions of a plan over a receding horizon.
 
 The plan holds the command of one pump at a few future samples, its knots; between them the command
-runs straight, after the last one it is zero. For x(k+1) = A x(k) + B u(k), y(k) = C x(k) + D u(k)
-all predictions are linear in the state x(k) and the plan z, and the cost is a sum of squares::
+is linear, after the last one it is zero. For x(k+1) = A x(k) + B u(k), y(k) = C x(k) + D u(k) all
+predictions are linear in the state x(k) and the plan z, and the cost is a sum of squares::
 
     y(k+q) = outputs_state[q] x + outputs_plan[q] z
     sum_{q >= first_output} |y_T(k+q) - y(k+q)|^2_W + Q sum_q u(k+q)^2 + |L x(k+N)|^2
@@ -34,15 +34,15 @@ class Horizon:
     outputs_state : ndarray, shape (N, m, n)
     outputs_plan : ndarray, shape (N, m, j)
     outputs_held : ndarray, shape (N, m)
-        Effect on the outputs of one unit of command held all the time.
+        Outputs due to one unit of constant command.
     hessian : ndarray, shape (j, j)
         M'M.
     unlimited_state : ndarray, shape (j, n)
-        The best plan is unlimited_state x + sum_q unlimited_target[q] y_T(k+q) as long as no limit
-        is in its way.
+        Without active limits the best plan is unlimited_state x + sum_q unlimited_target[q]
+        y_T(k+q).
     unlimited_target : ndarray, shape (N, j, m)
     output_weight, input_weight, first_output, terminal, correction
-        As `condense` was given them; no terminal cost has shape (0, n), no correction is zero.
+        As in `condense`; no terminal cost has shape (0, n), no correction is zero.
     """
 
     knots: npt.NDArray[np.int64]
@@ -71,7 +71,7 @@ def condense(
     terminal: FloatArray | None = None,
     correction: FloatArray | None = None,
 ) -> Horizon:
-    """Cost and predictions of a plan.
+    """Compute cost and predictions of a plan.
 
     Parameters
     ----------
@@ -86,11 +86,11 @@ def condense(
     input_weight : float
         Q, positive.
     first_output : int
-        Outputs before y(k + first_output) are not weighed.
+        Outputs before y(k + first_output) have no weight.
     terminal : ndarray, shape (t, n), optional
         L.
     correction : ndarray, shape (n,), optional
-        From the state to what is added to the command of each sample; no command changes it.
+        From the state to an addition to each sample's command, which does not depend on commands.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def condense(
     power = np.eye(states)
     added = np.zeros(states) if correction is None else correction
     corrections = np.empty((samples, states))
-    reach = np.empty((states, samples))  # of u(k+q) on x(k+N)
+    reach = np.empty((states, samples))  # effect of u(k+q) on x(k+N)
     arrived = model.B[:, 0]
     for q in range(samples):
         by_state[q] = model.C @ power
@@ -144,7 +144,7 @@ def condense(
     state_rows = np.vstack(
         [root[:, None] * by_state.reshape(-1, states), np.zeros((samples, states)), rest @ power]
     )
-    # solved as the least-squares problem that it is: squaring it loses half the digits
+    # Solved as a least-squares problem, because the normal equations lose half the digits.
     orthogonal, triangle = np.linalg.qr(plan_rows)
     by_target = np.linalg.solve(triangle, orthogonal[: len(root)].T * root)
     return Horizon(

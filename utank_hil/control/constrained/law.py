@@ -1,18 +1,17 @@
 """Predictive control that plans within the limits of pump and tank.
 
-Every sample it looks for the plan of least cost (`utank_hil.control.constrained.horizon`) with::
+Each sample it finds the plan of least cost (`utank_hil.control.constrained.horizon`) with::
 
     |P| <= pressure limit          at every knot
     P At h' <= power limit         at every knot, with the water's speed h' of the last plan
-    |P(q+1) - P(q)| <= rate Ts     along the plan, and from the command that left last
-    |h| <= level limit + s         s >= 0 as small as its cost makes it
+    |P(q+1) - P(q)| <= rate Ts     along the plan, and from the last sent command
+    |h| <= level limit + s         s >= 0, at a cost
 
-The pressure can always be brought to zero at its rate limit and s can be anything, so there is
-always a plan, whatever the waves do to the level. As long as the analytic optimum, linear in the
-state, touches no limit, it is the plan; else a quadratic programme is solved
-(`utank_hil.control.constrained.plan_programme`). When that takes more than its budget of
-iterations, the last plan goes on; a plan ends in the steady command, zero if no heel is to be
-corrected, so if that lasts, the tank is passive.
+The pressure can always be brought to zero at its rate limit and s is unbounded, so a plan exists
+for any level and waves. As long as the analytic optimum, linear in the state, keeps all limits, it
+is the plan; else a quadratic programme is solved (`utank_hil.control.constrained.plan_programme`).
+If this reaches its iteration limit, the last plan continues; a plan ends in the steady command,
+zero without a heel correction, so the tank is passive if that persists.
 """
 
 import math
@@ -30,18 +29,18 @@ from utank_hil.control.lqg import LQGLaw
 from utank_hil.dynamics.sampling import LinearModel
 
 _GRID_BITS = 20
-"""Binary digits of a command along a limit: 2^-20 is the tolerance of the solver.
+"""Binary digits of a command along a limit; 2^-20 is the tolerance of the solver.
 
-A plan often goes along a limit, at a round pressure or a whole number of steps from one, where what
-is done with it (a comparison, the rounding of a message) hangs on its last digit; and that is the
-processor's. On a grid it is the same number on each.
+A plan often follows a limit, at a round pressure or a whole number of steps from one, where a
+comparison or the rounding of a message depends on its last digit, which differs between processors.
+Rounding to a grid makes it equal on all.
 """
-_FOLLOWED = 0.02  # of the greatest pressure: a mean command this near to the plan's counts as it
+_FOLLOWED = 0.02  # over the greatest pressure; a mean command this near the plan's counts as it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConstrainedLaw:
-    """What a `ConstrainedController` is made from; without its limits, a linear law.
+    """Parameters of a `ConstrainedController`; a linear law while no limit is active.
 
     Attributes
     ----------
@@ -52,19 +51,19 @@ class ConstrainedLaw:
     horizon : Horizon
         Cost and predictions of `model`.
     limits : PumpLimits
-        Of which pressure, rate, level and power count.
+        Its pressure, rate, level and power are used.
     level_output : int or None
-        Which output is the level; None leaves level and power without limit.
+        Index of the level among the outputs; None leaves level and power unlimited.
     level_penalty : float
         Cost of a metre above the level limit, in the unit of the horizon's cost.
     reservoir_area_m2 : float
         At, for the power.
     steady_state : ndarray, shape (n, n)
-        From the state to the part of it that a steady heel explains: the cost is that of the rest.
+        From the state to its part due to a steady heel, which the cost leaves out.
     steady_command : ndarray, shape (n,)
         From the state to the command that belongs to that part.
     iteration_limit : int
-        Budget of a programme.
+        Limit on the iterations of a programme.
 
     Raises
     ------
@@ -103,28 +102,24 @@ class ConstrainedLaw:
         return self.model.dt
 
     def controller(self) -> "ConstrainedController":
-        """A new steppable controller, at rest."""
+        """Return a new steppable controller, at rest."""
         return ConstrainedController(self)
 
     def matrices(self) -> LinearModel:
-        """The law from y to u while no limit is touched."""
+        """State-space model from y to u while no limit is active."""
         return self.unlimited().matrices()
 
     def response(self, z: ComplexArray) -> ComplexArray:
-        """Its transfer matrix at the points `z`, shape (N,); shape (N, 1, m)."""
+        """Transfer matrix without active limits at the points `z`, shape (N,); shape (N, 1, m)."""
         return self.unlimited().response(z)
 
     def following(self, law: LQGLaw) -> "ConstrainedLaw":
-        """The law that commands what a linear one does as long as no limit is touched.
+        """Return the law that commands what a linear law does while no limit is active.
 
-        Both estimates run side by side, and the plan is that of this law with the other's command
-        less its own added at each sample. Without surprises the difference fades as the linear
-        law's estimate comes to the plan's.
-
-        Parameters
-        ----------
-        law : LQGLaw
-            For the same outputs, on a model whose estimate follows the same commands.
+        Both estimates run side by side. The plan is that of this law plus, at each sample, the
+        difference between the two commands. Without innovations the difference decays as the linear
+        law's estimate converges to the plan's. `law` has the same outputs, and a model whose
+        estimate follows the same commands.
         """
         from scipy.linalg import block_diag
 
@@ -161,21 +156,21 @@ class ConstrainedLaw:
         )
 
     def unlimited(self) -> LQGLaw:
-        """The law as it is while no limit is touched: one that knows of none."""
+        """Linear law that the controller follows while no limit is active."""
         rest = np.eye(len(self.steady_state)) - self.steady_state
         gain = -(self.horizon.unlimited_state[:1] @ rest + self.steady_command)
         return LQGLaw(self.model, gain, self.observer_gain)
 
 
 class ConstrainedController:
-    """Steps a `ConstrainedLaw`.
+    """Stepping of a `ConstrainedLaw`.
 
     Attributes
     ----------
     limited : bool
-        Whether a limit bent the last plan.
+        Whether a limit changed the last plan.
     fallbacks : int
-        How often a programme was not solved within its budget.
+        Number of programmes that reached their iteration limit.
     """
 
     def __init__(self, law: ConstrainedLaw) -> None:
@@ -215,18 +210,18 @@ class ConstrainedController:
         self.reset()
 
     def derive(self) -> None:
-        """Set the programme up anew, after other numbers were put into the controller."""
+        """Rebuild the programme after numbers of the controller were replaced."""
         self._programme.rebuild(self._hessian)
 
     def reset(self) -> None:
-        """Forget the past: state, plan and command zero."""
+        """Set state, plan and command to zero."""
         self._state = np.zeros(len(self._a))
         self._plan_pa = np.zeros(len(self._interpolation))
-        self._command_pa = 0.0  # the last answer
-        self._before_pa = 0.0  # where the command stood before it
-        self._mean_pa = 0.0  # of the commands that left since then
+        self._command_pa = 0.0  # the last returned command
+        self._before_pa = 0.0  # the sent command before it
+        self._mean_pa = 0.0  # mean of the commands sent since then
         self._mean_before_pa = 0.0
-        self._last_pa = 0.0  # the command that left last
+        self._last_pa = 0.0  # the last sent command
         self.limited = False
         self.fallbacks = 0
         self._programme.forget()
@@ -246,7 +241,7 @@ class ConstrainedController:
             else:
                 best += np.einsum("qjm,qm->j", self._target_gains, reference)
         self._plan_pa = self._plan(best, float(self._steady_command.dot(state)))
-        # the solver keeps its bounds to a tolerance
+        # The solver keeps its bounds only to a tolerance.
         low, high = self._last_pa - self._step_pa, self._last_pa + self._step_pa
         command = min(max(float(self._plan_pa[0]), low), high)
         command = min(max(command, -self._pressure_pa), self._pressure_pa)
@@ -257,13 +252,13 @@ class ConstrainedController:
         return np.array([command])
 
     def allow(self, share: float) -> None:
-        """Tell the share of its pressure limit that the next plan may use."""
+        """Set the share of the pressure limit that the next plan may use."""
         self._allowed_pa = share * self._pressure_pa
 
     def observe(self, y: FloatArray) -> None:
-        """Take a measurement as `step` does, and plan nothing: how a law learns the past.
+        """Update the estimate by a measurement as `step` does, without planning.
 
-        A measurement that is not finite, whichever output it is of, corrects nothing.
+        A measurement with any output that is not finite corrects nothing.
         """
         state, mean = self._state, self._mean_pa
         surprise = y - self._c.dot(state) - self._d * mean
@@ -273,10 +268,11 @@ class ConstrainedController:
         self._mean_before_pa = mean
 
     def applied(self, u: FloatArray) -> None:
-        """Tell the mean of the commands that left since the last step, shape (1,).
+        """Take the mean of the commands sent since the last step, shape (1,).
 
-        Where the last one of them stood follows from it: where the answer would have brought it, at
-        once or at the rate limit, if the mean agrees with that, else straight on from the mean.
+        The last of them follows from it: the value that the returned command would reach, at once
+        or at the rate limit, if the mean agrees with that, else a linear extrapolation from the
+        mean.
         """
         mean = float(u[0])
         change = self._command_pa - self._before_pa
@@ -290,7 +286,7 @@ class ConstrainedController:
         self._last_pa = min(max(last, -self._pressure_pa), self._pressure_pa)
 
     def _on_grid(self, command: float) -> float:
-        """The nearest command of the grid, or the limit if that is nearer than the next one."""
+        """Round to the nearest command of the grid, or to the limit if that is nearer."""
         command = float(np.rint(command / self._grid_pa)) * self._grid_pa + 0.0  # not -0.0
         if 0 < abs(command) - self._allowed_pa < self._grid_pa:
             return math.copysign(self._allowed_pa, command)
@@ -322,7 +318,7 @@ class ConstrainedController:
             share = self._power_pa_m_s / np.maximum(np.abs(speed), 1e-9)
             high = np.where(speed > 0, np.minimum(high, share), high)
             low = np.where(speed < 0, np.maximum(low, -share), low)
-        # what the rate limit does not let it reach is no bound
+        # a bound is relaxed to what the rate limit can reach
         high = np.maximum(high, self._last_pa - self._reach_pa)
         low = np.minimum(low, self._last_pa + self._reach_pa)
         return low - steady_pa, high - steady_pa

@@ -1,7 +1,7 @@
-"""The quadratic programme behind a constrained plan, built once.
+"""The quadratic programme of a constrained plan, built once.
 
 The plan z is the command at the knots less a steady part c. In units of the greatest pressure, with
-a slack s that the level may exceed its limit by::
+a slack s by which the level may exceed its limit::
 
     minimize    1/2 z'H z + f'z + penalty (s + s^2 / 2)
     subject to  low <= c + z <= high,    |z_j - z_{j-1}| <= rate Ts (samples between),
@@ -15,7 +15,7 @@ from utank_hil.control.constrained.active_set import ActiveSetSolver
 from utank_hil.control.constrained.horizon import Horizon
 from utank_hil.control.limits import PumpLimits
 
-LEVEL_SPACING = 3  # samples between two at which the level is held
+LEVEL_SPACING = 3  # the level is constrained at every third sample
 _FREE = 1e30
 
 
@@ -27,14 +27,14 @@ class PlanProgramme:
     horizon : Horizon
         In Pa; j knots.
     level_output : int or None
-        Which output is the level; None leaves the level free.
+        Index of the level among the outputs; None leaves the level free.
     level_penalty : float
         Cost of a metre above the limit, in the unit of the horizon's cost.
 
     Attributes
     ----------
     held : ndarray of int, shape (l,)
-        Samples of the horizon at which the level is held.
+        Samples of the horizon at which the level is constrained.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class PlanProgramme:
         self._solver = self._set_up(horizon.hessian, iteration_limit)
 
     def rebuild(self, hessian: FloatArray) -> None:
-        """Set the solver up anew, for another cost and whatever numbers the programme holds."""
+        """Rebuild the solver for another cost and the programme's present numbers."""
         self._solver = self._set_up(hessian, self._solver.iteration_limit)
         self.forget()
 
@@ -77,7 +77,7 @@ class PlanProgramme:
         return float(np.trace(hessian * self._unit_pa**2)) / len(hessian)
 
     def _set_up(self, hessian: FloatArray, iteration_limit: int) -> ActiveSetSolver:
-        """The solver, in units of the greatest pressure."""
+        """Return the solver, in units of the greatest pressure."""
         unit, knots, levels = self._unit_pa, len(hessian), len(self.held)
         whole = np.zeros((knots + 1, knots + 1))
         whole[:knots, :knots] = hessian * unit**2 / self._cost(hessian)
@@ -89,7 +89,7 @@ class PlanProgramme:
         return ActiveSetSolver(whole, rows, iteration_limit)
 
     def forget(self) -> None:
-        """Start the next solution from nothing: as newly built."""
+        """Discard the active set of the last solution."""
         self._solver.forget()
 
     def respects(
@@ -111,7 +111,7 @@ class PlanProgramme:
         last: float,
         levels: FloatArray,
     ) -> FloatArray | None:
-        """The best plan in Pa, shape (j,), or None if the budget did not suffice.
+        """Return the best plan in Pa, shape (j,), or None if the iteration limit was reached.
 
         Parameters
         ----------
@@ -120,7 +120,7 @@ class PlanProgramme:
         low, high : ndarray, shape (j,)
             Bounds of the plan.
         last : float
-            The command that left last, less the steady part.
+            The last sent command, less the steady part.
         levels : ndarray, shape (l,)
             Levels at the samples `held` with the steady command alone.
         """

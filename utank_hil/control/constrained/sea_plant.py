@@ -1,7 +1,7 @@
-"""The plant of a predictor that foresees the waves: ship, tank and drive, waves and heel.
+"""Plant model of a predictor with a wave forecast: ship and tank, drive, waves and heel.
 
-The waves are white noise through the shaping filter of a `SeaModel`; between two samples their
-moment runs straight. A heel (wind, cargo, turning) is a moment that wanders slowly.
+The waves are white noise through the shaping filter of a `SeaModel`, with a moment that is linear
+between two samples. A heel (wind, cargo, turning) is a slowly varying moment.
 """
 
 import numpy as np
@@ -28,9 +28,10 @@ def sea_plant(
     Parameters
     ----------
     pressure_noise_pa_rt_s : float
-        Root of the two-sided density of a white pressure disturbance: what the model ignores.
+        Root of the two-sided density of a white pressure disturbance, which stands for model
+        errors.
     slope_noise_rad_rt_s : float
-        The same of a white roll moment, per roll stiffness.
+        Root of the two-sided density of a white roll moment, per roll stiffness.
     heel_std_rad, heel_time_s : float
         Standard deviation and time constant of the heeling moment, per roll stiffness.
 
@@ -79,7 +80,7 @@ def sea_plant(
 def _straight_line_effect(
     a: FloatArray, b: FloatArray, time_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Effect of the first and the last value of an input that runs straight, after a time."""
+    """Effect of the first and the last value of a linearly varying input, after a time."""
     from scipy.linalg import expm
 
     n = len(a)

@@ -7,8 +7,8 @@ the product of its memberships over the sum of all rules' products. The sum fact
 
     xi_{jk...}(x) = nu_1j(x_1) nu_2k(x_2) ...,    nu_ij = mu_ij / sum_j mu_ij
 
-so the basis costs three exponentials an input, sums to one by construction, and
-xi xi' = prod_i sum_j nu_ij^2 needs no rules at all.
+so the basis takes three exponentials per input and sums to one by construction, and
+xi xi' = prod_i sum_j nu_ij^2 needs no rules.
 """
 
 import math
@@ -18,7 +18,7 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 
 SETS = 3
-# neighbouring sets cross at a membership of one half (the thesis gives no width)
+# Neighbouring sets cross at a membership of one half; the thesis gives no width.
 WIDTH = 1 / math.sqrt(8 * math.log(2))
 
 
@@ -28,7 +28,7 @@ class FuzzyBasis:
     Parameters
     ----------
     ranges : sequence of float
-        c_i of the n inputs, each in its unit: where "positive" begins to hold in full.
+        c_i of the n inputs, each in its unit: the value from which "positive" holds fully.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class FuzzyBasis:
 
     def memberships(self, x: FloatArray) -> list[tuple[float, float, float]]:
         """Normalised memberships nu of each input (negative, zero, positive), summing to one."""
-        # with a dozen numbers, plain arithmetic is several times faster than arrays
+        # Plain arithmetic on a dozen numbers is several times faster than arrays.
         return [
             _degrees(value * scale) for value, scale in zip(x.tolist(), self._scales, strict=True)
         ]
@@ -72,7 +72,7 @@ class FuzzyBasis:
 
 
 def _degrees(x: float) -> tuple[float, float, float]:
-    """Normalised memberships of an input in units of its range."""
+    """Normalised memberships of an input that is given in units of its range."""
     negative = 1.0 if x <= -1 else _gauss(x + 1)
     zero = _gauss(x)
     positive = 1.0 if x >= 1 else _gauss(x - 1)

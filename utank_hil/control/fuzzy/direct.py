@@ -1,8 +1,8 @@
-"""Direct adaptive fuzzy control of roll, thesis section 4.4.3: the law's own gains are adapted.
+"""Direct adaptive fuzzy control of roll, thesis section 4.4.3, which adapts the law's own gains.
 
-For phi'' = f(x) + g(x) u + d with f, d unknown and only the sign and a least size of g known. No
-parameter of the fuzzy model of f is identified; its basis xi (`FuzzyBasis`) only says how strongly
-to act. With s = B' P e (`ErrorDynamics`) and psi = 1 + x'x + abs(xi):
+The plant is phi'' = f(x) + g(x) u + d with f, d unknown and only the sign and a least size of g
+known. No parameter of the fuzzy model of f is identified; its basis xi (`FuzzyBasis`) only
+determines the gain. With s = B' P e (`ErrorDynamics`) and psi = 1 + x'x + abs(xi):
 
 `SmallGainFuzzy`, (4.20)-(4.22), one parameter lambda::
 
@@ -15,11 +15,11 @@ to act. With s = B' P e (`ErrorDynamics`) and psi = 1 + x'x + abs(xi):
     lambda' = Gamma_1 (xi xi' s^2 / (2 gamma^2) - sigma_1 (lambda - lambda_0))
     theta' = Gamma_2 (psi abs(s) - sigma_2 (theta - theta_0))
 
-The acceleration u is turned into pressure by a nominal g. The leakage (sigma) is integrated exactly
-over a sample, so that the parameters stay bounded and positive at any sample time; what drives them
-rests while the command is cut short or another law is in charge.
+A nominal g turns the acceleration u into pressure. The leakage (sigma) is integrated exactly over a
+sample, so the parameters stay bounded and positive at any sample time. Adaptation pauses while the
+command is limited or another law is active.
 
-Derivation, and where the print differs: docs/control.md.
+The derivation, and deviations from the print, are in docs/control.md.
 """
 
 import math
@@ -60,13 +60,13 @@ class SmallGainFuzzy(FuzzyLaw):
 
     @property
     def start(self) -> tuple[float, ...]:
-        """Parameters (lambda,) to start from and leak to."""
+        """Initial parameters (lambda,), which the leakage returns to."""
         return (self.initial,)
 
     def answer(
         self, parameters: tuple[float, ...], s: float, square: float, psi: float
     ) -> tuple[float, tuple[float, ...]]:
-        """Acceleration u, and what drives each parameter, before leakage."""
+        """Acceleration u, and the driving term of each parameter, without leakage."""
         theta = square / (4 * self.gamma**2) + psi**2 / (4 * self.rho**2)
         return -parameters[0] * theta * s, (theta * s * s,)
 
@@ -110,13 +110,13 @@ class RobustFuzzy(FuzzyLaw):
 
     @property
     def start(self) -> tuple[float, ...]:
-        """Parameters (lambda, theta) to start from and leak to."""
+        """Initial parameters (lambda, theta), which the leakage returns to."""
         return self.initial
 
     def answer(
         self, parameters: tuple[float, ...], s: float, square: float, psi: float
     ) -> tuple[float, tuple[float, ...]]:
-        """Acceleration u, and what drives each parameter, before leakage."""
+        """Acceleration u, and the driving term of each parameter, without leakage."""
         gain, bound = parameters
         share = square / (2 * self.gamma**2)
         u = -gain * share * s - bound * psi * math.tanh(bound * psi * s / self.epsilon)
@@ -133,18 +133,18 @@ class RobustFuzzy(FuzzyLaw):
 
 
 def _q_problems(law: FuzzyLaw, above: float) -> list[Problem]:
-    """Too small an eigenvalue for the proof of a law."""
+    """Find an eigenvalue that is too small for the proof of a law."""
     q = law.error.q
     return [] if q > above else [("error.q", f"must be above {above:g} for this law, got {q}")]
 
 
 class DirectFuzzyController(FuzzyController):
-    """Steps a direct adaptive fuzzy law.
+    """Stepping of a direct adaptive fuzzy law.
 
     Attributes
     ----------
     parameters : tuple of float
-        What is adapted: (lambda,) or (lambda, theta).
+        Adapted parameters: (lambda,) or (lambda, theta).
     """
 
     def __init__(self, law: SmallGainFuzzy | RobustFuzzy) -> None:

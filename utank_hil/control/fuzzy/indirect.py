@@ -6,15 +6,15 @@
     fhat = xi(x) A (1, x),    ghat = xi(x) b
 
 A holds the consequents of the Takagi-Sugeno rules, (3^n, n + 1). For ghat they are constants: a
-weighted mean of numbers that are all at or above a least value stays there itself, so that keeping
-each b_i above it is the projection that keeps ghat away from zero, everywhere. With s = B' P e ::
+weighted mean of numbers at or above a least value is at or above it too, so limiting each b_i is
+the projection that keeps ghat away from zero. With s = B' P e ::
 
     A' = gamma_f s xi' (1, x) - leakage (A - A_0)
     b' = gamma_g s u xi'      - leakage (b - 1),       b_i >= least
 
-make V = e' P e / 2 + tr(Ã' Ã) / (2 gamma_f) + b̃' b̃ / (2 gamma_g) fall wherever f and g are of this
-form (without leakage; with it, outside a bound). u is counted in roll acceleration, by a nominal g,
-so that g is near one.
+V = e' P e / 2 + tr(Ã' Ã) / (2 gamma_f) + b̃' b̃ / (2 gamma_g) decreases wherever f and g are of
+this form (without leakage; with it, outside a bound). u is a roll acceleration, by a nominal g, so
+g is near one.
 """
 
 import math
@@ -41,9 +41,9 @@ class IndirectFuzzy(FuzzyLaw):
     leakage : float
         Per second.
     least_gain : float
-        Least ghat, in nominal ones; above 0, below 1.
+        Least ghat over the nominal g; above 0, below 1.
     prior : tuple of float, optional
-        What every rule knows of f before learning: a constant, then a factor for each input.
+        Initial f of every rule: a constant, then a factor for each input.
     """
 
     adaptation_f: Positive
@@ -65,7 +65,7 @@ class IndirectFuzzy(FuzzyLaw):
 
 
 class IndirectFuzzyController(FuzzyController):
-    """Steps an `IndirectFuzzy`.
+    """Stepping of an `IndirectFuzzy`.
 
     Attributes
     ----------
@@ -94,14 +94,14 @@ class IndirectFuzzyController(FuzzyController):
         self._extended[1:] = now.x
         drift = float(xi.dot(self.drift).dot(self._extended))
         u = (-drift - self._k1 * now.e[0] - self._k2 * now.e[1]) / float(xi.dot(self.gain))
-        # the rules know nothing of what lies beyond their reach
+        # The rules do not describe inputs beyond their range.
         self._adapt(xi, now.s if now.learning and not now.beyond else 0.0, u)
         return u
 
     def _adapt(self, xi: FloatArray, s: float, u: float) -> None:
-        """Let A and b learn over a sample from the error signal `s` under the acceleration `u`."""
+        """Adapt A and b over a sample by the error signal `s` under the acceleration `u`."""
         law, kept = self._law, self._kept
-        per_rate = (1 - kept) / law.leakage  # the sample time, for a small leakage
+        per_rate = (1 - kept) / law.leakage  # close to the sample time for a small leakage
         self.drift -= self._start
         self.drift *= kept
         self.drift += self._start

@@ -1,9 +1,9 @@
-"""What the adaptive fuzzy laws have in common: parameters, error signal, brake, rest from learning.
+"""Common part of the adaptive fuzzy laws: parameters, error signal, brake, pause of adaptation.
 
-A law gives a roll acceleration u from the error e = (phi - y_d, phi') and the fuzzy inputs x, and
-learns driven by s = B' P e (`ErrorDynamics`). A nominal g turns u into pressure; a brake on the
-water may be added. Nothing is learnt from a command that was cut short: what followed it is not
-what the law asked for.
+A law computes a roll acceleration u from the error e = (phi - y_d, phi') and the fuzzy inputs x,
+and adapts by s = B' P e (`ErrorDynamics`). A nominal g turns u into pressure; a brake on the water
+may be added. Adaptation pauses after a limited command, because the response is not that to the
+law's own command.
 """
 
 from abc import ABC, abstractmethod
@@ -29,8 +29,8 @@ from utank_hil.control.slope import slope_at_rest
 from utank_hil.control.tracking_error import ErrorDynamics
 from utank_hil.dynamics.linear import STATES
 
-_OBEYED = 0.9  # part of a command that must have left for the law to learn from what followed
-_REACH = 2.0  # the inputs are held within so many times their ranges
+_OBEYED = 0.9  # share of a command that must be sent for adaptation to continue
+_REACH = 2.0  # the inputs are limited to this multiple of their ranges
 _LEVEL_RATE = STATES.index("level_rate_m_s")
 
 
@@ -45,7 +45,7 @@ class FuzzyLaw(ABC):
     gain_rad_s2_pa : float
         Nominal g: roll acceleration per pressure.
     brake_pa_s_m : float
-        Pump pressure per level rate against the flow (`level_brake`); 0 for the source's law.
+        Pump pressure per level rate against the flow (`level_brake`); 0 for the thesis's law.
     """
 
     error: ErrorDynamics
@@ -59,17 +59,17 @@ class FuzzyLaw(ABC):
         refuse("fuzzy law", self._problems())
 
     def build(self, plant: DesignPlant) -> BuiltLaw:  # noqa: ARG002, its gain is a parameter
-        """The law, for any plant; what it starts from has a slope at rest."""
+        """Return the law, the same for any plant; its initial form has a slope at rest."""
         measured = STATES[: len(self.ranges)]
         slope = slope_at_rest(self.controller, len(measured))
         return BuiltLaw(self.controller, measured, slope, at_rest=True, adapts=True)
 
     @abstractmethod
     def controller(self) -> Controller:
-        """A new steppable controller."""
+        """Return a new steppable controller."""
 
     def _problems(self) -> list[Problem]:
-        """What is wrong with the parameters; laws add to it what their proofs ask for."""
+        """Find errors in the parameters; laws add the conditions of their proofs."""
         problems = range_problems(self)
         inputs = len(self.ranges)
         if not 2 <= inputs <= len(STATES):
@@ -81,20 +81,20 @@ class FuzzyLaw(ABC):
 
 
 class FuzzyInputs(NamedTuple):
-    """What a law sees in one step.
+    """Inputs of a law in one step.
 
     Attributes
     ----------
     x : ndarray, shape (n,)
-        Fuzzy inputs, held within reach of the rules.
+        Fuzzy inputs, limited to the reach of the rules.
     beyond : bool
-        Whether they had to be.
+        Whether they were limited.
     e : tuple of float
         Errors of roll and of roll rate.
     s : float
         B' P e.
     learning : bool
-        Whether the last command left as it was asked for.
+        Whether the last command was sent unchanged.
     """
 
     x: FloatArray
@@ -105,15 +105,15 @@ class FuzzyInputs(NamedTuple):
 
 
 class FuzzyController(ABC):
-    """Steps a fuzzy law; what is learnt, and the acceleration, are its subclasses'.
+    """Stepping of a fuzzy law, with adaptation and acceleration in its subclasses.
 
-    What was learnt before a fault, or before an operator disarmed, may be what led to it: an armed
-    law starts anew (`StartsAnew`).
+    Parameters adapted before a fault or a disarming may have caused it, so an armed law restarts
+    from its initial parameters (`StartsAnew`).
 
     Attributes
     ----------
     passed_limit : str
-        Empty: the law has no limit that ends it.
+        Empty, as the law has no limit that ends it.
     """
 
     passed_limit = ""
@@ -128,7 +128,7 @@ class FuzzyController(ABC):
         self.reset()
 
     def reset(self) -> None:
-        """Forget what was learnt."""
+        """Discard the adaptation."""
         self._command_pa = 0.0
         self._learning = True
         self._forget()
@@ -137,8 +137,8 @@ class FuzzyController(ABC):
         """Pressure, shape (1,), for the fuzzy inputs `y`; the target of roll is one number."""
         x = np.minimum(np.maximum(y, -self._reach), self._reach)
         beyond = bool((x != y).any())
-        # the error from the inputs as they are held: a measurement that overflows is no reason to
-        # learn what a float does not hold
+        # The error is that of the limited inputs, so that an extreme measurement cannot make
+        # the parameters overflow.
         error, rate = float(x[0]), float(x[1])
         if reference is not None:
             error -= float(reference[0])
@@ -151,14 +151,14 @@ class FuzzyController(ABC):
         return np.array([self._command_pa])
 
     def applied(self, u: FloatArray) -> None:
-        """Rest from learning if the last command was cut short."""
+        """Pause adaptation if the last command was limited."""
         left, asked = float(u[0]), self._command_pa
         self._learning = abs(left - asked) <= (1 - _OBEYED) * abs(asked)
 
     @abstractmethod
     def _answer(self, now: FuzzyInputs) -> float:
-        """Give the roll acceleration, and learn."""
+        """Return the roll acceleration, and adapt."""
 
     @abstractmethod
     def _forget(self) -> None:
-        """Go back to the parameters that the law starts with."""
+        """Return to the initial parameters."""

@@ -1,1 +1,1 @@
-"""Predictive laws of fixed gains: GPC and DPC."""
+"""Predictive laws with constant gains: GPC and DPC."""

@@ -1,13 +1,13 @@
-"""From a ship, a tank and what is known of the sea to a predictive law.
+"""A predictive law designed for ship, tank and sea.
 
-The predictor is made for the plant as the loop sees it: ship and tank, the drive's lag, the delay
-from sensor to pump, and the waves. A wave moment that comes in groups around a peak is modelled as
-white noise through a lightly damped oscillator::
+The predictor is designed for the plant of the loop: ship and tank, the drive's lag, the delay from
+sensor to pump, and the waves. A wave moment in groups around a peak is modelled as white noise
+through a lightly damped oscillator::
 
     K'' + 2 zeta wp K' + wp^2 K = noise
 
-and a white disturbance of the pump's pressure stands for all that the model does not know: the more
-of it, the less the predictor trusts its model, and the greater the margins.
+A white disturbance of the pump's pressure stands for all model errors: the greater it is, the less
+the predictor relies on its model, and the greater the margins.
 """
 
 from dataclasses import dataclass
@@ -37,18 +37,19 @@ from utank_hil.dynamics.sampling import LinearModel, noise_covariance, sample
 from utank_hil.dynamics.ship import RollShip
 
 MOST_ORDER: Final = 500
-"""Of a predictor: its law has as many states per output, and judging it takes their cube."""
+"""Limit on the order of a predictor; its law has as many states per output, and the cost of judging
+it grows with their cube."""
 
 MOST_SAMPLES: Final = 1000
-"""Of a horizon: more than the sea can be foreseen by far."""
+"""Limit on a horizon, far beyond the range of a wave forecast."""
 
 WASHOUT_SHARE: Final = 0.25
-"""Of the ship's roll frequency, a washout's corner at most: there it takes 3 % of the roll and
-turns its phase by 14 degrees; above, it takes the roll itself from the law."""
+"""Greatest corner frequency of a washout over the ship's roll frequency. There it removes 3 % of
+the roll and turns its phase by 14 degrees; above, it removes the roll itself."""
 
 
 def measured_problems(measured: tuple[str, ...], *needed: str) -> list[Problem]:
-    """What is wrong with names of outputs, of which the `needed` ones must be there."""
+    """Find errors in names of outputs, of which the `needed` ones must be present."""
     if measured and set(needed) <= set(measured) <= set(STATES):
         return []
     besides = f", {' and '.join(needed)} with them" if needed else ""
@@ -56,19 +57,19 @@ def measured_problems(measured: tuple[str, ...], *needed: str) -> list[Problem]:
 
 
 def weight_problems(name: str, weight: tuple[float, ...]) -> list[Problem]:
-    """The problem of weights that are all zero: the best law for them is to do nothing."""
+    """Find the error of weights that are all zero, for which the best law is none."""
     if any(each > 0 for each in weight):
         return []
     return [(name, f"must have a positive number: with {weight} the law does nothing")]
 
 
 def washed(law: WashableLaw, washout_rad_s: float, ship: RollShip) -> LinearLaw:
-    """A law with its washout, or itself for a corner of zero.
+    """Return a law with its washout, or unchanged for a corner of zero.
 
     Raises
     ------
     ValueError
-        If the corner is so near to the ship's roll that the washout takes that out, too.
+        If the corner is so near to the roll frequency that the washout removes the roll, too.
     """
     if washout_rad_s == 0:
         return law
@@ -83,7 +84,7 @@ def washed(law: WashableLaw, washout_rad_s: float, ship: RollShip) -> LinearLaw:
 
 
 def per_output(name: str, values: tuple[float, ...], measured: tuple[str, ...]) -> Problem:
-    """The problem of a parameter that does not have one value for each output."""
+    """Error of a parameter that does not have one value for each output."""
     return (
         name,
         f"must have one value per measured output, {len(measured)} of them, got {values}",
@@ -104,7 +105,7 @@ class Predictor:
     order : int
         Number p of past samples.
     wave_peak_rad_s : float
-        Frequency wp of the wave moment's peak, below half that of the samples.
+        Peak frequency wp of the wave moment, below half the sampling frequency.
     wave_damping_ratio : float
         zeta; small for long groups.
     wave_slope_rad : float
@@ -138,19 +139,19 @@ class Predictor:
 
 @dataclass(frozen=True, slots=True)
 class PredictiveDesign:
-    """A predictive law in parameters: what a configuration file holds.
+    """Parameters of a predictive law.
 
     Parameters
     ----------
     kind : {"gpc", "dpc"}
-        Which law.
+        Type of the law.
     output_weight : tuple of float, optional
         One for each measured output. None, for DPC alone, is the exact deadbeat.
     first_output : int
         See `design_gpc`; for GPC alone.
     washout_rad_s : float
-        Corner of the washout that keeps the steady list from the law (`WashoutLaw`), a quarter of
-        the ship's roll frequency at most; 0 for none.
+        Corner frequency of the washout that removes the steady list (`WashoutLaw`), at most a
+        quarter of the ship's roll frequency; 0 for none.
 
     Raises
     ------
@@ -214,7 +215,7 @@ class PredictiveDesign:
         return []
 
     def law(self, plant: DesignPlant) -> LinearLaw:
-        """The law for a plant."""
+        """Design the law for a plant."""
         return washed(self._predictive_law(plant), self.washout_rad_s, plant.ship)
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
@@ -258,7 +259,7 @@ def wave_plant(predictor: Predictor, plant: DesignPlant) -> tuple[LinearModel, F
     a[n:, n:] = [[0.0, 1.0], [-(wp**2), -2 * zeta * wp]]
     b = np.vstack([pressure, np.zeros((2, 1))])
     noise = np.zeros((n + 2, 2))
-    noise[n + 1, 0] = np.sqrt(4 * zeta * wp**3)  # makes the RMS of the wave state one
+    noise[n + 1, 0] = np.sqrt(4 * zeta * wp**3)  # gives the wave state an RMS of one
     noise[:, 1] = b[:, 0] * predictor.pressure_noise_pa_rt_s
     model = LinearModel(a, b, np.eye(n, n + 2), np.zeros((n, 1)), 0.0)
     sampled = sample(model, predictor.sample_time_s, plant.delay_s, plant.lag_s)

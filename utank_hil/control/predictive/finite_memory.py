@@ -1,13 +1,13 @@
-"""The best ARX predictor of given order for a plant whose noises are known.
+"""The best ARX predictor of given order for a plant with known noises.
 
-A Kalman predictor remembers everything; an ARX model of order p remembers p samples. The best one
-is the Kalman predictor started p samples ago from what is then known, the stationary distribution
-of the state. With K_j its gains (oldest first) and F_j = A - K_j C::
+A Kalman predictor uses the whole past, an ARX model of order p only p samples. The best one is the
+Kalman predictor started p samples ago from the stationary distribution of the state. With K_j its
+gains (oldest first) and F_j = A - K_j C::
 
     alpha_i = C F_p ... F_{p-i+2} K_{p-i+1},    beta_i = C F_p ... F_{p-i+2} (B - K_{p-i+1} D)
 
-Cutting the stationary predictor off after p samples is much worse where its memory is longer, and
-against waves and a lightly damped tank it is.
+Truncating the stationary predictor to p samples is much worse where its memory is longer, as it is
+with waves and a lightly damped tank.
 """
 
 from typing import TYPE_CHECKING
@@ -39,9 +39,9 @@ def finite_memory_arx(
     system : control.StateSpace or LinearModel
         Discrete and stable, n states, m outputs.
     process_covariance : ndarray, shape (n, n)
-        Of the white noise w.
+        Covariance of the white noise w.
     measurement_covariance : ndarray, shape (m, m)
-        Of the white noise v, positive definite.
+        Covariance of the white noise v, positive definite.
     order : int
         p.
 

@@ -8,8 +8,8 @@ from utank_hil.control.arx import ARX
 from utank_hil.control.predictive.law import PredictiveLaw
 from utank_hil.control.predictive.multistep import Prediction, predict
 
-# Singular values below this share of the greatest are rounding: numpy's default lets them in and
-# ruins the deadbeat law as soon as its target window is longer than the model's order.
+# Singular values below this share of the greatest are rounding errors. numpy's default keeps them
+# and ruins the deadbeat law as soon as its target window is longer than the model's order.
 _RANK_CUTOFF = 1e-10
 
 
@@ -31,13 +31,13 @@ def design_gpc(
     control_horizon : int
         hc, number of free inputs; zero input after them.
     prediction_horizon : int
-        hp >= hc, number of outputs y(k) ... y(k + hp - 1) that are weighed.
+        hp >= hc, number of weighted outputs y(k) ... y(k + hp - 1).
     output_weight : float or array_like, shape (m,)
         Diagonal of R, zero or more, the same at each future sample; 1 / (unit of y)^2.
     input_weight : float or array_like, shape (r,)
         Diagonal of Q, positive; 1 / (unit of u)^2.
     first_output : int
-        Outputs before y(k + first_output) are not weighed.
+        Outputs before y(k + first_output) have no weight.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def design_gpc(
     prediction = predict(arx, prediction_horizon)
     rows = np.tile(r_root, prediction_horizon)
     rows[: first_output * arx.outputs] = 0.0
-    # A least-squares problem solved as one: squaring it into tau^T R tau + Q loses half the digits
+    # Solved as a least-squares problem, because tau^T R tau + Q loses half the digits.
     stacked = np.vstack(
         [
             rows[:, None] * prediction.future_inputs(control_horizon),
@@ -88,13 +88,13 @@ def design_dpc(
     Parameters
     ----------
     control_horizon : int
-        hc; a longer one asks for less pressure.
+        hc; a longer one needs less pressure.
     prediction_horizon : int
         hp > hc.
     output_weight : float or array_like, shape (m,), optional
-        Relaxes the deadbeat: the squares of the outputs in the window, so weighed, are traded
-        against the squares of the inputs instead of being brought to zero whatever it takes. What
-        the inputs cannot reach, such as a wave that goes on, then costs no undue effort.
+        Relaxes the deadbeat: the weighted squares of the outputs in the window are traded against
+        the squares of the inputs. Outputs that the inputs cannot bring to zero, such as those due
+        to a continuing wave, then cause no excessive effort.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def design_dpc(
         )
     prediction = predict(arx, prediction_horizon)
     window = prediction.future_inputs(control_horizon)[control_horizon * arx.outputs :]
-    # each output in the size the inputs can give it, so that the cut-off does not see the units
+    # Outputs are scaled by the inputs' effect, so that the cut-off does not depend on units.
     size = np.abs(prediction.markov).max(axis=(0, 2))
     size[size == 0] = 1.0
     rows = np.tile(1 / size, prediction_horizon - control_horizon)

@@ -1,4 +1,4 @@
-"""The law that predictive design ends in: fixed gains on past inputs and outputs."""
+"""Linear law with constant gains on past inputs and outputs, the result of predictive design."""
 
 from dataclasses import dataclass
 
@@ -31,7 +31,7 @@ class PredictiveLaw:
     sample_time_s: float
 
     def controller(self, washout_share: float = 0.0) -> "PredictiveController":
-        """A new steppable controller, at rest; `washout_share` as in `WashoutLaw.share`."""
+        """Return a new controller at rest; `washout_share` as in `WashoutLaw.share`."""
         return PredictiveController(self, washout_share)
 
     def response(self, z: ComplexArray) -> ComplexArray:
@@ -46,7 +46,7 @@ class PredictiveLaw:
         return solved
 
     def matrices(self) -> LinearModel:
-        """The law from y to u, p r states (block observer form)."""
+        """State-space model from y to u with p r states (block observer form)."""
         p, r, m = self.output_gains.shape
         a = np.eye(p * r, k=r)
         a[:, :r] += self.input_gains.reshape(p * r, r)
@@ -55,27 +55,26 @@ class PredictiveLaw:
 
 
 class PredictiveController:
-    """Steps a `PredictiveLaw`.
+    """Stepping of a `PredictiveLaw`.
 
     The past is kept as rows [u(k-i), y(k-i)], newest first, in a buffer much longer than the
-    window that the gains look at; the window moves one row towards the front each step, and what
-    it still needs is copied back to the end once in many steps. A step is then one product.
+    window of the gains. The window moves one row towards the front each step, and its rows are
+    copied back to the end once in many steps. A step is then one product.
 
-    With a washout the law sees d(k) = keep (d(k-1) + y(k) - y(k-1)), keep = 1 - share, in place of
-    y(k). Its answer a(k) less keep a(k-1) then needs no d any more, only y itself and one sample
-    more of the past::
+    With a washout the law uses d(k) = keep (d(k-1) + y(k) - y(k-1)), keep = 1 - share, in place of
+    y(k). Its result a(k) less keep a(k-1) does not contain d, only y and one more past sample::
 
         a(k) = keep a(k-1) + sum_i (Gu_i - keep Gu_{i-1}) u(k-i)
                            + sum_i keep (Gy_i - Gy_{i-1}) y(k-i)
 
-    i = 1 ... p + 1, with zero gains beyond 1 ... p. So the last answer stands in front of the rows,
-    and a step is one product still. What is not in a is a reference, and what `applied` says.
+    i = 1 ... p + 1, with zero gains beyond 1 ... p. So the last result stands in front of the rows,
+    and a step is still one product. References and the commands of `applied` are not part of a.
 
     Parameters
     ----------
     washout_share : float
-        Share of the newest sample in the mean that is taken off the outputs (`WashoutLaw`); 0 for
-        no washout.
+        Weight of the newest sample in the mean that is subtracted from the outputs (`WashoutLaw`);
+        0 for no washout.
     """
 
     _ROOM = 512  # steps between two copies
@@ -105,21 +104,13 @@ class PredictiveController:
     def reset(self) -> None:
         """Forget all past inputs and outputs."""
         self._flat[:] = 0.0
-        self._newest = self._flat.size - self._window  # where the newest row begins
+        self._newest = self._flat.size - self._window  # index of the newest row
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
-        """Take y(k-1), the newest measurement, and return u(k).
+        """Take y(k-1), the newest measurement, shape (m,), and return u(k), shape (r,).
 
-        Parameters
-        ----------
-        y : ndarray, shape (m,)
-        reference : ndarray, shape (m,) or (hp, m), optional
-            Target of the outputs: one for the whole horizon, or one for each sample of it. With a
-            washout it is relative to the mean.
-
-        Returns
-        -------
-        ndarray, shape (r,)
+        `reference`, shape (m,) or (hp, m), is the target of the outputs: one for the whole horizon,
+        or one for each sample of it. With a washout it is relative to the mean.
         """
         flat, newest, answers, width = self._flat, self._newest, self._answers, self._width
         flat[newest + self._inputs : newest + width] = y
@@ -141,5 +132,5 @@ class PredictiveController:
         return u
 
     def applied(self, u: FloatArray) -> None:
-        """Replace the newest input of the past by what was really commanded, shape (r,)."""
+        """Replace the newest past input by the actual command, shape (r,)."""
         self._flat[self._newest : self._newest + self._inputs] = u

@@ -10,7 +10,7 @@ from utank_hil.control.arx import ARX
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
-    """Coefficients of y(k) ... y(k + hp - 1) on past and future, all newest first in the past.
+    """Coefficients of y(k) ... y(k + hp - 1) on past (newest first) and future.
 
     ::
 
@@ -30,7 +30,7 @@ class Prediction:
     markov: FloatArray
 
     def future_inputs(self, control_horizon: int) -> FloatArray:
-        """The matrix tau_c, shape (hp m, hc r): effect of u(k) ... u(k + hc - 1), zero after."""
+        """Matrix tau_c, shape (hp m, hc r): effect of u(k) ... u(k + hc - 1), zero after."""
         horizon, outputs, inputs = self.markov.shape
         tau = np.zeros((horizon, outputs, control_horizon, inputs))
         for j in range(min(control_horizon, horizon)):
