@@ -1,3 +1,3 @@
-"""What stands in for the ship: sensor node, pump drive, ship emulator and operator panel."""
+"""Emulated ship side: sensor node, pump drive, ship, operator panel; benches and campaigns."""
 
 import utank_hil  # noqa: F401, first of all: it may have compiled modules loaded

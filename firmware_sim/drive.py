@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 NANOSECONDS = 1e-9
 MISCODED_COMMANDS_TO_TRIP = 5
+"""Consecutive refused commands that trip the drive (docs/safety.md). Chosen; no study."""
 STOPPED_SHARE = 0.02
 """Share of the drive's pressure limit below which the pump counts as stopped. Chosen; no study."""
 LONGEST_STOP_NS = 500_000_000

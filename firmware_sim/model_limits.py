@@ -16,7 +16,9 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea import Spectrum
 
 MOST_ROLL_RAD: Final = math.radians(40.0)
+"""Roll up to which decks stay dry and cargo does not shift. Chosen; no study."""
 MOST_LINEAR_ROLL_RAD: Final = math.radians(10.0)
+"""Roll up to which the linear plant is used. Chosen; no study."""
 OVERSPEED: Final = 1.02
 """Ratio to the pump's speed limit up to which the speed loop lets the rotor overshoot."""
 

@@ -52,6 +52,7 @@ LONGEST_S: Final = 86_400.0
 """Longest run in s, a day: its rows are kept in memory."""
 
 _TINY: Final = 1e-30
+"""Term that keeps a quotient finite on still water."""
 _NO_MOMENT: Final = 1e-9
 """Share of the waves' slope below which they do not act on the ship."""
 

@@ -41,6 +41,7 @@ Bearing = Annotated[float, Range(least=-360, most=360)]
 Speed = Annotated[float, Range(least=0, most=40)]
 """Speed of a ship in m/s; the fastest ferries reach 30."""
 _FAST_M_S: Final = 20.0
+"""Speed above which a warning is given. Chosen; no study."""
 _STEEPEST: Final = 1 / 7
 """Steepness (height per length) at which a regular wave breaks in deep water (Michell 1893)."""
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from firmware_sim.plant import Plant  # compiled: a scenario is read without it
 
 NOISE_BLOCK = 4096
+"""Number of random values drawn at once. Chosen; no study."""
 
 # bound once: in Python 3.11 class access to an enum member is eight times slower
 _GOOD = Quality.GOOD

@@ -9,6 +9,7 @@ from utank_hil.configuration.ship_keys import weather_criterion_period_s
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 _GYRATION_PER_BEAM: Final = (0.1, 1.2)
+"""Plausible radius of gyration per beam; usual ships have about 0.4."""
 _DEPTH_PER_BEAM: Final = (0.01, 1.0)
 """Plausible ratio of displaced volume to length times squared beam."""
 

@@ -27,12 +27,15 @@ from utank_hil.nodes.housekeeping import Housekeeping
 
 NANOSECONDS: Final = 1e-9
 LONGEST_TIMEOUT_S: Final = 0.1
+"""Longest command timeout that the valve accepts, as that of the drive."""
 MISCODED_COMMANDS_TO_TRIP: Final = 5
+"""Consecutive rejected commands that cause a fault, as in the drive."""
 STUCK_OFF: Final = 0.05
 """Deviation from the target above which the valve must move. Chosen; no study."""
 STUCK_NS: Final = 200_000_000
 """Time in ns in which it must move. Chosen; no study."""
 _AT_END: Final = 1e-3
+"""Distance from an end position below which its limit switch is set. Chosen; no study."""
 
 
 class ValveNode:

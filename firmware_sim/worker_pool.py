@@ -16,6 +16,7 @@ T = TypeVar("T")
 
 _shared: list[Any] = []
 _PR_SET_PDEATHSIG: Final = 1
+"""Option of Linux's prctl for the signal at the parent's death."""
 
 
 class WorkerPool(ProcessPoolExecutor):

@@ -16,6 +16,7 @@ from utank_hil.configuration.spectra import read_spectra, utc
 Value = Any
 """Number, text, time, truth value, or content of a file that the study names."""
 MOST_CASES: Final = 1_000_000
+"""Most cases of a study: their list is kept in memory. Chosen; no study."""
 WEIGHT: Final = "weight"
 """Column of a table of draws: relative probability of a row."""
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 BATCH_S: Final = 0.5
 """Work per batch in s: large beside the 10 ms of sending it, small enough to lose."""
 MOST_TOGETHER: Final = 200
+"""Most cases in a batch. Chosen; no study."""
 AHEAD: Final = 2
 """Number of batches queued or running at each worker."""
 LOOK_S: Final = 5.0

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 STORM = CONFIGS / "scenarios" / "storm.yaml"
 REAL_TIME_S = 120.0
+"""Default length of a run in real time. Chosen; no study."""
 
 
 def bench(

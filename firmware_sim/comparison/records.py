@@ -33,6 +33,7 @@ LEAST_PERIODS: Final = 20
 """Batch length in mean roll periods for a shorter record, down to `LEAST_BATCHES`. Chosen; no
 study."""
 MOST_BATCHES, LEAST_BATCHES = 30, 6
+"""Most and least batches of a run. Chosen; no study."""
 _WAVES: Final = ("sea", "voyage")
 """Sections of a scenario that draw the waves, together with the seed."""
 

@@ -10,6 +10,7 @@ from utank_hil.runners.hooks import LinkObserver
 from utank_hil.runners.node import Selective
 
 NEVER_NS: Final = 1 << 62
+"""Time beyond the end of every run."""
 
 Spoil = Callable[[Frame, float], Iterable[Frame]]
 """Function of a frame and the time in s since the fault that gives the frames sent instead."""
