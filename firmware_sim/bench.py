@@ -49,8 +49,6 @@ class BenchResult:
     ----------
     mode : str
         "lockstep", "real time", or "real time on" and the interface.
-    duration_s : float
-        Requested length of each run.
     settle_s, end_s : float
         Window: its start, and the end of the shortest run that reached `LEAST_REACH` of the
         longest.
@@ -60,12 +58,8 @@ class BenchResult:
         Runs with at least one row; the passive tank first.
     not_run : tuple of str
         Names of the runs without a row.
-    interrupted : bool
-        Whether the bench was ended from outside.
     without_tank_capsized_s : float
         Time at which the bare ship capsized; infinite if it did not.
-    killed : bool
-        Whether a process of the bench was killed from outside.
     """
 
     scenario: Scenario

@@ -127,7 +127,6 @@ def firmware_sim(
 def _run(
     nodes: list[Node], bus: str, name: str, length_s: float, statistics: LoopStatistics
 ) -> None:
-    """Run the nodes on the bus in real time."""
     try:
         port = SocketCanPort(bus, heard_by(nodes))
     except OSError as error:

@@ -55,8 +55,6 @@ class PumpDrive:
 
     Attributes
     ----------
-    hears : frozenset of int
-        Identifier of the pump command, see `Selective`.
     refused : int
         Number of commands outside the drive's limits so far.
     """

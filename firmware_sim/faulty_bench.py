@@ -34,18 +34,10 @@ class FaultyBench:
         Scenario; its own faults are left to the caller.
     law : BuiltLaw, optional
         Law of the controller; it is designed if not given.
-    script : tuple of TimedAction
-        Actions of the operator.
-    trace : callable, optional
-        Trace function of `Lockstep`.
     sink : callable, optional
         Function that takes a row of the controller's telemetry every `sink_every` ticks.
     retuner : Retuner, optional
         Retuner of a self-tuning controller, whose law cannot be made to fail.
-    estimating : Retuner, optional
-        Estimator of sea and ship.
-    commissioned : bool
-        Whether the controller may be armed.
     tapped : Tap, optional
         Wrapper between each controller and its faults.
 

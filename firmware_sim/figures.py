@@ -77,12 +77,8 @@ class RunFigures:
 
     Attributes
     ----------
-    mark : Mark or None
-        Reason why the run is not ranked.
     rows, expected_rows : int
         Number of rows in the window, and of a complete run.
-    end_s : float
-        Ship's time at the end of the run.
     capsized_s : float or None
         Time of capsizing; None if the ship did not capsize.
     strikes, max_strike_impulse_nms, pump_speed_rad_s, energy_j, bus_load, refused_commands
@@ -92,10 +88,6 @@ class RunFigures:
     roll_below_no_tank, roll_below_passive : float or None
         Relative reduction of the roll RMS against no tank, and against the passive tank; None where
         one of the two runs does not count, and on still water.
-    mode, fault : str or None
-        Final state of the controller.
-    active_share : float or None
-        Share of the window in which the controller was in charge.
     loop : dict or None
         Timing statistics of the loop; None in simulated time.
     """
@@ -134,10 +126,6 @@ class OnBoardFigures:
 
     Attributes
     ----------
-    exposure_s : float
-        Exposure for which the sickness is predicted.
-    levels_rad : tuple of float
-        Single amplitudes of roll whose exceedance is stated.
     runs : dict of str to OnBoard
         Bare ship, and the compared runs that did not capsize.
     """
@@ -154,8 +142,6 @@ class BenchFigures:
 
     Attributes
     ----------
-    exit_code : int
-        Exit code of the command.
     endings : tuple of str
         Remarks on the ends of runs; empty where all went as ordered.
     limits_passed : tuple of str

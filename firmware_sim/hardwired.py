@@ -25,8 +25,6 @@ class HardwiredNode:
     ----------
     high_level_m : float
         Level above still water at which a reservoir's switch closes.
-    configuration_version : int
-        Version sent in the heartbeat.
 
     Attributes
     ----------

@@ -53,7 +53,6 @@ def run_lockstep(job: Job, watch: Watch | None = None) -> Run:
 
 
 def _run_with_faults(job: Job, watch: Watch | None, desks: Tapped, tapped: Tap) -> Run:
-    """Run with the scenario's faults."""
     log = MemoryLog(len(SIGNALS), -(-job.ticks // ROW_TICKS))
     bench = FaultyBench(
         job.scenario, job.controller, job.law, seed=job.seed, script=job.script, sink=log.write,

@@ -83,7 +83,6 @@ class Plant:
         self.presses_off = False
 
     def _load(self, ship: RollShip) -> None:
-        """Set the ship's parameters."""
         tank = self._tank
         self._linear_model = np.zeros((0, 7))
         if self._linear:

@@ -183,7 +183,6 @@ def _interpolated(weights: FloatArray, row: int, moments: FloatArray) -> float:
 def _linear_step(
     model: FloatArray, x: State, moments: tuple[float, float, float], pressure_pa: float
 ) -> State:
-    """Advance the linear model by one Runge-Kutta step."""
     k1 = _rates(model, x, x, 0.0, pressure_pa, moments[0])
     k2 = _rates(model, x, k1, STEP_S / 2, pressure_pa, moments[1])
     k3 = _rates(model, x, k2, STEP_S / 2, pressure_pa, moments[1])

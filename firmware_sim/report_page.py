@@ -52,10 +52,6 @@ def bench_page(
 
     Parameters
     ----------
-    about : mapping
-        Provenance.
-    picture : bytes, optional
-        PNG of all runs.
     rolls : mapping of str to ndarray, shape (n,)
         Roll of each compared run, every `RECORD_S` in the window.
     scratch : Path

@@ -40,8 +40,6 @@ class RetuningFigures:
 
     Attributes
     ----------
-    attempts : int
-        Number of retunings begun, with an identification or without.
     retuned_at_s : float or None
         Time at which the last new law took charge, on trial at first; None if none did.
     roll_before_rad : float or None
@@ -55,8 +53,6 @@ class RetuningFigures:
         Model for which the last new law was designed.
     truth : ShipInFigures
         True values at the start of the retuning that found `found`, or of the last one.
-    state : str
-        State at the end.
     reasons : tuple of str
         Reasons of the last retuning's begin and end, without its result.
     events : tuple of dict

@@ -52,10 +52,6 @@ class Job:
 
     Attributes
     ----------
-    law : BuiltLaw
-        Law of the controller.
-    script : tuple of TimedAction
-        Actions of the operator.
     frames : Path or None
         Path of the run's frame log, if any.
     """
@@ -95,26 +91,16 @@ class Run:
     rows : ndarray, shape (n, len(COLUMNS))
         Telemetry and truth every `RECORD_S`, on ship's time: `time_s` counts from the start of its
         motion. In real time, rows that either side did not write are missing.
-    bus_load : float
-        Mean share of the bus in use.
     refused_commands : int
         Number of commands outside the drive's own limits.
-    energy_j : float
-        Work of the pump's shaft.
-    strikes : int
-        Number of strikes of the water on a limit of its level.
     capsized_s : float
         Ship's time of capsizing; infinite if it did not.
-    max_strike_impulse_nms : float
-        Greatest angular impulse of a strike on the ship.
     pump_speed_rad_s : float
         Greatest speed of the pump's rotor.
     loop : LoopStatistics or None
         Timing statistics of the controller's loop; None in simulated time.
     retuning : tuple of RetuningEvent
         Events of the controller's retuning.
-    law_error : str
-        Value of `ControllerNode.law_error`.
     """
 
     name: str

@@ -274,7 +274,6 @@ class Scenario(Section):
         return problems
 
     def _fault_problems(self) -> list[Problem]:
-        """Problems of faults of absent nodes."""
         problems = missing_nodes(self.vessel, self.faults)
         if any(controller.retuning is not None for controller in self.controllers.values()):
             problems += [

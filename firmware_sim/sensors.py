@@ -50,8 +50,6 @@ class SensorNode:
     ----------
     configuration_version : int
         Version sent in the heartbeat, which the controller compares with its own.
-    seed : int
-        Seed of the noise.
     second : bool
         Whether it is the second motion sensor, which measures nothing else and has no bias.
     """

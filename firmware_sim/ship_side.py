@@ -30,17 +30,7 @@ PASSIVE_SCRIPT = (TimedAction(1.0, Action.PASSIVE),)
 
 @dataclass(frozen=True, slots=True)
 class ShipSide:
-    """All nodes on the bus except the controller.
-
-    Attributes
-    ----------
-    drive : PumpDrive or None
-        Drive, if the tank has a pump.
-    valve : ValveNode or None
-        Valve, if the tank has one.
-    hardwired : HardwiredNode or None
-        Hard-wired inputs, if the vessel has them.
-    """
+    """All nodes on the bus except the controller."""
 
     vessel: Vessel
     plant: Plant
@@ -107,8 +97,6 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
     ----------
     seed : int
         Seed of sea and sensor noise.
-    script : tuple of TimedAction
-        Actions of the operator.
     """
     vessel, catalogue = scenario.vessel, load_catalogue()
     plant = Plant(

@@ -60,13 +60,9 @@ class StarterProject:
 
     Attributes
     ----------
-    demand : PumpDemand
-        Demand for which the pump was designed.
     prediction : RollPrediction
         Roll in the scenario's sea; with the pump, for a gentle LQG law that stays within the
         limits.
-    sea : dict
-        Sea of the scenario.
     texts : dict of str to str
         Contents of `FILES`.
     """
@@ -83,13 +79,7 @@ class StarterProject:
 def starter_sea(
     length_m: float, roll_period_s: float, hs_m: float | None = None, tp_s: float | None = None
 ) -> dict[str, Any]:
-    """Sea at the roll period, with a height that ship's length and pump permit.
-
-    Parameters
-    ----------
-    hs_m, tp_s : float, optional
-        Given height and peak period, which take precedence.
-    """
+    """Sea as given, else at the roll period and as high as ship's length and pump permit."""
     shortest_s, longest_s = PERIODS_S
     period_s = tp_s or float(f"{min(max(roll_period_s, shortest_s), longest_s):.3g}")
     wavenumber = (2 * math.pi / period_s) ** 2 / GRAVITY_M_S2
@@ -117,8 +107,6 @@ def make_starter(
     ----------
     stability_share : float
         Share of the stability that the free surface may take, see `size_tank`.
-    hs_m, tp_s : float, optional
-        Height and peak period of the scenario's sea.
 
     Raises
     ------

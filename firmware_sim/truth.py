@@ -33,13 +33,6 @@ def true_values(plant: Plant) -> tuple[float, ...]:
 class TruthRecorder:
     """Recorder of the plant on a fixed time grid: a node without frames.
 
-    Parameters
-    ----------
-    log : MemoryLog
-        Log that takes the rows, columns `TRUTH`.
-    period_ns : int
-        Time between two rows.
-
     Attributes
     ----------
     start_ns : int

@@ -43,15 +43,11 @@ class ValveNode:
 
     Parameters
     ----------
-    plant : Plant
-        Plant whose valve loss is set.
     configuration_version : int
         Version sent in the heartbeat, which the controller compares with its own.
 
     Attributes
     ----------
-    hears : frozenset of int
-        Identifier of the valve command, see `Selective`.
     opening : float
         Position: 0 is shut except for leakage, 1 is open.
     stuck : bool

@@ -36,13 +36,7 @@ class Waves(Protocol):
 
 
 class SteadyWaves:
-    """Constant components.
-
-    Parameters
-    ----------
-    moment : Harmonics
-        Roll moment in N m, from the start on.
-    """
+    """Constant components of a roll moment in N m."""
 
     def __init__(self, moment: Harmonics) -> None:
         frequency, phase = moment.frequency_rad_s, moment.phase_rad

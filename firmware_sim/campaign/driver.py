@@ -37,12 +37,8 @@ class Count:
 
     Attributes
     ----------
-    needed : int
-        Number of cases computed or still to be computed.
     done, failed, lost : int
         Number of cases computed, failed, and ended from outside.
-    case_s : float
-        Mean time of a case.
     """
 
     needed: int
@@ -65,17 +61,7 @@ Progress = Callable[[Count], None]
 
 @dataclass(slots=True)
 class Driver:
-    """Sender of the missing cases of a study to workers.
-
-    Parameters
-    ----------
-    store : Store
-        Store already begun for this study.
-    progress : callable
-        Function called with the `Count` after each batch.
-    work : callable
-        Function that a worker runs on a batch.
-    """
+    """Sender of the missing cases of a study to workers."""
 
     loaded: LoadedStudy
     store: Store

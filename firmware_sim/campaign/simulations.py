@@ -59,8 +59,6 @@ def rows_of(simulation: str, scenario: Scenario, seed: int, laws: Laws) -> list[
         "bus", "linear" or "nonlinear".
     seed : int
         Seed that replaces the scenario's.
-    laws : mapping of str to BuiltLaw
-        Laws of the scenario's controllers.
 
     Returns
     -------

@@ -29,8 +29,6 @@ class Group:
         Varied keys that the cases have in common.
     rows : list of list of dict
         Rows of each case that counts and succeeded.
-    planned : int
-        Number of cases in the study.
     failed, lost : int
         Number of counted cases that failed or were lost.
     """

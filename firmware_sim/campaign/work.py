@@ -38,8 +38,6 @@ class Batch:
     ----------
     scenario : str
         Content of the study's scenario as text.
-    code : str
-        Required `code_digest`.
     allow_code : bool
         Whether laws may be code that the files name.
     cases : tuple of tuple

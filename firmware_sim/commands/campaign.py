@@ -83,7 +83,6 @@ def campaign(
 
 
 def _about(loaded: "LoadedStudy", folder: Path, given: dict[str, Any]) -> dict[str, Any]:
-    """Provenance of the results."""
     from firmware_sim.campaign.case_name import code_digest
     from firmware_sim.campaign.metrics import LEAVES_OUT, METRICS
 

@@ -109,7 +109,6 @@ def _cells(name: str, figure: "Difference") -> list[str]:
 
 
 def _unit(name: str) -> tuple[float, str]:
-    """Scale and unit for the display of a figure."""
     if name in _SHARES:
         return 100.0, "%"
     return _SCALES.get(name.rsplit("_", 1)[-1], (1.0, ""))

@@ -144,7 +144,6 @@ def _plant(vessel: Vessel, tank: Tank) -> "DesignPlant":
 
 
 def _figures(vessel: Vessel, tank: Tank, found: "RollPrediction | None") -> dict[str, Any]:
-    """Figures of a tank in SI units."""
     from firmware_sim.tank_report import prediction_json
     from utank_hil.analysis.tank_design import tank_figures
     from utank_hil.analysis.tank_sizing import tank_cost

@@ -199,7 +199,6 @@ def _place(name: str, prefix: str) -> str:
 
 
 def _as_json(project: "StarterProject") -> dict[str, Any]:
-    """Project in SI units."""
     vessel, sized, law, pump = project.vessel, project.sized, project.law, project.vessel.pump
     assert pump is not None
     return {
@@ -228,7 +227,6 @@ def _as_json(project: "StarterProject") -> dict[str, Any]:
 
 
 def _table(project: "StarterProject") -> Table:
-    """Table of tank, pump, law and expected roll."""
     sized, demand, law, pump = project.sized, project.demand, project.law, project.vessel.pump
     assert pump is not None
     sea = f"{project.sea['hs_m']:g} m, {project.sea['tp_s']:g} s"

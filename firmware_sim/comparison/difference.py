@@ -21,8 +21,6 @@ class Difference:
 
     Attributes
     ----------
-    reference, value : float
-        Means.
     difference : float
         `value` minus `reference`.
     half_width : float or None
@@ -49,8 +47,6 @@ class Comparison:
     ----------
     source : str
         Origin of the run.
-    parameters : dict
-        Varied keys that both have in common.
     remarks : tuple of str
         Remarks on the validity of the comparison.
     """

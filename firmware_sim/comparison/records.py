@@ -63,8 +63,6 @@ class Record:
     ----------
     about : dict
         Provenance; empty where the file has none.
-    runs : dict
-        Columns of each run.
     """
 
     path: Path

@@ -67,13 +67,6 @@ class LiveError(Exception):
 class LiveBench:
     """Ship and controller as processes on an interface, with a listener.
 
-    Parameters
-    ----------
-    bus : str
-        SocketCAN interface.
-    folder : Path
-        Folder for the controller's files.
-
     Attributes
     ----------
     start : int

@@ -76,8 +76,6 @@ def times_of(
         Time of the fault, and end of listening.
     silences : Stream, optional
         Stream that the fault ends: times count from its last frame.
-    judged : str
-        Time that is judged.
     """
     begin_s = fault_s
     if silences is not None:

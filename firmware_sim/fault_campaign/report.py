@@ -24,8 +24,6 @@ def as_json(
         Live rows in the form of `run_live`.
     not_run : mapping of str to str
         Rows that were not run, with the reason.
-    about : mapping
-        Provenance.
     """
     rows = [*(result.as_json() for result in results), *on_bus]
     return {

@@ -29,8 +29,6 @@ Progress = Callable[[int], None]
 
 @dataclass(frozen=True, slots=True)
 class _Shared:
-    """Values that the pool's processes inherit."""
-
     campaign: Campaign
     window: Window
     recorded: bool
@@ -80,8 +78,6 @@ def run_rows(
 
     Parameters
     ----------
-    progress : callable
-        Function called several times a second.
     stopped : callable
         Function that returns whether to end early.
     recorded : bool

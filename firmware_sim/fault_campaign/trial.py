@@ -96,10 +96,6 @@ class Said:
     ----------
     status : str
         Mode and fault in the last CTRL_STATUS.
-    alarms : tuple of str
-        Faults in ALARM.
-    flags : tuple of str
-        Flags that CTRL_STATUS has set.
     """
 
     status: str = ""
@@ -115,8 +111,6 @@ class Excess:
     ----------
     beyond_share_pa : float
         Largest excess of the drive's set-point over the halved pressure limit.
-    refused : int
-        Number of commands that the drive refused.
     steepest_pa_s : float
         Largest rate of the commands, cuts excepted.
     """
@@ -145,8 +139,6 @@ class Outcome:
         Final mode, and the fault that was latched or shown.
     wire : str
         First frame that the fault changed; empty if none differs.
-    error : str
-        Error of the program.
     rows : ndarray or None
         Recording with columns `COLUMNS`, if requested.
     """
@@ -194,10 +186,6 @@ class Sea:
 
     Parameters
     ----------
-    law : BuiltLaw
-        Law of the setup's controller.
-    recorded : bool
-        Whether the outcomes contain recordings.
     patient : bool
         Whether the bench runs on for `REARMED_S` after the pump is off.
     stopped : callable

@@ -53,12 +53,8 @@ class Result:
 
     Attributes
     ----------
-    requirement : str
-        Text of the requirement.
     found_ms, zero_ms : float or None
         Start of the required reaction, and final zero of the drive's set-point.
-    codes : tuple of str
-        Fault codes over the seeds.
     wire : str
         First frame that the fault changed, in the first seed.
     roll_ratio : float
@@ -67,10 +63,6 @@ class Result:
         Time over which `roll_ratio` was computed.
     problems : tuple of str
         Reasons for failure; empty if passed.
-    outcomes : tuple of Outcome
-        Outcomes by seed.
-    recording : str
-        File name of the recording, if any.
     """
 
     row: Row

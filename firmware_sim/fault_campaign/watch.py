@@ -39,8 +39,6 @@ class BusLog:
     ----------
     commands : list of tuple of (int, float, bool)
         Time, pressure, and whether the pressure was to be cut.
-    shown : list of tuple of (int, ControllerStatus)
-        CTRL_STATUS messages.
     told : list of tuple of (int, Fault)
         Faults sent in ALARM.
     node : ControllerNode
@@ -146,12 +144,8 @@ class Watch:
         Last time at which the drive's set-point was not zero, or the valve followed.
     code : Fault
         First latched fault; while there is none, the fault shown.
-    armed_again : bool
-        Whether the controller was in charge again after a fault.
     beyond_share_pa : float
         Largest excess of the drive's set-point over `degraded_most`.
-    rolls : Moments
-        Variance of the true roll over every tick.
     """
 
     name = "watch"

@@ -51,8 +51,6 @@ class Disturbance:
         "loses", "delays", "doubles" or "swaps" (with the next frame of its identifier).
     can_id : int or None
         Identifier concerned; None for all.
-    by_ns : int
-        Delay.
     """
 
     span: Span
@@ -65,17 +63,10 @@ class Disturbance:
 class FaultyBus:
     """Simulated bus with faults.
 
-    Parameters
-    ----------
-    seed : int
-        Seed of the random events.
-
     Attributes
     ----------
     bit_errors : list of tuple of (Span, float, int or None)
         Share of the transmissions that are destroyed, for one sender or for all.
-    error_counts : dict of int to int
-        Transmit error counter by sender.
     statistics : callable
         Method of `SimulatedBus`; destroyed transmissions count as frames.
     warn, cut_off : callable

@@ -47,10 +47,6 @@ class FaultyNode:
 
     Attributes
     ----------
-    node : Node
-        Node that currently runs.
-    hears : frozenset of int
-        Filter of the node, if it has one.
     spoiled : list of Spoiled
         Faults of its frames, applied in order.
     hangs : list of Span

@@ -38,18 +38,12 @@ class Bench:
 
     Attributes
     ----------
-    nodes : dict of str to FaultyNode
-        Nodes by name.
-    version : int
-        Version of the ship's configuration.
     bus : FaultyBus or None
         Simulated bus; None on a real one.
     law : LawFailures or None
         Failures of the running controller's law; None if the controller is another process.
     restart : callable or None
         Function that replaces the controller by a new one.
-    joining : list of Node
-        Nodes that the faults add.
     """
 
     nodes: dict[str, FaultyNode]
