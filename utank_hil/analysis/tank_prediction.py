@@ -138,13 +138,7 @@ class LoadingPoint:
 
 @dataclass(frozen=True, slots=True)
 class SweepPoint:
-    """One tank of a sweep.
-
-    Attributes
-    ----------
-    stability_share, frequency_ratio : float
-        Prescribed share of stability, and frequency of the water over the roll frequency.
-    """
+    """One tank of a sweep, given by its share of stability and its frequency ratio."""
 
     stability_share: float
     frequency_ratio: float

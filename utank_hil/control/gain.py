@@ -11,12 +11,7 @@ from utank_hil.dynamics.sampling import LinearModel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GainLaw:
-    """Constant feedback of the measured outputs, u(k) = -K y(k-1) (`utank_hil.dynamics.sampling`).
-
-    Attributes
-    ----------
-    gain : ndarray, shape (r, m)
-        K.
+    """Constant feedback of the measured outputs, u(k) = -K y(k-1), with K of shape (r, m).
 
     Raises
     ------

@@ -27,15 +27,7 @@ BANDWIDTH_RAD_S: Final = 6.0
 class LevelObserver:
     """Observer of the level with a double pole (critically damped).
 
-    Parameters
-    ----------
-    period_s : float
-        Time between two measurements.
-
-    Attributes
-    ----------
-    level_m, rate_m_s : float
-        Estimated level and its rate.
+    `level_m` and `rate_m_s` are its estimates, `period_s` is the time between two measurements.
 
     Raises
     ------

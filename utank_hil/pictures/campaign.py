@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MOST_GROUPS: Final = 40
+"""Limit on the named groups in a figure. Chosen; no study."""
 
 
 @dataclass(frozen=True, slots=True)

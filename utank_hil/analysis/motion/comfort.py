@@ -129,11 +129,7 @@ def apparent_gravity(
 ) -> tuple[FloatArray, FloatArray]:
     """Lateral and vertical apparent gravity, by the equation of the module docstring.
 
-    Arguments as for `comfort`.
-
-    Returns
-    -------
-    lateral_m_s2, vertical_m_s2 : ndarray, shape (n,)
+    Arguments as for `comfort`; both results in m/s^2, shape (n,).
     """
     acceleration = np.gradient(roll_rate_rad_s, step_s)
     square = np.square(roll_rate_rad_s)

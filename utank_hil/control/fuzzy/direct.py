@@ -139,13 +139,7 @@ def _q_problems(law: FuzzyLaw, above: float) -> list[Problem]:
 
 
 class DirectFuzzyController(FuzzyController):
-    """Stepping of a direct adaptive fuzzy law.
-
-    Attributes
-    ----------
-    parameters : tuple of float
-        Adapted parameters: (lambda,) or (lambda, theta).
-    """
+    """Stepping of a direct adaptive fuzzy law; adapts (lambda,) or (lambda, theta)."""
 
     def __init__(self, law: SmallGainFuzzy | RobustFuzzy) -> None:
         self.law = law
