@@ -24,7 +24,7 @@ from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.nodes.panel import OperatorPanel, TimedAction
 
 BIT_RATE: Final = 250_000
-"""Bit rate of the bus in bit/s, as in the scenarios."""
+"""Bit rate of the bus in bit/s (docs/can-catalogue.md)."""
 _SHARE = Annotated[float, Field(gt=0, le=1)]
 
 
