@@ -1,7 +1,7 @@
 """The announcer: a process that logs and prints events, for which the loop has no time.
 
-The loop writes an event into shared memory. This process logs it, prints it if retuning made it,
-and writes the ship that was found to files. It reads the rest when the loop was killed, too.
+The loop writes an event into shared memory. This process logs it, prints it if it is of retuning,
+and writes the identified ship to files. It reads the remaining events even if the loop was killed.
 """
 
 import multiprocessing
@@ -25,19 +25,19 @@ from utank_hil.runners.stopping import SIGNALS, signals_waiting
 from utank_hil.telemetry.events import Event, EventReader, EventWriter, event_text
 
 LOOK_S: Final = 0.5
-"""Time between two looks at the ring: soon enough to be read by people."""
+"""Time between two reads of the ring, short enough for a reader."""
 _NICENESS: Final = 5
 _START_S, _END_S, _PRINTED_S = 30.0, 10.0, 5.0
 """Times for the process to start, to end, and to print the last lines, on a busy machine."""
 
 
 class Announcer:
-    """Event ring of a run, and the process that prints what comes through it, ready at once.
+    """Event ring of a run, and the process that prints its events, ready at once.
 
     Parameters
     ----------
     ships : IdentifiedShips, optional
-        Where a ship that a law was retuned for is kept.
+        Destination of a ship that a law was retuned for.
     log : Path, optional
         File of the log.
 
@@ -46,7 +46,7 @@ class Announcer:
     ring : str or None
         Name of the ring, for a recorder; None if there was no room for it.
     error : str or None
-        Why events are not printed; the controller runs all the same.
+        Why events are not printed; the controller runs nevertheless.
     """
 
     def __init__(self, ships: IdentifiedShips | None = None, log: Path | None = None) -> None:
@@ -71,7 +71,7 @@ class Announcer:
                 self.error = str(error)
                 return
             finally:
-                says.close()  # the process has its own, so that its death is heard, too
+                says.close()  # The process has its own copy, so that its end is detected.
             if _ready(heard):
                 self._process = process
             else:
@@ -85,14 +85,14 @@ class Announcer:
             self._writer.write_event(event, start_ns)
 
     def failure(self) -> str:
-        """The reason why the process has ended before the run, once; never waits."""
+        """Return once the reason why the process ended before the run; never waits."""
         if self.error is not None or self._process is None or self._process.is_alive():
             return ""
         self._note_end(self._process)
         return self.error or ""
 
     def stop(self) -> None:
-        """Have the last events printed, and find out whether all went well; idempotent."""
+        """Let the last events be printed and check the result; idempotent."""
         writer, self._writer = self._writer, None
         if writer is None:
             return
@@ -113,9 +113,9 @@ class Announcer:
 
 
 def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: Connection) -> None:
-    """Log and print events until their writer ends or dies: the whole life of the process."""
+    """Log and print events until their writer ends or dies, as main function of the process."""
     with EventReader(ring) as reader, ExitStack() as stack:
-        # a terminal may be held up, and the log must not wait for it
+        # A terminal may block, and the log must not wait for it.
         lines, events = Lines(), None
         stack.callback(lines.close, _PRINTED_S)
         if log is not None:
@@ -127,7 +127,7 @@ def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: 
                 stack.callback(events.close)
         ready.send_bytes(b"ready")
         ready.close()
-        # what ends it is the end of the ring, not Ctrl-C, a closed terminal or a stopped service
+        # The end of the ring ends it, not Ctrl-C, a closed terminal or a stopped service.
         os.setsid()
         for number in SIGNALS:
             signal.signal(number, signal.SIG_IGN)
@@ -137,7 +137,7 @@ def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: 
             for event in reader.read_events():
                 if events is not None:
                     _log(events, event, reader.start_ns, lines)
-                if isinstance(event, RetuningEvent):  # alarms are printed at once, by the run
+                if isinstance(event, RetuningEvent):  # The run prints alarms itself, at once.
                     _print(event, ships, lines)
             if last:
                 break
@@ -147,7 +147,7 @@ def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: 
 
 
 def _ready(heard: Connection) -> bool:
-    """Wait until the process says that it listens."""
+    """Wait until the process reports that it listens."""
     try:
         return heard.poll(_START_S) and bool(heard.recv_bytes())
     except EOFError:
@@ -157,7 +157,7 @@ def _ready(heard: Connection) -> bool:
 def _log(events: EventLog, event: Event, start_ns: int, lines: Lines) -> None:
     try:
         events.write(event, start_ns)
-    except OSError as error:  # a full disk is no reason to end
+    except OSError as error:  # A full disk does not end it.
         lines.say(f"an event was not logged: {error}")
 
 
@@ -166,7 +166,7 @@ def _print(event: RetuningEvent, ships: IdentifiedShips | None, lines: Lines) ->
     if ships is not None and event.found is not None and event.state is RetuningState.RETUNED:
         try:
             files = ships.write(event.found)
-        except (OSError, ValueError) as error:  # no room; or found beyond what a file may hold
+        except (OSError, ValueError) as error:  # no room, or a ship that no file may hold
             kept = f"the ship that was found could not be written: {error}"
         else:
             kept = f"the ship that was found: {', '.join(map(shown, files.values()))}"

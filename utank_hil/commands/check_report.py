@@ -1,4 +1,4 @@
-"""What ``utank-hil check`` says of a controller or a scenario."""
+"""Output of ``utank-hil check`` for a controller or a scenario."""
 
 import math
 from dataclasses import asdict
@@ -25,13 +25,13 @@ DISSIPATES = (
 )
 
 LEAST_LOOP_GAIN = 0.05
-"""Below it a law with all margins hardly acts; the shipped ones have 1.3 and more."""
+"""Loop gain below which a law with all margins hardly acts; the shipped laws have 1.3 and more."""
 
 Judged = dict[str, JudgedLaw]
 
 
 def controller_json(judged: JudgedLaw) -> dict[str, Any]:
-    """A controller as one JSON object."""
+    """Return a controller as one JSON object."""
     config, report = judged.config, judged.robustness
     return {
         "name": config.name,
@@ -51,7 +51,7 @@ def controller_json(judged: JudgedLaw) -> dict[str, Any]:
 
 
 def collection_json(collection: Any, judged: Judged) -> dict[str, Any]:
-    """A file of several controllers, a scenario for one, as one JSON object."""
+    """Return a file of several controllers, such as a scenario, as one JSON object."""
     vessel: Vessel = collection.vessel
     controllers = {name: controller_json(each) for name, each in judged.items()}
     return {
@@ -124,7 +124,7 @@ def print_collection(kind: str, collection: Any, judged: Judged) -> None:
     console.say(ship_line(collection.vessel))
     for line in collection.meaning():
         console.say(line)
-    if not judged:  # a passive tank has no law
+    if not judged:  # A passive tank has no law.
         return
     figures = (
         "peak\nsensitivity",
@@ -161,7 +161,7 @@ def print_collection(kind: str, collection: Any, judged: Judged) -> None:
 
 
 def _verdict(judged: JudgedLaw) -> str | Text:
-    """The verdict on a law in a word."""
+    """Return the verdict on a law in one word."""
     if judged.failures:
         return Text("accepted", "yellow") if judged.accepted else Text("refused", "red")
     if judged.robustness is None:
@@ -187,12 +187,12 @@ def _delay(law: BuiltLaw, margin: Margins) -> str:
 
 
 def _searched_s(law: BuiltLaw) -> float:
-    """Extra delay up to which the loop was found stable, when no margin was found."""
+    """Return the extra delay up to which the loop was found stable, if no margin was found."""
     return 0.0 if law.linear is None else DELAY_SAMPLES * law.linear.sample_time_s
 
 
 def _remarks(law: BuiltLaw, report: Robustness) -> list[str]:
-    """Notes on the margins beside whether they are missed."""
+    """Return notes on the margins besides those on missed ones."""
     notes = [note for note in (_at_rest(law),) if note is not None]
     gain = report.nominal.peak_loop_gain
     if gain < LEAST_LOOP_GAIN and not law.adapts:
@@ -208,7 +208,7 @@ def _print_met(console: Terminal, law: BuiltLaw) -> None:
 
 
 def _at_rest(law: BuiltLaw) -> str | None:
-    """What the margins of a nonlinear law are those of; None for a linear one."""
+    """Return which state the margins of a nonlinear law are for; None for a linear one."""
     if not law.at_rest:
         return None
     learning = " with the parameters it starts from" if law.adapts else ""

@@ -29,7 +29,7 @@ from utank_hil.runners import LoopStatistics, RealTimeLoop, real_time_scheduling
 from utank_hil.safety.faults import fault_text
 
 SAY_TICKS: Final = 500
-"""Between two lines about one stage."""
+"""Ticks between two lines about one stage."""
 
 
 def commission(
@@ -55,7 +55,7 @@ def commission(
 
     **Example:** utank-hil commission configs/controllers/gpc.yaml --bus can0
     """
-    loaded = load(config, ControllerConfig, allow_code=True)  # its law is not built
+    loaded = load(config, ControllerConfig, allow_code=True)  # The law is not built.
     path = record or record_path(config)
     reason = why_not_replaceable(path) or why_not_writable(path.parent, (path.name,))
     if reason:
@@ -75,7 +75,7 @@ def commission(
                 return
             if event.code is not Fault.NOT_COMMISSIONED:
                 lines.tell(event, start_ns)
-            elif event.state is AlarmState.ACTIVE_UNACKNOWLEDGED:  # of here and now it says nothing
+            elif event.state is AlarmState.ACTIVE_UNACKNOWLEDGED:  # it says nothing of here and now
                 lines.say("  not armed: wait until this asks for it")
 
         try:
@@ -90,20 +90,20 @@ def commission(
         with real_time_scheduling() as scheduling:
             for line in scheduling.lines():
                 notes.say(line)
-            with suppress(PortError):  # the loop meets it too, and its node reacts
-                port.receive()  # what came before is old, and must not look fresh
+            with suppress(PortError):  # The loop meets the error too, and its node reacts.
+                port.receive()  # Old frames must not look new.
             RealTimeLoop([node], port, statistics=statistics).run(lambda: guide.look() or stop())
     if node.stage is not Stage.DONE:
         what = "ended before all was checked; there is no new record"
-        if node.stage is Stage.MOVING:  # who ends that may have seen what the record denies
+        if node.stage is Stage.MOVING:  # Ending this stage must not contradict the record.
             try:
                 remove_record(path)
             except OSError as error:
                 fail(f"{what}, and the one before can't be removed: {error}; remove it")
             what += ", and the one before is removed"
         fail(what, ExitCode.INTERRUPTED)
-    # the last commissioning counts: what came of the one before is void, whatever happens now
-    with suppress(OSError):  # what can't be removed can't be replaced either, and that is said
+    # The previous record is void from now on, whatever this commissioning yields.
+    with suppress(OSError):  # What can't be removed can't be replaced either, and that is reported.
         remove_record(path)
     made = make_record(loaded, config, channel, node.checks(), node.ended)
     unwritten = ""
@@ -112,7 +112,7 @@ def commission(
     except OSError as error:
         left = "; remove the one that is there" if path.exists() else ""
         unwritten = f"{path}: the record can't be written: {error.strerror}{left}"
-    # where the output is full or gone (Rich ends by SystemExit), the exit code tells how it ended
+    # The exit code reports the end if the output is full or gone (Rich ends by SystemExit).
     with suppress(OSError, SystemExit):
         if json_:
             print_json({**made, "record": str(path)})
@@ -124,14 +124,7 @@ def commission(
 
 
 class Guide:
-    """Says what is done and what is to do, while the loop goes on.
-
-    Parameters
-    ----------
-    node : CommissioningNode
-    lines : Lines
-        Where it is said.
-    """
+    """Guides the operator through the stages while the loop runs, by `lines`."""
 
     def __init__(self, node: CommissioningNode, lines: Lines) -> None:
         self._node = node
@@ -140,7 +133,7 @@ class Guide:
         self._ticks = 0
 
     def look(self) -> bool:
-        """Say what is new, before a tick; return whether all is done."""
+        """Report news before a tick; return whether all stages are done."""
         node = self._node
         self._ticks = self._ticks + 1 if node.stage is self._stage else 0
         if self._ticks % SAY_TICKS == 0:
@@ -159,7 +152,7 @@ class Guide:
 
 
 def _print(record: dict[str, Any], path: Path, config: Path) -> None:
-    """The checks as a table, then what to do about those that failed."""
+    """Print the checks as a table, then the remedies of those that failed."""
     console = Terminal()
     table = Table(title=f"Commissioning of {record['vessel']}")
     for heading in ("check", "measured", "expected", "unit", "verdict"):

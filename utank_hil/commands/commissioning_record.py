@@ -1,4 +1,4 @@
-"""The record of a commissioning: written by ``commission``, asked for by ``run``."""
+"""The record of a commissioning: written by ``commission``, required by ``run``."""
 
 import json
 import math
@@ -19,17 +19,17 @@ from utank_hil.nodes.commissioning.checks import Check
 
 SUFFIX: Final = ".commissioning.json"
 EMULATED: Final = ("vcan", "vxcan")
-"""Begin the names of interfaces that no hardware is on."""
+"""Beginnings of the names of interfaces without hardware."""
 INTERFACES: Final = Path("/sys/class/net")
 
 
 def record_path(config: Path) -> Path:
-    """Where the record of a controller's file is, if nothing else is said: beside it."""
+    """Return the default place of a controller's record: beside its file."""
     return config.with_suffix(SUFFIX)
 
 
 def commissioned_for(config: ControllerConfig) -> dict[str, Any]:
-    """What of a configuration a commissioning stands for; a change of it makes the record void."""
+    """Return what a commissioning covers; a change of it makes the record void."""
     vessel = config.vessel
     parts = {name: getattr(vessel, name) for name in ("ship", "tank", "pump", "valve")}
     return {
@@ -43,18 +43,16 @@ def commissioned_for(config: ControllerConfig) -> dict[str, Any]:
 def make_record(
     config: ControllerConfig, file: Path, bus: str, checks: list[Check], ended: str
 ) -> dict[str, Any]:
-    """The record of a commissioning, ready for `json.dumps`.
+    """Return the record of a commissioning, ready for `json.dumps`.
 
     Parameters
     ----------
-    config : ControllerConfig
     file : Path
-        It was read from.
+        File of the configuration.
     bus : str
         Interface on which it was done.
-    checks : list of Check
     ended : str
-        Why it ended before its time; empty if it did not.
+        Why it ended early; empty if it did not.
     """
     return {
         "program": PROGRAM,
@@ -82,12 +80,12 @@ def make_record(
 
 
 def why_not_replaceable(path: Path) -> str:
-    """Why no record may be written to a place, because of what is there; empty if it may."""
+    """Return why the existing file may not be replaced by a record; empty if it may."""
     if not path.exists():
         return ""
     if not path.is_file():
         return f"{path}: is no regular file"
-    if path.name.endswith(SUFFIX) or not path.stat().st_size:  # one that is damaged, too
+    if path.name.endswith(SUFFIX) or not path.stat().st_size:  # a damaged one is replaceable too
         return ""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -99,12 +97,9 @@ def why_not_replaceable(path: Path) -> str:
 
 
 def write_record(path: Path, record: dict[str, Any]) -> None:
-    """Write a record so that at any time there is the old one or the new one as a whole.
+    """Write a record atomically: at any time the old or the new one is complete.
 
-    Raises
-    ------
-    OSError
-        If it can't be written.
+    OSError is raised if it can't be written.
     """
     with tempfile.NamedTemporaryFile(
         "w", dir=path.parent, prefix=path.name, delete=False, encoding="utf-8"
@@ -123,19 +118,13 @@ def write_record(path: Path, record: dict[str, Any]) -> None:
 
 
 def remove_record(path: Path) -> None:
-    """Remove a record, if there is one, also in case of a power cut.
-
-    Raises
-    ------
-    OSError
-        If it can't be removed.
-    """
+    """Remove a record, if there is one, safely against a power cut; raises OSError if it can't."""
     path.unlink(missing_ok=True)
     _sync(path.parent)
 
 
 def _sync(folder: Path) -> None:
-    """Bring what a folder holds to the disk: a file's own sync does not."""
+    """Sync a folder's entries to the disk, which a file's own sync does not."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -144,18 +133,17 @@ def _sync(folder: Path) -> None:
 
 
 def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: Path | None) -> str:
-    """Why a controller must not be armed, with what to do; empty if it may.
+    """Return why a controller must not be armed, with the remedy; empty if it may.
 
     Parameters
     ----------
-    config : ControllerConfig
     bus : str
-        Interface of the run. On an emulated one no record is asked for unless `path` is given: the
-        ship there is made of the same files.
+        Interface of the run. On an emulated one no record is required unless `path` is given,
+        because the emulated ship is made from the same files.
     file : Path
-        The configuration was read from.
+        File of the configuration.
     path : Path, optional
-        Of the record, if it is not `record_path`.
+        Place of the record, by default `record_path`.
     """
     vessel = config.vessel
     if (vessel.pump is None and vessel.valve is None) or (path is None and _is_emulated(bus)):
@@ -186,7 +174,7 @@ class _Verdict(BaseModel):
 
 
 class _Record(BaseModel):
-    """What is read of a record."""
+    """The required parts of a record."""
 
     commissioned_for: dict[str, Any]
     passed: bool
@@ -203,12 +191,12 @@ class _Record(BaseModel):
 
 
 def _is_emulated(bus: str) -> bool:
-    # any name may be given to an interface: one with hardware behind it has a device
+    # Any interface may have such a name; one with hardware has a device.
     return bus.startswith(EMULATED) and not (INTERFACES / bus / "device").exists()
 
 
 def _differences(before: Any, now: Any, key: str = "") -> list[str]:
-    """Keys of a configuration that differ."""
+    """Return the keys of a configuration that differ."""
     if isinstance(before, dict) and isinstance(now, dict):
         return [
             found

@@ -1,4 +1,4 @@
-"""The log of a run: one JSON object a line for each event, with monotonic time and UTC."""
+"""The log of a run: one JSON object per line for each event, with monotonic time and UTC."""
 
 import contextlib
 import json
@@ -18,24 +18,15 @@ _WORDS: Final = {row.code: (row.happened, row.remedy) for row in FAULTS}
 
 
 class EventLog:
-    """Appends events to a file, each one at once, and brings it to the disk.
-
-    Raises
-    ------
-    OSError
-        If the file can't be opened.
-    """
+    """Appends and syncs each event to a file at once; raises OSError if it can't be opened."""
 
     def __init__(self, file: Path) -> None:
-        self._file = file.open("ab", buffering=0)  # what does not fit now is not tried again
+        self._file = file.open("ab", buffering=0)  # A write that did not fit is not repeated.
 
     def write(self, event: Event, start_ns: int) -> None:
         """Append an event whose `time_ns` counts from `start_ns` on this machine's monotonic clock.
 
-        Raises
-        ------
-        OSError
-            If there is no room; then no part of it is left.
+        OSError is raised if there is no room; then no part of the event is left.
         """
         monotonic_ns = start_ns + event.time_ns
         utc_ns = time.time_ns() - time.monotonic_ns() + monotonic_ns
@@ -48,7 +39,7 @@ class EventLog:
         left = (json.dumps(line, ensure_ascii=False) + "\n").encode(errors="replace")
         begin = self._file.seek(0, os.SEEK_END)
         try:
-            while left:  # what fits is written; the next write gives the reason
+            while left:  # A partial write is followed by one that gives the reason.
                 left = left[self._file.write(left) :]
             os.fsync(self._file.fileno())
         except OSError:

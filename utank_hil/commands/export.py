@@ -72,7 +72,7 @@ def export(
 
 
 def _entries(recording: Path, note: Callable[[str], None]) -> Iterable[Entry]:
-    """Frames of a recording; `note` is called with the place where a log is cut."""
+    """Return the frames of a recording; `note` is called with the place where a log is cut."""
     suffix = recording.suffix.lower()
     if suffix == SUFFIX:
         return entries_of(FrameLog(recording).blocks(note))

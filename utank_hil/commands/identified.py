@@ -1,4 +1,4 @@
-"""The configuration for a ship that was identified: vessel, and a controller that names it."""
+"""Configuration of an identified ship: its vessel, and a controller that names it."""
 
 import dataclasses
 import os
@@ -23,7 +23,7 @@ CONTROLLER: Final = "identified_controller.yaml"
 
 
 def read_controller(config: Path) -> dict[str, Any]:
-    """Content of a controller's file, the files it names given by their whole path."""
+    """Read the content of a controller's file, with absolute paths of the files that it names."""
     content: dict[str, Any] = yaml.safe_load(config.read_text(encoding="utf-8"))
     whole: dict[str, Any] = _with_whole_paths(content, config.resolve().parent)
     return whole
@@ -32,17 +32,16 @@ def read_controller(config: Path) -> dict[str, Any]:
 def write_identified(
     folder: Path, vessel: Vessel, ship: RollShip, tank: Tank, content: dict[str, Any]
 ) -> dict[str, Path]:
-    """Write vessel and controller for a ship that was found.
+    """Write vessel and controller of an identified ship.
 
     Parameters
     ----------
-    folder : Path
     vessel : Vessel
-        As configured.
+        The configured vessel.
     ship, tank : RollShip, Tank
-        As found.
+        The identified ship and tank.
     content : dict
-        Of the controller's file, from `read_controller`.
+        Content of the controller's file, from `read_controller`.
 
     Returns
     -------
@@ -54,16 +53,16 @@ def write_identified(
 
 @dataclasses.dataclass(frozen=True)
 class IdentifiedShips:
-    """Where the ships go that retuning found while running: each into files of its own.
+    """Files of the ships that retuning identified under way, each with files of its own.
 
     Attributes
     ----------
     folder : Path
-        Made if it is not there.
+        Folder of the files; created if missing.
     vessel : Vessel
-        As configured.
+        The configured vessel.
     content : dict
-        Of the controller's file, from `read_controller`.
+        Content of the controller's file, from `read_controller`.
     """
 
     folder: Path
@@ -71,19 +70,14 @@ class IdentifiedShips:
     content: dict[str, Any]
 
     def write(self, found: ModelSummary) -> dict[str, Path]:
-        """Write vessel and controller, named by the time (UTC).
-
-        Returns
-        -------
-        dict
-            Paths of both: "vessel" and "config".
+        """Write vessel and controller, named by the time (UTC); return paths by both names.
 
         Raises
         ------
         OSError
             If they can't be written.
         ParameterError
-            If it is no ship that a file may hold.
+            If a file may not hold such a ship.
         """
         ship, tank = found.ship(self.vessel.ship), found.tank(self.vessel.tank)
         refuse("vessel", tank_problems(ship, tank))
@@ -109,12 +103,12 @@ def _write(
             with file.open("w", encoding="utf-8") as written:
                 written.write(text)
                 written.flush()
-                os.fsync(written.fileno())  # found once, perhaps in hours: it outlives a power cut
+                os.fsync(written.fileno())  # a rare result must survive a power cut
     return {"vessel": vessel_file, "config": controller_file}
 
 
 def _vessel_content(vessel: Vessel) -> dict[str, Any]:
-    """What a vessel's file holds; values at their defaults are left out."""
+    """Return the content of a vessel's file, without values at their defaults."""
     content: dict[str, Any] = {"name": f"{vessel.name.removesuffix(', identified')}, identified"}
     if vessel.least_gm_m is not None:
         content["least_gm_m"] = vessel.least_gm_m
@@ -131,7 +125,7 @@ def _vessel_content(vessel: Vessel) -> dict[str, Any]:
 
 
 def _with_whole_paths(value: Any, folder: Path) -> Any:
-    """Content of a file in `folder` as it can stand in another (`configuration.files`)."""
+    """Return content of a file in `folder` with absolute paths (`configuration.files`)."""
     if isinstance(value, dict):
         return {key: _with_whole_paths(item, folder) for key, item in value.items()}
     if isinstance(value, list):

@@ -71,7 +71,7 @@ def identify_log(
     for option, value in (("--from", from_s), ("--to", to_s)):
         if value is not None and not math.isfinite(value):
             fail(f"{option} must be a number of seconds, got {value}")
-    loaded = load(config, ControllerConfig, allow_code=True)  # code is refused, not run
+    loaded = load(config, ControllerConfig, allow_code=True)  # Code is refused, not run.
     task = _task(loaded, order)
     content = read_controller(config)
     results = [out / name for name in (PICTURE, VESSEL, CONTROLLER)]
@@ -90,7 +90,7 @@ def identify_log(
             signals = even_rows(log, signals, sample_time_s, from_s, to_s)
             from_s = to_s = None
         record = logged_samples(signals, measured, sample_time_s, from_s, to_s)
-        for path in results:  # what stands there afterwards is of this recording
+        for path in results:  # Later content of these files is of this recording.
             path.unlink(missing_ok=True)
     except (OSError, ValueError) as error:
         fail(error)
@@ -117,7 +117,7 @@ def identify_log(
 
 
 def _keep_apart(results: list[Path], config: Path, content: dict[str, Any]) -> None:
-    """Refuse to write over what is read."""
+    """Refuse to overwrite input files."""
     given = [config, *(Path(content[key]) for key in ("vessel",) if isinstance(content[key], str))]
     for path in {path.resolve() for path in results} & {path.resolve() for path in given}:
         fail(f"{path} is what this begins with, and would be written over: choose another --out")

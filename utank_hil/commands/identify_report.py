@@ -1,4 +1,4 @@
-"""What ``utank-hil identify`` prints: tables for people, figures for scripts."""
+"""Output of ``utank-hil identify``: tables for people, figures for scripts."""
 
 import dataclasses
 import math
@@ -20,11 +20,11 @@ from utank_hil.retuning.redesign import Identification, RetuningTask
 
 STATES: Final = 4
 QUANTILE: Final = 1.96
-"""Standard deviations to either side of a 95 % interval."""
+"""Number of standard deviations to either side of a 95 % interval."""
 
 
 def realized_modes(found: Identification) -> ModalConfidence | None:
-    """Modes of the model without physics; None where it has none with deviations."""
+    """Return the modes of the model without physics; None if it has none with deviations."""
     try:
         return modal_confidence(found.okid, STATES)
     except (IdentificationError, ValueError):
@@ -34,7 +34,7 @@ def realized_modes(found: Identification) -> ModalConfidence | None:
 def figures(
     found: Identification, answer: Candidate | Refusal, files: Mapping[str, Path]
 ) -> dict[str, Any]:
-    """All that was found, for ``--json``; deviations are standard ones, as parts of the values."""
+    """Return all results for ``--json``; deviations are relative standard deviations."""
     fit, validation = found.fit, found.validation
     modes = realized_modes(found)
     return {
@@ -81,7 +81,7 @@ def print_report(
     answer: Candidate | Refusal,
     files: Mapping[str, Path],
 ) -> None:
-    """Print what an engineer asks: which ship, how sure, does it hold, and is it accepted."""
+    """Print the ship, its uncertainty, the validation and the acceptance."""
     console.table(_ship_table(found, task))
     console.table(_mode_table(found, task))
     console.table(_check_table(found, task))
@@ -142,7 +142,7 @@ def _ship_table(found: Identification, task: RetuningTask) -> Table:
 
 
 def _mode_table(found: Identification, task: RetuningTask) -> Table:
-    """Modes of ship and tank together, with physics and without."""
+    """Return the table of modes of ship and tank together, with physics and without."""
     table = new_table(
         "Modes of ship and tank together",
         "configured",
@@ -173,10 +173,10 @@ def _mode_table(found: Identification, task: RetuningTask) -> Table:
 
 
 def _modes(ship: RollShip, tank: Tank) -> list[tuple[float, float]]:
-    """Undamped frequency and damping ratio of the two modes, by rising frequency."""
+    """Return undamped frequency and damping ratio of the two modes, by rising frequency."""
     poles = np.linalg.eigvals(state_matrices(ship, tank)[0])
     frequency = abs(poles)
-    order = np.argsort(frequency)[::2]  # of each pair one
+    order = np.argsort(frequency)[::2]  # One of each pair is taken.
     return [(float(frequency[k]), float(-poles[k].real / frequency[k])) for k in order]
 
 

@@ -1,4 +1,4 @@
-"""The keyboard of ``utank-hil panel``: words to actions, and what the controller says in words."""
+"""The keyboard of ``utank-hil panel``: words to actions, and the controller's state in words."""
 
 import os
 import select
@@ -10,9 +10,9 @@ from utank_hil.nodes.panel import SILENT_NS, Action, OperatorPanel
 from utank_hil.safety.faults import fault_text
 
 ANSWER_NS: Final = 1_000_000_000
-"""So long after a reset its answer has come: 500 ms for the button, 100 ms for the status."""
+"""Time within which a reset is answered: 500 ms for the button, 100 ms for the status."""
 LEAVE_NS: Final = 3_000_000_000
-"""So long a panel that is left waits for the answer to a stop."""
+"""Time that a panel waits for the answer to a stop before it ends."""
 HELP: Final = """\
   arm, disarm          take charge; ramp to zero, pump enabled and passive
   stop                 zero at once, as what looks like it: s, stop!; on a terminal Enter alone
@@ -28,23 +28,23 @@ _STOP: Final = Action.STOP.value
 _LONGEST_LINE: Final = 256
 _WORDS: Final = (*(action.value for action in Action), "help", "quit")
 _ANYWHERE: Final = (Action.STOP, Action.ACCEPT, Action.TAKE, Action.FORBID, Action.PERMIT)
-"""What a station without the command may press, too."""
+"""Actions that are allowed to a station without the command."""
 _LASTING: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.ACTIVE_ACKNOWLEDGED)
 _UNACCEPTED: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.RECTIFIED_UNACKNOWLEDGED)
 
 
 class Keyboard:
-    """Reads words from a terminal or a pipe between two ticks, and shows what has changed.
+    """Reads words from a terminal or a pipe between two ticks, and shows changes.
 
     Parameters
     ----------
-    node : OperatorPanel
     descriptor : int
-        To read from. The end of a pipe only ends the typing; that of a terminal stops and leaves.
+        Descriptor to read from. The end of a pipe only ends the input; that of a terminal stops the
+        controller and ends the panel.
     say : callable
         Shows a line.
     terminal : bool
-        Whether somebody sits there: then Enter alone stops, and a new alarm rings.
+        Whether a person types: then Enter alone stops, and a new alarm rings.
     """
 
     def __init__(
@@ -65,10 +65,10 @@ class Keyboard:
         self._alarms: dict[Fault | None, AlarmState | None] = {}
 
     def look(self, now_ns: int, *, signalled: bool = False) -> bool:
-        """Obey every line that has come and show what is new; whether to leave.
+        """Execute new lines and show changes; return whether to leave.
 
-        A signal (`signalled`) is like ``quit``: a closed terminal, whose input has then ended,
-        is to have its stop sent.
+        A signal (`signalled`) acts like ``quit``, so that the stop of a closed terminal, whose
+        input has ended, is still sent.
         """
         was_open, self._now_ns = self._open, now_ns
         lines = self._lines()
@@ -81,39 +81,39 @@ class Keyboard:
         if signalled and self._leave_ns is None:
             self._leave_ns = now_ns + LEAVE_NS
         self._tell_of_reset(now_ns)
-        # what was pressed last is to be heard: a stop until it is answered
+        # The last press must arrive: a stop is kept until it is answered.
         return self._leave_ns is not None and (not self._node.busy or now_ns >= self._leave_ns)
 
     def _lines(self) -> list[str]:
-        """Whole lines that have come; what comes with the end of a pipe is one, too.
+        """Return the complete lines so far; the end of a pipe completes one.
 
-        Python's own buffer would keep a line back until there is something to read again. There is
-        one read a look: a pipe that is never empty is not to hold the panel up.
+        Python's own buffer would hold a line back until more can be read. There is one read per
+        look, so that a pipe that is never empty does not block the panel.
         """
         if self._open and select.select([self._descriptor], [], [], 0)[0]:
             try:
                 data = os.read(self._descriptor, _READ_BYTES)
-            except OSError:  # a terminal that is gone
+            except OSError:  # The terminal is gone.
                 data = b""
             self._open = bool(data)
             self._typed += data
         *lines, begun = self._typed.split(b"\n")
-        # what is longer than any word is none, and kept no longer than its beginning
+        # A line longer than any word is cut to its beginning.
         self._typed = begun[:_LONGEST_LINE] if self._open else b""
         if begun and not self._open:
             lines.append(begun)
         return [line.decode(errors="replace").strip().lower() for line in lines]
 
     def _end(self, now_ns: int) -> None:
-        """React to the end of what is read."""
-        if self._terminal:  # Ctrl-D, or it is gone: a panel that is deaf must not stay armed
+        """React to the end of the input."""
+        if self._terminal:  # without input a panel must not stay armed
             self._press(Action.STOP)
             self._leave_ns = self._leave_ns or now_ns + LEAVE_NS
         elif self._leave_ns is None:
             self._say("the input has ended; what was asked for stays, Ctrl-C leaves")
 
     def _tell_of_reset(self, now_ns: int) -> None:
-        """Say that a reset was refused: the controller is still in FAULT."""
+        """Report that a reset was refused: the controller is still in FAULT."""
         if self._reset_ns is None or now_ns - self._reset_ns < ANSWER_NS:
             return
         self._reset_ns = None
@@ -127,13 +127,13 @@ class Keyboard:
             self._say(f"reset REFUSED while this lasts: {', '.join(lasting)}")
 
     def _obey(self, word: str) -> bool:
-        """Do what a line says; whether that is to leave."""
+        """Execute a line; return whether to leave."""
         if not word:
             if self._terminal:
                 self._press(Action.STOP)
             return False
         found = [word] if word in _WORDS else [each for each in _WORDS if each.startswith(word)]
-        if word.startswith(_STOP) or _STOP in found:  # typed in a hurry: st, stopp, stop!
+        if word.startswith(_STOP) or _STOP in found:  # hasty spellings stop: st, stopp, stop!
             self._press(Action.STOP)
         elif len(found) != 1:
             self._say(f"{word!r} is {' or '.join(found) or 'no action; help lists them'}")

@@ -1,4 +1,4 @@
-"""Plain lines on standard error, at once, while a loop goes on: of alarms, and of a panel."""
+"""Plain lines on standard error while a loop runs, for alarms and for a panel."""
 
 import contextlib
 import os
@@ -12,20 +12,16 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.telemetry.events import event_text
 
 _END_S: Final = 10.0
-"""For the last line on a terminal that is slow."""
+"""Time for the last line on a slow terminal."""
 _STANDARD_ERROR: Final = 2
 
 
 class Lines:
-    """Prints lines through a process of its own.
+    """Prints lines through a separate process.
 
-    A terminal or a journal may be held up, and the loop must not wait for it: it writes into a
-    pipe, and ``cat`` copies from there. A line is left out when the pipe is full.
-
-    Raises
-    ------
-    OSError
-        If the process can't be started.
+    A terminal or a journal may block, and the loop must not wait for it: it writes into a pipe, and
+    ``cat`` copies from there. A line is dropped when the pipe is full. OSError is raised if the
+    process can't be started.
     """
 
     def __init__(self) -> None:
@@ -33,36 +29,36 @@ class Lines:
             ["cat"],
             stdin=subprocess.PIPE,
             stdout=_STANDARD_ERROR,
-            start_new_session=True,  # Ctrl-C in the terminal does not end it before the last line
+            start_new_session=True,  # Ctrl-C in the terminal does not end it before the last line.
         )
         assert self._process.stdin is not None
         self._pipe = self._process.stdin.fileno()
         os.set_blocking(self._pipe, False)
 
     def tell(self, event: AlarmEvent, start_ns: int) -> None:
-        """Print what becomes of an alarm, with the time since the start; never waits."""
+        """Print the change of an alarm with the time since the start; never waits."""
         self.say(f"{(event.time_ns - start_ns) * 1e-9:8.1f} s {event_text(event)}")
 
     def say(self, line: str) -> None:
         """Print a line; never waits."""
-        with contextlib.suppress(OSError):  # the fault is also the last word of the command
+        with contextlib.suppress(OSError):  # The command's last words name the fault too.
             os.write(self._pipe, f"{line}\n".encode())
 
     def close(self, within_s: float = _END_S) -> None:
-        """Have the last line printed; idempotent."""
+        """Let the last line be printed; idempotent."""
         process = self._process
         if process.stdin is not None and not process.stdin.closed:
             process.stdin.close()
             try:
                 process.wait(within_s)
-            except subprocess.TimeoutExpired:  # the terminal takes nothing
+            except subprocess.TimeoutExpired:  # The terminal takes no output.
                 process.kill()
                 process.wait()
 
 
 @contextlib.contextmanager
 def printed_lines() -> Iterator[Lines]:
-    """Lines for as long as a loop runs; the command fails where no process can be started."""
+    """Yield lines while a loop runs; the command fails if no process can be started."""
     try:
         lines = Lines()
     except OSError as error:

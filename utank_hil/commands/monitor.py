@@ -1,4 +1,4 @@
-"""``utank-hil monitor``: look at a recording, or at a controller that runs."""
+"""``utank-hil monitor``: shows a recording, or a running controller."""
 
 import os
 from collections.abc import Callable
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 LIVE: Final = "rerun+http://"
 """Beginning of the address of a live stream."""
 LOOKS: Final = "&theme=dark&hide_welcome_screen&notebook=0&persist=0"
-"""Options of the viewer in a browser: a dark ground, as the colours ask for, and no menus."""
+"""Options of the viewer in a browser: a dark ground that suits the colours, and no menus."""
 _LOOK_S: Final = 0.25
-"""Time between two looks at the ring and at the viewer: smooth to the eye of a watch-keeper."""
+"""Time between two reads of the ring, short enough to appear smooth."""
 _NICENESS: Final = 5
 
 
@@ -59,9 +59,9 @@ def watch(
     Parameters
     ----------
     source, at_s
-        As `open_viewer` takes them.
+        Arguments of `open_viewer`.
     send : callable, optional
-        Sends what there is to see since the last call, and returns whether more may come.
+        Function that sends new data, and returns whether more may come.
     """
     from utank_hil.runners import stop_on_signals
     from utank_hil.telemetry.viewer import open_viewer
@@ -94,7 +94,7 @@ def watch(
 
 
 def _said(viewer: "Viewer", at_s: float | None) -> "Viewer":
-    """A viewer, after it was said where a browser finds it, and where in time to look."""
+    """Return a viewer after printing its address and the time to look at."""
     if viewer.url is not None:
         tunnel = " ".join(f"-L {port}:127.0.0.1:{port}" for port in viewer.ports)
         notes.say(
@@ -102,7 +102,7 @@ def _said(viewer: "Viewer", at_s: float | None) -> "Viewer":
             f"From another machine first: ssh {tunnel} THIS_MACHINE"
         )
         if at_s is not None:
-            # Rerun 0.41 moves the cursor of a page neither by its address nor by a layout
+            # Rerun 0.41 moves the cursor of a page neither by its address nor by a layout.
             notes.say(f"Something happens at {at_s:.1f} s: type it into the field at the bottom.")
     return viewer
 
@@ -125,7 +125,7 @@ def _attach(pid: int | None) -> None:
     """Show a run of this machine."""
     from utank_hil.telemetry.live import LiveStream, live_runs
 
-    os.nice(_NICENESS)  # a loop may run here
+    os.nice(_NICENESS)  # A loop may run on this machine.
     try:
         with LiveStream(_chosen(live_runs(), pid)) as stream:
             watch(stream.url, send=stream.send)
@@ -134,7 +134,7 @@ def _attach(pid: int | None) -> None:
 
 
 def _chosen(runs: "list[LiveRun]", pid: int | None) -> "LiveRun":
-    """The run with a process number, or the only one."""
+    """Return the run with a process number, or the only one."""
     found = [run for run in runs if pid in (None, run.pid)]
     if not found and pid is None:
         fail(

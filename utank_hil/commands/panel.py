@@ -20,7 +20,7 @@ from utank_hil.nodes.panel import OperatorPanel
 from utank_hil.runners import RealTimeLoop, stop_on_signals
 
 LOOK_NS = 2 * TICK_NS
-"""Between two looks at the keyboard: a frame leaves within 50 ms of its button."""
+"""Time between two reads of the keyboard: a frame leaves within 50 ms of its button."""
 
 
 def panel(
@@ -49,7 +49,7 @@ def panel(
         port = SocketCanPort(bus, can_ids=node.hears)
     except OSError as error:
         fail(error, ExitCode.NO_BUS)
-    # a terminal that is held up is not to hold a stop back
+    # A blocked terminal must not delay a stop.
     with closing(port), printed_lines() as lines, stop_on_signals() as signalled:
         lines.say(HELP)
         descriptor = os.open(os.devnull, os.O_RDONLY) if sys.stdin is None else sys.stdin.fileno()

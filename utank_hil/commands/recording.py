@@ -23,24 +23,24 @@ FRAMES: Final = f"run-{{}}{SUFFIX}"
 PART_S: Final = 3600.0
 """Length of one file of a recording."""
 RING_SLOTS: Final = 1640
-"""Of each ring, 82 s at 20 Hz: a recorder that is held up for less loses nothing."""
+"""Number of slots per ring: 82 s at 20 Hz, a delay of the recorder without loss."""
 
 
 @dataclass(slots=True)
 class RecordingSummary:
-    """What became of a recording.
+    """Result of a recording.
 
     Attributes
     ----------
     file : str or None
-        None if there is none.
+        The recording; None if there is none.
     frames : str or None
         The frame log, which `utank-hil replay` reads.
     rows, lost, records_lost : int or None
-        Rows recorded, and rows that the recorder was too slow for, of the recording and of the
-        frame log; None if it failed.
+        Rows recorded, and rows and records of the frame log that were lost because the recorder was
+        too slow; None if it failed.
     parts : int or None
-        Files; `file` is the first. None if it failed.
+        Number of files, of which `file` is the first; None if it failed.
     error : str or None
         Why it did not start, or ended before the run.
     """
@@ -57,28 +57,28 @@ class RecordingSummary:
 class RunRecording:
     """Ring and recorder of a run; the constructor returns when the recorder is ready, or failed.
 
-    Viewers read the ring, too (`utank_hil.telemetry.live`).
+    Viewers read the ring too (`utank_hil.telemetry.live`).
 
     Parameters
     ----------
     folder : Path or None
-        Made if it is not there. The file is named by the time, so that none is overwritten: the
-        recording of a run that crashed shows why. None for a ring without a recorder.
+        Folder of the files, created if missing; None for a ring without a recorder. Files are named
+        by the time, so that a crashed run's recording is not overwritten.
     events : str, optional
-        Name of the run's ring of events, to be recorded beside the rows.
+        Name of the run's ring of events, recorded beside the rows.
     about : mapping, optional
-        Where it comes from (`utank_hil.base.provenance`).
+        Origin of the rows (`utank_hil.base.provenance`).
     head : mapping, optional
         Head of the frame log (`utank_hil.telemetry.replay_head`); without it there is none.
     keep_bytes : int, optional
-        The folder's oldest recordings beyond this size are removed; without it none are.
+        Size beyond which the folder's oldest recordings are removed; by default none are.
     log : Path, optional
-        Log of the run's events, whose time the recording is named by: a report looks for it there.
+        Log of the run's events; the recording is named by its time, so that a report finds it.
 
     Attributes
     ----------
     summary : RecordingSummary
-        Complete after `stop`.
+        Result, complete after `stop`.
     """
 
     def __init__(
@@ -122,7 +122,7 @@ class RunRecording:
             self._close_records()
         for file in files:
             if file.exists() and file.stat().st_size == 0:
-                file.unlink()  # nothing in it
+                file.unlink()  # The file is empty.
         if head is not None and find_spec("rerun") is None:
             self.summary.error = f"{NEEDS_RERUN}; there is the frame log alone"
         names = [str(file) if file.exists() else None for file in files]
@@ -135,7 +135,7 @@ class RunRecording:
 
     @property
     def recorder_pid(self) -> int | None:
-        """Process of the recorder, if there is one."""
+        """Process id of the recorder, if there is one."""
         return None if self._recorder is None else self._recorder.pid
 
     @property
@@ -149,7 +149,7 @@ class RunRecording:
             self._records.write(records)
 
     def failure(self) -> str:
-        """The reason why the recorder has ended before the run, once; never waits."""
+        """Return once the reason why the recorder ended before the run; never waits."""
         if self._recorder is None or not self._recorder.has_ended:
             return ""
         self._end_recorder()
@@ -157,8 +157,8 @@ class RunRecording:
         return self.summary.error
 
     def stop(self) -> None:
-        """Have the summary completed; idempotent."""
-        self._close_records()  # before the other, whose end is what ends the recorder
+        """Complete the summary; idempotent."""
+        self._close_records()  # This comes first, because the end of the other ends the recorder.
         ring, self._ring = self._ring, None
         if ring is not None:
             ring.close()

@@ -1,6 +1,6 @@
-"""What would make a refused law pass: the same design, asked for less until its margins hold.
+"""Search for a gentler design of a refused law that meets the margins.
 
-Where no gentler one does, the law of the kind that finds its own numbers.
+If there is none, the remedy is the law kind that finds its own numbers.
 """
 
 from dataclasses import replace
@@ -26,12 +26,9 @@ LONGER: Final = (1.3, 1.6, 2.0, 3.0)
 
 
 def remedy(judged: JudgedLaw) -> str | None:
-    """The first gentler design of a refused law that meets all requirements, as keys of the file.
+    """Return the first gentler design that meets all requirements, as keys of the file.
 
-    Returns
-    -------
-    str or None
-        None if the law is not refused for its margins or has nothing to scale.
+    None is returned if the law is not refused for its margins or has nothing to scale.
     """
     design, plant, report = judged.config.law, judged.config.plant, judged.robustness
     refused = report is not None and report.failures() and judged.step_s <= MOST_STEP_S
@@ -51,7 +48,7 @@ def remedy(judged: JudgedLaw) -> str | None:
                 gentler.law(plant), plant, judged.law.measured, with_delay_margin=False
             )
         except (ValueError, ArithmeticError):
-            continue  # can't be designed or judged either
+            continue  # It can't be designed or judged either.
         if not found.failures():
             return f"{_keys(gentler)} passes; a value between may, too"
     return _automatic(design, plant) or (
@@ -60,7 +57,7 @@ def remedy(judged: JudgedLaw) -> str | None:
 
 
 def _automatic(design: Design, plant: DesignPlant) -> str | None:
-    """The law of the kind that finds its own numbers; None if there is none."""
+    """Return the law of the kind that finds its own numbers; None if there is none."""
     try:
         if isinstance(design, ConstrainedDesign):
             SelfTunedDesign("self_tuned", design.sea).tuned(plant)
@@ -72,7 +69,7 @@ def _automatic(design: Design, plant: DesignPlant) -> str | None:
 
 
 def _keys(design: Design) -> str:
-    """What `scaled` scales, as it is written in a file."""
+    """Return the keys of the numbers that `scaled` scales, as written in a file."""
     if isinstance(design, ConstrainedDesign):
         return f"law.pressure_weight_rad2: {design.pressure_weight_rad2:.3g}"
     if isinstance(design, LQGDesign):

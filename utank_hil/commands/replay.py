@@ -1,4 +1,4 @@
-"""``utank-hil replay``: the recorded bus handed to the controller again."""
+"""``utank-hil replay``: gives recorded inputs to the controller again."""
 
 import json
 import math
@@ -85,7 +85,7 @@ def replay(
 
 
 def _replay_bus_log(log: Path, chosen: ControllerConfig | None) -> tuple[ReplayResult, list[str]]:
-    """Replay a log that knows of no configuration and no ticks."""
+    """Replay a log without configuration and ticks."""
     if chosen is None:
         fail(f"{log} says nothing of the controller: name its configuration by --config")
     entries = read_bus_log(log)
@@ -119,7 +119,7 @@ def _as_json(
 
 
 def _print_law(console: Terminal, law: LawVerdict) -> None:
-    """Print which law answered, and how far the one that is designed here is from the recorded."""
+    """Print which law answered, and how far the design made here is from the recorded law."""
     if law.why_not_recorded:
         console.say(f"the law designed here answered: {law.why_not_recorded}")
     if not law.differences:
@@ -132,7 +132,7 @@ def _print_law(console: Terminal, law: LawVerdict) -> None:
 
 
 def _law_as_json(law: LawVerdict) -> dict[str, Any]:
-    """The law's verdict; a deviation without a size, of arrays that can't be compared, is null."""
+    """Return the law's verdict; the deviation of arrays that can't be compared is null."""
     return {
         "recorded_law_ran": not law.why_not_recorded,
         "why_not": law.why_not_recorded,

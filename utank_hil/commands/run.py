@@ -48,7 +48,7 @@ from utank_hil.telemetry.replay_head import replay_head
 
 _REFUSALS: Final = (errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE, errno.ENOSPC)
 LOOK_TICKS: Final = 100
-"""Between two looks at the recorder."""
+"""Ticks between two checks of the recorder."""
 _COMMAND_LINE: Final = "from utank_hil.cli import main; main()"
 
 
@@ -69,7 +69,7 @@ def run(
         typer.Option(
             metavar="MB",
             min=0,
-            max=1e9,  # a float without a limit may be infinite
+            max=1e9,  # A float without a limit may be infinite.
             help="Remove the folder's oldest recordings beyond so much; without it none are.",
         ),
     ] = None,
@@ -163,16 +163,16 @@ def run(
                 manager.ready(f"{loaded.name} on {bus}")
             except OSError as error:
                 fail(f"NOTIFY_SOCKET: the manager does not answer: {error}", ExitCode.SYSTEM)
-            with suppress(PortError):  # the loop meets it too, and its node reacts
-                port.receive()  # what came before is old, and must not look fresh
+            with suppress(PortError):  # The loop meets the error too, and its node reacts.
+                port.receive()  # Old frames must not look new.
             try:
                 RealTimeLoop([on_bus], port, statistics=statistics).run(
                     ended, None if duration is None else round(duration * 1e9)
                 )
             finally:
-                manager.stopping()  # the watchdog must not cut short what an error has to say
+                manager.stopping()  # The watchdog must not interrupt an error message.
     kept = None if out is None else recording.summary
-    # where the output is full or gone (Rich ends by SystemExit), the exit code tells how it ended
+    # The exit code reports the end if the output is full or gone (Rich ends by SystemExit).
     with suppress(OSError, SystemExit):
         unlogged = None if announcer is None else announcer.error
         if unlogged is not None:
@@ -186,9 +186,9 @@ def run(
 
 @contextmanager
 def _refusals_named() -> Iterator[None]:
-    """End in words, and so that a service manager starts it again, where the system refuses.
+    """End with a message and a restart by the service manager if the system refuses a resource.
 
-    Any other error is a defect: it keeps its traceback, and is started again, too.
+    Any other error is a defect: it keeps its traceback, and also leads to a restart.
     """
     try:
         yield
@@ -215,7 +215,7 @@ def _port(stack: ExitStack, bus: str) -> SocketCanPort:
 
 
 def _log(folder: Path) -> Path | None:
-    """File for the log of events; `folder` is made."""
+    """Return the file of the event log; `folder` is created."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         (log,) = claimed_files(folder.resolve(), event_log.NAME)
@@ -232,7 +232,7 @@ def _announcer(
     folder: Path | None,
     log: Path | None,
 ) -> Announcer | None:
-    """What prints events, and keeps in `folder` the ships that retuning found."""
+    """Start the process that prints events and writes ships identified by retuning to `folder`."""
     if folder is None and all(work is None for work in works_of(loaded)):
         return None
     ships = None
@@ -276,7 +276,7 @@ def _recording(
     head: dict[str, Any] | None,
     log: Path | None,
 ) -> RunRecording:
-    """The ring that monitors read, and the recorder that keeps it in `folder`."""
+    """Open the ring that monitors read, and the recorder that writes it to `folder`."""
     if head is None:
         about = describe("run", loaded, Path.cwd(), options=context.params)
     else:
@@ -296,7 +296,7 @@ def _recording(
 
 
 def _desks(stack: ExitStack, loaded: ControllerConfig) -> tuple[Desk | None, Desk | None]:
-    """The retuner's and the estimator's end in this process, where they are configured."""
+    """Open the retuner's and the estimator's desks in this process, if configured."""
     desks = stack.enter_context(retuner_process(loaded))
     if any(desk is not None and not desk.alive for desk in desks):
         notes.say("nothing will be retuned or estimated", red="the retuner did not start:")
@@ -309,7 +309,7 @@ def _as_json(
     recording: RecordingSummary | None,
     refused: str,
 ) -> dict[str, Any]:
-    """What became of a run, for scripts."""
+    """Return the result of a run for scripts."""
     return {
         "exit_code": _code(node),
         "mode": node.mode.name,
@@ -324,7 +324,7 @@ def _as_json(
 
 
 def _code(node: ControllerNode) -> ExitCode:
-    """The code with which ``run`` ends, by the controller's state after its last tick."""
+    """Return the exit code of ``run`` by the controller's state after its last tick."""
     if node.measured.link_lost or node.fault is Fault.BUS_LOST:
         return ExitCode.BUS_LOST
     return ExitCode.FAULT if node.mode is Mode.FAULT else ExitCode.OK
@@ -336,12 +336,12 @@ def _print_summary(
     statistics: LoopStatistics,
     recording: RecordingSummary | None,
 ) -> None:
-    """What became of a run, for people."""
+    """Print the result of a run for people."""
     console = Terminal()
     console.table(timing_table({name: statistics}))
     for event in node.law.events:
         console.say(f"{(event.time_ns - node.start_ns) * 1e-9:8.1f} s {event_text(event)}")
-    what = "waiting for" if node.mode is Mode.INIT else "fault"  # what INIT waits for is no fault
+    what = "waiting for" if node.mode is Mode.INIT else "fault"  # INIT waits; that is no fault
     console.say(f"ended in {node.mode.name}, {what} {fault_text(node.fault)}")
     if node.law.error:
         console.say(node.law.error, red="the law failed:")
@@ -354,7 +354,7 @@ def _print_summary(
 
 
 def _show(stack: ExitStack) -> None:
-    """Have a process of its own show this one until the run ends; the run goes on without it."""
+    """Show this run in a separate process until it ends; the run continues without it."""
     command = [sys.executable, "-c", _COMMAND_LINE, "monitor", str(os.getpid())]
     try:
         process = stack.enter_context(subprocess.Popen(command, stdin=subprocess.DEVNULL))

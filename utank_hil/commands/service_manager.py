@@ -1,4 +1,4 @@
-"""What a service reports to systemd of ``Type=notify``: ready, alive, stopping (sd_notify(3))."""
+"""Notifications to systemd by a service of ``Type=notify``: ready, alive, stopping (sd_notify)."""
 
 import contextlib
 import os
@@ -10,9 +10,9 @@ from utank_hil.base.closing import Closing
 from utank_hil.base.tick import TICK_NS
 
 _FEEDS: Final = 4
-"""Signs of life in the watchdog's time."""
+"""Number of notifications within the watchdog's time."""
 READY_S: Final = 30.0
-"""A third of the time in which systemd expects a service to be ready."""
+"""Time limit of the ready notification: a third of systemd's for the start of a service."""
 
 
 class ServiceManager(Closing):
@@ -47,33 +47,27 @@ class ServiceManager(Closing):
             self._every_ticks = max(1, watchdog_ns // (_FEEDS * TICK_NS))
 
     def ready(self, status: str) -> None:
-        """Tell that the loop begins; from here on the watchdog waits for ticks.
+        """Report that the loop begins; from here on the watchdog waits for ticks.
 
-        It is said once, and a manager that misses it ends the program after a while. So it waits
-        for one that is busy.
-
-        Raises
-        ------
-        OSError
-            If the manager does not take it in time.
+        It is reported once, and a manager that misses it ends the program after a while, so this
+        waits for a busy manager. OSError is raised if the manager does not take it in time.
         """
         if self._socket is not None:
             self._socket.settimeout(READY_S)
-            words = " ".join(status.split())  # a line is an assignment of its own
+            words = " ".join(status.split())  # Each line is an assignment.
             self._socket.send(f"READY=1\nSTATUS={words}".encode(errors="replace"))
             self._socket.setblocking(False)
 
     def progress(self, ticks: int) -> None:
-        """Feed the watchdog by the loop's own progress: only as the count of ticks goes on.
+        """Notify the watchdog while the count of ticks advances; to be called before each tick.
 
-        To be called before each tick. It costs a datagram in a fraction of the watchdog's time and
-        never waits.
+        It costs a datagram in a fraction of the watchdog's time and never waits.
         """
         if self._every_ticks and ticks % self._every_ticks == 0:
             self._send("WATCHDOG=1")
 
     def stopping(self) -> None:
-        """Tell that the loop has ended."""
+        """Report that the loop has ended."""
         self._send("STOPPING=1")
 
     def close(self) -> None:
@@ -84,6 +78,6 @@ class ServiceManager(Closing):
 
     def _send(self, message: str) -> None:
         if self._socket is not None:
-            # a manager that is busy or starts anew misses a datagram; the next one follows
+            # A busy or restarting manager misses a datagram; the next one follows.
             with contextlib.suppress(OSError):
                 self._socket.send(message.encode())

@@ -1,4 +1,4 @@
-"""What the configuration files hold.
+"""Content of a controller's configuration.
 
 Sections that stand for a model or a node are the dataclasses of the code itself, so a key in a file
 is the parameter of the same name.
@@ -30,15 +30,15 @@ from utank_hil.safety.safety_limits import SafetyLimits
 _WITHOUT_PUMP: Final = (PassiveDesign, OnOffValveDesign, ClippedValveDesign)
 
 MOST_PRESSURE_PA: Final = 250e3
-"""What PUMP_CMD can ask for: the codec cuts what is more, and the controller would not know."""
+"""Largest pressure of PUMP_CMD: the codec cuts larger ones without the controller's knowledge."""
 LEAST_PAUSE_S: Final = 600.0
-"""Least time between two scheduled retunings."""
+"""Shortest time between two scheduled retunings."""
 MOST_PULSES_S: Final = 3600.0
-"""Longest identification: the pulses and the record are kept in memory."""
+"""Longest identification, because pulses and record are kept in memory."""
 
 
 class ControllerConfig(Section):
-    """The controller's side, ``configs/controllers``: what ``utank-hil run`` takes."""
+    """A controller's configuration, ``configs/controllers``: the argument of ``utank-hil run``."""
 
     noun: ClassVar = "controller"
 
@@ -46,21 +46,23 @@ class ControllerConfig(Section):
     vessel: Vessel
     law: AnyDesign
     delay_s: Annotated[float, Range(least=0, most=1)] = 0.05
-    """From the sampling of a measurement to the drive's answer to the command made of it."""
+    """Time from the sampling of a measurement to the drive's answer to its command."""
     accept_low_margins: bool = False
-    """Use the law even if it misses the required margins."""
+    """Whether the law is used even if it misses the required margins."""
     limits: Annotated[PumpLimits, Field(default_factory=dict, validate_default=True)]
-    """Those not given are the vessel's (`Vessel.default_limits`)."""
+    """Limits of the pump's command; missing ones are the vessel's (`Vessel.default_limits`)."""
     safety: Annotated[SafetyLimits, Field(default_factory=dict, validate_default=True)]
-    """Thresholds of the fault table; roll and heel not given: `Vessel.default_safety`."""
+    """Thresholds of the fault table; missing ones of roll and heel are from
+    `Vessel.default_safety`."""
     sensors: SensorFigures = SensorFigures()
     """Noise of the sensors, from which the monitors' thresholds follow."""
     command_timeout_ms: Annotated[float, Range(least=20, most=100)] = 50.0
     bit_rate: Annotated[int, Range(least=10_000, most=1_000_000)] = 250_000
     retuning: RetuningSettings | None = None
-    """How the controller may retune itself; without it, it never does."""
+    """Settings of retuning; without them the controller does not retune itself."""
     sea_estimate: EstimateSettings | None = None
-    """How waves and ship are estimated from the motion; without it, they are not."""
+    """Settings of the estimate of waves and ship from the motion; without them nothing is
+    estimated."""
 
     @field_validator("limits", "safety", mode="before")
     @classmethod
@@ -90,7 +92,7 @@ class ControllerConfig(Section):
         return self
 
     def warnings(self) -> list[Problem]:
-        """What is unusual in the vessel, and a limit of it that nothing watches."""
+        """Return what is unusual in the vessel, and limits without a monitor."""
         found = [(f"vessel.{key}", reason) for key, reason in self.vessel.warnings()]
         if self.vessel.least_gm_m is not None and self.sea_estimate is None:
             reason = "is not watched without the section sea_estimate: add `sea_estimate: {}`"
@@ -104,7 +106,7 @@ class ControllerConfig(Section):
         return found + self._pressure_warnings()
 
     def _pressure_warnings(self) -> list[Problem]:
-        """A pump that could capsize the ship: no monitor helps against a drive that hangs."""
+        """Warn of a pump that could capsize the ship: no monitor prevents a drive from hanging."""
         most_pa, roll_rad = self.limits.pressure_pa, self.safety.roll_limit_rad
         if self.vessel.pump is None:
             return []
@@ -160,7 +162,7 @@ class ControllerConfig(Section):
         ]
 
     def _roll_problems(self) -> list[Problem]:
-        """The protection against great roll must act while the ship still rights itself."""
+        """Return problems of roll limits beyond the range in which the ship rights itself."""
         limit_rad, righting = self.safety.roll_limit_rad, self.vessel.righting
         if limit_rad < righting.vanishing_rad:
             return []
@@ -240,7 +242,7 @@ class ControllerConfig(Section):
 
     @property
     def plant(self) -> DesignPlant:
-        """What the law is designed for."""
+        """The plant that the law is designed for."""
         vessel = self.vessel
         lag_s = 0.0 if vessel.pump is None else vessel.pump.lag_s
         valve = None if vessel.valve is None else vessel.valve.range(vessel.tank)

@@ -1,4 +1,4 @@
-"""What is said of a value that a configuration can't take: one table, in the project's words."""
+"""Words for values that a configuration can't take, in one table."""
 
 import re
 from datetime import date
@@ -38,20 +38,20 @@ WANTED: Final = {
     "datetime_from_date_parsing": _TIME,
     "datetime_object_invalid": _TIME,
 }
-"""What a value must be, by the type of the validation error."""
+"""Description of a valid value, by the type of the validation error."""
 
 _LONGEST = 60
 
 
 def words_for(error: Any, model: type[BaseModel]) -> str:
-    """What an error of validation is called in a file.
+    """Describe an error of validation for the reader of a file.
 
     Parameters
     ----------
     error : dict
         One of `pydantic.ValidationError.errors`.
     model : type of pydantic.BaseModel
-        What the configuration as a whole must hold.
+        Model of the whole configuration.
     """
     kind, value, context = error["type"], error["input"], error.get("ctx", {})
     if kind == "missing":
@@ -77,14 +77,14 @@ def words_for(error: Any, model: type[BaseModel]) -> str:
 
 
 def _one_of(context: Any, key: str) -> str:
-    """The choices of an error, and the one that was meant if it can be recognized."""
+    """Return the choices of an error, and the probably intended one."""
     choices = re.findall(r"'([^' ]*)'", context[key])
     near = nearest(str(context.get("tag", "")).lower(), choices)
     return f"one of {', '.join(choices)}" + (f"; did you mean {near}?" if near else "")
 
 
 def _shown(value: Any) -> str:
-    """A value as its writer would know it again."""
+    """Return a value as its writer recognizes it."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -99,7 +99,7 @@ def _shown(value: Any) -> str:
 
 
 def _remedy(wanted: str, value: Any) -> str:
-    """How to write a value so that it is what it is wanted to be; empty if that is not known."""
+    """Return how to write a value validly; empty if that is unknown."""
     if wanted == "text":
         return ": put it in quotes" if isinstance(value, bool | int | float | date) else ""
     if wanted not in (_NUMBER, _WHOLE) or not isinstance(value, str):

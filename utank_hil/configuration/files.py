@@ -1,4 +1,4 @@
-"""Reading configuration files: YAML that may name other YAML files, and errors that name the place.
+"""Reader of configuration files: YAML that may name other YAML files, with errors at their place.
 
 A value that is the name of a ``.yaml`` file stands for that file's content, and one that begins
 with ``./`` or ``../`` is the path of a data file; both are relative to the file they stand in.
@@ -20,7 +20,7 @@ from utank_hil.configuration.yaml_text import Key, YamlError, parse_yaml
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
 ALLOW_CODE: Final = "allow_code"
-"""Key of the validation's context: whether the file may name code that is run."""
+"""Key of the validation's context: whether the file may name code to run."""
 
 
 class Section(BaseModel):
@@ -28,25 +28,25 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     noun: ClassVar[str] = ""
-    """What a file of this is, in a word; empty for what is only a part of files."""
+    """Name of this kind of file in one word; empty for a part of files."""
 
     def warnings(self) -> list[Problem]:
-        """What is unusual in the section, by keys within it; it can be used all the same."""
+        """Return what is unusual but usable in the section, by keys within it."""
         return []
 
 
 @dataclass(frozen=True, slots=True)
 class ConfigProblem:
-    """One thing wrong in a configuration.
+    """One problem of a configuration.
 
     Attributes
     ----------
     file : Path
-        File in which the value stands.
+        File of the value.
     key : str
         Dotted key within that file; empty for the file as a whole.
     reason : str
-        What is wrong with it and what is expected.
+        What is wrong with the value, and what is expected.
     """
 
     file: Path
@@ -59,7 +59,7 @@ class ConfigProblem:
 
 
 class ConfigError(ValueError):
-    """A configuration can't be used; `problems` lists everything found, not just the first."""
+    """A configuration can't be used; `problems` lists all of them, not just the first."""
 
     def __init__(self, problems: list[ConfigProblem]) -> None:
         super().__init__("\n".join(str(problem) for problem in problems))
@@ -74,15 +74,16 @@ def load_config(path: Path | str, model: type[ModelT], *, allow_code: bool = Fal
     path : Path or str
         The YAML file.
     model : type of pydantic.BaseModel
-        What the file must hold.
+        Model of its content.
     allow_code : bool
-        Whether it may name code that is run (a law of the kind python).
+        Whether the file may name code to run (a law of the kind python).
 
     Raises
     ------
     ConfigError
         With every problem found: unreadable files, YAML errors, keys written twice, unknown or
-        missing keys and values out of range. What an unreadable file was to hold is not missed.
+        missing keys and values out of range. The content of an unreadable file is not reported
+        missing.
     """
     reader = _Reader()
     content = reader.read(Path(path))
@@ -106,16 +107,16 @@ def load_config(path: Path | str, model: type[ModelT], *, allow_code: bool = Fal
 
 
 def located(error: ParameterError, path: Path | str, key: str = "") -> ConfigError:
-    """What was found wrong with a configuration later, at the places where the values are written.
+    """Return later problems of a configuration at the places where the values are written.
 
     Parameters
     ----------
     error : ParameterError
-        Its problems are named by their keys in the configuration.
+        Problems named by their keys in the configuration.
     path : Path or str
-        The file that the configuration was read from.
+        The file of the configuration.
     key : str
-        Where in that file the configuration stands; empty for the file as a whole.
+        Place of the configuration in that file; empty for the file as a whole.
     """
     reader = _Reader()
     reader.read(Path(path))
@@ -125,12 +126,9 @@ def located(error: ParameterError, path: Path | str, key: str = "") -> ConfigErr
 
 
 def files_named(path: Path | str) -> dict[Key, Path]:
-    """The files that a configuration file names, by the keys at which their content stands.
+    """Return the files that a configuration file names, by the keys of their content.
 
-    Raises
-    ------
-    ConfigError
-        If one of them can't be read.
+    ConfigError is raised if one of them can't be read.
     """
     reader = _Reader()
     reader.read(Path(path))
@@ -142,24 +140,19 @@ def files_named(path: Path | str) -> dict[Key, Path]:
 def problems_in_words(
     error: ValidationError, content: Any, model: type[BaseModel]
 ) -> list[tuple[Key, str]]:
-    """What is wrong with a content that was put together, by the keys within it."""
+    """Describe the problems of assembled content, by the keys within it."""
     return [found for item in error.errors() for found in _in_words(item, content, model)]
 
 
 def kind_of(path: Path | str, models: dict[str, type[BaseModel]]) -> str:
-    """Which of several models a file is written for, by its keys.
+    """Return the kind of a file: the one whose own keys, those of no other, occur most often.
 
     Parameters
     ----------
     path : Path or str
         The YAML file.
     models : dict of str to type of pydantic.BaseModel
-        By the names of the kinds.
-
-    Returns
-    -------
-    str
-        Kind whose own keys, those of no other kind, occur most often.
+        Models by the names of the kinds.
 
     Raises
     ------
@@ -179,14 +172,14 @@ def kind_of(path: Path | str, models: dict[str, type[BaseModel]]) -> str:
 
 
 def _own(models: dict[str, type[BaseModel]]) -> Iterator[tuple[str, set[str]]]:
-    """Keys that no other of several models has."""
+    """Return the keys that only one of several models has, for each."""
     for kind, model in models.items():
         others = (other.model_fields for name, other in models.items() if name != kind)
         yield kind, set(model.model_fields).difference(*others)
 
 
 def _kind(content: dict[str, Any], models: dict[str, type[BaseModel]]) -> str | None:
-    """Which of several models has most of its own keys in a content; None if not one alone."""
+    """Return the model with most of its own keys in a content; None without a unique one."""
     found = {kind: len(own.intersection(content)) for kind, own in _own(models)}
     best = max(found.values())
     kinds = [kind for kind, count in found.items() if count == best]
@@ -194,7 +187,7 @@ def _kind(content: dict[str, Any], models: dict[str, type[BaseModel]]) -> str | 
 
 
 def _nouns(base: type[Section] = Section) -> Iterator[tuple[str, type[Section]]]:
-    """The models of whole files, by what they are."""
+    """Return the models of whole files by their nouns."""
     for model in base.__subclasses__():
         if model.noun:
             yield model.noun, model
@@ -202,12 +195,12 @@ def _nouns(base: type[Section] = Section) -> Iterator[tuple[str, type[Section]]]
 
 
 class _Reader:
-    """Puts the content of files together and remembers where each part of it was written.
+    """Assembles the content of files and remembers where each part was written.
 
     Attributes
     ----------
     unread : set of Key
-        Keys of the whole that stand for files which could not be read.
+        Keys of the whole whose files could not be read.
     origins : dict of Key to Path
         Files by the keys of the whole at which their content stands.
     """
@@ -220,14 +213,14 @@ class _Reader:
     def read(
         self, file: Path, key: Key = (), stack: tuple[Path, ...] = (), namer: Key | None = None
     ) -> Any:
-        """Content of a file, with the files it names put in place.
+        """Return the content of a file, with that of the files it names.
 
         Parameters
         ----------
         key : tuple
-            Where it stands in the whole.
+            Its place in the whole.
         stack : tuple of Path
-            Files that this one is being read for.
+            Files that led to this one.
         namer : tuple, optional
             Key of the value that names it.
         """
@@ -257,7 +250,7 @@ class _Reader:
         return self._resolve(content, key, file, (*stack, resolved))
 
     def refuse_strangers(self, content: Any, model: type[BaseModel]) -> None:
-        """Name the files that were written for something else than they are named for."""
+        """Report files of another kind than they are named for."""
         for key, file in sorted(self.origins.items(), key=lambda item: len(item[0])):
             part = content
             for name in key:
@@ -280,7 +273,7 @@ class _Reader:
             self.unread.add(key)
 
     def located(self, error: Any, content: Any, model: type[BaseModel]) -> list[ConfigProblem]:
-        """An error of validation as problems at the place where the value was written."""
+        """Return an error of validation as problems at the place where the value was written."""
         return [
             self.problem(at, reason)
             for at, reason in _in_words(error, content, model)
@@ -288,12 +281,12 @@ class _Reader:
         ]
 
     def problem(self, key: Key, reason: str) -> ConfigProblem:
-        """A problem at the place where the value of a key is written."""
+        """Return a problem at the place where the value of a key is written."""
         file, within = self._within(key)
         return ConfigProblem(file, _dotted(within), reason)
 
     def problem_at_name(self, key: Key, why: str) -> ConfigProblem:
-        """A problem of a whole file at the place where it is named."""
+        """Return a problem of a whole file at the place where it is named."""
         file, within = self._within(key[:-1])
         return ConfigProblem(file, _dotted((*within, key[-1])), why)
 
@@ -308,7 +301,7 @@ class _Reader:
             return {
                 name: self._resolve(item, (*key, name), file, stack)
                 for name, item in value.items()
-                if isinstance(name, str)  # another was a finding
+                if isinstance(name, str)  # Other names have been reported.
             }
         if isinstance(value, list):
             return [
@@ -321,7 +314,7 @@ class _Reader:
         return value
 
     def _within(self, key: Key) -> tuple[Path, Key]:
-        """File that holds `key`, and the rest of the key within that file."""
+        """Return the file that holds `key`, and the rest of the key within that file."""
         depth = max(n for n in range(len(key) + 1) if key[:n] in self.origins)
         return self.origins[key[:depth]], key[depth:]
 
@@ -341,7 +334,7 @@ def _split(name: str) -> Key:
 
 
 def _in_words(error: Any, content: Any, model: type[BaseModel]) -> list[tuple[Key, str]]:
-    """One error of pydantic: the keys as written, and what is wrong with each."""
+    """Return the keys as written, and the problem of each, of one pydantic error."""
     at = _written(error, content)
     if error["type"] == "union_tag_invalid":
         at = (*at, "kind")
@@ -352,7 +345,7 @@ def _in_words(error: Any, content: Any, model: type[BaseModel]) -> list[tuple[Ke
 
 
 def _written(error: Any, content: Any) -> Key:
-    """The key as it stands in the file: pydantic names the chosen kind of a section as well."""
+    """Return the key as written in the file, without the kind of a section that pydantic adds."""
     location = error["loc"]
     key: Key = ()
     for index, part in enumerate(location):

@@ -1,4 +1,4 @@
-"""Which keys a place in a configuration file may have, for the misspelt ones."""
+"""Valid keys of a place in a configuration file, for advice on misspelt ones."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
@@ -10,12 +10,12 @@ from pydantic import BaseModel
 
 
 def instead_of(model: type[BaseModel], location: tuple[str | int, ...]) -> str:
-    """Advice for a key that is not known; empty if none resembles it.
+    """Return advice for an unknown key; empty if none resembles it.
 
     Parameters
     ----------
     model : type of pydantic.BaseModel
-        What the configuration as a whole must hold.
+        Model of the whole configuration.
     location : tuple
         The key as a validation error gives it, with the kinds of sections chosen by kind.
     """
@@ -25,25 +25,25 @@ def instead_of(model: type[BaseModel], location: tuple[str | int, ...]) -> str:
 
 
 def nearest(written: str, known: Sequence[str]) -> str | None:
-    """The known word that a misspelt one most likely stands for; None if none resembles it."""
+    """Return the known word most similar to a misspelt one; None if none resembles it."""
     without_unit = [name for name in known if written and name.startswith(f"{written}_")]
     found = without_unit or get_close_matches(written, known, n=1, cutoff=0.8)
     return found[0] if found else None
 
 
 def known_keys(model: type[BaseModel], location: Iterable[str | int]) -> set[str]:
-    """Keys that may stand at a place, in any kind of section that may stand there."""
+    """Return the valid keys of a place, in any kind of section that may stand there."""
     return {name for place in _places(model, location) for name in _members(place)}
 
 
 def kinds_at(model: type[BaseModel], location: Iterable[str | int]) -> list[str]:
-    """Kinds of sections that may stand at a place."""
+    """Return the kinds of sections that may stand at a place."""
     kinds = (get_args(_members(place).get("kind")) for place in _places(model, location))
     return list(dict.fromkeys(kind for each in kinds for kind in each))
 
 
 def _places(model: type[BaseModel], location: Iterable[str | int]) -> list[Any]:
-    """What may stand at a place: sections, each kind of them alone."""
+    """Return the models of a place: sections, each kind of them alone."""
     places: list[Any] = [model]
     for part in location:
         places = [inner for place in places for inner in _inside(place, part)]
@@ -51,7 +51,7 @@ def _places(model: type[BaseModel], location: Iterable[str | int]) -> list[Any]:
 
 
 def _alone(place: Any) -> Iterator[Any]:
-    """The members of a union, without the marks on them."""
+    """Return the members of a union, without the marks on them."""
     origin, arguments = get_origin(place), get_args(place)
     if origin is Annotated:
         yield from _alone(arguments[0])
@@ -63,7 +63,7 @@ def _alone(place: Any) -> Iterator[Any]:
 
 
 def _members(place: Any) -> dict[str, Any]:
-    """Annotations of a section's keys, without the marks on them."""
+    """Return the annotations of a section's keys, without the marks on them."""
     if get_origin(place) in (Union, UnionType):
         return {name: hint for kind in get_args(place) for name, hint in _members(kind).items()}
     if isinstance(place, type) and issubclass(place, BaseModel):
@@ -75,12 +75,12 @@ def _members(place: Any) -> dict[str, Any]:
 
 
 def _inside(place: Any, part: str | int) -> Iterator[Any]:
-    """What stands at a key or index, or is the kind of that name."""
+    """Return the annotation at a key or index, or of the kind of that name."""
     origin, arguments = get_origin(place), get_args(place)
     if origin is Annotated:
         yield from _inside(arguments[0], part)
     elif origin in (Union, UnionType):
-        # a kind, or another key and its value
+        # The place is a kind, or another key and its value.
         key, _, value = str(part).rpartition(" ")
         members = [*_alone(place)]
         chosen = [each for each in members if value in get_args(_members(each).get(key or "kind"))]

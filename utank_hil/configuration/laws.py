@@ -44,14 +44,14 @@ _AUTO_KEYS: Final = frozenset(each.name for each in fields(AutoDesign))
 
 
 def _tag(content: Any) -> Any:
-    """Which design is meant: its kind, or `_AUTO`."""
+    """Return the tag of the design: its kind, or `_AUTO`."""
     given = content if isinstance(content, dict) else {"kind": getattr(content, "kind", None)}
     automatic = "tuning" in given or isinstance(content, AutoDesign)
     return _AUTO if automatic and given.get("kind") in LINEAR_KINDS else given.get("kind")
 
 
 def _without_numbers(content: Any) -> Any:
-    """Refuse what `AutoDesign` finds itself."""
+    """Refuse keys that `AutoDesign` computes itself."""
     if isinstance(content, dict):
         reason = "and tuning: auto exclude each other, for the numbers follow from it: remove one"
         given = [(name, reason) for name in content if name not in _AUTO_KEYS]
@@ -60,7 +60,7 @@ def _without_numbers(content: Any) -> Any:
 
 
 def _code_allowed(content: Any, info: ValidationInfo) -> Any:
-    """Refuse code unless whoever reads the file allows it."""
+    """Refuse code unless the reader of the file allows it."""
     if isinstance(content, dict) and not (info.context or {}).get(ALLOW_CODE):
         reason = (
             f"is python: it runs {content.get('factory', 'code')}, which the file names; allow it "
@@ -71,14 +71,7 @@ def _code_allowed(content: Any, info: ValidationInfo) -> Any:
 
 
 def _as_written(design: Any, sections: dict[Any, Any]) -> Any:
-    """Annotation of a design, some of whose sections a file may write in another way.
-
-    Parameters
-    ----------
-    design : type of LawDesign
-    sections : dict of type to any
-        Annotations to read such a section by, by its type.
-    """
+    """Return the annotation of a design whose `sections`, by type, have other written forms."""
     hints = get_type_hints(design, include_extras=True)
     own = {
         name: reduce(or_, (sections.get(each, each) for each in get_args(hint) or (hint,)))
@@ -115,7 +108,7 @@ def _default(parameter: Field[Any]) -> dict[str, Any]:
 
 
 def _one_of(written: dict[type[LawDesign], Any], automatic: Any) -> Any:
-    """Annotation of one of these designs, by how a file writes it, its numbers given or not."""
+    """Return the annotation of one of these designs, with or without given numbers."""
     given = [
         Annotated[each, Tag(kind)]
         for design, each in written.items()
@@ -131,7 +124,7 @@ else:
     _valves = (OnOffValveDesign, ClippedValveDesign, PumpWithValveDesign)
     _sections = {SeaModel: LawSea, SystemMatrices: SystemFile}
     _automatic = Annotated[_as_written(AutoDesign, _sections), BeforeValidator(_without_numbers)]
-    # the design within another one is that of a pump, and never code
+    # The design within another one is that of a pump, and never code.
     _of_a_pump = {
         each: _as_written(each, _sections)
         for each in _designs
@@ -144,7 +137,7 @@ else:
 
 
 def sample_time(law: LawDesign) -> tuple[str, float] | None:
-    """Dotted key below ``law`` and value of a law's sample time, if that is a parameter of it."""
+    """Return the key below ``law`` and the value of a law's sample time, if it is a parameter."""
     name, part = "", law
     for section in ("pump", "predictor", "system"):
         if hasattr(part, section):

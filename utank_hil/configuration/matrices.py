@@ -36,7 +36,7 @@ def read_system(path: Path) -> dict[str, Any]:
         content = readers[path.suffix](path)
     except OSError as error:
         raise ValueError(f"{path} can't be read: {error.strerror or error}") from error
-    except Exception as error:  # readers raise what they like at a file that is broken
+    except Exception as error:  # Readers raise any exception at a damaged file.
         raise ValueError(f"{path} holds no matrices: {error}") from error
     found = [name for name in _SAMPLE_TIMES if name in content]
     missing = [name for name in _NAMES if name not in content]
@@ -76,7 +76,7 @@ def _npz(path: Path) -> Mapping[str, Any]:
 
 
 def _mat(path: Path) -> Mapping[str, Any]:
-    from scipy.io import loadmat  # here, because few configurations need it
+    from scipy.io import loadmat  # Few configurations need this import.
 
     content: dict[str, Any] = loadmat(path, appendmat=False)
     return {name: value for name, value in content.items() if not name.startswith("__")}

@@ -1,4 +1,4 @@
-"""The section ``ship`` as it may be written: `RollShip` in the keys of a naval architect too.
+"""The section ``ship`` of a file: `RollShip`, also in the keys of a naval architect.
 
 With displacement D in kg, metacentric height GM, roll period T and damping ratio zeta, all of the
 ship without the tank's water::
@@ -6,7 +6,7 @@ ship without the tank's water::
     stiffness = D g GM        inertia = stiffness (T / 2 pi)^2
     linear damping = 2 zeta sqrt(inertia stiffness)
 
-Without a period, it is that of the weather criterion, IS Code 2008, part A, 2.3.4 (beam B, mean
+A missing period is that of the weather criterion, IS Code 2008, part A, 2.3.4 (beam B, mean
 draught d, length L at the waterline)::
 
     T = 2 C B / sqrt(GM),     C = 0.373 + 0.023 B / d - 0.043 L / 100
@@ -24,7 +24,7 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 NOT_GIVEN = math.nan
-"""No key of a file can have this value."""
+"""Mark of a missing key; no key of a file can have this value."""
 
 _PAIRS = (
     ("displacement_t", "displacement_n"),
@@ -32,7 +32,7 @@ _PAIRS = (
     ("roll_period_s", "inertia_kg_m2"),
     ("damping_ratio", "damping_nms_rad"),
 )
-"""A naval architect's key and that of `RollShip` for the same quantity."""
+"""Pairs of a naval architect's key and `RollShip`'s for the same quantity."""
 
 _UNITS = {
     "displacement_t": "it is in tonnes",
@@ -49,7 +49,7 @@ _Length = Annotated[float, Range(above=0, most=1e4)]
 def weather_criterion_period_s(
     beam_m: float, draught_m: float, length_m: float, gm_m: float
 ) -> float:
-    """Roll period that the IS Code 2008 (part A, 2.3.4) takes for a ship.
+    """Return the roll period of the IS Code 2008 (part A, 2.3.4).
 
     Parameters
     ----------
@@ -64,21 +64,21 @@ def weather_criterion_period_s(
 
 @dataclass(frozen=True, slots=True)
 class WrittenShip(RollShip):
-    """A ship as a file has it: each quantity by one of the keys that can give it.
+    """A ship as written in a file: each quantity by one of its possible keys.
 
     Parameters
     ----------
     displacement_t : float
-        Of the ship without the tank's water; instead of `displacement_n`.
+        Displacement of the ship without the tank's water; instead of `displacement_n`.
     gm_m : float
         Metacentric height without the tank's water; with `displacement_t` instead of
         `stiffness_nm_rad`.
     roll_period_s : float
         Natural roll period without the tank's water; instead of `inertia_kg_m2`.
     beam_m, draught_m, length_m : float
-        Of the hull at the waterline; instead of `roll_period_s`.
+        Dimensions of the hull at the waterline; instead of `roll_period_s`.
     damping_ratio : float
-        Of the ship's roll; instead of `damping_nms_rad`.
+        Damping ratio of the ship's roll; instead of `damping_nms_rad`.
 
     Raises
     ------
@@ -107,7 +107,7 @@ class WrittenShip(RollShip):
         refuse("ship", twice or self._missing())
 
     def gives(self, name: str) -> bool:
-        """Whether a key stands in the file."""
+        """Whether the file has a key."""
         return not math.isnan(getattr(self, name))
 
     @property
@@ -116,13 +116,7 @@ class WrittenShip(RollShip):
         return not (self.gives("roll_period_s") or self.gives("inertia_kg_m2"))
 
     def ship(self) -> RollShip:
-        """The ship in the terms of its equation.
-
-        Raises
-        ------
-        ValueError
-            As `RollShip`.
-        """
+        """Return the ship as a `RollShip`, with its errors."""
         displacement_n = self._displacement_n
         stiffness = self.stiffness_nm_rad
         if self.gives("gm_m"):
@@ -147,7 +141,7 @@ class WrittenShip(RollShip):
             raise ParameterError(error.owner, problems) from error
 
     def _source(self, name: str) -> str:
-        """The key that a parameter of the ship was computed from."""
+        """Return the key that a parameter of the ship was computed from."""
         for own, other in _PAIRS:
             if name == other and self.gives(own):
                 return own
@@ -197,12 +191,12 @@ class WrittenShip(RollShip):
 
 
 def in_written_keys(problems: list[Problem], written: Collection[str]) -> list[Problem]:
-    """Problems of a vessel's ship at the keys that the file has, with the units of those.
+    """Return problems of a vessel's ship at the keys of the file, with their units.
 
     Parameters
     ----------
     problems : list of Problem
-        Named by the keys of the vessel.
+        Problems by the keys of the vessel.
     written : collection of str
         Keys of the ship in its file.
     """
@@ -211,13 +205,13 @@ def in_written_keys(problems: list[Problem], written: Collection[str]) -> list[P
 
 def _in_written_key(name: str, reason: str, written: Collection[str]) -> Problem:
     section, _, key = name.partition(".")
-    weight = key == "displacement"  # by whichever key it is given
+    weight = key == "displacement"  # The weight has one of two keys.
     if weight:
         key, name = "displacement_n", "ship.displacement_n"
     if section != "ship" or key in written:
         return name, reason
     if key == "displacement_n" and "gm_m" in written and not weight:
-        key = "stiffness_nm_rad"  # the radius of gyration is that of GM and period, at any weight
+        key = "stiffness_nm_rad"  # The radius of gyration is that of GM and period, at any weight.
     by_formula = "beam_m" if key == "inertia_kg_m2" else key
     own = next((own for own, other in _PAIRS if other == key and own in written), by_formula)
     if own not in _UNITS:

@@ -1,4 +1,4 @@
-"""Where the shipped configurations are."""
+"""Place of the shipped configurations."""
 
 import sys
 from pathlib import Path
@@ -8,4 +8,4 @@ _CHECKOUT: Final = Path(__file__).resolve().parents[2] / "configs"
 CONFIGS: Final = (
     _CHECKOUT if _CHECKOUT.is_dir() else Path(sys.prefix) / "share" / "utank-hil" / "configs"
 )
-"""The shipped configurations: of the checkout, or installed with the package."""
+"""Folder of the shipped configurations: in the checkout, or installed with the package."""

@@ -1,6 +1,6 @@
-"""Seas in configuration files: the spectra that a scenario and a law can name alike.
+"""Seas in configuration files: spectra for scenarios and laws.
 
-A scenario draws its waves from one; a law that foresees the waves is made for one.
+A scenario draws its waves from a spectrum; a law that foresees waves is designed for one.
 """
 
 import math
@@ -56,7 +56,7 @@ class _GivenSea(Section):
         return self
 
     def warnings(self) -> list[Problem]:
-        """Steeper than storms are: DNV-RP-C205, limiting average steepness."""
+        """Warn of waves steeper than in storms: DNV-RP-C205, limiting average steepness."""
         limit = float(np.interp(self.tp_s, (8, 15), (1 / 15, 1 / 25)))
         steepness = _steepness(self.hs_m, self.tp_s)
         if steepness <= limit:
@@ -69,7 +69,7 @@ class _GivenSea(Section):
 
 
 def _steepness(hs_m: float, tp_s: float) -> float:
-    """Significant height per length of a wave of the peak period."""
+    """Return the significant height per length of a wave of the peak period."""
     return 2 * math.pi * hs_m / (GRAVITY_M_S2 * tp_s**2)
 
 
@@ -95,7 +95,7 @@ class IttcSpectrum(_GivenSea):
 
 
 class PiersonMoskowitzSpectrum(Section):
-    """A fully developed sea: the height settles the period."""
+    """A fully developed sea, whose period follows from its height."""
 
     kind: Literal["pierson_moskowitz"]
     hs_m: WaveHeight
@@ -110,7 +110,7 @@ class MeasuredSpectrum(Section):
 
     kind: Literal["measured"]
     file: Path
-    """Spectral density, NDBC's yearly or 45-day layout."""
+    """File of the spectral density, in NDBC's yearly or 45-day layout."""
     time: datetime
     """Start of the record's hour as written in the file, UTC unless it names another zone."""
 
@@ -136,7 +136,7 @@ class MeasuredSpectrum(Section):
 
 
 def utc(time: datetime) -> datetime:
-    """A time as measured files have it: UTC, without a zone; a time without one is UTC."""
+    """Return a time in UTC without a zone; a time without a zone is UTC."""
     return time if time.tzinfo is None else time.astimezone(UTC).replace(tzinfo=None)
 
 
@@ -144,14 +144,14 @@ AnySpectrum = Annotated[
     MeasuredSpectrum | JonswapSpectrum | IttcSpectrum | PiersonMoskowitzSpectrum,
     Field(discriminator="kind"),
 ]
-"""A spectrum by its kind."""
+"""A spectrum, chosen by its kind."""
 
 _SPECTRUM: Final[TypeAdapter[Any]] = TypeAdapter(AnySpectrum)
 _BANDS: Final = ("frequency_hz", "density_m2_hz")
 
 
 def _bands_of(content: Any) -> Any:
-    """The section ``sea`` of a law with its spectrum as bands, if it names one by its kind."""
+    """Return the section ``sea`` of a law with a spectrum named by kind as bands."""
     if not (isinstance(content, dict) and "kind" in content):
         return content
     given = [name for name in _BANDS if name in content]
@@ -173,13 +173,7 @@ LawSea = Annotated[SeaModel, BeforeValidator(_bands_of)]
 
 
 def read_spectra(file: Path, direction_file: Path | None = None) -> MeasuredSpectra:
-    """Spectra of a file; pydantic lists ValueErrors with their key, and no other errors.
-
-    Raises
-    ------
-    ValueError
-        If a file can't be read, or does not hold what it should.
-    """
+    """Return the spectra of a file; any error is a ValueError, which pydantic lists by key."""
     try:
         return load_ndbc(file, direction_file)
     except OSError as error:

@@ -22,10 +22,10 @@ from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.safety.safety_limits import SafetyLimits
 
 NOT_AVAILABLE = 0xFFF
-"""Twelve bits carry the hash on the bus; all ones means that there is none."""
+"""Hash that means none: twelve bits carry it on the bus, and all are ones."""
 
-# default limits keep the first ship's ratios to its pump and tank: the laws were
-# tuned within these
+# Default limits keep the first ship's ratios to its pump and tank,
+# because the laws were tuned within these.
 _RATE_PER_PRESSURE: Final = 2.0
 _LEVEL_SHARE: Final = 3.85 / 4.88
 
@@ -40,16 +40,16 @@ class Vessel(Section):
     tank: Tank
     pump: Pump | None = None
     valve: Valve | None = None
-    """Without pump and valve the tank is passive."""
+    """Valve of a semi-active tank; without pump and valve the tank is passive."""
     least_gm_m: Annotated[float, Range(above=0, most=1e3)] | None = None
     """Limit of the stability booklet on the metacentric height, tank water free to move."""
     redundancy: Redundancy = NO_REDUNDANCY
-    """What the ship has twice, or by wires of its own."""
-    _written: frozenset[str] = frozenset()  # keys of the ship in its file
+    """Equipment that the ship has twice, or with separate wires."""
+    _written: frozenset[str] = frozenset()  # These are the keys of the ship in its file.
 
     @property
     def version(self) -> int:
-        """Hash of everything but the name, for the nodes to compare before arming."""
+        """Hash of everything but the name, compared by the nodes before arming."""
         parts = (self.ship, self.tank, self.pump)
         content = [None if part is None else not_by_default(part) for part in parts]
         if self.valve is not None:
@@ -61,7 +61,7 @@ class Vessel(Section):
 
     @property
     def default_limits(self) -> dict[str, float]:
-        """Limits of the pump's command where the user sets none."""
+        """Limits of the pump's command for keys that the user does not set."""
         level = {"level_m": self.tank.level_limit_m * _LEVEL_SHARE}
         pump = self.pump
         if pump is None:
@@ -77,7 +77,7 @@ class Vessel(Section):
     @field_validator("pump", mode="before")
     @classmethod
     def _by_similarity(cls, pump: Any, info: ValidationInfo) -> Any:
-        """Parameters of the pump that are not given: the first ship's pump, scaled."""
+        """Complete the pump's parameters by scaling the first ship's pump."""
         if not isinstance(pump, dict):
             return pump
         tank = info.data.get("tank")
@@ -85,18 +85,18 @@ class Vessel(Section):
         try:
             similar = Pump.for_duct(float(area_m2), float(pump["max_pressure_pa"]))
         except (KeyError, TypeError, ValueError, OverflowError):
-            similar = Pump.for_duct(1.0)  # what is wrong with these two is found at their keys
+            similar = Pump.for_duct(1.0)  # Problems of these two are found at their keys.
         others = {name: of for name, of in asdict(similar).items() if name != "max_pressure_pa"}
         return others | pump
 
     @property
     def righting(self) -> RightingRange:
-        """How far the ship rights itself with the tank's water."""
+        """Righting range of the ship with the tank's water."""
         return righting_range(RollModel(self.ship, self.tank))
 
     @property
     def default_safety(self) -> dict[str, float]:
-        """Limits of roll and heel, where the ship rights itself less far than by `SafetyLimits`."""
+        """Limits of roll and heel for a ship with a short righting range (`SafetyLimits`)."""
         greatest_rad = math.floor(100 * self.righting.greatest_rad) / 100
         most = SafetyLimits()
         return {
@@ -122,7 +122,7 @@ class Vessel(Section):
 
     @property
     def assumptions(self) -> tuple[str, ...]:
-        """What was taken for granted because the file does not say it, in words."""
+        """Return the assumptions in place of keys that the file does not have."""
         if not self._written or self._written & {"roll_period_s", "inertia_kg_m2"}:
             return ()
         period_s = 2 * math.pi / self.ship.natural_frequency_rad_s
@@ -132,11 +132,11 @@ class Vessel(Section):
         )
 
     def warnings(self) -> list[Problem]:
-        """What is unusual in the vessel."""
+        """Return what is unusual in the vessel."""
         return in_written_keys(vessel_warnings(self.ship, self.tank, self.pump), self._written)
 
 
 def not_by_default(part: Any) -> dict[str, Any]:
-    """The parameters that differ from their default, so that a new one changes no version."""
+    """Return parameters that differ from their default, so that a new one changes no version."""
     defaults = {field.name: field.default for field in fields(part)}
     return {name: value for name, value in asdict(part).items() if value != defaults[name]}

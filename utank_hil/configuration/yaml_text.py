@@ -1,4 +1,4 @@
-"""YAML as configuration files are written in it: what plain YAML passes over is a problem here."""
+"""YAML of configuration files, stricter than plain YAML."""
 
 import re
 from collections.abc import Iterator
@@ -18,11 +18,11 @@ _NUMBERS = (_INT, _FLOAT)
 
 
 class YamlError(ValueError):
-    """Text that holds nothing to go on with."""
+    """The text has no usable content."""
 
 
 class _Loader(yaml.SafeLoader):
-    """Tells the place of a value that looks like a date or number but is none.
+    """Loader that reports the place of a value that resembles a date or number but is none.
 
     Numbers are decimal, as in YAML 1.2: ``1e7`` is one, ``010`` is ten, ``1:30`` is text.
     """
@@ -54,12 +54,9 @@ _Loader.add_constructor(_INT, lambda _, node: int(node.value))
 
 
 def parse_yaml(text: str) -> tuple[Any, list[Finding]]:
-    """Content of a text, and the keys in it that are written twice or are no names.
+    """Return the content of a text, and its keys that are written twice or are no names.
 
-    Raises
-    ------
-    YamlError
-        If the text is not valid YAML, or nested so that it has no end.
+    YamlError is raised if the text is not valid YAML, or nested without end.
     """
     try:
         loader = _Loader(text)
@@ -93,7 +90,7 @@ def _findings(node: yaml.Node, key: Key, above: tuple[yaml.Node, ...]) -> Iterat
     for name, value in node.value:
         line = name.start_mark.line + 1
         if not isinstance(name, yaml.ScalarNode):
-            continue  # can be no key, and is refused when it is made
+            continue  # It can be no key, and is refused when it is made.
         if name.tag not in (_STRING, _MERGE):
             kind = name.tag.rpartition(":")[2]
             if name.tag == _INT and node.flow_style and not value.value and lines:  # {hs_m: 9,5}

@@ -1,9 +1,9 @@
-"""Is a ship with its tank and pump one that can be: what a wrong unit or a slip of a digit gives.
+"""Plausibility of a ship with its tank and pump, to find wrong units and slips of a digit.
 
-Each figure is compared with what ships, tanks and pumps have. Far outside, by more than a hundred
-or so, the file is refused at the key that is most likely wrong; outside, it is a warning. The
-figures are ratios to the vessel's own size and period, so that a model in a basin passes as a
-container ship does. The limits are wide: they find slips, they do not judge a design.
+Each figure is compared with those of real ships, tanks and pumps. A value far outside, by a factor
+of a hundred or so, is refused at the key that is most likely wrong; one outside is a warning. The
+figures are ratios to the vessel's own size and period, so that a basin model passes like a
+container ship. The limits are wide: they find slips and do not judge a design.
 """
 
 from collections.abc import Callable, Iterator
@@ -37,13 +37,13 @@ from utank_hil.dynamics.tank import Tank
 __all__ = ["free_surface_nm_rad", "holding", "tank_problems", "vessel_problems", "vessel_warnings"]
 
 LEAST_RIGHTING_RAD: Final = 0.01
-"""Below it the figures are wrong: half a degree of heel would capsize the ship."""
+"""Smallest range of righting: below, half a degree of heel would capsize the ship."""
 
 
 def vessel_problems(ship: RollShip, tank: Tank, pump: Pump | None) -> list[Problem]:
-    """Why a vessel can't be; only the first cause, as the figures that follow from it mislead."""
+    """Return why a vessel is impossible: the first cause, because dependent figures mislead."""
     for stage in _stages(ship, tank, pump):
-        with np.errstate(all="ignore"):  # numbers that overflow are refused by their figure
+        with np.errstate(all="ignore"):  # Overflowing numbers are refused by their figure.
             found = [(each.key, each.words) for each in stage() if each.refused]
         if found:
             return found
@@ -51,7 +51,7 @@ def vessel_problems(ship: RollShip, tank: Tank, pump: Pump | None) -> list[Probl
 
 
 def vessel_warnings(ship: RollShip, tank: Tank, pump: Pump | None) -> list[Problem]:
-    """What is unusual in a vessel that has no problems."""
+    """Return what is unusual in a vessel without problems."""
     return [
         (each.key, each.words)
         for stage in _stages(ship, tank, pump)
@@ -61,9 +61,9 @@ def vessel_warnings(ship: RollShip, tank: Tank, pump: Pump | None) -> list[Probl
 
 
 def tank_problems(ship: RollShip, tank: Tank) -> list[Problem]:
-    """Why a ship can't carry a tank: with its water, inertia and stability must stay positive.
+    """Return why a ship can't carry a tank.
 
-    So must the righting moment over some heel.
+    Inertia, stability, and the righting moment over some heel must stay positive with its water.
     """
     mass, _, stiffness = coupled_matrices(ship, tank)
     water = mass[1, 1] * (tank.width_m / 2) ** 2  # about the ship's axis, as in mass_ratio
@@ -94,7 +94,7 @@ def tank_problems(ship: RollShip, tank: Tank) -> list[Problem]:
 def _stages(
     ship: RollShip, tank: Tank, pump: Pump | None
 ) -> Iterator[Callable[[], Iterator[Figure]]]:
-    """The parts of a vessel in an order in which each is judged by those before it."""
+    """Return the parts of a vessel in an order in which each is judged with those before it."""
     yield partial(of_sizes, tank)
     yield partial(of_ship, ship, tank)
     yield partial(of_weight, ship, tank)

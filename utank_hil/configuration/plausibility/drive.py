@@ -10,7 +10,7 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 
 def holding(pump: Pump) -> tuple[float, float, float]:
-    """Speed in rad/s, torque in N m and power in W that hold the pump's pressure in still water."""
+    """Return speed (rad/s), torque (N m) and power (W) that hold the pressure in still water."""
     coefficients = pump.coefficients
     speed = pump_speed(pump.max_pressure_pa, 0.0, coefficients)
     torque, _ = pump_load(speed, 0.0, coefficients)
@@ -18,7 +18,7 @@ def holding(pump: Pump) -> tuple[float, float, float]:
 
 
 def of_pump(tank: Tank, pump: Pump) -> Iterator[Figure]:
-    """Pressure and size, for the tank that it stands in."""
+    """Return figures of pressure and size, relative to the tank."""
     pressure_pa = pump.max_pressure_pa
     head_m = pressure_pa / (tank.density_kg_m3 * GRAVITY_M_S2)
     head = (
@@ -42,7 +42,7 @@ def of_pump(tank: Tank, pump: Pump) -> Iterator[Figure]:
 
 
 def of_motor(pump: Pump) -> Iterator[Figure]:
-    """What the motor has of what its greatest pressure takes even in still water."""
+    """Return figures of the motor, relative to the greatest pressure in still water."""
     needs = zip(
         ("max_speed_rad_s", "max_torque_nm", "max_power_w"),
         holding(pump),
@@ -65,7 +65,7 @@ def of_motor(pump: Pump) -> Iterator[Figure]:
 
 
 def of_quickness(ship: RollShip, pump: Pump) -> Iterator[Figure]:
-    """How fast the pump is beside the ship."""
+    """Return figures of the pump's speed of response, relative to the ship."""
     roll_s = 2 * math.pi / ship.natural_frequency_rad_s
     rise_s = pump.max_pressure_pa / pump.max_pressure_rate_pa_s
     yield Figure(

@@ -1,4 +1,4 @@
-"""A figure of a vessel and where it may lie."""
+"""A figure of a vessel with its plausible range."""
 
 import math
 from dataclasses import dataclass
@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A figure of a vessel, and where it may lie.
+    """A figure of a vessel with its plausible range.
 
     Parameters
     ----------
     key : str
-        What is most likely wrong when it lies outside.
+        Key that is most likely wrong if the figure lies outside.
     low, high : str
-        What is wrong with a value too low and too high, and the remedy.
+        Problem and remedy of a value too low and too high.
     """
 
     key: str
@@ -27,16 +27,16 @@ class Figure:
 
     @property
     def words(self) -> str:
-        """What is wrong, and the remedy."""
+        """Problem and remedy in words."""
         words = self.low if self.value < self.warned_below else self.high
-        return words or "gives a figure that overflows"  # of what is not a number
+        return words or "gives a figure that overflows"  # The value is not a number.
 
     @property
     def refused(self) -> bool:
-        """Whether it can't be."""
+        """Whether the value is impossible."""
         return not self.refused_below <= self.value <= self.refused_above
 
     @property
     def warned(self) -> bool:
-        """Whether it can be, but hardly is."""
+        """Whether the value is possible, but unusual."""
         return not self.refused and not self.warned_below <= self.value <= self.warned_above

@@ -9,17 +9,17 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 _ROLL_RAD = math.radians(10)
-_PER_1000 = math.sqrt(1000)  # of a period, where inertia or stiffness is in thousands
+_PER_1000 = math.sqrt(1000)  # period factor if inertia or stiffness is in thousands
 
 
 def free_surface_nm_rad(ship: RollShip, tank: Tank) -> float:
-    """Stiffness that the tank's free surface takes from the ship."""
+    """Return the stiffness that the tank's free surface takes from the ship."""
     _, _, stiffness = coupled_matrices(ship, tank)
     return float(stiffness[0, 1] ** 2 / stiffness[1, 1])
 
 
 def of_sizes(tank: Tank) -> Iterator[Figure]:
-    """What the others are measured by."""
+    """Return figures of the sizes that the other figures are relative to."""
     wide = f"is {tank.width_m:g} m, wider than any ship: it is in metres, not millimetres"
     yield Figure("tank.width_m", tank.width_m, warned_above=80, refused_above=100, high=wide)
     heavy = "is no liquid's density: water has 1000 to 1030"
@@ -30,13 +30,13 @@ def of_sizes(tank: Tank) -> Iterator[Figure]:
 
 
 def of_ship(ship: RollShip, tank: Tank) -> Iterator[Figure]:
-    """Roll period, damping and radius of gyration, for a ship as wide as the tank."""
+    """Return roll period, damping and radius of gyration for a ship as wide as the tank."""
     frequency = ship.natural_frequency_rad_s
     period_s = 2 * math.pi / frequency
     beam = f"for a ship that holds a tank {tank.width_m:g} m wide"
     yield Figure(
         "ship.inertia_kg_m2",
-        period_s / math.sqrt(tank.width_m),  # ships' periods rise with the root of their size
+        period_s / math.sqrt(tank.width_m),  # Ships' periods rise with the root of their size.
         0.35,
         0.9,
         f"gives a roll period of {period_s:.2g} s, short {beam}: inertia_kg_m2 is in kg m2 (in t "
@@ -71,7 +71,7 @@ def of_ship(ship: RollShip, tank: Tank) -> Iterator[Figure]:
 
 
 def of_weight(ship: RollShip, tank: Tank) -> Iterator[Figure]:
-    """Radius of gyration, where the weight is known."""
+    """Return the radius of gyration, if the weight is known."""
     if ship.displacement_n <= 0:
         return
     gyration_m = math.sqrt(ship.inertia_kg_m2 * GRAVITY_M_S2 / ship.displacement_n)
@@ -94,7 +94,7 @@ def of_weight(ship: RollShip, tank: Tank) -> Iterator[Figure]:
 
 
 def of_tank(ship: RollShip, tank: Tank) -> Iterator[Figure]:
-    """Losses, place and water of the tank."""
+    """Return figures of losses, place and water of the tank."""
     damping = tank.damping_ratio
     yield Figure(
         "tank.damping_ratio",
@@ -126,7 +126,7 @@ def of_tank(ship: RollShip, tank: Tank) -> Iterator[Figure]:
 
 
 def _water(ship: RollShip, tank: Tank) -> Iterator[Figure]:
-    """The water's period, the duct and what the free surface takes."""
+    """Return figures of the water's period, the duct and the free surface."""
     yield Figure(
         "tank.duct_area_m2",
         tank.duct_area_m2 / tank.reservoir_area_m2,
