@@ -1,7 +1,7 @@
 """Closed-form response of ship and tank to sinusoidal pump pressure and wave moment, (2.22)-(2.26).
 
-Written as in the thesis, with the tank angle tau = 2 h / L and in real arithmetic. So it is an
-independent check of complex arithmetic on the matrices. Errors of the print are corrected
+The equations are those of the thesis, with the tank angle tau = 2 h / L and in real arithmetic, as
+an independent check of complex arithmetic on the matrices. Errors of the print are corrected
 (docs/thesis.md):
 
 * every pump term carries f^2, P0 / k_hh -> f^2 P0 / k_hh (A, B, C, D and (2.25));
@@ -51,12 +51,7 @@ def harmonic_response(
     """Steady response of the linear coupled model to sinusoidal inputs, thesis (2.22) corrected.
 
     With one amplitude zero it is the wave response (2.23), (2.24) or pump response (2.25), (2.26).
-
-    Parameters
-    ----------
-    frequency_rad_s : array_like, shape (n,)
-    pressure_pa, wave_moment_nm : float
-        Amplitudes of the inputs.
+    `frequency_rad_s` has shape (n,); `pressure_pa` and `wave_moment_nm` are amplitudes.
     """
     mass, damping, stiffness = coupled_matrices(ship, tank)
     half = tank.width_m / 2  # level per tank angle; turns the level's force into a moment

@@ -1,9 +1,9 @@
 """Compiled fixed-step integration of the nonlinear coupled model; imports numba, so import it late.
 
-Classical Runge-Kutta of order four. The wave moment is a sum of components ``amplitude
-cos(frequency t + phase)``. It is advanced by rotating one phasor per component, without cosines,
-and recomputed from the cosines every `REFRESH` steps, so that rounding errors do not accumulate.
-Pump pressure and valve loss are held over whole steps.
+The method is the classical Runge-Kutta of order four. The wave moment is a sum of components
+``amplitude cos(frequency t + phase)``. It is advanced by rotating one phasor per component, without
+cosines, and recomputed from the cosines every `REFRESH` steps, so that rounding errors do not
+accumulate. Pump pressure and valve loss are held over whole steps.
 
 A step in which the level passes its limit ends at the impact, found by the Illinois method. The
 impulse is applied, and the rest of the step follows.
@@ -19,13 +19,13 @@ from utank_hil.dynamics.jit import njit
 from utank_hil.dynamics.nonlinear import RollCoefficients
 from utank_hil.dynamics.reference import INSIDE_M, REST_M_S
 
-REFRESH = 256  # a power of two
-STRIKES_PER_STEP = 8  # beyond these the water comes to rest at the stop
-# entries of a ship's summary; the last two are the energy that impacts took, and damping in the
-# steps with impacts
+REFRESH = 256  # This is a power of two.
+STRIKES_PER_STEP = 8  # The water comes to rest at the stop beyond these.
+# Entries of a ship's summary; the last two are the energy of impacts, and the damping energy in
+# steps with impacts.
 CAPSIZED_S, MAX_ROLL, MAX_LEVEL, STRIKES, MAX_IMPULSE, STRIKE_LOSS, DAMPED_AROUND = range(7)
 SUMMARY = 7
-# allows reordered and fused sums for vector instructions; NaN and infinity stay exact
+# This allows reordered and fused sums for vector instructions; NaN and infinity stay exact.
 FAST = {"reassoc", "contract", "nsz", "arcp"}
 
 State = tuple[float, float, float, float]
@@ -64,7 +64,7 @@ def unpacked(row: FloatArray) -> RollCoefficients:
     )  # fmt: skip
 
 
-# inline: handing its coefficients over four times a step costs a third of the step
+# Passing the coefficients four times a step would cost a third of the step.
 @njit(fastmath=FAST, error_model="numpy", inline="always")
 def accelerations(
     c: RollCoefficients,
@@ -124,7 +124,7 @@ def rk4(
     valve: float,
     dt: float,
 ) -> State:
-    """One Runge-Kutta step; `moments` are the wave moments at its start, middle and end."""
+    """Advance by one Runge-Kutta step; `moments` are the wave's at start, middle and end."""
     x, v1, h, w1 = state
     start, middle, end = moments
     half = 0.5 * dt
@@ -149,7 +149,7 @@ def rk4(
 
 @njit(error_model="numpy")
 def damping_w(c: RollCoefficients, state: State, valve: float) -> float:
-    """Power that damping of the ship, losses of the tank and the valve take."""
+    """Return the power dissipated by damping of the ship, losses of the tank, and the valve."""
     _, v, _, w = state
     ship = c.damping + c.quadratic_damping * abs(v)
     water = c.loss + (c.quadratic_loss + valve) * abs(w)
@@ -160,7 +160,7 @@ def damping_w(c: RollCoefficients, state: State, valve: float) -> float:
 def _moments_within(
     moments: tuple[float, float, float], begin: float, end: float
 ) -> tuple[float, float, float]:
-    """Wave moments at start, middle and end of a part of the step, by quadratic interpolation."""
+    """Interpolate wave moments quadratically at start, middle and end of a part of the step."""
     a, b, c = moments
     slope, curvature = 4 * b - 3 * a - c, 2 * (a + c - 2 * b)
     mid = 0.5 * (begin + end)
@@ -190,7 +190,7 @@ def step_with_impacts(
     impacts: FloatArray,
     summary: FloatArray,
 ) -> State:
-    """One step with impacts at the level limits, each counted and written to `impacts`."""
+    """Return the state after a step with impacts, each counted and written to `impacts`."""
     done = 0.0
     limit = c.level_limit
     for strike in range(STRIKES_PER_STEP + 1):
@@ -236,8 +236,8 @@ def step_with_impacts(
         summary[STRIKES] += 1
         summary[STRIKE_LOSS] -= stop_impulse * (w + rebound) / 2
         summary[MAX_IMPULSE] = max(summary[MAX_IMPULSE], abs(c.ship_inertia * roll_jump))
-        # at rest exactly on the limit, where `accelerations` holds it; else just inside, so that
-        # the next impact is a change of sign
+        # At rest exactly on the limit, where `accelerations` holds it, or just inside, so that the
+        # next impact is a change of sign.
         h = side * (limit if rebound == 0.0 else limit - INSIDE_M)
         state = (x, v + roll_jump, h, rebound)
     moments_left = _moments_within(moments, done, 1.0)
@@ -284,7 +284,7 @@ def advance(
     alive = summary[CAPSIZED_S] == np.inf
     max_roll, max_level = summary[MAX_ROLL], summary[MAX_LEVEL]
     start = 0.0
-    # counters, because integer division costs as much as a sine
+    # Counters are used, because integer division costs as much as a sine.
     until_output, row_out = 0, 0
     sample, held = first // hold, first % hold
     pump = c.area * pressure[min(sample, len(pressure) - 1)]

@@ -25,12 +25,9 @@ def body_to_earth(roll_rad: float, pitch_rad: float, yaw_rad: float) -> FloatArr
 
 
 def euler_rates(roll_rad: float, pitch_rad: float) -> FloatArray:
-    """Matrix, shape (3, 3), that turns body rates (p, q, r) into rates of (roll, pitch, yaw).
+    """Matrix, shape (3, 3), from body rates (p, q, r) to rates of (roll, pitch, yaw).
 
-    Raises
-    ------
-    ValueError
-        At a pitch of 90 degrees, where Euler angles are singular.
+    ValueError is raised at a pitch of 90 degrees, where Euler angles are singular.
     """
     sf, cf = math.sin(roll_rad), math.cos(roll_rad)
     ct, tt = math.cos(pitch_rad), math.tan(pitch_rad)

@@ -30,13 +30,7 @@ INPUTS = ("pressure_pa", "wave_moment_nm")
 
 
 def coupled_matrices(ship: RollShip, tank: Tank) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Mass, damping and stiffness matrices for q = (roll_rad, level_m).
-
-    Returns
-    -------
-    mass, damping, stiffness : ndarray, shape (2, 2)
-        SI units; all three symmetric.
-    """
+    """Mass, damping, stiffness for q = (roll_rad, level_m); SI units, symmetric, (2, 2)."""
     g, at = GRAVITY_M_S2, tank.reservoir_area_m2
     water = water_moments(tank, 0.0)
     coupling_inertia = water.swirl_kgm[0]
@@ -58,19 +52,11 @@ def coupled_matrices(ship: RollShip, tank: Tank) -> tuple[FloatArray, FloatArray
 
 
 def state_matrices(ship: RollShip, tank: Tank) -> tuple[FloatArray, FloatArray]:
-    """State and input matrix of `coupled_model`, without python-control.
-
-    Returns
-    -------
-    a : ndarray, shape (4, 4)
-        State matrix for `STATES`.
-    b : ndarray, shape (4, 2)
-        Input matrix for `INPUTS`.
-    """
+    """State matrix (4, 4) for `STATES`, input matrix (4, 2) for `INPUTS`; no python-control."""
     mass, damping, stiffness = coupled_matrices(ship, tank)
     inverse = np.linalg.inv(mass)
     effort = np.array([[0.0, 1.0], [tank.reservoir_area_m2, 0.0]])
-    # first order in q and q', then sorted into (phi, phi', h, h')
+    # The model is of first order in q and q', then sorted into (phi, phi', h, h').
     a = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ stiffness, -inverse @ damping]])
     b = np.vstack([np.zeros((2, 2)), inverse @ effort])
     order = [0, 2, 1, 3]
@@ -78,14 +64,8 @@ def state_matrices(ship: RollShip, tank: Tank) -> tuple[FloatArray, FloatArray]:
 
 
 def coupled_model(ship: RollShip, tank: Tank) -> "StateSpace":
-    """Continuous linear model of ship and tank.
-
-    Returns
-    -------
-    control.StateSpace
-        States and outputs `STATES`, inputs `INPUTS`.
-    """
-    from control import ss  # here, because importing it brings plotting into the process
+    """Continuous linear model of ship and tank: states and outputs `STATES`, inputs `INPUTS`."""
+    from control import ss  # This import would bring plotting into the process.
 
     a, b = state_matrices(ship, tank)
     return ss(

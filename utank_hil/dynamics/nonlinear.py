@@ -114,13 +114,9 @@ class RollModel:
         ----------
         state : array_like, shape (..., 4)
         pressure_pa, wave_moment_nm, valve_loss_pa_per_m2_s2 : array_like, shape (...)
-            Inputs; the valve loss is what `valves` returns.
+            Inputs; the valve loss is the output of `valves`.
         stopped : bool
-            Hold the level where it is, as while the water is pressed against a limit.
-
-        Returns
-        -------
-        ndarray, shape (..., 4)
+            Whether the level is held, as while the water is pressed against a limit.
         """
         c = self.coefficients
         phi, phi_dot, h, h_dot = np.moveaxis(np.asarray(state, dtype=np.float64), -1, 0)
@@ -153,12 +149,9 @@ class RollModel:
         return np.stack(np.broadcast_arrays(phi_dot, phi_ddot, h_dot, h_ddot), axis=-1)
 
     def strike(self, time_s: float, state: FloatArray) -> tuple[FloatArray, Impact]:
-        """State after an impact at the present level, and the impact.
+        """Return the state after an impact, and the impact.
 
-        Parameters
-        ----------
-        state : ndarray, shape (4,)
-            With the level at its limit and moving outward.
+        The state before, shape (4,), has its level at the limit and moving outward.
         """
         c = self.coefficients
         phi, phi_dot, h, h_dot = (float(x) for x in state)

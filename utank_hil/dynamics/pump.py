@@ -54,12 +54,12 @@ class PumpState(NamedTuple):
     """State and last outputs of the pump; all zero at rest, see `AT_REST`."""
 
     speed_rad_s: float
-    reference_pa: float  # the set-point after limit, lag and rate limit
+    reference_pa: float  # Set-point after limit, lag and rate limit.
     integral_pa: float
-    pressure_pa: float  # pressure rise at the end of the step
-    torque_nm: float  # motor torque during the step
-    power_w: float  # shaft power, mean of the step; negative when the water drives the motor
-    limited: bool  # speed, torque or power was at its limit
+    pressure_pa: float  # Pressure rise at the end of the step.
+    torque_nm: float  # Motor torque during the step.
+    power_w: float  # Mean shaft power of the step; negative when the water drives the motor.
+    limited: bool  # Speed, torque or power was at its limit.
 
 
 AT_REST = PumpState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
@@ -116,7 +116,7 @@ class Pump:
 
     def __post_init__(self) -> None:
         problems = range_problems(self)
-        if not problems:  # the checks below divide by these values
+        if not problems:  # The checks below divide by these values.
             problems = [*self._blade_problems(), *self._lag_problems()]
         refuse("pump", problems)
 
@@ -144,24 +144,19 @@ class Pump:
 
     @classmethod
     def for_duct(cls, area_m2: float, max_pressure_pa: float = 50e3) -> "Pump":
-        """Pump for a duct, scaled from the first ship's pump by similarity.
+        """Pump for a duct of `area_m2`, scaled from the first ship's pump by similarity.
 
         That pump (6.22 m^2, 50 kPa at up to 45 m^3/s, 2.25 MW of hydraulic power) has the size of
         a 3.5 MW tunnel thruster: 2.8 m, 25 rad/s, 67 % efficiency. With geometric similarity and
         water speeds proportional to the square root of pressure, shaft speed scales as sqrt(P/A),
-        torque as P A^1.5, power as P^1.5 A and inertia as A^2.5.
-
-        Parameters
-        ----------
-        area_m2 : float
-            Duct cross-section: 6.22 for the first ship, 0.19 for Patti-B.
+        torque as P A^1.5, power as P^1.5 A and inertia as A^2.5. Patti-B's duct has 0.19 m^2.
         """
         if not (area_m2 > 0 and max_pressure_pa > 0):
             raise ValueError(
                 f"pump needs positive area and pressure, got {area_m2}, {max_pressure_pa}"
             )
-        size = math.sqrt(area_m2 / 6.22)  # ratio of lengths
-        speed = math.sqrt(max_pressure_pa / 50e3)  # ratio of water and blade speeds
+        size = math.sqrt(area_m2 / 6.22)  # Ratio of lengths.
+        speed = math.sqrt(max_pressure_pa / 50e3)  # Ratio of water and blade speeds.
         return cls(
             duct_area_m2=area_m2,
             radius_m=0.985 * size,
@@ -217,7 +212,7 @@ def pump_load(speed: float, flow: float, c: PumpCoefficients) -> tuple[float, fl
     """Load torque of the water in N m, and its derivative by speed in N m s, zero or more."""
     u = flow / c.area
     rn = c.radius * speed
-    w = math.hypot(rn, u) + 1e-9  # avoids division by zero
+    w = math.hypot(rn, u) + 1e-9  # The offset avoids division by zero.
     slip = c.pitch * speed - u
     drag = c.pitch * c.half_rho_lift * slip + c.half_rho_friction * c.radius * rn
     drag_slope = c.half_rho_lift * c.pitch**2 + c.half_rho_friction * c.radius**2
@@ -238,12 +233,12 @@ def pump_speed(pressure: float, flow: float, c: PumpCoefficients) -> float:
     """Speed in rad/s that gives a pressure rise at a flow: the inverse of `pump_pressure`."""
     u = flow / c.area
     wanted = pressure / c.half_rho_lift
-    # start from the slip of s (a |s| + b |u|) = wanted, exact with no flow and with no slip
+    # The start is from the slip s of (a |s| + b |u|) = wanted, exact without flow or slip.
     a = c.radius / c.pitch
     b = math.sqrt(1.0 + a * a) * abs(u)
     slip = 2.0 * wanted / (b + math.sqrt(b * b + 4.0 * a * abs(wanted)) + 1e-12)
     speed = (u + slip) / c.pitch
-    for _ in range(8):  # Newton; the head curve is smooth and monotone
+    for _ in range(8):  # Newton's method: the head curve is smooth and monotone.
         w = math.hypot(c.radius * speed, u)
         slip = c.pitch * speed - u
         slope = w * c.pitch + c.radius * c.radius * speed * slip / (w + 1e-12)
@@ -268,7 +263,7 @@ def pump_step(
     flow : float
         Flow to starboard Q = At dh/dt in m^3/s, held over the step.
     step_s : float
-        About 20 ms at most.
+        Step, about 20 ms at most.
     """
     target = min(max(setpoint, -c.max_pressure), c.max_pressure)
     change = (target - state.reference_pa) * (1.0 - math.exp(-step_s / c.reference_lag))
@@ -279,13 +274,13 @@ def pump_step(
     demanded_speed = pump_speed(reference + c.gain * error + state.integral_pa, flow, c)
     command = min(max(demanded_speed, -c.max_speed), c.max_speed)
 
-    # implicit (linearised) load torque: stable for any step
+    # The implicit (linearised) load torque is stable for any step.
     load, slope = pump_load(state.speed_rad_s, flow, c)
     stiffness = c.inertia / step_s + slope
     speed_change = (command - state.speed_rad_s) * (1.0 - math.exp(-step_s * c.speed_bandwidth))
     demanded = load + stiffness * speed_change
     torque, speed = 0.0, state.speed_rad_s
-    for _ in range(2):  # the power limit depends on the speed at the end of the step
+    for _ in range(2):  # The power limit depends on the speed at the end of the step.
         fastest = max(abs(state.speed_rad_s), abs(speed), 1e-9)
         torque_limit = min(c.max_torque, c.max_power / fastest)
         torque = min(max(demanded, -torque_limit), torque_limit)
@@ -293,7 +288,7 @@ def pump_step(
 
     limited = command != demanded_speed or torque != demanded
     integral = state.integral_pa
-    if not limited:  # anti-windup by conditional integration
+    if not limited:  # Conditional integration prevents windup.
         integral += error * step_s / c.integral_time
     return PumpState(
         speed,
@@ -307,20 +302,17 @@ def pump_step(
 
 
 def pump_coast(state: PumpState, flow: float, step_s: float, c: PumpCoefficients) -> PumpState:
-    """Advance by one step with the motor off; the water turns the rotor. See `pump_step`."""
+    """Advance by one step (`pump_step`) with the motor off; the water turns the rotor."""
     load, slope = pump_load(state.speed_rad_s, flow, c)
     speed = state.speed_rad_s - load / (c.inertia / step_s + slope)
     return PumpState(speed, 0.0, 0.0, pump_pressure(speed, flow, c), 0.0, 0.0, False)
 
 
 def compile_pump(compiler: Callable[[Any], Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Compiled `pump_step` and `pump_coast`.
+    """Return compiled `pump_step` and `pump_coast`.
 
-    Parameters
-    ----------
-    compiler : callable
-        For example `utank_hil.dynamics.jit.njit`'s. The functions are compiled in a namespace of
-        their own, callees first.
+    The compiler, such as that of `utank_hil.dynamics.jit.njit`, compiles the functions in a
+    separate namespace, callees first.
     """
     scope = dict(globals())
     for function in (pump_pressure, pump_load, pump_speed, pump_step, pump_coast):

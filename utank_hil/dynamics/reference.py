@@ -1,8 +1,8 @@
 """Adaptive high-order integration of the nonlinear coupled model, for verification.
 
-Dormand-Prince 8(5,3) between events. Every impact at a limit of the level is located to rounding
-error and its impulse is applied. Water at rest on a limit leaves it when its acceleration turns
-inward.
+Dormand-Prince 8(5,3) integrates between events. Every impact at a limit of the level is located to
+rounding error and its impulse is applied. Water at rest on a limit leaves it when its acceleration
+turns inward.
 """
 
 from collections.abc import Callable
@@ -13,8 +13,8 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.nonlinear import Impact, RollModel
 
-REST_M_S = 1e-4  # a slower rebound ends at rest, which bounds the number of bounces
-INSIDE_M = 1e-12  # distance from the limit after an impact, so that the next is a sign change
+REST_M_S = 1e-4  # A slower rebound ends at rest, which bounds the number of bounces.
+INSIDE_M = 1e-12  # Distance from the limit after an impact, so that the next is a sign change.
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,24 +61,18 @@ def simulate_reference(
     tolerance: float = 1e-12,
     capsize_rad: float = np.pi,
 ) -> RollRun:
-    """Integrate nearly to rounding error, with located events.
+    """Integrate nearly to rounding error; raises RuntimeError if the integrator fails.
 
     Parameters
     ----------
-    initial : array_like, shape (4,)
     pressure_pa, wave_moment_nm : callable
         Smooth functions of time in s.
     samples : int
         Number of equally spaced output times, both ends included.
     tolerance : float
-        Relative; the absolute one is a hundredth of it in SI units.
+        Relative tolerance; the absolute one is a hundredth of it in SI units.
     capsize_rad : float
-        The run ends when the roll's magnitude passes this angle.
-
-    Raises
-    ------
-    RuntimeError
-        If the integrator fails.
+        Magnitude of the roll at which the run ends.
     """
     from scipy.integrate import solve_ivp
 
@@ -94,10 +88,10 @@ def simulate_reference(
     def slope(t: float, x: FloatArray) -> FloatArray:
         return model.derivative(x, pressure_pa(t), wave_moment_nm(t), stopped=stopped)
 
-    def full(_t: float, x: FloatArray) -> float:  # rises through zero at a limit
+    def full(_t: float, x: FloatArray) -> float:  # This rises through zero at a limit.
         return float(abs(x[2]) - c.level_limit)
 
-    def pressed(t: float, x: FloatArray) -> float:  # falls through zero when the stop lets go
+    def pressed(t: float, x: FloatArray) -> float:  # falls through zero at release
         free = model.derivative(x, pressure_pa(t), wave_moment_nm(t))
         return float(free[3] * np.sign(x[2]))
 

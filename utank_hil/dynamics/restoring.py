@@ -56,8 +56,8 @@ def restoring(ship: RollShip) -> Restoring:
     levers = np.array(ship.gz_m)
     heel = ship.gz_step_rad * np.arange(len(levers))
     slope = ship.stiffness_nm_rad / ship.displacement_n
-    # even derivatives vanish at zero heel, so that the odd continuation is smooth there; one knot
-    # less at the far end makes up for the third condition
+    # Even derivatives vanish at zero heel, so that the odd continuation is smooth there; one knot
+    # less at the far end makes up for the third condition.
     knots = np.concatenate([np.zeros(6), heel[1:-2], np.full(6, heel[-1])])
     conditions = [(1, slope), (2, 0.0), (4, 0.0)]
     spline = make_interp_spline(heel, levers, k=5, t=knots, bc_type=(conditions, None))

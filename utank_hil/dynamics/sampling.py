@@ -31,14 +31,9 @@ if TYPE_CHECKING:
 
 
 class LinearModel(NamedTuple):
-    """Matrices of a linear model, a light substitute for control.StateSpace with the same names.
+    """Matrices of a linear model, with the names of control.StateSpace, which imports plotting.
 
-    For code that must not import python-control, which imports plotting.
-
-    Attributes
-    ----------
-    dt : float
-        Sample time in seconds, 0 if continuous.
+    `dt` is the sample time in seconds, 0 if continuous.
     """
 
     A: FloatArray
@@ -56,10 +51,10 @@ def sampled_model(
     Parameters
     ----------
     system : control.StateSpace
-        Continuous, without feedthrough; all inputs are pump inputs. Select signals by name:
+        Continuous model without feedthrough; all inputs are pump inputs. Select signals by name:
         ``coupled_model(ship, tank)[["roll_rad"], ["pressure_pa"]]``.
     delay_s : float
-        From measurement to effect at the drive; any value, not only whole samples.
+        Time from measurement to effect at the drive; any value, not only whole samples.
     lag_s : float
         Time constant of the drive's inner pressure loop.
 
@@ -73,7 +68,7 @@ def sampled_model(
     ValueError
         If a time is out of range, or the model is discrete or has feedthrough.
     """
-    from control import ss  # here, because importing it brings plotting into the process
+    from control import ss  # This import would bring plotting into the process.
 
     model = sample(system, sample_time_s, delay_s, lag_s)
     return ss(*model, inputs=system.input_labels, outputs=system.output_labels)
@@ -82,7 +77,7 @@ def sampled_model(
 def sample(
     system: "StateSpace | LinearModel", sample_time_s: float, delay_s: float, lag_s: float
 ) -> LinearModel:
-    """Same as `sampled_model`, without python-control."""
+    """Sample a model as `sampled_model` does, without python-control."""
     for name, time in (("delay_s", delay_s), ("lag_s", lag_s)):
         if not (math.isfinite(time) and time >= 0):
             raise ValueError(f"{name} must be zero or more and finite, got {time}")
@@ -119,7 +114,7 @@ def transition_and_step(
 def _with_lag(
     a: FloatArray, b: FloatArray, c: FloatArray, lag_s: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The continuous model with a first-order lag of time constant `lag_s` at each input."""
+    """Return the model with a first-order lag of time constant `lag_s` at each input."""
     if lag_s == 0:
         return a, b, c
     states, inputs = b.shape
@@ -134,8 +129,8 @@ def _with_lag(
 def _shifted(
     a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, samples: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """The discrete model with its input delayed by whole samples."""
-    for _ in range(samples):  # the newest past command becomes a state
+    """Return the discrete model with its input delayed by whole samples."""
+    for _ in range(samples):  # The newest past command becomes a state.
         states, inputs = b.shape
         a = np.block([[a, b], [np.zeros((inputs, states + inputs))]])
         c = np.hstack([c, d])
@@ -147,17 +142,9 @@ def _shifted(
 def noise_covariance(a: FloatArray, noise: FloatArray, time_s: float) -> FloatArray:
     """Covariance of the state after a time of continuous white noise of unit spectral density.
 
-    Parameters
-    ----------
-    a : ndarray, shape (n, n)
-        State matrix.
-    noise : ndarray, shape (n, k)
-        Input matrix of the k noises.
-
-    References
-    ----------
-    C. F. Van Loan, Computing integrals involving the matrix exponential, IEEE Transactions on
-    Automatic Control 23 (1978) 395-404.
+    State matrix `a` is (n, n), the input matrix `noise` of k noises (n, k). Source: C. F. Van Loan,
+    Computing integrals involving the matrix exponential, IEEE Transactions on Automatic Control 23
+    (1978) 395-404.
     """
     from scipy.linalg import expm
 

@@ -7,10 +7,10 @@ from typing import Annotated
 from utank_hil.base.parameters import Finite, Problem, Range, range_problems, refuse
 
 RollLimit = Annotated[float, Range(above=0, most=0.7)]
-"""Limit on roll in rad, at most 0.7 (40 degrees): up to there the IS Code 2008 (part A, 2.2.1)
+"""Limit on roll in rad, at most 0.7 (40 degrees), up to which the IS Code 2008 (part A, 2.2.1)
 rates a ship's righting levers."""
 
-_MOST = 1e30  # far beyond any ship; keeps the results of designs finite
+_MOST = 1e30  # Far beyond any ship; it keeps the results of designs finite.
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ class RollShip:
         return problems
 
     def at_speed(self, speed_m_s: float) -> "RollShip":
-        """The ship with the damping that it has under way."""
+        """Return the ship with its damping at a speed."""
         if self.lift_damping_ns2_rad == 0:
             return self
         damping = self.damping_nms_rad + self.lift_damping_ns2_rad * speed_m_s
@@ -93,7 +93,7 @@ class RollShip:
     def with_figures(
         self, inertia_kg_m2: float, stiffness_nm_rad: float, damping_nms_rad: float
     ) -> "RollShip":
-        """The ship with other figures of small roll; righting levers scale with the stiffness."""
+        """Return the ship with other figures of small roll; levers scale with the stiffness."""
         share = stiffness_nm_rad / self.stiffness_nm_rad
         return replace(
             self,

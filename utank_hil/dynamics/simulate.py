@@ -36,11 +36,7 @@ class WaveComponents(Protocol):
 class WaveMoment(NamedTuple):
     """Wave moment as a sum of ``amplitude cos(frequency t + phase)``.
 
-    Attributes
-    ----------
-    amplitude : array_like, shape (m,) or (n, m)
-        In N m; one sea per ship of a batch, or one for all.
-    frequency_rad_s, phase_rad : array_like, shape (m,) or (n, m)
+    Arrays have shape (m,), or (n, m) for one sea per ship of a batch; amplitudes are in N m.
     """
 
     amplitude: npt.ArrayLike
@@ -165,18 +161,18 @@ def simulate_batch(
 ) -> BatchResult:
     """Simulate many ships on all cores; the result does not depend on the number of cores.
 
-    Models, initial states, seas and inputs are each given once for all ships, or once per ship; the
-    rest, and the errors, are those of `simulate`.
+    Models, initial states, seas and inputs are each given once for all ships, or once per ship.
+    Results and errors are those of `simulate`.
 
     Parameters
     ----------
     initial : array_like, shape (4,) or (n, 4)
     wave : WaveMoment
-        With arrays of shape (m,) or (n, m).
+        Sea with arrays of shape (m,) or (n, m).
     pressure_pa, valve_loss_pa_per_m2_s2 : array_like, shape (), (k,) or (n, k)
         Samples, each held for `hold_s`, the last one to the end.
     record_every : int, optional
-        Steps between recorded states; nothing is recorded if not given.
+        Steps between recorded states; by default nothing is recorded.
     """
     from utank_hil.dynamics import kernels
 
@@ -204,7 +200,7 @@ def simulate_batch(
     samples = -(-steps // stride) if record_every else 0
     history = np.empty((ships, samples, 4))
     chunk = max(1, round(steps / 50 / (stride * kernels.REFRESH))) * stride * kernels.REFRESH
-    for first in range(0, steps, chunk):  # in parts, so that Ctrl-C is heard
+    for first in range(0, steps, chunk):  # Parts of the run allow Ctrl-C.
         part = slice(first // stride, (first + chunk) // stride)
         count = min(chunk, steps - first)
         kernels.advance_batch(
@@ -224,12 +220,9 @@ def simulate_batch(
 
 
 def whole_steps(name: str, duration_s: float, step_s: float) -> int:
-    """Whole number of steps in a duration.
+    """Return the whole number of steps in a duration.
 
-    Raises
-    ------
-    ValueError
-        If the step is not positive, or the duration is not a whole number of steps, 1 or more.
+    ValueError is raised if the step is not positive, or the number is not whole and 1 or more.
     """
     if not (math.isfinite(step_s) and step_s > 0):
         raise ValueError(f"step_s must be positive and finite, got {step_s}")
@@ -248,7 +241,7 @@ def _blank_summary(ships: int) -> FloatArray:
 
 
 def _sea(wave: WaveComponents) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Amplitudes, frequencies and phases as rows of equal length."""
+    """Return amplitudes, frequencies and phases as rows of equal length."""
     amplitude, frequency, phase = (
         _rows(x) for x in (wave.amplitude, wave.frequency_rad_s, wave.phase_rad)
     )
@@ -266,12 +259,12 @@ def _check_record_every(record_every: int) -> None:
 
 
 def _rows(values: npt.ArrayLike) -> FloatArray:
-    """Values as contiguous rows, shape (1 or n, k)."""
+    """Return values as contiguous rows, shape (1 or n, k)."""
     return np.atleast_2d(np.ascontiguousarray(values, dtype=np.float64))
 
 
 def _stacked(restoring: list[FloatArray]) -> FloatArray:
-    """Restoring coefficients of all ships as one array, padded with zeros to the highest power."""
+    """Return restoring coefficients of all ships as one array, zero-padded to the highest power."""
     if len({len(table) for table in restoring}) > 1:
         raise ValueError("the ships of a batch must have righting levers of the same length")
     powers = max(table.shape[1] for table in restoring)

@@ -40,13 +40,13 @@ class SixDegreeShip:
     Parameters
     ----------
     roll : RollShip
-        Roll; its inertia includes ``added_mass[3][3]``.
+        Ship in roll; its inertia includes ``added_mass[3][3]``.
     pitch_inertia_kg_m2, yaw_inertia_kg_m2 : float
-        Without added mass, about the centre of gravity.
+        Inertias about the centre of gravity, without added mass.
     product_xz_kg_m2 : float
         Product of inertia, the integral of x z dm.
     added_mass : 6 x 6 nested tuple of float
-        Symmetric, about the centre of gravity, SI units.
+        Added mass about the centre of gravity, symmetric, SI units.
     damping : 6 x 6 nested tuple of float
         Linear damping in SI units; ``[3][3]`` must be zero, because `roll` has the roll damping.
     heave_stiffness_n_m, heave_pitch_n, pitch_stiffness_nm_rad : float
@@ -98,17 +98,8 @@ class SixDegreeModel:
     """Ship and tank in six degrees of freedom.
 
     The state, shape (14,), is the earth position (x, y, z), the Euler angles (roll, pitch, yaw),
-    the body velocities (u, v, w, p, q, r), the level and its rate.
-
-    Parameters
-    ----------
-    free : tuple of str
-        Free motions out of `MOTIONS`; the others are constrained to rest.
-
-    Raises
-    ------
-    ValueError
-        If a motion's name is unknown.
+    the body velocities (u, v, w, p, q, r), the level and its rate. Motions outside of `free`, a
+    subset of `MOTIONS`, are constrained to rest; ValueError is raised for an unknown one.
     """
 
     ship: SixDegreeShip
@@ -129,17 +120,9 @@ class SixDegreeModel:
     def derivative(
         self, state: FloatArray, pressure_pa: float = 0.0, force: FloatArray | None = None
     ) -> FloatArray:
-        """Time derivative of the state.
+        """Return the time derivative of the state, shape (14,).
 
-        Parameters
-        ----------
-        state : ndarray, shape (14,)
-        force : ndarray, shape (6,), optional
-            External force and moment in body axes, as from waves.
-
-        Returns
-        -------
-        ndarray, shape (14,)
+        `force`, shape (6,), is an external force and moment in body axes, as from waves.
         """
         angles, nu, level, speed = state[3:6], state[6:12], state[12], state[13]
         tank = self.tank
@@ -179,14 +162,14 @@ class SixDegreeModel:
         return out
 
     def _hull_loads(self, state: FloatArray) -> FloatArray:
-        """Forces and moments on the hull in body axes, without inertia and tank, shape (6,)."""
+        """Return hull forces and moments in body axes, without inertia and tank, shape (6,)."""
         ship, roll = self.ship, self.ship.roll
         z, angles, nu = state[2], state[3:6], state[6:12]
         rotation = body_to_earth(*angles)
         momentum = self._mass @ nu
         damping = self._damping @ nu
         damping[3] += (roll.damping_nms_rad + roll.quadratic_damping_nms2_rad2 * abs(nu[3])) * nu[3]
-        # generalized forces on the Euler angles: minus the gradient of the potential
+        # Generalized forces on the Euler angles are minus the gradient of the potential.
         heeling = roll.offset_moment_nm * np.cos(angles[0]) + roll.wind_moment_nm
         generalized = np.array(
             [
@@ -201,7 +184,7 @@ class SixDegreeModel:
         loads[:3] = rotation.T @ np.array([0.0, 0.0, heave]) + buoyancy
         loads[3:] = euler_rates(angles[0], angles[1]).T @ generalized
         loads[3:] += np.cross([self.tank.lx_m, 0.0, 0.0], buoyancy)
-        # Coriolis and centripetal forces, C(nu) nu
+        # The Coriolis and centripetal forces are C(nu) nu.
         loads[:3] -= np.cross(nu[3:], momentum[:3])
         loads[3:] -= np.cross(nu[:3], momentum[:3]) + np.cross(nu[3:], momentum[3:])
         return loads - damping
@@ -217,15 +200,14 @@ def simulate_six_degree(
     samples: int = 1001,
     tolerance: float = 1e-10,
 ) -> tuple[FloatArray, FloatArray]:
-    """Integrate with Dormand-Prince 8(5,3).
+    """Integrate with Dormand-Prince 8(5,3) from `initial`, shape (14,).
 
     Parameters
     ----------
-    initial : ndarray, shape (14,)
     pressure_pa, force : callable
         Functions of time in s; `force` is in body axes, shape (6,).
     samples, tolerance
-        As in `simulate_reference`.
+        Output times and tolerance as in `simulate_reference`.
 
     Returns
     -------

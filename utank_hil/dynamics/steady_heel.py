@@ -1,4 +1,4 @@
-"""The heel at which a ship comes to rest under steady moments and pressure; its righting range."""
+"""Steady heel of a ship under steady moments and pressure, and its righting range."""
 
 import math
 from dataclasses import replace
@@ -9,32 +9,26 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.nonlinear import RollModel
 
-_HEELS_RAD: Final = np.radians(np.linspace(0.0, 89.9, 2000))  # a step of 0.05 degrees
-_HALVINGS: Final = 12  # to a four-thousandth of the pressure
+_HEELS_RAD: Final = np.radians(np.linspace(0.0, 89.9, 2000))  # The step is 0.05 degrees.
+_HALVINGS: Final = 12  # The result is accurate to a four-thousandth of the pressure.
 
 
 class SteadyHeel(NamedTuple):
-    """A ship at rest.
-
-    Attributes
-    ----------
-    at_the_end : bool
-        A reservoir is full or empty.
-    """
+    """A ship at rest; `at_the_end` means that a reservoir is full or empty."""
 
     roll_rad: float
     at_the_end: bool
 
 
 class RightingRange(NamedTuple):
-    """How far a ship rights itself with the water at rest in its tank.
+    """Range of heel in which a ship rights itself with the water at rest in its tank.
 
     Attributes
     ----------
     greatest_rad : float
         Heel of the greatest righting moment.
     vanishing_rad : float
-        Heel from which it capsizes; infinite where there is none up to 90 degrees.
+        Heel from which it capsizes; infinite if there is none up to 90 degrees.
     """
 
     greatest_rad: float
@@ -42,7 +36,7 @@ class RightingRange(NamedTuple):
 
 
 def righting_range(model: RollModel) -> RightingRange:
-    """The righting range of a ship, without its steady moments."""
+    """Return the righting range of a ship, without its steady moments."""
     push, _ = _at_rest(upright(model), _HEELS_RAD, 0.0)
     over = np.flatnonzero(push[1:] > 0)
     vanishing_rad = float(_HEELS_RAD[1 + over[0]]) if over.size else math.inf
@@ -51,9 +45,9 @@ def righting_range(model: RollModel) -> RightingRange:
 
 
 def greatest_held_pa(model: RollModel, most_pa: float, within_rad: float) -> float:
-    """The greatest pressure up to `most_pa` that, held, heels a ship by `within_rad` at most.
+    """Return the greatest held pressure, up to `most_pa`, with a heel of `within_rad` at most.
 
-    Without its steady moments; it may be raised slowly only.
+    Steady moments are left out, and the pressure must be raised slowly.
     """
     model = upright(model)
 
@@ -74,14 +68,14 @@ def greatest_held_pa(model: RollModel, most_pa: float, within_rad: float) -> flo
 
 
 def steady_heel(model: RollModel, pressure_pa: float = 0.0) -> SteadyHeel | None:
-    """Where a ship comes to rest to the side to which it is pushed; None if it capsizes.
+    """Return the rest position on the side of the steady moment; None if the ship capsizes.
 
     Parameters
     ----------
     model : RollModel
-        With the steady moments of its ship.
+        Ship with its steady moments.
     pressure_pa : float
-        Of the pump, held.
+        Held pressure of the pump.
     """
     side = float(np.sign(_at_rest(model, np.zeros(1), pressure_pa)[0][0]))
     if side == 0:
@@ -98,7 +92,7 @@ def steady_heel(model: RollModel, pressure_pa: float = 0.0) -> SteadyHeel | None
 
 
 def upright(model: RollModel) -> RollModel:
-    """A ship without its steady moments."""
+    """Return a ship without its steady moments."""
     ship = replace(model.ship, offset_moment_nm=0.0, wind_moment_nm=0.0)
     return RollModel(ship, model.tank)
 
@@ -106,12 +100,12 @@ def upright(model: RollModel) -> RollModel:
 def _at_rest(
     model: RollModel, roll_rad: FloatArray, pressure_pa: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Roll acceleration, and the level that the water would have if there were room."""
+    """Return the roll acceleration, and the level of the water without limits."""
     c = model.coefficients
     flat_m = c.weight_h * np.tan(roll_rad) / (2 * c.weight_h2)
     flat_m = flat_m + c.area * pressure_pa / (2 * c.weight_h2 * np.cos(roll_rad))
     level_m = np.clip(flat_m, -c.level_limit, c.level_limit)
     still = np.zeros_like(roll_rad)
     states = np.stack([roll_rad, still, level_m, still], axis=-1)
-    with np.errstate(all="ignore"):  # levers that overflow
+    with np.errstate(all="ignore"):  # Levers may overflow.
         return model.derivative(states, pressure_pa, stopped=True)[:, 1], flat_m

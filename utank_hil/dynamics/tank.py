@@ -22,7 +22,7 @@ from utank_hil.base.parameters import (
     refuse,
 )
 
-GRAVITY_M_S2 = 9.80665  # standard gravity (ISO 80000-3)
+GRAVITY_M_S2 = 9.80665  # Standard gravity (ISO 80000-3).
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ class Tank:
 
 
 def negligible(tank: Tank) -> Tank:
-    """A tank of 1e-9 of the water, strongly damped: the ship goes as without a tank."""
+    """Return a tank with 1e-9 of the water, strongly damped: the ship moves as without a tank."""
     return replace(
         tank,
         reservoir_area_m2=1e-9 * tank.reservoir_area_m2,

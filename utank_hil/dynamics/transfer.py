@@ -10,21 +10,13 @@ from utank_hil.dynamics.sampling import LinearModel
 if TYPE_CHECKING:
     from control import StateSpace
 
-_AT_ONCE: Final = 1_000_000  # elements of the resolvents held at a time: 16 MB
+_AT_ONCE: Final = 1_000_000  # Elements of the resolvents held at a time: 16 MB.
 
 
 def state_space_response(system: "StateSpace | LinearModel", points: ComplexArray) -> ComplexArray:
     """Transfer function C (p I - A)^-1 B + D of a model at complex points s (or z).
 
-    Parameters
-    ----------
-    system : control.StateSpace or LinearModel
-        n states.
-    points : ndarray, shape (N,)
-
-    Returns
-    -------
-    ndarray, shape (N, outputs, inputs)
+    The points have shape (N,), the result (N, outputs, inputs).
     """
     a, b, c, d = system.A, system.B, system.C, system.D
     points = np.asarray(points, dtype=np.complex128)

@@ -14,17 +14,17 @@ from utank_hil.dynamics.tank import Tank
 
 AIR_DENSITY_KG_M3 = 1.225  # ISO 2533, at sea level
 STOPPING_S = 1e-3
-"""A valve that stops the water faster is as good as closed."""
+"""Time to stop the water below which a valve is as good as closed. Chosen; no study."""
 
 
 @dataclass(frozen=True, slots=True)
 class ValveRange:
-    """What a valve can do.
+    """Range of a valve's loss.
 
     Parameters
     ----------
     open_loss, shut_loss : float
-        Least and greatest loss in Pa per (m/s)^2 of dh/dt.
+        Smallest and greatest loss in Pa per (m/s)^2 of dh/dt.
 
     Raises
     ------
@@ -51,15 +51,15 @@ class Valve:
     kind : str
         "duct": a gate in the duct. "air": an orifice in the air pipe between the reservoirs.
     opening_time_s : float
-        From shut to open, and back.
+        Time from shut to open, and back.
     leakage : float
-        Open share that is left when it is shut.
+        Open share that remains when the valve is shut.
     fail_position : str
-        "open" or "shut": where it goes without a command or power.
+        "open" or "shut": the position without a command or power.
     pipe_area_m2 : float, optional
-        Of an air valve, fully open.
+        Area of an air valve, fully open.
     discharge_coefficient : float
-        Of an air valve, see `air_valve_loss`.
+        Coefficient of an air valve, see `air_valve_loss`.
 
     Raises
     ------
@@ -88,14 +88,14 @@ class Valve:
         return 1.0 if self.fail_position == "open" else 0.0
 
     def loss(self, tank: Tank, opening: float) -> float:
-        """Loss in Pa per (m/s)^2 of dh/dt at an opening from 0, shut but for the leakage, to 1."""
+        """Return the loss in Pa per (m/s)^2 of dh/dt at an opening from 0 (leakage) to 1."""
         share = self.leakage + (1 - self.leakage) * opening
         if self.pipe_area_m2 is None:
             return duct_valve_loss(tank, share)
         return air_valve_loss(tank, self.pipe_area_m2, share, self.discharge_coefficient)
 
     def opening(self, tank: Tank, loss: float) -> float:
-        """The opening, 0 to 1, with the loss nearest to the one given."""
+        """Return the opening, 0 to 1, with the loss nearest to the given one."""
         if self.pipe_area_m2 is None:
             area_ratio = tank.reservoir_area_m2 / tank.duct_area_m2
             speed_ratio = math.sqrt(2 * loss / tank.density_kg_m3)
@@ -111,24 +111,17 @@ class Valve:
 
 
 def added_damping_ratio(tank: Tank, loss: float, level_m: float) -> float:
-    """Damping ratio that a valve adds to the water's swing in a ship held still.
+    """Damping ratio that a valve adds to the free oscillation of the water in a fixed ship.
 
-    That of the linear loss which takes the same energy from a sine of amplitude h at the natural
-    frequency: 8 / (3 pi) omega h loss.
-
-    Parameters
-    ----------
-    loss : float
-        Pa per (m/s)^2 of dh/dt.
-    level_m : float
-        Amplitude h of the level.
+    It is that of the linear loss with the same energy per cycle of amplitude h = `level_m` at the
+    natural frequency: 8 / (3 pi) omega h loss, with the loss in Pa per (m/s)^2 of dh/dt.
     """
     inertia_pa_s2_m = tank.density_kg_m3 * tank.effective_length_m
     return 4 / (3 * math.pi) * level_m * loss / inertia_pa_s2_m
 
 
 def valve_problems(tank: Tank, valve: Valve) -> list[Problem]:
-    """Why a tank can't have a valve: it must let some water pass."""
+    """Return why a tank can't have a valve: it must let some water pass."""
     speed_m_s = tank.natural_frequency_rad_s * tank.level_limit_m
     inertia_pa_s2_m = tank.density_kg_m3 * tank.effective_length_m
     if valve.loss(tank, 0.0) * speed_m_s * STOPPING_S < inertia_pa_s2_m:
@@ -138,22 +131,10 @@ def valve_problems(tank: Tank, valve: Valve) -> list[Problem]:
 
 
 def duct_valve_loss(tank: Tank, opening: float) -> float:
-    """Loss coefficient of a gate in the duct, by the Borda-Carnot law (1 / s - 1)^2.
+    """Loss in Pa per (m/s)^2 of dh/dt of a gate in the duct, by the Borda-Carnot law (1 / s - 1)^2.
 
-    Parameters
-    ----------
-    opening : float
-        Open fraction s of the duct's area, above 0 and up to 1.
-
-    Returns
-    -------
-    float
-        Pa per (m/s)^2 of dh/dt, in addition to the tank's quadratic loss.
-
-    Raises
-    ------
-    ValueError
-        If the opening is out of range.
+    It adds to the tank's quadratic loss. The opening is the open fraction s of the duct's area,
+    above 0 and up to 1; ValueError is raised for others.
     """
     _check_opening(opening)
     area_ratio = tank.reservoir_area_m2 / tank.duct_area_m2
@@ -163,7 +144,9 @@ def duct_valve_loss(tank: Tank, opening: float) -> float:
 def air_valve_loss(
     tank: Tank, pipe_area_m2: float, opening: float, discharge_coefficient: float = 0.6
 ) -> float:
-    """Loss coefficient of an orifice in the air pipe between the reservoirs.
+    """Loss in Pa per (m/s)^2 of dh/dt of an orifice in the air pipe between the reservoirs.
+
+    It adds to the tank's quadratic loss.
 
     Parameters
     ----------
@@ -173,11 +156,6 @@ def air_valve_loss(
         Open fraction of that area, above 0 and up to 1.
     discharge_coefficient : float
         Contraction of the jet; 0.6 for a sharp edge.
-
-    Returns
-    -------
-    float
-        Pa per (m/s)^2 of dh/dt, in addition to the tank's quadratic loss.
 
     Raises
     ------

@@ -45,19 +45,14 @@ class WaterMoments(NamedTuple):
 
 
 def water_moments(tank: Tank, level_m: npt.ArrayLike) -> WaterMoments:
-    """Moments of the tank water at the given levels.
-
-    Parameters
-    ----------
-    level_m : array_like, shape (...)
-    """
+    """Moments of the tank water at the given levels, any shape."""
     h = np.asarray(level_m, dtype=np.float64)
     rho, at, ap = tank.density_kg_m3, tank.reservoir_area_m2, tank.duct_area_m2
     length, height, lx, lz = tank.width_m, tank.height_m, tank.lx_m, tank.lz_m
     zero = np.zeros_like(h)
     mass = rho * (2 * at * height + ap * length)
 
-    # integrals of y, z, y^2, z^2, y z over the mass; those of x follow from x = lx
+    # These are integrals of y, z, y^2, z^2, y z over the mass; those of x follow from x = lx.
     first_y = rho * at * length * h
     first_z = rho * (at * (2 * lz * height - height**2 - h**2) + ap * length * lz)
     square_y = rho * (at * length**2 * height / 2 + ap * length**3 / 12)
@@ -83,7 +78,7 @@ def water_moments(tank: Tank, level_m: npt.ArrayLike) -> WaterMoments:
     inertia_slope[..., 0, 2] = inertia_slope[..., 2, 0] = -lx * slope_z
     inertia_slope[..., 1, 2] = inertia_slope[..., 2, 1] = -slope_yz
 
-    flow = rho * at  # the same mass flow per dh/dt along the whole streamline
+    flow = rho * at  # The mass flow per dh/dt is the same along the whole streamline.
     return WaterMoments(
         mass_kg=mass,
         first_kgm=np.stack([zero + mass * lx, first_y, zero + first_z], axis=-1),

@@ -104,8 +104,8 @@ def tank_wrench(
     )
     moment = -(np.cross(first, specific_force) + relative_dot + np.cross(omega, relative))
 
-    # along the streamline the Coriolis acceleration does no work, and the centrifugal one is the
-    # gradient of -|rate x r|^2 / 2, so that only its values at the two surfaces remain
+    # Along the streamline the Coriolis acceleration does no work, and the centrifugal one is the
+    # gradient of -|rate x r|^2 / 2, so that only its values at the two surfaces remain.
     flow_kg_m = tank.density_kg_m3 * tank.reservoir_area_m2
     zero = np.zeros_like(level)
     across = np.stack([zero, zero + tank.width_m, -2 * level], axis=-1)  # port to starboard surface

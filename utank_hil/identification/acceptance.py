@@ -1,7 +1,7 @@
-"""Acceptance test of an identified model; objections in words.
+"""Acceptance test of an identified model, with objections in words.
 
-The model is judged on validation data and against prior knowledge of the ship. The law designed
-with it is judged elsewhere (`utank_hil.retuning.redesign`).
+The model is judged on validation data and against prior knowledge of the ship. Its law is judged
+elsewhere (`utank_hil.retuning.redesign`).
 """
 
 import math
@@ -25,8 +25,8 @@ class ModelLimits:
         Smallest one-step fit of each output on validation data.
     correlation : float
         Largest autocorrelation of the prediction errors on validation data at any lag. A whiteness
-        test is no criterion here: with hundreds of coefficients the errors are always slightly
-        coloured, and with enough data significantly.
+        test is no criterion: with hundreds of coefficients the errors are always slightly coloured,
+        and with enough data significantly.
     period_deviation : float
         Largest relative standard deviation of the roll period.
     dispersion : float
@@ -41,17 +41,12 @@ class ModelLimits:
 
 
 def model_objections(validation: Validation, fit: ShipFit, limits: ModelLimits) -> tuple[str, ...]:
-    """Objections to an identified model, in words; empty if it is acceptable.
+    """Return objections to an identified model, in words; empty if it is acceptable.
 
-    Parameters
-    ----------
-    validation : Validation
-        Validation of the identified ARX model.
-    fit : ShipFit
-        Ship and tank fitted to it.
+    `validation` is of the ARX model, and `fit` the ship and tank fitted to it.
     """
     found = []
-    # written so that NaN is an objection too
+    # The form of these conditions makes NaN an objection too.
     one_step = float(np.min(validation.one_step_fit))
     if not one_step >= limits.fit:
         found.append(f"fit on held-out data is {one_step:.2f}, less than {limits.fit:g}")

@@ -72,6 +72,6 @@ class DisturbanceBasis:
             span = np.linspace(-1.0, 1.0, samples)
             rows += list(np.polynomial.legendre.legvander(span, self.polynomial_degree).T)
         for rate in self.decay_rates_1_s:
-            # 1 at the end where the function is largest, so that none overflows
+            # The value is 1 at the end where the function is largest, so that none overflows.
             rows.append(np.exp(-abs(rate) * (time_s if rate > 0 else time_s[::-1])))
         return np.array(rows).reshape(len(rows), samples)

@@ -22,9 +22,9 @@ from utank_hil.identification.errors import IdentificationError
 if TYPE_CHECKING:
     from control import StateSpace
 
-_HIGHEST_ORDER = 20  # limit of an order chosen from the singular values
-_SMALLEST, _LARGEST = 1e-140, 1e140  # range in which products stay finite
-_SIGNAL = 1e-3  # smallest singular value of a signal, relative to the largest
+_HIGHEST_ORDER = 20  # This limits an order chosen from the singular values. Chosen; no study.
+_SMALLEST, _LARGEST = 1e-140, 1e140  # Products stay finite in this range.
+_SIGNAL = 1e-3  # This is the smallest singular value of a signal, relative to the largest.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +56,7 @@ def era(markov: FloatArray, order: int | None = None, *, sample_time_s: float) -
     Parameters
     ----------
     markov : array_like, shape (K, m, r)
-        ``markov[0]`` is D.
+        Markov parameters; ``markov[0]`` is D.
     order : int or None
         Number of states; None: `order_from_singular_values`.
 
@@ -73,7 +73,7 @@ def era(markov: FloatArray, order: int | None = None, *, sample_time_s: float) -
 
 
 def hankel_singular_values(markov: FloatArray) -> FloatArray:
-    """Singular values of the scaled Hankel matrix that `era` decomposes, largest first."""
+    """Return the singular values of the scaled Hankel matrix of `era`, largest first."""
     scaled, _, _ = _scaled(_checked(markov))
     half = len(scaled) // 2
     values: FloatArray = svdvals(_hankel(scaled, 1, half, len(scaled) - 1 - half))
@@ -81,12 +81,9 @@ def hankel_singular_values(markov: FloatArray) -> FloatArray:
 
 
 def order_from_singular_values(values: FloatArray) -> int:
-    """Order before the largest relative drop of the singular values.
+    """Return the order before the largest relative drop of the singular values, largest first.
 
-    Parameters
-    ----------
-    values : ndarray
-        Largest first; values below 1e-3 of the first, or beyond the 20th, are ignored.
+    Values below 1e-3 of the first, or beyond the 20th, are ignored.
     """
     held = values[: _HIGHEST_ORDER + 1]
     signal = int(np.count_nonzero(held > _SIGNAL * held[0]))
@@ -96,7 +93,7 @@ def order_from_singular_values(values: FloatArray) -> int:
 
 
 def realize(markov: FloatArray, order: int | None) -> Realization:
-    """Realization of `era`, with what `modal_confidence` needs."""
+    """Return the realization of `era`, with the data for `modal_confidence`."""
     scaled, row_scale, column_scale = _scaled(markov)
     m, r = markov.shape[1:]
     half = len(markov) // 2
@@ -118,7 +115,7 @@ def realize(markov: FloatArray, order: int | None) -> Realization:
 
 
 def _hankel(markov: FloatArray, first: int, rows: int, columns: int) -> FloatArray:
-    """Block Hankel matrix from ``markov[first]`` on, shape (rows m, columns r)."""
+    """Return the block Hankel matrix from ``markov[first]`` on, shape (rows m, columns r)."""
     _, m, r = markov.shape
     index = first + np.arange(rows)[:, None] + np.arange(columns)
     matrix: FloatArray = markov[index].transpose(0, 2, 1, 3).reshape(rows * m, columns * r)
@@ -126,7 +123,7 @@ def _hankel(markov: FloatArray, first: int, rows: int, columns: int) -> FloatArr
 
 
 def _scaled(markov: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Markov parameters with D = 0, scaled to channels of equal energy; and the two scales."""
+    """Return Markov parameters with D = 0 and channels of equal energy, and the two scales."""
     scaled = markov.copy()
     scaled[0] = 0.0
     rows = _energy(scaled, (0, 2))
@@ -136,8 +133,8 @@ def _scaled(markov: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _energy(markov: FloatArray, axes: tuple[int, int]) -> FloatArray:
-    """Root sum of squares over `axes`; 1 for a zero channel."""
-    largest = np.abs(markov).max(axis=axes)  # scaling before squaring, against underflow
+    """Return the root sum of squares over `axes`; 1 for a zero channel."""
+    largest = np.abs(markov).max(axis=axes)  # Scaling before squaring prevents underflow.
     largest = np.where(largest > 0, largest, 1.0)
     relative = markov / np.expand_dims(largest, axes)
     energy: FloatArray = largest * np.sqrt(np.sum(relative**2, axis=axes))
@@ -164,7 +161,7 @@ def _checked(markov: FloatArray) -> FloatArray:
 
 
 def _checked_order(order: int | None, values: FloatArray) -> int:
-    if values[0] < _SMALLEST:  # of scaled channels: about 1 otherwise
+    if values[0] < _SMALLEST:  # Scaled channels have values of about 1.
         raise IdentificationError("the Markov parameters hold no response that can be realized")
     if order is None:
         return order_from_singular_values(values)
@@ -179,6 +176,6 @@ def _checked_order(order: int | None, values: FloatArray) -> int:
 def _state_space(
     a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, sample_time_s: float
 ) -> "StateSpace":
-    from control import ss  # here, because importing it brings plotting into the process
+    from control import ss  # This import would bring plotting into the process.
 
     return ss(a, b, c, d, sample_time_s)

@@ -27,7 +27,7 @@ def random_pulses(
     Parameters
     ----------
     limits : PumpLimits
-        Pressure and rate limits are used.
+        Pump limits, of which pressure and rate are used.
     hold_s : tuple of float
         Shortest and longest pulse.
 
@@ -80,20 +80,8 @@ def multisine(
 ) -> FloatArray:
     """Multisine: equal amplitudes and random phases at all harmonics of the duration in a band.
 
-    Parameters
-    ----------
-    duration_s, limits, seed, sample_time_s
-        As in `random_pulses`.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-        Pressure in Pa.
-
-    Raises
-    ------
-    ValueError
-        If the band has no harmonic or extends beyond the Nyquist frequency.
+    The pressure is in Pa, shape (N,). ValueError is raised if the band has no harmonic or extends
+    beyond the Nyquist frequency.
     """
     samples = _samples(duration_s, sample_time_s)
     low, high = _band(band_rad_s, sample_time_s)
@@ -117,7 +105,7 @@ def chirp(
 ) -> FloatArray:
     """Linear chirp: a sine with a frequency that rises from one end of a band to the other.
 
-    Parameters, result and errors as `multisine`.
+    Result and errors are those of `multisine`.
     """
     time_s = np.arange(_samples(duration_s, sample_time_s)) * sample_time_s
     low, high = _band(band_rad_s, sample_time_s)
@@ -130,7 +118,6 @@ def response_scale(pressure_pa: FloatArray, model: ARX, response_limits: FloatAr
 
     Parameters
     ----------
-    pressure_pa : ndarray, shape (N,)
     model : ARX
         Model from pressure to outputs; the response is simulated from rest, without waves.
     response_limits : array_like, shape (m,)

@@ -50,9 +50,9 @@ class LagRegression:
     z : ndarray, shape (N, q)
         Outputs and inputs; a row with a value that is not finite is a gap.
     outputs : int
-        m, the number of leading channels that are outputs.
+        Number m of leading channels that are outputs.
     order : int
-        p.
+        Order p of the model.
     basis : ndarray, shape (d, N)
         Disturbance basis at every sample.
 
@@ -96,19 +96,12 @@ class LagRegression:
         return squares
 
     def gram(self) -> tuple[FloatArray, FloatArray]:
-        """Normal equations of the regression.
-
-        Returns
-        -------
-        gram : ndarray, shape (n, n)
-            Upper triangle only.
-        right : ndarray, shape (n, m)
-        """
+        """Normal equations: the upper triangle of G (n, n), and the right side (n, m)."""
         p, q, m = self.order, self.channels, self.outputs
         lags = (p + 1) * q
         size = lags + self.basis_size
         gram = np.zeros((size, size))
-        # window ends of all segments side by side: the displacement is one matrix product
+        # The window ends of all segments are side by side: the displacement is one matrix product.
         head = np.hstack([s.channels[:, :p][:, ::-1].T.reshape(-1, 1) for s in self.segments])
         tail = np.hstack([s.channels[:, -p:][:, ::-1].T.reshape(-1, 1) for s in self.segments])
         np.matmul(np.hstack([head, tail]), np.hstack([head, -tail]).T, out=gram[q:lags, q:lags])

@@ -22,11 +22,11 @@ from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.persistence import input_excitation
 from utank_hil.identification.shrinkage import shrinkage_estimate
 
-_RANK = 1e-12  # smallest pivot of the Gram matrix, relative to the first
-_EXACT = 1e-10  # relative residual of data without noise
-_CONVERGED = 1e-9  # the next correction is its square, far below rounding
-_CORRECTIONS = 6  # at most
-_INFLATION = 100.0  # above, noise in weak directions of the input exceeds shrinkage's bias
+_RANK = 1e-12  # Smallest pivot of the Gram matrix, relative to the first.
+_EXACT = 1e-10  # Relative residual of data without noise.
+_CONVERGED = 1e-9  # The next correction is the square of this, far below rounding.
+_CORRECTIONS = 6  # Largest number of corrections.
+_INFLATION = 100.0  # Above this, noise in weak directions of the input exceeds shrinkage's bias.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,12 +55,9 @@ class Fit:
 
 
 def fit(regression: LagRegression) -> Fit:
-    """Least-squares solution, of minimum norm if it is not unique.
+    """Return the least-squares solution, of minimum norm if it is not unique.
 
-    Raises
-    ------
-    IdentificationError
-        If there are no more rows than columns.
+    IdentificationError is raised if there are no more rows than columns.
     """
     if regression.rows <= regression.columns:
         raise IdentificationError(
@@ -80,7 +77,7 @@ def fit(regression: LagRegression) -> Fit:
         try:
             coefficients, penalty = shrinkage_estimate(regression, gram, right)
             rank = regression.columns
-        except np.linalg.LinAlgError:  # dependent outputs, or hardly any noise
+        except np.linalg.LinAlgError:  # The outputs are dependent, or there is hardly any noise.
             matrix, wanted = regression.matrix()
             solution = np.linalg.lstsq(matrix, wanted, rcond=None)
             coefficients = solution[0].astype(np.float64)
@@ -99,7 +96,7 @@ def _squares(errors: list[FloatArray]) -> FloatArray:
 def _corrected(
     regression: LagRegression, solver: "_Cholesky", right: FloatArray
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """Solution after corrections, its residual squares (m, m), and whether it has converged."""
+    """Return the corrected solution, its residual squares (m, m), and whether it has converged."""
     coefficients = solver.solve(right)
     previous = np.inf
     converged = False
@@ -115,7 +112,7 @@ def _corrected(
         if converged or not change < 0.5 * previous:
             break
         previous = change
-    # the last correction changes the squares by a known amount
+    # The last correction changes the squares by a known amount.
     squares = _squares(errors) - correction.T @ gradient
     return coefficients, squares, converged
 
@@ -129,7 +126,7 @@ class _Cholesky:
         self.rank = size
         self._pivots = np.arange(size)
         self._null: FloatArray | None = None
-        # LAPACK's lower triangle in column order is the upper one in row order
+        # LAPACK's lower triangle in column order is the upper one in row order.
         factor, failed = lapack.dpotrf(np.array(gram.T, order="F"), lower=1, overwrite_a=1, clean=0)
         if failed or factor.diagonal().min() ** 2 < threshold:
             factor, pivots, rank, _ = lapack.dpstrf(gram.T, lower=1, tol=threshold)
@@ -137,7 +134,7 @@ class _Cholesky:
             self._pivots = pivots - 1
         self._factor = factor[: self.rank, : self.rank]
         if self.rank < size:
-            # with P G P^T = [L; M][L; M]^T the dependent columns are T = L^-T M^T of the chosen
+            # With P G P^T = [L; M][L; M]^T the dependent columns are T = L^-T M^T of the chosen.
             self._null = solve_triangular(
                 self._factor, factor[self.rank :, : self.rank].T, lower=True, trans=1
             )

@@ -1,4 +1,4 @@
-"""A law's samples, reconstructed from a recording."""
+"""Reconstruction of a law's samples from a recording."""
 
 from collections.abc import Mapping
 
@@ -14,7 +14,7 @@ def logged_samples(
     from_s: float | None = None,
     to_s: float | None = None,
 ) -> FloatArray:
-    """Rows (mean command since the last sample, outputs...), the retuner's record format.
+    """Return rows (mean command since the last sample, outputs...), the retuner's record.
 
     Parameters
     ----------
@@ -23,14 +23,14 @@ def logged_samples(
     measured : tuple of str
         Outputs, among roll_rad, roll_rate_rad_s and level_m.
     sample_time_s : float
-        Samples are at its multiples on the time axis of the recording.
+        Sample time; samples are at its multiples on the time axis of the recording.
     from_s, to_s : float, optional
         Start and end of the part to use.
 
     Returns
     -------
     ndarray, shape (N, 1 + m)
-        NaN for missing values.
+        Samples; NaN for missing values.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def logged_samples(
         raise ValueError(f"the recording has nothing between {low:g} and {high:g} s")
     place = time_s / sample_time_s - first
     record = np.full((count, 1 + len(measured)), np.nan)
-    # a command is held to the next row, so it belongs to the sample after it
+    # A command is held to the next row, so it belongs to the sample after it.
     ahead = np.floor(place + 1e-6).astype(np.int64) + 1
     inside = (ahead >= 0) & (ahead < count)
     sums = np.bincount(ahead[inside], columns["pressure_command_pa"][inside], minlength=count)

@@ -17,22 +17,17 @@ from utank_hil.control.arx import ARX
 
 
 def markov_parameters(arx: ARX, count: int) -> tuple[FloatArray, FloatArray]:
-    """System and observer gain Markov parameters.
-
-    Parameters
-    ----------
-    count : int
-        Number K of Markov parameters.
+    """Return K = `count` Markov parameters of the system and of the observer gain.
 
     Returns
     -------
     markov : ndarray, shape (K, m, r)
-        ``markov[0]`` is D, ``markov[k]`` is C A^(k-1) B.
+        Parameters of the system: ``markov[0]`` is D, ``markov[k]`` is C A^(k-1) B.
     observer_gain : ndarray, shape (K - 1, m, m)
-        ``observer_gain[k - 1]`` is C A^(k-1) K.
+        Parameters of the observer: ``observer_gain[k - 1]`` is C A^(k-1) K.
     """
     p, m, r = arx.order, arx.outputs, arx.inputs
-    # both recursions at once, newest first, so that the last p responses are contiguous
+    # Both recursions run at once, newest first, so that the last p responses are contiguous.
     newest_first = np.zeros((count + p, m, r + m))
     known = min(count, p + 1)
     newest_first[count - known : count, :, :r] = arx.beta[:known][::-1]
@@ -40,7 +35,7 @@ def markov_parameters(arx: ARX, count: int) -> tuple[FloatArray, FloatArray]:
     alphas = np.ascontiguousarray(arx.alpha.transpose(1, 0, 2).reshape(m, p * m))
     past = newest_first.reshape(-1, r + m)
     for k in range(1, count):
-        first = count - k  # row block of response k - 1
+        first = count - k  # This is the row block of response k - 1.
         newest_first[first - 1] += alphas @ past[first * m : (first + p) * m]
     responses = newest_first[:count][::-1]
     return responses[:, :, :r].copy(), responses[1:, :, r:].copy()
@@ -49,18 +44,9 @@ def markov_parameters(arx: ARX, count: int) -> tuple[FloatArray, FloatArray]:
 def markov_gradient(arx: ARX, markov: FloatArray, weights: np.ndarray) -> np.ndarray:
     """Gradient of sum_k <weights_k, Y_k> with respect to the ARX coefficients.
 
-    One backward pass through the recursion (adjoint method).
-
-    Parameters
-    ----------
-    markov : ndarray, shape (K, m, r)
-    weights : ndarray, shape (K, m, r)
-        Real or complex.
-
-    Returns
-    -------
-    ndarray, shape (r + p (m + r), m)
-        In the order of `LagRegression`, without the disturbance basis.
+    One backward pass through the recursion (adjoint method) is made. `markov` and the real or
+    complex `weights` have shape (K, m, r), the gradient (r + p (m + r), m) in the order of
+    `LagRegression`, without the disturbance basis.
     """
     p, m, r = arx.order, arx.outputs, arx.inputs
     count = len(weights)

@@ -5,10 +5,10 @@ order the change of an ERA pole with the Markov parameters is ::
 
     d lambda = psi^H S^-1/2 U^T (dH1 - lambda dH0) V S^-1/2 phi / (psi^H phi)
 
-and theirs with the coefficients follows from the recursion of `markov`, whose adjoint gives the
-gradient in one backward pass (delta method; Pintelon, Guillaume and Schoukens 2007 for the subspace
-case). The covariance is valid for white prediction errors, which a high order makes and `validate`
-checks.
+and that of the parameters with the coefficients follows from the recursion of `markov`, whose
+adjoint gives the gradient in one backward pass (delta method; Pintelon, Guillaume and Schoukens
+2007 for the subspace case). The covariance is valid for white prediction errors, which a high order
+gives and `validate` checks.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ from utank_hil.identification.okid import OkidResult
 if TYPE_CHECKING:
     from control import StateSpace
 
-_NULL = 1e-12  # smallest eigenvalue of the Gram matrix, relative to the largest
+_NULL = 1e-12  # Smallest eigenvalue of the Gram matrix, relative to the largest.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +40,7 @@ class ModalParameters:
     frequency_rad_s : ndarray, shape (k,)
         Undamped natural frequency; infinite for a pole at 0.
     damping_ratio : ndarray, shape (k,)
-        1 for a real pole, negative when unstable.
+        Damping ratio: 1 for a real pole, negative when unstable.
     shapes : ndarray, shape (k, m)
         Mode shapes: complex amplitudes of the outputs, the largest 1; zero if unobservable.
     """
@@ -53,30 +53,14 @@ class ModalParameters:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalConfidence:
-    """Modal parameters with standard deviations.
-
-    Parameters
-    ----------
-    frequency_std_rad_s : ndarray, shape (k,)
-    damping_ratio_std : ndarray, shape (k,)
-    """
+    """Modal parameters with standard deviations, shape (k,), of frequency and damping ratio."""
 
     modes: ModalParameters
     frequency_std_rad_s: FloatArray
     damping_ratio_std: FloatArray
 
     def intervals(self, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
-        """Confidence intervals of frequency and damping ratio.
-
-        Parameters
-        ----------
-        level : float
-            Confidence level.
-
-        Returns
-        -------
-        frequency_rad_s, damping_ratio : ndarray, shape (k, 2)
-        """
+        """Return confidence intervals of frequency and damping ratio, both of shape (k, 2)."""
         reach = float(ndtri((1 + level) / 2)) * np.array([-1.0, 1.0])
         return (
             self.modes.frequency_rad_s[:, None] + self.frequency_std_rad_s[:, None] * reach,
@@ -85,35 +69,21 @@ class ModalConfidence:
 
 
 def modal_parameters(system: "StateSpace") -> ModalParameters:
-    """Modal parameters of a discrete python-control model.
-
-    Raises
-    ------
-    ValueError
-        If the model is not discrete.
-    """
+    """Return the modal parameters of a discrete python-control model; ValueError for others."""
     if not system.dt or system.dt is True:
         raise ValueError(f"modes need a discrete model with a sample time, its dt is {system.dt}")
     return _eigen(np.asarray(system.A), np.asarray(system.C), float(system.dt)).modes
 
 
 def modal_confidence(result: OkidResult, order: int) -> ModalConfidence:
-    """Modal parameters of an identification's ERA model, with standard deviations.
+    """Return modal parameters of an identification's ERA model, with standard deviations.
 
-    Parameters
-    ----------
-    order : int
-        Order of the model, as in `era`.
-
-    Returns
-    -------
-    ModalConfidence
-        Its modes are ``modal_parameters(era(result.markov, order, sample_time_s))``.
+    The modes are those of ``modal_parameters(era(result.markov, order, sample_time_s))``.
 
     Raises
     ------
     ValueError, IdentificationError
-        As `era`; and if poles coincide or lie at 0 or 1, where the gradient is not defined.
+        If `era` raises them, or poles coincide or lie at 0 or 1, where the gradient is not defined.
     """
     found = realize(result.markov, order)
     sample_time_s = result.arx.sample_time_s
@@ -149,7 +119,7 @@ def modal_confidence(result: OkidResult, order: int) -> ModalConfidence:
 
 
 def _frequency_and_damping_std(s: complex, covariance: FloatArray) -> tuple[float, float]:
-    """Standard deviations of |s| and -Re s / |s| from the covariance of (Re s, Im s)."""
+    """Return the standard deviations of |s| and -Re s / |s| from the covariance of (Re s, Im s)."""
     size = abs(s)
     to_frequency = np.array([s.real, s.imag]) / size
     to_damping = np.array([-1.0, 0.0]) / size + s.real / size**2 * to_frequency
@@ -180,7 +150,7 @@ class _Eigen(NamedTuple):
 
 def _eigen(a: FloatArray, c: FloatArray, sample_time_s: float) -> _Eigen:
     values, vectors = np.linalg.eig(a)
-    with np.errstate(divide="ignore", invalid="ignore"):  # the logarithm of 0
+    with np.errstate(divide="ignore", invalid="ignore"):  # The logarithm of 0 is allowed.
         s = np.log(values.astype(np.complex128)) / sample_time_s
     kept = np.flatnonzero(values.imag >= 0)
     kept = kept[np.argsort(np.abs(s[kept]))]
@@ -206,7 +176,7 @@ def _pole_weights(
     right_vector: ComplexArray,
     left_vector: ComplexArray,
 ) -> ComplexArray:
-    """Gradient of a pole with respect to the Markov parameters, shape (K, m, r)."""
+    """Return a pole's gradient with respect to the Markov parameters, shape (K, m, r)."""
     count, m, r = result.markov.shape
     down = (found.left @ left_vector).reshape(-1, m)
     across = (found.right @ right_vector).reshape(-1, r)
@@ -220,7 +190,7 @@ def _pole_weights(
 
 
 def _inverse_root(result: OkidResult, output: int) -> FloatArray:
-    """Symmetric square root of one output's coefficient covariance, for unit error variance."""
+    """Return the symmetric root of one output's coefficient covariance, for unit error variance."""
     gram = result.gram.copy()
     m, r = result.arx.outputs, result.arx.inputs
     inputs = (np.arange(result.arx.order + 1)[:, None] * (m + r) + np.arange(r)).ravel()

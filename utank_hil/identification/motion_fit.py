@@ -5,10 +5,10 @@ measured. With the coefficients of roll and level at a frequency it gives the wa
 
     K_w = D_phi(w, theta) phi + D_h(w) h + n,    theta = log (stiffness, inertia, damping) factors
 
-n is what the ship's own file says of quadratic damping and bent restoring moment, from the measured
-motion. The tank's D_h is known and absolute: it is what the ship is weighed against.
+n is the configured ship's quadratic damping and nonlinear restoring moment in the measured motion.
+The tank's D_h is known and absolute: it is the reference for the ship.
 
-A wrong ship gives a wrong spectrum of K_w. Which one is right follows from the likelihood of the
+A wrong ship gives a wrong spectrum of K_w. The right one follows from the likelihood of the
 motion under a spectrum that is smooth (`smooth_spectrum`). From moment to roll the change of
 variables has the factor 1 / D_c, of ship and passive tank together::
 
@@ -45,27 +45,28 @@ from utank_hil.sea import SlopeSpectrum
 SPREAD: Final = (0.7, 0.1, 0.5)
 """Prior deviations of the logarithms of stiffness, inertia and damping, for any loading."""
 KNOWN_SPREAD: Final = (0.02, 0.02, 0.3)
-"""Prior deviations of a ship that is known: consumption and trim of a voyage."""
+"""Prior deviations of a known ship: consumption and trim of a voyage."""
 BAND: Final = (0.25, 3.2)
-"""Band of the frequencies used for the ship, over the given ship's natural frequency."""
+"""Frequency band for the ship, relative to the given ship's natural frequency."""
 TOP_RAD_S: Final = 2.4
-"""The spectrum reaches to here, or to the end of `BAND`; beyond it waves have no height."""
+"""Upper end of the spectrum, or that of `BAND` if larger; waves are negligible beyond it."""
 RESOLUTION: Final = 0.03
-"""Width of a spectral band over the given ship's natural frequency."""
+"""Width of a spectral band relative to the given ship's natural frequency."""
 LEAST_TAPERS: Final = 3
-"""Least averages of a spectral estimate: with fewer the distribution of its logarithm is skewed."""
+"""Smallest number of averages of a spectral estimate; fewer skew the distribution of its logarithm.
+"""
 _STARTS = np.log([0.45, 0.6, 0.8, 1.0, 1.25, 1.6, 2.2])  # stiffness: roll periods x 0.67 to 1.5
 _NOISE_BAND = (0.4, 0.9)  # of the Nyquist frequency: no motion there, only noise
-_NOISE_LINES = 200  # their median is known to a few per cent
+_NOISE_LINES = 200  # Their median is known to a few per cent.
 _NOISE_TAPERS = 4
 _MEDIAN = 0.918  # median over mean of chi-square with twice `_NOISE_TAPERS` degrees of freedom
-_STEP = np.array([0.02, 0.03, 0.1])  # for the curvature
-_MOST_TRIES = 250  # of ships
+_STEP = np.array([0.02, 0.03, 0.1])  # These are steps for the curvature.
+_MOST_TRIES = 250  # This is the largest number of ships tried.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionFit:
-    """Ship and wave moment.
+    """Ship and wave moment fitted to a record.
 
     Attributes
     ----------
@@ -82,7 +83,7 @@ class MotionFit:
     clear : float
         Part of the moment's energy in bands where it exceeds the sensors' noise.
     log_likelihood : float
-        Of the motion, without constants; to compare fits to one record.
+        Log-likelihood of the motion without constants, to compare fits to one record.
     """
 
     ship: RollShip
@@ -107,9 +108,9 @@ def fit_motion(
     motion : ndarray, shape (N, 3)
         Roll in rad, roll rate in rad/s and level in m, without gaps.
     plant : DesignPlant
-        Ship that the prior is about, and the tank.
+        Ship of the prior, and the tank.
     spread : tuple of float
-        Deviations of the prior.
+        Standard deviations of the prior.
     """
     natural = plant.ship.natural_frequency_rad_s
     record = _Record(motion, plant, sample_time_s, BAND[1] * natural)
@@ -133,7 +134,7 @@ def fit_motion(
 
 
 class _Record:
-    """Spectral coefficients of a record, and what they say of a ship."""
+    """Spectral coefficients of a record, and the likelihood of ships."""
 
     def __init__(
         self, motion: FloatArray, plant: DesignPlant, sample_time_s: float, top_rad_s: float
@@ -161,7 +162,7 @@ class _Record:
         )
         noise_roll, noise_rate, self._noise_level = np.median(noise, axis=1) / _MEDIAN
         roll_w, rate_w, self._level, bent_w = coefficients(signals, sample_time_s, omega, tapers)
-        # roll from both sensors, each by its noise
+        # The roll is from both sensors, each weighted by its noise.
         by_roll, by_rate = 1 / max(noise_roll, 1e-30), omega**2 / max(noise_rate, 1e-30)
         self._roll = (by_roll * roll_w + by_rate * rate_w / (1j * omega)) / (by_roll + by_rate)
         self._noise_roll = 1 / (by_roll + by_rate)
@@ -170,7 +171,7 @@ class _Record:
         parts = (mass * s[:, None, None] ** 2 + damping * s[:, None, None] + stiffness) / (
             ship.stiffness_nm_rad
         )
-        # of water and hull; the ship's own part scales with theta
+        # These are of water and hull; the ship's own part scales with theta.
         self._hull = np.array(
             [
                 np.ones_like(s),
@@ -188,7 +189,7 @@ class _Record:
         return factor
 
     def _moment(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Density of the moment over the given ship's stiffness, and that of its noise."""
+        """Return the density of the moment per stiffness of the given ship, and its noise's."""
         factor = self._roll_factor(theta)
         moment = factor * self._roll + self._coupling * self._level + self._bent
         noise = np.abs(factor) ** 2 * self._noise_roll
@@ -196,14 +197,14 @@ class _Record:
         return np.mean(np.abs(moment) ** 2, axis=0), noise
 
     def likelihood(self, theta: FloatArray) -> LogSpectrum:
-        """The spectrum of the wave moment for a ship, and the likelihood of the motion."""
+        """Return the spectrum of the wave moment for a ship, and the likelihood of the motion."""
         found = self.spectrum.find(*self._moment(theta))
         passive = np.abs(self._roll_factor(theta) - self._swing)
         change = 2 * self._tapers * float(np.log(passive).sum())
         return found._replace(log_likelihood=found.log_likelihood + change)
 
     def fit(self, theta: FloatArray, covariance: FloatArray, log_likelihood: float) -> MotionFit:
-        """The outcome for the likeliest ship."""
+        """Return the fit of the most likely ship."""
         stiffness, inertia, damping = np.exp(theta).tolist()
         ship = self._ship
         fitted = dataclasses.replace(
@@ -213,7 +214,7 @@ class _Record:
             damping_nms_rad=ship.damping_nms_rad * damping,
         )
         found = self.likelihood(theta)
-        # a ship that is off changes the spectrum, and the stiffness that it is given per
+        # A ship in error changes the spectrum, and the stiffness that it is relative to.
         by_ship = np.array(
             [
                 (self.likelihood(theta + step).mean - self.likelihood(theta - step).mean) / 2
@@ -241,7 +242,7 @@ class _Record:
 def _inverse_curvature(
     cost: Callable[[FloatArray], float], theta: FloatArray, prior: FloatArray
 ) -> FloatArray:
-    """Covariance of theta: the inverse of the cost's second derivatives, at most the prior's."""
+    """Return the covariance of theta: the inverse curvature of the cost, at most the prior's."""
     curvature = np.zeros((3, 3))
     steps = np.diag(_STEP)
     for row, one in enumerate(steps):
@@ -253,7 +254,7 @@ def _inverse_curvature(
             ]
             value = sum(corners) / (4 * _STEP[row] * _STEP[column])
             curvature[row, column] = curvature[column, row] = value
-    # in units of the prior the least curvature is 1, the prior's own
+    # In units of the prior the smallest curvature is 1, the prior's own.
     values, vectors = np.linalg.eigh(prior[:, None] * curvature * prior)
     scaled = (vectors / np.maximum(values, 1.0)) @ vectors.T
     covariance: FloatArray = prior[:, None] * scaled * prior

@@ -1,8 +1,8 @@
 """Sine-taper spectral coefficients of a record (Riedel and Sidorenko, 1995).
 
 The squared magnitudes of the coefficients of one frequency, averaged over the tapers, estimate the
-one-sided density there with two degrees of freedom a taper. Frequencies `bandwidth_rad_s` apart are
-nearly independent.
+one-sided density there with two degrees of freedom per taper. Frequencies `bandwidth_rad_s` apart
+are nearly independent.
 """
 
 import numpy as np
@@ -13,25 +13,21 @@ _PADDING = 8  # finer grid of the transform: a coefficient is that of its freque
 
 
 def bandwidth_rad_s(samples: int, sample_time_s: float, tapers: int) -> float:
-    """Full width of the band that a coefficient is from."""
+    """Full bandwidth of a coefficient."""
     return (tapers + 1) * np.pi / (samples * sample_time_s)
 
 
 def coefficients(
     signals: FloatArray, sample_time_s: float, omega_rad_s: FloatArray, tapers: int
 ) -> ComplexArray:
-    """Spectral coefficients; their squared magnitude is one-sided density per rad/s.
+    """Spectral coefficients, (m, tapers, F); their squares are one-sided density per rad/s.
 
     Parameters
     ----------
     signals : ndarray, shape (N, m)
-        Without gaps. A straight line is taken off each.
+        Signals without gaps; a straight line is subtracted from each.
     omega_rad_s : ndarray, shape (F,)
-        Below the Nyquist frequency.
-
-    Returns
-    -------
-    ndarray, shape (m, tapers, F)
+        Frequencies below the Nyquist frequency.
     """
     count = len(signals)
     time = np.linspace(-1.0, 1.0, count)

@@ -22,8 +22,8 @@ from utank_hil.identification.least_squares import Fit, fit
 from utank_hil.identification.markov import markov_parameters
 from utank_hil.identification.record import channel_scale, stacked_record
 
-_MARKOV_COUNT = 401  # at 0.2 s a Hankel matrix over 40 s, longer than any roll period
-_LEAST_EXCITATION = 4  # for one oscillation: twice its order
+_MARKOV_COUNT = 401  # At 0.2 s this is a Hankel matrix over 40 s, longer than any roll period.
+_LEAST_EXCITATION = 4  # One oscillation needs twice its order.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,13 +84,8 @@ def arx(
 ) -> ARX:
     """Fit an ARX model by least squares: the first step of `okid`.
 
-    Parameters and errors are those of `okid`, except that strongly unstable models are not refused:
-    their one-step predictions are as good as others.
-
-    Returns
-    -------
-    ARX
-        As `OkidResult.arx` for the same record.
+    Parameters and errors are those of `okid`, except that strongly unstable models, whose one-step
+    predictions are valid, are not refused. The result is `OkidResult.arx` of the same record.
     """
     return _fitted(
         u,

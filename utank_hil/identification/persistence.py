@@ -6,20 +6,20 @@ from scipy.linalg import lapack
 from utank_hil.base.arrays import FloatArray
 from utank_hil.identification.lag_regression import LagRegression
 
-_EXCITED = 1e-10  # smallest pivot of the lagged inputs' Gram matrix: singular values of 1e-5
+_EXCITED = 1e-10  # Smallest pivot of the lagged inputs' Gram matrix: singular values of 1e-5.
 
 
 def excitation_order(u: FloatArray, most: int) -> int:
     """Order of persistent excitation of an input, to numerical precision.
 
-    The rank of the Gram matrix of `most` lagged inputs. A model of n states needs 2 n or more; all
-    coefficients of an ARX model of order p need p + 1. A narrow-band signal has a low order for any
-    number of lines.
+    This is the rank of the Gram matrix of `most` lagged inputs. A model of n states needs 2 n or
+    more; all coefficients of an ARX model of order p need p + 1. A narrow-band signal has a low
+    order for any number of lines.
 
     Parameters
     ----------
     u : array_like, shape (N,) or (N, r)
-        Rows that are not finite are gaps.
+        Input; rows that are not finite are gaps.
     most : int
         Largest order to test.
 
@@ -39,14 +39,10 @@ def excitation_order(u: FloatArray, most: int) -> int:
 
 
 def input_excitation(regression: LagRegression, gram: FloatArray) -> tuple[int, float]:
-    """Order of persistent excitation and variance inflation, from a regression's Gram matrix.
+    """Return persistent excitation and variance inflation, from a regression's Gram matrix.
 
-    Returns
-    -------
-    order : int
-    inflation : float
-        Mean variance of the input coefficients relative to white inputs of the same power;
-        infinite if the order is less than the number of lags.
+    The first is the order. The second is the mean variance of the input coefficients relative to
+    white inputs of the same power, infinite if the order is less than the number of lags.
     """
     index = regression.input_rows
     lagged = gram[np.ix_(index, index)]
@@ -56,6 +52,6 @@ def input_excitation(regression: LagRegression, gram: FloatArray) -> tuple[int, 
     if rank < len(index):
         return int(rank) // inputs, np.inf
     inverse, _ = lapack.dtrtri(factor, lower=1)
-    # dpstrf leaves the other triangle as it was
+    # The routine dpstrf leaves the other triangle unchanged.
     inflation = np.sum(np.tril(inverse) ** 2) * power.mean() / len(index)
     return int(rank) // inputs, float(inflation)

@@ -5,13 +5,13 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.identification.errors import IdentificationError
 
-_SMALLEST, _LARGEST = 1e-60, 1e60  # range in which products of squares stay finite
-_CLIPPED = 0.01  # largest share of samples; at twice that a model of roll has errors of 2 %
-_FEWEST = 4  # fewer equal samples are chance
+_SMALLEST, _LARGEST = 1e-60, 1e60  # Products of squares stay finite in this range.
+_CLIPPED = 0.01  # largest share; at twice that a model of roll has errors of 2 %
+_FEWEST = 4  # Fewer equal samples are chance.
 
 
 def stacked_record(u: FloatArray, y: FloatArray) -> tuple[FloatArray, int]:
-    """Outputs and inputs side by side, shape (N, m + r), and m; rows of gaps are all NaN."""
+    """Return outputs and inputs side by side, shape (N, m + r), and m; rows of gaps are all NaN."""
     columns = []
     for name, part in (("y", y), ("u", u)):
         array = np.asarray(part, dtype=np.float64)
@@ -65,7 +65,7 @@ def _refuse_clipped(output: FloatArray, number: int) -> None:
     from the values.
     """
     values, counts = np.unique(output, return_counts=True)
-    # a low quantile: rare values leave wider gaps, rounding narrower ones
+    # A low quantile is used: rare values leave wider gaps, rounding narrower ones.
     step = float(np.quantile(np.diff(values), 0.1))
     turning = 2 * np.sqrt(4 * step / (values[-1] - values[0])) / np.pi  # twice, for flat peaks
     for index, word in ((-1, "largest"), (0, "smallest")):

@@ -38,15 +38,15 @@ from utank_hil.dynamics.tank import Tank
 from utank_hil.identification.errors import IdentificationError
 from utank_hil.identification.okid import OkidResult
 
-_BAND_RAD_S = 2.5  # above it ship and tank hardly respond
-_LINES = 64  # frequencies in the band; an ARX model of order 120 resolves no more
-_SPREAD = (0.1, 0.7, 0.5, 0.2)  # sigma of the prior: relative changes by loading
-_PRESSURE_SPREAD = 0.005  # gain errors of pressure sensor and pressure loop
-_DELAY_SPREAD_S = 2 * TICK_S  # a frame arrives in one tick or the next
-_PRESSURE = len(_SPREAD)  # index of the pressure gain in theta; the delays follow
-_STARTS = np.log([0.5, 0.7, 1.0, 1.4, 2.0, 2.8])  # initial values of the stiffness factor
-_PASSES = 5  # at most
-_CONVERGED = 1e-3  # of the dispersion: far below what it is known to
+_BAND_RAD_S = 2.5  # Ship and tank hardly respond above this.
+_LINES = 64  # Frequencies in the band; an ARX model of order 120 resolves no more.
+_SPREAD = (0.1, 0.7, 0.5, 0.2)  # Standard deviations of the prior: relative changes by loading.
+_PRESSURE_SPREAD = 0.005  # Gain errors of pressure sensor and pressure loop.
+_DELAY_SPREAD_S = 2 * TICK_S  # A frame arrives in one tick or the next.
+_PRESSURE = len(_SPREAD)  # Index of the pressure gain in theta; the delays follow.
+_STARTS = np.log([0.5, 0.7, 1.0, 1.4, 2.0, 2.8])  # Initial values of the stiffness factor.
+_PASSES = 5  # Largest number of passes.
+_CONVERGED = 1e-3  # Relative change of the dispersion, far below its own uncertainty.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,7 +93,7 @@ def fit_ship(
     Parameters
     ----------
     result : OkidResult
-        With one input.
+        Result with one input.
     u : array_like, shape (N,)
         Input of the identification, gaps included.
     plant : DesignPlant
@@ -159,7 +159,7 @@ def fit_ship(
             if abs(residual_rms - 1) < _CONVERGED or dispersion == 1:
                 break
         covariance = np.linalg.inv(solution.jac.T @ solution.jac)[:_PRESSURE, :_PRESSURE]
-    except (np.linalg.LinAlgError, ValueError) as error:  # overflow on the way, or singular
+    except (np.linalg.LinAlgError, ValueError) as error:  # overflow, or a singular matrix
         raise IdentificationError(f"no ship fits the identified model: {error}") from None
     period_gradient = np.array([0.5, -0.5, 0.0, 0.0])
     coefficients_per_row = len(result.column_scale) / result.rows
@@ -177,7 +177,7 @@ def fit_ship(
 
 
 def _amplitude(u: FloatArray, sample_time_s: float) -> FloatArray:
-    """Root of the input's two-sided energy around each frequency; shape (_LINES,)."""
+    """Return the root of the input's two-sided energy around each frequency; shape (_LINES,)."""
     here = np.isfinite(u)
     energy = 2 * np.abs(np.fft.rfft(np.where(here, u - u[here].mean(), 0.0))) ** 2 / len(u)
     frequency = 2 * np.pi * np.fft.rfftfreq(len(u), sample_time_s)

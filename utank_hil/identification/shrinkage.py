@@ -17,31 +17,17 @@ from scipy.optimize import minimize_scalar
 from utank_hil.base.arrays import FloatArray
 from utank_hil.identification.lag_regression import LagRegression
 
-_NULL = 1e-12  # smallest eigenvalue, relative to the largest
-_LOG_KAPPA = (-15.0, 30.0)  # from zero input coefficients to plain least squares
+_NULL = 1e-12  # Smallest eigenvalue, relative to the largest.
+_LOG_KAPPA = (-15.0, 30.0)  # The range is from zero input coefficients to plain least squares.
 
 
 def shrinkage_estimate(
     regression: LagRegression, gram: FloatArray, right: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Coefficients of a regression, with shrinkage of the input coefficients.
+    """Return shrunk coefficients (n, m), and 1 / kappa for each output (m,).
 
-    Parameters
-    ----------
-    gram : ndarray, shape (n, n)
-        Upper triangle of the Gram matrix.
-    right : ndarray, shape (n, m)
-
-    Returns
-    -------
-    coefficients : ndarray, shape (n, m)
-    penalty : ndarray, shape (m,)
-        1 / kappa for each output.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If the other columns of the regression are dependent.
+    `gram` (n, n) is the upper triangle of the Gram matrix, `right` the right side (n, m).
+    numpy.linalg.LinAlgError is raised if the other columns of the regression are dependent.
     """
     full = np.triu(gram) + np.triu(gram, 1).T
     inputs = regression.input_rows

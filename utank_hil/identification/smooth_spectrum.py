@@ -1,10 +1,10 @@
-"""A spectrum as a Gaussian process of its logarithm, from estimates that scatter.
+"""A spectrum as a Gaussian process of its logarithm, from estimates with scatter.
 
-The spectrum S is sought. An estimate I scatters like chi-square with 2 K degrees of freedom about S
-plus a known noise n, so its likelihood is (S + n)^-K exp(-K I / (S + n)), after Whittle. The prior
-says that log S is smooth over the logarithm of frequency, and nothing of its level. Its mode is
-found by Fisher scoring, the likelihood of the whole by Laplace's approximation there (Rasmussen and
-Williams, Gaussian Processes for Machine Learning, 3.4).
+An estimate I of the spectrum S scatters like chi-square with 2 K degrees of freedom about S plus a
+known noise n, so its likelihood is (S + n)^-K exp(-K I / (S + n)), after Whittle. The prior makes
+log S smooth over the logarithm of frequency and leaves its level free. Its mode is found by Fisher
+scoring, the likelihood of the whole by Laplace's approximation there (Rasmussen and Williams,
+Gaussian Processes for Machine Learning, 3.4).
 """
 
 from typing import NamedTuple
@@ -14,13 +14,13 @@ from scipy.linalg import cho_solve, solve_triangular
 
 from utank_hil.base.arrays import FloatArray
 
-_SPREAD = 2.0  # standard deviation of the logarithm about its level: a factor of 7
-_LENGTH = 0.3  # Matern's length over the logarithm of frequency: a third of an octave
-_LEVEL_SPREAD = 5.0  # of the logarithm: practically free
-_START = 0.1  # of the mean density: the level about which the logarithm is spread
-_STEPS = 60  # of Newton's method, at most
-_CONVERGED = 1e-4  # of the logarithm
-_TINY = 1e-9  # keeps the prior and the weights positive definite
+_SPREAD = 2.0  # Standard deviation of the logarithm about its level: a factor of 7.
+_LENGTH = 0.3  # Matern length over the logarithm of frequency: a third of an octave.
+_LEVEL_SPREAD = 5.0  # Standard deviation of the logarithm's level: practically free.
+_START = 0.1  # Level about which the logarithm is spread, relative to the mean density.
+_STEPS = 60  # Largest number of Newton steps.
+_CONVERGED = 1e-4  # Largest last change of the logarithm.
+_TINY = 1e-9  # This keeps the prior and the weights positive definite.
 
 
 class LogSpectrum(NamedTuple):
@@ -29,10 +29,11 @@ class LogSpectrum(NamedTuple):
     Attributes
     ----------
     log_likelihood : float
-        Of the estimates, whatever the spectrum; without its constants.
+        Log-likelihood of the estimates over all spectra, without its constants.
     mean : ndarray, shape (F,)
         Logarithm of the density at the mode.
     covariance : ndarray, shape (F, F)
+        Covariance of the logarithm.
     """
 
     log_likelihood: float
@@ -60,17 +61,11 @@ class SmoothSpectrum:
         self._warm: FloatArray | None = None
 
     def restart(self) -> None:
-        """Begin the next search from the estimates, not from the last spectrum."""
+        """Start the next search from the estimates, not from the last spectrum."""
         self._warm = None
 
     def find(self, estimate: FloatArray, noise: FloatArray) -> LogSpectrum:
-        """The spectrum behind the estimates, noise taken off.
-
-        Parameters
-        ----------
-        estimate, noise : ndarray, shape (F,)
-            Densities, positive.
-        """
+        """Return the spectrum without noise from positive densities, shape (F,)."""
         prior, tapers = self._prior, self._tapers
         level = np.log(_START * estimate.mean())
         if self._warm is None:

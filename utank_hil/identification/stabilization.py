@@ -9,9 +9,9 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.identification.era import era
 from utank_hil.identification.modal import ModalParameters, modal_assurance, modal_parameters
 
-_FREQUENCY = 0.01  # relative changes from one order to the next that count as stable
-_DAMPING = 0.05  # these three as usual for stabilization diagrams (Peeters and De Roeck 1999)
-_SHAPE = 0.98  # modal assurance
+_FREQUENCY = 0.01  # Stable modes change by less than these from one order to the next,
+_DAMPING = 0.05  # as usual for stabilization diagrams (Peeters and De Roeck 1999).
+_SHAPE = 0.98  # Modal assurance of a stable mode.
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,18 +36,10 @@ class StabilizationPoint:
 def stabilization(
     markov: FloatArray, orders: Sequence[int], sample_time_s: float
 ) -> tuple[StabilizationPoint, ...]:
-    """Modes of ERA models of increasing order.
+    """Return the modes of ERA models of increasing order, by order, then frequency.
 
-    Parameters
-    ----------
-    markov : ndarray, shape (K, m, r)
-    orders : sequence of int
-        Increasing, at most the rank of the Markov parameters.
-
-    Returns
-    -------
-    tuple of StabilizationPoint
-        By order, then frequency; no mode is stable at the first order.
+    No mode is stable at the first order. The orders are at most the rank of `markov`, shape (K, m,
+    r).
     """
     points = []
     before: ModalParameters | None = None

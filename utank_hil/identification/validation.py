@@ -1,7 +1,7 @@
 """Validation of an identified model on data that it was not fitted to.
 
-Fit, whiteness of the prediction errors, and their correlation with the input. Coloured errors mean
-unmodelled dynamics or disturbances (a wave, a higher order). Errors correlated with past inputs
+The criteria are fit, whiteness of the prediction errors, and their correlation with the input.
+Coloured errors mean unmodelled dynamics or disturbances (a wave, a higher order). Errors correlated with past inputs
 mean a wrong transfer function. Ljung, System Identification, 16.6.
 """
 
@@ -30,7 +30,7 @@ class Validation:
     one_step_fit : ndarray, shape (m,)
         1 - rms(prediction error) / rms(y - mean y); 1 is perfect.
     simulation_fit : ndarray, shape (m,)
-        The same for the simulated response to input and disturbance basis, with the first p samples
+        Fit of the simulated response to input and disturbance basis, with the first p samples
         of each segment as initial state. It includes the effect of an irregular sea. Minus
         infinity for a response that overflows.
     residual_correlation : ndarray, shape (lags, m)
@@ -121,12 +121,7 @@ def validate(
 
 
 def _refuse_unusable(regression: LagRegression, lags: int) -> None:
-    """Refuse a record with too few predictions, or with channels that do not move.
-
-    Raises
-    ------
-    IdentificationError
-    """
+    """Raise IdentificationError for too few predictions, or channels that do not move."""
     p, m = regression.order, regression.outputs
     if regression.rows <= lags:
         raise IdentificationError(
@@ -134,7 +129,7 @@ def _refuse_unusable(regression: LagRegression, lags: int) -> None:
             "on a longer record, mend its gaps or ask for fewer lags"
         )
     for c in range(regression.channels):
-        # outputs are compared at the predictions, inputs also at every lag before them
+        # Outputs are compared at the predictions, inputs also at every lag before them.
         for lag in range(1 if c < m else lags + 1):
             parts = [
                 s.channels[c, p - lag : s.channels.shape[1] - lag] for s in regression.segments
@@ -148,7 +143,7 @@ def _refuse_unusable(regression: LagRegression, lags: int) -> None:
 
 
 def _errors(regression: LagRegression, coefficients: FloatArray) -> list[FloatArray]:
-    """One-step prediction errors by segment, refused if they overflow."""
+    """Return one-step prediction errors by segment; an overflow is refused."""
     with np.errstate(over="ignore", invalid="ignore"):
         errors = regression.residuals(coefficients)
         if not all(np.isfinite(e @ e.T).all() for e in errors):
@@ -162,7 +157,7 @@ def _errors(regression: LagRegression, coefficients: FloatArray) -> list[FloatAr
 def _simulation_fit(
     regression: LagRegression, coefficients: FloatArray, spread: FloatArray
 ) -> FloatArray:
-    """Fit of the simulated response; minus infinity if it overflows."""
+    """Return the fit of the simulated response; minus infinity if it overflows."""
     with np.errstate(over="ignore", invalid="ignore"):
         simulated = [
             s.channels[: regression.outputs, regression.order :] - free
@@ -175,19 +170,19 @@ def _simulation_fit(
 
 
 def _coefficients(arx: ARX, scale: FloatArray, regression: LagRegression) -> FloatArray:
-    """Coefficients of the model in a scaled regression; zero beyond its order and for the basis."""
+    """Return coefficients in a scaled regression; zero beyond the order and for the basis."""
     m = arx.outputs
     by_lag = np.zeros((regression.order + 1, m, regression.channels))
     by_lag[1 : arx.order + 1, :, :m] = arx.alpha
     by_lag[: arx.order + 1, :, m:] = arx.beta
-    with np.errstate(over="ignore", invalid="ignore"):  # then the predictions are not finite
+    with np.errstate(over="ignore", invalid="ignore"):  # The predictions are then not finite.
         by_lag *= scale / scale[:m, None]
     lagged = by_lag.transpose(0, 2, 1).reshape(-1, m)[m:]
     return np.vstack([lagged, np.zeros((regression.basis_size, m))])
 
 
 def _simulated(regression: LagRegression, coefficients: FloatArray) -> list[FloatArray]:
-    """Simulated response of each segment, (m, N - p), with its first p samples as initial state."""
+    """Return the response of each segment, (m, N - p), with its first p samples as state."""
     p, q, m = regression.order, regression.channels, regression.outputs
     split = (p + 1) * q - m
     past = coefficients[q - m : split].reshape(p, q, m)[:, :m]
@@ -198,7 +193,7 @@ def _simulated(regression: LagRegression, coefficients: FloatArray) -> list[Floa
     for segment, left in zip(regression.segments, regression.residuals(inputs_only), strict=True):
         forced = segment.channels[:m, p:] - left
         samples = segment.channels.shape[1]
-        history = np.zeros((samples, m))  # reversed in time: newest first
+        history = np.zeros((samples, m))  # The time is reversed: newest first.
         history[samples - p :] = segment.channels[:m, :p].T[::-1]
         for k in range(samples - p):
             now = samples - p - 1 - k
@@ -213,7 +208,7 @@ def _rms(errors: list[FloatArray]) -> FloatArray:
 
 
 def _whiteness(errors: list[FloatArray], lags: int) -> tuple[FloatArray, FloatArray]:
-    """Ljung-Box p-value and autocorrelation of each output's errors."""
+    """Return the Ljung-Box p-value and the autocorrelation of each output's errors."""
     total = sum(np.sum(e**2, axis=1) for e in errors)
     correlation = np.array(
         [
@@ -229,7 +224,7 @@ def _whiteness(errors: list[FloatArray], lags: int) -> tuple[FloatArray, FloatAr
 def _independence(
     errors: list[FloatArray], regression: LagRegression, lags: int
 ) -> tuple[FloatArray, FloatArray]:
-    """p-value of the independence of errors and past inputs, and their correlation."""
+    """Return the p-value of the independence of errors and past inputs, and their correlation."""
     p, m = regression.order, regression.outputs
     inputs = regression.channels - m
     probability = np.empty((m, inputs))
@@ -247,7 +242,7 @@ def _independence(
         scale = np.sqrt(power.diagonal())
         crossed = sum(w @ e.T for w, e in zip(lagged, errors, strict=True))
         correlation[:, :, j] = crossed / scale[:, None] / size
-        # lagged inputs are correlated, those of a slow input almost completely
+        # Lagged inputs are correlated, those of a slow input almost completely.
         values, vectors = np.linalg.eigh(power / np.outer(scale, scale))
         kept = values > 1e-6 * values[-1]
         along = vectors[:, kept].T @ correlation[:, :, j] / np.sqrt(values[kept])[:, None]

@@ -20,10 +20,10 @@ from utank_hil.identification.disturbance import DisturbanceBasis
 from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.record import channel_scale, stacked_record
 
-_ORDER = 12  # three times the states of ship and tank: their memory, but not a wave's
-_RIDGE = 1e-4  # squared relative noise of 1 %
-_STEPS_A_CYCLE = 4  # trial frequencies per DFT bin (one cycle over the record)
-_EVIDENCE = 30.0  # least F statistic of a line; noise reaches 6, an irregular sea 20
+_ORDER = 12  # Three times the states of ship and tank: their memory, but not a wave's.
+_RIDGE = 1e-4  # Squared relative noise of 1 %.
+_STEPS_A_CYCLE = 4  # Trial frequencies per DFT bin (one cycle over the record).
+_EVIDENCE = 30.0  # Smallest F statistic of a line; noise reaches 6, an irregular sea 20.
 
 
 def find_disturbance_frequencies(
@@ -70,7 +70,7 @@ def find_disturbance_frequencies(
     lines: list[float] = []
     while len(lines) < most:
         search = _Search(z, m, lines, sample_time_s)
-        # no second line within one DFT bin of another
+        # No second line is allowed within one DFT bin of another.
         candidates = [w for w in grid if all(abs(w - old) > _STEPS_A_CYCLE * step for old in lines)]
         if not candidates:
             break
@@ -78,7 +78,7 @@ def find_disturbance_frequencies(
         if search.reduction(line) < _EVIDENCE * 2 * m:
             break
         lines.append(line)
-        if len(lines) > 1:  # lines interact: refine each one with the others in place
+        if len(lines) > 1:  # Lines interact, so each one is refined with the others in place.
             for i, old in enumerate(lines):
                 others = lines[:i] + lines[i + 1 :]
                 lines[i] = _Search(z, m, others, sample_time_s).refined(old, step)
@@ -98,12 +98,12 @@ class _Search:
         self._errors = self._regression.residuals(cho_solve(self._factor, right))
         squares = sum(np.sum(e**2, axis=1) for e in self._errors)
         self._variance = squares / self._regression.rows + _RIDGE
-        # times of the regression's rows, for the sines and cosines
+        # These are the times of the regression's rows, for the sines and cosines.
         marks = LagRegression(z, m, _ORDER, time_s[None])
         self._times = [segment.basis[0] for segment in marks.segments]
 
     def reduction(self, frequency_rad_s: float) -> float:
-        """Reduction of the squared error by a line over its variance, summed over outputs."""
+        """Return the reduction of the squared error over its variance, summed over outputs."""
         waves = [
             np.array([np.sin(frequency_rad_s * t), np.cos(frequency_rad_s * t)])
             for t in self._times
@@ -115,7 +115,7 @@ class _Search:
         return float(np.sum(gain / self._variance))
 
     def refined(self, frequency_rad_s: float, step: float) -> float:
-        """Frequency of the largest reduction within a step of a trial frequency."""
+        """Return the frequency of the largest reduction within a step of a trial frequency."""
         found = minimize_scalar(
             lambda w: -self.reduction(w),
             bounds=(max(frequency_rad_s - step, step / 2), frequency_rad_s + step),

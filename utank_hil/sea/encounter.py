@@ -24,9 +24,9 @@ def wavenumber_rad_m(omega_rad_s: FloatArray) -> FloatArray:
 def encounter_frequency(
     omega_rad_s: FloatArray, heading_rad: FloatArray | float, speed_m_s: float
 ) -> FloatArray:
-    """Signed encounter frequency in rad/s.
+    """Signed encounter frequency in rad/s; arguments broadcast.
 
-    Negative where the ship overtakes the wave, which then passes from bow to stern. Broadcasts.
+    It is negative where the ship overtakes the wave, which then passes from bow to stern.
     """
     omega = np.asarray(omega_rad_s, dtype=float)
     return omega - wavenumber_rad_m(omega) * speed_m_s * np.cos(heading_rad)

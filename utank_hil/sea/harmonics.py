@@ -6,20 +6,15 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 
-BLOCK = 1 << 19  # cosines evaluated at a time in `at`: 4 MB
+BLOCK = 1 << 19  # Number of cosines evaluated at a time in `at`: 4 MB.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Harmonics:
     """x(t) = sum of amplitude cos(frequency t + phase).
 
-    Parameters
-    ----------
-    amplitude : ndarray, shape (N,)
-        In the unit of x; may be negative.
-    frequency_rad_s : ndarray, shape (N,)
-        Zero or more.
-    phase_rad : ndarray, shape (N,)
+    All arrays have shape (N,). Amplitudes are in the unit of x and may be negative; frequencies are
+    zero or more.
     """
 
     amplitude: FloatArray
@@ -32,17 +27,7 @@ class Harmonics:
         return float(self.amplitude @ self.amplitude / 2)
 
     def at(self, time_s: FloatArray | float) -> FloatArray:
-        """Evaluate at arbitrary times by the direct sum.
-
-        Parameters
-        ----------
-        time_s : float or ndarray, any shape
-
-        Returns
-        -------
-        ndarray
-            Shape of `time_s`.
-        """
+        """Evaluate at arbitrary times, a float or an array, by the direct sum."""
         times = np.asarray(time_s, dtype=float)
         flat = times.ravel()
         result = np.empty(flat.size)
@@ -58,16 +43,8 @@ class Harmonics:
 
         With t = T + s, T on a coarse and s on a fine grid, cos(w T + phase + w s) is expanded into
         two products. This takes sqrt(count) cosines per component and one matrix product. No error
-        accumulates, so the result equals `at` to rounding error.
-
-        Returns
-        -------
-        ndarray, shape (count,)
-
-        Raises
-        ------
-        ValueError
-            If `step_s` is not positive or `count` is negative.
+        accumulates, so the result equals `at` to rounding error. ValueError is raised if `step_s`
+        is not positive or `count` is negative.
         """
         if not step_s > 0 or count < 0:
             raise ValueError(f"series needs a positive step and count, got {step_s} and {count}")

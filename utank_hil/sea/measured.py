@@ -44,7 +44,7 @@ class MeasuredSpectra:
     def __getitem__(self, index: int) -> Spectrum:
         """Return the spectrum at a position.
 
-        Missing bands at either end of the grid count as zero. A missing band in between is a
+        Missing bands at either end of the grid count as zero. A missing band in between raises a
         ValueError, because its energy is unknown.
         """
         density = self._zero_filled_ends()[index]
@@ -63,7 +63,7 @@ class MeasuredSpectra:
         Parameters
         ----------
         time : str or datetime64
-            UTC, such as ``"2019-02-10T05:40"``.
+            Time in UTC, such as ``"2019-02-10T05:40"``.
         within_s : float
             Largest distance in time to the nearest measurement.
 

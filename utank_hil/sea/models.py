@@ -18,7 +18,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea.spectrum import Spectrum
 
-PHILLIPS = 8.1e-3  # equilibrium-range constant of Pierson and Moskowitz (1964)
+PHILLIPS = 8.1e-3  # Equilibrium-range constant of Pierson and Moskowitz (1964).
 
 
 def ittc_density(omega_rad_s: FloatArray, hs_m: float, tp_s: float) -> FloatArray:
@@ -34,7 +34,7 @@ def ittc_density(omega_rad_s: FloatArray, hs_m: float, tp_s: float) -> FloatArra
     Returns
     -------
     ndarray
-        S(omega) in m^2 s/rad, shape of `omega_rad_s`.
+        Density S(omega) in m^2 s/rad, shape of `omega_rad_s`.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def ittc_density(omega_rad_s: FloatArray, hs_m: float, tp_s: float) -> FloatArra
     _require_positive(hs_m=hs_m, tp_s=tp_s)
     peak = 2 * math.pi / tp_s
     ratio = np.asarray(omega_rad_s, dtype=float) / peak
-    # below 0.2 the exponential is less than 1e-300; this also avoids division by zero
+    # Below 0.2 the exponential is less than 1e-300; this also avoids division by zero.
     u = np.maximum(ratio, 0.2)
     shape = np.where(ratio > 0.2, u**-5 * np.exp(-1.25 * u**-4), 0.0)
     density: FloatArray = 5 / 16 * hs_m**2 / peak * shape
@@ -115,7 +115,7 @@ def _energy_ratio(gamma: float) -> float:
     """
     nodes, weights = np.polynomial.legendre.leggauss(64)
     excess = 0.0
-    for low, high in ((0.4, 1.0), (1.0, 1.9)):  # 8.6 and 10 sigma: the excess is below 1e-16
+    for low, high in ((0.4, 1.0), (1.0, 1.9)):  # At 8.6 and 10 sigma the excess is below 1e-16.
         u = low + (high - low) * (nodes + 1) / 2
         bump = 5 * u**-5 * np.exp(-1.25 * u**-4) * (_enhancement(u, gamma) - 1)
         excess += float((high - low) / 2 * weights @ bump)
@@ -123,7 +123,7 @@ def _energy_ratio(gamma: float) -> float:
 
 
 def _sample(density: Callable[[FloatArray], FloatArray], tp_s: float) -> Spectrum:
-    ratio = np.arange(40, 1001) / 100  # bands of a hundredth of the peak frequency
+    ratio = np.arange(40, 1001) / 100  # Bands are a hundredth of the peak frequency.
     omega = 2 * np.pi / tp_s * ratio
     return Spectrum(frequency_hz=ratio / tp_s, density=2 * np.pi * density(omega))
 

@@ -1,9 +1,9 @@
-"""Roll moment of a wave from a table, such as a strip or panel program writes.
+"""Roll moment of a wave from a table, as of a strip or panel program.
 
-A CSV file with the columns ``omega_rad_s, heading_deg, moment_nm_per_m, phase_deg``: for each pair
+A CSV file has the columns ``omega_rad_s, heading_deg, moment_nm_per_m, phase_deg``: for each pair
 of wave frequency (earth frame) and heading (0 following, 90 from port to starboard, 180 head) the
-moment on roll, positive to starboard, per metre of wave amplitude, and by how much it leads the
-wave's crest at the centre of gravity. Headings of -180 to 0 may be left out: the ship is symmetric.
+moment on roll, positive to starboard, per metre of wave amplitude, and its lead on the wave's crest
+at the centre of gravity. Headings of -180 to 0 may be left out, because the ship is symmetric.
 """
 
 import csv
@@ -26,11 +26,11 @@ class MomentTable:
     Parameters
     ----------
     omega_rad_s : ndarray, shape (F,)
-        Increasing.
+        Frequencies, increasing.
     heading_rad : ndarray, shape (H,)
-        Increasing, from 0 to pi.
+        Headings, increasing from 0 to pi.
     moment_nm_per_m : complex ndarray, shape (F, H)
-        Real part in phase with the crest, argument positive where the moment leads it.
+        Moment: real part in phase with the crest, argument positive for a lead.
     """
 
     omega_rad_s: FloatArray
@@ -56,7 +56,7 @@ class MomentTable:
                 rows = [[float(row[name]) for name in COLUMNS] for row in reader]
         except OSError as error:
             raise ValueError(f"{file} can't be read: {error.strerror}") from error
-        except TypeError as error:  # a row with fewer fields
+        except TypeError as error:  # A row has fewer fields.
             raise ValueError(f"{file}: a row has fewer than {len(COLUMNS)} values") from error
         except ValueError as error:
             if str(error).startswith(str(file)):
@@ -78,19 +78,19 @@ class MomentTable:
 
     def moment(self, omega_rad_s: FloatArray, heading_rad: FloatArray) -> ComplexArray:
         """Moment in N m per m of amplitude, shape (N,); zero outside of the table's frequencies."""
-        relative = np.pi - np.mod(np.pi - heading_rad, 2 * np.pi)  # to (-pi, pi]
+        relative = np.pi - np.mod(np.pi - heading_rad, 2 * np.pi)  # This maps to (-pi, pi].
         row, across = _between(self.omega_rad_s, omega_rad_s)
         column, along = _between(self.heading_rad, np.abs(relative))
         m = self.moment_nm_per_m
         low = (1 - along) * m[row, column] + along * m[row, column + 1]
         high = (1 - along) * m[row + 1, column] + along * m[row + 1, column + 1]
         inside = (omega_rad_s >= self.omega_rad_s[0]) & (omega_rad_s <= self.omega_rad_s[-1])
-        side = np.where(relative < 0, -1.0, 1.0)  # the same wave from the other side
+        side = np.where(relative < 0, -1.0, 1.0)  # The wave is the same from the other side.
         result: ComplexArray = np.where(inside, side * ((1 - across) * low + across * high), 0)
         return result
 
 
 def _between(grid: FloatArray, at: FloatArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
-    """Index of the grid point below each value, and how far each is on the way to the next."""
+    """Return the index of the grid point below each value, and the fraction to the next point."""
     index = np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2)
     return index, (at - grid[index]) / (grid[index + 1] - grid[index])

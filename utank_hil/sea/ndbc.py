@@ -1,6 +1,6 @@
 """Reader of wave spectra as the US National Data Buoy Center (NDBC) publishes them.
 
-Yearly archive (``41010w2019.txt``): the header has the frequencies, each line one spectrum::
+In the yearly archive (``41010w2019.txt``) the header has the frequencies, each line one spectrum::
 
     #YY  MM DD hh mm  .0200  .0325  .0375 ...
     2019 02 06 00 40   0.00   0.00   0.02 ...
@@ -30,7 +30,7 @@ PAIR = re.compile(r"(\S+)\s*\(\s*([^()\s]+)\s*\)")
 DENSITY_MISSING = (99.0, 999.0, 9999.0)
 DIRECTION_MISSING = (999.0, 9999.0)
 
-# the 45-day layout rounds the centres of NDBC's narrow bands, 0.0325, 0.0375 ... 0.0925, to 1 mHz
+# The 45-day layout rounds the centres of NDBC's bands 0.0325, 0.0375 ... 0.0925 to 1 mHz.
 ROUNDED_HZ = {round(0.033 + 0.005 * i, 3): round(0.0325 + 0.005 * i, 4) for i in range(13)}
 
 
@@ -83,7 +83,7 @@ def load_ndbc(path: str | Path, direction_path: str | Path | None = None) -> Mea
 def _parse(
     path: Path, missing: tuple[float, ...], quantity: str, bounds: tuple[float, float]
 ) -> tuple[npt.NDArray[np.datetime64], tuple[float, ...], FloatArray]:
-    """Parse one file: times, frequencies and values (N, F), sorted by time."""
+    """Return times, frequencies and values (N, F) of one file, sorted by time."""
     rows = _data_lines(path)
     seen: dict[np.datetime64, int] = {}
     for row in rows:
@@ -131,7 +131,7 @@ def _data_lines(path: Path) -> list[DataLine]:
 
 
 def _header(path: Path, number: int, line: str) -> tuple[int, tuple[float, ...]] | None:
-    """Number of time columns, and frequencies; None for a line without frequencies."""
+    """Return number of time columns and frequencies; None for a line without frequencies."""
     words = line.replace("#", " ").split()
     names = [word for word in words if not word[0].isdigit() and word[0] != "."]
     if len(names) == len(words) or "(" in line:
@@ -153,7 +153,7 @@ def _columns(
 
 
 def _pairs(path: Path, number: int, line: str) -> DataLine:
-    lead = PAIR.sub("", line).split()  # time, and separation frequency
+    lead = PAIR.sub("", line).split()  # The lead is time and separation frequency.
     if len(lead) not in (5, 6):
         raise _error(
             path, number, "not of the form: year month day hour minute density (frequency)"

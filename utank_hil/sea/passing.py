@@ -1,7 +1,7 @@
-"""A sea that passes from one spectrum to the next while the ship sails through it.
+"""A sea that changes from one spectrum to the next while the ship sails through it.
 
-The components keep their frequency and phase; energy and direction change linearly in time from
-one spectrum to the next. So at each moment the sea is Gaussian with the spectrum in between.
+The components keep their frequency and phase; energy and direction change linearly in time, so that
+at each moment the sea is Gaussian with the interpolated spectrum.
 """
 
 from collections.abc import Sequence
@@ -21,11 +21,11 @@ class PassingSea:
     Parameters
     ----------
     time_s : ndarray, shape (K,)
-        When the sea has each of the K spectra, increasing; before and after, it stays.
+        Times of the K spectra, increasing; before and after, the sea is constant.
     energy_m2 : ndarray, shape (K, N)
         Variance of each component.
     heading_rad : ndarray, shape (K, N)
-        Direction of travel relative to the course that the ship has at the start.
+        Direction of travel relative to the ship's initial course.
     omega_rad_s, phase_rad : ndarray, shape (N,)
         Earth-frame frequency, and phase at the ship at time 0.
     """
@@ -38,7 +38,7 @@ class PassingSea:
 
     @classmethod
     def of(cls, sea: Sea) -> "PassingSea":
-        """A sea that stays as it is."""
+        """Return a sea that does not change."""
         energy_m2, heading_rad = sea.amplitude_m[None] ** 2 / 2, sea.heading_rad[None]
         return cls(np.zeros(1), energy_m2, heading_rad, sea.omega_rad_s, sea.phase_rad)
 
@@ -53,16 +53,16 @@ class PassingSea:
         spreading: float | None = None,
         components: int = COMPONENTS,
     ) -> "PassingSea":
-        """Draw the components as `Sea.irregular` does, for all spectra alike.
+        """Draw the components as `Sea.irregular` does, common to all spectra.
 
         Parameters
         ----------
         time_s : sequence of float
-            When the sea has each of the spectra.
+            Times of the spectra.
         heading_rad : sequence of float or ndarray, shape (F,)
-            Mean direction of travel of each, for all bands or for each band.
+            Mean direction of travel of each spectrum, for all bands or for each band.
         spreading, components
-            As `Sea.irregular` takes them.
+            Arguments of `Sea.irregular`.
 
         Raises
         ------
@@ -75,7 +75,7 @@ class PassingSea:
         return cls(np.asarray(time_s, dtype=float), energy_m2, heading, omega_rad_s, phase_rad)
 
     def at(self, time_s: float) -> tuple[FloatArray, FloatArray]:
-        """Amplitude in m and direction in rad of each component at a time."""
+        """Return amplitude in m and direction in rad of each component at a time."""
         after = int(np.searchsorted(self.time_s, time_s, side="right"))
         if after in (0, len(self.time_s)):
             index = min(after, len(self.time_s) - 1)
@@ -83,7 +83,7 @@ class PassingSea:
         start_s, end_s = self.time_s[after - 1 : after + 1]
         share = (time_s - start_s) / (end_s - start_s)
         before, later = (1 - share) * self.energy_m2[after - 1], share * self.energy_m2[after]
-        # a direction without energy has no weight
+        # A direction without energy has no weight.
         flow: ComplexArray = before * np.exp(1j * self.heading_rad[after - 1]) + later * np.exp(
             1j * self.heading_rad[after]
         )

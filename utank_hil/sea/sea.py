@@ -25,12 +25,12 @@ from utank_hil.sea.encounter import encounter_frequency, wavenumber_rad_m
 from utank_hil.sea.harmonics import Harmonics
 from utank_hil.sea.spectrum import Spectrum
 
-BEAM_RAD = math.pi / 2  # waves travelling from port to starboard
+BEAM_RAD = math.pi / 2  # These waves travel from port to starboard.
 COMPONENTS = 512
 
 
 MOST_SLOPE_SHARE: Final = 2.0
-"""Twice the long-wave limit of a hull that follows the slope: beyond it the value is no share."""
+"""Twice the long-wave limit of a hull that follows the slope; a larger value is no share."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,10 +107,7 @@ class Sea:
     ) -> "Sea":
         """One regular wave, by default with a crest at the ship at t = 0.
 
-        Raises
-        ------
-        ValueError
-            If the amplitude is negative or the frequency is not positive.
+        ValueError is raised if the amplitude is negative or the frequency is not positive.
         """
         if not (amplitude_m >= 0 and omega_rad_s > 0):
             raise ValueError(
@@ -176,7 +173,7 @@ class Sea:
         return encounter_frequency(self.omega_rad_s, self.heading_rad, self.speed_m_s)
 
     def harmonics(self, amplitude: ComplexArray) -> Harmonics:
-        """A quantity with these complex amplitudes, arguments as leads on the crest."""
+        """Return a quantity with complex amplitudes, whose arguments are leads on the crest."""
         return self._harmonics(np.abs(amplitude), np.angle(amplitude))
 
     @property
@@ -200,7 +197,7 @@ class Sea:
         stiffness_nm_rad : float
             Restoring stiffness k1 of the ship (`RollShip.stiffness_nm_rad`).
         effective_slope : EffectiveSlope, optional
-            By default the true slope.
+            Effective slope; by default the true slope.
         """
         slope = effective_slope or EffectiveSlope()
         moment = slope.moment(self.omega_rad_s, self.heading_rad, stiffness_nm_rad)
@@ -209,7 +206,7 @@ class Sea:
     def _harmonics(self, amplitude: FloatArray, lead_rad: FloatArray | float) -> Harmonics:
         encounter = self.encounter_rad_s
         phase = self.phase_rad + lead_rad
-        # cos is even: a negative frequency is a positive one with reversed phase
+        # The cosine is even: a negative frequency is a positive one with reversed phase.
         return Harmonics(amplitude, np.abs(encounter), np.where(encounter < 0, -phase, phase))
 
 
@@ -220,9 +217,9 @@ def drawn_components(
     heading_rad: Sequence[FloatArray | float],
     spreading: float | None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Components that serve several spectra; for one alone see `Sea.irregular`.
+    """Return components common to several spectra; for one alone see `Sea.irregular`.
 
-    The intervals are those of the mean of the spectra, each taken with its total as one.
+    The intervals are those of the mean of the spectra, each normalized to a total of one.
 
     Returns
     -------
@@ -249,7 +246,7 @@ def drawn_components(
         [_heading_at(frequency, *pair) for pair in zip(spectra, heading_rad, strict=True)]
     )
     if spreading is not None:
-        # stratified sampling: one draw per quantile interval, in random order
+        # Stratified sampling makes one draw per quantile interval, in random order.
         headings = headings + _spread((np.argsort(order) + across) / components, spreading)
     return energies, 2 * np.pi * frequency, headings, 2 * np.pi * phase
 
@@ -259,7 +256,7 @@ def _energy_below(spectrum: Spectrum, edges_hz: FloatArray) -> FloatArray:
     own = spectrum.band_edges_hz
     per_band = spectrum.density * (own[:, 1] - own[:, 0])
     total = np.concatenate([[0.0], np.cumsum(per_band)])
-    # constant between bands that leave a gap
+    # The spectrum is constant between bands that leave a gap.
     below = np.column_stack([total[:-1], total[1:]])
     return np.asarray(np.interp(edges_hz, own.ravel(), below.ravel()), dtype=float)
 

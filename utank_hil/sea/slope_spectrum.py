@@ -1,8 +1,8 @@
 """The roll moment of the waves as a spectrum over encounter frequency.
 
-The moment is given per roll stiffness of the ship, as an angle: the effective wave slope (`Sea`). A
-law needs no more of the sea. How high the waves are follows with a ratio of effective to true slope
-and a direction, which must be assumed.
+The moment is given per roll stiffness of the ship, as an angle: the effective wave slope (`Sea`).
+This is sufficient for a law. The wave height follows from an assumed ratio of effective to true
+slope and an assumed direction.
 """
 
 import math
@@ -25,7 +25,7 @@ class SlopeSpectrum:
     density : ndarray, shape (F,)
         One-sided density in rad^2 per rad/s, zero or more.
     deviation : ndarray, shape (F,), optional
-        Standard deviation of each density; zero if it is not given.
+        Standard deviation of each density, by default zero.
 
     Raises
     ------
@@ -73,21 +73,17 @@ class SlopeSpectrum:
         return 2 * math.pi / float(self.omega_rad_s[peak]) if self.density[peak] > 0 else math.nan
 
     def slope_density(self, omega_rad_s: FloatArray) -> FloatArray:
-        """One-sided density of the effective wave slope at other frequencies, rad^2 per rad/s.
+        """One-sided density of the effective wave slope in rad^2 per rad/s, at other frequencies.
 
-        Linear between the centres; outside of the bands zero.
+        It is linear between the centres, and zero outside of the bands.
         """
         return np.interp(omega_rad_s, self.omega_rad_s, self.density, left=0.0, right=0.0)
 
     def elevation_density(self, effective_slope: float) -> FloatArray:
         """One-sided density of the surface elevation in each band, m^2 per rad/s.
 
-        For waves on the beam, in deep water, of a ship without speed.
-
-        Parameters
-        ----------
-        effective_slope : float
-            Ratio of effective to true wave slope.
+        It holds for beam waves in deep water and a ship without speed; `effective_slope` is the
+        ratio of effective to true wave slope.
         """
         per_height = effective_slope * self.omega_rad_s**2 / GRAVITY_M_S2
         density: FloatArray = self.density / per_height**2

@@ -14,33 +14,24 @@ from utank_hil.base.arrays import FloatArray
 
 
 def band_edges(frequency_hz: FloatArray) -> FloatArray:
-    """Edges of the frequency bands with given centre frequencies.
+    """Lower and upper edges, shape (F, 2) in Hz, of frequency bands with given increasing centres.
 
-    Midpoints where the spacing is uniform. Where it changes, between two uniformly spaced parts,
-    the gap is divided in proportion to the spacing on either side. For NDBC's
-    grids (0.0325, 0.0375, ... 0.0925, 0.1000, 0.1100, ...) this gives the bandwidths in NDBC's
-    "Description of NDBC wave spectra"; with midpoints the band at 0.1 Hz is an eighth too narrow.
-
-    Parameters
-    ----------
-    frequency_hz : ndarray, shape (F,), F > 1
-        Increasing.
-
-    Returns
-    -------
-    ndarray, shape (F, 2)
-        Lower and upper edge of each band in Hz; bands never overlap.
+    Edges are midpoints where the spacing is uniform. Where it changes, between two uniformly spaced
+    parts, the gap is divided in proportion to the spacing on either side, and bands never overlap.
+    For NDBC's grids (0.0325, 0.0375, ... 0.0925, 0.1000, 0.1100, ...) this gives the bandwidths in
+    NDBC's "Description of NDBC wave spectra"; with midpoints the band at 0.1 Hz is an eighth too
+    narrow.
     """
     gap = np.diff(frequency_hz)
-    # beyond the grid the spacing is extrapolated linearly
+    # The spacing is extrapolated linearly beyond the grid.
     before = max(2 * gap[0] - gap[min(1, gap.size - 1)], gap[0])
     after = max(2 * gap[-1] - gap[max(-2, -gap.size)], gap[-1])
     left = np.concatenate([[before], gap[:-1]])
     right = np.concatenate([gap[1:], [after]])
-    margin = 1.02  # tolerance for frequencies rounded in the file
+    margin = 1.02  # This is the tolerance for frequencies rounded in the file.
     changes = (gap > margin * np.minimum(left, right)) & (margin * gap < np.maximum(left, right))
     between = frequency_hz[:-1] + gap * np.where(changes, left / (left + right), 0.5)
-    # outermost bands: symmetric, at most twice as wide as their neighbours
+    # The outermost bands are symmetric, at most twice as wide as their neighbours.
     widths = np.diff(between) if between.size > 1 else gap
     first_half = min(between[0] - frequency_hz[0], widths[0])
     last_half = min(frequency_hz[-1] - between[-1], widths[-1])
@@ -109,7 +100,7 @@ class Spectrum:
 
     @property
     def tp_s(self) -> float:
-        """Peak period, of the band with the greatest density; nan without energy."""
+        """Peak period of the band with the greatest density; nan without energy."""
         peak = int(np.argmax(self.density))
         return float(1 / self.frequency_hz[peak]) if self.density[peak] > 0 else math.nan
 
@@ -120,22 +111,11 @@ class Spectrum:
         return math.sqrt(self.moment(0) / second) if second > 0 else math.nan
 
     def heading_rad(self, course_deg: float) -> FloatArray:
-        """Direction of travel relative to a ship on a course, per band.
+        """Direction of travel relative to a ship on a course, per band, shape (F,).
 
-        Parameters
-        ----------
-        course_deg : float
-            Course of the ship, degrees clockwise from true north.
-
-        Returns
-        -------
-        ndarray, shape (F,)
-            In (-pi, pi]: 0 following, pi head, +pi/2 travelling from port to starboard.
-
-        Raises
-        ------
-        ValueError
-            If the spectrum has no directions, or one is missing where there is energy.
+        It lies in (-pi, pi]: 0 following, pi head, +pi/2 travelling from port to starboard.
+        `course_deg` is clockwise from true north. ValueError is raised if the spectrum has no
+        directions, or one is missing where there is energy.
         """
         if self.direction_from_deg is None:
             raise ValueError("spectrum has no directions: load it with the mean direction file")
