@@ -1,8 +1,8 @@
 """Validation of an identified model on data that it was not fitted to.
 
 The criteria are fit, whiteness of the prediction errors, and their correlation with the input.
-Coloured errors mean unmodelled dynamics or disturbances (a wave, a higher order). Errors correlated with past inputs
-mean a wrong transfer function. Ljung, System Identification, 16.6.
+Coloured errors mean unmodelled dynamics or disturbances (a wave, a higher order). Errors correlated
+with past inputs mean a wrong transfer function. Ljung, System Identification, 16.6.
 """
 
 from collections.abc import Sequence
