@@ -38,7 +38,7 @@ GPC = Path("configs/controllers/gpc.yaml")
 def test_run_ends_with_a_code_of_its_own_for_a_fault_and_for_a_lost_bus(
     mode: Mode, fault: Fault, link_lost: bool, code: ExitCode
 ) -> None:
-    node = SimpleNamespace(mode=mode, fault=fault, seen=SimpleNamespace(link_lost=link_lost))
+    node = SimpleNamespace(mode=mode, fault=fault, measured=SimpleNamespace(link_lost=link_lost))
     assert module._code(node) is code
 
 

@@ -44,7 +44,7 @@ def test_pressure_is_acceleration_per_nominal_gain(law):
         ({"ranges": (0.5,)}, "ranges must be those of at least roll"),
         ({"ranges": (0.5,) * 5}, "level_rate_m_s, got 5 numbers"),
         ({"ranges": (0.5, 0.5), "brake_pa_s_m": 1e3}, "level rate as fourth"),
-        ({"ranges": (0.5, 0.0, 1.0, 1.0)}, "ranges must be positive"),
+        ({"ranges": (0.5, 0.0, 1.0, 1.0)}, r"ranges\.1 must be positive"),
     ],
 )
 def test_parameters_out_of_range_are_refused_by_name(law, change, message):
