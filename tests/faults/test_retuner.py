@@ -126,8 +126,8 @@ def test_after_a_refusal_the_law_is_the_one_it_was() -> None:
     # with pulses of no pressure a refused identification leaves no trace at all
     def silent(retuner: Retuner | None) -> Voyage:
         voyage = Voyage(retuner)
-        adaptive = voyage.node._retuning
-        if adaptive is not None:
+        if retuner is not None:
+            adaptive = voyage.node.law.law
             adaptive._pulses_pa = np.zeros_like(adaptive._pulses_pa)
         return voyage.run(80)
 
@@ -161,7 +161,7 @@ def test_law_that_fails_on_trial_is_never_in_charge_again(failing: str) -> None:
     script = (*SCRIPT, TimedAction(75.0, Action.DISARM), TimedAction(77.0, Action.RESET),
               TimedAction(80.0, Action.ARM))  # fmt: skip
     voyage = Voyage(Broken(law_of(1e5)), script).run(66)
-    adaptive = voyage.node._retuning
+    adaptive = voyage.node.law.law
     assert adaptive.state is TRIAL
     configured, bad = adaptive.laws.accepted, adaptive.laws.on_trial
     good = configured.controller.step

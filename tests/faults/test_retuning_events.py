@@ -44,7 +44,7 @@ def test_events_are_handed_on_when_they_happen_and_no_event_twice() -> None:
         lockstep = Lockstep([*build_ship_side(storm(), 1, SCRIPT).nodes, node])
         lockstep.run_until(60 * SECOND)
         told = reader.read_events()
-    assert [event for _, event in heard] == list(node.retuning_events)
+    assert [event for _, event in heard] == list(node.law.events)
     for place, event in heard:
         assert times_s[place] == pytest.approx((event.time_ns - node.start_ns) / SECOND, abs=1e-9)
     identify, design, refused = [event for _, event in heard if event.state != RetuningState.IDLE]

@@ -69,7 +69,8 @@ def test_project_is_valid_and_its_law_is_let_on_the_bus(
     most_m = usable_level_m(vessel.ship, vessel.tank)
     assert controller.limits.level_m == pytest.approx(most_m, rel=0.01)
     peak = judged.robustness.nominal.peak_sensitivity
-    assert told["law"]["peak_sensitivity"] == pytest.approx(peak)
+    # the files have four digits
+    assert told["law"]["peak_sensitivity"] == pytest.approx(peak, rel=1e-4)
     scenario = load_config(folder / "scenario.yaml", Scenario)
     assert scenario.controllers["self_tuned"] == controller
     found = told["linear_prediction"]

@@ -95,7 +95,7 @@ def test_the_level_s_rate_is_known_while_the_valve_works() -> None:
     for _ in range(3000):
         bench.lockstep.run_until(bench.lockstep.now_ns + TICK_NS)
         rate = bench.plant.flow_m3_s / SCENARIO.vessel.tank.reservoir_area_m2
-        errors.append(bench.controller._level.rate_m_s - rate)
+        errors.append(bench.controller.level.rate_m_s - rate)
         rates.append(rate)
     assert np.std(rates) > 0.3
     assert np.sqrt(np.mean(np.square(errors))) < 0.04 * np.std(rates)

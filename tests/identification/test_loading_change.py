@@ -38,7 +38,7 @@ def test_ship_is_found_again_after_loading(
 ) -> None:
     truth, u = plant(period_s=7.5), pulses(4, SLOW_PUMP)
     y = noisy(truth.respond(u, _sea(sea, len(u))), 0.01, 6)[:, :outputs]
-    waves = find_disturbance_frequencies(u, y, sample_time_s=SAMPLE_TIME_S)
+    waves = find_disturbance_frequencies(u, y, sample_time_s=SAMPLE_TIME_S, most=1)
     assert waves == (pytest.approx((0.8,), abs=5e-4) if sea == "regular" else ())
     found = modal_confidence(
         okid(u, y, order, disturbance_frequencies_rad_s=waves, sample_time_s=SAMPLE_TIME_S), 4

@@ -122,8 +122,10 @@ class Voyage:
 def test_an_estimate_is_shown_wherever_people_look(limit_m: float | None) -> None:
     voyage = Voyage(limit_m)
     voyage.run_until(34.0)
-    (record,) = voyage.desk.records
-    assert np.ptp(record[2:, 1:], axis=0).min() > 0  # a ship that rolls, as she was measured
+    (request,) = voyage.desk.records
+    assert (
+        np.ptp(request.record[1:, 1:], axis=0).min() > 0
+    )  # a ship that rolls, as she was measured
     sea = [each for each in voyage.heard if isinstance(each, SeaEstimate)]
     told = [each for each in voyage.heard if isinstance(each, ShipEstimate)]
     assert sea[0].verdict is Verdict.RECORD_SHORT

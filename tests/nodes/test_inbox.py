@@ -148,7 +148,7 @@ def test_good_frames_are_kept_with_the_time_they_came() -> None:
     assert {kind: age_ms(seen) * MS for kind, age_ms in AGES.items()} == pytest.approx(
         {kind: ages_ns[kind] for kind in AGES}
     )
-    assert (line.now_ns - seen.tank_ns, line.now_ns - seen.drive_ns) == (
+    assert (line.now_ns - seen.tank_ns, line.now_ns - seen.drive_echo_ns) == (
         ages_ns[SensorTank], ages_ns[DriveStatus1],
     )  # fmt: skip
     assert seen.drive_echo == 4
@@ -314,13 +314,13 @@ def test_drive_of_an_unknown_fault_is_not_healthy() -> None:
 def test_drive_status_without_a_state_is_as_if_it_had_not_come() -> None:
     line, status = Line(), GOOD[DriveStatus1]._replace(power_limited=True)  # type: ignore[attr-defined]
     line.say(status._replace(state=None))
-    assert (line.seen.drive_state, line.seen.drive_ns) == (None, NEVER_HEARD_NS)
+    assert (line.seen.drive_state, line.seen.drive_echo_ns) == (None, NEVER_HEARD_NS)
     line.say(status)
-    heard_ns = line.seen.drive_ns
+    heard_ns = line.seen.drive_echo_ns
     line.say(status._replace(state=None, power_limited=False, command_echo=9))
     seen = line.seen
     assert (seen.drive_state, seen.drive_held_back) == (DriveState.OPERATION_ENABLED, True)
-    assert (seen.drive_ns, seen.drive_echo) == (heard_ns, 4)
+    assert (seen.drive_echo_ns, seen.drive_echo) == (heard_ns, 4)
 
 
 def test_a_mode_nobody_asked_for_is_standby() -> None:
@@ -440,10 +440,10 @@ def test_what_the_valve_says_is_kept_with_the_echo_of_the_last_status() -> None:
     first_ns = line.now_ns
     assert (seen.valve_following, seen.valve_fault) == (True, False)
     assert (seen.valve_opening, seen.valve_heard_ns) == (pytest.approx(0.4, abs=0.01), first_ns)
-    assert (seen.valve_ns, seen.valve_echo) == (first_ns, None)
+    assert (seen.valve_echo_ns, seen.valve_echo) == (NEVER_HEARD_NS, None)
     seen = say(NAN, 3)  # without an opening
     assert (seen.valve_opening, seen.valve_heard_ns) == (pytest.approx(0.4, abs=0.01), first_ns)
-    assert (seen.valve_ns, seen.valve_echo) == (line.now_ns, 3)
+    assert (seen.valve_echo_ns, seen.valve_echo) == (line.now_ns, 3)
     assert say(0.5, 3).valve_heard_ns == line.now_ns
 
 

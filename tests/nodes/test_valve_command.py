@@ -391,7 +391,9 @@ def test_a_valve_that_is_silent_is_not_one_that_does_not_follow() -> None:
     assert valve is not None
     valve._told = 0.0  # as if it had been commanded to shut
     for late_ms in range(10, 2000, 10):
-        report = valve.observe(replace(measured, now_ns=measured.valve_ns + late_ms * 1_000_000))
+        report = valve.observe(
+            replace(measured, now_ns=measured.valve_heard_ns + late_ms * 1_000_000)
+        )
     assert report.age_ms > 1900
     assert report.off_ms == 0.0
 

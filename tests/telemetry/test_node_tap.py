@@ -3,6 +3,7 @@
 import tracemalloc
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,9 @@ class Node:
     name: str = "controller"
     period_ns: int = TICK
     last_ns: int = 0
-    statistics: LoopStatistics = field(default_factory=lambda: LoopStatistics(real_time=True))
+    telemetry: Any = field(
+        default_factory=lambda: SimpleNamespace(statistics=LoopStatistics(real_time=True))
+    )
     calls: list[tuple[Any, ...]] = field(default_factory=list)
 
     def receive(self, frame: Frame, now_ns: int) -> None:

@@ -22,7 +22,7 @@ def test_a_frame_that_is_not_whole_and_is_believed_is_found(
     def believe(self: Inbox, frame: Frame, now_ns: int) -> None:
         subscription = self._subscriptions.get(frame.can_id)
         if subscription is not None and len(frame.data) == 7:
-            self.motion_ns = now_ns
+            self._tank_ns = now_ns
 
     monkeypatch.setattr(Inbox, "receive", believe)
     with pytest.raises(FuzzError, match=r"seed 1, session \d+: .*is not whole"):

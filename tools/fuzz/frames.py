@@ -275,7 +275,8 @@ def _is_own(frame: Frame) -> bool:
     return frame.can_id & SOURCE_ADDRESS == Address.CONTROLLER
 
 
-def _next_counter(receiver: Any) -> int:
+def _next_counter(heard: Any) -> int:
+    receiver = getattr(heard, "receiver", heard)  # of a panel's orders
     return 0 if receiver is None or receiver.counter is None else (receiver.counter + 1) & 15
 
 

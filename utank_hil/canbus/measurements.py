@@ -103,8 +103,8 @@ class Measurements:
     pump_age_ms : float
     drive_state : DriveState or None
     drive_age_ms : float
-    drive_ns, drive_echo : int, int or None
-        Time of receipt of the drive's status, and the command counter that it sent back.
+    drive_echo_ns, drive_echo : int, int or None
+        Command counter that the drive's status sends back, and when it first came.
     drive_fault, drive_warns : bool
         The drive reports a fault, or a warning.
     drive_held_back : bool
@@ -114,8 +114,8 @@ class Measurements:
     valve_opening : float
     valve_following, valve_fault : bool
         The valve follows its commands; it reports a fault.
-    valve_ns, valve_echo : int, int or None
-        Time of receipt of the valve's status, and the command counter that it sent back.
+    valve_echo_ns, valve_echo : int, int or None
+        Command counter that the valve's status sends back, and when it first came.
     valve_heard_ns : int
         Time of receipt of the last status with an opening.
     hardwired_stop : bool
@@ -157,7 +157,7 @@ class Measurements:
     pump_age_ms: Final[float]
     drive_state: Final[DriveState | None]
     drive_age_ms: Final[float]
-    drive_ns: Final[int]
+    drive_echo_ns: Final[int]
     drive_echo: Final[int | None]
     drive_fault: Final[bool]
     drive_warns: Final[bool]
@@ -166,7 +166,7 @@ class Measurements:
     valve_opening: Final[float]
     valve_following: Final[bool]
     valve_fault: Final[bool]
-    valve_ns: Final[int]
+    valve_echo_ns: Final[int]
     valve_echo: Final[int | None]
     valve_heard_ns: Final[int]
     hardwired_stop: Final[bool]

@@ -80,7 +80,7 @@ class Actuators:
             The drive was commanded off in vain.
         valve : ValveReport
         """
-        self._echo.heard(measured.drive_echo, measured.drive_ns)
+        self._echo.heard(measured.drive_echo, measured.drive_echo_ns)
         return (
             (measured.now_ns - self._echo.heard_ns) / MILLISECOND_NS,
             self.pump and self._sequence.ignored,

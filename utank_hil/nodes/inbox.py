@@ -183,7 +183,7 @@ class Inbox:
         self._valve_opening = 1.0  # open, before it is known and where there is none
         self._valve_state: ValveState | None = None
         self._valve_fault: ValveFault | None = ValveFault.NONE
-        self._valve_ns = self._valve_heard_ns = NEVER_HEARD_NS
+        self._valve_echo_ns = self._valve_heard_ns = NEVER_HEARD_NS
         self._valve_echo: int | None = None
         self._drive_state = None if pump else _ENABLED
         self._drive_fault: DriveFault | None = DriveFault.NONE
@@ -191,6 +191,7 @@ class Inbox:
         self._versions_match = False
         self._tank_ns = NEVER_HEARD_NS
         self._pump_ns = self._drive_ns = NEVER_HEARD_NS if pump else _ABSENT_NS
+        self._drive_echo_ns = self._drive_ns
         self._tank_cycles = self._cycles = self._tank_lost = 0
         self._tank_due_ns = NEVER_HEARD_NS  # when the last frame was due by its counter
         self._tank_patience_ns = self._tank.cycle_ns * 3 // 2
@@ -237,7 +238,7 @@ class Inbox:
             (now_ns - self._pump_ns) / MILLISECOND_NS,
             drive_state,
             (now_ns - self._drive_ns) / MILLISECOND_NS,
-            self._drive_ns,
+            self._drive_echo_ns,
             self._drive_echo,
             drive_state is _DRIVE_FAULT
             or drive_state is _DRIVE_BRAKES
@@ -248,7 +249,7 @@ class Inbox:
             self._valve_opening,
             valve_state is _VALVE_FOLLOWS,
             valve_state is _VALVE_FAULT or self._valve_fault is not _NO_VALVE_FAULT,
-            self._valve_ns,
+            self._valve_echo_ns,
             self._valve_echo,
             self._valve_heard_ns,
             stop,
@@ -341,7 +342,8 @@ class Inbox:
         self._drive_state = status.state
         self._drive_held_back = status.power_limited or status.speed_limited
         self._drive_ns = now_ns
-        self._drive_echo = status.command_echo
+        if status.command_echo != self._drive_echo:
+            self._drive_echo_ns, self._drive_echo = now_ns, status.command_echo
 
     def _on_drive_2(self, status: DriveStatus2, now_ns: int) -> None:  # noqa: ARG002
         self._drive_fault = status.fault
@@ -358,7 +360,8 @@ class Inbox:
         self._valve_fault = status.fault
         if math.isfinite(status.opening):
             self._valve_opening, self._valve_heard_ns = status.opening, now_ns
-        self._valve_ns, self._valve_echo = now_ns, status.command_echo
+        if status.command_echo != self._valve_echo:
+            self._valve_echo_ns, self._valve_echo = now_ns, status.command_echo
 
     def _on_heartbeat(self, can_id: int, beat: Heartbeat, now_ns: int) -> None:
         versions = (beat.catalogue_version, beat.configuration_version)

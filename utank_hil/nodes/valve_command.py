@@ -72,7 +72,7 @@ class ValveCommander:
     def observe(self, measured: Measurements) -> ValveReport:
         """Look at the valve, once a tick."""
         now_ns, opening = measured.now_ns, measured.valve_opening
-        self._echo.heard(measured.valve_echo, measured.valve_ns)
+        self._echo.heard(measured.valve_echo, measured.valve_echo_ns)
         if not self._following or measured.valve_following:
             self._followed_ns = now_ns
         if not self._heard:  # it may stand anywhere at first, and runs from there

@@ -95,7 +95,7 @@ def test_washout_and_kind_of_law():
         ({"measured": ("yaw_rad", "level_m")}, "measured must name outputs"),
         ({"measured": ()}, "measured must name outputs"),
         ({"measurement_std": (1e-3,)}, "one value per measured output"),
-        ({"measurement_std": (1e-3, 0.0)}, "measurement_std must be positive"),
+        ({"measurement_std": (1e-3, 0.0)}, r"measurement_std\.1 must be positive"),
         ({"order": 0}, "order must be 1 to 500"),
         ({"wave_damping_ratio": -0.1}, "wave_damping_ratio"),
         ({"pressure_noise_pa_rt_s": -1.0}, "pressure_noise_pa_rt_s"),

@@ -106,11 +106,9 @@ def test_noise_counts_after_a_second_and_a_half() -> None:
 
 
 def test_both_have_to_or_one_for_twice_as_long() -> None:
-    port, starboard = Standstill(), Standstill()
     for one, other, found in (
         (0, 0, False), (10, 0, False), (10, 10, True),
         (14 - 1, 0, False), (14, 0, True), (0, 14, True),
         (0, 14 - 1, False),
     ):  # fmt: skip
-        port.still, starboard.still = one, other
-        assert gauges_stand_still(port, starboard) == found
+        assert gauges_stand_still(one, other) == found
