@@ -56,7 +56,10 @@ def closure(extras: frozenset[str]) -> dict[str, set[str]]:
 
 
 def locked(names: set[str]) -> str:
-    """The entries of the lock for these packages that hold on this machine."""
+    """Return the entries of the lock for these packages that hold on this machine.
+
+    An extra that only other packages ask for goes: its own packages are not among these.
+    """
     text = LOCK.read_text(encoding="utf-8")
     kept = {}
     for entry in re.split(r"\n(?=\S)", text.strip()):
@@ -64,11 +67,22 @@ def locked(names: set[str]) -> str:
         if canonicalize_name(wanted.name) in names and (
             wanted.marker is None or wanted.marker.evaluate({"extra": ""})
         ):
-            kept[canonicalize_name(wanted.name)] = entry
+            kept[canonicalize_name(wanted.name)] = wanted, entry
     missing = sorted(names - kept.keys())
     if missing:
         raise SystemExit(f"{LOCK.name} lacks {', '.join(missing)}: run `make lock`")
-    return "\n".join(kept.values()) + "\n"
+    asked = {
+        (other, extra)
+        for name in (*names, PROJECT)
+        for other, extras in required_by(name, frozenset()).items()
+        for extra in extras
+    }
+    lines = []
+    for name, (wanted, entry) in kept.items():
+        extras = sorted(extra for extra in wanted.extras if (name, extra) in asked)
+        pinned = f"{wanted.name}[{','.join(extras)}]" if extras else wanted.name
+        lines.append(re.sub(r"^[^=\s]+(?===)", pinned, entry))
+    return "\n".join(lines) + "\n"
 
 
 def sbom(extras: frozenset[str] = frozenset()) -> dict[str, Any]:

@@ -81,6 +81,8 @@ def test_the_lock_of_a_ships_pc_has_the_listed_parts_with_hashes_and_pip_takes_i
     pinned = {Requirement(entry.rstrip("\\ ")).name: entry for entry in entries}
     assert pinned.keys() == closure(frozenset({"viewer"})).keys() - {"utank-hil"}
     assert all("==" in entry for entry in entries)
+    # no part asks for an extra of another; one that stays would ask for packages without hashes
+    assert [entry for entry in entries if "[" in entry] == []
     file = tmp_path / "requirements.txt"
     file.write_text(text)
     install = ["-m", "pip", "install", "--dry-run", "--no-index", "--require-hashes", "-r"]
