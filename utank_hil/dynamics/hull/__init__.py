@@ -1,0 +1,1 @@
+"""Hydrodynamic data of a hull and what follows from them."""

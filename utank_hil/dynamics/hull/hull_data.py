@@ -1,0 +1,237 @@
+"""Hydrodynamic data of a hull, in one convention, whichever code computed them.
+
+Axes: x forward, y to port, z up; the origin lies in the waterline. Degrees in the order surge,
+sway, heave, roll, pitch, yaw; rotations follow the right hand. Heading is the direction that the
+waves travel to: 0 degrees along +x (following sea), 90 degrees to port. Time goes as exp(+i w t),
+with w the frequency of encounter, so a positive phase is a lead over the crest of the undisturbed
+wave at the origin, and deep-water waves are ``exp(i w t - i k (x cos b + y sin b))``::
+
+    [-w^2 (M + A) + i w B + C] xi = X
+
+These are not the body axes of `SixDegreeModel` (y to starboard, z down): multiply vectors by
+`TO_BODY_AXES`, and matrices by it on both sides.
+"""
+
+import math
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.parameters import ParameterError, Problem, refuse
+
+DEGREES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+TO_BODY_AXES = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
+_MOST_ASYMMETRY = 0.1
+"""Panel codes keep the symmetry of A and B within 1 %, except at irregular frequencies."""
+
+
+@dataclass(frozen=True, eq=False)
+class HullData:
+    """Mass, restoring, radiation and excitation of a hull in waves, SI units.
+
+    Parameters
+    ----------
+    frequency_rad_s : ndarray, shape (n,)
+        Frequencies of motion (of encounter) of the coefficients, ascending, without 0 and infinity.
+    added_mass, damping : ndarray, shape (n, 6, 6)
+        Radiation about `reference_m`; first index: force.
+    wave_frequency_rad_s : ndarray, shape (k,)
+        Wave frequencies of the excitation, ascending.
+    heading_deg : ndarray, shape (m,)
+        Directions that the waves travel to, ascending, from above -180 up to 360.
+    excitation : ndarray, shape (m, k, 6), complex
+        Force and moment about `reference_m` per metre of wave amplitude.
+    hydrostatic : ndarray, shape (6, 6)
+        Restoring matrix C about `reference_m`, with the weight's part.
+    mass_kg : float, optional
+        Displaced mass.
+    inertia_kg_m2 : ndarray, shape (3, 3), optional
+        Inertia tensor about the centre of gravity: products of inertia with a negative sign.
+    gravity_centre_m : ndarray, shape (3,), optional
+        Centre of gravity from the origin.
+    reference_m : ndarray, shape (3,)
+        Point of the motions and moments, from the origin. Phases always refer to the origin.
+    infinite_added_mass, zero_added_mass : ndarray, shape (6, 6), optional
+        Limits of the added mass.
+    viscous_roll_nms_rad, quadratic_roll_nms2_rad2 : ndarray, shape (n,), optional
+        Roll damping beside radiation, where the source has it: B44 linear, and of the square.
+    water_depth_m : float
+        Infinite for deep water.
+    source : str
+        Where the data come from, for messages.
+    notes : tuple of str
+        What the reader left out, added or found odd.
+
+    Raises
+    ------
+    ParameterError
+        If a shape is wrong, a number is not finite, frequencies or headings do not ascend, or a
+        matrix that must be symmetric is not.
+    """
+
+    frequency_rad_s: FloatArray
+    added_mass: FloatArray
+    damping: FloatArray
+    wave_frequency_rad_s: FloatArray
+    heading_deg: FloatArray
+    excitation: ComplexArray
+    hydrostatic: FloatArray
+    mass_kg: float | None = None
+    inertia_kg_m2: FloatArray | None = None
+    gravity_centre_m: FloatArray | None = None
+    reference_m: FloatArray = field(default_factory=lambda: np.zeros(3))
+    infinite_added_mass: FloatArray | None = None
+    zero_added_mass: FloatArray | None = None
+    viscous_roll_nms_rad: FloatArray | None = None
+    quadratic_roll_nms2_rad2: FloatArray | None = None
+    density_kg_m3: float = 1025.0
+    gravity_m_s2: float = 9.81
+    water_depth_m: float = math.inf
+    speed_m_s: float = 0.0
+    source: str = "hull"
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in self._shapes():
+            if (value := getattr(self, name)) is not None:
+                kind = np.complex128 if name == "excitation" else np.float64
+                array = np.array(value, dtype=kind)
+                array.setflags(write=False)
+                object.__setattr__(self, name, array)
+        refuse(self.source, self._array_problems() or self._value_problems())
+
+    def _shapes(self) -> dict[str, tuple[int, ...]]:
+        """Shape that each array must have."""
+        n, k, m = (
+            np.size(each)
+            for each in (self.frequency_rad_s, self.wave_frequency_rad_s, self.heading_deg)
+        )
+        matrix = (6, 6)
+        return {
+            "frequency_rad_s": (n,),
+            "added_mass": (n, 6, 6),
+            "damping": (n, 6, 6),
+            "wave_frequency_rad_s": (k,),
+            "heading_deg": (m,),
+            "excitation": (m, k, 6),
+            "hydrostatic": matrix,
+            "inertia_kg_m2": (3, 3),
+            "gravity_centre_m": (3,),
+            "reference_m": (3,),
+            "infinite_added_mass": matrix,
+            "zero_added_mass": matrix,
+            "viscous_roll_nms_rad": (n,),
+            "quadratic_roll_nms2_rad2": (n,),
+        }
+
+    def _array_problems(self) -> list[Problem]:
+        problems = []
+        for name, shape in self._shapes().items():
+            array = getattr(self, name)
+            if array is None:
+                continue
+            if array.shape != shape or 0 in shape:
+                problems.append((name, f"has shape {array.shape}, must have {shape}, not empty"))
+            elif not np.all(np.isfinite(array)):
+                problems.append((name, "holds numbers that are not finite"))
+        return problems
+
+    def _value_problems(self) -> list[Problem]:
+        problems = []
+        for name in ("frequency_rad_s", "wave_frequency_rad_s"):
+            grid = getattr(self, name)
+            if grid[0] <= 0 or np.any(np.diff(grid) <= 0):
+                problems.append((name, "must be positive and ascend without doubled rows"))
+        heading = self.heading_deg
+        if np.any(np.diff(heading) <= 0) or heading[0] <= -180 or heading[-1] > 360:
+            problems.append(("heading_deg", "must ascend, from above -180 up to 360 degrees"))
+        if heading[-1] - heading[0] >= 360:
+            problems.append(("heading_deg", "covers the circle twice: leave out one of the ends"))
+        for name in ("mass_kg", "density_kg_m3", "gravity_m_s2", "water_depth_m"):
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                problems.append((name, f"must be positive, got {value}"))
+        if self.inertia_kg_m2 is not None and not _positive(self.inertia_kg_m2):
+            problems.append(("inertia_kg_m2", "must be symmetric and positive definite"))
+        if not self.speed_m_s >= 0:
+            problems.append(("speed_m_s", f"must be zero or more, got {self.speed_m_s}"))
+        matrices = ["hydrostatic"]
+        if self.speed_m_s == 0:  # with speed, radiation couples degrees one way
+            matrices += ["added_mass", "damping", "infinite_added_mass", "zero_added_mass"]
+        for name in matrices:
+            value = getattr(self, name)
+            if value is not None and (found := _asymmetry(value)) > _MOST_ASYMMETRY:
+                problems.append((name, f"is not symmetric: halves differ by {100 * found:.0f} %"))
+        return problems
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of the fields that the source does not have."""
+        return tuple(each.name for each in fields(self) if getattr(self, each.name) is None)
+
+    def known(self, name: str) -> Any:
+        """Return a field, or raise `ParameterError` naming it if the source does not have it."""
+        if (value := getattr(self, name)) is None:
+            raise ParameterError(self.source, [(name, "is missing")])
+        return value
+
+    @property
+    def mass_matrix(self) -> FloatArray:
+        """Rigid mass matrix about `reference_m`, shape (6, 6)."""
+        matrix = np.zeros((6, 6))
+        matrix[:3, :3] = self.known("mass_kg") * np.eye(3)
+        matrix[3:, 3:] = self.known("inertia_kg_m2")
+        back = _inverse_shift(self.reference_m - self.known("gravity_centre_m"))
+        return np.asarray(back.T @ matrix @ back)
+
+    def about(self, point_m: npt.ArrayLike) -> "HullData":
+        """Return the data with motions and moments about a point, shape (3,), from the origin."""
+        point = np.asarray(point_m, dtype=np.float64)
+        back = _inverse_shift(point - self.reference_m)
+        moved = {
+            name: back.T @ value @ back
+            for name in (
+                "added_mass",
+                "damping",
+                "hydrostatic",
+                "infinite_added_mass",
+                "zero_added_mass",
+            )
+            if (value := getattr(self, name)) is not None
+        }
+        return replace(self, **moved, excitation=self.excitation @ back, reference_m=point)
+
+    def about_gravity_centre(self) -> "HullData":
+        """Return the data about the centre of gravity; `ParameterError` if that is not known."""
+        return self.about(self.known("gravity_centre_m"))
+
+
+def skew(vector: npt.ArrayLike) -> FloatArray:
+    """Matrix of the cross product: ``skew(a) @ b`` is a x b."""
+    x, y, z = np.asarray(vector, dtype=np.float64)
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def _inverse_shift(step_m: FloatArray) -> FloatArray:
+    """S^-1 of motions xi' = S xi at a point that is `step_m` from the old one."""
+    matrix = np.eye(6)
+    matrix[:3, 3:] = skew(step_m)
+    return matrix
+
+
+def _asymmetry(matrix: FloatArray) -> float:
+    """Median over frequencies of the greatest difference of halves, per root of diagonals."""
+    size = np.sqrt(np.abs(np.einsum("...ii->...i", matrix)))
+    scale = np.maximum(size[..., :, None] * size[..., None, :], 1e-300)
+    apart = np.abs(matrix - np.swapaxes(matrix, -1, -2))
+    # Codes print small couplings as noise beside the greatest entry of a symmetric hull.
+    noise = 1e-6 * np.max(np.abs(matrix), axis=(-1, -2), keepdims=True)
+    return float(np.median(np.max(np.where(apart > noise, apart / scale, 0.0), axis=(-1, -2))))
+
+
+def _positive(matrix: FloatArray) -> bool:
+    """Whether a matrix is symmetric and positive definite."""
+    return bool(np.allclose(matrix, matrix.T, rtol=1e-6) and np.linalg.eigvalsh(matrix)[0] > 0)
