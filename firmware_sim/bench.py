@@ -43,36 +43,23 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BenchResult:
-    """Results of a bench; all runs are compared over one window of ship's time.
-
-    Attributes
-    ----------
-    mode : str
-        "lockstep", "real time", or "real time on" and the interface.
-    settle_s, end_s : float
-        Window: its start, and the end of the shortest run that reached `LEAST_REACH` of the
-        longest.
-    without_tank_rad : ndarray, shape (n,)
-        Roll of the bare ship in the same waves, every `RECORD_S` up to `end_s`.
-    runs : tuple of Run
-        Runs with at least one row; the passive tank first.
-    not_run : tuple of str
-        Names of the runs without a row.
-    without_tank_capsized_s : float
-        Time at which the bare ship capsized; infinite if it did not.
-    """
+    """Results of a bench; all runs are compared over one window of ship's time."""
 
     scenario: Scenario
-    mode: str
+    mode: str  #: "lockstep", "real time", or "real time on" and the interface.
     seed: int
     duration_s: float
+    #: settle_s, end_s: window: its start, and the end of the shortest run that reached
+    #: `LEAST_REACH` of the longest.
     settle_s: float
     end_s: float
+    #: shape (n,): roll of the bare ship in the same waves, every `RECORD_S` up to `end_s`.
     without_tank_rad: FloatArray
-    runs: tuple[Run, ...]
-    not_run: tuple[str, ...]
+    runs: tuple[Run, ...]  #: Runs with at least one row; the passive tank first.
+    not_run: tuple[str, ...]  #: Names of the runs without a row.
     interrupted: bool
     wall_s: float
+    #: Time at which the bare ship capsized; infinite if it did not.
     without_tank_capsized_s: float = math.inf
     killed: bool = False
 
@@ -92,21 +79,14 @@ class BenchResult:
 
 @dataclass(frozen=True, slots=True)
 class BenchOptions:
-    """Options of a bench; `seed` and `duration_s` replace the scenario's values.
-
-    Attributes
-    ----------
-    channel : str, optional
-        SocketCAN interface for real time; without it both sides share one process.
-    frames : Path, optional
-        Folder for a frame log of each run in simulated time.
-    """
+    """Options of a bench; `seed` and `duration_s` replace the scenario's values."""
 
     real_time: bool = False
+    #: SocketCAN interface for real time; without it both sides share one process.
     channel: str | None = None
     seed: int | None = None
     duration_s: float | None = None
-    frames: Path | None = None
+    frames: Path | None = None  #: Folder for a frame log of each run in simulated time.
 
 
 class _Board:

@@ -73,33 +73,19 @@ class BareShip(RollStatistics):
 
 @dataclass(frozen=True, slots=True)
 class RunFigures:
-    """Figures of one run; a run that is not compared has None up to `active_share`.
-
-    Attributes
-    ----------
-    rows, expected_rows : int
-        Number of rows in the window, and of a complete run.
-    capsized_s : float or None
-        Time of capsizing; None if the ship did not capsize.
-    strikes, max_strike_impulse_nms, pump_speed_rad_s, energy_j, bus_load, refused_commands
-        Values of `Run` over the whole run; so are `fallbacks` and `law_error`.
-    rank : int or None
-        Rank by roll RMS among the runs that count, from 1.
-    roll_below_no_tank, roll_below_passive : float or None
-        Relative reduction of the roll RMS against no tank, and against the passive tank; None where
-        one of the two runs does not count, and on still water.
-    loop : dict or None
-        Timing statistics of the loop; None in simulated time.
-    """
+    """Figures of one run; a run that is not compared has None up to `active_share`."""
 
     name: str
     compared: bool
     ranked: bool
     mark: Mark | None
+    #: rows, expected_rows: number of rows in the window, and of a complete run.
     rows: int
     expected_rows: int
     end_s: float
-    capsized_s: float | None
+    capsized_s: float | None  #: Time of capsizing; None if the ship did not capsize.
+    #: strikes, max_strike_impulse_nms, pump_speed_rad_s, energy_j, bus_load, refused_commands:
+    #: values of `Run` over the whole run; so are `fallbacks` and `law_error`.
     strikes: int
     max_strike_impulse_nms: float
     pump_speed_rad_s: float
@@ -108,10 +94,13 @@ class RunFigures:
     refused_commands: int
     fallbacks: int | None
     law_error: str
-    loop: dict[str, Any] | None
+    loop: dict[str, Any] | None  #: Timing statistics of the loop; None in simulated time.
     retuning: RetuningFigures | None
-    rank: int | None = None
+    rank: int | None = None  #: Rank by roll RMS among the runs that count, from 1.
     roll: RollStatistics | None = None
+    #: roll_below_no_tank, roll_below_passive: relative reduction of the roll RMS against no tank,
+    #: and against the passive tank; None where one of the two runs does not count, and on still
+    #: water.
     roll_below_no_tank: float | None = None
     roll_below_passive: float | None = None
     pump: PumpStatistics | None = None
@@ -122,33 +111,17 @@ class RunFigures:
 
 @dataclass(frozen=True, slots=True)
 class OnBoardFigures:
-    """Effect of the roll on people at a place, by run.
-
-    Attributes
-    ----------
-    runs : dict of str to OnBoard
-        Bare ship, and the compared runs that did not capsize.
-    """
+    """Effect of the roll on people at a place, by run."""
 
     place: Place
     exposure_s: float
     levels_rad: tuple[float, ...]
-    runs: dict[str, OnBoard]
+    runs: dict[str, OnBoard]  #: Bare ship, and the compared runs that did not capsize.
 
 
 @dataclass(frozen=True, slots=True)
 class BenchFigures:
-    """Figures of a bench over its window, in SI units.
-
-    Attributes
-    ----------
-    endings : tuple of str
-        Remarks on the ends of runs; empty where all went as ordered.
-    limits_passed : tuple of str
-        Limits of the model that were passed.
-    runs : tuple of RunFigures
-        All runs with at least one row; the passive tank first.
-    """
+    """Figures of a bench over its window, in SI units."""
 
     scenario: str
     mode: str
@@ -160,11 +133,11 @@ class BenchFigures:
     not_run: tuple[str, ...]
     wall_s: float
     exit_code: int
-    endings: tuple[str, ...]
-    limits_passed: tuple[str, ...]
+    endings: tuple[str, ...]  #: Remarks on the ends of runs; empty where all went as ordered.
+    limits_passed: tuple[str, ...]  #: Limits of the model that were passed.
     no_tank: BareShip
     on_board: OnBoardFigures
-    runs: tuple[RunFigures, ...]
+    runs: tuple[RunFigures, ...]  #: All runs with at least one row; the passive tank first.
 
     @property
     def compared(self) -> tuple[RunFigures, ...]:

@@ -25,18 +25,11 @@ OVERSPEED: Final = 1.02
 
 @dataclass(frozen=True, slots=True)
 class ModelLimit:
-    """Limit of the model.
+    """Limit of the model."""
 
-    Attributes
-    ----------
-    limit : str
-        The limit, and what is not modelled beyond it.
-    passed : callable
-        Function of a bench that describes what passed the limit, with the figure; empty if nothing
-        did.
-    """
-
-    limit: str
+    limit: str  #: The limit, and what is not modelled beyond it.
+    #: Function of a bench that describes what passed the limit, with the figure; empty if nothing
+    #: did.
     passed: Callable[[BenchResult], Iterator[str]]
 
 

@@ -20,22 +20,14 @@ LEVELS_RAD: Final = tuple(math.radians(degrees) for degrees in (2.5, 5.0, 7.5, 1
 
 @dataclass(frozen=True, slots=True)
 class OnBoard:
-    """Effect of a run's roll on people.
+    """Effect of a run's roll on people."""
 
-    Attributes
-    ----------
-    exceedance : tuple of float, or None
-        Shares of the single amplitudes of roll above each of `LEVELS_RAD`; None for a record
-        without a half-cycle.
-    rayleigh : tuple of float
-        The shares for a narrow-banded Gaussian roll of the same standard deviation.
-    comfort : Comfort
-        Comfort at the place.
-    """
-
+    #: Shares of the single amplitudes of roll above each of `LEVELS_RAD`; None for a record without
+    #: a half-cycle.
     exceedance: tuple[float, ...] | None
+    #: The shares for a narrow-banded Gaussian roll of the same standard deviation.
     rayleigh: tuple[float, ...]
-    comfort: Comfort
+    comfort: Comfort  #: Comfort at the place.
 
 
 def on_board(roll_rad: FloatArray, step_s: float, place: Place) -> OnBoard:

@@ -8,18 +8,10 @@ from utank_hil.dynamics.tank import Tank
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Place on board, relative to the ship's centre of gravity.
+    """Place on board, relative to the ship's centre of gravity."""
 
-    Parameters
-    ----------
-    height_m : float
-        Height above the centre of gravity.
-    starboard_m : float
-        Distance to starboard of the centre of gravity.
-    """
-
-    height_m: Finite
-    starboard_m: Finite = 0.0
+    height_m: Finite  #: Height above the centre of gravity.
+    starboard_m: Finite = 0.0  #: Distance to starboard of the centre of gravity.
 
     def __post_init__(self) -> None:
         refuse("place", range_problems(self))

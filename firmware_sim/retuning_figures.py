@@ -21,14 +21,9 @@ _NEW_LAW: Final = (RetuningState.TRIAL, RetuningState.RETUNED)
 
 @dataclass(frozen=True, slots=True)
 class ShipInFigures:
-    """True ship and tank, for comparison with the identified ones.
+    """True ship and tank, for comparison with the identified ones."""
 
-    Attributes
-    ----------
-    roll_period_s, damping_nms_rad : float
-        Values of the ship without tank water.
-    """
-
+    #: roll_period_s, damping_nms_rad: values of the ship without tank water.
     roll_period_s: float
     damping_nms_rad: float
     tank_damping_ratio: float
@@ -36,39 +31,23 @@ class ShipInFigures:
 
 @dataclass(frozen=True, slots=True)
 class RetuningFigures:
-    """Figures of a run's retuning; all times are ship's time.
-
-    Attributes
-    ----------
-    retuned_at_s : float or None
-        Time at which the last new law took charge, on trial at first; None if none did.
-    roll_before_rad : float or None
-        Roll RMS about the heel before the first retuning; None if there is no such time.
-    roll_after_rad : float or None
-        Roll RMS from `SETTLING_S` after the last new law took charge, while it stayed in charge and
-        no identification ran; None if there is no such time.
-    roll_after_below_before : float or None
-        Relative reduction of the roll.
-    found : ModelSummary or None
-        Model for which the last new law was designed.
-    truth : ShipInFigures
-        True values at the start of the retuning that found `found`, or of the last one.
-    reasons : tuple of str
-        Reasons of the last retuning's begin and end, without its result.
-    events : tuple of dict
-        Events as by `RetuningEvent.as_json`, on ship's time.
-    """
+    """Figures of a run's retuning; all times are ship's time."""
 
     attempts: int
+    #: Time at which the last new law took charge, on trial at first; None if none did.
     retuned_at_s: float | None
+    #: Roll RMS about the heel before the first retuning; None if there is no such time.
     roll_before_rad: float | None
+    #: Roll RMS from `SETTLING_S` after the last new law took charge, while it stayed in charge and
+    #: no identification ran; None if there is no such time.
     roll_after_rad: float | None
-    roll_after_below_before: float | None
-    found: ModelSummary | None
+    roll_after_below_before: float | None  #: Relative reduction of the roll.
+    found: ModelSummary | None  #: Model for which the last new law was designed.
+    #: True values at the start of the retuning that found `found`, or of the last one.
     truth: ShipInFigures
     state: str
-    reasons: tuple[str, ...]
-    events: tuple[dict[str, Any], ...]
+    reasons: tuple[str, ...]  #: Reasons of the last retuning's begin and end, without its result.
+    events: tuple[dict[str, Any], ...]  #: Events as by `RetuningEvent.as_json`, on ship's time.
 
 
 def retuning_figures(run: Run, scenario: Scenario, settle_s: float) -> RetuningFigures | None:

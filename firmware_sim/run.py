@@ -48,13 +48,7 @@ class Watch(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """Run to be executed.
-
-    Attributes
-    ----------
-    frames : Path or None
-        Path of the run's frame log, if any.
-    """
+    """Run to be executed."""
 
     name: str
     scenario: Scenario
@@ -63,7 +57,7 @@ class Job:
     script: tuple[TimedAction, ...]
     seed: int
     duration_s: float
-    frames: Path | None = None
+    frames: Path | None = None  #: Path of the run's frame log, if any.
 
     @property
     def ticks(self) -> int:
@@ -84,36 +78,23 @@ class ShipFigures(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """Results of one run.
-
-    Attributes
-    ----------
-    rows : ndarray, shape (n, len(COLUMNS))
-        Telemetry and truth every `RECORD_S`, on ship's time: `time_s` counts from the start of its
-        motion. In real time, rows that either side did not write are missing.
-    refused_commands : int
-        Number of commands outside the drive's own limits.
-    capsized_s : float
-        Ship's time of capsizing; infinite if it did not.
-    pump_speed_rad_s : float
-        Greatest speed of the pump's rotor.
-    loop : LoopStatistics or None
-        Timing statistics of the controller's loop; None in simulated time.
-    retuning : tuple of RetuningEvent
-        Events of the controller's retuning.
-    """
+    """Results of one run."""
 
     name: str
+    #: shape (n, len(COLUMNS)): telemetry and truth every `RECORD_S`, on ship's time: `time_s`
+    #: counts from the start of its motion. In real time, rows that either side did not write are
+    #: missing.
     rows: FloatArray
     bus_load: float
-    refused_commands: int
+    refused_commands: int  #: Number of commands outside the drive's own limits.
     energy_j: float
     strikes: int = 0
-    capsized_s: float = math.inf
+    capsized_s: float = math.inf  #: Ship's time of capsizing; infinite if it did not.
     max_strike_impulse_nms: float = 0.0
-    pump_speed_rad_s: float = 0.0
+    pump_speed_rad_s: float = 0.0  #: Greatest speed of the pump's rotor.
+    #: Timing statistics of the controller's loop; None in simulated time.
     loop: LoopStatistics | None = None
-    retuning: tuple[RetuningEvent, ...] = ()
+    retuning: tuple[RetuningEvent, ...] = ()  #: Events of the controller's retuning.
     fallbacks: int | None = None
     law_error: str = ""
 

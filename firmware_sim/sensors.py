@@ -41,34 +41,22 @@ _M = TypeVar("_M", bound=tuple[Any, ...])
 class SensorErrors:
     """Errors of the sensors; noise is white and Gaussian, given as standard deviation.
 
-    Attributes
-    ----------
-    roll_noise_rad, roll_rate_noise_rad_s : float
-        Noise of the motion sensor.
-    motion_delay_ms : float
-        Age of the motion sensor's sample when sent, a multiple of its 10 ms cycle; at most 1000,
-        the longest delay that a law can be designed for.
-    level_noise_m : float
-        Noise of each level gauge.
-    pressure_noise_pa : float
-        Noise of the pressure sensor.
-    high_level_m : float
-        Level above still water at which a reservoir's high-level switch closes.
-    roll_bias_rad : float
-        Constant error of the roll, such as that of a misaligned sensor; 0.2 at most.
-
     Raises
     ------
     ValueError
         If a value is out of its range, or the delay is not a multiple of the cycle.
     """
 
-    roll_noise_rad: NotNegative = 2e-4
-    roll_rate_noise_rad_s: NotNegative = 5e-4
+    roll_noise_rad: NotNegative = 2e-4  #: Noise of the motion sensor.
+    roll_rate_noise_rad_s: NotNegative = 5e-4  #: Noise of the motion sensor.
+    #: Age of the motion sensor's sample when sent, a multiple of its 10 ms cycle; at most 1000, the
+    #: longest delay that a law can be designed for.
     motion_delay_ms: Annotated[float, Range(least=0, most=1000)] = 20.0
-    level_noise_m: NotNegative = 0.005
-    pressure_noise_pa: NotNegative = 100.0
+    level_noise_m: NotNegative = 0.005  #: Noise of each level gauge.
+    pressure_noise_pa: NotNegative = 100.0  #: Noise of the pressure sensor.
+    #: Level above still water at which a reservoir's high-level switch closes.
     high_level_m: Positive = 4.6
+    #: Constant error of the roll, such as that of a misaligned sensor; 0.2 at most.
     roll_bias_rad: Annotated[float, Range(least=-0.2, most=0.2)] = 0.0
 
     def __post_init__(self) -> None:

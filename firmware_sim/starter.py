@@ -56,24 +56,16 @@ _LEAST_LEVEL_CHANGE: Final = 0.01
 
 @dataclass(frozen=True, slots=True)
 class StarterProject:
-    """Project that can be checked and run on the bench.
-
-    Attributes
-    ----------
-    prediction : RollPrediction
-        Roll in the scenario's sea; with the pump, for a gentle LQG law that stays within the
-        limits.
-    texts : dict of str to str
-        Contents of `FILES`.
-    """
+    """Project that can be checked and run on the bench."""
 
     vessel: Vessel
     sized: SizedTank
     demand: PumpDemand
     law: SelfTuned
+    #: Roll in the scenario's sea; with the pump, for a gentle LQG law that stays within the limits.
     prediction: RollPrediction
     sea: dict[str, Any]
-    texts: dict[str, str]
+    texts: dict[str, str]  #: Contents of `FILES`.
 
 
 def starter_sea(

@@ -18,11 +18,6 @@ _DEPTH_PER_BEAM: Final = (0.01, 1.0)
 class StarterShip:
     """Ship as a naval architect knows it, without the tank's water.
 
-    Parameters
-    ----------
-    roll_period_s : float, optional
-        Roll period; by default from the weather criterion's formula, which needs the draught.
-
     Raises
     ------
     ValueError
@@ -35,6 +30,7 @@ class StarterShip:
     beam_m: Positive
     displacement_t: Positive
     gm_m: Positive
+    #: Roll period; by default from the weather criterion's formula, which needs the draught.
     roll_period_s: Positive | None = None
     draught_m: Positive | None = None
     roll_damping_ratio: Annotated[float, Range(above=0, most=0.3)] = 0.05

@@ -22,23 +22,12 @@ STEPS_TIMED: Final = 5
 
 @dataclass(frozen=True, slots=True)
 class JudgedLaw:
-    """A law with what its loop stands.
-
-    Attributes
-    ----------
-    config : ControllerConfig
-    law : BuiltLaw
-        Designed for it.
-    robustness : Robustness or None
-        None where there is no loop, or none that can be judged.
-    step_s : float
-        Time that a step of the law takes here, at rest.
-    """
+    """A law with what its loop stands."""
 
     config: ControllerConfig
-    law: BuiltLaw
-    robustness: Robustness | None
-    step_s: float
+    law: BuiltLaw  #: Designed for it.
+    robustness: Robustness | None  #: None where there is no loop, or none that can be judged.
+    step_s: float  #: Time that a step of the law takes here, at rest.
 
     @property
     def failures(self) -> tuple[str, ...]:

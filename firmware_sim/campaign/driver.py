@@ -33,15 +33,10 @@ Work = Callable[[Batch], list[Row]]
 
 @dataclass(slots=True)
 class Count:
-    """Progress of a campaign.
-
-    Attributes
-    ----------
-    done, failed, lost : int
-        Number of cases computed, failed, and ended from outside.
-    """
+    """Progress of a campaign."""
 
     needed: int
+    #: done, failed, lost: number of cases computed, failed, and ended from outside.
     done: int = 0
     failed: int = 0
     lost: int = 0

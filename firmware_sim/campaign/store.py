@@ -113,23 +113,12 @@ class Store:
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """Campaign as read from its folder.
+    """Campaign as read from its folder."""
 
-    Attributes
-    ----------
-    about : dict
-        Provenance; ``configuration`` is the study.
-    keys : tuple of str
-        Keys that define groups.
-    cases : list of dict
-        Index, name, waves and parameters of every case.
-    rows : dict
-        Rows by the name of the case; a case without rows is absent.
-    """
-
-    about: dict[str, Any]
-    keys: tuple[str, ...]
-    cases: list[dict[str, Any]]
+    about: dict[str, Any]  #: Provenance; ``configuration`` is the study.
+    keys: tuple[str, ...]  #: Keys that define groups.
+    cases: list[dict[str, Any]]  #: Index, name, waves and parameters of every case.
+    #: Rows by the name of the case; a case without rows is absent.
     rows: dict[str, list[dict[str, Any]]]
 
 

@@ -105,48 +105,27 @@ class Study(Section):
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One case of a study.
-
-    Attributes
-    ----------
-    name : str
-        Hash of configuration, seed and code.
-    waves : str
-        Hash of what determines the waves.
-    group : tuple
-        Values of the keys that define groups.
-    parameters : dict
-        Varied keys with their values, or the names of files that stand for them.
-    values : dict
-        Overrides of the study's scenario by dotted key.
-    """
+    """One case of a study."""
 
     index: int
-    name: str
-    waves: str
+    name: str  #: Hash of configuration, seed and code.
+    waves: str  #: Hash of what determines the waves.
     seed: int
-    group: tuple[Scalar, ...]
+    group: tuple[Scalar, ...]  #: Values of the keys that define groups.
+    #: Varied keys with their values, or the names of files that stand for them.
     parameters: dict[str, Scalar]
-    values: Content
+    values: Content  #: Overrides of the study's scenario by dotted key.
 
 
 @dataclass(frozen=True, slots=True)
 class LoadedStudy:
-    """Study with its cases.
-
-    Attributes
-    ----------
-    keys : tuple of str
-        Keys that define groups.
-    allow_code : bool
-        Whether laws may be code that the files name.
-    """
+    """Study with its cases."""
 
     path: Path
     study: Study
     cases: list[Case]
-    keys: tuple[str, ...]
-    allow_code: bool
+    keys: tuple[str, ...]  #: Keys that define groups.
+    allow_code: bool  #: Whether laws may be code that the files name.
 
     def scenario_of(self, case: Case) -> Scenario:
         """Scenario of a case."""

@@ -21,21 +21,12 @@ Figure = dict[str, float | int | None]
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Cases that differ only in the keys averaged over.
+    """Cases that differ only in the keys averaged over."""
 
-    Attributes
-    ----------
-    parameters : dict
-        Varied keys that the cases have in common.
-    rows : list of list of dict
-        Rows of each case that counts and succeeded.
-    failed, lost : int
-        Number of counted cases that failed or were lost.
-    """
-
-    parameters: dict[str, Scalar]
-    rows: list[list[dict[str, Any]]]
+    parameters: dict[str, Scalar]  #: Varied keys that the cases have in common.
+    rows: list[list[dict[str, Any]]]  #: Rows of each case that counts and succeeded.
     planned: int
+    #: failed, lost: number of counted cases that failed or were lost.
     failed: int
     lost: int
 

@@ -32,23 +32,13 @@ class OtherCodeError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Cases sent to a worker together.
-
-    Attributes
-    ----------
-    scenario : str
-        Content of the study's scenario as text.
-    allow_code : bool
-        Whether laws may be code that the files name.
-    cases : tuple of tuple
-        Name, seed, and overrides of the scenario as text.
-    """
+    """Cases sent to a worker together."""
 
     simulation: str
-    scenario: str
+    scenario: str  #: Content of the study's scenario as text.
     code: str
-    allow_code: bool
-    cases: tuple[tuple[str, int, str], ...]
+    allow_code: bool  #: Whether laws may be code that the files name.
+    cases: tuple[tuple[str, int, str], ...]  #: Name, seed, and overrides of the scenario as text.
 
 
 def run_batch(batch: Batch) -> list[Row]:

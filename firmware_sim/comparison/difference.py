@@ -17,45 +17,26 @@ class CompareError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Figure of one run beside that of another.
-
-    Attributes
-    ----------
-    difference : float
-        `value` minus `reference`.
-    half_width : float or None
-        Half width of the difference's 95 % confidence interval; None with too few values.
-    count : int
-        Number of pairs, or of values on the smaller side.
-    paired : bool
-        Whether both sides met the same waves.
-    """
+    """Figure of one run beside that of another."""
 
     reference: float
     value: float
-    difference: float
+    difference: float  #: `value` minus `reference`.
+    #: Half width of the difference's 95 % confidence interval; None with too few values.
     half_width: float | None
-    count: int
-    paired: bool
+    count: int  #: Number of pairs, or of values on the smaller side.
+    paired: bool  #: Whether both sides met the same waves.
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Run beside the reference run of the same name.
+    """Run beside the reference run of the same name."""
 
-    Attributes
-    ----------
-    source : str
-        Origin of the run.
-    remarks : tuple of str
-        Remarks on the validity of the comparison.
-    """
-
-    source: str
+    source: str  #: Origin of the run.
     run: str
     parameters: dict[str, Any]
     figures: dict[str, Difference]
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  #: Remarks on the validity of the comparison.
 
 
 def paired(reference: FloatArray, values: FloatArray) -> Difference:

@@ -57,16 +57,10 @@ _FIGURES: Final = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Record:
-    """Recording.
-
-    Attributes
-    ----------
-    about : dict
-        Provenance; empty where the file has none.
-    """
+    """Recording."""
 
     path: Path
-    about: dict[str, Any]
+    about: dict[str, Any]  #: Provenance; empty where the file has none.
     runs: Runs
 
     @property

@@ -56,30 +56,19 @@ class Requirement(Section):
 
 
 class Setup(Section):
-    """Ship in a sea with one of the scenario's controllers.
-
-    Attributes
-    ----------
-    actual_ship : dict of str to float
-        Parameters of the ship from the fault on, with the keys of a scenario.
-    redundancy : Redundancy
-        Redundancy of the ship in addition to that of the scenario's vessel.
-    displacement_n, least_gm_m : float, optional
-        Values that replace the vessel's.
-    sea_estimate : EstimateSettings, optional
-        Settings that replace the controller's.
-    commissioned : bool
-        Whether the controller may be armed.
-    """
+    """Ship in a sea with one of the scenario's controllers."""
 
     scenario: Scenario
     controller: str
+    #: Parameters of the ship from the fault on, with the keys of a scenario.
     actual_ship: Annotated[dict[str, Finite], Field(default_factory=dict)]
+    #: Redundancy of the ship in addition to that of the scenario's vessel.
     redundancy: Redundancy = NO_REDUNDANCY
+    #: displacement_n, least_gm_m: values that replace the vessel's.
     displacement_n: Positive | None = None
     least_gm_m: Positive | None = None
-    sea_estimate: EstimateSettings | None = None
-    commissioned: bool = True
+    sea_estimate: EstimateSettings | None = None  #: Settings that replace the controller's.
+    commissioned: bool = True  #: Whether the controller may be armed.
 
     @property
     def equipped(self) -> Scenario:
@@ -124,28 +113,16 @@ class Setup(Section):
 
 
 class Trial(Section):
-    """Stimulus for a ship under way.
+    """Stimulus for a ship under way."""
 
-    Attributes
-    ----------
-    setup : str
-        Name of a setup in `Campaign.setups`.
-    inject : tuple
-        Faults; their times count from `Campaign.fault_at_s`.
-    operator : tuple of TimedAction
-        Additional actions of the operator; their times count from the fault.
-    from_start : bool
-        Whether the faults exist before arming; times then count from the controller's being in
-        charge.
-    followed_s : float
-        Time for which the bus is followed after the fault.
-    """
-
-    setup: str = "pump"
-    inject: tuple[AnyFault, ...] = ()
+    setup: str = "pump"  #: Name of a setup in `Campaign.setups`.
+    inject: tuple[AnyFault, ...] = ()  #: Faults; their times count from `Campaign.fault_at_s`.
+    #: Additional actions of the operator; their times count from the fault.
     operator: tuple[TimedAction, ...] = ()
+    #: Whether the faults exist before arming; times then count from the controller's being in
+    #: charge.
     from_start: bool = False
-    followed_s: FaultSpan = 4.0
+    followed_s: FaultSpan = 4.0  #: Time for which the bus is followed after the fault.
 
     @property
     def on_bus(self) -> bool:
@@ -159,24 +136,15 @@ class Trial(Section):
 
 
 class Expectation(Section):
-    """Expected outcome of a trial.
-
-    Attributes
-    ----------
-    codes : tuple of str
-        Accepted fault codes.
-    also : tuple of str
-        Faults that must also be alarms, and flags that CTRL_STATUS must set.
-    may_end : tuple of str
-        Faults that may end a run after `Trial.followed_s`, while the roll is compared.
-    unheard : bool
-        Whether the fault keeps the controller's frames off the bus, so that they are not judged.
-    """
+    """Expected outcome of a trial."""
 
     reaction: Reaction
-    codes: tuple[FaultName, ...] = ()
+    codes: tuple[FaultName, ...] = ()  #: Accepted fault codes.
+    #: Faults that must also be alarms, and flags that CTRL_STATUS must set.
     also: tuple[FaultName | StatusFlag, ...] = ()
+    #: Faults that may end a run after `Trial.followed_s`, while the roll is compared.
     may_end: tuple[FaultName, ...] = ()
+    #: Whether the fault keeps the controller's frames off the bus, so that they are not judged.
     unheard: bool = False
 
     @property
@@ -186,28 +154,19 @@ class Expectation(Section):
 
 
 class Limit(Section):
-    """Deadlines of an expectation, and the largest permitted roll.
+    """Deadlines of an expectation, and the largest permitted roll."""
 
-    Attributes
-    ----------
-    found_ms, halved_ms, zero_ms : float, optional
-        Deadlines from the fault on; without `zero_ms`, `firmware_sim.fault_campaign.verdict` has
-        the limit.
-    counts_from : dict of str to float
-        Deviation from which times count, because the fault is invisible before it: the first
-        deviation of a received value from the truth; a lasting deviation of the pump's pressure
-        from its set-point; or the first roll of this size (`over_roll_rad`).
-    roll : float
-        Largest ratio of the roll variance to that of the passive ship.
-    roll_window_s : float, optional
-        Time over which the roll is compared, instead of the one for all rows.
-    """
-
+    #: found_ms, halved_ms, zero_ms: deadlines from the fault on; without `zero_ms`,
+    #: `firmware_sim.fault_campaign.verdict` has the limit.
     found_ms: Positive | None = None
     halved_ms: Positive | None = None
     zero_ms: Positive | None = None
+    #: Deviation from which times count, because the fault is invisible before it: the first
+    #: deviation of a received value from the truth; a lasting deviation of the pump's pressure from
+    #: its set-point; or the first roll of this size (`over_roll_rad`).
     counts_from: Annotated[dict[CountsFrom, Positive], Field(default_factory=dict, max_length=1)]
-    roll: Positive = 1.05
+    roll: Positive = 1.05  #: Largest ratio of the roll variance to that of the passive ship.
+    #: Time over which the roll is compared, instead of the one for all rows.
     roll_window_s: FaultSpan | None = None
 
 
@@ -240,39 +199,24 @@ class Row(Section):
 
 
 class LiveRow(Section):
-    """Fault that needs processes and a CAN interface.
-
-    Attributes
-    ----------
-    does : str
-        Name in `firmware_sim.fault_campaign.live.ACTIONS`; empty where it is verified elsewhere.
-    judged : str
-        Whether the controller's fault or the drive's stop is judged.
-    elsewhere : str
-        Test or document that verifies it, where the campaign does not run it.
-    """
+    """Fault that needs processes and a CAN interface."""
 
     id: Annotated[str, Field(pattern=r"^live-[a-z0-9-]+$")]
     meets: Annotated[tuple[str, ...], Field(min_length=1)]
+    #: Name in `firmware_sim.fault_campaign.live.ACTIONS`; empty where it is verified elsewhere.
     does: str = ""
+    #: Whether the controller's fault or the drive's stop is judged.
     judged: Literal["found", "zero"] = "zero"
     within_ms: Positive | None = None
-    elsewhere: str = ""
+    elsewhere: str = ""  #: Test or document that verifies it, where the campaign does not run it.
 
 
 class Campaign(Section):
-    """Requirements and rows.
+    """Requirements and rows."""
 
-    Attributes
-    ----------
-    fault_s : float
-        Earliest start of the faults; they begin up to a second later, see `fault_at_s`.
-    arm_s : float
-        Time at which the operator arms.
-    """
-
+    #: Earliest start of the faults; they begin up to a second later, see `fault_at_s`.
     fault_s: FaultTime
-    arm_s: FaultTime
+    arm_s: FaultTime  #: Time at which the operator arms.
     setups: dict[str, Setup]
     requirements: tuple[Requirement, ...]
     rows: tuple[Row, ...]

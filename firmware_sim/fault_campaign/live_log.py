@@ -45,18 +45,13 @@ class LiveLog:
 
 @dataclass(frozen=True, slots=True)
 class LiveTimes:
-    """Reaction times of a fault.
+    """Reaction times of a fault."""
 
-    Attributes
-    ----------
-    found_ms, zero_ms : float or None
-        Times from the fault to the controller's FAULT, and to the drive's being disabled.
-    held_up_ms : float
-        Longest delay by the machine of the side that had to detect the fault or to act.
-    """
-
+    #: found_ms, zero_ms: times from the fault to the controller's FAULT, and to the drive's being
+    #: disabled.
     found_ms: float | None
     zero_ms: float | None
+    #: Longest delay by the machine of the side that had to detect the fault or to act.
     held_up_ms: float
 
 

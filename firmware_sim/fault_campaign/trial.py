@@ -52,72 +52,43 @@ RECORDED_S: Final = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Time after the fault over which the roll is compared with the passive ship's.
+    """Time after the fault over which the roll is compared with the passive ship's."""
 
-    Attributes
-    ----------
-    stopped_s : float
-        Time for rows that end with the pump off, after which the ship alone is integrated.
-    running_s : float
-        Time for rows whose controller stays in charge.
-    """
-
+    #: Time for rows that end with the pump off, after which the ship alone is integrated.
     stopped_s: float = 600.0
-    running_s: float = 600.0
+    running_s: float = 600.0  #: Time for rows whose controller stays in charge.
 
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """First times of events in ms from the row's time zero; None where there is none.
+    """First times of events in ms from the row's time zero; None where there is none."""
 
-    Attributes
-    ----------
-    found, halved, noted, alarm : float or None
-        Events of `Watch.first_ns`.
-    zero : float or None
-        Final stop of drive or valve.
-    commanded : float
-        Last command with a pressure other than zero.
-    """
-
+    #: found, halved, noted, alarm: events of `Watch.first_ns`.
     found: float | None = None
     halved: float | None = None
     noted: float | None = None
     alarm: float | None = None
-    zero: float | None = None
-    commanded: float = 0.0
+    zero: float | None = None  #: Final stop of drive or valve.
+    commanded: float = 0.0  #: Last command with a pressure other than zero.
 
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """Information about the controller that was on the bus since the fault.
+    """Information about the controller that was on the bus since the fault."""
 
-    Attributes
-    ----------
-    status : str
-        Mode and fault in the last CTRL_STATUS.
-    """
-
-    status: str = ""
+    status: str = ""  #: Mode and fault in the last CTRL_STATUS.
     alarms: tuple[str, ...] = ()
     flags: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Excess:
-    """Commands beyond the permitted range.
+    """Commands beyond the permitted range."""
 
-    Attributes
-    ----------
-    beyond_share_pa : float
-        Largest excess of the drive's set-point over the halved pressure limit.
-    steepest_pa_s : float
-        Largest rate of the commands, cuts excepted.
-    """
-
+    #: Largest excess of the drive's set-point over the halved pressure limit.
     beyond_share_pa: float = 0.0
     refused: int = 0
-    steepest_pa_s: float = 0.0
+    steepest_pa_s: float = 0.0  #: Largest rate of the commands, cuts excepted.
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,21 +102,12 @@ class Rolls:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Outcome of a row in one sea.
-
-    Attributes
-    ----------
-    mode, code : str
-        Final mode, and the fault that was latched or shown.
-    wire : str
-        First frame that the fault changed; empty if none differs.
-    rows : ndarray or None
-        Recording with columns `COLUMNS`, if requested.
-    """
+    """Outcome of a row in one sea."""
 
     row: str
     seed: int
     times: Times = Times()
+    #: mode, code: final mode, and the fault that was latched or shown.
     mode: str = ""
     code: str = ""
     was_active: bool = False
@@ -153,9 +115,9 @@ class Outcome:
     said: Said = Said()
     excess: Excess = Excess()
     rolls: Rolls = Rolls()
-    wire: str = ""
+    wire: str = ""  #: First frame that the fault changed; empty if none differs.
     error: str = ""
-    rows: FloatArray | None = None
+    rows: FloatArray | None = None  #: Recording with columns `COLUMNS`, if requested.
 
 
 class Recorder:

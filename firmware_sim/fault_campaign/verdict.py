@@ -49,32 +49,19 @@ _GO_ON: Final = ("halve", "alarm", "note", "none")
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """Verdict on a row over all seeds; times are the worst of them, None where there is none.
-
-    Attributes
-    ----------
-    found_ms, zero_ms : float or None
-        Start of the required reaction, and final zero of the drive's set-point.
-    wire : str
-        First frame that the fault changed, in the first seed.
-    roll_ratio : float
-        Roll variance divided by that of the passive ship.
-    window_s : float
-        Time over which `roll_ratio` was computed.
-    problems : tuple of str
-        Reasons for failure; empty if passed.
-    """
+    """Verdict on a row over all seeds; times are the worst of them, None where there is none."""
 
     row: Row
     requirement: str
+    #: found_ms, zero_ms: start of the required reaction, and final zero of the drive's set-point.
     found_ms: float | None
     zero_ms: float | None
     zero_limit_ms: float | None
     codes: tuple[str, ...]
-    wire: str
-    roll_ratio: float
-    window_s: float
-    problems: tuple[str, ...]
+    wire: str  #: First frame that the fault changed, in the first seed.
+    roll_ratio: float  #: Roll variance divided by that of the passive ship.
+    window_s: float  #: Time over which `roll_ratio` was computed.
+    problems: tuple[str, ...]  #: Reasons for failure; empty if passed.
     outcomes: tuple[Outcome, ...] = field(repr=False)
     recording: str = ""
 

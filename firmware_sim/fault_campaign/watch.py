@@ -41,11 +41,9 @@ class BusLog:
         Time, pressure, and whether the pressure was to be cut.
     told : list of tuple of (int, Fault)
         Faults sent in ALARM.
-    node : ControllerNode
-        Sender of the commands; must be set before the first frame.
     """
 
-    node: ControllerNode
+    node: ControllerNode  #: Sender of the commands; must be set before the first frame.
 
     def __init__(self) -> None:
         self.frames: list[Heard] = []

@@ -43,20 +43,13 @@ class OtherFrame(Frame):
 
 @dataclass(frozen=True, slots=True)
 class Disturbance:
-    """Gateway fault of a share of the frames.
-
-    Attributes
-    ----------
-    does : str
-        "loses", "delays", "doubles" or "swaps" (with the next frame of its identifier).
-    can_id : int or None
-        Identifier concerned; None for all.
-    """
+    """Gateway fault of a share of the frames."""
 
     span: Span
+    #: "loses", "delays", "doubles" or "swaps" (with the next frame of its identifier).
     does: Literal["loses", "delays", "doubles", "swaps"]
     share: float
-    can_id: int | None
+    can_id: int | None  #: Identifier concerned; None for all.
     by_ns: int = 0
 
 

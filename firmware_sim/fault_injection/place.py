@@ -34,24 +34,16 @@ class Sticks(Protocol):
 
 @dataclass(slots=True)
 class Bench:
-    """Parts of a bench in which faults are placed.
-
-    Attributes
-    ----------
-    bus : FaultyBus or None
-        Simulated bus; None on a real one.
-    law : LawFailures or None
-        Failures of the running controller's law; None if the controller is another process.
-    restart : callable or None
-        Function that replaces the controller by a new one.
-    """
+    """Parts of a bench in which faults are placed."""
 
     nodes: dict[str, FaultyNode]
     plant: Pumped
     drive: Trips | None
     valve: Sticks | None
     version: int
-    bus: FaultyBus | None = None
+    bus: FaultyBus | None = None  #: Simulated bus; None on a real one.
+    #: Failures of the running controller's law; None if the controller is another process.
     law: LawFailures | None = None
+    #: Function that replaces the controller by a new one.
     restart: Callable[[], None] | None = None
     joining: list[Node] = field(default_factory=list)

@@ -134,25 +134,15 @@ class _Flooder:
 
 
 class Flood(Fault):
-    """A node fills a share of the bus with frames of one identifier.
-
-    Attributes
-    ----------
-    identifier : str
-        Identifier in hexadecimal, in candump's notation.
-    share : float
-        Share of a bus of 250 kbit/s; above 1 the frames queue up.
-    format : str
-        "extended", "standard" or "remote"; the last two are not passed to any node.
-    length : int
-        Number of data bytes.
-    """
+    """A node fills a share of the bus with frames of one identifier."""
 
     kind: Literal["flood"]
-    identifier: Identifier
+    identifier: Identifier  #: Identifier in hexadecimal, in candump's notation.
+    #: Share of a bus of 250 kbit/s; above 1 the frames queue up.
     share: Annotated[float, Field(gt=0, le=3)]
+    #: "extended", "standard" or "remote"; the last two are not passed to any node.
     format: Literal["extended", "standard", "remote"] = "extended"
-    length: Annotated[int, Field(ge=0, le=FRAME_BYTES)] = FRAME_BYTES
+    length: Annotated[int, Field(ge=0, le=FRAME_BYTES)] = FRAME_BYTES  #: Number of data bytes.
 
     @model_validator(mode="after")
     def _short(self) -> "Flood":

@@ -1,9 +1,8 @@
 """docs/configuration.md: every key of every configuration file, made from the classes they fill.
 
-The ranges are the annotations' own; what a key means is the docstring of its class.
+The ranges are the annotations' own; what a key means stands beside its field.
 """
 
-import ast
 import inspect
 import textwrap
 from collections.abc import Iterator
@@ -17,6 +16,7 @@ from numpydoc.docscrape import NumpyDocString
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
+from sphinx.pycode import ModuleAnalyzer
 
 from firmware_sim.campaign.study import Study
 from firmware_sim.scenario import Scenario
@@ -245,20 +245,8 @@ def _meanings(section: type) -> dict[str, str]:
                 for name in parameter.name.split(", "):
                     if not meaning.startswith("As in "):
                         found[name] = meaning
-            found |= _strings_below(each)
+            documented = ModuleAnalyzer.for_module(each.__module__).find_attr_docs()
+            for (owner, name), lines in documented.items():
+                if owner == each.__name__:
+                    found[name] = " ".join(" ".join(lines).split())
     return found
-
-
-def _strings_below(section: type) -> dict[str, str]:
-    """Strings that stand below the fields of a class."""
-    (body,) = ast.parse(textwrap.dedent(inspect.getsource(section))).body
-    assert isinstance(body, ast.ClassDef)
-    return {
-        field.target.id: " ".join(below.value.value.split())
-        for field, below in zip(body.body, body.body[1:], strict=False)
-        if isinstance(field, ast.AnnAssign)
-        and isinstance(field.target, ast.Name)
-        and isinstance(below, ast.Expr)
-        and isinstance(below.value, ast.Constant)
-        and isinstance(below.value.value, str)
-    }

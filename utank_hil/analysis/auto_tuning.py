@@ -42,17 +42,11 @@ _OMEGA: Final = np.geomspace(0.1, 10.0, 600)
 
 @dataclass(frozen=True, slots=True)
 class AutoTuned:
-    """A law with all required margins.
-
-    Attributes
-    ----------
-    cost : float
-        Predicted cost; 1 is that of the roll with the passive tank.
-    """
+    """A law with all required margins."""
 
     design: LinearDesign
     robustness: Robustness
-    cost: float
+    cost: float  #: Predicted cost; 1 is that of the roll with the passive tank.
 
 
 def auto_tuned(kind: LinearKind, plant: DesignPlant, sea: SlopeDensity) -> AutoTuned:
@@ -83,19 +77,11 @@ def auto_tuned(kind: LinearKind, plant: DesignPlant, sea: SlopeDensity) -> AutoT
 
 @dataclass(frozen=True, slots=True)
 class AutoDesign:
-    """A GPC, DPC or LQG law with numbers that follow from ship, pump and sea.
-
-    Parameters
-    ----------
-    kind : {"gpc", "dpc", "lqg"}
-    tuning : {"auto"}
-        Replaces the numbers of the kind.
-    sea : SeaModel or None
-        Expected sea, of which spectrum and effective slope count; None for an unknown sea.
-    """
+    """A GPC, DPC or LQG law with numbers that follow from ship, pump and sea."""
 
     kind: LinearKind
-    tuning: Literal["auto"]
+    tuning: Literal["auto"]  #: Replaces the numbers of the kind.
+    #: Expected sea, of which spectrum and effective slope count; None for an unknown sea.
     sea: SeaModel | None = None
 
     def tuned(self, plant: DesignPlant) -> LinearDesign:

@@ -19,25 +19,14 @@ _WAVES = np.geomspace(0.05, 5.0, 4000)
 
 @dataclass(frozen=True, slots=True)
 class TankFigures:
-    """Dimensionless numbers of a tank.
+    """Dimensionless numbers of a tank."""
 
-    Attributes
-    ----------
-    mass_ratio, coupling_ratio : float
-        As in `ShipTankRatios`.
-    frequency_ratio : float
-        Natural frequency of the water over the ship's roll frequency.
-    damping_ratio : float
-        Damping ratio of the water.
-    peak : float
-        Greatest roll over static roll, over all wave frequencies.
-    """
-
+    #: mass_ratio, coupling_ratio: as in `ShipTankRatios`.
     mass_ratio: float
     coupling_ratio: float
-    frequency_ratio: float
-    damping_ratio: float
-    peak: float
+    frequency_ratio: float  #: Natural frequency of the water over the ship's roll frequency.
+    damping_ratio: float  #: Damping ratio of the water.
+    peak: float  #: Greatest roll over static roll, over all wave frequencies.
     duct_area_m2: float
 
 

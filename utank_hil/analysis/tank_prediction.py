@@ -44,21 +44,11 @@ _BANDS = 40
 
 @dataclass(frozen=True, slots=True)
 class SeaState:
-    """A sea and its roll moment on a ship.
+    """A sea and its roll moment on a ship."""
 
-    Attributes
-    ----------
-    wave_moment : Harmonics
-        In N m.
-    slope_rad : float
-        Significant amplitude of the effective wave slope.
-    peak_rad_s : float
-        Peak frequency of the spectrum.
-    """
-
-    wave_moment: Harmonics
-    slope_rad: float
-    peak_rad_s: float
+    wave_moment: Harmonics  #: In N m.
+    slope_rad: float  #: Significant amplitude of the effective wave slope.
+    peak_rad_s: float  #: Peak frequency of the spectrum.
 
     @classmethod
     def on(cls, ship: RollShip, wave_moment: Harmonics) -> "SeaState":
@@ -84,26 +74,15 @@ class SeaState:
 
 @dataclass(frozen=True, slots=True)
 class RollPrediction:
-    """Root mean squares of the linear motions in one sea.
-
-    Attributes
-    ----------
-    active : MotionInSea or None
-        None without pump or law.
-    mean_power_w : float or None
-        Shaft power of a pump similar to the first ship's, see `mean_shaft_power_w`.
-    law : FirstLaw or None
-        Law of the active tank.
-    no_law : str
-        Reason for the absence of a law.
-    """
+    """Root mean squares of the linear motions in one sea."""
 
     without_tank_rad: float
     passive: MotionInSea
-    active: MotionInSea | None
+    active: MotionInSea | None  #: None without pump or law.
+    #: Shaft power of a pump similar to the first ship's, see `mean_shaft_power_w`.
     mean_power_w: float | None
-    law: FirstLaw | None
-    no_law: str = ""
+    law: FirstLaw | None  #: Law of the active tank.
+    no_law: str = ""  #: Reason for the absence of a law.
 
     @property
     def passive_below_no_tank(self) -> float:
@@ -120,17 +99,10 @@ class RollPrediction:
 
 @dataclass(frozen=True, slots=True)
 class LoadingPoint:
-    """Roll in one loading of a ship, with unchanged tank and law.
+    """Roll in one loading of a ship, with unchanged tank and law."""
 
-    Attributes
-    ----------
-    period_scale : float
-        Factor on the roll period, by the stiffness.
-    without_tank_rad, passive_rad : float
-        Roll RMS.
-    """
-
-    period_scale: float
+    period_scale: float  #: Factor on the roll period, by the stiffness.
+    #: without_tank_rad, passive_rad: roll RMS.
     without_tank_rad: float
     passive_rad: float
     active_rad: float | None
@@ -149,22 +121,15 @@ class SweepPoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RollCurves:
-    """Roll over static roll in regular waves, and the distribution of the sea's energy.
+    """Roll over static roll in regular waves, and the distribution of the sea's energy."""
 
-    Attributes
-    ----------
-    period_s : ndarray, shape (N,)
-        Wave periods.
-    without_tank, passive : ndarray, shape (N,)
-    active : ndarray, shape (N,), or None
-    sea_period_s, sea : ndarray, shape (M,)
-        Energy of the moment in each band over that of the greatest band.
-    """
-
-    period_s: FloatArray
+    period_s: FloatArray  #: shape (N,): wave periods.
+    #: without_tank, passive: shape (N,)
     without_tank: FloatArray
     passive: FloatArray
-    active: FloatArray | None
+    active: FloatArray | None  #: shape (N,)
+    #: sea_period_s, sea: shape (M,): energy of the moment in each band over that of the greatest
+    #: band.
     sea_period_s: FloatArray
     sea: FloatArray
 

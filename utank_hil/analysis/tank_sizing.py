@@ -68,27 +68,16 @@ class TankImpossibleError(ValueError):
 class TankRoom:
     """Room for a U-tube tank across the ship.
 
-    Parameters
-    ----------
-    breadth_m : float
-        Across the ship, between the outer walls of the reservoirs.
-    height_m : float
-        From the duct's bottom to the reservoirs' roof.
-    length_m : float
-        Along the ship.
-    duct_below_cg_m : float
-        Depth of the duct's centre below the ship's centre of gravity.
-
     Raises
     ------
     ValueError
         If a length is not positive.
     """
 
-    breadth_m: Positive
-    height_m: Positive
-    length_m: Positive
-    duct_below_cg_m: Finite = 0.0
+    breadth_m: Positive  #: Across the ship, between the outer walls of the reservoirs.
+    height_m: Positive  #: From the duct's bottom to the reservoirs' roof.
+    length_m: Positive  #: Along the ship.
+    duct_below_cg_m: Finite = 0.0  #: Depth of the duct's centre below the ship's centre of gravity.
 
     def __post_init__(self) -> None:
         refuse("tank room", range_problems(self))
@@ -101,74 +90,44 @@ class TankRoom:
 
 @dataclass(frozen=True, slots=True)
 class SizedTank:
-    """A tank in its room.
-
-    Attributes
-    ----------
-    reservoir_length_m, reservoir_breadth_m : float
-        Dimensions of one reservoir, along and across the ship.
-    duct_height_m : float
-        Height of a duct as long as the reservoirs along the ship.
-    bound_by : str
-        Constraint that determined the size, in words.
-    """
+    """A tank in its room."""
 
     tank: Tank
+    #: reservoir_length_m, reservoir_breadth_m: dimensions of one reservoir, along and across the
+    #: ship.
     reservoir_length_m: float
     reservoir_breadth_m: float
-    duct_height_m: float
-    bound_by: str
+    duct_height_m: float  #: Height of a duct as long as the reservoirs along the ship.
+    bound_by: str  #: Constraint that determined the size, in words.
 
 
 @dataclass(frozen=True, slots=True)
 class PumpDemand:
-    """Requirements on a pump that moves the water to a level, in the ship held still.
+    """Requirements on a pump that moves the water to a level, in the ship held still."""
 
-    Attributes
-    ----------
-    level_m : float
-        Amplitude.
-    pressure_pa, flow_m3_s : float
-        Amplitudes, the greatest over `LOADINGS`.
-    duct_speed_m_s : float
-        Speed of the water at that flow.
-    mean_power_w : float
-        Shaft power at the ship's own roll period, where the pump balances the water's losses.
-    """
-
-    level_m: float
+    level_m: float  #: Amplitude.
+    #: pressure_pa, flow_m3_s: amplitudes, the greatest over `LOADINGS`.
     pressure_pa: float
     flow_m3_s: float
-    duct_speed_m_s: float
+    duct_speed_m_s: float  #: Speed of the water at that flow.
+    #: Shaft power at the ship's own roll period, where the pump balances the water's losses.
     mean_power_w: float
 
 
 @dataclass(frozen=True, slots=True)
 class TankCost:
-    """Cost of a tank to the ship, and its capacity.
-
-    Attributes
-    ----------
-    share_of_displacement : float or None
-        Mass of the water over the displacement; None for a ship without a displacement.
-    stability_taken : float
-        Share of the stability that the free surface takes.
-    water_period_s, damping_ratio : float
-        Of the water in the ship held still.
-    usable_level_m : float
-        As the function `usable_level_m`.
-    slope_capacity_rad : float
-        Effective wave slope that the usable level holds.
-    """
+    """Cost of a tank to the ship, and its capacity."""
 
     water_t: float
+    #: Mass of the water over the displacement; None for a ship without a displacement.
     share_of_displacement: float | None
-    stability_taken: float
+    stability_taken: float  #: Share of the stability that the free surface takes.
     gm_loss_m: float | None
+    #: water_period_s, damping_ratio: of the water in the ship held still.
     water_period_s: float
     damping_ratio: float
-    usable_level_m: float
-    slope_capacity_rad: float
+    usable_level_m: float  #: As the function `usable_level_m`.
+    slope_capacity_rad: float  #: Effective wave slope that the usable level holds.
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,23 +43,15 @@ class ParameterError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Annotation of a number: where it must lie.
+    """Annotation of a number: where it must lie."""
 
-    Parameters
-    ----------
-    least, most : float
-        Bounds, themselves allowed.
-    above, below : float, optional
-        Bounds that are not themselves allowed, instead of `least` and `most`.
-    infinite : bool
-        Whether infinity is a value, for limits that need not be there.
-    """
-
+    #: least, most: bounds, themselves allowed.
     least: float = -math.inf
     most: float = math.inf
+    #: above, below: bounds that are not themselves allowed, instead of `least` and `most`.
     above: float | None = None
     below: float | None = None
-    infinite: bool = False
+    infinite: bool = False  #: Whether infinity is a value, for limits that need not be there.
 
     def holds(self, value: float) -> bool:
         """Whether a value lies in the range; what is not a number never does."""

@@ -53,21 +53,11 @@ def write_identified(
 
 @dataclasses.dataclass(frozen=True)
 class IdentifiedShips:
-    """Files of the ships that retuning identified under way, each with files of its own.
+    """Files of the ships that retuning identified under way, each with files of its own."""
 
-    Attributes
-    ----------
-    folder : Path
-        Folder of the files; created if missing.
-    vessel : Vessel
-        The configured vessel.
-    content : dict
-        Content of the controller's file, from `read_controller`.
-    """
-
-    folder: Path
-    vessel: Vessel
-    content: dict[str, Any]
+    folder: Path  #: Folder of the files; created if missing.
+    vessel: Vessel  #: The configured vessel.
+    content: dict[str, Any]  #: Content of the controller's file, from `read_controller`.
 
     def write(self, found: ModelSummary) -> dict[str, Path]:
         """Write vessel and controller, named by the time (UTC); return paths by both names.

@@ -28,30 +28,17 @@ RING_SLOTS: Final = 1640
 
 @dataclass(slots=True)
 class RecordingSummary:
-    """Result of a recording.
+    """Result of a recording."""
 
-    Attributes
-    ----------
-    file : str or None
-        The recording; None if there is none.
-    frames : str or None
-        The frame log, which `utank-hil replay` reads.
-    rows, lost, records_lost : int or None
-        Rows recorded, and rows and records of the frame log that were lost because the recorder was
-        too slow; None if it failed.
-    parts : int or None
-        Number of files, of which `file` is the first; None if it failed.
-    error : str or None
-        Why it did not start, or ended before the run.
-    """
-
-    file: str | None = None
-    frames: str | None = None
+    file: str | None = None  #: The recording; None if there is none.
+    frames: str | None = None  #: The frame log, which `utank-hil replay` reads.
+    #: rows, lost, records_lost: rows recorded, and rows and records of the frame log that were lost
+    #: because the recorder was too slow; None if it failed.
     rows: int | None = None
     lost: int | None = None
     records_lost: int | None = None
-    parts: int | None = None
-    error: str | None = None
+    parts: int | None = None  #: Number of files, of which `file` is the first; None if it failed.
+    error: str | None = None  #: Why it did not start, or ended before the run.
 
 
 class RunRecording:

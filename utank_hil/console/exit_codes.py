@@ -4,16 +4,9 @@ from enum import IntEnum
 
 
 class ExitCode(IntEnum):
-    """How a command ended, for scripts and service managers.
+    """How a command ended, for scripts and service managers."""
 
-    Attributes
-    ----------
-    commands : str
-        Those that may end so.
-    meaning : str
-    """
-
-    commands: str
+    commands: str  #: Those that may end so.
     meaning: str
 
     def __new__(cls, value: int, commands: str, meaning: str) -> "ExitCode":

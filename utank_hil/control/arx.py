@@ -30,13 +30,6 @@ _EXACT = 1e-7  # relative residual above which past outputs do not determine the
 class ARX:
     """Autoregressive model with exogenous input.
 
-    Parameters
-    ----------
-    alpha : array_like, shape (p, m, m)
-        Output coefficients alpha_1 ... alpha_p.
-    beta : array_like, shape (p + 1, m, r)
-        Input coefficients beta_0 ... beta_p; beta_0 acts at once.
-
     Raises
     ------
     ValueError
@@ -44,7 +37,8 @@ class ARX:
         positive.
     """
 
-    alpha: FloatArray
+    alpha: FloatArray  #: shape (p, m, m): output coefficients alpha_1 ... alpha_p.
+    #: shape (p + 1, m, r): input coefficients beta_0 ... beta_p; beta_0 acts at once.
     beta: FloatArray
     sample_time_s: float
 

@@ -18,17 +18,6 @@ _LIMITS: Final = PumpLimits()
 class DesignPlant:
     """A ship with its tank, delay, lag and limits.
 
-    Parameters
-    ----------
-    delay_s : float
-        From the sampling of a measurement to the drive's response to the resulting command.
-    lag_s : float
-        Time constant of the pump's pressure.
-    limits : PumpLimits
-        On the command, for the laws that plan within them.
-    valve : ValveRange or None
-        Range of the tank's valve, if any.
-
     Raises
     ------
     ValueError
@@ -37,10 +26,11 @@ class DesignPlant:
 
     ship: RollShip
     tank: Tank
+    #: From the sampling of a measurement to the drive's response to the resulting command.
     delay_s: NotNegative = 0.05
-    lag_s: NotNegative = 0.1
-    limits: PumpLimits = _LIMITS
-    valve: ValveRange | None = None
+    lag_s: NotNegative = 0.1  #: Time constant of the pump's pressure.
+    limits: PumpLimits = _LIMITS  #: On the command, for the laws that plan within them.
+    valve: ValveRange | None = None  #: Range of the tank's valve, if any.
 
     def __post_init__(self) -> None:
         refuse("design plant", range_problems(self))

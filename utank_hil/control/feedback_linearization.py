@@ -52,30 +52,19 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 @dataclass(frozen=True, slots=True)
 class FeedbackLinearizationDesign:
-    """Parameters of the law.
+    """Parameters of the law."""
 
-    Parameters
-    ----------
-    frequency_rad_s, damping_ratio : float
-        w and zeta of the linear response of the output s.
-    soft_level_m, hard_level_m : float
-        Swing of the level up to which the law acts fully, and from which it does not act; both
-        within the reservoirs, or both beyond them for the law as printed, without reduction.
-    shift_rad_m : float
-        kL, zero or more.
-    shift_length_m : float
-        l.
-    level_damping_ratio : float
-        zeta_h; 0 for the exact linear response.
-    """
-
-    frequency_rad_s: Positive
-    damping_ratio: Positive
+    frequency_rad_s: Positive  #: w and zeta of the linear response of the output s.
+    damping_ratio: Positive  #: w and zeta of the linear response of the output s.
+    #: Swing of the level up to which the law acts fully, and from which it does not act; both
+    #: within the reservoirs, or both beyond them for the law as printed, without reduction.
     soft_level_m: Positive
+    #: Swing of the level up to which the law acts fully, and from which it does not act; both
+    #: within the reservoirs, or both beyond them for the law as printed, without reduction.
     hard_level_m: Positive
-    shift_rad_m: NotNegative = 0.0
-    shift_length_m: Positive = 1.0
-    level_damping_ratio: NotNegative = 0.0
+    shift_rad_m: NotNegative = 0.0  #: kL, zero or more.
+    shift_length_m: Positive = 1.0  #: l.
+    level_damping_ratio: NotNegative = 0.0  #: zeta_h; 0 for the exact linear response.
     kind: Literal["feedback_linearization"] = "feedback_linearization"
 
     def __post_init__(self) -> None:

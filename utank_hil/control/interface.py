@@ -19,14 +19,9 @@ class Controller(Protocol):
     plant from t_k + delay until the result of the next step takes over. A controller that is not
     active is stepped too and receives the actual command through `applied`, so that it can take
     over without a bump.
-
-    Attributes
-    ----------
-    sample_time_s : float
-        Time between two calls of `step`.
     """
 
-    sample_time_s: float
+    sample_time_s: float  #: Time between two calls of `step`.
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take the newest measurement `y`, shape (m,), and return the command, shape (r,).
@@ -43,14 +38,9 @@ class Controller(Protocol):
 
 @runtime_checkable
 class Plans(Protocol):
-    """A controller that plans each sample within limits and an iteration limit.
+    """A controller that plans each sample within limits and an iteration limit."""
 
-    Attributes
-    ----------
-    fallbacks : int
-        Number of steps since its reset in which the limit was reached and the last plan was kept.
-    """
-
+    #: Number of steps since its reset in which the limit was reached and the last plan was kept.
     fallbacks: int
 
     def allow(self, share: float) -> None:
@@ -63,14 +53,10 @@ class StartsAnew(Protocol):
 
     Its memory depends on its own action: the progress of a ramp, its end, or adaptation while
     active. The memory of other controllers is an estimate of the ship, which a reset would lose.
-
-    Attributes
-    ----------
-    passed_limit : str
-        The measurement, a name of `STATES`, that passed a limit of the law; the pressure is then
-        zero until a reset. Empty if none did.
     """
 
+    #: The measurement, a name of `STATES`, that passed a limit of the law; the pressure is then
+    #: zero until a reset. Empty if none did.
     passed_limit: str
 
     def reset(self) -> None:
@@ -102,37 +88,20 @@ class LinearLaw(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class BuiltLaw:
-    """A law designed for a plant.
+    """A law designed for a plant."""
 
-    Attributes
-    ----------
-    controller : callable
-        Makes a new `Controller`, at rest.
-    measured : tuple of str
-        Measurements of the controller, in order; names of `STATES`.
-    linear : LinearLaw or None
-        The law for the analysis of its loop, from `linear_measured` to the pressure.
-    at_rest : bool
-        The law is nonlinear, and `linear` is its slope at rest.
-    adapts : bool
-        The law changes while it runs, and `linear` is its initial form.
-    closes_loop : bool
-        The law feeds measurements back. If it does and `linear` is None, its loop is judged by its
-        impulse response.
-    unjudged : str
-        Reason for which its loop cannot be judged; empty otherwise.
-    commands : tuple of str
-        Commands of the controller, in order: `PRESSURE` of the pump in Pa, `VALVE` for the loss of
-        the valve in Pa per (m/s)^2 of dh/dt.
-    """
-
-    controller: Callable[[], Controller]
-    measured: tuple[str, ...]
+    controller: Callable[[], Controller]  #: Makes a new `Controller`, at rest.
+    measured: tuple[str, ...]  #: Measurements of the controller, in order; names of `STATES`.
+    #: The law for the analysis of its loop, from `linear_measured` to the pressure.
     linear: LinearLaw | None = None
-    at_rest: bool = False
-    adapts: bool = False
+    at_rest: bool = False  #: The law is nonlinear, and `linear` is its slope at rest.
+    adapts: bool = False  #: The law changes while it runs, and `linear` is its initial form.
+    #: The law feeds measurements back. If it does and `linear` is None, its loop is judged by its
+    #: impulse response.
     closes_loop: bool = True
-    unjudged: str = ""
+    unjudged: str = ""  #: Reason for which its loop cannot be judged; empty otherwise.
+    #: Commands of the controller, in order: `PRESSURE` of the pump in Pa, `VALVE` for the loss of
+    #: the valve in Pa per (m/s)^2 of dh/dt.
     commands: tuple[str, ...] = (PRESSURE,)
 
     @property

@@ -143,23 +143,12 @@ def design_lqg(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LQGLaw:
-    """Regulator and Kalman predictor.
+    """Regulator and Kalman predictor."""
 
-    Attributes
-    ----------
-    model : LinearModel
-        Discrete, from inputs to the measured outputs.
-    gain : ndarray, shape (r, n)
-        K.
-    observer_gain : ndarray, shape (n, m)
-        L.
-    innovation_covariance : ndarray, shape (m, m), or None
-        None for a predictor not designed for a known noise.
-    """
-
-    model: LinearModel
-    gain: FloatArray
-    observer_gain: FloatArray
+    model: LinearModel  #: Discrete, from inputs to the measured outputs.
+    gain: FloatArray  #: shape (r, n): K.
+    observer_gain: FloatArray  #: shape (n, m): L.
+    #: shape (m, m): none for a predictor not designed for a known noise.
     innovation_covariance: FloatArray | None = None
 
     @property

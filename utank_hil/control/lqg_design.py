@@ -21,24 +21,14 @@ from utank_hil.dynamics.linear import STATES
 
 @dataclass(frozen=True, slots=True)
 class LQGDesign:
-    """Parameters of an LQG law.
+    """Parameters of an LQG law."""
 
-    Parameters
-    ----------
-    predictor : Predictor
-        Parameters of the Kalman filter. Its `order` is not used.
-    state_weight : tuple of float
-        On the squares of `STATES`, per rad^2, (rad/s)^2, m^2, (m/s)^2.
-    input_weight : float
-        On the square of the pressure in Pa.
-    washout_rad_s : float
-        Corner frequency of the washout that removes the steady list (`WashoutLaw`), at most a
-        quarter of the ship's roll frequency; 0 for none.
-    """
-
-    predictor: Predictor
+    predictor: Predictor  #: Parameters of the Kalman filter. Its `order` is not used.
+    #: On the squares of `STATES`, per rad^2, (rad/s)^2, m^2, (m/s)^2.
     state_weight: tuple[NotNegative, ...]
-    input_weight: Positive = 1.0
+    input_weight: Positive = 1.0  #: On the square of the pressure in Pa.
+    #: Corner frequency of the washout that removes the steady list (`WashoutLaw`), at most a
+    #: quarter of the ship's roll frequency; 0 for none.
     washout_rad_s: NotNegative = 0.0
     kind: Literal["lqg"] = "lqg"
 

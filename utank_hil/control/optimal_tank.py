@@ -30,27 +30,16 @@ _WAVES = np.geomspace(0.05, 5.0, 4000)
 class ShipTankRatios:
     """Ratios that determine the roll response, besides frequency and damping of the water.
 
-    Parameters
-    ----------
-    mass_ratio : float
-        mu, between 0 and 1.
-    coupling_ratio : float
-        G1.
-    roll_damping_ratio : float
-        xi_phi of the ship without its tank.
-    static_coupling : float, optional
-        c of an existing tank; f^2 by default.
-
     Raises
     ------
     ValueError
         If a ratio is out of its range.
     """
 
-    mass_ratio: Annotated[float, Range(above=0, below=1)]
-    coupling_ratio: Finite
-    roll_damping_ratio: NotNegative = 0.0
-    static_coupling: Finite | None = None
+    mass_ratio: Annotated[float, Range(above=0, below=1)]  #: mu, between 0 and 1.
+    coupling_ratio: Finite  #: G1.
+    roll_damping_ratio: NotNegative = 0.0  #: xi_phi of the ship without its tank.
+    static_coupling: Finite | None = None  #: c of an existing tank; f^2 by default.
 
     def __post_init__(self) -> None:
         refuse("ship and tank", range_problems(self))
@@ -58,21 +47,11 @@ class ShipTankRatios:
 
 @dataclass(frozen=True, slots=True)
 class PassiveOptimum:
-    """Best tank for a ship.
+    """Best tank for a ship."""
 
-    Attributes
-    ----------
-    frequency_ratio : float
-        Natural frequency of the water over the ship's roll frequency.
-    damping_ratio : float
-        Damping ratio of the water.
-    peak : float
-        Greatest roll over static roll, over all wave frequencies.
-    """
-
-    frequency_ratio: float
-    damping_ratio: float
-    peak: float
+    frequency_ratio: float  #: Natural frequency of the water over the ship's roll frequency.
+    damping_ratio: float  #: Damping ratio of the water.
+    peak: float  #: Greatest roll over static roll, over all wave frequencies.
 
 
 def ship_ratios(ship: RollShip, tank: Tank) -> tuple[ShipTankRatios, float]:

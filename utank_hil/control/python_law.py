@@ -37,24 +37,17 @@ _METHODS = ("step", "applied", "reset")
 class PythonDesign:
     """A law of a configuration that is user-defined code.
 
-    Parameters
-    ----------
-    factory : str
-        ``package.module:function`` of an installed package, or ``./file.py:function`` of a file,
-        from the folder of the configuration.
-    measured : tuple of str
-        Measurements of the law, in order; names of `STATES`.
-    parameters : mapping of str to any
-        Keyword arguments of the factory.
-
     Raises
     ------
     ValueError
         If `factory` is not of that form, or `measured` names no outputs.
     """
 
+    #: ``package.module:function`` of an installed package, or ``./file.py:function`` of a file,
+    #: from the folder of the configuration.
     factory: str
-    measured: tuple[str, ...]
+    measured: tuple[str, ...]  #: Measurements of the law, in order; names of `STATES`.
+    #: Keyword arguments of the factory.
     parameters: Mapping[str, Any] = field(default_factory=dict)
     kind: Literal["python"] = "python"
 

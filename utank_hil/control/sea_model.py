@@ -39,34 +39,24 @@ _MEMORY_S = 160.0  # length of the impulse response that is used
 class SeaModel:
     """The sea of a predictor, on the beam of a ship without speed.
 
-    Parameters
-    ----------
-    frequency_hz : tuple of float
-        Centres of the spectrum's bands, two or more (`utank_hil.sea.Spectrum`).
-    density_m2_hz : tuple of float
-        Density of the surface elevation in each band.
-    effective_slope : float
-        Ratio of effective to true wave slope.
-    order : int
-        States of the model, 32 at most, and fewer than the samples in 160 s.
-    floor : float
-        Added to the slope's density, as a share of its maximum. A smaller one makes the forecast
-        longer and more sensitive to errors of spectrum and ship. At most 100, a white sea.
-    smoothing_rad_s : float
-        Standard deviation of the Gaussian that the slope's density is smoothed with; 1 at most,
-        wider than any sea's peak.
-
     Raises
     ------
     ValueError
         If a value is out of its range.
     """
 
+    #: Centres of the spectrum's bands, two or more (`utank_hil.sea.Spectrum`).
     frequency_hz: tuple[Positive, ...]
-    density_m2_hz: tuple[NotNegative, ...]
+    density_m2_hz: tuple[NotNegative, ...]  #: Density of the surface elevation in each band.
+    #: Ratio of effective to true wave slope.
     effective_slope: Annotated[float, Range(above=0, most=2)] = 0.5
+    #: States of the model, 32 at most, and fewer than the samples in 160 s.
     order: Annotated[int, Range(least=1, most=32)] = 8
+    #: Added to the slope's density, as a share of its maximum. A smaller one makes the forecast
+    #: longer and more sensitive to errors of spectrum and ship. At most 100, a white sea.
     floor: Annotated[float, Range(above=0, most=100)] = 1.3e-3
+    #: Standard deviation of the Gaussian that the slope's density is smoothed with; 1 at most,
+    #: wider than any sea's peak.
     smoothing_rad_s: Annotated[float, Range(above=0, most=1)] = 0.007
 
     def __post_init__(self) -> None:

@@ -55,12 +55,6 @@ def throttled(valve: ValveRange, pressure_pa: float, flow_m_s: float) -> float:
 class OnOffValve:
     """Energy law with a valve that is open or shut.
 
-    Parameters
-    ----------
-    threshold_rad_m_s2 : float
-        The valve moves when the product of roll rate and level rate exceeds this, so that noise
-        does not make it chatter.
-
     Raises
     ------
     ValueError
@@ -68,6 +62,8 @@ class OnOffValve:
     """
 
     valve: ValveRange
+    #: The valve moves when the product of roll rate and level rate exceeds this, so that noise does
+    #: not make it chatter.
     threshold_rad_m_s2: NotNegative = 0.0
     sample_time_s: SampleTime = 0.1
     _shut: bool = field(default=False, init=False, repr=False)
@@ -145,15 +141,9 @@ class OnOffValveDesign:
 
 @dataclass(frozen=True, slots=True)
 class ClippedValveDesign:
-    """A valve in place of a pump, as a law of a configuration.
+    """A valve in place of a pump, as a law of a configuration."""
 
-    Parameters
-    ----------
-    pump : LawDesign
-        The law whose pressure the valve provides as far as a throttle can.
-    """
-
-    pump: LawDesign
+    pump: LawDesign  #: The law whose pressure the valve provides as far as a throttle can.
     kind: Literal["valve_clipped"] = "valve_clipped"
 
     def build(self, plant: DesignPlant) -> BuiltLaw:

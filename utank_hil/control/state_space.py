@@ -28,18 +28,14 @@ from utank_hil.dynamics.transfer import state_space_response
 class StateSpaceLaw:
     """A law given by its matrices.
 
-    Parameters
-    ----------
-    model : LinearModel
-        From the m measured outputs to the r commands; discrete, ``dt`` in seconds. D is the direct
-        gain on the newest measurement. The sign is the law's own: u = -K y has D = -K.
-
     Raises
     ------
     ValueError
         If the model is not discrete, its shapes are inconsistent, or a number is not finite.
     """
 
+    #: From the m measured outputs to the r commands; discrete, ``dt`` in seconds. D is the direct
+    #: gain on the newest measurement. The sign is the law's own: u = -K y has D = -K.
     model: LinearModel
 
     def __post_init__(self) -> None:
@@ -112,12 +108,6 @@ _Matrix = tuple[tuple[Finite, ...], ...]
 class SystemMatrices:
     """Matrices of a discrete system, as rows of numbers in a file.
 
-    Parameters
-    ----------
-    D : tuple of tuple of float, 1 x m
-    A, B, C : tuple of tuple of float, n x n, n x m, 1 x n
-        Omitted for a law without states.
-
     Raises
     ------
     ValueError
@@ -126,9 +116,9 @@ class SystemMatrices:
 
     D: _Matrix
     sample_time_s: SampleTime
-    A: _Matrix = ()
-    B: _Matrix = ()
-    C: _Matrix = ((),)
+    A: _Matrix = ()  #: Omitted for a law without states.
+    B: _Matrix = ()  #: Omitted for a law without states.
+    C: _Matrix = ((),)  #: Omitted for a law without states.
 
     def __post_init__(self) -> None:
         problems = range_problems(self)
@@ -155,17 +145,13 @@ class SystemMatrices:
 class StateSpaceDesign:
     """A law of a configuration that is given by its matrices.
 
-    Parameters
-    ----------
-    measured : tuple of str
-        Measurements of the law, in the order of the columns of B and D; names of `STATES`.
-
     Raises
     ------
     ValueError
         If `measured` does not name one output for each column of D.
     """
 
+    #: Measurements of the law, in the order of the columns of B and D; names of `STATES`.
     measured: tuple[str, ...]
     system: SystemMatrices
     kind: Literal["state_space"] = "state_space"

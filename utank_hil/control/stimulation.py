@@ -44,19 +44,6 @@ SHORT = 0.01  # over the pressure's amplitude; a smaller shortfall is ignored
 class StimulationDesign:
     """Parameters of the wanted roll.
 
-    Parameters
-    ----------
-    amplitude_rad, period_s : float
-        Wanted roll.
-    ramp_s : float
-        Time in which the amplitude goes from zero to full and back.
-    roll_limit_rad : float
-        Roll at which the stimulation ends.
-    correction_s : float
-        T.
-    duration_s : float
-        Time from the beginning of the ramp in to that of the ramp out; infinite for no planned end.
-
     Raises
     ------
     ValueError
@@ -64,11 +51,12 @@ class StimulationDesign:
         ends within the ramp in.
     """
 
-    amplitude_rad: Positive
-    period_s: Positive
-    ramp_s: Positive
-    roll_limit_rad: Positive
-    correction_s: Positive = 120.0
+    amplitude_rad: Positive  #: Wanted roll.
+    period_s: Positive  #: Wanted roll.
+    ramp_s: Positive  #: Time in which the amplitude goes from zero to full and back.
+    roll_limit_rad: Positive  #: Roll at which the stimulation ends.
+    correction_s: Positive = 120.0  #: T.
+    #: Time from the beginning of the ramp in to that of the ramp out; infinite for no planned end.
     duration_s: Annotated[float, Range(above=0, infinite=True)] = math.inf
     kind: Literal["stimulate"] = "stimulate"
 

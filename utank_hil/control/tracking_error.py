@@ -19,22 +19,15 @@ from utank_hil.base.parameters import Positive, range_problems, refuse
 class ErrorDynamics:
     """Wanted error dynamics and their Lyapunov function e' P e / 2.
 
-    Parameters
-    ----------
-    frequency_rad_s, damping_ratio : float
-        w and zeta.
-    q : float
-        Factor of Q = q I.
-
     Raises
     ------
     ValueError
         If a parameter is not positive.
     """
 
-    frequency_rad_s: Positive
-    damping_ratio: Positive
-    q: Positive
+    frequency_rad_s: Positive  #: w and zeta.
+    damping_ratio: Positive  #: w and zeta.
+    q: Positive  #: Factor of Q = q I.
 
     def __post_init__(self) -> None:
         refuse("error dynamics", range_problems(self))

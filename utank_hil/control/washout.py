@@ -29,11 +29,6 @@ class WashableLaw(LinearLaw, Protocol):
 class WashoutLaw:
     """A law on outputs without their mean.
 
-    Parameters
-    ----------
-    corner_rad_s : float
-        w0, far below the ship's roll frequency.
-
     Raises
     ------
     ValueError
@@ -41,7 +36,7 @@ class WashoutLaw:
     """
 
     law: WashableLaw
-    corner_rad_s: float
+    corner_rad_s: float  #: w0, far below the ship's roll frequency.
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.corner_rad_s) and self.corner_rad_s > 0):

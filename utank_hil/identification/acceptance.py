@@ -15,28 +15,17 @@ from utank_hil.identification.validation import Validation
 
 @dataclass(frozen=True, slots=True)
 class ModelLimits:
-    """Limits of the acceptance test.
+    """Limits of the acceptance test."""
 
-    Attributes
-    ----------
-    roll_period_range_s : tuple of float
-        Shortest and longest roll period of the ship's stability booklet.
-    fit : float
-        Smallest one-step fit of each output on validation data.
-    correlation : float
-        Largest autocorrelation of the prediction errors on validation data at any lag. A whiteness
-        test is no criterion: with hundreds of coefficients the errors are always slightly coloured,
-        and with enough data significantly.
-    period_deviation : float
-        Largest relative standard deviation of the roll period.
-    dispersion : float
-        Largest misfit of the ship to the identified model, relative to its uncertainty.
-    """
-
+    #: Shortest and longest roll period of the ship's stability booklet.
     roll_period_range_s: tuple[float, float]
-    fit: float = 0.8
+    fit: float = 0.8  #: Smallest one-step fit of each output on validation data.
+    #: Largest autocorrelation of the prediction errors on validation data at any lag. A whiteness
+    #: test is no criterion: with hundreds of coefficients the errors are always slightly coloured,
+    #: and with enough data significantly.
     correlation: float = 0.5
-    period_deviation: float = 0.05
+    period_deviation: float = 0.05  #: Largest relative standard deviation of the roll period.
+    #: Largest misfit of the ship to the identified model, relative to its uncertainty.
     dispersion: float = 12.0
 
 

@@ -17,24 +17,17 @@ from utank_hil.base.arrays import FloatArray
 class DisturbanceBasis:
     """Sine and cosine, polynomial and exponential functions of time.
 
-    Parameters
-    ----------
-    frequencies_rad_s : sequence of float
-        Frequencies, with a sine and a cosine each.
-    polynomial_degree : int or None
-        Degree of Legendre polynomials over the record: 0 for an offset (a steady heel, the bias of
-        a sensor), 1 for a drift as well; None for no offset.
-    decay_rates_1_s : sequence of float
-        Rates of functions exp(-rate t); a negative rate grows.
-
     Raises
     ------
     ValueError
         If a frequency is not positive, a rate is zero, one is repeated, or the degree is negative.
     """
 
-    frequencies_rad_s: Sequence[float] = ()
+    frequencies_rad_s: Sequence[float] = ()  #: Frequencies, with a sine and a cosine each.
+    #: Degree of Legendre polynomials over the record: 0 for an offset (a steady heel, the bias of a
+    #: sensor), 1 for a drift as well; None for no offset.
     polynomial_degree: int | None = None
+    #: Rates of functions exp(-rate t); a negative rate grows.
     decay_rates_1_s: Sequence[float] = ()
 
     def __post_init__(self) -> None:

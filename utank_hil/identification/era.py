@@ -29,23 +29,18 @@ _SIGNAL = 1e-3  # This is the smallest singular value of a signal, relative to t
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Realization:
-    """A realized model with the singular vectors of the scaled Hankel matrix.
+    """A realized model with the singular vectors of the scaled Hankel matrix."""
 
-    Parameters
-    ----------
-    a, b, c : ndarray
-        State matrix (n, n), input matrix (n, r), output matrix (m, n), for unscaled channels.
-    left, right : ndarray, shape (a m, n) and (b r, n)
-        Singular vectors of H0, divided by the square roots of its singular values.
-    row_scale, column_scale : ndarray, shape (m,) and (r,)
-        Scales by which outputs and inputs were divided.
-    """
-
+    #: a, b, c: state matrix (n, n), input matrix (n, r), output matrix (m, n), for unscaled
+    #: channels.
     a: FloatArray
     b: FloatArray
     c: FloatArray
+    #: left, right: shape (a m, n): singular vectors of H0, divided by the square roots of its
+    #: singular values.
     left: FloatArray
     right: FloatArray
+    #: row_scale, column_scale: shape (m,): scales by which outputs and inputs were divided.
     row_scale: FloatArray
     column_scale: FloatArray
 

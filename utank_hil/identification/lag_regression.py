@@ -25,18 +25,10 @@ from utank_hil.identification.errors import IdentificationError
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A part of the record without gaps.
+    """A part of the record without gaps."""
 
-    Parameters
-    ----------
-    channels : ndarray, shape (q, N)
-        Outputs, then inputs; each channel contiguous.
-    basis : ndarray, shape (d, N - p)
-        Disturbance basis at the rows of the regression.
-    """
-
-    channels: FloatArray
-    basis: FloatArray
+    channels: FloatArray  #: shape (q, N): outputs, then inputs; each channel contiguous.
+    basis: FloatArray  #: shape (d, N - p): disturbance basis at the rows of the regression.
 
 
 class LagRegression:

@@ -31,27 +31,17 @@ _INFLATION = 100.0  # Above this, noise in weak directions of the input exceeds 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """Solution of a regression.
+    """Solution of a regression."""
 
-    Parameters
-    ----------
-    coefficients : ndarray, shape (n, m)
-    residual_covariance : ndarray, shape (m, m)
-        Covariance of the equation errors, with rows minus rank as degrees of freedom.
-    gram : ndarray, shape (n, n)
-        Upper triangle of the Gram matrix.
-    penalty : ndarray, shape (m,)
-        Term of the shrinkage on the diagonal of the inputs' part; zero without shrinkage.
-    excitation_order : int
-        See `persistence.excitation_order`, for p + 1 lags.
-    """
-
-    coefficients: FloatArray
+    coefficients: FloatArray  #: shape (n, m)
+    #: shape (m, m): covariance of the equation errors, with rows minus rank as degrees of freedom.
     residual_covariance: FloatArray
-    gram: FloatArray
+    gram: FloatArray  #: shape (n, n): upper triangle of the Gram matrix.
+    #: shape (m,): term of the shrinkage on the diagonal of the inputs' part; zero without
+    #: shrinkage.
     penalty: FloatArray
     rank: int
-    excitation_order: int
+    excitation_order: int  #: See `persistence.excitation_order`, for p + 1 lags.
 
 
 def fit(regression: LagRegression) -> Fit:

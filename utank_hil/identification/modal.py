@@ -31,23 +31,15 @@ _NULL = 1e-12  # Smallest eigenvalue of the Gram matrix, relative to the largest
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalParameters:
-    """Modes in order of frequency, one of each conjugate pair.
+    """Modes in order of frequency, one of each conjugate pair."""
 
-    Parameters
-    ----------
-    poles : ndarray, shape (k,)
-        Poles of the discrete model, imaginary part zero or more.
-    frequency_rad_s : ndarray, shape (k,)
-        Undamped natural frequency; infinite for a pole at 0.
-    damping_ratio : ndarray, shape (k,)
-        Damping ratio: 1 for a real pole, negative when unstable.
-    shapes : ndarray, shape (k, m)
-        Mode shapes: complex amplitudes of the outputs, the largest 1; zero if unobservable.
-    """
-
-    poles: ComplexArray
+    poles: ComplexArray  #: shape (k,): poles of the discrete model, imaginary part zero or more.
+    #: shape (k,): undamped natural frequency; infinite for a pole at 0.
     frequency_rad_s: FloatArray
+    #: shape (k,): damping ratio: 1 for a real pole, negative when unstable.
     damping_ratio: FloatArray
+    #: shape (k, m): mode shapes: complex amplitudes of the outputs, the largest 1; zero if
+    #: unobservable.
     shapes: ComplexArray
 
 

@@ -66,32 +66,16 @@ _MOST_TRIES = 250  # This is the largest number of ships tried.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionFit:
-    """Ship and wave moment fitted to a record.
+    """Ship and wave moment fitted to a record."""
 
-    Attributes
-    ----------
-    ship : RollShip
-        The given ship with fitted stiffness, inertia and linear damping.
-    deviation : ndarray, shape (3,)
-        Relative standard deviations of stiffness, inertia and linear damping.
-    period_deviation : float
-        Relative standard deviation of the roll period.
-    waves : SlopeSpectrum
-        Wave moment per stiffness of `ship`.
-    rms_deviation : float
-        Relative standard deviation of the root mean square of `waves`.
-    clear : float
-        Part of the moment's energy in bands where it exceeds the sensors' noise.
-    log_likelihood : float
-        Log-likelihood of the motion without constants, to compare fits to one record.
-    """
-
-    ship: RollShip
+    ship: RollShip  #: The given ship with fitted stiffness, inertia and linear damping.
+    #: shape (3,): relative standard deviations of stiffness, inertia and linear damping.
     deviation: FloatArray
-    period_deviation: float
-    waves: SlopeSpectrum
-    rms_deviation: float
-    clear: float
+    period_deviation: float  #: Relative standard deviation of the roll period.
+    waves: SlopeSpectrum  #: Wave moment per stiffness of `ship`.
+    rms_deviation: float  #: Relative standard deviation of the root mean square of `waves`.
+    clear: float  #: Part of the moment's energy in bands where it exceeds the sensors' noise.
+    #: Log-likelihood of the motion without constants, to compare fits to one record.
     log_likelihood: float
 
 

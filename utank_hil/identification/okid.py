@@ -28,48 +28,30 @@ _LEAST_EXCITATION = 4  # One oscillation needs twice its order.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OkidResult:
-    """Result of OKID.
+    """Result of OKID."""
 
-    Parameters
-    ----------
-    arx : ARX
-        Observer Markov parameters as a model.
-    markov : ndarray, shape (K, m, r)
-        System Markov parameters; ``markov[0]`` is D, ``markov[k]`` is C A^(k-1) B.
-    observer_gain : ndarray, shape (K - 1, m, m)
-        Observer gain Markov parameters C A^(k-1) K, K being -G of the thesis.
-    disturbance : ndarray, shape (d, m)
-        Coefficients of the disturbance basis in the ARX equation.
-    residual_covariance : ndarray, shape (m, m)
-        Covariance of the one-step prediction errors.
-    gram : ndarray, shape (n, n)
-        Upper triangle of the regression's Gram matrix, with columns divided by `column_scale`, in
-        the order of `LagRegression`.
-    column_scale : ndarray, shape (n,)
-    penalty : ndarray, shape (m,)
-        Term of the shrinkage on the inputs' diagonal of the Gram matrix; zero for plain least
-        squares, when the input excites well.
-    rank : int
-        Rank of the regression; below n if the data fit exactly or the input does not excite.
-    excitation_order : int
-        Order of persistent excitation of the input, at most p + 1. A system of order n needs 2 n
-        or more.
-    rows : int
-        Number of equations, without gaps.
-    """
-
-    arx: ARX
+    arx: ARX  #: Observer Markov parameters as a model.
+    #: shape (K, m, r): system Markov parameters; ``markov[0]`` is D, ``markov[k]`` is C A^(k-1) B.
     markov: FloatArray
+    #: shape (K - 1, m, m): observer gain Markov parameters C A^(k-1) K, K being -G of the thesis.
     observer_gain: FloatArray
     basis: DisturbanceBasis
+    #: shape (d, m): coefficients of the disturbance basis in the ARX equation.
     disturbance: FloatArray
-    residual_covariance: FloatArray
+    residual_covariance: FloatArray  #: shape (m, m): covariance of the one-step prediction errors.
+    #: shape (n, n): upper triangle of the regression's Gram matrix, with columns divided by
+    #: `column_scale`, in the order of `LagRegression`.
     gram: FloatArray
-    column_scale: FloatArray
+    column_scale: FloatArray  #: shape (n,)
+    #: shape (m,): term of the shrinkage on the inputs' diagonal of the Gram matrix; zero for plain
+    #: least squares, when the input excites well.
     penalty: FloatArray
+    #: Rank of the regression; below n if the data fit exactly or the input does not excite.
     rank: int
+    #: Order of persistent excitation of the input, at most p + 1. A system of order n needs 2 n or
+    #: more.
     excitation_order: int
-    rows: int
+    rows: int  #: Number of equations, without gaps.
 
 
 def arx(

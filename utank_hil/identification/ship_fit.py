@@ -51,35 +51,19 @@ _CONVERGED = 1e-3  # Relative change of the dispersion, far below its own uncert
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShipFit:
-    """Ship and tank fitted to a record.
+    """Ship and tank fitted to a record."""
 
-    Attributes
-    ----------
-    ship : RollShip
-        The given ship with fitted inertia, stiffness and linear damping.
-    tank : Tank
-        The given tank with fitted damping ratio.
-    deviation : ndarray, shape (4,)
-        Relative standard deviations of inertia, stiffness, ship damping and tank damping ratio. In
-        an irregular sea, intervals of two deviations contain the true value in about 90 % of
-        records.
-    period_deviation : float
-        Relative standard deviation of the ship's roll period.
-    dispersion : float
-        RMS of the misfit relative to the stated errors.
-    extra_delay_s : ndarray, shape (m,)
-        Delay of each output in addition to the plant's delay and lag.
-    pressure_gain : float
-        Ratio of pressure to command.
-    """
-
-    ship: RollShip
-    tank: Tank
+    ship: RollShip  #: The given ship with fitted inertia, stiffness and linear damping.
+    tank: Tank  #: The given tank with fitted damping ratio.
+    #: shape (4,): relative standard deviations of inertia, stiffness, ship damping and tank damping
+    #: ratio. In an irregular sea, intervals of two deviations contain the true value in about 90 %
+    #: of records.
     deviation: FloatArray
-    period_deviation: float
-    dispersion: float
+    period_deviation: float  #: Relative standard deviation of the ship's roll period.
+    dispersion: float  #: RMS of the misfit relative to the stated errors.
+    #: shape (m,): delay of each output in addition to the plant's delay and lag.
     extra_delay_s: FloatArray
-    pressure_gain: float
+    pressure_gain: float  #: Ratio of pressure to command.
 
 
 def fit_ship(

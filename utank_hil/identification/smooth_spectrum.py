@@ -24,21 +24,12 @@ _TINY = 1e-9  # This keeps the prior and the weights positive definite.
 
 
 class LogSpectrum(NamedTuple):
-    """The logarithm of a spectrum.
+    """The logarithm of a spectrum."""
 
-    Attributes
-    ----------
-    log_likelihood : float
-        Log-likelihood of the estimates over all spectra, without its constants.
-    mean : ndarray, shape (F,)
-        Logarithm of the density at the mode.
-    covariance : ndarray, shape (F, F)
-        Covariance of the logarithm.
-    """
-
+    #: Log-likelihood of the estimates over all spectra, without its constants.
     log_likelihood: float
-    mean: FloatArray
-    covariance: FloatArray
+    mean: FloatArray  #: shape (F,): logarithm of the density at the mode.
+    covariance: FloatArray  #: shape (F, F): covariance of the logarithm.
 
 
 class SmoothSpectrum:

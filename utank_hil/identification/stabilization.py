@@ -16,18 +16,13 @@ _SHAPE = 0.98  # Modal assurance of a stable mode.
 
 @dataclass(frozen=True, slots=True)
 class StabilizationPoint:
-    """A mode at one model order, compared with the nearest mode at the order before.
-
-    Parameters
-    ----------
-    frequency_stable, damping_stable, shape_stable : bool
-        Whether it changes by 1 % in frequency or less, by 5 % in damping ratio or less, and has a
-        modal assurance of 0.98 or more.
-    """
+    """A mode at one model order, compared with the nearest mode at the order before."""
 
     order: int
     frequency_rad_s: float
     damping_ratio: float
+    #: frequency_stable, damping_stable, shape_stable: whether it changes by 1 % in frequency or
+    #: less, by 5 % in damping ratio or less, and has a modal assurance of 0.98 or more.
     frequency_stable: bool
     damping_stable: bool
     shape_stable: bool

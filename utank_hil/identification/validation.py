@@ -23,35 +23,23 @@ _STILL = 1e-12  # smallest peak-to-peak value, relative to a channel's root mean
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Validation:
-    """Validation results of a model on a record.
+    """Validation results of a model on a record."""
 
-    Parameters
-    ----------
-    one_step_fit : ndarray, shape (m,)
-        1 - rms(prediction error) / rms(y - mean y); 1 is perfect.
-    simulation_fit : ndarray, shape (m,)
-        Fit of the simulated response to input and disturbance basis, with the first p samples
-        of each segment as initial state. It includes the effect of an irregular sea. Minus
-        infinity for a response that overflows.
-    residual_correlation : ndarray, shape (lags, m)
-        Autocorrelation of the prediction errors at lags 1, 2, ...
-    whiteness_probability : ndarray, shape (m,)
-        p-value of the Ljung-Box test for white errors.
-    input_correlation : ndarray, shape (lags + 1, m, r)
-        Correlation of the errors with the input at lags 0, 1, ...
-    independence_probability : ndarray, shape (m, r)
-        p-value of the test for errors independent of the input.
-    rows : int
-        Number of predictions.
-    """
-
+    #: shape (m,): 1 - rms(prediction error) / rms(y - mean y); 1 is perfect.
     one_step_fit: FloatArray
+    #: shape (m,): fit of the simulated response to input and disturbance basis, with the first p
+    #: samples of each segment as initial state. It includes the effect of an irregular sea. Minus
+    #: infinity for a response that overflows.
     simulation_fit: FloatArray
+    #: shape (lags, m): autocorrelation of the prediction errors at lags 1, 2, ...
     residual_correlation: FloatArray
+    #: shape (m,): p-value of the Ljung-Box test for white errors.
     whiteness_probability: FloatArray
+    #: shape (lags + 1, m, r): correlation of the errors with the input at lags 0, 1, ...
     input_correlation: FloatArray
+    #: shape (m, r): p-value of the test for errors independent of the input.
     independence_probability: FloatArray
-    rows: int
+    rows: int  #: Number of predictions.
 
 
 def validate(

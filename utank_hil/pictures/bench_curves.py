@@ -37,48 +37,27 @@ _LABELS: Final = ("Roll (°)", "Tank level (m)", "Pump pressure (kPa)")
 
 @dataclass(frozen=True, slots=True)
 class BenchCurve:
-    """Signals of one run of a bench.
+    """Signals of one run of a bench."""
 
-    Attributes
-    ----------
-    label : str
-        Text in the legend, results included.
-    time_s, roll_rad, level_m, pressure_pa : array (n,)
-        The level is the starboard level above still water.
-    retuning : array (n,), optional
-        `RetuningState` of a retuning run, drawn as a lane.
-    """
-
-    label: str
+    label: str  #: Text in the legend, results included.
+    #: time_s, roll_rad, level_m, pressure_pa: the level is the starboard level above still water.
     time_s: FloatArray
     roll_rad: FloatArray
     level_m: FloatArray
     pressure_pa: FloatArray
-    retuning: FloatArray | None = None
+    retuning: FloatArray | None = None  #: `RetuningState` of a retuning run, drawn as a lane.
 
 
 @dataclass(frozen=True, slots=True)
 class BenchBar:
-    """One run in the summary of a bench.
-
-    Attributes
-    ----------
-    roll_rad : float or None
-        Root mean square, or None.
-    said : str
-        Text beside the bar of the roll.
-    power_w : float or None
-        Mean shaft power; None without a pump.
-    cost : str
-        Text beside the bar of the power.
-    """
+    """One run in the summary of a bench."""
 
     name: str
     color: str
-    roll_rad: float | None
-    said: str
-    power_w: float | None
-    cost: str
+    roll_rad: float | None  #: Root mean square, or None.
+    said: str  #: Text beside the bar of the roll.
+    power_w: float | None  #: Mean shaft power; None without a pump.
+    cost: str  #: Text beside the bar of the power.
 
 
 def draw_bench(

@@ -19,20 +19,13 @@ MOST_GROUPS: Final = 40
 
 @dataclass(frozen=True, slots=True)
 class CampaignRun:
-    """One run of a campaign's groups.
-
-    Attributes
-    ----------
-    mean_rad, half_width_rad : sequence of float
-        Roll RMS of each group, or NaN.
-    rolls_rad : sequence of float
-        Roll RMS of each case.
-    """
+    """One run of a campaign's groups."""
 
     name: str
+    #: mean_rad, half_width_rad: roll RMS of each group, or NaN.
     mean_rad: Sequence[float]
     half_width_rad: Sequence[float]
-    rolls_rad: Sequence[float]
+    rolls_rad: Sequence[float]  #: Roll RMS of each case.
 
 
 def draw_campaign(

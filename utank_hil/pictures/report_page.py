@@ -27,18 +27,10 @@ class ReportTable:
 
 @dataclass(frozen=True, slots=True)
 class ReportPicture:
-    """A picture.
+    """A picture."""
 
-    Attributes
-    ----------
-    png : bytes
-        Content of the `.png` file.
-    says : str
-        Description for readers who cannot see it.
-    """
-
-    png: bytes
-    says: str
+    png: bytes  #: Content of the `.png` file.
+    says: str  #: Description for readers who cannot see it.
 
     @property
     def base64(self) -> str:

@@ -24,18 +24,11 @@ class Report(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ReportKind:
-    """A kind of run that can be reported.
+    """A kind of run that can be reported."""
 
-    Attributes
-    ----------
-    file : str
-        By which the run's folder is known.
-    report : callable
-        Of the folder, with another one for pictures that are made for the report. Raises OSError
-        or ValueError for what it can't read, KeyError for what another version wrote.
-    """
-
-    file: str
+    file: str  #: By which the run's folder is known.
+    #: Of the folder, with another one for pictures that are made for the report. Raises OSError or
+    #: ValueError for what it can't read, KeyError for what another version wrote.
     report: Callable[[Path, Path], Report]
 
 

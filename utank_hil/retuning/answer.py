@@ -36,11 +36,6 @@ LONGEST_BYTES: Final = OVERHEAD_BYTES + max(
 class Candidate:
     """A law that passed every check of the retuner.
 
-    Attributes
-    ----------
-    washout_rad_s : float
-        Corner frequency of the washout; 0 for none.
-
     Raises
     ------
     ValueError
@@ -49,7 +44,7 @@ class Candidate:
     """
 
     law: PredictiveLaw
-    washout_rad_s: float
+    washout_rad_s: float  #: Corner frequency of the washout; 0 for none.
     summary: ModelSummary
 
     def __post_init__(self) -> None:

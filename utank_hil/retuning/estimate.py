@@ -19,11 +19,6 @@ MOST_BANDS: Final = 1000
 class ShipFigures:
     """A ship in roll, without tank water, and the uncertainty of its figures.
 
-    Attributes
-    ----------
-    stiffness_deviation, period_deviation : float
-        Relative standard deviations of stiffness and roll period.
-
     Raises
     ------
     ValueError
@@ -34,6 +29,8 @@ class ShipFigures:
     stiffness_nm_rad: Annotated[float, Range(least=1e-6, most=1e30)]
     inertia_kg_m2: Annotated[float, Range(least=1e-6, most=1e30)]
     damping_nms_rad: Annotated[float, Range(least=0, most=1e30)]
+    #: stiffness_deviation, period_deviation: relative standard deviations of stiffness and roll
+    #: period.
     stiffness_deviation: Annotated[float, Range(least=0, most=1e3)] = 0.0
     period_deviation: Annotated[float, Range(least=0, most=1e3)] = 0.0
 
@@ -72,36 +69,26 @@ class ShipFigures:
 class MotionEstimate:
     """Estimate of waves and ship from the latest part of the motion record.
 
-    Attributes
-    ----------
-    of_sea, of_ship : Verdict
-        Whether the estimate of waves and ship is good, and if not, why.
-    ship : ShipFigures or None
-        The ship found; if `of_ship` is not good, the known ship that the waves are based on. None
-        if nothing was found.
-    waves : SlopeSpectrum or None
-        Wave moment per stiffness of that ship.
-    rms_deviation : float
-        Relative standard deviation of the root mean square of `waves`.
-    hs_m, tp_s : float
-        Significant height and peak period of beam waves at the configured effective slope.
-    duration_s : float
-        Length of the record.
-
     Raises
     ------
     ValueError
         If the waves have more bands than the loop can read between two ticks.
     """
 
+    #: of_sea, of_ship: whether the estimate of waves and ship is good, and if not, why.
     of_sea: Verdict
     of_ship: Verdict
+    #: The ship found; if `of_ship` is not good, the known ship that the waves are based on. None if
+    #: nothing was found.
     ship: ShipFigures | None = None
-    waves: SlopeSpectrum | None = None
+    waves: SlopeSpectrum | None = None  #: Wave moment per stiffness of that ship.
+    #: Relative standard deviation of the root mean square of `waves`.
     rms_deviation: float = math.nan
+    #: hs_m, tp_s: significant height and peak period of beam waves at the configured effective
+    #: slope.
     hs_m: float = math.nan
     tp_s: float = math.nan
-    duration_s: float = 0.0
+    duration_s: float = 0.0  #: Length of the record.
 
     def __post_init__(self) -> None:
         bands = 0 if self.waves is None else len(self.waves.omega_rad_s)
@@ -111,15 +98,7 @@ class MotionEstimate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EstimateRequest:
-    """Request for an estimate.
+    """Request for an estimate."""
 
-    Attributes
-    ----------
-    ship : ShipFigures
-        The known ship.
-    record : ndarray, shape (N, 4)
-        Latest samples, columns `estimator.COLUMNS`; gaps are NaN.
-    """
-
-    ship: ShipFigures
-    record: FloatArray
+    ship: ShipFigures  #: The known ship.
+    record: FloatArray  #: shape (N, 4): latest samples, columns `estimator.COLUMNS`; gaps are NaN.

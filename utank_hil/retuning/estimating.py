@@ -38,19 +38,11 @@ SAME: Final = 3.0
 
 @dataclass(frozen=True, slots=True)
 class EstimateTask:
-    """Constant inputs of the estimator.
+    """Constant inputs of the estimator."""
 
-    Attributes
-    ----------
-    plant : DesignPlant
-        The configured ship and tank.
-    effective_slope : float
-        Ratio of effective to true wave slope, for the wave height.
-    """
-
-    plant: DesignPlant
+    plant: DesignPlant  #: The configured ship and tank.
     sample_time_s: float
-    effective_slope: float
+    effective_slope: float  #: Ratio of effective to true wave slope, for the wave height.
 
 
 def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:

@@ -42,27 +42,19 @@ GM_DEVIATIONS: Final = 2.0
 class EstimateSettings:
     """Settings of the estimate of waves and ship: section ``sea_estimate`` of a controller.
 
-    Attributes
-    ----------
-    every_s : float
-        Time between two estimates.
-    record_s : float
-        Length of the record.
-    effective_slope : float
-        Ratio of effective to true wave slope, for the wave height.
-    renew : bool
-        Whether a self-tuned law is redesigned when the estimated waves or ship differ from those
-        that the present law was designed for.
-
     Raises
     ------
     ValueError
         If a value is out of its range.
     """
 
-    every_s: Annotated[float, Range(least=30, most=3600)] = 180.0
+    every_s: Annotated[float, Range(least=30, most=3600)] = 180.0  #: Time between two estimates.
+    #: Length of the record.
     record_s: Annotated[float, Range(least=300, most=LONGEST_RECORD_S)] = 1200.0
+    #: Ratio of effective to true wave slope, for the wave height.
     effective_slope: Annotated[float, Range(above=0, most=2)] = 0.5
+    #: Whether a self-tuned law is redesigned when the estimated waves or ship differ from those
+    #: that the present law was designed for.
     renew: bool = False
 
     def __post_init__(self) -> None:
@@ -76,39 +68,32 @@ class EstimateSettings:
 
 @dataclass(slots=True)
 class EstimateFigures:
-    """Estimates for panels and telemetry; NaN while unknown.
+    """Estimates for panels and telemetry; NaN while unknown."""
 
-    Attributes
-    ----------
-    of_sea, of_ship : Verdict
-        Whether the estimate of waves and ship is good now.
-    hs_m, tp_s : float
-        Significant height and peak period of beam waves.
-    moment_rms_rad, moment_deviation : float
-        Root mean square of the wave moment per roll stiffness; its relative standard deviation.
-    sea_age_s, ship_age_s : float
-        Time since the end of the record of the waves, and of the one that identified the ship.
-    roll_period_s, roll_period_deviation_s : float
-        Roll period of the last identified ship without tank water; NaN if that is too old.
-    gm_m, gm_deviation_m : float
-        Metacentric height with free tank water; NaN also if the displacement is unknown.
-    gm_low : bool
-        Whether the interval of the last `gm_m` reaches below the limit of the stability booklet, or
-        estimates have ceased; False without a limit.
-    """
-
+    #: of_sea, of_ship: whether the estimate of waves and ship is good now.
     of_sea: Verdict = Verdict.RECORD_SHORT
     of_ship: Verdict = Verdict.RECORD_SHORT
+    #: hs_m, tp_s: significant height and peak period of beam waves.
     hs_m: float = nan
     tp_s: float = nan
+    #: moment_rms_rad, moment_deviation: root mean square of the wave moment per roll stiffness; its
+    #: relative standard deviation.
     moment_rms_rad: float = nan
     moment_deviation: float = nan
+    #: sea_age_s, ship_age_s: time since the end of the record of the waves, and of the one that
+    #: identified the ship.
     sea_age_s: float = nan
+    #: roll_period_s, roll_period_deviation_s: roll period of the last identified ship without tank
+    #: water; NaN if that is too old.
     roll_period_s: float = nan
     roll_period_deviation_s: float = nan
+    #: gm_m, gm_deviation_m: metacentric height with free tank water; NaN also if the displacement
+    #: is unknown.
     gm_m: float = nan
     gm_deviation_m: float = nan
     ship_age_s: float = nan
+    #: Whether the interval of the last `gm_m` reaches below the limit of the stability booklet, or
+    #: estimates have ceased; False without a limit.
     gm_low: bool = False
 
     def words(self) -> tuple[str, ...]:

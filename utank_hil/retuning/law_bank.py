@@ -28,19 +28,13 @@ _NOTHING: Final = np.zeros(1)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MonitoredLaw:
-    """A law's controller, with a monitor of changes of its ship.
-
-    Attributes
-    ----------
-    found : ModelSummary, ShipFigures or None
-        The identified ship that the law was designed for; None for the configured ship.
-    estimate : MotionEstimate or None
-        Estimate of the waves that it was designed for; None if they were not estimated.
-    """
+    """A law's controller, with a monitor of changes of its ship."""
 
     controller: Controller
     monitor: ChangeMonitor
+    #: The identified ship that the law was designed for; None for the configured ship.
     found: ModelSummary | ShipFigures | None = None
+    #: Estimate of the waves that it was designed for; None if they were not estimated.
     estimate: MotionEstimate | None = None
 
 

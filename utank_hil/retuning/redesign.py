@@ -60,42 +60,24 @@ EFFORT_PART = 0.9
 
 @dataclass(frozen=True, slots=True)
 class RetuningTask:
-    """Inputs of the retuner besides the record.
+    """Inputs of the retuner besides the record."""
 
-    Attributes
-    ----------
-    design : PredictiveDesign
-        Design method of the laws.
-    plant : DesignPlant
-        The configured plant, where the fit starts.
-    order : int
-        Order of the ARX model.
-    least_gain : float or None
-        Smallest relative reduction of the roll against the configured law; None: not compared.
-    """
-
-    design: PredictiveDesign
-    plant: DesignPlant
-    order: int
+    design: PredictiveDesign  #: Design method of the laws.
+    plant: DesignPlant  #: The configured plant, where the fit starts.
+    order: int  #: Order of the ARX model.
     limits: ModelLimits
+    #: Smallest relative reduction of the roll against the configured law; None: not compared.
     least_gain: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identification:
-    """Result of an identification.
-
-    Attributes
-    ----------
-    wave_frequencies_rad_s : tuple of float
-        Frequencies of regular waves; empty in an irregular sea.
-    validation : Validation
-        Validation on the second part of the record.
-    """
+    """Result of an identification."""
 
     okid: OkidResult
+    #: Frequencies of regular waves; empty in an irregular sea.
     wave_frequencies_rad_s: tuple[float, ...]
-    validation: Validation
+    validation: Validation  #: Validation on the second part of the record.
     fit: ShipFit
 
     def plant(self, task: RetuningTask) -> DesignPlant:

@@ -23,21 +23,11 @@ ROLL_PART: Final = 1.0
 
 @dataclass(frozen=True, slots=True)
 class RenewalTask:
-    """Inputs of the retuner besides the estimate.
+    """Inputs of the retuner besides the estimate."""
 
-    Attributes
-    ----------
-    plant : DesignPlant
-        The configured ship and tank.
-    sample_time_s : float
-        Sample time of the present and of the new law.
-    mean_power_w : float
-        Budget of the predicted power.
-    """
-
-    plant: DesignPlant
-    sample_time_s: float
-    mean_power_w: float = math.inf
+    plant: DesignPlant  #: The configured ship and tank.
+    sample_time_s: float  #: Sample time of the present and of the new law.
+    mean_power_w: float = math.inf  #: Budget of the predicted power.
 
 
 class TailedSpectrum:

@@ -37,20 +37,13 @@ MOST_NUMBERS: Final = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RenewedLaw:
-    """A constrained law for the estimated waves and ship, with all margins.
-
-    Attributes
-    ----------
-    roll_rad, pressure_pa : float
-        Root mean squares predicted in these waves, without limits.
-    passive_roll_rad : float
-        Predicted root mean square of the roll with the passive tank.
-    """
+    """A constrained law for the estimated waves and ship, with all margins."""
 
     law: ConstrainedLaw
+    #: roll_rad, pressure_pa: root mean squares predicted in these waves, without limits.
     roll_rad: float
     pressure_pa: float
-    passive_roll_rad: float
+    passive_roll_rad: float  #: Predicted root mean square of the roll with the passive tank.
 
 
 class RenewedLawMessage(

@@ -19,21 +19,16 @@ _BAND_RAD_S: Final = (0.2, 1.2)
 class Excitation:
     """Excitation signal of an identification: key ``excitation`` of the section.
 
-    Attributes
-    ----------
-    kind : str
-        A function of `utank_hil.identification.excitation`; the clock of ``prbs`` is the shortest
-        pulse of `RetuningSettings.pulse_hold_s`.
-    band_rad_s : tuple of float or None
-        Frequency band of multisine and chirp; None: 0.2 to 1.2 rad/s.
-
     Raises
     ------
     ValueError
         If a value is out of its range, or a band is given for another kind.
     """
 
+    #: A function of `utank_hil.identification.excitation`; the clock of ``prbs`` is the shortest
+    #: pulse of `RetuningSettings.pulse_hold_s`.
     kind: Literal["random_pulses", "prbs", "multisine", "chirp"] = "random_pulses"
+    #: Frequency band of multisine and chirp; None: 0.2 to 1.2 rad/s.
     band_rad_s: tuple[Positive, Positive] | None = None
 
     def __post_init__(self) -> None:
@@ -66,65 +61,42 @@ class TrialSettings:
 class RetuningSettings:
     """Settings of retuning: section ``retuning`` of a controller.
 
-    Attributes
-    ----------
-    roll_period_range_s : tuple of float
-        Shortest and longest natural roll period of the ship's stability booklet; a model outside
-        it is refused.
-    order : int
-        Order of the identified ARX model.
-    identification_s : float
-        Time for which pulses are given and recorded.
-    pulse_pa : float
-        Greatest pressure of the pulses.
-    pulse_hold_s : tuple of float
-        Shortest and longest pulse.
-    excitation : Excitation
-        Signal type of the pulses.
-    alone : bool
-        Whether the pulses replace the law's pressure instead of being added to it.
-    added_roll_rad : float
-        Greatest roll that the pulses alone may cause in still water, on the configured ship.
-    roll_limit_rad : float
-        Roll at which an identification is aborted; at most the largest of `SafetyLimits`.
-    every_s : float or None
-        Time from the end of a retuning to the next scheduled one, in a controller's file 600 s or
-        more; None: no schedule.
-    change_factor : float or None
-        Factor in roll period, or in the root of the stiffness, between the estimated ship and the
-        law's, from which the law is retuned (`ChangeMonitor`); None: not monitored.
-    trial_s : float
-        Length of a trial and of the old law's window that it is compared with: from
-        `EARLIEST_VERDICT_S` to one hour, for which a sea counts as stationary.
-    roll_factor, effort_factor : float
-        Factors by which a law on trial may exceed the old law's RMS of roll and pressure.
-    answer_within_s : float
-        Timeout of identification and design, 600 s at most; they take seconds.
-    seed : int
-        Seed of the pulses.
-
     Raises
     ------
     ValueError
         If a value is out of its range.
     """
 
+    #: Shortest and longest natural roll period of the ship's stability booklet; a model outside it
+    #: is refused.
     roll_period_range_s: tuple[Positive, Positive]
-    order: Annotated[int, Range(least=2)] = 120
-    identification_s: Positive = 500.0
-    pulse_pa: Positive = 30e3
-    pulse_hold_s: tuple[Positive, Positive] = (1.0, 5.0)
-    excitation: Excitation = field(default_factory=Excitation)
+    order: Annotated[int, Range(least=2)] = 120  #: Order of the identified ARX model.
+    identification_s: Positive = 500.0  #: Time for which pulses are given and recorded.
+    pulse_pa: Positive = 30e3  #: Greatest pressure of the pulses.
+    pulse_hold_s: tuple[Positive, Positive] = (1.0, 5.0)  #: Shortest and longest pulse.
+    excitation: Excitation = field(default_factory=Excitation)  #: Signal type of the pulses.
+    #: Whether the pulses replace the law's pressure instead of being added to it.
     alone: bool = False
+    #: Greatest roll that the pulses alone may cause in still water, on the configured ship.
     added_roll_rad: Positive = 0.05
+    #: Roll at which an identification is aborted; at most the largest of `SafetyLimits`.
     roll_limit_rad: RollLimit = 0.3
+    #: Time from the end of a retuning to the next scheduled one, in a controller's file 600 s or
+    #: more; None: no schedule.
     every_s: Positive | None = None
+    #: Factor in roll period, or in the root of the stiffness, between the estimated ship and the
+    #: law's, from which the law is retuned (`ChangeMonitor`); None: not monitored.
     change_factor: Annotated[float, Range(above=1)] | None = None
+    #: Length of a trial and of the old law's window that it is compared with: from
+    #: `EARLIEST_VERDICT_S` to one hour, for which a sea counts as stationary.
     trial_s: Annotated[float, Range(least=EARLIEST_VERDICT_S, most=3600)] = 120.0
+    #: Factors by which a law on trial may exceed the old law's RMS of roll and pressure.
     roll_factor: Positive = 1.25
+    #: Factors by which a law on trial may exceed the old law's RMS of roll and pressure.
     effort_factor: Positive = 2.0
+    #: Timeout of identification and design, 600 s at most; they take seconds.
     answer_within_s: Annotated[float, Range(above=0, most=600)] = 60.0
-    seed: Annotated[int, Range(least=0)] = 1
+    seed: Annotated[int, Range(least=0)] = 1  #: Seed of the pulses.
 
     def __post_init__(self) -> None:
         problems = range_problems(self)

@@ -7,21 +7,15 @@ import numpy as np
 
 
 class WindowStatistics(NamedTuple):
-    """Roll and pressure over a window.
+    """Roll and pressure over a window."""
 
-    Attributes
-    ----------
-    roll_rad, pressure_pa : float
-        Standard deviations. A steady heel, the same with either law, would mask a change in roll.
-    pressure_rms_pa : float
-        Root mean square including the steady part, which costs power and may heel the ship.
-    passive_roll_rad : float
-        Standard deviation of the roll that a passive tank would have left; 0 if unknown.
-    """
-
+    #: roll_rad, pressure_pa: standard deviations. A steady heel, the same with either law, would
+    #: mask a change in roll.
     roll_rad: float
     pressure_pa: float
+    #: Root mean square including the steady part, which costs power and may heel the ship.
     pressure_rms_pa: float
+    #: Standard deviation of the roll that a passive tank would have left; 0 if unknown.
     passive_roll_rad: float = 0.0
 
 

@@ -13,26 +13,14 @@ from utank_hil.sea.spectrum import Spectrum, band_edges
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredSpectra:
-    """A time series of spectra on one frequency grid.
+    """A time series of spectra on one frequency grid."""
 
-    Parameters
-    ----------
-    source : str
-        Origin, for error messages.
-    time : ndarray of datetime64[s], shape (N,)
-        UTC, increasing.
-    frequency_hz : ndarray, shape (F,)
-        Centre frequencies of the bands.
-    density : ndarray, shape (N, F)
-        Spectral density in m^2/Hz; nan where the source has none.
-    direction_from_deg : ndarray, shape (N, F), optional
-        Mean direction the waves come from, degrees from true north; nan where the source has none.
-    """
-
-    source: str
-    time: npt.NDArray[np.datetime64]
-    frequency_hz: FloatArray
-    density: FloatArray
+    source: str  #: Origin, for error messages.
+    time: npt.NDArray[np.datetime64]  #: shape (N,): UTC, increasing.
+    frequency_hz: FloatArray  #: shape (F,): centre frequencies of the bands.
+    density: FloatArray  #: shape (N, F): spectral density in m^2/Hz; nan where the source has none.
+    #: shape (N, F): mean direction the waves come from, degrees from true north; nan where the
+    #: source has none.
     direction_from_deg: FloatArray | None = None
 
     def __len__(self) -> int:

@@ -21,20 +21,11 @@ COLUMNS: Final = ("omega_rad_s", "heading_deg", "moment_nm_per_m", "phase_deg")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MomentTable:
-    """Roll moment per wave amplitude, interpolated linearly in frequency and heading.
+    """Roll moment per wave amplitude, interpolated linearly in frequency and heading."""
 
-    Parameters
-    ----------
-    omega_rad_s : ndarray, shape (F,)
-        Frequencies, increasing.
-    heading_rad : ndarray, shape (H,)
-        Headings, increasing from 0 to pi.
-    moment_nm_per_m : complex ndarray, shape (F, H)
-        Moment: real part in phase with the crest, argument positive for a lead.
-    """
-
-    omega_rad_s: FloatArray
-    heading_rad: FloatArray
+    omega_rad_s: FloatArray  #: shape (F,): frequencies, increasing.
+    heading_rad: FloatArray  #: shape (H,): headings, increasing from 0 to pi.
+    #: shape (F, H): moment: real part in phase with the crest, argument positive for a lead.
     moment_nm_per_m: ComplexArray
 
     @classmethod

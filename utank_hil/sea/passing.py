@@ -16,23 +16,14 @@ from utank_hil.sea.spectrum import Spectrum
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PassingSea:
-    """Wave components whose energy and direction change with time.
+    """Wave components whose energy and direction change with time."""
 
-    Parameters
-    ----------
-    time_s : ndarray, shape (K,)
-        Times of the K spectra, increasing; before and after, the sea is constant.
-    energy_m2 : ndarray, shape (K, N)
-        Variance of each component.
-    heading_rad : ndarray, shape (K, N)
-        Direction of travel relative to the ship's initial course.
-    omega_rad_s, phase_rad : ndarray, shape (N,)
-        Earth-frame frequency, and phase at the ship at time 0.
-    """
-
+    #: shape (K,): times of the K spectra, increasing; before and after, the sea is constant.
     time_s: FloatArray
-    energy_m2: FloatArray
+    energy_m2: FloatArray  #: shape (K, N): variance of each component.
+    #: shape (K, N): direction of travel relative to the ship's initial course.
     heading_rad: FloatArray
+    #: omega_rad_s, phase_rad: shape (N,): earth-frame frequency, and phase at the ship at time 0.
     omega_rad_s: FloatArray
     phase_rad: FloatArray
 

@@ -39,24 +39,16 @@ class EffectiveSlope:
 
     r = coefficient * exp(-k depth) * sinc(k ``|sin(heading)|`` beam / 2), sinc(x) = sin(x) / x.
 
-    Parameters
-    ----------
-    coefficient : float
-        Effective wave slope coefficient, the long-wave limit of r.
-    depth_m : float
-        Depth for the Smith effect, usually half the draught.
-    beam_m : float
-        Beam over which the slope is averaged; much shorter waves cancel.
-
     Raises
     ------
     ValueError
         If a value is negative or not finite, or the coefficient above `MOST_SLOPE_SHARE`.
     """
 
+    #: Effective wave slope coefficient, the long-wave limit of r.
     coefficient: Annotated[float, Range(least=0, most=MOST_SLOPE_SHARE)] = 1.0
-    depth_m: NotNegative = 0.0
-    beam_m: NotNegative = 0.0
+    depth_m: NotNegative = 0.0  #: Depth for the Smith effect, usually half the draught.
+    beam_m: NotNegative = 0.0  #: Beam over which the slope is averaged; much shorter waves cancel.
 
     def __post_init__(self) -> None:
         refuse("effective slope", range_problems(self))
@@ -79,21 +71,15 @@ class EffectiveSlope:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sea:
-    """Wave components at a ship; created by `Sea.irregular` or `Sea.regular`.
+    """Wave components at a ship; created by `Sea.irregular` or `Sea.regular`."""
 
-    Parameters
-    ----------
-    amplitude_m, omega_rad_s, heading_rad, phase_rad : ndarray, shape (N,)
-        Amplitude, earth-frame frequency, direction of travel relative to the ship, phase.
-    speed_m_s : float
-        Speed of the ship.
-    """
-
+    #: amplitude_m, omega_rad_s, heading_rad, phase_rad: shape (N,): amplitude, earth-frame
+    #: frequency, direction of travel relative to the ship, phase.
     amplitude_m: FloatArray
     omega_rad_s: FloatArray
     heading_rad: FloatArray
     phase_rad: FloatArray
-    speed_m_s: float = 0.0
+    speed_m_s: float = 0.0  #: Speed of the ship.
 
     @classmethod
     def regular(

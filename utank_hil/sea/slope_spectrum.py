@@ -18,15 +18,6 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2
 class SlopeSpectrum:
     """Density of the effective wave slope in bands of equal width.
 
-    Parameters
-    ----------
-    omega_rad_s : ndarray, shape (F,)
-        Centres of the bands: encounter frequencies, positive and equally spaced, F > 1.
-    density : ndarray, shape (F,)
-        One-sided density in rad^2 per rad/s, zero or more.
-    deviation : ndarray, shape (F,), optional
-        Standard deviation of each density, by default zero.
-
     Raises
     ------
     ValueError
@@ -34,8 +25,10 @@ class SlopeSpectrum:
         finite.
     """
 
+    #: shape (F,): centres of the bands: encounter frequencies, positive and equally spaced, F > 1.
     omega_rad_s: FloatArray
-    density: FloatArray
+    density: FloatArray  #: shape (F,): one-sided density in rad^2 per rad/s, zero or more.
+    #: shape (F,): standard deviation of each density, by default zero.
     deviation: FloatArray | None = None
 
     def __post_init__(self) -> None:

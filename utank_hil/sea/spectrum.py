@@ -46,24 +46,17 @@ def band_edges(frequency_hz: FloatArray) -> FloatArray:
 class Spectrum:
     """Wave spectrum at a fixed point (earth frame).
 
-    Parameters
-    ----------
-    frequency_hz : ndarray, shape (F,)
-        Centre frequencies of the bands, positive and increasing, F > 1.
-    density : ndarray, shape (F,)
-        One-sided spectral density in m^2/Hz, zero or more.
-    direction_from_deg : ndarray, shape (F,), optional
-        Mean direction the waves of each band come from, degrees clockwise from true north
-        (NDBC's alpha1).
-
     Raises
     ------
     ValueError
         If the shapes differ, the frequencies do not increase, or a value is not finite.
     """
 
+    #: shape (F,): centre frequencies of the bands, positive and increasing, F > 1.
     frequency_hz: FloatArray
-    density: FloatArray
+    density: FloatArray  #: shape (F,): one-sided spectral density in m^2/Hz, zero or more.
+    #: shape (F,): mean direction the waves of each band come from, degrees clockwise from true
+    #: north (NDBC's alpha1).
     direction_from_deg: FloatArray | None = None
 
     def __post_init__(self) -> None:

@@ -36,22 +36,14 @@ class Derives(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ValueDifference:
-    """An array, or a number, that differs.
+    """An array, or a number, that differs."""
 
-    Attributes
-    ----------
-    name : str
-        Path of attributes, with the index of the first element that differs.
-    recorded, designed : str
-        Exact values of that element; "missing" if there is none.
-    deviation : float
-        Largest deviation of an element, relative to the largest recorded one; infinite if no
-        elements can be compared.
-    """
-
-    name: str
+    name: str  #: Path of attributes, with the index of the first element that differs.
+    #: recorded, designed: exact values of that element; "missing" if there is none.
     recorded: str
     designed: str
+    #: Largest deviation of an element, relative to the largest recorded one; infinite if no
+    #: elements can be compared.
     deviation: float = math.inf
 
     def __str__(self) -> str:

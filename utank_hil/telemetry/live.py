@@ -26,24 +26,12 @@ _START_S: Final = 5.0
 
 @dataclass(frozen=True, slots=True)
 class LiveRun:
-    """A run whose writer lives.
+    """A run whose writer lives."""
 
-    Attributes
-    ----------
-    ring : str
-        Name of its telemetry ring.
-    events : str or None
-        Name of its ring of events.
-    pid : int
-        Id of its process.
-    about : mapping
-        Origin of its rows (`utank_hil.base.provenance`); empty if unknown.
-    """
-
-    ring: str
-    events: str | None
-    pid: int
-    about: Mapping[str, Any]
+    ring: str  #: Name of its telemetry ring.
+    events: str | None  #: Name of its ring of events.
+    pid: int  #: Id of its process.
+    about: Mapping[str, Any]  #: Origin of its rows (`utank_hil.base.provenance`); empty if unknown.
 
     def __str__(self) -> str:
         name = self.about.get("configuration", {}).get("name", self.ring)

@@ -13,28 +13,15 @@ from utank_hil.telemetry.rotation import Rotation
 
 @dataclass(frozen=True, slots=True)
 class RecordingTask:
-    """Sources and destination of a recording.
+    """Sources and destination of a recording."""
 
-    Attributes
-    ----------
-    rows : str
-        Name of the ring of rows.
-    file : str
-        The first `.rrd` file; the frame log stands beside it.
-    events, frames : str or None
-        Names of the rings of events and of `bus_records`.
-    head : mapping
-        Head of the frame log (`replay_head`).
-    rotation : Rotation or None
-        Division into several files; None for a single one.
-    """
-
-    rows: str
-    file: str
+    rows: str  #: Name of the ring of rows.
+    file: str  #: The first `.rrd` file; the frame log stands beside it.
+    #: events, frames: names of the rings of events and of `bus_records`.
     events: str | None = None
     frames: str | None = None
-    head: Mapping[str, Any] = field(default_factory=dict)
-    rotation: Rotation | None = None
+    head: Mapping[str, Any] = field(default_factory=dict)  #: Head of the frame log (`replay_head`).
+    rotation: Rotation | None = None  #: Division into several files; None for a single one.
 
     def held(self) -> "RecordingTask":
         """Return the task with ring names that stay valid after `exec` in this process."""
@@ -45,45 +32,27 @@ class RecordingTask:
 
 @dataclass(slots=True)
 class RecorderReport:
-    """Result of a recording.
+    """Result of a recording."""
 
-    Attributes
-    ----------
-    rows, lost : int
-        Rows recorded, and rows that the ring overwrote before they were read.
-    parts : int
-        Number of Rerun files, or of frame logs if there are none.
-    records_lost : int
-        Records of the frame log that its ring overwrote before they were read.
-    """
-
+    #: rows, lost: rows recorded, and rows that the ring overwrote before they were read.
     rows: int = 0
     lost: int = 0
-    parts: int = 0
+    parts: int = 0  #: Number of Rerun files, or of frame logs if there are none.
+    #: Records of the frame log that its ring overwrote before they were read.
     records_lost: int = 0
 
 
 @dataclass(slots=True)
 class RecorderState:
-    """State that the recorder passes from one file, and one program, to the next.
-
-    Attributes
-    ----------
-    report : RecorderReport
-        Numbers of what has reached the files.
-    places : dict of RingKind to int
-        End of that in each ring (`RingReader.place`); a missing ring is read from its oldest slot.
-    failure : str
-        Reason why the last file failed; empty if it did not.
-    complained : bool
-        Whether the failure was reported.
-    """
+    """State that the recorder passes from one file, and one program, to the next."""
 
     task: RecordingTask
+    #: Numbers of what has reached the files.
     report: RecorderReport = field(default_factory=RecorderReport)
+    #: End of that in each ring (`RingReader.place`); a missing ring is read from its oldest slot.
     places: dict[RingKind, int] = field(default_factory=dict)
-    failure: str = ""
-    complained: bool = True
+    failure: str = ""  #: Reason why the last file failed; empty if it did not.
+    complained: bool = True  #: Whether the failure was reported.
 
     def as_input(self) -> int:
         """Return the descriptor of a file in memory from which `of_input` reads the state."""

@@ -38,21 +38,12 @@ class Entry(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """First difference between a replay and the recording.
+    """First difference between a replay and the recording."""
 
-    Attributes
-    ----------
-    tick : int
-        Number of the controller's tick, from 0.
-    time_s : float
-        Time since its first tick.
-    message, signal : str
-        Message and signal that differ; the message is "retuner" or "estimator" if the controller
-        sent it a different request.
-    """
-
-    tick: int
-    time_s: float
+    tick: int  #: Number of the controller's tick, from 0.
+    time_s: float  #: Time since its first tick.
+    #: message, signal: message and signal that differ; the message is "retuner" or "estimator" if
+    #: the controller sent it a different request.
     message: str
     signal: str
     recorded: str
@@ -67,25 +58,15 @@ class Difference:
 
 @dataclass(slots=True)
 class ReplayResult:
-    """Result of a replay.
+    """Result of a replay."""
 
-    Attributes
-    ----------
-    ticks, frames : int
-        Ticks run, and recorded frames of the controller that were compared.
-    different : Counter of str
-        Number of frames that differ, by message.
-    first : Difference or None
-        First difference; None if every frame is equal bit for bit.
-    lost_rows : int
-        Rows that the recorder lost; after these an exact replay is impossible.
-    """
-
+    #: ticks, frames: ticks run, and recorded frames of the controller that were compared.
     ticks: int = 0
     frames: int = 0
+    #: Number of frames that differ, by message.
     different: Counter[str] = field(default_factory=Counter)
-    first: Difference | None = None
-    lost_rows: int = 0
+    first: Difference | None = None  #: First difference; None if every frame is equal bit for bit.
+    lost_rows: int = 0  #: Rows that the recorder lost; after these an exact replay is impossible.
 
     @property
     def exact(self) -> bool:
@@ -95,17 +76,10 @@ class ReplayResult:
 
 @dataclass(frozen=True, slots=True)
 class LawVerdict:
-    """Which law answered the recorded frames, and how far today's design is from the recorded law.
+    """The law that answered recorded frames, and its distance from the one designed today."""
 
-    Attributes
-    ----------
-    why_not_recorded : str
-        Why the law designed here answered; empty if the recorded one did.
-    differences : list of ValueDifference
-        Differences between the recorded law and the one designed here; they fail no replay.
-    """
-
-    why_not_recorded: str
+    why_not_recorded: str  #: Why the law designed here answered; empty if the recorded one did.
+    #: Differences between the recorded law and the one designed here; they fail no replay.
     differences: list[ValueDifference]
 
     @property

@@ -19,18 +19,11 @@ SUFFIXES: Final = (".rrd", ".frames")
 
 @dataclass(frozen=True, slots=True)
 class Rotation:
-    """Length of a file, and the size of its folder.
+    """Length of a file, and the size of its folder."""
 
-    Attributes
-    ----------
-    part_s : float
-        Length of a file.
-    keep_bytes : int or None
-        Size of the folder: before a file begins, the oldest recordings are removed until the others
-        and one as long as the last fit in. None removes none.
-    """
-
-    part_s: float
+    part_s: float  #: Length of a file.
+    #: Size of the folder: before a file begins, the oldest recordings are removed until the others
+    #: and one as long as the last fit in. None removes none.
     keep_bytes: int | None = None
 
     def make_room(self, file: Path, number: int) -> None:

@@ -39,23 +39,14 @@ LIMIT, PUMP, SEA = (0xF0, 0xE4, 0x42), (0xA0, 0x28, 0x00), (0x2A, 0x5C, 0x7A)
 
 @dataclass(frozen=True, slots=True)
 class SceneSize:
-    """Dimensions of the scene, in metres below and to starboard of the centre of gravity.
+    """Dimensions of the scene, in metres below and to starboard of the centre of gravity."""
 
-    Attributes
-    ----------
-    width_m, height_m, lz_m : float
-        Dimensions of the tank (`utank_hil.dynamics.Tank`).
-    level_limit_m : float
-        Level at which a reservoir is full or empty.
-    pressure_pa : float
-        Greatest pressure of the pump; 0 without one.
-    """
-
+    #: width_m, height_m, lz_m: dimensions of the tank (`utank_hil.dynamics.Tank`).
     width_m: float
     height_m: float
     lz_m: float
-    level_limit_m: float
-    pressure_pa: float
+    level_limit_m: float  #: Level at which a reservoir is full or empty.
+    pressure_pa: float  #: Greatest pressure of the pump; 0 without one.
 
     @classmethod
     def of(cls, about: Mapping[str, Any] | None) -> "SceneSize | None":

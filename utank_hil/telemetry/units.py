@@ -11,22 +11,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """An SI unit and its display unit.
+    """An SI unit and its display unit."""
 
-    Attributes
-    ----------
-    suffix, shown_suffix : str
-        Endings of the column's name and of the recorded field's name.
-    scale : float
-        Displayed value per SI value.
-    plot : str
-        Title of the plot of columns of this unit without a plot of their own.
-    """
-
+    #: suffix, shown_suffix: endings of the column's name and of the recorded field's name.
     suffix: str
     shown_suffix: str
-    scale: float
-    plot: str
+    scale: float  #: Displayed value per SI value.
+    plot: str  #: Title of the plot of columns of this unit without a plot of their own.
 
 
 # The order is that of matching: a suffix comes before any shorter one that it ends in.
@@ -49,21 +40,11 @@ UNITS = (
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A column as recorded.
+    """A column as recorded."""
 
-    Attributes
-    ----------
-    column : str
-        Name of the column, in SI units.
-    name : str
-        Name in the recording, unit included.
-    label : str
-        Label in the plot, without unit.
-    """
-
-    column: str
-    name: str
-    label: str
+    column: str  #: Name of the column, in SI units.
+    name: str  #: Name in the recording, unit included.
+    label: str  #: Label in the plot, without unit.
     unit: Unit
 
 

@@ -68,21 +68,13 @@ class NotDecaying(NoImpulseResponse):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImpulseResponseLaw:
-    """The linear law that has a controller's impulse response; a `LinearLaw`.
+    """The linear law that has a controller's impulse response; a `LinearLaw`."""
 
-    Attributes
-    ----------
-    impulse : ndarray, shape (N, r, m)
-        Command of the j-th step, per unit of an impulse in the first.
-    model : LinearModel
-        Realization of `impulse`, strictly proper.
-    linear : bool
-        Whether impulses of half the size and of opposite sign have the same response. If not, the
-        law is nonlinear at rest, and `impulse` is the slope for small measurements.
-    """
-
+    #: shape (N, r, m): command of the j-th step, per unit of an impulse in the first.
     impulse: FloatArray
-    model: LinearModel
+    model: LinearModel  #: Realization of `impulse`, strictly proper.
+    #: Whether impulses of half the size and of opposite sign have the same response. If not, the
+    #: law is nonlinear at rest, and `impulse` is the slope for small measurements.
     linear: bool
     make_controller: Callable[[], Controller]
 

@@ -78,18 +78,12 @@ _SHORTEST: Final = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """Predicted root mean squares without limits, and mean power.
-
-    Attributes
-    ----------
-    power_w : float
-        Mean power from pump to water; power taken from the water is not counted.
-    """
+    """Predicted root mean squares without limits, and mean power."""
 
     roll_rad: float
     level_m: float
     pressure_pa: float
-    power_w: float
+    power_w: float  #: Mean power from pump to water; power taken from the water is not counted.
 
 
 class InnovationFilter:

@@ -43,18 +43,11 @@ class SensorNoise:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoopRun:
-    """Signals of a run, one value per tick.
+    """Signals of a run, one value per tick."""
 
-    Attributes
-    ----------
-    motion : ndarray, shape (n, 4)
-        `STATES`.
-    pressure_pa, command_pa, wish_pa : ndarray, shape (n,)
-        Actual pressure, limited command before delay and lag, and the controller's unlimited
-        command.
-    """
-
-    motion: FloatArray
+    motion: FloatArray  #: shape (n, 4): `STATES`.
+    #: pressure_pa, command_pa, wish_pa: shape (n,): actual pressure, limited command before delay
+    #: and lag, and the controller's unlimited command.
     pressure_pa: FloatArray
     command_pa: FloatArray
     wish_pa: FloatArray

@@ -22,39 +22,25 @@ DELAY_SAMPLES = 25
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """Stability margins with the loop broken at the pump.
+    """Stability margins with the loop broken at the pump."""
 
-    Attributes
-    ----------
-    radius : float
-        Greatest eigenvalue magnitude of the closed loop; stable below one. For an unstable loop the
-        margins are zero (gains one) and carry no other information.
-    peak_sensitivity : float
-        Greatest abs(S) = abs(1 / (1 - L)); its inverse is the distance of L from the critical
-        point.
-    gain_low, gain_high : float
-        The loop is stable for any gain factor between these.
-    phase_margin_rad : float
-        Least lag or lead, taken alone, that destabilizes; inf if none does.
-    delay_margin_s : float
-        Least extra delay that destabilizes; inf if none up to `DELAY_SAMPLES` samples does, nan if
-        it was not searched for.
-    disk_margin : float
-        Greatest a for which every gain and phase error (1 + a d / 2) / (1 - a d / 2), complex
-        abs(d) < 1, is harmless (symmetric disk); at most 2.
-    peak_loop_gain : float
-        Greatest abs(L); far below one the law has no effect on the roll.
-    """
-
+    #: Greatest eigenvalue magnitude of the closed loop; stable below one. For an unstable loop the
+    #: margins are zero (gains one) and carry no other information.
     radius: float
+    #: Greatest abs(S) = abs(1 / (1 - L)); its inverse is the distance of L from the critical point.
     peak_sensitivity: float
     peak_frequency_rad_s: float
+    #: gain_low, gain_high: the loop is stable for any gain factor between these.
     gain_low: float
     gain_high: float
-    phase_margin_rad: float
+    phase_margin_rad: float  #: Least lag or lead, taken alone, that destabilizes; inf if none does.
+    #: Least extra delay that destabilizes; inf if none up to `DELAY_SAMPLES` samples does, nan if
+    #: it was not searched for.
     delay_margin_s: float
+    #: Greatest a for which every gain and phase error (1 + a d / 2) / (1 - a d / 2), complex abs(d)
+    #: < 1, is harmless (symmetric disk); at most 2.
     disk_margin: float
-    peak_loop_gain: float
+    peak_loop_gain: float  #: Greatest abs(L); far below one the law has no effect on the roll.
 
 
 def margins(

@@ -25,26 +25,19 @@ GAINS = (0.8, 1.0, 1.2)
 
 @dataclass(frozen=True, slots=True)
 class Robustness:
-    """Margins of a law's loop on its own ship and on a grid of variants.
+    """Margins of a law's loop on its own ship and on a grid of variants."""
 
-    Attributes
-    ----------
-    nominal : Margins
-        On the ship of the design.
-    late_radius, late_peak_sensitivity : float
-        Closed-loop radius and peak sensitivity with `EXTRA_DELAY_S` more delay.
-    worst_radius : float
-        Greatest closed-loop radius over `PERIOD_SCALES` of the ship's roll period (by its
-        stiffness) and `INERTIA_SCALES` of its inertia, `GAINS` of the pump, and `EXTRA_DELAY_S`
-        more delay or none.
-    worst_period_scale, worst_inertia_scale, worst_gain, worst_extra_delay_s : float
-        Variant with the greatest radius; one of the first two is 1.
-    """
-
-    nominal: Margins
+    nominal: Margins  #: On the ship of the design.
+    #: late_radius, late_peak_sensitivity: closed-loop radius and peak sensitivity with
+    #: `EXTRA_DELAY_S` more delay.
     late_radius: float
     late_peak_sensitivity: float
+    #: Greatest closed-loop radius over `PERIOD_SCALES` of the ship's roll period (by its stiffness)
+    #: and `INERTIA_SCALES` of its inertia, `GAINS` of the pump, and `EXTRA_DELAY_S` more delay or
+    #: none.
     worst_radius: float
+    #: worst_period_scale, worst_inertia_scale, worst_gain, worst_extra_delay_s: variant with the
+    #: greatest radius; one of the first two is 1.
     worst_period_scale: float
     worst_inertia_scale: float
     worst_gain: float

@@ -68,16 +68,10 @@ class NoLawError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class FirstLaw:
-    """A law that meets the required margins.
-
-    Attributes
-    ----------
-    weight_factor : float
-        Factor on the weights of similarity; 1 where those were accepted.
-    """
+    """A law that meets the required margins."""
 
     design: LinearDesign
-    weight_factor: float
+    weight_factor: float  #: Factor on the weights of similarity; 1 where those were accepted.
     robustness: Robustness
 
 

@@ -107,21 +107,13 @@ class SlopeDensity(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class SelfTuned:
-    """A law with all required margins.
-
-    Attributes
-    ----------
-    law : ConstrainedLaw
-        The law of `design` with a filter on its innovations.
-    prediction : Prediction
-        In the expected sea.
-    """
+    """A law with all required margins."""
 
     design: ConstrainedDesign
-    law: ConstrainedLaw
+    law: ConstrainedLaw  #: The law of `design` with a filter on its innovations.
     robustness: Robustness
     passive_roll_rad: float
-    prediction: Prediction
+    prediction: Prediction  #: In the expected sea.
 
 
 def self_tuned(
@@ -184,19 +176,12 @@ def cost_weights(passive_rad: float, limits: PumpLimits) -> tuple[float, float, 
 
 @dataclass(frozen=True, slots=True)
 class SelfTunedDesign:
-    """A constrained law whose numbers follow from its ship and sea.
-
-    Parameters
-    ----------
-    kind : {"self_tuned"}
-    sea : SeaModel or None
-        Expected sea, of which spectrum and effective slope count; None for an unknown sea.
-    mean_power_w : float
-        Limit on the predicted mean power from pump to water; infinite for the least roll.
-    """
+    """A constrained law whose numbers follow from its ship and sea."""
 
     kind: Literal["self_tuned"]
+    #: Expected sea, of which spectrum and effective slope count; None for an unknown sea.
     sea: SeaModel | None = None
+    #: Limit on the predicted mean power from pump to water; infinite for the least roll.
     mean_power_w: Annotated[float, Range(above=0, infinite=True)] = math.inf
 
     def __post_init__(self) -> None:

@@ -26,21 +26,11 @@ HORIZON_FACTORS: Final = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.15, 1.3, 1.5, 1.7
 
 @dataclass(frozen=True, slots=True)
 class TradePoint:
-    """One law of a trade-off.
+    """One law of a trade-off."""
 
-    Attributes
-    ----------
-    factor : float
-        Factor on the weight or horizon; 1 is the unchanged design.
-    motion : MotionInSea or None
-        Linear prediction; None if the loop is unstable on its own ship.
-    roll_below_passive : float or None
-        Reduction of the roll RMS relative to the passive tank.
-    """
-
-    factor: float
-    motion: MotionInSea | None
-    roll_below_passive: float | None
+    factor: float  #: Factor on the weight or horizon; 1 is the unchanged design.
+    motion: MotionInSea | None  #: Linear prediction; None if the loop is unstable on its own ship.
+    roll_below_passive: float | None  #: Reduction of the roll RMS relative to the passive tank.
     robustness: Robustness
 
     @property
@@ -51,18 +41,10 @@ class TradePoint:
 
 @dataclass(frozen=True, slots=True)
 class Trade:
-    """A trade-off, from the least to the greatest effort.
+    """A trade-off, from the least to the greatest effort."""
 
-    Attributes
-    ----------
-    varied : str
-        Name of the scaled parameter, in words.
-    passive : MotionInSea
-        With the passive tank.
-    """
-
-    varied: str
-    passive: MotionInSea
+    varied: str  #: Name of the scaled parameter, in words.
+    passive: MotionInSea  #: With the passive tank.
     points: tuple[TradePoint, ...]
 
 

@@ -57,33 +57,16 @@ roll."""
 
 @dataclass(frozen=True, slots=True)
 class Comfort:
-    """Comfort at a place on board, for a roll record.
+    """Comfort at a place on board, for a roll record."""
 
-    Attributes
-    ----------
-    lateral_rms_m_s2 : float
-        RMS of the lateral force estimator, which contains gravity.
-    vertical_rms_m_s2 : float
-        RMS of the vertical acceleration without its mean.
-    gravity_angle_rms_rad : float
-        RMS of the effective gravity angle, between apparent gravity and the deck's normal.
-    interruptions_per_min : float
-        `motion_induced_interruptions` of a standing person.
-    sickness_percent : float
-        `motion_sickness_incidence` for an exposure of `EXPOSURE_S`.
-    sickness_dose_m_s15 : float
-        `motion_sickness_dose` for the same exposure.
-    allowed_work : tuple of str
-        Work within the limits of `NORDFORSK_1987`.
-    """
-
-    lateral_rms_m_s2: float
-    vertical_rms_m_s2: float
+    lateral_rms_m_s2: float  #: RMS of the lateral force estimator, which contains gravity.
+    vertical_rms_m_s2: float  #: RMS of the vertical acceleration without its mean.
+    #: RMS of the effective gravity angle, between apparent gravity and the deck's normal.
     gravity_angle_rms_rad: float
-    interruptions_per_min: float
-    sickness_percent: float
-    sickness_dose_m_s15: float
-    allowed_work: tuple[str, ...]
+    interruptions_per_min: float  #: `motion_induced_interruptions` of a standing person.
+    sickness_percent: float  #: `motion_sickness_incidence` for an exposure of `EXPOSURE_S`.
+    sickness_dose_m_s15: float  #: `motion_sickness_dose` for the same exposure.
+    allowed_work: tuple[str, ...]  #: Work within the limits of `NORDFORSK_1987`.
 
 
 def comfort(

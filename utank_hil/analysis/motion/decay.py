@@ -17,23 +17,13 @@ from utank_hil.base.arrays import FloatArray
 
 
 class RollDecay(NamedTuple):
-    """Result of a decay test.
+    """Result of a decay test."""
 
-    Attributes
-    ----------
-    period_s : float
-        Mean period over the peaks.
-    damping_ratio : float
-        Linear damping ratio.
-    quadratic_per_rad : float
-        Quadratic damping over inertia, b2 / I, in 1 / rad.
-    peak_s, peak_rad : ndarray, shape (n,)
-        Times and amplitudes of the peaks, alternately port and starboard.
-    """
-
-    period_s: float
-    damping_ratio: float
-    quadratic_per_rad: float
+    period_s: float  #: Mean period over the peaks.
+    damping_ratio: float  #: Linear damping ratio.
+    quadratic_per_rad: float  #: Quadratic damping over inertia, b2 / I, in 1 / rad.
+    #: peak_s, peak_rad: shape (n,): times and amplitudes of the peaks, alternately port and
+    #: starboard.
     peak_s: FloatArray
     peak_rad: FloatArray
 

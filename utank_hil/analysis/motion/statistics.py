@@ -9,21 +9,11 @@ from utank_hil.base.arrays import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class RollStatistics:
-    """Statistics of a roll record.
+    """Statistics of a roll record."""
 
-    Attributes
-    ----------
-    rms_rad : float
-        Root mean square of the roll angle.
-    significant_rad : float or None
-        Significant single amplitude, see `significant_amplitude`.
-    maximum_rad : float
-        Largest roll to either side.
-    """
-
-    rms_rad: float
-    significant_rad: float | None
-    maximum_rad: float
+    rms_rad: float  #: Root mean square of the roll angle.
+    significant_rad: float | None  #: Significant single amplitude, see `significant_amplitude`.
+    maximum_rad: float  #: Largest roll to either side.
 
 
 def significant_amplitude(signal: FloatArray) -> float | None:
@@ -70,23 +60,16 @@ def roll_statistics(roll_rad: FloatArray) -> RollStatistics:
 
 @dataclass(frozen=True, slots=True)
 class PumpStatistics:
-    """Statistics of the pump.
+    """Statistics of the pump."""
 
-    Attributes
-    ----------
-    pressure_rms_pa, pressure_peak_pa : float
-        RMS and peak of the differential pressure across the pump.
-    power_mean_w, power_peak_w : float
-        Mean and peak of the shaft power drawn; regenerated power counts as zero.
-    level_peak_m : float
-        Largest deviation of a reservoir's level from still water.
-    """
-
+    #: pressure_rms_pa, pressure_peak_pa: RMS and peak of the differential pressure across the pump.
     pressure_rms_pa: float
     pressure_peak_pa: float
+    #: power_mean_w, power_peak_w: mean and peak of the shaft power drawn; regenerated power counts
+    #: as zero.
     power_mean_w: float
     power_peak_w: float
-    level_peak_m: float
+    level_peak_m: float  #: Largest deviation of a reservoir's level from still water.
 
 
 def pump_statistics(

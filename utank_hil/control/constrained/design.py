@@ -48,59 +48,39 @@ _PENALTY_ROLL_RAD = 0.05
 
 @dataclass(frozen=True, slots=True)
 class ConstrainedDesign:
-    """Parameters of a constrained predictive law.
-
-    Parameters
-    ----------
-    kind : {"constrained_gpc"}
-    sea : SeaModel
-        Expected sea.
-    measured : tuple of str
-        Measured outputs, in order, the level among them; names of `STATES`.
-    measurement_std : tuple of float
-        Standard deviation of the white noise on each, in its unit.
-    pressure_noise_pa_rt_s : float
-        Root of the two-sided density of a white pressure disturbance, which stands for model
-        errors.
-    slope_noise_rad_rt_s : float
-        Root of the two-sided density of a white roll moment, per roll stiffness.
-    knots : tuple of int
-        Samples of the horizon at which the plan holds the command, increasing from 0; 60 at most.
-    horizon : int
-        Samples N that are planned, 400 at most.
-    pressure_weight_rad2 : float
-        Square of the roll angle that costs as much as the greatest pressure throughout.
-    level_weight_rad2_m2 : float
-        Square of the roll angle that costs as much as a level of one metre.
-    level_margin_m : float or None
-        Distance of the plan from the limit on the level; None for the standard deviation of the
-        level's forecast one sample ahead, the error that a plan cannot know.
-    heel_std_rad, heel_time_s : float
-        Standard deviation and time constant of a slowly varying heel.
-    heel_share : float
-        Part of that heel which the tank removes, 0 to 1. With 0 the pump holds no steady pressure
-        and the roll about the heel is controlled; the level limit still includes the level due to
-        the heel.
-    iteration_limit : int
-        Limit on the iterations of a quadratic programme, 200 at most.
-    """
+    """Parameters of a constrained predictive law."""
 
     kind: Literal["constrained_gpc"]
-    sea: SeaModel
+    sea: SeaModel  #: Expected sea.
+    #: Measured outputs, in order, the level among them; names of `STATES`.
     measured: tuple[str, ...] = ("roll_rad", "roll_rate_rad_s", "level_m")
+    #: Standard deviation of the white noise on each, in its unit.
     measurement_std: tuple[Positive, ...] = (2e-4, 5e-4, 3.5e-3)
+    #: Root of the two-sided density of a white pressure disturbance, which stands for model errors.
     pressure_noise_pa_rt_s: NotNegative = 10e3
+    #: Root of the two-sided density of a white roll moment, per roll stiffness.
     slope_noise_rad_rt_s: NotNegative = 2.5e-3
+    #: Samples of the horizon at which the plan holds the command, increasing from 0; 60 at most.
     knots: tuple[Annotated[int, Range()], ...] = (
         *(0, 1, 2, 3, 4, 6, 8, 10, 13, 16, 19, 23, 27, 31, 36, 41, 46, 51, 56),
     )
+    #: Samples N that are planned, 400 at most.
     horizon: Annotated[int, Range(least=1, most=MOST_HORIZON)] = 60
+    #: Square of the roll angle that costs as much as the greatest pressure throughout.
     pressure_weight_rad2: Positive = 2.1e-4
+    #: Square of the roll angle that costs as much as a level of one metre.
     level_weight_rad2_m2: NotNegative = 3e-5
+    #: Distance of the plan from the limit on the level; None for the standard deviation of the
+    #: level's forecast one sample ahead, the error that a plan cannot know.
     level_margin_m: NotNegative | None = None
+    #: Standard deviation and time constant of a slowly varying heel.
     heel_std_rad: NotNegative = 0.01
-    heel_time_s: Positive = 50e3
+    heel_time_s: Positive = 50e3  #: Standard deviation and time constant of a slowly varying heel.
+    #: Part of that heel which the tank removes, 0 to 1. With 0 the pump holds no steady pressure
+    #: and the roll about the heel is controlled; the level limit still includes the level due to
+    #: the heel.
     heel_share: Share = 0.0
+    #: Limit on the iterations of a quadratic programme, 200 at most.
     iteration_limit: Annotated[int, Range(least=1, most=MOST_ITERATIONS)] = 60
     sample_time_s: SampleTime = 0.2
 

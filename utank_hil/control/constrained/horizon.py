@@ -23,36 +23,21 @@ from utank_hil.dynamics.sampling import LinearModel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Horizon:
-    """Cost and predictions over N samples; n states, m outputs, j knots.
+    """Cost and predictions over N samples; n states, m outputs, j knots."""
 
-    Attributes
-    ----------
-    knots : ndarray of int, shape (j,)
-        Samples of the horizon at which the plan holds the command.
-    interpolation : ndarray, shape (N, j)
-        From the plan to the command at each sample.
-    outputs_state : ndarray, shape (N, m, n)
-    outputs_plan : ndarray, shape (N, m, j)
-    outputs_held : ndarray, shape (N, m)
-        Outputs due to one unit of constant command.
-    hessian : ndarray, shape (j, j)
-        M'M.
-    unlimited_state : ndarray, shape (j, n)
-        Without active limits the best plan is unlimited_state x + sum_q unlimited_target[q]
-        y_T(k+q).
-    unlimited_target : ndarray, shape (N, j, m)
-    output_weight, input_weight, first_output, terminal, correction
-        As in `condense`; no terminal cost has shape (0, n), no correction is zero.
-    """
-
+    #: shape (j,): samples of the horizon at which the plan holds the command.
     knots: npt.NDArray[np.int64]
-    interpolation: FloatArray
-    outputs_state: FloatArray
-    outputs_plan: FloatArray
-    outputs_held: FloatArray
-    hessian: FloatArray
+    interpolation: FloatArray  #: shape (N, j): from the plan to the command at each sample.
+    outputs_state: FloatArray  #: shape (N, m, n)
+    outputs_plan: FloatArray  #: shape (N, m, j)
+    outputs_held: FloatArray  #: shape (N, m): outputs due to one unit of constant command.
+    hessian: FloatArray  #: shape (j, j): M'M.
+    #: shape (j, n): without active limits the best plan is unlimited_state x + sum_q
+    #: unlimited_target[q] y_T(k+q).
     unlimited_state: FloatArray
-    unlimited_target: FloatArray
+    unlimited_target: FloatArray  #: shape (N, j, m)
+    #: output_weight, input_weight, first_output, terminal, correction: as in `condense`; no
+    #: terminal cost has shape (0, n), no correction is zero.
     output_weight: FloatArray
     input_weight: float
     first_output: int

@@ -42,45 +42,27 @@ _FOLLOWED = 0.02  # over the greatest pressure; a mean command this near the pla
 class ConstrainedLaw:
     """Parameters of a `ConstrainedController`; a linear law while no limit is active.
 
-    Attributes
-    ----------
-    model : LinearModel
-        Discrete, from the pump's command to the m measured outputs.
-    observer_gain : ndarray, shape (n, m)
-        L of ``x(k+1) = A x(k) + B u(k) + L (y(k) - C x(k) - D u(k))``.
-    horizon : Horizon
-        Cost and predictions of `model`.
-    limits : PumpLimits
-        Its pressure, rate, level and power are used.
-    level_output : int or None
-        Index of the level among the outputs; None leaves level and power unlimited.
-    level_penalty : float
-        Cost of a metre above the level limit, in the unit of the horizon's cost.
-    reservoir_area_m2 : float
-        At, for the power.
-    steady_state : ndarray, shape (n, n)
-        From the state to its part due to a steady heel, which the cost leaves out.
-    steady_command : ndarray, shape (n,)
-        From the state to the command that belongs to that part.
-    iteration_limit : int
-        Limit on the iterations of a programme.
-
     Raises
     ------
     ValueError
         If a value is out of its range, or the power is limited and no level is measured.
     """
 
-    model: LinearModel
+    model: LinearModel  #: Discrete, from the pump's command to the m measured outputs.
+    #: shape (n, m): l of ``x(k+1) = A x(k) + B u(k) + L (y(k) - C x(k) - D u(k))``.
     observer_gain: FloatArray
-    horizon: Horizon
-    limits: PumpLimits
+    horizon: Horizon  #: Cost and predictions of `model`.
+    limits: PumpLimits  #: Its pressure, rate, level and power are used.
+    #: Index of the level among the outputs; None leaves level and power unlimited.
     level_output: int | None
+    #: Cost of a metre above the level limit, in the unit of the horizon's cost.
     level_penalty: Positive
-    reservoir_area_m2: Positive
+    reservoir_area_m2: Positive  #: At, for the power.
+    #: shape (n, n): from the state to its part due to a steady heel, which the cost leaves out.
     steady_state: FloatArray
+    #: shape (n,): from the state to the command that belongs to that part.
     steady_command: FloatArray
-    iteration_limit: Annotated[int, Range(least=1)] = 60
+    iteration_limit: Annotated[int, Range(least=1)] = 60  #: Limit on the iterations of a programme.
 
     def __post_init__(self) -> None:
         problems = range_problems(self)

@@ -40,19 +40,13 @@ class SmallGainFuzzy(FuzzyLaw):
     ----------
     error, ranges, gain_rad_s2_pa, brake_pa_s_m, sample_time_s
         As in `FuzzyLaw`.
-    gamma : float
-        Below 1.
-    adaptation, leakage : float
-        Gamma and sigma.
-    initial : float
-        lambda_0, zero or more.
     """
 
-    gamma: _Gamma
+    gamma: _Gamma  #: Below 1.
     rho: Positive
-    adaptation: Positive
-    leakage: Positive
-    initial: NotNegative = 0.0
+    adaptation: Positive  #: Gamma and sigma.
+    leakage: Positive  #: Gamma and sigma.
+    initial: NotNegative = 0.0  #: lambda_0, zero or more.
     kind: Literal["fuzzy_small_gain"] = "fuzzy_small_gain"
 
     def _problems(self) -> list[Problem]:
@@ -88,21 +82,13 @@ class RobustFuzzy(FuzzyLaw):
     ----------
     error, ranges, gain_rad_s2_pa, brake_pa_s_m, sample_time_s
         As in `FuzzyLaw`.
-    gamma : float
-        Below 1.
-    epsilon : float
-        Softness of the switching term.
-    adaptation, leakage : tuple of float
-        Gamma_1, Gamma_2 and sigma_1, sigma_2.
-    initial : tuple of float
-        lambda_0, theta_0, zero or more.
     """
 
-    gamma: _Gamma
-    epsilon: Positive
-    adaptation: tuple[Positive, Positive]
-    leakage: tuple[Positive, Positive]
-    initial: tuple[NotNegative, NotNegative] = (0.0, 0.0)
+    gamma: _Gamma  #: Below 1.
+    epsilon: Positive  #: Softness of the switching term.
+    adaptation: tuple[Positive, Positive]  #: Gamma_1, Gamma_2 and sigma_1, sigma_2.
+    leakage: tuple[Positive, Positive]  #: Gamma_1, Gamma_2 and sigma_1, sigma_2.
+    initial: tuple[NotNegative, NotNegative] = (0.0, 0.0)  #: lambda_0, theta_0, zero or more.
     kind: Literal["fuzzy_robust"] = "fuzzy_robust"
 
     def _problems(self) -> list[Problem]:

@@ -36,20 +36,14 @@ class IndirectFuzzy(FuzzyLaw):
     ----------
     error, ranges, gain_rad_s2_pa, brake_pa_s_m, sample_time_s
         As in `FuzzyLaw`.
-    adaptation_f, adaptation_g : float
-        gamma_f and gamma_g.
-    leakage : float
-        Per second.
-    least_gain : float
-        Least ghat over the nominal g; above 0, below 1.
-    prior : tuple of float, optional
-        Initial f of every rule: a constant, then a factor for each input.
     """
 
-    adaptation_f: Positive
-    adaptation_g: Positive
-    leakage: Positive
+    adaptation_f: Positive  #: gamma_f and gamma_g.
+    adaptation_g: Positive  #: gamma_f and gamma_g.
+    leakage: Positive  #: Per second.
+    #: Least ghat over the nominal g; above 0, below 1.
     least_gain: Annotated[float, Range(above=0, below=1)] = 0.3
+    #: Initial f of every rule: a constant, then a factor for each input.
     prior: tuple[Finite, ...] | None = None
     kind: Literal["fuzzy_indirect"] = "fuzzy_indirect"
 

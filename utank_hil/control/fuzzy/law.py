@@ -36,22 +36,13 @@ _LEVEL_RATE = STATES.index("level_rate_m_s")
 
 @dataclass(frozen=True, slots=True)
 class FuzzyLaw(ABC):
-    """Parameters of every adaptive fuzzy law.
-
-    Parameters
-    ----------
-    ranges : tuple of float
-        Ranges of the fuzzy inputs, the first two to four of `STATES`.
-    gain_rad_s2_pa : float
-        Nominal g: roll acceleration per pressure.
-    brake_pa_s_m : float
-        Pump pressure per level rate against the flow (`level_brake`); 0 for the thesis's law.
-    """
+    """Parameters of every adaptive fuzzy law."""
 
     error: ErrorDynamics
-    ranges: tuple[Positive, ...]
-    gain_rad_s2_pa: Positive
+    ranges: tuple[Positive, ...]  #: Ranges of the fuzzy inputs, the first two to four of `STATES`.
+    gain_rad_s2_pa: Positive  #: Nominal g: roll acceleration per pressure.
     _: KW_ONLY
+    #: Pump pressure per level rate against the flow (`level_brake`); 0 for the thesis's law.
     brake_pa_s_m: NotNegative = 0.0
     sample_time_s: SampleTime = TICK_S
 
@@ -81,27 +72,13 @@ class FuzzyLaw(ABC):
 
 
 class FuzzyInputs(NamedTuple):
-    """Inputs of a law in one step.
+    """Inputs of a law in one step."""
 
-    Attributes
-    ----------
-    x : ndarray, shape (n,)
-        Fuzzy inputs, limited to the reach of the rules.
-    beyond : bool
-        Whether they were limited.
-    e : tuple of float
-        Errors of roll and of roll rate.
-    s : float
-        B' P e.
-    learning : bool
-        Whether the last command was sent unchanged.
-    """
-
-    x: FloatArray
-    beyond: bool
-    e: tuple[float, float]
-    s: float
-    learning: bool
+    x: FloatArray  #: shape (n,): fuzzy inputs, limited to the reach of the rules.
+    beyond: bool  #: Whether they were limited.
+    e: tuple[float, float]  #: Errors of roll and of roll rate.
+    s: float  #: B' P e.
+    learning: bool  #: Whether the last command was sent unchanged.
 
 
 class FuzzyController(ABC):

@@ -93,33 +93,20 @@ def per_output(name: str, values: tuple[float, ...], measured: tuple[str, ...]) 
 
 @dataclass(frozen=True, slots=True)
 class Predictor:
-    """Parameters of the predictor; with a ship and tank they determine its ARX model.
+    """Parameters of the predictor; with a ship and tank they determine its ARX model."""
 
-    Parameters
-    ----------
-    measured : tuple of str
-        Outputs, in order: ``"roll_rad"``, ``"roll_rate_rad_s"``, ``"level_m"``,
-        ``"level_rate_m_s"``.
-    measurement_std : tuple of float
-        Standard deviation of the white noise on each, in its unit.
-    order : int
-        Number p of past samples.
-    wave_peak_rad_s : float
-        Peak frequency wp of the wave moment, below half the sampling frequency.
-    wave_damping_ratio : float
-        zeta; small for long groups.
-    wave_slope_rad : float
-        RMS of the effective wave slope, wave moment per roll stiffness of the ship.
-    pressure_noise_pa_rt_s : float
-        Root of the two-sided density of the white pressure disturbance.
-    """
-
+    #: Outputs, in order: ``"roll_rad"``, ``"roll_rate_rad_s"``, ``"level_m"``,
+    #: ``"level_rate_m_s"``.
     measured: tuple[str, ...]
+    #: Standard deviation of the white noise on each, in its unit.
     measurement_std: tuple[Positive, ...]
-    order: Annotated[int, Range(least=1, most=MOST_ORDER)]
+    order: Annotated[int, Range(least=1, most=MOST_ORDER)]  #: Number p of past samples.
+    #: Peak frequency wp of the wave moment, below half the sampling frequency.
     wave_peak_rad_s: Positive
-    wave_damping_ratio: Positive
+    wave_damping_ratio: Positive  #: zeta; small for long groups.
+    #: RMS of the effective wave slope, wave moment per roll stiffness of the ship.
     wave_slope_rad: Positive
+    #: Root of the two-sided density of the white pressure disturbance.
     pressure_noise_pa_rt_s: NotNegative
     sample_time_s: SampleTime = 0.2
 
@@ -141,30 +128,21 @@ class Predictor:
 class PredictiveDesign:
     """Parameters of a predictive law.
 
-    Parameters
-    ----------
-    kind : {"gpc", "dpc"}
-        Type of the law.
-    output_weight : tuple of float, optional
-        One for each measured output. None, for DPC alone, is the exact deadbeat.
-    first_output : int
-        See `design_gpc`; for GPC alone.
-    washout_rad_s : float
-        Corner frequency of the washout that removes the steady list (`WashoutLaw`), at most a
-        quarter of the ship's roll frequency; 0 for none.
-
     Raises
     ------
     ValueError
         If the kind is unknown, or DPC has a first output.
     """
 
-    kind: Literal["gpc", "dpc"]
+    kind: Literal["gpc", "dpc"]  #: Type of the law.
     predictor: Predictor
     control_horizon: Annotated[int, Range(least=1, most=MOST_SAMPLES)]
     prediction_horizon: Annotated[int, Range(least=1, most=MOST_SAMPLES)]
+    #: One for each measured output. None, for DPC alone, is the exact deadbeat.
     output_weight: tuple[NotNegative, ...] | None = None
-    first_output: Annotated[int, Range(least=0)] = 0
+    first_output: Annotated[int, Range(least=0)] = 0  #: See `design_gpc`; for GPC alone.
+    #: Corner frequency of the washout that removes the steady list (`WashoutLaw`), at most a
+    #: quarter of the ship's roll frequency; 0 for none.
     washout_rad_s: NotNegative = 0.0
 
     def __post_init__(self) -> None:

@@ -16,18 +16,11 @@ class PredictiveLaw:
 
         u(k) = sum_i input_gains[i-1] u(k-i) + sum_i output_gains[i-1] y(k-i)
                + sum_q reference_gains[q] y_T(k+q)
-
-    Attributes
-    ----------
-    input_gains : ndarray, shape (p, r, r)
-    output_gains : ndarray, shape (p, r, m)
-    reference_gains : ndarray, shape (hp, r, m)
-        On the target y_T(k) ... y_T(k + hp - 1).
     """
 
-    input_gains: FloatArray
-    output_gains: FloatArray
-    reference_gains: FloatArray
+    input_gains: FloatArray  #: shape (p, r, r)
+    output_gains: FloatArray  #: shape (p, r, m)
+    reference_gains: FloatArray  #: shape (hp, r, m): on the target y_T(k) ... y_T(k + hp - 1).
     sample_time_s: float
 
     def controller(self, washout_share: float = 0.0) -> "PredictiveController":

@@ -16,17 +16,11 @@ class Prediction:
 
         y(k+q) = sum_i outputs[q, i-1] y(k-i) + sum_i inputs[q, i-1] u(k-i)
                  + sum_{j=0..q} markov[q-j] u(k+j)
-
-    Attributes
-    ----------
-    outputs : ndarray, shape (hp, p, m, m)
-    inputs : ndarray, shape (hp, p, m, r)
-    markov : ndarray, shape (hp, m, r)
-        Response of the output q samples after a unit pulse of an input.
     """
 
-    outputs: FloatArray
-    inputs: FloatArray
+    outputs: FloatArray  #: shape (hp, p, m, m)
+    inputs: FloatArray  #: shape (hp, p, m, r)
+    #: shape (hp, m, r): response of the output q samples after a unit pulse of an input.
     markov: FloatArray
 
     def future_inputs(self, control_horizon: int) -> FloatArray:
