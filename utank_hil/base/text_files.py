@@ -1,0 +1,155 @@
+"""Files of other programs: one convention for gzip, encodings, line ends, sizes and damaged ends.
+
+A file may be compressed with gzip, whatever its name. Text is UTF-8 with or without a byte order
+mark, or UTF-16 with one; lines end with LF, CR LF or CR.
+"""
+
+import io
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO, Final, TextIO
+
+_GZIP: Final = b"\x1f\x8b"
+_UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
+_CHUNK_BYTES: Final = 1 << 16
+LIMIT_BYTES: Final = 1 << 30
+"""Largest content that is read whole: a table of a day at 10 Hz with a hundred columns."""
+LINE_LIMIT: Final = 1 << 16
+"""Longest line of a log in characters; that of a CAN FD frame has some 300."""
+
+
+class TextFileError(ValueError):
+    """The file can't be read; the message names it, the cause and the remedy."""
+
+
+def kind_of(path: Path) -> str:
+    """Return the suffix in small letters, the one before it where that is ``.gz``."""
+    return Path(path.stem if path.suffix.lower() == ".gz" else path.name).suffix.lower()
+
+
+@contextmanager
+def open_content(
+    path: Path, limit_bytes: int = LIMIT_BYTES, on_cut: Callable[[str], None] | None = None
+) -> Iterator[BinaryIO]:
+    """Open a file, decompressed if it is compressed with gzip.
+
+    Parameters
+    ----------
+    path : Path
+        File to read.
+    limit_bytes : int
+        Largest number of bytes to read from it.
+    on_cut : callable, optional
+        Called with the place where compressed content is cut or damaged; reading then ends there as
+        at the end of the file. Without it that is an error.
+
+    Raises
+    ------
+    TextFileError
+        If it is larger, or compressed content is cut or damaged.
+    OSError
+        If it can't be read.
+    """
+    with path.open("rb") as file:
+        compressed = file.peek(2)[:2] == _GZIP
+        yield io.BufferedReader(_Content(file, path, limit_bytes, on_cut, compressed))
+
+
+@contextmanager
+def open_text(
+    path: Path, limit_bytes: int = LIMIT_BYTES, on_cut: Callable[[str], None] | None = None
+) -> Iterator[TextIO]:
+    """Open a text as `open_content` does; a line that is read ends with a line feed.
+
+    Raises
+    ------
+    TextFileError
+        As `open_content`; also if the text is not UTF-8, or UTF-16 with its byte order mark.
+    """
+    with open_content(path, limit_bytes, on_cut) as content:
+        begin = content.peek(2)[:2]  # type: ignore[attr-defined]  # of a BufferedReader
+        encoding = "utf-16" if begin in _UTF_16 else "utf-8-sig"
+        try:
+            yield io.TextIOWrapper(content, encoding)
+        except UnicodeError as error:
+            raise TextFileError(f"{path}: is no text in UTF-8: save it as that") from error
+
+
+def lines_of(path: Path, text: TextIO) -> Iterator[tuple[int, str]]:
+    """Yield the number, from 1, and the content of each line, its line feed included.
+
+    Raises
+    ------
+    TextFileError
+        If a line is longer than `LINE_LIMIT`, as in no log.
+    """
+    for number, line in enumerate(iter(lambda: text.readline(LINE_LIMIT), ""), start=1):
+        if len(line) == LINE_LIMIT:
+            raise TextFileError(
+                f"{path}: line {number} has more than {LINE_LIMIT} characters: is it a text?"
+            )
+        yield number, line
+
+
+class _Content(io.RawIOBase):
+    """Bytes of a file, decompressed if asked for, up to a limit."""
+
+    def __init__(
+        self,
+        file: BinaryIO,
+        path: Path,
+        limit_bytes: int,
+        on_cut: Callable[[str], None] | None,
+        compressed: bool,
+    ) -> None:
+        self._file, self._path, self._left, self._on_cut = file, path, limit_bytes, on_cut
+        self._limit_bytes, self._ended = limit_bytes, False
+        self._gzip = zlib.decompressobj(wbits=31) if compressed else None
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: bytearray | memoryview) -> int:  # type: ignore[override]
+        """Read up to a buffer's size; 0 is the end."""
+        size = len(buffer)
+        content = self._file.read(size) if self._gzip is None else self._decompressed(size)
+        self._left -= len(content)
+        if self._left < 0:
+            raise TextFileError(
+                f"{self._path}: holds more than {self._limit_bytes} bytes, the most that is read "
+                "of it: cut it in parts"
+            )
+        buffer[: len(content)] = content
+        return len(content)
+
+    def _decompressed(self, size: int) -> bytes:
+        """Return the next bytes, of all members of the archive; empty at its end."""
+        while not self._ended:
+            assert self._gzip is not None
+            given = self._gzip.unconsumed_tail or self._gzip.unused_data
+            given = given or self._file.read(_CHUNK_BYTES)
+            if self._gzip.eof:  # Another member may follow; zeros fill up a tape's block.
+                given = given.lstrip(b"\0")
+                if not given:
+                    self._ended = not self._file.peek(1)  # type: ignore[attr-defined]
+                    continue
+                self._gzip = zlib.decompressobj(wbits=31)
+            try:
+                content = self._gzip.decompress(given, size)
+            except zlib.error:
+                return self._cut("damaged")
+            if content:
+                return content
+            if not given:
+                return self._cut("cut")
+        return b""
+
+    def _cut(self, how: str) -> bytes:
+        self._ended = True
+        place = f"{self._path.name} is {how} near byte {self._file.tell()} of the compressed file"
+        if self._on_cut is None:
+            raise TextFileError(f"{self._path}: {place}")
+        self._on_cut(place)
+        return b""
