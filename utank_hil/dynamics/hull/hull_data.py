@@ -9,7 +9,7 @@ wave at the origin, and deep-water waves are ``exp(i w t - i k (x cos b + y sin 
     [-w^2 (M + A) + i w B + C] xi = X
 
 These are not the body axes of `SixDegreeModel` (y to starboard, z down): multiply vectors by
-`TO_BODY_AXES`, and matrices by it on both sides.
+`TO_BODY_AXES`, and matrices by it on both sides, and headings by -1.
 """
 
 import math
@@ -44,7 +44,7 @@ class HullData:
         Directions that the waves travel to, ascending, from above -180 up to 360.
     excitation : ndarray, shape (m, k, 6), complex
         Force and moment about `reference_m` per metre of wave amplitude.
-    hydrostatic : ndarray, shape (6, 6)
+    hydrostatic : ndarray, shape (6, 6), optional
         Restoring matrix C about `reference_m`, with the weight's part.
     mass_kg : float, optional
         Displaced mass.
@@ -78,7 +78,7 @@ class HullData:
     wave_frequency_rad_s: FloatArray
     heading_deg: FloatArray
     excitation: ComplexArray
-    hydrostatic: FloatArray
+    hydrostatic: FloatArray | None = None
     mass_kg: float | None = None
     inertia_kg_m2: FloatArray | None = None
     gravity_centre_m: FloatArray | None = None
@@ -184,13 +184,13 @@ class HullData:
         matrix = np.zeros((6, 6))
         matrix[:3, :3] = self.known("mass_kg") * np.eye(3)
         matrix[3:, 3:] = self.known("inertia_kg_m2")
-        back = _inverse_shift(self.reference_m - self.known("gravity_centre_m"))
+        back = inverse_shift(self.reference_m - self.known("gravity_centre_m"))
         return np.asarray(back.T @ matrix @ back)
 
     def about(self, point_m: npt.ArrayLike) -> "HullData":
         """Return the data with motions and moments about a point, shape (3,), from the origin."""
         point = np.asarray(point_m, dtype=np.float64)
-        back = _inverse_shift(point - self.reference_m)
+        back = inverse_shift(point - self.reference_m)
         moved = {
             name: back.T @ value @ back
             for name in (
@@ -215,7 +215,7 @@ def skew(vector: npt.ArrayLike) -> FloatArray:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def _inverse_shift(step_m: FloatArray) -> FloatArray:
+def inverse_shift(step_m: FloatArray) -> FloatArray:
     """S^-1 of motions xi' = S xi at a point that is `step_m` from the old one."""
     matrix = np.eye(6)
     matrix[:3, 3:] = skew(step_m)

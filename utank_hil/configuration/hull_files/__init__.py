@@ -1,0 +1,1 @@
+"""Readers of hull data, as seakeeping codes write them."""

@@ -1,0 +1,124 @@
+"""What readers of hull data have in common."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import Positive, Range, range_problems, refuse
+from utank_hil.dynamics.hull.hull_data import HullData
+
+GRAVITY_M_S2 = 9.81
+"""For codes that write none into their numeric files."""
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What a user knows of the hull besides its file, for what the file lacks.
+
+    Parameters
+    ----------
+    density_kg_m3 : float, optional
+        Of the water.
+    mass_kg : float, optional
+        Displaced mass.
+    gravity_centre_m : tuple of 3 floats, optional
+        Centre of gravity forward, to port and up of the place in the waterline that phases refer
+        to.
+    gyration_m : tuple of 3 floats, optional
+        Radii of gyration about the centre of gravity in roll, pitch and yaw.
+    """
+
+    density_kg_m3: Annotated[float, Range(least=900, most=1100)] | None = None
+    mass_kg: Positive | None = None
+    gravity_centre_m: tuple[float, float, float] | None = None
+    gyration_m: tuple[Positive, Positive, Positive] | None = None
+
+    def __post_init__(self) -> None:
+        refuse("hull", range_problems(self))
+
+
+def rigid_body(matrix: npt.ArrayLike, reference_m: npt.ArrayLike = (0, 0, 0)) -> dict[str, Any]:
+    """Return mass, centre of gravity and inertia about it of a mass matrix about a point.
+
+    The inertia is left out where the whole diagonal is the mass, which is a placeholder.
+    """
+    m = np.asarray(matrix, dtype=np.float64)
+    mass = m[0, 0]
+    arm = np.array([m[1, 5], m[2, 3], m[0, 4]]) / mass
+    body: dict[str, Any] = {
+        "mass_kg": float(mass),
+        "gravity_centre_m": arm + np.asarray(reference_m, dtype=np.float64),
+    }
+    if not np.allclose(np.diag(m), mass):
+        body["inertia_kg_m2"] = m[3:, 3:] - mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return body
+
+
+def hull_of(path: Path, notes: Iterable[str] = (), **fields: Any) -> HullData:
+    """Return the hull of a file, by its name, without the notes that are empty."""
+    return HullData(**fields, source=str(path), notes=tuple(filter(None, notes)))
+
+
+def floats(line: str) -> list[float]:
+    """Return the numbers at the beginning of a line."""
+    found: list[float] = []
+    for word in line.replace(",", " ").split():
+        try:
+            found.append(float(word))
+        except ValueError:
+            break
+    return found
+
+
+def table(path: Path, least_columns: int) -> list[list[float]]:
+    """Return the rows of a file of numbers; a first line of text is left out.
+
+    Raises
+    ------
+    ValueError
+        With file and line, if another row has fewer numbers.
+    """
+    rows = []
+    for number, line in enumerate(text(path).splitlines(), 1):
+        row = floats(line)
+        if len(row) >= least_columns:
+            rows.append(row)
+        elif line.strip() and number > 1:
+            raise ValueError(f"{path}: line {number} has not {least_columns} numbers: {line!r}")
+    if not rows:
+        raise ValueError(f"{path} holds no numbers")
+    return rows
+
+
+def text(path: Path) -> str:
+    """Return a file's text; ValueError if it can't be read."""
+    try:
+        return path.read_text(encoding="latin-1")
+    except OSError as error:
+        raise ValueError(f"{path} can't be read: {error.strerror}") from error
+
+
+def sibling(path: Path, suffix: str) -> Path | None:
+    """Return the file of the same name with another suffix in any case, if there is one."""
+    names = (path.with_suffix(each) for each in (suffix, suffix.upper()))
+    return next((each for each in names if each.is_file()), None)
+
+
+def half_turn(heading_deg: float | FloatArray) -> FloatArray:
+    """Return headings above -180 and up to 180 degrees, to a thousandth of a degree."""
+    return np.asarray(180 - np.mod(180 - np.round(heading_deg, 3), 360))
+
+
+def phase_at(
+    place_m: npt.ArrayLike, heading_deg: FloatArray, wave_number_per_m: FloatArray
+) -> npt.NDArray[np.complex128]:
+    """Return a wave of amplitude 1 at a place: exp(-i k (x cos b + y sin b)), shape (m, k, 1)."""
+    x, y = np.asarray(place_m, dtype=np.float64)[:2]
+    b = np.radians(heading_deg)
+    along = x * np.cos(b) + y * np.sin(b)
+    return np.asarray(np.exp(-1j * wave_number_per_m[None, :, None] * along[:, None, None]))

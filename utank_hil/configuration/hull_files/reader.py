@@ -1,0 +1,86 @@
+"""Hull data of any code, by the name of its file."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from utank_hil.configuration.hull_files.aqwa import read_aqwa
+from utank_hil.configuration.hull_files.capytaine import read_capytaine
+from utank_hil.configuration.hull_files.nemoh import read_nemoh
+from utank_hil.configuration.hull_files.parts import Given
+from utank_hil.configuration.hull_files.shipx import read_mss, read_shipx
+from utank_hil.configuration.hull_files.wamit import read_wamit
+from utank_hil.dynamics.hull.hull_data import HullData
+
+_READERS: dict[str, Callable[[Path, Given], HullData]] = {
+    ".nc": read_capytaine,
+    ".1": read_wamit,
+    ".cal": read_nemoh,
+    ".ah1": read_aqwa,
+    ".re7": read_shipx,
+    ".mat": read_mss,
+}
+_SAME = 0.01
+"""Relative difference up to which a figure of the user's and of the file are the same."""
+
+
+def read_hull(path: Path, given: Given | None = None) -> HullData:
+    """Read the hull data of a seakeeping code.
+
+    Parameters
+    ----------
+    path : Path
+        Capytaine's ``.nc``, WAMIT's ``.1``, NEMOH's ``Nemoh.cal``, AQWA's ``.AH1``, ShipX's
+        ``.re7`` or MSS's ``.mat``. Further files of the code are sought beside it.
+    given : Given, optional
+        What the file lacks.
+
+    Raises
+    ------
+    ValueError
+        If the file is of no known code, incomplete or wrong, or has a figure that `given` has
+        otherwise.
+    """
+    known = Given() if given is None else given
+    reader = _READERS.get(path.suffix.lower())
+    if reader is None:
+        kinds = "Capytaine .nc, WAMIT .1, NEMOH Nemoh.cal, AQWA .AH1, ShipX .re7, MSS .mat"
+        raise ValueError(f"{path} is of no known kind; known are {kinds}")
+    try:
+        hull = reader(path, known)
+    except (IndexError, StopIteration, RuntimeError, TypeError) as error:
+        raise ValueError(f"{path} is incomplete, or not what its name says: {error!r}") from error
+    return completed(hull, known)
+
+
+def completed(hull: HullData, given: Given) -> HullData:
+    """Return a hull with what a user knows besides, where it lacks that.
+
+    Restoring follows a centre of gravity that the file did not have. `ValueError` is raised where
+    the hull has another figure.
+    """
+    mass = hull.mass_kg if given.mass_kg is None else given.mass_kg
+    inertia = None
+    if given.gyration_m is not None:
+        if mass is None:
+            raise ValueError(f"{hull.source}: mass_kg is missing beside gyration_m")
+        inertia = mass * np.diag(np.square(given.gyration_m))
+    wanted = {
+        "density_kg_m3": given.density_kg_m3,
+        "mass_kg": given.mass_kg,
+        "gravity_centre_m": given.gravity_centre_m,
+        "inertia_kg_m2": inertia,
+    }
+    new: dict[str, Any] = {name: of for name, of in wanted.items() if of is not None}
+    for name in list(new):
+        own = getattr(hull, name)
+        if own is None:
+            continue
+        size = max(float(np.max(np.abs(own))), 1e-9)
+        if np.max(np.abs(own - np.asarray(new[name]))) > _SAME * max(size, 1e-3):
+            raise ValueError(f"{hull.source}: {name} is {own} in the file: remove it here")
+        del new[name]
+    return replace(hull, **new)

@@ -1,0 +1,158 @@
+"""WAMIT: ``.1``, ``.3`` or ``.2``, ``.hst``, and what ``.gdf .frc .pot .cfg`` add beside them.
+
+Numbers are made dimensional with the density, gravity and the length ULEN of the ``.gdf``::
+
+    A = a rho L^k,  B = b rho L^k w,  X = x rho g L^m,  C = c rho g L^q
+    k = 3, 4, 5 and q = 2, 3, 4 with no, one, two indices of rotation; m = 2, 3
+
+The ``.hst`` has the weight's part in it. Form 1 of the ``.frc`` has the radii of gyration about the
+body's origin.
+"""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from utank_hil.configuration.hull_files.parts import (
+    GRAVITY_M_S2,
+    Given,
+    floats,
+    hull_of,
+    rigid_body,
+    sibling,
+    table,
+    text,
+)
+from utank_hil.dynamics.hull.hull_data import HullData
+
+_TURNS = np.array([0, 0, 0, 1, 1, 1])
+_PAIR = _TURNS[:, None] + _TURNS
+
+
+def read_wamit(path: Path, given: Given) -> HullData:
+    """Read the files beside a ``.1``."""
+    rows = table(path, 4)
+    config = text(found) if (found := sibling(path, ".cfg")) else ""
+    by_frequency = _option(config, "IPEROUT", 1)
+    if by_frequency not in (1, 2):
+        raise ValueError(f"{path}: first column is a wave number (IPEROUT {by_frequency}): use 1")
+    unit_m, gravity = _unit_and_gravity(path)
+    body: dict[str, Any] = {}
+    density = given.density_kg_m3
+    if force := sibling(path, ".frc"):
+        density, body = _body(force, _option(config, "IALTFRC", 1), given)
+    if density is None:
+        raise ValueError(f"{path}: density_kg_m3 is missing: WAMIT's numbers are non-dimensional")
+    place, depth = _place(path)
+
+    def at(first: float) -> float:
+        """Return the frequency of a first column: of a period, -1 is zero and 0 infinity."""
+        if by_frequency == 2:
+            return np.inf if first < 0 else first
+        return 0.0 if first < 0 else np.inf if first == 0 else 2 * np.pi / first
+
+    first = {at(row[0]): np.zeros((2, 6, 6)) for row in rows}
+    for row in rows:
+        i, j = int(row[1]) - 1, int(row[2]) - 1
+        if max(i, j) > 5:
+            raise ValueError(f"{path}: has more than one body or more than six degrees")
+        first[at(row[0])][:, i, j] = [*row[3:5], 0.0][:2]
+    scale = density * unit_m ** (3 + _PAIR)
+    omega = np.array(sorted(w for w in first if 0 < w < np.inf))
+    limits = {
+        name: scale * first[w][0]
+        for w, name in ((0.0, "zero_added_mass"), (np.inf, "infinite_added_mass"))
+        if w in first
+    }
+    forces = sibling(path, ".3") or sibling(path, ".2")
+    if forces is None:
+        raise ValueError(f"{path}: the excitation is missing: put the .3 or .2 beside it")
+    force_rows = np.array([[at(row[0]), *row[1:7]] for row in table(forces, 7)])
+    waves, headings = np.unique(force_rows[:, 0]), np.unique(force_rows[:, 1])
+    excitation = np.zeros((len(headings), len(waves), 6), dtype=np.complex128)
+    where = (
+        np.searchsorted(headings, force_rows[:, 1]),
+        np.searchsorted(waves, force_rows[:, 0]),
+        force_rows[:, 2].astype(int) - 1,
+    )
+    excitation[where] = force_rows[:, 5] + 1j * force_rows[:, 6]
+    hydrostatic = None
+    if stiff := sibling(path, ".hst"):
+        hydrostatic = np.zeros((6, 6))
+        for row in table(stiff, 3):
+            hydrostatic[int(row[0]) - 1, int(row[1]) - 1] = row[2]
+        hydrostatic = hydrostatic * density * gravity * unit_m ** (2.0 + _PAIR)
+    return hull_of(
+        path,
+        [_no_unit(path), "roll damping is that of waves alone: add the viscous part"],
+        frequency_rad_s=omega,
+        added_mass=np.array([scale * first[w][0] for w in omega]),
+        damping=np.array([scale * w * first[w][1] for w in omega]),
+        wave_frequency_rad_s=waves,
+        heading_deg=headings,
+        excitation=excitation * density * gravity * unit_m ** (2.0 + _TURNS),
+        hydrostatic=hydrostatic,
+        reference_m=place,
+        density_kg_m3=density,
+        gravity_m_s2=gravity,
+        water_depth_m=depth,
+        **limits,
+        **body,
+    )
+
+
+def _option(config: str, name: str, default: int) -> int:
+    found = re.search(rf"(?im)^\s*{name}\s*=\s*(\d+)", config)
+    return int(found.group(1)) if found else default
+
+
+def _unit_and_gravity(path: Path) -> tuple[float, float]:
+    """Return ULEN and GRAV of the ``.gdf``."""
+    if (found := sibling(path, ".gdf")) is None:
+        return 1.0, GRAVITY_M_S2
+    lines = text(found).splitlines()
+    numbers = floats(lines[1]) if len(lines) > 1 else []
+    if len(numbers) < 2:
+        raise ValueError(f"{found}: line 2 must hold ULEN and GRAV")
+    return numbers[0], numbers[1]
+
+
+def _no_unit(path: Path) -> str:
+    return "" if sibling(path, ".gdf") else "no .gdf beside it: ULEN is taken as 1 m, g as 9.81"
+
+
+def _body(path: Path, form: int, given: Given) -> tuple[float | None, dict[str, Any]]:
+    """Return density, mass, centre and inertia of the ``.frc``, as far as it has them."""
+    lines = [floats(line) for line in text(path).splitlines()[1:]]
+    lines = [line for line in lines if line][1:]  # without the options
+    if form == 2:
+        body = rigid_body(np.array(lines[3:9])[:, :6]) if lines[2][0] else {}
+        return lines[0][0], body | {"gravity_centre_m": lines[1][:3]}
+    z_m, about_origin = lines[0][0], np.array([line[:3] for line in lines[1:4]])
+    if given.mass_kg is None or given.gravity_centre_m is None or not np.any(about_origin):
+        return given.density_kg_m3, {}
+    centre = np.array([*given.gravity_centre_m[:2], z_m])
+    inertia = given.mass_kg * (
+        about_origin * np.abs(about_origin)
+        - (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    )
+    body = {"mass_kg": given.mass_kg, "gravity_centre_m": centre, "inertia_kg_m2": inertia}
+    return given.density_kg_m3, body
+
+
+def _place(path: Path) -> tuple[list[float], float]:
+    """Return the body's origin in global axes, and the depth, of the ``.pot``."""
+    if (found := sibling(path, ".pot")) is None:
+        return [0.0, 0.0, 0.0], np.inf
+    lines = text(found).splitlines()
+    names = [n for n, line in enumerate(lines) if n and ".gdf" in line.lower()]
+    if names:  # IALTPOT 2: depth in line 2, XBODY after the body's file
+        depth, place = floats(lines[1])[0], floats(lines[names[0] + 1])[:4]
+    else:
+        row = next(numbers for line in lines[1:] if len(numbers := floats(line)) >= 5)
+        depth, place = row[0], row[1:5]
+    if place[3] != 0:
+        raise ValueError(f"{found}: the body is turned by {place[3]:g} degrees (XBODY): use 0")
+    return place[:3], depth if depth > 0 else np.inf

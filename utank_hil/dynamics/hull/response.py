@@ -1,0 +1,190 @@
+"""Motions of a hull in regular waves, and what they say of roll at its resonance.
+
+At the frequency of free roll w, the undamped mode v of sway, roll and yaw (v = 1 in roll) turns the
+coupled equations into one of roll alone, ``C44`` its stiffness::
+
+    w^2 = C44 / (v (M + A) v),    zeta = w v B v / (2 C44),    r = v X / (C44 slope)
+
+r is the effective wave slope in a beam sea. The share of sway is that of ``-g slope`` in the
+lateral acceleration of the centre of gravity: 1 where the ship moves as the water does.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.dynamics.hull.hull_data import HullData
+
+_LATERAL = [1, 3, 5]
+_MIRRORED = np.array([1, -1, 1, -1, 1, -1])
+_MOST_TURN_DEG = 45.0
+"""Between headings farther apart than this, forces are not known: seakeeping runs have 10 to 30."""
+
+
+@dataclass(frozen=True, slots=True)
+class RollResonance:
+    """Roll of a hull about its resonance in a beam sea from starboard.
+
+    Attributes
+    ----------
+    period_s : float
+        Natural period, sway and yaw free.
+    radiation_ratio, viscous_ratio : float
+        Damping ratios by waves and by what else the data hold.
+    effective_slope, effective_slope_phase_rad : float
+        Size and lead of the roll moment per stiffness times wave slope.
+    sway_share, sway_phase_rad : float
+        Lateral acceleration of the centre of gravity per minus g times slope, with `viscous_ratio`
+        or the ratio that was given: size and lead.
+    """
+
+    period_s: float
+    radiation_ratio: float
+    viscous_ratio: float
+    effective_slope: float
+    effective_slope_phase_rad: float
+    sway_share: float
+    sway_phase_rad: float
+
+
+def wave_number(omega_rad_s: FloatArray, depth_m: float, gravity_m_s2: float) -> FloatArray:
+    """Return k with w^2 = g k tanh(k depth), in 1/m, by Newton's method."""
+    deep = omega_rad_s**2 / gravity_m_s2
+    if not math.isfinite(depth_m):
+        return np.asarray(deep)
+    k = np.maximum(deep, omega_rad_s / math.sqrt(gravity_m_s2 * depth_m))
+    for _ in range(20):
+        t = np.tanh(k * depth_m)
+        k = k - (k * t - deep) / (t + k * depth_m * (1 - t**2))
+    return np.asarray(k)
+
+
+def radiation_at(hull: HullData, omega_rad_s: float) -> tuple[FloatArray, FloatArray]:
+    """Return added mass and damping, shape (6, 6), between the frequencies of the data.
+
+    Raises
+    ------
+    ValueError
+        If the frequency lies outside of the data.
+    """
+    grid = hull.frequency_rad_s
+    _inside(hull, "frequency_rad_s", grid, omega_rad_s)
+    return _between(grid, hull.added_mass, omega_rad_s), _between(grid, hull.damping, omega_rad_s)
+
+
+def excitation_at(hull: HullData, omega_rad_s: float, heading_deg: float) -> ComplexArray:
+    """Return force and moment per metre, shape (6,), at a wave frequency and heading.
+
+    Headings that the data lack are those of the other side of the ship, mirrored. ValueError is
+    raised for a frequency outside of the data, and between headings far apart.
+    """
+    grid = hull.wave_frequency_rad_s
+    _inside(hull, "wave_frequency_rad_s", grid, omega_rad_s)
+    force = _between(grid, hull.excitation.transpose(1, 0, 2), omega_rad_s)
+    both = np.concatenate([hull.heading_deg, -hull.heading_deg]) % 360
+    around, first = np.unique(np.round(both, 6), return_index=True)
+    force = np.concatenate([force, _MIRRORED * force])[first]
+    around = np.concatenate([around[-1:] - 360, around, around[:1] + 360])
+    force = np.concatenate([force[-1:], force, force[:1]])
+    heading = heading_deg % 360
+    n = int(np.searchsorted(around, heading))
+    if around[n] - around[n - 1] > _MOST_TURN_DEG and around[n] != heading:
+        near = f"{heading_deg:g} degrees, the nearest are {around[n - 1]:g} and {around[n]:g}"
+        raise ValueError(f"{hull.source}: heading_deg does not cover {near}")
+    return np.asarray(_between(around, force, heading), dtype=np.complex128)
+
+
+def motions(
+    hull: HullData, omega_rad_s: float, heading_deg: float, roll_damping_nms_rad: float
+) -> ComplexArray:
+    """Return the motions about `hull.reference_m` per metre of wave at rest, shape (6,), m and rad.
+
+    Parameters
+    ----------
+    roll_damping_nms_rad : float
+        Linear damping B44 besides radiation: data of potential theory have none.
+    """
+    added, damping = radiation_at(hull, omega_rad_s)
+    damping = damping.copy()
+    damping[3, 3] += roll_damping_nms_rad
+    matrix = (
+        -(omega_rad_s**2) * (hull.mass_matrix + added)
+        + 1j * omega_rad_s * damping
+        + hull.known("hydrostatic")
+    )
+    return np.asarray(np.linalg.solve(matrix, excitation_at(hull, omega_rad_s, heading_deg)))
+
+
+def roll_resonance(hull: HullData, viscous_ratio: float | None = None) -> RollResonance:
+    """Return roll at its resonance in a beam sea, ship at rest.
+
+    Parameters
+    ----------
+    viscous_ratio : float, optional
+        Share of critical damping besides radiation; without it that of the data.
+
+    Raises
+    ------
+    ValueError
+        If mass, inertia, centre of gravity, restoring or a frequency is not in the data, the ship
+        is not stable upright, or there is no viscous damping.
+    """
+    ship = hull.about_gravity_centre()
+    stiffness = float(ship.known("hydrostatic")[3, 3])
+    if stiffness <= 0:
+        raise ValueError(f"{hull.source}: C44 is {stiffness:.3g} N m/rad: GM must be positive")
+    omega = math.sqrt(stiffness / (1.3 * ship.mass_matrix[3, 3]))  # hulls add a third in roll
+    for _ in range(50):
+        added, damping = radiation_at(ship, omega)
+        inertia = (ship.mass_matrix + added)[np.ix_(_LATERAL, _LATERAL)]
+        mode = _mode(inertia)
+        before, omega = omega, math.sqrt(stiffness / float(mode @ inertia @ mode))
+        if abs(omega - before) < 1e-9 * omega:
+            break
+    radiated = float(mode @ damping[np.ix_(_LATERAL, _LATERAL)] @ mode)
+    if viscous_ratio is not None:
+        viscous = 2 * viscous_ratio * stiffness / omega
+    elif ship.viscous_roll_nms_rad is not None:
+        viscous = float(np.interp(omega, ship.frequency_rad_s, ship.viscous_roll_nms_rad))
+    else:
+        reason = "viscous_roll_nms_rad is missing, and roll cannot be judged without it"
+        raise ValueError(f"{hull.source}: {reason}")
+    k = float(wave_number(np.array(omega), hull.water_depth_m, hull.gravity_m_s2))
+    slope = -1j * k
+    force = excitation_at(ship, omega, 90.0)[_LATERAL]
+    effective = (mode @ force) / (stiffness * slope)
+    sway = motions(ship, omega, 90.0, viscous)[1] * omega**2 / (hull.gravity_m_s2 * slope)
+    return RollResonance(
+        period_s=2 * math.pi / omega,
+        radiation_ratio=omega * radiated / (2 * stiffness),
+        viscous_ratio=omega * viscous / (2 * stiffness),
+        effective_slope=float(abs(effective)),
+        effective_slope_phase_rad=float(np.angle(effective)),
+        sway_share=float(abs(sway)),
+        sway_phase_rad=float(np.angle(sway)),
+    )
+
+
+def _mode(inertia: FloatArray) -> FloatArray:
+    """Return sway, 1, yaw of free roll: sway and yaw have inertia alone."""
+    others = np.ix_([0, 2], [0, 2])
+    sway, yaw = -np.linalg.solve(inertia[others], inertia[[0, 2], 1])
+    return np.array([sway, 1.0, yaw])
+
+
+def _inside(hull: HullData, name: str, grid: FloatArray, at: float) -> None:
+    if not grid[0] <= at <= grid[-1]:
+        raise ValueError(f"{hull.source}: {name} goes from {grid[0]:g} to {grid[-1]:g}, not {at:g}")
+
+
+def _between(grid: FloatArray, values: npt.NDArray[Any], at: float) -> Any:
+    """Return values between those of a grid, which is their first index."""
+    if len(grid) == 1:
+        return values[0]
+    n = int(np.clip(np.searchsorted(grid, at) - 1, 0, len(grid) - 2))
+    share = (at - grid[n]) / (grid[n + 1] - grid[n])
+    return (1 - share) * values[n] + share * values[n + 1]
