@@ -15,7 +15,8 @@ from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.dynamics.water import water_moments
 from utank_hil.sea import Harmonics
 
 SAILING_TICKS = 100
@@ -37,7 +38,8 @@ class Plant:
     pump : Pump or None
         None for a tank without one.
     waves : Waves or Harmonics
-        Roll moment of the waves in N m, from the plant's start on.
+        Roll moment of the waves in N m, and lateral acceleration over g if the ship sways, from the
+        plant's start on.
     linear : bool
         Whether to integrate the small-angle limit: no quadratic loss, level limit or capsizing.
 
@@ -76,7 +78,10 @@ class Plant:
         self._ticks = 0
         phasors, rotations = self._waves.begin()
         for index in range(4):
-            self._state[kernel.MOMENTS][index] = kernel.turned_sum(phasors, rotations)
+            for wave, phasor, rotation in zip(
+                (kernel.MOMENTS, kernel.SWAY), phasors, rotations, strict=False
+            ):
+                self._state[wave][index] = kernel.turned_sum(phasor, rotation)
         self._values: list[float] = self._state.tolist()
         self._now_ns: int | None = None
         self.broken_pump: Callable[[float], float] | None = None
@@ -84,11 +89,13 @@ class Plant:
 
     def _load(self, ship: RollShip) -> None:
         tank = self._tank
-        self._linear_model = np.zeros((0, 7))
+        self._linear_model = np.zeros((0, 8))
         if self._linear:
             a, b = state_matrices(ship, tank)
             heel = b[:, 1:] * ship.heeling_moment_nm
-            self._linear_model = np.hstack([a, b, heel])
+            push_pa = tank.density_kg_m3 * GRAVITY_M_S2 * tank.width_m  # per acceleration over g
+            lever_nm = GRAVITY_M_S2 * float(water_moments(tank, 0.0).first_kgm[2])
+            self._linear_model = np.hstack([a, b, heel, b @ [[-push_pa], [lever_nm]]])
             ship = replace(ship, quadratic_damping_nms2_rad2=0.0)
             tank = replace(tank, quadratic_loss=0.0)
         model = RollModel(ship, tank)
@@ -198,7 +205,7 @@ class Plant:
 
     @property
     def wave_work_j(self) -> float:
-        """Work of the waves on the ship since the start."""
+        """Work of the waves since the start, in a frame that sways with the ship."""
         return self._values[kernel.WAVE_WORK]
 
     @property
@@ -231,6 +238,11 @@ class Plant:
     def wave_moment_nm(self) -> float:
         """Roll moment of the waves."""
         return self._values[kernel.MOMENT_NOW]
+
+    @property
+    def lateral_m_s2(self) -> float:
+        """Lateral acceleration of the ship's centre of gravity, positive to starboard."""
+        return GRAVITY_M_S2 * self._values[kernel.SWAY_NOW]
 
     @property
     def pressure_limited(self) -> bool:

@@ -16,10 +16,12 @@ from utank_hil.dynamics.kernels import (
     DAMPED_AROUND,
     STRIKE_LOSS,
     SUMMARY,
+    InStep,
     State,
     damping_w,
     rk4,
     step_with_impacts,
+    sway_work_j,
     unpacked,
 )
 from utank_hil.dynamics.pump import PumpCoefficients, PumpState, compile_pump
@@ -39,7 +41,10 @@ TIME = 18  # since the start, s
 # damping and valve
 SHAFT_WORK, WAVE_WORK, PUMP_WORK, DAMPED = range(19, 23)
 SUMMED = slice(23, 23 + SUMMARY)  # summary of `utank_hil.dynamics.kernels`
-STATES = 23 + SUMMARY
+# lateral acceleration of the centre of gravity over g, at the times of MOMENTS
+SWAY = slice(23 + SUMMARY, 27 + SUMMARY)
+SWAY_NOW = 24 + SUMMARY
+STATES = 27 + SUMMARY
 CAPSIZED, STRUCK, DAMPED_STRIKING = 23 + CAPSIZED_S, 23 + STRIKE_LOSS, 23 + DAMPED_AROUND
 
 # values of MODE: the rotor turns freely; it follows the set-point; the set-point is the pressure;
@@ -82,13 +87,14 @@ def advance_tick(
         `RollCoefficients`, and the pieces of the restoring moment per radian.
     restoring : ndarray, shape (pieces, powers)
         Coefficients of `utank_hil.dynamics.restoring.Restoring`.
-    linear : ndarray, shape (4, 7) or (0, 7)
+    linear : ndarray, shape (4, 8) or (0, 8)
         Linear model that replaces `row` and `restoring`. Columns: state matrix, effect of pressure,
-        effect of wave moment, accelerations by steady heeling moments.
+        effect of wave moment, accelerations by steady heeling moments, effect of sway.
     coefficients : tuple of float
         `PumpCoefficients` as a plain tuple: numba needs 2 us to unbox a named one.
-    phasors, rotations : ndarray, shape (n,)
-        Wave components two ticks ahead, and their rotation per tick; `phasors` is advanced.
+    phasors, rotations : ndarray, shape (1 or 2, n)
+        Wave components of moment and lateral acceleration two ticks ahead, and their rotation per
+        tick; `phasors` is advanced.
     weights : ndarray
         Result of `interpolation_weights`.
     """
@@ -107,7 +113,8 @@ def advance_tick(
     valve = c.area * state[VALVE_LOSS]
     moments, summary = state[MOMENTS], state[SUMMED]
     shaft_j, wave_j, pump_j, damped_j = 0.0, 0.0, 0.0, 0.0
-    first = moments[1]
+    sway = state[SWAY]
+    first, sway_first = moments[1], sway[1]
     # not STEPS: numba's cache would keep the number of an earlier tick
     for step in range(len(weights) // 2):
         if summary[CAPSIZED_S] < np.inf:
@@ -125,15 +132,17 @@ def advance_tick(
             pump = PumpState(pump.speed_rad_s, 0.0, 0.0, pressure_pa, 0.0, power_w, False)
         middle = _interpolated(weights, 2 * step + 1, moments)
         last = _interpolated(weights, 2 * step + 2, moments)
-        waves = (first, middle, last)
+        sway_middle = _interpolated(weights, 2 * step + 1, sway)
+        sway_last = _interpolated(weights, 2 * step + 2, sway)
+        waves, sways = (first, middle, last), (sway_first, sway_middle, sway_last)
         force = c.area * pump.pressure_pa
         if len(linear) > 0:
-            after = _linear_step(linear, x, waves, pump.pressure_pa)
+            after = _linear_step(linear, x, waves, sways, pump.pressure_pa)
         else:
-            after = rk4(c, row[17], restoring, x, waves, force, valve, STEP_S)
+            after = rk4(c, row[17], restoring, x, waves, sways, force, valve, STEP_S)
         if abs(after[2]) > c.level_limit and len(linear) == 0:
             after = step_with_impacts(
-                c, row[17], restoring, x, waves, force, valve, STEP_S,
+                c, row[17], restoring, x, waves, sways, force, valve, STEP_S,
                 state[TIME] + step * STEP_S, np.empty((0, 5)), summary,
             )  # fmt: skip
         else:
@@ -142,7 +151,9 @@ def advance_tick(
         # force times distance, which also holds in a step with an impact
         wave_j += (first + last) / 2 * (after[0] - x[0])
         pump_j += force * (after[2] - x[2])
-        x, first = after, last
+        if len(phasors) > 1:
+            wave_j += sway_work_j(c, x, after, (sway_first + sway_last) / 2)
+        x, first, sway_first = after, last, sway_last
         if abs(x[0]) >= CAPSIZE_RAD and len(linear) == 0:
             summary[CAPSIZED_S] = state[TIME] + (step + 1) * STEP_S
     state[ROLL], state[ROLL_RATE], state[LEVEL], state[LEVEL_RATE] = x
@@ -158,8 +169,10 @@ def advance_tick(
     state[PUMP_WORK] += pump_j
     state[DAMPED] += damped_j
     state[TIME] += (len(weights) // 2) * STEP_S
-    moments[0], moments[1], moments[2] = moments[1], moments[2], moments[3]
-    moments[3] = turned_sum(phasors, rotations)
+    for k, ahead in enumerate((moments, sway)):
+        ahead[0], ahead[1], ahead[2] = ahead[1], ahead[2], ahead[3]
+        if k < len(phasors):
+            ahead[3] = turned_sum(phasors[k], rotations[k])
 
 
 @njit(error_model="numpy")
@@ -181,12 +194,12 @@ def _interpolated(weights: FloatArray, row: int, moments: FloatArray) -> float:
 
 @njit(error_model="numpy")
 def _linear_step(
-    model: FloatArray, x: State, moments: tuple[float, float, float], pressure_pa: float
+    model: FloatArray, x: State, moments: InStep, sways: InStep, pressure_pa: float
 ) -> State:
-    k1 = _rates(model, x, x, 0.0, pressure_pa, moments[0])
-    k2 = _rates(model, x, k1, STEP_S / 2, pressure_pa, moments[1])
-    k3 = _rates(model, x, k2, STEP_S / 2, pressure_pa, moments[1])
-    k4 = _rates(model, x, k3, STEP_S, pressure_pa, moments[2])
+    k1 = _rates(model, x, x, 0.0, pressure_pa, moments[0], sways[0])
+    k2 = _rates(model, x, k1, STEP_S / 2, pressure_pa, moments[1], sways[1])
+    k3 = _rates(model, x, k2, STEP_S / 2, pressure_pa, moments[1], sways[1])
+    k4 = _rates(model, x, k3, STEP_S, pressure_pa, moments[2], sways[2])
     return (
         x[0] + STEP_S / 6 * (k1[0] + 2 * k2[0] + 2 * k3[0] + k4[0]),
         x[1] + STEP_S / 6 * (k1[1] + 2 * k2[1] + 2 * k3[1] + k4[1]),
@@ -197,7 +210,13 @@ def _linear_step(
 
 @njit(error_model="numpy")
 def _rates(
-    model: FloatArray, x: State, slope: State, time_s: float, pressure_pa: float, moment_nm: float
+    model: FloatArray,
+    x: State,
+    slope: State,
+    time_s: float,
+    pressure_pa: float,
+    moment_nm: float,
+    sway: float,
 ) -> State:
     """Rates of the state at x + time_s * slope."""
     a = x[0] + time_s * slope[0]
@@ -209,7 +228,7 @@ def _rates(
     level = m[3, 0] * a + m[3, 1] * b + m[3, 2] * c + m[3, 3] * d
     return (
         b,
-        roll + m[1, 4] * pressure_pa + m[1, 5] * moment_nm + m[1, 6],
+        roll + m[1, 4] * pressure_pa + m[1, 5] * moment_nm + m[1, 6] + m[1, 7] * sway,
         d,
-        level + m[3, 4] * pressure_pa + m[3, 5] * moment_nm + m[3, 6],
+        level + m[3, 4] * pressure_pa + m[3, 5] * moment_nm + m[3, 6] + m[3, 7] * sway,
     )

@@ -20,7 +20,7 @@ from firmware_sim.voyage import (
     track,
     waypoint_problems,
 )
-from firmware_sim.waves import PassingWaves, SteadyWaves, Waves
+from firmware_sim.waves import PassingWaves, Response, SteadyWaves, Waves
 from utank_hil.base.parameters import Finite, NotNegative, ParameterError, Problem, Range, refuse
 from utank_hil.configuration import ControllerConfig, Section, Vessel
 from utank_hil.configuration.plausibility import tank_problems
@@ -30,6 +30,7 @@ from utank_hil.dynamics.steady_heel import steady_heel
 from utank_hil.nodes.panel import TimedAction
 from utank_hil.sea import Harmonics
 from utank_hil.sea.encounter import wavenumber_rad_m
+from utank_hil.sea.sea import slope_per_m
 
 MOST_CONTROLLERS = 7
 """Most controllers: more runs with the passive one cannot be distinguished in a picture."""
@@ -47,6 +48,9 @@ SAILED: Final = (
     "wind_moment_nm",
 )
 """Parameters of the ship that may differ from the vessel's; the last two heel it."""
+
+SWAY: Final = "sway_of_slope"
+"""Another one, which does not change under way."""
 
 LONGEST_S: Final = 86_400.0
 """Longest run in s, a day: its rows are kept in memory."""
@@ -105,7 +109,7 @@ class Scenario(Section):
     actual_ship: dict[str, Finite] = Field(default_factory=dict)
     """Parameters of the actual ship that differ from the vessel's, on which the controller relies.
 
-    Allowed keys are those of `SAILED`."""
+    Allowed keys are those of `SAILED`, and ``sway_of_slope``, which holds from the start."""
     actual_from_s: NotNegative = 0.0
     """Time at which the difference arises, as by shifted cargo or burnt fuel."""
     voyage: tuple[Waypoint, ...] = ()
@@ -232,13 +236,18 @@ class Scenario(Section):
     def waves(self, seed: int) -> Waves:
         """Waves that the ship meets."""
         spectra = spectra_on_the_way(self.voyage, self.sea.spectra)
+        sway = self.sailing_ship.sway_of_slope
         if not self.voyage and len(spectra) <= 1:
-            return SteadyWaves(self.wave_moment(seed))
+            forces = [self.wave_moment(seed)]
+            if sway is not None:
+                slope = self.sea.sea(seed).slope
+                forces.append(replace(slope, amplitude=sway * slope.amplitude))
+            return SteadyWaves(*forces)
+        responses: list[Response] = [self.sea.moment(self.vessel.ship.stiffness_nm_rad)]
+        if sway is not None:
+            responses.append(lambda omega, heading: sway * slope_per_m(omega, heading))
         return PassingWaves(
-            self.sea.passing_sea(spectra, seed),
-            self.turn_rad,
-            self._speed_m_s,
-            self.sea.moment(self.vessel.ship.stiffness_nm_rad),
+            self.sea.passing_sea(spectra, seed), self.turn_rad, self._speed_m_s, *responses
         )
 
     def _controller_problems(self, name: str, controller: ControllerConfig) -> list[Problem]:
@@ -284,9 +293,10 @@ class Scenario(Section):
         return problems
 
     def _ship_problems(self) -> list[Problem]:
-        wrong = [key for key in self.actual_ship if key not in SAILED]
+        known = (*SAILED, SWAY)
+        wrong = [key for key in self.actual_ship if key not in known]
         if wrong:
-            reason = f"can't differ from the vessel's; it takes {', '.join(SAILED)}"
+            reason = f"can't differ from the vessel's; it takes {', '.join(known)}"
             return [(f"actual_ship.{key}", reason) for key in wrong]
         try:
             unstable = tank_problems(self.sailing_ship, self.vessel.tank)

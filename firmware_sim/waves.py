@@ -19,8 +19,12 @@ interpolated smoothly."""
 _LEAST: Final = 1e-12  # share of the largest amplitude: a ratio cannot start from zero
 
 
+Response = Callable[[FloatArray, FloatArray], ComplexArray]
+"""Complex amplitude per m of a wave's, shape (N,), of wave frequencies and headings."""
+
+
 class Waves(Protocol):
-    """Wave components at the ship."""
+    """Wave components at the ship: phasors of shape (k, N), one row for each force."""
 
     def begin(self) -> tuple[ComplexArray, ComplexArray]:
         """Phasors `AHEAD_TICKS` before the start, and their rotation per tick.
@@ -36,12 +40,15 @@ class Waves(Protocol):
 
 
 class SteadyWaves:
-    """Constant components of a roll moment in N m."""
+    """Constant components of a roll moment in N m, and of a lateral acceleration over g if any."""
 
-    def __init__(self, moment: Harmonics) -> None:
-        frequency, phase = moment.frequency_rad_s, moment.phase_rad
-        self._rotations = np.exp(1j * frequency * TICK_S)
-        self._phasors = moment.amplitude * np.exp(1j * (phase - AHEAD_TICKS * frequency * TICK_S))
+    def __init__(self, *forces: Harmonics) -> None:
+        frequency = forces[0].frequency_rad_s
+        self._rotations = np.array([np.exp(1j * frequency * TICK_S)] * len(forces))
+        lead_rad = AHEAD_TICKS * frequency * TICK_S
+        self._phasors = np.array(
+            [force.amplitude * np.exp(1j * (force.phase_rad - lead_rad)) for force in forces]
+        )
 
     def begin(self) -> tuple[ComplexArray, ComplexArray]:
         """Return the phasors and rotations at the start."""
@@ -62,8 +69,9 @@ class PassingWaves:
     ----------
     turn_rad, speed_m_s : callable
         Clockwise turn of the ship since the start, and its speed, as functions of time in s.
-    moment : callable
-        Complex roll moment in N m per m of amplitude as a function of frequency and heading.
+    responses : callable
+        Complex roll moment in N m per m of amplitude as a function of frequency and heading; the
+        lateral acceleration over g may follow.
     """
 
     def __init__(
@@ -71,14 +79,16 @@ class PassingWaves:
         sea: PassingSea,
         turn_rad: Callable[[float], float],
         speed_m_s: Callable[[float], float],
-        moment: Callable[[FloatArray, FloatArray], ComplexArray],
+        *responses: Response,
     ) -> None:
-        self._sea, self._turn_rad, self._speed_m_s, self._moment = sea, turn_rad, speed_m_s, moment
+        self._sea, self._turn_rad, self._speed_m_s = sea, turn_rad, speed_m_s
+        self._responses = responses
         lead_s = AHEAD_TICKS * TICK_S
         self._angle_rad = sea.phase_rad - lead_s * self._encounter_rad_s(0.0)
-        self._amplitude = self._amplitude_nm(0.0)
+        self._amplitude = self._amplitudes(0.0)
         self._phasors = self._amplitude * np.exp(1j * self._angle_rad)
-        self._rotations = np.exp(1j * TICK_S * self._encounter_rad_s(0.0))
+        rotation = np.exp(1j * TICK_S * self._encounter_rad_s(0.0))
+        self._rotations = np.tile(rotation, (len(responses), 1))
 
     def begin(self) -> tuple[ComplexArray, ComplexArray]:
         """Return the phasors and rotations at the start."""
@@ -98,7 +108,7 @@ class PassingWaves:
             self._encounter_rad_s(now_s + share * step_s) for share in (0.0, 0.5, 1.0)
         )
         turn_rad = step_s / 6 * (first + 4 * middle + last)
-        before, after = self._amplitude, self._amplitude_nm(now_s + step_s)
+        before, after = self._amplitude, self._amplitudes(now_s + step_s)
         self._phasors[:] = before * np.exp(1j * self._angle_rad)  # rounding does not accumulate
         self._rotations = np.exp((np.log(after / before) + 1j * turn_rad) / RENEWED_TICKS)
         self._angle_rad += turn_rad
@@ -113,9 +123,12 @@ class PassingWaves:
         _, heading_rad = self._heading_rad(time_s)
         return encounter_frequency(self._sea.omega_rad_s, heading_rad, self._speed_m_s(time_s))
 
-    def _amplitude_nm(self, time_s: float) -> ComplexArray:
+    def _amplitudes(self, time_s: float) -> ComplexArray:
+        """Amplitudes of each force, shape (k, N)."""
         amplitude_m, heading_rad = self._heading_rad(time_s)
-        amplitude = amplitude_m * self._moment(self._sea.omega_rad_s, heading_rad)
+        omega_rad_s = self._sea.omega_rad_s
+        rows = [amplitude_m * response(omega_rad_s, heading_rad) for response in self._responses]
+        amplitude = np.array(rows)
         size = np.abs(amplitude)
-        least = _LEAST * max(float(size.max()), 1.0)
+        least = _LEAST * np.maximum(size.max(axis=1, keepdims=True), 1.0)
         return np.where(size > least, amplitude, least)

@@ -158,6 +158,8 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
         raise ValueError("simulation: linear keeps ship, course and sea: take nonlinear or bus")
     if ship.heeling_moment_nm:
         raise ValueError("simulation: linear knows no steady heel: take nonlinear or bus")
+    if ship.sway_of_slope:
+        raise ValueError("simulation: linear knows no sway: take nonlinear or bus")
     moment = scenario.wave_moment(seed)
     count = round(scenario.duration_s / RECORD_S)
     at_rest = np.zeros(count)

@@ -65,18 +65,19 @@ def test_compiled_accelerations_equal_the_model(ship):
     model = RollModel(ship, tank)
     rng = np.random.default_rng(3)
     states = rng.uniform(-1, 1, (500, 4)) * [1.4, 0.5, 4.8, 3]
-    pressure, wave = rng.uniform(-1, 1, (2, 500)) * [[5e4], [2e7]]
-    expected = model.derivative(states, pressure, wave, 3e4)
+    pressure, wave, sway = rng.uniform(-1, 1, (3, 500)) * [[5e4], [2e7], [0.3]]
+    expected = model.derivative(states, pressure, wave, 3e4, 9.80665 * sway)
     values = [
         accelerations(
             model.coefficients,
             *model.packed[1:],
             *state,
             w,
+            s,
             tank.reservoir_area_m2 * p,
             tank.reservoir_area_m2 * 3e4,
         )
-        for state, p, w in zip(states, pressure, wave, strict=True)
+        for state, p, w, s in zip(states, pressure, wave, sway, strict=True)
     ]
     scale = np.abs(expected[:, [1, 3]]).max(axis=0)
     assert np.max(np.abs(values - expected[:, [1, 3]]) / scale) < 1e-13

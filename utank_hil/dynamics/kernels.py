@@ -29,6 +29,9 @@ SUMMARY = 7
 FAST = {"reassoc", "contract", "nsz", "arcp"}
 
 State = tuple[float, float, float, float]
+InStep = tuple[float, float, float]
+"""Values of a quantity at start, middle and end of a step."""
+NO_SWAY = (0.0, 0.0, 0.0)
 
 
 @njit(fastmath=FAST, error_model="numpy")
@@ -75,10 +78,15 @@ def accelerations(
     h: float,
     h_dot: float,
     moment: float,
+    sway: float,
     pump: float,
     valve: float,
 ) -> tuple[float, float]:
-    """Roll and level acceleration; `pump` is area times pressure, `valve` area times valve loss."""
+    """Roll and level acceleration; `pump` is area times pressure, `valve` area times valve loss.
+
+    `sway` is the centre of gravity's lateral acceleration over g, positive to starboard. To the
+    water it turns gravity (`utank_hil.dynamics.nonlinear`).
+    """
     sin, cos = sine_cosine(phi)
     heel = abs(phi)
     piece = min(int(heel * per_piece), restoring.shape[0] - 1)
@@ -98,6 +106,7 @@ def accelerations(
         - righting
         - 2 * c.inertia_h2 * h * h_dot * phi_dot
         - (c.weight_lever - c.weight_h2 * h * h) * sin
+        + sway * (c.weight_h * h * sin + (c.weight_lever - c.weight_h2 * h * h) * cos)
     )
     level_force = (
         pump
@@ -105,6 +114,7 @@ def accelerations(
         + c.inertia_h2 * h * phi_dot * phi_dot
         + c.weight_h * sin
         - 2 * c.weight_h2 * h * cos
+        - sway * (c.weight_h * cos + 2 * c.weight_h2 * h * sin)
     )
     scale = 1 / (roll_inertia * c.level_inertia - c.coupling * c.coupling)
     h_ddot = (roll_inertia * level_force - c.coupling * roll_moment) * scale
@@ -119,25 +129,31 @@ def rk4(
     per_piece: float,
     restoring: FloatArray,
     state: State,
-    moments: tuple[float, float, float],
+    moments: InStep,
+    sways: InStep,
     pump: float,
     valve: float,
     dt: float,
 ) -> State:
-    """Advance by one Runge-Kutta step; `moments` are the wave's at start, middle and end."""
+    """Advance by one Runge-Kutta step in a wave's moments and lateral accelerations over g."""
     x, v1, h, w1 = state
     start, middle, end = moments
+    sway_start, sway_middle, sway_end = sways
     half = 0.5 * dt
-    a1, b1 = accelerations(c, per_piece, restoring, x, v1, h, w1, start, pump, valve)
+    a1, b1 = accelerations(c, per_piece, restoring, x, v1, h, w1, start, sway_start, pump, valve)
     v2, w2 = v1 + half * a1, w1 + half * b1
     x2, h2 = x + half * v1, h + half * w1
-    a2, b2 = accelerations(c, per_piece, restoring, x2, v2, h2, w2, middle, pump, valve)
+    a2, b2 = accelerations(
+        c, per_piece, restoring, x2, v2, h2, w2, middle, sway_middle, pump, valve
+    )
     v3, w3 = v1 + half * a2, w1 + half * b2
     x3, h3 = x + half * v2, h + half * w2
-    a3, b3 = accelerations(c, per_piece, restoring, x3, v3, h3, w3, middle, pump, valve)
+    a3, b3 = accelerations(
+        c, per_piece, restoring, x3, v3, h3, w3, middle, sway_middle, pump, valve
+    )
     v4, w4 = v1 + dt * a3, w1 + dt * b3
     x4, h4 = x + dt * v3, h + dt * w3
-    a4, b4 = accelerations(c, per_piece, restoring, x4, v4, h4, w4, end, pump, valve)
+    a4, b4 = accelerations(c, per_piece, restoring, x4, v4, h4, w4, end, sway_end, pump, valve)
     sixth = dt / 6
     return (
         x + sixth * (v1 + 2 * (v2 + v3) + v4),
@@ -157,11 +173,21 @@ def damping_w(c: RollCoefficients, state: State, valve: float) -> float:
 
 
 @njit(error_model="numpy")
-def _moments_within(
-    moments: tuple[float, float, float], begin: float, end: float
-) -> tuple[float, float, float]:
-    """Interpolate wave moments quadratically at start, middle and end of a part of the step."""
-    a, b, c = moments
+def sway_work_j(c: RollCoefficients, before: State, after: State, sway: float) -> float:
+    """Return the work on the water of a lateral acceleration over g."""
+    raised = 0.0
+    for side, state in ((1.0, before), (-1.0, after)):
+        phi, _, h, _ = state
+        across = c.weight_h * h
+        down = c.weight_lever - c.weight_h2 * h * h
+        raised += side * (across * math.cos(phi) - down * math.sin(phi))
+    return sway * raised
+
+
+@njit(error_model="numpy")
+def _within(values: InStep, begin: float, end: float) -> InStep:
+    """Interpolate quadratically at start, middle and end of a part of the step."""
+    a, b, c = values
     slope, curvature = 4 * b - 3 * a - c, 2 * (a + c - 2 * b)
     mid = 0.5 * (begin + end)
     return (
@@ -182,7 +208,8 @@ def step_with_impacts(
     per_piece: float,
     restoring: FloatArray,
     state: State,
-    moments: tuple[float, float, float],
+    moments: InStep,
+    sways: InStep,
     pump: float,
     valve: float,
     dt: float,
@@ -195,8 +222,8 @@ def step_with_impacts(
     limit = c.level_limit
     for strike in range(STRIKES_PER_STEP + 1):
         left = 1.0 - done
-        moments_left = _moments_within(moments, done, 1.0)
-        after = rk4(c, per_piece, restoring, state, moments_left, pump, valve, left * dt)
+        moment, sway = _within(moments, done, 1.0), _within(sways, done, 1.0)
+        after = rk4(c, per_piece, restoring, state, moment, sway, pump, valve, left * dt)
         if abs(after[2]) <= limit:
             summary[DAMPED_AROUND] += _damped_j(c, state, after, valve, left * dt)
             return after
@@ -207,8 +234,8 @@ def step_with_impacts(
             if g_high < 1e-13 or high - low < 1e-15 or g_low >= 0:
                 break
             s = high - g_high * (high - low) / (g_high - g_low)
-            moments_left = _moments_within(moments, done, done + s)
-            candidate = rk4(c, per_piece, restoring, state, moments_left, pump, valve, s * dt)
+            moment, sway = _within(moments, done, done + s), _within(sways, done, done + s)
+            candidate = rk4(c, per_piece, restoring, state, moment, sway, pump, valve, s * dt)
             g = side * candidate[2] - limit
             if g > 0:
                 high, g_high, after = s, g, candidate
@@ -240,8 +267,9 @@ def step_with_impacts(
         # next impact is a change of sign.
         h = side * (limit if rebound == 0.0 else limit - INSIDE_M)
         state = (x, v + roll_jump, h, rebound)
-    moments_left = _moments_within(moments, done, 1.0)
-    x, v, h, w = rk4(c, per_piece, restoring, state, moments_left, pump, valve, (1.0 - done) * dt)
+    moment, sway = _within(moments, done, 1.0), _within(sways, done, 1.0)
+    left = 1.0 - done
+    x, v, h, w = rk4(c, per_piece, restoring, state, moment, sway, pump, valve, left * dt)
     return x, v, math.copysign(min(abs(h), limit), h), w
 
 
@@ -320,11 +348,12 @@ def advance(
             valve = c.area * valve_loss[min(sample, len(valve_loss) - 1)]
         held += 1
         moments = (start, middle, end)
-        after = rk4(c, per_piece, restoring, now, moments, pump, valve, dt)
+        after = rk4(c, per_piece, restoring, now, moments, NO_SWAY, pump, valve, dt)
         if abs(after[2]) > c.level_limit:
             after = step_with_impacts(
-                c, per_piece, restoring, now, moments, pump, valve, dt, step * dt, impacts, summary
-            )
+                c, per_piece, restoring, now, moments, NO_SWAY, pump, valve, dt, step * dt,
+                impacts, summary,
+            )  # fmt: skip
         now, start = after, end
         max_roll, max_level = max(max_roll, abs(now[0])), max(max_level, abs(now[2]))
         if not abs(now[0]) < capsize:

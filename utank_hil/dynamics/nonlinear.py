@@ -18,6 +18,14 @@ the equations of motion are::
 They replace thesis (4.2)-(4.4), whose printed h phi'^2 and h h' phi' terms violate conservation of
 energy.
 
+Where the centre of gravity is accelerated sideways by a, to starboard, gravity in a frame that
+moves with it is (-a, g) instead of (0, g). The ship's own weight and buoyancy act in it on the
+hull, whose wave moment contains what the waves do; on the water the potential of a is added::
+
+    V_sway = a (S_y cos phi - S_z sin phi)
+
+Water in a ship that lies along the slope s of a long wave, a = g tan s and phi = s, is at rest.
+
 The level is stopped where one reservoir is full or the other one empty. The stop is an impulse J on
 the level alone: h' changes to -e h', and the roll rate jumps through the coupling,
 d phi' = -m_c / (m0 + m2 h^2) d h'. While the water is pressed against the stop, h'' = 0.
@@ -105,6 +113,7 @@ class RollModel:
         pressure_pa: npt.ArrayLike = 0.0,
         wave_moment_nm: npt.ArrayLike = 0.0,
         valve_loss_pa_per_m2_s2: npt.ArrayLike = 0.0,
+        sway_m_s2: npt.ArrayLike = 0.0,
         *,
         stopped: bool = False,
     ) -> FloatArray:
@@ -113,14 +122,15 @@ class RollModel:
         Parameters
         ----------
         state : array_like, shape (..., 4)
-        pressure_pa, wave_moment_nm, valve_loss_pa_per_m2_s2 : array_like, shape (...)
-            Inputs; the valve loss is the output of `valves`.
+        pressure_pa, wave_moment_nm, valve_loss_pa_per_m2_s2, sway_m_s2 : array_like, shape (...)
+            Inputs; the valve loss is the output of `valves`, the sway the lateral acceleration.
         stopped : bool
             Whether the level is held, as while the water is pressed against a limit.
         """
         c = self.coefficients
         phi, phi_dot, h, h_dot = np.moveaxis(np.asarray(state, dtype=np.float64), -1, 0)
         sin, cos = np.sin(phi), np.cos(phi)
+        sway = np.asarray(sway_m_s2) / GRAVITY_M_S2
         roll_inertia = c.inertia + c.inertia_h2 * h**2
         roll_moment = (
             np.asarray(wave_moment_nm)
@@ -131,6 +141,7 @@ class RollModel:
             - 2 * c.inertia_h2 * h * h_dot * phi_dot
             + c.weight_h * h * cos
             - (c.weight_lever - c.weight_h2 * h**2) * sin
+            + sway * (c.weight_h * h * sin + (c.weight_lever - c.weight_h2 * h**2) * cos)
         )
         loss = c.quadratic_loss + c.area * np.asarray(valve_loss_pa_per_m2_s2)
         level_force = (
@@ -139,6 +150,7 @@ class RollModel:
             + c.inertia_h2 * h * phi_dot**2
             + c.weight_h * sin
             - 2 * c.weight_h2 * h * cos
+            - sway * (c.weight_h * cos + 2 * c.weight_h2 * h * sin)
         )
         if stopped:
             phi_ddot, h_ddot = roll_moment / roll_inertia, np.zeros_like(h)

@@ -2,13 +2,17 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, Final
 
 from utank_hil.base.parameters import Finite, Problem, Range, range_problems, refuse
 
 RollLimit = Annotated[float, Range(above=0, most=0.7)]
 """Limit on roll in rad, at most 0.7 (40 degrees), up to which the IS Code 2008 (part A, 2.2.1)
 rates a ship's righting levers."""
+
+MOST_SWAY: Final = 1.0
+"""Share of g times the slope by which the water particles at the surface are accelerated: a hull
+in long waves goes with them."""
 
 _MOST = 1e30  # Far beyond any ship; it keeps the results of designs finite.
 
@@ -46,6 +50,10 @@ class RollShip:
         Moment of off-centre weight in the upright ship; varies with the cosine of the roll angle.
     wind_moment_nm : float
         Steady wind moment, the same at every angle.
+    sway_of_slope : float, optional
+        Lateral acceleration of the centre of gravity, as a share of g times the slope of the waves:
+        1 in long waves, 0.4 to 0.8 where ships roll most. Without it the ship does not sway, and
+        the monitors allow for every share up to `MOST_SWAY`.
 
     Raises
     ------
@@ -65,6 +73,7 @@ class RollShip:
     gz_m: tuple[Finite, ...] = ()
     offset_moment_nm: Finite = 0.0
     wind_moment_nm: Finite = 0.0
+    sway_of_slope: Annotated[float, Range(least=0, most=MOST_SWAY)] | None = None
 
     def __post_init__(self) -> None:
         refuse("ship", [*range_problems(self), *self._lever_problems()])

@@ -170,8 +170,7 @@ class Sea:
     @property
     def slope(self) -> Harmonics:
         """Wave slope across the ship in rad, positive starboard down."""
-        wavenumber = wavenumber_rad_m(self.omega_rad_s)
-        return self._harmonics(self.amplitude_m * wavenumber * np.sin(self.heading_rad), np.pi / 2)
+        return self.harmonics(self.amplitude_m * slope_per_m(self.omega_rad_s, self.heading_rad))
 
     def roll_moment(
         self, stiffness_nm_rad: float, effective_slope: EffectiveSlope | None = None
@@ -194,6 +193,12 @@ class Sea:
         phase = self.phase_rad + lead_rad
         # The cosine is even: a negative frequency is a positive one with reversed phase.
         return Harmonics(amplitude, np.abs(encounter), np.where(encounter < 0, -phase, phase))
+
+
+def slope_per_m(omega_rad_s: FloatArray, heading_rad: FloatArray) -> ComplexArray:
+    """Complex wave slope across the ship per m of amplitude, positive starboard down."""
+    slope = wavenumber_rad_m(omega_rad_s) * np.sin(heading_rad)
+    return np.asarray(1j * slope, dtype=np.complex128)
 
 
 def drawn_components(

@@ -1,0 +1,108 @@
+"""The emulated ship with its sway, against the same equations by another integrator."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from roll_energy import energy
+from scipy.integrate import solve_ivp
+
+from firmware_sim.plant import Plant
+from firmware_sim.scenario import Scenario
+from firmware_sim.waves import PassingWaves, SteadyWaves
+from utank_hil.base.tick import TICK_NS
+from utank_hil.configuration import Vessel, load_config
+from utank_hil.dynamics.nonlinear import RollModel
+from utank_hil.sea import Harmonics, Sea, jonswap
+from utank_hil.sea.passing import PassingSea
+from utank_hil.sea.sea import slope_per_m
+
+VESSEL = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)
+STORM = Path("configs/scenarios/storm.yaml")
+FREQUENCY = np.array([0.5, 0.8])
+MOMENT = Harmonics(np.array([1.5e7, 0.5e7]), FREQUENCY, np.array([0.3, 2.0]))
+LATERAL = Harmonics(np.array([0.05, 0.03]), FREQUENCY, np.array([0.1, 2.2]))
+
+
+def advanced(plant: Plant, seconds: int) -> list[float]:
+    for tick in range(100 * seconds + 1):
+        plant.advance(tick * TICK_NS)
+    return [
+        plant.roll_rad,
+        plant.roll_rate_rad_s,
+        plant.level_m,
+        plant.flow_m3_s / VESSEL.tank.reservoir_area_m2,
+    ]
+
+
+def test_swaying_plant_equals_an_adaptive_integration() -> None:
+    ship = replace(VESSEL.ship, quadratic_damping_nms2_rad2=2e8)
+    model = RollModel(ship, VESSEL.tank)
+
+    def slopes(t, x):
+        lateral = 9.80665 * float(LATERAL.at(t))
+        return model.derivative(x, 0.0, float(MOMENT.at(t)), sway_m_s2=lateral)
+
+    expected = solve_ivp(slopes, (0, 60), [0.0] * 4, "DOP853", rtol=1e-10, atol=1e-12).y[:, -1]
+    plant = Plant(ship, VESSEL.tank, None, SteadyWaves(MOMENT, LATERAL))
+    assert advanced(plant, 60) == pytest.approx(expected, abs=1e-6)
+    assert plant.lateral_m_s2 == pytest.approx(9.80665 * float(LATERAL.at(60.0)), rel=1e-6)
+
+
+def test_its_small_motion_is_that_of_the_linear_plant() -> None:
+    small = [Harmonics(1e-5 * each.amplitude, FREQUENCY, each.phase_rad)
+             for each in (MOMENT, LATERAL)]  # fmt: skip
+    found = [
+        advanced(Plant(VESSEL.ship, VESSEL.tank, None, SteadyWaves(*small), linear=linear), 60)
+        for linear in (False, True)
+    ]
+    assert found[0] == pytest.approx(found[1], rel=1e-4, abs=1e-10)
+
+
+def test_work_less_losses_is_the_change_of_energy_in_a_swaying_ship() -> None:
+    tank = replace(VESSEL.tank, quadratic_loss=2.0, headroom_m=1.5, restitution=0.2)
+    forces = [Harmonics(3 * each.amplitude, FREQUENCY, each.phase_rad)
+              for each in (MOMENT, LATERAL)]  # fmt: skip
+    plant = Plant(VESSEL.ship, tank, VESSEL.pump, SteadyWaves(*forces))
+    upright_j = float(energy(VESSEL.ship, tank, [[0.0] * 4])[0])
+    state = advanced(plant, 120)
+    assert plant.strikes > 3
+    gained_j = float(energy(VESSEL.ship, tank, [state])[0]) - upright_j
+    work_j = plant.wave_work_j + plant.pump_work_j - plant.losses_j
+    assert work_j == pytest.approx(gained_j, abs=1e-5 * plant.losses_j)
+
+
+def test_a_sea_that_passes_sways_the_ship_as_a_steady_one() -> None:
+    sea = Sea.irregular(jonswap(3.0, 9.0), 2, components=32, heading_rad=1.2, speed_m_s=5.0)
+
+    def moment(omega, heading):
+        return 2e8 * slope_per_m(omega, heading)
+
+    def lateral(omega, heading):
+        return 0.7 * slope_per_m(omega, heading)
+
+    forces = [sea.harmonics(sea.amplitude_m * each(sea.omega_rad_s, sea.heading_rad))
+              for each in (moment, lateral)]  # fmt: skip
+    passing = PassingWaves(PassingSea.of(sea), lambda _: 0.0, lambda _: 5.0, moment, lateral)
+    plants = [Plant(VESSEL.ship, VESSEL.tank, None, waves)
+              for waves in (SteadyWaves(*forces), passing)]  # fmt: skip
+    assert advanced(plants[1], 30) == pytest.approx(advanced(plants[0], 30), rel=1e-7)
+
+
+def test_scenario_sways_by_its_share_of_the_slope_and_not_without_it(tmp_path: Path) -> None:
+    def plant(**ship: float) -> Plant:
+        text = f"actual_ship: {json.dumps(ship)}\n" + STORM.read_text()
+        file = tmp_path / "storm.yaml"
+        file.write_text(text.replace("../", f"{STORM.resolve().parents[1]}/"))
+        scenario = load_config(file, Scenario)
+        return Plant(scenario.ship_at, VESSEL.tank, None, scenario.waves(1))
+
+    still, zero, swaying = plant(), plant(sway_of_slope=0.0), plant(sway_of_slope=0.7)
+    assert advanced(still, 20) == advanced(zero, 20)
+    assert advanced(swaying, 20) != advanced(still, 20)
+    slope = load_config(STORM, Scenario).sea.sea(1).slope
+    assert swaying.lateral_m_s2 == pytest.approx(0.7 * 9.80665 * float(slope.at(20.0)), rel=1e-6)
+    assert math.isclose(zero.lateral_m_s2, 0.0)
