@@ -181,7 +181,7 @@ def causes(head: Mapping[str, Any], config: ControllerConfig, folder: Path) -> l
             f"configuration, {key}: recorded {recorded_keys.get(key, 'absent')!r}, "
             f"replayed {replayed_keys.get(key, 'absent')!r}"
             for key in dict.fromkeys((*recorded_keys, *replayed_keys))
-            if recorded_keys.get(key, "absent") != replayed_keys.get(key, "absent")
+            if recorded_keys.get(key) != replayed_keys.get(key)  # None: as without the key
         ]
     )
 
