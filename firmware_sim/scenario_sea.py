@@ -29,6 +29,7 @@ from utank_hil.configuration.spectra import (
     JonswapSpectrum,
     MeasuredSpectrum,
     PiersonMoskowitzSpectrum,
+    TabulatedSpectrum,
     read_spectra,
     utc,
 )
@@ -176,6 +177,10 @@ class PiersonMoskowitzSea(PiersonMoskowitzSpectrum, IrregularSea):
     """Fully developed sea."""
 
 
+class TabulatedSea(TabulatedSpectrum, IrregularSea):
+    """Sea of a spectrum from any source."""
+
+
 class MeasuredSea(MeasuredSpectrum, IrregularSea):
     """Hour of a buoy's record, in one direction or in the directions measured."""
 
@@ -297,7 +302,7 @@ class RegularSea(_AnySea):
 
 
 ScenarioSea = Annotated[
-    MeasuredSea | JonswapSea | IttcSea | PiersonMoskowitzSea | RegularSea,
+    MeasuredSea | TabulatedSea | JonswapSea | IttcSea | PiersonMoskowitzSea | RegularSea,
     Field(discriminator="kind"),
 ]
 """Section ``sea`` of a scenario."""

@@ -1,4 +1,5 @@
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -90,6 +91,12 @@ def test_missing_file_is_a_problem_even_where_nothing_is_required(tmp_path: Path
         ("ship: &a {name: *a}\n", "", "an alias (*) names what it stands in"),
         ("ship: 2019-13-45\n", "", "line 1, column 7: month must be in 1..12; put text in quotes"),
         ("ship: !!int x\n", "", "put text in quotes"),
+        (
+            "a: &a [x, x, x, x, x, x, x, x, x]\n"
+            + "".join(f"{c}: &{c} [{', '.join([f'*{b}'] * 9)}]\n" for b, c in pairwise("abcdefgh")),
+            "", "holds more than 200000 values, aliases (*) written out",
+        ),
+        (f"# {'x' * (1 << 22)}\n", "", "holds more than 4194304 bytes"),
         ("[" * 5000, "", "nested too deeply"),
         ("ship: {name: A\n", "", "is not valid YAML in line 2, column 1"),
         ("a: 1\n--- \nb: 2\n", "", "is not valid YAML"),
@@ -125,6 +132,26 @@ def test_any_text_loads_or_is_told_what_is_wrong(tmp_path: Path, text: str) -> N
         load_config(path, Scenario)
     except ConfigError as error:
         assert all(problem.file == path for problem in error.problems)  # noqa: PT017
+
+
+@pytest.mark.parametrize("name", ["a.yml", "a.YAML", "a b.yaml"])
+def test_other_files_are_named_with_any_suffix_of_yaml(tmp_path: Path, name: str) -> None:
+    write(tmp_path, name, "name: A\nlength_m: 20\n")
+    top = write(tmp_path, "top.yml", f"ship: {name}\nduration_s: 10\n")
+    assert load_config(top, Scenario).ship.length_m == 20
+
+
+def test_the_name_of_a_file_is_text(tmp_path: Path) -> None:
+    write(tmp_path, "a.yaml", "name: as in b.yaml\nlength_m: 20\n")
+    top = write(tmp_path, "top.yaml", "ship: a.yaml\nduration_s: 10\n")
+    assert load_config(top, Scenario).ship.name == "as in b.yaml"
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path, encoding: str) -> None:
+    top = tmp_path / "top.yaml"
+    top.write_text("ship: {name: Älv, length_m: 20}\r\nduration_s: 10\r\n", encoding=encoding)
+    assert load_config(top, Scenario).ship.name == "Älv"
 
 
 def test_kind_is_told_by_the_keys_that_no_other_has(tmp_path: Path) -> None:

@@ -1,14 +1,22 @@
 """Laws in matrices: the same law from every kind of file, and clear errors."""
 
 import json
+import math
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from others import field_case
 from scipy.io import savemat
+from scipy.sparse import csc_matrix
 
 from utank_hil.assembly import build_law
 from utank_hil.configuration import ConfigError, ControllerConfig, load_config
+from utank_hil.configuration.matrices import read_system
 
 SHIP = Path("configs/ships/thesis_first.yaml").resolve()
 LAW = {"A": [[0.5, 0.1], [0.0, 0.2]], "B": [[1.0], [2.0]], "C": [[1e4, 2e4]], "D": [[3e4]]}
@@ -72,13 +80,24 @@ def test_a_static_law_may_be_json(tmp_path: Path) -> None:
     [
         (".json", {**LAW}, "must hold A, B, C, D and one of sample_time_s, dt, Ts; it has A, B"),
         (".npz", {**LAW, "dt": 0.1, "Ts": 0.1}, "must hold A, B, C, D and one of"),
-        (".json", {**LAW, "dt": "fast"}, "must hold matrices of real numbers"),
+        (".json", {**LAW, "dt": "fast"}, "dt must be a time in seconds, got 'fast'"),
         (".json", {**LAW, "dt": 0.1, "B": [[1.0]]}, "system.B: must have shape (2, 1)"),
         (".npz", {**LAW, "dt": 0.1, "D": [[1.0], [2.0]]}, "system.D: must be one row"),
         (".npz", {**LAW, "dt": 0.1, "C": [[np.inf, 0.0]]}, "system.C"),
-        (".json", {**LAW, "dt": True}, "dt must be a time in seconds, not true or false"),
+        (".json", {**LAW, "dt": True}, "dt must be a time in seconds, got True"),
         (".json", {**LAW, "dt": 0.013}, "law.system.sample_time_s: must be a whole number of"),
-        (".mat", {**LAW, "dt": 0.1, "A": [[1j, 0], [0, 1]]}, "a complex one is not"),
+        (".json", {**LAW, "dt": 0}, "dt is 0, a continuous system: sample it first"),
+        (".mat", {**LAW, "Ts": -1.0}, "Ts is -1, an unknown sample time"),
+        (".json", {**LAW, "dt": 0.1, "A": [[True, 0.1], [0.0, 0.2]]}, "A has true in the place"),
+        (".json", {**LAW, "dt": 0.1, "A": [["0.5", 0.1], [0, 1]]}, "A must hold numbers"),
+        (".json", {**LAW, "dt": 0.1, "A": [[0.5], [0.0, 0.2]]}, "A must have rows of one length"),
+        (".npz", {**LAW, "dt": 0.1, "C": [[True, False]]}, "C must hold numbers, got bool"),
+        (".json", {**LAW, "dt": 0.1, "D": [[math.nan]]}, "NaN is no finite number"),
+        (
+            ".mat",
+            {**LAW, "dt": 0.1, "A": [[1j, 0], [0, 1]]},
+            "A must be real, and has imaginary parts",
+        ),
     ],
 )
 def test_what_is_wrong_is_said_at_its_key(tmp_path: Path, suffix, content, message) -> None:
@@ -92,6 +111,7 @@ def test_what_is_wrong_is_said_at_its_key(tmp_path: Path, suffix, content, messa
     ("name", "text", "message"),
     [
         ("law.json", "[1, 2", "holds no matrices"),
+        ("law.json", '{"dt": 0.1, "dt": 0.2}', "it has the key 'dt' twice: remove one"),
         ("law.npz", "PK nonsense", "holds no matrices"),
         ("law.mat", "nonsense", "holds no matrices"),
         ("law.csv", "1, 2", "must be a file of .json, .npz, .mat"),
@@ -109,3 +129,101 @@ def test_a_file_that_is_none_is_said(tmp_path: Path, name: str, text: str, messa
 def test_it_measures_as_many_outputs_as_d_has_columns(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"law.measured: must name 1 outputs"):
         configured(tmp_path, {**LAW, "sample_time_s": 0.1}, "[roll_rad, level_m]")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"sys": {**LAW, "Ts": 0.1}},
+        {**LAW, "Ts": 0.1, "A": np.array(LAW["A"]) + 0j},
+        {**{name: csc_matrix(value) for name, value in LAW.items()}, "Ts": 0.1},
+        {**LAW, "Ts": np.uint8(1), "A": np.array(LAW["A"])},
+    ],
+    ids=["structure", "complex without imaginary part", "sparse", "whole number"],
+)
+def test_matrices_are_read_as_matlab_has_them(tmp_path: Path, content) -> None:
+    savemat(tmp_path / "law.MAT", content)
+    found = read_system(tmp_path / "law.MAT")
+    assert [list(map(list, found[name])) for name in "ABCD"] == list(LAW.values())
+
+
+def test_a_vector_is_a_column_for_b_and_a_row_for_c(tmp_path: Path) -> None:
+    vectors = {**LAW, "B": [1.0, 2.0], "C": [1e4, 2e4], "D": 3e4, "dt": 0.1}
+    found = read_system(tmp_path / written(tmp_path, ".json", vectors))
+    assert [list(map(list, found[name])) for name in "ABCD"] == list(LAW.values())
+
+
+def matlab_73(path: Path, content: dict[str, object]) -> None:
+    """Write matrices as MATLAB's `save -v7.3` does: HDF5, transposed, sparse ones in columns."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        struct = file.create_group("sys")
+        struct.attrs["MATLAB_class"] = np.bytes_("struct")
+        for name, value in content.items():
+            matrix = np.atleast_2d(np.asarray(value, dtype=float))
+            if name == "A":
+                columns = csc_matrix(matrix)
+                group = struct.create_group(name)
+                group.attrs["MATLAB_sparse"] = np.uint64(len(matrix))
+                group["data"], group["ir"], group["jc"] = (
+                    columns.data, columns.indices.astype("u8"), columns.indptr.astype("u8"),
+                )  # fmt: skip
+            elif name == "C":
+                kind = np.dtype([("real", "<f8"), ("imag", "<f8")])
+                struct[name] = np.array([[(x, 0.0) for x in row] for row in matrix.T], dtype=kind)
+            else:
+                struct[name] = matrix.T
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(508) + b"\x00\x02IM")
+
+
+def test_files_of_matlab_7_3_are_read(tmp_path: Path) -> None:
+    matlab_73(tmp_path / "law.mat", {**LAW, "Ts": 0.1})
+    found = read_system(tmp_path / "law.mat")
+    assert [list(map(list, found[name])) for name in "ABCD"] == list(LAW.values())
+    assert found["sample_time_s"] == 0.1
+
+
+@given(
+    st.integers(1, 4).flatmap(
+        lambda n: st.tuples(
+            arrays(float, (n, n), elements=st.floats(-1e9, 1e9)),
+            arrays(float, (n, 2), elements=st.floats(-1e9, 1e9)),
+        )
+    )
+)
+def test_matrices_are_read_to_the_bit(tmp_path_factory, pair) -> None:
+    a, b = pair
+    content = {"A": a, "B": b, "C": b[:, :1].T, "D": b[:1], "dt": 0.1}
+    folder = tmp_path_factory.mktemp("law")
+    savemat(folder / "law.mat", content)
+    np.savez(folder / "law.npz", **content)
+    lists = {name: np.asarray(value).tolist() for name, value in content.items()}
+    (folder / "law.json").write_text(json.dumps(lists))
+    read = [read_system(folder / f"law{suffix}") for suffix in (".mat", ".npz", ".json")]
+    assert read[0] == read[1] == read[2]
+    np.testing.assert_array_equal(read[0]["A"], a)
+
+
+@pytest.mark.parametrize(
+    ("file", "message"),
+    [
+        ("10-law-in-json-is-not-read-strictly/text.json", "dt must be a time in seconds"),
+        ("10-law-in-json-is-not-read-strictly/true.json", "A has true in the place of a number"),
+        ("10-law-in-json-is-not-read-strictly/twice.json", "it has the key 'dt' twice"),
+        ("15-byte-order-mark/law.json", ""),
+        ("16-mat-as-matlab-has-it/struct.mat", ""),
+        ("16-mat-as-matlab-has-it/sparse.mat", ""),
+        ("16-mat-as-matlab-has-it/complex.mat", ""),
+        ("16-mat-as-matlab-has-it/suffix.MAT", ""),
+        ("16-mat-as-matlab-has-it/column.json", ""),
+    ],
+)
+def test_cases_from_the_field(file: str, message: str) -> None:
+    path = field_case(file)
+    if message:
+        with pytest.raises(ValueError, match=message):
+            read_system(path)
+    else:
+        found = read_system(path)
+        assert found["A"] == ((0.5, 0.1), (0.0, 0.2))
+        assert found["B"] == ((1.0,), (2.0,))

@@ -1,5 +1,6 @@
 """The sea of a law: a spectrum by its kind is the same sea as the bands written out."""
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,50 @@ KINDS: dict[str, dict[str, Any]] = {
     "ittc": {"kind": "ittc", "hs_m": 3.0, "tp_s": 9.0},
     "pierson_moskowitz": {"kind": "pierson_moskowitz", "hs_m": 3.0},
 }
+
+
+def tabulated(folder: Path, text: str) -> dict[str, Any]:
+    (folder / "sea.csv").write_text(text)
+    return {"kind": "tabulated", "file": "./sea.csv"}
+
+
+def test_a_sea_is_read_from_a_table_of_frequency_and_density(tmp_path: Path) -> None:
+    sea = tabulated(tmp_path, "frequency_hz;density_m2_hz\n0.08;1.5\n0.10;4\n0.12;2\n")
+    assert loaded(tmp_path, sea).spectrum.density.tolist() == [1.5, 4, 2]
+    (tmp_path / "scenario.yaml").write_text(yaml.safe_dump({"sea": sea}))
+    scenario_sea = load_config(tmp_path / "scenario.yaml", Holder).sea
+    assert scenario_sea.sea(1).amplitude_m.size == 512
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("f,s\n0.1,1\n", "needs the columns frequency_hz and density_m2_hz, has f, s"),
+        ("frequency_hz,density_m2_hz\n0.2,1\n0.1,1\n", "frequency_hz must be finite, positive"),
+        ("frequency_hz,density_m2_hz\n0.1,-1\n0.2,1\n", "density must be finite and zero"),
+        ("frequency_hz,density_m2_hz\n0.1,9e3\n0.2,9e3\n", "holds a sea of"),
+        ("frequency_hz,density_m2_hz\n0.1,0\n0.2,0\n", "holds a sea of 0 m"),
+        ("frequency_hz,density_m2_hz\n0.1,\n0.2,1\n", "density must be finite and zero"),
+    ],
+)
+def test_a_table_that_holds_no_sea_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "scenario.yaml").write_text(yaml.safe_dump({"sea": tabulated(tmp_path, text)}))
+    with pytest.raises(ConfigError, match=said):
+        load_config(tmp_path / "scenario.yaml", Holder)
+
+
+def test_rows_that_are_left_out_are_a_warning_and_a_new_file_is_read_anew(tmp_path: Path) -> None:
+    file = tmp_path / "sea.txt"
+    head = "#YY  MM DD hh mm .05 .10\n2020 01 01 01 00 1 2\n"
+    file.write_text(head + "2020 01 01 02 00 1\n")
+    sea = {"kind": "measured", "file": "./sea.txt", "time": "2020-01-01T01:00"}
+    (tmp_path / "scenario.yaml").write_text(yaml.safe_dump({"sea": sea}))
+    ((key, why),) = load_config(tmp_path / "scenario.yaml", Holder).sea.warnings()
+    assert key == "file"
+    assert "line 3: 1 values for 2 frequencies" in why
+    file.write_text(head)
+    os.utime(file, ns=(1, 1))
+    assert not load_config(tmp_path / "scenario.yaml", Holder).sea.warnings()
 
 
 class Holder(Section):

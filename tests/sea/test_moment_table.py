@@ -1,3 +1,4 @@
+import gzip
 from pathlib import Path
 
 import numpy as np
@@ -54,12 +55,16 @@ def test_rows_may_stand_in_any_order(tmp_path: Path) -> None:
     ("change", "reason"),
     [
         (lambda text: text.replace("phase_deg", "phase"), "needs the columns omega_rad_s"),
-        (lambda text: text.replace("0.5", "half"), "could not convert"),
-        (lambda text: text.replace("\n0.5,0.0,", "\n0.5,0.0\n", 1), "fewer than 4 values"),
+        (lambda text: text.replace("0.5", "half"), "line 2, omega_rad_s: 'half' is no number"),
+        (
+            lambda text: text.replace("\n0.5,0.0,", "\n0.5,0.0\n", 1),
+            "line 2 has 2 fields",
+        ),
         (lambda text: text + "1.0,90.0,1.0,0.0\n", "once"),
         (lambda text: text.replace(",180.0,", ",170.0,"), "headings from 0 to 180"),
         (lambda text: text.replace("\n0.5", "\nnan", 1), "finite"),
-        (lambda text: text.splitlines()[0] + "\n", "two or more frequencies"),
+        (lambda text: text.splitlines()[0] + "\n", "a line of names and no rows"),
+        (lambda text: "\n".join(text.splitlines()[:2]), "two or more frequencies"),
     ],
 )
 def test_what_is_wrong_with_a_table_is_said(tmp_path: Path, change, reason: str) -> None:
@@ -67,6 +72,16 @@ def test_what_is_wrong_with_a_table_is_said(tmp_path: Path, change, reason: str)
     file.write_text(change(file.read_text()))
     with pytest.raises(ValueError, match=reason):
         MomentTable.read(file)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_a_table_is_read_as_any_other(tmp_path: Path, separator: str) -> None:
+    file = write(tmp_path / "table.csv", np.array([0.5, 1.0]), np.array([0.0, 90.0, 180.0]))
+    before = MomentTable.read(file)
+    text = "\ufeff" + file.read_text().replace(",", separator).replace("\n", "\r\n")
+    (tmp_path / "other.csv.gz").write_bytes(gzip.compress(text.encode()))
+    other = MomentTable.read(tmp_path / "other.csv.gz")
+    np.testing.assert_array_equal(other.moment_nm_per_m, before.moment_nm_per_m)
 
 
 def test_file_that_is_not_there_is_named(tmp_path: Path) -> None:

@@ -1,8 +1,10 @@
+import gzip
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from others import field_case, others_file
 
 from utank_hil.sea import load_ndbc
 
@@ -38,6 +40,8 @@ def as_45_day_layout(path, separation=True):
         ]
         rows.append(" ".join(words[:5] + ["9.999"] * separation + pairs))
     title = "#YY  MM DD hh mm Sep_Freq  < spec_1 (freq_1) spec_2 (freq_2) spec_3 (freq_3) ... >"
+    if path == DIRECTION:
+        title = "#YY  MM DD hh mm alpha1_1 (freq_1) alpha1_2 (freq_2) alpha1_3 (freq_3) ... >"
     return "\n".join([title, *rows[::-1]]) + "\n"
 
 
@@ -155,21 +159,24 @@ def test_selection_is_exact_unless_told_how_far():
         (HEADER, "no spectra in the file"),
         ("2020 01 01 01 00 1 2 3\n", "line 1: no header line"),
         (HEADER + "2020 01 01 01 00 1 2\n", "line 2: 2 values for 3 frequencies"),
-        (HEADER + "2020 01 01 01 00 1 x 3\n", "line 2: 'x' is not a number"),
+        (HEADER + "2020 01 01 01 00 1 x 3\n", "line 2: 'x' is not a finite number"),
         (HEADER + "2020 13 01 01 00 1 2 3\n", "line 2: bad time '2020 13 01 01 00'"),
-        (HEADER + "2020 01 01 01 00 1 -2 3\n", "line 2: density -2 is outside 0 to inf"),
+        (HEADER + "2020 01 01 01 00 1 -2 3\n", "line 2: density -2 is below 0"),
         (HEADER + "2020 01 01 01 00 1 inf 3\n", "line 2: 'inf' is not a finite number"),
-        (HEADER + "2020 01 01 01 00 1 2 3\n2020 01 01 01 00 1 2 3\n", "line 3: .* in line 2 too"),
-        (HEADER + "2020 01 01 01 00 MM MM MM\n", "every density in the file is marked as missing"),
+        (HEADER + "2020 01 01 01 00 1 2 3\n2020 01 01 01 00 1 2 9\n", "line 3: .* in line 2 too"),
+        (HEADER + "2020 01 01 01 00 1 1_0 3\n", "line 2: '1_0' is not a finite number"),
+        (HEADER + "2020 01 01 01 00 640 640 640\n", "line 2: waves of 39.2 m are higher"),
+        ("YY MM DD hh .3 .4\n20 01 01 01 .1 .9\n", "line 2: density 0.9 at 0.4 Hz is more than"),
+        (
+            "#YY  MM DD hh mm alpha1_1 (freq_1) ... >\n2020 01 01 01 00 9 (0.1) 8 (0.2)\n",
+            "line 1 says that it holds mean directions .alpha1., and a file of spectral densities",
+        ),
+        (HEADER + "2020 01 01 01 00 MM MM MM\n", "every value in the file is marked as missing"),
         ("#YY MM DD hh mm .1 .1\n2020 01 01 01 00 1 2\n", "line 1: frequencies must be"),
         ("#YY MM DD hh mm .1\n2020 01 01 01 00 1\n", "line 1: frequencies must be two or more"),
         ("#YY MM DD .1 .2\n2020 01 01 1 1\n", "line 1: header must be year"),
         ("2020 01 01 01 1.0 (0.1) 2.0 (0.2)\n", "line 1: not of the form"),
         ("2020 01 01 01 00 9.999 1.0 (0.2) 2.0 (0.1)\n", "line 1: frequencies must be"),
-        (
-            "2020 01 01 01 00 9.999 1.0 (0.1) 2.0 (0.2)\n2020 01 01 02 00 9.999 1.0 (0.1) 1 (0.3)",
-            "line 2: frequencies differ from those of line 1",
-        ),
     ],
 )
 def test_bad_files_are_refused_with_file_line_and_reason(write, text, message):
@@ -177,10 +184,100 @@ def test_bad_files_are_refused_with_file_line_and_reason(write, text, message):
         load_ndbc(write(text))
 
 
-def test_directions_on_another_grid_or_out_of_range_are_refused(write):
-    other = write(HEADER + "2019 02 06 00 40 1 2 3\n")
+def test_directions_on_another_grid_or_of_another_quantity_are_refused(write):
+    other = write(HEADER + "2019 02 06 00 40 101 102 103\n")
     with pytest.raises(ValueError, match=r"spectra\.txt: frequencies differ"):
         load_ndbc(DENSITY, other)
-    text = DIRECTION.read_text(encoding="utf-8").replace(" 136 ", " 436 ", 1)
-    with pytest.raises(ValueError, match="line 2: direction 436 is outside 0 to 360"):
-        load_ndbc(DENSITY, write(text))
+    with pytest.raises(ValueError, match=r"spectra\.txt: no value is above 44.*alpha1"):
+        load_ndbc(DENSITY, write(DENSITY.read_text(encoding="utf-8")))
+    text = DIRECTION.read_text(encoding="utf-8")
+    for letter, found in (("j", "r1"), ("w", "spectral densities")):
+        with pytest.raises(ValueError, match=f"the name says that it holds {found}"):
+            load_ndbc(DENSITY, write(text, f"41010{letter}2019.txt"))
+    one_wrong = load_ndbc(DENSITY, write(text.replace(" 136 ", " 436 ", 1), "41010d2019.txt"))
+    assert "line 2: direction 436 is outside 0 to 360" in one_wrong.notes[0]
+    assert np.isnan(one_wrong.direction_from_deg[0]).all()
+    assert np.isfinite(one_wrong.direction_from_deg[1]).all()
+
+
+def test_damaged_rows_are_named_and_the_others_used(write):
+    rows = {
+        "01": "1.0 2.0 3.0", "02": "1.0 2.0", "03": "1.0 2.0 9.0", "04": "1 2 -3", "05": "2 2 2",
+    }  # fmt: skip
+    text = HEADER + "".join(f"2020 01 01 {hour} 00 {row}\n" for hour, row in rows.items())
+    text += "2020 01 01 05 00 2 2 2\n2020 01 01 03 00 4 4 4\n"
+    text += "#YY MM DD hh mm .05 .10\n2020 01 01 06 00 1 2\n2020 01 01 07 00 1"
+    spectra = load_ndbc(write(text))
+    assert [str(time)[11:13] for time in spectra.time] == ["01", "05", "06"]
+    assert spectra.at("2020-01-01T06:00").frequency_hz.tolist() == [0.05, 0.10]
+    assert spectra.at("2020-01-01T01:00").density.tolist() == [1, 2, 3]
+    assert np.isfinite(spectra.hs_m).all()
+    assert spectra.tp_s.tolist() == [1 / 0.15, 1 / 0.05, 1 / 0.1]
+    lines = [re.search("line ([0-9]+)", note)[1] for note in spectra.notes]
+    assert lines == ["3", "11", "5", "7", "8"]
+    with pytest.raises(ValueError, match=r"(?s)no spectrum within.*5 rows are left out.*line 3"):
+        spectra.at("2020-01-01T02:00")
+
+
+def test_directions_of_other_bands_are_left_out(write):
+    density = HEADER + "2020 01 01 01 00 1 2 3\n#YY MM DD hh mm .05 .10\n2020 01 01 02 00 1 2\n"
+    direction = HEADER + "2020 01 01 01 00 1 2 300\n2020 01 01 02 00 5 6 7\n"
+    spectra = load_ndbc(write(density), write(direction, "41010d2020.txt"))
+    np.testing.assert_array_equal(spectra.direction_from_deg, [[1, 2, 300], [np.nan] * 3])
+    assert "directions of 2020-01-01T02:00:00 are of other frequencies" in spectra.notes[0]
+
+
+def test_a_compressed_file_is_read(tmp_path):
+    (tmp_path / "sea.txt.gz").write_bytes(gzip.compress(DENSITY.read_bytes()))
+    zipped = load_ndbc(tmp_path / "sea.txt.gz")
+    np.testing.assert_array_equal(zipped.density, load_ndbc(DENSITY).density)
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("station.data_spec",), ""),
+        (("station.swdir",), "line 1 says that it holds mean directions"),
+        (("station.swr1",), "line 1 says that it holds r1"),
+        (("year_direction.txt",), "line 2: .*is it a file of densities"),
+        (("year_r1.txt",), "line 2: .*is it a file of densities"),
+        (("station.data_spec", "station.swdir"), ""),
+        (("station.data_spec", "station.swr1"), "line 1 says that it holds r1"),
+        (("station.data_spec", "station.data_spec"), "line 1 says that it holds spectral"),
+        (("station.data_spec", "year_r1.txt"), "no value is above 85"),
+    ],
+)
+def test_a_file_of_another_quantity_is_refused(names, said):
+    files = [field_case(f"35-ndbc-file-of-another-quantity/{name}") for name in names]
+    if said:
+        with pytest.raises(ValueError, match=said):
+            load_ndbc(*files)
+    else:
+        assert load_ndbc(*files).hs_m[0] == pytest.approx(1.16, abs=1.5)
+
+
+@pytest.mark.parametrize(
+    ("name", "hours", "notes"),
+    [("bands.data_spec", 2, 0), ("year.txt", 2, 0), ("double.txt", 2, 1), ("cut.txt", 1, 1)],
+)
+def test_files_that_change_or_are_damaged_are_read(name, hours, notes):
+    spectra = load_ndbc(field_case(f"13-ndbc-bands-change/{name}"))
+    assert (len(spectra), len(spectra.notes)) == (hours, notes)
+    assert all(spectrum.hs_m > 0 for spectrum in spectra)
+
+
+@pytest.mark.parametrize(
+    ("density", "direction", "heights_m"),
+    [
+        ("41010.data_spec", "41010.swdir", {"2020-06-02T02:50": 2.994, "2020-06-08T03:50": 1.119}),
+        (
+            "41010w2019part.txt.gz", "41010d2019part.txt.gz",
+            {"2019-02-10T05:40": 4.710, "2019-02-06T00:40": 1.905},
+        ),
+    ],
+)  # fmt: skip
+def test_heights_of_the_buoy_of_others(density, direction, heights_m):
+    spectra = load_ndbc(others_file(f"seas/{density}"), others_file(f"seas/{direction}"))
+    assert not spectra.notes
+    for time, height_m in heights_m.items():
+        assert spectra.at(time).hs_m == pytest.approx(height_m, abs=1e-3)

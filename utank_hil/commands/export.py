@@ -12,7 +12,7 @@ from utank_hil.console.terminal import notes, say_cut, shown
 from utank_hil.telemetry.bus_logs import BUS_SUFFIXES, read_bus_log, write_bus_log
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
 from utank_hil.telemetry.replay import Entry, entries_of
-from utank_hil.telemetry.signal_files import TABLE_SUFFIXES, read_signals, write_signals
+from utank_hil.telemetry.signal_files import TABLE_SUFFIXES, read_signals, require, write_signals
 
 _FORMATS = ", ".join((*BUS_SUFFIXES, *TABLE_SUFFIXES))
 
@@ -59,6 +59,7 @@ def export(
             name = list(runs)[-1] if run is None else run
             if name not in runs:
                 fail(f"{recording} has no run {name!r}; it has {', '.join(runs)}")
+            require(recording, runs[name], "time_s")
             write_signals(to, runs[name])
             count, unit = len(runs[name]["time_s"]), "rows"
     except (OSError, ValueError) as error:

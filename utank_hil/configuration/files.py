@@ -1,7 +1,8 @@
 """Reader of configuration files: YAML that may name other YAML files, with errors at their place.
 
-A value that is the name of a ``.yaml`` file stands for that file's content, and one that begins
-with ``./`` or ``../`` is the path of a data file; both are relative to the file they stand in.
+A value that is the name of a ``.yaml`` or ``.yml`` file stands for that file's content, and one
+that begins with ``./`` or ``../`` is the path of a data file; both are relative to the file they
+stand in. The key ``name`` of a file is text, whatever it looks like.
 Every error carries the file and key where the wrong value was written.
 """
 
@@ -13,12 +14,16 @@ from typing import Any, ClassVar, Final, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from utank_hil.base.parameters import ParameterError, Problem
+from utank_hil.base.text_files import open_text
 from utank_hil.configuration.error_words import words_for
 from utank_hil.configuration.known_keys import known_keys, nearest
 from utank_hil.configuration.yaml_text import Key, YamlError, parse_yaml
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
+_LIMIT_BYTES: Final = 1 << 22
+"""Largest file: a text of four megabytes takes half a minute to parse."""
+_SUFFIXES: Final = (".yaml", ".yml")
 ALLOW_CODE: Final = "allow_code"
 """Key of the validation's context: whether the file may name code to run."""
 
@@ -226,9 +231,10 @@ class _Reader:
         """
         try:
             resolved = file.resolve()
-            text = file.read_text(encoding="utf-8")
+            with open_text(file, _LIMIT_BYTES) as content_of:
+                text = content_of.read()
         except (OSError, RuntimeError, ValueError) as error:
-            reason = f"can't be read: {_why(error)}"
+            reason = f"can't be read: {_why(error).removeprefix(f'{file}: ')}"
             if namer is None:
                 return self._give_up(key, ConfigProblem(file, "", reason))
             where, within = self._within(namer)
@@ -307,7 +313,8 @@ class _Reader:
             return [
                 self._resolve(item, (*key, index), file, stack) for index, item in enumerate(value)
             ]
-        if isinstance(value, str) and value.endswith(".yaml"):
+        named = key[-1:] == ("name",) and key[:-1] in self.origins
+        if isinstance(value, str) and value.lower().endswith(_SUFFIXES) and not named:
             return self.read(file.parent / value, key, stack, key)
         if isinstance(value, str) and value.startswith(("./", "../")):
             return str(file.parent / value)

@@ -12,6 +12,12 @@ from utank_hil.control.state_space import SystemMatrices
 
 _NAMES: Final = ("A", "B", "C", "D")
 _SAMPLE_TIMES: Final = ("sample_time_s", "dt", "Ts")
+_HDF5: Final = b"\x89HDF\r\n\x1a\n"
+_MATLAB_73: Final = b"MATLAB 7.3"
+_AS_STRUCT: Final = (
+    "save its matrices: s = struct('A',sys.A,'B',sys.B,'C',sys.C,'D',sys.D,'Ts',sys.Ts); "
+    "save('law.mat','s')"
+)
 
 
 def read_system(path: Path) -> dict[str, Any]:
@@ -20,9 +26,10 @@ def read_system(path: Path) -> dict[str, Any]:
     Parameters
     ----------
     path : Path
-        ``.json`` (an object), ``.npz`` (`numpy.savez`) or ``.mat`` (MATLAB's ``save`` up to
-        ``-v7``, `scipy.io.savemat`): A, B, C, D and the sample time as ``sample_time_s``, ``dt`` or
-        ``Ts``.
+        ``.json`` (an object), ``.npz`` (`numpy.savez`) or ``.mat`` (MATLAB's ``save`` of any
+        version, `scipy.io.savemat`): A, B, C, D and the sample time as ``sample_time_s``, ``dt`` or
+        ``Ts``, at the top or as fields of its only variable. Matrices may be sparse, or complex
+        with imaginary parts of zero; a vector is a column for B and a row for C.
 
     Raises
     ------
@@ -30,12 +37,16 @@ def read_system(path: Path) -> dict[str, Any]:
         If the file can't be read or holds no such system.
     """
     readers = {".json": _json, ".npz": _npz, ".mat": _mat}
-    if path.suffix not in readers:
+    reader = readers.get(path.suffix.lower())
+    if reader is None:
         raise ValueError(f"{path.name} must be a file of {', '.join(readers)}")
     try:
-        content = readers[path.suffix](path)
+        content = _unwrapped(reader(path))
     except OSError as error:
         raise ValueError(f"{path} can't be read: {error.strerror or error}") from error
+    except ImportError as error:
+        reason = "is of MATLAB 7.3: pip install 'utank-hil[files]', or save it with -v7"
+        raise ValueError(f"{path} {reason}") from error
     except Exception as error:  # Readers raise any exception at a damaged file.
         raise ValueError(f"{path} holds no matrices: {error}") from error
     found = [name for name in _SAMPLE_TIMES if name in content]
@@ -45,29 +56,101 @@ def read_system(path: Path) -> dict[str, Any]:
             f"{path.name} must hold A, B, C, D and one of {', '.join(_SAMPLE_TIMES)}; it has "
             f"{', '.join(sorted(content)) or 'nothing'}"
         )
-    if isinstance(content[found[0]], bool) or np.asarray(content[found[0]]).dtype == bool:
-        raise ValueError(f"{path.name}: {found[0]} must be a time in seconds, not true or false")
+    sample_time_s = _sample_time_s(path, found[0], content[found[0]])
+    matrices = {name: _matrix(path, name, content[name]) for name in _NAMES}
+    return {"sample_time_s": sample_time_s, **_in_rows(matrices)}
+
+
+def _sample_time_s(path: Path, name: str, value: Any) -> float:
+    """Return the sample time; ValueError says what the value of another system means."""
+    number = None if value is None or isinstance(value, bool | str) else np.asarray(value)
+    if number is None or number.dtype.kind not in "iuf" or number.size != 1:
+        raise ValueError(f"{path.name}: {name} must be a time in seconds, got {value!r}")
+    seconds = float(number.ravel()[0])
+    if seconds == 0:
+        raise ValueError(f"{path.name}: {name} is 0, a continuous system: sample it first (c2d)")
+    if seconds == -1:
+        raise ValueError(f"{path.name}: {name} is -1, an unknown sample time: set it in seconds")
+    return seconds
+
+
+def _matrix(path: Path, name: str, value: Any) -> Any:
+    """Return an array of real numbers; ValueError names the matrix and what it holds."""
+    toarray = getattr(value, "toarray", None)
     try:
-        (sample_time_s,) = np.asarray(content[found[0]], dtype=np.float64).ravel().tolist()
-        rows = {name: _rows(content[name]) for name in _NAMES}
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{path.name} must hold matrices of real numbers: {error}") from error
-    return {"sample_time_s": sample_time_s, **rows}
+        matrix = np.asarray(value if toarray is None else toarray())
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {name} must have rows of one length") from error
+    if matrix.size and matrix.dtype.kind not in "iufc":
+        raise ValueError(f"{path.name}: {name} must hold numbers, got {matrix.dtype}")
+    if matrix.dtype.kind == "c":
+        if np.any(matrix.imag != 0):
+            raise ValueError(f"{path.name}: {name} must be real, and has imaginary parts")
+        matrix = matrix.real
+    if matrix.ndim > 2:
+        raise ValueError(f"{path.name}: {name} must be a matrix, and has {matrix.ndim} dimensions")
+    return matrix
 
 
-def _rows(matrix: Any) -> tuple[tuple[float, ...], ...]:
-    if np.iscomplexobj(matrix):
-        raise ValueError("a complex one is not")
-    if np.size(matrix) == 0:
-        return tuple(() for _ in range(len(np.atleast_2d(matrix)) if np.ndim(matrix) == 2 else 0))
-    return tuple(map(tuple, np.atleast_2d(np.asarray(matrix, dtype=np.float64)).tolist()))
+def _in_rows(matrices: dict[str, Any]) -> dict[str, tuple[tuple[float, ...], ...]]:
+    """Return matrices as rows, with a vector B as a column, and vectors C and D as a row."""
+    states = len(np.atleast_2d(matrices["A"])) if matrices["A"].size else 0
+    rows = {}
+    for name, matrix in matrices.items():
+        if matrix.size == 0:
+            empty: tuple[float, ...] = ()
+            rows[name] = (empty,) * (len(matrix) if matrix.ndim == 2 else 0)
+            continue
+        column = name == "B" and matrix.ndim == 1 and matrix.size == states
+        shaped = matrix.reshape(-1, 1) if column else np.atleast_2d(matrix)
+        rows[name] = tuple(map(tuple, np.asarray(shaped, dtype=np.float64).tolist()))
+    return rows
+
+
+def _unwrapped(content: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the fields of the only variable, if the content is one structure."""
+    if len(content) != 1:
+        return content
+    (value,) = content.values()
+    if isinstance(value, Mapping):
+        return value
+    fields = getattr(getattr(value, "dtype", None), "names", None)
+    if fields and value.size == 1:
+        return {name: value[name].item() for name in fields}
+    return content
 
 
 def _json(path: Path) -> Mapping[str, Any]:
-    content = json.loads(path.read_text(encoding="utf-8"))
+    content = json.loads(
+        path.read_text(encoding="utf-8-sig"), object_pairs_hook=_once, parse_constant=_no_number
+    )
     if not isinstance(content, dict):
         raise ValueError("it is no object")
+    for name in _NAMES:
+        _refuse_truth(name, content.get(name))
     return content
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"it has the key {twice!r} twice: remove one")
+    return content
+
+
+def _no_number(word: str) -> float:
+    raise ValueError(f"{word} is no finite number")
+
+
+def _refuse_truth(name: str, value: Any) -> None:
+    """Refuse true and false in a matrix, which numpy takes as one and zero among numbers."""
+    if isinstance(value, bool):
+        raise ValueError(f"{name} has {str(value).lower()} in the place of a number")
+    if isinstance(value, list):
+        for item in value:
+            _refuse_truth(name, item)
 
 
 def _npz(path: Path) -> Mapping[str, Any]:
@@ -76,10 +159,52 @@ def _npz(path: Path) -> Mapping[str, Any]:
 
 
 def _mat(path: Path) -> Mapping[str, Any]:
+    with path.open("rb") as file:
+        head = file.read(512 + len(_HDF5))
+    if head.startswith((_HDF5, _MATLAB_73)) or head[512:] == _HDF5:
+        return _mat_73(path)
     from scipy.io import loadmat  # Few configurations need this import.
+    from scipy.io.matlab import MatlabOpaque
 
     content: dict[str, Any] = loadmat(path, appendmat=False)
-    return {name: value for name, value in content.items() if not name.startswith("__")}
+    found = {name: value for name, value in content.items() if not name.startswith("__")}
+    if any(isinstance(value, MatlabOpaque) for value in found.values()):
+        raise ValueError(f"it holds a MATLAB object, not matrices: {_AS_STRUCT}")
+    return found
+
+
+def _mat_73(path: Path) -> Mapping[str, Any]:
+    """Read a file of MATLAB 7.3, which is HDF5 with transposed matrices."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        if "#subsystem#" in file:
+            raise ValueError(f"it holds a MATLAB object, not matrices: {_AS_STRUCT}")
+        return {name: _of_hdf5(item) for name, item in file.items() if not name.startswith("#")}
+
+
+def _of_hdf5(item: Any) -> Any:
+    """Return a variable: a structure as a mapping, a sparse or complex matrix as an array."""
+    if "MATLAB_sparse" in item.attrs:
+        from scipy.sparse import csc_array
+
+        columns = item["jc"][()]
+        if "data" not in item:  # All elements are zero.
+            return np.zeros((int(item.attrs["MATLAB_sparse"]), len(columns) - 1))
+        shape = (int(item.attrs["MATLAB_sparse"]), len(columns) - 1)
+        return csc_array((_complex(item["data"][()]), item["ir"][()], columns), shape=shape)
+    if hasattr(item, "items"):
+        return {name: _of_hdf5(field) for name, field in item.items()}
+    if item.attrs.get("MATLAB_empty"):  # The data are the dimensions.
+        return np.zeros(item[()].astype(int).tolist())
+    if item.attrs.get("MATLAB_class", b"double") in (b"char", b"logical", b"cell"):
+        kind = item.attrs["MATLAB_class"].decode()
+        raise ValueError(f"{item.name.rpartition('/')[2]} is of MATLAB's class {kind}")
+    return _complex(item[()]).T
+
+
+def _complex(values: Any) -> Any:
+    return values["real"] + 1j * values["imag"] if values.dtype.names else values
 
 
 def _from_file(content: Any) -> Any:

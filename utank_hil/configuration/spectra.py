@@ -6,6 +6,7 @@ A scenario draws its waves from a spectrum; a law that foresees waves is designe
 import math
 from dataclasses import fields
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self
 
@@ -19,6 +20,7 @@ from pydantic import (
     model_validator,
 )
 
+from utank_hil.base.number_table import read_number_table
 from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
 from utank_hil.configuration.files import Section
 from utank_hil.control.sea_model import SeaModel
@@ -31,11 +33,13 @@ from utank_hil.sea import (
     load_ndbc,
     pierson_moskowitz,
 )
+from utank_hil.sea.ndbc import HIGHEST_M
 
-WaveHeight = Annotated[float, Range(above=0, most=30)]
+WaveHeight = Annotated[float, Range(above=0, most=HIGHEST_M)]
 """Significant height in m; the greatest ever measured is 19 m."""
 WavePeriod = Annotated[float, Range(above=0, most=40)]
 _STEEPEST: Final = 0.1
+_BANDS: Final = ("frequency_hz", "density_m2_hz")
 
 
 class _GivenSea(Section):
@@ -134,6 +138,44 @@ class MeasuredSpectrum(Section):
         """The hour's spectrum."""
         return read_spectra(self.file).at(self.time.isoformat())
 
+    def warnings(self) -> list[Problem]:
+        """Warn of rows of the file that are left out."""
+        notes = read_spectra(self.file).notes
+        if not notes:
+            return super().warnings()
+        reason = f"has rows that are left out, {len(notes)}; the first: {notes[0]}"
+        return [*super().warnings(), ("file", reason)]
+
+
+class TabulatedSpectrum(Section):
+    """A spectrum from a table of any source."""
+
+    kind: Literal["tabulated"]
+    file: Path
+    """CSV file with the columns ``frequency_hz`` and ``density_m2_hz``, frequencies increasing."""
+
+    @model_validator(mode="after")
+    def _readable(self) -> Self:
+        height_m = self.spectrum().hs_m
+        if not 0 < height_m <= HIGHEST_M:
+            reason = f"holds a sea of {height_m:.3g} m: is the density in m2/Hz, of waves?"
+            refuse("sea", [("file", reason)])
+        return self
+
+    def spectrum(self) -> Spectrum:
+        """The table's spectrum."""
+        try:
+            columns = read_number_table(self.file)
+        except OSError as error:
+            raise ValueError(f"{error.filename} can't be read: {error.strerror}") from error
+        if set(columns) != set(_BANDS):
+            has = ", ".join(columns)
+            raise ValueError(f"{self.file} needs the columns {' and '.join(_BANDS)}, has {has}")
+        try:
+            return Spectrum(*(columns[name] for name in _BANDS))
+        except ValueError as error:
+            raise ValueError(f"{self.file}: {error}") from error
+
 
 def utc(time: datetime) -> datetime:
     """Return a time in UTC without a zone; a time without a zone is UTC."""
@@ -141,13 +183,16 @@ def utc(time: datetime) -> datetime:
 
 
 AnySpectrum = Annotated[
-    MeasuredSpectrum | JonswapSpectrum | IttcSpectrum | PiersonMoskowitzSpectrum,
+    MeasuredSpectrum
+    | TabulatedSpectrum
+    | JonswapSpectrum
+    | IttcSpectrum
+    | PiersonMoskowitzSpectrum,
     Field(discriminator="kind"),
 ]
 """A spectrum, chosen by its kind."""
 
 _SPECTRUM: Final[TypeAdapter[Any]] = TypeAdapter(AnySpectrum)
-_BANDS: Final = ("frequency_hz", "density_m2_hz")
 
 
 def _bands_of(content: Any) -> Any:
@@ -175,6 +220,16 @@ LawSea = Annotated[SeaModel, BeforeValidator(_bands_of)]
 def read_spectra(file: Path, direction_file: Path | None = None) -> MeasuredSpectra:
     """Return the spectra of a file; any error is a ValueError, which pydantic lists by key."""
     try:
-        return load_ndbc(file, direction_file)
+        written = tuple(each.stat().st_mtime_ns for each in (file, direction_file) if each)
+        return _loaded(file, direction_file, written)
     except OSError as error:
         raise ValueError(f"{error.filename} can't be read: {error.strerror}") from error
+
+
+@lru_cache(maxsize=4)
+def _loaded(
+    file: Path,
+    direction_file: Path | None,
+    written: tuple[int, ...],  # noqa: ARG001, a file that is written anew is read anew
+) -> MeasuredSpectra:
+    return load_ndbc(file, direction_file)

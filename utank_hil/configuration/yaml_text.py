@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Final
 
 import yaml
 
@@ -15,6 +15,8 @@ _MERGE = "tag:yaml.org,2002:merge"
 _INT = "tag:yaml.org,2002:int"
 _FLOAT = "tag:yaml.org,2002:float"
 _NUMBERS = (_INT, _FLOAT)
+_MOST_VALUES: Final = 200_000
+"""Values of a text with its aliases written out; a law of a hundred states has some 10,000."""
 
 
 class YamlError(ValueError):
@@ -56,14 +58,17 @@ _Loader.add_constructor(_INT, lambda _, node: int(node.value))
 def parse_yaml(text: str) -> tuple[Any, list[Finding]]:
     """Return the content of a text, and its keys that are written twice or are no names.
 
-    YamlError is raised if the text is not valid YAML, or nested without end.
+    YamlError is raised if the text is not valid YAML, nested without end, or if its aliases make it
+    too large.
     """
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
         if node is None:
             return None, []
-        findings = list(_findings(node, (), ()))
+        if _values(node, {}) > _MOST_VALUES:
+            raise YamlError(f"holds more than {_MOST_VALUES} values, aliases (*) written out")
+        findings = list(_findings(node, ()))
         return loader.construct_document(node), findings
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
@@ -75,15 +80,28 @@ def parse_yaml(text: str) -> tuple[Any, list[Finding]]:
         raise YamlError("is not valid YAML: it is nested too deeply") from None
 
 
-def _findings(node: yaml.Node, key: Key, above: tuple[yaml.Node, ...]) -> Iterator[Finding]:
-    if node in above:
-        raise yaml.composer.ComposerError(
-            None, None, "an alias (*) names what it stands in", node.start_mark
-        )
-    above = (*above, node)
+def _values(node: yaml.Node, known: dict[yaml.Node, int]) -> int:
+    """Return the number of values in a node, each alias counted as what it stands for."""
+    if node in known:
+        if not known[node]:
+            raise yaml.composer.ComposerError(
+                None, None, "an alias (*) names what it stands in", node.start_mark
+            )
+        return known[node]
+    known[node] = 0
+    parts: list[yaml.Node] = []
+    if isinstance(node, yaml.SequenceNode):
+        parts = node.value
+    elif isinstance(node, yaml.MappingNode):
+        parts = [part for pair in node.value for part in pair]
+    known[node] = 1 + sum(_values(part, known) for part in parts)
+    return known[node]
+
+
+def _findings(node: yaml.Node, key: Key) -> Iterator[Finding]:
     if isinstance(node, yaml.SequenceNode):
         for index, item in enumerate(node.value):
-            yield from _findings(item, (*key, index), above)
+            yield from _findings(item, (*key, index))
     if not isinstance(node, yaml.MappingNode):
         return
     lines: dict[str, int] = {}
@@ -109,4 +127,4 @@ def _findings(node: yaml.Node, key: Key, above: tuple[yaml.Node, ...]) -> Iterat
                 f"is written twice, in lines {lines[name.value]} and {line}: remove one",
             )
         lines[name.value] = line
-        yield from _findings(value, (*key, name.value), above)
+        yield from _findings(value, (*key, name.value))

@@ -13,15 +13,17 @@ from utank_hil.sea.spectrum import Spectrum, band_edges
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredSpectra:
-    """A time series of spectra on one frequency grid."""
+    """A time series of spectra, each on its own frequencies."""
 
     source: str  #: Origin, for error messages.
     time: npt.NDArray[np.datetime64]  #: shape (N,): UTC, increasing.
-    frequency_hz: FloatArray  #: shape (F,): centre frequencies of the bands.
+    #: shape (N, F): centre frequencies; nan behind the last band of a spectrum of fewer.
+    frequency_hz: FloatArray
     density: FloatArray  #: shape (N, F): spectral density in m^2/Hz; nan where the source has none.
     #: shape (N, F): mean direction the waves come from, degrees from true north; nan where the
     #: source has none.
     direction_from_deg: FloatArray | None = None
+    notes: tuple[str, ...] = ()  #: Rows of the source that are left out, with place and reason.
 
     def __len__(self) -> int:
         return len(self.time)
@@ -35,15 +37,17 @@ class MeasuredSpectra:
         Missing bands at either end of the grid count as zero. A missing band in between raises a
         ValueError, because its energy is unknown.
         """
-        density = self._zero_filled_ends()[index]
+        frequency_hz, density = self._bands(index)
         if np.isnan(density).any():
-            gap = self.frequency_hz[np.isnan(density)][0]
+            gap = frequency_hz[np.isnan(density)][0]
             raise ValueError(
                 f"{self.source}: the spectrum of {self.time[index]} has no value at {gap:g} Hz: "
                 "choose another time"
             )
-        direction = None if self.direction_from_deg is None else self.direction_from_deg[index]
-        return Spectrum(self.frequency_hz, density, direction)
+        direction = None
+        if self.direction_from_deg is not None:
+            direction = self.direction_from_deg[index, : len(density)]
+        return Spectrum(frequency_hz, density, direction)
 
     def at(self, time: str | np.datetime64, within_s: float = 0.0) -> Spectrum:
         """Spectrum measured at a time, or nearest to it.
@@ -63,9 +67,12 @@ class MeasuredSpectra:
         wanted = np.datetime64(str(time), "s")
         index = int(np.argmin(np.abs(self.time - wanted)))
         if not abs((self.time[index] - wanted) / np.timedelta64(1, "s")) <= within_s:
+            left_out = ""
+            if self.notes:
+                left_out = f"; {len(self.notes)} rows are left out, the first: {self.notes[0]}"
             raise ValueError(
                 f"{self.source}: no spectrum within {within_s:g} s of {wanted}; the nearest is of "
-                f"{self.time[index]}, all are from {self.time[0]} to {self.time[-1]}"
+                f"{self.time[index]}, all are from {self.time[0]} to {self.time[-1]}{left_out}"
             )
         return self[index]
 
@@ -77,21 +84,23 @@ class MeasuredSpectra:
     @property
     def hs_m(self) -> FloatArray:
         """Significant wave heights 4 sqrt(m0), shape (N,); nan if a band in between is missing."""
-        widths = np.diff(band_edges(self.frequency_hz))[:, 0]
-        heights: FloatArray = 4 * np.sqrt(self._zero_filled_ends() @ widths)
-        return heights
+        bands = [self._bands(index) for index in range(len(self))]
+        energy = [density @ np.diff(band_edges(hz))[:, 0] for hz, density in bands]
+        return 4 * np.sqrt(np.array(energy))
 
     @property
     def tp_s(self) -> FloatArray:
         """Peak periods, shape (N,); nan without energy or if a band in between is missing."""
-        density = self._zero_filled_ends()
-        period = 1 / self.frequency_hz[np.argmax(density, axis=1)]
-        known = np.isfinite(density).all(axis=1) & (density > 0).any(axis=1)
-        return np.where(known, period, np.nan)
+        bands = [self._bands(index) for index in range(len(self))]
+        # The greatest of densities with a nan among them is nan, which is not above zero.
+        return np.array(
+            [1 / hz[np.argmax(d)] if np.max(d) > 0 else np.nan for hz, d in bands], dtype=np.float64
+        )
 
-    def _zero_filled_ends(self) -> FloatArray:
-        """Density, with zeros for missing values at either end of a spectrum."""
-        present = np.isfinite(self.density)
-        begun = np.logical_or.accumulate(present, axis=1)
-        ahead = np.logical_or.accumulate(present[:, ::-1], axis=1)[:, ::-1]
-        return np.where(begun & ahead, self.density, 0.0)
+    def _bands(self, index: int) -> tuple[FloatArray, FloatArray]:
+        """Frequencies and densities, with zeros for missing densities at either end."""
+        frequency_hz = self.frequency_hz[index][np.isfinite(self.frequency_hz[index])]
+        density = self.density[index, : len(frequency_hz)]
+        present = np.isfinite(density)
+        begun, ahead = np.logical_or.accumulate(present), np.logical_or.accumulate(present[::-1])
+        return frequency_hz, np.where(begun & ahead[::-1], density, 0.0)

@@ -6,7 +6,6 @@ moment on roll, positive to starboard, per metre of wave amplitude, and its lead
 at the centre of gravity. Headings of -180 to 0 may be left out, because the ship is symmetric.
 """
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -15,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.number_table import read_number_table
 
 COLUMNS: Final = ("omega_rad_s", "heading_deg", "moment_nm_per_m", "phase_deg")
 
@@ -39,21 +39,12 @@ class MomentTable:
             frequency and heading are no complete grid from 0 to 180 degrees.
         """
         try:
-            with file.open(newline="") as lines:
-                reader = csv.DictReader(lines, skipinitialspace=True)
-                given = tuple(reader.fieldnames or ())
-                if set(given) != set(COLUMNS):
-                    raise ValueError(f"{file} needs the columns {', '.join(COLUMNS)}, has {given}")
-                rows = [[float(row[name]) for name in COLUMNS] for row in reader]
+            columns = read_number_table(file)
         except OSError as error:
             raise ValueError(f"{file} can't be read: {error.strerror}") from error
-        except TypeError as error:  # A row has fewer fields.
-            raise ValueError(f"{file}: a row has fewer than {len(COLUMNS)} values") from error
-        except ValueError as error:
-            if str(error).startswith(str(file)):
-                raise
-            raise ValueError(f"{file}: {error}") from error
-        values = np.array(rows).reshape(-1, len(COLUMNS))
+        if set(columns) != set(COLUMNS):
+            raise ValueError(f"{file} needs the columns {', '.join(COLUMNS)}, has {tuple(columns)}")
+        values = np.column_stack([columns[name] for name in COLUMNS])
         omega, heading = np.unique(values[:, 0]), np.unique(values[:, 1])
         if not np.isfinite(values).all() or len(omega) < 2 or omega[0] <= 0:
             raise ValueError(f"{file}: needs finite values, two or more frequencies above zero")

@@ -12,21 +12,38 @@ frequency that the directional files (``.swdir``) lack::
     #YY  MM DD hh mm Sep_Freq  < spec_1 (freq_1) spec_2 (freq_2) ... >
     2019 02 10 05 40 0.153 0.000 (0.033) 0.012 (0.038) ...
 
-A missing value is ``MM``, 99.00 (densities only), 999 or 9999, with any number of decimals.
+A missing value is ``MM``, 99.00 (densities only), 999 or 9999, with any number of decimals. A file
+may be compressed with gzip, and may change its bands from row to row.
 """
 
+import math
 import re
 from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.number_table import NUMBER
+from utank_hil.base.text_files import lines_of, open_text
+from utank_hil.sea.encounter import GRAVITY_M_S2
 from utank_hil.sea.measured import MeasuredSpectra
+from utank_hil.sea.spectrum import Spectrum
 
 PAIR = re.compile(r"(\S+)\s*\(\s*([^()\s]+)\s*\)")
+QUANTITY = re.compile(r"\b(spec|alpha1|alpha2|r1|r2)_[1-9]")
+"""The quantity in the header of a 45-day file: `spec` is density, `alpha1` mean direction."""
+LETTER = re.compile(r"[0-9a-z]{5}([wdijk])[0-9]{4}", re.IGNORECASE)
+"""The letter of the quantity in the name of a yearly file."""
+LETTERS = {"w": "spec", "d": "alpha1", "i": "alpha2", "j": "r1", "k": "r2"}
+HIGHEST_M = 30.0
+"""Significant height above which a file holds no densities; the greatest ever measured is 19 m."""
+TAIL_HZ, TAIL = 0.3, 0.1
+"""Frequency from which waves are saturated, and a bound of Phillips's constant there: ten times
+that of his equilibrium range (J. Fluid Mech. 4, 1958), which growing seas pass threefold."""
+MOST_R1 = 100.0
+"""Largest value of r1 or r2 in hundredths; mean directions of a whole file go beyond."""
 DENSITY_MISSING = (99.0, 999.0, 9999.0)
 DIRECTION_MISSING = (999.0, 9999.0)
 
@@ -41,6 +58,8 @@ class DataLine(NamedTuple):
     time: np.datetime64
     frequency_hz: tuple[float, ...]
     values: tuple[float, ...]
+    named: bool = False
+    """Whether the file names the quantity that it holds."""
 
 
 def load_ndbc(path: str | Path, direction_path: str | Path | None = None) -> MeasuredSpectra:
@@ -58,76 +77,158 @@ def load_ndbc(path: str | Path, direction_path: str | Path | None = None) -> Mea
     -------
     MeasuredSpectra
         In order of time. Spectra without any value are left out; single missing values are nan.
+        Rows that can't be used are left out and named in its notes.
 
     Raises
     ------
     ValueError
-        If the file cannot be parsed; the message has file, line and reason.
+        If no row can be used, or the file is one of another quantity; the message has file, line
+        and reason.
     OSError
         If a file cannot be read.
     """
-    time, frequency, density = _parse(Path(path), DENSITY_MISSING, "density", (0.0, np.inf))
+    notes: list[str] = []
+    rows = _rows(Path(path), "spec", notes)
+    time, frequency, density = (np.array(part) for part in zip(*rows.values(), strict=True))
     direction = None
     if direction_path is not None:
-        direction_time, direction_frequency, measured = _parse(
-            Path(direction_path), DIRECTION_MISSING, "direction", (0.0, 360.0)
-        )
-        if direction_frequency != frequency:
-            raise ValueError(f"{direction_path}: frequencies differ from those of {path}")
+        measured = _rows(Path(direction_path), "alpha1", notes)
         direction = np.full_like(density, np.nan)
-        _, ours, theirs = np.intersect1d(time, direction_time, return_indices=True)
-        direction[ours] = measured[theirs]
-    return MeasuredSpectra(str(path), time, np.array(frequency), density, direction)
+        shared = [index for index, each in enumerate(rows) if each in measured]
+        for index in shared:
+            _, theirs, values = measured[time[index]]
+            if _same(theirs, frequency[index]):
+                size = min(len(values), direction.shape[1])  # Beyond it there are no bands.
+                direction[index, :size] = values[:size]
+            else:
+                reason = f"directions of {time[index]} are of other frequencies than its densities"
+                notes.append(f"{direction_path}: {reason}")
+        if shared and not np.isfinite(direction).any():
+            raise ValueError(f"{direction_path}: frequencies differ from those of {path}")
+    return MeasuredSpectra(str(path), time, frequency, density, direction, tuple(notes))
 
 
-def _parse(
-    path: Path, missing: tuple[float, ...], quantity: str, bounds: tuple[float, float]
-) -> tuple[npt.NDArray[np.datetime64], tuple[float, ...], FloatArray]:
-    """Return times, frequencies and values (N, F) of one file, sorted by time."""
-    rows = _data_lines(path)
-    seen: dict[np.datetime64, int] = {}
-    for row in rows:
-        if row.frequency_hz != rows[0].frequency_hz:
-            raise _error(
-                path, row.number, f"frequencies differ from those of line {rows[0].number}"
-            )
-        if row.time in seen:
-            raise _error(path, row.number, f"{row.time} stands in line {seen[row.time]} too")
-        seen[row.time] = row.number
-    values = np.array([row.values for row in rows])
-    values[np.isin(values, missing)] = np.nan
-    for row, numbers in zip(rows, values, strict=True):
-        wrong = (numbers < bounds[0]) | (numbers > bounds[1])
-        if wrong.any():
-            reason = f"{quantity} {numbers[wrong][0]:g} is outside {bounds[0]:g} to {bounds[1]:g}"
-            raise _error(path, row.number, reason)
-    time = np.array([row.time for row in rows])
-    order = np.argsort(time)
-    order = order[np.isfinite(values[order]).any(axis=1)]
-    if order.size == 0:
-        raise ValueError(f"{path}: every {quantity} in the file is marked as missing")
-    return time[order], rows[0].frequency_hz, values[order]
+_Row = tuple[np.datetime64, FloatArray, FloatArray]
+"""Time, frequencies and values, filled up with nan to the most bands of the file."""
 
 
-def _data_lines(path: Path) -> list[DataLine]:
-    rows = []
+def _same(one: FloatArray, other: FloatArray) -> bool:
+    return np.array_equal(one[np.isfinite(one)], other[np.isfinite(other)])
+
+
+def _rows(path: Path, quantity: str, notes: list[str]) -> dict[np.datetime64, _Row]:
+    """Return the rows of one file by time, sorted by it; others are named in `notes`."""
+    missing = DENSITY_MISSING if quantity == "spec" else DIRECTION_MISSING
+    lines, problems = _data_lines(path, quantity)
+    used: dict[np.datetime64, DataLine] = {}
+    values_of: dict[np.datetime64, FloatArray] = {}
+    double: set[np.datetime64] = set()
+    for line in lines:
+        values = np.where(np.isin(line.values, missing), np.nan, line.values)
+        why = _no_density(line, values) if quantity == "spec" else _no_direction(values)
+        if why:
+            problems.append(_error(path, line.number, why))
+        elif line.time in used:
+            first = used[line.time]
+            equal = line[2:] == first[2:]
+            double |= set() if equal else {line.time}
+            reason = f"{line.time} stands in line {first.number} too"
+            problems.append(_error(path, line.number, reason + (", the same" if equal else "")))
+        elif np.isfinite(values).any():
+            used[line.time], values_of[line.time] = line, values
+    good = {time: used[time] for time in sorted(used) if time not in double}
+    notes.extend(map(str, problems))
+    if not good:
+        reason = (
+            "every value in the file is marked as missing" if lines else "no spectra in the file"
+        )
+        raise problems[0] if problems else ValueError(f"{path}: {reason}")
+    if quantity == "alpha1" and not any(line.named for line in good.values()):
+        _check_directions(path, max(np.nanmax(values_of[time]) for time in good))
+    most = max(len(line.values) for line in good.values())
+    return {
+        time: (time, _padded(np.array(line.frequency_hz), most), _padded(values_of[time], most))
+        for time, line in good.items()
+    }
+
+
+def _padded(values: FloatArray, size: int) -> FloatArray:
+    return np.pad(values, (0, size - len(values)), constant_values=np.nan)
+
+
+def _no_density(line: DataLine, values: FloatArray) -> str:
+    """Return why values are no densities of a sea; empty if they may be."""
+    if (values < 0).any():
+        return f"density {values[values < 0][0]:g} is below 0"
+    frequency, density = np.array(line.frequency_hz), np.nan_to_num(values)
+    height_m = Spectrum(frequency, density).hs_m
+    if height_m > HIGHEST_M:
+        return f"waves of {height_m:.3g} m are higher than any sea's: is it a file of densities?"
+    saturated = TAIL * GRAVITY_M_S2**2 / (2 * np.pi) ** 4 / frequency**5
+    wrong = (frequency >= TAIL_HZ) & (density > saturated)
+    if wrong.any():
+        return (
+            f"density {density[wrong][-1]:g} at {frequency[wrong][-1]:g} Hz is more than waves of "
+            "this frequency can have without breaking: is it a file of densities?"
+        )
+    return ""
+
+
+def _no_direction(values: FloatArray) -> str:
+    wrong = (values < 0) | (values > 360)
+    return f"direction {values[wrong][0]:g} is outside 0 to 360" if wrong.any() else ""
+
+
+def _check_directions(path: Path, greatest: float) -> None:
+    """Refuse values that are no mean directions, in a file that does not name its quantity."""
+    if greatest <= MOST_R1:
+        raise ValueError(
+            f"{path}: no value is above {greatest:g}: is it a file of mean directions (alpha1), "
+            "and not of r1, r2 or densities?"
+        )
+
+
+def _data_lines(path: Path, quantity: str) -> tuple[list[DataLine], list[ValueError]]:
+    """Return the lines of data, and the reasons of those that can't be read."""
+    letter = LETTER.match(path.name)
+    named = letter is not None
+    if letter:
+        _check_quantity(path, "the name", LETTERS[letter[1].lower()], quantity)
+    rows, problems = [], []
     header: tuple[int, tuple[float, ...]] | None = None  # time columns and frequencies
-    for number, line in enumerate(
-        path.read_text(encoding="utf-8", errors="replace").splitlines(), 1
-    ):
-        if not line.strip():
-            continue
-        if line.lstrip().startswith(("#", "YY")):
-            header = _header(path, number, line) or header
-        elif "(" in line:
-            rows.append(_pairs(path, number, line))
-        elif header is None:
-            raise _error(path, number, "no header line with frequencies stands before the data")
-        else:
-            rows.append(_columns(path, number, line.split(), *header))
-    if not rows:
-        raise ValueError(f"{path}: no spectra in the file")
-    return rows
+    with open_text(path) as text:
+        for number, line in lines_of(path, text):
+            if not line.strip():
+                continue
+            if line.lstrip().startswith(("#", "YY")):
+                written = QUANTITY.search(line)
+                if written:
+                    _check_quantity(path, f"line {number}", written[1], quantity)
+                    named = True
+                header = _header(path, number, line) or header
+                continue
+            try:
+                if "(" in line:
+                    row = _pairs(path, number, line)
+                elif header is None:
+                    reason = "no header line with frequencies stands before the data"
+                    raise _error(path, number, reason)
+                else:
+                    row = _columns(path, number, line.split(), *header)
+            except ValueError as error:
+                problems.append(error)
+            else:
+                rows.append(row._replace(named=named))
+    return rows, problems
+
+
+def _check_quantity(path: Path, place: str, found: str, wanted: str) -> None:
+    if found != wanted:
+        names = {"spec": "spectral densities", "alpha1": "mean directions (alpha1)"}
+        raise ValueError(
+            f"{path}: {place} says that it holds {names.get(found, found)}, and a file of "
+            f"{names[wanted]} is wanted"
+        )
 
 
 def _header(path: Path, number: int, line: str) -> tuple[int, tuple[float, ...]] | None:
@@ -183,14 +284,10 @@ def _time(path: Path, number: int, words: list[str]) -> np.datetime64:
 
 def _number(path: Path, number: int, word: str) -> float:
     if word == "MM":
-        return np.nan
-    try:
-        value = float(word)
-    except ValueError:
-        raise _error(path, number, f"{word!r} is not a number") from None
-    if not np.isfinite(value):
+        return math.nan
+    if not NUMBER.fullmatch(word) or math.isinf(float(word)):
         raise _error(path, number, f"{word!r} is not a finite number")
-    return value
+    return float(word)
 
 
 def _error(path: Path, number: int, reason: str) -> ValueError:

@@ -7,14 +7,15 @@ Tables (CSV, Parquet) may have columns in other units, according to their names 
 
 import csv
 import math
-from collections.abc import Callable, Iterator, Mapping
-from itertools import chain
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.number_table import is_time, read_number_table, since_first
+from utank_hil.base.text_files import TextFileError, kind_of
 from utank_hil.base.whole_file import left_whole
 from utank_hil.telemetry.bus_logs import BUS_SUFFIXES, read_bus_log
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
@@ -27,6 +28,7 @@ SUFFIXES: Final = (".rrd", SUFFIX, *BUS_SUFFIXES, *TABLE_SUFFIXES)
 """Suffixes of files with signals."""
 
 Columns = dict[str, FloatArray]
+_Column = tuple[str, FloatArray]
 
 _OTHER_UNITS: Final = {
     "_mm": ("_m", 1e-3),
@@ -34,6 +36,7 @@ _OTHER_UNITS: Final = {
     "_bar": ("_pa", 1e5),
     "_mbar": ("_pa", 1e2),
     "_mpa": ("_pa", 1e6),
+    "_ms": ("_s", 1e-3),
 }
 """Other units of tables: ending of the column, and SI ending and value of the unit."""
 _LEVEL_OF_GAUGES: Final = ("port_level_m", "starboard_level_m")
@@ -45,10 +48,6 @@ _RATE: Final = 1e-3
 """Largest relative error of a logger's clock: ten times a poor quartz's."""
 
 
-class SignalFileError(ValueError):
-    """The file lacks something or can't be read; the message names file, line and remedy."""
-
-
 def read_signals(path: Path, note: Callable[[str], None] | None = None) -> dict[str, Columns]:
     """Read the runs of a file by name; a file without names has one run, named by its stem.
 
@@ -57,7 +56,8 @@ def read_signals(path: Path, note: Callable[[str], None] | None = None) -> dict[
     path : Path
         File with one of `SUFFIXES`.
     note : callable, optional
-        Called with the place where a frame log is cut or damaged; later rows are left out.
+        Called with the place where a frame log is cut or damaged, whose later rows are left out,
+        and with the columns of a table that hold no numbers, which are an error without it.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def read_signals(path: Path, note: Callable[[str], None] | None = None) -> dict[
     OSError
         If it can't be opened.
     """
-    suffix = path.suffix.lower()
+    suffix = kind_of(path)
     path.open("rb").close()  # Readers may give a less precise reason.
     if suffix == ".rrd":
         from utank_hil.telemetry.recording import read_recording  # This imports Rerun.
@@ -76,13 +76,14 @@ def read_signals(path: Path, note: Callable[[str], None] | None = None) -> dict[
         columns = signal_table(entries_of(FrameLog(path).blocks(note)))
     elif suffix in BUS_SUFFIXES:
         columns = signal_table(read_bus_log(path))
+    elif suffix == ".csv":
+        columns = _all_in_si(path, read_number_table(path).items())
     elif suffix in TABLE_SUFFIXES:
-        columns = _read_csv(path) if suffix == ".csv" else _read_parquet(path)
+        columns = _all_in_si(path, _read_parquet(path, note))
     else:
-        raise SignalFileError(
-            f"{path}: holds no signals that can be read: give {_listed(SUFFIXES)}"
-        )
-    return {path.stem: columns}
+        raise TextFileError(f"{path}: holds no signals that can be read: give {_listed(SUFFIXES)}")
+    packed = path.suffix.lower() == ".gz"
+    return {Path(path.stem).stem if packed else path.stem: columns}
 
 
 def write_signals(path: Path, columns: Mapping[str, FloatArray]) -> None:
@@ -125,7 +126,7 @@ def even_rows(
 
     Raises
     ------
-    SignalFileError
+    TextFileError
         If the times do not rise, have a gap, or are not even; or if the sample time is no whole
         number of their steps. The line and the remedy are named.
     """
@@ -135,11 +136,11 @@ def even_rows(
     low, high = -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s
     (kept,) = np.nonzero((time_s >= low) & (time_s <= high) | np.isnan(time_s))
     if len(kept) < 3:
-        raise SignalFileError(f"{path}: {len(kept)} rows between {low:g} and {high:g} s: too few")
+        raise TextFileError(f"{path}: {len(kept)} rows between {low:g} and {high:g} s: too few")
     part_s = time_s[kept]
 
-    def refused(row: int, reason: str) -> SignalFileError:
-        return SignalFileError(f"{path}: {_line(path, kept, row)}{reason}")
+    def refused(row: int, reason: str) -> TextFileError:
+        return TextFileError(f"{path}: {_line(path, kept, row)}{reason}")
 
     if not np.isfinite(part_s).all():
         row = int(np.flatnonzero(~np.isfinite(part_s))[0])
@@ -183,7 +184,7 @@ def even_rows(
 
 
 def require(path: Path, columns: Mapping[str, FloatArray], *names: str) -> None:
-    """Raise SignalFileError, with missing and present columns, for a file that lacks columns.
+    """Raise TextFileError, with missing and present columns, for a file that lacks columns.
 
     A level may be given as that of both gauges.
     """
@@ -193,13 +194,16 @@ def require(path: Path, columns: Mapping[str, FloatArray], *names: str) -> None:
             raise _lacks(path, name, columns)
 
 
-def _lacks(path: Path, name: str, columns: Mapping[str, FloatArray]) -> SignalFileError:
+def _lacks(path: Path, name: str, columns: Mapping[str, FloatArray]) -> TextFileError:
     other = {"roll_rad": " or roll_deg", "roll_rate_rad_s": " or roll_rate_deg_s"}.get(name, "")
     if name == "level_m":
         other = f", or {_listed(_LEVEL_OF_GAUGES)}"
     if name.endswith("_pa"):
         other = f" or {name.removesuffix('_pa')}_kpa"
-    return SignalFileError(
+    unclear = [column for column in columns if name == "time_s" and is_time(column)]
+    if unclear:
+        other = f": name {unclear[0]!r} {name} if it is in seconds"
+    return TextFileError(
         f"{path}: has no column {name}{other}; it has {', '.join(columns)}. Name columns by what "
         "they hold and their unit (docs/how-to/logs.md)"
     )
@@ -208,85 +212,64 @@ def _lacks(path: Path, name: str, columns: Mapping[str, FloatArray]) -> SignalFi
 def _line(path: Path, rows: Any, index: int) -> str:
     """Return the place of a row: line of a CSV, from 1 with the header, or row of a table."""
     row = int(rows[index])
-    return f"line {row + 2}" if path.suffix.lower() == ".csv" else f"row {row}"
+    return f"line {row + 2}" if kind_of(path) == ".csv" else f"row {row}"
 
 
-def _read_csv(path: Path) -> Columns:
-    """Read the columns of a CSV: a line of names, then numbers; empty fields are not available."""
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as content:
-            first = content.readline()
-            content.seek(0)
-            lines = csv.reader(content, delimiter=max(",;\t", key=first.count))
-            names = [name.strip() for name in next(lines, [])]
-            _check_names(path, names)
-            rows = list(_numbers(path, names, lines))
-    except (csv.Error, UnicodeDecodeError) as error:
-        raise SignalFileError(f"{path}: is no table of text in UTF-8") from error
-    if not rows:
-        raise SignalFileError(f"{path}: has a line of names and no rows")
-    table = np.array(rows)
-    return dict(chain.from_iterable(_in_si(n, table[:, i]) for i, n in enumerate(names)))
-
-
-def _check_names(path: Path, names: list[str]) -> None:
-    if not names or not any(names):
-        raise SignalFileError(f"{path}: line 1 must name the columns, such as time_s,roll_deg")
-    for name in names:
-        if names.count(name) > 1:
-            raise SignalFileError(f"{path}: line 1 names {name!r} twice: rename one")
-        if name.replace(".", "", 1).lstrip("+-").isdigit():
-            raise SignalFileError(
-                f"{path}: line 1 holds the number {name}: it must name the columns, such as "
-                "time_s,roll_deg"
-            )
-
-
-def _numbers(path: Path, names: list[str], lines: Any) -> Iterator[list[float]]:
-    for row in filter(None, lines):
-        if len(row) != len(names):
-            raise SignalFileError(
-                f"{path}: line {lines.line_num} has {len(row)} fields, line 1 names {len(names)}"
-            )
-        numbers = []
-        for name, field in zip(names, row, strict=True):
-            try:
-                numbers.append(float(field) if field.strip() else math.nan)
-            except ValueError:
-                comma = "; write decimals with a point" if "," in field else ""
-                raise SignalFileError(
-                    f"{path}: line {lines.line_num}, {name}: {field!r} is no number{comma}"
-                ) from None
-        yield numbers
-
-
-def _read_parquet(path: Path) -> Columns:
+def _read_parquet(path: Path, note: Callable[[str], None] | None) -> Iterator[_Column]:
+    """Yield the columns of numbers; `note` is called with the columns of other types."""
     import pyarrow
     from pyarrow import parquet
 
     try:
         table = parquet.read_table(path)
-    except pyarrow.ArrowException as error:
-        raise SignalFileError(f"{path}: is no Parquet file") from error
-    columns: Columns = {}
-    for name in table.column_names:
-        column = table.column(name)
-        kind = column.type
-        if pyarrow.types.is_integer(kind) or pyarrow.types.is_floating(kind):
-            values = column.cast(pyarrow.float64()).to_numpy(zero_copy_only=False)
-            columns.update(_in_si(name, values))
-    if not columns:
-        raise SignalFileError(f"{path}: has no column of numbers")
-    return columns
+    except (pyarrow.ArrowException, OSError) as error:
+        raise TextFileError(f"{path}: is no Parquet file that can be read: {error}") from error
+    other = []
+    for field in table.schema:
+        kind, types = field.type, pyarrow.types
+        column = table.column(field.name)
+        if types.is_timestamp(kind) and is_time(field.name):
+            seconds = column.cast(pyarrow.timestamp("ns", kind.tz)).cast(pyarrow.int64())
+            values = seconds.cast(pyarrow.float64(), safe=False).to_numpy(zero_copy_only=False)
+            yield since_first(path, field.name, values * 1e-9)
+        elif types.is_boolean(kind):
+            yield field.name, column.cast(pyarrow.int8()).cast(pyarrow.float64()).to_numpy()
+        elif types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind):
+            yield field.name, column.cast(pyarrow.float64(), safe=False).to_numpy()
+        else:
+            other.append(f"{field.name} ({kind})")
+    if other:
+        why = f"{path}: columns that are no numbers are left out: {', '.join(other)}"
+        if note is None:
+            raise TextFileError(why)
+        note(why)
 
 
-def _in_si(name: str, values: FloatArray) -> list[tuple[str, FloatArray]]:
+def _all_in_si(path: Path, columns: Iterable[_Column]) -> Columns:
+    """Return columns in SI units; TextFileError names two that are one signal."""
+    found: Columns = {}
+    sources: dict[str, str] = {}
+    for name, values in columns:
+        column, in_si = _in_si(name, values)
+        if column in found:
+            other = sources[column]
+            reason = (
+                f"names {name!r} twice" if name == other else f"{other} and {name} are one signal"
+            )
+            raise TextFileError(f"{path}: {reason}: remove or rename one")
+        sources[column], found[column] = name, in_si
+    if not found:
+        raise TextFileError(f"{path}: has no column of numbers")
+    return found
+
+
+def _in_si(name: str, values: FloatArray) -> _Column:
     """Return a column in SI units, and its name."""
     for suffix, (si, factor) in _OTHER_UNITS.items():
         if name.endswith(suffix):
-            return [(name.removesuffix(suffix) + si, values * factor)]
+            return name.removesuffix(suffix) + si, values * factor
     column, unit = column_of(name)
-    return [(column, values if unit.scale == 1 or column == name else values / unit.scale)]
+    return column, values if unit.scale == 1 or column == name else values / unit.scale
 
 
 def _listed(names: tuple[str, ...]) -> str:
