@@ -55,7 +55,7 @@ class MomentTable:
                 f"{heading[0]:g} to {heading[-1]:g}"
             )
         grid = values[np.lexsort((values[:, 1], values[:, 0]))].reshape(len(omega), -1, 4)
-        moment = grid[..., 2] * np.exp(1j * np.radians(grid[..., 3]))
+        moment = np.asarray(grid[..., 2] * np.exp(1j * np.radians(grid[..., 3])), np.complex128)
         return cls(omega, np.radians(heading), moment)
 
     def moment(self, omega_rad_s: FloatArray, heading_rad: FloatArray) -> ComplexArray:
