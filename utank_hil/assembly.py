@@ -17,6 +17,7 @@ from utank_hil.base.parameters import ParameterError
 from utank_hil.base.tick import TICK_S, is_whole_ticks
 from utank_hil.canbus import load_catalogue
 from utank_hil.canbus.measurements import MEASURED, Measurements, MotionSample
+from utank_hil.canbus.profiles.foreign import NO_FOREIGN_DEVICES
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign
 from utank_hil.control.constrained.law import ConstrainedLaw
@@ -183,6 +184,7 @@ def build_controller_node(
     """
     law = law or build_law(config)
     vessel, tank, catalogue = config.vessel, config.vessel.tank, load_catalogue()
+    foreign = NO_FOREIGN_DEVICES if vessel.devices is None else vessel.devices.foreign()
     exchange: LawExchange | None = None
     if retuner is not None and config.retuning is not None:
         exchange = _adaptive(config, law, retuner)
@@ -201,10 +203,11 @@ def build_controller_node(
         monitors = Monitors(
             config.plant,
             config.safety.roll_limit_rad,
-            config.sensors,
+            config.sensor_figures,
             config.bit_rate,
             compares=law.closes_loop,
             second_motion=vessel.redundancy.second_motion_sensor,
+            motion_cycles_s=vessel.motion_cycles_s,
         )
     thresholds = None if monitors is None else monitors.thresholds
     measure = measure_of(law.measured)
@@ -218,10 +221,17 @@ def build_controller_node(
     limiter = CommandLimiter(config.limits, tank, TICK_S)
     return ControllerNode(
         running,
-        Safety(config.safety, config.bit_rate, monitors, pump=pump),
+        Safety(
+            config.safety,
+            config.bit_rate,
+            monitors,
+            pump=pump,
+            motion_cycles_s=vessel.motion_cycles_s,
+            unprotected=vessel.devices is not None and vessel.devices.unprotected,
+        ),
         Actuators(limiter, catalogue, timeout_s, pump=pump, valve=valve),
         Telemetry(statistics, sink, sink_every, event_sink),
-        ControllerSettings(config.vessel.version, commissioned, tank, vessel.redundancy),
+        ControllerSettings(config.vessel.version, commissioned, tank, vessel.redundancy, foreign),
         catalogue,
         estimator,
     )
@@ -269,7 +279,7 @@ def build_commissioning_node(
         plant,
         plan=None if vessel.pump is None else plan_pulses(plant),
         stroke=None if vessel.valve is None else plan_stroke(vessel.valve, vessel.tank),
-        volume_m=thresholds_of(plant, config.safety.roll_limit_rad, config.sensors).volume_m,
+        volume_m=thresholds_of(plant, config.safety.roll_limit_rad, config.sensor_figures).volume_m,
     )
 
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from toy_nodes import BIT_NS, MS, frame
 
-from utank_hil.canbus.frame import Frame
+from utank_hil.canbus.frame import STANDARD, Frame
 from utank_hil.runners import SimulatedBus, frame_bits
 
 SECOND_NS = 1000 * MS
@@ -125,3 +125,13 @@ def test_queueing_delays_are_exact():
 def test_bit_rate_without_whole_nanoseconds_is_refused(bit_rate):
     with pytest.raises(ValueError, match="bit_rate"):
         SimulatedBus(bit_rate=bit_rate)
+
+
+def test_an_identifier_of_11_bits_goes_before_all_that_begin_with_it():
+    bus = SimulatedBus()
+    standard = STANDARD | 0x123
+    ids = [0x123 << 18, 0x124 << 18, standard, (0x123 << 18) - 1]
+    for can_id in ids:
+        bus.queue(0, Frame(can_id, b""), 0)
+    arrived = [frame.can_id for _, _, frame in bus.carry_until(10_000_000)]
+    assert arrived == [(0x123 << 18) - 1, standard, 0x123 << 18, 0x124 << 18]

@@ -2,12 +2,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.canbus.frame import Frame
+from utank_hil.canbus.frame import STANDARD, Frame
 from utank_hil.runners import frame_bits
 
 frames = st.builds(
     Frame,
-    st.integers(0, 2**29 - 1) | st.sampled_from([0, 2**29 - 1, 0x08FF1080, 0x18EEFF81]),
+    st.integers(0, 2**29 - 1)
+    | st.integers(STANDARD, STANDARD | 0x7FF)
+    | st.sampled_from([0, 2**29 - 1, 0x08FF1080, 0x18EEFF81]),
     st.binary(max_size=8) | st.lists(st.sampled_from([0, 255, 0x0F, 0xF8]), max_size=8).map(bytes),
 )
 
@@ -26,9 +28,10 @@ def crc_15(bits: str) -> str:
 def on_the_wire(frame: Frame) -> str:
     """Every bit of the frame as ISO 11898-1 writes it out, from start of frame to intermission."""
     identifier = f"{frame.can_id:029b}"
-    plain = (
-        "0" + identifier[:11] + "1" + "1" + identifier[11:] + "0" + "00" + f"{len(frame.data):04b}"
-    ) + "".join(f"{byte:08b}" for byte in frame.data)
+    head = "0" + identifier[:11] + "1" + "1" + identifier[11:] + "0" + "00"
+    if frame.can_id & STANDARD:
+        head = "0" + f"{frame.can_id & 0x7FF:011b}" + "0" + "0" + "0"
+    plain = head + f"{len(frame.data):04b}" + "".join(f"{byte:08b}" for byte in frame.data)
     plain += crc_15(plain)
     stuffed = ""
     for bit in plain:
@@ -65,17 +68,20 @@ def test_written_out_frame_obeys_the_stuffing_rule_and_is_received_whole(frame):
     stuffed = on_the_wire(frame)[:-13]
     assert "000000" not in stuffed
     assert "111111" not in stuffed
-    assert len(destuffed(stuffed)) == 54 + 8 * len(frame.data)
+    header = 34 if frame.can_id & STANDARD else 54
+    assert len(destuffed(stuffed)) == header + 8 * len(frame.data)
 
 
 @given(frames)
 def test_length_is_within_the_published_bounds(frame):
     # Davis, Burns, Bril, Lukkien: Controller Area Network schedulability analysis refuted,
     # revisited and revised, Real-Time Systems 35 (2007): (80 + 10 s) bit times with 29-bit ids
-    assert 67 + 8 * len(frame.data) <= frame_bits(frame) <= 80 + 10 * len(frame.data)
+    # and (55 + 10 s) with 11
+    least, most = (47, 55) if frame.can_id & STANDARD else (67, 80)
+    assert least + 8 * len(frame.data) <= frame_bits(frame) <= most + 10 * len(frame.data)
 
 
-@pytest.mark.parametrize("can_id", [-1, 2**29])
+@pytest.mark.parametrize("can_id", [-1, STANDARD + 2**11, 2**30])
 @pytest.mark.parametrize("data", [bytes(8), bytes(3)])
 def test_identifier_out_of_range_is_refused(can_id, data):
     with pytest.raises(ValueError, match="29-bit"):

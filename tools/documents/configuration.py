@@ -114,7 +114,7 @@ def _rows(section: type, key: str) -> tuple[str, list[tuple[str, type]]]:
         meaning = meanings.get(name) or next(map(_first_line, _sections(hint)), GENERAL.get(name))
         if meaning is None:
             raise ValueError(f"{section.__name__}.{name} is explained nowhere: add a docstring")
-        cells = (f"`{name}`", _value(hint), _default(default), meaning)
+        cells = (f"`{name.rstrip('_')}`", _value(hint), _default(default), meaning)
         rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n")
     return "".join(rows), inner
 

@@ -1,15 +1,26 @@
 """The CAN frame of nodes and ports."""
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
+
+STANDARD: Final = 1 << 29
+"""Mark of an identifier of 11 bits."""
+BUS_SHIFT: Final = 30
+"""Above it stands the number of the interface; the controller's own is 0."""
+MOST_BUSES: Final = 4
+OTHER_BUS: Final = 1 << BUS_SHIFT
+"""Identifiers from here on are of other interfaces than the controller's own."""
+LONGEST_ID: Final = (1 << 29) - 1
+LONGEST_STANDARD_ID: Final = (1 << 11) - 1
 
 
 class Frame(NamedTuple):
-    """One CAN 2.0B data frame with a 29-bit identifier.
+    """One CAN 2.0 data frame.
 
     Attributes
     ----------
     can_id : int
-        Extended identifier, 0 to 2**29 - 1.
+        Identifier of 29 bits, or of 11 bits with the mark `STANDARD`; above `BUS_SHIFT` the number
+        of the interface.
     data : bytes
         Payload, at most 8 bytes.
     """

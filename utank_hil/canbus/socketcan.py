@@ -12,7 +12,7 @@ from typing import Final
 import can
 from can.interfaces.socketcan import SocketcanBus
 
-from utank_hil.canbus.frame import Frame
+from utank_hil.canbus.frame import LONGEST_ID, STANDARD, Frame
 from utank_hil.canbus.port import PortError
 
 #: More than the kernel's receive buffer (about 280 frames); bounds the time on a babbling bus.
@@ -62,6 +62,10 @@ class SocketCanPort:
     can_ids : iterable of int, optional
         Acceptance filter in the kernel, extended identifiers; none by default, for nodes that
         detect unknown identifiers.
+    standard : bool
+        Whether frames with identifiers of 11 bits are handed on, and not only counted.
+    receive_only : bool
+        Whether nothing is ever sent.
 
     Attributes
     ----------
@@ -76,8 +80,16 @@ class SocketCanPort:
         If there is no such interface, or no CAN support in the kernel.
     """
 
-    def __init__(self, channel: str, can_ids: Iterable[int] | None = None) -> None:
+    def __init__(
+        self,
+        channel: str,
+        can_ids: Iterable[int] | None = None,
+        *,
+        standard: bool = False,
+        receive_only: bool = False,
+    ) -> None:
         self.channel = channel
+        self._standard, self._receive_only = standard, receive_only
         self.error_frames = 0
         self.standard_frames = 0
         self.remote_frames = 0
@@ -91,7 +103,12 @@ class SocketCanPort:
     def send(self, frame: Frame) -> None:
         """Queue one frame; see `Port.send`."""
         bus = self._open_bus()
-        message = can.Message(arbitration_id=frame.can_id, is_extended_id=True, data=frame.data)
+        if self._receive_only:
+            raise self._port_error("receive-only by the ship's file", "nothing is sent there")
+        standard = frame.can_id & STANDARD
+        message = can.Message(
+            arbitration_id=frame.can_id & LONGEST_ID, is_extended_id=not standard, data=frame.data
+        )
         try:
             bus.send(message)
         except (can.CanError, OSError) as error:
@@ -144,7 +161,11 @@ class SocketCanPort:
             elif message.is_remote_frame:
                 self.remote_frames += 1
             elif not message.is_extended_id:
-                self.standard_frames += 1
+                if self._standard:
+                    can_id = message.arbitration_id | STANDARD
+                    frames.append(Frame(can_id, bytes(message.data)))
+                else:
+                    self.standard_frames += 1
             else:
                 frames.append(Frame(message.arbitration_id, bytes(message.data)))
         return frames

@@ -11,6 +11,7 @@ from utank_hil.analysis.loop.robustness import Robustness
 from utank_hil.base.finite import finite
 from utank_hil.commands.remedy import remedy
 from utank_hil.configuration import Vessel
+from utank_hil.console.device_report import devices_json, print_devices
 from utank_hil.console.ship_report import ship_figures, ship_line
 from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.control import BuiltLaw
@@ -37,6 +38,7 @@ def controller_json(judged: JudgedLaw) -> dict[str, Any]:
         "name": config.name,
         "vessel": config.vessel.name,
         "ship": ship_figures(config.vessel),
+        "devices": devices_json(config.vessel.devices),
         "configuration_version": config.vessel.version,
         "law": config.law.kind,
         "at_rest": _at_rest(judged.law),
@@ -72,6 +74,7 @@ def print_controller(judged: JudgedLaw) -> None:
     names = f"{config.name} for {config.vessel.name}"
     console.say(f"{names}: the configuration is valid.")
     console.say(ship_line(config.vessel))
+    print_devices(console, config.vessel.devices)
     if report is None:
         if judged.law.unjudged:
             _print_verdict(console, judged)

@@ -9,8 +9,9 @@ from typing import Annotated, Any, ClassVar, Final
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from utank_hil.analysis.loop.robustness import EXTRA_DELAY_S
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
-from utank_hil.base.parameters import Problem, Range, refuse
+from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
 from utank_hil.base.tick import TICK_S, is_whole_ticks
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.laws import AnyDesign, sample_time
@@ -33,6 +34,8 @@ MOST_PRESSURE_PA: Final = 250e3
 """Largest pressure of PUMP_CMD: the codec cuts larger ones without the controller's knowledge."""
 LEAST_PAUSE_S: Final = 600.0
 """Shortest time between two scheduled retunings."""
+COMMAND_S: Final = 0.02
+"""Share of the delay that the cycle of the pump's commands takes."""
 MOST_PULSES_S: Final = 3600.0
 """Longest identification, because pulses and record are kept in memory."""
 
@@ -85,6 +88,7 @@ class ControllerConfig(Section):
     def _consistent(self) -> "ControllerConfig":
         problems = [*self._limit_problems(), *self._retuning_problems(), *self._law_problems()]
         problems += self._roll_problems()
+        problems += self._late_problems()
         if self.renews and not isinstance(self.law, SelfTunedDesign):
             reason = f"is for a law of kind self_tuned, not {self.law.kind}: leave it out"
             problems.append(("sea_estimate.renew", reason))
@@ -126,6 +130,45 @@ class ControllerConfig(Section):
     def renews(self) -> bool:
         """Whether the law is renewed under way."""
         return self.sea_estimate is not None and self.sea_estimate.renew
+
+    @property
+    def sensor_figures(self) -> SensorFigures:
+        """Noise of the sensors, no less than what a device of another maker brings."""
+        devices = self.vessel.devices
+        if devices is None:
+            return self.sensors
+        roles = ("motion", "motion_2")
+        values = {
+            "roll_noise_rad": [devices.noise(role, "roll_rad") for role in roles],
+            "roll_rate_noise_rad_s": [devices.noise(role, "roll_rate_rad_s") for role in roles],
+            "level_noise_m": [devices.noise("levels", "port_level_m")],
+        }
+        most = {name: max(getattr(self.sensors, name), *found) for name, found in values.items()}
+        return SensorFigures(**most)
+
+    def _late_problems(self) -> list[Problem]:
+        """Problems of a motion sensor that is too slow for the delay that the law is made for."""
+        devices = self.vessel.devices
+        problems: list[Problem] = []
+        try:
+            _ = self.sensor_figures
+        except ParameterError as error:
+            problems += [(f"vessel.devices: noise or step: {n}", why) for n, why in error.problems]
+        for role in ("motion", "motion_2"):
+            device = None if devices is None else devices.sensors()[role]
+            if device is None or device.native or device.cycle_ms is None:
+                continue
+            late_ms = device.latency_ms + device.cycle_ms
+            borne_ms = 1e3 * (self.delay_s + EXTRA_DELAY_S - COMMAND_S)
+            if late_ms > borne_ms:
+                reason = (
+                    f"brings roll {late_ms:g} ms late, cycle and latency, but the law is made for "
+                    f"a delay of {1e3 * self.delay_s:g} ms and bears {borne_ms:g}: use a sensor of "
+                    f"{1e3 / max(borne_ms - device.latency_ms, 1.0):.3g} Hz or more, or set "
+                    f"delay_s to {late_ms * 1e-3 + COMMAND_S - EXTRA_DELAY_S:.3g} or more"
+                )
+                problems.append((f"vessel.devices.{role}.cycle_ms", reason))
+        return problems
 
     def _limit_problems(self) -> list[Problem]:
         pump = self.vessel.pump

@@ -67,7 +67,7 @@ def _members(place: Any) -> dict[str, Any]:
     if get_origin(place) in (Union, UnionType):
         return {name: hint for kind in get_args(place) for name, hint in _members(kind).items()}
     if isinstance(place, type) and issubclass(place, BaseModel):
-        return {name: field.annotation for name, field in place.model_fields.items()}
+        return {field.alias or name: field.annotation for name, field in place.model_fields.items()}
     if isinstance(place, type) and is_dataclass(place):
         hints = get_type_hints(place)
         return {field.name: hints[field.name] for field in fields(place) if field.init}

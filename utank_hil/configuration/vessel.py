@@ -10,6 +10,8 @@ from typing import Annotated, Any, ClassVar, Final
 from pydantic import ValidationInfo, field_validator, model_validator
 
 from utank_hil.base.parameters import Problem, Range, refuse
+from utank_hil.base.tick import TICK_S
+from utank_hil.configuration.devices import DevicesSection
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
 from utank_hil.configuration.ship_keys import ShipFromFile, in_written_keys
@@ -45,6 +47,8 @@ class Vessel(Section):
     """Limit of the stability booklet on the metacentric height, tank water free to move."""
     redundancy: Redundancy = NO_REDUNDANCY
     """Equipment that the ship has twice, or with separate wires."""
+    devices: DevicesSection | None = None
+    """What is on the bus in the place of the native nodes."""
     _written: frozenset[str] = frozenset()  # These are the keys of the ship in its file.
 
     @property
@@ -56,6 +60,8 @@ class Vessel(Section):
             content.append(not_by_default(self.valve))
         if self.redundancy != NO_REDUNDANCY:
             content.append({"redundancy": asdict(self.redundancy)})
+        if self.devices is not None:
+            content.append({"devices": self.devices.model_dump(mode="json")})
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).digest()
         return int.from_bytes(digest[:4], "big") % NOT_AVAILABLE
 
@@ -99,9 +105,11 @@ class Vessel(Section):
         """Limits of roll and heel for a ship with a short righting range (`SafetyLimits`)."""
         greatest_rad = math.floor(100 * self.righting.greatest_rad) / 100
         most = SafetyLimits()
+        ages = {} if self.devices is None else self.devices.default_ages()
         return {
             "roll_limit_rad": min(most.roll_limit_rad, greatest_rad),
             "heel_limit_rad": min(most.heel_limit_rad, greatest_rad / 2),
+            **ages,
         }
 
     @model_validator(mode="wrap")
@@ -117,8 +125,21 @@ class Vessel(Section):
             problems += [(f"valve.{name}", reason) for name, reason in wrong]
         if vessel.least_gm_m is not None and not vessel.ship.displacement_n > 0:
             problems.append(("least_gm_m", "needs ship.displacement_t, to which GM refers: add it"))
+        if vessel.devices is not None:
+            lacking = vessel.devices.redundancy_problems(vessel.redundancy)
+            problems += [(f"devices.{name}", reason) for name, reason in lacking]
         refuse("", in_written_keys(problems, vessel._written))
         return vessel
+
+    @property
+    def motion_cycles_s(self) -> tuple[float, float]:
+        """Time between two samples of each motion sensor."""
+        if self.devices is None:
+            return TICK_S, TICK_S
+        first, second = self.devices.motion.cycle_ms, self.devices.motion_2.cycle_ms
+        return (TICK_S if first is None else first * 1e-3), (
+            TICK_S if second is None else second * 1e-3
+        )
 
     @property
     def assumptions(self) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 from utank_hil.analysis.tank_design import tank_figures
 from utank_hil.configuration import Vessel
 from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
+from utank_hil.console.device_report import devices_json, print_devices
 from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.nonlinear import RollModel
@@ -24,6 +25,7 @@ def ship_json(vessel: Vessel) -> dict[str, Any]:
         "configuration_version": vessel.version,
         **ship_figures(vessel),
         "assumptions": list(vessel.assumptions),
+        "devices": devices_json(vessel.devices),
         "limits": vessel.default_limits,
     }
 
@@ -186,6 +188,7 @@ def print_ship(vessel: Vessel) -> None:
         if value:
             rest.add_row(text, value)
     console.table(rest)
+    print_devices(console, vessel.devices)
     for assumption in vessel.assumptions:
         console.say(f"Assumed: {assumption}.")
 

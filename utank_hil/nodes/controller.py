@@ -17,11 +17,11 @@ from utank_hil.canbus import (
     PassiveTwin,
     RetuningState,
     SeaEstimate,
-    SensorTank,
     ShipEstimate,
 )
 from utank_hil.canbus.events import RetuningEvent
 from utank_hil.canbus.measurements import Measurements, MotionSample
+from utank_hil.canbus.profiles.foreign import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.dynamics.tank import Tank
 from utank_hil.nodes.actuators import Actuators
@@ -57,12 +57,15 @@ class ControllerSettings:
     tank : Tank
     redundancy : Redundancy
         What the ship has twice.
+    foreign : ForeignDevices
+        Devices that are not nodes of the catalogue.
     """
 
     configuration_version: int
     commissioned: bool
     tank: Tank
     redundancy: Redundancy
+    foreign: ForeignDevices = NO_FOREIGN_DEVICES
 
 
 class ControllerNode:
@@ -127,11 +130,11 @@ class ControllerNode:
             valve=actuators.valve is not None,
             thresholds=None if monitors is None else monitors.thresholds,
             redundancy=settings.redundancy,
+            foreign=settings.foreign,
         )
         if monitors is not None:
             monitors.watch(self.inbox.watched, self.inbox.expected)
-        level_period_s = catalogue.codec(SensorTank).cycle_ns * NANOSECONDS
-        self.level = LevelObserver(settings.tank, level_period_s)
+        self.level = LevelObserver(settings.tank, self.inbox.tank_cycle_ns * NANOSECONDS)
         self._versions = catalogue.version, version
         self._housekeeping = Housekeeping(Address.CONTROLLER, catalogue, version)
         self._status = catalogue.transmitter(ControllerStatus)

@@ -30,7 +30,10 @@ from utank_hil.canbus import (
     ValveState,
     ValveStatus,
 )
+from utank_hil.canbus.frame import OTHER_BUS, STANDARD
 from utank_hil.canbus.measurements import Measurements
+from utank_hil.canbus.profiles.device import ProfiledDevice
+from utank_hil.canbus.profiles.foreign import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.nodes.hardwired import HardwiredHeard
 from utank_hil.nodes.plausibility import (
     MILLISECOND_NS,
@@ -91,6 +94,8 @@ class Inbox:
     thresholds : MonitorThresholds, optional
         What no motion of ship and water exceeds; without them no sample is a spike.
     redundancy : Redundancy
+    foreign : ForeignDevices
+        Devices of other makers.
 
     Attributes
     ----------
@@ -119,6 +124,7 @@ class Inbox:
         valve: bool = False,
         thresholds: MonitorThresholds | None = None,
         redundancy: Redundancy = NO_REDUNDANCY,
+        foreign: ForeignDevices = NO_FOREIGN_DEVICES,
     ) -> None:
         self._most_level_m = LEVEL_MARGIN * level_limit_m
         self._most_sum_m = SUM_SHARE * level_limit_m
@@ -126,20 +132,31 @@ class Inbox:
         self._known = catalogue.can_ids
         self.watched: list[Heard] = []
         self._subscriptions: dict[int, tuple[_Accept, _Handle]] = {}
+        self._foreign = foreign
+        self._devices: dict[int, Callable[[Frame, int], None]] = {}
         # a second sensor that is silent is missed but not waited for
         senders = [Address.SENSORS, Address.SENSORS_2][: 1 + redundancy.second_motion_sensor]
-        self.motions = tuple(
-            MotionSensor(catalogue.receiver(SensorMotion, sender), thresholds) for sender in senders
-        )
+        sources = [
+            catalogue.receiver(SensorMotion, sender) if plan is None else ProfiledDevice(plan)
+            for sender, plan in zip(senders, foreign.motions, strict=False)
+        ]
+        self.motions = tuple(MotionSensor(source, thresholds) for source in sources)
         for sensor in self.motions:
-            self._subscribe(sensor.receiver, sensor.take)
+            self._hear(sensor.receiver, sensor.take)
         self.gates = None if thresholds is None else LevelGates(thresholds)
-        self._tank = self._subscribe(catalogue.receiver(SensorTank), self._on_tank)
+        levels, pump_sensor = foreign.levels, foreign.pump_sensor
+        self._tank = catalogue.receiver(SensorTank) if levels is None else ProfiledDevice(levels)
+        self._hear(self._tank, self._on_tank)
         self._drive: Receiver[DriveStatus1] | None = None
-        matched = [Address.SENSORS]
+        matched = []
+        if foreign.motions[0] is None or levels is None or (pump and pump_sensor is None):
+            matched.append(Address.SENSORS)
         if pump:
             matched.append(Address.DRIVE)
-            self._subscribe(catalogue.receiver(SensorPump), self._on_pump)
+            pressure = catalogue.receiver(SensorPump)
+            self._hear(
+                pressure if pump_sensor is None else ProfiledDevice(pump_sensor), self._on_pump
+            )
             self._drive = self._subscribe(catalogue.receiver(DriveStatus1), self._on_drive_1)
             self._subscribe(catalogue.receiver(DriveStatus2), self._on_drive_2)
         if valve:
@@ -155,7 +172,8 @@ class Inbox:
         for orders in self.stations.orders.values():
             self._subscriptions[orders.can_id] = orders.accept, orders.obey
             self.watched.append(orders)
-        matched += senders[1:]
+        if len(senders) == 2 and foreign.motions[1] is None:
+            matched.append(Address.SENSORS_2)
         self._matching: dict[int, bool] = {}
         self._second_beat = 0
         self._strange_ns = NEVER_HEARD_NS
@@ -275,6 +293,22 @@ class Inbox:
         self.watched.append(receiver)
         return receiver
 
+    def _hear(
+        self, source: Receiver[_M] | ProfiledDevice[_M], handle: Callable[[_M, int], None]
+    ) -> None:
+        """Hand on what a node, or a device of another maker, has measured."""
+        if isinstance(source, Receiver):
+            self._subscribe(source, handle)
+            return
+        source.deliver = handle
+        self._devices |= source.takes
+        self.watched += source.watched
+
+    @property
+    def tank_cycle_ns(self) -> int:
+        """Time from one measurement of the levels to the next."""
+        return self._tank.cycle_ns
+
     def link_error(self, now_ns: int, period_ns: int) -> None:
         """Take note that the bus could not be read or written; it counts as lost for a period."""
         self._link_lost_until_ns = now_ns + period_ns
@@ -285,17 +319,22 @@ class Inbox:
         self.foreign += count
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Take one frame from the bus."""
-        self.frames += 1
-        subscription = self._subscriptions.get(frame.can_id)
+        """Take one frame from the bus; load and foreign frames are those of the own bus alone."""
+        can_id = frame.can_id
+        self.frames += can_id < OTHER_BUS
+        subscription = self._subscriptions.get(can_id)
         if subscription is not None:
             accept, handle = subscription
             message = accept(frame)
             if message is not None:
                 handle(message, now_ns)
-        elif frame.can_id & SOURCE_ADDRESS == _OWN_ADDRESS:
+            return
+        take = self._devices.get(can_id)
+        if take is not None:
+            take(frame, now_ns)
+        elif can_id & SOURCE_ADDRESS == _OWN_ADDRESS and can_id < STANDARD:
             self._conflict_ns = now_ns
-        elif frame.can_id not in self._known:
+        elif can_id < OTHER_BUS and can_id not in self._known and not self._foreign.knows(can_id):
             self.foreign += 1
 
     def _on_tank(self, tank: SensorTank, now_ns: int) -> None:

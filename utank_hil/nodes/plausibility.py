@@ -3,9 +3,9 @@
 import math
 from typing import Final
 
-from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import Quality, Receiver, SensorMotion
 from utank_hil.canbus.measurements import MotionSample
+from utank_hil.canbus.profiles.device import ProfiledDevice
 from utank_hil.safety.monitors.repetition import Repetition
 from utank_hil.safety.monitors.standstill import Standstill
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
@@ -56,13 +56,13 @@ class MotionSensor:
 
     Parameters
     ----------
-    receiver : Receiver of SensorMotion
+    receiver : Receiver of SensorMotion, or ProfiledDevice
     thresholds : MonitorThresholds, optional
         Of what no ship can do; without them every finite sample is taken.
 
     Attributes
     ----------
-    receiver : Receiver of SensorMotion
+    receiver
         As given.
     roll_rad, roll_rate_rad_s : float
         Of the last plausible sample, received at `heard_ns`.
@@ -71,7 +71,9 @@ class MotionSensor:
     """
 
     def __init__(
-        self, receiver: Receiver[SensorMotion], thresholds: MonitorThresholds | None
+        self,
+        receiver: Receiver[SensorMotion] | ProfiledDevice[SensorMotion],
+        thresholds: MonitorThresholds | None,
     ) -> None:
         self.receiver = receiver
         self.roll_rad = self.roll_rate_rad_s = 0.0
@@ -80,7 +82,7 @@ class MotionSensor:
         self._repetition: Repetition | None = None
         if thresholds is not None:
             remembered_s = REPEATS_WITHIN_PERIODS * thresholds.tank_period_s
-            self._repetition = Repetition(round(remembered_s / TICK_S))
+            self._repetition = Repetition(round(remembered_s * 1e9 / receiver.cycle_ns))
             self._roll = SpikeGate(thresholds.roll_spike_rad, thresholds.roll_most_rad_s)
             self._rate = SpikeGate(thresholds.rate_spike_rad_s, thresholds.rate_most_rad_s2)
 

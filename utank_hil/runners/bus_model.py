@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from heapq import heappop, heappush
 from typing import Final
 
-from utank_hil.canbus.frame import Frame
+from utank_hil.canbus.frame import LONGEST_STANDARD_ID, STANDARD, Frame
 from utank_hil.runners.wire_time import INTERMISSION_BITS, frame_bits
 
 WINDOW_NS: Final = 1_000_000_000
@@ -70,7 +70,7 @@ class SimulatedBus:
             )
         self._bit_ns: Final = 1_000_000_000 // bit_rate
         self._intermission_ns: Final = INTERMISSION_BITS * self._bit_ns
-        # (identifier, order of queueing, frame, sender, queued at, time on the wire)
+        # (rank by identifier, order of queueing, frame, sender, queued at, time on the wire)
         self._waiting: list[tuple[int, int, Frame, int, int, int]] = []
         self._order = 0
         self._in_flight: tuple[int, int, Frame] | None = None
@@ -94,7 +94,10 @@ class SimulatedBus:
         """
         duration_ns = (frame_bits(frame) + more_bits) * self._bit_ns
         self._order += 1
-        heappush(self._waiting, (frame.can_id, self._order, frame, sender, now_ns, duration_ns))
+        can_id = frame.can_id
+        # twice, so that an identifier of 11 bits goes before all that begin with it
+        rank = (can_id & LONGEST_STANDARD_ID) << 19 if can_id & STANDARD else 2 * can_id + 1
+        heappush(self._waiting, (rank, self._order, frame, sender, now_ns, duration_ns))
         if self._free_ns < now_ns:
             self._free_ns = now_ns
 

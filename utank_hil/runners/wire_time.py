@@ -9,6 +9,8 @@ length depends on every bit of the frame, including the CRC:
     CRC delimiter 1, acknowledge slot 1 and delimiter 1, end of frame 7    (10 bits)
     intermission 3                                  (belongs to the frame: the bus is not free yet)
 
+An identifier of 11 bits has neither SRR nor the other 18 bits nor r1: 20 bits less.
+
 Eight data bytes make 131 bits without and at most 160 bits with stuffing. This is the largest
 single cost of a simulated frame. So the header of an identifier is processed bit by bit once and
 cached, and data and CRC go bytewise through tables small enough for the processor's cache.
@@ -18,7 +20,7 @@ cached, and data and CRC go bytewise through tables small enough for the process
 from functools import lru_cache
 from typing import Final
 
-from utank_hil.canbus.frame import Frame
+from utank_hil.canbus.frame import LONGEST_STANDARD_ID, STANDARD, Frame
 
 LONGEST_FRAME_BITS: Final = 160
 """Of a frame with eight data bytes."""
@@ -28,6 +30,7 @@ _AFTER_CRC_BITS: Final = 10 + INTERMISSION_BITS
 _CRC_BITS: Final = 15
 _CRC_POLYNOMIAL: Final = 0x4599
 _HEADER_BITS: Final = 39
+_SHORT_HEADER_BITS: Final = 19
 
 Row = list[tuple["Row", int]]
 """Of one state of the stuffing rule, by byte: the row of the next state, and the stuff bits."""
@@ -79,15 +82,23 @@ _CRC_LOW: Final = [_crc(0, byte, 8) << 1 & 0xFF for byte in range(256)]
 @lru_cache(maxsize=4096)
 def _after_header(can_id: int, length: int) -> tuple[int, int, Row, int]:
     """Return CRC and row after the DLC, and the frame's bits except later stuff bits."""
-    if not 0 <= can_id < 1 << 29:
+    if not 0 <= can_id < 1 << 29 and not STANDARD <= can_id <= STANDARD | LONGEST_STANDARD_ID:
         raise ValueError(f"can_id {can_id:#x}: not a 29-bit identifier")
     if length > 8:
         raise ValueError(f"frame {can_id:#x}: {length} data bytes, a CAN frame holds 8")
+    if can_id & STANDARD:  # RTR, IDE and r0 follow the identifier, all dominant
+        return _after_bits_of(
+            (can_id & LONGEST_STANDARD_ID) << 7 | length, _SHORT_HEADER_BITS, length
+        )
     # SRR and IDE are recessive; start of frame, RTR, r1 and r0 are not
     header = can_id >> 18 << 27 | 0b11 << 25 | (can_id & 0x3FFFF) << 7 | length
-    state, stuffed = _after_bits(0, header, _HEADER_BITS)
-    plain = _HEADER_BITS + 8 * length + _CRC_BITS + _AFTER_CRC_BITS
-    crc = _crc(0, header, _HEADER_BITS)
+    return _after_bits_of(header, _HEADER_BITS, length)
+
+
+def _after_bits_of(header: int, bits: int, length: int) -> tuple[int, int, Row, int]:
+    state, stuffed = _after_bits(0, header, bits)
+    plain = bits + 8 * length + _CRC_BITS + _AFTER_CRC_BITS
+    crc = _crc(0, header, bits)
     return crc >> 7, crc << 1 & 0xFF, _ROWS[state], plain + stuffed
 
 
@@ -97,7 +108,7 @@ def frame_bits(frame: Frame) -> int:
     Parameters
     ----------
     frame : Frame
-        29-bit identifier, 0 to 8 data bytes.
+        Without a number of an interface, 0 to 8 data bytes.
 
     Returns
     -------

@@ -17,6 +17,7 @@ from utank_hil.safety.alarms import (
 )
 from utank_hil.safety.bus_load import BusLoad
 from utank_hil.safety.monitoring import Monitors
+from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.thresholds import DEGRADED_SHARE
 from utank_hil.safety.safety_limits import SafetyLimits
 from utank_hil.safety.situation import MILLISECOND_NS, OwnState, Situation
@@ -29,7 +30,7 @@ FIRST_HEEL_S: Final = 10.0
 """Time for which the heel counts as measured, as zero, at the start: no first roll is a heel."""
 HEEL_AGE_MS: Final = 100.0
 """An older roll says nothing of the heel."""
-SILENT_MS: Final = 25.0
+SILENT_CYCLES: Final = 2.5
 """Two samples of a motion sensor are missing: the other sensor is used, before the first one counts
 as silent."""
 QUIET_START_NS: Final = 10_000_000_000
@@ -40,6 +41,7 @@ _ALL_LATE: Final = 0x3FF
 _INIT: Final = Mode.INIT
 _ACTIVE: Final = Mode.ACTIVE
 _NO_FAULT: Final = Fault.NONE
+_DISAGREE: Final = int(Finding.SENSORS_DISAGREE)
 
 
 @dataclass(slots=True, eq=False)
@@ -137,6 +139,11 @@ class Safety:
         Of sensors, pump and bus; without them the fault table has ages, states and limits only.
     pump : bool
         Whether the tank has a pump to be watched.
+    motion_cycles_s : tuple of float
+        Time between two samples of each motion sensor.
+    unprotected : bool
+        Whether neither counter nor checksum protects a motion sensor's messages: the pressure is
+        as of a sensor in doubt unless a second one agrees.
 
     Attributes
     ----------
@@ -156,7 +163,11 @@ class Safety:
         monitors: Monitors | None = None,
         *,
         pump: bool = True,
+        motion_cycles_s: tuple[float, ...] = (TICK_S, TICK_S),
+        unprotected: bool = False,
     ) -> None:
+        self._silent_ms = [1e3 * SILENT_CYCLES * cycle_s for cycle_s in motion_cycles_s]
+        self._unprotected = unprotected
         self.supervisor = Supervisor(limits)
         self.monitors = monitors
         self.alarms = AlarmList()
@@ -237,19 +248,28 @@ class Safety:
             supervisor.demand,
             supervisor.drive_wanted,
             self._motion,
-            self._degraded_share if supervisor.degraded else 1.0,
+            self._degraded_share if supervisor.degraded or self._alone(found) else 1.0,
             unconfirmed_share,
             supervisor.standing,
             passive_roll_rad,
         )
+
+    def _alone(self, found: int) -> bool:
+        """Whether unprotected motion is used that no second sensor confirms."""
+        if not self._unprotected:
+            return False
+        spare_age_ms = self.situation.motion_spare_age_ms
+        agrees = len(self.situation.measured.motions) == 2 and not found & _DISAGREE
+        return not (agrees and spare_age_ms <= self.supervisor.limits.motion_spare_age_ms)
 
     def _leave_silent_sensor(self, measured: Measurements) -> None:
         """Use the other motion sensor if this one is silent, and that one neither nor accused."""
         motions, used = measured.motions, self._motion
         spare = 1 - used
         accused = self.monitors is not None and self.monitors.sensors[spare].accused
-        if motions[used].age_ms > SILENT_MS >= motions[spare].age_ms and not accused:
-            self._motion = spare
+        silent_ms = self._silent_ms
+        if motions[used].age_ms > silent_ms[used] and motions[spare].age_ms <= silent_ms[spare]:
+            self._motion = used if accused else spare
 
     def _note_causes(self, now_ns: int) -> None:
         """Keep what may be gone before alarms are looked at, ten times a second."""

@@ -43,7 +43,7 @@ LONG_S: Final = ROUND_TICKS * TICK_S
 SHORT_TICKS: Final = ROUND_TICKS // 2
 """Most ticks that are made up for: nothing is then done twice with the same sample."""
 SHORT_S: Final = SHORT_TICKS * TICK_S
-SPARE_MS: Final = 30.0
+SPARE_CYCLES: Final = 3.0
 """An older measurement of the other motion sensor is not changed over to."""
 STALE_MS: Final = 100.0
 """Older measurements are a gap, after which a comparison begins anew."""
@@ -102,6 +102,8 @@ class Monitors:
         the ship is not.
     second_motion : bool
         Whether there is a second motion sensor.
+    motion_cycles_s : tuple of float
+        Time between two samples of each motion sensor.
 
     Attributes
     ----------
@@ -129,7 +131,9 @@ class Monitors:
         *,
         compares: bool = True,
         second_motion: bool = False,
+        motion_cycles_s: tuple[float, ...] = (TICK_S, TICK_S),
     ) -> None:
+        self._spare_ms = [1e3 * SPARE_CYCLES * cycle_s for cycle_s in motion_cycles_s]
         self.thresholds: MonitorThresholds = thresholds_of(plant, roll_limit_rad, sensors)
         thresholds, ship, tank = self.thresholds, plant.ship, plant.tank
         self._spikes = SpikeCount()
@@ -151,10 +155,10 @@ class Monitors:
         self._compares = compares
         self.sensors = tuple(
             SensorEvidence(
-                MotionWatch(thresholds),
+                MotionWatch(thresholds, cycle_s),
                 TankEquation(ship, tank, thresholds, LONG_S, valve=not self._water_free),
             )
-            for _ in range(1 + second_motion)
+            for cycle_s in motion_cycles_s[: 1 + second_motion]
         )
         self.used = 0
         self._pair = MotionPair(thresholds, SHORT_S)
@@ -306,7 +310,8 @@ class Monitors:
     def _leave_accused(self, measured: Measurements) -> None:
         """Use the other motion sensor if something speaks against this one alone."""
         used, spare = self.sensors[self.used], self.sensors[1 - self.used]
-        if measured.motions[1 - self.used].age_ms > SPARE_MS or spare.found or spare.accused:
+        spare_ms = self._spare_ms[1 - self.used]
+        if measured.motions[1 - self.used].age_ms > spare_ms or spare.found or spare.accused:
             return
         if used.found or used.accused:
             used.accused = True

@@ -11,6 +11,8 @@ from utank_hil.safety.monitors.noise import Noise, SecondDifference
 from utank_hil.safety.monitors.spikes import SpikeCount
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
+SLOW_CYCLE_S: Final = 0.02
+"""Of a slower sensor not every look finds a new sample, nor two looks the same number of them."""
 _REPEATS: Final = int(Finding.MOTION_REPEATS)
 _NOISE: Final = int(Finding.NOISE)
 _SPIKES: Final = int(Finding.SPIKES)
@@ -22,6 +24,8 @@ class MotionWatch:
     Parameters
     ----------
     thresholds : MonitorThresholds
+    cycle_s : float
+        Time between two samples.
 
     Attributes
     ----------
@@ -31,7 +35,10 @@ class MotionWatch:
         Bits of `Finding`.
     """
 
-    def __init__(self, thresholds: MonitorThresholds) -> None:
+    def __init__(self, thresholds: MonitorThresholds, cycle_s: float = TICK_S) -> None:
+        self._half_s = 0.5 * cycle_s
+        self._slow = cycle_s > SLOW_CYCLE_S
+        self._bent_ns = 0
         self.motion = RollAgainstRate(thresholds)
         self.rate_noise = Noise(math.sqrt(6) * thresholds.rate_noise_rad_s)
         self._rate_bend = SecondDifference()
@@ -56,8 +63,8 @@ class MotionWatch:
     def update(self, sample: MotionSample, elapsed_s: float, *, stale: bool) -> None:
         """Take a sample, and set `found`; one that is `stale` begins anew."""
         roll_rad, rate_rad_s = sample.roll_rad, sample.roll_rate_rad_s
-        # half a tick of the ends makes a trapezoid of the sum, where no sample was lost
-        turned_rad = self._turned_rad - 0.5 * TICK_S * (rate_rad_s - self._last_rate_rad_s)
+        # half a cycle of the ends makes a trapezoid of the sum, where no sample was lost
+        turned_rad = self._turned_rad - self._half_s * (rate_rad_s - self._last_rate_rad_s)
         self._turned_rad = 0.0
         self._last_rate_rad_s = rate_rad_s
         if stale:
@@ -66,7 +73,7 @@ class MotionWatch:
             self.found = 0
             return
         found = self.motion.update(roll_rad, rate_rad_s, turned_rad, elapsed_s)
-        if self.rate_noise.update(self._rate_bend.update(rate_rad_s), elapsed_s):
+        if self._bend(sample, elapsed_s):
             found |= _NOISE
         # the largest samples of noise are discarded, too
         if self._spikes.update(sample.discarded, elapsed_s) and not found & _NOISE:
@@ -74,3 +81,14 @@ class MotionWatch:
         if sample.repeats:
             found |= _REPEATS
         self.found = found
+
+    def _bend(self, sample: MotionSample, elapsed_s: float) -> bool:
+        """Whether the rate is noisy; of a slow sensor each sample counts once."""
+        if not self._slow:
+            return self.rate_noise.update(self._rate_bend.update(sample.roll_rate_rad_s), elapsed_s)
+        since_s = (sample.heard_ns - self._bent_ns) * 1e-9
+        if since_s <= 0:
+            return self.rate_noise.found
+        self._bent_ns = sample.heard_ns
+        bend = self._rate_bend.update_after(sample.roll_rate_rad_s, since_s)
+        return self.rate_noise.update(bend, since_s)

@@ -59,9 +59,22 @@ class SecondDifference:
     def restart(self) -> None:
         """Begin anew after a gap."""
         self._last = self._before = math.nan
+        self._step_s = 0.0
 
     def update(self, value: float) -> float:
         """Take the next sample; return the second difference, zero as long as there is none."""
         difference = value - 2 * self._last + self._before
         self._before, self._last = self._last, value
         return difference if difference == difference else 0.0
+
+    def update_after(self, value: float, step_s: float) -> float:
+        """The same of samples that are not equally far apart: `step_s` since the last one.
+
+        What is left of the line through the last two; scaled so that white noise leaves as much.
+        """
+        ratio = step_s / self._step_s if self._step_s else math.nan
+        bend = value - self._last - ratio * (self._last - self._before)
+        self._before, self._last, self._step_s = self._last, value, step_s
+        if bend != bend:
+            return 0.0
+        return bend * math.sqrt(6.0 / (1.0 + (1.0 + ratio) ** 2 + ratio * ratio))

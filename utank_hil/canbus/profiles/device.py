@@ -1,0 +1,255 @@
+"""A device of another maker: from its frames to a measurement of the catalogue's own type."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final, Generic, TypeVar
+
+from utank_hil.canbus.enumerations import Quality, Switch
+from utank_hil.canbus.frame import Frame
+from utank_hil.canbus.messages import SensorMotion, SensorPump, SensorTank
+from utank_hil.canbus.profiles.field import Field
+from utank_hil.canbus.profiles.heard_message import Crc8, HeardMessage, Stamp
+
+T = TypeVar("T", bound=tuple[Any, ...])
+
+FIELDS: Final[dict[type[tuple[Any, ...]], tuple[str, ...]]] = {
+    SensorMotion: ("roll_rad", "roll_rate_rad_s"),
+    SensorTank: ("port_level_m", "starboard_level_m", "port_high", "starboard_high"),
+    SensorPump: ("pressure_pa", "flow_m3_s"),
+}
+"""What a device may measure, in the order of the message's fields before the quality."""
+SWITCHES: Final = ("port_high", "starboard_high")
+STATUS_CYCLES: Final = 3
+"""A status that is older by so many of its cycles says nothing any longer."""
+_LONG_AGO: Final = -(1 << 62)
+_new: Final = tuple.__new__
+
+
+def _nobody(message: Any, now_ns: int) -> None:
+    """Take what nobody has asked for yet."""
+
+
+@dataclass(frozen=True, slots=True)
+class SignalPlan:
+    """One measured value: value = sign * (physical * factor + offset).
+
+    Attributes
+    ----------
+    place : int
+        Of the value in the message.
+    message : int
+        Place of its message in the device.
+    field : Field
+    factor, offset : float
+    sign : int
+    least, most : float
+        Range of the physical value, in the maker's unit; outside it is none.
+    """
+
+    place: int
+    message: int
+    field: Field
+    factor: float
+    offset: float
+    sign: int
+    least: float
+    most: float
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionPlan:
+    """What a status must say: its counts under a mask are among those allowed."""
+
+    message: int
+    field: Field
+    mask: int
+    allowed: frozenset[int]
+
+
+@dataclass(frozen=True, slots=True)
+class MessagePlan:
+    """One message: the identifiers that it may have, its length, cycle and protection."""
+
+    name: str
+    can_ids: tuple[int, ...]
+    length: int
+    cycle_ns: int
+    counter: Field | None = None
+    crc: Crc8 | None = None
+    stamp: Field | None = None
+    stamp_us: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class DevicePlan(Generic[T]):
+    """All that is needed to hear a device.
+
+    Attributes
+    ----------
+    name : str
+    kind : type
+        Message that it stands for.
+    messages : tuple of MessagePlan
+    signals : tuple of SignalPlan
+    conditions : tuple of ConditionPlan
+    cycle_ns, same_instant_ns : int
+        Of the measurement; frames that belong to one come within the second.
+    age_ms : float
+        A stamp that is later than others by more is too late.
+    unchanged_ns : int
+        Content that has been the same for longer is none; 0 where stamp or counter say more.
+    high_level_m : float
+        Level above which a reservoir counts as high where there are no switches.
+    derived : bool
+        Whether the rate is the difference of two rolls.
+    name_id : tuple of (int, int) or None
+        Identifier (priority 6) of the address claim of the device, and the NAME it must carry.
+    """
+
+    name: str
+    kind: type[T]
+    messages: tuple[MessagePlan, ...]
+    signals: tuple[SignalPlan, ...]
+    conditions: tuple[ConditionPlan, ...]
+    cycle_ns: int
+    same_instant_ns: int
+    age_ms: float
+    unchanged_ns: int = 0
+    high_level_m: float = math.inf
+    derived: bool = False
+    name_id: tuple[int, int] | None = None
+
+
+class ProfiledDevice(Generic[T]):
+    """Hears one device, and hands on each measurement that is complete.
+
+    Parameters
+    ----------
+    plan : DevicePlan
+
+    Attributes
+    ----------
+    deliver : callable
+        Called with each message and the time at which it was complete.
+    takes : dict of int to callable
+        What takes a frame and the time of its receipt, by identifier.
+    watched : tuple of HeardMessage
+        Counters of its messages.
+    cycle_ns : int
+    """
+
+    def __init__(self, plan: DevicePlan[T]) -> None:
+        self._plan = plan
+        self.deliver: Callable[[T, int], None] = _nobody
+        self.cycle_ns = plan.cycle_ns
+        self.watched = tuple(
+            HeardMessage(each.can_ids[0], each.cycle_ns, each.length, each.counter, each.crc)
+            for each in plan.messages
+        )
+        count = len(plan.messages)
+        self._stamps = [
+            None if each.stamp is None else Stamp(each.stamp, each.stamp_us, plan.age_ms)
+            for each in plan.messages
+        ]
+        self._signals = [[s for s in plan.signals if s.message == m] for m in range(count)]
+        self._conditions = [[c for c in plan.conditions if c.message == m] for m in range(count)]
+        self._needed = [m for m in range(count) if self._signals[m] or self._stamps[m] is not None]
+        self._status = [m for m in range(count) if self._conditions[m]]
+        self._came_ns = [_LONG_AGO] * count
+        self._good_ns = [_LONG_AGO] * count
+        self._values: list[float] = [math.nan] * len(FIELDS[plan.kind])
+        self._tank = plan.kind is SensorTank
+        self._before: list[float] = []
+        self._changed_ns = _LONG_AGO
+        self._last_roll_rad, self._last_ns = math.nan, 0
+        self.named = plan.name_id is None
+        self.takes: dict[int, Callable[[Frame, int], None]] = {}
+        for place, each in enumerate(plan.messages):
+            for can_id in each.can_ids:
+                self.takes[can_id] = partial(self._take, place)
+        if plan.name_id is not None:
+            self.takes[plan.name_id[0]] = self._take_claim
+
+    @property
+    def valid(self) -> bool:
+        """Whether the messages with a value arrive intact and in order."""
+        return all(self.watched[place].valid for place in self._needed)
+
+    @property
+    def lost(self) -> int:
+        """Measurements missing by a counter."""
+        return max([self.watched[place].lost for place in self._needed])
+
+    def _take_claim(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
+        assert self._plan.name_id is not None
+        self.named = int.from_bytes(frame.data, "little") == self._plan.name_id[1]
+
+    def _take(self, place: int, frame: Frame, now_ns: int) -> None:
+        data = frame.data
+        if not self.watched[place].passes(data):
+            return
+        for condition in self._conditions[place]:
+            if condition.field.raw(data) & condition.mask not in condition.allowed:
+                self._good_ns[place] = _LONG_AGO
+                break
+        else:
+            self._good_ns[place] = now_ns
+        stamp = self._stamps[place]
+        if stamp is not None and not stamp.passes(data, now_ns):
+            self._came_ns[place] = _LONG_AGO
+            return
+        values = self._values
+        for signal in self._signals[place]:
+            physical = signal.field.value(data)
+            if not signal.least <= physical <= signal.most:
+                physical = math.nan
+            values[signal.place] = signal.sign * (physical * signal.factor + signal.offset)
+        self._came_ns[place] = now_ns
+        self._complete(now_ns)
+
+    def _complete(self, now_ns: int) -> None:
+        """Hand on a measurement, where all that it is made of belongs to one instant."""
+        earliest_ns = now_ns - self._plan.same_instant_ns
+        for place in self._needed:
+            if self._came_ns[place] < earliest_ns:
+                return
+        for place in self._needed:
+            self._came_ns[place] = _LONG_AGO
+        values = self._values
+        if self._plan.derived:
+            rate_rad_s = (values[0] - self._last_roll_rad) / max(now_ns - self._last_ns, 1) * 1e9
+            self._last_roll_rad, self._last_ns = values[0], now_ns
+            values[1] = rate_rad_s
+        usable = self.named and self._changes(now_ns)
+        for place in self._status:
+            limit_ns = STATUS_CYCLES * self.watched[place].cycle_ns
+            usable = usable and now_ns - self._good_ns[place] <= limit_ns
+        quality = Quality.GOOD if usable else Quality.BAD
+        content: tuple[Any, ...] = (*values, quality)
+        if self._tank:
+            port_m, starboard_m, port_high, starboard_high = values
+            content = (
+                port_m,
+                starboard_m,
+                self._switch(port_high, port_m),
+                self._switch(starboard_high, starboard_m),
+                quality,
+            )
+        self.deliver(_new(self._plan.kind, content), now_ns)
+
+    def _changes(self, now_ns: int) -> bool:
+        """Whether the content has changed within its time; without a limit it always has."""
+        if not self._plan.unchanged_ns:
+            return True
+        if self._values != self._before:
+            self._before = self._values.copy()
+            self._changed_ns = now_ns
+        return now_ns - self._changed_ns <= self._plan.unchanged_ns
+
+    def _switch(self, raw: float, level_m: float) -> Switch:
+        """A switch's state; without switches the level decides, and one that is unknown is high."""
+        if math.isfinite(self._plan.high_level_m):
+            return Switch.OFF if level_m <= self._plan.high_level_m else Switch.ON
+        return Switch.OFF if raw == 0.0 else Switch.ON

@@ -1,0 +1,98 @@
+"""One signal in a frame of any maker, with its bits worked out beforehand."""
+
+import math
+import struct
+from typing import Final
+
+_REAL: Final = {16: "<e", 32: "<f", 64: "<d"}
+
+
+class Field:
+    """A signal as a DBC lays it out: physical = raw * scale + offset.
+
+    Parameters
+    ----------
+    start, bits : int
+        First bit as in a DBC, and number of bits: of a signal with the least byte first the least
+        bit, of one with the most byte first the most.
+    length : int
+        Bytes of the frame.
+    big_endian, signed, real : bool
+        Most byte first; two's complement; IEEE 754.
+    scale, offset : float
+    least_raw, most_raw : int, optional
+        Counts outside are not available, or an error; without them every count is a value.
+
+    Raises
+    ------
+    ValueError
+        If the signal does not fit its frame, or a real number has not 16, 32 or 64 bits.
+    """
+
+    __slots__ = (
+        "_half", "_least", "_mask", "_most", "_order", "_real", "_shift", "bits", "offset", "scale",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        start: int,
+        bits: int,
+        length: int,
+        *,
+        big_endian: bool = False,
+        signed: bool = False,
+        real: bool = False,
+        scale: float = 1.0,
+        offset: float = 0.0,
+        least_raw: int | None = None,
+        most_raw: int | None = None,
+    ) -> None:
+        shift = start
+        if big_endian:  # the most bit is so far from the left
+            shift = 8 * length - (8 * (start // 8) + 7 - start % 8) - bits
+        if bits < 1 or shift < 0 or shift + bits > 8 * length:
+            raise ValueError(f"bits {start} and on, {bits} of them, are not in {length} bytes")
+        if real and bits not in _REAL:
+            raise ValueError(f"a real number has 16, 32 or 64 bits, not {bits}")
+        self._order: str = "big" if big_endian else "little"
+        self._shift = shift
+        self._mask = (1 << bits) - 1
+        self._half = 1 << (bits - 1) if signed and not real else 1 << bits
+        self._real = _REAL[bits] if real else ""
+        self._least = -(1 << bits) if least_raw is None else least_raw
+        self._most = 1 << bits if most_raw is None else most_raw
+        self.bits, self.scale, self.offset = bits, scale, offset
+
+    def raw(self, data: bytes) -> int:
+        """Counts of the signal, with their sign."""
+        word = int.from_bytes(data, "big" if self._order == "big" else "little")
+        raw = word >> self._shift & self._mask
+        return raw - self._mask - 1 if raw >= self._half else raw
+
+    def value(self, data: bytes) -> float:
+        """Physical value; NaN if the counts say that there is none."""
+        raw = self.raw(data)
+        if not self._least <= raw <= self._most:
+            return math.nan
+        if self._real:
+            packed = raw.to_bytes(self.bits // 8, "little")
+            return float(struct.unpack(self._real, packed)[0]) * self.scale + self.offset
+        return raw * self.scale + self.offset
+
+    def put(self, word: int, value: float, length: int) -> int:
+        """The frame's content as a number, least byte first, with this value in it.
+
+        The value is cut to what the bits, and the counts that are values, can hold.
+        """
+        raw = (value - self.offset) / self.scale
+        if self._real:
+            counts = int.from_bytes(struct.pack(self._real, raw), "little")
+        else:
+            low = -self._half if self._half <= self._mask else 0
+            high = self._half - 1 if self._half <= self._mask else self._mask
+            counts = round(min(max(raw, low, self._least), high, self._most)) & self._mask
+        if self._order == "big":
+            turned = int.from_bytes(word.to_bytes(length, "little"), "big")
+            turned = turned & ~(self._mask << self._shift) | counts << self._shift
+            return int.from_bytes(turned.to_bytes(length, "big"), "little")
+        return word & ~(self._mask << self._shift) | counts << self._shift

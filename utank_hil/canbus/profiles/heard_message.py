@@ -1,0 +1,158 @@
+"""What protects the frames of one message of another maker's device."""
+
+from dataclasses import dataclass
+from typing import Final
+
+from utank_hil.canbus.endpoints import BUCKET_LIMIT, MAX_LOST, RESYNC_FRAMES, Rejection
+from utank_hil.canbus.profiles.field import Field
+
+
+@dataclass(frozen=True, slots=True)
+class Crc8:
+    """A checksum of eight bits over all other bytes of a frame, in their order.
+
+    Attributes
+    ----------
+    byte : int
+        Its place in the frame.
+    polynomial, start, final : int
+        As in the Rocksoft model, without reflection; SAE J1850 has 0x1D, 0xFF and 0xFF.
+    """
+
+    byte: int
+    polynomial: int = 0x1D
+    start: int = 0xFF
+    final: int = 0xFF
+
+    def of(self, data: bytes) -> int:
+        """The checksum that belongs into the frame."""
+        register = self.start
+        for place, byte in enumerate(data):
+            if place != self.byte:
+                register ^= byte
+                for _ in range(8):
+                    register = (register << 1) ^ (self.polynomial if register & 0x80 else 0)
+                    register &= 0xFF
+        return register ^ self.final
+
+
+class HeardMessage:
+    """Length, checksum and counter of one message, and how its frames pass them.
+
+    Parameters
+    ----------
+    can_id, cycle_ns, length : int
+    counter : Field, optional
+    crc : Crc8, optional
+
+    Attributes
+    ----------
+    can_id, cycle_ns, length : int
+        As given.
+    heard, lost : int
+        Frames so far, accepted or not, and those missing by the counter.
+    rejected : dict
+        Number of rejected frames by `Rejection`.
+    valid : bool
+        As of `Receiver`.
+    """
+
+    def __init__(
+        self,
+        can_id: int,
+        cycle_ns: int,
+        length: int,
+        counter: Field | None = None,
+        crc: Crc8 | None = None,
+    ) -> None:
+        self.can_id, self.cycle_ns, self.length = can_id, cycle_ns, length
+        self.heard = self.lost = 0
+        self.rejected = dict.fromkeys(Rejection, 0)
+        self.valid = False
+        self._counter, self._crc = counter, crc
+        self._counts: Final = 0 if counter is None else 1 << counter.bits
+        self._last = self._candidate = -1
+        self._run = self._bucket = 0
+
+    def passes(self, data: bytes) -> bool:
+        """Judge the next frame; a rejected one does not change the counter."""
+        self.heard += 1
+        if len(data) != self.length:
+            return self._reject(Rejection.LENGTH)
+        if self._crc is not None and self._crc.of(data) != data[self._crc.byte]:
+            return self._reject(Rejection.CRC)
+        if self._counter is not None:
+            counter = self._counter.raw(data)
+            if self._last >= 0:
+                steps = (counter - self._last) % self._counts
+                if not 0 < steps <= MAX_LOST + 1:
+                    self._run = self._run + 1 if counter == self._candidate else 1
+                    self._candidate = (counter + 1) % self._counts
+                    if self._run < RESYNC_FRAMES:
+                        return self._reject(Rejection.SEQUENCE if steps else Rejection.REPEATED)
+                else:
+                    self.lost += steps - 1
+            self._last, self._run = counter, 0
+        self._bucket = max(self._bucket - 1, 0)
+        if not self._bucket:
+            self.valid = True
+        return True
+
+    def _reject(self, reason: Rejection) -> bool:
+        self.rejected[reason] += 1
+        self._bucket = min(self._bucket + 1, BUCKET_LIMIT)
+        if self._bucket == BUCKET_LIMIT:
+            self.valid = False
+        return False
+
+
+DRIFT: Final = 0.02
+"""Two clocks may run apart by so much: one part in a hundred was measured, of an inertial sensor;
+twice that."""
+
+
+class Stamp:
+    """The device's own time in a message: whether it moves on, and how late its frame came.
+
+    The least delay so far counts as none. It is forgotten at the rate of two clocks that run apart.
+
+    Parameters
+    ----------
+    field : Field
+    unit_us : float
+        Microseconds a count.
+    late_ms : float
+        A frame that is later than others by more is not accepted.
+    """
+
+    def __init__(self, field: Field, unit_us: float, late_ms: float) -> None:
+        self._field = field
+        self._unit_ns = unit_us * 1e3
+        self._late_ns = late_ms * 1e6
+        self._counts = 1 << field.bits
+        self._last = -1
+        self._time_ns = self._least_ns = 0.0
+        self._came_ns = 0
+        self.late = 0
+
+    def passes(self, data: bytes, now_ns: int) -> bool:
+        """Take the next stamp; False where it stands, steps back, or comes late.
+
+        A step back that is no wrap is a device that has restarted: its next stamp is taken.
+        """
+        stamp = self._field.raw(data)
+        last, self._last = self._last, stamp
+        steps = (stamp - last) % self._counts
+        if last < 0 or steps > self._counts // 2:
+            self._time_ns, self._least_ns, self._came_ns = 0.0, float(now_ns), now_ns
+            return False
+        if steps == 0:
+            return False
+        self._time_ns += steps * self._unit_ns
+        delay_ns = now_ns - self._time_ns
+        forgiven_ns = self._least_ns + DRIFT * (now_ns - self._came_ns)
+        self._least_ns, self._came_ns = min(delay_ns, forgiven_ns), now_ns
+        if delay_ns - self._least_ns > self._late_ns:
+            self.late += 1
+            return False
+        return True

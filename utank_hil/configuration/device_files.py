@@ -1,0 +1,115 @@
+"""Profiles that are shipped, and layouts out of a maker's DBC."""
+
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+from utank_hil.canbus import profiles
+from utank_hil.configuration.yaml_text import parse_yaml
+
+FOLDER: Final = Path(profiles.__file__).parent
+NATIVE: Final = "native"
+ENCODINGS: Final = ("utf-8", "cp1252")
+"""A DBC has no mark of its encoding: UTF-8 fails on anything else, and then it is a Windows one."""
+
+
+def shipped_profiles() -> tuple[str, ...]:
+    """Names of the profiles that are shipped, but for the native nodes."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
+
+
+@cache
+def _profile(name: str) -> Any:
+    content, findings = parse_yaml((FOLDER / f"{name}.yaml").read_text(encoding="utf-8"))
+    assert not findings, findings
+    return content
+
+
+def with_profile(content: dict[str, Any]) -> dict[str, Any]:
+    """A device's section with what its profile or its DBC says, where it says nothing itself.
+
+    Raises
+    ------
+    ValueError
+        If there is no such profile, or the DBC can't be read, or has no such message.
+    """
+    name = content.get("profile", "")
+    if "dbc" in content:
+        return _with_dbc(content)
+    if not isinstance(name, str) or name in ("", NATIVE):
+        return content
+    if name not in shipped_profiles():
+        known = ", ".join((NATIVE, *shipped_profiles()))
+        raise ValueError(f"no profile {name!r}: there are {known}; or name a file by dbc")
+    merged: dict[str, Any] = _merged(_profile(name), content)
+    return merged
+
+
+def _merged(below: Any, above: Any) -> Any:
+    if isinstance(below, dict) and isinstance(above, dict):
+        both = {key: _merged(below[key], above[key]) for key in below.keys() & above.keys()}
+        return {**below, **above, **both}
+    return above
+
+
+def _with_dbc(content: dict[str, Any]) -> dict[str, Any]:
+    """Replace the names of messages by their layouts; the file is not needed any longer."""
+    rest = {key: value for key, value in content.items() if key not in ("dbc", "messages")}
+    named = content.get("messages")
+    if not isinstance(named, dict) or not all(isinstance(each, str) for each in named.values()):
+        raise ValueError(
+            "with dbc, messages gives each message of the file a name: {name: MESSAGE}"
+        )
+    layouts = _dbc_layouts(str(content["dbc"]))
+    for each in named.values():
+        if each not in layouts:
+            raise ValueError(f"messages: {content['dbc']} has no message {each}")
+    messages = {key: layouts[each] for key, each in named.items()}
+    return {"profile": f"DBC {Path(str(content['dbc'])).name}", **rest, "messages": messages}
+
+
+@cache
+def _dbc_layouts(file: str) -> dict[str, dict[str, Any]]:
+    """Layouts of all messages of a DBC, as `MessageSection` has them, by their names."""
+    from cantools.database.can import Database
+    from cantools.database.errors import Error
+
+    try:
+        content = Path(file).read_bytes()
+    except OSError as error:
+        raise ValueError(f"dbc: {file} can't be read: {error.strerror}") from error
+    database = Database(strict=False)  # one message that does not fit spoils no other
+    for encoding in ENCODINGS:
+        try:
+            database.add_dbc_string(content.decode(encoding))
+            break
+        except UnicodeDecodeError:
+            continue
+        except (Error, ValueError) as error:
+            raise ValueError(f"dbc: {file} is no DBC: {error}") from error
+    else:
+        raise ValueError(f"dbc: {file} is text in none of {', '.join(ENCODINGS)}")
+    return {message.name: _layout(message) for message in database.messages}
+
+
+def _layout(message: Any) -> dict[str, Any]:
+    signals = {
+        signal.name: {
+            "start": signal.start,
+            "bits": signal.length,
+            "big_endian": signal.byte_order == "big_endian",
+            "signed": signal.is_signed,
+            "real": signal.is_float,
+            "scale": float(signal.scale),
+            "offset": float(signal.offset),
+            "unit": signal.unit or "",
+        }
+        for signal in message.signals
+    }
+    return {
+        "id": message.frame_id,
+        "format": "29bit" if message.is_extended_frame else "11bit",
+        "bytes": max(message.length, 1),
+        "cycle_ms": message.cycle_time or None,
+        "signals": signals,
+    }

@@ -1,0 +1,420 @@
+"""Section ``devices`` of a ship's file: what is on the bus in the place of the native nodes."""
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Any, Final
+
+from pydantic import Field, model_validator
+
+from utank_hil.base.parameters import Problem, Range, refuse
+from utank_hil.canbus.frame import BUS_SHIFT, MOST_BUSES, STANDARD
+from utank_hil.canbus.messages import SensorMotion, SensorPump, SensorTank
+from utank_hil.canbus.profiles.device import (
+    FIELDS,
+    SWITCHES,
+    ConditionPlan,
+    DevicePlan,
+    MessagePlan,
+    SignalPlan,
+)
+from utank_hil.canbus.profiles.foreign import ForeignDevices
+from utank_hil.canbus.profiles.heard_message import Crc8
+from utank_hil.configuration.device_files import NATIVE, with_profile
+from utank_hil.configuration.device_sections import (
+    UNITS,
+    ConditionSection,
+    Cycle,
+    Id11,
+    Id29,
+    MessageSection,
+    NodeNumber,
+    Pgn,
+    ProtectionSection,
+    SignalSection,
+    SourceAddress,
+    unit_of,
+)
+from utank_hil.configuration.files import Section
+from utank_hil.nodes.redundancy import Redundancy
+from utank_hil.safety.safety_limits import SafetyLimits
+
+MOST_MOTION_CYCLE_MS: Final = 50.0
+"""The monitors look at motion every 50 ms and take a gap of 100 ms as a loss: below 20 Hz they see
+nothing."""
+LEAST_AGE_CYCLES: Final = 2.0
+"""One lost frame must not end the run."""
+PRIORITIES: Final = range(8)
+_NAME_PGN: Final = 0xEEFF
+"""Address claimed, to all."""
+
+
+Noise = Annotated[float, Range(above=0, most=1.0)]
+
+
+class DeviceSection(Section):
+    """One device."""
+
+    profile: str = NATIVE
+    """Shipped profile, or `native` for a node of this project's own catalogue."""
+    bus: str = ""
+    """Interface that it is on; empty for the controller's own."""
+    device: str = ""
+    """Maker and kind, in the shipped profiles."""
+    documents: str = ""
+    """Public documents that the profile was made from."""
+    node: NodeNumber | None = None
+    """CANopen node."""
+    source: SourceAddress | None = None
+    """Source address, SAE J1939 and NMEA 2000."""
+    messages: Annotated[dict[str, MessageSection], Field(default_factory=dict)]
+    """Layouts and identifiers by names of your own; with `dbc: FILE` the names in that file."""
+    signals: Annotated[dict[str, SignalSection], Field(default_factory=dict)]
+    """What each value is made of."""
+    valid_when: tuple[ConditionSection, ...] = ()
+    """Conditions on status words that must all hold."""
+    protection: ProtectionSection = ProtectionSection()
+    """What tells frames that are wrong, old or not the device's."""
+    accept_unprotected: bool = False
+    """Whether a device without counter and checksum is used all the same."""
+    cycle_ms: Cycle | None = None
+    """Time between two measurements."""
+    age_ms: Cycle | None = None
+    """Longest age of the last measurement."""
+    latency_ms: Annotated[float, Range(least=0, most=1000)] = 0.0
+    """From the motion to the first bit on the bus."""
+    same_instant_ms: Cycle | None = None
+    """Frames of one measurement come within this time; half a cycle without it."""
+    noise: Annotated[
+        dict[str, Annotated[float, Range(above=0, most=1.0)]], Field(default_factory=dict)
+    ]
+    """Standard deviation of a value, where it is more than `sensors` of the controller's file."""
+    high_level_m: Annotated[float, Range(above=0, most=100)] | None = None
+    """Level that counts as too high, where the levels come without switches."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _complete(cls, content: Any) -> Any:
+        return with_profile(content) if isinstance(content, dict) else content
+
+    @property
+    def native(self) -> bool:
+        """Whether it is the node of this project's own catalogue."""
+        return self.profile == NATIVE
+
+    @property
+    def protected(self) -> bool:
+        """Whether a counter or a checksum is in each message with a value."""
+        guarded = {each.partition(".")[0] for each in self.protection.counters}
+        guarded |= {each.message for each in self.protection.crcs}
+        return all(
+            each.from_.partition(".")[0] in guarded
+            for each in self.signals.values()
+            if each.source == "measured"
+        )
+
+    def period_ms(self) -> float:
+        """Time between two measurements."""
+        assert self.cycle_ms is not None
+        return self.cycle_ms
+
+    def problems(self, kind: type[tuple[Any, ...]]) -> Iterator[Problem]:
+        """What is wrong with the device as a source of this message; native ones are right."""
+        if self.native:
+            if self.bus:
+                yield (
+                    "bus",
+                    "is for a device with a profile: native nodes are on the controller's bus",
+                )
+            return
+        for name in ("cycle_ms", "age_ms"):
+            if getattr(self, name) is None:
+                yield name, "is required but missing"
+        if self.cycle_ms is not None and self.age_ms is not None:
+            least_ms = LEAST_AGE_CYCLES * self.cycle_ms
+            if self.age_ms < least_ms:
+                yield "age_ms", f"must be {least_ms:g} or more, two cycles, got {self.age_ms:g}"
+        yield from self._message_problems()
+        yield from self._signal_problems(kind)
+        for place, (key, path) in enumerate(self._paths()):
+            if path.partition(".")[0] not in self.messages or self._field(path) is None:
+                yield key, f"{path!r} is no signal of messages: write MESSAGE.SIGNAL (no. {place})"
+        for crc in self.protection.crcs:
+            if crc.message not in self.messages:
+                yield "protection.crcs", f"there is no message {crc.message!r}"
+        guards = self.protection
+        if not self.protected and not self.accept_unprotected:
+            yield (
+                "accept_unprotected",
+                "must be set to true: no counter or checksum tells frames of another sender, old "
+                "or spoilt ones. The pressure stays at half until a second motion sensor agrees",
+            )
+        if not (guards.counters or guards.stamps or guards.unchanged_ms):
+            reason = "is required where nothing counts: a device that hangs sends the same for ever"
+            yield "protection.unchanged_ms", reason
+
+    def _message_problems(self) -> Iterator[Problem]:
+        for name, message in self.messages.items():
+            ways = [getattr(message, way) is not None for way in ("id", "pgn", "cob")]
+            if sum(ways) != 1:
+                yield f"messages.{name}", "needs one of id, pgn and cob"
+            elif message.pgn is not None and self.source is None:
+                yield "source", f"is required but missing: it sends PGN {message.pgn}"
+            elif message.cob is not None and self.node is None:
+                yield "node", "is required but missing: its identifiers follow from it"
+            for signal, layout in message.signals.items():
+                try:
+                    layout.field(message.bytes)
+                except ValueError as error:
+                    yield f"messages.{name}.signals.{signal}", str(error)
+        if self.protection.n2k_name is not None and self.source is None:
+            yield "source", "is required but missing: n2k_name claims it"
+
+    def _signal_problems(self, kind: type[tuple[Any, ...]]) -> Iterator[Problem]:
+        known = FIELDS[kind]
+        for name, signal in self.signals.items():
+            if name not in known:
+                yield f"signals.{name}", f"is no value of it; there are {', '.join(known)}"
+                continue
+            layout = self._field(signal.from_)
+            if layout is None or signal.source == "derived" or name in SWITCHES:
+                continue
+            if signal.scale is None and UNITS.get(layout.unit, ("",))[0] != unit_of(name):
+                unit = f"has the unit {layout.unit!r}" if layout.unit else "has no unit"
+                reason = f"{signal.from_} {unit}: give scale, from it to {unit_of(name)}"
+                yield f"signals.{name}.scale", reason
+        needed = [name for name in known if name not in SWITCHES and name != "flow_m3_s"]
+        if kind is SensorTank and self.high_level_m is None:
+            needed += SWITCHES
+        for name in needed:
+            if name not in self.signals:
+                more = ", or else high_level_m" if name in SWITCHES else ""
+                yield f"signals.{name}", f"is required but missing{more}"
+
+    def _paths(self) -> Iterator[tuple[str, str]]:
+        for name, signal in self.signals.items():
+            if signal.source == "measured":
+                yield f"signals.{name}", signal.from_
+        yield from (("valid_when", each.from_) for each in self.valid_when)
+        yield from (("protection.counters", each) for each in self.protection.counters)
+        yield from (("protection.stamps", each.from_) for each in self.protection.stamps)
+
+    def _field(self, path: str) -> Any:
+        message, _, signal = path.partition(".")
+        section = self.messages.get(message)
+        return None if section is None else section.signals.get(signal)
+
+    def step(self, value: str) -> float:
+        """The least step of a value, in its own unit; zero for a real number."""
+        signal = self.signals[value]
+        layout = self._field(signal.from_)
+        if layout is None or layout.real:
+            return 0.0
+        factor = UNITS.get(layout.unit, ("", 1.0))[1] if signal.scale is None else signal.scale
+        return abs(float(layout.scale) * factor)
+
+    def plan(self, kind: type[tuple[Any, ...]], name: str, bus: int) -> DevicePlan[Any]:
+        """The device as the inbox hears it, on the interface of this number."""
+        places = {each: place for place, each in enumerate(self.messages)}
+        fields = {
+            f"{message}.{signal}": layout.field(section.bytes)
+            for message, section in self.messages.items()
+            for signal, layout in section.signals.items()
+        }
+        cycle_ms, age_ms = self.period_ms(), self.age_ms
+        assert age_ms is not None
+        signals = []
+        for value, signal in self.signals.items():
+            if signal.source == "derived":
+                continue
+            layout = self._field(signal.from_)
+            factor = UNITS.get(layout.unit, ("", 1.0))[1] if signal.scale is None else signal.scale
+            signals.append(
+                SignalPlan(
+                    FIELDS[kind].index(value), places[signal.from_.partition(".")[0]],
+                    fields[signal.from_], factor, signal.offset, signal.sign, signal.least,
+                    signal.most,
+                )
+            )  # fmt: skip
+        conditions = [
+            ConditionPlan(
+                places[each.from_.partition(".")[0]], fields[each.from_], each.mask,
+                frozenset(each.in_),
+            )
+            for each in self.valid_when
+        ]  # fmt: skip
+        half_ms = cycle_ms / 2 if self.same_instant_ms is None else self.same_instant_ms
+        guards = self.protection
+        claim = None
+        if guards.n2k_name is not None:
+            assert self.source is not None
+            claim = (bus << BUS_SHIFT) | 6 << 26 | _NAME_PGN << 8 | self.source, guards.n2k_name
+        return DevicePlan(
+            name,
+            kind,
+            tuple(self._message_plan(each, fields, bus) for each in self.messages),
+            tuple(signals),
+            tuple(conditions),
+            round(cycle_ms * 1e6),
+            round(half_ms * 1e6),
+            age_ms,
+            round((guards.unchanged_ms or 0.0) * 1e6),
+            math.inf if self.high_level_m is None else self.high_level_m,
+            any(each.source == "derived" for each in self.signals.values()),
+            claim,
+        )
+
+    def _message_plan(self, name: str, fields: dict[str, Any], bus: int) -> MessagePlan:
+        section, guards = self.messages[name], self.protection
+        counters = [fields[each] for each in guards.counters if each.partition(".")[0] == name]
+        crcs = [each for each in guards.crcs if each.message == name]
+        stamps = [each for each in guards.stamps if each.from_.partition(".")[0] == name]
+        cycle_ms = self.period_ms() if section.cycle_ms is None else section.cycle_ms
+        return MessagePlan(
+            name,
+            tuple(each | bus << BUS_SHIFT for each in self._can_ids(section)),
+            section.bytes,
+            round(cycle_ms * 1e6),
+            counters[0] if counters else None,
+            Crc8(crcs[0].byte, crcs[0].polynomial, crcs[0].start, crcs[0].final) if crcs else None,
+            fields[stamps[0].from_] if stamps else None,
+            stamps[0].us if stamps else 1.0,
+        )
+
+    def _can_ids(self, section: MessageSection) -> tuple[int, ...]:
+        if section.pgn is not None:  # the priority is the sender's choice
+            assert self.source is not None
+            return tuple(each << 26 | section.pgn << 8 | self.source for each in PRIORITIES)
+        if section.cob is not None:
+            assert self.node is not None
+            return (STANDARD | section.cob + self.node,)
+        assert section.id is not None
+        return (section.id if section.format == "29bit" else STANDARD | section.id,)
+
+
+NATIVE_NODE: Final = DeviceSection.model_validate({})
+
+
+class OthersSection(Section):
+    """Devices on the controller's own bus that it has nothing to do with."""
+
+    ids_11bit: tuple[Id11, ...] = ()
+    """Identifiers of 11 bits."""
+    ids_29bit: tuple[Id29, ...] = ()
+    """Identifiers of 29 bits."""
+    pgns: tuple[Pgn, ...] = ()
+    """Groups by SAE J1939-21, of any source and priority."""
+
+
+_KINDS: Final[dict[str, type[tuple[Any, ...]]]] = {
+    "motion": SensorMotion,
+    "motion_2": SensorMotion,
+    "levels": SensorTank,
+    "pump_sensor": SensorPump,
+}
+
+
+class DevicesSection(Section):
+    """Section ``devices`` of a ship's file."""
+
+    motion: DeviceSection = NATIVE_NODE
+    """Motion sensor."""
+    motion_2: DeviceSection = NATIVE_NODE
+    """Second motion sensor."""
+    levels: DeviceSection = NATIVE_NODE
+    """Level gauges."""
+    pump_sensor: DeviceSection = NATIVE_NODE
+    """Sensor of the pump's pressure."""
+    receive_only: tuple[str, ...] = ()
+    """Interfaces on which the controller sends nothing."""
+    others: OthersSection = OthersSection()
+    """Devices that the controller has nothing to do with."""
+
+    @model_validator(mode="after")
+    def _usable(self) -> "DevicesSection":
+        problems = [
+            (f"{role}.{name}", reason)
+            for role, device in self.sensors().items()
+            for name, reason in device.problems(_KINDS[role])
+        ]
+        for role in ("motion", "motion_2"):
+            cycle_ms = self.sensors()[role].cycle_ms
+            if cycle_ms is not None and cycle_ms > MOST_MOTION_CYCLE_MS:
+                reason = (
+                    f"is {cycle_ms:g}, {1e3 / cycle_ms:.3g} Hz: too slow for any law and for the "
+                    f"monitors, which need {1e3 / MOST_MOTION_CYCLE_MS:g} Hz or more"
+                )
+                problems.append((f"{role}.cycle_ms", reason))
+        if len(self.buses()) > MOST_BUSES:
+            reason = f"are on {len(self.buses())} interfaces, {MOST_BUSES} is the most"
+            problems.append(("", reason))
+        strange = [name for name in self.receive_only if name not in self.buses()]
+        problems += [("receive_only", f"no device is on {name}") for name in strange]
+        refuse("devices", problems)
+        return self
+
+    def sensors(self) -> dict[str, DeviceSection]:
+        """The sensors by their roles."""
+        return {role: getattr(self, role) for role in _KINDS}
+
+    def redundancy_problems(self, redundancy: Redundancy) -> Iterator[Problem]:
+        """What a second motion sensor must be there for, or is there without need."""
+        if redundancy.second_motion_sensor:
+            return
+        if not self.motion_2.native:
+            yield "motion_2", "needs redundancy: {second_motion_sensor: true} in the ship's file"
+        rate = self.motion.signals.get("roll_rate_rad_s")
+        if rate is not None and rate.source == "derived":
+            reason = (
+                "is derived of the roll: nothing would tell a wrong one. Give a measured rate, or "
+                "a second motion sensor (redundancy: {second_motion_sensor: true})"
+            )
+            yield "motion.signals.roll_rate_rad_s.source", reason
+
+    def default_ages(self) -> dict[str, float]:
+        """Limits of age where the controller's file says nothing, by `SafetyLimits`' names."""
+        ages = {}
+        if self.motion.age_ms is not None:
+            ages["motion_age_ms"] = self.motion.age_ms
+        both = [each.age_ms for each in (self.motion, self.motion_2) if each.age_ms is not None]
+        if both:
+            ages["motion_spare_age_ms"] = max(SafetyLimits().motion_spare_age_ms, 2 * max(both))
+        if self.levels.age_ms is not None:
+            ages["tank_degraded_age_ms"] = self.levels.age_ms
+        if self.pump_sensor.age_ms is not None:
+            ages["pump_degraded_age_ms"] = self.pump_sensor.age_ms
+        return ages
+
+    def noise(self, role: str, value: str) -> float:
+        """Noise of a value: as given, or that of its least step."""
+        device = self.sensors()[role]
+        if device.native:
+            return 0.0
+        return max(device.noise.get(value, 0.0), device.step(value) / math.sqrt(12))
+
+    @property
+    def unprotected(self) -> bool:
+        """Whether nothing tells a spoilt or foreign frame of a motion sensor."""
+        return any(not (each.native or each.protected) for each in (self.motion, self.motion_2))
+
+    def buses(self) -> tuple[str, ...]:
+        """Interfaces, the controller's own first, which has no name."""
+        named = sorted({each.bus for each in self.sensors().values() if each.bus})
+        return ("", *named)
+
+    def foreign(self) -> ForeignDevices:
+        """The devices as the controller node hears them."""
+        buses = self.buses()
+        plans = {
+            role: None
+            if device.native
+            else device.plan(_KINDS[role], role, buses.index(device.bus))
+            for role, device in self.sensors().items()
+        }
+        others = self.others
+        return ForeignDevices(
+            (plans["motion"], plans["motion_2"]),
+            plans["levels"],
+            plans["pump_sensor"],
+            frozenset((*others.ids_29bit, *(STANDARD | each for each in others.ids_11bit))),
+            frozenset(others.pgns),
+        )
