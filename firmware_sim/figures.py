@@ -157,10 +157,7 @@ class BenchFigures:
 def read_figures(content: Mapping[str, Any]) -> BenchFigures:
     """Read the figures from the JSON of a bench.
 
-    Raises
-    ------
-    pydantic.ValidationError
-        If there are none, or those of another version.
+    Raises `pydantic.ValidationError` if there are none, or those of another version.
     """
     return TypeAdapter(BenchFigures).validate_python(content)
 

@@ -79,10 +79,7 @@ def bench_page(
 def read_bench(folder: Path, scratch: Path) -> Report:
     """Return the page of a bench from its files.
 
-    Raises
-    ------
-    OSError, ValueError
-        If a file is missing or invalid.
+    Raises `OSError, ValueError` if a file is missing or invalid.
     """
     content = json.loads((folder / FIGURES).read_text(encoding="utf-8"))
     try:

@@ -41,10 +41,7 @@ _M = TypeVar("_M", bound=tuple[Any, ...])
 class SensorErrors:
     """Errors of the sensors; noise is white and Gaussian, given as standard deviation.
 
-    Raises
-    ------
-    ValueError
-        If a value is out of its range, or the delay is not a multiple of the cycle.
+    Raises `ValueError` if a value is out of its range, or the delay is not a multiple of the cycle.
     """
 
     roll_noise_rad: NotNegative = 2e-4  #: Noise of the motion sensor.

@@ -58,12 +58,8 @@ class ShipSide:
         """Return the nodes that remain when hardware replaces some of `NODE_NAMES`.
 
         Without the emulated drive an `ExternalDrive` moves the plant's pump, without the emulated
-        valve an `ExternalValve` its valve.
-
-        Raises
-        ------
-        ValueError
-            If the ship does not have a node of this name.
+        valve an `ExternalValve` its valve. Raises `ValueError` if the ship does not have a node of
+        this name.
         """
         known = [node.name for node in self.nodes]
         for name in names:

@@ -18,11 +18,8 @@ _DEPTH_PER_BEAM: Final = (0.01, 1.0)
 class StarterShip:
     """Ship as a naval architect knows it, without the tank's water.
 
-    Raises
-    ------
-    ValueError
-        If a value is out of its range, neither period nor draught is given, or displacement and
-        length, or GM and period, are inconsistent.
+    Raises `ValueError` if a value is out of its range, neither period nor draught is given, or
+    displacement and length, or GM and period, are inconsistent.
     """
 
     name: str

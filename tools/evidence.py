@@ -130,10 +130,7 @@ def commit() -> str:
 def run(name: str, part: Part) -> float:
     """Run a part, write its record, and return how many seconds it took.
 
-    Raises
-    ------
-    PartError
-        If the command fails.
+    Raises `PartError` if the command fails.
     """
     programs = Path(sys.executable).parent
     environment = {**os.environ, "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}"}

@@ -80,10 +80,7 @@ MEASUREMENTS: Final = tuple(_GETTERS)
 def measure_of(names: tuple[str, ...]) -> Measure:
     """Function that picks the named signals as a measurement vector, shape (m,).
 
-    Raises
-    ------
-    ValueError
-        If a name is none of `MEASUREMENTS`.
+    Raises `ValueError` if a name is none of `MEASUREMENTS`.
     """
     for name in names:
         if name not in MEASUREMENTS:
@@ -99,15 +96,13 @@ def measure_of(names: tuple[str, ...]) -> Measure:
 def build_law(config: ControllerConfig) -> BuiltLaw:
     """Design the law of a configuration for its vessel.
 
+    Raises `ParameterError` if it can't be designed; the problems are named by their keys in the
+    configuration.
+
     Returns
     -------
     BuiltLaw
         To be handed on to whatever needs the law: judging it, running it.
-
-    Raises
-    ------
-    ParameterError
-        If it can't be designed; the problems are named by their keys in the configuration.
     """
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
@@ -245,17 +240,14 @@ def build_commissioning_node(
 ) -> CommissioningNode:
     """Build the node that leads through the commissioning of a configuration.
 
+    Raises `ValueError` if the vessel has neither pump nor valve.
+
     Parameters
     ----------
     config : ControllerConfig
         Its law has no part in it.
     statistics, event_sink
         As `ControllerNode` takes them.
-
-    Raises
-    ------
-    ValueError
-        If the vessel has neither pump nor valve.
     """
     vessel, plant = config.vessel, config.plant
     commands = tuple(
@@ -288,17 +280,14 @@ def retuning_task(
 ) -> "RetuningTask":
     """What is to be identified and designed anew: the part of a configuration that matters to it.
 
+    Raises `ValueError` if the law is not one that can be designed anew.
+
     Parameters
     ----------
     order : int
         Of the ARX model.
     roll_period_range_s : tuple of float
         Of the ships that the stability booklet covers.
-
-    Raises
-    ------
-    ValueError
-        If the law is not one that can be designed anew.
     """
     from utank_hil.identification.acceptance import ModelLimits  # here: scipy.optimize
     from utank_hil.retuning.redesign import RetuningTask

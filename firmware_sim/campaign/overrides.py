@@ -22,12 +22,8 @@ def changed(content: Content, values: Mapping[str, Any]) -> Content:
 
     ``*`` stands for every name, as in ``controllers.*.limits.pressure_pa``. A key of ``vessel``
     also applies to the controllers of the same ship; ``actual_ship`` changes the ship alone and not
-    the controllers' model of it. Values are applied in order; `WHOLE` replaces the content.
-
-    Raises
-    ------
-    OverrideError
-        If a key leads into a value, or to a name that does not exist.
+    the controllers' model of it. Values are applied in order; `WHOLE` replaces the content. Raises
+    `OverrideError` if a key leads into a value, or to a name that does not exist.
     """
     new: Content = values.get(WHOLE, content)
     for key, value in values.items():

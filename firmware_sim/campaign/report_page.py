@@ -17,10 +17,7 @@ MOST_LINES: Final = 8
 def campaign_report(folder: Path, scratch: Path) -> Report:  # noqa: ARG001
     """Return the report of a campaign's folder; `scratch` is unused, as it makes no pictures.
 
-    Raises
-    ------
-    OSError, ValueError
-        If a file of the campaign is missing or invalid.
+    Raises `OSError, ValueError` if a file of the campaign is missing or invalid.
     """
     content = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
     groups, failed, study = content["groups"], content["failures"], content["configuration"]

@@ -53,6 +53,8 @@ class _Record:
 def rows_of(simulation: str, scenario: Scenario, seed: int, laws: Laws) -> list[Row]:
     """Compute a case.
 
+    Raises `ValueError` if this kind of simulation cannot compute the scenario.
+
     Parameters
     ----------
     simulation : str
@@ -65,11 +67,6 @@ def rows_of(simulation: str, scenario: Scenario, seed: int, laws: Laws) -> list[
     list of dict
         One row for the bare ship and for each run: ``run``, ``mark`` (why it does not count, or
         empty) and the figures of `METRICS`.
-
-    Raises
-    ------
-    ValueError
-        If this kind of simulation cannot compute the scenario.
     """
     if simulation == "bus":
         return _on_the_bus(scenario, seed, laws)

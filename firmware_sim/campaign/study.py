@@ -137,12 +137,8 @@ def load_study(path: Path, *, allow_code: bool = False) -> LoadedStudy:
     """Read a study and list its cases.
 
     The first case with each set of keys is validated completely; a later invalid case fails alone.
-    The parameter `allow_code` is that of `load_config`.
-
-    Raises
-    ------
-    ConfigError
-        If the study, its scenario or one of its keys is invalid.
+    The parameter `allow_code` is that of `load_config`. Raises `ConfigError` if the study, its
+    scenario or one of its keys is invalid.
     """
     study = load_config(path, Study)
     files = files_named(path)

@@ -26,10 +26,7 @@ _Figures = dict[str, dict[str, float]]
 def compare_campaigns(reference: Path, others: list[Path]) -> list[Comparison]:
     """Compare campaigns with the first one, group by group and run by run.
 
-    Raises
-    ------
-    CompareError
-        If the campaigns vary different keys, or share no group or no run.
+    Raises `CompareError` if the campaigns vary different keys, or share no group or no run.
     """
     first = read_results(reference)
     return [each for other in others for each in _compared(first, other)]

@@ -87,10 +87,7 @@ class Record:
 def read_record(path: Path) -> Record:
     """Read a recording, a log of the bus or a table.
 
-    Raises
-    ------
-    ValueError
-        If the file is none of these, or has no roll.
+    Raises `ValueError` if the file is none of these, or has no roll.
     """
     runs = read_signals(path)
     for columns in runs.values():
@@ -105,12 +102,8 @@ def read_record(path: Path) -> Record:
 def compare_records(reference: Path, others: list[Path]) -> list[Comparison]:
     """Compare recordings with the first one, run by run.
 
-    Raises
-    ------
-    CompareError
-        If the recordings share no run, or the runs share no column.
-    ValueError
-        If a file is not a recording.
+    Raises `CompareError` if the recordings share no run, or the runs share no column. Raises
+    `ValueError` if a file is not a recording.
     """
     first = read_record(reference)
     return [each for other in others for each in _compared(first, read_record(other))]

@@ -218,10 +218,7 @@ ACTIONS: Final[dict[str, tuple[Act, Stream | None]]] = {
 def _in_charge(bus: str) -> Iterator[LiveBench]:
     """Yield a bench with its controller in charge, after several starts if needed.
 
-    Raises
-    ------
-    LiveError
-        If no start succeeded.
+    Raises `LiveError` if no start succeeded.
     """
     for start in range(1, STARTS + 1):
         with (
@@ -243,10 +240,7 @@ def _in_charge(bus: str) -> Iterator[LiveBench]:
 def run_live(row: LiveRow, bus: str, requirement: str) -> dict[str, Any]:
     """Run and judge a live row; return the form of `Result.as_json`.
 
-    Raises
-    ------
-    OSError
-        If the interface cannot be used.
+    Raises `OSError` if the interface cannot be used.
     """
     for attempt in range(1, ATTEMPTS + 1):
         told, held_up_ms = _attempt(row, bus)

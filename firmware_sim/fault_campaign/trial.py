@@ -399,12 +399,8 @@ def _words(there: Heard | None, here: Heard | None, start_ns: int) -> str:
 def in_a_copy(work: Callable[[], T], stopped: Callable[[], bool] = lambda: False) -> T:
     """Run a function in a copy of this process and return its result.
 
-    Raises
-    ------
-    InterruptedError
-        If `stopped` became true first.
-    RuntimeError
-        If the function failed, with its traceback.
+    Raises `InterruptedError` if `stopped` became true first. Raises `RuntimeError` if the function
+    failed, with its traceback.
     """
     reading, writing = os.pipe()
     parent_pid = os.getpid()

@@ -214,10 +214,7 @@ class Late(SignalFault):
 def value_of(hint: Any, written: float | bool | str | None) -> Any:
     """Signal's value from its configuration: a number, a name of its table, or None.
 
-    Raises
-    ------
-    ValueError
-        If the signal cannot have this value.
+    Raises `ValueError` if the signal cannot have this value.
     """
     kind = field_kind(hint)
     if isinstance(written, str):

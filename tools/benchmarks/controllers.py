@@ -62,20 +62,12 @@ SHIPPED = (
 
 @dataclass(frozen=True)
 class Candidate:
-    """A controller to be timed.
-
-    Attributes
-    ----------
-    plant : DesignPlant
-        That it is run on.
-    pumps : bool
-        Whether its answer is a pressure; a valve's is not.
-    """
+    """A controller to be timed."""
 
     controller: Controller
     measured: tuple[str, ...]
-    plant: DesignPlant
-    pumps: bool = True
+    plant: DesignPlant  #: That it is run on.
+    pumps: bool = True  #: Whether its answer is a pressure; a valve's is not.
 
 
 class Timed:

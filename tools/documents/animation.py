@@ -116,10 +116,7 @@ class Section:
 def animate(recording: Path, picture: Path, names: list[str]) -> None:
     """Draw the animation.
 
-    Raises
-    ------
-    ValueError
-        If the recording has no such run, or does not say of which ship it is.
+    Raises `ValueError` if the recording has no such run, or does not say of which ship it is.
     """
     runs = read_recording(recording)
     names = names or list(dict.fromkeys((next(iter(runs)), list(runs)[-1])))

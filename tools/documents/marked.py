@@ -13,10 +13,7 @@ PLACE = re.compile(
 def written_anew(page: Path, lines: Iterable[str]) -> str:
     """The page as it stands, with these lines between its marks.
 
-    Raises
-    ------
-    ValueError
-        If the page does not have the marks once.
+    Raises `ValueError` if the page does not have the marks once.
     """
     text, places = PLACE.subn(lambda _: "".join(lines), page.read_text(encoding="utf-8"))
     if places != 1:

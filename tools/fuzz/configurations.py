@@ -109,10 +109,7 @@ class FuzzError(AssertionError):
 def outcome(file: Path, *, laws: bool) -> str:
     """What became of one file.
 
-    Raises
-    ------
-    FuzzError
-        If it is refused without saying where or why.
+    Raises `FuzzError` if it is refused without saying where or why.
     """
     try:
         loaded = load_config(file, KINDS[file.parent.name])
@@ -139,10 +136,7 @@ def _says(problem: ConfigProblem, file: Path) -> bool:
 def fuzz(number: int, seed: int, *, laws: bool = False, keep: Path | None = None) -> Counter[str]:
     """Read so many mutated files; counts of what became of them.
 
-    Raises
-    ------
-    FuzzError
-        If one raised anything but the errors that it should.
+    Raises `FuzzError` if one raised anything but the errors that it should.
     """
     counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():

@@ -283,10 +283,7 @@ def _next_counter(heard: Any) -> int:
 def fuzz(frames: int, seed: int, session: int = 0) -> Counter[str]:
     """Disturb benches with so many frames; counts of what was done.
 
-    Raises
-    ------
-    FuzzError
-        If a claim does not hold.
+    Raises `FuzzError` if a claim does not hold.
     """
     counts: Counter[str] = Counter()
     done = 0

@@ -38,43 +38,21 @@ AGAIN: Final[Script] = ((6.0, Action.RESET), (6.5, Action.DISARM), (7.0, Action.
 
 @dataclass(frozen=True)
 class Case:
-    """One run.
+    """One run."""
 
-    Attributes
-    ----------
-    name : str
-        Also of the file.
-    controller : str
-        Name of a shipped controller.
-    script : tuple
-        Times and buttons of the operator.
-    faults : tuple of dict
-        As a scenario lists them; not of the controller.
-    late_s : tuple of tuple of float
-        From when to when the controller does not tick.
-    scenario : str
-        Name of a shipped scenario: ship and sea.
-    link_errors_s : tuple of float
-        When the bus can't be read or written.
-    retuning : mapping
-        Settings of the controller's retuning that differ, if it retunes itself.
-    quiet : bool
-        Sensors without noise, which makes a long log small.
-    by_tick : bool
-        Frames reach the controller with its next tick, as in real time, and not when they end on
-        the bus: the times of a long log take no room then.
-    """
-
-    name: str
-    controller: str
+    name: str  #: Also of the file.
+    controller: str  #: Name of a shipped controller.
     seconds: float
-    script: Script = ARM
-    faults: tuple[dict[str, Any], ...] = ()
-    late_s: tuple[tuple[float, float], ...] = ()
-    scenario: str = "storm"
-    link_errors_s: tuple[float, ...] = ()
+    script: Script = ARM  #: Times and buttons of the operator.
+    faults: tuple[dict[str, Any], ...] = ()  #: As a scenario lists them; not of the controller.
+    late_s: tuple[tuple[float, float], ...] = ()  #: From when to when the controller does not tick.
+    scenario: str = "storm"  #: Name of a shipped scenario: ship and sea.
+    link_errors_s: tuple[float, ...] = ()  #: When the bus can't be read or written.
+    #: Settings of the controller's retuning that differ, if it retunes itself.
     retuning: dict[str, Any] = field(default_factory=dict)
-    quiet: bool = False
+    quiet: bool = False  #: Sensors without noise, which makes a long log small.
+    #: Frames reach the controller with its next tick, as in real time, and not when they end on the
+    #: bus: the times of a long log take no room then.
     by_tick: bool = False
 
 

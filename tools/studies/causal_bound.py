@@ -53,24 +53,13 @@ _SETTLING_S: Final = 400.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Innovations:
-    """A sampled plant as a law can know it.
+    """A sampled plant as a law can know it."""
 
-    Attributes
-    ----------
-    model : LinearModel
-        From the command to `STATES`; first the states of `pump_with_lag`, then the sea's.
-    gain : ndarray, shape (n, m)
-        L.
-    covariance : ndarray, shape (m, m)
-        S.
-    roll_error_rad2 : float
-        Variance of e.
-    """
-
+    #: From the command to `STATES`; first the states of `pump_with_lag`, then the sea's.
     model: LinearModel
-    gain: FloatArray
-    covariance: FloatArray
-    roll_error_rad2: float
+    gain: FloatArray  #: shape (n, m): L.
+    covariance: FloatArray  #: shape (m, m): S.
+    roll_error_rad2: float  #: Variance of e.
 
     def increments(
         self, value: FloatArray, nu: FloatArray, passive: FloatArray, states: int
@@ -103,37 +92,24 @@ class Innovations:
 
 @dataclass(frozen=True, slots=True)
 class CausalRun:
-    """Mean squares of the roll in one record, in rad^2.
+    """Mean squares of the roll in one record, in rad^2."""
 
-    Attributes
-    ----------
-    passive, clairvoyant : float
-        With the passive tank, and with the waves known in advance.
-    causal : float
-        Its mean over many records is below that of any law.
-    """
-
+    #: passive, clairvoyant: with the passive tank, and with the waves known in advance.
     passive: float
     clairvoyant: float
-    causal: float
+    causal: float  #: Its mean over many records is below that of any law.
 
 
 @dataclass(frozen=True, slots=True)
 class CausalBound:
-    """The bounds over several records.
+    """The bounds over several records."""
 
-    Attributes
-    ----------
-    passive_rad, clairvoyant_rad, causal_rad : float
-        Roll RMS, the first one exact. The second one is the share of it that the records have.
-    share : Interval
-        Part of the way from passive to clairvoyant that no causal law exceeds.
-    """
-
+    #: passive_rad, clairvoyant_rad, causal_rad: roll RMS, the first one exact. The second one is
+    #: the share of it that the records have.
     passive_rad: float
     clairvoyant_rad: float
     causal_rad: float
-    share: Interval
+    share: Interval  #: Part of the way from passive to clairvoyant that no causal law exceeds.
 
 
 class CausalProblem:
@@ -180,10 +156,7 @@ class CausalProblem:
     def run(self, seed: int, duration_s: float = 600.0) -> CausalRun:
         """The bounds in one record.
 
-        Raises
-        ------
-        ValueError
-            If nothing keeps within the limits, or the solver fails.
+        Raises `ValueError` if nothing keeps within the limits, or the solver fails.
         """
         found, plant = self.innovations, self._plant
         settle, count = (round(t / found.model.dt) for t in (_SETTLING_S, duration_s))

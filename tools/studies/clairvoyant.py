@@ -39,25 +39,13 @@ class NoHistoryError(ValueError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClairvoyantRun:
-    """The best history.
-
-    Attributes
-    ----------
-    motion : ndarray, shape (N, 4)
-        `STATES` at the end of each sample.
-    pressure_pa : ndarray, shape (N,)
-        Actual pressure then, behind the drive's lag.
-    command_pa : ndarray, shape (N,)
-        Held over each sample.
-    linear_cost : float
-        Mean of the linear terms, 0 without them.
-    """
+    """The best history."""
 
     roll_rms_rad: float
-    motion: FloatArray
-    pressure_pa: FloatArray
-    command_pa: FloatArray
-    linear_cost: float = 0.0
+    motion: FloatArray  #: shape (N, 4): `STATES` at the end of each sample.
+    pressure_pa: FloatArray  #: shape (N,): actual pressure then, behind the drive's lag.
+    command_pa: FloatArray  #: shape (N,): held over each sample.
+    linear_cost: float = 0.0  #: Mean of the linear terms, 0 without them.
 
 
 def clairvoyant_bound(
@@ -65,17 +53,14 @@ def clairvoyant_bound(
 ) -> ClairvoyantRun:
     """Least roll of the linear ship within the plant's limits, the waves known in advance.
 
+    Raises `ValueError` if nothing keeps within the limits, or the solver fails.
+
     Parameters
     ----------
     plant : DesignPlant
         Its delay makes no difference where the whole record is known.
     wave_motion : ndarray, shape (N + 1, 4)
         `STATES` with the tank passive (`passive_motion`), at 0, Ts, ... N Ts.
-
-    Raises
-    ------
-    ValueError
-        If nothing keeps within the limits, or the solver fails.
     """
     model = pump_with_lag(plant, sample_time_s, delay_s=0.0)
     return best_history(plant, model, wave_motion[1:])
@@ -104,6 +89,8 @@ def best_history(
 ) -> ClairvoyantRun:
     """Least mean square of the roll plus the mean of linear terms, the waves known.
 
+    Raises `ValueError` if nothing keeps within the limits, or the solver fails.
+
     Parameters
     ----------
     plant : DesignPlant
@@ -116,11 +103,6 @@ def best_history(
         c(k), of the model's states in rad^2 per unit.
     command_slope : ndarray, shape (N,), optional
         d(k), in rad^2 per Pa.
-
-    Raises
-    ------
-    ValueError
-        If nothing keeps within the limits, or the solver fails.
     """
     import clarabel
     from scipy import sparse

@@ -48,33 +48,23 @@ DECIBEL = 10 / math.log(10)
 
 @dataclass(frozen=True)
 class Part:
-    """One part of a record, estimated and true.
-
-    Attributes
-    ----------
-    of_sea, of_ship : str
-        Verdicts.
-    moment, height, peak : float
-        Relative errors of the moment's root mean square, of Hs and of Tp.
-    spectrum_db : float
-        Root mean square of the error of the moment's density where its energy is.
-    stated : float
-        Relative deviation stated of `moment`.
-    stiffness, period : float
-        Relative errors of stiffness and roll period.
-    """
+    """One part of a record, estimated and true."""
 
     sea: str
     law: str
     period_s: float
     minutes: float
+    #: of_sea, of_ship: verdicts.
     of_sea: str
     of_ship: str
+    #: moment, height, peak: relative errors of the moment's root mean square, of Hs and of Tp.
     moment: float
     height: float
     peak: float
+    #: Root mean square of the error of the moment's density where its energy is.
     spectrum_db: float
-    stated: float
+    stated: float  #: Relative deviation stated of `moment`.
+    #: stiffness, period: relative errors of stiffness and roll period.
     stiffness: float
     period: float
     stiffness_deviation: float

@@ -43,98 +43,58 @@ _LEVEL, _SPEED = STATES.index("level_m"), STATES.index("level_rate_m_s")
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
-    """A law that takes part.
-
-    Attributes
-    ----------
-    law : LinearLaw
-        Also one that is linear within its limits only.
-    measured : tuple of str
-        Names of `STATES` that it sees, in its order.
-    limits : PumpLimits
-        Of the limiter behind it.
-    """
+    """A law that takes part."""
 
     name: str
-    law: LinearLaw
-    measured: tuple[str, ...]
-    limits: PumpLimits
+    law: LinearLaw  #: Also one that is linear within its limits only.
+    measured: tuple[str, ...]  #: Names of `STATES` that it sees, in its order.
+    limits: PumpLimits  #: Of the limiter behind it.
 
 
 @dataclass(frozen=True, slots=True)
 class TrialShip:
-    """The real plant, which may differ from that which a law was designed for.
+    """The real plant, which may differ from that which a law was designed for."""
 
-    Attributes
-    ----------
-    plant : DesignPlant
-        As it really is; its limits are each entrant's own.
-    effective_slope : float
-        Ratio of effective to true wave slope.
-    pump_gain : float
-        As in `simulate_loop`.
-    noise : SensorNoise or None
-        None for the usual one
-    heading_rad, speed_m_s : float
-        As `Sea.irregular` takes them.
-    """
-
-    plant: DesignPlant
-    effective_slope: float = 0.5
-    pump_gain: float = 1.0
-    noise: SensorNoise | None = None
+    plant: DesignPlant  #: As it really is; its limits are each entrant's own.
+    effective_slope: float = 0.5  #: Ratio of effective to true wave slope.
+    pump_gain: float = 1.0  #: As in `simulate_loop`.
+    noise: SensorNoise | None = None  #: None for the usual one
+    #: heading_rad, speed_m_s: as `Sea.irregular` takes them.
     heading_rad: float = math.pi / 2
     speed_m_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One realisation of a sea, and who sails in it.
-
-    Attributes
-    ----------
-    seed : int
-        Of waves and sensor noise.
-    bound_limits : PumpLimits or None
-        Limits of the clairvoyant bound (`CLAIRVOYANT`); None leaves it out.
-    """
+    """One realisation of a sea, and who sails in it."""
 
     sea: Spectrum
-    seed: int
+    seed: int  #: Of waves and sensor noise.
     vessel: TrialShip
     entrants: tuple[Entrant, ...]
     duration_s: float = 3600.0
+    #: Limits of the clairvoyant bound (`CLAIRVOYANT`); None leaves it out.
     bound_limits: PumpLimits | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class TrialFigures:
-    """One run in figures.
-
-    Attributes
-    ----------
-    power_peak_w : float
-        Into the water.
-    held_back : float
-        Share of the law's samples at whose end the limiter had still not come to the pressure that
-        was asked for, by 1 % of the pump's greatest or more.
-    """
+    """One run in figures."""
 
     roll_rms_rad: float
     level_rms_m: float = 0.0
     level_peak_m: float = 0.0
     pressure_rms_pa: float = 0.0
-    power_peak_w: float = 0.0
+    power_peak_w: float = 0.0  #: Into the water.
+    #: Share of the law's samples at whose end the limiter had still not come to the pressure that
+    #: was asked for, by 1 % of the pump's greatest or more.
     held_back: float = 0.0
 
 
 def run_trial(trial: Trial) -> dict[str, TrialFigures]:
     """Figures by name: `NO_TANK`, `PASSIVE`, the entrants, and `CLAIRVOYANT` if it was asked for.
 
-    Raises
-    ------
-    ValueError
-        If two entrants have one name, or the clairvoyant bound does not exist.
+    Raises `ValueError` if two entrants have one name, or the clairvoyant bound does not exist.
     """
     names = [entrant.name for entrant in trial.entrants]
     if len(set(names)) < len(names):
@@ -176,16 +136,12 @@ def run_trials(
     """Run trials in a process for each core; results in their order.
 
     The calling module must be importable (`if __name__ == "__main__"`): processes are spawned.
+    Raises `ValueError` as `run_trial`.
 
     Parameters
     ----------
     progress : callable, optional
         Told the finished share after each trial.
-
-    Raises
-    ------
-    ValueError
-        As `run_trial`.
     """
     context = multiprocessing.get_context("spawn")
     with (

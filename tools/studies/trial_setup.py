@@ -109,10 +109,7 @@ def run_shown(cases: Mapping[str, Sequence[Trial]]) -> dict[str, list[dict[str, 
 def chosen(cases: Mapping[str, Case], text: str) -> dict[str, Case]:
     """The cases whose names hold a text.
 
-    Raises
-    ------
-    ValueError
-        If none does.
+    Raises `ValueError` if none does.
     """
     found = {name: case for name, case in cases.items() if text in name}
     if not found:

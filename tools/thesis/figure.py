@@ -35,53 +35,31 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """One curve of a panel.
+    """One curve of a panel."""
 
-    Attributes
-    ----------
-    label : str
-        Text in the legend.
-    x, y : array_like, shape (n,)
-        In the units of the panel's labels.
-    marks : bool
-        Single points instead of a line.
-    """
-
-    label: str
+    label: str  #: Text in the legend.
+    #: x, y: shape (n,): in the units of the panel's labels.
     x: npt.ArrayLike
     y: npt.ArrayLike
-    marks: bool = False
+    marks: bool = False  #: Single points instead of a line.
 
 
 @dataclass(frozen=True, slots=True)
 class Panel:
     """One coordinate system of a figure.
 
-    Attributes
-    ----------
-    x_label, y_label : str
-        Units included.
-    curves : tuple of Curve
-        One to `MOST_CURVES`.
-    span : tuple of float, optional
-        Abscissae to highlight.
-    span_label : str
-        What the highlight means.
-
-    Raises
-    ------
-    ValueError
-        If there are no curves, or too many.
+    Raises `ValueError` if there are no curves, or too many.
     """
 
     title: str
+    #: x_label, y_label: units included.
     x_label: str
     y_label: str
-    curves: tuple[Curve, ...]
+    curves: tuple[Curve, ...]  #: One to `MOST_CURVES`.
     log_x: bool = False
     log_y: bool = False
-    span: tuple[float, float] | None = None
-    span_label: str = ""
+    span: tuple[float, float] | None = None  #: Abscissae to highlight.
+    span_label: str = ""  #: What the highlight means.
     y_limits: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
@@ -93,23 +71,14 @@ class Panel:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A printed number beside ours.
-
-    Attributes
-    ----------
-    printed : float or tuple of float
-        A number, or the ends of a range; the upper one infinite for "or more".
-    ours : float or None
-        None where the source gives too little to make it.
-    reason : str
-        Why ours deviates, or why there is none.
-    """
+    """A printed number beside ours."""
 
     quantity: str
     unit: str
+    #: A number, or the ends of a range; the upper one infinite for "or more".
     printed: float | tuple[float, float]
-    ours: float | None
-    reason: str
+    ours: float | None  #: None where the source gives too little to make it.
+    reason: str  #: Why ours deviates, or why there is none.
 
     @property
     def deviation(self) -> float | None:
@@ -123,55 +92,31 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A statement of the text about a figure, judged.
-
-    Attributes
-    ----------
-    measured : str
-        What it was judged by.
-    """
+    """A statement of the text about a figure, judged."""
 
     statement: str
     verdict: Verdict
-    measured: str
+    measured: str  #: What it was judged by.
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """What cells show better than curves.
+    """What cells show better than curves."""
 
-    Attributes
-    ----------
-    headings : tuple of str
-        Units included.
-    rows : tuple of tuple of str
-        As many cells each as there are headings.
-    """
-
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
+    headings: tuple[str, ...]  #: Units included.
+    rows: tuple[tuple[str, ...], ...]  #: As many cells each as there are headings.
 
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A figure, or a group of printed numbers, made anew.
+    """A figure, or a group of printed numbers, made anew."""
 
-    Attributes
-    ----------
-    method : str
-        How ours was made.
-    open_points : str
-        What the source leaves open, and what was assumed or varied.
-    columns : int
-        Panels side by side.
-    """
-
-    method: str
-    open_points: str
+    method: str  #: How ours was made.
+    open_points: str  #: What the source leaves open, and what was assumed or varied.
     panels: tuple[Panel, ...] = ()
     rows: tuple[Row, ...] = ()
     checks: tuple[Check, ...] = ()
-    columns: int = 2
+    columns: int = 2  #: Panels side by side.
     table: Table | None = None
 
 

@@ -41,35 +41,20 @@ STEP_S: Final = 0.02
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
-    """A law on a ship.
-
-    Attributes
-    ----------
-    delay_s : float
-        From measurement to effect.
-    """
+    """A law on a ship."""
 
     law: GainLaw | PredictiveLaw
     measured: tuple[str, ...]
-    delay_s: float
+    delay_s: float  #: From measurement to effect.
 
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """A law's answer to waves over the frequency ratio q.
+    """A law's answer to waves over the frequency ratio q."""
 
-    Attributes
-    ----------
-    ratio : ndarray, shape (n,)
-    roll : ndarray, shape (n,)
-        Per static roll.
-    pressure_pa : ndarray, shape (n,)
-        Per rad of static roll.
-    """
-
-    ratio: FloatArray
-    roll: FloatArray
-    pressure_pa: FloatArray
+    ratio: FloatArray  #: shape (n,)
+    roll: FloatArray  #: shape (n,): per static roll.
+    pressure_pa: FloatArray  #: shape (n,): per rad of static roll.
 
 
 def lqr_on_roll(ship: RollShip, tank: Tank) -> Entrant:
@@ -129,13 +114,9 @@ def responses(
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """A run in a regular wave.
+    """A run in a regular wave."""
 
-    Attributes
-    ----------
-    time_s, roll_rad, level_m, pressure_pa : ndarray, shape (n,)
-    """
-
+    #: time_s, roll_rad, level_m, pressure_pa: shape (n,)
     time_s: FloatArray
     roll_rad: FloatArray
     level_m: FloatArray

@@ -37,41 +37,21 @@ _SEED: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class Wave:
-    """A regular wave.
-
-    Attributes
-    ----------
-    slope_rad : float
-        Its moment per stiffness of the changed ship.
-    """
+    """A regular wave."""
 
     frequency_rad_s: float
-    slope_rad: float
+    slope_rad: float  #: Its moment per stiffness of the changed ship.
 
 
 @dataclass(frozen=True, slots=True)
 class Adaptation:
-    """An adaptive law.
+    """An adaptive law."""
 
-    Attributes
-    ----------
-    design : callable
-        From a model to the law.
-    measured : tuple of str
-        `roll_rad`, after `level_m` if that is fed back.
-    order : int
-        Of the identified ARX model.
-    pulse_pa : float
-        Greatest pressure of the pulses.
-    pulse_s : tuple of float
-        Shortest and longest pulse.
-    """
-
-    design: Callable[[ARX], PredictiveLaw]
-    measured: tuple[str, ...]
-    order: int
-    pulse_pa: float = 20e3
-    pulse_s: tuple[float, float] = (1.0, 5.0)
+    design: Callable[[ARX], PredictiveLaw]  #: From a model to the law.
+    measured: tuple[str, ...]  #: `roll_rad`, after `level_m` if that is fed back.
+    order: int  #: Of the identified ARX model.
+    pulse_pa: float = 20e3  #: Greatest pressure of the pulses.
+    pulse_s: tuple[float, float] = (1.0, 5.0)  #: Shortest and longest pulse.
 
     def excitation(self) -> FloatArray:
         """The pulses, pressures at the samples."""
@@ -91,25 +71,17 @@ class Adaptation:
 
 @dataclass(frozen=True, slots=True)
 class Voyage:
-    """What happened.
+    """What happened."""
 
-    Attributes
-    ----------
-    time_s : ndarray, shape (n,)
-    roll_rad, level_m, pressure_pa : ndarray, shape (n,)
-        At the samples.
-    before_rad, after_rad : float
-        Roll amplitudes under the old and the new law, over their last 100 s.
-    found_rad_s, true_rad_s : tuple of float
-        Frequencies of the identified and of the true modes, rising.
-    """
-
-    time_s: FloatArray
+    time_s: FloatArray  #: shape (n,)
+    #: roll_rad, level_m, pressure_pa: shape (n,): at the samples.
     roll_rad: FloatArray
     level_m: FloatArray
     pressure_pa: FloatArray
+    #: before_rad, after_rad: roll amplitudes under the old and the new law, over their last 100 s.
     before_rad: float
     after_rad: float
+    #: found_rad_s, true_rad_s: frequencies of the identified and of the true modes, rising.
     found_rad_s: tuple[float, ...]
     true_rad_s: tuple[float, ...]
 

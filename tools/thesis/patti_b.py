@@ -27,22 +27,14 @@ METHOD: Final = "nonlinear model, compiled simulation, laws sampled at 20 ms wit
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One law in one wave.
+    """One law in one wave."""
 
-    Attributes
-    ----------
-    time_s, roll_deg, rate_deg_s : ndarray, shape (n,)
-        To the end, or to capsizing.
-    pressure_pa : ndarray, shape (n,)
-    parameters : ndarray, shape (n, p)
-        Of a direct fuzzy law; p = 0 for others.
-    """
-
+    #: time_s, roll_deg, rate_deg_s: shape (n,): to the end, or to capsizing.
     time_s: FloatArray
     roll_deg: FloatArray
     rate_deg_s: FloatArray
-    pressure_pa: FloatArray
-    parameters: FloatArray
+    pressure_pa: FloatArray  #: shape (n,)
+    parameters: FloatArray  #: shape (n, p): of a direct fuzzy law; p = 0 for others.
     result: Survival
 
 

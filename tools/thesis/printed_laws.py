@@ -37,22 +37,13 @@ PRINTED_ARX: Final = ARX(
 
 @dataclass(frozen=True, slots=True)
 class PrintedLaw:
-    """One law as it is printed.
+    """One law as it is printed."""
 
-    Attributes
-    ----------
-    input_gains, roll_gains : tuple of float
-        Newest first; the latter in Pa/rad.
-    angle_gains : tuple of float
-        On the tank angle, Pa/rad; empty where it is not fed back.
-    index : float
-        Printed performance index, Fig. 3.10.
-    """
-
+    #: input_gains, roll_gains: newest first; the latter in Pa/rad.
     input_gains: tuple[float, ...]
     roll_gains: tuple[float, ...]
-    angle_gains: tuple[float, ...]
-    index: float
+    angle_gains: tuple[float, ...]  #: On the tank angle, Pa/rad; empty where it is not fed back.
+    index: float  #: Printed performance index, Fig. 3.10.
 
     @property
     def measured(self) -> tuple[str, ...]:
@@ -93,21 +84,11 @@ PRINTED: Final[Mapping[str, PrintedLaw]] = {
 
 @dataclass(frozen=True, slots=True)
 class Deviations:
-    """Greatest relative deviations of designed from printed coefficients.
+    """Greatest relative deviations of designed from printed coefficients."""
 
-    Attributes
-    ----------
-    roll_only : float
-        Of the 16 coefficients of the laws that see roll alone.
-    both : float
-        Of the 8 on inputs and roll of the laws that see the tank angle too.
-    angle : float
-        Of the 4 on the tank angle.
-    """
-
-    roll_only: float
-    both: float
-    angle: float
+    roll_only: float  #: Of the 16 coefficients of the laws that see roll alone.
+    both: float  #: Of the 8 on inputs and roll of the laws that see the tank angle too.
+    angle: float  #: Of the 4 on the tank angle.
 
 
 def designed_laws(ship: RollShip, tank: Tank) -> dict[str, PredictiveLaw]:

@@ -41,22 +41,13 @@ from tools.thesis.wave_phases import figure_3_1
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One figure or group of numbers.
+    """One figure or group of numbers."""
 
-    Attributes
-    ----------
-    key : str
-        Number of the figure, or name of the group.
-    make : callable or None
-        What makes it anew; None for a sketch, of which there is nothing to compute.
-    word : str
-        What a sketch shows.
-    """
-
-    key: str
+    key: str  #: Number of the figure, or name of the group.
     title: str
+    #: What makes it anew; None for a sketch, of which there is nothing to compute.
     make: Callable[[], Figure] | None = None
-    word: str = ""
+    word: str = ""  #: What a sketch shows.
 
     @property
     def heading(self) -> str:
@@ -128,10 +119,7 @@ class UnknownFigureError(ValueError):
 def chosen(keys: Sequence[str]) -> tuple[Entry, ...]:
     """Entries of some keys, in the order of the source; all of them for no key.
 
-    Raises
-    ------
-    UnknownFigureError
-        If there is no such figure.
+    Raises `UnknownFigureError` if there is no such figure.
     """
     known = {entry.key for entry in ENTRIES}
     for key in keys:

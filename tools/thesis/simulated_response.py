@@ -13,14 +13,10 @@ SAMPLES = 256  # integration steps per wave period
 
 
 class ResponseAmplitude(NamedTuple):
-    """First harmonic of the steady oscillation per wave moment.
+    """First harmonic of the steady oscillation per wave moment."""
 
-    Attributes
-    ----------
-    roll_rad_per_nm, level_m_per_nm : ndarray of complex, shape (n,)
-        Complex amplitude relative to the wave moment; NaN where the ship capsized.
-    """
-
+    #: roll_rad_per_nm, level_m_per_nm: shape (n,): complex amplitude relative to the wave moment;
+    #: NaN where the ship capsized.
     roll_rad_per_nm: ComplexArray
     level_m_per_nm: ComplexArray
 

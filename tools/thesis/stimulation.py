@@ -14,31 +14,19 @@ DURATION_S = 300.0
 
 
 class StimulatedRoll(NamedTuple):
-    """Result of a stimulation in still water.
-
-    Attributes
-    ----------
-    stimulated_rad : float
-        Largest roll in the last cycle before the pump stops.
-    level_lead_rad : float
-        Phase lead of the level against the roll in that cycle.
-    cycles_to_tenth : float
-        Cycles after the stop until the roll stays below a tenth of `stimulated_rad`.
-    """
+    """Result of a stimulation in still water."""
 
     run: RollRun
-    stimulated_rad: float
-    level_lead_rad: float
+    stimulated_rad: float  #: Largest roll in the last cycle before the pump stops.
+    level_lead_rad: float  #: Phase lead of the level against the roll in that cycle.
+    #: Cycles after the stop until the roll stays below a tenth of `stimulated_rad`.
     cycles_to_tenth: float
 
 
 def tuned_tank(ship: RollShip, tank: Tank) -> Tank:
     """The tank with its duct sized for the ship's natural roll frequency, thesis 2.6.
 
-    Raises
-    ------
-    ValueError
-        If the reservoirs alone have a lower natural frequency than the ship.
+    Raises `ValueError` if the reservoirs alone have a lower natural frequency than the ship.
     """
     duct_part_m = 2 * GRAVITY_M_S2 / ship.natural_frequency_rad_s**2 - 2 * tank.height_m
     if duct_part_m <= 0:
@@ -54,17 +42,14 @@ def stimulate_on_still_water(
 ) -> StimulatedRoll:
     """Drive the roll with a sinusoidal pressure from rest, stop the pump, and let the roll decay.
 
+    Raises `ValueError` if the pump runs for less than one cycle, or to the end.
+
     Parameters
     ----------
     pressure_pa : float
         Amplitude of the pump pressure.
     off_s : float
         Time at which the pump stops.
-
-    Raises
-    ------
-    ValueError
-        If the pump runs for less than one cycle, or to the end.
     """
     cycle_s = math.tau / frequency_rad_s
     if not cycle_s < off_s < DURATION_S:

@@ -16,10 +16,7 @@ class PackageError(Exception):
 def cache() -> Path:
     """Directory of what is kept: ``.cache/vcan`` of the project, or ``VCAN_CACHE_DIR``.
 
-    Raises
-    ------
-    PackageError
-        If it can't be made.
+    Raises `PackageError` if it can't be made.
     """
     project = Path(__file__).resolve().parents[2]
     directory = Path(os.environ.get("VCAN_CACHE_DIR") or project / ".cache" / "vcan").absolute()
@@ -36,12 +33,8 @@ def unpacked(package: str) -> Path:
     """Directory that holds the unpacked ``package``, downloaded at first use.
 
     It is in the cache. Runs side by side wait for one another, and a half-unpacked package is never
-    seen.
-
-    Raises
-    ------
-    PackageError
-        If the cache cannot be written, or the package can be neither found nor downloaded.
+    seen. Raises `PackageError` if the cache cannot be written, or the package can be neither found
+    nor downloaded.
     """
     kept = cache()
     target = kept / package

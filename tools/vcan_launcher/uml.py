@@ -61,12 +61,8 @@ class KernelError(Exception):
 def run(argv: list[bytes], env: dict[bytes, bytes]) -> int:
     """Run the command inside the user-mode kernel and return its exit code.
 
-    When a signal ended the command, this process ends by the same signal.
-
-    Raises
-    ------
-    KernelError
-        If the kernel cannot be started or ends before the command does.
+    When a signal ended the command, this process ends by the same signal. Raises `KernelError` if
+    the kernel cannot be started or ends before the command does.
     """
     status = _Machine(argv, env).run()
     if os.WIFSIGNALED(status):

@@ -19,10 +19,7 @@ SOURCE = Path(__file__).with_name("whole_xstate.c")
 def environment() -> dict[str, str]:
     """What the user-mode kernel's environment needs on this processor.
 
-    Raises
-    ------
-    debian.PackageError
-        If there is no compiler and none can be had.
+    Raises `debian.PackageError` if there is no compiler and none can be had.
     """
     if "amx_tile" not in Path("/proc/cpuinfo").read_text().split():
         return {}

@@ -52,10 +52,7 @@ class AutoTuned:
 def auto_tuned(kind: LinearKind, plant: DesignPlant, sea: SlopeDensity) -> AutoTuned:
     """Find the law of a kind with all margins that costs least of those tried.
 
-    Raises
-    ------
-    NoLawError
-        If no law has the margins, or the sea does not roll the ship.
+    Raises `NoLawError` if no law has the margins, or the sea does not roll the ship.
     """
     search = _Search(kind, plant, sea)
     best, factors = search.start, [1.0] * len(_STEPS)
@@ -87,10 +84,7 @@ class AutoDesign:
     def tuned(self, plant: DesignPlant) -> LinearDesign:
         """Numbers of the law for a plant.
 
-        Raises
-        ------
-        NoLawError
-            As `auto_tuned`.
+        Raises `NoLawError` as `auto_tuned`.
         """
         return auto_tuned(self.kind, plant, self.sea or unknown_sea(plant.ship)).design
 

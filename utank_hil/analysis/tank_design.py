@@ -49,12 +49,8 @@ def best_passive_tank(ship: RollShip, tank: Tank) -> Tank:
     """Return the tank with the duct area and damping ratio of the passive optimum, thesis (3.2).
 
     Reservoirs, width, height and place are kept. The duct's area changes mass and coupling ratio
-    too, so area and optimum are iterated to agreement.
-
-    Raises
-    ------
-    ValueError
-        If the reservoirs alone already make the water slower than the optimum.
+    too, so area and optimum are iterated to agreement. Raises `ValueError` if the reservoirs alone
+    already make the water slower than the optimum.
     """
     for _ in range(50):
         ratios, roll_rad_s = ship_ratios(ship, tank)

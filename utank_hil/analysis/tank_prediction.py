@@ -54,10 +54,7 @@ class SeaState:
     def on(cls, ship: RollShip, wave_moment: Harmonics) -> "SeaState":
         """Return the sea that acts on a ship: waves up to twice its roll frequency, and their peak.
 
-        Raises
-        ------
-        CalmSeaError
-            If there are no such waves.
+        Raises `CalmSeaError` if there are no such waves.
         """
         w, energy = wave_moment.frequency_rad_s, np.square(wave_moment.amplitude)
         most_rad_s = 2 * ship.natural_frequency_rad_s

@@ -9,17 +9,14 @@ from pathlib import Path
 def write_whole(path: Path, content: bytes | str) -> None:
     """Write a file; on a full disk none is left, since half of it would be taken for the whole.
 
+    Raises `OSError` if it can't be written, with its name.
+
     Parameters
     ----------
     path : Path
         Overwritten.
     content : bytes or str
         Text is written in UTF-8.
-
-    Raises
-    ------
-    OSError
-        If it can't be written, with its name.
     """
     with left_whole(path):
         path.write_bytes(content.encode() if isinstance(content, str) else content)
@@ -29,10 +26,7 @@ def write_whole(path: Path, content: bytes | str) -> None:
 def left_whole(path: Path) -> Iterator[None]:
     """While a file is written: whatever ends that, no half of it is left.
 
-    Raises
-    ------
-    OSError
-        If it can't be written, with its name.
+    Raises `OSError` if it can't be written, with its name.
     """
     with errors_name(path):
         try:

@@ -62,12 +62,8 @@ class IdentifiedShips:
     def write(self, found: ModelSummary) -> dict[str, Path]:
         """Write vessel and controller, named by the time (UTC); return paths by both names.
 
-        Raises
-        ------
-        OSError
-            If they can't be written.
-        ParameterError
-            If a file may not hold such a ship.
+        Raises `OSError` if they can't be written. Raises `ParameterError` if a file may not hold
+        such a ship.
         """
         ship, tank = found.ship(self.vessel.ship), found.tank(self.vessel.tank)
         refuse("vessel", tank_problems(ship, tank))

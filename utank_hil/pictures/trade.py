@@ -30,12 +30,8 @@ def draw_trade(
 
     Filled dots meet every required margin, open ones miss one, and the star is the design itself.
     Laws that are unstable on their own ship are left out. `pressure_limit_pa` and `level_limit_m`
-    are drawn as lines; the RMS values are those of linear theory, without limits.
-
-    Raises
-    ------
-    ValueError
-        If no law is stable.
+    are drawn as lines; the RMS values are those of linear theory, without limits. Raises
+    `ValueError` if no law is stable.
     """
     points = [point for point in trade.points if point.motion is not None]
     if not points:

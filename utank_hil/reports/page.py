@@ -18,10 +18,7 @@ PAGE: Final = "report.html"
 def write_page(runs: list[Path], page: Path) -> Path:
     """Write the page of these runs.
 
-    Raises
-    ------
-    OSError, ValueError
-        If a run can't be read or the page can't be written; says which.
+    Raises `OSError, ValueError` if a run can't be read or the page can't be written; says which.
     """
     return write_reports([_report(run) for run in runs], page)
 
@@ -29,10 +26,7 @@ def write_page(runs: list[Path], page: Path) -> Path:
 def write_reports(reports: Sequence[Report], page: Path) -> Path:
     """Write the page of these reports, one after the other.
 
-    Raises
-    ------
-    OSError
-        If the page can't be written.
+    Raises `OSError` if the page can't be written.
     """
     title, below = reports[0].title, reports[0].below
     if len(reports) > 1:

@@ -36,11 +36,8 @@ LONGEST_BYTES: Final = OVERHEAD_BYTES + max(
 class Candidate:
     """A law that passed every check of the retuner.
 
-    Raises
-    ------
-    ValueError
-        If the law is too large for the loop, its gains do not fit together, or a number besides
-        them is not finite.
+    Raises `ValueError` if the law is too large for the loop, its gains do not fit together, or a
+    number besides them is not finite.
     """
 
     law: PredictiveLaw
@@ -119,10 +116,7 @@ def answer_bytes(answer: Answer) -> bytes:
 def read_answer(data: bytes) -> Answer:
     """Decode what `answer_bytes` encoded.
 
-    Raises
-    ------
-    ValueError
-        If `data` is anything else.
+    Raises `ValueError` if `data` is anything else.
     """
     try:
         message: _Message = _DECODER.decode(data)

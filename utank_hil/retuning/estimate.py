@@ -19,11 +19,8 @@ MOST_BANDS: Final = 1000
 class ShipFigures:
     """A ship in roll, without tank water, and the uncertainty of its figures.
 
-    Raises
-    ------
-    ValueError
-        If stiffness or inertia is too small for the loop to compute with, or any value is too
-        large.
+    Raises `ValueError` if stiffness or inertia is too small for the loop to compute with, or any
+    value is too large.
     """
 
     stiffness_nm_rad: Annotated[float, Range(least=1e-6, most=1e30)]
@@ -69,10 +66,7 @@ class ShipFigures:
 class MotionEstimate:
     """Estimate of waves and ship from the latest part of the motion record.
 
-    Raises
-    ------
-    ValueError
-        If the waves have more bands than the loop can read between two ticks.
+    Raises `ValueError` if the waves have more bands than the loop can read between two ticks.
     """
 
     #: of_sea, of_ship: whether the estimate of waves and ship is good, and if not, why.

@@ -42,10 +42,7 @@ GM_DEVIATIONS: Final = 2.0
 class EstimateSettings:
     """Settings of the estimate of waves and ship: section ``sea_estimate`` of a controller.
 
-    Raises
-    ------
-    ValueError
-        If a value is out of its range.
+    Raises `ValueError` if a value is out of its range.
     """
 
     every_s: Annotated[float, Range(least=30, most=3600)] = 180.0  #: Time between two estimates.

@@ -121,12 +121,8 @@ def judge(record: FloatArray, found: Identification, task: RetuningTask) -> Cand
 def identify(record: FloatArray, task: RetuningTask) -> Identification:
     """Identify ship and tank on the first part of a record and validate on the second.
 
-    Raises
-    ------
-    ValueError
-        If the number of columns does not match the task's signals.
-    IdentificationError
-        If it does not determine a model.
+    Raises `ValueError` if the number of columns does not match the task's signals. Raises
+    `IdentificationError` if it does not determine a model.
     """
     predictor = task.design.predictor
     record = np.asarray(record, dtype=np.float64)

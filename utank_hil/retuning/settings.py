@@ -19,10 +19,7 @@ _BAND_RAD_S: Final = (0.2, 1.2)
 class Excitation:
     """Excitation signal of an identification: key ``excitation`` of the section.
 
-    Raises
-    ------
-    ValueError
-        If a value is out of its range, or a band is given for another kind.
+    Raises `ValueError` if a value is out of its range, or a band is given for another kind.
     """
 
     #: A function of `utank_hil.identification.excitation`; the clock of ``prbs`` is the shortest
@@ -61,10 +58,7 @@ class TrialSettings:
 class RetuningSettings:
     """Settings of retuning: section ``retuning`` of a controller.
 
-    Raises
-    ------
-    ValueError
-        If a value is out of its range.
+    Raises `ValueError` if a value is out of its range.
     """
 
     #: Shortest and longest natural roll period of the ship's stability booklet; a model outside it

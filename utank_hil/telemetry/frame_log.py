@@ -41,6 +41,9 @@ class FrameLogError(ValueError):
 class FrameLogWriter(Closing):
     """Writes a frame log; every call of `write` adds one block and syncs it to the disk.
 
+    Raises `OSError` if the file can't be written, with its name; also raised by `write` and
+    `close`.
+
     Parameters
     ----------
     file : Path
@@ -49,11 +52,6 @@ class FrameLogWriter(Closing):
         Origin of the records (`utank_hil.telemetry.replay_head`).
     small : bool
         Whether to compress as well as possible, for logs to be kept.
-
-    Raises
-    ------
-    OSError
-        If the file can't be written, with its name; also raised by `write` and `close`.
     """
 
     def __init__(self, file: Path, head: Mapping[str, Any], *, small: bool = False) -> None:
@@ -119,6 +117,9 @@ class BlockSink:
 class FrameLog:
     """A frame log, read block by block; a log of several parts is read as one.
 
+    Raises `FrameLogError` if the file is no frame log, or its head is incomplete. Raises `OSError`
+    if the file can't be read.
+
     Parameters
     ----------
     path : Path
@@ -131,13 +132,6 @@ class FrameLog:
     cut : str
         Where and why reading ended before the end of a file, after all `blocks` were taken; empty
         if it did not.
-
-    Raises
-    ------
-    FrameLogError
-        If the file is no frame log, or its head is incomplete.
-    OSError
-        If the file can't be read.
     """
 
     def __init__(self, path: Path) -> None:

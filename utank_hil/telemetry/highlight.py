@@ -13,10 +13,7 @@ from utank_hil.telemetry.recording import read_recording
 def highlight_s(file: Path) -> float:
     """Time of the first fault of any run, else of the first trial of a law, else of most roll.
 
-    Raises
-    ------
-    ValueError
-        If the file is no recording.
+    Raises `ValueError` if the file is no recording.
     """
     runs = list(read_recording(file).values())
     faults = [_first(rows, in_service(rows) & (rows["fault"] != Fault.NONE)) for rows in runs]

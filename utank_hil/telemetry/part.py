@@ -58,6 +58,9 @@ def live_log(
 class RecordingPart(Closing):
     """Writes one file of a recording, complete in itself.
 
+    Raises `OSError` if the file can't be created, or there is no room for its beginning. Raises
+    `RuntimeError` if the file can't be finished.
+
     Parameters
     ----------
     file : Path
@@ -66,13 +69,6 @@ class RecordingPart(Closing):
         Names of a row's values.
     about : mapping, optional
         Origin of the rows (`utank_hil.base.provenance`).
-
-    Raises
-    ------
-    OSError
-        If the file can't be created, or there is no room for its beginning.
-    RuntimeError
-        If the file can't be finished.
     """
 
     def __init__(

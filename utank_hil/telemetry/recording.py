@@ -50,6 +50,10 @@ def write_recording(
 ) -> None:
     """Write runs side by side on one time line into a recording, with its blueprint.
 
+    Raises `ValueError` if there is no run, a table is empty or does not fit the columns, `time_s`
+    is missing, or a column is not in SI units. Raises `OSError` if the file can't be written; it is
+    then removed.
+
     Parameters
     ----------
     path : Path
@@ -62,14 +66,6 @@ def write_recording(
         Retuning events by run, `time_ns` on the clock of `time_s`.
     about : mapping, optional
         Origin of the runs (`utank_hil.base.provenance`).
-
-    Raises
-    ------
-    ValueError
-        If there is no run, a table is empty or does not fit the columns, `time_s` is missing, or a
-        column is not in SI units.
-    OSError
-        If the file can't be written; it is then removed.
     """
     if not runs:
         raise ValueError("a recording needs at least one run")
@@ -120,16 +116,13 @@ def _zero(columns: Sequence[str], runs: Mapping[str, FloatArray]) -> set[tuple[s
 def read_recording(path: Path) -> dict[str, dict[str, FloatArray]]:
     """Read the runs of a recording, also of a live or a truncated one.
 
+    Raises `ValueError` if the file is no recording, or holds no telemetry.
+
     Returns
     -------
     dict
         Arrays (n,) by run and column, in SI units; `time_s` is exact to 1 ns, the others to the
         rounding of their unit conversion.
-
-    Raises
-    ------
-    ValueError
-        If the file is no recording, or holds no telemetry.
     """
     blocks: dict[str, list[dict[str, FloatArray]]] = {}
     for chunk in _chunks(path, _ROWS):

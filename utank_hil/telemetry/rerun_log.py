@@ -77,6 +77,8 @@ def _level(mode: float, fault: float) -> rr.TextLogLevel:
 class RunLog:
     """Writes the rows of one run.
 
+    Raises `ValueError` if there is no `time_s`, or a column is not in SI units.
+
     Parameters
     ----------
     path : str
@@ -91,11 +93,6 @@ class RunLog:
         Colour of the run among several.
     beside : (int, int)
         Number of the run, and number of runs (`MotionFigures`).
-
-    Raises
-    ------
-    ValueError
-        If there is no `time_s`, or a column is not in SI units.
     """
 
     def __init__(

@@ -83,6 +83,8 @@ class RingError(OSError):
 class RingWriter(Closing):
     """Writing end; creates and owns the segment.
 
+    Raises `RingError` if there is no room for it.
+
     Parameters
     ----------
     record_bytes : int
@@ -100,11 +102,6 @@ class RingWriter(Closing):
         Name of the ring for readers.
     count : int
         Number of slots written so far.
-
-    Raises
-    ------
-    RingError
-        If there is no room for it.
     """
 
     def __init__(
@@ -192,6 +189,9 @@ class RingWriter(Closing):
 class RingReader(Closing):
     """Reading end with its own cursor.
 
+    Raises `RingError` if there is no such ring, or the segment is not a ring of this version and
+    kind.
+
     Parameters
     ----------
     place : int, optional
@@ -205,11 +205,6 @@ class RingReader(Closing):
         The writer's description of the records.
     lost : int
         Number of slots overwritten before they were read.
-
-    Raises
-    ------
-    RingError
-        If there is no such ring, or the segment is not a ring of this version and kind.
     """
 
     def __init__(self, name: str, place: int | None = None, kind: RingKind | None = None) -> None:

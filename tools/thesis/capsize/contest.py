@@ -47,22 +47,16 @@ LAWS = (
 
 
 class Contest(NamedTuple):
-    """Result of one law with one pump.
+    """Result of one law with one pump."""
 
-    Attributes
-    ----------
-    runs : tuple of Survival
-        Runs at the amplitudes `PRINTED_NM`.
-    survivable_nm : float
-        Largest survived wave moment.
-    """
-
-    runs: tuple[Survival, ...]
-    survivable_nm: float
+    runs: tuple[Survival, ...]  #: Runs at the amplitudes `PRINTED_NM`.
+    survivable_nm: float  #: Largest survived wave moment.
 
 
 def contest(law: str, pump_pa: float = math.inf, duration_s: float = 300.0) -> Contest:
     """Run one law in the printed waves, and find the largest wave that it survives.
+
+    Raises `ValueError` if there is no such law.
 
     Parameters
     ----------
@@ -72,11 +66,6 @@ def contest(law: str, pump_pa: float = math.inf, duration_s: float = 300.0) -> C
         Largest pressure. The rate limit is ten times that per second, and the level barrier of
         `CommandLimiter` keeps the water within `LEVEL_M`, also with the passive law. Infinite: a
         pump without limits, and a passive tank without a pump.
-
-    Raises
-    ------
-    ValueError
-        If there is no such law.
     """
     model = without_tank(PATTI_B) if law == "no tank" else PATTI_B
     build = law_factory(law, unlimited=math.isinf(pump_pa))
@@ -97,17 +86,14 @@ def contest(law: str, pump_pa: float = math.inf, duration_s: float = 300.0) -> C
 def law_factory(law: str, *, unlimited: bool) -> Callable[[], Controller]:
     """Factory of new controllers of a law, at rest.
 
+    Raises `ValueError` if there is no such law.
+
     Parameters
     ----------
     law : str
         One of `LAWS`.
     unlimited : bool
         Whether the pump has no limits; the fuzzy laws have other parameters then.
-
-    Raises
-    ------
-    ValueError
-        If there is no such law.
     """
     c = PATTI_B.coefficients
     gain = -c.coupling * c.area / (c.inertia * c.level_inertia - c.coupling**2)

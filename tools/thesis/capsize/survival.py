@@ -20,25 +20,14 @@ from utank_hil.dynamics.simulate import WaveMoment, whole_steps
 
 
 class Survival(NamedTuple):
-    """Result of a run.
+    """Result of a run."""
 
-    Attributes
-    ----------
-    capsized_s : float
-        Time of capsizing, infinite if the ship survives.
-    max_roll_rad, max_level_m : float
-        Maxima at the controller's samples.
-    max_command : float
-        Largest pressure in Pa, or largest valve loss in Pa / (m/s)^2.
-    strikes : int
-        Number of impacts at the limits of the level.
-    """
-
-    capsized_s: float
+    capsized_s: float  #: Time of capsizing, infinite if the ship survives.
+    #: max_roll_rad, max_level_m: maxima at the controller's samples.
     max_roll_rad: float
     max_level_m: float
-    max_command: float
-    strikes: int
+    max_command: float  #: Largest pressure in Pa, or largest valve loss in Pa / (m/s)^2.
+    strikes: int  #: Number of impacts at the limits of the level.
 
 
 def controlled_run(
@@ -55,6 +44,9 @@ def controlled_run(
     each_step: Callable[[float, FloatArray, float], None] | None = None,
 ) -> Survival:
     """Run a controller on the nonlinear model.
+
+    Raises `ValueError` if the duration is not a whole number of samples, or the sample time of
+    steps.
 
     Parameters
     ----------
@@ -77,11 +69,6 @@ def controlled_run(
         Roll angle at which the run ends.
     each_step : callable, optional
         Called with time, state and command at every sample.
-
-    Raises
-    ------
-    ValueError
-        If the duration is not a whole number of samples, or the sample time of steps.
     """
     from utank_hil.dynamics import kernels
 

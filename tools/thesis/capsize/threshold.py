@@ -20,28 +20,18 @@ BLOCK = 256  # amplitudes tried at once in the search for a threshold
 
 
 class Equilibrium(NamedTuple):
-    """An equilibrium of ship and water.
-
-    Attributes
-    ----------
-    stable : bool
-        True for a minimum of the potential energy; otherwise a saddle.
-    """
+    """An equilibrium of ship and water."""
 
     roll_rad: float
     level_m: float
-    stable: bool
+    stable: bool  #: True for a minimum of the potential energy; otherwise a saddle.
 
 
 class Threshold(NamedTuple):
-    """Bracket of the smallest amplitude of a regular wave moment that capsizes a ship.
+    """Bracket of the smallest amplitude of a regular wave moment that capsizes a ship."""
 
-    Attributes
-    ----------
-    safe_nm, capsizing_nm : float
-        Ends of the bracket; the upper one is infinite if no amplitude capsizes the ship.
-    """
-
+    #: safe_nm, capsizing_nm: ends of the bracket; the upper one is infinite if no amplitude
+    #: capsizes the ship.
     safe_nm: float
     capsizing_nm: float
 

@@ -32,11 +32,8 @@ def closed_loop_eigenvalues(
 ) -> ComplexArray:
     """Eigenvalues of the loop of a law and a sampled plant (`sampled_model`), scaled by `gain`.
 
-    Raises
-    ------
-    ValueError
-        If the loop is ill-posed: 1 - D Dp is singular, so the direct paths of law and plant leave
-        the command undetermined.
+    Raises `ValueError` if the loop is ill-posed: 1 - D Dp is singular, so the direct paths of law
+    and plant leave the command undetermined.
     """
     compensator = law.matrices()
     reach, direct = gain * plant.B, gain * plant.D
@@ -74,6 +71,8 @@ def closed_loop_response(
 ) -> tuple[ComplexArray, ComplexArray]:
     """Motions and pump pressure per unit of wave moment, at the wave's frequency.
 
+    Raises `ValueError` if a frequency is outside (0, pi / Ts).
+
     Parameters
     ----------
     law : LinearLaw or None
@@ -90,11 +89,6 @@ def closed_loop_response(
     motions : ndarray, shape (N, outputs of system)
     pressure : ndarray, shape (N,)
         Actual pressure, after delay and lag.
-
-    Raises
-    ------
-    ValueError
-        If a frequency is outside (0, pi / Ts).
     """
     w = np.asarray(frequency_rad_s, dtype=np.float64)
     s = np.asarray(1j * w, dtype=np.complex128)

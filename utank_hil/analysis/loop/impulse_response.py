@@ -114,6 +114,10 @@ def impulse_response_law(
 ) -> ImpulseResponseLaw:
     """Find the linear law that a controller is about rest, by stepping it.
 
+    Raises `NotDecaying` if a response has not decayed to 1e-9 of its peak in `most_samples`. Raises
+    `NoImpulseResponse` if a step raises, its command is not an array of finite numbers, the steps
+    take too long, or no model of `MOST_STATES` states has the response.
+
     Parameters
     ----------
     make_controller : callable
@@ -126,14 +130,6 @@ def impulse_response_law(
         Steps after which a response must have decayed.
     budget_s : float
         Time limit for all steps.
-
-    Raises
-    ------
-    NotDecaying
-        If a response has not decayed to 1e-9 of its peak in `most_samples`.
-    NoImpulseResponse
-        If a step raises, its command is not an array of finite numbers, the steps take too long, or
-        no model of `MOST_STATES` states has the response.
     """
     until_s = time.monotonic() + budget_s
     columns, linear = [], True
@@ -155,10 +151,8 @@ def impulse_response_law(
 def realize(impulse: FloatArray, sample_time_s: float) -> LinearModel:
     """Strictly proper state-space model of a decayed impulse response C B, C A B, ..., (N, r, m).
 
-    Raises
-    ------
-    NoImpulseResponse
-        If no model of `MOST_STATES` states has the response to 1e-6 of its greatest value.
+    Raises `NoImpulseResponse` if no model of `MOST_STATES` states has the response to 1e-6 of its
+    greatest value.
     """
     _, commands, outputs = impulse.shape
     row_scale = _peaks(impulse, (0, 2))

@@ -220,6 +220,8 @@ def run_law(
 ) -> LoopRun:
     """Run a controller on a ship, armed from the start.
 
+    Raises `ValueError` if delay or sample time are not whole numbers of ticks.
+
     Parameters
     ----------
     measured : tuple of str
@@ -228,11 +230,6 @@ def run_law(
         Gives tank, limits and delay.
     ticks : int
         Length of the run in ticks of `TICK_S`.
-
-    Raises
-    ------
-    ValueError
-        If delay or sample time are not whole numbers of ticks.
     """
     delay_ticks = _ticks("delay_s", plant.delay_s)
     sample_ticks = _ticks("sample_time_s", controller.sample_time_s)

@@ -126,15 +126,12 @@ def first_law(
 ) -> FirstLaw:
     """Find the law of `scaled_law` with the greatest weights at which it has the required margins.
 
+    Raises `NoLawError` if no weights do.
+
     Parameters
     ----------
     suits : callable, optional
         Further requirement on a law with all margins; smaller weights must help to meet it.
-
-    Raises
-    ------
-    NoLawError
-        If no weights do.
     """
     design = scaled_law(kind, plant, slope_rad, peak_rad_s)
     failures: tuple[str, ...] = ()

@@ -125,6 +125,8 @@ def self_tuned(
 ) -> SelfTuned:
     """Design the constrained law of least predicted cost with all margins, within a mean power.
 
+    Raises `NoLawError` if no law has the margins, or the sea does not roll the ship.
+
     Parameters
     ----------
     plant : DesignPlant
@@ -133,11 +135,6 @@ def self_tuned(
         Limit on the predicted mean power; infinite for the least cost.
     sample_time_s : float, optional
         The default follows from the roll frequency.
-
-    Raises
-    ------
-    NoLawError
-        If no law has the margins, or the sea does not roll the ship.
     """
     search, gentlest_w = _Search(plant, sea, sample_time_s), math.inf
     first = search.least_cost()
@@ -190,10 +187,7 @@ class SelfTunedDesign:
     def tuned(self, plant: DesignPlant) -> SelfTuned:
         """The design and its law for a plant.
 
-        Raises
-        ------
-        NoLawError
-            As `self_tuned`.
+        Raises `NoLawError` as `self_tuned`.
         """
         return _tuned(self, plant)
 

@@ -84,7 +84,8 @@ def trade(
 ) -> Trade:
     """Design, judge and predict a law for each factor, in about half a second each.
 
-    A constrained design is judged and predicted within its limits, where it is linear.
+    A constrained design is judged and predicted within its limits, where it is linear. Raises
+    `CalmSeaError` if the sea does not roll the ship.
 
     Parameters
     ----------
@@ -94,11 +95,6 @@ def trade(
         Positive; the default is `WEIGHT_FACTORS` or `HORIZON_FACTORS`.
     progress : callable, optional
         Called with the finished fraction.
-
-    Raises
-    ------
-    CalmSeaError
-        If the sea does not roll the ship.
     """
     horizon = varied(design) == "control horizon"
     if factors is None:

@@ -24,17 +24,15 @@ class Interval(NamedTuple):
 def mean_interval(values: npt.ArrayLike, confidence: float = 0.95) -> Interval:
     """Mean of independent, roughly normal values with its confidence interval (Student's t).
 
+    Raises `ValueError` if there are fewer than two values, or the confidence is not between 0 and
+    1.
+
     Parameters
     ----------
     values : array_like, shape (n,)
         Two or more values; for a paired comparison the differences.
     confidence : float
         Probability that the interval holds the true mean.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than two values, or the confidence is not between 0 and 1.
     """
     from scipy.stats import t as student
 
@@ -51,10 +49,7 @@ def mean_interval(values: npt.ArrayLike, confidence: float = 0.95) -> Interval:
 def batch_means(values: FloatArray, batches: int) -> FloatArray:
     """Means of equal parts of a record, shape (batches,); a remainder at its end is left out.
 
-    Raises
-    ------
-    ValueError
-        If the record has fewer values than batches.
+    Raises `ValueError` if the record has fewer values than batches.
     """
     length = len(values) // batches
     if length < 1:

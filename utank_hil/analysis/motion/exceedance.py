@@ -9,12 +9,8 @@ def exceedance(signal: FloatArray, levels: FloatArray) -> FloatArray:
     """Share of single amplitudes of a record above each level, shape (k,).
 
     A single amplitude is the largest deviation from the mean between two crossings of it, to either
-    side. The parts before the first crossing and after the last are left out.
-
-    Raises
-    ------
-    ValueError
-        If the record crosses its mean less than twice.
+    side. The parts before the first crossing and after the last are left out. Raises `ValueError`
+    if the record crosses its mean less than twice.
     """
     centred = signal - signal.mean()
     crossings = np.flatnonzero(np.diff(np.signbit(centred))) + 1

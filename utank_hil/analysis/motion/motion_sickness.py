@@ -28,17 +28,13 @@ def motion_sickness_incidence(
     a RMS in g, f in Hz, t in minutes, Phi the normal distribution. McCauley, Royal, Wylie, O'Hanlon
     and Mackie (1976), "Motion sickness incidence: exploratory studies of habituation, pitch and
     roll, and the refinement of a mathematical model", Human Factors Research, AD-A024 709;
-    unadapted young men, single frequencies. For irregular motion f is its mean frequency.
+    unadapted young men, single frequencies. For irregular motion f is its mean frequency. Raises
+    `ValueError` if an argument is negative, or frequency or exposure is zero.
 
     Returns
     -------
     float
         0 to 100.
-
-    Raises
-    ------
-    ValueError
-        If an argument is negative, or frequency or exposure is zero.
     """
     if not (acceleration_rms_m_s2 >= 0 and frequency_hz > 0 and exposure_s > 0):
         raise ValueError(

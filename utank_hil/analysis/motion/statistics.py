@@ -44,10 +44,7 @@ def significant_amplitude(signal: FloatArray) -> float | None:
 def roll_statistics(roll_rad: FloatArray) -> RollStatistics:
     """Statistics of a roll record, shape (n,).
 
-    Raises
-    ------
-    ValueError
-        If the record is empty.
+    Raises `ValueError` if the record is empty.
     """
     if roll_rad.size == 0:
         raise ValueError("roll record is empty: run longer than the time left out at its start")
