@@ -2,7 +2,7 @@
 
     python -m tools.evidence                      # all that this release has not; `make evidence`
     python -m tools.evidence --list
-    python -m tools.evidence codec week           # these, even if this release has them
+    python -m tools.evidence cost_slice week         # these, even if this release has them
 
 A part is a command. Its record holds what it printed, with command, version, commit, date, machine
 and duration. A part that fails leaves the record that was there. After Ctrl-C the same command goes
@@ -47,7 +47,6 @@ PARTS: Final = {
     "share_of_possible": Part("python -m tools.studies.share_of_possible --seeds 8 --json", 6),
     "many_seas": Part("python -m tools.studies.many_seas --seconds 900 --seeds 3 --json", 15),
     "renewed_seas": Part("python -m tools.studies.renewed_seas --seeds 3 --json", 30),
-    "sea_estimates": Part("python -m tools.studies.sea_estimates --hours 3 --json", 30),
     "starter_ships": Part("python -m tools.studies.starter_ships --json", 3),
     "february_hours": Part(_study("february_hours"), 80),
     "storm_seeds": Part(_study("storm_seeds"), 30),
@@ -63,10 +62,7 @@ PARTS: Final = {
         10,
     ),
     "week": Part("python -m tools.studies.week --days 7 --json", 120),
-    "fuzz_frames": Part("python -m tools.fuzz.frames --frames 10000000 --json", 8),
-    "fuzz_configurations": Part(
-        "python -m tools.fuzz.configurations --number 10000 --laws --json", 10
-    ),
+    "search": Part("make search", 60),
     "mutants": Part("make mutants", 90),
     "coverage": Part("make coverage", 5),
     "tests": Part("pytest -n auto -rA -m 'evidence and not socketcan'", 10),
@@ -78,10 +74,7 @@ PARTS: Final = {
     **{
         f"cost_{name}": Part(f"python -m tools.benchmarks.{name} {options}--json", minutes)
         for name, options, minutes in (
-            ("campaign", "", 2),
-            ("codec", "", 1),
             ("controllers", "--steps 5000 ", 1),
-            ("dynamics", "", 3),
             ("lockstep", "", 1),
             ("monitors", "--minutes 5 ", 1),
             ("realtime", "--seconds 200 ", 20),
