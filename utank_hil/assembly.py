@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from utank_hil.analysis.auto_tuning import AutoDesign
+from utank_hil.analysis.loop.linear_tuning import AutoDesign
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign, sample_time_of
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import ParameterError

@@ -46,7 +46,7 @@ def controller(
 
     **Example:** utank-hil design controller configs/controllers/gpc.yaml
     """
-    from utank_hil.analysis.auto_tuning import AutoDesign
+    from utank_hil.analysis.loop.linear_tuning import AutoDesign
     from utank_hil.analysis.loop.sea_response import CalmSeaError
     from utank_hil.analysis.loop.trade import Design, trade
     from utank_hil.pictures.trade import draw_trade

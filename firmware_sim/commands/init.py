@@ -102,8 +102,8 @@ def init(
     """
     from firmware_sim.starter import FILES, make_starter
     from firmware_sim.starter_ship import StarterShip
-    from utank_hil.analysis.loop.scaled_law import NoLawError
     from utank_hil.analysis.loop.sea_response import CalmSeaError
+    from utank_hil.analysis.loop.self_tuning import NoLawError
     from utank_hil.analysis.tank_sizing import TankImpossibleError, TankRoom
 
     for path in (folder / file for file in FILES):

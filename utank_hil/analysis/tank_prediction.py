@@ -13,8 +13,8 @@ from typing import Final
 import numpy as np
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
+from utank_hil.analysis.loop.linear_tuning import LinearDesign, NoLawError, TunedLaw, first_law
 from utank_hil.analysis.loop.robustness import PERIOD_SCALES
-from utank_hil.analysis.loop.scaled_law import FirstLaw, LinearDesign, NoLawError, first_law
 from utank_hil.analysis.loop.sea_response import (
     CalmSeaError,
     MotionInSea,
@@ -78,7 +78,7 @@ class RollPrediction:
     active: MotionInSea | None  #: None without pump or law.
     #: Shaft power of a pump similar to the first ship's, see `mean_shaft_power_w`.
     mean_power_w: float | None
-    law: FirstLaw | None  #: Law of the active tank.
+    law: TunedLaw | None  #: Law of the active tank.
     no_law: str = ""  #: Reason for the absence of a law.
 
     @property
@@ -131,7 +131,7 @@ class RollCurves:
     sea: FloatArray
 
 
-def roll_curves(plant: DesignPlant, sea: SeaState, law: FirstLaw | None) -> RollCurves:
+def roll_curves(plant: DesignPlant, sea: SeaState, law: TunedLaw | None) -> RollCurves:
     """Roll over static roll in regular waves of half to twice the roll period."""
     ship, system = plant.ship, coupled_model(plant.ship, plant.tank)
     own = ship.natural_frequency_rad_s

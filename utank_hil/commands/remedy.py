@@ -8,10 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.analysis.auto_tuning import AutoDesign
+from utank_hil.analysis.loop.linear_tuning import AutoDesign
 from utank_hil.analysis.loop.robustness import robustness
-from utank_hil.analysis.loop.scaled_law import NoLawError
-from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
+from utank_hil.analysis.loop.self_tuning import NoLawError, SelfTunedDesign
 from utank_hil.analysis.loop.trade import Design, scaled, varied
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.design_plant import DesignPlant

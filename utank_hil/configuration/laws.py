@@ -22,8 +22,7 @@ from pydantic import (
     WrapValidator,
 )
 
-from utank_hil.analysis.auto_tuning import AutoDesign
-from utank_hil.analysis.loop.scaled_law import LINEAR_KINDS
+from utank_hil.analysis.loop.linear_tuning import LINEAR_KINDS, AutoDesign
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.base.parameters import refuse
 from utank_hil.configuration.files import ALLOW_CODE

@@ -3,14 +3,14 @@ from pathlib import Path
 
 import pytest
 
-from utank_hil.analysis.loop.robustness import robustness
-from utank_hil.analysis.loop.scaled_law import (
+from utank_hil.analysis.loop.linear_tuning import (
     STEP,
     LinearKind,
     NoLawError,
     first_law,
     scaled_law,
 )
+from utank_hil.analysis.loop.robustness import robustness
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.control.lqg_design import LQGDesign
@@ -57,7 +57,7 @@ def test_the_first_ship_has_the_shipped_law() -> None:
     assert mine.measurement_std == pytest.approx(theirs.measurement_std, rel=0.01)
     for key in ("wave_damping_ratio", "sample_time_s", "pressure_noise_pa_rt_s"):
         assert getattr(mine, key) == pytest.approx(getattr(theirs, key), rel=0.01)
-    assert first_law(SHIPPED.plant, SLOPE, PEAK).weight_factor == 1.0
+    assert first_law(SHIPPED.plant, SLOPE, PEAK).design == found
 
 
 @pytest.mark.parametrize("kind", ["gpc", "dpc"])
@@ -97,7 +97,7 @@ def test_a_refused_law_is_asked_for_less_and_no_less_than_it_must() -> None:
     plant = SHIPPED.plant
     strong = dataclasses.replace(plant, limits=PumpLimits(300e3, 600e3, 3.85))
     found = first_law(strong, SLOPE, PEAK)
-    assert found.weight_factor < 1
+    assert found.design != scaled_law("lqg", strong, SLOPE, PEAK)
     assert not found.robustness.failures()
     harder = tuple(STEP * weight for weight in found.design.state_weight)
     law = dataclasses.replace(found.design, state_weight=harder)
@@ -106,7 +106,7 @@ def test_a_refused_law_is_asked_for_less_and_no_less_than_it_must() -> None:
 
 
 def test_that_no_law_is_robust_enough_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("utank_hil.analysis.loop.scaled_law.MOST_TRIALS", 1)
+    monkeypatch.setattr("utank_hil.analysis.loop.linear_tuning.MOST_TRIALS", 1)
     strong = dataclasses.replace(SHIPPED.plant, limits=PumpLimits(300e3, 600e3, 3.85))
     with pytest.raises(NoLawError, match="the gentlest one is"):
         first_law(strong, SLOPE, PEAK)

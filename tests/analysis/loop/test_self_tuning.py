@@ -9,9 +9,9 @@ import pytest
 from utank_hil.analysis.loop.innovation_filter import InnovationFilter
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.analysis.loop.robustness import robustness
-from utank_hil.analysis.loop.scaled_law import NoLawError
 from utank_hil.analysis.loop.sea_response import motion_in_sea
 from utank_hil.analysis.loop.self_tuning import (
+    NoLawError,
     SelfTuned,
     SelfTunedDesign,
     passive_roll_rad,

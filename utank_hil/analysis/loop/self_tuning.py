@@ -35,7 +35,6 @@ from utank_hil.analysis.loop.robustness import (
     Robustness,
     robustness,
 )
-from utank_hil.analysis.loop.scaled_law import NoLawError
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import Range, range_problems, refuse
 from utank_hil.base.tick import TICK_S
@@ -96,6 +95,10 @@ _LEAST_STIFFNESS: Final = 1 / 3
 """Least stiffness of ship and water at the longest roll period over the nominal one; below it a
 heel and a load cannot be distinguished."""
 _MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
+
+
+class NoLawError(ValueError):
+    """No law of the kind is robust or within the limits, even with the smallest weights tried."""
 
 
 class SlopeDensity(Protocol):
@@ -233,10 +236,10 @@ class _Search:
             sea.slope_density(omega),
             order=_ORDER,
             floor=_LEAST_FLOOR,
-            smoothing_rad_s=_short(min(_SMOOTHING * w, 1.0)),
+            smoothing_rad_s=short(min(_SMOOTHING * w, 1.0)),
         )
         self._hard_cases = list(self._longest_and_shortest_period())
-        self._heel_rad = _short(_HEEL * self._roll_rad) if self._tells_heel() else 0.0
+        self._heel_rad = short(_HEEL * self._roll_rad) if self._tells_heel() else 0.0
 
     def least_cost(self) -> float:
         """Least factor on the pressure's scaled weight without oscillation at the pump's limit."""
@@ -300,10 +303,10 @@ class _Search:
             "constrained_gpc",
             self._sea,
             measurement_std=self._std,
-            pressure_noise_pa_rt_s=_short(_PRESSURE_NOISE * limits.pressure_pa * roll / root),
-            slope_noise_rad_rt_s=_short((_SLOPE_NOISE + math.sqrt(knob)) * roll / root),
-            pressure_weight_rad2=_short(pressure),
-            level_weight_rad2_m2=_short(level),
+            pressure_noise_pa_rt_s=short(_PRESSURE_NOISE * limits.pressure_pa * roll / root),
+            slope_noise_rad_rt_s=short((_SLOPE_NOISE + math.sqrt(knob)) * roll / root),
+            pressure_weight_rad2=short(pressure),
+            level_weight_rad2_m2=short(level),
             heel_std_rad=self._heel_rad,
             sample_time_s=self._step_s,
         )
@@ -349,5 +352,6 @@ def sample_time_of(plant: DesignPlant) -> float:
     return round(TICK_S * max(2, round(0.1 / w / TICK_S)), 2)
 
 
-def _short(value: float) -> float:
+def short(value: float) -> float:
+    """Round to three digits, as a file shows them."""
     return float(f"{value:.3g}")

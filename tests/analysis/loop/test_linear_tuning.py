@@ -5,11 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from utank_hil.analysis.auto_tuning import AutoDesign, _Search, auto_tuned
+from utank_hil.analysis.loop.linear_tuning import LINEAR_KINDS, AutoDesign, _Search, auto_tuned
 from utank_hil.analysis.loop.robustness import robustness
-from utank_hil.analysis.loop.scaled_law import LINEAR_KINDS, NoLawError
 from utank_hil.analysis.loop.sea_response import motion_in_sea
-from utank_hil.analysis.loop.self_tuning import cost_weights, passive_roll_rad, unknown_sea
+from utank_hil.analysis.loop.self_tuning import (
+    NoLawError,
+    cost_weights,
+    passive_roll_rad,
+    unknown_sea,
+)
 from utank_hil.assembly import build_law
 from utank_hil.configuration import ConfigError, ControllerConfig, load_config
 from utank_hil.control.sea_model import SeaModel
@@ -27,9 +31,9 @@ SEA = SeaModel(tuple(SPECTRUM.frequency_hz), tuple(SPECTRUM.density))
 
 @pytest.fixture
 def short_search(monkeypatch):
-    monkeypatch.setattr("utank_hil.analysis.auto_tuning._SIZES", 1)
-    monkeypatch.setattr("utank_hil.analysis.auto_tuning._SWEEPS", 1)
-    monkeypatch.setattr("utank_hil.analysis.loop.scaled_law.STEP", 8.0)
+    monkeypatch.setattr("utank_hil.analysis.loop.linear_tuning._SIZES", 1)
+    monkeypatch.setattr("utank_hil.analysis.loop.linear_tuning._SWEEPS", 1)
+    monkeypatch.setattr("utank_hil.analysis.loop.linear_tuning.STEP", 8.0)
 
 
 @pytest.mark.evidence("dpc", "gpc")

@@ -1,31 +1,85 @@
-"""GPC, DPC and LQG laws whose numbers all follow from ship, pump and sea: ``tuning: auto``.
+"""Tuning of linear laws: a shipped law scaled to ship, pump and sea, and a search from there.
 
-The search begins with the shipped law of the kind, scaled to ship and sea, with weights lowered
-until it has all margins (`first_law`). Then four factors are varied in turn, in decreasing steps:
-on the weights, on the noises (never below the sensors'), on peak and on damping of the waves in the
+The parameters of ``lqg.yaml``, ``gpc.yaml`` and ``dpc.yaml`` in ``configs/controllers`` are those
+of one ship in one sea. Made dimensionless by roll frequency w, effective wave slope s, greatest
+pressure P and level limit h, they serve another ship in another sea (`scaled_law`):
+
+* measurement noise on roll over s, on roll rate over s w, on level over h;
+* pressure noise over P / sqrt(w); sample time 0.1 / w; corner of the washout 0.04 w; horizons in
+  samples unchanged;
+* weights over P^2, times s^2 on roll, (s w)^2 on roll rate, h^2 on level, (h w)^2 on its rate, with
+  1 on the square of the pressure.
+
+Similarity does not guarantee robustness. The weights on the motion of a law that misses a required
+margin are lowered until it has all margins (`first_law`).
+
+With ``tuning: auto`` (`auto_tuned`) four factors are then varied in turn, in decreasing steps: on
+the weights, on the noises (never below the sensors'), on peak and on damping of the waves in the
 predictor. A law is accepted if it has all margins and costs less in that sea, by linear prediction,
 with the cost of a self-tuned law (`cost_weights`).
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.analysis.loop.loop_simulation import SensorNoise
 from utank_hil.analysis.loop.robustness import Robustness, robustness
-from utank_hil.analysis.loop.scaled_law import LinearDesign, LinearKind, NoLawError, first_law
 from utank_hil.analysis.loop.sea_response import motion_in_sea
-from utank_hil.analysis.loop.self_tuning import SlopeDensity, cost_weights, unknown_sea
+from utank_hil.analysis.loop.self_tuning import (
+    NoLawError,
+    SlopeDensity,
+    cost_weights,
+    sample_time_of,
+    short,
+    unknown_sea,
+)
 from utank_hil.analysis.loop.trade import scaled
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import BuiltLaw
+from utank_hil.control.lqg_design import LQGDesign
+from utank_hil.control.predictive.design import PredictiveDesign, Predictor
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.dynamics.linear import coupled_model
+from utank_hil.dynamics.linear import STATES, coupled_model
 from utank_hil.sea import Harmonics
 
+LinearKind = Literal["gpc", "dpc", "lqg"]
+LINEAR_KINDS: Final[tuple[LinearKind, ...]] = get_args(LinearKind)
+LinearDesign = PredictiveDesign | LQGDesign
+
+STEP: Final = 2.0
+"""Factor between successive trials of the weights. Chosen; no study."""
+MOST_TRIALS: Final = 16
+"""Limit on trials, down to weights of 2^-15. Chosen; no study."""
+
+
+class _Shipped(NamedTuple):
+    """Dimensionless parameters of a shipped law."""
+
+    measured: tuple[str, ...]
+    noise: tuple[float, ...]
+    order: int
+    wave_damping_ratio: float
+    pressure_noise: float
+    weight: tuple[float, ...]
+
+
+_SHIPPED: Final[dict[LinearKind, _Shipped]] = {
+    "gpc": _Shipped(("roll_rad",), (0.0778,), 90, 0.0117, 0.0293, (1.43,)),
+    "dpc": _Shipped(("roll_rad", "level_m"), (0.0389, 0.0127), 90, 0.0178, 0.00877, (1.56, 0.125)),
+    "lqg": _Shipped(
+        ("roll_rad", "roll_rate_rad_s", "level_m"),
+        (0.0907, 0.133, 0.0143),
+        1,
+        0.0051,
+        0.0246,
+        (0.35, 0.175, 0.00534, 0.000296),
+    ),
+}
 _STEPS: Final = (4.0, 2.0, 1.15, 2.0)
 """First step of each factor: on weights, noises, peak and damping. Chosen; no study."""
 _SIZES: Final = 3
@@ -41,15 +95,89 @@ _OMEGA: Final = np.geomspace(0.1, 10.0, 600)
 
 
 @dataclass(frozen=True, slots=True)
-class AutoTuned:
-    """A law with all required margins."""
+class TunedLaw:
+    """Parameters of a law that has the required margins."""
 
     design: LinearDesign
     robustness: Robustness
-    cost: float  #: Predicted cost; 1 is that of the roll with the passive tank.
+    cost: float = math.nan  #: Predicted cost, over that with the passive tank; if it was asked for.
 
 
-def auto_tuned(kind: LinearKind, plant: DesignPlant, sea: SlopeDensity) -> AutoTuned:
+def scaled_law(
+    kind: LinearKind, plant: DesignPlant, slope_rad: float, peak_rad_s: float
+) -> LinearDesign:
+    """Scale the shipped law of a kind to another ship, without judging it.
+
+    Parameters
+    ----------
+    plant : DesignPlant
+        With the limits of its pump.
+    slope_rad : float
+        Significant amplitude of the effective wave slope.
+    peak_rad_s : float
+        Peak frequency of the sea's spectrum.
+    """
+    w, shipped, limits = plant.ship.natural_frequency_rad_s, _SHIPPED[kind], plant.limits
+    sizes = slope_rad, slope_rad * w, limits.level_m, limits.level_m * w
+    size = dict(zip(STATES, sizes, strict=True))
+    predictor = Predictor(
+        measured=shipped.measured,
+        measurement_std=tuple(
+            short(noise * size[name])
+            for name, noise in zip(shipped.measured, shipped.noise, strict=True)
+        ),
+        order=shipped.order,
+        wave_peak_rad_s=short(peak_rad_s),
+        wave_damping_ratio=shipped.wave_damping_ratio,
+        wave_slope_rad=short(slope_rad),
+        pressure_noise_pa_rt_s=short(shipped.pressure_noise * limits.pressure_pa / math.sqrt(w)),
+        sample_time_s=sample_time_of(plant),
+    )
+    weighed = STATES if kind == "lqg" else shipped.measured
+    weight = tuple(
+        short(limits.pressure_pa**2 * share / size[name] ** 2)
+        for name, share in zip(weighed, shipped.weight, strict=True)
+    )
+    washout_rad_s = short(0.04 * w)
+    if kind == "lqg":
+        return LQGDesign(predictor, weight, washout_rad_s=washout_rad_s)
+    control, first = (58, 28) if kind == "gpc" else (57, 0)
+    return PredictiveDesign(kind, predictor, control, 71, weight, first, washout_rad_s)
+
+
+def first_law(
+    plant: DesignPlant,
+    slope_rad: float,
+    peak_rad_s: float,
+    suits: Callable[[LinearDesign], bool] = lambda _: True,
+    kind: LinearKind = "lqg",
+) -> TunedLaw:
+    """Find the law of `scaled_law` with the greatest weights at which it has the required margins.
+
+    Raises `NoLawError` if no weights do.
+
+    Parameters
+    ----------
+    suits : callable, optional
+        Further requirement on a law with all margins; smaller weights must help to meet it.
+    """
+    design = scaled_law(kind, plant, slope_rad, peak_rad_s)
+    failures: tuple[str, ...] = ()
+    for trial in range(MOST_TRIALS):
+        asked = scaled(design, STEP**-trial)
+        judged = _judged(asked, plant)
+        failures = judged.failures()
+        if not failures and suits(asked):
+            return TunedLaw(asked, judged)
+    gentlest = failures[0] if failures else "beyond the limits of pump and tank"
+    raise NoLawError(f"no {kind.upper()} law will do on this ship; the gentlest one is {gentlest}")
+
+
+def _judged(design: LinearDesign, plant: DesignPlant) -> Robustness:
+    return robustness(design.law(plant), plant, design.predictor.measured, with_delay_margin=False)
+
+
+def auto_tuned(kind: LinearKind, plant: DesignPlant, sea: SlopeDensity) -> TunedLaw:
     """Find the law of a kind with all margins that costs least of those tried.
 
     Raises `NoLawError` if no law has the margins, or the sea does not roll the ship.
@@ -113,11 +241,11 @@ class _Search:
         peaks = mean_rad_s, math.sqrt(mean_rad_s * plant.ship.natural_frequency_rad_s)
         first = [first_law(plant, _SLOPE * self._passive_rad, peak, kind=kind) for peak in peaks]
         self.start = min(
-            (AutoTuned(each.design, each.robustness, self._cost(each.design)) for each in first),
+            (replace(each, cost=self._cost(each.design)) for each in first),
             key=lambda each: each.cost,
         )
 
-    def better(self, factors: list[float], cost: float) -> AutoTuned | None:
+    def better(self, factors: list[float], cost: float) -> TunedLaw | None:
         """The law with these factors if it has all margins and costs less than `cost`."""
         design = _varied(self.start.design, self._least_std, *factors)
         if design is None:
@@ -126,14 +254,10 @@ class _Search:
             found = self._cost(design)
             if not found < cost:
                 return None
-            judged = self._judged(design)
+            judged = _judged(design, self._plant)
         except (ValueError, ArithmeticError):  # LinAlgError is a ValueError
             return None
-        return None if judged.failures() else AutoTuned(design, judged, found)
-
-    def _judged(self, design: LinearDesign) -> Robustness:
-        law, measured = design.law(self._plant), design.predictor.measured
-        return robustness(law, self._plant, measured, with_delay_margin=False)
+        return None if judged.failures() else TunedLaw(design, judged, found)
 
     def _cost(self, design: LinearDesign) -> float:
         plant, limits = self._plant, self._plant.limits
