@@ -52,11 +52,6 @@ class PumpDrive:
     ----------
     configuration_version : int
         Version sent in the heartbeat, which the controller compares with its own.
-
-    Attributes
-    ----------
-    refused : int
-        Number of commands outside the drive's limits so far.
     """
 
     name = "drive"
@@ -92,7 +87,7 @@ class PumpDrive:
         self._warnings_left = 0
         self._shown_state = self._states.state
         self._ticks = 0
-        self.refused = 0
+        self.refused = 0  #: Number of commands outside the drive's limits so far.
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Accept a command if it is intact and inside the drive's own limits."""

@@ -43,8 +43,6 @@ class FaultyBench:
 
     Attributes
     ----------
-    nodes : dict of str to FaultyNode
-        Sensors, drive, valve, panel and controller, as far as the ship has them.
     node : ControllerNode
         Controller that currently runs.
     """
@@ -74,6 +72,7 @@ class FaultyBench:
         self._law_failures = LawFailures()
         self._tapped = tapped
         self._controller = FaultyNode(self._new_controller())
+        #: Sensors, drive, valve, panel and controller, as far as the ship has them.
         self.nodes = {node.name: FaultyNode(node) for node in self.ship.nodes}
         self.nodes["controller"] = self._controller
         self.bus = FaultyBus(config.bit_rate, seed)

@@ -25,11 +25,6 @@ class HardwiredNode:
     ----------
     high_level_m : float
         Level above still water at which a reservoir's switch closes.
-
-    Attributes
-    ----------
-    stop_pressed : bool
-        Whether the hard-wired stop is pressed, which opens its loop.
     """
 
     name = "hardwired"
@@ -50,7 +45,7 @@ class HardwiredNode:
         self._cycle_ticks = self._transmitter.cycle_ns // self.period_ns
         self._housekeeping = Housekeeping(Address.HARDWIRED, catalogue, configuration_version)
         self._ticks = 0
-        self.stop_pressed = False
+        self.stop_pressed = False  #: Whether the hard-wired stop is pressed, which opens its loop.
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Ignore the frame."""

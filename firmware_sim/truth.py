@@ -31,15 +31,7 @@ def true_values(plant: Plant) -> tuple[float, ...]:
 
 
 class TruthRecorder:
-    """Recorder of the plant on a fixed time grid: a node without frames.
-
-    Attributes
-    ----------
-    start_ns : int
-        Time of the first row; -1 before it.
-    pump_speed_rad_s : float
-        Greatest speed of the pump's rotor in a row.
-    """
+    """Recorder of the plant on a fixed time grid: a node without frames."""
 
     name = "truth"
 
@@ -49,8 +41,8 @@ class TruthRecorder:
         self._plant = plant
         self._log = log
         self._row = np.zeros(len(TRUTH))
-        self.start_ns = -1
-        self.pump_speed_rad_s = 0.0
+        self.start_ns = -1  #: Time of the first row; -1 before it.
+        self.pump_speed_rad_s = 0.0  #: Greatest speed of the pump's rotor in a row.
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Ignore the frame: the truth is not on the bus."""

@@ -45,18 +45,6 @@ class ValveNode:
     ----------
     configuration_version : int
         Version sent in the heartbeat, which the controller compares with its own.
-
-    Attributes
-    ----------
-    opening : float
-        Position: 0 is shut except for leakage, 1 is open.
-    stuck : bool
-        Injected fault: while set, the valve does not move.
-    powered : bool
-        Injected fault: while cleared, the valve is silent and moves to its fail position; set
-        again, it restarts.
-    refused : int
-        Number of rejected commands so far.
     """
 
     name = "valve"
@@ -78,10 +66,12 @@ class ValveNode:
         self._configuration_version = configuration_version
         self._most_step = TICK_S / valve.opening_time_s
         self._fail_position = FailPosition[valve.fail_position.upper()]
-        self.opening = valve.fail_opening
-        self.stuck = False
+        self.opening = valve.fail_opening  #: Position: 0 is shut except for leakage, 1 is open.
+        self.stuck = False  #: Injected fault: while set, the valve does not move.
+        #: Injected fault: while cleared, the valve is silent and moves to its fail position; set
+        #: again, it restarts.
         self.powered = True
-        self.refused = 0
+        self.refused = 0  #: Number of rejected commands so far.
         self._start()
         self.hears = frozenset([self._commands.can_id])
         plant.set_valve_loss(valve.loss(tank, self.opening))

@@ -65,13 +65,7 @@ class LiveError(Exception):
 
 
 class LiveBench:
-    """Ship and controller as processes on an interface, with a listener.
-
-    Attributes
-    ----------
-    start : int
-        Ordinal number of this bench among the starts.
-    """
+    """Ship and controller as processes on an interface, with a listener."""
 
     def __init__(self, bus: str, folder: Path) -> None:
         SocketCanPort(bus).close()  # fails with the reason and the remedy
@@ -91,7 +85,7 @@ class LiveBench:
             can_filters=[{"can_id": each, "can_mask": _EXTENDED_MASK, "extended": True}
                          for each in heard],
         )  # fmt: skip
-        self.start = 1
+        self.start = 1  #: Ordinal number of this bench among the starts.
         self.mode: Mode | None = None
         self.fault = ""
         self._status_s = -math.inf

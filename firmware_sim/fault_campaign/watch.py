@@ -33,23 +33,16 @@ JITTER_S = 0.002
 
 
 class BusLog:
-    """Log of every frame on the bus, and of the controller's commands and status.
-
-    Attributes
-    ----------
-    commands : list of tuple of (int, float, bool)
-        Time, pressure, and whether the pressure was to be cut.
-    told : list of tuple of (int, Fault)
-        Faults sent in ALARM.
-    """
+    """Log of every frame on the bus, and of the controller's commands and status."""
 
     node: ControllerNode  #: Sender of the commands; must be set before the first frame.
 
     def __init__(self) -> None:
         self.frames: list[Heard] = []
+        #: Time, pressure, and whether the pressure was to be cut.
         self.commands: list[tuple[int, float, bool]] = []
         self.shown: list[tuple[int, ControllerStatus]] = []
-        self.told: list[tuple[int, Fault]] = []
+        self.told: list[tuple[int, Fault]] = []  #: Faults sent in ALARM.
 
     def __call__(self, time_ns: int, sender: str, frame: Frame) -> None:
         """Record a frame."""
@@ -128,22 +121,6 @@ class Watch:
         Row whose operator acts at times after the first tick.
     degraded_most : tuple of (float, int)
         Permitted pressure in Pa while the pressure is halved, and the time in ns to reach it.
-
-    Attributes
-    ----------
-    first_ns : dict of str to int
-        First time at which the controller was in charge ("active"), latched a fault ("found"),
-        halved the pressure ("halved"), rejected, missed or discarded a frame ("noted"), or raised
-        one of the row's alarms ("alarm").
-    over_ns : int or None
-        First time at which the condition of `Limit.counts_from` held; for the pressure, at which it
-        held until detection, or for the row's deadline.
-    pressed_ns : int
-        Last time at which the drive's set-point was not zero, or the valve followed.
-    code : Fault
-        First latched fault; while there is none, the fault shown.
-    beyond_share_pa : float
-        Largest excess of the drive's set-point over `degraded_most`.
     """
 
     name = "watch"
@@ -164,14 +141,20 @@ class Watch:
         self._start_ns: int | None = None
         self._noted = self._count()
         now_ns = bench.lockstep.now_ns
+        #: First time at which the controller was in charge ("active"), latched a fault ("found"),
+        #: halved the pressure ("halved"), rejected, missed or discarded a frame ("noted"), or
+        #: raised one of the row's alarms ("alarm").
         self.first_ns: dict[str, int] = {}
         if bench.node.mode is Mode.ACTIVE:
             self.first_ns["active"] = now_ns
+        #: First time at which the condition of `Limit.counts_from` held; for the pressure, at which
+        #: it held until detection, or for the row's deadline.
         self.over_ns: int | None = None
+        #: Last time at which the drive's set-point was not zero, or the valve followed.
         self.pressed_ns = now_ns - TICK_NS
-        self.code = Fault.NONE
+        self.code = Fault.NONE  #: First latched fault; while there is none, the fault shown.
         self.armed_again = self._waited = False
-        self.beyond_share_pa = 0.0
+        self.beyond_share_pa = 0.0  #: Largest excess of the drive's set-point over `degraded_most`.
         self.rolls = Moments()
 
     def receive(self, frame: Frame, now_ns: int) -> None:

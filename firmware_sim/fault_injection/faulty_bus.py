@@ -58,22 +58,18 @@ class FaultyBus:
 
     Attributes
     ----------
-    bit_errors : list of tuple of (Span, float, int or None)
-        Share of the transmissions that are destroyed, for one sender or for all.
-    statistics : callable
-        Method of `SimulatedBus`; destroyed transmissions count as frames.
     warn, cut_off : callable
         Functions of time and sender, called when it becomes error-passive and while it is off the
         bus.
-    hear_others : callable
-        Function called with each `OtherFrame` that was carried.
     """
 
     def __init__(self, bit_rate: int = 250_000, seed: int = 1) -> None:
         self._bus = SimulatedBus(bit_rate)
+        #: Method of `SimulatedBus`; destroyed transmissions count as frames.
         self.statistics = self._bus.statistics
         self._draw = random.Random(seed).random
         self.disturbances: list[Disturbance] = []
+        #: Share of the transmissions that are destroyed, for one sender or for all.
         self.bit_errors: list[tuple[Span, float, int | None]] = []
         self.error_counts: dict[int, int] = {}
         self._off_until_ns: dict[int, int] = {}
@@ -82,6 +78,7 @@ class FaultyBus:
         self._swapped: dict[int, Arrived] = {}
         self.warn: Callable[[int, int], None] = lambda *_: None
         self.cut_off: Callable[[int, int], None] = lambda *_: None
+        #: Function called with each `OtherFrame` that was carried.
         self.hear_others: Callable[[OtherFrame], None] = lambda _: None
 
     def queue(self, sender: int, frame: Frame, now_ns: int) -> None:

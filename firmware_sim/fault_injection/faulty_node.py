@@ -43,21 +43,7 @@ class Spoiled:
 
 
 class FaultyNode:
-    """Node with faults; without any it behaves as the node itself.
-
-    Attributes
-    ----------
-    spoiled : list of Spoiled
-        Faults of its frames, applied in order.
-    hangs : list of Span
-        Spans in which it neither ticks nor receives.
-    deaf : list of Span
-        Spans in which it receives nothing.
-    cut_off : list of tuple of (Span, str)
-        Spans in which the bus is unreachable, with the reason.
-    warned : list of tuple of (Span, str)
-        Spans in which its interface reports a warning in every tick and still carries frames.
-    """
+    """Node with faults; without any it behaves as the node itself."""
 
     def __init__(self, node: Node) -> None:
         self.node = node
@@ -65,10 +51,12 @@ class FaultyNode:
         self.period_ns = node.period_ns
         if isinstance(node, Selective):
             self.hears = node.hears
-        self.spoiled: list[Spoiled] = []
-        self.hangs: list[Span] = []
-        self.deaf: list[Span] = []
+        self.spoiled: list[Spoiled] = []  #: Faults of its frames, applied in order.
+        self.hangs: list[Span] = []  #: Spans in which it neither ticks nor receives.
+        self.deaf: list[Span] = []  #: Spans in which it receives nothing.
+        #: Spans in which the bus is unreachable, with the reason.
         self.cut_off: list[tuple[Span, str]] = []
+        #: Spans in which its interface reports a warning in every tick and still carries frames.
         self.warned: list[tuple[Span, str]] = []
         self._actions: list[tuple[int, Callable[[], object]]] = []
 

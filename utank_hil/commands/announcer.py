@@ -40,17 +40,12 @@ class Announcer:
         Destination of a ship that a law was retuned for.
     log : Path, optional
         File of the log.
-
-    Attributes
-    ----------
-    ring : str or None
-        Name of the ring, for a recorder; None if there was no room for it.
-    error : str or None
-        Why events are not printed; the controller runs nevertheless.
     """
 
     def __init__(self, ships: IdentifiedShips | None = None, log: Path | None = None) -> None:
+        #: Name of the ring, for a recorder; None if there was no room for it.
         self.ring: str | None = None
+        #: Why events are not printed; the controller runs nevertheless.
         self.error: str | None = None
         self._writer: EventWriter | None = None
         self._process: SpawnProcess | None = None

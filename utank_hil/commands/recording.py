@@ -61,11 +61,6 @@ class RunRecording:
         Size beyond which the folder's oldest recordings are removed; by default none are.
     log : Path, optional
         Log of the run's events; the recording is named by its time, so that a report finds it.
-
-    Attributes
-    ----------
-    summary : RecordingSummary
-        Result, complete after `stop`.
     """
 
     def __init__(
@@ -77,7 +72,7 @@ class RunRecording:
         keep_bytes: int | None = None,
         log: Path | None = None,
     ) -> None:
-        self.summary = RecordingSummary()
+        self.summary = RecordingSummary()  #: Result, complete after `stop`.
         self._ring: RingWriter | None = None
         self._records: RingWriter | None = None
         self._recorder: RecorderProcess | None = None

@@ -23,15 +23,7 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 
 class CommandLimiter:
-    """Limiter of a desired pressure to `PumpLimits`, called once every command period `period_s`.
-
-    Attributes
-    ----------
-    command_pa : float
-        The last command.
-    limiting : bool
-        Whether the last command was smaller than desired.
-    """
+    """Limits a desired pressure to `PumpLimits`; called once every command period `period_s`."""
 
     def __init__(self, limits: PumpLimits, tank: Tank, period_s: float) -> None:
         if not (math.isfinite(period_s) and period_s > 0):
@@ -41,8 +33,8 @@ class CommandLimiter:
         self._stiffness_pa_m = 2 * tank.density_kg_m3 * GRAVITY_M_S2
         self._frequency_rad_s = tank.natural_frequency_rad_s
         self._area_m2 = tank.reservoir_area_m2
-        self.command_pa = 0.0
-        self.limiting = False
+        self.command_pa = 0.0  #: The last command.
+        self.limiting = False  #: Whether the last command was smaller than desired.
         self._sum_pa = 0.0
         self._count = 0
 

@@ -48,11 +48,6 @@ class AdaptiveController(LawExchange):
         Index of the roll among the outputs.
     pulses_pa : ndarray, shape (N,)
         Excitation pressure, one value per sample.
-
-    Attributes
-    ----------
-    candidate : Candidate or None
-        Latest admitted candidate.
     """
 
     def __init__(
@@ -73,7 +68,7 @@ class AdaptiveController(LawExchange):
             retuner,
             len(pulses_pa),
         )
-        self.candidate: Candidate | None = None
+        self.candidate: Candidate | None = None  #: Latest admitted candidate.
         self._settings = settings
         self._pulses_pa = pulses_pa
         self._admission = Admission(law, self._history)

@@ -16,18 +16,13 @@ SIGNIFICANT: Final = 3.0
 
 
 class ChangeMonitor:
-    """Monitor that compares the present ship with the ship that a law was designed for.
-
-    Attributes
-    ----------
-    change : float
-        Ratio (1 or more) of the roll periods or of the square roots of the stiffnesses, whichever
-        is larger; 1 while no difference is significant.
-    """
+    """Monitor that compares the present ship with the ship that a law was designed for."""
 
     def __init__(self, ship: ShipFigures) -> None:
         self._ship = ship
         self._latest: ShipFigures | None = None
+        #: Ratio (1 or more) of the roll periods or of the square roots of the stiffnesses,
+        #: whichever is larger; 1 while no difference is significant.
         self.change = 1.0
 
     def watch(self, estimate: MotionEstimate) -> None:

@@ -164,11 +164,6 @@ class Estimator:
         Answers with a `MotionEstimate`.
     least_gm_m : float or None
         Limit of the stability booklet on the metacentric height.
-
-    Attributes
-    ----------
-    trouble : str
-        First known reason why no estimates come; empty while they do.
     """
 
     def __init__(
@@ -195,7 +190,7 @@ class Estimator:
         self._asked_ns: int | None = None
         self._since_ns = 0  # The end of the latest estimate's record, or the start.
         self._ship_ns: int | None = None
-        self.trouble = ""
+        self.trouble = ""  #: First known reason why no estimates come; empty while they do.
         self._news: list[str] = []
         self.figures = EstimateFigures()
 

@@ -10,11 +10,6 @@ class SampleHistory:
 
     The buffer has twice the capacity and is compacted every `capacity` samples, so that the latest
     rows are always contiguous.
-
-    Attributes
-    ----------
-    count : int
-        Number of samples taken so far.
     """
 
     def __init__(self, capacity: int, outputs: int) -> None:
@@ -23,7 +18,7 @@ class SampleHistory:
         self._rows = np.zeros((2 * capacity, 1 + outputs))
         self._fresh = np.zeros(2 * capacity, dtype=np.bool_)
         self._end = 0
-        self.count = 0
+        self.count = 0  #: Number of samples taken so far.
 
     def add(self, command_pa: float, y: FloatArray, *, fresh: bool) -> None:
         """Append a sample.

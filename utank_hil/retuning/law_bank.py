@@ -39,13 +39,7 @@ class MonitoredLaw:
 
 
 class LawBank:
-    """The laws of one retuning controller.
-
-    Attributes
-    ----------
-    stepped : tuple of MonitoredLaw
-        Every law of the bank, once.
-    """
+    """The laws of one retuning controller."""
 
     def __init__(self, configured: MonitoredLaw) -> None:
         self.accepted = configured
@@ -53,7 +47,7 @@ class LawBank:
         self.previous: MonitoredLaw | None = None
         self._fading: MonitoredLaw | None = None
         self._fade = FADE_SAMPLES
-        self.stepped: tuple[MonitoredLaw, ...] = (configured,)
+        self.stepped: tuple[MonitoredLaw, ...] = (configured,)  #: Every law of the bank, once.
 
     @property
     def active(self) -> MonitoredLaw:

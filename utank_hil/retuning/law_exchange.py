@@ -72,11 +72,6 @@ class LawExchange(ABC):
         Number of outputs, and index of the roll among them.
     history_samples : int
         Smallest length of the record of commands and outputs.
-
-    Attributes
-    ----------
-    events : deque of RetuningEvent
-        The last `MOST_EVENTS`.
     """
 
     def __init__(
@@ -90,7 +85,7 @@ class LawExchange(ABC):
     ) -> None:
         self.sample_time_s = first.controller.sample_time_s
         self.state = RetuningState.IDLE
-        self.events: deque[RetuningEvent] = deque(maxlen=MOST_EVENTS)
+        self.events: deque[RetuningEvent] = deque(maxlen=MOST_EVENTS)  #: The last `MOST_EVENTS`.
         self._untaken = 0
         self.laws = LawBank(first)
         self._trial_settings = settings

@@ -78,13 +78,6 @@ class RenewingController(LawExchange):
         Index of the roll among the outputs.
     limits : PumpLimits
         Limits that no law may exceed.
-
-    Attributes
-    ----------
-    renewed : RenewedLaw or None
-        Latest admitted law.
-    fallbacks : int
-        Fallbacks (`Plans`) of all laws together.
     """
 
     def __init__(
@@ -109,8 +102,8 @@ class RenewingController(LawExchange):
         self._seen: ShipFigures | None = None
         self._due = ""
         self._asked: MotionEstimate | None = None
-        self.renewed: RenewedLaw | None = None
-        self.fallbacks = 0
+        self.renewed: RenewedLaw | None = None  #: Latest admitted law.
+        self.fallbacks = 0  #: Fallbacks (`Plans`) of all laws together.
 
     def allow(self, share: float) -> None:
         """Set the share of every law of the bank (`Plans`), as each may become active next."""

@@ -40,23 +40,17 @@ class RetunerProcess(Closing):
         Work importable in another process (functions, or `functools.partial` of them).
     hangs_after_s : float
         Time after which a busy worker is killed and replaced.
-
-    Attributes
-    ----------
-    desks : tuple of Desk
-        Desks in the order of `works`.
-    pid : int
-        Process id of the watchdog, and id of the process group of both.
     """
 
     def __init__(self, *works: Work, hangs_after_s: float = _HANGS_S) -> None:
-        self.desks = tuple(Desk(work) for work in works)
+        self.desks = tuple(Desk(work) for work in works)  #: Desks in the order of `works`.
         self._process = multiprocessing.get_context("spawn").Process(
             target=run_watchdog, args=(self.desks, os.getpid(), hangs_after_s), daemon=True
         )
         with one_thread_each():
             self._process.start()
         assert self._process.pid is not None
+        #: Process id of the watchdog, and id of the process group of both.
         self.pid: int = self._process.pid
         self._closed = False
         deadline_s = time.monotonic() + _START_S

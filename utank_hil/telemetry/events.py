@@ -66,16 +66,11 @@ class EventWriter(RingWriter):
 
 
 class EventReader(RingReader):
-    """A reading end.
-
-    Attributes
-    ----------
-    start_ns : int
-        Time of the first telemetry row on the writer's monotonic clock, set by the first event.
-    """
+    """A reading end."""
 
     def __init__(self, name: str, place: int | None = None) -> None:
         super().__init__(name, place, RingKind.EVENTS)
+        #: Time of the first telemetry row on the writer's monotonic clock, set by the first event.
         self.start_ns = 0
 
     def read_events(self) -> list[Event]:

@@ -124,22 +124,16 @@ class FrameLog:
     ----------
     path : Path
         The first part, or another to start from.
-
-    Attributes
-    ----------
-    first_part : bool
-        Whether the log begins where the run did.
-    cut : str
-        Where and why reading ended before the end of a file, after all `blocks` were taken; empty
-        if it did not.
     """
 
     def __init__(self, path: Path) -> None:
         first, number = whole_of(path)
-        self.first_part = number == 1
+        self.first_part = number == 1  #: Whether the log begins where the run did.
         self._paths = [path]
         while (following := part_of(first, number + len(self._paths))).exists():
             self._paths.append(following)
+        #: Where and why reading ended before the end of a file, after all `blocks` were taken;
+        #: empty if it did not.
         self.cut = ""
         kind, payload = next(self._read(path), (b"", b""))
         if kind != _HEAD:

@@ -21,11 +21,6 @@ class FrameRecording(Closing):
         The recording beside which the log is written.
     place : int, optional
         Place in the ring to start from (`RingReader`).
-
-    Attributes
-    ----------
-    lost : int
-        Number of records overwritten before they were read; each lost slot counts as full.
     """
 
     def __init__(
@@ -33,6 +28,7 @@ class FrameRecording(Closing):
     ) -> None:
         self._reader = RingReader(ring, place, RingKind.FRAMES)
         self._writer = FrameLogWriter(file.with_suffix(SUFFIX), head)
+        #: Number of records overwritten before they were read; each lost slot counts as full.
         self.lost = 0
 
     @property

@@ -167,15 +167,13 @@ class Tapped:
     ----------
     retuner, estimating : Retuner or None
         Desks for the controller.
-    taps : list of RetunerTap
-        Taps for `NodeTap`.
     """
 
     def __init__(
         self, retuner: Retuner | None, estimating: Retuner | None, *, wanted: bool
     ) -> None:
         self.retuner, self.estimating = retuner, estimating
-        self.taps: list[RetunerTap] = []
+        self.taps: list[RetunerTap] = []  #: Taps for `NodeTap`.
         if wanted and retuner is not None:
             self.retuner = tap = RetunerTap(retuner)
             self.taps.append(tap)

@@ -97,15 +97,10 @@ class ReplayedLog(NamedTuple):
 
 
 class RecordedRetuner:
-    """Gives the answers of a recording, in the ticks in which they were taken.
-
-    Attributes
-    ----------
-    astray : str
-        Request of the controller that was not recorded; empty if there is none.
-    """
+    """Gives the answers of a recording, in the ticks in which they were taken."""
 
     def __init__(self) -> None:
+        #: Request of the controller that was not recorded; empty if there is none.
         self.astray = ""
         self._alive: deque[bool] = deque()
         self._answer = bytearray()

@@ -95,13 +95,6 @@ class RingWriter(Closing):
         Number of slots, two or more.
     content : mapping, optional
         Description of the records for readers, ready for `json.dumps`.
-
-    Attributes
-    ----------
-    name : str
-        Name of the ring for readers.
-    count : int
-        Number of slots written so far.
     """
 
     def __init__(
@@ -121,6 +114,7 @@ class RingWriter(Closing):
         first = _first_slot_byte(len(text))
         stride = slot_bytes + 8
         size = first + slots * stride
+        #: Name of the ring for readers.
         self.name = f"{_PREFIX}{os.getpid()}-{secrets.token_hex(4)}"
         # A process group that was killed as a whole leaves its segment.
         for left_over in ring_names():
@@ -149,7 +143,7 @@ class RingWriter(Closing):
         self._slots = [memory[at : at + slot_bytes] for at in range(first, size, stride)]
         self._closing = words[(first + slot_bytes) // 8 :: stride // 8]
         self._record_bytes, self._slot_bytes, self._slot_count = record_bytes, slot_bytes, slots
-        self.count = 0
+        self.count = 0  #: Number of slots written so far.
 
     def write(self, records: FloatArray | bytes | bytearray) -> None:
         """Append one or more records, overwriting the oldest if the ring is full; never blocks.
@@ -198,13 +192,6 @@ class RingReader(Closing):
         `place` of a reader that this one continues; by default it starts at the oldest slot.
     kind : RingKind, optional
         The only accepted kind.
-
-    Attributes
-    ----------
-    content : mapping
-        The writer's description of the records.
-    lost : int
-        Number of slots overwritten before they were read.
     """
 
     def __init__(self, name: str, place: int | None = None, kind: RingKind | None = None) -> None:
@@ -227,6 +214,7 @@ class RingReader(Closing):
             raise RingError(f"{name!r} is not a telemetry ring of version {_VERSION}")
         text = self._map[8 * _HEADER_WORDS : 8 * _HEADER_WORDS + text_bytes]
         try:
+            #: The writer's description of the records.
             self.content: Mapping[str, Any] = dict(json.loads(text))
             self.kind = RingKind(self.content["kind"])
         except (ValueError, TypeError, KeyError, RecursionError) as error:
@@ -234,7 +222,7 @@ class RingReader(Closing):
         if kind not in (None, self.kind):
             raise RingError(f"{name!r} is a telemetry ring of {self.kind}, not of {kind}")
         self.writer_pid: int = pid
-        self.lost = 0
+        self.lost = 0  #: Number of slots overwritten before they were read.
         self._slots: int = slots
         self._writer_start: int = start
         self._next: int = max(0, self._words[_COUNT] - slots) if place is None else place

@@ -21,15 +21,7 @@ LOOPBACK: Final = "127.0.0.1"
 
 
 class Viewer(Closing):
-    """A running viewer, made by `open_viewer`.
-
-    Attributes
-    ----------
-    url : str or None
-        Address for a browser; None if the viewer has its own window.
-    ports : tuple of int
-        Ports on loopback that such a browser needs.
-    """
+    """A running viewer, made by `open_viewer`."""
 
     def __init__(
         self,
@@ -40,8 +32,8 @@ class Viewer(Closing):
     ) -> None:
         self._process = process
         self._held = held
-        self.url = url
-        self.ports = ports
+        self.url = url  #: Address for a browser; None if the viewer has its own window.
+        self.ports = ports  #: Ports on loopback that such a browser needs.
 
     def wait(self, longest_s: float) -> bool:
         """Wait for the end of the viewer and return whether it ended, closed or failed.

@@ -98,11 +98,6 @@ class InnovationFilter:
     weights : tuple of float
         Cost weights on the squares of roll in rad, level in m, and pressure over the pump's
         maximum.
-
-    Attributes
-    ----------
-    coefficients : int
-        Number of coefficients of the filter.
     """
 
     def __init__(
@@ -120,7 +115,7 @@ class InnovationFilter:
         share = np.where(omega > 2e-3 * angle, self._mean / omega, 0.0)
         self._octaves = share / share.sum()  # each octave has the same weight
         self._measured = [STATES.index(name) for name in design.measured]
-        self.coefficients = _ORDER * len(self._measured)
+        self.coefficients = _ORDER * len(self._measured)  #: Number of coefficients of the filter.
         self._noise = np.diag(np.asarray(design.measurement_std))
         self._basis_a, self._basis_b = laguerre(_ORDER, math.exp(-_POLE * angle))
         basis = LinearModel(

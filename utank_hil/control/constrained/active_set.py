@@ -32,11 +32,6 @@ class ActiveSetSolver:
         G.
     iteration_limit : int
         Limit on the iterations of a solution.
-
-    Attributes
-    ----------
-    iterations : int
-        Iterations of the last solution.
     """
 
     def __init__(self, hessian: FloatArray, rows: FloatArray, iteration_limit: int) -> None:
@@ -44,7 +39,7 @@ class ActiveSetSolver:
         self._model = daqp.Model()
         self._cold = np.zeros(bounds, dtype=np.int32)
         self._warm = True
-        self.iterations = 0
+        self.iterations = 0  #: Iterations of the last solution.
         flag, _ = self._model.setup(
             hessian, np.zeros(len(hessian)), rows, np.ones(bounds), -np.ones(bounds), self._cold
         )

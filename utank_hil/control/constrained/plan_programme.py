@@ -30,11 +30,6 @@ class PlanProgramme:
         Index of the level among the outputs; None leaves the level free.
     level_penalty : float
         Cost of a metre above the limit, in the unit of the horizon's cost.
-
-    Attributes
-    ----------
-    held : ndarray of int, shape (l,)
-        Samples of the horizon at which the level is constrained.
     """
 
     def __init__(
@@ -48,6 +43,7 @@ class PlanProgramme:
     ) -> None:
         knots, samples = len(horizon.knots), len(horizon.interpolation)
         end = 0 if level_output is None else samples
+        #: shape (l,): samples of the horizon at which the level is constrained.
         self.held = np.arange(LEVEL_SPACING - 1, end, LEVEL_SPACING)
         levels = len(self.held)
         self._by_plan: FloatArray = horizon.outputs_plan[self.held, level_output or 0]

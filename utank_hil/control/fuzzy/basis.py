@@ -33,8 +33,6 @@ class FuzzyBasis:
     Attributes
     ----------
     ranges : ndarray, shape (n,)
-    rules : int
-        3^n; 81 for four inputs.
 
     Raises
     ------
@@ -46,7 +44,7 @@ class FuzzyBasis:
         if not ranges or not all(math.isfinite(c) and c > 0 for c in ranges):
             raise ValueError(f"fuzzy ranges must be positive and finite, got {ranges}")
         self.ranges = np.array(ranges, dtype=np.float64)
-        self.rules = SETS ** len(ranges)
+        self.rules = SETS ** len(ranges)  #: 3^n; 81 for four inputs.
         self._scales = [1 / c for c in ranges]
 
     def memberships(self, x: FloatArray) -> list[tuple[float, float, float]]:
