@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
-from utank_hil.analysis.loop.linear_tuning import LinearDesign, NoLawError, TunedLaw, first_law
+from utank_hil.analysis.loop.linear_tuning import LinearDesign, TunedLaw, first_law
 from utank_hil.analysis.loop.robustness import PERIOD_SCALES
 from utank_hil.analysis.loop.sea_response import (
     CalmSeaError,
@@ -22,6 +22,7 @@ from utank_hil.analysis.loop.sea_response import (
     rms,
     roll_response_without_tank,
 )
+from utank_hil.analysis.loop.self_tuning import NoLawError
 from utank_hil.analysis.shaft_power import mean_shaft_power_w
 from utank_hil.analysis.tank_sizing import MOST_STABILITY_SHARE, stability_taken
 from utank_hil.base.arrays import ComplexArray, FloatArray
