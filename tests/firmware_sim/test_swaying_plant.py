@@ -12,10 +12,14 @@ from scipy.integrate import solve_ivp
 
 from firmware_sim.plant import Plant
 from firmware_sim.scenario import Scenario
+from firmware_sim.ship_side import build_ship_side
 from firmware_sim.waves import PassingWaves, SteadyWaves
+from utank_hil.assembly import build_controller_node
 from utank_hil.base.tick import TICK_NS
+from utank_hil.canbus import Mode
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.dynamics.nonlinear import RollModel
+from utank_hil.runners import Lockstep, SimulatedBus
 from utank_hil.sea import Harmonics, Sea, jonswap
 from utank_hil.sea.passing import PassingSea
 from utank_hil.sea.sea import slope_per_m
@@ -106,3 +110,17 @@ def test_scenario_sways_by_its_share_of_the_slope_and_not_without_it(tmp_path: P
     slope = load_config(STORM, Scenario).sea.sea(1).slope
     assert swaying.lateral_m_s2 == pytest.approx(0.7 * 9.80665 * float(slope.at(20.0)), rel=1e-6)
     assert math.isclose(zero.lateral_m_s2, 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.5, 1.0])
+def test_controller_that_knows_no_sway_is_in_charge_of_a_ship_that_sways(share: float) -> None:
+    storm = load_config(STORM, Scenario)
+    scenario = storm.model_copy(update={"actual_ship": {"sway_of_slope": share}})
+    ship = build_ship_side(scenario, 1, scenario.operator)
+    node = build_controller_node(scenario.controllers["gpc"], commissioned=True)
+    run = Lockstep([*ship.nodes, node], SimulatedBus(bit_rate=250_000))
+    for second in range(10, 180):
+        run.run_until(second * 1_000_000_000)
+        assert node.mode is Mode.ACTIVE
+        assert node.safety.monitors.found == 0

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from controller_bench import CATALOGUE, VERSION, VESSEL
+from controller_bench import CATALOGUE, VERSION
+from controller_bench import VESSEL as SHIPPED
 from monitors.moving_ship import MovingShip
 
 from utank_hil.base.tick import TICK_NS, TICK_S
@@ -23,6 +24,8 @@ from utank_hil.safety.monitoring import ROUND_TICKS, Monitors
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.thresholds import SensorFigures
 from utank_hil.safety.situation import OwnState
+
+VESSEL = SHIPPED.model_copy(update={"ship": replace(SHIPPED.ship, sway_of_slope=0.0)})
 
 OF_MOTION = ("roll_rad", "roll_rate_rad_s", "heard_ns")
 

@@ -362,9 +362,6 @@ class Monitors:
             return self._level_found | unwatched
         self._round_ns = now_ns
         level_m, pressure_pa = measured.level_m, measured.pressure_pa - own.held_pa
-        if self._water_free:
-            for _ in range(steps):
-                self._level_found = self._level_stuck.update(motion.roll_rad, level_m, pressure_pa)
         for sensor, sample in zip(self.sensors, motions, strict=True):
             if sample.age_ms > STALE_MS:
                 sensor.restart_water()
@@ -373,6 +370,10 @@ class Monitors:
                 sample.roll_rad, level_m, pressure_pa, steps, own.held_pa, frozen=sample.frozen
             )
         used = self.sensors[self.used]
+        if self._water_free and used.equation.settled:
+            push, slope_push = used.equation.push, used.equation.slope_push
+            for _ in range(steps):
+                self._level_found = self._level_stuck.update(level_m, push, slope_push)
         wrong = used.water or used.watch.found & _MOTION_SIGN
         self.confirmed = not wrong and (self.confirmed or used.equation.obeyed)
         if len(motions) == 2:

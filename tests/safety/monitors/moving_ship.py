@@ -2,6 +2,7 @@
 
 import cmath
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from utank_hil.safety.monitors.thresholds import MonitorThresholds, SensorFigure
 
 CONFIG = load_config(Path("configs/controllers/gpc.yaml"), ControllerConfig)
 TANK = CONFIG.vessel.tank
-SHIP = CONFIG.vessel.ship
+SHIP = replace(CONFIG.vessel.ship, sway_of_slope=0.0)
 THRESHOLDS: MonitorThresholds = thresholds_of(
     CONFIG.plant, CONFIG.safety.roll_limit_rad, SensorFigures()
 )

@@ -22,7 +22,8 @@ def found_after(ship: MovingShip, fault, until_s: float = 60.0) -> dict[Finding,
         sample = [ship.roll_rad(t), ship.level_m(t), ship.pressure_pa(t)]
         if t >= FAULT_S:
             sample = fault(t, *sample)
-        found = equation.update(*sample) | stuck.update(*sample)
+        found = equation.update(*sample)
+        found |= stuck.update(sample[1], equation.push, equation.slope_push)
         for finding in Finding:
             if found & finding:
                 first.setdefault(finding, t - FAULT_S)
@@ -44,9 +45,10 @@ def test_water_at_rest_under_a_steady_heel_and_pressure_is_not_stuck() -> None:
     stuck = LevelStuck(SHIP, TANK, THRESHOLDS, STEP_S)
     heel_rad, pressure_pa = 0.1, 20e3
     level_m = (heel_rad * 9.80665 * TANK.width_m + pressure_pa / 1000) / (2 * 9.80665)
-    found = [stuck.update(heel_rad * min(k / 600, 1), 0.01 * k, 0.0) for k in range(600)]
-    found += [stuck.update(heel_rad, level_m, pressure_pa) for _ in range(600)]
-    assert not any(found)
+    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    for k in range(1200):
+        equation.update(heel_rad, level_m, pressure_pa)
+        assert not stuck.update(level_m, equation.push, equation.slope_push), k
 
 
 ZEROS = (math.radians(0.3), 0.044, 870.0)
@@ -62,12 +64,13 @@ def test_zeros_of_the_sensors_are_no_wrong_sign_no_delay_and_nothing_stuck(
     roll_deg: float, pressure_pa: float, frequency_rad_s: float, sensor: int, way: int
 ) -> None:
     ship = MovingShip(math.radians(roll_deg), pressure_pa, frequency_rad_s)
-    monitors = (TankEquation(SHIP, TANK, THRESHOLDS, STEP_S),
-                LevelStuck(SHIP, TANK, THRESHOLDS, STEP_S))  # fmt: skip
+    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    stuck = LevelStuck(SHIP, TANK, THRESHOLDS, STEP_S)
     for k in range(900):
         sample = [each(k * STEP_S) for each in (ship.roll_rad, ship.level_m, ship.pressure_pa)]
         sample[sensor] += way * ZEROS[sensor]
-        assert not any(monitor.update(*sample) for monitor in monitors)
+        assert not equation.update(*sample)
+        assert not stuck.update(sample[1], equation.push, equation.slope_push)
 
 
 def test_zeros_explain_a_standing_roll_only_as_far_as_they_go() -> None:

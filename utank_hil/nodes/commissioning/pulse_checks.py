@@ -24,7 +24,7 @@ from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.nodes.commissioning.checks import Check, Record
 from utank_hil.nodes.commissioning.pulses import PulsePlan
-from utank_hil.safety.monitors.tank_equation import DerivativeFilter
+from utank_hil.safety.monitors.derivative_filter import DerivativeFilter
 
 SCALE: Final = 0.15
 ROLL_SCALE: Final = 0.3

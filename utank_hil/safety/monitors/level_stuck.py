@@ -3,17 +3,16 @@
 While the measured level stays within a band, the water is computed from where it began, at rest, by
 the tank's equation. Water that does move may cross the band to its turning point and back; in that
 time the computed level moves four bands, and some more by the noise. Sixteen are a level that is
-stuck.
+stuck, if they are as many with every sway that the ship may have.
 """
 
 import math
 from typing import Final
 
-from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.monitors.tank_equation import roll_push_at_natural_frequency
+from utank_hil.safety.monitors.sway import most_sway
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
 BANDS: Final = 16.0
@@ -63,13 +62,7 @@ class LevelStuck:
     def __init__(
         self, ship: RollShip, tank: Tank, thresholds: MonitorThresholds, period_s: float
     ) -> None:
-        water_kg_m = tank.density_kg_m3 * tank.reservoir_area_m2
-        push = roll_push_at_natural_frequency(ship, tank)
-        stiffness = coupled_matrices(ship, tank)[2][1, 0]
-        self._push, self._steady_push = push, -stiffness / water_kg_m
-        self._mean_share = period_s * tank.natural_frequency_rad_s / (2 * math.pi)
-        self._mean_rad = 0.0
-        self._density = tank.density_kg_m3
+        self._most_sway = most_sway(ship)
         self._band_m = thresholds.level_still_m
         self._period_s = period_s
         self._inertia = tank.effective_length_m
@@ -79,20 +72,27 @@ class LevelStuck:
     def restart(self) -> None:
         """Begin anew after a gap."""
         self._level_m = math.inf
-        self._moved_m = self._rate_m_s = 0.0
+        self._begin(math.inf)
 
-    def update(self, roll_rad: float, level_m: float, pressure_pa: float) -> int:
-        """Take what is measured; return what was found."""
-        # a steady heel pushes otherwise than a roll does
-        self._mean_rad += self._mean_share * (roll_rad - self._mean_rad)
+    def _begin(self, level_m: float) -> None:
+        self._level_m = level_m
+        self._moved_m = self._rate_m_s = 0.0
+        self._swayed_m = self._sway_rate_m_s = 0.0
+
+    def update(self, level_m: float, push_m2_s2: float, slope_push_m2_s2: float) -> int:
+        """Take the level and the pushes of `TankEquation`; return what was found."""
         if abs(level_m - self._level_m) > self._band_m:
-            self._level_m = level_m
-            self._moved_m = self._rate_m_s = 0.0
+            self._begin(level_m)
             return 0
-        level_m = self._level_m + self._moved_m
-        pushed = self._push * (roll_rad - self._mean_rad) + self._steady_push * self._mean_rad
-        pushed += pressure_pa / self._density
-        pushed -= self._loss * self._rate_m_s + 2 * GRAVITY_M_S2 * level_m
-        self._rate_m_s += pushed / self._inertia * self._period_s
-        self._moved_m += self._rate_m_s * self._period_s
-        return _LEVEL_STUCK if abs(self._moved_m) > BANDS * self._band_m else 0
+        moved_m, rate_m_s = self._moved_m, self._rate_m_s
+        pushed = push_m2_s2 - self._loss * rate_m_s - 2 * GRAVITY_M_S2 * (self._level_m + moved_m)
+        self._rate_m_s = rate_m_s = rate_m_s + pushed / self._inertia * self._period_s
+        self._moved_m = moved_m = moved_m + rate_m_s * self._period_s
+        # what a sway of g times the slope takes from that
+        swayed_m, rate_m_s = self._swayed_m, self._sway_rate_m_s
+        pushed = slope_push_m2_s2 - self._loss * rate_m_s - 2 * GRAVITY_M_S2 * swayed_m
+        self._sway_rate_m_s = rate_m_s = rate_m_s + pushed / self._inertia * self._period_s
+        self._swayed_m = swayed_m = swayed_m + rate_m_s * self._period_s
+        other_m, most_m = moved_m - self._most_sway * swayed_m, BANDS * self._band_m
+        stuck = min(moved_m, other_m) > most_m or max(moved_m, other_m) < -most_m
+        return _LEVEL_STUCK if stuck else 0

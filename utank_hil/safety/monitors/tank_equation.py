@@ -5,6 +5,8 @@ With the level h, the roll phi and the pump's pressure P, thesis (2.19) per mass
     Le h'' + (c + q |h'|) h' + 2 g h  =  P / rho  +  g L phi + L (H + Lz) phi''
               y, what the water shows      p                 x
 
+A ship that sways takes c u from the right side, with u = L g times the slope of the waves, as the
+moment that rolls the ship tells it (`SlopePush`), and c anything from 0 to `most_sway`.
 All three are low-pass filtered alike, with both poles at 2 w0, which gives the derivatives without
 differentiating. Sums with a memory of 0.4 roll periods tell the gains::
 
@@ -17,7 +19,9 @@ Where the roll has not moved for a quarter of a period, y - p - x itself tells t
 Where a motion sensor that had noise has sent a hundred samples that are the same, less of it does.
 No sensor's zero is quite right: y - p - x may hold any constant up to +-z, as a commissioning lets
 pass. Something is found only if no constant of that size explains it.
-The ship's inertia, stiffness and load stand in none of this. A gain is judged only where its own
+The sums hold the middle of the range, and no sway within it may explain what is found: for each
+frequency a c within a circle about the middle, since sway need not be in phase with the slope.
+The ship's inertia, stiffness and load stand in u alone. A gain is judged only where its own
 push is large enough, in itself and beside the other one: an error of the model of 3 % of a push
 sixteen times as large is half of it. What a valve holds back is known less well than what a pump
 presses: the roll's push has to be larger beside it.
@@ -26,14 +30,13 @@ presses: the roll's push has to be larger beside it.
 import math
 from typing import Final
 
-import numpy as np
-
 from utank_hil.dynamics.linear import coupled_matrices
-from utank_hil.dynamics.sampling import transition_and_step
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.safety.monitors.derivative_filter import DerivativeFilter
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.noise import within
+from utank_hil.safety.monitors.sway import SlopePush, most_sway
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
 SIGN_GAIN: Final = -0.25
@@ -72,54 +75,6 @@ def roll_push_at_natural_frequency(ship: RollShip, tank: Tank) -> float:
     mass, _, stiffness = coupled_matrices(ship, tank)
     push = mass[1, 0] * tank.natural_frequency_rad_s**2 - stiffness[1, 0]
     return float(push / (tank.density_kg_m3 * tank.reservoir_area_m2))
-
-
-class DerivativeFilter:
-    """1 / (s / w + 1)^2 with its first and second derivative, for inputs that run straight.
-
-    Parameters
-    ----------
-    frequency_rad_s : float
-        w.
-    period_s : float
-        Time between two inputs.
-
-    Attributes
-    ----------
-    value, rate : float
-        Output and its first derivative.
-    last : float
-        The last input.
-    """
-
-    __slots__ = (
-        "_a11", "_a12", "_a21", "_a22", "_b1", "_b2", "_c1", "_c2", "_w", "last", "rate", "value",
-    )  # fmt: skip
-
-    def __init__(self, frequency_rad_s: float, period_s: float) -> None:
-        w = frequency_rad_s
-        # states: value, rate, input; the input's slope is constant over a period
-        states = np.array([[0.0, 1.0, 0.0], [-w * w, -2 * w, w * w], [0.0, 0.0, 0.0]])
-        transition, ramp = transition_and_step(states, np.array([[0.0], [0.0], [1.0]]), period_s)
-        (self._a11, self._a12, _), (self._a21, self._a22, _) = transition[:2].tolist()
-        self._b1, self._b2 = (ramp[:2, 0] / period_s).tolist()
-        self._c1, self._c2 = (transition[:2, 2] - ramp[:2, 0] / period_s).tolist()
-        self._w = w
-        self.start(0.0)
-
-    def start(self, value: float) -> None:
-        """Begin anew with a constant input."""
-        self.last = self.value = value
-        self.rate = 0.0
-
-    def update(self, value: float) -> float:
-        """Take the next value; return the second derivative."""
-        last, old, rate, w = self.last, self.value, self.rate, self._w
-        self.last = value
-        self.value = new = self._a11 * old + self._a12 * rate + self._b1 * value + self._c1 * last
-        self.rate = rate = self._a21 * old + self._a22 * rate + self._b2 * value + self._c2 * last
-        bend: float = w * (w * (value - new) - 2 * rate)
-        return bend
 
 
 class TankEquation:
@@ -166,6 +121,8 @@ class TankEquation:
         water_kg_m = density * tank.reservoir_area_m2
         self._density = density
         self._inertia = float(mass[1, 1] / water_kg_m)
+        self._slope = SlopePush(ship, tank, period_s)
+        self._sway = most_sway(ship) / 2
         self._loss = tank.loss_pa_per_m_s / density
         self._quadratic_loss = tank.quadratic_loss_pa_per_m2_s2 / density
         self._stiffness = float(stiffness[1, 1] / water_kg_m)
@@ -203,6 +160,9 @@ class TankEquation:
         self.settled = self.obeyed = False
         self._xx = self._pp = self._vv = self._rest_x = self._rest_p = 0.0
         self._both = self._level_both = 0.0
+        self._uu = self._late_uu = 0.0
+        self._slope.restart()
+        self.push = self.slope_push = 0.0
         self._x = self._p = self._left = self._weight = 0.0
         self._forget_lead()
         self._still = 0
@@ -261,6 +221,10 @@ class TankEquation:
         level_m_s2 = level.update(level_m)
         roll_rad_s2 = roll.update(roll_rad)
         self._pump.update(pump_m2_s2)
+        p = self._pump.value
+        x = self._push * roll.value + self._push_inertia * roll_rad_s2
+        self.push = push = p + x
+        self.slope_push = u = self._slope.update(roll, roll_rad_s2, level.value, level_m_s2)
         if self._wait > 0:
             self._wait -= 1
             self.settled = self.settled or self._wait == 0
@@ -271,9 +235,7 @@ class TankEquation:
         rate_m_s = level.rate
         loss = self._loss + self._quadratic_loss * abs(rate_m_s)
         y = self._inertia * level_m_s2 + loss * rate_m_s + self._stiffness * level.value
-        p = self._pump.value
-        x = self._push * roll.value + self._push_inertia * roll_rad_s2
-        push = p + x
+        y += self._sway * u  # and no more than as much is left of it, either way
         keep = self._keep
         self._xx = xx = keep * self._xx + x * x
         self._pp = pp = keep * self._pp + p * p
@@ -288,6 +250,8 @@ class TankEquation:
         self._p = keep * self._p + p
         self._left = keep * self._left + left
         self._weight = keep * self._weight + 1.0
+        self._uu = keep * self._uu + u * u
+        self._late_uu = self._late_keep * self._late_uu + u * u
         d = self._push_at_w0 * roll.rate
         self._lead = self._late_keep * self._lead + left * d
         self._d = self._late_keep * self._d + d
@@ -303,20 +267,21 @@ class TankEquation:
     def _judge(self, xx: float, pp: float, both: float, dd: float) -> int:
         found = 0
         self.obeyed = False
-        zero = self._zero
+        zero, sway = self._zero, self._sway * math.sqrt(self._uu)
         self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
         if xx > self._least_xx and xx > LEAST_SHARE**2 * pp + HELD_SHARE**2 * self._vv:
-            feigned = zero * abs(self._x)
+            feigned = zero * abs(self._x) + sway * math.sqrt(xx)
             self.roll_gain = gain = (self._rest_x + feigned) / xx
             self.obeyed = self._rest_x - feigned > STUCK_GAIN * xx
             if gain < self.sign_gain:
                 found = _WATER_SIGN
         if pp > self._least_pp and pp > self._pump_share * xx:
-            self.pump_gain = gain = (self._rest_p + zero * abs(self._p)) / pp
+            feigned = zero * abs(self._p) + sway * math.sqrt(pp)
+            self.pump_gain = gain = (self._rest_p + feigned) / pp
             if gain < self.sign_gain:
                 found |= _PUMP_SIGN
         if both > self._least_xx + self._least_pp:
-            feigned = zero * abs(self._x + self._p)
+            feigned = zero * abs(self._x + self._p) + sway * math.sqrt(both)
             self.level_gain = gain = (self._level_both + feigned) / both
             self.obeyed = self.obeyed or self._level_both - feigned > STUCK_GAIN * both
             if gain < self.sign_gain:
@@ -327,10 +292,12 @@ class TankEquation:
             weight = self._weight
             mean = within(self._left / weight, zero)
             most = self._most_frozen if self._frozen else self._most_unmoved
-            if self._unmoved + mean * (weight * mean - 2 * self._left) > most:
+            unmoved = self._unmoved + mean * (weight * mean - 2 * self._left)
+            if unmoved > (math.sqrt(most) + sway) ** 2:
                 found |= _ROLL_STUCK
         if dd > self._least_dd and self._samples > self._late_samples:
-            self.late_s = late_s = (self._lead - zero * abs(self._d)) / dd
+            feigned = zero * abs(self._d) + self._sway * math.sqrt(self._late_uu * dd)
+            self.late_s = late_s = (self._lead - feigned) / dd
             if late_s > self._late_limit_s:
                 found |= _LATE
         return found

@@ -1,0 +1,60 @@
+"""The sway of a ship in waves, which no sensor measures: what it may do to the water.
+
+The centre of gravity is accelerated by c g times the slope of the waves, c from 0 to the share that
+the ship has at most, and 1 in long waves. The moment that rolls the ship is r times stiffness times
+slope with an effective wave slope r below 1, so that c / r of `SlopePush` is what sway takes.
+"""
+
+import math
+from typing import Final
+
+from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.dynamics.ship import MOST_SWAY, RollShip
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.safety.monitors.derivative_filter import DerivativeFilter
+
+LEAST_SLOPE: Final = 0.5
+"""Least effective wave slope of a ship that rolls: the weather criterion's (2008 IS Code, part A,
+2.3) is 0.73 + 0.6 OG/d, 0.55 where the centre of gravity is lowest, 0.3 draughts below water."""
+
+
+def most_sway(ship: RollShip) -> float:
+    """Return the largest share of `SlopePush` that the ship may have."""
+    share = MOST_SWAY if ship.sway_of_slope is None else ship.sway_of_slope
+    return share / LEAST_SLOPE
+
+
+class SlopePush:
+    """Push on the water by a ship that sways with the waves, from the moment that rolls it.
+
+    Parameters
+    ----------
+    ship : RollShip
+    tank : Tank
+    period_s : float
+        Time between two updates.
+    """
+
+    def __init__(self, ship: RollShip, tank: Tank, period_s: float) -> None:
+        scale = GRAVITY_M_S2 * tank.width_m / ship.stiffness_nm_rad
+        mass, damping, stiffness = (scale * each[0] for each in coupled_matrices(ship, tank))
+        self._mass, self._coupling = mass.tolist()
+        self._damping, self._quadratic = float(damping[0]), scale * ship.quadratic_damping_nms2_rad2
+        self._stiffness, self._weight = stiffness.tolist()
+        self._mean_share = period_s * tank.natural_frequency_rad_s / (2 * math.pi)
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin anew after a gap."""
+        self._mean = 0.0
+
+    def update(
+        self, roll: DerivativeFilter, roll_rad_s2: float, level_m: float, level_m_s2: float
+    ) -> float:
+        """Return the push of a sway of g times the slope."""
+        rate_rad_s = roll.rate
+        push: float = self._mass * roll_rad_s2 + self._coupling * level_m_s2
+        push += (self._damping + self._quadratic * abs(rate_rad_s)) * rate_rad_s
+        push += self._stiffness * roll.value + self._weight * level_m
+        self._mean += self._mean_share * (push - self._mean)  # a steady heel is no wave
+        return push - self._mean
