@@ -7,6 +7,7 @@ same keys in all.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -35,6 +36,7 @@ from utank_hil.configuration.spectra import (
 )
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea, Spectrum
+from utank_hil.sea.directional import SUFFIXES
 from utank_hil.sea.moment_table import MomentTable
 from utank_hil.sea.passing import PassingSea
 
@@ -182,11 +184,11 @@ class TabulatedSea(TabulatedSpectrum, IrregularSea):
 
 
 class MeasuredSea(MeasuredSpectrum, IrregularSea):
-    """Hour of a buoy's record, in one direction or in the directions measured."""
+    """Hour of a buoy's record or of a wave model, in one direction or in those of the file."""
 
     direction_file: Path | None = None
     """File of the same station's mean directions; it requires `course_deg` instead of
-    `heading_deg`."""
+    `heading_deg`. A file of directional spectra needs none."""
     course_deg: Bearing | None = None
     """Ship's course, degrees clockwise from true north."""
     until: datetime | None = None
@@ -199,7 +201,8 @@ class MeasuredSea(MeasuredSpectrum, IrregularSea):
             until = utc(until)
             if until <= info.data["time"]:
                 raise ValueError(f"must be after time, {info.data['time'].isoformat()}")
-            for time in (until, *read_spectra(info.data["file"]).times(info.data["time"], until)):
+            spectra = read_spectra(info.data["file"], place=info.data.get("place"))
+            for time in (until, *spectra.times(info.data["time"], until)):
                 cls._hour_is_there(time, info)
         return until
 
@@ -207,22 +210,26 @@ class MeasuredSea(MeasuredSpectrum, IrregularSea):
     @classmethod
     def _belongs_to_file(cls, direction_file: Path | None, info: ValidationInfo) -> Path | None:
         if direction_file is not None and "file" in info.data:
-            read_spectra(info.data["file"], direction_file)
+            read_spectra(info.data["file"], direction_file, info.data.get("place"))
         return direction_file
 
     @model_validator(mode="after")
     def _one_direction_for_each_band(self) -> Self:
         problems: list[Problem] = []
-        if self.direction_file is None:
-            if self.course_deg is not None:
-                problems.append(("course_deg", "needs direction_file; without it give heading_deg"))
-        else:
-            if self.course_deg is None:
+        directional = self.file.suffix.lower() in SUFFIXES
+        if self.course_deg is None:
+            if self.direction_file is not None:
                 problems.append(("course_deg", "is required with direction_file: from true north"))
-            if "heading_deg" in self.model_fields_set:
-                problems.append(
-                    ("heading_deg", "and direction_file exclude each other: remove one")
-                )
+            elif directional and "heading_deg" not in self.model_fields_set:
+                reason = "is required, or heading_deg for waves from one direction"
+                problems.append(("course_deg", reason))
+        elif self.direction_file is None and not directional:
+            problems.append(("course_deg", "needs direction_file; without it give heading_deg"))
+        elif "heading_deg" in self.model_fields_set:
+            other = "course_deg" if directional else "direction_file"
+            problems.append(("heading_deg", f"and {other} exclude each other: remove one"))
+        if self.course_deg is not None and directional and self.spreading is not None:
+            problems.append(("spreading", "is in the file: remove the key"))
         refuse("sea", problems)
         try:
             self.heading_rad(self.spectrum())
@@ -233,20 +240,22 @@ class MeasuredSea(MeasuredSpectrum, IrregularSea):
     @model_serializer(mode="wrap")
     def _as_it_can_be_read(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         content: dict[str, Any] = handler(self)
-        if self.direction_file is not None:
+        if self.course_deg is not None:
             del content["heading_deg"]
         return content
 
     def spectrum(self) -> Spectrum:
         """Spectrum of the hour, with the directions if measured."""
-        return read_spectra(self.file, self.direction_file).at(self.time.isoformat())
+        spectra = read_spectra(self.file, self.direction_file, self.place)
+        spectrum = spectra.at(self.time.isoformat())
+        return spectrum if self.course_deg is not None else replace(spectrum, spread=None)
 
     @property
     def spectra(self) -> list[tuple[float, SpectrumSection]]:
         """Spectra of all records from `time` to `until`."""
         if self.until is None:
             return super().spectra
-        times = read_spectra(self.file).times(self.time, self.until)
+        times = read_spectra(self.file, place=self.place).times(self.time, self.until)
         return [
             ((time - self.time).total_seconds(), self.model_copy(update={"time": time}))
             for time in times

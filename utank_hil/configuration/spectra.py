@@ -33,11 +33,14 @@ from utank_hil.sea import (
     load_ndbc,
     pierson_moskowitz,
 )
+from utank_hil.sea.directional import SUFFIXES, load_directional
 from utank_hil.sea.ndbc import HIGHEST_M
 
 WaveHeight = Annotated[float, Range(above=0, most=HIGHEST_M)]
 """Significant height in m; the greatest ever measured is 19 m."""
 WavePeriod = Annotated[float, Range(above=0, most=40)]
+Latitude = Annotated[float, Range(least=-90, most=90)]
+Longitude = Annotated[float, Range(least=-360, most=360)]
 _STEEPEST: Final = 0.1
 _BANDS: Final = ("frequency_hz", "density_m2_hz")
 
@@ -113,15 +116,18 @@ class MeasuredSpectrum(Section):
     """One hour of a buoy's record."""
 
     kind: Literal["measured"]
+    place: tuple[Latitude, Longitude] | None = None
+    """Latitude and longitude in degrees; only for a file of several places."""
     file: Path
-    """File of the spectral density, in NDBC's yearly or 45-day layout."""
+    """File of the spectral density in NDBC's yearly or 45-day layout, or of directional spectra:
+    WAVEWATCH III, SWAN, ERA5, NDBC's netCDF, Spotter, Datawell."""
     time: datetime
     """Start of the record's hour as written in the file, UTC unless it names another zone."""
 
     @field_validator("file")
     @classmethod
-    def _readable(cls, file: Path) -> Path:
-        read_spectra(file)
+    def _readable(cls, file: Path, info: ValidationInfo) -> Path:
+        read_spectra(file, place=info.data.get("place"))
         return file
 
     @field_validator("time")
@@ -129,18 +135,19 @@ class MeasuredSpectrum(Section):
     def _hour_is_there(cls, time: datetime, info: ValidationInfo) -> datetime:
         time = utc(time)
         if "file" in info.data:
-            spectrum = read_spectra(info.data["file"]).at(time.isoformat())
+            spectra = read_spectra(info.data["file"], place=info.data.get("place"))
+            spectrum = spectra.at(time.isoformat())
             if spectrum.moment(0) == 0:
                 raise ValueError("the spectrum holds no energy: choose another hour")
         return time
 
     def spectrum(self) -> Spectrum:
         """The hour's spectrum."""
-        return read_spectra(self.file).at(self.time.isoformat())
+        return read_spectra(self.file, place=self.place).at(self.time.isoformat())
 
     def warnings(self) -> list[Problem]:
         """Warn of rows of the file that are left out."""
-        notes = read_spectra(self.file).notes
+        notes = read_spectra(self.file, place=self.place).notes
         if not notes:
             return super().warnings()
         reason = f"has rows that are left out, {len(notes)}; the first: {notes[0]}"
@@ -172,7 +179,7 @@ class TabulatedSpectrum(Section):
             has = ", ".join(columns)
             raise ValueError(f"{self.file} needs the columns {' and '.join(_BANDS)}, has {has}")
         try:
-            return Spectrum(*(columns[name] for name in _BANDS))
+            return Spectrum(columns["frequency_hz"], columns["density_m2_hz"])
         except ValueError as error:
             raise ValueError(f"{self.file}: {error}") from error
 
@@ -217,11 +224,13 @@ LawSea = Annotated[SeaModel, BeforeValidator(_bands_of)]
 """The section ``sea`` of a law: bands, or a spectrum by its kind, and the keys of `SeaModel`."""
 
 
-def read_spectra(file: Path, direction_file: Path | None = None) -> MeasuredSpectra:
+def read_spectra(
+    file: Path, direction_file: Path | None = None, place: tuple[float, float] | None = None
+) -> MeasuredSpectra:
     """Return the spectra of a file; any error is a ValueError, which pydantic lists by key."""
     try:
         written = tuple(each.stat().st_mtime_ns for each in (file, direction_file) if each)
-        return _loaded(file, direction_file, written)
+        return _loaded(file, direction_file, place, written)
     except OSError as error:
         raise ValueError(f"{error.filename} can't be read: {error.strerror}") from error
 
@@ -230,6 +239,13 @@ def read_spectra(file: Path, direction_file: Path | None = None) -> MeasuredSpec
 def _loaded(
     file: Path,
     direction_file: Path | None,
+    place: tuple[float, float] | None,
     written: tuple[int, ...],  # noqa: ARG001, a file that is written anew is read anew
 ) -> MeasuredSpectra:
-    return load_ndbc(file, direction_file)
+    if file.suffix.lower() not in SUFFIXES:
+        if place is not None:
+            raise ValueError(f"{file}: is of one place: remove the key place")
+        return load_ndbc(file, direction_file)
+    if direction_file is not None:
+        raise ValueError(f"{file}: holds its directions: remove the key direction_file")
+    return load_directional(file, place)

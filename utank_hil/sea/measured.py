@@ -1,14 +1,14 @@
 """A time series of wave spectra measured at one place."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.sea.spectrum import Spectrum, band_edges
+from utank_hil.sea.spectrum import Spectrum, Spread, band_edges
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,6 +23,7 @@ class MeasuredSpectra:
     #: shape (N, F): mean direction the waves come from, degrees from true north; nan where the
     #: source has none.
     direction_from_deg: FloatArray | None = None
+    spread: Spread | None = None  #: Spread of all spectra, energy of shape (N, F, D).
     notes: tuple[str, ...] = ()  #: Rows of the source that are left out, with place and reason.
 
     def __len__(self) -> int:
@@ -44,10 +45,12 @@ class MeasuredSpectra:
                 f"{self.source}: the spectrum of {self.time[index]} has no value at {gap:g} Hz: "
                 "choose another time"
             )
-        direction = None
+        direction, spread = None, None
         if self.direction_from_deg is not None:
             direction = self.direction_from_deg[index, : len(density)]
-        return Spectrum(frequency_hz, density, direction)
+        if self.spread is not None:
+            spread = replace(self.spread, energy=self.spread.energy[index])
+        return Spectrum(frequency_hz, density, direction, spread)
 
     def at(self, time: str | np.datetime64, within_s: float = 0.0) -> Spectrum:
         """Spectrum measured at a time, or nearest to it.

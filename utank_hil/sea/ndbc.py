@@ -42,8 +42,8 @@ HIGHEST_M = 30.0
 TAIL_HZ, TAIL = 0.3, 0.1
 """Frequency from which waves are saturated, and a bound of Phillips's constant there: ten times
 that of his equilibrium range (J. Fluid Mech. 4, 1958), which growing seas pass threefold."""
-MOST_R1 = 100.0
-"""Largest value of r1 or r2 in hundredths; mean directions of a whole file go beyond."""
+MOST_R1, MANY = 100.0, 10
+"""Largest value of r1 or r2 in hundredths; so many different directions of a file go beyond."""
 DENSITY_MISSING = (99.0, 999.0, 9999.0)
 DIRECTION_MISSING = (999.0, 9999.0)
 
@@ -105,7 +105,7 @@ def load_ndbc(path: str | Path, direction_path: str | Path | None = None) -> Mea
                 notes.append(f"{direction_path}: {reason}")
         if shared and not np.isfinite(direction).any():
             raise ValueError(f"{direction_path}: frequencies differ from those of {path}")
-    return MeasuredSpectra(str(path), time, frequency, density, direction, tuple(notes))
+    return MeasuredSpectra(str(path), time, frequency, density, direction, notes=tuple(notes))
 
 
 _Row = tuple[np.datetime64, FloatArray, FloatArray]
@@ -144,7 +144,7 @@ def _rows(path: Path, quantity: str, notes: list[str]) -> dict[np.datetime64, _R
         )
         raise problems[0] if problems else ValueError(f"{path}: {reason}")
     if quantity == "alpha1" and not any(line.named for line in good.values()):
-        _check_directions(path, max(np.nanmax(values_of[time]) for time in good))
+        _check_directions(path, np.concatenate([values_of[time] for time in good]))
     most = max(len(line.values) for line in good.values())
     return {
         time: (time, _padded(np.array(line.frequency_hz), most), _padded(values_of[time], most))
@@ -179,9 +179,10 @@ def _no_direction(values: FloatArray) -> str:
     return f"direction {values[wrong][0]:g} is outside 0 to 360" if wrong.any() else ""
 
 
-def _check_directions(path: Path, greatest: float) -> None:
+def _check_directions(path: Path, values: FloatArray) -> None:
     """Refuse values that are no mean directions, in a file that does not name its quantity."""
-    if greatest <= MOST_R1:
+    greatest = np.nanmax(values)
+    if greatest <= MOST_R1 and len(np.unique(values)) >= MANY:
         raise ValueError(
             f"{path}: no value is above {greatest:g}: is it a file of mean directions (alpha1), "
             "and not of r1, r2 or densities?"

@@ -138,8 +138,9 @@ class Sea:
             (`Spectrum.heading_rad`): 0 following, pi head, +pi/2 from port to starboard.
         spreading : float, optional
             Exponent s of the short-crested spreading cos^2s(theta / 2) about the mean direction
-            (Longuet-Higgins 1963; 10 to 15 for wind sea, 25 and more for swell). Long-crested by
-            default. Each component has one direction, so the sea is ergodic.
+            (Longuet-Higgins 1963; 10 to 15 for wind sea, 25 and more for swell). By default the
+            spread of the spectrum, and long-crested where it has none. Each component has one
+            direction, so the sea is ergodic.
         speed_m_s : float
             Speed of the ship.
 
@@ -233,12 +234,16 @@ def drawn_components(
     share_at_cuts = np.interp(cuts, edges, share)
     frequency = np.interp(share_at_cuts[:-1] + within * np.diff(share_at_cuts), share, edges)
     energies = np.diff(np.stack([np.interp(cuts, edges, each) for each in energy]))
+    # Stratified sampling makes one draw per quantile interval, in random order.
+    quantile = (np.argsort(order) + across) / components
     headings = np.stack(
-        [_heading_at(frequency, *pair) for pair in zip(spectra, heading_rad, strict=True)]
+        [
+            _heading_at(frequency, *pair, quantile if spreading is None else None)
+            for pair in zip(spectra, heading_rad, strict=True)
+        ]
     )
     if spreading is not None:
-        # Stratified sampling makes one draw per quantile interval, in random order.
-        headings = headings + _spread((np.argsort(order) + across) / components, spreading)
+        headings = headings + _spread(quantile, spreading)
     return energies, 2 * np.pi * frequency, headings, 2 * np.pi * phase
 
 
@@ -253,12 +258,19 @@ def _energy_below(spectrum: Spectrum, edges_hz: FloatArray) -> FloatArray:
 
 
 def _heading_at(
-    frequency_hz: FloatArray, spectrum: Spectrum, heading_rad: FloatArray | float
+    frequency_hz: FloatArray,
+    spectrum: Spectrum,
+    heading_rad: FloatArray | float,
+    quantile: FloatArray | None,
 ) -> FloatArray:
+    """Return the direction of each component; `quantile` draws it from the measured spread."""
     mean: FloatArray = np.broadcast_to(np.asarray(heading_rad, dtype=float), spectrum.density.shape)
     upper = spectrum.band_edges_hz[:, 1]
     band = np.clip(np.searchsorted(upper, frequency_hz), 0, len(upper) - 1)
-    return np.asarray(mean[band], dtype=float)
+    heading = np.asarray(mean[band], dtype=float)
+    if spectrum.spread is None or spectrum.direction_from_deg is None or quantile is None:
+        return heading
+    return heading + spectrum.spread.offset_rad(spectrum.direction_from_deg, band, quantile)
 
 
 def _uniform(seed: int, shape: tuple[int, int]) -> FloatArray:

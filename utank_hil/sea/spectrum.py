@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
 
@@ -43,6 +44,42 @@ def band_edges(frequency_hz: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Spread:
+    """Energy of frequency bands in the directions that their waves come from."""
+
+    #: shape (D,): centres of the sectors, degrees clockwise from true north, increasing.
+    direction_from_deg: FloatArray
+    energy: FloatArray  #: shape (..., F, D): energy per sector, in any unit.
+
+    def offset_rad(
+        self, mean_from_deg: FloatArray, band: npt.NDArray[np.intp], probability: FloatArray
+    ) -> FloatArray:
+        """Quantiles of the directions of bands, relative to their mean direction.
+
+        Parameters
+        ----------
+        mean_from_deg : ndarray, shape (F,)
+            Mean direction of each band.
+        band : ndarray of int, shape (N,)
+            Band of each quantile; `energy` has the shape (F, D).
+        probability : ndarray, shape (N,)
+            From 0, 180 degrees left of the mean, to 1. Energy is constant within a sector.
+        """
+        offset = np.zeros(len(band))
+        for each in np.unique(band):
+            relative = (self.direction_from_deg - mean_from_deg[each] + 180) % 360 - 180
+            order = np.argsort(relative)
+            relative, energy = relative[order], self.energy[each][order]
+            edges = (relative + np.r_[relative[-1] - 360, relative[:-1]]) / 2
+            edges = np.r_[edges, edges[0] + 360]
+            below = np.r_[0.0, np.cumsum(energy)]
+            if below[-1] > 0:
+                here = band == each
+                offset[here] = np.interp(probability[here], below / below[-1], edges)
+        return np.radians(offset)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Spectrum:
     """Wave spectrum at a fixed point (earth frame).
 
@@ -58,6 +95,7 @@ class Spectrum:
     #: shape (F,): mean direction the waves of each band come from, degrees clockwise from true
     #: north (NDBC's alpha1).
     direction_from_deg: FloatArray | None = None
+    spread: Spread | None = None  #: Spread of each band about its mean direction.
 
     def __post_init__(self) -> None:
         frequency, density = self.frequency_hz, self.density
@@ -74,6 +112,8 @@ class Spectrum:
             raise ValueError("spectrum density must be finite and zero or more")
         if self.direction_from_deg is not None and self.direction_from_deg.shape != frequency.shape:
             raise ValueError("spectrum direction_from_deg must have one value per frequency")
+        if self.spread is not None and self.direction_from_deg is None:
+            raise ValueError("a spectrum with a spread must have mean directions")
 
     @property
     def band_edges_hz(self) -> FloatArray:
