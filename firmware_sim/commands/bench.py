@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import TaskProgressColumn
 
 from utank_hil.base.provenance import describe
 from utank_hil.commands.monitor import watch
@@ -23,11 +23,14 @@ from utank_hil.console.common import (
     print_json,
 )
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import Terminal, notes, shown
+from utank_hil.console.progress import progress_bar
+from utank_hil.console.terminal import Terminal, shown
 from utank_hil.console.timing import timing_table
+from utank_hil.control import BuiltLaw
 
 if TYPE_CHECKING:
-    from firmware_sim.bench import BenchOptions
+    from firmware_sim.bench import BenchOptions, BenchResult
+    from firmware_sim.figures import BenchFigures
     from firmware_sim.scenario import Scenario
 
 STORM = CONFIGS / "scenarios" / "storm.yaml"
@@ -74,23 +77,15 @@ def bench(
     says so (docs/deployment.md).
     """
     # imported late: `--help` needs none of it
-    from firmware_sim.bench import BenchOptions, frames_name, run_bench
+    from firmware_sim.bench import BenchOptions, frames_name
     from firmware_sim.figures import figures
     from firmware_sim.report import REPORT_FILES, write_report
-    from firmware_sim.report_tables import tables
     from firmware_sim.scenario import Scenario
 
     if bus is not None and not real_time:
         fail("--bus is for real time: add --realtime, or leave --bus out")
     loaded = load(scenario, Scenario, allow_code=allow_code)
-    if real_time and loaded.faults:
-        fail(f"{scenario}: faults: are for simulated time: leave --realtime out, or the faults")
-    for number, fault in enumerate(loaded.faults if frames else ()):
-        if not fault.replayable:
-            fail(
-                f"{scenario}: faults.{number}: kind {fault.kind} changes the controller itself, so "
-                "its frames can't be replayed: leave --frames out, or the fault"
-            )
+    _refuse_faults(scenario, loaded, real_time=real_time, frames=frames)
     logs = [frames_name(name) for name in ("passive", *loaded.controllers)] if frames else []
     prepare_out(out, (*REPORT_FILES, *logs))
     laws = {
@@ -100,60 +95,81 @@ def bench(
     if real_time and duration is None:
         duration = min(loaded.duration_s, REAL_TIME_S)
     options = BenchOptions(real_time, bus, seed, duration, out if frames else None)
-    length_s = loaded.duration_s if duration is None else duration
     about = _about(loaded, options, out, context.params)
-    bar = Progress(
-        TextColumn("{task.description:>10}", markup=False),
-        BarColumn(),
-        TaskProgressColumn(),
-        TextColumn("{task.completed:.0f} of {task.total:.0f} s"),
-        TimeRemainingColumn(),
-        console=notes,
-        disable=not notes.is_terminal,
-    )
-    with bar:
-        tasks = {
-            name: bar.add_task(name, total=length_s) for name in ("passive", *loaded.controllers)
-        }
-        try:
-            result = run_bench(
-                loaded, options, lambda name, done: bar.update(tasks[name], completed=done), laws
-            )
-        except InterruptedError as error:
-            fail(error, ExitCode.INTERRUPTED)
-        except OSError as error:
-            fail(error, ExitCode.USAGE if bus is None else ExitCode.NO_BUS)
+    result = _run(loaded, options, laws)
     found = figures(result)
     files, failures = write_report(result, found, out, about)
     files |= {f"frames of {Path(name).stem}": out / name for name in logs}
     if json_:
         print_json(found.as_json(files, about))
     else:
-        console = Terminal()
-        for table in tables(found):
-            console.table(table)
-        for ending in found.endings:
-            console.say(red=ending)
-        for limit in found.limits_passed:
-            console.say(yellow=limit)
-        loops = {run.name: run.loop for run in result.runs if run.loop is not None}
-        if loops:
-            console.table(timing_table(loops))
-        else:
-            simulated_s = sum(run.end_s for run in result.runs)
-            console.say(
-                f"Simulated {len(result.runs)} runs, {simulated_s:.0f} s in all, in "
-                f"{result.wall_s:.1f} s, {simulated_s / result.wall_s:.0f} times real time; "
-                "no deadlines there."
-            )
-        console.files(files)
-        sound = [] if found.endings else ["run CONTROLLER.yaml --bus can0"]
-        console.lead_on(f"monitor {shown(out)}", *sound)
+        _print(result, found, files, out)
     if failures:
         fail("; ".join(failures))
     if view:
         watch(files["recording"])
     raise typer.Exit(found.exit_code)
+
+
+def _refuse_faults(path: Path, scenario: "Scenario", *, real_time: bool, frames: bool) -> None:
+    """End with exit code 2 where the scenario's faults can't be had as asked."""
+    if real_time and scenario.faults:
+        fail(f"{path}: faults: are for simulated time: leave --realtime out, or the faults")
+    for number, fault in enumerate(scenario.faults if frames else ()):
+        if not fault.replayable:
+            fail(
+                f"{path}: faults.{number}: kind {fault.kind} changes the controller itself, so "
+                "its frames can't be replayed: leave --frames out, or the fault"
+            )
+
+
+def _run(
+    scenario: "Scenario", options: "BenchOptions", laws: Mapping[str, BuiltLaw]
+) -> "BenchResult":
+    """Run the bench with a progress bar for each run."""
+    from firmware_sim.bench import run_bench
+
+    length_s = scenario.duration_s if options.duration_s is None else options.duration_s
+    with progress_bar(TaskProgressColumn(), "{task.completed:.0f} of {task.total:.0f} s") as bar:
+        tasks = {
+            name: bar.add_task(f"{name:>10}", total=length_s)
+            for name in ("passive", *scenario.controllers)
+        }
+        try:
+            return run_bench(
+                scenario, options, lambda name, done: bar.update(tasks[name], completed=done), laws
+            )
+        except InterruptedError as error:
+            fail(error, ExitCode.INTERRUPTED)
+        except OSError as error:
+            fail(error, ExitCode.USAGE if options.channel is None else ExitCode.NO_BUS)
+
+
+def _print(
+    result: "BenchResult", found: "BenchFigures", files: Mapping[str, Path], out: Path
+) -> None:
+    from firmware_sim.report_tables import tables
+
+    console = Terminal()
+    for table in tables(found):
+        console.table(table)
+    for ending in found.endings:
+        console.say(red=ending)
+    for limit in found.limits_passed:
+        console.say(yellow=limit)
+    loops = {run.name: run.loop for run in result.runs if run.loop is not None}
+    if loops:
+        console.table(timing_table(loops))
+    else:
+        simulated_s = sum(run.end_s for run in result.runs)
+        console.say(
+            f"Simulated {len(result.runs)} runs, {simulated_s:.0f} s in all, in "
+            f"{result.wall_s:.1f} s, {simulated_s / result.wall_s:.0f} times real time; "
+            "no deadlines there."
+        )
+    console.files(files)
+    sound = [] if found.endings else ["run CONTROLLER.yaml --bus can0"]
+    console.lead_on(f"monitor {shown(out)}", *sound)
 
 
 def _about(

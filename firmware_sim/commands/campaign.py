@@ -4,12 +4,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import MofNCompleteColumn
 
 from utank_hil.base.provenance import describe
 from utank_hil.configuration import ConfigError
 from utank_hil.console.common import OUT, AllowCode, Json, fail, fail_with, prepare_out, print_json
 from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.progress import progress_bar
 from utank_hil.console.terminal import Terminal, notes, shown
 
 if TYPE_CHECKING:
@@ -103,15 +104,7 @@ def _run(loaded: "LoadedStudy", store: Any, scheduler: str | None, count: int | 
     from firmware_sim.campaign.driver import Count, Driver
     from firmware_sim.campaign.work import OtherCodeError
 
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[failed]}"),
-        TimeRemainingColumn(),
-        console=notes,
-        disable=not notes.is_terminal,
-    )
+    bar = progress_bar(MofNCompleteColumn(), "{task.fields[failed]}")
     task = bar.add_task("cases", total=None, failed="")
 
     def progress(state: Count) -> None:

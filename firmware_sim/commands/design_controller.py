@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -18,7 +17,8 @@ from utank_hil.base.provenance import describe
 from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import ControllerConfig
 from utank_hil.console.common import OUT, Json, fail, load, prepare_out, print_json
-from utank_hil.console.terminal import Terminal, new_table, notes
+from utank_hil.console.progress import progress_bar
+from utank_hil.console.terminal import Terminal, new_table
 
 if TYPE_CHECKING:
     from utank_hil.analysis.loop.trade import Trade, TradePoint
@@ -66,12 +66,9 @@ def controller(
         fail(f"no shipped scenario is for {vessel.name}: say with --scenario which sea counts")
     sea = load(path, Scenario, allow_code=True)  # laws are not built from it
     prepare_out(out, (PICTURE, FIGURES))
-    bar = Progress(
-        TextColumn("designing"), BarColumn(), console=notes, disable=not notes.is_terminal
-    )
     try:
-        with bar:
-            task = bar.add_task("", total=1.0)
+        with progress_bar() as bar:
+            task = bar.add_task("designing", total=1.0)
             result = trade(
                 law,
                 loaded.plant,

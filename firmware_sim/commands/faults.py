@@ -9,17 +9,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import MofNCompleteColumn
 
 from utank_hil.base.provenance import describe
 from utank_hil.configuration.shipped import CONFIGS
 from utank_hil.console.common import Json, fail, load, prepare_out, why
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.failures import KILLED
+from utank_hil.console.progress import progress_bar
 from utank_hil.console.terminal import Terminal, notes, shown
 
 if TYPE_CHECKING:
-    from firmware_sim.fault_campaign.campaign import Campaign, LiveRow
+    from firmware_sim.fault_campaign.campaign import Campaign, LiveRow, Row
     from firmware_sim.fault_campaign.verdict import Result
 
 CAMPAIGN = CONFIGS / "faults" / "campaign.yaml"
@@ -69,25 +70,12 @@ def faults(
     window = Window() if full else Window(60.0, 20.0)
     too_long = [row for row in chosen if row.long and not (full or names)]
     chosen = [row for row in chosen if row not in too_long]
-    for name in names:
-        if not (any(loaded.chosen([name])) or loaded.shown_elsewhere([name])):
-            fail(f"--rows: no row or requirement begins with {name}")
-    if names and not chosen and (bus is None or not any(row.does for row in live)):
-        lack = "--bus is missing" if any(row.does for row in live) else "tests show all of them"
-        fail(f"--rows: nothing to run: {lack}")
+    _refuse_names(loaded, names, chosen, live, bus)
     if out is not None:
         prepare_out(out, [f"{row.id}.rrd" for row in chosen])
     began = time.monotonic()
-    bar = Progress(
-        TextColumn("faults"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=notes,
-        disable=not notes.is_terminal,
-    )
-    with bar, stop_on_signals() as stopped:
-        task = bar.add_task("", total=len(chosen) * seeds)
+    with progress_bar(MofNCompleteColumn()) as bar, stop_on_signals() as stopped:
+        task = bar.add_task("faults", total=len(chosen) * seeds)
         outcomes = run_rows(
             loaded,
             chosen,
@@ -101,11 +89,7 @@ def faults(
     partly = [row.id for row in chosen if len(outcomes[row.id]) < seeds]
     killed = bool(partly) and not interrupted
     results = [judged(loaded, row, outcomes[row.id]) for row in chosen if row.id not in partly]
-    not_run = {
-        each.id: f"{each.fault}: shown by {each.elsewhere}"
-        for each in loaded.shown_elsewhere(names)
-    }
-    not_run |= {row.id: f"shown by {row.elsewhere}" for row in live if row.elsewhere}
+    not_run = _shown_elsewhere(loaded, live, names)
     not_run |= {row.id: "takes long: --full or --rows" for row in too_long}
     not_run |= dict.fromkeys(partly, KILLED if killed else INTERRUPTED)
     on_bus, waiting, bus_error = _on_bus(loaded, live, None if partly else bus)
@@ -135,6 +119,33 @@ def faults(
     on_bus_passed = all(told["verdict"] == "pass" for told in on_bus)
     if not (on_bus_passed and all(result.passed for result in results)):
         raise typer.Exit(ExitCode.REFUSED)
+
+
+def _refuse_names(
+    campaign: "Campaign",
+    names: Sequence[str],
+    chosen: Sequence["Row"],
+    live: Sequence["LiveRow"],
+    bus: str | None,
+) -> None:
+    """End with exit code 2 if a name is that of no row, or nothing is left to run."""
+    for name in names:
+        if not (any(campaign.chosen([name])) or campaign.shown_elsewhere([name])):
+            fail(f"--rows: no row or requirement begins with {name}")
+    if names and not chosen and (bus is None or not any(row.does for row in live)):
+        lack = "--bus is missing" if any(row.does for row in live) else "tests show all of them"
+        fail(f"--rows: nothing to run: {lack}")
+
+
+def _shown_elsewhere(
+    campaign: "Campaign", live: Sequence["LiveRow"], names: Sequence[str]
+) -> dict[str, str]:
+    """Rows and requirements that tests show, with where they do."""
+    shown_by = {
+        each.id: f"{each.fault}: shown by {each.elsewhere}"
+        for each in campaign.shown_elsewhere(names)
+    }
+    return shown_by | {row.id: f"shown by {row.elsewhere}" for row in live if row.elsewhere}
 
 
 def _on_bus(
