@@ -31,8 +31,8 @@ LEAVES_OUT: Final = {
     "nonlinear": (
         "bus, nodes, modes and monitors: the law is in charge from the start",
         "retuning",
-        "errors of the sensors: the law sees the true motion, its command comes later by the "
-        "delay that it was designed for",
+        "errors of the sensors: the law sees the true motion and the level's estimated rate, its "
+        "command comes later by the delay that it was designed for",
         "the drive's own limits",
     ),
 }

@@ -1,8 +1,7 @@
 """Simulation of one case: bare ship, passive tank and every controller in the same waves."""
 
 import math
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,7 +12,12 @@ from firmware_sim.figures import LEAST_ROLL_RAD, NO_TANK, bare_figures, run_figu
 from firmware_sim.plant import Plant
 from firmware_sim.run import RECORD_S, roll_without_tank
 from firmware_sim.scenario import PASSIVE, Scenario
-from utank_hil.analysis.loop.loop_simulation import SensorNoise, passive_motion, simulate_loop
+from utank_hil.analysis.loop.loop_simulation import (
+    SensorNoise,
+    passive_motion,
+    run_law,
+    simulate_loop,
+)
 from utank_hil.analysis.motion import bare_ship
 from utank_hil.analysis.motion.statistics import (
     PumpStatistics,
@@ -23,10 +27,9 @@ from utank_hil.analysis.motion.statistics import (
 )
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.tick import TICK_NS, TICK_S
-from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, DesignPlant
 from utank_hil.control.interface import PRESSURE
-from utank_hil.control.limiter import CommandLimiter
+from utank_hil.control.passive import PassiveDesign
 from utank_hil.dynamics.linear import STATES
 from utank_hil.nodes.signals import ROW_TICKS
 
@@ -202,57 +205,54 @@ def _nonlinear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
     roll_rad, capsized_s = roll_without_tank(scenario, seed, count)
     at_rest = np.zeros(count)
     yield _Record(NO_TANK, roll_rad, at_rest, at_rest, at_rest, capsized_s=capsized_s)
-    yield _sailed(PASSIVE, scenario, seed, lambda plant: 0.0)  # noqa: ARG005
-    for name, controller in scenario.controllers.items():
-        command = _Commander(controller, _pump_law(name, laws[name]))
-        yield _sailed(name, scenario, seed, command)
+    plant = next(iter(scenario.controllers.values())).plant
+    runs = [(PASSIVE, PassiveDesign().build(plant), plant)]
+    runs += [
+        (name, _pump_law(name, laws[name]), controller.plant)
+        for name, controller in scenario.controllers.items()
+    ]
+    for name, law, plant in runs:
+        ship = _PlantInWaves(scenario, seed)
+        run = run_law(ship, law.controller(), law.measured, plant, count * ROW_TICKS)
+        motion, moved = run.motion[::ROW_TICKS], ship.plant
+        yield _Record(
+            name,
+            motion[:, 0],
+            motion[:, _LEVEL],
+            run.pressure_pa[::ROW_TICKS],
+            np.array(ship.power_w),
+            moved.strikes,
+            moved.capsized_s,
+        )
 
 
-def _sailed(name: str, scenario: Scenario, seed: int, command: Callable[[Plant], float]) -> _Record:
-    """Simulate a plant whose set-point is given by a function called once a tick."""
-    plant = Plant(
-        scenario.ship_at, scenario.vessel.tank, scenario.vessel.pump, scenario.waves(seed)
-    )
-    count = round(scenario.duration_s / RECORD_S)
-    rows = np.empty((count, 4))
-    for tick in range(count * ROW_TICKS):
-        plant.advance(tick * TICK_NS)
-        if tick % ROW_TICKS == 0:
-            rows[tick // ROW_TICKS] = (
-                plant.roll_rad, plant.level_m, plant.pressure_pa, plant.pump_power_w
-            )  # fmt: skip
-        plant.drive_pump(command(plant), enabled=True)
-    roll_rad, level_m, pressure_pa, power_w = rows.T
-    return _Record(name, roll_rad, level_m, pressure_pa, power_w, plant.strikes, plant.capsized_s)
+class _PlantInWaves:
+    """The bench's plant as `run_law` moves it, sensed without noise."""
 
+    def __init__(self, scenario: Scenario, seed: int) -> None:
+        vessel = scenario.vessel
+        self.plant = Plant(scenario.ship_at, vessel.tank, vessel.pump, scenario.waves(seed))
+        self.power_w: list[float] = []  #: Power of the pump, every `RECORD_S`.
+        self._area_m2, self._tick = vessel.tank.reservoir_area_m2, 0
+        self.plant.advance(0)
 
-class _Commander:
-    """Law, limiter and delay between a plant and its pump, called once a tick."""
+    def truth(self) -> FloatArray:
+        """`STATES` and the pressure."""
+        plant = self.plant
+        rate_m_s = plant.flow_m3_s / self._area_m2
+        return np.array(
+            [plant.roll_rad, plant.roll_rate_rad_s, plant.level_m, rate_m_s, plant.pressure_pa]
+        )
 
-    def __init__(self, controller: ControllerConfig, law: BuiltLaw) -> None:
-        self._law = law.controller()
-        self._samples = round(self._law.sample_time_s / TICK_S)
-        self._limiter = CommandLimiter(controller.limits, controller.vessel.tank, TICK_S)
-        self._area_m2 = controller.vessel.tank.reservoir_area_m2
-        self._measured = law.measured
-        self._waiting = deque([0.0] * round(controller.delay_s / TICK_S))
-        self._wish_pa = 0.0
-        self._tick = 0
+    sensed = truth
 
-    def __call__(self, plant: Plant) -> float:
-        """Set-point of the pump from now on."""
-        level_m, rate_m_s = plant.level_m, plant.flow_m3_s / self._area_m2
-        if self._tick % self._samples == 0:
-            if self._tick:
-                self._law.applied(np.array([self._limiter.mean_since_last_call()]))
-            motion = (plant.roll_rad, plant.roll_rate_rad_s, level_m, rate_m_s)
-            seen = dict(zip(STATES, motion, strict=True))
-            self._wish_pa = float(
-                self._law.step(np.array([seen[name] for name in self._measured]))[0]
-            )
+    def advance(self, command_pa: float) -> None:
+        """Move by one tick with a set-point of the pump."""
+        if self._tick % ROW_TICKS == 0:
+            self.power_w.append(self.plant.pump_power_w)
+        self.plant.drive_pump(command_pa, enabled=True)
         self._tick += 1
-        self._waiting.append(self._limiter.limit(self._wish_pa, level_m, rate_m_s))
-        return self._waiting.popleft()
+        self.plant.advance(self._tick * TICK_NS)
 
 
 def _refuse_valve(scenario: Scenario) -> None:
