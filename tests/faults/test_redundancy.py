@@ -65,11 +65,6 @@ class Bench:
         """Place of the motion sensor in use."""
         return self.node.safety._motion
 
-    def accused(self, place: int) -> bool:
-        """Whether anything has spoken against a motion sensor."""
-        assert self.node.safety.monitors is not None
-        return self.node.safety.monitors.sensors[place].accused
-
     def fail(self, name: str, spoil: Callable[[Frame], object], begin_ns: int = T0) -> None:
         self.failing[name].begin_ns = begin_ns
         self.failing[name].spoil = spoil  # type: ignore[assignment]
@@ -113,7 +108,7 @@ def test_in_health_the_first_sensor_is_used_and_nothing_is_degraded() -> None:
 
 
 @pytest.mark.parametrize("first", [True, False])
-def test_one_silent_motion_sensor_leaves_the_other_and_half_the_pressure(first: bool) -> None:
+def test_one_silent_motion_sensor_leaves_the_other(first: bool) -> None:
     bench = Bench()
     bench.fail("sensors" if first else "sensors_2", dropped(SensorMotion) if first else dropped())
     bench.run(T0_S + 5.0)
@@ -160,67 +155,27 @@ WRONG = {
 
 
 @pytest.mark.parametrize(
-    ("wrong", "first"),
-    [*((wrong, True) for wrong in [*WRONG, "both stuck"]), ("flipped", False)],
+    ("wrong", "name"),
+    [  # the noise of one that is not in use is no difference
+        (wrong, name)
+        for wrong in (*WRONG, "both stuck", "a degree apart")
+        for name in ("sensors", "sensors_2")
+        if (wrong, name) != ("noisy", "sensors_2")
+    ],
 )
-def test_a_wrong_sensor_is_left_for_the_other_one(wrong: str, first: bool) -> None:
+def test_where_the_two_disagree_the_pressure_falls_to_zero(wrong: str, name: str) -> None:
+    """Within the roll that a wrong sensor may do: nobody knows which one is wrong."""
+    change = WRONG.get(wrong) or (
+        held() if wrong == "both stuck" else lambda roll, rate: (roll + 0.0175, rate)
+    )
     bench = Bench()
-    address = None if first else Address.SENSORS_2
-    name = "sensors" if first else "sensors_2"
-    bench.fail(name, motion(WRONG.get(wrong) or held(), address))
-    end_ns = T0 + round(1.5 * PERIOD_S * SECOND)
-    while bench.lockstep.now_ns < end_ns and (not first or bench.used == 0):
-        bench.run(bench.lockstep.now_ns * 1e-9 + 0.1)
-    assert bench.used == int(first)
-    bench.run(bench.lockstep.now_ns * 1e-9 + 0.5)
-    assert bench.node.mode is Mode.ACTIVE, bench.node.fault
-    assert bench.node.safety.supervisor.degraded
-    assert Fault.SENSORS_DISAGREE in {alarm.code for alarm in bench.ship.panel.alarms}
-
-
-@pytest.mark.parametrize("gap_ms", [30, 60_000])
-def test_a_sensor_found_wrong_is_not_gone_back_to_while_the_other_is_silent(gap_ms: int) -> None:
-    bench = Bench()
-    bench.fail("sensors", motion(lambda roll, rate: (roll + 0.015, rate)))
-    bench.run(T0_S + 20)
-    assert bench.used == 1
-    # its evidence is gone by now, and the two are still apart
-    bench.run(T0_S + 40)
-    assert (bench.accused(0), bench.node.mode) == (True, Mode.ACTIVE)
-    gap = bench.failing["sensors_2"]
-    gap.spoil, gap.begin_ns = dropped(), bench.lockstep.now_ns
-    gap.end_ns = gap.begin_ns + gap_ms * MS
-    for _ in range(1500):
-        bench.lockstep.run_until(bench.lockstep.now_ns + 10 * MS)
-        assert bench.used == 1
-        assert bench.accused(0)
-    if gap_ms == 30:
-        assert bench.node.mode is Mode.ACTIVE
-    else:
-        assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.MOTION_SILENT)
-
-
-def test_an_offset_that_nothing_explains_halves_and_then_ends_it() -> None:
-    bench = Bench()
-    bench.fail("sensors_2", motion(lambda roll, rate: (roll + 0.02, rate), Address.SENSORS_2), MS)
-    bench.run(5.0)
-    assert bench.node.safety.supervisor.degraded or bench.node.mode is not Mode.ACTIVE
-    bench.run_to_fault(60.0)
-    assert bench.node.fault is Fault.SENSORS_DISAGREE
-
-
-def test_a_wrong_sensor_beside_does_not_excuse_the_law_from_her_twin() -> None:
-    """The twin's comparison stood still for as long as the two sensors were apart."""
-    bench = Bench()
-    bench.fail("sensors_2", motion(WRONG["flipped"], Address.SENSORS_2))
-    bench.run(T0_S + 12.0)
-    assert bench.node.mode is Mode.ACTIVE
-    monitors = bench.node.safety.monitors
-    monitors.twin.amplified = True
-    monitors.twin._losing_s = 100.0
-    monitors.twin._power = 4 * max(monitors.twin._twin_power, 1e-3)
-    bench.run_to_fault(T0_S + 13.0)
-    assert bench.node.fault is Fault.ROLL_AMPLIFIED
+    bench.fail(name, motion(change, Address.SENSORS_2 if name == "sensors_2" else None))
+    found_s = bench.run_to_fault(T0_S + PERIOD_S) - T0_S
+    # whatever else speaks against the one in use is as good a reason
+    assert bench.node.fault in (Fault.SENSORS_DISAGREE, Fault.DRIFT, Fault.SPIKES)
+    assert found_s <= PERIOD_S / 4
+    bench.run(T0_S + found_s + 1.1)
+    assert bench.node.command_pa == 0.0
 
 
 def test_gauges_that_are_swapped_are_no_reason_to_change_the_motion_sensor() -> None:
@@ -349,36 +304,6 @@ def test_commissioning_checks_the_second_sensor_against_the_first() -> None:
     assert [check.name for check in node.checks() if not check.passed] == ["roll_2"]
 
 
-def test_while_the_two_disagree_the_roll_does_not_count_for_the_twin_and_nothing_is_forgotten(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    bench = Bench()
-    monitors = bench.node.safety.monitors
-    assert monitors is not None
-    twin, update = monitors.twin, monitors.twin.update
-    counted: list[bool] = []
-    excused: list[bool] = []
-
-    def noted(*sample: float, counts: bool) -> None:
-        counted.append(counts)
-        update(*sample, counts=counts)
-
-    monkeypatch.setattr(twin, "update", noted)
-    # from the start: a jump would speak against the second alone
-    wider = motion(lambda *both: (1.6 * both[0], 1.6 * both[1]), Address.SENSORS_2)
-    bench.fail("sensors_2", wider, begin_ns=0)
-    while bench.node.mode is not Mode.ACTIVE or all(counted):
-        assert bench.lockstep.now_ns < 60 * SECOND
-        bench.lockstep.run_until(bench.lockstep.now_ns + SECOND)
-    assert counted[0]
-    counted.clear()
-    monkeypatch.setattr(twin, "excuse", lambda: excused.append(True))
-    bench.lockstep.run_until(bench.lockstep.now_ns + 4 * SECOND)
-    assert bench.node.mode is Mode.ACTIVE
-    assert set(counted) == {False}
-    assert not excused
-
-
 def naval_with_both() -> ControllerConfig:
     naval = controller("naval_constrained_gpc")
     vessel = naval.vessel.model_copy(update={"redundancy": BOTH})
@@ -418,15 +343,3 @@ def test_commissioning_ends_where_the_level_goes_too_far_to_either_side(sign: fl
     begin_ns = round((ARM_S + 8.0) * SECOND)
     node = commissioned(naval_with_both(), spoil={"sensors": far}, begin_ns=begin_ns)
     assert node.ended.startswith("The level went")
-
-
-def test_a_sensor_that_is_left_is_accused_from_then_on() -> None:
-    bench = Bench()
-    bench.fail("sensors", motion(lambda roll, rate: (-roll, rate)))
-    left = 0
-    while bench.lockstep.now_ns < (T0_S + 5.0) * SECOND:
-        bench.lockstep.run_until(bench.lockstep.now_ns + 10 * MS)
-        if bench.used == 1:
-            left += 1
-            assert bench.accused(0)
-    assert left > 400

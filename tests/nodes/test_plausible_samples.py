@@ -72,14 +72,6 @@ def test_roll_and_rate_each_have_their_own_bounds_and_both_see_every_sample() ->
         assert motion.discarded == motion.sample(0).discarded == discarded
 
 
-def test_samples_that_repeat_within_a_third_of_a_roll_period_are_found() -> None:
-    for length, found in ((333, True), (334, False)):
-        motion = sensor(replace(APART, tank_period_s=10.0))
-        for k in range(3 * length):
-            taken(motion, 1e-3 * (k % length), 0.0, 0)
-        assert motion.sample(0).repeats is found
-
-
 def test_levels_each_have_a_gate_and_what_they_discard_is_counted() -> None:
     for port_m, starboard_m, after_ns, discarded in (
         (16.0, -16.0, 0, 0), (16.5, 0.0, 0, 1), (0.0, 16.5, 0, 1), (17.0, 17.0, 0, 1),

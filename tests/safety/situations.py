@@ -17,7 +17,7 @@ MEASURED = Measurements(
     armed=False, stop=False, arm_edge=False, reset_edge=False, passive_edge=False, now_ns=0,
     requested_mode=Mode.STANDBY, panel_age_ms=0.0, panel_matches=True, motions=(MotionSample(),),
     port_level_m=0.0, starboard_level_m=0.0, level_m=0.0, tank_ns=0, tank_cycles=0,
-    tank_age_ms=0.0, levels_discarded=0, port_still=0, starboard_still=0, high_level=False,
+    tank_age_ms=0.0, levels_discarded=0, high_level=False,
     pressure_pa=0.0, pump_age_ms=0.0, drive_state=None, drive_age_ms=0.0, drive_echo_ns=0,
     drive_echo=None, drive_fault=False, drive_warns=False, drive_held_back=False, power_w=0.0,
     valve_opening=1.0, valve_following=False, valve_fault=False, valve_echo_ns=0, valve_echo=None,

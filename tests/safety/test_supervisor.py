@@ -72,22 +72,19 @@ SIGNS: list[tuple[Fault, Reaction, dict[str, object]]] = [
     (Fault.OVERRUN, Reaction.RAMP, {"overruns_in_ten": 3}),
     (Fault.VERSION_MISMATCH, Reaction.STOP, {"versions_match": False}),
     (Fault.SIGN_FLIP, Reaction.STOP, {"found": Finding.PUMP_SIGN}),
-    (Fault.MOTION_SIGN_FLIP, Reaction.STOP, {"found": Finding.MOTION_SIGN}),
     (Fault.MOTION_SIGN_FLIP, Reaction.STOP, {"found": Finding.WATER_SIGN}),
     (Fault.FOREIGN_SENDER, Reaction.STOP, {"found": Finding.SECOND_SENDER}),
     (Fault.UNKNOWN_IDENTIFIERS, Reaction.STOP, {"found": Finding.FLOOD}),
     (Fault.DRIVE_NOT_FOLLOWING, Reaction.STOP, {"found": Finding.DRIVE_LOST}),
     (Fault.DRIVE_NOT_FOLLOWING, Reaction.RAMP, {"found": Finding.DRIVE_LAGS}),
     (Fault.STUCK_SIGNAL, Reaction.RAMP, {"found": Finding.ROLL_STUCK}),
-    (Fault.STUCK_SIGNAL, Reaction.RAMP, {"found": Finding.RATE_STUCK}),
     (Fault.STUCK_SIGNAL, Reaction.RAMP, {"found": Finding.LEVEL_STUCK}),
-    (Fault.STUCK_SIGNAL, Reaction.RAMP, {"found": Finding.MOTION_REPEATS}),
     (Fault.DRIFT, Reaction.RAMP, {"found": Finding.DRIFT_LASTS}),
     (Fault.VOLUME, Reaction.RAMP, {"found": Finding.VOLUME_LASTS}),
     (Fault.SPIKES, Reaction.RAMP, {"found": Finding.SPIKES}),
     (Fault.SIGNAL_DELAYED, Reaction.RAMP, {"found": Finding.MOTION_LATE}),
     (Fault.ROLL_AMPLIFIED, Reaction.RAMP, {"found": Finding.ROLL_AMPLIFIED}),
-    (Fault.SENSORS_DISAGREE, Reaction.RAMP, {"found": Finding.SENSORS_UNCLEAR}),
+    (Fault.SENSORS_DISAGREE, Reaction.RAMP, {"found": Finding.SENSORS_DISAGREE}),
     (Fault.BUS_DEGRADED, Reaction.RAMP, {"found": Finding.UNWATCHED_LONG}),
     (Fault.HARDWIRED_STOP, Reaction.STOP, {"hardwired_stop": True}),
     (Fault.HARDWIRED_SILENT, Reaction.STOP, {"hardwired_age_ms": 160}),
@@ -904,7 +901,7 @@ def test_control_only_while_armed_fresh_and_after_an_edge(history: list[dict[str
 
 
 DEGRADING = (
-    "DRIFT", "VOLUME", "NOISE", "SATURATED", "NODE_SILENT", "SENSORS_DISAGREE", "UNWATCHED",
+    "DRIFT", "VOLUME", "NOISE", "SATURATED", "NODE_SILENT", "UNWATCHED",
 )  # fmt: skip
 
 WARNING = ("FRAMES_LOST",)

@@ -32,7 +32,7 @@ from utank_hil.nodes.plausibility import LevelGates, MotionSensor
 from utank_hil.runners import Lockstep, SimulatedBus
 from utank_hil.runners.process_priority import real_time_scheduling
 from utank_hil.safety.monitors.drive import DriveFollowing, Saturation
-from utank_hil.safety.monitors.level_stuck import GaugeStuck, LevelStuck
+from utank_hil.safety.monitors.level_stuck import LevelStuck
 from utank_hil.safety.monitors.motion import RollAgainstRate
 from utank_hil.safety.monitors.motion_watch import MotionWatch
 from utank_hil.safety.monitors.senders import Senders
@@ -57,15 +57,14 @@ class Empty:
 
 MONITORS: Final[dict[str, tuple[type, str]]] = {
     "passive twin": (PassiveTwin, "update"),
-    "motion samples: spikes, repetition": (MotionSensor, "take"),
-    "gauge samples: spikes, standstill": (LevelGates, "passes"),
+    "motion samples: spikes": (MotionSensor, "take"),
+    "gauge samples: spikes": (LevelGates, "passes"),
     "motion sensor in all": (MotionWatch, "update"),
     "roll against rate (part of it)": (RollAgainstRate, "update"),
     "senders": (Senders, "update"),
     "tank equation": (TankEquation, "update"),
     "drive follows": (DriveFollowing, "update"),
     "volume": (Volume, "update"),
-    "gauge against gauge": (GaugeStuck, "update"),
     "saturation": (Saturation, "update"),
     "level against roll": (LevelStuck, "update"),
 }

@@ -25,7 +25,6 @@ from utank_hil.retuning import SimulatedRetuner
 from utank_hil.runners import Lockstep, SimulatedBus
 from utank_hil.safety.monitoring import Monitors
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.monitors.motion_sign import MOST as SIGN_SUM
 from utank_hil.safety.monitors.tank_equation import STUCK_GAIN
 
 LOOK_TICKS = 5
@@ -37,7 +36,6 @@ def shares(monitors: Monitors) -> dict[str, float]:
     """Each statistic of now over its threshold; NaN where it is not known."""
     limits, equation, twin = monitors.thresholds, monitors.equation, monitors.twin
     return {
-        "motion sign": monitors.motion.sign.sum / SIGN_SUM,
         "drift": abs(monitors.motion.unexplained_rad) / limits.drift_rad,
         "roll noise": monitors.motion.noise.share,
         "rate noise": monitors.rate_noise.share,

@@ -29,10 +29,6 @@ class MotionSample:
         The sensor's messages arrive intact and in order.
     discarded : int
         Samples so far that were no motion of a ship.
-    repeats : bool
-        The samples are those of an earlier time.
-    frozen : bool
-        The samples have been equal to the last bit, after samples with noise.
     """
 
     roll_rad: Final[float] = 0.0
@@ -41,8 +37,6 @@ class MotionSample:
     age_ms: Final[float] = 0.0
     valid: Final[bool] = True
     discarded: Final[int] = 0
-    repeats: Final[bool] = False
-    frozen: Final[bool] = False
 
 
 class Wishes(NamedTuple):
@@ -94,8 +88,6 @@ class Measurements:
     tank_age_ms : float
     levels_discarded : int
         Samples of the gauges so far that were no motion of water.
-    port_still, starboard_still : int
-        Equal levels in a row of a gauge that had noise.
     high_level : bool
         A high-level switch is closed or broken.
     pressure_pa : float
@@ -150,8 +142,6 @@ class Measurements:
     tank_cycles: Final[int]
     tank_age_ms: Final[float]
     levels_discarded: Final[int]
-    port_still: Final[int]
-    starboard_still: Final[int]
     high_level: Final[bool]
     pressure_pa: Final[float]
     pump_age_ms: Final[float]

@@ -249,8 +249,6 @@ class Inbox:
             self._tank_cycles,
             (now_ns - self._tank_ns) / MILLISECOND_NS,
             0 if gates is None else gates.discarded,
-            0 if gates is None else gates.port.still,
-            0 if gates is None else gates.starboard.still,
             high_level,
             self._pressure_pa,
             (now_ns - self._pump_ns) / MILLISECOND_NS,

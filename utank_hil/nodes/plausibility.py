@@ -6,8 +6,6 @@ from typing import Final
 from utank_hil.canbus import Quality, Receiver, SensorMotion
 from utank_hil.canbus.measurements import MotionSample
 from utank_hil.canbus.profiles.device import ProfiledDevice
-from utank_hil.safety.monitors.repetition import Repetition
-from utank_hil.safety.monitors.standstill import Standstill
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
 NEVER_HEARD_NS: Final = -(1 << 62)
@@ -16,8 +14,6 @@ MILLISECOND_NS: Final = 1_000_000
 USABLE: Final = (Quality.GOOD, Quality.DEGRADED)
 STEP_SAMPLES: Final = 5
 """So many in a row are no spike but a step, which is taken."""
-REPEATS_WITHIN_PERIODS: Final = 1 / 3
-"""Of the roll's. No motion of a ship worth mentioning comes again so soon, even without noise."""
 
 
 class SpikeGate:
@@ -79,10 +75,8 @@ class MotionSensor:
         self.roll_rad = self.roll_rate_rad_s = 0.0
         self.heard_ns = NEVER_HEARD_NS
         self.discarded = 0
-        self._repetition: Repetition | None = None
+        self._gated = thresholds is not None
         if thresholds is not None:
-            remembered_s = REPEATS_WITHIN_PERIODS * thresholds.tank_period_s
-            self._repetition = Repetition(round(remembered_s * 1e9 / receiver.cycle_ns))
             self._roll = SpikeGate(thresholds.roll_spike_rad, thresholds.roll_most_rad_s)
             self._rate = SpikeGate(thresholds.rate_spike_rad_s, thresholds.rate_most_rad_s2)
 
@@ -92,9 +86,7 @@ class MotionSensor:
         # one test for both: the sum is NaN if either is not available
         if motion.quality not in USABLE or not math.isfinite(roll_rad + rate_rad_s):
             return
-        repetition = self._repetition
-        if repetition is not None:
-            repetition.take(roll_rad, rate_rad_s)
+        if self._gated:
             # both see every sample
             passes = self._roll.passes(roll_rad, now_ns) & self._rate.passes(rate_rad_s, now_ns)
             if not passes:
@@ -104,7 +96,7 @@ class MotionSensor:
 
     def sample(self, now_ns: int) -> MotionSample:
         """The last plausible sample, with its age."""
-        repetition, heard_ns = self._repetition, self.heard_ns
+        heard_ns = self.heard_ns
         return MotionSample(
             self.roll_rad,
             self.roll_rate_rad_s,
@@ -112,8 +104,6 @@ class MotionSensor:
             (now_ns - heard_ns) / MILLISECOND_NS,
             self.receiver.valid,
             self.discarded,
-            repetition is not None and repetition.found,
-            repetition is not None and repetition.frozen,
         )
 
 
@@ -122,8 +112,6 @@ class LevelGates:
 
     Attributes
     ----------
-    port, starboard : Standstill
-        Of every sample of the gauges.
     discarded : int
         Samples so far that did not pass, by either level.
     """
@@ -131,13 +119,10 @@ class LevelGates:
     def __init__(self, thresholds: MonitorThresholds) -> None:
         self._port = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
         self._starboard = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
-        self.port, self.starboard = Standstill(), Standstill()
         self.discarded = 0
 
     def passes(self, port_m: float, starboard_m: float, now_ns: int) -> bool:
         """Whether a sample of the level gauges may be used."""
-        self.port.take(port_m)
-        self.starboard.take(starboard_m)
         passes = self._port.passes(port_m, now_ns) & self._starboard.passes(starboard_m, now_ns)
         self.discarded += not passes
         return passes

@@ -324,13 +324,13 @@ FAULTS: Final = (
     ),
     _row(
         Fault.MOTION_SIGN_FLIP,
-        "Roll, roll rate or the levels are measured with the wrong sign, or are swapped.",
+        "Roll and its rate, or the levels, are measured with the wrong sign, or are swapped.",
         "Check how motion sensor and level gauges are mounted and connected: roll is positive "
         "starboard down.",
         _found(
             Reaction.STOP,
-            "roll against its integrated rate, or the water against roll and pressure",
-            Finding.MOTION_SIGN | Finding.WATER_SIGN,
+            "the water against roll and pressure",
+            Finding.WATER_SIGN,
         ),
     ),
     _row(
@@ -378,16 +378,11 @@ FAULTS: Final = (
     ),
     _row(
         Fault.SENSORS_DISAGREE,
-        "The two motion sensors disagree, or something speaks against one of them.",
+        "The two motion sensors disagree.",
         "Compare both with the horizon and a plumb line; mend or replace the one that is wrong.",
         _found(
             Reaction.RAMP,
-            "roll or rate apart for 1.5 roll periods, and nothing says which one is wrong",
-            Finding.SENSORS_UNCLEAR,
-        ),
-        _found(
-            Reaction.HALVE,
-            "roll apart by half a degree, or their rates; or one found wrong, the other used",
+            "roll apart by half a degree for 0.3 s, or their rates by as much at 2 w0",
             Finding.SENSORS_DISAGREE,
         ),
     ),
@@ -437,24 +432,19 @@ FAULTS: Final = (
     ),
     _row(
         Fault.STUCK_SIGNAL,
-        "Roll, roll rate or level stands still although the ship moves, or roll and rate repeat.",
+        "The roll or the level stands still although the water is pushed.",
         "Check the motion sensor, the level gauges and whatever passes their messages on.",
         _found(
             Reaction.RAMP,
-            "roll or rate still while the other one moves, both while the water does, or level "
-            "still while it is pushed",
-            Finding.ROLL_STUCK | Finding.RATE_STUCK | Finding.LEVEL_STUCK,
-        ),
-        _found(
-            Reaction.RAMP,
-            "32 samples of roll and rate in a row equal to those of an earlier time",
-            Finding.MOTION_REPEATS,
+            "roll still while the water moves, or level still while it is pushed",
+            Finding.ROLL_STUCK | Finding.LEVEL_STUCK,
         ),
     ),
     _row(
         Fault.DRIFT,
         "Roll and integrated roll rate do not agree.",
-        "Check the motion sensor: alignment, bias of the gyroscope, filter of the roll.",
+        "Check the motion sensor: sign of each, a signal that stands still, alignment, bias of the "
+        "gyroscope, filter of the roll.",
         _found(
             Reaction.HALVE, "roll off the integrated rate by six times its noise", Finding.DRIFT
         ),

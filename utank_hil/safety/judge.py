@@ -218,8 +218,6 @@ class Safety:
         found = 0
         if monitors is not None:
             found = monitors.update(measured, own, self._motion)
-            self._motion = monitors.used
-            motion = measured.motions[self._motion]
         supervisor.count(measured, motion.roll_rad, own.command_pa)
         self.situation = situation = Situation(
             measured,
@@ -263,13 +261,11 @@ class Safety:
         return not (agrees and spare_age_ms <= self.supervisor.limits.motion_spare_age_ms)
 
     def _leave_silent_sensor(self, measured: Measurements) -> None:
-        """Use the other motion sensor if this one is silent, and that one neither nor accused."""
+        """Use the other motion sensor if this one is silent, and that one is not."""
         motions, used = measured.motions, self._motion
-        spare = 1 - used
-        accused = self.monitors is not None and self.monitors.sensors[spare].accused
-        silent_ms = self._silent_ms
+        spare, silent_ms = 1 - used, self._silent_ms
         if motions[used].age_ms > silent_ms[used] and motions[spare].age_ms <= silent_ms[spare]:
-            self._motion = used if accused else spare
+            self._motion = spare
 
     def _note_causes(self, now_ns: int) -> None:
         """Keep what may be gone before alarms are looked at, ten times a second."""

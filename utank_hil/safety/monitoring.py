@@ -24,14 +24,13 @@ from utank_hil.retuning.estimate import ShipFigures
 from utank_hil.safety.bus_load import MEAN_FRAME_BITS
 from utank_hil.safety.monitors.drive import DriveFollowing, Saturation
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.monitors.level_stuck import GaugeStuck, LevelStuck
+from utank_hil.safety.monitors.level_stuck import LevelStuck
 from utank_hil.safety.monitors.motion import RollAgainstRate
-from utank_hil.safety.monitors.motion_pair import MotionPair, SensorEvidence
+from utank_hil.safety.monitors.motion_pair import MotionPair
 from utank_hil.safety.monitors.motion_watch import MotionWatch
 from utank_hil.safety.monitors.noise import Noise
 from utank_hil.safety.monitors.senders import Heard, Senders, Stream
 from utank_hil.safety.monitors.spikes import SpikeCount
-from utank_hil.safety.monitors.standstill import gauges_stand_still
 from utank_hil.safety.monitors.tank_equation import TankEquation
 from utank_hil.safety.monitors.thresholds import MonitorThresholds, SensorFigures, thresholds_of
 from utank_hil.safety.monitors.volume import Volume
@@ -43,8 +42,6 @@ LONG_S: Final = ROUND_TICKS * TICK_S
 SHORT_TICKS: Final = ROUND_TICKS // 2
 """Most ticks that are made up for: nothing is then done twice with the same sample."""
 SHORT_S: Final = SHORT_TICKS * TICK_S
-SPARE_CYCLES: Final = 3.0
-"""An older measurement of the other motion sensor is not changed over to."""
 STALE_MS: Final = 100.0
 """Older measurements are a gap, after which a comparison begins anew."""
 SILENT_S: Final = 1.0
@@ -68,13 +65,11 @@ MOST_DAMPING_RATIO: Final = 1.0
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _DRIVE_ENABLED: Final = DriveState.OPERATION_ENABLED
-_LEVEL_STUCK: Final = int(Finding.LEVEL_STUCK)
 _NOISE: Final = int(Finding.NOISE)
 _SPIKES: Final = int(Finding.SPIKES)
 _AMPLIFIED: Final = int(Finding.ROLL_AMPLIFIED)
 _WATER_SIGN: Final = int(Finding.WATER_SIGN)
-_MOTION_SIGN: Final = int(Finding.MOTION_SIGN)
-_VOLUME: Final = int(Finding.VOLUME)
+_DRIFT_LASTS: Final = int(Finding.DRIFT_LASTS)
 _UNWATCHED: Final = int(Finding.UNWATCHED)
 _UNWATCHED_LONG: Final = int(Finding.UNWATCHED | Finding.UNWATCHED_LONG)
 
@@ -112,8 +107,10 @@ class Monitors:
     drive : DriveFollowing
     volume : Volume
         The monitors whose statistics are of interest.
-    sensors : tuple of SensorEvidence
-        What speaks against each motion sensor.
+    watches : tuple of MotionWatch
+        What is judged of each motion sensor by itself.
+    equation : TankEquation
+        With the roll of the motion sensor in use.
     used : int
         Place of the motion sensor in use.
     confirmed : bool
@@ -133,14 +130,12 @@ class Monitors:
         second_motion: bool = False,
         motion_cycles_s: tuple[float, ...] = (TICK_S, TICK_S),
     ) -> None:
-        self._spare_ms = [1e3 * SPARE_CYCLES * cycle_s for cycle_s in motion_cycles_s]
         self.thresholds: MonitorThresholds = thresholds_of(plant, roll_limit_rad, sensors)
         thresholds, ship, tank = self.thresholds, plant.ship, plant.tank
         self._spikes = SpikeCount()
         self.drive = DriveFollowing(plant.lag_s, thresholds, SHORT_S)
         self._saturation = Saturation(thresholds)
         self._level_stuck = LevelStuck(ship, tank, thresholds, LONG_S)
-        self._port_stuck, self._starboard_stuck = GaugeStuck(thresholds), GaugeStuck(thresholds)
         self.volume = Volume(thresholds)
         room = ROOM_OF_VALVE if plant.valve else 1.0
         self._open_loss = plant.valve.open_loss if plant.valve else 0.0
@@ -153,13 +148,10 @@ class Monitors:
         self._water_free = plant.valve is None
         self._counts_of_water = ~0 if self._water_free else _WATER_SIGN
         self._compares = compares
-        self.sensors = tuple(
-            SensorEvidence(
-                MotionWatch(thresholds, cycle_s),
-                TankEquation(ship, tank, thresholds, LONG_S, valve=not self._water_free),
-            )
-            for cycle_s in motion_cycles_s[: 1 + second_motion]
+        self.watches = tuple(
+            MotionWatch(thresholds, cycle_s) for cycle_s in motion_cycles_s[: 1 + second_motion]
         )
+        self.equation = TankEquation(ship, tank, thresholds, LONG_S, valve=not self._water_free)
         self.used = 0
         self._pair = MotionPair(thresholds, SHORT_S)
         self._frames_per_s = bit_rate / MEAN_FRAME_BITS
@@ -171,6 +163,9 @@ class Monitors:
         self._judges_from_ns = 0
         self._longest_gap_s = max(GAP_PERIODS * thresholds.tank_period_s, LATE_ROUND_S)
         self._unwatched_s = 0.0
+        self._wrong_ns = -(1 << 62)
+        # a wrong sign is not seen where the roll passes through zero
+        self._doubted_ns = round(thresholds.tank_period_s * 1e9)
         self.confirmed = False
         self._looks: tuple[Callable[[Measurements, OwnState], int], ...] = (
             self._look_at_motion,
@@ -181,7 +176,7 @@ class Monitors:
             self._look_at_bus,
         )
         self._found_by = [0] * len(self._looks)
-        self._level_found = 0
+        self._level_found = self._water_found = 0
         self.found = 0
 
     def follow(self, found: ModelSummary | ShipFigures | None) -> None:
@@ -210,17 +205,12 @@ class Monitors:
     @property
     def motion(self) -> RollAgainstRate:
         """Roll against its rate, by the motion sensor in use."""
-        return self.sensors[self.used].watch.motion
+        return self.watches[self.used].motion
 
     @property
     def rate_noise(self) -> Noise:
         """Noise of the roll rate of the motion sensor in use."""
-        return self.sensors[self.used].watch.rate_noise
-
-    @property
-    def equation(self) -> TankEquation:
-        """The tank's equation with the roll of the motion sensor in use."""
-        return self.sensors[self.used].equation
+        return self.watches[self.used].rate_noise
 
     def watch(self, receivers: Iterable[Heard], expected: Collection[int]) -> None:
         """Watch the pace of messages; of those `expected`, by identifier, the silence too."""
@@ -233,11 +223,11 @@ class Monitors:
     def twin_message(self) -> PassiveTwinMessage:
         """What the panels are shown of the twin: degraded by what degrades the motion sensor."""
         twin = self.twin
-        quality = Quality.DEGRADED if self.sensors[self.used].watch.found else Quality.GOOD
+        quality = Quality.DEGRADED if self.watches[self.used].found else Quality.GOOD
         return PassiveTwinMessage(quality, twin.roll_rad, twin.rms_rad, twin.ship_rms_rad)
 
     def update(self, measured: Measurements, own: OwnState, used: int = 0) -> int:
-        """Look at one tick; set `used` to the motion sensor that is to be used from now on.
+        """Look at one tick.
 
         Parameters
         ----------
@@ -255,11 +245,13 @@ class Monitors:
         if not self._begun:
             self._begin(measured)
         self.follow(own.designed_for)
-        self.used = used
+        if used != self.used:  # they may be mounted apart
+            self.used = used
+            self._restart_water()
         elapsed_s = (now_ns - self._last_ns) * 1e-9
         self._last_ns = now_ns
-        for sensor, sample in zip(self.sensors, measured.motions, strict=True):
-            sensor.watch.turn(sample, elapsed_s)
+        for watch, sample in zip(self.watches, measured.motions, strict=True):
+            watch.turn(sample, elapsed_s)
         due = 1
         if elapsed_s > 1.5 * TICK_S:
             due = min(round(elapsed_s / TICK_S), SHORT_TICKS)
@@ -270,8 +262,7 @@ class Monitors:
             self._phase = phase + 1 if phase < ROUND_TICKS - 1 else 0
             look = _ROUND[phase]
             found_by[look] = self._looks[look](measured, own)
-        sensor = self.sensors[self.used]
-        found = sensor.watch.found | sensor.water
+        found = self.watches[used].found | self._water_found
         for each in found_by:
             found |= each
         self.found = found
@@ -292,31 +283,22 @@ class Monitors:
         self._motion_ns = now_ns
         backlog = now_ns < self._judges_from_ns
         fresh = True
-        for sensor, sample in zip(self.sensors, motions, strict=True):
+        for watch, sample in zip(self.watches, motions, strict=True):
             stale = backlog or sample.age_ms > STALE_MS
-            sensor.watch.update(sample, elapsed_s, stale=stale)
+            watch.update(sample, elapsed_s, stale=stale)
             fresh = fresh and not stale
         if len(motions) == 1:
             return 0
-        self._leave_accused(measured)
-        used, spare = motions[self.used], motions[1 - self.used]
+        first, second = motions
         return self._pair.update(
-            used.roll_rad - spare.roll_rad if fresh else math.nan,
-            used.roll_rate_rad_s - spare.roll_rate_rad_s,
-            self.sensors[self.used],
-            self.sensors[1 - self.used],
+            first.roll_rad - second.roll_rad if fresh else math.nan,
+            first.roll_rate_rad_s - second.roll_rate_rad_s,
         )
 
-    def _leave_accused(self, measured: Measurements) -> None:
-        """Use the other motion sensor if something speaks against this one alone."""
-        used, spare = self.sensors[self.used], self.sensors[1 - self.used]
-        spare_ms = self._spare_ms[1 - self.used]
-        if measured.motions[1 - self.used].age_ms > spare_ms or spare.found or spare.accused:
-            return
-        if used.found or used.accused:
-            used.accused = True
-            self.twin.excuse()  # of what the other one said
-            self.used = 1 - self.used
+    def _restart_water(self) -> None:
+        """Begin anew with the tank's equation."""
+        self.equation.restart()
+        self._water_found = 0
 
     def _look_at_drive(self, measured: Measurements, own: OwnState) -> int:
         return self.drive.update(
@@ -337,10 +319,12 @@ class Monitors:
         pressure_pa = measured.pressure_pa if fresh else own.command_pa
         # what a valve that is not open takes from the water acts like a pump
         pressure_pa -= own.held_pa - self._open_loss * abs(level_rate_m_s) * level_rate_m_s
-        # gaps of a motion sensor, or two that disagree now and then, hide no law that loses
-        sure = motion.age_ms <= STALE_MS and not self._pair.unclear
         twin.update(
-            motion.roll_rad, motion.roll_rate_rad_s, level_rate_m_s, pressure_pa, counts=sure
+            motion.roll_rad,
+            motion.roll_rate_rad_s,
+            level_rate_m_s,
+            pressure_pa,
+            counts=motion.age_ms <= STALE_MS,  # gaps hide no law that loses
         )
         return _AMPLIFIED if twin.amplified and self._compares else 0
 
@@ -350,34 +334,28 @@ class Monitors:
         steps = max(round(elapsed_s / LONG_S), 1)
         if elapsed_s > self._longest_gap_s:
             steps = 1
-            for sensor in self.sensors:
-                sensor.restart_water()
+            self._restart_water()
             self._level_stuck.restart()
             self._level_found = 0
-        motions = measured.motions
-        motion = motions[self.used]
+        motion = measured.motions[self.used]
         oldest_ms = max(motion.age_ms, measured.tank_age_ms, measured.pump_age_ms)
         unwatched = self._note_watch(now_ns, elapsed_s, oldest_ms)
         if oldest_ms > STALE_MS:
             return self._level_found | unwatched
         self._round_ns = now_ns
         level_m, pressure_pa = measured.level_m, measured.pressure_pa - own.held_pa
-        for sensor, sample in zip(self.sensors, motions, strict=True):
-            if sample.age_ms > STALE_MS:
-                sensor.restart_water()
-                continue
-            sensor.water = self._counts_of_water & sensor.equation.update(
-                sample.roll_rad, level_m, pressure_pa, steps, own.held_pa, frozen=sample.frozen
-            )
-        used = self.sensors[self.used]
-        if self._water_free and used.equation.settled:
-            push, slope_push = used.equation.push, used.equation.slope_push
+        self._water_found = self._counts_of_water & self.equation.update(
+            motion.roll_rad, level_m, pressure_pa, steps, own.held_pa
+        )
+        if self._water_free and self.equation.settled:
+            push, slope_push = self.equation.push, self.equation.slope_push
             for _ in range(steps):
                 self._level_found = self._level_stuck.update(level_m, push, slope_push)
-        wrong = used.water or used.watch.found & _MOTION_SIGN
-        self.confirmed = not wrong and (self.confirmed or used.equation.obeyed)
-        if len(motions) == 2:
-            self._leave_accused(measured)
+        if self._water_found or self.watches[self.used].found & _DRIFT_LASTS:
+            self._wrong_ns = now_ns
+            self.confirmed = False
+        elif self.equation.obeyed and now_ns - self._wrong_ns > self._doubted_ns:
+            self.confirmed = True
         return self._level_found | unwatched
 
     def _note_watch(self, now_ns: int, elapsed_s: float, oldest_ms: float) -> int:
@@ -399,15 +377,7 @@ class Monitors:
     def _look_at_levels(self, measured: Measurements, own: OwnState) -> int:  # noqa: ARG002
         if measured.tank_age_ms > STALE_MS:
             return self._found_by[_LEVELS]
-        port_m, starboard_m = measured.port_level_m, measured.starboard_level_m
-        volume = self.volume.update(port_m, starboard_m, SHORT_S)
-        stuck = self._port_stuck.update(port_m, starboard_m)
-        stuck |= self._starboard_stuck.update(starboard_m, port_m)
-        if not volume & _VOLUME:
-            stuck = 0
-        if gauges_stand_still(measured.port_still, measured.starboard_still):
-            stuck = _LEVEL_STUCK
-        return volume | stuck
+        return self.volume.update(measured.port_level_m, measured.starboard_level_m, SHORT_S)
 
     def _look_at_bus(self, measured: Measurements, own: OwnState) -> int:
         elapsed_s = (measured.now_ns - self._senders_ns) * 1e-9

@@ -9,7 +9,7 @@ from moving_ship import SHIP, TANK, THRESHOLDS
 from scipy.integrate import solve_ivp
 
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.monitors.level_stuck import GaugeStuck, LevelStuck
+from utank_hil.safety.monitors.level_stuck import LevelStuck
 
 STEP_S = 0.01
 G = 9.80665
@@ -98,50 +98,3 @@ def test_what_the_water_should_have_done_before_it_moved_does_not_count() -> Non
     stuck.restart()
     found = [stuck.update(0.0, 60e3 / 1025.0, 0.0) for _ in range(steps + 1)]
     assert found == [0] * steps + [Finding.LEVEL_STUCK]
-
-
-def gauges(*samples: tuple[float, float]) -> list[int]:
-    stuck = GaugeStuck(THRESHOLDS)
-    return [stuck.update(*sample) for sample in samples]
-
-
-@pytest.mark.parametrize("way", [-1, 1])
-def test_a_gauge_that_stands_still_while_the_other_moves_is_stuck(way: int) -> None:
-    band_m, volume_m = THRESHOLDS.level_still_m, THRESHOLDS.volume_m
-    still = [(0.3, 0.1 + way * 0.03 * k * volume_m) for k in range(40)]
-    assert gauges(*still) == [0] * 34 + [Finding.LEVEL_STUCK] * 6
-    # it may be noisy, and the way counts from the least to the most
-    noisy = [
-        (0.3 + (-1) ** k * 0.7 * band_m, way * 0.7 * volume_m * math.sin(0.2 * k))
-        for k in range(40)
-    ]
-    assert Finding.LEVEL_STUCK in gauges(*noisy)
-    # eight bands at least, in a low tank
-    low = GaugeStuck(replace(THRESHOLDS, volume_m=0.01))
-    found = [low.update(0.0, moved * band_m) for moved in (0.0, 0.0, 7.9, 8.1)]
-    assert found == [0, 0, 0, Finding.LEVEL_STUCK]
-
-
-def test_a_gauge_has_moved_beyond_its_band_and_the_other_beyond_its_way() -> None:
-    assert gauges((math.pi, -math.pi)) == [0]
-    volume_m = THRESHOLDS.volume_m
-    assert gauges((0.0, 0.0), (0.0, volume_m), (0.0, 1.001 * volume_m)) == [
-        0, 0, Finding.LEVEL_STUCK,
-    ]  # fmt: skip
-    at_the_band = GaugeStuck(THRESHOLDS)
-    at_the_band.update(0.0, 0.0)
-    assert at_the_band.update(at_the_band._band_m, 2 * volume_m) == Finding.LEVEL_STUCK
-
-
-def test_gauges_that_both_stand_still_or_both_move_are_sound() -> None:
-    assert not any(gauges(*[(0.3, -0.3)] * 1000))
-    for other in (-1.0, -0.3, 0.5):
-        moving = [(math.sin(0.1 * k), other * math.sin(0.1 * k)) for k in range(1000)]
-        assert not any(gauges(*moving))
-    # one that has moved again is judged from there
-    band_m, volume_m = THRESHOLDS.level_still_m, THRESHOLDS.volume_m
-    moves_m = 0.9 * volume_m
-    assert not any(gauges(*[(0.0, 0.0)], *[(0.0, moves_m)] * 20, *[(0.1, 0.0)] * 20))
-    # within the band of its own noise it has not moved
-    for moves, found in ((1.4, Finding.LEVEL_STUCK), (1.45, 0)):
-        assert gauges((0.0, 0.0), (moves * band_m, 9.0 * volume_m))[1] == found

@@ -8,19 +8,16 @@ from moving_ship import THRESHOLDS
 from scipy.integrate import solve_ivp
 
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.monitors.motion import RollAgainstRate, Stuck
+from utank_hil.safety.monitors.motion import RollAgainstRate
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
 D = 1 / 64
 """The threshold of the drift, rad."""
-DRIFTS = replace(THRESHOLDS, drift_rad=D, roll_still_rad=1e-9, rate_still_rad_s=1e-9)
-S = 1 / 1024
-SIGNS = replace(THRESHOLDS, drift_rad=1e6, roll_noise_rad=5 * S, rate_still_rad_s=0.5)
-"""A sample's noise is S, and no drift is seen: only the sign is judged."""
+DRIFTS = replace(THRESHOLDS, drift_rad=D)
 
 
 class Fed:
-    """A monitor that is fed with what the roll moves and what the rate says, at a rate not still.
+    """A monitor that is fed with what the roll moves and what the rate says.
 
     Parameters
     ----------
@@ -29,13 +26,12 @@ class Fed:
 
     def __init__(self, step_s: float, thresholds: MonitorThresholds = DRIFTS) -> None:
         self.monitor = RollAgainstRate(thresholds)
-        self.step_s, self.roll_rad, self.rate_rad_s = step_s, 0.0, 1.0
-        assert self.monitor.update(0.0, 1.0, 0.0, step_s) == 0
+        self.step_s, self.roll_rad = step_s, 0.0
+        assert self.monitor.update(0.0, 0.0, step_s) == 0
 
-    def __call__(self, moved_rad: float, turned_rad: float = 0.0, *, still: bool = False) -> int:
+    def __call__(self, moved_rad: float, turned_rad: float = 0.0) -> int:
         self.roll_rad += moved_rad
-        self.rate_rad_s *= 1 if still else -1
-        return self.monitor.update(self.roll_rad, self.rate_rad_s, turned_rad, self.step_s)
+        return self.monitor.update(self.roll_rad, turned_rad, self.step_s)
 
     def to(self, unexplained_rad: float) -> int:
         """Jump so far that so much is left unexplained."""
@@ -67,7 +63,7 @@ def test_of_a_constant_bias_so_much_is_left_as_has_not_been_learned(at_s: float,
     fed.monitor.restart()
     assert fed.monitor.unexplained_rad == 0.0
     # what was learned is kept
-    fed.monitor.update(fed.roll_rad, 0.0, 0.0, 0.1)
+    fed.monitor.update(fed.roll_rad, 0.0, 0.1)
     fed(0.0, bias_rad_s * 0.1)
     remains = 30 / (30 + at_s) if at_s < 270 else 0.1 * math.exp(-(at_s - 270) / 300)
     left_rad = -remains * bias_rad_s * 0.1 * (1 - 0.1 / 15)
@@ -188,86 +184,6 @@ def test_noise_of_the_roll_is_its_second_difference_over_the_square_root_of_six(
     assert fed.monitor.noise.power == pytest.approx((4 * a) ** 2)
     # of a new roll after a gap there is none
     fed.monitor.restart()
-    fed.monitor.update(1.0, 0.0, 0.0, 0.7)
-    fed.monitor.update(1.0, 0.0, 0.0, 0.7)
+    fed.monitor.update(1.0, 0.0, 0.7)
+    fed.monitor.update(1.0, 0.0, 0.7)
     assert fed.monitor.noise.power == 0.0
-
-
-@pytest.mark.parametrize("way", [-1, 1])
-def test_a_signal_is_stuck_after_a_while_within_its_band_with_too_much_left(way: int) -> None:
-    def judged(*samples: tuple[float, float], keep: float = 1.0, step_s: float = 0.4) -> list[bool]:
-        stuck = Stuck(0.25, 0.5)
-        assert stuck.still_s == 0.0
-        assert stuck.update(3.0, 9.0, keep, step_s) is False
-        return [stuck.update(value, way * left, keep, step_s) for value, left in samples]
-
-    assert judged((3.25, 0.5), (2.75, 0.0), (3.0, 0.0)) == [False] * 3  # not more than the limit
-    assert judged((3.25, 0.5), (2.75, 0.125)) == [False, True]
-    assert judged((3.0, 0.5), (3.26, 9.0), (3.0, 9.0), (3.0, 0.5), (3.0, 0.125)) == [
-        False, False, False, False, True,
-    ]  # fmt: skip
-    assert judged((3.0, 1.0), (3.0, 1.0), step_s=0.7) == [False, True]
-    assert judged((3.0, 1.0), (3.0, 0.25), (3.0, 0.5), keep=0.5) == [False, False, False]
-    assert judged((3.0, 1.0), (3.0, 1.0), keep=0.5) == [False, True]
-
-
-def test_a_jump_is_half_a_threshold_of_what_a_still_signal_leaves() -> None:
-    fed = Fed(0.4)
-    found = [fed(10 * D, still=True) & Finding.RATE_STUCK for _ in range(4)]
-    assert found == [0, 0, 0, Finding.RATE_STUCK]
-
-
-@pytest.mark.parametrize("way", [-1, 1])
-def test_a_stuck_signal_is_found_when_more_is_left_than_its_threshold(way: int) -> None:
-    """Of a roll, with the band that a wrong rate would leave: four times the still roll more."""
-    moves = replace(THRESHOLDS, drift_rad=D, roll_still_rad=D, rate_still_rad_s=1e-3)
-    for roll_stands, rate_stands in ((True, False), (False, True), (False, False)):
-        fed, found = Fed(0.05, moves), []
-        for k in range(200):
-            x = way * 0.05 * D
-            # the roll is moved to and fro by what is more than its band
-            swing = 0.0 if roll_stands else 3 * D * (-1) ** k
-            left = x if roll_stands else 0.0
-            moved = swing + (0.0 if roll_stands else x)
-            found.append(fed(moved, swing + left, still=rate_stands))
-        first = {
-            what: next((k + 1 for k, each in enumerate(found) if each & what), None)
-            for what in (Finding.ROLL_STUCK, Finding.RATE_STUCK)
-        }
-
-        # 1 D/s, of which 30 / (30 + t) is not yet learned, up to three thresholds, and a leak
-        def steps_to(limit: float) -> float:
-            left, t, learned_s = 0.0, 0.0, 0.0
-            while left <= limit:
-                learned_s = t if left < 3 else learned_s
-                left += 0.01 * (30 / (30 + learned_s) - left / 15)
-                t += 0.01
-            return t / 0.05
-
-        if roll_stands:
-            assert first[Finding.ROLL_STUCK] == pytest.approx(steps_to(5.0), abs=3)
-        else:
-            assert first[Finding.ROLL_STUCK] is None
-        if rate_stands:
-            assert first[Finding.RATE_STUCK] == pytest.approx(steps_to(1.0), abs=3)
-        else:
-            assert first[Finding.RATE_STUCK] is None
-
-
-def test_where_the_rate_stands_still_for_longer_the_sign_is_not_judged() -> None:
-    fed = Fed(0.35, SIGNS)
-    found = []
-    for still in (False, True, True, True, False):
-        fed(-8 * S, 8 * S, still=still)
-        found.append(fed.monitor.sign.sum)
-    # 0.7 s is not longer
-    assert found == [5.0, 10.0, 15.0, 15.0, 16.0]
-
-
-def test_a_gap_begins_the_test_of_the_sign_anew() -> None:
-    fed = Fed(0.35, SIGNS)
-    for _ in range(3):
-        fed(-8 * S, 8 * S)
-    assert fed.monitor.sign.sum > 0
-    fed.monitor.restart()
-    assert fed.monitor.sign.sum == 0.0

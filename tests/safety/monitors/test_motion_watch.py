@@ -74,16 +74,6 @@ def test_spikes_of_its_gate_are_found_unless_they_are_noise() -> None:
     assert spiked(4, 1e-3) == spiked(5, 1e-3) == Finding.NOISE
 
 
-def test_samples_that_repeat_are_found_beside_the_noise() -> None:
-    watch = MotionWatch(replace(LOOSE, rate_noise_rad_s=0.1))
-    for k in range(60):
-        watch.update(MotionSample(0.0, (-1) ** k, repeats=k >= 48), 0.7, stale=False)
-        assert watch.found & ~Finding.NOISE == (Finding.MOTION_REPEATS if k >= 48 else 0)
-    assert watch.found & Finding.NOISE
-    watch.update(MotionSample(0.0, 0.0), 0.7, stale=True)
-    assert watch.found == 0
-
-
 def test_what_the_roll_says_against_the_rate_is_found_beside_the_noise() -> None:
     watch = MotionWatch(replace(LOOSE, drift_rad=0.01, rate_noise_rad_s=0.1))
     for k in range(10):

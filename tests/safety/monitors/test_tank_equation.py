@@ -148,34 +148,6 @@ def test_a_roll_that_stands_still_with_its_rate_is_told_by_the_water(
     assert Finding.ROLL_STUCK not in found_after(calm, lambda _, roll, *rest: (0.0, *rest))
 
 
-@pytest.mark.parametrize("pressure_pa", [0.0, 10e3])
-@pytest.mark.parametrize("phase", [0.0, 0.25, 0.5, 0.75])
-def test_a_frozen_roll_is_told_sooner_and_where_less_is_unexplained(
-    pressure_pa: float, phase: float
-) -> None:
-    """Samples that are all the same hold no noise that could explain it."""
-
-    def found_s(roll_deg: float, *, stands: bool, frozen: bool) -> float:
-        ship = MovingShip(math.radians(roll_deg), pressure_pa)
-        equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
-        fault_s = FAULT_S + phase * 2 * math.pi / ship.w
-        at_rad = MovingShip(math.radians(roll_deg), noise=False).roll_rad(fault_s)
-        for k in range(round((fault_s + 2 * T) / STEP_S)):
-            t = k * STEP_S
-            roll_rad = at_rad if stands and t >= fault_s else ship.roll_rad(t)
-            said = frozen and t >= fault_s + 1.0
-            if equation.update(roll_rad, ship.level_m(t), ship.pressure_pa(t), frozen=said):
-                return t - fault_s
-        return math.inf
-
-    assert found_s(1.0, stands=True, frozen=True) <= 2.5
-    assert found_s(0.4, stands=True, frozen=True) <= 3.5
-    assert found_s(0.4, stands=True, frozen=False) == math.inf
-    # a sensor without noise on a ship that does lie still
-    assert found_s(0.0, stands=True, frozen=True) == math.inf
-    assert found_s(1.0, stands=False, frozen=True) == math.inf
-
-
 @pytest.mark.parametrize("shift_s", [0.0, 1.3, 5.2, 6.5])
 def test_gauges_that_jump_say_nothing_of_the_motion_sensor(shift_s: float) -> None:
     ship = MovingShip(math.radians(2.0), 5e3)

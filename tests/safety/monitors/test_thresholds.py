@@ -43,10 +43,9 @@ def test_every_threshold_is_what_the_documents_say_of_ship_and_sensors() -> None
         # six times that of the roll and of 15 s of its rate, of which half is remembered
         "drift_rad": 6 * math.sqrt(1e-8 + 16e-8 * 0.075),
         "roll_still_rad": 5e-4,
-        "rate_still_rad_s": 2e-3,
         "level_still_m": 0.009,
         "volume_m": 0.15,
-        "least_roll_push_m2_s2": math.radians(0.2) * 0.6 * 9.81 * 20.0,
+        "least_roll_push_m2_s2": math.radians(0.2) * 0.6 * G * 20.0,
         "least_pump_push_m2_s2": 4e3 / 1025.0,
         "zero_push_m2_s2": G * 20.0 * math.radians(0.3),
         "motion_late_s": 1 / 3,

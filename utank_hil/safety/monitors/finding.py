@@ -7,15 +7,12 @@ class Finding(IntFlag):
     """One bit a finding."""
 
     ROLL_STUCK = auto()
-    RATE_STUCK = auto()
     LEVEL_STUCK = auto()
     DRIFT = auto()
     DRIFT_LASTS = auto()
-    MOTION_SIGN = auto()
     WATER_SIGN = auto()
     PUMP_SIGN = auto()
     MOTION_LATE = auto()
-    MOTION_REPEATS = auto()
     NOISE = auto()
     SPIKES = auto()
     VOLUME = auto()
@@ -28,7 +25,6 @@ class Finding(IntFlag):
     FLOOD = auto()
     ROLL_AMPLIFIED = auto()
     SENSORS_DISAGREE = auto()
-    SENSORS_UNCLEAR = auto()
     DAMAGED = auto()
     FRAMES_LOST = auto()
     UNWATCHED = auto()

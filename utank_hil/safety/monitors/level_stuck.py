@@ -16,35 +16,7 @@ from utank_hil.safety.monitors.sway import most_sway
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
 BANDS: Final = 16.0
-
-GAUGE_BANDS: Final = 8.0
 _LEVEL_STUCK: Final = int(Finding.LEVEL_STUCK)
-
-
-class GaugeStuck:
-    """One gauge that stands still while the other one moves: both show the same water.
-
-    Noise of the other one looks the same, so that it counts only where their sum is wrong, too.
-
-    Parameters
-    ----------
-    thresholds : MonitorThresholds
-    """
-
-    def __init__(self, thresholds: MonitorThresholds) -> None:
-        # a level of its own has more noise than the mean of both
-        self._band_m = math.sqrt(2) * thresholds.level_still_m
-        self._moved_m = max(thresholds.volume_m, GAUGE_BANDS * thresholds.level_still_m)
-        self._still_m = self._least_m = self._most_m = math.inf
-
-    def update(self, gauge_m: float, other_m: float) -> int:
-        """Take the level of both; return what was found of the first."""
-        if abs(gauge_m - self._still_m) > self._band_m:
-            self._still_m = gauge_m
-            self._least_m = self._most_m = other_m
-        self._least_m = min(self._least_m, other_m)
-        self._most_m = max(self._most_m, other_m)
-        return _LEVEL_STUCK if self._most_m - self._least_m > self._moved_m else 0
 
 
 class LevelStuck:

@@ -1,4 +1,4 @@
-"""Roll against its integrated rate: drift, stuck signals, and the sign of one of the two.
+"""Roll against its integrated rate: a drift, a signal that stands still, one sign that is wrong.
 
 Over a step the roll moves by m, and the integrated rate says that it turned by t. What is left,
 m - t, is summed with a leak of 15 s, so that a sensor's noise stays small in it. A gyroscope's
@@ -6,16 +6,12 @@ constant bias is learned over five minutes and taken off. A slow drift is learne
 a sensor that is replaced, or right again, would not be believed for what was learned of it before.
 So a bias that explains nothing for a minute is forgotten, and learned as at the start. The drift
 goes on being found until the two have agreed for half a minute.
-
-The sum tells *that* the two disagree. What disagrees is found by the sums over the time in which
-one of them has not moved, and by a test of the sign (`SignTest`).
 """
 
 import math
 from typing import Final
 
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.monitors.motion_sign import SignTest
 from utank_hil.safety.monitors.noise import Noise, SecondDifference, within
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
@@ -24,11 +20,6 @@ BIAS_S: Final = 300.0
 FIRST_BIAS_S: Final = 30.0
 """The bias is zero at the start as if it had been learned for so long."""
 SMOOTH_S: Final = 0.25
-STUCK_S: Final = 0.7
-STUCK_STEP: Final = 0.5
-"""One step adds so many thresholds at most to what a still signal leaves: noise that begins while
-a signal stands still at a turning point is no standstill.
-"""
 LEARN: Final = 3.0
 """Up to so many times the threshold what is left is taken for a bias."""
 LARGE_DRIFT: Final = 4.0
@@ -44,42 +35,6 @@ TRIAL_S: Final = 30.0
 _DRIFT: Final = int(Finding.DRIFT)
 _DRIFT_LASTS: Final = int(Finding.DRIFT_LASTS)
 _NOISE: Final = int(Finding.NOISE)
-_SIGN: Final = int(Finding.MOTION_SIGN)
-_ROLL_STUCK: Final = int(Finding.ROLL_STUCK)
-_RATE_STUCK: Final = int(Finding.RATE_STUCK)
-
-
-class Stuck:
-    """Sums what a signal leaves unexplained while it stays within a band about a value.
-
-    Parameters
-    ----------
-    band : float
-        Of the signal.
-    limit_rad : float
-        Sum, with the same leak, at which the signal is stuck.
-
-    Attributes
-    ----------
-    still_s : float
-        How long it has stayed there.
-    """
-
-    def __init__(self, band: float, limit_rad: float) -> None:
-        self._band = band
-        self._limit_rad = limit_rad
-        self._value = math.inf
-        self._sum_rad = self.still_s = 0.0
-
-    def update(self, value: float, left_rad: float, keep: float, elapsed_s: float) -> bool:
-        """Take a value and what the step left unexplained; return whether the signal is stuck."""
-        if abs(value - self._value) > self._band:
-            self._value = value
-            self._sum_rad = self.still_s = 0.0
-            return False
-        self._sum_rad = keep * (self._sum_rad + left_rad)
-        self.still_s += elapsed_s
-        return abs(self._sum_rad) > self._limit_rad and self.still_s > STUCK_S
 
 
 class RollAgainstRate:
@@ -91,17 +46,11 @@ class RollAgainstRate:
         Leaky sum of the roll's moves that the rate does not account for.
     noise : Noise
         Of the roll, by its second difference.
-    sign : SignTest
     """
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
         self._limit_rad = thresholds.drift_rad
-        # with the rate's sign wrong a roll that crosses its band leaves twice the band
-        least_rad = thresholds.drift_rad + 4 * thresholds.roll_still_rad
-        self._roll_stuck = Stuck(thresholds.roll_still_rad, least_rad)
-        self._rate_stuck = Stuck(thresholds.rate_still_rad_s, thresholds.drift_rad)
         self.noise = Noise(math.sqrt(6) * thresholds.roll_noise_rad)
-        self.sign = SignTest(thresholds)
         self._bend = SecondDifference()
         self._bias_rad_s = 0.0
         self._learned_s = FIRST_BIAS_S
@@ -114,16 +63,13 @@ class RollAgainstRate:
         self._bend.restart()
         self.unexplained_rad = 0.0
         self._over_s = self._smooth_rad = 0.0
-        self.sign.restart()
 
-    def update(
-        self, roll_rad: float, rate_rad_s: float, turned_rad: float, elapsed_s: float
-    ) -> int:
+    def update(self, roll_rad: float, turned_rad: float, elapsed_s: float) -> int:
         """Take a sample; return what was found.
 
         Parameters
         ----------
-        roll_rad, rate_rad_s : float
+        roll_rad : float
             Measured now.
         turned_rad : float
             Integral of the rate since the last sample.
@@ -138,7 +84,7 @@ class RollAgainstRate:
         turned_rad += self._bias_rad_s * elapsed_s
         left_rad = moved_rad - turned_rad
         noisy = self.noise.update(self._bend.update(roll_rad), elapsed_s)
-        slow_rad = within(left_rad, limit_rad)  # a jump is neither bias nor standstill
+        slow_rad = within(left_rad, limit_rad)  # a jump is no bias
         if abs(self.unexplained_rad) < LEARN * limit_rad:  # a fault is no bias
             self._learned_s = min(self._learned_s + elapsed_s, BIAS_S)
             self._bias_rad_s += slow_rad / self._learned_s
@@ -151,14 +97,7 @@ class RollAgainstRate:
         summed_rad = within(keep * (self.unexplained_rad + left_rad), MOST_DRIFT * limit_rad)
         self.unexplained_rad = summed_rad
         self._smooth_rad += (summed_rad - self._smooth_rad) * min(elapsed_s / SMOOTH_S, 1.0)
-        slow_rad = within(slow_rad, STUCK_STEP * limit_rad)
-        roll_stuck = self._roll_stuck.update(roll_rad, slow_rad, keep, elapsed_s)
-        rate_stuck = self._rate_stuck.update(rate_rad_s, slow_rad, keep, elapsed_s)
         found = _NOISE if noisy else 0
-        # else it is the rate that is wrong
-        judged = self._rate_stuck.still_s <= STUCK_S
-        if self.sign.update(moved_rad, turned_rad, elapsed_s, judged=judged):
-            found |= _SIGN
         if abs(summed_rad) <= limit_rad:
             if abs(summed_rad) < 0.5 * limit_rad:
                 self._over_s = 0.0
@@ -173,10 +112,6 @@ class RollAgainstRate:
             found |= _DRIFT_LASTS
         if self._over_s > DRIFT_LASTS_S or abs(self._smooth_rad) > LARGE_DRIFT * limit_rad:
             found |= _DRIFT_LASTS
-        if roll_stuck:
-            found |= _ROLL_STUCK
-        if rate_stuck:
-            found |= _RATE_STUCK
         return found
 
     def _forget(self) -> None:

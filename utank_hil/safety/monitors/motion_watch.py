@@ -13,7 +13,6 @@ from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
 SLOW_CYCLE_S: Final = 0.02
 """Of a slower sensor not every look finds a new sample, nor two looks the same number of them."""
-_REPEATS: Final = int(Finding.MOTION_REPEATS)
 _NOISE: Final = int(Finding.NOISE)
 _SPIKES: Final = int(Finding.SPIKES)
 
@@ -72,14 +71,12 @@ class MotionWatch:
             self._rate_bend.restart()
             self.found = 0
             return
-        found = self.motion.update(roll_rad, rate_rad_s, turned_rad, elapsed_s)
+        found = self.motion.update(roll_rad, turned_rad, elapsed_s)
         if self._bend(sample, elapsed_s):
             found |= _NOISE
         # the largest samples of noise are discarded, too
         if self._spikes.update(sample.discarded, elapsed_s) and not found & _NOISE:
             found |= _SPIKES
-        if sample.repeats:
-            found |= _REPEATS
         self.found = found
 
     def _bend(self, sample: MotionSample, elapsed_s: float) -> bool:

@@ -16,7 +16,6 @@ differentiating. Sums with a memory of 0.4 roll periods tell the gains::
 
 and what leads y - p - x the measured roll tells the motion sensor's delay, over 1.5 roll periods.
 Where the roll has not moved for a quarter of a period, y - p - x itself tells that it should have.
-Where a motion sensor that had noise has sent a hundred samples that are the same, less of it does.
 No sensor's zero is quite right: y - p - x may hold any constant up to +-z, as a commissioning lets
 pass. Something is found only if no constant of that size explains it.
 The sums hold the middle of the range, and no sway within it may explain what is found: for each
@@ -48,8 +47,6 @@ STUCK_GAIN: Final = 0.3
 STILL_PERIODS: Final = 0.25
 STILL_PUSHES: Final = 4.0
 """Of the least push, root mean square: so much must be left unexplained by a roll that is still."""
-FROZEN_PUSHES: Final = 1.0
-"""The same where a sensor with noise sends the same sample all the time: it is to be confirmed."""
 MEMORY_PERIODS: Final = 0.4
 LATE_PERIODS: Final = 1.5
 LATE_PUSHES: Final = 1.75
@@ -147,7 +144,6 @@ class TankEquation:
         self._still_rad = thresholds.roll_still_rad
         self._still_samples = round(STILL_PERIODS * thresholds.tank_period_s / period_s)
         self._most_unmoved = STILL_PUSHES**2 * self._least_xx
-        self._most_frozen = FROZEN_PUSHES**2 * self._least_xx
         self._late_limit_s = thresholds.motion_late_s
         self._spike_m = thresholds.level_spike_m
         self._most_step_m = thresholds.level_most_m_s * period_s
@@ -168,7 +164,6 @@ class TankEquation:
         self._still = 0
         self._roll_rad = math.inf
         self._unmoved = 0.0
-        self._frozen = False
         self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
 
     def _forget_lead(self) -> None:
@@ -183,16 +178,12 @@ class TankEquation:
         pressure_pa: float,
         steps: int = 1,
         held_pa: float = 0.0,
-        *,
-        frozen: bool = False,
     ) -> int:
         """Take a sample of all three; return what was found.
 
         Between two samples that are some `steps` apart all three are taken to run straight. The
-        pressure is that on the water, with what a valve holds back, `held_pa`, taken off. The roll
-        is `frozen` as `Repetition` says.
+        pressure is that on the water, with what a valve holds back, `held_pa`, taken off.
         """
-        self._frozen = frozen
         held, push, held_m2_s2 = self._held, pressure_pa / self._density, held_pa / self._density
         if self._wait < 0:
             self._roll.start(roll_rad)
@@ -288,12 +279,11 @@ class TankEquation:
                 found |= _WATER_SIGN
             elif gain < STUCK_GAIN:
                 found |= _LEVEL_STUCK
-        if self._frozen or self._still > self._still_samples:
+        if self._still > self._still_samples:
             weight = self._weight
             mean = within(self._left / weight, zero)
-            most = self._most_frozen if self._frozen else self._most_unmoved
             unmoved = self._unmoved + mean * (weight * mean - 2 * self._left)
-            if unmoved > (math.sqrt(most) + sway) ** 2:
+            if unmoved > (math.sqrt(self._most_unmoved) + sway) ** 2:
                 found |= _ROLL_STUCK
         if dd > self._least_dd and self._samples > self._late_samples:
             feigned = zero * abs(self._d) + self._sway * math.sqrt(self._late_uu * dd)

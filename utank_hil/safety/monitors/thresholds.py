@@ -21,9 +21,15 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2
 UNCONFIRMED_SHARE: Final = 0.25
 UNCONFIRMED_HEEL_DEG: Final = 0.25
 """Steady heel by a pressure that does little harm, whichever way it presses."""
+NOISE_LIMIT: Final = 5.0
+"""Noise, in the figures of the sensors, from which a signal counts as degraded."""
 DEGRADED_SHARE: Final = 0.5
 """Of the greatest pressure, or of that which would take the ship to her roll limit if it was held:
 nobody knows whether it presses the right way, and a step heels her up to twice as far at first."""
+LEAST_ROLL_DEG: Final = 0.2
+ROLL_PUSH_AT_W0: Final = 0.6
+"""The tank's equation judges from so many degrees RMS on, which push the water by this share of
+g L phi at w0: the least of the shipped tanks, the naval vessel's (Patti-B's has 0.93)."""
 ZERO_HEEL_DEG: Final = 0.3
 """Steady heel by which motion sensor, gauges and pressure sensor may disagree about the water."""
 
@@ -72,8 +78,8 @@ class MonitorThresholds:
         Noise at which the signals count as degraded.
     drift_rad : float
         Roll that the integrated rate does not account for.
-    roll_still_rad, rate_still_rad_s : float
-        A signal that stays within this of a value does not move.
+    roll_still_rad : float
+        A roll that stays within this of a value does not move.
     level_still_m : float
         The same of the level.
     volume_m : float
@@ -111,7 +117,6 @@ class MonitorThresholds:
     level_noise_m: float
     drift_rad: float
     roll_still_rad: float
-    rate_still_rad_s: float
     level_still_m: float
     volume_m: float
     least_roll_push_m2_s2: float
@@ -142,8 +147,7 @@ def thresholds_of(
     frequency_rad_s = tank.natural_frequency_rad_s
     fastest_rad_s = 2 * frequency_rad_s
     roll_s, rate_s = sensors.roll_noise_rad, sensors.roll_rate_noise_rad_s
-    # push of a roll of 0.2 degrees RMS, a little less at the water's own frequency
-    roll_push_m2_s2 = 0.2 * math.pi / 180 * 0.6 * 9.81 * tank.width_m
+    roll_push_m2_s2 = math.radians(LEAST_ROLL_DEG) * ROLL_PUSH_AT_W0 * GRAVITY_M_S2 * tank.width_m
     model = RollModel(plant.ship, tank)
     held_pa = greatest_held_pa(model, limits.pressure_pa, roll_limit_rad)
     # the noise of 15 s of integrated rate, and of the roll itself
@@ -156,12 +160,11 @@ def thresholds_of(
         rate_most_rad_s2=roll_limit_rad * fastest_rad_s**2,
         level_spike_m=10 * sensors.level_noise_m,
         level_most_m_s=tank.level_limit_m * fastest_rad_s,
-        roll_noise_rad=5 * roll_s,
-        rate_noise_rad_s=5 * rate_s,
+        roll_noise_rad=NOISE_LIMIT * roll_s,
+        rate_noise_rad_s=NOISE_LIMIT * rate_s,
         level_noise_m=3.75 * sensors.level_noise_m,  # in the sum of both
         drift_rad=6 * drift_s,
         roll_still_rad=5 * roll_s,
-        rate_still_rad_s=5 * rate_s,
         level_still_m=3 * sensors.level_noise_m,
         volume_m=max(0.03 * tank.height_m, 6 * sensors.level_noise_m),
         least_roll_push_m2_s2=roll_push_m2_s2,

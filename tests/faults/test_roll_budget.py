@@ -1,0 +1,54 @@
+"""The roll budget of docs/monitors.md: how soon a fault has to be found, from the ship alone."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.dynamics.linear import state_matrices
+from utank_hil.dynamics.sampling import transition_and_step
+
+ROOT = Path(__file__).resolve().parents[2]
+STEP_S, HORIZON_S, RAMP_S, SHARE = 0.02, 60.0, 1.0, 0.25
+BUDGET_S = 7.5
+FOUND_BY_BUDGET = {"rate-stuck", "roll-stuck", "motion-stuck", "one-gauge-stuck", "levels-stuck",
+                   "roll-sign-flipped", "rate-sign-flipped", "replay-160-ms", "replay-1600-ms",
+                   "naval-roll-sign-flipped", "naval-levels-stuck"}  # fmt: skip
+
+
+def time_to_find_s(name: str) -> float:
+    """After which pressure at its limit, in the worst phase, has spent the budget."""
+    config = load_config(ROOT / f"configs/controllers/{name}.yaml", ControllerConfig)
+    a, b = state_matrices(config.vessel.ship, config.vessel.tank)
+    transition, step = transition_and_step(a, b[:, :1], STEP_S)
+    answers, state = [], step[:, 0]
+    for _ in range(round(HORIZON_S / STEP_S)):
+        answers.append(abs(state[0]))
+        state = transition @ state
+    sums_rad = config.limits.pressure_pa * np.concatenate([[0.0], np.cumsum(answers)])
+    within = next(
+        k
+        for k in range(1, len(sums_rad))
+        if np.max(sums_rad[k:] - sums_rad[:-k]) > SHARE * config.safety.roll_limit_rad
+    )
+    return within * STEP_S - RAMP_S / 2
+
+
+@pytest.mark.parametrize(
+    ("name", "least_s", "most_s"),
+    [
+        ("gpc", BUDGET_S, 8.5),
+        ("naval_constrained_gpc", BUDGET_S, 8.5),
+        ("patti_b_constrained_gpc", -0.5, 0.0),  # no monitor is fast enough
+    ],
+)
+def test_the_budget_is_what_the_page_says(name: str, least_s: float, most_s: float) -> None:
+    assert least_s <= time_to_find_s(name) <= most_s
+
+
+def test_the_rows_that_no_faster_monitor_watches_have_the_limit_of_the_budget() -> None:
+    campaign = yaml.safe_load((ROOT / "configs/faults/campaign.yaml").read_text())
+    limits = {row["id"]: row["limit"].get("found_ms") for row in campaign["rows"] if "limit" in row}
+    assert {limits[row] for row in FOUND_BY_BUDGET} == {1e3 * BUDGET_S}
