@@ -95,7 +95,7 @@ class Plant:
             heel = b[:, 1:] * ship.heeling_moment_nm
             push_pa = tank.density_kg_m3 * GRAVITY_M_S2 * tank.width_m  # per acceleration over g
             lever_nm = GRAVITY_M_S2 * float(water_moments(tank, 0.0).first_kgm[2])
-            self._linear_model = np.hstack([a, b, heel, b @ [[-push_pa], [lever_nm]]])
+            self._linear_model = np.hstack([a, b, heel, b[:, 1:] * lever_nm - b[:, :1] * push_pa])
             ship = replace(ship, quadratic_damping_nms2_rad2=0.0)
             tank = replace(tank, quadratic_loss=0.0)
         model = RollModel(ship, tank)

@@ -6,6 +6,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.elementary import angles_of, each, exp, log, phasors, sizes
 from utank_hil.base.tick import TICK_S
 from utank_hil.sea import Harmonics
 from utank_hil.sea.encounter import encounter_frequency
@@ -21,6 +22,14 @@ _LEAST: Final = 1e-12  # share of the largest amplitude: a ratio cannot start fr
 
 Response = Callable[[FloatArray, FloatArray], ComplexArray]
 """Complex amplitude per m of a wave's, shape (N,), of wave frequencies and headings."""
+
+
+def _product(a: ComplexArray, b: ComplexArray) -> ComplexArray:
+    """Return a b, whose terms numpy's product fuses where the processor can."""
+    real = a.real * b.real - a.imag * b.imag
+    result = np.empty(real.shape, dtype=np.complex128)
+    result.real, result.imag = real, a.real * b.imag + a.imag * b.real
+    return result
 
 
 class Waves(Protocol):
@@ -44,10 +53,10 @@ class SteadyWaves:
 
     def __init__(self, *forces: Harmonics) -> None:
         frequency = forces[0].frequency_rad_s
-        self._rotations = np.array([np.exp(1j * frequency * TICK_S)] * len(forces))
+        self._rotations = np.array([phasors(1.0, frequency * TICK_S)] * len(forces))
         lead_rad = AHEAD_TICKS * frequency * TICK_S
         self._phasors = np.array(
-            [force.amplitude * np.exp(1j * (force.phase_rad - lead_rad)) for force in forces]
+            [phasors(force.amplitude, force.phase_rad - lead_rad) for force in forces]
         )
 
     def begin(self) -> tuple[ComplexArray, ComplexArray]:
@@ -86,8 +95,8 @@ class PassingWaves:
         lead_s = AHEAD_TICKS * TICK_S
         self._angle_rad = sea.phase_rad - lead_s * self._encounter_rad_s(0.0)
         self._amplitude = self._amplitudes(0.0)
-        self._phasors = self._amplitude * np.exp(1j * self._angle_rad)
-        rotation = np.exp(1j * TICK_S * self._encounter_rad_s(0.0))
+        self._phasors = _product(self._amplitude, phasors(1.0, self._angle_rad))
+        rotation = phasors(1.0, TICK_S * self._encounter_rad_s(0.0))
         self._rotations = np.tile(rotation, (len(responses), 1))
 
     def begin(self) -> tuple[ComplexArray, ComplexArray]:
@@ -109,8 +118,11 @@ class PassingWaves:
         )
         turn_rad = step_s / 6 * (first + 4 * middle + last)
         before, after = self._amplitude, self._amplitudes(now_s + step_s)
-        self._phasors[:] = before * np.exp(1j * self._angle_rad)  # rounding does not accumulate
-        self._rotations = np.exp((np.log(after / before) + 1j * turn_rad) / RENEWED_TICKS)
+        # rounding does not accumulate
+        self._phasors[:] = _product(before, phasors(1.0, self._angle_rad))
+        growth = each(log, sizes(after) / sizes(before)) / RENEWED_TICKS
+        angle_rad = angles_of(_product(after, before.conj())) + turn_rad
+        self._rotations = phasors(each(exp, growth), angle_rad / RENEWED_TICKS)
         self._angle_rad += turn_rad
         self._amplitude = after
 
@@ -129,6 +141,6 @@ class PassingWaves:
         omega_rad_s = self._sea.omega_rad_s
         rows = [amplitude_m * response(omega_rad_s, heading_rad) for response in self._responses]
         amplitude = np.array(rows)
-        size = np.abs(amplitude)
+        size = sizes(amplitude)
         least = _LEAST * np.maximum(size.max(axis=1, keepdims=True), 1.0)
         return np.where(size > least, amplitude, least)

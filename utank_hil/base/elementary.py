@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.base.arrays import FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 
 _LOG2_HIGH: Final = 6.93147180369123816490e-01  # 32 bits: its products with exponents are exact
 _LOG2_LOW: Final = 1.90821492927058770002e-10
@@ -85,6 +85,32 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     if turn & 1:
         sin, cos = cos, -sin
     return (-sin, -cos) if turn & 2 else (sin, cos)
+
+
+def sines_cosines(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sines and cosines of angles, as `sine_cosine`."""
+    both = np.array([sine_cosine(x) for x in angles.ravel().tolist()]).reshape(*angles.shape, 2)
+    return both[..., 0], both[..., 1]
+
+
+def phasors(size: FloatArray | float, angles: FloatArray) -> ComplexArray:
+    """Complex numbers of these sizes and angles."""
+    sines, cosines = sines_cosines(angles)
+    real = size * cosines
+    result = np.empty(real.shape, dtype=np.complex128)
+    result.real, result.imag = real, size * sines
+    return result
+
+
+def sizes(values: ComplexArray) -> FloatArray:
+    """Absolute values of complex numbers."""
+    return np.sqrt(values.real * values.real + values.imag * values.imag)
+
+
+def angles_of(values: ComplexArray) -> FloatArray:
+    """Angles of complex numbers, -pi to pi."""
+    pairs = zip(values.imag.ravel().tolist(), values.real.ravel().tolist(), strict=True)
+    return np.array([arctan2(y, x) for y, x in pairs]).reshape(values.shape)
 
 
 def arctan2(y: float, x: float) -> float:

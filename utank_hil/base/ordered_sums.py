@@ -1,10 +1,10 @@
 """Products of arrays whose sums have one order, the same on every processor.
 
 A linear-algebra library chooses its order of summation by processor, shape and memory. Here each
-product is rounded, then added: numpy's `multiply` and `add` are single IEEE operations. With a
-vector the sum of a row is pairwise (`numpy.add.reduce` of contiguous numbers): from 8 terms on in
-eight interleaved sums, joined in pairs, halves from 129 terms on. With a matrix the terms are added
-from first to last.
+term is rounded, then added: numpy's `multiply` and `add` are single IEEE operations. The sum of n
+terms is that of `numpy.add.reduce` over contiguous numbers: from first to last for n < 8; for
+n <= 128 in eight interleaved sums, which are joined in pairs, the rest after them; else of two
+halves, the first of a multiple of eight terms.
 """
 
 import math
@@ -16,13 +16,10 @@ from utank_hil.base.arrays import FloatArray
 
 def product(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return a @ b for `a` of shape (n,) or (m, n), and `b` of shape (n,) or (n, k)."""
-    if b.ndim == 1:
-        # C order, as the order of a sum follows that of the memory; 0 makes a sum of -0.0 one of 0
-        return np.add.reduce(np.multiply(a, b, order="C"), axis=-1, initial=0.0)  # type: ignore[no-any-return]
-    total: FloatArray = np.zeros((*a.shape[:-1], b.shape[1]))
-    for i, row in enumerate(b):
-        total += a[..., i, None] * row
-    return total
+    # in C order, as the order of a sum follows the memory; a sum from 0 is not -0
+    terms = np.multiply(a if b.ndim == 1 else a[..., None, :], b.T, order="C")
+    summed: FloatArray = np.add.reduce(terms, axis=-1, initial=0.0)
+    return summed
 
 
 def exponential(a: FloatArray) -> FloatArray:

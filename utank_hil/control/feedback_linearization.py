@@ -39,6 +39,7 @@ from typing import Literal
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.elementary import sine_cosine
 from utank_hil.base.parameters import NotNegative, Positive, SampleTime, range_problems, refuse
 from utank_hil.base.tick import TICK_S
 from utank_hil.control.design_plant import DesignPlant
@@ -144,13 +145,14 @@ class FeedbackLinearization(FeedbackLinearizationDesign):
         _, phi_ddot, _, h_ddot = self.model.derivative(state).tolist()  # without the pump
         output, rate, drift = self._output(state.tolist(), phi_ddot, h_ddot)
         w = self.frequency_rad_s
-        wanted = -(w**2) * (output - target_rad) - 2 * self.damping_ratio * w * rate
+        wanted = -w * w * (output - target_rad) - 2 * self.damping_ratio * w * rate
         brake = self._brake_pa_s_m * float(state[3])
         return (wanted - drift) / self._grip(float(state[2])) - brake
 
     def share(self, level_m: float, level_rate_m_s: float) -> float:
         """Share of the linearizing pressure allowed at this swing of the level, 0 to 1."""
-        swing = math.hypot(level_m, level_rate_m_s / self.tank.natural_frequency_rad_s)
+        rate_m = level_rate_m_s / self.tank.natural_frequency_rad_s
+        swing = math.sqrt(level_m * level_m + rate_m * rate_m)
         x = (self.hard_level_m - swing) / (self.hard_level_m - self.soft_level_m)
         x = min(max(x, 0.0), 1.0)
         return x * x * (3 - 2 * x)
@@ -165,19 +167,20 @@ class FeedbackLinearization(FeedbackLinearizationDesign):
         """Output s, its rate, and its acceleration for given accelerations."""
         phi, phi_dot, h, h_dot = state
         shift, length = self.shift_rad_m, self.shift_length_m
-        sin, cos = math.sin(h / length), math.cos(h / length)
+        sin, cos = sine_cosine(h / length)
         return (
             phi + shift * length * sin,
             phi_dot + shift * cos * h_dot,
-            phi_ddot + shift * (cos * h_ddot - sin * h_dot**2 / length),
+            phi_ddot + shift * (cos * h_ddot - sin * h_dot * h_dot / length),
         )
 
     def _grip(self, level_m: float) -> float:
         """Acceleration of s per pressure: g_phi + kL cos(h / l) g_h."""
         c = self.model.coefficients
-        roll_inertia = c.inertia + c.inertia_h2 * level_m**2
-        determinant = roll_inertia * c.level_inertia - c.coupling**2
-        shifted = self.shift_rad_m * math.cos(level_m / self.shift_length_m) * roll_inertia
+        roll_inertia = c.inertia + c.inertia_h2 * level_m * level_m
+        determinant = roll_inertia * c.level_inertia - c.coupling * c.coupling
+        _, cos = sine_cosine(level_m / self.shift_length_m)
+        shifted = self.shift_rad_m * cos * roll_inertia
         return c.area * (shifted - c.coupling) / determinant
 
 
@@ -188,7 +191,7 @@ def level_brake(model: RollModel, damping_ratio: float) -> float:
     """
     c, tank = model.coefficients, model.tank
     frequency = math.sqrt(GRAVITY_M_S2 / (tank.height_m + tank.lz_m))
-    inertia = (c.inertia * c.level_inertia - c.coupling**2) / (c.inertia * c.area)
+    inertia = (c.inertia * c.level_inertia - c.coupling * c.coupling) / (c.inertia * c.area)
     return 2 * damping_ratio * frequency * inertia
 
 

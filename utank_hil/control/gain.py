@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import SampleTime, range_problems, refuse
 from utank_hil.dynamics.sampling import LinearModel
 
@@ -60,8 +61,7 @@ class GainController:
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Return -K (y - reference)."""
         error = y if reference is None else y - reference
-        u: FloatArray = self._gain.dot(error)
-        return u
+        return product(self._gain, error)
 
     def applied(self, u: FloatArray) -> None:
         """Ignore the command; the law has no memory."""

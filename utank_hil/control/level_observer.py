@@ -14,6 +14,7 @@ time, with pole^n in place of the pole after n periods.
 import math
 from typing import Final
 
+from utank_hil.base.elementary import exp
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 LONGEST_GAP_S: Final = 1.0
@@ -43,11 +44,11 @@ class LevelObserver:
     def __init__(self, tank: Tank, period_s: float) -> None:
         if not period_s > 0:
             raise ValueError(f"period_s must be positive, got {period_s}")
-        pole = math.exp(-BANDWIDTH_RAD_S * period_s)
+        pole = exp(-BANDWIDTH_RAD_S * period_s)
         self._period_s = period_s
         self._pole = pole
-        self._alpha = 1.0 - pole**2
-        self._beta = (1.0 - pole) ** 2
+        self._alpha = 1.0 - pole * pole
+        self._beta = (1.0 - pole) * (1.0 - pole)
         self._longest = round(LONGEST_GAP_S / period_s)
         self._ahead = 0  # periods since the last measurement
         self._inertia_pa_s2_m = tank.density_kg_m3 * tank.effective_length_m
@@ -79,8 +80,10 @@ class LevelObserver:
             self.predict(pressure_pa)
         self._ahead = 0
         if periods > 1:
-            pole = self._pole**periods
-            alpha, beta = 1.0 - pole**2, (1.0 - pole) ** 2 / periods
+            pole = 1.0
+            for _ in range(periods):
+                pole *= self._pole
+            alpha, beta = 1.0 - pole * pole, (1.0 - pole) * (1.0 - pole) / periods
         surprise_m = measured_m - self.level_m
         self.level_m += alpha * surprise_m
         self.rate_m_s += beta / self._period_s * surprise_m

@@ -106,7 +106,8 @@ class CommandLimiter:
         if room_m <= 1e-3:
             return -most_pa
         swing_m = rate_m_s / self._frequency_rad_s
-        touch_m = (limits.level_m**2 - level_m**2 - swing_m**2) / (2 * room_m)
+        squares_m2 = limits.level_m * limits.level_m - level_m * level_m - swing_m * swing_m
+        touch_m = squares_m2 / (2 * room_m)
         brake_pa = limits.brake_share * most_pa
         allowed = -brake_pa + limits.sharpness * (self._stiffness_pa_m * touch_m + brake_pa)
         return min(max(allowed, -most_pa), most_pa)

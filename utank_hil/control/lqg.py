@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.ordered_sums import product
 from utank_hil.control.arx import discrete_matrices
 from utank_hil.control.gain import GainLaw
 from utank_hil.dynamics.sampling import LinearModel
@@ -232,8 +233,7 @@ class LQGController:
     @property
     def innovation(self) -> FloatArray:
         """Newest measurement less its prediction, shape (m,); white for the true model."""
-        surprise: FloatArray = self._surprise @ self._stepped
-        return surprise
+        return product(self._surprise, self._stepped)
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take the newest measurement, shape (m,), and return the command, shape (r,).
@@ -248,7 +248,7 @@ class LQGController:
         """
         memory, own = self._memory, self._own
         memory[own:] = y
-        following: FloatArray = self._advance.dot(memory)
+        following = product(self._advance, memory)
         command = following[self._command]
         if reference is not None:
             if self._reference_gain is None:
@@ -256,7 +256,7 @@ class LQGController:
                     "reference: the law's model has a pole at 1 and so no steady state to hold a "
                     "target with; step it without, or give the model's pole some decay"
                 )
-            command += self._reference_gain @ reference
+            command += product(self._reference_gain, reference)
         # the previous vector is kept for the innovation
         self._memory, self._stepped = self._stepped, memory
         self._memory[:own] = following

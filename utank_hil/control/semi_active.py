@@ -46,9 +46,9 @@ def throttled(valve: ValveRange, pressure_pa: float, flow_m_s: float) -> float:
     """
     if pressure_pa * flow_m_s >= 0:
         return valve.open_loss
-    if abs(pressure_pa) >= valve.shut_loss * flow_m_s**2:  # also at vanishing flow
+    if abs(pressure_pa) >= valve.shut_loss * flow_m_s * flow_m_s:  # also at vanishing flow
         return valve.shut_loss
-    return max(abs(pressure_pa) / flow_m_s**2, valve.open_loss)
+    return max(abs(pressure_pa) / (flow_m_s * flow_m_s), valve.open_loss)
 
 
 @dataclass(slots=True, eq=False)

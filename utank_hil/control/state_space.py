@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import Finite, Problem, SampleTime, range_problems, refuse
 from utank_hil.control.arx import discrete_matrices
 from utank_hil.control.design_plant import DesignPlant
@@ -89,8 +90,8 @@ class StateSpaceController:
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Return C x + D (y - reference), shape (r,), and advance the state."""
         error = y if reference is None else y - reference
-        u: FloatArray = self._c.dot(self._state) + self._d.dot(error)
-        self._state = self._a.dot(self._state) + self._b.dot(error)
+        u = product(self._c, self._state) + product(self._d, error)
+        self._state = product(self._a, self._state) + product(self._b, error)
         return u
 
     def applied(self, u: FloatArray) -> None:

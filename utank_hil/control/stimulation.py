@@ -21,6 +21,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.elementary import sine_cosine
 from utank_hil.base.parameters import (
     Positive,
     Problem,
@@ -209,7 +210,7 @@ class StimulationController:
             size = plan.pressure_pa
             self._steps_to_growth = self._period_steps
         self._size_pa = size
-        self._command_pa = size * math.sin(self._turn * self._steps)
+        self._command_pa = size * sine_cosine(self._turn * self._steps)[0]
         self._steps += 1
         self._steps_in_charge += 1
         return np.array([self._command_pa])
@@ -241,8 +242,9 @@ class StimulationController:
             self._factor = min(max(self._factor, FACTOR[0]), FACTOR[1])
 
     def _lock_in(self, roll_rad: float) -> None:
-        angle = self._turn * self._steps
-        turned = roll_rad * complex(math.cos(angle), -math.sin(angle))
+        sine, cosine = sine_cosine(self._turn * self._steps)
+        turned = complex(roll_rad * cosine, -roll_rad * sine)
         self._first += self._share * (turned - self._first)
         self._second += self._share * (self._first - self._second)
-        self.amplitude_rad = 2 * abs(self._second)
+        in_phase, behind = self._second.real, self._second.imag
+        self.amplitude_rad = 2 * math.sqrt(in_phase * in_phase + behind * behind)

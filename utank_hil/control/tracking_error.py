@@ -35,7 +35,8 @@ class ErrorDynamics:
     @property
     def gains(self) -> tuple[float, float]:
         """Gains k of the outer loop: w^2 and 2 zeta w."""
-        return self.frequency_rad_s**2, 2 * self.damping_ratio * self.frequency_rad_s
+        w = self.frequency_rad_s
+        return w * w, 2 * self.damping_ratio * w
 
     @property
     def lyapunov(self) -> FloatArray:

@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray
+from utank_hil.base.elementary import tanh
 from utank_hil.control.interface import Controller, LinearLaw
 from utank_hil.dynamics.sampling import LinearModel
 
@@ -50,7 +51,8 @@ class WashoutLaw:
     @property
     def share(self) -> float:
         """Weight of the newest sample in the mean."""
-        return -math.expm1(-self.corner_rad_s * self.sample_time_s)
+        half = tanh(self.corner_rad_s * self.sample_time_s / 2)
+        return 2 * half / (1 + half)
 
     def controller(self) -> Controller:
         """Return a new controller at rest; a reference is relative to the mean."""

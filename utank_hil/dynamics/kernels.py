@@ -14,6 +14,7 @@ import math
 import numpy as np
 from numba import prange
 
+from utank_hil.base import elementary
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.jit import njit
 from utank_hil.dynamics.nonlinear import RollCoefficients
@@ -25,37 +26,13 @@ STRIKES_PER_STEP = 8  # The water comes to rest at the stop beyond these.
 # steps with impacts.
 CAPSIZED_S, MAX_ROLL, MAX_LEVEL, STRIKES, MAX_IMPULSE, STRIKE_LOSS, DAMPED_AROUND = range(7)
 SUMMARY = 7
-# This allows reordered and fused sums for vector instructions; NaN and infinity stay exact.
-FAST = {"reassoc", "contract", "nsz", "arcp"}
 
 State = tuple[float, float, float, float]
 InStep = tuple[float, float, float]
 """Values of a quantity at start, middle and end of a step."""
 NO_SWAY = (0.0, 0.0, 0.0)
-
-
-@njit(fastmath=FAST, error_model="numpy")
-def sine_cosine(angle: float) -> tuple[float, float]:
-    """Sine and cosine together, to 2e-16 for angles of a few turns.
-
-    The minimax polynomials of fdlibm on -pi/4 to pi/4; they halve the time of a step.
-    """
-    quarter = math.floor(angle * (2 / math.pi) + 0.5)
-    r = angle - quarter * (math.pi / 2)
-    z = r * r
-    sin = -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10
-    sin = -1.98412698298579493134e-04 + z * (2.75573137070700676789e-06 + z * sin)
-    sin = r + r * z * (-1.66666666666666324348e-01 + z * (8.33333333332248946124e-03 + z * sin))
-    cos = 2.08757232129817482790e-09 - z * 1.13596475577881948265e-11
-    cos = 2.48015872894767294178e-05 + z * (-2.75573143513906633035e-07 + z * cos)
-    cos = 4.16666666666666019037e-02 + z * (-1.38888888888741095749e-03 + z * cos)
-    cos = 1 - 0.5 * z + z * z * cos
-    if quarter == 0:
-        return sin, cos
-    turn = int(quarter) & 3
-    if turn & 1:
-        sin, cos = cos, -sin
-    return (-sin, -cos) if turn & 2 else (sin, cos)
+# No kernel reorders or fuses sums (`fastmath`): processors would differ in their last digits.
+sine_cosine = njit(error_model="numpy")(elementary.sine_cosine)
 
 
 @njit(error_model="numpy")
@@ -68,7 +45,7 @@ def unpacked(row: FloatArray) -> RollCoefficients:
 
 
 # Passing the coefficients four times a step would cost a third of the step.
-@njit(fastmath=FAST, error_model="numpy", inline="always")
+@njit(error_model="numpy", inline="always")
 def accelerations(
     c: RollCoefficients,
     per_piece: float,
@@ -123,7 +100,7 @@ def accelerations(
     return (c.level_inertia * roll_moment - c.coupling * level_force) * scale, h_ddot
 
 
-@njit(fastmath=FAST, error_model="numpy")
+@njit(error_model="numpy")
 def rk4(
     c: RollCoefficients,
     per_piece: float,
@@ -178,9 +155,10 @@ def sway_work_j(c: RollCoefficients, before: State, after: State, sway: float) -
     raised = 0.0
     for side, state in ((1.0, before), (-1.0, after)):
         phi, _, h, _ = state
+        sine, cosine = sine_cosine(phi)
         across = c.weight_h * h
         down = c.weight_lever - c.weight_h2 * h * h
-        raised += side * (across * math.cos(phi) - down * math.sin(phi))
+        raised += side * (across * cosine - down * sine)
     return sway * raised
 
 
@@ -252,7 +230,7 @@ def step_with_impacts(
             rebound = 0.0
         jump = rebound - w
         roll_jump = -c.coupling / roll_inertia * jump
-        stop_impulse = (c.level_inertia - c.coupling**2 / roll_inertia) * jump
+        stop_impulse = (c.level_inertia - c.coupling * c.coupling / roll_inertia) * jump
         number = int(summary[STRIKES])
         if number < impacts.shape[0]:
             impacts[number, 0] = time + done * dt
@@ -273,7 +251,7 @@ def step_with_impacts(
     return x, v, math.copysign(min(abs(h), limit), h), w
 
 
-@njit(fastmath=FAST, error_model="numpy")
+@njit(error_model="numpy")
 def advance(
     row: FloatArray,
     per_piece: float,
@@ -306,8 +284,8 @@ def advance(
     half_cos, half_sin = np.empty(waves), np.empty(waves)
     full_cos, full_sin = np.empty(waves), np.empty(waves)
     for j in range(waves):
-        half_cos[j], half_sin[j] = math.cos(frequency[j] * dt / 2), math.sin(frequency[j] * dt / 2)
-        full_cos[j], full_sin[j] = math.cos(frequency[j] * dt), math.sin(frequency[j] * dt)
+        half_sin[j], half_cos[j] = sine_cosine(frequency[j] * dt / 2)
+        full_sin[j], full_cos[j] = sine_cosine(frequency[j] * dt)
     now = (state[0], state[1], state[2], state[3])
     alive = summary[CAPSIZED_S] == np.inf
     max_roll, max_level = summary[MAX_ROLL], summary[MAX_LEVEL]
@@ -331,8 +309,8 @@ def advance(
         if i == 0 or step & (REFRESH - 1) == 0:
             start = 0.0
             for j in range(waves):
-                angle = frequency[j] * (step * dt) + phase[j]
-                re[j], im[j] = amplitude[j] * math.cos(angle), amplitude[j] * math.sin(angle)
+                sine, cosine = sine_cosine(frequency[j] * (step * dt) + phase[j])
+                re[j], im[j] = amplitude[j] * cosine, amplitude[j] * sine
                 start += re[j]
         middle, end = 0.0, 0.0
         for j in range(waves):
@@ -364,7 +342,7 @@ def advance(
         state[k] = now[k]
 
 
-@njit(fastmath=FAST, parallel=True, error_model="numpy")
+@njit(parallel=True, error_model="numpy")
 def advance_batch(
     rows: FloatArray,
     per_piece: FloatArray,

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.ordered_sums import product
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
@@ -54,11 +55,13 @@ def coupled_matrices(ship: RollShip, tank: Tank) -> tuple[FloatArray, FloatArray
 def state_matrices(ship: RollShip, tank: Tank) -> tuple[FloatArray, FloatArray]:
     """State matrix (4, 4) for `STATES`, input matrix (4, 2) for `INPUTS`; no python-control."""
     mass, damping, stiffness = coupled_matrices(ship, tank)
-    inverse = np.linalg.inv(mass)
+    (m11, m12), (_, m22) = mass
+    inverse = np.array([[m22, -m12], [-m12, m11]]) / (m11 * m22 - m12 * m12)
     effort = np.array([[0.0, 1.0], [tank.reservoir_area_m2, 0.0]])
     # The model is of first order in q and q', then sorted into (phi, phi', h, h').
-    a = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ stiffness, -inverse @ damping]])
-    b = np.vstack([np.zeros((2, 2)), inverse @ effort])
+    rows = -product(inverse, stiffness), -product(inverse, damping)
+    a = np.block([[np.zeros((2, 2)), np.eye(2)], [*rows]])
+    b = np.vstack([np.zeros((2, 2)), product(inverse, effort)])
     order = [0, 2, 1, 3]
     return a[np.ix_(order, order)], b[order]
 

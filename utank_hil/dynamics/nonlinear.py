@@ -38,6 +38,7 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.elementary import sines_cosines
 from utank_hil.dynamics.restoring import Restoring, restoring
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
@@ -129,9 +130,9 @@ class RollModel:
         """
         c = self.coefficients
         phi, phi_dot, h, h_dot = np.moveaxis(np.asarray(state, dtype=np.float64), -1, 0)
-        sin, cos = np.sin(phi), np.cos(phi)
+        sin, cos = sines_cosines(phi)
         sway = np.asarray(sway_m_s2) / GRAVITY_M_S2
-        roll_inertia = c.inertia + c.inertia_h2 * h**2
+        roll_inertia = c.inertia + c.inertia_h2 * h * h
         roll_moment = (
             np.asarray(wave_moment_nm)
             + c.wind_moment
@@ -140,14 +141,14 @@ class RollModel:
             - self.restoring.moment_nm(phi)
             - 2 * c.inertia_h2 * h * h_dot * phi_dot
             + c.weight_h * h * cos
-            - (c.weight_lever - c.weight_h2 * h**2) * sin
-            + sway * (c.weight_h * h * sin + (c.weight_lever - c.weight_h2 * h**2) * cos)
+            - (c.weight_lever - c.weight_h2 * h * h) * sin
+            + sway * (c.weight_h * h * sin + (c.weight_lever - c.weight_h2 * h * h) * cos)
         )
         loss = c.quadratic_loss + c.area * np.asarray(valve_loss_pa_per_m2_s2)
         level_force = (
             c.area * np.asarray(pressure_pa)
             - (c.loss + loss * np.abs(h_dot)) * h_dot
-            + c.inertia_h2 * h * phi_dot**2
+            + c.inertia_h2 * h * phi_dot * phi_dot
             + c.weight_h * sin
             - 2 * c.weight_h2 * h * cos
             - sway * (c.weight_h * cos + 2 * c.weight_h2 * h * sin)
@@ -155,7 +156,7 @@ class RollModel:
         if stopped:
             phi_ddot, h_ddot = roll_moment / roll_inertia, np.zeros_like(h)
         else:
-            determinant = roll_inertia * c.level_inertia - c.coupling**2
+            determinant = roll_inertia * c.level_inertia - c.coupling * c.coupling
             phi_ddot = (c.level_inertia * roll_moment - c.coupling * level_force) / determinant
             h_ddot = (roll_inertia * level_force - c.coupling * roll_moment) / determinant
         return np.stack(np.broadcast_arrays(phi_dot, phi_ddot, h_dot, h_ddot), axis=-1)
@@ -167,11 +168,11 @@ class RollModel:
         """
         c = self.coefficients
         phi, phi_dot, h, h_dot = (float(x) for x in state)
-        roll_inertia = c.inertia + c.inertia_h2 * h**2
+        roll_inertia = c.inertia + c.inertia_h2 * h * h
         jump = -(1 + c.restitution) * h_dot
         roll_jump = -c.coupling / roll_inertia * jump
         after = np.array([phi, phi_dot + roll_jump, h, h_dot + jump])
-        stop_impulse = (c.level_inertia - c.coupling**2 / roll_inertia) * jump
+        stop_impulse = (c.level_inertia - c.coupling * c.coupling / roll_inertia) * jump
         return after, Impact(time_s, h, h_dot, c.ship_inertia * roll_jump, stop_impulse)
 
 

@@ -27,6 +27,7 @@ from dataclasses import dataclass
 from types import FunctionType
 from typing import Any, NamedTuple
 
+from utank_hil.base.elementary import exp
 from utank_hil.base.parameters import Positive, Problem, range_problems, refuse
 
 
@@ -163,10 +164,10 @@ class Pump:
             pitch_m=0.40 * size,
             lift=1.405,
             friction=0.005,
-            inertia_kg_m2=1700.0 * size**5,
+            inertia_kg_m2=1700.0 * size * size * size * size * size,
             max_speed_rad_s=28.0 * speed / size,
-            max_torque_nm=200e3 * speed**2 * size**3,
-            max_power_w=3.6e6 * speed**3 * size**2,
+            max_torque_nm=200e3 * speed * speed * size * size * size,
+            max_power_w=3.6e6 * speed * speed * speed * size * size,
             max_pressure_pa=max_pressure_pa,
             max_pressure_rate_pa_s=10 * max_pressure_pa,
         )
@@ -202,20 +203,24 @@ class Pump:
         )
 
 
+def _length(x: float, y: float) -> float:
+    return math.sqrt(x * x + y * y)  # `hypot` is the C library's
+
+
 def pump_pressure(speed: float, flow: float, c: PumpCoefficients) -> float:
     """Pressure rise in Pa at a speed (rad/s) and a flow to starboard (m^3/s)."""
     u = flow / c.area
-    return c.half_rho_lift * math.hypot(c.radius * speed, u) * (c.pitch * speed - u)
+    return c.half_rho_lift * _length(c.radius * speed, u) * (c.pitch * speed - u)
 
 
 def pump_load(speed: float, flow: float, c: PumpCoefficients) -> tuple[float, float]:
     """Load torque of the water in N m, and its derivative by speed in N m s, zero or more."""
     u = flow / c.area
     rn = c.radius * speed
-    w = math.hypot(rn, u) + 1e-9  # The offset avoids division by zero.
+    w = _length(rn, u) + 1e-9  # The offset avoids division by zero.
     slip = c.pitch * speed - u
     drag = c.pitch * c.half_rho_lift * slip + c.half_rho_friction * c.radius * rn
-    drag_slope = c.half_rho_lift * c.pitch**2 + c.half_rho_friction * c.radius**2
+    drag_slope = c.half_rho_lift * c.pitch * c.pitch + c.half_rho_friction * c.radius * c.radius
     slope = c.area * (c.radius * rn / w * drag + w * drag_slope)
     return c.area * w * drag, max(slope, 0.0)
 
@@ -226,7 +231,7 @@ def pump_losses(speed: float, flow: float, c: PumpCoefficients) -> float:
     rn = c.radius * speed
     slip = c.pitch * speed - u
     per_speed = c.half_rho_lift * slip * slip + c.half_rho_friction * rn * rn
-    return c.area * math.hypot(rn, u) * per_speed
+    return c.area * _length(rn, u) * per_speed
 
 
 def pump_speed(pressure: float, flow: float, c: PumpCoefficients) -> float:
@@ -239,7 +244,7 @@ def pump_speed(pressure: float, flow: float, c: PumpCoefficients) -> float:
     slip = 2.0 * wanted / (b + math.sqrt(b * b + 4.0 * a * abs(wanted)) + 1e-12)
     speed = (u + slip) / c.pitch
     for _ in range(8):  # Newton's method: the head curve is smooth and monotone.
-        w = math.hypot(c.radius * speed, u)
+        w = _length(c.radius * speed, u)
         slip = c.pitch * speed - u
         slope = w * c.pitch + c.radius * c.radius * speed * slip / (w + 1e-12)
         if slope < 1e-9:
@@ -266,7 +271,7 @@ def pump_step(
         Step, about 20 ms at most.
     """
     target = min(max(setpoint, -c.max_pressure), c.max_pressure)
-    change = (target - state.reference_pa) * (1.0 - math.exp(-step_s / c.reference_lag))
+    change = (target - state.reference_pa) * (1.0 - exp(-step_s / c.reference_lag))
     bound = c.max_pressure_rate * step_s
     reference = state.reference_pa + min(max(change, -bound), bound)
 
@@ -277,7 +282,7 @@ def pump_step(
     # The implicit (linearised) load torque is stable for any step.
     load, slope = pump_load(state.speed_rad_s, flow, c)
     stiffness = c.inertia / step_s + slope
-    speed_change = (command - state.speed_rad_s) * (1.0 - math.exp(-step_s * c.speed_bandwidth))
+    speed_change = (command - state.speed_rad_s) * (1.0 - exp(-step_s * c.speed_bandwidth))
     demanded = load + stiffness * speed_change
     torque, speed = 0.0, state.speed_rad_s
     for _ in range(2):  # The power limit depends on the speed at the end of the step.
@@ -315,7 +320,8 @@ def compile_pump(compiler: Callable[[Any], Any]) -> tuple[Callable[..., Any], Ca
     separate namespace, callees first.
     """
     scope = dict(globals())
-    for function in (pump_pressure, pump_load, pump_speed, pump_step, pump_coast):
+    scope["exp"] = compiler(exp)
+    for function in (_length, pump_pressure, pump_load, pump_speed, pump_step, pump_coast):
         name = function.__name__
         scope[name] = compiler(FunctionType(function.__code__, scope, name))
     return scope["pump_step"], scope["pump_coast"]

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.ordered_sums import orthogonal_triangle, product, solved
 from utank_hil.dynamics.ship import RollShip
 
 
@@ -51,7 +52,7 @@ def restoring(ship: RollShip) -> Restoring:
         coefficients = np.zeros((1, 2 * len(odd)))
         coefficients[0, 1::2] = odd
         return Restoring(math.inf, coefficients)
-    from scipy.interpolate import make_interp_spline
+    from scipy.interpolate import BSpline
 
     levers = np.array(ship.gz_m)
     heel = ship.gz_step_rad * np.arange(len(levers))
@@ -59,8 +60,11 @@ def restoring(ship: RollShip) -> Restoring:
     # Even derivatives vanish at zero heel, so that the odd continuation is smooth there; one knot
     # less at the far end makes up for the third condition.
     knots = np.concatenate([np.zeros(6), heel[1:-2], np.full(6, heel[-1])])
-    conditions = [(1, slope), (2, 0.0), (4, 0.0)]
-    spline = make_interp_spline(heel, levers, k=5, t=knots, bc_type=(conditions, None))
+    basis = BSpline(knots, np.eye(len(levers) + 3), 5)
+    ends = [basis(0.0, nu=k) for k in (1, 2, 4)]
+    orthogonal, triangle = orthogonal_triangle(np.vstack([*ends, basis(heel)]))
+    wanted = product(orthogonal.T, np.concatenate([[slope, 0.0, 0.0], levers]))
+    spline = BSpline(knots, solved(triangle, wanted[:, None])[:, 0], 5)
     taylor = [spline(heel[:-1], nu=k) / math.factorial(k) for k in range(6)]
     return Restoring(ship.gz_step_rad, ship.displacement_n * np.stack(taylor, axis=1))
 

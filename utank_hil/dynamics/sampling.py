@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.ordered_sums import exponential
 
 if TYPE_CHECKING:
     from control import StateSpace
@@ -101,13 +102,11 @@ def transition_and_step(
     a: FloatArray, b: FloatArray, time_s: float
 ) -> tuple[FloatArray, FloatArray]:
     """Transition matrix exp(A t), and the step response of the state to each input at time t."""
-    from scipy.linalg import expm
-
     states = a.shape[0]
     block = np.zeros((states + b.shape[1],) * 2)
     block[:states, :states] = a
     block[:states, states:] = b
-    whole: FloatArray = expm(block * time_s)
+    whole = exponential(block * time_s)
     return whole[:states, :states], whole[:states, states:]
 
 

@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.elementary import sines_cosines
 from utank_hil.dynamics.nonlinear import RollModel
 
 _HEELS_RAD: Final = np.radians(np.linspace(0.0, 89.9, 2000))  # The step is 0.05 degrees.
@@ -102,8 +103,8 @@ def _at_rest(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the roll acceleration, and the level of the water without limits."""
     c = model.coefficients
-    flat_m = c.weight_h * np.tan(roll_rad) / (2 * c.weight_h2)
-    flat_m = flat_m + c.area * pressure_pa / (2 * c.weight_h2 * np.cos(roll_rad))
+    sine, cosine = sines_cosines(roll_rad)
+    flat_m = (c.weight_h * sine + c.area * pressure_pa) / (2 * c.weight_h2 * cosine)
     level_m = np.clip(flat_m, -c.level_limit, c.level_limit)
     still = np.zeros_like(roll_rad)
     states = np.stack([roll_rad, still, level_m, still], axis=-1)

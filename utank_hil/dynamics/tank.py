@@ -94,7 +94,7 @@ class Tank:
     def quadratic_loss_pa_per_m2_s2(self) -> float:
         """Quadratic pressure loss per ``|dh/dt| dh/dt``, from `quadratic_loss`."""
         area_ratio = self.reservoir_area_m2 / self.duct_area_m2
-        return self.quadratic_loss * self.density_kg_m3 / 2 * area_ratio**2
+        return self.quadratic_loss * self.density_kg_m3 / 2 * area_ratio * area_ratio
 
     @property
     def level_limit_m(self) -> float:

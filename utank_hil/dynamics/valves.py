@@ -138,7 +138,8 @@ def duct_valve_loss(tank: Tank, opening: float) -> float:
     """
     _check_opening(opening)
     area_ratio = tank.reservoir_area_m2 / tank.duct_area_m2
-    return tank.density_kg_m3 / 2 * ((1 / opening - 1) * area_ratio) ** 2
+    faster = (1 / opening - 1) * area_ratio
+    return tank.density_kg_m3 / 2 * faster * faster
 
 
 def air_valve_loss(
@@ -170,7 +171,8 @@ def air_valve_loss(
         if not value > 0:
             raise ValueError(f"air valve {name} must be positive, got {value}")
     jet_area = discharge_coefficient * opening * pipe_area_m2
-    return AIR_DENSITY_KG_M3 / 2 * (tank.reservoir_area_m2 / jet_area) ** 2
+    faster = tank.reservoir_area_m2 / jet_area
+    return AIR_DENSITY_KG_M3 / 2 * faster * faster
 
 
 def _check_opening(opening: float) -> None:

@@ -54,12 +54,17 @@ def water_moments(tank: Tank, level_m: npt.ArrayLike) -> WaterMoments:
 
     # These are integrals of y, z, y^2, z^2, y z over the mass; those of x follow from x = lx.
     first_y = rho * at * length * h
-    first_z = rho * (at * (2 * lz * height - height**2 - h**2) + ap * length * lz)
-    square_y = rho * (at * length**2 * height / 2 + ap * length**3 / 12)
+    first_z = rho * (at * (2 * lz * height - height * height - h * h) + ap * length * lz)
+    square_y = rho * (at * length * length * height / 2 + ap * length * length * length / 12)
     square_z = rho * (
         at
-        * (2 * height**3 / 3 - 2 * lz * height**2 + 2 * lz**2 * height + 2 * (height - lz) * h**2)
-        + ap * length * lz**2
+        * (
+            2 * height * height * height / 3
+            - 2 * lz * height * height
+            + 2 * lz * lz * height
+            + 2 * (height - lz) * h * h
+        )
+        + ap * length * lz * lz
     )
     product_yz = rho * at * length * (lz - height) * h
     slope_y, slope_z = rho * at * length, -2 * rho * at * h
@@ -67,8 +72,8 @@ def water_moments(tank: Tank, level_m: npt.ArrayLike) -> WaterMoments:
 
     inertia = np.empty((*h.shape, 3, 3))
     inertia[..., 0, 0] = square_y + square_z
-    inertia[..., 1, 1] = mass * lx**2 + square_z
-    inertia[..., 2, 2] = mass * lx**2 + square_y
+    inertia[..., 1, 1] = mass * lx * lx + square_z
+    inertia[..., 2, 2] = mass * lx * lx + square_y
     inertia[..., 0, 1] = inertia[..., 1, 0] = -lx * first_y
     inertia[..., 0, 2] = inertia[..., 2, 0] = -lx * first_z
     inertia[..., 1, 2] = inertia[..., 2, 1] = -product_yz

@@ -8,6 +8,7 @@ estimate was of the same ship.
 import math
 from typing import Final
 
+from utank_hil.base.elementary import exp, log
 from utank_hil.canbus import Verdict
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 
@@ -46,16 +47,20 @@ def ship_factor(now: ShipFigures, then: ShipFigures) -> float:
     """Factor, 1 or more, by which two ships differ; 1 if that is not significant."""
     by_period = _significant(
         now.roll_period_s / then.roll_period_s,
-        math.hypot(now.period_deviation, then.period_deviation),
+        _together(now.period_deviation, then.period_deviation),
     )
     by_stiffness = _significant(
         math.sqrt(now.stiffness_nm_rad / then.stiffness_nm_rad),
-        math.hypot(now.stiffness_deviation, then.stiffness_deviation) / 2,
+        _together(now.stiffness_deviation, then.stiffness_deviation) / 2,
     )
     return max(by_period, by_stiffness)
 
 
+def _together(a: float, b: float) -> float:
+    return math.sqrt(a * a + b * b)
+
+
 def _significant(ratio: float, deviation: float) -> float:
     """Return the ratio as a factor of 1 or more; 1 if it is within the deviations."""
-    change = abs(math.log(ratio))
-    return math.exp(change) if change > SIGNIFICANT * deviation else 1.0
+    change = abs(log(ratio))
+    return exp(change) if change > SIGNIFICANT * deviation else 1.0

@@ -150,7 +150,7 @@ def metacentric_height_m(ship: RollShip, tank: Tank, stiffness_nm_rad: float) ->
     if not ship.displacement_n > 0:
         return nan
     stiffness = coupled_matrices(ship, tank)[2]
-    free = stiffness[0, 0] - stiffness[0, 1] ** 2 / stiffness[1, 1]
+    free = stiffness[0, 0] - stiffness[0, 1] * stiffness[0, 1] / stiffness[1, 1]
     weight_n = ship.displacement_n + GRAVITY_M_S2 * float(water_moments(tank, 0.0).mass_kg)
     return float(free + stiffness_nm_rad - ship.stiffness_nm_rad) / weight_n
 

@@ -1,8 +1,8 @@
 """A constrained law as the answer of the retuner's process, and as a message.
 
-The message holds what the law is condensed from: model, predictor, knots, weights and the cost of
-the motion after the horizon. The predictions over the horizon follow by `condense`, bit for bit,
-in less time than their transfer takes.
+The message holds model, predictor, knots and the plan that `condense` found. The predictions over
+the horizon follow by `predictions`, on every processor bit for bit, in less time than their
+transfer takes.
 """
 
 import math
@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.control.constrained.horizon import condense
+from utank_hil.control.constrained.horizon import Horizon, predictions
 from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.limits import PumpLimits
 from utank_hil.dynamics.linear import STATES
@@ -30,7 +30,9 @@ _MOST_OUTPUTS: Final = len(STATES)
 _MOST_ITERATIONS: Final = 200  # This is three times the budget of the shipped laws.
 
 MOST_NUMBERS: Final = (
-    3 * MOST_STATES**2 + MOST_STATES * (3 + 2 * _MOST_OUTPUTS) + 2 * _MOST_OUTPUTS + MOST_KNOTS
+    MOST_STATES * (3 + 3 * MOST_STATES + 2 * _MOST_OUTPUTS + MOST_KNOTS)
+    + MOST_KNOTS * (1 + MOST_KNOTS + MOST_SAMPLES * _MOST_OUTPUTS)
+    + 2 * _MOST_OUTPUTS
 )
 """Most numbers in the arrays of a message."""
 
@@ -49,7 +51,7 @@ class RenewedLaw:
 class RenewedLawMessage(
     msgspec.Struct, frozen=True, eq=False, tag="renewed", forbid_unknown_fields=True
 ):
-    """Message of a `RenewedLaw`; names and shapes as in `ConstrainedLaw` and `condense`."""
+    """Message of a `RenewedLaw`; names and shapes as in `ConstrainedLaw` and `Horizon`."""
 
     model: LinearModel
     observer_gain: FloatArray
@@ -60,6 +62,9 @@ class RenewedLawMessage(
     first_output: Annotated[int, msgspec.Meta(ge=0, le=MOST_SAMPLES)]
     terminal: FloatArray
     correction: FloatArray
+    hessian: FloatArray
+    unlimited_state: FloatArray
+    unlimited_target: FloatArray
     limits: PumpLimits
     level_output: int | None
     level_penalty: float
@@ -85,6 +90,9 @@ class RenewedLawMessage(
             first_output=horizon.first_output,
             terminal=horizon.terminal,
             correction=horizon.correction,
+            hessian=horizon.hessian,
+            unlimited_state=horizon.unlimited_state,
+            unlimited_target=horizon.unlimited_target,
             limits=law.limits,
             level_output=law.level_output,
             level_penalty=float(law.level_penalty),
@@ -101,7 +109,7 @@ class RenewedLawMessage(
     def answer(self) -> RenewedLaw:
         """Return the law; raises ValueError if its parts do not fit together or are not finite."""
         a, b, c, d, sample_time_s = self.model
-        n, m, rest = len(a), len(c), len(self.terminal)
+        n, m, rest, knots = len(a), len(c), len(self.terminal), len(self.knots)
         refuse_sizes(
             states=(n, 1, MOST_STATES), outputs=(m, 1, _MOST_OUTPUTS), rest=(rest, 0, MOST_STATES)
         )
@@ -114,6 +122,9 @@ class RenewedLawMessage(
             ("output_weight", self.output_weight, (m,)),
             ("terminal", self.terminal, (rest, n)),
             ("correction", self.correction, (n,)),
+            ("hessian", self.hessian, (knots, knots)),
+            ("unlimited_state", self.unlimited_state, (knots, n)),
+            ("unlimited_target", self.unlimited_target, (self.samples, knots, m)),
             ("steady_state", self.steady_state, (n, n)),
             ("steady_command", self.steady_command, (n,)),
         )
@@ -121,18 +132,21 @@ class RenewedLawMessage(
         if not (sample_time_s > 0 and all(map(math.isfinite, (sample_time_s, *predicted)))):
             raise ValueError("the sample time or what is predicted is not finite")
         with np.errstate(all="ignore"):
-            horizon = condense(
-                self.model,
-                self.knots,
-                self.samples,
-                self.output_weight,
-                self.input_weight,
-                first_output=self.first_output,
-                terminal=self.terminal,
-                correction=self.correction,
-            )
-        if not (np.isfinite(horizon.unlimited_state).all() and np.isfinite(horizon.hessian).all()):
+            motions = predictions(self.model, self.knots, self.samples)
+        if not all(np.isfinite(each).all() for each in motions):
             raise ValueError("the answer's law is not finite")
+        horizon = Horizon(
+            np.array(self.knots),
+            *motions,
+            self.hessian,
+            self.unlimited_state,
+            self.unlimited_target,
+            self.output_weight,
+            self.input_weight,
+            self.first_output,
+            self.terminal,
+            self.correction,
+        )
         law = ConstrainedLaw(
             model=self.model,
             observer_gain=self.observer_gain,

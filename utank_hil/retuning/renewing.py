@@ -299,6 +299,6 @@ def sea_difference(now: SlopeSpectrum, then: SlopeSpectrum) -> float:
     It is 0 for equal seas and 0.2 for waves a fifth higher.
     """
     before = then.slope_density(now.omega_rad_s)
-    apart = float(np.sum((np.sqrt(now.density) - np.sqrt(before)) ** 2))
+    apart = float(np.sum(np.square(np.sqrt(now.density) - np.sqrt(before))))
     energy = float(np.sum(before))
     return math.sqrt(apart / energy) if energy > 0 else math.inf

@@ -109,4 +109,5 @@ def worsening(
 
 def _deviation(total: float, squares: float, count: int) -> float:
     """Return the standard deviation from sums; rounding may leave a variance just below zero."""
-    return math.sqrt(max(0.0, squares / count - (total / count) ** 2))
+    mean = total / count
+    return math.sqrt(max(0.0, squares / count - mean * mean))

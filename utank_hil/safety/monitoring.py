@@ -9,8 +9,6 @@ import math
 from collections.abc import Callable, Collection, Iterable
 from typing import Final
 
-import numpy as np
-
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import PassiveTwin as PassiveTwinMessage
 from utank_hil.canbus import Quality
@@ -194,9 +192,8 @@ class Monitors:
         ship, tank = self._ship, self._tank
         if found is not None and _may_be(found, ship):
             identified = found.ship(ship)
-            if (
-                np.linalg.det(coupled_matrices(identified, tank)[2]) > 0
-            ):  # stable with the tank's water
+            (k11, k12), (_, k22) = coupled_matrices(identified, tank)[2].tolist()
+            if k11 * k22 > k12 * k12:  # stable with the tank's water
                 ship = identified
                 if isinstance(found, ModelSummary):
                     tank = found.tank(tank)

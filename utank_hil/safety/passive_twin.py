@@ -28,6 +28,7 @@ from typing import Final
 
 import numpy as np
 
+from utank_hil.base.ordered_sums import product
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.restoring import restoring
 from utank_hil.dynamics.sampling import transition_and_step
@@ -105,7 +106,7 @@ class PassiveTwin:
         self._patience_s = LASTS_PERIODS * roll_period_s
         self._decay_s = DECAY_PERIODS * roll_period_s
         self._anew_s = ANEW_PERIODS * roll_period_s
-        self._least_power = least_roll_rad**2
+        self._least_power = least_roll_rad * least_roll_rad
         self._pressure_pa = 0.0
         self._mean_rad = self._twin_mean_rad = 0.0
         self._record_share = period_s / (RECORD_PERIODS * roll_period_s)
@@ -175,7 +176,7 @@ class PassiveTwin:
         if self._loss:
             other = level_rate_m_s - float(made[3])
             effort[2] = -self._loss * (abs(level_rate_m_s) * level_rate_m_s - abs(other) * other)
-        made[:4] = self._step @ made
+        made[:4] = product(self._step, made)
         if not abs(float(made[0])) < MOST_MADE_RAD:
             made[:4] = 0.0
             self.excuse()
@@ -211,7 +212,8 @@ class PassiveTwin:
             return
         ratio = RECOVERED if self.amplified else self._amplified + self._unknown
         least_power = max(self._least_power, ratio * ratio * self._twin_power)
-        on_record = self.amplified or self._record_power > self._record**2 * self._twin_record_power
+        record_power = self._record * self._record * self._twin_record_power
+        on_record = self.amplified or self._record_power > record_power
         if on_record and self._power > least_power:
             self._losing_s += self._period_s
         else:

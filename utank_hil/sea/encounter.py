@@ -12,12 +12,14 @@ negative for a wave that the ship overtakes.
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.elementary import sines_cosines
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 
 def wavenumber_rad_m(omega_rad_s: FloatArray) -> FloatArray:
     """Deep-water wave number omega^2 / g in rad/m."""
-    wavenumber: FloatArray = np.asarray(omega_rad_s, dtype=float) ** 2 / GRAVITY_M_S2
+    omega = np.asarray(omega_rad_s, dtype=float)
+    wavenumber: FloatArray = omega * omega / GRAVITY_M_S2
     return wavenumber
 
 
@@ -29,4 +31,9 @@ def encounter_frequency(
     It is negative where the ship overtakes the wave, which then passes from bow to stern.
     """
     omega = np.asarray(omega_rad_s, dtype=float)
-    return omega - wavenumber_rad_m(omega) * speed_m_s * np.cos(heading_rad)
+    return (
+        omega
+        - wavenumber_rad_m(omega)
+        * speed_m_s
+        * sines_cosines(np.asarray(heading_rad, dtype=float))[1]
+    )

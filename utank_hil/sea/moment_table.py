@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.elementary import phasors
 from utank_hil.base.number_table import read_number_table
 
 COLUMNS: Final = ("omega_rad_s", "heading_deg", "moment_nm_per_m", "phase_deg")
@@ -55,7 +56,7 @@ class MomentTable:
                 f"{heading[0]:g} to {heading[-1]:g}"
             )
         grid = values[np.lexsort((values[:, 1], values[:, 0]))].reshape(len(omega), -1, 4)
-        moment = np.asarray(grid[..., 2] * np.exp(1j * np.radians(grid[..., 3])), np.complex128)
+        moment = phasors(grid[..., 2], np.radians(grid[..., 3]))
         return cls(omega, np.radians(heading), moment)
 
     def moment(self, omega_rad_s: FloatArray, heading_rad: FloatArray) -> ComplexArray:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.elementary import angles_of, phasors
 from utank_hil.sea.sea import COMPONENTS, Sea, drawn_components
 from utank_hil.sea.spectrum import Spectrum
 
@@ -30,7 +31,7 @@ class PassingSea:
     @classmethod
     def of(cls, sea: Sea) -> "PassingSea":
         """Return a sea that does not change."""
-        energy_m2, heading_rad = sea.amplitude_m[None] ** 2 / 2, sea.heading_rad[None]
+        energy_m2, heading_rad = np.square(sea.amplitude_m[None]) / 2, sea.heading_rad[None]
         return cls(np.zeros(1), energy_m2, heading_rad, sea.omega_rad_s, sea.phase_rad)
 
     @classmethod
@@ -75,7 +76,6 @@ class PassingSea:
         share = (time_s - start_s) / (end_s - start_s)
         before, later = (1 - share) * self.energy_m2[after - 1], share * self.energy_m2[after]
         # A direction without energy has no weight.
-        flow: ComplexArray = before * np.exp(1j * self.heading_rad[after - 1]) + later * np.exp(
-            1j * self.heading_rad[after]
-        )
-        return np.sqrt(2 * (before + later)), np.angle(flow)
+        headings = self.heading_rad[after - 1], self.heading_rad[after]
+        flow = phasors(before, headings[0]) + phasors(later, headings[1])
+        return np.sqrt(2 * (before + later)), angles_of(flow)

@@ -20,6 +20,7 @@ from typing import Annotated, Final
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.elementary import angles_of, each, exp, log, sines_cosines, sizes
 from utank_hil.base.parameters import NotNegative, Range, range_problems, refuse
 from utank_hil.sea.encounter import encounter_frequency, wavenumber_rad_m
 from utank_hil.sea.harmonics import Harmonics
@@ -55,9 +56,10 @@ class EffectiveSlope:
 
     def factor(self, wavenumber_rad_m: FloatArray, heading_rad: FloatArray) -> FloatArray:
         """Return the ratio r per component."""
-        across = wavenumber_rad_m * np.abs(np.sin(heading_rad)) * self.beam_m / 2
-        smith = np.exp(-wavenumber_rad_m * self.depth_m)
-        ratio: FloatArray = self.coefficient * smith * np.sinc(across / np.pi)
+        across = wavenumber_rad_m * np.abs(sines_cosines(heading_rad)[0]) * self.beam_m / 2
+        smith = each(exp, -wavenumber_rad_m * self.depth_m)
+        averaged = np.divide(sines_cosines(across)[0], across, where=across > 0, out=across + 1)
+        ratio: FloatArray = self.coefficient * smith * averaged
         return ratio
 
     def moment(
@@ -65,7 +67,7 @@ class EffectiveSlope:
     ) -> ComplexArray:
         """Roll moment in N m per m of wave amplitude; its argument is the lead on the crest."""
         wavenumber = wavenumber_rad_m(omega_rad_s)
-        slope = wavenumber * np.sin(heading_rad) * self.factor(wavenumber, heading_rad)
+        slope = wavenumber * sines_cosines(heading_rad)[0] * self.factor(wavenumber, heading_rad)
         return np.asarray(1j * stiffness_nm_rad * slope, dtype=np.complex128)
 
 
@@ -161,7 +163,7 @@ class Sea:
 
     def harmonics(self, amplitude: ComplexArray) -> Harmonics:
         """Return a quantity with complex amplitudes, whose arguments are leads on the crest."""
-        return self._harmonics(np.abs(amplitude), np.angle(amplitude))
+        return self._harmonics(sizes(amplitude), angles_of(amplitude))
 
     @property
     def elevation(self) -> Harmonics:
@@ -198,7 +200,7 @@ class Sea:
 
 def slope_per_m(omega_rad_s: FloatArray, heading_rad: FloatArray) -> ComplexArray:
     """Complex wave slope across the ship per m of amplitude, positive starboard down."""
-    slope = wavenumber_rad_m(omega_rad_s) * np.sin(heading_rad)
+    slope = wavenumber_rad_m(omega_rad_s) * sines_cosines(heading_rad)[0]
     return np.asarray(1j * slope, dtype=np.complex128)
 
 
@@ -282,6 +284,7 @@ def _uniform(seed: int, shape: tuple[int, int]) -> FloatArray:
 def _spread(probability: FloatArray, exponent: float) -> FloatArray:
     """Quantiles of the density cos^2s(theta / 2) on (-pi, pi)."""
     theta = np.linspace(-np.pi, np.pi, 8193)
-    density = np.cos(theta / 2) ** (2 * exponent)
+    cosine = np.maximum(sines_cosines(theta / 2)[1], 1e-300)  # zero at the ends
+    density = each(exp, 2 * exponent * each(log, cosine))
     cumulative = np.concatenate([[0.0], np.cumsum(density[1:] + density[:-1])])
     return np.interp(probability, cumulative / cumulative[-1], theta)

@@ -13,11 +13,13 @@ predictive control, thesis (3.8).
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.ordered_sums import product
 from utank_hil.dynamics.sampling import LinearModel
 
 
@@ -43,6 +45,44 @@ class Horizon:
     first_output: int
     terminal: FloatArray
     correction: FloatArray
+
+
+class Predictions(NamedTuple):
+    """What follows from model and knots alone; names and shapes as in `Horizon`."""
+
+    interpolation: FloatArray
+    outputs_state: FloatArray
+    outputs_plan: FloatArray
+    outputs_held: FloatArray
+
+
+def predictions(model: LinearModel, knots: tuple[int, ...], samples: int) -> Predictions:
+    """Predict the outputs over a horizon, with the same bits on every processor.
+
+    Raises ValueError if the knots are out of their range, or the model has several inputs.
+    """
+    if not knots or knots[0] != 0 or np.any(np.diff(knots) < 1) or knots[-1] >= samples:
+        raise ValueError(
+            f"knots must increase from 0 and stay below the horizon of {samples} samples, "
+            f"got {knots}"
+        )
+    if model.B.shape[1] != 1:
+        raise ValueError(f"a plan is that of one pump, the model has {model.B.shape[1]} inputs")
+    states, outputs = len(model.A), len(model.C)
+    interpolation = _interpolation(knots, samples)
+    by_state = np.empty((samples, outputs, states))
+    pulse = np.empty((samples, outputs))
+    by_state[0], pulse[0] = model.C, model.D[:, 0]
+    for q in range(1, samples):
+        by_state[q] = product(by_state[q - 1], model.A)
+        pulse[q] = product(by_state[q - 1], model.B[:, 0])
+    by_input = np.zeros((samples, outputs, samples))
+    for j in range(samples):
+        by_input[j:, :, j] = pulse[: samples - j]
+    by_plan = product(by_input.reshape(-1, samples), interpolation)
+    return Predictions(
+        interpolation, by_state, by_plan.reshape(samples, outputs, -1), pulse.cumsum(axis=0)
+    )
 
 
 def condense(
@@ -82,39 +122,25 @@ def condense(
     ValueError
         If the knots or a weight are out of their range.
     """
-    if not knots or knots[0] != 0 or np.any(np.diff(knots) < 1) or knots[-1] >= samples:
-        raise ValueError(
-            f"knots must increase from 0 and stay below the horizon of {samples} samples, "
-            f"got {knots}"
-        )
     weights = np.append(output_weight, input_weight)
     if not (np.isfinite(weights).all() and np.min(output_weight) >= 0 and input_weight > 0):
         raise ValueError(
             "output_weight must be zero or more, input_weight positive, and both finite, got "
             f"{output_weight} and {input_weight}"
         )
-    if model.B.shape[1] != 1:
-        raise ValueError(f"a plan is that of one pump, the model has {model.B.shape[1]} inputs")
     states, outputs = len(model.A), len(model.C)
-    interpolation = _interpolation(knots, samples)
-    by_state = np.empty((samples, outputs, states))
-    pulse = np.empty((samples, outputs))
+    predicted = predictions(model, knots, samples)
+    interpolation, by_state, by_plan, held = predicted
     power = np.eye(states)
     added = np.zeros(states) if correction is None else correction
     corrections = np.empty((samples, states))
     reach = np.empty((states, samples))  # effect of u(k+q) on x(k+N)
     arrived = model.B[:, 0]
     for q in range(samples):
-        by_state[q] = model.C @ power
         corrections[q] = added @ power
-        pulse[q] = model.D[:, 0] if q == 0 else by_state[q - 1] @ model.B[:, 0]
         power = model.A @ power
         reach[:, samples - 1 - q] = arrived
         arrived = model.A @ arrived
-    by_input = np.zeros((samples, outputs, samples))
-    for j in range(samples):
-        by_input[j:, :, j] = pulse[: samples - j]
-    by_plan = by_input @ interpolation
 
     root = np.tile(np.sqrt(output_weight), samples)
     root[: first_output * outputs] = 0.0
@@ -137,7 +163,7 @@ def condense(
         interpolation=interpolation,
         outputs_state=by_state,
         outputs_plan=by_plan,
-        outputs_held=pulse.cumsum(axis=0),
+        outputs_held=held,
         hessian=plan_rows.T @ plan_rows,
         unlimited_state=corrections[list(knots)]
         - np.linalg.solve(triangle, orthogonal.T @ state_rows),

@@ -21,6 +21,7 @@ from typing import Annotated
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import Positive, Range, range_problems, refuse
 from utank_hil.control.constrained.horizon import Horizon, condense
 from utank_hil.control.constrained.plan_programme import PlanProgramme
@@ -160,7 +161,7 @@ class ConstrainedController:
         self.sample_time_s = model.dt
         self._a, self._b, self._c, self._d = model.A, model.B[:, 0], model.C, model.D[:, 0]
         self._observer_gain = law.observer_gain
-        self._plan_gain = horizon.unlimited_state @ (np.eye(len(model.A)) - law.steady_state)
+        self._plan_gain = product(horizon.unlimited_state, np.eye(len(model.A)) - law.steady_state)
         self._target_gains = horizon.unlimited_target
         self._constant_target_gain: FloatArray = horizon.unlimited_target.sum(axis=0)
         self._hessian = horizon.hessian
@@ -175,9 +176,8 @@ class ConstrainedController:
             law.iteration_limit,
         )
         output = law.level_output or 0
-        self._levels_state = horizon.outputs_state[:, output] + np.outer(
-            horizon.outputs_held[:, output], law.steady_command
-        )
+        held = horizon.outputs_held[:, output]
+        self._levels_state = horizon.outputs_state[:, output] + held[:, None] * law.steady_command
         self._levels_plan = horizon.outputs_plan[:, output]
         self._held_state = self._levels_state[self._programme.held]
         self._pressure_pa = self._allowed_pa = limits.pressure_pa
@@ -216,13 +216,14 @@ class ConstrainedController:
         """
         self.observe(y)
         state = self._state
-        best = self._plan_gain.dot(state)
+        best = product(self._plan_gain, state)
         if reference is not None:
             if reference.ndim == 1:
-                best += self._constant_target_gain @ reference
+                best += product(self._constant_target_gain, reference)
             else:
-                best += np.einsum("qjm,qm->j", self._target_gains, reference)
-        self._plan_pa = self._plan(best, float(self._steady_command.dot(state)))
+                gains = self._target_gains.swapaxes(0, 1).reshape(len(best), -1)
+                best += product(gains, reference.ravel())
+        self._plan_pa = self._plan(best, float(product(self._steady_command, state)))
         # The solver keeps its bounds only to a tolerance.
         low, high = self._last_pa - self._step_pa, self._last_pa + self._step_pa
         command = min(max(float(self._plan_pa[0]), low), high)
@@ -243,10 +244,11 @@ class ConstrainedController:
         A measurement with any output that is not finite corrects nothing.
         """
         state, mean = self._state, self._mean_pa
-        surprise = y - self._c.dot(state) - self._d * mean
+        surprise = y - product(self._c, state) - self._d * mean
         if not math.isfinite(surprise.sum()):
             surprise = np.zeros(len(surprise))
-        self._state = self._a.dot(state) + self._b * mean + self._observer_gain.dot(surprise)
+        ahead = product(self._a, state) + self._b * mean
+        self._state = ahead + product(self._observer_gain, surprise)
         self._mean_before_pa = mean
 
     def applied(self, u: FloatArray) -> None:
@@ -278,16 +280,15 @@ class ConstrainedController:
         """Commands at each sample of the horizon; `best` is the analytic plan."""
         low, high = self._bounds(steady_pa)
         last = self._last_pa - steady_pa
-        levels = self._held_state.dot(self._state)
+        levels = product(self._held_state, self._state)
         plan: FloatArray | None = best
         self.limited = not self._programme.respects(best, low, high, last, levels)
         if self.limited:
-            plan = self._programme.solve(-self._hessian.dot(best), low, high, last, levels)
+            plan = self._programme.solve(-product(self._hessian, best), low, high, last, levels)
         if plan is None:
             self.fallbacks += 1
             return np.append(self._plan_pa[1:], steady_pa)
-        commands: FloatArray = self._interpolation.dot(plan)
-        return commands + steady_pa
+        return product(self._interpolation, plan) + steady_pa
 
     def _bounds(self, steady_pa: float) -> tuple[FloatArray, FloatArray]:
         """Least and greatest pressure at the knots, less the steady command."""
@@ -295,7 +296,7 @@ class ConstrainedController:
         low = -high
         if self._power_pa_m_s < math.inf:
             plan = self._plan_pa[self._next] - steady_pa
-            levels = self._levels_state.dot(self._state) + self._levels_plan.dot(plan)
+            levels = product(self._levels_state, self._state) + product(self._levels_plan, plan)
             speed = np.diff(levels)[self._knots] / self.sample_time_s
             share = self._power_pa_m_s / np.maximum(np.abs(speed), 1e-9)
             high = np.where(speed > 0, np.minimum(high, share), high)

@@ -11,6 +11,7 @@ a slack s by which the level may exceed its limit::
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.ordered_sums import product
 from utank_hil.control.constrained.active_set import ActiveSetSolver
 from utank_hil.control.constrained.horizon import Horizon
 from utank_hil.control.limits import PumpLimits
@@ -70,13 +71,13 @@ class PlanProgramme:
         self.forget()
 
     def _cost(self, hessian: FloatArray) -> float:
-        return float(np.trace(hessian * self._unit_pa**2)) / len(hessian)
+        return float(np.trace(hessian * (self._unit_pa * self._unit_pa))) / len(hessian)
 
     def _set_up(self, hessian: FloatArray, iteration_limit: int) -> ActiveSetSolver:
         """Return the solver, in units of the greatest pressure."""
         unit, knots, levels = self._unit_pa, len(hessian), len(self.held)
         whole = np.zeros((knots + 1, knots + 1))
-        whole[:knots, :knots] = hessian * unit**2 / self._cost(hessian)
+        whole[:knots, :knots] = hessian * (unit * unit) / self._cost(hessian)
         whole[knots, knots] = self._gradient[knots]
         slack = np.ones((levels, 1))
         by_plan = self._by_plan * unit
@@ -97,7 +98,7 @@ class PlanProgramme:
         steps = np.diff(plan, prepend=last)
         if (np.abs(steps) > self._rise_pa).any():
             return False
-        return bool((np.abs(levels + self._by_plan @ plan) <= self._level_m).all())
+        return bool((np.abs(levels + product(self._by_plan, plan)) <= self._level_m).all())
 
     def solve(
         self,

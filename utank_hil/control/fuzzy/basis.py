@@ -16,10 +16,11 @@ import math
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.elementary import exp, log
 
 SETS = 3
 # Neighbouring sets cross at a membership of one half; the thesis gives no width.
-WIDTH = 1 / math.sqrt(8 * math.log(2))
+WIDTH = 1 / math.sqrt(8 * log(2))
 
 
 class FuzzyBasis:
@@ -79,4 +80,4 @@ def _degrees(x: float) -> tuple[float, float, float]:
 
 
 def _gauss(distance: float) -> float:
-    return math.exp(-(distance * distance) / (2 * WIDTH * WIDTH))
+    return exp(-(distance * distance) / (2 * WIDTH * WIDTH))

@@ -26,6 +26,8 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+from utank_hil.base.elementary import exp, tanh
+from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import NotNegative, Positive, Problem, Range
 from utank_hil.control.fuzzy.law import FuzzyController, FuzzyInputs, FuzzyLaw
 
@@ -61,7 +63,7 @@ class SmallGainFuzzy(FuzzyLaw):
         self, parameters: tuple[float, ...], s: float, square: float, psi: float
     ) -> tuple[float, tuple[float, ...]]:
         """Acceleration u, and the driving term of each parameter, without leakage."""
-        theta = square / (4 * self.gamma**2) + psi**2 / (4 * self.rho**2)
+        theta = square / (4 * self.gamma * self.gamma) + psi * psi / (4 * self.rho * self.rho)
         return -parameters[0] * theta * s, (theta * s * s,)
 
     @property
@@ -104,8 +106,8 @@ class RobustFuzzy(FuzzyLaw):
     ) -> tuple[float, tuple[float, ...]]:
         """Acceleration u, and the driving term of each parameter, without leakage."""
         gain, bound = parameters
-        share = square / (2 * self.gamma**2)
-        u = -gain * share * s - bound * psi * math.tanh(bound * psi * s / self.epsilon)
+        share = square / (2 * self.gamma * self.gamma)
+        u = -gain * share * s - bound * psi * tanh(bound * psi * s / self.epsilon)
         return u, (share * s * s, psi * abs(s))
 
     @property
@@ -130,8 +132,7 @@ class DirectFuzzyController(FuzzyController):
     def __init__(self, law: SmallGainFuzzy | RobustFuzzy) -> None:
         self.law = law
         self._leak = [
-            (sigma, math.exp(-adaptation * sigma * law.sample_time_s))
-            for adaptation, sigma in law.rates
+            (sigma, exp(-adaptation * sigma * law.sample_time_s)) for adaptation, sigma in law.rates
         ]
         super().__init__(law)
 
@@ -140,7 +141,7 @@ class DirectFuzzyController(FuzzyController):
 
     def _answer(self, now: FuzzyInputs) -> float:
         square = self._basis.square(now.x)
-        psi = 1.0 + float(now.x.dot(now.x)) + math.sqrt(square)
+        psi = 1.0 + float(product(now.x, now.x)) + math.sqrt(square)
         u, drives = self.law.answer(self.parameters, now.s, square, psi)
         self.parameters = tuple(
             self._adapted(value, start, drive if now.learning else 0.0, leak)

@@ -17,13 +17,14 @@ this form (without leakage; with it, outside a bound). u is a roll acceleration,
 g is near one.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.elementary import exp
+from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import Finite, Positive, Problem, Range
 from utank_hil.control.fuzzy.law import FuzzyController, FuzzyInputs, FuzzyLaw
 
@@ -74,7 +75,7 @@ class IndirectFuzzyController(FuzzyController):
         inputs = len(law.ranges)
         self._prior = np.zeros(inputs + 1) if law.prior is None else np.array(law.prior)
         self._k1, self._k2 = law.error.gains
-        self._kept = math.exp(-law.leakage * law.sample_time_s)
+        self._kept = exp(-law.leakage * law.sample_time_s)
         self._extended = np.ones(inputs + 1)
         super().__init__(law)
 
@@ -86,8 +87,8 @@ class IndirectFuzzyController(FuzzyController):
     def _answer(self, now: FuzzyInputs) -> float:
         xi = self._basis(now.x)
         self._extended[1:] = now.x
-        drift = float(xi.dot(self.drift).dot(self._extended))
-        u = (-drift - self._k1 * now.e[0] - self._k2 * now.e[1]) / float(xi.dot(self.gain))
+        drift = float(product(product(xi, self.drift), self._extended))
+        u = (-drift - self._k1 * now.e[0] - self._k2 * now.e[1]) / float(product(xi, self.gain))
         # The rules do not describe inputs beyond their range.
         self._adapt(xi, now.s if now.learning and not now.beyond else 0.0, u)
         return u

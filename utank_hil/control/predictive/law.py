@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.ordered_sums import product
 from utank_hil.dynamics.sampling import LinearModel
 
 
@@ -107,7 +108,7 @@ class PredictiveController:
         """
         flat, newest, answers, width = self._flat, self._newest, self._answers, self._width
         flat[newest + self._inputs : newest + width] = y
-        u: FloatArray = self._gains.dot(flat[newest - answers : newest + self._window])
+        u = product(self._gains, flat[newest - answers : newest + self._window])
         if newest < width + answers:
             kept = self._window - width
             flat[flat.size - kept :] = flat[newest : newest + kept]
@@ -117,9 +118,10 @@ class PredictiveController:
             flat[newest - answers : newest] = u
         if reference is not None:
             if reference.ndim == 1:
-                u += self._constant_reference_gain @ reference
+                u += product(self._constant_reference_gain, reference)
             else:
-                u += np.einsum("qrm,qm->r", self._reference_gains, reference)
+                gains = self._reference_gains.swapaxes(0, 1).reshape(len(u), -1)
+                u += product(gains, reference.ravel())
         flat[newest : newest + self._inputs] = u
         self._newest = newest
         return u

@@ -3,6 +3,7 @@
 import math
 from typing import Final
 
+from utank_hil.base.elementary import exp
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
@@ -55,7 +56,7 @@ class DriveFollowing:
     """
 
     def __init__(self, lag_s: float, thresholds: MonitorThresholds, period_s: float) -> None:
-        self._share = 1 - math.exp(-period_s / lag_s) if lag_s > 0 else 1.0
+        self._share = 1 - exp(-period_s / lag_s) if lag_s > 0 else 1.0
         self._limit_pa = thresholds.pressure_error_pa
         self._free_pa_m = thresholds.free_rotor_pa_m
         self._period_s = period_s

@@ -37,7 +37,7 @@ class Noise:
     @property
     def share(self) -> float:
         """Noise over the limit."""
-        return float((self.power / self._limit_power) ** 0.5)
+        return math.sqrt(self.power / self._limit_power)
 
     def update(self, residual: float, elapsed_s: float) -> bool:
         """Take a residual; return whether there is too much noise."""
@@ -77,4 +77,4 @@ class SecondDifference:
         self._before, self._last, self._step_s = self._last, value, step_s
         if bend != bend:
             return 0.0
-        return bend * math.sqrt(6.0 / (1.0 + (1.0 + ratio) ** 2 + ratio * ratio))
+        return bend * math.sqrt(6.0 / (1.0 + (1.0 + ratio) * (1.0 + ratio) + ratio * ratio))

@@ -29,6 +29,7 @@ presses: the roll's push has to be larger beside it.
 import math
 from typing import Final
 
+from utank_hil.base.elementary import exp
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
@@ -70,7 +71,8 @@ _ROLL_STUCK: Final = int(Finding.ROLL_STUCK)
 def roll_push_at_natural_frequency(ship: RollShip, tank: Tank) -> float:
     """Push on the water per roll that swings at w0, in m^2/(s^2 rad): x / phi."""
     mass, _, stiffness = coupled_matrices(ship, tank)
-    push = mass[1, 0] * tank.natural_frequency_rad_s**2 - stiffness[1, 0]
+    frequency = tank.natural_frequency_rad_s
+    push = mass[1, 0] * frequency * frequency - stiffness[1, 0]
     return float(push / (tank.density_kg_m3 * tank.reservoir_area_m2))
 
 
@@ -111,7 +113,8 @@ class TankEquation:
         *,
         valve: bool = False,
     ) -> None:
-        self._pump_share = (VALVE_SHARE if valve else LEAST_SHARE) ** 2
+        share = VALVE_SHARE if valve else LEAST_SHARE
+        self._pump_share = share * share
         self.sign_gain = VALVE_SIGN_GAIN if valve else SIGN_GAIN
         mass, _, stiffness = coupled_matrices(ship, tank)
         density = tank.density_kg_m3
@@ -133,17 +136,17 @@ class TankEquation:
         self._pump = DerivativeFilter(2 * frequency_rad_s, period_s)
         self._held = DerivativeFilter(2 * frequency_rad_s, period_s) if valve else None
         self._settle = math.ceil(SETTLED / (2 * frequency_rad_s * period_s))
-        self._keep = math.exp(-period_s / (MEMORY_PERIODS * thresholds.tank_period_s))
-        self._late_keep = math.exp(-period_s / (LATE_PERIODS * thresholds.tank_period_s))
+        self._keep = exp(-period_s / (MEMORY_PERIODS * thresholds.tank_period_s))
+        self._late_keep = exp(-period_s / (LATE_PERIODS * thresholds.tank_period_s))
         # sums of so many squares of the least push
-        self._least_xx = thresholds.least_roll_push_m2_s2**2 / (1 - self._keep)
-        self._least_pp = thresholds.least_pump_push_m2_s2**2 / (1 - self._keep)
+        roll, pump = thresholds.least_roll_push_m2_s2, thresholds.least_pump_push_m2_s2
+        self._least_xx, self._least_pp = (x * x / (1 - self._keep) for x in (roll, pump))
         late_share = LATE_PUSHES * thresholds.least_roll_push_m2_s2 * frequency_rad_s
-        self._least_dd = late_share**2 / (1 - self._late_keep)
+        self._least_dd = late_share * late_share / (1 - self._late_keep)
         self._zero = thresholds.zero_push_m2_s2
         self._still_rad = thresholds.roll_still_rad
         self._still_samples = round(STILL_PERIODS * thresholds.tank_period_s / period_s)
-        self._most_unmoved = STILL_PUSHES**2 * self._least_xx
+        self._most_unmoved = STILL_PUSHES * STILL_PUSHES * self._least_xx
         self._late_limit_s = thresholds.motion_late_s
         self._spike_m = thresholds.level_spike_m
         self._most_step_m = thresholds.level_most_m_s * period_s
@@ -260,7 +263,8 @@ class TankEquation:
         self.obeyed = False
         zero, sway = self._zero, self._sway * math.sqrt(self._uu)
         self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
-        if xx > self._least_xx and xx > LEAST_SHARE**2 * pp + HELD_SHARE**2 * self._vv:
+        held = LEAST_SHARE * LEAST_SHARE * pp + HELD_SHARE * HELD_SHARE * self._vv
+        if xx > self._least_xx and xx > held:
             feigned = zero * abs(self._x) + sway * math.sqrt(xx)
             self.roll_gain = gain = (self._rest_x + feigned) / xx
             self.obeyed = self._rest_x - feigned > STUCK_GAIN * xx
@@ -283,7 +287,8 @@ class TankEquation:
             weight = self._weight
             mean = within(self._left / weight, zero)
             unmoved = self._unmoved + mean * (weight * mean - 2 * self._left)
-            if unmoved > (math.sqrt(self._most_unmoved) + sway) ** 2:
+            most = math.sqrt(self._most_unmoved) + sway
+            if unmoved > most * most:
                 found |= _ROLL_STUCK
         if dd > self._least_dd and self._samples > self._late_samples:
             feigned = zero * abs(self._d) + self._sway * math.sqrt(self._late_uu * dd)

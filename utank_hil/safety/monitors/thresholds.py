@@ -9,8 +9,6 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Final
 
-import numpy as np
-
 from utank_hil.base.parameters import Range, range_problems, refuse
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.linear import coupled_matrices
@@ -151,13 +149,13 @@ def thresholds_of(
     model = RollModel(plant.ship, tank)
     held_pa = greatest_held_pa(model, limits.pressure_pa, roll_limit_rad)
     # the noise of 15 s of integrated rate, and of the roll itself
-    drift_s = math.hypot(roll_s, rate_s * math.sqrt(0.01 * 7.5))
+    drift_s = math.sqrt(roll_s * roll_s + 0.01 * 7.5 * rate_s * rate_s)
     return MonitorThresholds(
         tank_period_s=2 * math.pi / frequency_rad_s,
         roll_spike_rad=30 * roll_s,
         roll_most_rad_s=roll_limit_rad * fastest_rad_s,
         rate_spike_rad_s=30 * rate_s,
-        rate_most_rad_s2=roll_limit_rad * fastest_rad_s**2,
+        rate_most_rad_s2=roll_limit_rad * fastest_rad_s * fastest_rad_s,
         level_spike_m=10 * sensors.level_noise_m,
         level_most_m_s=tank.level_limit_m * fastest_rad_s,
         roll_noise_rad=NOISE_LIMIT * roll_s,
@@ -185,6 +183,7 @@ def _unconfirmed_share(plant: DesignPlant) -> float:
     """A quarter, or what heels a ship whose pump is strong for her size by so little."""
     push_n = plant.limits.pressure_pa * plant.tank.reservoir_area_m2
     stiffness = coupled_matrices(plant.ship, plant.tank)[2]
-    heel_rad = abs(np.linalg.solve(stiffness, [0.0, push_n])[0])
+    (k11, k12), (_, k22) = stiffness.tolist()
+    heel_rad = abs(k12 * push_n / (k11 * k22 - k12 * k12))
     least = UNCONFIRMED_SHARE * heel_rad <= math.radians(UNCONFIRMED_HEEL_DEG)
     return UNCONFIRMED_SHARE if least else float(math.radians(UNCONFIRMED_HEEL_DEG) / heel_rad)
