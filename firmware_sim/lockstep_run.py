@@ -36,10 +36,7 @@ def run_lockstep(job: Job, watch: Watch | None = None) -> Run:
 
     The same job gives the same rows, bit for bit.
     """
-    retuner, estimating = (
-        work and SimulatedRetuner(work[0], job.scenario.retuner_latency_s)
-        for work in works_of(job.controller)
-    )
+    retuner, estimating = (work and SimulatedRetuner(work[0]) for work in works_of(job.controller))
     desks = Tapped(retuner, estimating, wanted=job.frames is not None)
     with frame_log(job, desks, FRAME_BLOCK_NS) as tapped:
         if job.scenario.faults and job.name != PASSIVE:

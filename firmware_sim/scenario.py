@@ -116,8 +116,6 @@ class Scenario(Section):
     """Changes of course, speed, loading and sea under way."""
     faults: tuple[AnyFault, ...] = ()
     """Faults in simulated runs with a controller; the passive run has none."""
-    retuner_latency_s: NotNegative = 5.0
-    """Time that identification and design take in simulated time."""
 
     @field_validator("sensors", mode="before")
     @classmethod

@@ -47,7 +47,6 @@ PARTS: Final = {
     "share_of_possible": Part("python -m tools.studies.share_of_possible --seeds 8 --json", 6),
     "many_seas": Part("python -m tools.studies.many_seas --seconds 900 --seeds 3 --json", 15),
     "renewed_seas": Part("python -m tools.studies.renewed_seas --seeds 3 --json", 30),
-    "starter_ships": Part("python -m tools.studies.starter_ships --json", 3),
     "february_hours": Part(_study("february_hours"), 80),
     "storm_seeds": Part(_study("storm_seeds"), 30),
     "shipped_scenarios": Part(_study("shipped_scenarios"), 10),
@@ -80,7 +79,6 @@ PARTS: Final = {
             ("realtime", "--seconds 200 ", 20),
             ("retuning", "--turns 8 ", 15),
             ("slice", "", 1),
-            ("telemetry", "", 1),
         )
     },
     # the source

@@ -190,7 +190,7 @@ class Sea:
             trace=log,
             sink=recorder if self._recorded else None,
             sink_every=SAMPLE_TICKS,
-            estimating=work and SimulatedRetuner(work[0], scenario.retuner_latency_s),
+            estimating=work and SimulatedRetuner(work[0]),
             commissioned=self._setup.commissioned,
         )
         recorder.bench, log.node = bench, bench.node

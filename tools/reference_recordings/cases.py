@@ -170,7 +170,7 @@ def record(case: Case, folder: Path, home: Path | None = None) -> Path:
     with FrameLogWriter(file, head, small=True) as writer:
         sink = BlockSink(writer, block_ns=_WHOLE_NS)
         desks = Tapped(
-            *(work and SimulatedRetuner(work[0], scenario.retuner_latency_s)
+            *(work and SimulatedRetuner(work[0])
               for work in (retuning, estimating)),
             wanted=True,
         )  # fmt: skip

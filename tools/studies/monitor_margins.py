@@ -80,9 +80,7 @@ class Onlooker:
 def controller_of(scenario: Scenario, name: str) -> ControllerNode:
     """A commissioned controller of a scenario, with what retunes it and estimates for it."""
     config = scenario.controllers[name]
-    retuner, estimating = (
-        work and SimulatedRetuner(work[0], scenario.retuner_latency_s) for work in works_of(config)
-    )
+    retuner, estimating = (work and SimulatedRetuner(work[0]) for work in works_of(config))
     return build_controller_node(config, commissioned=True, retuner=retuner, estimating=estimating)
 
 

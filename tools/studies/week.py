@@ -140,7 +140,7 @@ def sail(
     config = law_of(scenario)
     if settings is not None:
         config = config.model_copy(update={"retuning": settings})
-    retuner = SimulatedRetuner(retune, scenario.retuner_latency_s)
+    retuner = SimulatedRetuner(retune)
     side = build_ship_side(scenario, seed, (TimedAction(1.0, Action.ARM),))
     ships = scenario.vessel.ship, scenario.sailing_ship
     plant: Any = side.plant

@@ -1,7 +1,7 @@
 """The retuner's interface to the controller, and an implementation for simulated time."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.retuning.answer import Answer, answer_bytes, read_answer
@@ -39,12 +39,16 @@ class Retuner(Protocol):
         """Return the answer to request `number`, None while there is none."""
 
 
+LATENCY_S: Final = 5.0
+"""Time that identification and design take in simulated time. Chosen; no study."""
+
+
 class SimulatedRetuner:
     """Computes answers at once and delivers them after a fixed latency: runs are reproducible."""
 
     alive = True
 
-    def __init__(self, retune: RetuneFunction, latency_s: float) -> None:
+    def __init__(self, retune: RetuneFunction, latency_s: float = LATENCY_S) -> None:
         self._retune = retune
         self._latency_ns = round(latency_s * 1e9)
         self._number = 0
