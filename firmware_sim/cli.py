@@ -26,6 +26,9 @@ with quietly_interruptible():
         )
         from utank_hil.base.arrays import FloatArray
         from utank_hil.canbus import SocketCanPort
+        from utank_hil.canbus.port import Port
+        from utank_hil.canbus.ports import open_buses
+        from utank_hil.canbus.profiles.foreign import ForeignDevices
         from utank_hil.console.common import (
             Duration,
             Json,
@@ -95,6 +98,7 @@ def firmware_sim(
         loaded.name,
         length_s,
         statistics,
+        loaded.vessel.foreign,
     )
     if len(log.rows) == 0:
         fail("ended before the first sample", ExitCode.INTERRUPTED)
@@ -125,10 +129,19 @@ def firmware_sim(
 
 
 def _run(
-    nodes: list[Node], bus: str, name: str, length_s: float, statistics: LoopStatistics
+    nodes: list[Node],
+    bus: str,
+    name: str,
+    length_s: float,
+    statistics: LoopStatistics,
+    foreign: ForeignDevices,
 ) -> None:
+    port: Port
     try:
-        port = SocketCanPort(bus, heard_by(nodes))
+        if foreign.any:
+            port = open_buses(bus, foreign, sends=True)
+        else:
+            port = SocketCanPort(bus, heard_by(nodes))
     except OSError as error:
         fail(error, ExitCode.NO_BUS)
     try:

@@ -20,6 +20,7 @@ from utank_hil.nodes.panel import TimedAction
 from utank_hil.retuning import Retuner
 from utank_hil.runners import Lockstep, Node
 from utank_hil.runners.lockstep import Trace
+from utank_hil.runners.several_buses import with_more
 
 Tap = Callable[[ControllerNode], Node]
 """Function that wraps a controller in the node put on the bus."""
@@ -76,7 +77,9 @@ class FaultyBench:
         self.nodes = {node.name: FaultyNode(node) for node in self.ship.nodes}
         self.nodes["controller"] = self._controller
         self.bus = FaultyBus(config.bit_rate, seed)
-        self.lockstep = Lockstep(list(self.nodes.values()), self.bus, trace)
+        more = len(config.vessel.foreign.buses) - 1
+        joined = with_more(self.bus, more, config.bit_rate)
+        self.lockstep = Lockstep(list(self.nodes.values()), joined, trace)
 
     def _new_controller(self) -> Node:
         def controller() -> Controller:

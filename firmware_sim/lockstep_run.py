@@ -24,6 +24,7 @@ from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.signals import ROW_TICKS, SIGNALS
 from utank_hil.retuning import SimulatedRetuner
 from utank_hil.runners import Lockstep, SimulatedBus
+from utank_hil.runners.several_buses import with_more
 from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import Tapped
 
@@ -43,7 +44,9 @@ def run_lockstep(job: Job, watch: Watch | None = None) -> Run:
             return _run_with_faults(job, watch, desks, tapped)
         ship, truth, truth_log = ship_of(job)
         controller, log = controller_of(job, desks)
-        bus = SimulatedBus(bit_rate=job.controller.bit_rate)
+        bit_rate = job.controller.bit_rate
+        more = len(job.controller.vessel.foreign.buses) - 1
+        bus = with_more(SimulatedBus(bit_rate=bit_rate), more, bit_rate)
         lockstep = Lockstep([*ship.nodes, tapped(controller), truth], bus)
         _run_to_the_end(job, lockstep, watch)
     return _lockstep_run(job, lockstep, controller, log, ship, truth, truth_log)

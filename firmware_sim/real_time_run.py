@@ -28,6 +28,8 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.provenance import describe
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import SocketCanPort
+from utank_hil.canbus.port import Port
+from utank_hil.canbus.ports import open_buses
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import RetuningEvent
@@ -167,7 +169,12 @@ def _run_loop(
     watch: Watch | None,
     begin_ns: Callable[[], int] | None = None,
 ) -> LoopStatistics:
-    port = None if channel is None else SocketCanPort(channel, heard_by(nodes))
+    port: Port | None = None
+    foreign = job.controller.vessel.foreign
+    if channel is not None and foreign.any:
+        port = open_buses(channel, foreign, sends=True)
+    elif channel is not None:
+        port = SocketCanPort(channel, heard_by(nodes))
     loop = RealTimeLoop(nodes, port, statistics=statistics)
 
     def stop() -> bool:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 import numpy as np
 
+from firmware_sim.foreign_frames import ForeignFrames
 from utank_hil.base.parameters import NotNegative, Positive, Range, range_problems, refuse
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
@@ -20,6 +21,8 @@ from utank_hil.canbus import (
     Switch,
     Transmitter,
 )
+from utank_hil.canbus.profiles.device import DevicePlan
+from utank_hil.canbus.profiles.foreign import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.nodes.housekeeping import Housekeeping
 
 if TYPE_CHECKING:
@@ -80,6 +83,8 @@ class SensorNode:
         Version sent in the heartbeat, which the controller compares with its own.
     second : bool
         Whether it is the second motion sensor, which measures nothing else and has no bias.
+    foreign : ForeignDevices
+        Devices of other makers, in whose frames the node sends what they measure.
     """
 
     period_ns = TICK_NS
@@ -93,6 +98,7 @@ class SensorNode:
         configuration_version: int,
         seed: int,
         second: bool = False,
+        foreign: ForeignDevices = NO_FOREIGN_DEVICES,
     ) -> None:
         self.name = "sensors_2" if second else "sensors"
         address = Address.SENSORS_2 if second else Address.SENSORS
@@ -104,13 +110,24 @@ class SensorNode:
         self._motion: deque[tuple[float, float]] = deque(maxlen=delay_ticks + 1)
         self._messages: list[tuple[int, Callable[[Any], Frame], Callable[[], Any]]] = []
         # the noise is drawn in this order: append a new message at the end
-        self._publish(catalogue.transmitter(SensorMotion, address), self._measure_motion)
+        motion = catalogue.transmitter(SensorMotion, address)
+        self._foreign: list[tuple[ForeignFrames, Callable[[], tuple[Any, ...]]]] = []
+        self._send(motion, self._measure_motion, foreign.motions[second])
         if not second:
-            self._publish(catalogue.transmitter(SensorTank), self._measure_tank)
-            self._publish(catalogue.transmitter(SensorPump), self._measure_pump)
+            self._send(catalogue.transmitter(SensorTank), self._measure_tank, foreign.levels)
+            self._send(catalogue.transmitter(SensorPump), self._measure_pump, foreign.pump_sensor)
         self._bias_rad = 0.0 if second else errors.roll_bias_rad
         self._housekeeping = Housekeeping(address, catalogue, configuration_version)
         self._ticks = 0
+
+    def _send(
+        self, transmitter: Transmitter[_M], measure: Callable[[], _M], plan: DevicePlan[_M] | None
+    ) -> None:
+        """Send what is measured as the node of the catalogue, or as the device of a plan."""
+        if plan is None:
+            self._publish(transmitter, measure)
+        else:
+            self._foreign.append((ForeignFrames(plan), measure))
 
     def _publish(self, transmitter: Transmitter[_M], measure: Callable[[], _M]) -> None:
         """Send the result of `measure` once in the message's cycle."""
@@ -129,7 +146,10 @@ class SensorNode:
         for ticks, frame, measure in self._messages:
             if self._ticks % ticks == 0:
                 frames.append(frame(measure()))
-        frames.extend(self._housekeeping.frames(now_ns))
+        for device, measured in self._foreign:
+            frames += device.frames(measured(), now_ns, self._ticks)
+        if self._messages:  # else no node of the catalogue is on board
+            frames.extend(self._housekeeping.frames(now_ns))
         self._ticks += 1
         return frames
 

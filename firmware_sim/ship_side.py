@@ -103,6 +103,7 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
         linear=scenario.plant == "linear",
     )
     version = vessel.version
+    foreign = vessel.foreign
     drive = valve = None
     if vessel.pump is not None:
         drive = PumpDrive(plant, scenario.drive, catalogue, configuration_version=version)
@@ -119,6 +120,7 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
             configuration_version=version,
             seed=seed + 2,
             second=True,
+            foreign=foreign,
         )
     if vessel.redundancy.hardwired_inputs:
         hardwired = HardwiredNode(
@@ -128,7 +130,12 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
         vessel,
         plant,
         SensorNode(
-            plant, scenario.sensors, catalogue, configuration_version=version, seed=seed + 1
+            plant,
+            scenario.sensors,
+            catalogue,
+            configuration_version=version,
+            seed=seed + 1,
+            foreign=foreign,
         ),
         drive,
         OperatorPanel(catalogue, configuration_version=version, script=script),

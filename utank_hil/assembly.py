@@ -17,7 +17,6 @@ from utank_hil.base.parameters import ParameterError
 from utank_hil.base.tick import TICK_S, is_whole_ticks
 from utank_hil.canbus import load_catalogue
 from utank_hil.canbus.measurements import MEASURED, Measurements, MotionSample
-from utank_hil.canbus.profiles.foreign import NO_FOREIGN_DEVICES
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign
 from utank_hil.control.constrained.law import ConstrainedLaw
@@ -179,7 +178,6 @@ def build_controller_node(
     """
     law = law or build_law(config)
     vessel, tank, catalogue = config.vessel, config.vessel.tank, load_catalogue()
-    foreign = NO_FOREIGN_DEVICES if vessel.devices is None else vessel.devices.foreign()
     exchange: LawExchange | None = None
     if retuner is not None and config.retuning is not None:
         exchange = _adaptive(config, law, retuner)
@@ -226,7 +224,9 @@ def build_controller_node(
         ),
         Actuators(limiter, catalogue, timeout_s, pump=pump, valve=valve),
         Telemetry(statistics, sink, sink_every, event_sink),
-        ControllerSettings(config.vessel.version, commissioned, tank, vessel.redundancy, foreign),
+        ControllerSettings(
+            config.vessel.version, commissioned, tank, vessel.redundancy, vessel.foreign
+        ),
         catalogue,
         estimator,
     )

@@ -12,6 +12,8 @@ from utank_hil.assembly import build_commissioning_node
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import AlarmState, Fault, PortError, SocketCanPort
 from utank_hil.canbus.events import AlarmEvent, RetuningEvent
+from utank_hil.canbus.port import Port
+from utank_hil.canbus.ports import open_buses
 from utank_hil.commands.commissioning_record import (
     make_record,
     record_path,
@@ -63,7 +65,8 @@ def commission(
     statistics = LoopStatistics()
     with ExitStack() as stack:
         try:
-            port = SocketCanPort(channel)
+            foreign = loaded.vessel.foreign
+            port: Port = open_buses(channel, foreign) if foreign.any else SocketCanPort(channel)
         except OSError as error:
             fail(error, ExitCode.NO_BUS)
         stack.callback(port.close)

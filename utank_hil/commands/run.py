@@ -17,6 +17,9 @@ from utank_hil.base.provenance import describe
 from utank_hil.base.stamps import claimed_files
 from utank_hil.canbus import Fault, Mode, PortError, SocketCanPort
 from utank_hil.canbus.events import AlarmEvent
+from utank_hil.canbus.port import Port
+from utank_hil.canbus.ports import BusPorts, open_buses
+from utank_hil.canbus.profiles.foreign import ForeignDevices
 from utank_hil.commands import event_log
 from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.commissioning_record import why_not_commissioned
@@ -107,7 +110,7 @@ def run(
     statistics = LoopStatistics()
     with _refusals_named(), ExitStack() as stack:
         manager = _service_manager(stack)
-        port = _port(stack, bus)
+        port = _port(stack, bus, loaded.vessel.foreign)
         stop = stack.enter_context(stop_on_signals())
         log = None if out is None else _log(out)
         announcer = _announcer(stack, config, loaded, out, log)
@@ -147,6 +150,8 @@ def run(
             ticks = statistics.ticks
             manager.progress(ticks)
             if ticks % LOOK_TICKS == 0:
+                for error in port.take_errors() if isinstance(port, BusPorts) else ():
+                    alarms.say(f"a sensor's bus fails: {error}")
                 failure = recording.failure()
                 if failure:
                     alarms.say(f"not recorded any longer: {failure}")
@@ -205,9 +210,9 @@ def _service_manager(stack: ExitStack) -> ServiceManager:
         fail(f"NOTIFY_SOCKET: the service manager can't be reached: {error}", ExitCode.SYSTEM)
 
 
-def _port(stack: ExitStack, bus: str) -> SocketCanPort:
+def _port(stack: ExitStack, bus: str, foreign: ForeignDevices) -> Port:
     try:
-        port = SocketCanPort(bus)
+        port = open_buses(bus, foreign) if foreign.any else SocketCanPort(bus)
     except OSError as error:
         fail(error, ExitCode.NO_BUS)
     stack.callback(port.close)

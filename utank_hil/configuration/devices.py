@@ -415,6 +415,8 @@ class DevicesSection(Section):
             (plans["motion"], plans["motion_2"]),
             plans["levels"],
             plans["pump_sensor"],
+            buses,
+            frozenset(self.receive_only),
             frozenset((*others.ids_29bit, *(STANDARD | each for each in others.ids_11bit))),
             frozenset(others.pgns),
         )

@@ -11,6 +11,7 @@ from pydantic import ValidationInfo, field_validator, model_validator
 
 from utank_hil.base.parameters import Problem, Range, refuse
 from utank_hil.base.tick import TICK_S
+from utank_hil.canbus.profiles.foreign import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
@@ -130,6 +131,11 @@ class Vessel(Section):
             problems += [(f"devices.{name}", reason) for name, reason in lacking]
         refuse("", in_written_keys(problems, vessel._written))
         return vessel
+
+    @property
+    def foreign(self) -> ForeignDevices:
+        """Devices that are not nodes of the catalogue."""
+        return NO_FOREIGN_DEVICES if self.devices is None else self.devices.foreign()
 
     @property
     def motion_cycles_s(self) -> tuple[float, float]:

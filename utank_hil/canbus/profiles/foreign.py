@@ -16,6 +16,10 @@ class ForeignDevices:
     motions : tuple of DevicePlan or None
         Of the one or two motion sensors; None for a native one.
     levels, pump_sensor : DevicePlan or None
+    buses : tuple of str
+        Names of the interfaces by their numbers; the controller's own, the first, has none.
+    receive_only : frozenset of str
+        Interfaces on which nothing is sent.
     other_ids : frozenset of int
         Identifiers that are nobody's fault.
     other_pgns : frozenset of int
@@ -24,8 +28,15 @@ class ForeignDevices:
     motions: tuple[DevicePlan[SensorMotion] | None, ...] = (None, None)
     levels: DevicePlan[SensorTank] | None = None
     pump_sensor: DevicePlan[SensorPump] | None = None
+    buses: tuple[str, ...] = ("",)
+    receive_only: frozenset[str] = frozenset()
     other_ids: frozenset[int] = frozenset()
     other_pgns: frozenset[int] = frozenset()
+
+    @property
+    def any(self) -> bool:
+        """Whether there are any."""
+        return self != NO_FOREIGN_DEVICES
 
     def knows(self, can_id: int) -> bool:
         """Whether a frame on the controller's own bus is of a declared device."""

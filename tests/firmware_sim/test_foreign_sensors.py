@@ -1,0 +1,80 @@
+"""Emulated sensors that speak a maker's frames, on a bus of their own."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from firmware_sim.scenario import Scenario
+from firmware_sim.ship_side import build_ship_side
+from utank_hil.assembly import build_controller_node
+from utank_hil.canbus import Mode
+from utank_hil.canbus.frame import BUS_SHIFT
+from utank_hil.configuration import load_config
+from utank_hil.configuration.devices import DevicesSection
+from utank_hil.nodes.redundancy import Redundancy
+from utank_hil.runners import Lockstep, SimulatedBus
+from utank_hil.runners.several_buses import with_more
+
+SECOND_NS = 1_000_000_000
+SBG = {"profile": "sbg_ellipse", "bus": "can1", "accept_unprotected": True}
+LEVELS = {
+    "profile": "cia404_levels", "bus": "can2", "node": 7, "high_level_m": 4.6,
+    "accept_unprotected": True,
+    "signals": {name: {"scale": 0.65, "offset": -7.8} for name in
+                ("port_level_m", "starboard_level_m")},
+}  # fmt: skip
+
+
+def roll_and_shares(devices, *, second, seconds=30):
+    scenario = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
+    section = None if devices is None else DevicesSection(**devices)
+    redundancy = Redundancy(second_motion_sensor=second)
+    changed = {"devices": section, "redundancy": redundancy}
+    vessel = scenario.vessel.model_copy(update=changed)
+    config = scenario.controllers["pd" if "pd" in scenario.controllers else "gpc"]
+    config = config.model_copy(update={"vessel": vessel})
+    scenario = scenario.model_copy(update={"vessel": vessel})
+    ship = build_ship_side(scenario, 1, scenario.operator)
+    node = build_controller_node(config, commissioned=True)
+    more = len(vessel.foreign.buses) - 1
+    buses = set()
+    run = Lockstep(
+        [*ship.nodes, node],
+        with_more(SimulatedBus(), more, 250_000),
+        trace=lambda _, sender, frame: buses.add((sender, frame.can_id >> BUS_SHIFT)),
+    )
+    rolls, shares = [], []
+    for k in range(10 * seconds):
+        run.run_until(k * SECOND_NS // 10 + 1)
+        rolls.append(ship.plant.roll_rad)
+        if k > 150:
+            assert (node.mode, node.fault) == (Mode.ACTIVE, 0)
+            shares.append(node.judgement.share)
+    return np.array(rolls), shares, buses
+
+
+@pytest.mark.slow
+def test_with_two_sensors_the_ship_rolls_as_with_native_nodes():
+    native, _, _ = roll_and_shares(None, second=True)
+    foreign, shares, buses = roll_and_shares({"motion": SBG, "levels": LEVELS}, second=True)
+    assert set(shares) == {1.0}
+    rms = np.sqrt(np.mean(native**2))
+    assert np.sqrt(np.mean((foreign - native) ** 2)) < 0.03 * rms
+    assert ("sensors", 1) in buses
+    assert ("sensors", 2) in buses
+    assert {number for sender, number in buses if sender == "controller"} == {0}
+
+
+@pytest.mark.slow
+def test_alone_without_counter_or_checksum_it_has_half_the_pressure():
+    _, shares, _ = roll_and_shares({"motion": SBG}, second=False, seconds=18)
+    assert set(shares) == {0.5}
+
+
+def test_a_cycle_that_is_no_whole_tick_is_refused():
+    foreign = DevicesSection(motion=SBG | {"cycle_ms": 5, "age_ms": 20}).foreign()
+    from firmware_sim.foreign_frames import ForeignFrames
+
+    with pytest.raises(ValueError, match="5 ms can't be emulated"):
+        ForeignFrames(foreign.motions[0])

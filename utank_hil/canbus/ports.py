@@ -1,0 +1,113 @@
+"""Several CAN interfaces as one port; no frame is ever handed from one to another."""
+
+from collections.abc import Collection, Sequence
+
+from utank_hil.canbus.frame import BUS_SHIFT, OTHER_BUS, Frame
+from utank_hil.canbus.port import Port, PortError
+from utank_hil.canbus.profiles.foreign import ForeignDevices
+
+
+class BusPorts:
+    """The controller's own interface and others, whose frames carry their numbers.
+
+    Parameters
+    ----------
+    ports : sequence of Port
+        The controller's own first.
+    vital : collection of int
+        Interfaces whose errors are those of the bus. An error of another one is kept in `errors`,
+        and the devices on it fall silent.
+
+    Attributes
+    ----------
+    errors : dict of int to PortError
+        Last error of each interface that is not vital.
+    """
+
+    def __init__(self, ports: Sequence[Port], vital: Collection[int] = (0,)) -> None:
+        self._ports = tuple(ports)
+        self._vital = frozenset(vital)
+        self.errors: dict[int, PortError] = {}
+        self._told: dict[int, str] = {}
+        self._pending: PortError | None = None
+
+    @property
+    def others(self) -> int:
+        """Frames of other kinds on the controller's own interface; see `Port`."""
+        return self._ports[0].others
+
+    def send(self, frame: Frame) -> None:
+        """Queue one frame on its interface; see `Port.send`."""
+        number = frame.can_id >> BUS_SHIFT
+        self._ports[number].send(Frame(frame.can_id & (OTHER_BUS - 1), frame.data))
+
+    def receive(self) -> Sequence[Frame]:
+        """Return the frames of all interfaces; see `Port.receive`.
+
+        An error is raised by the next call where frames of other interfaces came with it.
+        """
+        frames: list[Frame] = []
+        if self._pending is None:
+            for number, port in enumerate(self._ports):
+                try:
+                    heard = port.receive()
+                except PortError as error:
+                    if number in self._vital:
+                        self._pending = self._pending or error
+                    else:
+                        self.errors[number] = error
+                    continue
+                if number:
+                    tag = number << BUS_SHIFT
+                    frames += [Frame(tag | each.can_id, each.data) for each in heard]
+                else:
+                    frames += heard
+        if self._pending is not None and not frames:
+            try:
+                raise self._pending  # held by a variable here it would never be freed
+            finally:
+                self._pending = None
+        return frames
+
+    def take_errors(self) -> list[PortError]:
+        """Errors of interfaces that are not vital, each once until it is another one."""
+        new = [each for number, each in self.errors.items() if str(each) != self._told.get(number)]
+        self._told = {number: str(each) for number, each in self.errors.items()}
+        return new
+
+    def close(self) -> None:
+        """Release all interfaces; idempotent."""
+        for port in self._ports:
+            port.close()
+
+
+def open_buses(own: str, foreign: ForeignDevices, *, sends: bool = False) -> BusPorts:
+    """Open the controller's own interface and those of the ship's devices.
+
+    Parameters
+    ----------
+    own : str
+        Name of the controller's interface.
+    foreign : ForeignDevices
+    sends : bool
+        Whether it is the devices' side, which sends where the controller is not to.
+
+    Raises
+    ------
+    PortError
+        If an interface is missing, or the controller's own stands in the ship's file, too.
+    """
+    from utank_hil.canbus.socketcan import SocketCanPort
+
+    if own in foreign.buses:
+        raise PortError(f"CAN interface {own}: is the controller's own: leave out bus: {own}")
+    ports: list[SocketCanPort] = []
+    try:
+        for name in (own, *foreign.buses[1:]):
+            silent = name in foreign.receive_only and not sends
+            ports.append(SocketCanPort(name, standard=True, receive_only=silent))
+    except PortError:
+        for port in ports:
+            port.close()
+        raise
+    return BusPorts(ports)

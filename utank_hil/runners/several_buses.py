@@ -1,0 +1,45 @@
+"""Several simulated buses between the same nodes."""
+
+from utank_hil.canbus.frame import BUS_SHIFT, OTHER_BUS, Frame
+from utank_hil.runners.bus_model import BusStatistics, SimulatedBus
+from utank_hil.runners.lockstep import Bus
+
+
+class SeveralBuses:
+    """A bus and more of them: the identifier of a frame tells which one carries it.
+
+    Parameters
+    ----------
+    first : Bus
+        The controller's own.
+    more : int
+        Number of the others.
+    bit_rate : int
+        Of the others.
+    """
+
+    def __init__(self, first: Bus, more: int, bit_rate: int) -> None:
+        self._buses = (first, *(SimulatedBus(bit_rate) for _ in range(more)))
+
+    def queue(self, sender: int, frame: Frame, now_ns: int) -> None:
+        """Take a frame to be sent on its bus."""
+        bare = Frame(frame.can_id & (OTHER_BUS - 1), frame.data)
+        self._buses[frame.can_id >> BUS_SHIFT].queue(sender, bare, now_ns)
+
+    def carry_until(self, before_ns: int) -> list[tuple[int, int, Frame]]:
+        """Advance, and return what has arrived on any bus, oldest first."""
+        arrived = [
+            (time_ns, sender, Frame(number << BUS_SHIFT | frame.can_id, frame.data))
+            for number, bus in enumerate(self._buses)
+            for time_ns, sender, frame in bus.carry_until(before_ns)
+        ]
+        return sorted(arrived, key=lambda each: each[0])
+
+    def statistics(self, now_ns: int) -> BusStatistics:
+        """Return the traffic on the controller's own bus."""
+        return self._buses[0].statistics(now_ns)
+
+
+def with_more(first: Bus, more: int, bit_rate: int) -> Bus:
+    """The bus itself, or with more beside it."""
+    return SeveralBuses(first, more, bit_rate) if more else first
