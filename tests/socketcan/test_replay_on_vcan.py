@@ -21,7 +21,8 @@ from two_processes import (
 )
 
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.telemetry.bus_logs import write_bus_log
+from utank_hil.telemetry.bus_files.writing import write_frames
+from utank_hil.telemetry.bus_logs import frames_of
 from utank_hil.telemetry.bus_records import Kind
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.replay import entries_of, replay_log
@@ -80,7 +81,7 @@ def test_canplayer_puts_an_exported_log_on_the_bus_frame_by_frame(tmp_path: Path
     entries = list(entries_of(FrameLog(KEPT).blocks()))
     first = list(takewhile(lambda entry: entry.time_ns < PLAYED_NS, entries))
     file = tmp_path / "kept.log"
-    write_bus_log(file, first)
+    write_frames(file, frames_of(first))
     with closing(Candump(tmp_path)):
         wait_for_listener()
         player = subprocess.run(

@@ -59,9 +59,14 @@ def open_content(
 
 @contextmanager
 def open_text(
-    path: Path, limit_bytes: int = LIMIT_BYTES, on_cut: Callable[[str], None] | None = None
+    path: Path,
+    limit_bytes: int = LIMIT_BYTES,
+    on_cut: Callable[[str], None] | None = None,
+    errors: str = "strict",
 ) -> Iterator[TextIO]:
     """Open a text as `open_content` does; a line that is read ends with a line feed.
+
+    Bytes that are no text are an error, or replaced (`errors`, as of `open`).
 
     Raises
     ------
@@ -72,7 +77,7 @@ def open_text(
         begin = content.peek(2)[:2]  # type: ignore[attr-defined]  # of a BufferedReader
         encoding = "utf-16" if begin in _UTF_16 else "utf-8-sig"
         try:
-            yield io.TextIOWrapper(content, encoding)
+            yield io.TextIOWrapper(content, encoding, errors)
         except UnicodeError as error:
             raise TextFileError(f"{path}: is no text in UTF-8: save it as that") from error
 
@@ -86,11 +91,11 @@ def lines_of(path: Path, text: TextIO) -> Iterator[tuple[int, str]]:
         If a line is longer than `LINE_LIMIT`, as in no log.
     """
     for number, line in enumerate(iter(lambda: text.readline(LINE_LIMIT), ""), start=1):
+        yield number, line
         if len(line) == LINE_LIMIT:
             raise TextFileError(
                 f"{path}: line {number} has more than {LINE_LIMIT} characters: is it a text?"
             )
-        yield number, line
 
 
 class _Content(io.RawIOBase):

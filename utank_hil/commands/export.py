@@ -1,18 +1,29 @@
 """``utank-hil export``: frames or signals of a recording for other programs."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from utank_hil.console.common import Json, fail, print_json
-from utank_hil.console.terminal import notes, say_cut, shown
-from utank_hil.telemetry.bus_logs import BUS_SUFFIXES, read_bus_log, write_bus_log
+from utank_hil.console.common import Channel, Json, fail, print_json
+from utank_hil.console.terminal import notes, say_note, shown
+from utank_hil.telemetry.bus_files.frame import BusFrame
+from utank_hil.telemetry.bus_files.log import READ, BusLog
+from utank_hil.telemetry.bus_files.writing import SUFFIXES as BUS_SUFFIXES
+from utank_hil.telemetry.bus_files.writing import write_frames
+from utank_hil.telemetry.bus_logs import frames_of
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
-from utank_hil.telemetry.replay import Entry, entries_of
-from utank_hil.telemetry.signal_files import TABLE_SUFFIXES, read_signals, require, write_signals
+from utank_hil.telemetry.replay import entries_of
+from utank_hil.telemetry.signal_files import (
+    TABLE_SUFFIXES,
+    is_table,
+    part_of_entries,
+    read_signals,
+    require,
+    write_signals,
+)
 
 _FORMATS = ", ".join((*BUS_SUFFIXES, *TABLE_SUFFIXES))
 
@@ -21,8 +32,8 @@ def export(
     recording: Annotated[
         Path,
         typer.Argument(
-            help=f"Frame log ({SUFFIX}), recording (.rrd), log of the bus (.log, .asc, .blf) or "
-            "table (.csv, .parquet)."
+            help=f"Frame log ({SUFFIX}), recording (.rrd), table (.csv, .parquet) or log of the "
+            f"bus ({READ})."
         ),
     ],
     to: Annotated[
@@ -35,11 +46,18 @@ def export(
     run: Annotated[
         str | None, typer.Option(help="Run of a recording; without it the last one.")
     ] = None,
+    channel: Channel = None,
+    from_s: Annotated[
+        float | None,
+        typer.Option("--from", metavar="SECONDS", help="From the first record; of frames only."),
+    ] = None,
+    until_s: Annotated[float | None, typer.Option("--until", metavar="SECONDS")] = None,
     json_: Json = False,
 ) -> None:
     """Write frames or signals of a recording in a format that other programs read.
 
-    Signals have one row a tick, SI units, and the unit in each column's name.
+    Frames keep their times, order, kinds and lengths, or the difference is said. Signals have one
+    row a tick, SI units, and the unit in each column's name.
 
     **Example:** utank-hil export out/gpc.frames --to gpc.blf
     """
@@ -50,12 +68,15 @@ def export(
         fail(f"--to {to} is what is read: name another file")
     if run is not None and recording.suffix.lower() != ".rrd":
         fail("--run is for recordings (.rrd), which hold several: leave it out")
-    cuts: list[str] = []
+    said: list[str] = []
     try:
         if kind in BUS_SUFFIXES:
-            count, unit = write_bus_log(to, _entries(recording, cuts.append)), "frames"
+            frames = _frames(recording, channel, from_s, until_s, said)
+            count, unit = write_frames(to, frames, said), "frames"
         else:
-            runs = read_signals(recording, cuts.append)
+            runs = read_signals(
+                recording, said.append, channel=channel, from_s=from_s, to_s=until_s
+            )
             name = list(runs)[-1] if run is None else run
             if name not in runs:
                 fail(f"{recording} has no run {name!r}; it has {', '.join(runs)}")
@@ -64,21 +85,29 @@ def export(
             count, unit = len(runs[name]["time_s"]), "rows"
     except (OSError, ValueError) as error:
         fail(error)
-    for cut in cuts:
-        say_cut(cut)
+    for text in said:
+        say_note(text)
     if json_:
-        print_json({"file": str(to), unit: count, "cut": "; ".join(cuts)})
+        print_json({"file": str(to), unit: count, "cut": "; ".join(said)})
     else:
         notes.say(f"{shown(to)}: {count} {unit}")
 
 
-def _entries(recording: Path, note: Callable[[str], None]) -> Iterable[Entry]:
-    """Return the frames of a recording; `note` is called with the place where a log is cut."""
+def _frames(
+    recording: Path,
+    channel: str | None,
+    from_s: float | None,
+    to_s: float | None,
+    said: list[str],
+) -> Iterator[BusFrame]:
+    """Yield the frames of a recording; `said` gets what was not read as it stands."""
     suffix = recording.suffix.lower()
     if suffix == SUFFIX:
-        return entries_of(FrameLog(recording).blocks(note))
-    if suffix in BUS_SUFFIXES:
-        return read_bus_log(recording)
-    beside = recording.with_suffix(SUFFIX)
-    hint = f": give {beside}" if suffix == ".rrd" and beside.exists() else ""
-    raise ValueError(f"{recording}: holds signals and no frames{hint}")
+        entries = entries_of(FrameLog(recording).blocks(said.append))
+        yield from frames_of(part_of_entries(entries, from_s, to_s), said)
+    elif suffix == ".rrd" or is_table(recording):
+        beside = recording.with_suffix(SUFFIX)
+        hint = f": give {beside}" if suffix == ".rrd" and beside.exists() else ""
+        raise ValueError(f"{recording}: holds signals and no frames{hint}")
+    else:
+        yield from BusLog(recording, channel, from_s, to_s).frames(said)

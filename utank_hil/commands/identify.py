@@ -16,9 +16,9 @@ from utank_hil.commands.identified import (
 )
 from utank_hil.commands.identify_report import figures, print_report
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.console.common import OUT, Json, fail, load, prepare_out, print_json
+from utank_hil.console.common import OUT, Channel, Json, fail, load, prepare_out, print_json
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import Terminal, notes, say_cut
+from utank_hil.console.terminal import Terminal, notes, say_note
 from utank_hil.identification import IdentificationError
 from utank_hil.identification.logged_samples import logged_samples
 from utank_hil.retuning import Candidate
@@ -33,7 +33,7 @@ def identify_log(
     log: Annotated[
         Path,
         typer.Argument(
-            help="With pulses of the pump in it: .rrd, .frames, .log, .asc, .blf, .csv, .parquet."
+            help="With pulses of the pump in it: .rrd, .frames, .csv, .parquet, log of the bus."
         ),
     ],
     config: Annotated[
@@ -42,6 +42,7 @@ def identify_log(
     run: Annotated[
         str | None, typer.Option(help="Run of the recording; without it the last one.")
     ] = None,
+    channel: Channel = None,
     from_s: Annotated[float | None, typer.Option("--from", metavar="SECONDS")] = None,
     to_s: Annotated[float | None, typer.Option("--to", metavar="SECONDS")] = None,
     order: Annotated[
@@ -62,8 +63,8 @@ def identify_log(
     """
     from utank_hil.pictures.identification import draw_identification
     from utank_hil.telemetry.signal_files import (
-        TABLE_SUFFIXES,
         even_rows,
+        is_table,
         read_signals,
         require,
     )
@@ -79,14 +80,14 @@ def identify_log(
     prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
     measured = task.design.predictor.measured
     try:
-        runs = read_signals(log, say_cut)
+        runs = read_signals(log, say_note, channel=channel)
         name = list(runs)[-1] if run is None else run
         if name not in runs:
             fail(f"{log} has no run {name!r}; it has {', '.join(runs)}")
         sample_time_s = task.design.predictor.sample_time_s
         signals = runs[name]
         require(log, signals, "time_s", "pressure_command_pa", *measured)
-        if log.suffix.lower() in TABLE_SUFFIXES:
+        if is_table(log):
             signals = even_rows(log, signals, sample_time_s, from_s, to_s)
             from_s = to_s = None
         record = logged_samples(signals, measured, sample_time_s, from_s, to_s)

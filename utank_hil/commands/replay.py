@@ -13,14 +13,11 @@ import typer
 from utank_hil.assembly import build_law
 from utank_hil.base.parameters import ParameterError
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.console.common import AllowCode, Json, fail, load
+from utank_hil.console.common import AllowCode, Channel, Json, fail, load
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import Terminal
-from utank_hil.telemetry.bus_logs import (
-    BUS_SUFFIXES,
-    begins_with_the_controller,
-    read_bus_log,
-)
+from utank_hil.console.terminal import Terminal, say_note
+from utank_hil.telemetry.bus_files.log import BusLog
+from utank_hil.telemetry.bus_logs import LoggedController
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
 from utank_hil.telemetry.replay import LawVerdict, ReplayResult, replay_log
 from utank_hil.telemetry.replay import replay as run_replay
@@ -31,13 +28,15 @@ def replay(
     log: Annotated[
         Path,
         typer.Argument(
-            help=f"Frame log ({SUFFIX}) of a run, its first part; or .log (candump), .asc, .blf."
+            help=f"Frame log ({SUFFIX}) of a run, its first part; or a log of the bus, such as "
+            "candump's."
         ),
     ],
     config: Annotated[
         Path | None,
         typer.Option(help="Controller configuration to replay with, instead of the recorded one."),
     ] = None,
+    channel: Channel = None,
     json_: Json = False,
     allow_code: AllowCode = False,
 ) -> None:
@@ -55,11 +54,11 @@ def replay(
     cut = ""
     named = None if config is None else load(config, ControllerConfig, allow_code=allow_code)
     try:
-        if log.suffix.lower() in BUS_SUFFIXES:
-            (result, why), law = _replay_bus_log(log, named), None
+        if log.suffix.lower() == ".rrd":
+            fail(f"{log} holds no frames: give the {SUFFIX} file beside it")
+        if log.suffix.lower() != SUFFIX:
+            (result, why), law = _replay_bus_log(BusLog(log, channel), named), None
         else:
-            if log.suffix == ".rrd":
-                fail(f"{log} holds no frames: give the {SUFFIX} file beside it")
             recording = FrameLog(log)
             if not recording.first_part:
                 fail(
@@ -84,17 +83,20 @@ def replay(
     raise typer.Exit(ExitCode.OK if result.exact else ExitCode.REFUSED)
 
 
-def _replay_bus_log(log: Path, chosen: ControllerConfig | None) -> tuple[ReplayResult, list[str]]:
+def _replay_bus_log(log: BusLog, chosen: ControllerConfig | None) -> tuple[ReplayResult, list[str]]:
     """Replay a log without configuration and ticks."""
     if chosen is None:
-        fail(f"{log} says nothing of the controller: name its configuration by --config")
-    entries = read_bus_log(log)
-    if not begins_with_the_controller(entries):
+        fail(f"{log.path} says nothing of the controller: name its configuration by --config")
+    said: list[str] = []
+    controller = LoggedController(log, said)
+    for text in said:
+        say_note(text)
+    if not controller.starts:
         fail(
-            f"{log} begins in the middle of a run, or has no controller in it: its first frame of "
-            "the controller must be the address claim, with which it starts"
+            f"{log.path} begins in the middle of a run, or has no controller in it: its first "
+            "frame of the controller must be the address claim, with which it starts"
         )
-    result = run_replay(entries, chosen, build_law(chosen))
+    result = run_replay(controller.entries(answered=True), chosen, build_law(chosen))
     if result.exact:
         return result, []
     return result, [

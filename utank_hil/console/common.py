@@ -46,6 +46,9 @@ Version = Annotated[
         "--version", is_eager=True, callback=_print_version, help="Print the version and end."
     ),
 ]
+Channel = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Bus to read of a log with several, as it says.")
+]
 AllowCode = Annotated[
     bool, typer.Option("--allow-code", help="Run Python code that the file names as a law.")
 ]

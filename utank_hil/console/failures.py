@@ -14,6 +14,7 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import notes
 
 EXTRA_OF: Final = {
+    "asammdf": "files",
     "clarabel": "bench",
     "control": "bench",
     "dask": "bench",

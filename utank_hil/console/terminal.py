@@ -113,6 +113,6 @@ class _Notes(Terminal):
 notes: Final = _Notes(stderr=True)
 
 
-def say_cut(cut: str) -> None:
-    """Say where a file that was read is not whole."""
-    notes.say(f"{cut}; what follows in it is left out", yellow="not whole:")
+def say_note(note: str) -> None:
+    """Print what of a file was not read, or not written, as it stands."""
+    notes.say(note, yellow="note:")

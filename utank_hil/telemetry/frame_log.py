@@ -150,7 +150,7 @@ class FrameLog:
             if self.cut:  # Records after a gap do not continue the same run.
                 break
         if self.cut and note is not None:
-            note(self.cut)
+            note(f"{self.cut}; what follows in it is left out")
 
     def _read(self, path: Path) -> Iterator[tuple[bytes, bytes]]:
         with path.open("rb") as content:

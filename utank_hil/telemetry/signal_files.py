@@ -17,15 +17,14 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.number_table import is_time, read_number_table, since_first
 from utank_hil.base.text_files import TextFileError, kind_of
 from utank_hil.base.whole_file import left_whole
-from utank_hil.telemetry.bus_logs import BUS_SUFFIXES, read_bus_log
+from utank_hil.telemetry.bus_files.log import BusLog, format_of
+from utank_hil.telemetry.bus_logs import LoggedController
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
-from utank_hil.telemetry.replay import entries_of
+from utank_hil.telemetry.replay import Entry, entries_of
 from utank_hil.telemetry.signal_table import signal_table
 from utank_hil.telemetry.units import column_of
 
 TABLE_SUFFIXES: Final = (".csv", ".parquet")
-SUFFIXES: Final = (".rrd", SUFFIX, *BUS_SUFFIXES, *TABLE_SUFFIXES)
-"""Suffixes of files with signals."""
 
 Columns = dict[str, FloatArray]
 _Column = tuple[str, FloatArray]
@@ -48,16 +47,27 @@ _RATE: Final = 1e-3
 """Largest relative error of a logger's clock: ten times a poor quartz's."""
 
 
-def read_signals(path: Path, note: Callable[[str], None] | None = None) -> dict[str, Columns]:
+def read_signals(
+    path: Path,
+    note: Callable[[str], None] | None = None,
+    *,
+    channel: str | None = None,
+    from_s: float | None = None,
+    to_s: float | None = None,
+) -> dict[str, Columns]:
     """Read the runs of a file by name; a file without names has one run, named by its stem.
 
     Parameters
     ----------
     path : Path
-        File with one of `SUFFIXES`.
+        Recording, frame log, table, or log of the bus of any name.
     note : callable, optional
-        Called with the place where a frame log is cut or damaged, whose later rows are left out,
-        and with the columns of a table that hold no numbers, which are an error without it.
+        Called with what was not read as it stands: a cut, a step of a clock, and the columns of a
+        table that hold no numbers, which are an error without it.
+    channel : str, optional
+        Bus to read of a log with several.
+    from_s, to_s : float, optional
+        Part of a frame log or a log of the bus, in seconds from its first record.
 
     Raises
     ------
@@ -73,17 +83,37 @@ def read_signals(path: Path, note: Callable[[str], None] | None = None) -> dict[
 
         return read_recording(path)
     if suffix == SUFFIX:
-        columns = signal_table(entries_of(FrameLog(path).blocks(note)))
-    elif suffix in BUS_SUFFIXES:
-        columns = signal_table(read_bus_log(path))
+        entries = part_of_entries(entries_of(FrameLog(path).blocks(note)), from_s, to_s)
+        columns = signal_table(entries)
+    elif not is_table(path):
+        notes: list[str] = []
+        controller = LoggedController(BusLog(path, channel, from_s, to_s), notes)
+        if note is not None and notes:
+            note("; ".join(notes))
+        columns = signal_table(controller.entries())
     elif suffix == ".csv":
         columns = _all_in_si(path, read_number_table(path).items())
-    elif suffix in TABLE_SUFFIXES:
-        columns = _all_in_si(path, _read_parquet(path, note))
     else:
-        raise TextFileError(f"{path}: holds no signals that can be read: give {_listed(SUFFIXES)}")
+        columns = _all_in_si(path, _read_parquet(path, note))
     packed = path.suffix.lower() == ".gz"
     return {Path(path.stem).stem if packed else path.stem: columns}
+
+
+def is_table(path: Path) -> bool:
+    """Whether a file is a table of signals by its name, and no table of frames."""
+    return kind_of(path) in TABLE_SUFFIXES and not (path.exists() and format_of(path))
+
+
+def part_of_entries(
+    entries: Iterable[Entry], from_s: float | None, to_s: float | None
+) -> Iterator[Entry]:
+    """Yield the records between two times, in seconds from the first; None is no limit."""
+    begin_ns = None
+    for entry in entries:
+        begin_ns = entry.time_ns if begin_ns is None else begin_ns
+        after_s = (entry.time_ns - begin_ns) * 1e-9
+        if (from_s is None or after_s >= from_s) and (to_s is None or after_s <= to_s):
+            yield entry
 
 
 def write_signals(path: Path, columns: Mapping[str, FloatArray]) -> None:

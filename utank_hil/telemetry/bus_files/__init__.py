@@ -1,0 +1,1 @@
+"""Logs of a CAN bus in the formats of other programs."""

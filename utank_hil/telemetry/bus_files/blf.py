@@ -1,0 +1,194 @@
+"""Logs in BLF, the binary format of Vector's programs: objects in compressed containers."""
+
+import zlib
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from struct import Struct
+from typing import BinaryIO, Final
+
+from utank_hil.base.text_files import open_content
+from utank_hil.telemetry.bus_files.frame import FD_LENGTHS, BusFrame, BusLogError, FrameKind
+from utank_hil.telemetry.bus_files.text_log import LIMIT_BYTES
+
+MARK: Final = b"LOGG"
+_FILE: Final = Struct("<4sL32x8H")  # mark, size of the head; when the log was begun
+_OBJECT: Final = Struct("<4sHHLL")  # mark, size of the head, its version, size, type
+_TIME: Final = Struct("<L4xQ")  # flags; time
+_CLASSIC: Final = Struct("<HBBL8s")
+_FD: Final = Struct("<HBBL5xBB5x64s")
+_FD_64: Final = Struct("<BBBxL4xL20xBB4x")
+_ERROR: Final = Struct("<H8xB5xL4x8s")
+_CONTAINER: Final = 10
+_CONTAINER_HEAD: Final = 16
+_LIMIT: Final = 1 << 26
+"""Largest object: programs write containers of 128 kB."""
+_EXTENDED: Final = 0x80000000
+_MASK: Final = 0x1FFFFFFF
+_TICK_NS: Final = 10_000
+"""Unit of time of objects with the flag 1; of others it is 1 ns."""
+
+
+class BlfLog:
+    """Frames of a BLF file; objects of other types are not frames and are passed by.
+
+    Raises
+    ------
+    BusLogError
+        From the iteration, if there is no frame before the first damaged object.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.notes: list[str] = []
+        self._path, self._count, self._byte = path, 0, 0
+
+    @property
+    def place(self) -> str:
+        """Number of the last frame."""
+        return f"frame {self._count}"
+
+    def __iter__(self) -> Iterator[BusFrame]:
+        cut = ""
+        with open_content(self._path, LIMIT_BYTES, self.notes.append) as content:
+            begin_ns = self._begin_ns(content)
+            try:
+                for kind, head_size, body in self._objects(content):
+                    frame = _frame(kind, head_size, body, begin_ns)
+                    if frame is not None:
+                        self._count += 1
+                        yield frame
+            except _CutError as error:
+                cut = f"{self._path.name} is cut after frame {self._count}: {error}"
+            except _DamagedError as error:
+                raise BusLogError(
+                    f"{self._path}: is damaged after frame {self._count}, in the object that ends "
+                    f"at byte {self._byte}: {error}; use the part before by --until"
+                ) from error
+        if not self._count:
+            raise BusLogError(f"{self._path}: no frames in it{f': {cut}' if cut else ''}")
+        if cut:
+            self.notes.append(f"{cut}; what follows in it is left out")
+
+    def _begin_ns(self, content: BinaryIO) -> int:
+        head = content.read(_FILE.size)
+        if len(head) < _FILE.size or head[:4] != MARK:
+            raise BusLogError(f"{self._path}: is no BLF file, or its head is cut")
+        _, size, year, month, _, *day_to_milliseconds = _FILE.unpack(head)
+        self._byte = len(head) + len(content.read(max(0, min(size, _LIMIT) - len(head))))
+        day, hour, minute, second, milliseconds = day_to_milliseconds
+        try:
+            begin = datetime(year, month, day, hour, minute, second, tzinfo=UTC)
+        except ValueError:  # Zeros: the times count from the log's begin.
+            return 0
+        return int(begin.timestamp()) * 10**9 + int(milliseconds) * 10**6
+
+    def _objects(self, content: BinaryIO) -> Iterator[tuple[int, int, bytes]]:
+        """Yield type, size of the head and bytes of each object in the containers."""
+        rest = b""
+        while head := content.read(_OBJECT.size):
+            size, kind = _checked(head, 0)
+            body = content.read(size - len(head))
+            if len(body) < size - len(head):
+                raise _CutError("the file ends in an object")
+            self._byte += size + len(content.read(size % 4))
+            if kind != _CONTAINER:
+                continue
+            rest += _unpacked(body)
+            place = 0
+            while len(rest) - place >= _OBJECT.size:
+                if not rest.startswith(b"LOBJ", place):  # Up to 3 bytes fill up an object.
+                    place = rest.find(b"LOBJ", place, place + 8)
+                    if place < 0:
+                        raise _DamagedError("no object where one should begin")
+                    if len(rest) - place < _OBJECT.size:
+                        break
+                size, kind = _checked(rest, place)
+                if len(rest) - place < size:
+                    break
+                yield kind, _OBJECT.unpack_from(rest, place)[1], rest[place : place + size]
+                place += size
+            rest = rest[place:]
+        if len(rest) > 3:
+            raise _CutError("its last object is not whole")
+
+
+class _DamagedError(ValueError):
+    """The file is damaged; the message says how."""
+
+
+class _CutError(_DamagedError):
+    """The file ends before its last object does."""
+
+
+def _checked(data: bytes, place: int) -> tuple[int, int]:
+    """Return size and type of an object."""
+    if len(data) - place < _OBJECT.size:
+        raise _CutError("the file ends in an object")
+    mark, head_size, _, size, kind = _OBJECT.unpack_from(data, place)
+    if mark != b"LOBJ" or not _OBJECT.size <= size <= _LIMIT or head_size > size:
+        raise _DamagedError(f"an object of {size} bytes")
+    return int(size), int(kind)
+
+
+def _unpacked(body: bytes) -> bytes:
+    """Return the content of a container."""
+    method = int.from_bytes(body[:2], "little")
+    if method == 0:
+        return body[_CONTAINER_HEAD:]
+    if method != 2:
+        raise _DamagedError(f"a container of the unknown compression {method}")
+    unpacking = zlib.decompressobj()
+    try:
+        content = unpacking.decompress(body[_CONTAINER_HEAD:], _LIMIT)
+    except zlib.error as error:
+        raise _DamagedError("a container that can't be decompressed") from error
+    if not unpacking.eof:
+        raise _DamagedError(f"a container that is cut or has more than {_LIMIT} bytes")
+    return content
+
+
+def _frame(kind: int, head_size: int, body: bytes, begin_ns: int) -> BusFrame | None:
+    """Return the frame of an object; None if it is of another type."""
+    layout = {1: _CLASSIC, 86: _CLASSIC, 100: _FD, 101: _FD_64, 73: _ERROR, 2: None}.get(kind, 0)
+    if layout == 0:
+        return None
+    if len(body) < max(32, head_size + (layout.size if isinstance(layout, Struct) else 2)):
+        raise _DamagedError(f"an object of {len(body)} bytes")
+    flags, time = _TIME.unpack_from(body, _OBJECT.size)
+    now_ns = begin_ns + time * (_TICK_NS if flags == 1 else 1)
+    if layout is None or layout is _ERROR:
+        channel = int.from_bytes(body[head_size : head_size + 2], "little")
+        code, number, data = _ERROR.unpack_from(body, head_size)[1:] if layout else (0, 0, b"")
+        data = data[: min(code, 8)]
+        extended = bool(number & _EXTENDED)
+        return BusFrame(
+            now_ns, str(channel), number & _MASK, extended, FrameKind.ERROR, data, len(data)
+        )
+    speed, is_fd = 0, False
+    if layout is _CLASSIC:
+        channel, flags, code, number, data = layout.unpack_from(body, head_size)
+        size, sent, remote = min(code, 8), flags & 1, flags & 0x80
+    elif layout is _FD:
+        channel, flags, code, number, fd_flags, size, data = layout.unpack_from(body, head_size)
+        sent, remote, is_fd, speed = flags & 1, flags & 0x80, bool(fd_flags & 1), fd_flags >> 1 & 3
+    else:
+        channel, code, size, number, fd_flags, sent, more = _FD_64.unpack_from(body, head_size)
+        end = more if head_size + _FD_64.size <= more <= len(body) else len(body)
+        data = body[head_size + _FD_64.size : end]
+        remote, is_fd, speed = fd_flags & 0x10, bool(fd_flags & 0x1000), fd_flags >> 13 & 3
+    if size > FD_LENGTHS[-1]:
+        raise _DamagedError(f"a frame of {size} bytes")
+    frame_kind = FrameKind.REMOTE if remote else FrameKind.FD if is_fd else FrameKind.DATA
+    # Bytes that count and are not in the object are zero, as Vector's library reads them.
+    data = b"" if remote else data[:size].ljust(size, b"\0")
+    return BusFrame(
+        now_ns,
+        str(channel),
+        number & _MASK,
+        bool(number & _EXTENDED),
+        frame_kind,
+        data,
+        min(code, 15),
+        bool(sent),
+        speed,
+    )

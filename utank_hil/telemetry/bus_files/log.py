@@ -1,0 +1,140 @@
+"""A log of the bus in any format: which one is seen from its content, whatever its name."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from utank_hil.base.text_files import open_content, open_text
+from utank_hil.telemetry.bus_files import asc, blf, candump, mf4, savvycan, trc
+from utank_hil.telemetry.bus_files.clock import OneClock
+from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError, FrameSource
+from utank_hil.telemetry.bus_files.text_log import LIMIT_BYTES, TextLog
+
+READ: Final = "candump, ASC, BLF, MF4, PEAK's .trc and SavvyCAN's .csv"
+"""Formats that are read."""
+_LOOKS: Final[dict[str, re.Pattern[str]]] = {
+    "savvycan": savvycan.LOOKS,
+    "trc": trc.LOOKS,
+    "candump": candump.LOOKS,
+    "asc": asc.LOOKS,
+}
+_MARKS: Final = {blf.MARK: "blf", mf4.MARK: "mf4"}
+_LOOKED_AT: Final = 1 << 16
+"""Number of characters at the begin of a file from which its format is seen."""
+
+
+def format_of(path: Path) -> str:
+    """Return the format of a log; empty if it looks like none.
+
+    Raises
+    ------
+    OSError
+        If it can't be read.
+    """
+    with open_content(path, LIMIT_BYTES, _ignored) as content:
+        mark = content.read(4)
+    if mark in _MARKS:
+        return _MARKS[mark]
+    for line in _begin(path):
+        for name, looks in _LOOKS.items():
+            if looks.match(line):
+                return name
+    return ""
+
+
+@dataclass(frozen=True, slots=True)
+class BusLog:
+    """Frames of a log, or of one channel and a part of it; read anew by every call of `frames`.
+
+    Attributes
+    ----------
+    path : Path
+        The file, compressed with gzip or not.
+    channel : str or None
+        Name of the bus; None for all.
+    from_s, to_s : float or None
+        Part to read, in seconds from the first frame.
+    """
+
+    path: Path
+    channel: str | None = None
+    from_s: float | None = None
+    to_s: float | None = None
+
+    def frames(self, notes: list[str] | None = None) -> Iterator[BusFrame]:
+        """Yield the frames in the order of the file, on one clock.
+
+        Parameters
+        ----------
+        notes : list of str, optional
+            What was found is appended, after the last frame.
+
+        Raises
+        ------
+        BusLogError
+            If it is no log, holds no such frames, or its times can't be trusted.
+        TextFileError, OSError
+            If it can't be read.
+        """
+        source = self._source()
+        others: set[str] = set()
+        clock = OneClock(self.path.name, self._of_channel(source, others), lambda: source.place)
+        begin_ns, found = None, False
+        for frame in clock:
+            begin_ns = frame.time_ns if begin_ns is None else begin_ns
+            after_s = (frame.time_ns - begin_ns) * 1e-9
+            if self.from_s is not None and after_s < self.from_s:
+                continue
+            if self.to_s is not None and after_s > self.to_s:
+                if after_s > self.to_s + 1.0:  # A burst may be written late.
+                    break
+                continue
+            found = True
+            yield frame
+        if begin_ns is None:
+            raise BusLogError(
+                f"{self.path}: no frames of channel {self.channel} in it; it has "
+                f"{', '.join(sorted(others))}"
+            )
+        if not found:
+            raise BusLogError(
+                f"{self.path}: no frames between --from and --until; the last is at {after_s:g} s"
+            )
+        if notes is not None:
+            notes += [*source.notes, *clock.notes]
+
+    def _of_channel(self, source: FrameSource, others: set[str]) -> Iterator[BusFrame]:
+        for frame in source:
+            if self.channel is None or frame.channel == self.channel:
+                yield frame
+            else:
+                others.add(frame.channel)
+
+    def _source(self) -> FrameSource:
+        name = format_of(self.path)
+        if name == "blf":
+            return blf.BlfLog(self.path)
+        if name == "mf4":
+            return mf4.Mf4Log(self.path)
+        if name == "candump":
+            return TextLog(self.path, candump.parse, counted=False)
+        if name == "savvycan":
+            return TextLog(self.path, savvycan.parse, counted=True)
+        if name:
+            parser = asc.AscParser() if name == "asc" else trc.TrcParser()
+            return TextLog(self.path, parser.parse, counted=True)
+        begin = next(iter(_begin(self.path)), "")
+        what = f"it begins with {begin[:60]!r}" if begin else "it is empty"
+        raise BusLogError(f"{self.path}: is no log of the bus, such as {READ}: {what}")
+
+
+def _begin(path: Path) -> list[str]:
+    """Return the first lines that are not blank."""
+    with open_text(path, LIMIT_BYTES, _ignored, errors="replace") as text:
+        return [line for line in text.read(_LOOKED_AT).splitlines() if line.strip()]
+
+
+def _ignored(_: str) -> None:
+    """Take the place of a cut, which the reading itself reports."""

@@ -1,0 +1,64 @@
+"""Frames of a bus in MDF 4 (``.mf4``), read by python-can and asammdf."""
+
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Final
+
+from utank_hil.telemetry.bus_files.frame import FD_LENGTHS, BusFrame, BusLogError, FrameKind
+
+MARK: Final = b"MDF "
+
+
+class Mf4Log:
+    """Frames of an MF4 file.
+
+    Raises
+    ------
+    BusLogError
+        From the iteration, if it can't be read to its end or holds no frames.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.notes: list[str] = []
+        self._path, self._count = path, 0
+
+    @property
+    def place(self) -> str:
+        """Number of the last frame."""
+        return f"frame {self._count}"
+
+    def __iter__(self) -> Iterator[BusFrame]:
+        from can import MF4Reader
+
+        if find_spec("asammdf") is None:  # The reader would not name the package.
+            raise ModuleNotFoundError("asammdf is not installed", name="asammdf")
+
+        try:
+            with MF4Reader(self._path) as messages:
+                for message in messages:
+                    self._count += 1
+                    kind = FrameKind.FD if message.is_fd else FrameKind.DATA
+                    kind = FrameKind.REMOTE if message.is_remote_frame else kind
+                    kind = FrameKind.ERROR if message.is_error_frame else kind
+                    data = bytes(message.data)
+                    size = message.dlc if kind is FrameKind.REMOTE else len(data)
+                    yield BusFrame(
+                        round(message.timestamp * 1e9),
+                        str(message.channel),
+                        message.arbitration_id,
+                        message.is_extended_id,
+                        kind,
+                        data,
+                        size if size <= 8 else FD_LENGTHS.index(size),
+                        not message.is_rx,
+                        message.bitrate_switch + 2 * message.error_state_indicator,
+                    )
+        except OSError:
+            raise
+        except Exception as error:  # The readers raise many kinds of exception at damaged bytes.
+            raise BusLogError(
+                f"{self._path}: can't be read as MF4 after frame {self._count}"
+            ) from error
+        if not self._count:
+            raise BusLogError(f"{self._path}: no frames of a bus in it")
