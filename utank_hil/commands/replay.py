@@ -96,7 +96,7 @@ def _replay_bus_log(log: BusLog, chosen: ControllerConfig | None) -> tuple[Repla
             f"{log.path} begins in the middle of a run, or has no controller in it: its first "
             "frame of the controller must be the address claim, with which it starts"
         )
-    result = run_replay(controller.entries(answered=True), chosen, build_law(chosen))
+    result = run_replay(controller.entries(), chosen, build_law(chosen), open_end=True)
     if result.exact:
         return result, []
     return result, [

@@ -90,15 +90,14 @@ class LoggedController:
         claim = catalogue.codec(AddressClaim, Address.CONTROLLER).can_id
         self.starts = bool(sent) and min(sent, key=lambda each: each.time_ns).number == claim
 
-    def entries(self, *, answered: bool = False) -> Iterator[Entry]:
+    def entries(self) -> Iterator[Entry]:
         """Yield what the controller received and sent, with its ticks; frames follow their tick.
 
-        Without `answered` the last tick is the first after the last frame, which is seen there.
-        What the controller sent in it is not in the log.
+        The last tick is the first after the last frame. What the controller sent in it may not be
+        in the log.
         """
         yield Entry(0, bytes([self._real_time]), Kind.STARTED, self._begin_ns)
-        length_ns = self._last_ns - self._begin_ns
-        tick, last = 0, length_ns // TICK_NS if answered else -(-length_ns // TICK_NS)
+        tick, last = 0, -((self._begin_ns - self._last_ns) // TICK_NS)
         received: deque[Entry] = deque()
         sent: list[Frame] = []
         for frame in self._log.frames():

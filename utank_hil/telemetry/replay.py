@@ -181,6 +181,7 @@ def replay(
     retuner: bool = False,
     estimating: bool = False,
     commissioned: bool = True,
+    open_end: bool = False,
 ) -> ReplayResult:
     """Give recorded entries to a new controller and compare what it sends.
 
@@ -194,6 +195,8 @@ def replay(
         Whether the controller had a retuner, and an estimator of sea and ship.
     commissioned : bool
         Whether it could be armed.
+    open_end : bool
+        Whether the log may end before what the controller sent in its last tick.
     """
     answers, estimates = RecordedRetuner(), RecordedRetuner()
     statistics = LoopStatistics()
@@ -240,7 +243,7 @@ def replay(
             estimates.take(data, alive=kind == Kind.ESTIMATOR_ALIVE)
         elif kind == Kind.LOST:
             result.lost_rows += number
-    if waiting:
+    if waiting and (recorded or not open_end):
         comparison.compare(recorded, sent)
     return result
 
