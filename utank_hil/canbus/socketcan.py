@@ -9,11 +9,9 @@ import socket
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-import can
-from can.interfaces.socketcan import SocketcanBus
-
 from utank_hil.canbus.frame import LONGEST_ID, STANDARD, Frame
 from utank_hil.canbus.port import PortError
+from utank_hil.canbus.python_can import SocketcanBus, can
 
 #: More than the kernel's receive buffer (about 280 frames); bounds the time on a babbling bus.
 MAX_FRAMES_PER_CALL: Final = 320

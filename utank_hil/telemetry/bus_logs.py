@@ -20,6 +20,7 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.canbus.codec import FRAME_BYTES
+from utank_hil.canbus.frame import BUS_SHIFT, LONGEST_ID, STANDARD
 from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError, FrameKind
 from utank_hil.telemetry.bus_files.log import BusLog
 from utank_hil.telemetry.bus_records import Kind
@@ -106,12 +107,13 @@ class LoggedController:
                 tick, sent = tick + 1, []
             if frame.kind is FrameKind.ERROR:
                 continue  # What the controller's own interface met is not in such a log.
-            if frame.kind is not FrameKind.DATA or not frame.extended:
+            number = frame.number | (0 if frame.extended else STANDARD)
+            if frame.kind is not FrameKind.DATA:
                 received.append(Entry(1, b"", Kind.OTHERS, frame.time_ns))
-            elif frame.number in self._own_ids and (bool(frame.sent) or not self._marked):
-                sent.append(Frame(frame.number, frame.data))
+            elif number in self._own_ids and (bool(frame.sent) or not self._marked):
+                sent.append(Frame(number, frame.data))
             else:
-                received.append(Entry(frame.number, frame.data, Kind.RECEIVED, frame.time_ns))
+                received.append(Entry(number, frame.data, Kind.RECEIVED, frame.time_ns))
             while received and frame.time_ns <= self._begin_ns:  # The log may begin days before.
                 yield received.popleft()
         for rest in range(tick, max(tick, last) + 1):
@@ -140,13 +142,15 @@ def frames_of(entries: Iterable[Entry], notes: list[str] | None = None) -> Itera
         begin_ns = time_ns if begin_ns is None else begin_ns
         if kind in (Kind.RECEIVED, Kind.SENT):
             after_ns, sent = max(0, time_ns - begin_ns), kind == Kind.SENT
-            yield BusFrame(after_ns, "1", number, True, FrameKind.DATA, data, len(data), sent)
+            bus, extended = str(1 + (number >> BUS_SHIFT)), not number & STANDARD
+            number &= LONGEST_ID
+            yield BusFrame(after_ns, bus, number, extended, FrameKind.DATA, data, len(data), sent)
         elif kind == Kind.OTHERS:
             others += number
     if others and notes is not None:
         notes.append(
-            f"{others} frames of other kinds (11 bits, remote, error) are counted in the recording "
-            "and not in the copy"
+            f"{others} frames of other kinds (remote, error, longer) are only counted in the "
+            "recording and not in the copy"
         )
 
 

@@ -1,6 +1,7 @@
 """Frames of a bus in MDF 4 (``.mf4``), read by python-can and asammdf."""
 
 from collections.abc import Iterator
+from importlib import reload
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
@@ -29,13 +30,15 @@ class Mf4Log:
         return f"frame {self._count}"
 
     def __iter__(self) -> Iterator[BusFrame]:
-        from can import MF4Reader
+        import can.io.mf4
 
         if find_spec("asammdf") is None:  # The reader would not name the package.
             raise ModuleNotFoundError("asammdf is not installed", name="asammdf")
 
+        # It was imported without asammdf (`utank_hil.canbus.python_can`).
+        reader = reload(can.io.mf4).MF4Reader
         try:
-            with MF4Reader(self._path) as messages:
+            with reader(self._path) as messages:
                 for message in messages:
                     self._count += 1
                     kind = FrameKind.FD if message.is_fd else FrameKind.DATA
