@@ -157,16 +157,10 @@ def run_bench(
     """Run a scenario with the passive tank, then with each controller, in the same waves.
 
     Each run has its own process. Ctrl-C ends the runs between two ticks, with the pump at zero; the
-    rows recorded until then are returned. Raises `OSError` if the interface cannot be used, or
-    everything was ended before the first sample. Raises `BrokenProcessPool` if a process was killed
-    before the passive run had ended.
-
-    Parameters
-    ----------
-    progress : callable
-        Function called several times a second.
-    laws : mapping of str to BuiltLaw, optional
-        Laws of the scenario's controllers; they are designed if not given.
+    rows recorded until then are returned. `progress` is called several times a second; laws that
+    are not given are designed. Raises `OSError` if the interface cannot be used, or everything was
+    ended before the first sample. Raises `BrokenProcessPool` if a process was killed before the
+    passive run had ended.
     """
     seed = scenario.seed if options.seed is None else options.seed
     duration_s = scenario.duration_s if options.duration_s is None else options.duration_s

@@ -48,10 +48,7 @@ ROUNDING_PA = 4.0
 class PumpDrive:
     """Pump drive with CiA 402 states.
 
-    Parameters
-    ----------
-    configuration_version : int
-        Version sent in the heartbeat, which the controller compares with its own.
+    `configuration_version` is sent in the heartbeat; the controller compares it with its own.
     """
 
     name = "drive"

@@ -29,18 +29,10 @@ Tap = Callable[[ControllerNode], Node]
 class FaultyBench:
     """Bench in lockstep in which faults can be placed, at the start or under way.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario; its own faults are left to the caller.
-    law : BuiltLaw, optional
-        Law of the controller; it is designed if not given.
-    sink : callable, optional
-        Function that takes a row of the controller's telemetry every `sink_every` ticks.
-    retuner : Retuner, optional
-        Retuner of a self-tuning controller, whose law cannot be made to fail.
-    tapped : Tap, optional
-        Wrapper between each controller and its faults.
+    Its scenario's own faults are left to the caller; a law that is not given is designed. `sink`
+    takes a row of the controller's telemetry every `sink_every` ticks. A `retuner` is for a
+    self-tuning controller, whose law cannot be made to fail. `tapped` wraps each controller before
+    its faults do.
 
     Attributes
     ----------

@@ -21,10 +21,7 @@ if TYPE_CHECKING:
 class HardwiredNode:
     """Node that sends the state of the wires.
 
-    Parameters
-    ----------
-    high_level_m : float
-        Level above still water at which a reservoir's switch closes.
+    A reservoir's switch closes at `high_level_m` above still water.
     """
 
     name = "hardwired"

@@ -30,12 +30,8 @@ def write_report(
 ) -> tuple[dict[str, Path], list[str]]:
     """Write picture, recording, figures and page of a bench, with their provenance `about`.
 
-    Returns
-    -------
-    files : dict
-        Paths of the files written: "picture", "recording", "figures", "report".
-    failures : list of str
-        Files that could not be written, with the reason.
+    Returns the paths of the files written ("picture", "recording", "figures", "report"), and those
+    that could not be, with the reason.
     """
     files: dict[str, Path] = {}
     failures = []

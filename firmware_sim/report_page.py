@@ -50,12 +50,8 @@ def bench_page(
 ) -> Report:
     """Return the page of a bench.
 
-    Parameters
-    ----------
-    rolls : mapping of str to ndarray, shape (n,)
-        Roll of each compared run, every `RECORD_S` in the window.
-    scratch : Path
-        Folder for pictures that are made for the page.
+    `rolls` has the roll of each compared run, shape (n,), every `RECORD_S` in the window; `scratch`
+    is a folder for pictures that are made for the page.
     """
     says = "Roll and power of each run, and roll, level and pressure over time"
     sections = [

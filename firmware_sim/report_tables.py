@@ -98,16 +98,8 @@ def pump_table(found: BenchFigures) -> RichTable:
 def in_one_unit(values: Sequence[float], unit: str) -> tuple[str, list[str]]:
     """Values of a column in the unit that gives the largest at most three integer digits.
 
-    Parameters
-    ----------
-    values : sequence of float
-        Non-negative values, in the unit without a prefix.
-
-    Returns
-    -------
-    unit : str
-        Unit with its prefix.
-    cells : list of str
+    The values are not negative and in the unit without a prefix. Returns the unit with its prefix,
+    and the cells.
     """
     largest = max(values, default=0.0)
     prefix, scale = next((each for each in _PREFIXES if largest >= each[1]), _PREFIXES[-1])

@@ -53,13 +53,8 @@ class RetuningFigures:
 def retuning_figures(run: Run, scenario: Scenario, settle_s: float) -> RetuningFigures | None:
     """Figures of a run's retuning; None if nothing happened.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario whose ship is the truth.
-    settle_s : float
-        Time left out at the start; where the ship changes later or under way, the time before that
-        is left out, too.
+    The scenario's ship is the truth. `settle_s` is left out at the start; where the ship changes
+    later or under way, the time before that, too.
     """
     if not run.retuning:
         return None

@@ -145,10 +145,7 @@ class IrregularSea(_AnySea, ABC):
     ) -> PassingSea:
         """Realisation that passes from one spectrum to the next.
 
-        Parameters
-        ----------
-        known : sequence of tuple
-            Time in s and spectrum; the first is that of this sea.
+        `known` has times in s with their spectra; the first is that of this sea.
         """
         if len(known) == 1:
             return PassingSea.of(self.sea(seed))

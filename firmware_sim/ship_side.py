@@ -89,10 +89,7 @@ def bare_plant(scenario: Scenario, seed: int) -> Plant:
 def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ...]) -> ShipSide:
     """Build the emulated ship and its nodes.
 
-    Parameters
-    ----------
-    seed : int
-        Seed of sea and sensor noise.
+    `seed` is that of sea and sensor noise.
     """
     vessel, catalogue = scenario.vessel, load_catalogue()
     plant = Plant(

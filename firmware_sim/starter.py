@@ -95,13 +95,9 @@ def make_starter(
 ) -> StarterProject:
     """Size tank and pump, find a law, and write the files.
 
-    Raises `TankImpossibleError, NoLawError` if there is no tank or no law for this ship. Raises
+    The free surface may take `stability_share` of the stability, see `size_tank`. Raises
+    `TankImpossibleError, NoLawError` if there is no tank or no law for this ship. Raises
     `ValueError` if a value is invalid.
-
-    Parameters
-    ----------
-    stability_share : float
-        Share of the stability that the free surface may take, see `size_tank`.
     """
     written = WrittenShip(
         displacement_t=ship.displacement_t,

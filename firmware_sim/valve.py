@@ -41,10 +41,7 @@ _AT_END: Final = 1e-3
 class ValveNode:
     """Valve with its actuator.
 
-    Parameters
-    ----------
-    configuration_version : int
-        Version sent in the heartbeat, which the controller compares with its own.
+    `configuration_version` is sent in the heartbeat; the controller compares it with its own.
     """
 
     name = "valve"

@@ -62,14 +62,8 @@ def track(
 ) -> Callable[[float], float]:
     """Return a quantity of the voyage as a function of time in s.
 
-    Parameters
-    ----------
-    start : float
-        Value at time 0.
-    value : callable
-        Function that gives a waypoint's value; None where it has none.
-    angle : bool
-        Whether it is an angle in degrees, which turns the shorter way.
+    `start` is the value at time 0; `value` gives a waypoint's, None where it has none. An `angle`
+    in degrees turns the shorter way.
     """
     times, values = [0.0], [start]
     for point in voyage:

@@ -72,15 +72,9 @@ class PassingWaves:
     """Components of a changing sea, met by a ship that changes course and speed.
 
     The angle of each component at the ship is the integral of its frequency of encounter, so
-    changes of course and speed cause no jump of the moment.
-
-    Parameters
-    ----------
-    turn_rad, speed_m_s : callable
-        Clockwise turn of the ship since the start, and its speed, as functions of time in s.
-    responses : callable
-        Complex roll moment in N m per m of amplitude as a function of frequency and heading; the
-        lateral acceleration over g may follow.
+    changes of course and speed cause no jump of the moment. `turn_rad` and `speed_m_s` are
+    functions of time in s: clockwise turn of the ship since the start, and its speed. `moment`
+    gives the complex roll moment in N m per m of amplitude for frequency and heading.
     """
 
     def __init__(

@@ -23,12 +23,8 @@ class WorkerPool(ProcessPoolExecutor):
     """Pool whose processes ignore `SIGNALS`; shared values tell them when to end.
 
     Ctrl-C, ``timeout`` and service managers signal all processes of a command. The pool's processes
-    end with this process if it is killed.
-
-    Parameters
-    ----------
-    shared : object
-        Result of `shared` in the processes: shared values cannot be sent with a job.
+    end with this process if it is killed. `shared` is what `shared` returns in the processes:
+    shared values cannot be sent with a job.
     """
 
     def __init__(self, workers: int, shared: object) -> None:

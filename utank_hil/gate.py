@@ -51,14 +51,8 @@ class JudgedLaw:
 def judge(config: ControllerConfig, *, with_delay_margin: bool = True) -> JudgedLaw:
     """Design the law of a configuration and judge its loop.
 
-    Raises `ParameterError` if the law can't be designed or its margins can't be computed; the
-    problems are named by their keys in the configuration.
-
-    Parameters
-    ----------
-    config : ControllerConfig
-    with_delay_margin : bool
-        As in `margins`.
+    `with_delay_margin` is as in `margins`. Raises `ParameterError` if the law can't be designed or
+    its margins can't be computed; the problems are named by their keys in the configuration.
     """
     law = build_law(config)
     step_s = _step_time_s(law)

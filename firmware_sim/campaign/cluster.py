@@ -26,14 +26,8 @@ CONNECT_S: Final = 10.0
 def workers(scheduler: str | None, count: int | None) -> Iterator[Client]:
     """Connect to a scheduler, or start a local one that no other machine can reach.
 
-    Raises `OSError` if the scheduler does not answer.
-
-    Parameters
-    ----------
-    scheduler : str, optional
-        Address such as ``tcp://10.0.0.5:8786``; without it the workers are local processes.
-    count : int, optional
-        Number of local processes; one per core by default.
+    `scheduler` is an address such as ``tcp://10.0.0.5:8786``; without it there are `count` local
+    processes, one per core by default. Raises `OSError` if the scheduler does not answer.
     """
     if scheduler is not None:
         with Client(scheduler, timeout=CONNECT_S) as client:

@@ -56,20 +56,10 @@ class _Record:
 def rows_of(simulation: str, scenario: Scenario, seed: int, laws: Laws) -> list[Row]:
     """Compute a case.
 
-    Raises `ValueError` if this kind of simulation cannot compute the scenario.
-
-    Parameters
-    ----------
-    simulation : str
-        "bus", "linear" or "nonlinear".
-    seed : int
-        Seed that replaces the scenario's.
-
-    Returns
-    -------
-    list of dict
-        One row for the bare ship and for each run: ``run``, ``mark`` (why it does not count, or
-        empty) and the figures of `METRICS`.
+    `simulation` is "bus", "linear" or "nonlinear"; `seed` replaces the scenario's. There is one row
+    for the bare ship and for each run: ``run``, ``mark`` (why it does not count, or empty) and the
+    figures of `METRICS`. Raises `ValueError` if this kind of simulation cannot compute the
+    scenario.
     """
     if simulation == "bus":
         return _on_the_bus(scenario, seed, laws)

@@ -65,12 +65,8 @@ def times_of(
 ) -> LiveTimes:
     """Return the times from a fault on.
 
-    Parameters
-    ----------
-    fault_s, end_s : float
-        Time of the fault, and end of listening.
-    silences : Stream, optional
-        Stream that the fault ends: times count from its last frame.
+    They count from `fault_s`, or from the last frame of the stream `silences` that the fault ends.
+    Listening ended at `end_s`.
     """
     begin_s = fault_s
     if silences is not None:

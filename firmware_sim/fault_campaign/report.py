@@ -18,12 +18,8 @@ def as_json(
 ) -> dict[str, Any]:
     """Return all results for `json.dumps`.
 
-    Parameters
-    ----------
-    on_bus : sequence of mapping
-        Live rows in the form of `run_live`.
-    not_run : mapping of str to str
-        Rows that were not run, with the reason.
+    `on_bus` are live rows in the form of `run_live`, `not_run` the reasons of rows that were not
+    run.
     """
     rows = [*(result.as_json() for result in results), *on_bus]
     return {

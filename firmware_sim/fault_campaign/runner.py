@@ -76,20 +76,9 @@ def run_rows(
 ) -> dict[str, list[Outcome]]:
     """Run rows in the seas of some seeds.
 
-    Parameters
-    ----------
-    stopped : callable
-        Function that returns whether to end early.
-    recorded : bool
-        Whether the outcomes of the first seed contain recordings.
-    workers : int, optional
-        Number of processes; by default the number of cores available.
-
-    Returns
-    -------
-    dict of str to list of Outcome
-        Outcomes by row in the order of the seeds; incomplete after an early end or a killed
-        process.
+    `stopped` says whether to end early; `recorded`, whether the outcomes of the first seed contain
+    recordings. There are `workers` processes, by default as many as cores. The outcomes of a row
+    are in the order of the seeds, and incomplete after an early end or a killed process.
     """
     context = multiprocessing.get_context("spawn")
     done, stop = context.Value("i", 0), context.Value("b", 0, lock=False)

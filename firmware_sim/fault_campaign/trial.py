@@ -146,12 +146,8 @@ class Underway:
 class Sea:
     """All rows of one setup in the waves of one seed.
 
-    Parameters
-    ----------
-    patient : bool
-        Whether the bench runs on for `REARMED_S` after the pump is off.
-    stopped : callable
-        Function that returns whether to end early, with an `InterruptedError`.
+    A `patient` bench runs on for `REARMED_S` after the pump is off. `stopped` says whether to end
+    early, with an `InterruptedError`.
     """
 
     def __init__(

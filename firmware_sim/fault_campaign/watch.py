@@ -115,12 +115,8 @@ class Moments:
 class Watch:
     """Observer of controller, drive and ship in each tick, after all of them.
 
-    Parameters
-    ----------
-    row : Row
-        Row whose operator acts at times after the first tick.
-    degraded_most : tuple of (float, int)
-        Permitted pressure in Pa while the pressure is halved, and the time in ns to reach it.
+    The operator of `row` acts at times after the first tick. `degraded_most` is the permitted
+    pressure in Pa while it is halved, and the time in ns to reach it.
     """
 
     name = "watch"

@@ -34,19 +34,8 @@ def write_identified(
 ) -> dict[str, Path]:
     """Write vessel and controller of an identified ship.
 
-    Parameters
-    ----------
-    vessel : Vessel
-        The configured vessel.
-    ship, tank : RollShip, Tank
-        The identified ship and tank.
-    content : dict
-        Content of the controller's file, from `read_controller`.
-
-    Returns
-    -------
-    dict
-        Paths of both: "vessel" and "config".
+    `vessel` is the configured one, `ship` and `tank` the identified ones, `content` that of the
+    controller's file, from `read_controller`. Returns the paths of both: "vessel" and "config".
     """
     return _write(folder / VESSEL, folder / CONTROLLER, vessel, ship, tank, content)
 

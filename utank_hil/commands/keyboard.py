@@ -36,15 +36,9 @@ _UNACCEPTED: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.RECTIFIED_UNA
 class Keyboard:
     """Reads words from a terminal or a pipe between two ticks, and shows changes.
 
-    Parameters
-    ----------
-    descriptor : int
-        Descriptor to read from. The end of a pipe only ends the input; that of a terminal stops the
-        controller and ends the panel.
-    say : callable
-        Shows a line.
-    terminal : bool
-        Whether a person types: then Enter alone stops, and a new alarm rings.
+    The end of a pipe only ends the input; that of a terminal stops the controller and ends the
+    panel. `say` shows a line. If a person types (`terminal`), Enter alone stops, and a new alarm
+    rings.
     """
 
     def __init__(

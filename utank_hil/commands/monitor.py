@@ -56,12 +56,8 @@ def watch(
 ) -> None:
     """Show a recording or a stream until the viewer is closed or Ctrl-C.
 
-    Parameters
-    ----------
-    source, at_s
-        Arguments of `open_viewer`.
-    send : callable, optional
-        Function that sends new data, and returns whether more may come.
+    `source` and `at_s` are those of `open_viewer`; `send` sends new data, and returns whether more
+    may come.
     """
     from utank_hil.runners import stop_on_signals
     from utank_hil.telemetry.viewer import open_viewer

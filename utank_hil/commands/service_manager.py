@@ -18,12 +18,8 @@ READY_S: Final = 30.0
 class ServiceManager(Closing):
     """The socket of the service manager; without one, nothing is sent.
 
-    Raises `OSError` if there is such a socket and it can't be reached.
-
-    Parameters
-    ----------
-    environment : mapping of str to str
-        ``NOTIFY_SOCKET`` and ``WATCHDOG_USEC`` as systemd sets them.
+    `environment` has ``NOTIFY_SOCKET`` and ``WATCHDOG_USEC`` as systemd sets them. Raises `OSError`
+    if there is such a socket and it can't be reached.
     """
 
     def __init__(self, environment: Mapping[str, str] = os.environ) -> None:

@@ -16,15 +16,8 @@ def judge_law(
 ) -> JudgedLaw:
     """The law of a configuration, judged; one that can't be ends the command with exit code 2.
 
-    Parameters
-    ----------
-    config : ControllerConfig
-    path : Path
-        The file it was read from, to name the place of what is wrong.
-    key : str
-        Where in that file it stands; empty for the file as a whole.
-    with_delay_margin : bool
-        As in `margins`.
+    `path` is the file it was read from and `key` where in it, empty for the file as a whole, to
+    name the place of what is wrong; `with_delay_margin` is as in `margins`.
     """
     try:
         with notes.busy(f"{config.name}: designing its law"):  # takes seconds at times

@@ -122,12 +122,8 @@ def fail_with(error: ConfigError) -> NoReturn:
 def why_not_writable(folder: Path, files: Iterable[str] = ()) -> str | None:
     """Make a folder and try whether files can be written there; the reason if they can't.
 
-    Parameters
-    ----------
-    folder : Path
-        Made, with its parents, if it is not there.
-    files : iterable of str
-        Names of the files to come; those that exist are left as they are.
+    The folder is made with its parents; `files` are the names of the files to come, and those that
+    exist are left as they are.
     """
     if folder.exists() and not folder.is_dir():
         return f"{folder}: is not a folder"

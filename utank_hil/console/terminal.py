@@ -37,10 +37,7 @@ def new_table(
 class Terminal(Console):
     """Rich's console without its markup: names and paths are the user's, brackets and all.
 
-    Parameters
-    ----------
-    **options
-        Of `rich.console.Console`.
+    Its options are those of `rich.console.Console`.
     """
 
     def __init__(self, **options: Any) -> None:

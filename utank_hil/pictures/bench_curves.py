@@ -73,18 +73,10 @@ def draw_bench(
 
     The whole run is drawn as the greatest value in each of `WINDOWS` parts, and three minutes in
     full, around the largest roll, or around the first trial of a new law if a run retuned. Lanes
-    below show the retuning states of each run. Raises `ValueError` if there are no curves, or more
-    than there are colours.
-
-    Parameters
-    ----------
-    curves : sequence of BenchCurve
-        The first is the reference, the passive tank: drawn in grey, and searched for the largest
-        roll.
-    bars : sequence of BenchBar
-        Runs of the summary, those of the curves last; empty for no summary.
-    wrong : sequence of str
-        Problems, written above the bars.
+    below show the retuning states of each run. The first curve is the reference, the passive tank:
+    drawn in grey, and searched for the largest roll. `bars` are the runs of the summary, those of
+    the curves last, or none; the problems in `wrong` are written above them. Raises `ValueError` if
+    there are no curves, or more than there are colours.
     """
     if not 1 <= len(curves) <= len(COLORS):
         raise ValueError(f"can draw 1 to {len(COLORS)} runs in one picture, got {len(curves)}")

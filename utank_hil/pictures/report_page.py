@@ -71,14 +71,8 @@ def write_report_page(
 ) -> Path:
     """Write the page over `path`, a `.html` file, and return the path.
 
-    Raises `OSError` if the page cannot be written.
-
-    Parameters
-    ----------
-    title, about : str
-        Heading, and the line below it.
-    verdicts : sequence of Verdict
-        One for each reported run.
+    `about` is the line below the heading `title`; there is a verdict for each reported run. Raises
+    `OSError` if the page cannot be written.
     """
     from jinja2 import Environment, StrictUndefined
 

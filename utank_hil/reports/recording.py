@@ -34,15 +34,9 @@ RUN, LOG = "run-", "log-"
 def recording_report(file: Path, scratch: Path) -> Report:
     """The report of a recording.
 
-    Raises `OSError, ValueError` if the file is no recording, one of several runs, or one of hardly
-    any rows.
-
-    Parameters
-    ----------
-    file : Path
-        The `.rrd` file of ``utank-hil run --out``. Its log of alarms is looked for beside it.
-    scratch : Path
-        Folder for pictures that are made for the report.
+    `file` is the `.rrd` of ``utank-hil run --out``, whose log of alarms is looked for beside it;
+    `scratch` is a folder for pictures that are made for the report. Raises `OSError, ValueError` if
+    the file is no recording, one of several runs, or one of hardly any rows.
     """
     from utank_hil.telemetry.recording import read_about, read_recording
 

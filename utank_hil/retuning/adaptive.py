@@ -38,16 +38,9 @@ _IDENTIFY: Final = RetuningState.IDENTIFY
 class AdaptiveController(LawExchange):
     """A controller that identifies its ship and has a law designed for it.
 
-    Parameters
-    ----------
-    controller : Controller
-        Controller of `law`, at rest.
-    ship : ShipFigures
-        The ship that `law` was designed for.
-    roll : int
-        Index of the roll among the outputs.
-    pulses_pa : ndarray, shape (N,)
-        Excitation pressure, one value per sample.
+    `controller` is that of `law`, at rest; `ship` the one that the law was designed for; `roll` the
+    index of the roll among the outputs. `pulses_pa`, shape (N,), is the excitation pressure, one
+    value per sample.
     """
 
     def __init__(

@@ -29,14 +29,8 @@ class Admission:
     """Conditions on a candidate: the same signals and sample time, and bounded gains.
 
     Bounded gains mean bounded commands: the law feeds back the applied commands, which the pump
-    limits, and the outputs.
-
-    Parameters
-    ----------
-    configured : LinearLaw
-        Reference for the bounds on the gains.
-    history : SampleHistory
-        Samples for the warm-up.
+    limits, and the outputs. `configured` is the reference for the bounds on the gains; `history`
+    has the samples for the warm-up.
     """
 
     def __init__(self, configured: LinearLaw, history: SampleHistory) -> None:

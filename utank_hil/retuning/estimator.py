@@ -140,12 +140,7 @@ class EstimateFigures:
 def metacentric_height_m(ship: RollShip, tank: Tank, stiffness_nm_rad: float) -> float:
     """Return the metacentric height of ship and tank with free water; NaN without a displacement.
 
-    Parameters
-    ----------
-    ship : RollShip
-        Ship with the displacement.
-    stiffness_nm_rad : float
-        Roll stiffness of the ship without tank water.
+    `ship` has the displacement; `stiffness_nm_rad` is the roll stiffness without tank water.
     """
     if not ship.displacement_n > 0:
         return nan
@@ -158,12 +153,8 @@ def metacentric_height_m(ship: RollShip, tank: Tank, stiffness_nm_rad: float) ->
 class Estimator:
     """Keeps the record, requests estimates, and holds the latest.
 
-    Parameters
-    ----------
-    desk : Retuner
-        Answers with a `MotionEstimate`.
-    least_gm_m : float or None
-        Limit of the stability booklet on the metacentric height.
+    `desk` answers with a `MotionEstimate`; `least_gm_m` is the limit of the stability booklet on
+    the metacentric height.
     """
 
     def __init__(
@@ -205,15 +196,8 @@ class Estimator:
         """Take a sample every `SAMPLE_TIME_S`; return a new estimate if there is one.
 
         When the last estimate has become outdated, one that says only OUTDATED is returned.
-
-        Parameters
-        ----------
-        pressure_pa : float
-            Measured pressure across the pump.
-        motion : tuple of float
-            Roll, roll rate and level.
-        fresh : bool
-            Whether all values are new measurements.
+        `pressure_pa` is measured across the pump; `motion` is roll, roll rate and level; `fresh`
+        says whether all values are new measurements.
         """
         self._motion[:] = motion
         self._history.add(pressure_pa, self._motion, fresh=fresh)

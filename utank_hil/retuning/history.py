@@ -23,14 +23,9 @@ class SampleHistory:
     def add(self, command_pa: float, y: FloatArray, *, fresh: bool) -> None:
         """Append a sample.
 
-        Parameters
-        ----------
-        command_pa : float
-            Mean command since the previous sample.
-        y : ndarray, shape (m,)
-            Outputs; held values if nothing was measured.
-        fresh : bool
-            Whether `y` is a new measurement.
+        `command_pa` is the mean command since the previous sample; `y`, shape (m,), are the
+        outputs, held values if nothing was measured; `fresh` says whether they are a new
+        measurement.
         """
         if self._end == len(self._rows):
             kept = self.capacity - 1

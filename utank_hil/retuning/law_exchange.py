@@ -66,12 +66,8 @@ _, _DESIGN, _TRIAL = _BUSY
 class LawExchange(ABC):
     """A controller whose law is replaced by a better one while it runs.
 
-    Parameters
-    ----------
-    outputs, roll : int
-        Number of outputs, and index of the roll among them.
-    history_samples : int
-        Smallest length of the record of commands and outputs.
+    There are `outputs` outputs; `roll` is the index of the roll among them. The record of commands
+    and outputs has at least `history_samples`.
     """
 
     def __init__(
@@ -146,14 +142,9 @@ class LawExchange(ABC):
     ) -> None:
         """Advance the state machine; call once before every `step`.
 
-        Parameters
-        ----------
-        engaged : bool
-            Whether this controller's command drives the pump.
-        fresh : bool
-            Whether the outputs for `step` are new measurements, not held values.
-        passive_roll_rad : float
-            Present roll of the ship if its tank were passive; not finite if unknown.
+        `engaged` says whether this controller's command drives the pump, `fresh` whether the
+        outputs for `step` are new measurements, not held values. `passive_roll_rad` is the present
+        roll of the ship if its tank were passive; not finite if unknown.
         """
         self._now_ns, self._engaged, self._fresh = now_ns, engaged, fresh
         self._passive_roll_rad = passive_roll_rad

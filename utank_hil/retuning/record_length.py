@@ -24,19 +24,9 @@ def record_problems(
 ) -> list[Problem]:
     """Return problems of a record's length and the model's order, known before any measurement.
 
-    Parameters
-    ----------
-    order : int
-        Order of the ARX model.
-    samples : int
-        Length of the record.
-    shortest_period_s : float
-        Shortest roll period of the stability booklet.
-
-    Returns
-    -------
-    list of (str, str)
-        Key, "order" or "identification_s", and reason.
+    `order` is that of the ARX model, `samples` the length of the record, `shortest_period_s` the
+    shortest roll period of the stability booklet. Returns key, "order" or "identification_s", and
+    reason of each.
     """
     problems = []
     if order * sample_time_s < shortest_period_s:

@@ -38,14 +38,8 @@ class RmsResponse(NamedTuple):
 class RecordedWaves:
     """The wave-induced part of a record, as a disturbance to simulate laws with.
 
-    Parameters
-    ----------
-    record : ndarray, shape (N, 1 + m)
-        Command and outputs; gaps are NaN.
-    plant : DesignPlant
-        Ship, tank, loop and limits at the time of the record.
-    measured : tuple of str
-        Names of the outputs, ``roll_rad`` among them.
+    `record`, shape (N, 1 + m), has command and outputs; gaps are NaN. `plant` is ship, tank, loop
+    and limits at the time of the record; `measured` names the outputs, ``roll_rad`` among them.
     """
 
     def __init__(

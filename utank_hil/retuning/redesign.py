@@ -88,16 +88,9 @@ class Identification:
 def retune(record: FloatArray, task: RetuningTask) -> Candidate | Refusal:
     """Identify the ship, design a law and check it.
 
-    Parameters
-    ----------
-    record : ndarray, shape (N, 1 + m)
-        Mean command since the previous sample, and the measured outputs of `task.design`, at its
-        sample time. Outputs that are not finite are gaps.
-
-    Returns
-    -------
-    Candidate or Refusal
-        A refusal, not an exception, for a record that determines no model.
+    `record`, shape (N, 1 + m), has the mean command since the previous sample and the measured
+    outputs of `task.design`, at its sample time. Outputs that are not finite are gaps. A record
+    that determines no model gives a refusal, not an exception.
     """
     record = np.where(np.isfinite(record), record, np.nan)
     try:

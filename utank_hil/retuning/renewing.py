@@ -66,18 +66,8 @@ _AT_REST_AFTER: Final = (RetuningState.REFUSED, RetuningState.UNDONE)
 class RenewingController(LawExchange):
     """A constrained law that is renewed as waves and ship change.
 
-    Parameters
-    ----------
-    law : ConstrainedLaw
-        First law, for an unknown sea.
-    controller : Controller
-        Controller of `law`, at rest.
-    ship : ShipFigures
-        The configured ship.
-    roll : int
-        Index of the roll among the outputs.
-    limits : PumpLimits
-        Limits that no law may exceed.
+    `law` is the first one, for an unknown sea, `controller` its controller, at rest, `ship` the
+    configured one, `roll` the index of the roll among the outputs. No law may exceed `limits`.
     """
 
     def __init__(

@@ -32,14 +32,8 @@ class RetunerProcess(Closing):
     """One desk for each kind of work, served by a separate process; start it before the loop.
 
     The constructor returns when the process is ready, or after half a minute; then no desk is alive
-    and nothing is requested.
-
-    Parameters
-    ----------
-    *works : Work
-        Work importable in another process (functions, or `functools.partial` of them).
-    hangs_after_s : float
-        Time after which a busy worker is killed and replaced.
+    and nothing is requested. `works` can be imported in another process (functions, or
+    `functools.partial` of them). A worker that is busy for `hangs_after_s` is killed and replaced.
     """
 
     def __init__(self, *works: Work, hangs_after_s: float = _HANGS_S) -> None:

@@ -71,24 +71,11 @@ def closed_loop_response(
 ) -> tuple[ComplexArray, ComplexArray]:
     """Motions and pump pressure per unit of wave moment, at the wave's frequency.
 
-    Raises `ValueError` if a frequency is outside (0, pi / Ts).
-
-    Parameters
-    ----------
-    law : LinearLaw or None
-        None leaves the tank passive.
-    system : control.StateSpace
-        Continuous, inputs pressure_pa and wave_moment_nm (`coupled_model`).
-    frequency_rad_s : ndarray, shape (N,)
-        Positive, below pi / Ts.
-    delay_s, lag_s : float
-        As in `sampled_model`.
-
-    Returns
-    -------
-    motions : ndarray, shape (N, outputs of system)
-    pressure : ndarray, shape (N,)
-        Actual pressure, after delay and lag.
+    Without a law the tank is passive. `system` is continuous with the inputs pressure_pa and
+    wave_moment_nm (`coupled_model`); the frequencies, shape (N,), are positive and below pi / Ts;
+    `delay_s` and `lag_s` are as in `sampled_model`. Returns motions, shape (N, outputs of system),
+    and the actual pressure, shape (N,), after delay and lag. Raises `ValueError` if a frequency is
+    outside (0, pi / Ts).
     """
     w = np.asarray(frequency_rad_s, dtype=np.float64)
     s = np.asarray(1j * w, dtype=np.complex128)

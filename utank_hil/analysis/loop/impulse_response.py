@@ -114,22 +114,12 @@ def impulse_response_law(
 ) -> ImpulseResponseLaw:
     """Find the linear law that a controller is about rest, by stepping it.
 
-    Raises `NotDecaying` if a response has not decayed to 1e-9 of its peak in `most_samples`. Raises
-    `NoImpulseResponse` if a step raises, its command is not an array of finite numbers, the steps
-    take too long, or no model of `MOST_STATES` states has the response.
-
-    Parameters
-    ----------
-    make_controller : callable
-        Makes a controller at rest.
-    measured : tuple of str
-        Measurements of the controller, in its order.
-    sizes : mapping of str to float
-        Size of the impulse in each measurement.
-    most_samples : int
-        Steps after which a response must have decayed.
-    budget_s : float
-        Time limit for all steps.
+    `make_controller` makes a controller at rest that measures `measured`, in this order; `sizes`
+    are those of the impulse in each measurement. A response must decay within `most_samples` steps;
+    `budget_s` limits the time of all steps. Raises `NotDecaying` if a response has not decayed to
+    1e-9 of its peak in `most_samples`. Raises `NoImpulseResponse` if a step raises, its command is
+    not an array of finite numbers, the steps take too long, or no model of `MOST_STATES` states has
+    the response.
     """
     until_s = time.monotonic() + budget_s
     columns, linear = [], True

@@ -89,15 +89,8 @@ class Prediction:
 class InnovationFilter:
     """The convex problem of one law on one ship in one sea.
 
-    Parameters
-    ----------
-    law : LQGLaw
-        Stable on all ships of the grid (`robustness`).
-    design : ConstrainedDesign
-        The design of that law.
-    weights : tuple of float
-        Cost weights on the squares of roll in rad, level in m, and pressure over the pump's
-        maximum.
+    `law` is stable on all ships of the grid (`robustness`), and that of `design`. `weights` are the
+    cost weights on the squares of roll in rad, level in m, and pressure over the pump's maximum.
     """
 
     def __init__(

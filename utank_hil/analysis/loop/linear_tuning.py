@@ -108,14 +108,8 @@ def scaled_law(
 ) -> LinearDesign:
     """Scale the shipped law of a kind to another ship, without judging it.
 
-    Parameters
-    ----------
-    plant : DesignPlant
-        With the limits of its pump.
-    slope_rad : float
-        Significant amplitude of the effective wave slope.
-    peak_rad_s : float
-        Peak frequency of the sea's spectrum.
+    `plant` has the limits of its pump; `slope_rad` is the significant amplitude of the effective
+    wave slope, `peak_rad_s` the peak frequency of the sea's spectrum.
     """
     w, shipped, limits = plant.ship.natural_frequency_rad_s, _SHIPPED[kind], plant.limits
     sizes = slope_rad, slope_rad * w, limits.level_m, limits.level_m * w
@@ -154,12 +148,8 @@ def first_law(
 ) -> TunedLaw:
     """Find the law of `scaled_law` with the greatest weights at which it has the required margins.
 
-    Raises `NoLawError` if no weights do.
-
-    Parameters
-    ----------
-    suits : callable, optional
-        Further requirement on a law with all margins; smaller weights must help to meet it.
+    `suits` is a further requirement on a law with all margins; smaller weights must help to meet
+    it. Raises `NoLawError` if no weights do.
     """
     design = scaled_law(kind, plant, slope_rad, peak_rad_s)
     failures: tuple[str, ...] = ()
