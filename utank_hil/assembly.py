@@ -95,13 +95,8 @@ def measure_of(names: tuple[str, ...]) -> Measure:
 def build_law(config: ControllerConfig) -> BuiltLaw:
     """Design the law of a configuration for its vessel.
 
-    Raises `ParameterError` if it can't be designed; the problems are named by their keys in the
-    configuration.
-
-    Returns
-    -------
-    BuiltLaw
-        To be handed on to whatever needs the law: judging it, running it.
+    The law is to be handed on to whatever needs it: judging it, running it. Raises `ParameterError`
+    if it can't be designed; the problems are named by their keys in the configuration.
     """
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
@@ -159,22 +154,12 @@ def build_controller_node(
 ) -> ControllerNode:
     """Build the controller node of a configuration.
 
-    Parameters
-    ----------
-    law : BuiltLaw, optional
-        Of this configuration, if it was built before; it is designed without.
-    retuner : Retuner, optional
-        Who identifies and designs, if the configuration has the controller retune itself; without
-        one it does not.
-    estimating : Retuner, optional
-        Who tells waves and ship from the motion, if the configuration asks for it.
-    statistics, sink, sink_every, event_sink
-        As `ControllerNode` takes them.
-    commissioned : bool
-        Whether it may be armed: a commissioning was passed, or it is on a bench, whose ship is
-        made of the same files.
-    monitored : bool
-        Whether it has monitors.
+    A `law` of this configuration that was built before is not designed again. `retuner` identifies
+    and designs, if the configuration has the controller retune itself; `estimating` tells waves and
+    ship from the motion, if it asks for that. `statistics`, `sink`, `sink_every` and `event_sink`
+    are those of `Telemetry`. A controller may be armed if it is `commissioned`: a commissioning was
+    passed, or it is on a bench, whose ship is made of the same files. One that is not `monitored`
+    has no monitors.
     """
     law = law or build_law(config)
     vessel, tank, catalogue = config.vessel, config.vessel.tank, load_catalogue()
@@ -240,14 +225,8 @@ def build_commissioning_node(
 ) -> CommissioningNode:
     """Build the node that leads through the commissioning of a configuration.
 
-    Raises `ValueError` if the vessel has neither pump nor valve.
-
-    Parameters
-    ----------
-    config : ControllerConfig
-        Its law has no part in it.
-    statistics, event_sink
-        As `ControllerNode` takes them.
+    The law of the configuration has no part in it. `statistics` and `event_sink` are those of
+    `Telemetry`. Raises `ValueError` if the vessel has neither pump nor valve.
     """
     vessel, plant = config.vessel, config.plant
     commands = tuple(
@@ -280,14 +259,8 @@ def retuning_task(
 ) -> "RetuningTask":
     """What is to be identified and designed anew: the part of a configuration that matters to it.
 
-    Raises `ValueError` if the law is not one that can be designed anew.
-
-    Parameters
-    ----------
-    order : int
-        Of the ARX model.
-    roll_period_range_s : tuple of float
-        Of the ships that the stability booklet covers.
+    `order` is that of the ARX model, `roll_period_range_s` that of the ships that the stability
+    booklet covers. Raises `ValueError` if the law is not one that can be designed anew.
     """
     from utank_hil.identification.acceptance import ModelLimits  # here: scipy.optimize
     from utank_hil.retuning.redesign import RetuningTask

@@ -140,16 +140,9 @@ def size_tank(
 ) -> SizedTank:
     """Size the tank with a share of the ship's stability, or the greatest feasible share below it.
 
-    Raises `TankImpossibleError` if ship or room allow no tank of `LEAST_STABILITY_SHARE`, with the
-    reason and a remedy. Raises `ValueError` if the share is out of its range or the ship has no
-    displacement.
-
-    Parameters
-    ----------
-    ship : RollShip
-        With its displacement.
-    stability_share : float
-        0.03 to 0.25.
+    `ship` has its displacement; `stability_share` is 0.03 to 0.25. Raises `TankImpossibleError` if
+    ship or room allow no tank of `LEAST_STABILITY_SHARE`, with the reason and a remedy. Raises
+    `ValueError` if the share is out of its range or the ship has no displacement.
     """
     _Demand(stability_share)
     if not ship.displacement_n > 0:

@@ -24,12 +24,8 @@ Problem = tuple[str, str]
 class ParameterError(ValueError):
     """Parameters that can't be used.
 
-    Parameters
-    ----------
-    owner : str
-        Whose they are, in a word.
-    problems : list of tuple of (str, str)
-        Name of each parameter and what is wrong with it.
+    `owner` says in a word whose they are; `problems` are the name of each parameter and what is
+    wrong with it.
     """
 
     def __init__(self, owner: str, problems: list[Problem]) -> None:
@@ -133,10 +129,7 @@ def range_problems(instance: "DataclassInstance") -> list[Problem]:
 def _outside(name: str, hint: Any, value: Any) -> Iterator[Problem]:
     """The numbers in a value that lie outside the `Range` of its annotation, as problems.
 
-    Parameters
-    ----------
-    name : str
-        Of the value; that of a number within it is followed by its place.
+    `name` is that of the value; that of a number within it is followed by its place.
     """
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is Annotated:

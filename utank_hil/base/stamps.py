@@ -8,15 +8,8 @@ from pathlib import Path
 def claimed_files(folder: Path, *names: str, stamp: str | None = None) -> tuple[Path, ...]:
     """Files named by the time (UTC), numbered where that is taken; all are made, and empty.
 
-    Raises `OSError` if one can't be made.
-
-    Parameters
-    ----------
-    folder : Path
-    *names : str
-        With `{}` in the time's place.
-    stamp : str, optional
-        In the place of the present time, for files that belong to others.
+    `names` have `{}` in the time's place. `stamp` is in the place of the present time, for files
+    that belong to others. Raises `OSError` if one can't be made.
     """
     now = stamp = stamp or f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
     for number in count(2):

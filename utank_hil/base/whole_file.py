@@ -9,14 +9,8 @@ from pathlib import Path
 def write_whole(path: Path, content: bytes | str) -> None:
     """Write a file; on a full disk none is left, since half of it would be taken for the whole.
 
-    Raises `OSError` if it can't be written, with its name.
-
-    Parameters
-    ----------
-    path : Path
-        Overwritten.
-    content : bytes or str
-        Text is written in UTF-8.
+    `path` is overwritten; a text is written in UTF-8. Raises `OSError` if it can't be written, with
+    its name.
     """
     with left_whole(path):
         path.write_bytes(content.encode() if isinstance(content, str) else content)

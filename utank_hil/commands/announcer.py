@@ -34,12 +34,7 @@ _START_S, _END_S, _PRINTED_S = 30.0, 10.0, 5.0
 class Announcer:
     """Event ring of a run, and the process that prints its events, ready at once.
 
-    Parameters
-    ----------
-    ships : IdentifiedShips, optional
-        Destination of a ship that a law was retuned for.
-    log : Path, optional
-        File of the log.
+    `ships` are where a ship goes that a law was retuned for; `log` is the file of the log.
     """
 
     def __init__(self, ships: IdentifiedShips | None = None, log: Path | None = None) -> None:

@@ -45,14 +45,8 @@ def make_record(
 ) -> dict[str, Any]:
     """Return the record of a commissioning, ready for `json.dumps`.
 
-    Parameters
-    ----------
-    file : Path
-        File of the configuration.
-    bus : str
-        Interface on which it was done.
-    ended : str
-        Why it ended early; empty if it did not.
+    `file` is that of the configuration, `bus` the interface on which it was done; `ended` says why
+    it ended early, and is empty if it did not.
     """
     return {
         "program": PROGRAM,
@@ -135,15 +129,9 @@ def _sync(folder: Path) -> None:
 def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: Path | None) -> str:
     """Return why a controller must not be armed, with the remedy; empty if it may.
 
-    Parameters
-    ----------
-    bus : str
-        Interface of the run. On an emulated one no record is required unless `path` is given,
-        because the emulated ship is made from the same files.
-    file : Path
-        File of the configuration.
-    path : Path, optional
-        Place of the record, by default `record_path`.
+    `bus` is the interface of the run: on an emulated one no record is required unless `path` is
+    given, because the emulated ship is made from the same files. `file` is that of the
+    configuration, `path` the place of the record, by default `record_path`.
     """
     vessel = config.vessel
     if (vessel.pump is None and vessel.valve is None) or (path is None and _is_emulated(bus)):

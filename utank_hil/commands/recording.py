@@ -44,23 +44,13 @@ class RecordingSummary:
 class RunRecording:
     """Ring and recorder of a run; the constructor returns when the recorder is ready, or failed.
 
-    Viewers read the ring too (`utank_hil.telemetry.live`).
-
-    Parameters
-    ----------
-    folder : Path or None
-        Folder of the files, created if missing; None for a ring without a recorder. Files are named
-        by the time, so that a crashed run's recording is not overwritten.
-    events : str, optional
-        Name of the run's ring of events, recorded beside the rows.
-    about : mapping, optional
-        Origin of the rows (`utank_hil.base.provenance`).
-    head : mapping, optional
-        Head of the frame log (`utank_hil.telemetry.replay_head`); without it there is none.
-    keep_bytes : int, optional
-        Size beyond which the folder's oldest recordings are removed; by default none are.
-    log : Path, optional
-        Log of the run's events; the recording is named by its time, so that a report finds it.
+    Viewers read the ring too (`utank_hil.telemetry.live`). The folder is created if it is missing,
+    and its files are named by the time, so that a crashed run's recording is not overwritten;
+    without it there is a ring and no recorder. `events` is the name of the run's ring of events,
+    recorded beside the rows; `about` the origin of the rows (`utank_hil.base.provenance`); `head`
+    that of the frame log (`utank_hil.telemetry.replay_head`), without which there is none. Beyond
+    `keep_bytes` the folder's oldest recordings are removed. The recording is named by the time of
+    `log`, the log of the run's events, so that a report finds it.
     """
 
     def __init__(

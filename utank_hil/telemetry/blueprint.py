@@ -100,19 +100,11 @@ def make_blueprint(
     """Lay out the views of one run, or of several on one time line.
 
     The first tab, for the watch, has the rolling section of the ship, words, and a few plots around
-    the cursor. The others, for the engineer, have every signal by subject.
-
-    Parameters
-    ----------
-    runs : sequence of str
-        Names of the runs; a colour stands for a run if there are several, else for a signal.
-    span_s : (float, float), optional
-        First and last time of a finished recording, shown in one tab as a whole and in another
-        around the cursor. By default the view is live and follows the newest data.
-    size : SceneSize, optional
-        Size of the scenes; without it there are no scenes and no tab for the watch.
-    zero : collection of (str, str), optional
-        Run and column of signals that are zero throughout and are not plotted.
+    the cursor. The others, for the engineer, have every signal by subject. A colour stands for a
+    run if there are several, else for a signal. `span_s` is the first and last time of a finished
+    recording, shown in one tab as a whole and in another around the cursor; by default the view is
+    live and follows the newest data. Without a `size` there are no scenes and no tab for the watch.
+    `zero` are run and column of signals that are zero throughout and are not plotted.
     """
     boundary = rr.TimeRangeBoundary
     if span_s is None:

@@ -15,12 +15,8 @@ from utank_hil.telemetry.ring import RingKind, RingReader
 class FrameRecording(Closing):
     """Writes a ring of `bus_records` into a frame log.
 
-    Parameters
-    ----------
-    file : Path
-        The recording beside which the log is written.
-    place : int, optional
-        Place in the ring to start from (`RingReader`).
+    The log is written beside the recording `file`; `place` is the place in the ring to start from
+    (`RingReader`).
     """
 
     def __init__(

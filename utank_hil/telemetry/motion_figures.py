@@ -34,14 +34,8 @@ _BAR_HZ: Final = 1 / (SEGMENT * STEP_S)
 class MotionFigures(Figure):
     """Writes both figures of one run.
 
-    Parameters
-    ----------
-    path : str
-        Entity path of the run.
-    columns : sequence of str
-        Names of a row's values, `NEEDED` among them.
-    beside : (int, int)
-        Number of the run, and number of runs whose bars stand side by side.
+    `path` is the entity path of the run, `columns` the names of a row's values, `NEEDED` among
+    them; `beside` is the number of the run, and that of runs whose bars stand side by side.
     """
 
     def __init__(

@@ -32,12 +32,8 @@ _AT_ONCE: Final = IN_A_SLOT * _FIELDS
 class NodeTap:
     """A controller node whose inputs and outputs are recorded.
 
-    Parameters
-    ----------
-    taps : sequence of RetunerTap
-        Taps whose records belong among the node's.
-    every : int
-        Number of ticks whose records are passed on together; the stop passes on the rest.
+    `taps` are those whose records belong among the node's. The records of `every` ticks are passed
+    on together; the stop passes on the rest.
     """
 
     def __init__(

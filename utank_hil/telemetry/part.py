@@ -58,17 +58,9 @@ def live_log(
 class RecordingPart(Closing):
     """Writes one file of a recording, complete in itself.
 
-    Raises `OSError` if the file can't be created, or there is no room for its beginning. Raises
-    `RuntimeError` if the file can't be finished.
-
-    Parameters
-    ----------
-    file : Path
-        The `.rrd` file; overwritten.
-    columns : sequence of str
-        Names of a row's values.
-    about : mapping, optional
-        Origin of the rows (`utank_hil.base.provenance`).
+    `file` is a `.rrd`, overwritten; `columns` are the names of a row's values; `about` is the
+    origin of the rows (`utank_hil.base.provenance`). Raises `OSError` if the file can't be created,
+    or there is no room for its beginning. Raises `RuntimeError` if the file can't be finished.
     """
 
     def __init__(

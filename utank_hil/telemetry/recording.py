@@ -50,22 +50,12 @@ def write_recording(
 ) -> None:
     """Write runs side by side on one time line into a recording, with its blueprint.
 
-    Raises `ValueError` if there is no run, a table is empty or does not fit the columns, `time_s`
-    is missing, or a column is not in SI units. Raises `OSError` if the file can't be written; it is
-    then removed.
-
-    Parameters
-    ----------
-    path : Path
-        The `.rrd` file; overwritten.
-    columns : sequence of str
-        Names of a row's values, in SI units, `time_s` among them.
-    runs : mapping of str to array (n, len(columns))
-        Rows of each run by name; the first run is the reference.
-    events : mapping of str to sequence of RetuningEvent, optional
-        Retuning events by run, `time_ns` on the clock of `time_s`.
-    about : mapping, optional
-        Origin of the runs (`utank_hil.base.provenance`).
+    `path` is a `.rrd` file, overwritten. The columns are in SI units, `time_s` among them. `runs`
+    has the rows of each, shape (n, columns), by name; the first is the reference. `events` are
+    those of retuning, `time_ns` on the clock of `time_s`; `about` is the origin of the runs
+    (`utank_hil.base.provenance`). Raises `ValueError` if there is no run, a table is empty or does
+    not fit the columns, `time_s` is missing, or a column is not in SI units. Raises `OSError` if
+    the file can't be written; it is then removed.
     """
     if not runs:
         raise ValueError("a recording needs at least one run")
@@ -116,13 +106,9 @@ def _zero(columns: Sequence[str], runs: Mapping[str, FloatArray]) -> set[tuple[s
 def read_recording(path: Path) -> dict[str, dict[str, FloatArray]]:
     """Read the runs of a recording, also of a live or a truncated one.
 
-    Raises `ValueError` if the file is no recording, or holds no telemetry.
-
-    Returns
-    -------
-    dict
-        Arrays (n,) by run and column, in SI units; `time_s` is exact to 1 ns, the others to the
-        rounding of their unit conversion.
+    Returns arrays, shape (n,), by run and column, in SI units; `time_s` is exact to 1 ns, the
+    others to the rounding of their unit conversion. Raises `ValueError` if the file is no
+    recording, or holds no telemetry.
     """
     blocks: dict[str, list[dict[str, FloatArray]]] = {}
     for chunk in _chunks(path, _ROWS):

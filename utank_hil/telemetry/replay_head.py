@@ -130,13 +130,8 @@ def recorded_law(
 ) -> tuple[BuiltLaw, str]:
     """Return the recorded law and an empty text, or the given law and why it replaces it.
 
-    Parameters
-    ----------
-    config : ControllerConfig
-        The recorded configuration.
-    law : BuiltLaw
-        Law designed for `config` here. Its controller takes the recorded numbers; its `linear`, for
-        loop analysis, stays the one designed here.
+    `config` is the recorded one, `law` the one designed for it here. Its controller takes the
+    recorded numbers; its `linear`, for loop analysis, stays the one designed here.
     """
     if isinstance(config.law, PythonDesign):
         return law, "the law is Python code of one's own, which keeps its numbers where it likes"

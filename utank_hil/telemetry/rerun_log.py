@@ -77,22 +77,11 @@ def _level(mode: float, fault: float) -> rr.TextLogLevel:
 class RunLog:
     """Writes the rows of one run.
 
-    Raises `ValueError` if there is no `time_s`, or a column is not in SI units.
-
-    Parameters
-    ----------
-    path : str
-        Entity path of the run, from `run_paths`.
-    columns : sequence of str
-        Names of a row's values; `time_s` must be among them.
-    about : mapping, optional
-        Origin of the run (`utank_hil.base.provenance`); if it has the ship, a scene is drawn.
-    batch_s : float, optional
-        Batch of figures (`Figure`); by default figures are sent at once.
-    color : tuple of int
-        Colour of the run among several.
-    beside : (int, int)
-        Number of the run, and number of runs (`MotionFigures`).
+    `path` is the entity path of the run, from `run_paths`; `time_s` is among the columns of a row.
+    If the origin of the run, `about` (`utank_hil.base.provenance`), has the ship, a scene is drawn.
+    `batch_s` is the batch of figures (`Figure`); by default figures are sent at once. `color` is
+    that of the run among several, `beside` its number and that of runs (`MotionFigures`). Raises
+    `ValueError` if there is no `time_s`, or a column is not in SI units.
     """
 
     def __init__(

@@ -83,18 +83,9 @@ class RingError(OSError):
 class RingWriter(Closing):
     """Writing end; creates and owns the segment.
 
-    Raises `RingError` if there is no room for it.
-
-    Parameters
-    ----------
-    record_bytes : int
-        Length of a record; 1 for records of individual lengths.
-    records : int
-        Number of records per slot; together a multiple of 8 bytes.
-    slots : int
-        Number of slots, two or more.
-    content : mapping, optional
-        Description of the records for readers, ready for `json.dumps`.
+    A record has `record_bytes`, 1 for records of individual lengths; there are `records` in a slot,
+    together a multiple of 8 bytes, and two or more `slots`. `content` describes the records for
+    readers, ready for `json.dumps`. Raises `RingError` if there is no room for it.
     """
 
     def __init__(
@@ -183,15 +174,9 @@ class RingWriter(Closing):
 class RingReader(Closing):
     """Reading end with its own cursor.
 
-    Raises `RingError` if there is no such ring, or the segment is not a ring of this version and
-    kind.
-
-    Parameters
-    ----------
-    place : int, optional
-        `place` of a reader that this one continues; by default it starts at the oldest slot.
-    kind : RingKind, optional
-        The only accepted kind.
+    It continues at `place` of another reader, and by default starts at the oldest slot. `kind` is
+    the only accepted one. Raises `RingError` if there is no such ring, or the segment is not a ring
+    of this version and kind.
     """
 
     def __init__(self, name: str, place: int | None = None, kind: RingKind | None = None) -> None:

@@ -56,11 +56,8 @@ def _found(paths: Iterable[Path]) -> Iterator[tuple[Path, stat_result]]:
 def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
     """Remove the oldest recordings of a folder until its size is within a limit; return them.
 
-    Parameters
-    ----------
-    file : Path
-        A recording of the folder, existing or not, which stays; other parts of it go last. Only
-        recordings whose names begin alike, up to the first hyphen, are counted and removed.
+    `file` is a recording of the folder, existing or not, which stays; other parts of it go last.
+    Only recordings whose names begin alike, up to the first hyphen, are counted and removed.
     """
     alike: dict[str, dict[Path, stat_result]] = {}
     for suffix in SUFFIXES:

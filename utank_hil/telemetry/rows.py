@@ -12,14 +12,8 @@ from utank_hil.telemetry.ring import RingError, RingKind, RingReader, RingWriter
 class RowWriter(RingWriter):
     """Writing end of a ring of rows.
 
-    Parameters
-    ----------
-    columns : sequence of str
-        One or more different names.
-    slots : int
-        Number of rows in the ring. The default is seven minutes at 20 Hz, some 2 MB.
-    about : mapping, optional
-        Origin of the rows (`utank_hil.base.provenance`).
+    The columns are one or more different names. The ring has `slots` rows; the default is seven
+    minutes at 20 Hz, some 2 MB. `about` is the origin of the rows (`utank_hil.base.provenance`).
     """
 
     def __init__(

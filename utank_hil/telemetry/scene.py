@@ -129,15 +129,8 @@ class SceneSize:
 class Figure(ABC):
     """A figure that is redrawn at even steps of time.
 
-    Parameters
-    ----------
-    columns : sequence of str
-        Names of a row's values.
-    step_s : float
-        Time between two drawings.
-    batch_s : float
-        Length of a batch of drawings, the last sent by `close`: small chunks cost a file more than
-        their content.
+    `columns` are the names of a row's values; two drawings are `step_s` apart. They are sent in
+    batches of `batch_s`, the last by `close`: small chunks cost a file more than their content.
     """
 
     def __init__(self, columns: Sequence[str], step_s: float, batch_s: float) -> None:
@@ -170,12 +163,7 @@ class Figure(ABC):
 class Scene(Figure):
     """Writes the scene of one run.
 
-    Parameters
-    ----------
-    path : str
-        Entity path of the run.
-    alone : bool
-        Whether only this ship is shown, with room for larger words.
+    `path` is the entity path of the run. A ship that is shown `alone` has room for larger words.
     """
 
     def __init__(

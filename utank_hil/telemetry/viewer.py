@@ -61,16 +61,9 @@ def open_viewer(source: Path | str, at_s: float | None = None, *, window: bool =
     """Show a recording or a live stream in a window, or in a browser if there is no display.
 
     Without a display the viewer is served on loopback at `Viewer.url`, for a browser on this
-    machine or through an ssh tunnel. FileNotFoundError is raised if there is no such file.
-
-    Parameters
-    ----------
-    source : Path or str
-        A file, or the `url` of a `LiveStream`.
-    at_s : float, optional
-        Cursor position in a recording, by default its beginning.
-    window : bool
-        Whether a window is allowed.
+    machine or through an ssh tunnel. FileNotFoundError is raised if there is no such file. `source`
+    is a file, or the `url` of a `LiveStream`; `at_s` the position of the cursor in a recording, by
+    default its beginning; `window` says whether a window is allowed.
     """
     if isinstance(source, Path) and not source.is_file():
         raise FileNotFoundError(f"no recording {source}")

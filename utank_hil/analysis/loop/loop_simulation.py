@@ -58,10 +58,7 @@ def passive_motion(
 ) -> FloatArray:
     """Motion of ship and passive tank from rest in a wave moment in N m, exact for any step.
 
-    Returns
-    -------
-    ndarray, shape (count, 4)
-        `STATES` at 0, step_s, 2 step_s, ...
+    Returns `STATES` at 0, step_s, 2 step_s, ..., shape (count, 4).
     """
     a, b = state_matrices(ship, tank)
     wave = b[:, 1:]
@@ -98,12 +95,8 @@ class ShipInWaves(Protocol):
 class LinearShip:
     """A linear ship in waves whose motion with the tank passive is known.
 
-    Parameters
-    ----------
-    wave_motion : ndarray, shape (n, 4)
-        From `passive_motion` with a step of `TICK_S`.
-    pump_gain : float
-        Actual steady pressure per commanded pressure.
+    `wave_motion`, shape (n, 4), is from `passive_motion` with a step of `TICK_S`; `pump_gain` is
+    the actual steady pressure per commanded pressure.
     """
 
     def __init__(
@@ -220,16 +213,9 @@ def run_law(
 ) -> LoopRun:
     """Run a controller on a ship, armed from the start.
 
-    Raises `ValueError` if delay or sample time are not whole numbers of ticks.
-
-    Parameters
-    ----------
-    measured : tuple of str
-        Names of `STATES` that the controller measures, in its order.
-    plant : DesignPlant
-        Gives tank, limits and delay.
-    ticks : int
-        Length of the run in ticks of `TICK_S`.
+    `measured` are the `STATES` that it measures, in its order; `plant` gives tank, limits and
+    delay; the run lasts `ticks` of `TICK_S`. Raises `ValueError` if delay or sample time are not
+    whole numbers of ticks.
     """
     delay_ticks = _ticks("delay_s", plant.delay_s)
     sample_ticks = _ticks("sample_time_s", controller.sample_time_s)

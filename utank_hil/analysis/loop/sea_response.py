@@ -46,16 +46,9 @@ def motion_in_sea(
 ) -> MotionInSea:
     """Linear motion with a law that stabilizes its loop.
 
-    Parameters
-    ----------
-    law : LinearLaw or None
-        None leaves the tank passive. For an unstable loop the result is meaningless.
-    system : control.StateSpace
-        `coupled_model` of ship and tank.
-    wave_moment : Harmonics
-        In N m. Above the Nyquist frequency pi / Ts the tank is taken as passive.
-    delay_s, lag_s : float
-        As in `sampled_model`.
+    Without a law the tank is passive; for an unstable loop the result is meaningless. `system` is
+    the `coupled_model` of ship and tank. `wave_moment` is in N m; above the Nyquist frequency pi /
+    Ts the tank is taken as passive. `delay_s` and `lag_s` are as in `sampled_model`.
     """
     w = wave_moment.frequency_rad_s
     motions, pressure = closed_loop_response(None, system, measured, w)

@@ -128,16 +128,9 @@ def self_tuned(
 ) -> SelfTuned:
     """Design the constrained law of least predicted cost with all margins, within a mean power.
 
-    Raises `NoLawError` if no law has the margins, or the sea does not roll the ship.
-
-    Parameters
-    ----------
-    plant : DesignPlant
-        With the limits of its pump.
-    mean_power_w : float
-        Limit on the predicted mean power; infinite for the least cost.
-    sample_time_s : float, optional
-        The default follows from the roll frequency.
+    `plant` has the limits of its pump; `mean_power_w` limits the predicted mean power, infinite for
+    the least cost; the default of `sample_time_s` follows from the roll frequency. Raises
+    `NoLawError` if no law has the margins, or the sea does not roll the ship.
     """
     search, gentlest_w = _Search(plant, sea, sample_time_s), math.inf
     first = search.least_cost()

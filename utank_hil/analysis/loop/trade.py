@@ -84,17 +84,10 @@ def trade(
 ) -> Trade:
     """Design, judge and predict a law for each factor, in about half a second each.
 
-    A constrained design is judged and predicted within its limits, where it is linear. Raises
+    A constrained design is judged and predicted within its limits, where it is linear.
+    `wave_moment` is the sea's roll moment in N m. The factors are positive, by default
+    `WEIGHT_FACTORS` or `HORIZON_FACTORS`. `progress` is called with the finished fraction. Raises
     `CalmSeaError` if the sea does not roll the ship.
-
-    Parameters
-    ----------
-    wave_moment : Harmonics
-        The sea's roll moment in N m.
-    factors : sequence of float, optional
-        Positive; the default is `WEIGHT_FACTORS` or `HORIZON_FACTORS`.
-    progress : callable, optional
-        Called with the finished fraction.
     """
     horizon = varied(design) == "control horizon"
     if factors is None:

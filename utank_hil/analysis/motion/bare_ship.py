@@ -15,13 +15,9 @@ def roll_without_tank(
     """Linear roll from rest at time 0 under a sum of harmonics in N m, exact for any step.
 
     It is the sum of the steady response to each component, the steady heel, and the free decay that
-    matches rest at the start. The ship's damping ratio must be below one. Raises `ValueError` if
-    the damping ratio is one or more.
-
-    Returns
-    -------
-    ndarray, shape (count,)
-        Roll in radians at 0, step_s, 2 step_s, ...
+    matches rest at the start. The ship's damping ratio must be below one. Returns the roll in
+    radians at 0, step_s, 2 step_s, ..., shape (count,). Raises `ValueError` if the damping ratio is
+    one or more.
     """
     omega = wave_moment.frequency_rad_s
     compliance = 1.0 / (

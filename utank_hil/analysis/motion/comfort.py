@@ -78,12 +78,8 @@ def comfort(
 ) -> Comfort:
     """Comfort at a place on board, for a roll record.
 
-    Parameters
-    ----------
-    roll_rad, roll_rate_rad_s : ndarray, shape (n,)
-        Uniformly sampled at 10 Hz or more.
-    height_m, starboard_m : float
-        Position above, and to starboard of, the ship's centre of gravity.
+    Roll and rate, shape (n,), are uniformly sampled at 10 Hz or more; `height_m` and `starboard_m`
+    are above, and to starboard of, the ship's centre of gravity.
     """
     lateral, vertical = apparent_gravity(roll_rad, roll_rate_rad_s, step_s, height_m, starboard_m)
     vertical_motion = vertical - vertical.mean()
@@ -132,14 +128,8 @@ def motion_induced_interruptions(
     Counts tips: lateral apparent gravity above `tipping_coefficient` times the vertical, to either
     side. Graham (1990), "Motion-induced interruptions as ship operability criteria", Naval
     Engineers Journal 102(2), calls 0.1 a minute possible, 0.5 probable, 1.5 serious, 3 severe and 5
-    extreme.
-
-    Parameters
-    ----------
-    lateral_m_s2, vertical_m_s2 : ndarray, shape (n,)
-        From `apparent_gravity`.
-    tipping_coefficient : float
-        Half the stance width over the height of the person's centre of gravity.
+    extreme. Both accelerations, shape (n,), are from `apparent_gravity`; `tipping_coefficient` is
+    half the stance width over the height of the person's centre of gravity.
     """
     limit = tipping_coefficient * vertical_m_s2
     tips = _up_crossings(lateral_m_s2 - limit) + _up_crossings(-lateral_m_s2 - limit)

@@ -24,15 +24,9 @@ class Interval(NamedTuple):
 def mean_interval(values: npt.ArrayLike, confidence: float = 0.95) -> Interval:
     """Mean of independent, roughly normal values with its confidence interval (Student's t).
 
-    Raises `ValueError` if there are fewer than two values, or the confidence is not between 0 and
-    1.
-
-    Parameters
-    ----------
-    values : array_like, shape (n,)
-        Two or more values; for a paired comparison the differences.
-    confidence : float
-        Probability that the interval holds the true mean.
+    `values`, shape (n,), are two or more, for a paired comparison the differences; `confidence` is
+    the probability that the interval holds the true mean. Raises `ValueError` if there are fewer
+    than two values, or the confidence is not between 0 and 1.
     """
     from scipy.stats import t as student
 

@@ -28,13 +28,8 @@ def motion_sickness_incidence(
     a RMS in g, f in Hz, t in minutes, Phi the normal distribution. McCauley, Royal, Wylie, O'Hanlon
     and Mackie (1976), "Motion sickness incidence: exploratory studies of habituation, pitch and
     roll, and the refinement of a mathematical model", Human Factors Research, AD-A024 709;
-    unadapted young men, single frequencies. For irregular motion f is its mean frequency. Raises
-    `ValueError` if an argument is negative, or frequency or exposure is zero.
-
-    Returns
-    -------
-    float
-        0 to 100.
+    unadapted young men, single frequencies. For irregular motion f is its mean frequency. Returns 0
+    to 100. Raises `ValueError` if an argument is negative, or frequency or exposure is zero.
     """
     if not (acceleration_rms_m_s2 >= 0 and frequency_hz > 0 and exposure_s > 0):
         raise ValueError(
@@ -56,11 +51,7 @@ def motion_sickness_dose(acceleration_m_s2: FloatArray, step_s: float) -> float:
 
     The square root of the time integral of the squared vertical acceleration with the frequency
     weighting W_f, which is applied to the discrete Fourier transform of the record.
-
-    Parameters
-    ----------
-    acceleration_m_s2 : ndarray, shape (n,)
-        Uniformly sampled at several Hz; its mean is subtracted.
+    `acceleration_m_s2`, shape (n,), is uniformly sampled at several Hz; its mean is subtracted.
     """
     spectrum = np.fft.rfft(acceleration_m_s2 - np.mean(acceleration_m_s2))
     frequency_hz = np.arange(len(spectrum)) / (step_s * len(acceleration_m_s2))

@@ -19,17 +19,8 @@ class RollStatistics:
 def significant_amplitude(signal: FloatArray) -> float | None:
     """Mean of the highest third of the single amplitudes between zero up-crossings.
 
-    For a narrow-banded Gaussian signal this is close to twice the standard deviation.
-
-    Parameters
-    ----------
-    signal : ndarray, shape (n,)
-        Uniformly sampled; its mean is subtracted.
-
-    Returns
-    -------
-    float or None
-        In the signal's unit; None if the record has no complete cycle.
+    For a narrow-banded Gaussian signal this is close to twice the standard deviation. `signal`,
+    shape (n,), is uniformly sampled; its mean is subtracted. None if it has no complete cycle.
     """
     centred = signal - signal.mean()
     starts = np.flatnonzero((centred[:-1] < 0) & (centred[1:] >= 0)) + 1
