@@ -216,7 +216,7 @@ def test_an_own_identifier_before_arming_is_said_to_be_the_reason() -> None:
 
 
 @pytest.mark.parametrize("off", [0, 1])
-def test_a_panel_of_other_versions_can_not_arm_and_does_not_stop(off: int) -> None:
+def test_a_panel_of_other_versions_can_not_arm_and_ends_it(off: int) -> None:
     wrong = [CATALOGUE.version, VERSION]
     wrong[off] ^= 1
     bench = ControllerBench(START_NS)
@@ -229,7 +229,7 @@ def test_a_panel_of_other_versions_can_not_arm_and_does_not_stop(off: int) -> No
     bench.drive_at(LEVEL)
     bench.panel_versions = (wrong[0], wrong[1])
     bench.run(400)
-    assert bench.node.mode is Mode.ACTIVE
+    assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.VERSION_MISMATCH)
 
 
 def test_lost_link_cuts_at_once_and_comes_back_without_arming() -> None:

@@ -135,6 +135,9 @@ def test_good_frames_are_kept_with_the_time_they_came() -> None:
     line = Line()
     for message in GOOD.values():
         line.say(message)
+    assert line.seen.panel_age_ms > 1e12  # without a heartbeat a panel is not live
+    line.beat(Address.OPERATOR, CATALOGUE.version, VERSION)
+    line.now_ns -= 10
     seen = line.seen
     motion = seen.motions[0]
     assert (motion.roll_rad, motion.roll_rate_rad_s) == pytest.approx((0.1, -0.05))
@@ -152,7 +155,7 @@ def test_good_frames_are_kept_with_the_time_they_came() -> None:
         ages_ns[SensorTank], ages_ns[DriveStatus1],
     )  # fmt: skip
     assert seen.drive_echo == 4
-    assert seen.frames == len(GOOD)
+    assert seen.frames == len(GOOD) + 1
     assert line.protected
 
 
@@ -405,6 +408,7 @@ def test_a_ship_with_a_pump_and_no_valve_hears_and_awaits_the_drive_alone() -> N
     assert heard == expected | {CATALOGUE.codec(kind).can_id for kind in GOOD} | {
         beats[Address.OPERATOR], beats[Address.OPERATOR_2],
         CATALOGUE.codec(OperatorCommand, Address.OPERATOR_2).can_id,
+        CATALOGUE.codec(HardwiredInputs).can_id,  # obeyed wherever they are heard
     }  # fmt: skip
     assert CATALOGUE.codec(ValveStatus).can_id not in heard
 

@@ -24,7 +24,6 @@ from utank_hil.canbus import (
     SensorMotion,
     SensorPump,
     SensorTank,
-    Station,
     Switch,
     ValveFault,
     ValveState,
@@ -66,6 +65,8 @@ SUM_SHARE: Final = 0.5
 """Share of a full reservoir beyond which the sum of both levels is none: the water stays."""
 CONFLICT_NS: Final = 10_000_000_000
 """Silence after which a second sender of an address counts as gone."""
+VERSION_NS: Final = 5_000_000_000
+"""A version that was not confirmed for so long is not known any more: fifty heartbeats."""
 STRANGE_NS: Final = 1_000_000_000
 """Silence after which a second motion sensor of another version counts as gone."""
 
@@ -101,8 +102,8 @@ class Inbox:
     ----------
     motions : tuple of MotionSensor
         The one or two motion sensors.
-    hardwired : HardwiredHeard or None
-        Hard-wired inputs, where there are such.
+    hardwired : HardwiredHeard
+        Hard-wired inputs: what they say counts wherever they are heard.
     gates : LevelGates or None
     stations : Stations
         The operators' orders.
@@ -162,33 +163,32 @@ class Inbox:
         if valve:
             matched.append(Address.VALVE)
             self._subscribe(catalogue.receiver(ValveStatus), self._on_valve)
-        self.hardwired: HardwiredHeard | None = None
+        self._hardwired_declared = redundancy.hardwired_inputs
         if redundancy.hardwired_inputs:
             matched.append(Address.HARDWIRED)
-            self.hardwired = hardwired = HardwiredHeard(catalogue.receiver(HardwiredInputs))
-            self._subscriptions[hardwired.receiver.can_id] = hardwired.accept, hardwired.take
-            self.watched.append(hardwired.receiver)
-        self.stations = Stations(catalogue)
+        self.hardwired = hardwired = HardwiredHeard(catalogue.receiver(HardwiredInputs))
+        self._subscriptions[hardwired.receiver.can_id] = hardwired.accept, hardwired.take
+        self.watched.append(hardwired.receiver)
+        self.stations = Stations(catalogue, self._versions, second=redundancy.second_station)
         for orders in self.stations.orders.values():
             self._subscriptions[orders.can_id] = orders.accept, orders.obey
             self.watched.append(orders)
         if len(senders) == 2 and foreign.motions[1] is None:
             matched.append(Address.SENSORS_2)
-        self._matching: dict[int, bool] = {}
+        self._matched_ns: dict[int, int] = {}
         self._second_beat = 0
         self._strange_ns = NEVER_HEARD_NS
         for address in matched:
             heartbeat = catalogue.receiver(Heartbeat, address)
-            self._matching[heartbeat.can_id] = False
+            self._matched_ns[heartbeat.can_id] = NEVER_HEARD_NS
             if address is Address.SENSORS_2:
                 self._second_beat = heartbeat.can_id
-                self._matching[heartbeat.can_id] = True
+                self._matched_ns[heartbeat.can_id] = _ABSENT_NS
             self._subscribe(heartbeat, partial(self._on_heartbeat, heartbeat.can_id))
-        self.expected = frozenset((catalogue.codec(DriveStatus2).can_id, *self._matching))
-        self._panels_match = dict.fromkeys(ADDRESSES, False)
+        self.expected = frozenset((catalogue.codec(DriveStatus2).can_id, *self._matched_ns))
         for station, address in ADDRESSES.items():
             beats = catalogue.receiver(Heartbeat, address)
-            self._subscribe(beats, partial(self._on_panel_heartbeat, station))
+            self._subscribe(beats, partial(self.stations.beat, station))
         self._names: dict[int, int | None] = {}
         for address in (*matched, *ADDRESSES.values()):
             claims = catalogue.receiver(AddressClaim, address)
@@ -205,8 +205,8 @@ class Inbox:
         self._valve_echo: int | None = None
         self._drive_state = None if pump else _ENABLED
         self._drive_fault: DriveFault | None = DriveFault.NONE
+        self._drive_2_heard = not pump
         self._drive_echo: int | None = None
-        self._versions_match = False
         self._tank_ns = NEVER_HEARD_NS
         self._pump_ns = self._drive_ns = NEVER_HEARD_NS if pump else _ABSENT_NS
         self._drive_echo_ns = self._drive_ns
@@ -230,17 +230,17 @@ class Inbox:
         motions = tuple([sensor.sample(now_ns) for sensor in self.motions])
         port_m, starboard_m = self._port_level_m, self._starboard_level_m
         drive_state, valve_state = self._drive_state, self._valve_state
-        high_level, stop, hardwired_age_ms = self._high_level, False, 0.0
-        if hardwired is not None:
-            high_level |= hardwired.high_level
-            stop = hardwired.take_stop()
+        hardwired_age_ms = 0.0
+        if self._hardwired_declared:
             hardwired_age_ms = (now_ns - hardwired.heard_ns) / MILLISECOND_NS
+        drive_ns = self._drive_ns if self._drive_2_heard else NEVER_HEARD_NS
+        matched_ns = min(self._matched_ns.values(), default=_ABSENT_NS)
         return Measurements(
             *wishes,
             now_ns,
             stations.requested_mode,
             (now_ns - stations.heard_ns) / MILLISECOND_NS,
-            self._panels_match[stations.in_command],
+            stations.matches,
             motions,
             port_m,
             starboard_m,
@@ -249,11 +249,11 @@ class Inbox:
             self._tank_cycles,
             (now_ns - self._tank_ns) / MILLISECOND_NS,
             0 if gates is None else gates.discarded,
-            high_level,
+            self._high_level or hardwired.high_level,
             self._pressure_pa,
             (now_ns - self._pump_ns) / MILLISECOND_NS,
             drive_state,
-            (now_ns - self._drive_ns) / MILLISECOND_NS,
+            (now_ns - drive_ns) / MILLISECOND_NS,
             self._drive_echo_ns,
             self._drive_echo,
             drive_state is _DRIVE_FAULT
@@ -268,9 +268,9 @@ class Inbox:
             self._valve_echo_ns,
             self._valve_echo,
             self._valve_heard_ns,
-            stop,
+            hardwired.take_stop(),
             hardwired_age_ms,
-            self._versions_match and now_ns - self._strange_ns > STRANGE_NS,
+            now_ns - matched_ns <= VERSION_NS and now_ns - self._strange_ns > STRANGE_NS,
             self._tank.valid and (drive is None or drive.valid),
             now_ns - self._conflict_ns <= CONFLICT_NS,
             now_ns - self._claimed_twice_ns <= CONFLICT_NS,
@@ -383,7 +383,7 @@ class Inbox:
             self._drive_echo_ns, self._drive_echo = now_ns, status.command_echo
 
     def _on_drive_2(self, status: DriveStatus2, now_ns: int) -> None:  # noqa: ARG002
-        self._drive_fault = status.fault
+        self._drive_fault, self._drive_2_heard = status.fault, True
         self._drive_warns = (
             status.temperature_warning
             or status.voltage_warning
@@ -406,20 +406,10 @@ class Inbox:
         if can_id == self._second_beat:  # silent, it is not waited for
             self._strange_ns = NEVER_HEARD_NS if matches else now_ns
             return
-        self._matching[can_id] = matches
-        self._versions_match = all(self._matching.values())
+        self._matched_ns[can_id] = now_ns if matches else NEVER_HEARD_NS
 
     def _on_claim(self, address: int, can_id: int, claim: AddressClaim, now_ns: int) -> None:
         self.stations.started(address)
         if self._names.setdefault(can_id, claim.name) != claim.name:
             self._claimed_twice_ns = now_ns
             self._names[can_id] = claim.name  # of a device that was replaced
-
-    def _on_panel_heartbeat(
-        self,
-        station: Station,
-        beat: Heartbeat,
-        now_ns: int,  # noqa: ARG002
-    ) -> None:
-        versions = (beat.catalogue_version, beat.configuration_version)
-        self._panels_match[station] = versions == self._versions

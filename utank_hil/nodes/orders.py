@@ -46,6 +46,8 @@ class Orders:
         Whether a frame has come since the last `take`.
     takes_command : bool
         Rising edge of the wish for the command since the last `take`.
+    lets_go : bool
+        An intact frame since the last `take` disarmed what an accepted one had armed.
     """
 
     def __init__(self, receiver: Receiver[OperatorCommand]) -> None:
@@ -64,7 +66,7 @@ class Orders:
         self._out_of_sequence = 0
         self._retuning = _NOTHING
         self._accepted: list[int | None] = []
-        self.news = self.takes_command = False
+        self.news = self.takes_command = self.lets_go = False
         self._lasting = Wishes()  # without edges
 
     @property
@@ -86,7 +88,9 @@ class Orders:
             self._stop_heard |= heard.stop
             # where it was not pressed before, what is pressed later in the tick counts
             before = self.last is None or _arms(self.last)
-            self._disarm_heard |= before and not _arms(heard)
+            disarms = before and not _arms(heard)
+            self._disarm_heard |= disarms
+            self.lets_go |= disarms and self.last is not None
         return order
 
     def begin_anew(self) -> None:
@@ -147,7 +151,7 @@ class Orders:
         self._lasting = Wishes(armed, stop)
         self._stop_heard = self._disarm_heard = False
         self._arm_edge = self._reset_edge = self._passive_edge = False
-        self.news = self.takes_command = False
+        self.news = self.takes_command = self.lets_go = False
         return _new(Wishes, wishes)
 
     def take_retuning(self) -> RetuningOrder:

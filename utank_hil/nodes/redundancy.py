@@ -14,10 +14,14 @@ class Redundancy:
     hardwired_inputs : bool
         HARDWIRED_INPUTS, high-level switches and a stop loop by wires of their own, comes from a
         node apart from sensors and drive.
+    second_station : bool
+        A second operator's panel may take the command. Of one that is not declared only stop and
+        disarm count.
     """
 
     second_motion_sensor: bool = False
     hardwired_inputs: bool = False
+    second_station: bool = False
 
 
 NO_REDUNDANCY = Redundancy()

@@ -173,12 +173,12 @@ FAULTS: Final = (
         Condition(
             Reaction.STOP,
             "a version in the heartbeats of drive, sensors, valve or hard-wired inputs differs, or "
-            "none was received",
+            "none was received for 5 s",
             lambda seen, _: not seen.measured.versions_match,
             awaited=8,
         ),
         Condition(
-            Reaction.REFUSE,
+            Reaction.RAMP,
             "a version in the panel's heartbeat differs, or none was received",
             lambda seen, _: not seen.measured.panel_matches,
         ),
@@ -219,8 +219,8 @@ FAULTS: Final = (
         "holds frames up, a gateway for example.",
         Condition(
             Reaction.STOP,
-            "status older than {drive_age_ms:g} ms, or no new command echo, at most three commands "
-            "behind, for over {echo_age_ms:g} ms",
+            "status older than {drive_age_ms:g} ms, or DRIVE_STATUS_2 never heard; no new command "
+            "echo, at most three commands behind, for over {echo_age_ms:g} ms",
             lambda seen, limits: (
                 seen.measured.drive_age_ms > limits.drive_age_ms
                 or seen.own.echo_age_ms > limits.echo_age_ms
@@ -577,8 +577,8 @@ FAULTS: Final = (
         ),
         _found(
             Reaction.HALVE,
-            "gaps of motion, levels or pressure have kept the tank's equation from judging for a "
-            "roll period",
+            "gaps of motion, levels or pressure, or a level over 0.9 of the tank, have kept the "
+            "tank's equation from judging for a roll period",
             Finding.UNWATCHED,
         ),
         _found(Reaction.RAMP, "the same for three roll periods", Finding.UNWATCHED_LONG),
@@ -620,12 +620,12 @@ FAULTS: Final = (
         "Check that the panel runs and is connected to the bus.",
         Condition(
             Reaction.REFUSE,
-            "silent for over {panel_age_to_arm_ms:g} ms",
+            "order or heartbeat silent for over {panel_age_to_arm_ms:g} ms",
             lambda seen, limits: seen.measured.panel_age_ms > limits.panel_age_to_arm_ms,
         ),
         Condition(
             Reaction.RAMP,
-            "silent for over {panel_age_armed_ms:g} ms",
+            "order or heartbeat silent for over {panel_age_armed_ms:g} ms",
             lambda seen, limits: seen.measured.panel_age_ms > limits.panel_age_armed_ms,
         ),
     ),

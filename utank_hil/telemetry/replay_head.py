@@ -176,7 +176,7 @@ def causes(head: Mapping[str, Any], config: ControllerConfig, folder: Path) -> l
             f"configuration, {key}: recorded {recorded_keys.get(key, 'absent')!r}, "
             f"replayed {replayed_keys.get(key, 'absent')!r}"
             for key in dict.fromkeys((*recorded_keys, *replayed_keys))
-            if recorded_keys.get(key) != replayed_keys.get(key)  # None: as without the key
+            if _set(recorded_keys.get(key)) != _set(replayed_keys.get(key))
         ]
     )
 
@@ -216,3 +216,8 @@ def _flat(value: Any, key: str = "") -> dict[str, Any]:
         for part, content in parts
         for name, each in _flat(content, f"{key}.{part}".lstrip(".")).items()
     }
+
+
+def _set(value: object) -> object:
+    """A key's value; None where it is as without the key, in a version that did not have it."""
+    return None if value is False else value

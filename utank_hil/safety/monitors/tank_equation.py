@@ -208,6 +208,8 @@ class TankEquation:
                 level.last + (level_m - level.last) / left,
                 pump.last + (push - pump.last) / left,
             )
+            if self._wait < 0:  # the tank was too full to be judged
+                break
         return found
 
     def _take(self, roll_rad: float, level_m: float, pump_m2_s2: float) -> int:
@@ -224,7 +226,7 @@ class TankEquation:
             self.settled = self.settled or self._wait == 0
             return 0
         if abs(level_m) > self._most_m:
-            self._wait = self._settle
+            self.restart()  # what is not seen now is not known
             return 0
         rate_m_s = level.rate
         loss = self._loss + self._quadratic_loss * abs(rate_m_s)
