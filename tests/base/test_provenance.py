@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from firmware_sim.cli import app as ship_app
 from firmware_sim.scenario import Scenario
 from utank_hil.base import provenance
+from utank_hil.base.machine import kernels, machine
 from utank_hil.base.provenance import commit, describe, headline, version
 from utank_hil.cli import app
 from utank_hil.commands.recording import RunRecording
@@ -102,7 +103,9 @@ def test_machine_and_program_are_said_and_nobodys_name(monkeypatch: pytest.Monke
     assert told["options"] == {"config": "mine.yaml", "out": "out", "seed": None}
     assert (told["command"], told["seed"], told["version"]) == ("bench", 7, version())
     assert abs(datetime.fromisoformat(told["date"]) - before).total_seconds() < 60
-    assert set(told["machine"]) == {"platform", "python", "cpus"}
+    assert set(told["machine"]) == {
+        "platform", "python", "cpus", "processor", "numpy", "blas", "libm",
+    }  # fmt: skip
     assert told["machine"]["python"] == platform.python_version()
     text = json.dumps(told, allow_nan=False)
     assert "somebody" not in text
@@ -132,8 +135,8 @@ def test_commit_is_that_of_the_tree_and_unknown_where_there_is_none(
 @pytest.mark.parametrize("application", [app, ship_app], ids=["utank-hil", "firmware-sim"])
 def test_both_commands_have_a_version(application) -> None:
     result = CliRunner().invoke(application, ["--version"])
-    assert (result.exit_code, result.stdout) == (0, f"{headline()}\n")
-    assert re.fullmatch(r"utank-hil \d+\.\d+\.\d+\S*, commit \S+\n", result.stdout)
+    assert (result.exit_code, result.stdout) == (0, f"{headline()}\n{kernels(machine())}\n")
+    assert re.fullmatch(r"utank-hil \d+\.\d+\.\d+\S*, commit \S+\n.+ libm .+\n", result.stdout)
 
 
 @pytest.mark.slow

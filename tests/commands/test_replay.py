@@ -187,6 +187,21 @@ def test_a_log_of_another_program_state_says_what_is_not_the_same(
     assert [line.split(":")[0] for line in found["causes"]] == ["commit", "numpy"]
 
 
+def test_a_log_of_another_machine_says_so_in_its_first_line(folder: Path, tmp_path: Path) -> None:
+    log = FrameLog(log_of(folder))
+    here = invoke(replay, log_of(folder))
+    log.head["about"]["machine"] |= {"processor": "Core of another kind", "blas": "openblas Old"}
+    changed = tmp_path / "run-x.frames"
+    with FrameLogWriter(changed, log.head) as writer:
+        for block in log.blocks():
+            writer.write(block)
+    first, *rest = invoke(replay, changed).stdout.splitlines()
+    assert first.startswith("another machine's log: Core of another kind, numpy ")
+    assert rest == here.stdout.splitlines()
+    told = json.loads(invoke(replay, changed, "--json").stdout)["other_machine"]
+    assert "openblas Old" in told
+
+
 def test_a_part_from_the_middle_of_a_run_is_refused(folder: Path, tmp_path: Path) -> None:
     part = tmp_path / "run-x-part002.frames"
     part.write_bytes(log_of(folder).read_bytes())

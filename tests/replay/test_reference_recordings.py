@@ -14,15 +14,23 @@ import pytest
 from tools.reference_recordings.cases import CASES, FAULTS, Case, record
 from tools.reference_recordings.comparison import DESIGN_BOUND, LOGS, compare
 from utank_hil.assembly import build_law
-from utank_hil.canbus import ControllerStatus, Fault, Mode, RetuningState, load_catalogue
+from utank_hil.canbus import (
+    ControllerStatus,
+    Fault,
+    Mode,
+    RetuningState,
+    SensorMotion,
+    load_catalogue,
+)
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.telemetry.bus_records import Kind
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.law_values import decoded, encoded, law_values
 from utank_hil.telemetry.replay import entries_of, replay, replay_log
-from utank_hil.telemetry.replay_head import law_differences, recorded_config
+from utank_hil.telemetry.replay_head import law_differences, recorded_config, recorded_law
 
 STATUS = load_catalogue().codec(ControllerStatus)
+MOTION = load_catalogue().codec(SensorMotion)
 ACCEPT = "if this is meant: python -m tools.reference_recordings --accept"
 MOST_BYTES = 600_000
 
@@ -153,3 +161,18 @@ def test_a_case_gives_the_same_bytes_every_time(tmp_path: Path) -> None:
     assert (first / "drive-fault.frames").read_bytes() == (
         again / "drive-fault.frames"
     ).read_bytes()
+
+
+def test_one_bit_of_one_sensor_frame_is_found_at_its_tick_and_named() -> None:
+    log = FrameLog(LOGS / "every-mode.frames")
+    entries = list(entries_of(log.blocks()))
+    at = [n for n, each in enumerate(entries)
+          if each.kind == Kind.RECEIVED and each.number == MOTION.can_id][400]  # fmt: skip
+    tick = sum(each.kind == Kind.TICK for each in entries[:at])
+    flipped = bytearray(entries[at].data)
+    flipped[3] ^= 1
+    with recorded_config(log.head) as config:
+        law, _ = recorded_law(log.head, config, build_law(config))
+        assert replay(entries, config, law).damaged == []
+        entries[at] = entries[at]._replace(data=bytes(flipped))
+        assert replay(entries, config, law).damaged == [(tick, "SENSOR_MOTION")]

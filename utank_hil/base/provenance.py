@@ -8,7 +8,6 @@ import importlib.metadata
 import json
 import math
 import os
-import platform
 import subprocess
 from collections.abc import Iterator, Mapping
 from datetime import UTC, date, datetime
@@ -18,6 +17,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from pydantic import BaseModel
+
+from utank_hil.base.machine import machine
 
 PROGRAM: Final = "utank-hil"
 UNKNOWN: Final = "unknown"
@@ -107,11 +108,7 @@ def describe(
         "version": version(),
         "commit": commit(),
         "date": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
-        "machine": {
-            "platform": platform.platform(),
-            "python": platform.python_version(),
-            "cpus": os.cpu_count(),
-        },
+        "machine": machine(),
         "command": command,
         "options": {name: _given(value) for name, value in options.items()},
         "seed": seed,

@@ -3,6 +3,7 @@
 import json
 import math
 import sys
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import asdict
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from utank_hil.assembly import build_law
+from utank_hil.base.machine import kernels, machine
 from utank_hil.base.parameters import ParameterError
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.console.common import AllowCode, Channel, Json, fail, load
@@ -51,7 +53,7 @@ def replay(
 
     **Example:** utank-hil replay out/gpc.frames
     """
-    cut = ""
+    cut = elsewhere = ""
     named = None if config is None else load(config, ControllerConfig, allow_code=allow_code)
     try:
         if log.suffix.lower() == ".rrd":
@@ -69,7 +71,7 @@ def replay(
                 result, why, law = replay_log(
                     recording, chosen, log.parent, as_recorded=named is None
                 )
-            cut = recording.cut
+            cut, elsewhere = recording.cut, _other_machine(recording.head)
     except (OSError, ValueError) as error:
         fail(f"{log}: {error}" if isinstance(error, ParameterError | ReplayHeadError) else error)
     if not result.ticks:
@@ -77,9 +79,12 @@ def replay(
     if result.lost_rows:
         why.insert(0, f"the recorder lost {result.lost_rows} rows of the log")
     if json_:
-        sys.stdout.write(json.dumps(_as_json(result, why, cut, law)) + "\n")
+        sys.stdout.write(json.dumps(_as_json(result, why, cut, law, elsewhere)) + "\n")
     else:
-        _print(Terminal(), result, why, cut, law)
+        console = Terminal()
+        if elsewhere:
+            console.say(f"{elsewhere}; here {kernels(machine())}", yellow="another machine's log:")
+        _print(console, result, why, cut, law)
     raise typer.Exit(ExitCode.OK if result.exact else ExitCode.REFUSED)
 
 
@@ -105,8 +110,14 @@ def _replay_bus_log(log: BusLog, chosen: ControllerConfig | None) -> tuple[Repla
     ]
 
 
+def _other_machine(head: Mapping[str, Any]) -> str:
+    """Processor and kernels with which a log was recorded, if they are not those of here."""
+    there = kernels(head["about"].get("machine", {}))
+    return "" if there == kernels(machine()) else there
+
+
 def _as_json(
-    result: ReplayResult, why: list[str], cut: str, law: LawVerdict | None
+    result: ReplayResult, why: list[str], cut: str, law: LawVerdict | None, elsewhere: str
 ) -> dict[str, Any]:
     return {
         "exact": result.exact,
@@ -116,7 +127,9 @@ def _as_json(
         "first_difference": None if result.first is None else asdict(result.first),
         "causes": why,
         "law": None if law is None else _law_as_json(law),
+        "damaged_frames": [{"tick": tick, "message": message} for tick, message in result.damaged],
         "cut": cut,
+        "other_machine": elsewhere,
     }
 
 
@@ -164,5 +177,8 @@ def _print(
         console.say("version, configuration and law are the same: the program was changed")
     if law is not None:
         _print_law(console, law)
+    if result.damaged:
+        each = [f"tick {tick}, {message}" for tick, message in result.damaged]
+        console.say("; ".join(few(each)), yellow="received with a wrong checksum:")
     if cut:
         console.say("compared up to there", yellow=f"{cut}:")

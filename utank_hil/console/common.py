@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from typer.core import TyperGroup
 
 from utank_hil.base.finite import finite
+from utank_hil.base.machine import kernels, machine
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import headline
 from utank_hil.configuration.files import (
@@ -32,7 +33,7 @@ OUT: Final = Path("out")
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        sys.stdout.write(headline() + "\n")
+        sys.stdout.write(f"{headline()}\n{kernels(machine())}\n")
         raise typer.Exit
 
 

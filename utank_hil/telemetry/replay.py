@@ -66,6 +66,8 @@ class ReplayResult:
     #: Number of frames that differ, by message.
     different: Counter[str] = field(default_factory=Counter)
     first: Difference | None = None  #: First difference; None if every frame is equal bit for bit.
+    #: Received frames whose checksum is wrong: the tick that they came before, and their message.
+    damaged: list[tuple[int, str]] = field(default_factory=list)
     lost_rows: int = 0  #: Rows that the recorder lost; after these an exact replay is impossible.
 
     @property
@@ -222,6 +224,7 @@ def replay(
             waiting = False
             recorded = []
         if kind == Kind.RECEIVED:
+            comparison.received(number, data)
             node.receive(Frame(number, data), time_ns)
         elif kind == Kind.TICK:
             sent, waiting = list(node.tick(time_ns)), True
@@ -259,6 +262,12 @@ class _Comparison:
     def at(self, tick: int, time_s: float) -> None:
         """Advance to a tick."""
         self._tick, self._time_s = tick, time_s
+
+    def received(self, can_id: int, data: bytes) -> None:
+        """Count a received frame whose checksum is wrong."""
+        codec = self._codecs.get(can_id)
+        if codec is not None and len(data) == PAYLOAD_BYTES and codec.decode(data) is None:
+            self._result.damaged.append((self._result.ticks, codec.name))
 
     def retuner(self, who: str, answers: RecordedRetuner) -> None:
         """Compare the requests to the retuner or the estimator."""
