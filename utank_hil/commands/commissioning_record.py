@@ -136,6 +136,8 @@ def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: P
     vessel = config.vessel
     if (vessel.pump is None and vessel.valve is None) or (path is None and _is_emulated(bus)):
         return ""
+    for key, reason in config.held_pressure_problems():
+        return f"{file}: {key} {reason}"
     path = path or record_path(file)
     remedy = f"run utank-hil commission {file} --bus {bus} at the quay"
     try:

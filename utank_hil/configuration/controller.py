@@ -107,12 +107,15 @@ class ControllerConfig(Section):
                 f"{self.safety.roll_limit_rad:g}, safety.roll_limit_rad: set it lower"
             )
             found.append(("retuning.roll_limit_rad", reason))
-        return found + self._pressure_warnings()
+        return found + self.held_pressure_problems()
 
-    def _pressure_warnings(self) -> list[Problem]:
-        """Warn of a pump that could capsize the ship: no monitor prevents a drive from hanging."""
+    def held_pressure_problems(self) -> list[Problem]:
+        """What is wrong with a pump that could capsize the ship: no monitor stops a drive.
+
+        It is a warning on an emulated bus. On hardware such a ship is not armed until it has a cut.
+        """
         most_pa, roll_rad = self.limits.pressure_pa, self.safety.roll_limit_rad
-        if self.vessel.pump is None:
+        if self.vessel.pump is None or self.vessel.redundancy.hardwired_inputs:
             return []
         model = RollModel(self.vessel.ship, self.vessel.tank)
         held_pa = greatest_held_pa(model, most_pa, roll_rad)
@@ -122,7 +125,7 @@ class ControllerConfig(Section):
             f"is {most_pa / 1e3:.4g} kPa, and over {math.floor(held_pa / 10) / 100:g} kPa takes "
             f"the ship beyond {roll_rad:g} rad, safety.roll_limit_rad, if it is held, as by a "
             "drive that hangs: lower it here and in the drive, or have a hard-wired stop cut its "
-            "power"
+            "power and declare it in the ship's file, redundancy: {hardwired_inputs: true}"
         )
         return [("limits.pressure_pa", reason)]
 
