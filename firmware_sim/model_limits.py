@@ -103,7 +103,7 @@ MODEL_LIMITS: Final = (
     ),
     ModelLimit(
         f"roll beyond {math.degrees(MOST_LINEAR_ROLL_RAD):.0f}° by linear equations: neither the "
-        "restoring curve nor quadratic damping (plant: nonlinear has both)",
+        "restoring curve nor quadratic damping (plant: roll has both)",
         _linear_roll,
     ),
     ModelLimit(

@@ -8,8 +8,9 @@ import numpy as np
 
 from firmware_sim import plant_kernel as kernel
 from firmware_sim.waves import SteadyWaves, Waves
-from utank_hil.base.arrays import FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.tick import TICK_NS, TICK_S
+from utank_hil.dynamics.hull.lateral import LateralHull, LateralModel
 from utank_hil.dynamics.kernels import MAX_IMPULSE, STRIKES
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.nonlinear import RollModel
@@ -42,6 +43,9 @@ class Plant:
         plant's start on.
     linear : bool
         Whether to integrate the small-angle limit: no quadratic loss, level limit or capsizing.
+    hull : LateralHull, optional
+        Hull of a ship that is free to sway and yaw; the waves are then sway force, roll and yaw
+        moment.
 
     Attributes
     ----------
@@ -60,11 +64,13 @@ class Plant:
         waves: Waves | Harmonics,
         *,
         linear: bool = False,
+        hull: LateralHull | None = None,
     ) -> None:
         self._ship_at = ship if callable(ship) else None
         self._ship = ship(0.0) if callable(ship) else ship
         self._tank = tank
         self._linear = linear
+        self._lateral = None if hull is None else LateralModel(hull, self._ship, tank)
         self._load(self._ship)
         self._area_m2 = tank.reservoir_area_m2
         self._has_pump = pump is not None
@@ -77,11 +83,15 @@ class Plant:
         self._state[kernel.MODE] = kernel.ABSENT if pump is None else kernel.FREE
         self._ticks = 0
         phasors, rotations = self._waves.begin()
+        ahead = [self._state[kernel.MOMENTS], self._state[kernel.SWAY]]
+        if self._lateral is not None:
+            self._oscillators = self._lateral.oscillators
+            self._x = np.zeros(8 + 2 * len(self._oscillators))
+            self._ahead = np.zeros((3, 4))
+            ahead = list(self._ahead)
         for index in range(4):
-            for wave, phasor, rotation in zip(
-                (kernel.MOMENTS, kernel.SWAY), phasors, rotations, strict=False
-            ):
-                self._state[wave][index] = kernel.turned_sum(phasor, rotation)
+            for wave, phasor, rotation in zip(ahead, phasors, rotations, strict=False):
+                wave[index] = kernel.turned_sum(phasor, rotation)
         self._values: list[float] = self._state.tolist()
         self._now_ns: int | None = None
         self.broken_pump: Callable[[float], float] | None = None
@@ -99,7 +109,10 @@ class Plant:
             ship = replace(ship, quadratic_damping_nms2_rad2=0.0)
             tank = replace(tank, quadratic_loss=0.0)
         model = RollModel(ship, tank)
-        self._row: FloatArray = np.array([*model.coefficients, 1 / model.restoring.piece_rad])
+        self._per_piece = 1 / model.restoring.piece_rad
+        self._row: FloatArray = np.array([*model.coefficients, self._per_piece])
+        if self._lateral is not None:
+            self._row = self._lateral.packed(ship)
         self._restoring = model.restoring.coefficients_nm
 
     def advance(self, now_ns: int) -> None:
@@ -112,6 +125,14 @@ class Plant:
             if self._ship_at is not None and self._ticks % SAILING_TICKS == 0:
                 self._sail(self._ship_at(self._ticks * TICK_S))
             phasors, rotations = self._waves.at(self._ticks)
+            self._tick(phasors, rotations)
+            self._now_ns += TICK_NS
+            self._ticks += 1
+        # plain numbers: reading array elements one by one costs more than converting all
+        self._values = self._state.tolist()
+
+    def _tick(self, phasors: ComplexArray, rotations: ComplexArray) -> None:
+        if self._lateral is None:
             kernel.advance_tick(
                 self._state,
                 self._row,
@@ -122,10 +143,13 @@ class Plant:
                 rotations,
                 self._weights,
             )
-            self._now_ns += TICK_NS
-            self._ticks += 1
-        # plain numbers: reading array elements one by one costs more than converting all
-        self._values = self._state.tolist()
+            return
+        from firmware_sim import lateral_plant_kernel
+
+        lateral_plant_kernel.advance_tick(
+            self._state, self._x, self._ahead, self._row, self._oscillators, self._per_piece,
+            self._restoring, self._coefficients, phasors, rotations, self._weights,
+        )  # fmt: skip
 
     def _sail(self, ship: RollShip) -> None:
         if ship != self._ship:

@@ -68,6 +68,47 @@ def interpolation_weights() -> FloatArray:
 
 
 @njit(error_model="numpy")
+def kept_pump(state: FloatArray) -> PumpState:
+    """Return the pump as it is in the state."""
+    return PumpState(
+        state[SPEED],
+        state[REFERENCE],
+        state[INTEGRAL],
+        state[PRESSURE],
+        state[TORQUE],
+        state[POWER],
+        state[LIMITED] > 0.5,
+    )
+
+
+@njit(error_model="numpy")
+def keep_pump(state: FloatArray, pump: PumpState) -> None:
+    """Keep the pump in the state."""
+    state[SPEED] = pump.speed_rad_s
+    state[REFERENCE] = pump.reference_pa
+    state[INTEGRAL] = pump.integral_pa
+    state[PRESSURE] = pump.pressure_pa
+    state[TORQUE] = pump.torque_nm
+    state[POWER] = pump.power_w
+    state[LIMITED] = 1.0 if pump.limited else 0.0
+
+
+@njit(error_model="numpy")
+def pump_after(
+    state: FloatArray, pump: PumpState, flow_m3_s: float, coefficients: PumpCoefficients
+) -> PumpState:
+    """Return the pump after a step, in the mode of the state."""
+    if state[MODE] == DRIVEN:
+        pump = pump_step(pump, state[SETPOINT], flow_m3_s, STEP_S, coefficients)
+    elif state[MODE] != ABSENT:
+        pump = pump_coast(pump, flow_m3_s, STEP_S, coefficients)
+    if state[MODE] == IMPOSED:
+        pressure_pa, power_w = state[SETPOINT], state[SETPOINT] * flow_m3_s
+        pump = PumpState(pump.speed_rad_s, 0.0, 0.0, pressure_pa, 0.0, power_w, False)
+    return pump
+
+
+@njit(error_model="numpy")
 def advance_tick(
     state: FloatArray,
     row: FloatArray,
@@ -100,15 +141,7 @@ def advance_tick(
     """
     c = unpacked(row)
     pump_coefficients = PumpCoefficients(*coefficients)
-    pump = PumpState(
-        state[SPEED],
-        state[REFERENCE],
-        state[INTEGRAL],
-        state[PRESSURE],
-        state[TORQUE],
-        state[POWER],
-        state[LIMITED] > 0.5,
-    )
+    pump = kept_pump(state)
     x = (state[ROLL], state[ROLL_RATE], state[LEVEL], state[LEVEL_RATE])
     valve = c.area * state[VALVE_LOSS]
     moments, summary = state[MOMENTS], state[SUMMED]
@@ -121,19 +154,11 @@ def advance_tick(
             x = (x[0], 0.0, x[2], 0.0)
             break
         flow_m3_s = c.area * x[3]
-        if state[MODE] == ABSENT:
-            pass
-        elif state[MODE] == DRIVEN:
-            pump = pump_step(pump, state[SETPOINT], flow_m3_s, STEP_S, pump_coefficients)
-        else:
-            pump = pump_coast(pump, flow_m3_s, STEP_S, pump_coefficients)
-        if state[MODE] == IMPOSED:
-            pressure_pa, power_w = state[SETPOINT], state[SETPOINT] * flow_m3_s
-            pump = PumpState(pump.speed_rad_s, 0.0, 0.0, pressure_pa, 0.0, power_w, False)
-        middle = _interpolated(weights, 2 * step + 1, moments)
-        last = _interpolated(weights, 2 * step + 2, moments)
-        sway_middle = _interpolated(weights, 2 * step + 1, sway)
-        sway_last = _interpolated(weights, 2 * step + 2, sway)
+        pump = pump_after(state, pump, flow_m3_s, pump_coefficients)
+        middle = interpolated(weights, 2 * step + 1, moments)
+        last = interpolated(weights, 2 * step + 2, moments)
+        sway_middle = interpolated(weights, 2 * step + 1, sway)
+        sway_last = interpolated(weights, 2 * step + 2, sway)
         waves, sways = (first, middle, last), (sway_first, sway_middle, sway_last)
         force = c.area * pump.pressure_pa
         if len(linear) > 0:
@@ -157,13 +182,7 @@ def advance_tick(
         if abs(x[0]) >= CAPSIZE_RAD and len(linear) == 0:
             summary[CAPSIZED_S] = state[TIME] + (step + 1) * STEP_S
     state[ROLL], state[ROLL_RATE], state[LEVEL], state[LEVEL_RATE] = x
-    state[SPEED] = pump.speed_rad_s
-    state[REFERENCE] = pump.reference_pa
-    state[INTEGRAL] = pump.integral_pa
-    state[PRESSURE] = pump.pressure_pa
-    state[TORQUE] = pump.torque_nm
-    state[POWER] = pump.power_w
-    state[LIMITED] = 1.0 if pump.limited else 0.0
+    keep_pump(state, pump)
     state[SHAFT_WORK] += shaft_j
     state[WAVE_WORK] += wave_j
     state[PUMP_WORK] += pump_j
@@ -186,7 +205,8 @@ def turned_sum(phasors: ComplexArray, rotations: ComplexArray) -> float:
 
 
 @njit(error_model="numpy")
-def _interpolated(weights: FloatArray, row: int, moments: FloatArray) -> float:
+def interpolated(weights: FloatArray, row: int, moments: FloatArray) -> float:
+    """Return a wave's value at a half step of the tick, from those at four ticks."""
     # explicit: a product of four numbers is not worth a call of the linear algebra library
     w, m = weights[row], moments
     return float(w[0] * m[0] + w[1] * m[1] + w[2] * m[2] + w[3] * m[3])

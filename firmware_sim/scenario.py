@@ -3,6 +3,8 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
@@ -21,9 +23,20 @@ from firmware_sim.voyage import (
     waypoint_problems,
 )
 from firmware_sim.waves import PassingWaves, Response, SteadyWaves, Waves
-from utank_hil.base.parameters import Finite, NotNegative, ParameterError, Problem, Range, refuse
+from utank_hil.base.parameters import (
+    Finite,
+    NotNegative,
+    ParameterError,
+    Positive,
+    Problem,
+    Range,
+    refuse,
+)
 from utank_hil.configuration import ControllerConfig, Section, Vessel
+from utank_hil.configuration.hull_files.parts import Given
+from utank_hil.configuration.hull_files.reader import read_hull
 from utank_hil.configuration.plausibility import tank_problems
+from utank_hil.dynamics.hull.lateral import LateralHull, LateralModel
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.steady_heel import steady_heel
@@ -81,6 +94,32 @@ def missing_nodes(vessel: Vessel, faults: Sequence[AnyFault], key: str = "faults
     ]
 
 
+class HullFile(Section):
+    """Hull data as seakeeping codes write them, and what their file lacks."""
+
+    file: Path
+    """Capytaine's netCDF, WAMIT's .1, Nemoh.cal, AQWA's .AH1, ShipX's .re7 or MSS's .mat."""
+    density_kg_m3: Annotated[float, Range(least=900, most=1100)] | None = None
+    """Density of the water."""
+    mass_kg: Positive | None = None
+    """Mass of the ship without the tank's water."""
+    gravity_centre_m: tuple[float, float, float] | None = None
+    """Centre of gravity forward, to port and up of the origin in the waterline."""
+    gyration_m: tuple[Positive, Positive, Positive] | None = None
+    """Radii of gyration about the centre of gravity in roll, pitch and yaw."""
+
+    @property
+    def hull(self) -> LateralHull:
+        """The hull; ValueError says what it lacks."""
+        given = Given(self.density_kg_m3, self.mass_kg, self.gravity_centre_m, self.gyration_m)
+        return _lateral_hull(self.file, given)
+
+
+@lru_cache(maxsize=4)
+def _lateral_hull(path: Path, given: Given) -> LateralHull:
+    return LateralHull(read_hull(path, given))
+
+
 class Scenario(Section):
     """Ship in a sea, with the controllers to be tested there."""
 
@@ -104,8 +143,10 @@ class Scenario(Section):
     seed: Annotated[int, Range(least=0)] = 1
     place: Place | None = None
     """Place where comfort is judged; the deck over the starboard reservoir by default."""
-    plant: Literal["nonlinear", "linear"] = "nonlinear"
-    """Equations of the emulated ship; the linear ones are their small-motion limit."""
+    plant: Literal["roll", "linear", "sway_roll_yaw"] = "roll"
+    """Equations of the emulated ship: roll, its small-motion limit, or three degrees of `hull`."""
+    hull: HullFile | None = None
+    """Hull data of the ship at rest, for plant: sway_roll_yaw."""
     actual_ship: dict[str, Finite] = Field(default_factory=dict)
     """Parameters of the actual ship that differ from the vessel's, on which the controller relies.
 
@@ -167,10 +208,10 @@ class Scenario(Section):
                 reason = f"names one {name!r}: files are named by it, so it can't be a path"
                 problems.append(("controllers", reason))
             problems += self._controller_problems(name, controller)
+        refuse("", [*problems, *self._hull_problems()])
         refuse(
             "",
             [
-                *problems,
                 *self._ship_problems(),
                 *self._sea_problems(),
                 *self._voyage_problems(),
@@ -178,6 +219,29 @@ class Scenario(Section):
             ],
         )
         return self
+
+    @property
+    def lateral_hull(self) -> LateralHull | None:
+        """Hull of a plant that sways and yaws."""
+        return None if self.hull is None else self.hull.hull
+
+    def _hull_problems(self) -> list[Problem]:
+        """Reasons why the plant can't be that of the hull."""
+        sways = self.plant == "sway_roll_yaw"
+        if self.hull is None or not sways:
+            wrong = [("hull", "is required with plant: sway_roll_yaw but missing")] if sways else []
+            return wrong or ([("hull", "needs plant: sway_roll_yaw")] if self.hull else [])
+        problems = []
+        if self.voyage or len(self.sea.spectra) > 1:
+            reason = "keeps course, speed and sea: remove voyage and sea.until, or take plant: roll"
+            problems.append(("plant", f"is sway_roll_yaw, which {reason}"))
+        given = {"effective_slope", "roll_moment_table"} & self.sea.model_fields_set
+        problems += [(f"sea.{key}", "and hull exclude each other: remove one") for key in given]
+        try:
+            LateralModel(self.hull.hull, self.sailing_ship, self.vessel.tank)
+        except (OSError, ValueError) as error:
+            problems.append(("hull", f"does not fit: {error}"))
+        return problems
 
     def figures(self) -> dict[str, float]:
         """Effect of the sea on the ship, in figures."""
@@ -234,6 +298,8 @@ class Scenario(Section):
     def waves(self, seed: int) -> Waves:
         """Waves that the ship meets."""
         spectra = spectra_on_the_way(self.voyage, self.sea.spectra)
+        if self.hull is not None:
+            return SteadyWaves(*self._hull_forces(seed))
         sway = self.sailing_ship.sway_of_slope
         if not self.voyage and len(spectra) <= 1:
             forces = [self.wave_moment(seed)]
@@ -384,4 +450,13 @@ class Scenario(Section):
 
     def wave_moment(self, seed: int) -> Harmonics:
         """Roll moment of the initial sea on a ship that keeps its course."""
+        if self.hull is not None:
+            return self._hull_forces(seed)[1]
         return self.sea.roll_moment(self.sea.sea(seed), self.vessel.ship.stiffness_nm_rad)
+
+    def _hull_forces(self, seed: int) -> list[Harmonics]:
+        """Sway force, roll and yaw moment of the initial sea."""
+        sea, hull = self.sea.sea(seed), self.lateral_hull
+        assert hull is not None
+        forces = hull.forces(sea.omega_rad_s, sea.heading_rad)
+        return [sea.harmonics(sea.amplitude_m * force) for force in forces]

@@ -83,6 +83,7 @@ def bare_plant(scenario: Scenario, seed: int) -> Plant:
         None,
         scenario.waves(seed),
         linear=scenario.plant == "linear",
+        hull=scenario.lateral_hull,
     )
 
 
@@ -98,6 +99,7 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
         vessel.pump,
         scenario.waves(seed),
         linear=scenario.plant == "linear",
+        hull=scenario.lateral_hull,
     )
     version = vessel.version
     foreign = vessel.foreign

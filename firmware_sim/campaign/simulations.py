@@ -148,7 +148,7 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
         raise ValueError("simulation: linear keeps ship, course and sea: take nonlinear or bus")
     if ship.heeling_moment_nm:
         raise ValueError("simulation: linear knows no steady heel: take nonlinear or bus")
-    if ship.sway_of_slope:
+    if ship.sway_of_slope or scenario.hull:
         raise ValueError("simulation: linear knows no sway: take nonlinear or bus")
     moment = scenario.wave_moment(seed)
     count = round(scenario.duration_s / RECORD_S)
@@ -221,7 +221,13 @@ class _PlantInWaves:
 
     def __init__(self, scenario: Scenario, seed: int) -> None:
         vessel = scenario.vessel
-        self.plant = Plant(scenario.ship_at, vessel.tank, vessel.pump, scenario.waves(seed))
+        self.plant = Plant(
+            scenario.ship_at,
+            vessel.tank,
+            vessel.pump,
+            scenario.waves(seed),
+            hull=scenario.lateral_hull,
+        )
         self.power_w: list[float] = []  #: Power of the pump, every `RECORD_S`.
         self._area_m2, self._tick = vessel.tank.reservoir_area_m2, 0
         self.plant.advance(0)

@@ -86,7 +86,7 @@ def test_shipped_scenarios_are_valid(path: Path) -> None:
         ({"plant": "linear", "vessel": str(CONFIGS / "ships" / "thesis_first_valve.yaml"),
           "controllers": {"valve": str(CONFIGS / "controllers" / "valve_on_off.yaml")}},
          "plant", "the loss of the vessel's valve is quadratic"),
-        ({"plant": "exact"}, "plant", "must be one of nonlinear, linear"),
+        ({"plant": "exact"}, "plant", "must be one of roll, linear"),
         ({"actual_ship": {"inertia_kg_m2": -1.0}}, "actual_ship.inertia_kg_m2", "got -1.0"),
         ({"actual_ship": {"wind_moment_nm": 4e8}}, "actual_ship",
          "full or empty at one side: lower offset_moment_nm or wind_moment_nm"),

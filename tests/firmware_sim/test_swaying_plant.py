@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from roll_energy import energy
 from scipy.integrate import solve_ivp
 
@@ -124,3 +125,47 @@ def test_controller_that_knows_no_sway_is_in_charge_of_a_ship_that_sways(share: 
         run.run_until(second * 1_000_000_000)
         assert node.mode is Mode.ACTIVE
         assert node.safety.monitors.found == 0
+
+
+HULL = {"file": "tests/dynamics/data/wigley.nc", "gyration_m": (4.56, 15.0, 15.0)}
+SEA = {"kind": "regular", "amplitude_m": 0.5, "period_s": 8.0}
+
+
+def hull_scenario(**changes: object) -> Scenario:
+    ship = {"stiffness_nm_rad": 2.0e7, "inertia_kg_m2": 3.2e7, "damping_nms_rad": 2e6}
+    tank = {"width_m": 8.0, "height_m": 2.5, "reservoir_area_m2": 2.0, "duct_area_m2": 0.7}
+    content = {
+        "name": "hull", "vessel": {"name": "wigley", "ship": ship, "tank": tank}, "sea": SEA,
+        "hull": HULL, "plant": "sway_roll_yaw", "duration_s": 60.0, "settle_s": 10.0, **changes,
+    }  # fmt: skip
+    return Scenario.model_validate(content)
+
+
+def test_scenario_with_a_hull_sways_rolls_and_yaws() -> None:
+    scenario = hull_scenario(sea={**SEA, "heading_deg": 60.0})
+    ship = build_ship_side(scenario, 1, ())
+    for tick in range(3001):
+        ship.plant.advance(tick * TICK_NS)
+    slope = 0.5 * (2 * math.pi / 8.0) ** 2 / 9.80665
+    assert 0.1 * slope < abs(ship.plant.roll_rad) < 5 * slope
+    assert 0.05 < abs(ship.plant.lateral_m_s2) / (9.80665 * slope) < 1.2
+    moment = scenario.wave_moment(1).at(30.0)
+    assert ship.plant.wave_moment_nm == pytest.approx(float(moment), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "reason"),
+    [
+        ({"hull": None}, "hull", "is required with plant: sway_roll_yaw"),
+        ({"plant": "roll"}, "hull", "needs plant: sway_roll_yaw"),
+        ({"sea": {**SEA, "effective_slope": {"coefficient": 0.5}}}, "sea.effective_slope", "hull"),
+        ({"voyage": [{"time_s": 5.0, "speed_m_s": 3.0}]}, "plant", "remove voyage"),
+        ({"hull": {"file": HULL["file"]}}, "hull", "inertia_kg_m2 is missing"),
+        ({"actual_ship": {"stiffness_nm_rad": 2.6e7}}, "hull", "make them agree"),
+    ],
+)
+def test_hull_that_does_not_fit_the_scenario_is_refused(changes, key: str, reason: str) -> None:
+    with pytest.raises(ValidationError) as refused:
+        hull_scenario(**changes)
+    assert key in str(refused.value)
+    assert reason in str(refused.value)

@@ -1,0 +1,101 @@
+"""Compiled integration of a ship in sway, roll and yaw with tank and pump; imports numba.
+
+As `plant_kernel`, with the ship by the step of `utank_hil.dynamics.hull.lateral_kernel`, which
+takes two steps of the pump at once.
+"""
+
+import numpy as np
+
+from firmware_sim import plant_kernel as kernel
+from firmware_sim.plant_kernel import (
+    CAPSIZE_RAD,
+    STEP_S,
+    interpolated,
+    keep_pump,
+    kept_pump,
+    pump_after,
+    turned_sum,
+)
+from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.dynamics.hull import lateral_kernel as lateral
+from utank_hil.dynamics.jit import njit
+from utank_hil.dynamics.kernels import CAPSIZED_S, MAX_IMPULSE, STRIKE_LOSS, STRIKES
+from utank_hil.dynamics.pump import PumpCoefficients
+from utank_hil.dynamics.tank import GRAVITY_M_S2
+
+
+@njit(error_model="numpy")
+def advance_tick(
+    state: FloatArray,
+    x: FloatArray,
+    ahead: FloatArray,
+    parameters: FloatArray,
+    oscillators: FloatArray,
+    per_piece: float,
+    restoring: FloatArray,
+    coefficients: tuple[float, ...],
+    phasors: ComplexArray,
+    rotations: ComplexArray,
+    weights: FloatArray,
+) -> None:
+    """Advance `state` and `x` by one tick, in place; a capsized ship does not move.
+
+    Parameters
+    ----------
+    state : ndarray
+        As of `plant_kernel`.
+    x : ndarray
+        State of `lateral_kernel`.
+    ahead : ndarray, shape (3, 4)
+        Sway force, roll and yaw moment of the waves at t - 1, t, t + 1 and t + 2 ticks.
+    parameters, oscillators, per_piece, restoring
+        Of `LateralModel`.
+    """
+    pump_coefficients = PumpCoefficients(*coefficients)
+    pump, summary = kept_pump(state), state[kernel.SUMMED]
+    area, valve = parameters[22], parameters[22] * state[kernel.VALVE_LOSS]
+    books, shaft_j = np.zeros(lateral.BOOKS), 0.0
+    books[lateral.IMPULSE] = summary[MAX_IMPULSE]
+    forces, room = np.empty((3, 3)), np.empty((4, max(len(x), 29)))
+    forces[2] = ahead[:, 1]
+    for step in range(len(weights) // 4):
+        if summary[CAPSIZED_S] < np.inf:
+            x[lateral.ROLL_RATE] = x[lateral.LEVEL_RATE] = 0.0
+            break
+        push = 0.0
+        for _ in range(2):
+            pump = pump_after(state, pump, area * x[lateral.LEVEL_RATE], pump_coefficients)
+            shaft_j += pump.power_w * STEP_S
+            push += area * pump.pressure_pa / 2
+        for i in range(3):
+            forces[0, i] = forces[2, i]
+            forces[1, i] = interpolated(weights, 4 * step + 2, ahead[i])
+            forces[2, i] = interpolated(weights, 4 * step + 4, ahead[i])
+        lateral.advance(
+            parameters, oscillators, per_piece, restoring, x, forces, push, valve,
+            2 * STEP_S, books, room,
+        )  # fmt: skip
+        if abs(x[lateral.ROLL]) >= CAPSIZE_RAD:
+            summary[CAPSIZED_S] = state[kernel.TIME] + (step + 1) * 2 * STEP_S
+    rates = np.empty(len(x))
+    lateral.rates(
+        parameters, oscillators, per_piece, restoring, x, forces[2], area * pump.pressure_pa, valve,
+        room[3, :16].reshape(4, 4), room[3, 16:20], rates,
+    )  # fmt: skip
+    state[kernel.ROLL], state[kernel.ROLL_RATE] = x[lateral.ROLL], x[lateral.ROLL_RATE]
+    state[kernel.LEVEL], state[kernel.LEVEL_RATE] = x[lateral.LEVEL], x[lateral.LEVEL_RATE]
+    state[kernel.SWAY_NOW] = rates[lateral.SWAY_RATE] / GRAVITY_M_S2
+    keep_pump(state, pump)
+    state[kernel.SHAFT_WORK] += shaft_j
+    state[kernel.WAVE_WORK] += books[lateral.WAVE_WORK]
+    state[kernel.PUMP_WORK] += books[lateral.PUMP_WORK]
+    state[kernel.DAMPED] += books[lateral.DAMPED]
+    summary[STRIKE_LOSS] += books[lateral.STRUCK]
+    summary[STRIKES] += books[lateral.NUMBER]
+    summary[MAX_IMPULSE] = books[lateral.IMPULSE]
+    state[kernel.TIME] += (len(weights) // 2) * STEP_S
+    for i in range(3):
+        row = ahead[i]
+        row[0], row[1], row[2] = row[1], row[2], row[3]
+        row[3] = turned_sum(phasors[i], rotations[i])
+    state[kernel.MOMENT_NOW] = ahead[1, 1]

@@ -1,0 +1,161 @@
+"""A ship in sway, roll and yaw with its tank, against `tank_wrench` and the frequency domain."""
+
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from firmware_sim.plant import Plant
+from firmware_sim.waves import SteadyWaves
+from utank_hil.base.tick import TICK_NS
+from utank_hil.configuration.hull_files.parts import Given
+from utank_hil.configuration.hull_files.reader import read_hull
+from utank_hil.dynamics import RollShip, Tank, tank_wrench
+from utank_hil.dynamics.hull import lateral_kernel as kernel
+from utank_hil.dynamics.hull.lateral import LateralHull, LateralModel
+from utank_hil.dynamics.hull.radiation import fit_radiation
+from utank_hil.dynamics.nonlinear import RollModel
+from utank_hil.sea import Harmonics
+
+TANK = Tank(8.0, 2.5, 2.0, 0.7, lx_m=3.0, lz_m=-0.5, damping_ratio=0.1, density_kg_m3=1025.0)
+
+
+@cache
+def hull() -> LateralHull:
+    """The Wigley hull of `tools.small_hull`."""
+    file = Path(__file__).parent / "data" / "wigley.nc"
+    return LateralHull(read_hull(file, Given(gyration_m=(4.56, 15.0, 15.0))))
+
+
+@cache
+def ship() -> RollShip:
+    stiffness = hull().stiffness_nm_rad
+    inertia = 1.15 * float(hull().rigid_mass[1, 1])
+    viscous = 2 * 0.03 * math.sqrt(stiffness * inertia)
+    return RollShip(inertia, stiffness, hull().radiated_nms_rad() + viscous)
+
+
+def test_ship_and_water_move_by_the_exact_wrench() -> None:
+    rough = replace(
+        ship(), quadratic_damping_nms2_rad2=2e6, offset_moment_nm=1e5, wind_moment_nm=2e5,
+        restoring_odd_nm=(-1e7,),
+    )  # fmt: skip
+    tank = replace(TANK, lz_m=1.2, quadratic_loss=1.0)
+    model, roll_model = LateralModel(hull(), rough, tank), RollModel(rough, tank)
+    inertia = hull().rigid_mass + hull().radiation.infinite_added_mass
+    rng = np.random.default_rng(1)
+    for _ in range(100):
+        roll, rate, level, speed, sway = rng.uniform(-1, 1, 5) * [0.8, 0.4, 2.0, 1.0, 2.0]
+        force, pressure = rng.uniform(-1, 1, 3) * [1e5, 1e6, 1e6], 1e4 * rng.uniform(-1, 1)
+        out = np.empty(8)
+        kernel.rates(
+            model.packed(rough), np.zeros((0, 7)), *roll_model.packed[1:],
+            np.array([roll, rate, level, speed, 0.0, sway, 0.0, 0.0]), force,
+            tank.reservoir_area_m2 * pressure, 0.0, np.empty((4, 4)), np.empty(4), out,
+        )  # fmt: skip
+        sin, cos = math.sin(roll), math.cos(roll)
+        water_force, moment, residual = tank_wrench(
+            tank, level, speed, out[kernel.LEVEL_RATE], [0, sway * cos, -sway * sin], [rate, 0, 0],
+            [0, out[5] * cos - sway * sin * rate, -out[5] * sin - sway * cos * rate],
+            [out[1], out[7] * sin, out[7] * cos], roll, 0.0,
+        )  # fmt: skip
+        loads = force + np.array([water_force @ [0, cos, -sin], moment[0], moment @ [0, sin, cos]])
+        viscous = model.viscous_nms_rad + rough.quadratic_damping_nms2_rad2 * abs(rate)
+        loads[1] += rough.wind_moment_nm + rough.offset_moment_nm * cos - viscous * rate
+        loads[1] -= float(roll_model.restoring.moment_nm(roll))
+        np.testing.assert_allclose(inertia @ out[[5, 1, 7]], loads, atol=1e-9 * abs(loads).max())
+        loss = (tank.loss_pa_per_m_s + tank.quadratic_loss_pa_per_m2_s2 * abs(speed)) * speed
+        assert tank.density_kg_m3 * residual == pytest.approx(pressure - loss, abs=1e-6)
+
+
+@pytest.mark.parametrize("limit", [True, False])
+def test_memory_is_the_radiation_of_the_data_to_one_percent(limit: bool) -> None:
+    data, found = hull().about_g, hull().radiation
+    if not limit:  # the fit finds it
+        lateral = np.ix_([1, 3, 5], [1, 3, 5])
+        sign = np.outer([-1, 1, -1], [-1, 1, -1])
+        added, damping = (
+            np.array([(m[lateral] + m[lateral].T) / 2 * sign for m in each])
+            for each in (data.added_mass, data.damping)
+        )
+        again = fit_radiation(data.frequency_rad_s, added, damping)
+        np.testing.assert_allclose(
+            np.diag(again.infinite_added_mass), np.diag(found.infinite_added_mass), rtol=0.05
+        )
+        found = again
+    assert found.error < 0.01
+    # energy is never given back, at any frequency and in any motion
+    memory = found.memory(np.geomspace(1e-2, 1e2, 200))
+    least = np.linalg.eigvalsh(memory.real)[:, 0]
+    assert np.all(least > -1e-9 * np.abs(memory.real).max())
+
+
+@pytest.mark.parametrize("heading_deg", [90.0, 135.0])
+@pytest.mark.parametrize("omega", [0.5, 0.8, 1.1])
+def test_plant_in_a_regular_wave_is_the_frequency_domain_of_the_data_to_one_percent(
+    heading_deg: float, omega: float
+) -> None:
+    """Added mass and damping of the file, not of the fit; interpolated between its frequencies."""
+    model = LateralModel(hull(), ship(), TANK)
+    force = 0.01 * hull().forces(np.array([omega]), np.array([math.radians(heading_deg)]))[:, 0]
+    waves = [Harmonics(np.array([abs(f)]), np.array([omega]), np.array([np.angle(f)]))
+             for f in force]  # fmt: skip
+    plant = Plant(ship(), TANK, None, SteadyWaves(*waves), hull=hull())
+    begin_s, rows, times = 120.0, [], []
+    for tick in range(round(100 * (begin_s + 4 * math.pi / omega))):
+        plant.advance(tick * TICK_NS)
+        if tick > 100 * begin_s:
+            times.append(0.01 * tick)
+            rows.append((plant.lateral_m_s2, plant.roll_rad, plant.level_m))
+    at = np.array(times)
+    basis = np.column_stack([np.cos(omega * at), -np.sin(omega * at), np.ones_like(at)])
+    real, imaginary, _ = np.linalg.lstsq(basis, np.array(rows), rcond=None)[0]
+    sway, roll, _, level = model.response(omega, force)
+    expected = np.array([-(omega**2) * sway, roll, level])
+    assert np.all(np.abs((real + 1j * imaginary) / expected - 1) < 0.01)
+
+
+def test_long_wave_carries_the_ship_and_its_water_along() -> None:
+    model, omega = LateralModel(hull(), ship(), TANK), 0.2
+    force = hull().forces(np.array([omega]), np.array([math.pi / 2]))[:, 0]
+    sway, roll, _, level = model.response(omega, force)
+    slope = 1j * omega**2 / 9.80665
+    assert -(omega**2) * sway / (9.80665 * slope) == pytest.approx(1.0, abs=0.03)
+    assert roll / slope == pytest.approx(1.0, abs=0.1)
+    assert abs(level) < 0.1 * abs(roll) * TANK.width_m / 2
+
+
+def test_energy_adds_up_with_strikes() -> None:
+    tank = replace(TANK, quadratic_loss=2.0, headroom_m=0.6, restitution=0.2)
+    heavy = replace(ship(), quadratic_damping_nms2_rad2=3e6, wind_moment_nm=3e5)
+    model = LateralModel(hull(), heavy, tank)
+    force = hull().forces(np.array([0.8]), np.array([2.0]))[:, 0]
+    waves = [Harmonics(np.array([abs(f)]), np.array([0.8]), np.array([np.angle(f)]))
+             for f in force]  # fmt: skip
+    plant = Plant(heavy, tank, None, SteadyWaves(*waves), hull=hull())
+    for tick in range(6001):
+        plant.advance(tick * TICK_NS)
+    assert plant.strikes > 3
+    x, parameters, oscillators = plant._x, model.packed(heavy), model.oscillators
+    mass = np.empty((4, 4))
+    kernel.mass_matrix(parameters, x[kernel.ROLL], x[kernel.LEVEL], mass)
+    mass = np.triu(mass) + np.triu(mass, 1).T
+    speeds = x[[kernel.SWAY_RATE, kernel.ROLL_RATE, kernel.YAW_RATE, kernel.LEVEL_RATE]]
+    place, rate = x[kernel.WAVES :].reshape(2, -1)
+    roll, level, c = x[kernel.ROLL], x[kernel.LEVEL], RollModel(heavy, tank).coefficients
+    stored_j = 0.5 * speeds @ mass @ speeds + 0.5 * heavy.stiffness_nm_rad * roll**2
+    stored_j += 0.5 * (rate @ rate + oscillators[:, 3] @ place**2) - heavy.wind_moment_nm * roll
+    stored_j -= c.weight_h * level * math.sin(roll)
+    stored_j -= (c.weight_lever - c.weight_h2 * level**2) * math.cos(roll) - c.weight_lever
+    work_j = plant.wave_work_j - plant.losses_j
+    assert work_j == pytest.approx(stored_j, abs=1e-5 * plant.losses_j)
+
+
+def test_ship_that_is_not_the_hull_s_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"stiffness_nm_rad is .* make them agree"):
+        LateralModel(hull(), replace(ship(), stiffness_nm_rad=1e7), TANK)
+    with pytest.raises(ValueError, match=r"damping_nms_rad is .* less than what waves .* raise it"):
+        LateralModel(hull(), replace(ship(), damping_nms_rad=1.0), TANK)

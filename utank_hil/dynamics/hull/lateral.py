@@ -1,0 +1,225 @@
+"""A ship in sway, roll and yaw with its tank, from the data of its hull.
+
+Body axes of the project (y to starboard, z down) about the centre of gravity of the ship without
+its tank's water. With the velocities u = (sway, roll, yaw, level), mass matrix M(phi, h) of hull
+and water, potential V of `utank_hil.dynamics.nonlinear`, oscillators e of the radiated waves with
+directions b (`utank_hil.dynamics.hull.radiation`) and wave forces F, Lagrange's equations are ::
+
+    d/dt (M u)_i = 1/2 u dM/dq_i u - dV/dq_i + F_i - damping_i - (b' e')_i
+
+They are exact in roll and level, and linear in what the hull makes of sway and yaw. What roll,
+pump and valve are is that of `RollModel`; its roll equation follows where sway and yaw are held.
+The data are those of the ship at rest, at the frequency of encounter.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.parameters import refuse
+from utank_hil.dynamics.hull.hull_data import TO_BODY_AXES, HullData
+from utank_hil.dynamics.hull.radiation import Radiation, fit_radiation
+from utank_hil.dynamics.hull.response import (
+    excitation_at,
+    radiation_at,
+    roll_resonance,
+    wave_number,
+)
+from utank_hil.dynamics.nonlinear import RollModel
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.dynamics.water import water_moments
+
+LATERAL = np.array([1, 3, 5])
+"""Sway, roll and yaw among the six degrees."""
+SIGN = TO_BODY_AXES[LATERAL]
+_MOST_STIFFNESS_ERROR = 0.05
+"""Inclining tests and hydrostatics of a mesh agree within some per cent."""
+
+
+@dataclass(frozen=True)
+class LateralHull:
+    """Sway, roll and yaw of a hull: what its data say, and the memory fitted to it.
+
+    Parameters
+    ----------
+    data : HullData
+        Of the ship at rest in deep water, with mass, inertia and centre of gravity.
+
+    Raises
+    ------
+    ValueError
+        If something is missing.
+    """
+
+    data: HullData
+
+    @cached_property
+    def about_g(self) -> HullData:
+        """The data about the centre of gravity."""
+        return self.data.about_gravity_centre()
+
+    @property
+    def stiffness_nm_rad(self) -> float:
+        """Restoring moment per roll angle."""
+        return float(self.about_g.known("hydrostatic")[3, 3])
+
+    @cached_property
+    def rigid_mass(self) -> FloatArray:
+        """Mass matrix, shape (3, 3)."""
+        return _lateral(self.about_g.mass_matrix)
+
+    @cached_property
+    def radiation(self) -> Radiation:
+        """Fitted radiation force."""
+        hull = self.about_g
+        limit = hull.infinite_added_mass
+        return fit_radiation(
+            hull.frequency_rad_s,
+            np.array([_lateral(each) for each in hull.added_mass]),
+            np.array([_lateral(each) for each in hull.damping]),
+            None if limit is None else _lateral(limit),
+        )
+
+    def radiated_nms_rad(self) -> float:
+        """Return the linear damping of free roll that radiation accounts for."""
+        found = roll_resonance(self.data, viscous_ratio=0.0)
+        stiffness = self.stiffness_nm_rad
+        return found.radiation_ratio * stiffness * found.period_s / math.pi
+
+    def forces(self, omega_rad_s: FloatArray, heading_rad: FloatArray) -> ComplexArray:
+        """Return sway force, roll and yaw moment per m of waves, shape (3, N), leads on the crest.
+
+        Below the frequencies of the data they go with the slope, above they are zero. The heading
+        is the project's: a half pi from port to starboard. ValueError is raised for headings that
+        the data do not cover.
+        """
+        hull = self.about_g
+        least, most = hull.wave_frequency_rad_s[[0, -1]]
+        forward_m = hull.reference_m[0]
+        found = np.zeros((3, len(omega_rad_s)), dtype=np.complex128)
+        for n, (omega, heading) in enumerate(
+            zip(omega_rad_s, np.broadcast_to(heading_rad, omega_rad_s.shape), strict=True)
+        ):
+            if omega > most:
+                continue
+            at = max(float(omega), float(least))
+            force = excitation_at(hull, at, -math.degrees(heading))[LATERAL] * SIGN
+            number = wave_number(np.array([omega, at]), hull.water_depth_m, hull.gravity_m_s2)
+            force *= number[0] / number[1]  # long waves push as their slope
+            found[:, n] = force * np.exp(1j * number[0] * forward_m * math.cos(heading))
+        return found
+
+
+@dataclass(frozen=True)
+class LateralModel:
+    """A hull with the roll of a ship and a tank.
+
+    Parameters
+    ----------
+    hull : LateralHull
+    ship : RollShip
+        Righting moment, heeling moments and damping; of the linear damping, which a decay test
+        gives, radiation is taken off. Its inertia is the hull's.
+    tank : Tank
+
+    Raises
+    ------
+    ValueError
+        If the ship's stiffness is not that of the hull, or its damping less than radiation's.
+    """
+
+    hull: LateralHull
+    ship: RollShip
+    tank: Tank
+
+    def __post_init__(self) -> None:
+        problems = []
+        of_hull, of_ship = self.hull.stiffness_nm_rad, self.ship.stiffness_nm_rad
+        if abs(of_hull / of_ship - 1) > _MOST_STIFFNESS_ERROR:
+            reason = f"is {of_ship:.4g}, but {self.hull.data.source} has {of_hull:.4g}: make them"
+            problems.append(("stiffness_nm_rad", f"{reason} agree"))
+        elif self.viscous_nms_rad < 0:
+            reason = f"is {self.ship.damping_nms_rad:.4g}, less than what waves alone take from it"
+            least = self.hull.radiated_nms_rad()
+            problems.append(("damping_nms_rad", f"{reason}, {least:.4g}: raise it"))
+        refuse("ship", problems)
+
+    @cached_property
+    def viscous_nms_rad(self) -> float:
+        """Linear roll damping beside radiation."""
+        return self.ship.damping_nms_rad - self.hull.radiated_nms_rad()
+
+    def packed(self, ship: RollShip) -> FloatArray:
+        """Return the parameters of `lateral_kernel` for the ship as it is now."""
+        tank, water = self.tank, water_moments(self.tank, 0.0)
+        c = RollModel(ship, tank).coefficients
+        hull = self.hull.rigid_mass + self.hull.radiation.infinite_added_mass
+        flow = tank.density_kg_m3 * tank.reservoir_area_m2
+        viscous = self.viscous_nms_rad + ship.damping_nms_rad - self.ship.damping_nms_rad
+        return np.array([
+            *hull[np.triu_indices(3)], c.inertia - c.ship_inertia, c.inertia_h2, c.coupling,
+            c.level_inertia, water.mass_kg, tank.lx_m, flow, tank.width_m, water.first_kgm[2],
+            tank.height_m - tank.lz_m,
+            float(water.inertia_kgm2[1, 1]) - water.mass_kg * tank.lx_m**2,
+            float(water.inertia_kgm2[2, 2]) - water.mass_kg * tank.lx_m**2,
+            viscous, c.quadratic_damping, c.offset_moment, c.wind_moment,
+            c.area, c.loss, c.quadratic_loss, c.level_limit, c.restitution,
+        ])  # fmt: skip
+
+    @property
+    def oscillators(self) -> FloatArray:
+        """Directions, square of the frequency, and losses, shape (n, 7)."""
+        found = self.hull.radiation
+        return np.column_stack([found.direction, found.frequency_rad_s**2, found.loss])
+
+    def response(
+        self, omega_rad_s: float, force: ComplexArray, *, fitted: bool = False
+    ) -> ComplexArray:
+        """Return sway, roll, yaw and level in the linear frequency domain, shape (4,).
+
+        Parameters
+        ----------
+        omega_rad_s : float
+            Frequency of encounter.
+        force : ndarray, shape (3,)
+            Sway force, roll and yaw moment.
+        fitted : bool
+            Whether radiation is that of the fitted memory, not of the data.
+        """
+        if fitted:
+            found = self.hull.radiation
+            memory = found.memory(np.array([omega_rad_s]))[0]
+            radiated = -(omega_rad_s**2) * found.infinite_added_mass + 1j * omega_rad_s * memory
+        else:
+            added, damping = (_lateral(m) for m in radiation_at(self.hull.about_g, omega_rad_s))
+            radiated = -(omega_rad_s**2) * added + 1j * omega_rad_s * damping
+        matrix = np.zeros((4, 4), dtype=np.complex128)
+        matrix[:3, :3] = radiated - omega_rad_s**2 * self.hull.rigid_mass
+        water, tank = water_moments(self.tank, 0.0), self.tank
+        area, density = tank.reservoir_area_m2, tank.density_kg_m3
+        mass = np.zeros((4, 4))
+        mass[0, 0] = water.mass_kg
+        mass[0, 1] = -water.first_kgm[2]
+        mass[0, 2] = water.first_kgm[0]
+        mass[1:3, 1:3] = water.inertia_kgm2[np.ix_([0, 2], [0, 2])]
+        mass[0, 3] = water.first_slope_kg[1]
+        mass[1:3, 3] = water.swirl_kgm[[0, 2]]
+        mass[3, 3] = density * area * tank.effective_length_m
+        matrix -= omega_rad_s**2 * (np.triu(mass) + np.triu(mass, 1).T)
+        matrix[1, 1] += self.ship.stiffness_nm_rad + GRAVITY_M_S2 * water.first_kgm[2]
+        matrix[1, 1] += 1j * omega_rad_s * self.viscous_nms_rad
+        matrix[1, 3] -= GRAVITY_M_S2 * water.first_slope_kg[1]
+        matrix[3, 1] = matrix[1, 3]
+        matrix[3, 3] += 2 * density * GRAVITY_M_S2 * area
+        matrix[3, 3] += 1j * omega_rad_s * area * tank.loss_pa_per_m_s
+        return np.asarray(np.linalg.solve(matrix, np.append(force, 0.0)))
+
+
+def _lateral(matrix: FloatArray) -> FloatArray:
+    """Return sway, roll and yaw of a (6, 6) matrix in body axes, made symmetric."""
+    part = matrix[np.ix_(LATERAL, LATERAL)] * np.outer(SIGN, SIGN)
+    return np.asarray((part + part.T) / 2)
