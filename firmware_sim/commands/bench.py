@@ -1,6 +1,7 @@
 """``utank-hil bench``: a controller quiets a rolling ship."""
 
 from collections.abc import Mapping
+from errno import ENOSPC
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,12 +22,14 @@ from utank_hil.console.common import (
     load,
     prepare_out,
     print_json,
+    why,
 )
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.progress import progress_bar
 from utank_hil.console.terminal import Terminal, shown
 from utank_hil.console.timing import timing_table
 from utank_hil.control import BuiltLaw
+from utank_hil.telemetry.ring import RingError
 
 if TYPE_CHECKING:
     from firmware_sim.bench import BenchOptions, BenchResult
@@ -142,6 +145,8 @@ def _run(
         except InterruptedError as error:
             fail(error, ExitCode.INTERRUPTED)
         except OSError as error:
+            if isinstance(error, RingError) or (error.errno == ENOSPC and error.filename is None):
+                fail(f"/dev/shm, the memory that processes share: {why(error)}", ExitCode.SYSTEM)
             fail(error, ExitCode.USAGE if options.channel is None else ExitCode.NO_BUS)
 
 

@@ -15,7 +15,7 @@ _FRAME_LIKE: Final = re.compile(
 )
 _CLASSIC: Final = re.compile(
     r"\s*(-?\d{1,10})[.,](\d{1,9})\s+(\d+)\s+(?:([0-9A-F]+)(x?)\s+(Rx|Tx)\s+"
-    r"(?:(d)\s+([0-9A-F]+)((?:\s+[0-9A-F]{2,3})*)|r(?:\s+([0-9A-F]+))?)|(ErrorFrame))(?=\s|$).*\s*",
+    r"(?:(d)\s+([0-9A-F]+)((?:\s+[0-9A-F]{1,3})*)|r(?:\s+([0-9A-F]+))?)|(ErrorFrame))(?=\s|$).*\s*",
     re.I | re.A,
 )
 _FD: Final = re.compile(
@@ -108,10 +108,13 @@ class AscParser:
         return self._frame(channel, number, extended, kind, data, int(code, 16), sent, speed)
 
     def _bytes(self, words: list[str], count: int) -> bytes:
-        data = [int(word, self._base) for word in words[:count]]
-        if len(data) < count or max(data, default=0) > 255:
-            raise NotUnderstoodError(f"has not the {count} bytes that it names")
-        return bytes(data)
+        words = words[:count]
+        try:
+            if len(words) < count or (self._base == 16 and any(len(word) != 2 for word in words)):
+                raise ValueError
+            return bytes(int(word, self._base) for word in words)
+        except ValueError:
+            raise NotUnderstoodError(f"has not the {count} bytes that it names") from None
 
     def _frame(
         self,

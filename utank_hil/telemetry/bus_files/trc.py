@@ -45,11 +45,11 @@ class TrcParser:
             raise NotUnderstoodError("is no frame as PCAN-View writes it")
         if (cells.get("d") or "").lower() in ("warng", "error") or cells.get("T") in _NO_FRAMES:
             return None
-        if cells["I"] == "FFFFFFFF":
+        if cells.get("I") == "FFFFFFFF":
             return None
         try:
             return _frame(cells)
-        except (KeyError, ValueError) as error:
+        except (LookupError, ValueError) as error:
             raise NotUnderstoodError(
                 f"is no frame with the columns of this trace: {error}"
             ) from None
@@ -60,6 +60,8 @@ def _frame(cells: dict[str, str]) -> BusFrame:
     kind = _TYPES[cells.get("T") or "DT"]
     if text.startswith("RTR"):
         kind = FrameKind.REMOTE
+    if not 0 <= int(cells.get("l") or cells["L"]) <= FD_LENGTHS[-1]:
+        raise ValueError("its length")
     size = int(cells["l"]) if "l" in cells else FD_LENGTHS[int(cells["L"])]
     code = FD_LENGTHS.index(size) if "l" in cells else int(cells["L"])
     if kind is not FrameKind.FD:
@@ -70,6 +72,8 @@ def _frame(cells: dict[str, str]) -> BusFrame:
     if len(number) not in (4, 8) or int(number, 16) > (0x7FF if len(number) == 4 else 0x1FFFFFFF):
         raise ValueError(f"{number} is no identifier of 11 or 29 bits")
     milliseconds, _, rest = cells["O"].partition(".")
+    if not (cells["O"].isascii() and milliseconds.isdecimal() and (rest or "0").isdecimal()):
+        raise ValueError(f"{cells['O']} is no time in ms")
     mark = cells.get("d")
     return BusFrame(
         int(milliseconds + rest.ljust(6, "0")[:6]),
