@@ -382,7 +382,8 @@ def quick_rows() -> list[Row]:
     seen: set[str] = set()
     rows = []
     for row in CAMPAIGN.rows:
-        shows = {*row.meets, *row.expect.codes[:1]}
+        codes = row.expect.codes
+        shows = {*row.meets, *codes[:1], *(f"{code} alone" for code in codes if len(codes) == 1)}
         if row.fault.followed_s < 100.0 and not shows <= seen:
             rows.append(row)
             seen |= shows
