@@ -71,6 +71,7 @@ SIGNS: list[tuple[Fault, Reaction, dict[str, object]]] = [
     (Fault.OVERRUN, Reaction.STOP, {"tick_late_ms": 50}),  # in whole ticks: up to 60
     (Fault.OVERRUN, Reaction.RAMP, {"overruns_in_ten": 3}),
     (Fault.VERSION_MISMATCH, Reaction.STOP, {"versions_match": False}),
+    (Fault.VERSION_MISMATCH, Reaction.RAMP, {"panel_matches": False}),
     (Fault.SIGN_FLIP, Reaction.STOP, {"found": Finding.PUMP_SIGN}),
     (Fault.MOTION_SIGN_FLIP, Reaction.STOP, {"found": Finding.WATER_SIGN}),
     (Fault.FOREIGN_SENDER, Reaction.STOP, {"found": Finding.SECOND_SENDER}),
