@@ -1,10 +1,14 @@
-"""``utank-hil identify``: from a recording to a model, and to a configuration made for it."""
+"""``utank-hil identify``: from a recording to a model, and to a configuration made for it.
+
+Its first word is a file, or one of the tests of `identify_test`.
+"""
 
 import math
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from utank_hil.assembly import retuning_task
 from utank_hil.base.provenance import describe
@@ -15,8 +19,18 @@ from utank_hil.commands.identified import (
     write_identified,
 )
 from utank_hil.commands.identify_report import figures, print_report
+from utank_hil.commands.identify_test import decay, inclining_test
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.console.common import OUT, Channel, Json, fail, load, prepare_out, print_json
+from utank_hil.console.common import (
+    OUT,
+    Channel,
+    Json,
+    fail,
+    load,
+    new_app,
+    prepare_out,
+    print_json,
+)
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, notes, say_note
 from utank_hil.identification import IdentificationError
@@ -133,3 +147,20 @@ def _task(config: ControllerConfig, order: int | None) -> RetuningTask:
         return retuning_task(config, order, period_range_s)
     except ValueError as error:
         fail(error)
+
+
+class _LogUnlessNamed(TyperGroup):
+    """Commands of which the one for a log needs no name."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        named = not args or args[0] in self.commands or args[0] in ctx.help_option_names
+        return super().parse_args(ctx, args if named else ["log", *args])
+
+
+application = new_app(
+    "Identify ship and tank from a recording (LOG CONFIG), or from a test of the ship.",
+    cls=_LogUnlessNamed,
+)
+application.command("log")(identify_log)
+application.command("decay")(decay)
+application.command("inclining")(inclining_test)

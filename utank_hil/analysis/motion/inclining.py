@@ -1,0 +1,60 @@
+"""Inclining test: metacentric height from heeling moments and angles.
+
+A straight line through all shifts of weight to both sides, ``tan(heel) = list + moment / (W GM)``.
+Its offset is the list, its scatter gives the interval. GM is that of the ship as it lay, every
+slack surface on board included.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import t as student
+
+from utank_hil.base.arrays import FloatArray
+
+_LEAST_SHIFTS = 5
+_MOST_HEEL_RAD = math.radians(6)
+"""Tests heel 1 to 4 degrees: beyond, GZ is no straight line."""
+
+
+class Inclining(NamedTuple):
+    """Metacentric height in m, its interval of 95 %, and the list in rad."""
+
+    gm_m: float
+    interval_m: tuple[float, float]
+    list_rad: float
+
+
+def inclining(moment_nm: FloatArray, heel_rad: FloatArray, displacement_n: float) -> Inclining:
+    """Evaluate an inclining test.
+
+    Parameters
+    ----------
+    moment_nm, heel_rad : ndarray, shape (n,)
+        Heeling moment of each position of the weights (weight times lever) and heel, both positive
+        to the same side.
+    displacement_n : float
+        Weight of the ship.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than five shifts, all to one side, too great a heel, or no stability.
+    """
+    if len(moment_nm) < _LEAST_SHIFTS or moment_nm.max() * moment_nm.min() >= 0:
+        raise ValueError("an inclining test needs five shifts or more, to both sides")
+    if np.max(np.abs(heel_rad - np.mean(heel_rad))) > _MOST_HEEL_RAD:
+        raise ValueError("an inclining test heels up to 4 degrees: lighter weights")
+    slope = np.tan(heel_rad)
+    spread = moment_nm - moment_nm.mean()
+    size = float(spread @ spread)
+    rise = float(spread @ slope) / size
+    level = float(slope.mean() - rise * moment_nm.mean())
+    rest = slope - level - rise * moment_nm
+    degrees = len(moment_nm) - 2
+    half = float(student.ppf(0.975, degrees)) * math.sqrt(float(rest @ rest) / degrees / size)
+    if rise - half <= 0:
+        raise ValueError("the heel does not follow the moment: check the signs of both")
+    low, high = (1 / (displacement_n * (rise + sign * half)) for sign in (1, -1))
+    return Inclining(1 / (displacement_n * rise), (low, high), math.atan(level))

@@ -1,0 +1,172 @@
+"""``utank-hil identify decay`` and ``inclining``: what tests of the ship say."""
+
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import numpy as np
+import typer
+
+from utank_hil.analysis.motion.decay import RollDecay, roll_decay
+from utank_hil.analysis.motion.inclining import inclining
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.provenance import describe
+from utank_hil.configuration import Vessel
+from utank_hil.console.common import OUT, Json, fail, load, prepare_out, print_json
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.terminal import Terminal, new_table, notes
+from utank_hil.dynamics.tank import GRAVITY_M_S2
+
+PICTURE = "decay.png"
+
+
+def decay(
+    context: typer.Context,
+    record: Annotated[Path, typer.Argument(help="Roll against time: a log or a table.")],
+    ship: Annotated[
+        Path | None, typer.Option(help="Ship whose GM turns the quadratic part into its key.")
+    ] = None,
+    from_s: Annotated[float | None, typer.Option("--from", metavar="SECONDS")] = None,
+    to_s: Annotated[float | None, typer.Option("--to", metavar="SECONDS")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for the picture.")] = OUT,
+    json_: Json = False,
+) -> None:
+    """Find roll period and damping in a free decay, with intervals of 95 %.
+
+    The tank is empty or shut, the water still. Columns: time_s, and roll_rad or roll_deg. --from
+    and --to leave out the pull and the end of the run.
+
+    Exit code 1: the record is no free decay; the reason is printed.
+
+    **Example:** utank-hil identify decay roll.csv --from 25 --to 91 --ship ship.yaml
+    """
+    from utank_hil.pictures.decay import draw_decay
+
+    vessel = None if ship is None else load(ship, Vessel)
+    prepare_out(out, (PICTURE,))
+    time_s, roll_rad = _columns(record, "time_s", "roll_rad")
+    part = np.ones(len(time_s), dtype=bool)
+    part &= True if from_s is None else time_s >= from_s
+    part &= True if to_s is None else time_s <= to_s
+    try:
+        found = roll_decay(time_s[part], roll_rad[part])
+    except ValueError as error:
+        _refuse(f"{record}: {error}; --from and --to choose a part", json_)
+    about: dict[str, Any] = {}
+    if vessel is not None:
+        about = describe("identify decay", vessel, out, options=context.params)
+    path = draw_decay(found, out / PICTURE, record.name, about)
+    keys = ship_keys(found, vessel)
+    if json_:
+        plain = {
+            name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in asdict(found).items()
+            if name not in ("time_s", "roll_rad", "fit_rad")
+        }
+        warnings = list(found.warnings)
+        print_json(about | plain | {"ship": keys, "warnings": warnings, "picture": str(path)})
+        return
+    _print_decay(Terminal(), found, keys, vessel, path)
+
+
+def ship_keys(found: RollDecay, vessel: Vessel | None) -> dict[str, float]:
+    """Return the keys of a ship's file that a decay test gives.
+
+    A negative linear part, which no file can have, is replaced by the equivalent ratio in the
+    middle of the amplitudes, without a quadratic part.
+    """
+    keys = {"roll_period_s": found.period_s, "damping_ratio": found.damping_ratio}
+    if found.damping_ratio < 0:
+        keys["damping_ratio"] = float(found.equivalent_ratio[1])
+    elif vessel is not None:
+        inertia = vessel.ship.stiffness_nm_rad * (found.period_s / (2 * math.pi)) ** 2
+        keys["quadratic_damping_nms2_rad2"] = max(0.0, inertia * found.quadratic_per_rad)
+    return {name: float(f"{value:.4g}") for name, value in keys.items()}
+
+
+def inclining_test(
+    record: Annotated[Path, typer.Argument(help="Table: moment_nm, and heel_rad or heel_deg.")],
+    displacement_t: Annotated[
+        float, typer.Option("--displacement", min=1e-3, help="Of the ship as it lay, t.")
+    ],
+    json_: Json = False,
+) -> None:
+    """Find GM in an inclining test: a row a position of the weights.
+
+    Exit code 1: no GM follows from the table; the reason is printed.
+
+    **Example:** utank-hil identify inclining shifts.csv --displacement 1900
+    """
+    moment_nm, heel_rad = _columns(record, "moment_nm", "heel_rad")
+    try:
+        found = inclining(moment_nm, heel_rad, 1e3 * GRAVITY_M_S2 * displacement_t)
+    except ValueError as error:
+        _refuse(f"{record}: {error}", json_)
+    if json_:
+        print_json(found._asdict())
+        return
+    low, high = found.interval_m
+    terminal = Terminal()
+    terminal.say(f"GM {found.gm_m:.3f} m, 95 % in {low:.3f} to {high:.3f} m, slack tanks included.")
+    terminal.say(f"The ship lists by {math.degrees(found.list_rad):.2f}°.")
+
+
+def _columns(path: Path, *names: str) -> list[FloatArray]:
+    """Return columns of the last run of a file."""
+    from utank_hil.telemetry.signal_files import read_signals, require
+
+    try:
+        run = list(read_signals(path).values())[-1]
+        require(path, run, *names)
+    except (OSError, ValueError) as error:
+        fail(error)
+    return [run[name] for name in names]
+
+
+def _refuse(reason: str, json_: bool) -> NoReturn:
+    notes.say(reason, red="refused:")
+    if json_:
+        print_json({"accepted": False, "reasons": [reason]})
+    raise typer.Exit(ExitCode.REFUSED)
+
+
+def _print_decay(
+    terminal: Terminal,
+    found: RollDecay,
+    keys: dict[str, Any],
+    vessel: Vessel | None,
+    path: Path,
+) -> None:
+    table = new_table("Free decay", "value", "95 %")
+    for name, value, (low, high), digits in (
+        ("natural period, s", found.period_s, found.period_interval_s, 3),
+        ("linear damping ratio", found.damping_ratio, found.ratio_interval, 4),
+        ("quadratic damping per inertia, 1/rad", found.quadratic_per_rad,
+         found.quadratic_interval_per_rad, 3),
+    ):  # fmt: skip
+        table.add_row(name, f"{value:.{digits}f}", f"{low:.{digits}f} to {high:.{digits}f}")
+    for amplitude, ratio, (low, high) in zip(
+        np.degrees(found.amplitude_rad),
+        found.equivalent_ratio,
+        found.equivalent_interval,
+        strict=True,
+    ):
+        name = f"damping ratio at {amplitude:.1f}°"
+        table.add_row(name, f"{ratio:.4f}", f"{low:.4f} to {high:.4f}")
+    if found.halves_ratio is not None:
+        one, two = found.halves_ratio
+        table.add_row("  by either half of the record", f"{one:.4f}, {two:.4f}", "")
+    table.add_row("heel", f"{math.degrees(found.heel_rad):.3f}°", "")
+    table.add_row("left by the fit, per greatest roll", f"{found.residual_share:.2%}", "")
+    terminal.table(table)
+    least, _, most = np.degrees(found.amplitude_rad)
+    terminal.say(f"It holds from {least:.1f} to {most:.1f}°, and nowhere else.")
+    for warning in found.warnings:
+        terminal.say(warning, yellow="warning:")
+    terminal.say("Keys of the ship:")
+    for name, value in keys.items():
+        terminal.say(f"  {name}: {value:g}")
+    if vessel is None and found.damping_ratio >= 0:
+        terminal.say("--ship SHIP.yaml adds quadratic_damping_nms2_rad2, which needs its GM.")
+    terminal.say(f"Picture: {path}")
