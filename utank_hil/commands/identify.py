@@ -73,7 +73,7 @@ def identify_log(
     Exit code 0: model and law passed every check. 1: refused; the reasons are printed and no
     configuration is written, nor left from an earlier time. 2: a file or an option is wrong.
 
-    **Example:** utank-hil identify out/bench.rrd configs/controllers/dpc.yaml --from 200
+    **Example:** utank-hil identify log out/bench.rrd configs/controllers/dpc.yaml --from 200
     """
     from utank_hil.pictures.identification import draw_identification
     from utank_hil.telemetry.signal_files import (

@@ -39,7 +39,7 @@ def decay(
 
     Exit code 1: the record is no free decay; the reason is printed.
 
-    **Example:** utank-hil identify decay roll.csv --from 25 --to 91 --ship ship.yaml
+    **Example:** utank-hil identify decay roll.csv --from 25 --ship configs/ships/naval_vessel.yaml
     """
     from utank_hil.pictures.decay import draw_decay
 
