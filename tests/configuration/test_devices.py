@@ -4,10 +4,12 @@ from pathlib import Path
 
 import pytest
 import yaml
+from others import others_file
 
 from utank_hil.canbus.profiles.foreign import ForeignDevices
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.configuration.device_files import shipped_profiles
+from utank_hil.configuration.devices import DevicesSection
 from utank_hil.configuration.files import ConfigError, load_config
 
 SHIP = Path("configs/ships/thesis_first.yaml").resolve()
@@ -123,10 +125,22 @@ def test_a_slow_sensor_is_refused_by_the_delay_of_the_law_with_the_number(tmp_pa
     assert config.sensor_figures.roll_rate_noise_rad_s == pytest.approx(5e-4)
 
 
+def test_a_ship_that_was_written_out_is_read_again(tmp_path):
+    messages = {"a": "SBG_ECAN_MSG_EKF_EULER", "g": "SBG_ECAN_MSG_IMU_GYRO"}
+    of_a_file = {
+        "dbc": str(others_file("devices/dbc/sbgCan.dbc")), "messages": messages,
+        "signals": {"roll_rad": {"from": "a.ROLL"}, "roll_rate_rad_s": {"from": "g.GYRO_X"}},
+        "cycle_ms": 10, "age_ms": 40, "accept_unprotected": True,
+        "protection": {"unchanged_ms": 100},
+    }  # fmt: skip
+    for motion in (SBG, of_a_file):
+        found = ship(tmp_path, {"motion": motion}).devices
+        for mode in ("json", "python"):
+            assert DevicesSection.model_validate(found.model_dump(mode=mode)) == found
+
+
 def test_coarse_steps_are_noise():
     section = {"signals": {"roll_rate_rad_s": {"scale": 0.01}}}
-    from utank_hil.configuration.devices import DevicesSection
-
     devices = DevicesSection(motion=SBG | section)
     assert devices.noise("motion", "roll_rate_rad_s") == pytest.approx(1e-5 / 12**0.5)
 

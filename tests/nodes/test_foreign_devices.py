@@ -1,12 +1,15 @@
 """Devices of other makers in the inbox, and what an unprotected one costs."""
 
+import time
 from types import SimpleNamespace
 
 import pytest
+from others import others_file
 
 from utank_hil.canbus import Address, Frame, Heartbeat, NodeState, load_catalogue
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.measurements import MotionSample
+from utank_hil.canbus.profiles.device import SILENT_NS
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.inbox import Inbox
 from utank_hil.nodes.redundancy import Redundancy
@@ -149,3 +152,66 @@ def test_redundancy_has_its_second_device():
         found.receive(Frame(0x18F02900 | source, slope(0)), 0)
         found.receive(Frame(0x0CF02A00 | source, RATES), 0)
     assert [each.age_ms for each in found.snapshot(0).motions] == [0, 0]
+
+
+def test_a_silent_canopen_node_is_started_and_its_pdo_is_a_level():
+    """The node is canopen's, with the description of its maker."""
+    import can
+    import canopen
+
+    levels = {
+        "profile": "cia404_levels", "node": 7, "high_level_m": 1.5, "accept_unprotected": True,
+        "signals": {each: {"scale": 0.25, "offset": -3.0} for each in
+                    ("port_level_m", "starboard_level_m")},
+    }  # fmt: skip
+    found = inbox({"levels": levels})
+    (start,) = found.wakes(0)
+    network = canopen.Network(can.Bus("levels", interface="virtual"))
+    with can.Bus("levels", interface="virtual") as ours:
+        network.connect()
+        node = network.create_node(7, str(others_file("devices/eds/systec-IoX4_8AI.eds")))
+        node.nmt.state = "PRE-OPERATIONAL"
+        ours.send(
+            can.Message(
+                arbitration_id=start.can_id & ~STANDARD, is_extended_id=False, data=start.data
+            )
+        )
+        end_s = time.monotonic() + 5
+        while node.nmt.state != "OPERATIONAL" and time.monotonic() < end_s:
+            time.sleep(0.01)
+        assert node.nmt.state == "OPERATIONAL"
+        node.tpdo.read()
+        pdo = node.tpdo[1]
+        for variable in pdo:
+            variable.raw = {0x7130: 12_000 if variable.subindex == 1 else 16_000}.get(
+                variable.index, 0
+            )
+        while ours.recv(0.01) is not None:
+            pass
+        pdo.transmit()
+        heard = ours.recv(5)
+        network.disconnect()
+    found.receive(Frame(STANDARD | heard.arbitration_id, bytes(heard.data)), 2 * SILENT_NS)
+    seen = found.snapshot(2 * SILENT_NS)
+    assert (seen.port_level_m, seen.starboard_level_m) == pytest.approx((0.0, 1.0))
+    assert found.wakes(2 * SILENT_NS) == []
+    assert len(found.wakes(4 * SILENT_NS)) == 1
+
+
+def test_a_name_is_asked_for_until_it_is_told():
+    name = 0xC0FFEE0102030405
+    found = inbox({"motion": SSI2 | {"protection": {"n2k_name": name}}})
+    (request,) = found.wakes(0)
+    assert request == Frame(0x18EA2080, bytes([0x00, 0xEE, 0x00]))
+    found.receive(Frame(0x18F02920, slope(0)), 5 * SILENT_NS)
+    found.receive(Frame(0x0CF02A20, RATES), 5 * SILENT_NS)
+    assert found.wakes(5 * SILENT_NS) == [request]
+    found.receive(Frame(0x18EEFF20, name.to_bytes(8, "little")), 5 * SILENT_NS)
+    assert found.wakes(5 * SILENT_NS) == []
+
+
+def test_nothing_is_sent_where_the_interface_is_receive_only():
+    levels = {"profile": "cia410", "node": 5, "accept_unprotected": True, "bus": "can1"}
+    redundancy = {"redundancy": Redundancy(second_motion_sensor=True)}
+    assert len(inbox({"motion": levels}, **redundancy).wakes(0)) == 1
+    assert inbox({"motion": levels, "receive_only": ["can1"]}, **redundancy).wakes(0) == []

@@ -9,6 +9,8 @@ from utank_hil.configuration.yaml_text import parse_yaml
 
 FOLDER: Final = Path(profiles.__file__).parent
 NATIVE: Final = "native"
+OF_A_DBC: Final = "DBC "
+"""Begins the name of a device whose layouts were read from a DBC."""
 ENCODINGS: Final = ("utf-8", "cp1252")
 """A DBC has no mark of its encoding: UTF-8 fails on anything else, and then it is a Windows one."""
 
@@ -33,16 +35,26 @@ def with_profile(content: dict[str, Any]) -> dict[str, Any]:
     ValueError
         If there is no such profile, or the DBC can't be read, or has no such message.
     """
+    content = _as_written(content)
     name = content.get("profile", "")
     if "dbc" in content:
         return _with_dbc(content)
-    if not isinstance(name, str) or name in ("", NATIVE):
+    if not isinstance(name, str) or name in ("", NATIVE) or name.startswith(OF_A_DBC):
         return content
     if name not in shipped_profiles():
         known = ", ".join((NATIVE, *shipped_profiles()))
         raise ValueError(f"no profile {name!r}: there are {known}; or name a file by dbc")
     merged: dict[str, Any] = _merged(_profile(name), content)
     return merged
+
+
+def _as_written(value: Any) -> Any:
+    """Names of keys as in a file, also where they come from a section that was read before."""
+    if isinstance(value, dict):
+        return {key.rstrip("_"): _as_written(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_as_written(item) for item in value]
+    return value
 
 
 def _merged(below: Any, above: Any) -> Any:
@@ -65,7 +77,7 @@ def _with_dbc(content: dict[str, Any]) -> dict[str, Any]:
         if each not in layouts:
             raise ValueError(f"messages: {content['dbc']} has no message {each}")
     messages = {key: layouts[each] for key, each in named.items()}
-    return {"profile": f"DBC {Path(str(content['dbc'])).name}", **rest, "messages": messages}
+    return {"profile": f"{OF_A_DBC}{Path(str(content['dbc'])).name}", **rest, "messages": messages}
 
 
 @cache

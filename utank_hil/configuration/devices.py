@@ -7,7 +7,8 @@ from typing import Annotated, Any, Final
 from pydantic import Field, model_validator
 
 from utank_hil.base.parameters import Problem, Range, refuse
-from utank_hil.canbus.frame import BUS_SHIFT, MOST_BUSES, STANDARD
+from utank_hil.canbus.enumerations import Address
+from utank_hil.canbus.frame import BUS_SHIFT, MOST_BUSES, STANDARD, Frame
 from utank_hil.canbus.messages import SensorMotion, SensorPump, SensorTank
 from utank_hil.canbus.profiles.device import (
     FIELDS,
@@ -46,6 +47,7 @@ LEAST_AGE_CYCLES: Final = 2.0
 PRIORITIES: Final = range(8)
 _NAME_PGN: Final = 0xEEFF
 """Address claimed, to all."""
+_REQUEST_PGN: Final = 0xEA00
 
 
 Noise = Annotated[float, Range(above=0, most=1.0)]
@@ -212,8 +214,23 @@ class DeviceSection(Section):
         factor = UNITS.get(layout.unit, ("", 1.0))[1] if signal.scale is None else signal.scale
         return abs(float(layout.scale) * factor)
 
-    def plan(self, kind: type[tuple[Any, ...]], name: str, bus: int) -> DevicePlan[Any]:
-        """The device as the inbox hears it, on the interface of this number."""
+    def _wake(self, bus: int) -> Frame | None:
+        """What starts a CANopen node (CiA 301), or has an address claimed anew (J1939-81)."""
+        if self.node is not None:
+            return Frame(bus << BUS_SHIFT | STANDARD, bytes((1, self.node)))
+        if self.protection.n2k_name is not None:
+            assert self.source is not None
+            can_id = 6 << 26 | _REQUEST_PGN << 8 | self.source << 8 | int(Address.CONTROLLER)
+            return Frame(bus << BUS_SHIFT | can_id, (_NAME_PGN & 0xFF00).to_bytes(3, "little"))
+        return None
+
+    def plan(
+        self, kind: type[tuple[Any, ...]], name: str, bus: int, *, silent: bool = False
+    ) -> DevicePlan[Any]:
+        """The device as the inbox hears it, on the interface of this number.
+
+        Nothing is sent to it on a `silent` interface.
+        """
         places = {each: place for place, each in enumerate(self.messages)}
         fields = {
             f"{message}.{signal}": layout.field(section.bytes)
@@ -261,6 +278,7 @@ class DeviceSection(Section):
             math.inf if self.high_level_m is None else self.high_level_m,
             any(each.source == "derived" for each in self.signals.values()),
             claim,
+            None if silent else self._wake(bus),
         )
 
     def _message_plan(self, name: str, fields: dict[str, Any], bus: int) -> MessagePlan:
@@ -347,6 +365,10 @@ class DevicesSection(Section):
         if len(self.buses()) > MOST_BUSES:
             reason = f"are on {len(self.buses())} interfaces, {MOST_BUSES} is the most"
             problems.append(("", reason))
+        for role, device in self.sensors().items():
+            if device.protection.n2k_name is not None and device.bus in self.receive_only:
+                reason = f"has to be asked for, but {device.bus} is receive-only: leave one out"
+                problems.append((f"{role}.protection.n2k_name", reason))
         strange = [name for name in self.receive_only if name not in self.buses()]
         problems += [("receive_only", f"no device is on {name}") for name in strange]
         refuse("devices", problems)
@@ -407,7 +429,12 @@ class DevicesSection(Section):
         plans = {
             role: None
             if device.native
-            else device.plan(_KINDS[role], role, buses.index(device.bus))
+            else device.plan(
+                _KINDS[role],
+                role,
+                buses.index(device.bus),
+                silent=device.bus in self.receive_only,
+            )
             for role, device in self.sensors().items()
         }
         others = self.others

@@ -24,10 +24,11 @@ class ExitCode(IntEnum):
     )
     REFUSED = (
         1,
-        "`check`, `commission`, `identify`, `init`, `faults`, `replay`",
-        "A law misses its margins, a commissioning is not passed, a model or its law is refused, "
-        "no tank can be for a ship, a row of the fault campaign failed, or a replay differs. Of "
-        "any command, with a traceback: an error in the program.",
+        "`bus`, `check`, `commission`, `identify`, `init`, `faults`, `replay`",
+        "Something on a bus is missing, wrong or double, a law misses its margins, a commissioning "
+        "is not passed, a model or its law is refused, no tank can be for a ship, a row of the "
+        "fault campaign failed, or a replay differs. Of any command, with a traceback: an error in "
+        "the program.",
     )
     USAGE = (
         2,
@@ -37,7 +38,7 @@ class ExitCode(IntEnum):
     )
     NO_BUS = (
         3,
-        "`run`, `commission`, `panel`, `bench`, `faults`, `firmware-sim`",
+        "`run`, `commission`, `panel`, `bench`, `bus`, `faults`, `firmware-sim`",
         "The CAN interface can't be opened.",
     )
     BUS_LOST = (

@@ -21,6 +21,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.events import RetuningEvent
 from utank_hil.canbus.measurements import Measurements, MotionSample
+from utank_hil.canbus.profiles.device import SILENT_NS
 from utank_hil.canbus.profiles.foreign import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.dynamics.tank import Tank
@@ -146,6 +147,7 @@ class ControllerNode:
         self._status_schedule = Schedule(self._status.cycle_ns)
         self._estimate_schedule = Schedule(round(SAMPLE_TIME_S / TICK_S) * TICK_NS)
         self._figures_schedule = Schedule(self._sea.cycle_ns)
+        self._wake_schedule = Schedule(SILENT_NS)
         self._started = False
         self.start_ns = self.last_ns = 0
         self._level_cycles = 0
@@ -285,6 +287,8 @@ class ControllerNode:
         now_ns, safety = measured.now_ns, self.safety
         # first, because an address is claimed before anything is said from it
         frames = self._housekeeping.frames(now_ns, faulted=judgement.mode is _FAULT)
+        if self._wake_schedule.due(now_ns):
+            frames += self.inbox.wakes(now_ns)
         if self._command_schedule.due(now_ns):
             frames += self.actuators.frames(judgement, measured)
         if self._status_schedule.due(now_ns):

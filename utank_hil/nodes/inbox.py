@@ -135,6 +135,7 @@ class Inbox:
         self._subscriptions: dict[int, tuple[_Accept, _Handle]] = {}
         self._foreign = foreign
         self._devices: dict[int, Callable[[Frame, int], None]] = {}
+        self._foreigners: list[ProfiledDevice[Any]] = []
         # a second sensor that is silent is missed but not waited for
         senders = [Address.SENSORS, Address.SENSORS_2][: 1 + redundancy.second_motion_sensor]
         sources = [
@@ -299,8 +300,14 @@ class Inbox:
             self._subscribe(source, handle)
             return
         source.deliver = handle
+        self._foreigners.append(source)
         self._devices |= source.takes
         self.watched += source.watched
+
+    def wakes(self, now_ns: int) -> list[Frame]:
+        """What is to be sent to devices of other makers that are silent."""
+        frames = (device.wake(now_ns) for device in self._foreigners)
+        return [frame for frame in frames if frame is not None]
 
     @property
     def tank_cycle_ns(self) -> int:

@@ -23,6 +23,8 @@ FIELDS: Final[dict[type[tuple[Any, ...]], tuple[str, ...]]] = {
 SWITCHES: Final = ("port_high", "starboard_high")
 STATUS_CYCLES: Final = 3
 """A status that is older by so many of its cycles says nothing any longer."""
+SILENT_NS: Final = 1_000_000_000
+"""A device that brings nothing for so long is woken: the time in which a node is back by itself."""
 _LONG_AGO: Final = -(1 << 62)
 _new: Final = tuple.__new__
 
@@ -106,6 +108,9 @@ class DevicePlan(Generic[T]):
         Whether the rate is the difference of two rolls.
     name_id : tuple of (int, int) or None
         Identifier (priority 6) of the address claim of the device, and the NAME it must carry.
+    wake : Frame or None
+        Sent each second to a device that is silent, or has not said its name: start of a CANopen
+        node, request of an address claim.
     """
 
     name: str
@@ -120,6 +125,7 @@ class DevicePlan(Generic[T]):
     high_level_m: float = math.inf
     derived: bool = False
     name_id: tuple[int, int] | None = None
+    wake: Frame | None = None
 
 
 class ProfiledDevice(Generic[T]):
@@ -162,7 +168,7 @@ class ProfiledDevice(Generic[T]):
         self._values: list[float] = [math.nan] * len(FIELDS[plan.kind])
         self._tank = plan.kind is SensorTank
         self._before: list[float] = []
-        self._changed_ns = _LONG_AGO
+        self._changed_ns = self._delivered_ns = _LONG_AGO
         self._last_roll_rad, self._last_ns = math.nan, 0
         self.named = plan.name_id is None
         self.takes: dict[int, Callable[[Frame, int], None]] = {}
@@ -176,6 +182,11 @@ class ProfiledDevice(Generic[T]):
     def valid(self) -> bool:
         """Whether the messages with a value arrive intact and in order."""
         return all(self.watched[place].valid for place in self._needed)
+
+    def wake(self, now_ns: int) -> Frame | None:
+        """What is to be sent to a device that says nothing, or not who it is."""
+        silent = now_ns - self._delivered_ns > SILENT_NS
+        return self._plan.wake if silent or not self.named else None
 
     @property
     def lost(self) -> int:
@@ -217,6 +228,7 @@ class ProfiledDevice(Generic[T]):
                 return
         for place in self._needed:
             self._came_ns[place] = _LONG_AGO
+        self._delivered_ns = now_ns
         values = self._values
         if self._plan.derived:
             rate_rad_s = (values[0] - self._last_roll_rad) / max(now_ns - self._last_ns, 1) * 1e9

@@ -1,0 +1,52 @@
+"""``utank-hil bus`` with a log: its table, its JSON, its exit codes."""
+
+import json
+
+import pytest
+from others import others_file
+from typer.testing import CliRunner
+
+from utank_hil.commands.bus import bus
+from utank_hil.console.common import new_app
+
+SHIP = "configs/ships/thesis_first.yaml"
+
+
+def invoke(*arguments):
+    app = new_app()
+    app.command()(bus)
+    return CliRunner().invoke(app, [str(each) for each in arguments])
+
+
+def log():
+    return others_file("devices/frames/cia402-sample.candump.log")
+
+
+def test_the_table_fits_in_80_columns(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    done = invoke(log())
+    assert done.exit_code == 0
+    table = [line for line in done.stdout.splitlines() if "│" in line]
+    assert len(table) == 26
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    assert "node 5: operational" in done.stdout
+
+
+def test_json_is_one_object():
+    told = json.loads(invoke(log(), "--json").stdout)
+    assert len(told["messages"]) == 26
+    assert told["canopen"]["1"] == "operational"
+    assert 0 < told["load"] < 1
+
+
+def test_a_ship_that_is_not_there_is_missed():
+    done = invoke(log(), "--ship", SHIP, "--json")
+    assert done.exit_code == 1
+    told = json.loads(done.stdout)
+    assert {each["kind"] for each in told["problems"]} == {"missing"}
+    assert any("SENSOR_MOTION" in each["text"] for each in told["problems"])
+
+
+@pytest.mark.parametrize(("place", "code"), [("nowhere.log", 2), ("nocan9", 3)])
+def test_what_can_not_be_listened_to(place, code):
+    assert invoke(place).exit_code == code

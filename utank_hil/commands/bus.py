@@ -1,0 +1,154 @@
+"""``utank-hil bus``: who is on the bus, and what of the ship's file is missing, wrong or double."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from utank_hil.base.text_files import TextFileError
+from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.configuration.files import ConfigError, kind_of
+from utank_hil.configuration.vessel import Vessel
+from utank_hil.console.common import Json, fail, load, print_json
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.terminal import Terminal, new_table
+from utank_hil.telemetry.bus_census import BusCensus
+from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError, FrameKind
+from utank_hil.telemetry.bus_files.log import READ, BusLog
+
+DEFAULT_BIT_RATE = 250_000
+
+
+def bus(
+    place: Annotated[str, typer.Argument(help=f"CAN interface, or a log of it: {READ}.")],
+    ship: Annotated[
+        Path | None, typer.Option(help="Controller or ship whose file is compared.")
+    ] = None,
+    interface: Annotated[
+        str,
+        typer.Option(help="With a log: the interface that it is of, as the ship's file has it."),
+    ] = "",
+    channel: Annotated[
+        str | None, typer.Option(help="With a log of several buses: the one to list.")
+    ] = None,
+    seconds: Annotated[
+        float, typer.Option(min=0.5, max=3600, help="How long to listen to an interface.")
+    ] = 5.0,
+    bit_rate: Annotated[
+        int | None, typer.Option(min=10_000, max=1_000_000, help="Of the bus, for its load.")
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """List the nodes and messages on a bus; nothing is sent.
+
+    With --ship, what its file expects is compared: exit code 1 if something is missing, wrong or
+    double.
+
+    **Example:** utank-hil bus can0 --ship configs/controllers/gpc.yaml
+    """
+    vessel, said = _ship(ship)
+    rate = bit_rate or said or DEFAULT_BIT_RATE
+    log = Path(place).exists() or bool(Path(place).suffix)
+    census = BusCensus(rate, vessel, interface if log else place)
+    try:
+        for message in BusLog(Path(place), channel).frames() if log else _heard(place, seconds):
+            census.take(message)
+    except (BusLogError, TextFileError) as error:
+        fail(error)
+    except OSError as error:
+        fail(error, ExitCode.USAGE if log else ExitCode.NO_BUS)
+    problems = census.problems()
+    if json_:
+        print_json(_as_json(census, problems))
+    else:
+        _print(census, problems, compared=vessel is not None)
+    if problems:
+        raise typer.Exit(ExitCode.REFUSED)
+
+
+def _ship(path: Path | None) -> tuple[Vessel | None, int | None]:
+    """The ship of a file, and the bit rate where the file says it."""
+    if path is None:
+        return None, None
+    try:
+        kind = kind_of(path, {"controller": ControllerConfig, "ship": Vessel})
+    except ConfigError as error:
+        fail(error)
+    if kind == "ship":
+        return load(path, Vessel), None
+    config = load(path, ControllerConfig)
+    return config.vessel, config.bit_rate
+
+
+def _heard(interface: str, seconds: float) -> Iterator[BusFrame]:
+    """Yield what comes on an interface within a time."""
+    import socket
+
+    from can.interfaces.socketcan import SocketcanBus
+
+    socket.if_nametoindex(interface)  # python-can leaks its socket where there is none
+    listening = SocketcanBus(interface, receive_own_messages=False)
+    try:
+        end_s = time.monotonic() + seconds
+        while (left_s := end_s - time.monotonic()) > 0:
+            message = listening.recv(left_s)
+            if message is None:
+                continue
+            kind = FrameKind.FD if message.is_fd else FrameKind.DATA
+            kind = FrameKind.REMOTE if message.is_remote_frame else kind
+            kind = FrameKind.ERROR if message.is_error_frame else kind
+            yield BusFrame(
+                round(message.timestamp * 1e9), interface, message.arbitration_id,
+                message.is_extended_id, kind, bytes(message.data), message.dlc,
+            )  # fmt: skip
+    finally:
+        listening.shutdown()
+
+
+def _as_json(census: BusCensus, problems: list[tuple[str, str]]) -> dict[str, Any]:
+    return {
+        "duration_s": census.duration_s,
+        "load": census.load,
+        "messages": census.rows(),
+        "versions": {
+            node: {"catalogue": catalogue, "configuration": configuration}
+            for node, (catalogue, configuration) in census.versions.items()
+        },
+        "names": {
+            f"{source:#04x}": [f"{name:#018x}" for name in sorted(names)]
+            for source, names in census.identities.items()
+        },
+        "canopen": {str(node): state for node, state in census.states.items()},
+        "errors": dict(census.errors),
+        "problems": [{"kind": kind, "text": text} for kind, text in problems],
+    }
+
+
+def _print(census: BusCensus, problems: list[tuple[str, str]], *, compared: bool) -> None:
+    console = Terminal()
+    table = new_table(None, "frames/s", "gap ms", "bytes", names=("identifier", "message", "node"))
+    for row in census.rows():
+        table.add_row(
+            row["id"],
+            row["message"],
+            row["node"],
+            f"{row['rate_hz']:.4g}",
+            f"{row['longest_gap_ms']:.4g}",
+            ",".join(map(str, row["bytes"])),
+        )
+    console.table(table)
+    console.say(f"{census.duration_s:.3g} s, {census.load:.1%} of the bus in use")
+    for node, (catalogue, configuration) in census.versions.items():
+        console.say(f"{node}: catalogue {catalogue}, ship {configuration}")
+    for source, names in census.identities.items():
+        console.say(f"source {source:#04x}: NAME " + ", ".join(f"{each:#018x}" for each in names))
+    for number, state in census.states.items():
+        console.say(f"node {number}: {state}")
+    for error, count in census.errors.items():
+        console.say(f"{count}", yellow=f"{error}:")
+    for kind, text in problems:
+        console.say(text, red=f"{kind}:")
+    if compared and not problems:
+        console.say(green="All that the ship's file expects is there, and once.")
