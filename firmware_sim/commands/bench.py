@@ -10,6 +10,7 @@ from rich.progress import TaskProgressColumn
 
 from utank_hil.base.provenance import describe
 from utank_hil.commands.monitor import watch
+from utank_hil.configuration.files import files_named
 from utank_hil.configuration.shipped import CONFIGS
 from utank_hil.console.admission import admit
 from utank_hil.console.common import (
@@ -26,7 +27,7 @@ from utank_hil.console.common import (
 )
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.progress import progress_bar
-from utank_hil.console.terminal import Terminal, shown
+from utank_hil.console.terminal import Terminal
 from utank_hil.console.timing import timing_table
 from utank_hil.control import BuiltLaw
 from utank_hil.telemetry.ring import RingError
@@ -106,7 +107,7 @@ def bench(
     if json_:
         print_json(found.as_json(files, about))
     else:
-        _print(result, found, files, out)
+        _print(result, found, files, out, scenario)
     if failures:
         fail("; ".join(failures))
     if view:
@@ -151,7 +152,11 @@ def _run(
 
 
 def _print(
-    result: "BenchResult", found: "BenchFigures", files: Mapping[str, Path], out: Path
+    result: "BenchResult",
+    found: "BenchFigures",
+    files: Mapping[str, Path],
+    out: Path,
+    scenario: Path,
 ) -> None:
     from firmware_sim.report_tables import tables
 
@@ -173,8 +178,17 @@ def _print(
             "no deadlines there."
         )
     console.files(files)
-    sound = [] if found.endings else ["run CONTROLLER.yaml --bus can0"]
-    console.lead_on(f"monitor {shown(out)}", *sound)
+    console.lead_on(("monitor", out), *_run_next(found, scenario))
+
+
+def _run_next(found: "BenchFigures", scenario: Path) -> list[tuple[str | Path, ...]]:
+    """Return the command that runs the best law of a sound bench, if a file of its own holds it."""
+    if found.endings:
+        return []
+    files = files_named(scenario)
+    ranked = sorted((run.rank, run.name) for run in found.runs if run.rank is not None)
+    named = [files[key] for _, name in ranked if (key := ("controllers", name)) in files]
+    return [("run", file, "--bus", "can0") for file in named[:1]]
 
 
 def _about(

@@ -77,7 +77,8 @@ def campaign(
         _print(loaded, groups, failed)
         console = Terminal()
         console.say(f"results: {shown(folder)}")
-        console.lead_on(f"campaign {shown(study)} --resume", f"report {shown(folder)}")
+        again = ("campaign", study, "--resume", *(() if out is None else ("--out", out)))
+        console.lead_on(again, ("report", folder))
     if interrupted:
         notes.say("interrupted: the same command with --resume goes on from here")
         raise typer.Exit(ExitCode.INTERRUPTED)

@@ -162,7 +162,7 @@ def init(
     for path in files.values():
         console.say(f"written: {shown(path)}")
     steps = (("check", "controller.yaml"), ("bench", "scenario.yaml"))
-    console.lead_on(*(f"{command} {shown(files[file])}" for command, file in steps))
+    console.lead_on(*((command, files[file]) for command, file in steps))
 
 
 def _little_help(project: "StarterProject") -> str | None:

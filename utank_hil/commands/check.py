@@ -13,7 +13,7 @@ from utank_hil.configuration.vessel import Vessel
 from utank_hil.console.admission import judge_law
 from utank_hil.console.common import AllowCode, Json, fail, load, print_json, warnings_of
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import Terminal, shown
+from utank_hil.console.terminal import Terminal
 
 GROUP = "utank_hil.collections"
 """Entry points of further kinds of file: models with a name, a vessel, a mapping `controllers`, and
@@ -67,5 +67,8 @@ def check(
     if not content.get("accepted", True):
         raise typer.Exit(ExitCode.REFUSED)
     if not json_:
-        following = {"ship": "design tank {}", "controller": "run {} --bus can0"}
-        Terminal().lead_on(following.get(kind, "bench {}").format(shown(config)))
+        following: dict[str, tuple[str | Path, ...]] = {
+            "ship": ("design", "tank", config),
+            "controller": ("run", config, "--bus", "can0"),
+        }
+        Terminal().lead_on(following.get(kind, ("bench", config)))

@@ -180,4 +180,4 @@ def _print(record: dict[str, Any], path: Path, config: Path) -> None:
         console.say(where, red="not passed: arming is refused;")
     else:
         console.say(where, green="passed;")
-        console.lead_on(f"run {shown(config)} --bus {record['bus']} --out log")
+        console.lead_on(("run", config, "--bus", record["bus"], "--out", "log"))

@@ -355,7 +355,7 @@ def _print_summary(
     if recording is not None:
         _tell(console, recording)
         if recording.file is not None and recording.error is None:
-            console.lead_on(f"report {shown(Path(recording.file))}")
+            console.lead_on(("report", Path(recording.file)))
 
 
 def _show(stack: ExitStack) -> None:

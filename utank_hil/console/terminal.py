@@ -1,7 +1,8 @@
 """What the commands print for people: text as it is, and tables at any width."""
 
 import os
-from collections.abc import Iterable, Mapping
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 from typing import Any, Final
@@ -65,11 +66,12 @@ class Terminal(Console):
         for name, path in files.items():
             self.say(f"{name:>10}: {shown(path)}")
 
-    def lead_on(self, *commands: str) -> None:
-        """Print which commands come next, the last thing that a command says."""
+    def lead_on(self, *commands: Sequence[str | Path]) -> None:
+        """Print which commands come next, by their words, as they can be pasted into a shell."""
         self.say("Next:")
         for command in commands:
-            self.say(f"  utank-hil {command}")
+            words = [shown(word) if isinstance(word, Path) else word for word in command]
+            self.say(f"  utank-hil {shlex.join(words)}")
 
     def table(self, table: Table) -> None:
         """Print a table, or the same as a list where the terminal is too narrow for it.
