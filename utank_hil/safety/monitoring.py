@@ -345,9 +345,11 @@ class Monitors:
             motion.roll_rad, level_m, pressure_pa, steps, own.held_pa
         )
         if self._water_free and self.equation.settled:
-            push, slope_push = self.equation.push, self.equation.slope_push
+            slope_push = self.equation.slope_push
             for _ in range(steps):
-                self._level_found = self._level_stuck.update(level_m, push, slope_push)
+                self._level_found = self._level_stuck.update(
+                    motion.roll_rad, level_m, pressure_pa, slope_push
+                )
         if self._water_found or self.watches[self.used].found & _DRIFT_LASTS:
             self._wrong_ns = now_ns
             self.confirmed = False

@@ -40,7 +40,7 @@ def found_in(ship, phasors, w: float, sign: float = 1.0, until_s: float = 120.0)
         at = [(each * cmath.exp(1j * w * k * STEP_S)).real for each in phasors]
         roll, level, pressure = np.array(at) + noise.standard_normal(3) * [2e-4, 0.0035, 100.0]
         found = equation.update(sign * roll, level, pressure)
-        found |= stuck.update(level, equation.push, equation.slope_push)
+        found |= stuck.update(sign * roll, level, pressure, equation.slope_push)
         for finding in Finding:
             if found & finding:
                 first.setdefault(finding, k * STEP_S)

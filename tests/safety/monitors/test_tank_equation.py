@@ -23,7 +23,7 @@ def found_after(ship: MovingShip, fault, until_s: float = 60.0) -> dict[Finding,
         if t >= FAULT_S:
             sample = fault(t, *sample)
         found = equation.update(*sample)
-        found |= stuck.update(sample[1], equation.push, equation.slope_push)
+        found |= stuck.update(*sample, equation.slope_push)
         for finding in Finding:
             if found & finding:
                 first.setdefault(finding, t - FAULT_S)
@@ -45,10 +45,9 @@ def test_water_at_rest_under_a_steady_heel_and_pressure_is_not_stuck() -> None:
     stuck = LevelStuck(SHIP, TANK, THRESHOLDS, STEP_S)
     heel_rad, pressure_pa = 0.1, 20e3
     level_m = (heel_rad * 9.80665 * TANK.width_m + pressure_pa / 1000) / (2 * 9.80665)
-    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
-    for k in range(1200):
-        equation.update(heel_rad, level_m, pressure_pa)
-        assert not stuck.update(level_m, equation.push, equation.slope_push), k
+    found = [stuck.update(heel_rad * min(k / 600, 1), 0.01 * k, 0.0, 0.0) for k in range(600)]
+    found += [stuck.update(heel_rad, level_m, pressure_pa, 0.0) for _ in range(600)]
+    assert not any(found)
 
 
 ZEROS = (math.radians(0.3), 0.044, 870.0)
@@ -70,7 +69,7 @@ def test_zeros_of_the_sensors_are_no_wrong_sign_no_delay_and_nothing_stuck(
         sample = [each(k * STEP_S) for each in (ship.roll_rad, ship.level_m, ship.pressure_pa)]
         sample[sensor] += way * ZEROS[sensor]
         assert not equation.update(*sample)
-        assert not stuck.update(sample[1], equation.push, equation.slope_push)
+        assert not stuck.update(*sample, equation.slope_push)
 
 
 def test_zeros_explain_a_standing_roll_only_as_far_as_they_go() -> None:

@@ -9,10 +9,12 @@ stuck, if they are as many with every sway that the ship may have.
 import math
 from typing import Final
 
+from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.sway import most_sway
+from utank_hil.safety.monitors.tank_equation import roll_push_at_natural_frequency
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
 BANDS: Final = 16.0
@@ -34,6 +36,12 @@ class LevelStuck:
     def __init__(
         self, ship: RollShip, tank: Tank, thresholds: MonitorThresholds, period_s: float
     ) -> None:
+        water_kg_m = tank.density_kg_m3 * tank.reservoir_area_m2
+        self._push = roll_push_at_natural_frequency(ship, tank)
+        self._steady_push = float(-coupled_matrices(ship, tank)[2][1, 0] / water_kg_m)
+        self._mean_share = period_s * tank.natural_frequency_rad_s / (2 * math.pi)
+        self._mean_rad = 0.0
+        self._density = tank.density_kg_m3
         self._most_sway = most_sway(ship)
         self._band_m = thresholds.level_still_m
         self._period_s = period_s
@@ -51,13 +59,23 @@ class LevelStuck:
         self._moved_m = self._rate_m_s = 0.0
         self._swayed_m = self._sway_rate_m_s = 0.0
 
-    def update(self, level_m: float, push_m2_s2: float, slope_push_m2_s2: float) -> int:
-        """Take the level and the pushes of `TankEquation`; return what was found."""
+    def update(
+        self, roll_rad: float, level_m: float, pressure_pa: float, slope_push_m2_s2: float
+    ) -> int:
+        """Take what is measured, and what a sway may push (`SlopePush`); return what was found.
+
+        Roll and pressure count as they are measured: the filters of the tank's equation delay them
+        by more than the time in which moving water crosses the band.
+        """
+        # A steady heel pushes otherwise than a roll does.
+        self._mean_rad += self._mean_share * (roll_rad - self._mean_rad)
         if abs(level_m - self._level_m) > self._band_m:
             self._begin(level_m)
             return 0
         moved_m, rate_m_s = self._moved_m, self._rate_m_s
-        pushed = push_m2_s2 - self._loss * rate_m_s - 2 * GRAVITY_M_S2 * (self._level_m + moved_m)
+        pushed = self._push * (roll_rad - self._mean_rad) + self._steady_push * self._mean_rad
+        pushed += pressure_pa / self._density - self._loss * rate_m_s
+        pushed -= 2 * GRAVITY_M_S2 * (self._level_m + moved_m)
         self._rate_m_s = rate_m_s = rate_m_s + pushed / self._inertia * self._period_s
         self._moved_m = moved_m = moved_m + rate_m_s * self._period_s
         # what a sway of g times the slope takes from that

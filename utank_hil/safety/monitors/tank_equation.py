@@ -161,7 +161,7 @@ class TankEquation:
         self._both = self._level_both = 0.0
         self._uu = self._late_uu = 0.0
         self._slope.restart()
-        self.push = self.slope_push = 0.0
+        self.slope_push = 0.0
         self._x = self._p = self._left = self._weight = 0.0
         self._forget_lead()
         self._still = 0
@@ -219,7 +219,7 @@ class TankEquation:
         self._pump.update(pump_m2_s2)
         p = self._pump.value
         x = self._push * roll.value + self._push_inertia * roll_rad_s2
-        self.push = push = p + x
+        push = p + x
         self.slope_push = u = self._slope.update(roll, roll_rad_s2, level.value, level_m_s2)
         if self._wait > 0:
             self._wait -= 1
