@@ -5,7 +5,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field
 
-from utank_hil.base.parameters import Range
+from utank_hil.base.parameters import Finite, Range
 from utank_hil.canbus.frame import LONGEST_ID, LONGEST_STANDARD_ID
 from utank_hil.canbus.profiles.field import Field as BusField
 from utank_hil.configuration.files import Section
@@ -21,7 +21,7 @@ def _whole(value: Any) -> Any:
 
 
 _WHOLE: Final = BeforeValidator(_whole)
-Whole = Annotated[int, _WHOLE]
+Whole = Annotated[int, Range(least=-(1 << 63), most=(1 << 64) - 1), _WHOLE]
 Id29 = Annotated[int, Range(least=0, most=LONGEST_ID), _WHOLE]
 Id11 = Annotated[int, Range(least=0, most=LONGEST_STANDARD_ID), _WHOLE]
 Pgn = Annotated[int, Range(least=0, most=0x3FFFF), _WHOLE]
@@ -58,9 +58,9 @@ class FieldSection(_Part):
     """Two's complement."""
     real: bool = False
     """IEEE 754."""
-    scale: float = 1.0
+    scale: Finite = 1.0
     """Physical value of one count."""
-    offset: float = 0.0
+    offset: Finite = 0.0
     """Physical value of no counts."""
     unit: str = ""
     """Unit of the physical value."""
@@ -106,9 +106,9 @@ class SignalSection(_Part):
     """In place of the factor of its unit."""
     offset: Annotated[float, Range(least=-1e9, most=1e9)] = 0.0
     """In the unit of the value, before the sign is applied."""
-    least: float = -1e300
+    least: Finite = -1e300
     """Least physical value, in the maker's unit, that is one."""
-    most: float = 1e300
+    most: Finite = 1e300
     """Range in the maker's unit, outside of which there is no value, as a broken 4-20 mA wire."""
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.parameters import Positive, Range, range_problems, refuse
+from utank_hil.base.parameters import Finite, Positive, Range, range_problems, refuse
 from utank_hil.dynamics.hull.hull_data import HullData
 
 GRAVITY_M_S2 = 9.81
@@ -35,7 +35,7 @@ class Given:
 
     density_kg_m3: Annotated[float, Range(least=900, most=1100)] | None = None
     mass_kg: Positive | None = None
-    gravity_centre_m: tuple[float, float, float] | None = None
+    gravity_centre_m: tuple[Finite, Finite, Finite] | None = None
     gyration_m: tuple[Positive, Positive, Positive] | None = None
 
     def __post_init__(self) -> None:
