@@ -103,7 +103,7 @@ class HullFile(Section):
     """Density of the water."""
     mass_kg: Positive | None = None
     """Mass of the ship without the tank's water."""
-    gravity_centre_m: tuple[float, float, float] | None = None
+    gravity_centre_m: tuple[Finite, Finite, Finite] | None = None
     """Centre of gravity forward, to port and up of the origin in the waterline."""
     gyration_m: tuple[Positive, Positive, Positive] | None = None
     """Radii of gyration about the centre of gravity in roll, pitch and yaw."""
