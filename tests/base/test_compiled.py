@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
 import pytest
@@ -32,40 +31,78 @@ print(json.dumps([in_use(), Path(lockstep.__file__).suffix, digests]))
 """
 
 
-def test_the_folder_follows_every_source_file(
+def test_the_digest_follows_every_source_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source = tmp_path / "utank_hil" / "module.py"
     source.parent.mkdir()
     source.write_text("ANSWER = 1\n")
     monkeypatch.setattr(compiled, "ROOT", tmp_path)
-    before = compiled.folder()
-    assert compiled.folder() == before
+    before = compiled.source_digest()
+    assert compiled.source_digest() == before
     source.write_text("ANSWER = 2\n")
-    assert compiled.folder() != before
+    assert compiled.source_digest() != before
     source.write_text("ANSWER = 1\n")
-    assert compiled.folder() == before
+    assert compiled.source_digest() == before
     (source.parent / "another.py").write_text("")
-    assert compiled.folder() != before
+    assert compiled.source_digest() != before
 
 
-@pytest.mark.parametrize(("wanted", "current"), [("", True), ("0", True), ("", False)])
-def test_modules_are_found_only_if_current_and_not_switched_off(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wanted: str, current: bool
+def test_a_library_is_used_only_if_whole_and_of_the_present_source(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made = compiled.folder() if current else Path("0123456789abcdef")
-    module = tmp_path / made.name / "utank_hil" / "base" / f"tick{EXTENSION_SUFFIXES[0]}"
-    module.parent.mkdir(parents=True)
-    module.touch()
-    monkeypatch.setattr(compiled, "_MADE", tmp_path)
+    monkeypatch.setattr(compiled, "FOLDER", tmp_path / "none")
+    assert compiled.current_library() is None
+    monkeypatch.setattr(compiled, "FOLDER", tmp_path)
+    (tmp_path / compiled.library_name("0123456789abcdef", b"of another source")).write_bytes(
+        b"of another source"
+    )
+    assert compiled.current_library() is None
+    library = tmp_path / compiled.library_name(compiled.source_digest(), b"whole")
+    library.write_bytes(b"whole")
+    assert compiled.current_library() == library
+    library.write_bytes(b"whol")
+    assert compiled.current_library() is None
+
+
+@pytest.mark.parametrize("wanted", ["", "0"])
+def test_a_library_that_does_not_load_leaves_plain_python_with_a_line(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    wanted: str,
+) -> None:
+    name = compiled.library_name(compiled.source_digest(), b"no library")
+    (tmp_path / name).write_bytes(b"no library")
+    monkeypatch.setattr(compiled, "FOLDER", tmp_path)
     monkeypatch.setattr(sys, "meta_path", list(sys.meta_path))
     monkeypatch.setenv("UTANK_HIL_COMPILED", wanted)
     compiled.use_if_current()
-    assert compiled.in_use() == (current and wanted != "0")
-    if compiled.in_use():
-        spec = sys.meta_path[0].find_spec("utank_hil.base.tick", None)
-        assert spec.origin == str(module)
-        assert sys.meta_path[0].find_spec("utank_hil.base.arrays", None) is None
+    assert not compiled.in_use()
+    said = capsys.readouterr().err
+    assert ("plain Python runs" in said and name in said) == (wanted != "0")
+
+
+@pytest.mark.parametrize("compiler", ["no-such-compiler", "false"])
+def test_without_a_compiler_that_works_one_line_is_said(compiler: str) -> None:
+    code = (
+        "from pathlib import Path; import tools.compiled as made;"
+        f"made.current_library = lambda: None; made.CC = {compiler!r};"
+        "made.build = lambda: made._run([]) if made.CC == 'false' else 1 / 0; made.main()"
+    )
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            code,
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert len(done.stdout.splitlines()) == 1
+    assert "plain Python runs" in done.stdout
+    assert not done.stderr
 
 
 @pytest.mark.evidence

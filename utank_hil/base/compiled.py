@@ -1,19 +1,19 @@
-"""Compiled copies of the modules of a tick, where `make compiled` has made them.
+"""Compiled copies of the modules of a tick, where `tools.compiled` has made them.
 
-mypyc makes extension modules of the same source. They are loaded only while every source file of
-both packages is what they were made of, so that what runs is always what the files say. A run in
-lockstep then takes 0.4 of the time and gives the same result, bit for bit. The variable
-UTANK_HIL_COMPILED=0 in the environment leaves them out.
+mypyc makes one extension library of the same source. It is loaded only while every source file of
+both packages is what it was made of and it is whole, so that what runs is always what the files
+say. A run in lockstep then takes 0.4 of the time and gives the same result, bit for bit. The
+variable UTANK_HIL_COMPILED=0 in the environment leaves it out.
 """
 
 import hashlib
 import importlib
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from importlib.abc import MetaPathFinder
-from importlib.machinery import EXTENSION_SUFFIXES, ModuleSpec
-from importlib.util import spec_from_file_location
+from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader, ModuleSpec
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
@@ -22,22 +22,56 @@ ROOT: Final = Path(__file__).resolve().parents[2]
 PACKAGES: Final = ("utank_hil", "firmware_sim")
 CODECS: Final = "utank_hil_codecs"
 """Compiled module of what `utank_hil.canbus.codec` writes for the messages of the catalogue."""
-_MADE: Final = ROOT / ".cache" / "compiled"
+GROUP: Final = "utank_hil_tick"
+SUFFIX: Final = EXTENSION_SUFFIXES[0]
+"""Names the version of Python and the processor, so that no other takes the library."""
+FOLDER: Final = ROOT / "utank_hil" / "compiled"
+_INIT: Final = "init_"
 
 
-def folder() -> Path:
-    """Where modules belong that the present compiler makes of the present source."""
-    whole = hashlib.sha256(sys.version.encode())
-    sources = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
-    for path in [*sources, *ROOT.glob("tools/compiled.py")]:
-        content = path.read_bytes()
-        whole.update(f"{path.relative_to(ROOT)} {len(content)}\n".encode() + content)
-    return _MADE / whole.hexdigest()[:16]
+def source_digest() -> str:
+    """Digest of every source file of both packages."""
+    whole = hashlib.sha256()
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            content = path.read_bytes()
+            whole.update(f"{path.relative_to(ROOT)} {len(content)}\n".encode() + content)
+    return whole.hexdigest()[:16]
+
+
+def library_name(source: str, content: bytes) -> str:
+    """File name of a library: of what source it is, its content, Python and processor."""
+    return f"{source}-{hashlib.sha256(content).hexdigest()[:16]}{SUFFIX}"
+
+
+def current_library() -> Path | None:
+    """The whole library of the present source, if there is one."""
+    if not FOLDER.is_dir():
+        return None
+    source = source_digest()
+    found = FOLDER.glob(f"{source}-*{SUFFIX}")
+    return next((file for file in found if file.name == library_name(source, _content(file))), None)
+
+
+def _content(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError:  # it is of someone who does not share it, or was just replaced
+        return b""
+
+
+class _Loader(ExtensionFileLoader):
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        # in one library each initialising function needs a name of its own
+        return super().create_module(
+            ModuleSpec(spec.name.replace(".", "___"), self, origin=self.path)
+        )
 
 
 class _Finder(MetaPathFinder):
-    def __init__(self, files: Mapping[str, Path]) -> None:
-        self.files = files
+    def __init__(self, library: Path, modules: Iterable[str]) -> None:
+        self.library = str(library)
+        self.modules = frozenset(modules)
 
     def find_spec(
         self,
@@ -45,17 +79,19 @@ class _Finder(MetaPathFinder):
         path: Sequence[str] | None,  # noqa: ARG002
         target: ModuleType | None = None,  # noqa: ARG002
     ) -> ModuleSpec | None:
-        file = self.files.get(fullname)
-        return spec_from_file_location(fullname, file) if file else None
+        if fullname not in self.modules:
+            return None
+        loader = _Loader(fullname, self.library)
+        return spec_from_file_location(fullname, self.library, loader=loader)
 
 
-def modules_in(made: Path) -> dict[str, Path]:
-    """Extension modules below a folder, by their dotted names."""
-    return {
-        ".".join(path.relative_to(made).parts).removesuffix(suffix): path
-        for suffix in EXTENSION_SUFFIXES[:1]
-        for path in made.rglob(f"*{suffix}")
-    }
+def _modules_in(library: Path) -> list[str]:
+    """Names of the modules in a library, which is loaded."""
+    spec = spec_from_file_location(f"{GROUP}__mypyc", library)
+    assert spec is not None
+    sys.modules[spec.name] = group = module_from_spec(spec)
+    names = (name.removeprefix(_INIT) for name in vars(group) if name.startswith(_INIT))
+    return [name.replace("___", ".") for name in names]
 
 
 def in_use() -> bool:
@@ -65,10 +101,13 @@ def in_use() -> bool:
 
 def use_if_current() -> None:
     """Have the compiled modules imported from now on, if there are any of this source."""
-    if os.environ.get("UTANK_HIL_COMPILED") == "0" or in_use() or not _MADE.is_dir():
+    if os.environ.get("UTANK_HIL_COMPILED") == "0" or in_use():
         return
-    if files := modules_in(folder()):
-        sys.meta_path.insert(0, _Finder(files))
+    if library := current_library():
+        try:
+            sys.meta_path.insert(0, _Finder(library, _modules_in(library)))
+        except ImportError as error:  # of a newer C library than this machine's
+            print(f"compiled modules are left out, plain Python runs: {error}", file=sys.stderr)
 
 
 def compiled_codecs() -> dict[str, tuple[Any, Any]]:

@@ -1,7 +1,7 @@
 """Transmitter and receiver of one message: sequence counter and acceptance of frames."""
 
 from enum import Enum
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, ClassVar, Final, Generic, TypeVar
 
 from utank_hil.canbus.codec import FRAME_BYTES, Codec
 from utank_hil.canbus.frame import Frame
@@ -83,8 +83,11 @@ class Receiver(Generic[T]):
         Frames missing by the counter.
     rejected : dict
         Number of rejected frames by `Rejection`.
+    changes : int
+        0: new contents are counted by who knows of a message that is also sent on a change.
     """
 
+    changes: ClassVar[int] = 0
     __slots__ = (
         "_bucket", "_candidate", "_decode", "_expected", "_protected", "_run",
         "can_id", "cycle_ns", "heard", "lost", "rejected", "valid",

@@ -49,8 +49,8 @@ class HeardMessage:
     ----------
     can_id, cycle_ns, length : int
         As given.
-    heard, lost : int
-        Frames so far, accepted or not, and those missing by the counter.
+    heard, lost, changes : int
+        Frames so far, accepted or not; those missing by the counter; those sent on a change.
     rejected : dict
         Number of rejected frames by `Rejection`.
     valid : bool
@@ -67,6 +67,7 @@ class HeardMessage:
     ) -> None:
         self.can_id, self.cycle_ns, self.length = can_id, cycle_ns, length
         self.heard = self.lost = 0
+        self.changes = 0  # No device of another maker sends a message on a change.
         self.rejected = dict.fromkeys(Rejection, 0)
         self.valid = False
         self._counter, self._crc = counter, crc

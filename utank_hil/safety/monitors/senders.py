@@ -20,7 +20,7 @@ frames is summed; with five too many people are to know. So they are of a node t
 
 import math
 from collections.abc import Sequence
-from typing import Final, Protocol, runtime_checkable
+from typing import Final, Protocol
 
 from utank_hil.canbus.endpoints import Rejection
 from utank_hil.safety.monitors.finding import Finding
@@ -65,12 +65,9 @@ class Heard(Protocol):
     def lost(self) -> int:
         """Frames missing by the counter."""
 
-
-@runtime_checkable
-class Changing(Heard, Protocol):
-    """The same for a message that is also sent on a change: `changes` counts new contents."""
-
-    changes: int
+    @property
+    def changes(self) -> int:
+        """Frames with a new content, of a message that is also sent on a change; else 0."""
 
 
 class Stream:
@@ -91,7 +88,6 @@ class Stream:
 
     def __init__(self, receiver: Heard, silent_s: float = float("inf")) -> None:
         self._receiver = receiver
-        self._changing = receiver if isinstance(receiver, Changing) else None
         self._cycles_per_s = 1e9 / receiver.cycle_ns
         self._silent_limit_s = silent_s
         self.begin()
@@ -105,7 +101,7 @@ class Stream:
         receiver = self._receiver
         self._heard, self._lost = receiver.heard, receiver.lost
         self._damaged = receiver.rejected[_CRC]
-        self._changes = 0 if self._changing is None else self._changing.changes
+        self._changes = receiver.changes
         self._rejected = sum(receiver.rejected.values())
 
     def update(self, elapsed_s: float) -> int:
@@ -121,8 +117,8 @@ class Stream:
         self._damaged = damaged
         cycles = self._cycles_per_s * elapsed_s
         excess = self.excess + came - MOST_PER_CYCLE * cycles
-        if self._changing is not None and self._changing.changes:
-            excess -= self._on_change(self._changing, elapsed_s)
+        if receiver.changes:
+            excess -= self._on_change(elapsed_s)
         # twice what is too many: it is forgotten soon after
         self.excess = excess = min(max(excess, 0.0), 2 * MOST_FRAMES)
         self._silent_s = 0.0 if heard else self._silent_s + elapsed_s
@@ -142,8 +138,9 @@ class Stream:
             found |= _LOST
         return found | _SILENT if self._silent_s > self._silent_limit_s else found
 
-    def _on_change(self, receiver: Changing, elapsed_s: float) -> float:
+    def _on_change(self, elapsed_s: float) -> float:
         """Frames since the last call that may come on top of the cycle's."""
+        receiver = self._receiver
         rejected = sum(receiver.rejected.values())
         extra = (receiver.changes - self._changes) - (rejected - self._rejected)
         self._changes, self._rejected = receiver.changes, rejected
