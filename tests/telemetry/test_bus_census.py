@@ -1,6 +1,7 @@
 """Who is on a bus: emulated ships, and logs that other people recorded."""
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,18 @@ def test_a_device_by_its_profile_is_expected_like_a_node():
     (problem,) = census(without, ship.vessel).problems()
     assert problem[0] == "missing"
     assert "PGN 61481" in problem[1]
+
+
+def test_hard_wired_inputs_are_missed_only_by_a_ship_that_has_them():
+    ship = scenario()
+    messages, _ = traffic(ship)
+    declared = replace(ship.vessel.redundancy, hardwired_inputs=True)
+    vessel = ship.vessel.model_copy(update={"redundancy": declared})
+    missing = [text for kind, text in census(messages, vessel).problems() if kind == "missing"]
+    assert any("HARDWIRED_INPUTS" in text for text in missing)
+    having = ship.model_copy(update={"vessel": vessel})
+    messages, _ = traffic(having)
+    assert census(messages, vessel).problems() == []
 
 
 def test_what_is_missing_wrong_and_double_is_named():

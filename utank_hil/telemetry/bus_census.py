@@ -4,7 +4,15 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from utank_hil.canbus import Address, AddressClaim, Frame, Heartbeat, Rejection, load_catalogue
+from utank_hil.canbus import (
+    Address,
+    AddressClaim,
+    Frame,
+    HardwiredInputs,
+    Heartbeat,
+    Rejection,
+    load_catalogue,
+)
 from utank_hil.canbus.frame import BUS_SHIFT, OTHER_BUS, STANDARD
 from utank_hil.configuration import Vessel
 from utank_hil.nodes.inbox import Inbox
@@ -183,11 +191,15 @@ class BusCensus:
                 told = "/".join("none" if each is None else str(each) for each in versions)
                 reason = f"{node} runs catalogue/ship {told}, wanted {wanted[0]}/{wanted[1]}"
                 found.append(("wrong", reason))
+        inputs = self._catalogue.codec(HardwiredInputs).can_id
+        declared = self._vessel.redundancy.hardwired_inputs
         for heard in self._inbox.watched:
             if heard.can_id & -OTHER_BUS != self._tag:
                 continue
             if heard.can_id & STANDARD == 0 and heard.can_id & 0xFF == Address.OPERATOR_2:
                 continue  # a second station need not be there
+            if heard.can_id == inputs and not (heard.heard or declared):
+                continue  # obeyed wherever they are, but missed only by a ship that has them
             found += self._message_problems(heard)
         return found
 
