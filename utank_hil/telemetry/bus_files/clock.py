@@ -71,7 +71,9 @@ class OneClock:
                 passed_ns = _NEAR_NS + waiting[-1].time_ns - waiting[0].time_ns if waiting else 0
                 if -_TICK_NS <= step_ns <= passed_ns + _NEAR_NS:
                     if waiting:
-                        stray = abs(frame.time_ns - waiting[-1].time_ns) > _TICK_NS
+                        back_ns = waiting[-1].time_ns - frame.time_ns
+                        ahead = waiting[0].time_ns + self._offset_ns > self._last_ns
+                        stray = (back_ns if ahead else -back_ns) > _TICK_NS
                         yield from self._strays() if stray else self._next_base()
                     yield self._shifted(frame)
                 elif not waiting:
