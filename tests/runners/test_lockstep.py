@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from toy_nodes import BIT_NS, MS, SelectiveNode, ToyNode, frame
 
-from utank_hil.canbus.frame import Frame
+from utank_hil.canbus.frame import LONGEST_STANDARD_ID, OTHER_BUS, STANDARD, Frame
 from utank_hil.runners import Lockstep, NodeError, SimulatedBus, frame_bits
 
 
@@ -173,9 +173,18 @@ def test_node_that_raises_in_receive_is_named_with_the_time():
     assert error.value.time_ns == (frame_bits(sent) - 3) * BIT_NS
 
 
-def test_frame_that_can_carries_not_is_its_senders_fault():
-    with pytest.raises(NodeError, match=r"'wild'.*29-bit"):
-        Lockstep([ToyNode("wild", says=lambda now: [frame(2**29)])]).run_until(1)
+@pytest.mark.parametrize(
+    ("sent", "message"),
+    [
+        (frame(STANDARD | LONGEST_STANDARD_ID + 1), "29-bit"),  # 12 bits, marked as 11
+        (frame(OTHER_BUS), "29-bit"),  # an interface that this bus is not
+        (Frame(5, bytes(9)), "9 data bytes"),
+    ],
+)
+def test_frame_that_can_carries_not_is_its_senders_fault(sent, message):
+    with pytest.raises(NodeError, match=f"'wild'.*{message}") as error:
+        Lockstep([ToyNode("wild", says=lambda now: [sent])]).run_until(1)
+    assert error.value.node_name == "wild"
 
 
 def test_time_does_not_go_back():
