@@ -1,5 +1,6 @@
 """Emulated sensors that speak a maker's frames, on a bus of their own."""
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -38,11 +39,11 @@ def roll_and_shares(devices, *, second, seconds=30):
     ship = build_ship_side(scenario, 1, scenario.operator)
     node = build_controller_node(config, commissioned=True)
     more = len(vessel.foreign.buses) - 1
-    buses = set()
+    buses = Counter()
     run = Lockstep(
         [*ship.nodes, node],
         with_more(SimulatedBus(), more, 250_000),
-        trace=lambda _, sender, frame: buses.add((sender, frame.can_id >> BUS_SHIFT)),
+        trace=lambda _, sender, frame: buses.update([(sender, frame.can_id >> BUS_SHIFT)]),
     )
     rolls, shares = [], []
     for k in range(10 * seconds):
@@ -63,7 +64,9 @@ def test_with_two_sensors_the_ship_rolls_as_with_native_nodes():
     assert np.sqrt(np.mean((foreign - native) ** 2)) < 0.03 * rms
     assert ("sensors", 1) in buses
     assert ("sensors", 2) in buses
-    assert {number for sender, number in buses if sender == "controller"} == {0}
+    # the gauges are started once, as a CANopen device has to be; else it speaks on its own bus
+    said = {number: count for (sender, number), count in buses.items() if sender == "controller"}
+    assert said == {0: said[0], 2: 1}
 
 
 @pytest.mark.slow
