@@ -17,7 +17,8 @@ from typer.testing import CliRunner, Result
 from utank_hil.commands.export import export
 from utank_hil.commands.replay import replay
 from utank_hil.console.common import new_app
-from utank_hil.telemetry.bus_files.frame import BusFrame
+from utank_hil.telemetry.bus_files.clock import OneClock
+from utank_hil.telemetry.bus_files.frame import BusFrame, FrameKind
 from utank_hil.telemetry.bus_files.log import BusLog
 from utank_hil.telemetry.signal_files import read_signals
 
@@ -77,6 +78,14 @@ def test_02_one_stamp_ahead_moves_one_frame(tmp_path: Path) -> None:
     for name, values in whole.items():
         different = ~((found[name] == values) | np.isnan(values))
         assert different.sum() <= 1, name
+
+
+def test_frames_of_a_quiet_bus_keep_their_times() -> None:
+    stamps_ns = [ms * 1_000_000 for k in range(200) for ms in (75 * k, 75 * k + 25, 75 * k + 37)]
+    frames = [BusFrame(each, "can0", 5, False, FrameKind.DATA, b"", 0) for each in stamps_ns]
+    clock = OneClock("quiet.log", frames, lambda: "a line")
+    assert [frame.time_ns for frame in clock] == stamps_ns
+    assert clock.notes == []
 
 
 def test_03_a_clock_of_1970_that_is_set_ends_at_once(tmp_path: Path) -> None:
