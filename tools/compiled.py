@@ -23,7 +23,7 @@ from utank_hil.base.compiled import (
     ROOT,
     SUFFIX,
     current_library,
-    library_name,
+    name_of_library,
     source_digest,
 )
 from utank_hil.base.whole_file import left_whole
@@ -154,7 +154,7 @@ def build() -> Path:
         starts = Path(scratch) / "starts.c"
         starts.write_text("#include <Python.h>\n" + "\n".join(map(START.format, modules)))
         content = _compiled([*map(Path, library.sources), starts], library.include_dirs)
-        new = FOLDER / library_name(source, content)
+        new = FOLDER / name_of_library(source, content)
         with left_whole(whole := new.with_name(f".{os.getpid()}-{new.name}")):
             whole.write_bytes(content)
             whole.rename(new)

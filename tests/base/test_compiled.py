@@ -54,11 +54,11 @@ def test_a_library_is_used_only_if_whole_and_of_the_present_source(
     monkeypatch.setattr(compiled, "FOLDER", tmp_path / "none")
     assert compiled.current_library() is None
     monkeypatch.setattr(compiled, "FOLDER", tmp_path)
-    (tmp_path / compiled.library_name("0123456789abcdef", b"of another source")).write_bytes(
+    (tmp_path / compiled.name_of_library("0123456789abcdef", b"of another source")).write_bytes(
         b"of another source"
     )
     assert compiled.current_library() is None
-    library = tmp_path / compiled.library_name(compiled.source_digest(), b"whole")
+    library = tmp_path / compiled.name_of_library(compiled.source_digest(), b"whole")
     library.write_bytes(b"whole")
     assert compiled.current_library() == library
     library.write_bytes(b"whol")
@@ -72,7 +72,7 @@ def test_a_library_that_does_not_load_leaves_plain_python_with_a_line(
     capsys: pytest.CaptureFixture[str],
     wanted: str,
 ) -> None:
-    name = compiled.library_name(compiled.source_digest(), b"no library")
+    name = compiled.name_of_library(compiled.source_digest(), b"no library")
     (tmp_path / name).write_bytes(b"no library")
     monkeypatch.setattr(compiled, "FOLDER", tmp_path)
     monkeypatch.setattr(sys, "meta_path", list(sys.meta_path))

@@ -39,7 +39,7 @@ def source_digest() -> str:
     return whole.hexdigest()[:16]
 
 
-def library_name(source: str, content: bytes) -> str:
+def name_of_library(source: str, content: bytes) -> str:
     """File name of a library: of what source it is, its content, Python and processor."""
     return f"{source}-{hashlib.sha256(content).hexdigest()[:16]}{SUFFIX}"
 
@@ -50,7 +50,9 @@ def current_library() -> Path | None:
         return None
     source = source_digest()
     found = FOLDER.glob(f"{source}-*{SUFFIX}")
-    return next((file for file in found if file.name == library_name(source, _content(file))), None)
+    return next(
+        (file for file in found if file.name == name_of_library(source, _content(file))), None
+    )
 
 
 def _content(file: Path) -> bytes:
@@ -70,7 +72,7 @@ class _Loader(ExtensionFileLoader):
 
 class _Finder(MetaPathFinder):
     def __init__(self, library: Path, modules: Iterable[str]) -> None:
-        self.library = str(library)
+        self.shared = str(library)
         self.modules = frozenset(modules)
 
     def find_spec(
@@ -81,8 +83,8 @@ class _Finder(MetaPathFinder):
     ) -> ModuleSpec | None:
         if fullname not in self.modules:
             return None
-        loader = _Loader(fullname, self.library)
-        return spec_from_file_location(fullname, self.library, loader=loader)
+        loader = _Loader(fullname, self.shared)
+        return spec_from_file_location(fullname, self.shared, loader=loader)
 
 
 def _modules_in(library: Path) -> list[str]:
