@@ -61,6 +61,7 @@ PARTS: Final = {
         10,
     ),
     "week": Part("python -m tools.studies.week --days 7 --json", 120),
+    "same_digits": Part("python -m tools.studies.same_digits --seconds 120", 60),
     "search": Part("make search", 60),
     "mutants": Part("make mutants", 90),
     "coverage": Part("make coverage", 5),
