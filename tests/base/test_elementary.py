@@ -53,6 +53,18 @@ def test_sine_and_cosine(x: float) -> None:
     assert abs(cosine(x) - mpmath.cos(x)) < 2e-16
 
 
+@given(st.floats(1e9, 1e16), st.sampled_from([-1, 1]))
+def test_sine_and_cosine_of_large_angles(size: float, sign: int) -> None:
+    x = sign * size
+    assert abs(sine(x) - math.sin(x)) < 4e-17 * size + 4e-16
+    assert abs(cosine(x) - math.cos(x)) < 4e-17 * size + 4e-16
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_sine_and_cosine_of_any_finite_angle_are_a_point_of_the_circle(x: float) -> None:
+    assert sine(x) ** 2 + cosine(x) ** 2 == pytest.approx(1, abs=1e-7)
+
+
 @given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
 def test_arctan2(y: float, x: float) -> None:
     assert elementary.arctan2(y, x) == pytest.approx(math.atan2(y, x), rel=6e-16, abs=1e-300)
@@ -104,3 +116,9 @@ def test_numba_gives_the_bits_of_plain_python(name: str) -> None:
     plain = getattr(elementary, name)
     compiled = njit(error_model="numpy")(plain)
     assert [compiled(x) for x in POINTS.tolist()] == [plain(x) for x in POINTS.tolist()]
+
+
+def test_numba_gives_the_bits_of_plain_python_at_large_angles() -> None:
+    compiled = njit(error_model="numpy")(elementary.sine_cosine)
+    angles = [sign * 10.0**power for power in range(9, 309) for sign in (1, -1)]
+    assert [compiled(x) for x in angles] == [elementary.sine_cosine(x) for x in angles]

@@ -66,9 +66,15 @@ def tanh(x: float) -> float:
 
 
 def sine_cosine(angle: float) -> tuple[float, float]:
-    """Sine and cosine, to 2e-16 for angles of up to 1e5 radians; NaN beyond 1e9."""
+    """Sine and cosine, to 2e-16 for angles of up to 1e5 radians; NaN for no finite angle.
+
+    From 1e9 on turns of the nearest double to 2 pi are taken off: errors of up to 4e-17 abs(angle).
+    """
     if not abs(angle) < 1e9:
-        return math.nan, math.nan
+        if not abs(angle) < math.inf:
+            return math.nan, math.nan
+        left = abs(angle) % (2 * math.pi)  # exact, so the same on every machine
+        angle = math.copysign(left, angle)
     quarter = math.floor(angle * (2 / math.pi) + 0.5)
     r = (angle - quarter * _QUARTER_HIGH) - quarter * _QUARTER_LOW
     z = r * r
