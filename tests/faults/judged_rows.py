@@ -13,7 +13,7 @@ CAMPAIGN = load_config(Path("configs/faults/campaign.yaml"), Campaign)
 ROWS = {row.id: row for row in CAMPAIGN.rows}
 
 GOOD = Outcome(
-    "roll-sign-flipped", 1, Times(found=500.0, zero=520.0), mode="FAULT", code="MOTION_SIGN_FLIP",
+    "both-signs-flipped", 1, Times(found=500.0, zero=520.0), mode="FAULT", code="MOTION_SIGN_FLIP",
     was_active=True, said=Said("FAULT MOTION_SIGN_FLIP", ("MOTION_SIGN_FLIP",)),
     rolls=Rolls(1.0, 1.0, 60.0), wire="differs",
 )  # fmt: skip

@@ -82,7 +82,7 @@ def problems_of(text: str) -> list[str]:
         ("meets: [F17", "meets: [F18", "requirements"),
         ("{id: F01, ", "{id: F02, ", "requirements.0.id"),
         ("setup: valve,", "setup: pump,", "rows.165.fault.inject.0"),
-        ("codes: [DRIVE_WARNING]", "codes: []", "rows.143.expect.codes"),
+        ("codes: [DRIVE_WARNING]", "codes: []", "rows.142.expect.codes"),
         ("fault_s: 40.0", "fault_s: 1.0e+300", "fault_s"),
         ("arm_s: 1.0", "arm_s: 1.0e+300", "arm_s"),
         ("followed_s: 92", "followed_s: 1.0e+300", "rows.69.fault.followed_s"),
@@ -90,7 +90,7 @@ def problems_of(text: str) -> list[str]:
         (
             "roll: 1.5, roll_window_s: 600",
             "roll_window_s: 1.0e+300",
-            "rows.169.limit.roll_window_s",
+            "rows.58.limit.roll_window_s",
         ),
     ],
 )

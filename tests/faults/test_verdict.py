@@ -7,10 +7,10 @@ from judged_rows import CAMPAIGN, GOOD, ROWS, changed, said, spoken, verdict
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"found": 1001.0}, "found after 1001 ms, 1000 allowed"),
+        ({"found": 10701.0}, "found after 10701 ms, 10700 allowed"),
         ({"found": None}, "was not found"),
         ({"zero": 601.0}, "pressure at zero after 601 ms, 600 allowed"),
-        ({"code": "DRIFT", "zero": 1251.0}, "pressure at zero after 1251 ms, 1250 allowed"),
+        ({"code": "DRIFT", "zero": 10951.0}, "pressure at zero after 10951 ms, 10950 allowed"),
         ({"mode": "ACTIVE"}, "not latched: ended in ACTIVE"),
         ({"mode": "STANDBY"}, "not latched: ended in STANDBY"),
         ({"commanded": 601.0}, "pressure commanded until 601 ms, 600 allowed"),
@@ -25,8 +25,8 @@ from judged_rows import CAMPAIGN, GOOD, ROWS, changed, said, spoken, verdict
     ],
 )
 def test_one_seed_of_two_fails_the_row(change: dict[str, object], words: str) -> None:
-    assert spoken("roll-sign-flipped", GOOD, GOOD).passed
-    result = spoken("roll-sign-flipped", GOOD, changed(GOOD, seed=2, **change))
+    assert spoken("both-signs-flipped", GOOD, GOOD).passed
+    result = spoken("both-signs-flipped", GOOD, changed(GOOD, seed=2, **change))
     assert not result.passed
     assert any(words in problem for problem in result.problems)
 
@@ -65,7 +65,7 @@ def test_each_reaction_asks_for_its_own() -> None:
 
 def test_a_fault_that_is_latched_has_a_name_of_the_row() -> None:
     other = changed(GOOD, code="OVERRUN", alarm=600.0)
-    assert spoken("roll-sign-flipped", other).problems == ("seed 1: called OVERRUN",)
+    assert spoken("both-signs-flipped", other).problems == ("seed 1: called OVERRUN",)
 
 
 def test_where_nothing_is_latched_an_alarm_has_the_row_s_name_in_time() -> None:
@@ -81,10 +81,10 @@ def test_where_nothing_is_latched_an_alarm_has_the_row_s_name_in_time() -> None:
 @pytest.mark.parametrize(
     ("row", "change", "words"),
     [
-        ("roll-sign-flipped", {"status": "ACTIVE NONE"}, "CTRL_STATUS shows ACTIVE NONE"),
-        ("roll-sign-flipped", {"status": "FAULT NONE"}, "CTRL_STATUS shows FAULT NONE"),
-        ("roll-sign-flipped", {"status": ""}, "CTRL_STATUS shows nothing"),
-        ("roll-sign-flipped", {"alarms": ()}, "no alarm MOTION_SIGN_FLIP"),
+        ("both-signs-flipped", {"status": "ACTIVE NONE"}, "CTRL_STATUS shows ACTIVE NONE"),
+        ("both-signs-flipped", {"status": "FAULT NONE"}, "CTRL_STATUS shows FAULT NONE"),
+        ("both-signs-flipped", {"status": ""}, "CTRL_STATUS shows nothing"),
+        ("both-signs-flipped", {"alarms": ()}, "no alarm MOTION_SIGN_FLIP"),
         ("level-offset", {"alarms": ("VOLUME",)}, "no alarm SIGNAL_DELAYED"),
         ("level-offset", {"alarms": ("SIGNAL_DELAYED",)}, "no alarm VOLUME"),
         ("level-offset", {"flags": ("alarm",)}, "never said degraded"),
@@ -97,7 +97,7 @@ def test_what_the_bus_was_not_told_fails_the_row(
     row: str, change: dict[str, object], words: str
 ) -> None:
     outcome = {
-        "roll-sign-flipped": GOOD,
+        "both-signs-flipped": GOOD,
         "level-offset": changed(GOOD, code="SIGNAL_DELAYED", found=31e3, halved=1e3,
                                 zero=31.5e3),
         "saturated": changed(GOOD, mode="ACTIVE", found=None, code="NONE", halved=10.1e3,
@@ -143,9 +143,9 @@ def test_minutes_later_a_run_may_end_in_the_faults_that_the_row_names() -> None:
 
 def test_a_ramp_that_comes_before_the_stop_has_the_stops_time() -> None:
     ramp = changed(GOOD, code="DRIFT", found=100.0, zero=1200.0)
-    assert spoken("roll-sign-flipped", ramp).passed
-    assert spoken("roll-sign-flipped", ramp).zero_limit_ms == 1250.0
-    assert spoken("roll-sign-flipped", GOOD).zero_limit_ms == 600.0
+    assert spoken("both-signs-flipped", ramp).passed
+    assert spoken("both-signs-flipped", ramp).zero_limit_ms == 10950.0
+    assert spoken("both-signs-flipped", GOOD).zero_limit_ms == 600.0
 
 
 def test_a_fault_that_refuses_arming_is_found() -> None:
@@ -157,6 +157,6 @@ def test_a_fault_that_refuses_arming_is_found() -> None:
 
 def test_the_worst_seed_counts_and_none_where_one_was_not_found() -> None:
     later = changed(GOOD, seed=2, found=700.0, zero=730.0)
-    assert spoken("roll-sign-flipped", GOOD, later).found_ms == 700.0
+    assert spoken("both-signs-flipped", GOOD, later).found_ms == 700.0
     missed = changed(GOOD, seed=2, found=None)
-    assert spoken("roll-sign-flipped", GOOD, missed).as_json()["found_ms"] is None
+    assert spoken("both-signs-flipped", GOOD, missed).as_json()["found_ms"] is None
