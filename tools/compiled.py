@@ -93,7 +93,7 @@ MYPY: Final = """[mypy]
 explicit_package_bases = true
 follow_imports_for_stubs = true
 [mypy-numpy.*,scipy.*,pydantic.*,pydantic_core.*,annotated_types.*,rich.*,typer.*,click.*,can.*,\
-cantools.*,msgspec.*,yaml.*,daqp.*,numba.*]
+cantools.*,control.*,yaml.*,daqp.*,numba.*]
 follow_imports = skip
 ignore_missing_imports = true
 """
@@ -135,25 +135,10 @@ def build() -> Path:
     made = current_library()
     if made is not None and made.stat().st_mtime > Path(__file__).stat().st_mtime:
         return made
-    from mypyc.build import mypycify  # takes a second
-
     source = source_digest()
-    found = [str(path.relative_to(ROOT)) for each in PATTERNS for path in sorted(ROOT.glob(each))]
-    files = [file for file in found if file not in NOT and not file.endswith("__init__.py")]
-    os.chdir(ROOT)  # mypyc names modules by their paths from here
     FOLDER.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:
-        codecs, settings = Path(scratch) / f"{CODECS}.py", Path(scratch) / "mypy.ini"
-        codecs.write_text(codecs_source())
-        settings.write_text(MYPY)
-        library = mypycify(
-            ["--config-file", str(settings), *files, str(codecs)],
-            multi_file=True, target_dir=scratch, group_name=GROUP,
-        )[0]  # fmt: skip
-        modules = [file.removesuffix(".py").replace("/", "___") for file in (*files, CODECS)]
-        starts = Path(scratch) / "starts.c"
-        starts.write_text("#include <Python.h>\n" + "\n".join(map(START.format, modules)))
-        content = _compiled([*map(Path, library.sources), starts], library.include_dirs)
+        content = _compiled(*c_sources(Path(scratch)))
         new = FOLDER / name_of_library(source, content)
         with left_whole(whole := new.with_name(f".{os.getpid()}-{new.name}")):
             whole.write_bytes(content)
@@ -162,6 +147,31 @@ def build() -> Path:
         if older != new:
             older.unlink(missing_ok=True)
     return new
+
+
+def c_sources(scratch: Path) -> tuple[list[Path], list[str]]:
+    """Translate the modules to C files in an empty folder; return these and folders to include.
+
+    Raises `SystemExit` if types are wrong.
+    """
+    from mypyc.build import mypycify  # takes a second
+
+    found = [str(path.relative_to(ROOT)) for each in PATTERNS for path in sorted(ROOT.glob(each))]
+    files = [file for file in found if file not in NOT and not file.endswith("__init__.py")]
+    os.chdir(ROOT)  # mypyc names modules by their paths from here
+    codecs, settings = scratch / f"{CODECS}.py", scratch / "mypy.ini"
+    codecs.write_text(codecs_source())
+    settings.write_text(MYPY)
+    # no cache from before: a type error that it hides would show on another machine first
+    options = ["--config-file", str(settings), "--cache-dir", str(scratch / "cache")]
+    library = mypycify(
+        [*options, *files, str(codecs)],
+        multi_file=True, target_dir=str(scratch), group_name=GROUP,
+    )[0]  # fmt: skip
+    modules = [file.removesuffix(".py").replace("/", "___") for file in (*files, CODECS)]
+    starts = scratch / "starts.c"
+    starts.write_text("#include <Python.h>\n" + "\n".join(map(START.format, modules)))
+    return [*map(Path, library.sources), starts], library.include_dirs
 
 
 def _compiled(sources: list[Path], include: list[str]) -> bytes:

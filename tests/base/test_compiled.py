@@ -122,3 +122,13 @@ def test_a_compiled_run_equals_the_plain_one_and_codecs_pass_their_tests() -> No
     assert fast[2] == plain[2]
     run_compiled = [sys.executable, "-m", "pytest", "-q", "tests/canbus", "tests/replay"]
     subprocess.run(run_compiled, env={**os.environ, "UTANK_HIL_COMPILED": "1"}, check=True)
+
+
+def test_the_tick_translates_to_c_without_a_cache_from_before(tmp_path: Path) -> None:
+    translate = (
+        "from pathlib import Path; from tools.compiled import c_sources; c_sources(Path('{}'))"
+    )
+    subprocess.run(
+        [sys.executable, "-c", translate.format(tmp_path)], check=True, cwd=compiled.ROOT
+    )
+    assert list(tmp_path.glob("**/*controller*.c"))

@@ -52,6 +52,19 @@ def test_nonsense_is_refused(data: bytes) -> None:
         read_answer(data)
 
 
+def test_numbers_of_numpy_cross_as_numbers_of_python() -> None:
+    sent = MotionEstimate(
+        Verdict.RECORD_SHORT,
+        Verdict.MOTION_SMALL,
+        rms_deviation=np.float64(1) / 3,
+        hs_m=np.float64(4),
+    )
+    came = read_answer(answer_bytes(sent))
+    assert isinstance(came, MotionEstimate)
+    assert (came.rms_deviation, came.hs_m) == (1 / 3, 4.0)
+    assert type(came.rms_deviation) is float
+
+
 @pytest.mark.parametrize("told", [True, False])
 def test_an_estimate_crosses_bit_for_bit(told: bool) -> None:
     sent = MotionEstimate(Verdict.RECORD_SHORT, Verdict.MOTION_SMALL)

@@ -21,7 +21,7 @@ _Shape = Annotated[tuple[Annotated[int, msgspec.Meta(ge=0, le=1 << 24)], ...],
 
 def encode(value: object) -> bytes:
     """Encode a struct, a dataclass or an array."""
-    return msgspec.msgpack.encode(value, enc_hook=_array_out)
+    return msgspec.msgpack.encode(value, enc_hook=_plain)
 
 
 def decoder(kind: Any, *, finite: bool) -> msgspec.msgpack.Decoder[Any]:
@@ -46,9 +46,11 @@ def refuse_sizes(**sizes: tuple[int, int, int]) -> None:
             raise ValueError(f"{name} must be {least} to {most}, got {value}")
 
 
-def _array_out(value: object) -> tuple[tuple[int, ...], bytes]:
+def _plain(value: object) -> object:
     if isinstance(value, np.ndarray):
         return value.shape, np.asarray(value, dtype="<f8").tobytes()
+    if isinstance(value, np.generic):
+        return value.item()
     raise NotImplementedError(f"{type(value).__name__} does not pass between processes")
 
 
