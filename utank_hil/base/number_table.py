@@ -31,12 +31,8 @@ def read_number_table(path: Path) -> dict[str, FloatArray]:
     A column of times may hold dates by ISO 8601, in UTC unless they name another zone; it becomes
     ``time_s``, in seconds from its first row.
 
-    Raises
-    ------
-    TextFileError
-        If it is no such table; the message has the line, the cause and the remedy.
-    OSError
-        If it can't be read.
+    TextFileError is raised if it is no such table; the message has the line, the cause and the
+    remedy. OSError is raised if it can't be read.
     """
     with open_text(path) as text:
         first = text.readline()

@@ -35,6 +35,9 @@ def open_content(
 ) -> Iterator[BinaryIO]:
     """Open a file, decompressed if it is compressed with gzip.
 
+    TextFileError is raised if it is larger, or compressed content is cut or damaged. OSError is
+    raised if it can't be read.
+
     Parameters
     ----------
     path : Path
@@ -44,13 +47,6 @@ def open_content(
     on_cut : callable, optional
         Called with the place where compressed content is cut or damaged; reading then ends there as
         at the end of the file. Without it that is an error.
-
-    Raises
-    ------
-    TextFileError
-        If it is larger, or compressed content is cut or damaged.
-    OSError
-        If it can't be read.
     """
     with path.open("rb") as file:
         compressed = file.peek(2)[:2] == _GZIP
@@ -68,10 +64,8 @@ def open_text(
 
     Bytes that are no text are an error, or replaced (`errors`, as of `open`).
 
-    Raises
-    ------
-    TextFileError
-        As `open_content`; also if the text is not UTF-8, or UTF-16 with its byte order mark.
+    The errors are those of `open_content`; TextFileError is raised too if the text is not UTF-8, or
+    UTF-16 with its byte order mark.
     """
     with open_content(path, limit_bytes, on_cut) as content:
         begin = content.peek(2)[:2]  # type: ignore[attr-defined]  # of a BufferedReader
@@ -85,10 +79,7 @@ def open_text(
 def lines_of(path: Path, text: TextIO) -> Iterator[tuple[int, str]]:
     """Yield the number, from 1, and the content of each line, its line feed included.
 
-    Raises
-    ------
-    TextFileError
-        If a line is longer than `LINE_LIMIT`, as in no log.
+    TextFileError is raised if a line is longer than `LINE_LIMIT`, as in no log.
     """
     for number, line in enumerate(iter(lambda: text.readline(LINE_LIMIT), ""), start=1):
         yield number, line

@@ -30,11 +30,8 @@ _EXACT = 1e-7  # relative residual above which past outputs do not determine the
 class ARX:
     """Autoregressive model with exogenous input.
 
-    Raises
-    ------
-    ValueError
-        If the shapes are inconsistent, a coefficient is not finite, or the sample time is not
-        positive.
+    ValueError is raised if the shapes are inconsistent, a coefficient is not finite, or the sample
+    time is not positive.
     """
 
     alpha: FloatArray  #: shape (p, m, m): output coefficients alpha_1 ... alpha_p.
@@ -85,17 +82,15 @@ class ARX:
         model predicts the response of `system` exactly. Of several solutions, the output
         coefficients of least norm are taken.
 
+        ValueError is raised if the model is not discrete, or `order` past outputs do not determine
+        its state.
+
         Parameters
         ----------
         system : control.StateSpace or LinearModel
             Discrete, with n states and m outputs.
         order : int
             p, with p m >= n.
-
-        Raises
-        ------
-        ValueError
-            If the model is not discrete, or `order` past outputs do not determine its state.
         """
         a, b, c, d, sample_time_s = discrete_matrices(system)
         states, outputs, inputs = a.shape[0], c.shape[0], b.shape[1]

@@ -16,13 +16,7 @@ _LIMITS: Final = PumpLimits()
 
 @dataclass(frozen=True, slots=True)
 class DesignPlant:
-    """A ship with its tank, delay, lag and limits.
-
-    Raises
-    ------
-    ValueError
-        If delay or lag is negative or not finite.
-    """
+    """A ship with its tank, delay, lag and limits."""
 
     ship: RollShip
     tank: Tank

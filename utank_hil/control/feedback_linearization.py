@@ -55,13 +55,11 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 class FeedbackLinearizationDesign:
     """Parameters of the law."""
 
-    frequency_rad_s: Positive  #: w and zeta of the linear response of the output s.
-    damping_ratio: Positive  #: w and zeta of the linear response of the output s.
-    #: Swing of the level up to which the law acts fully, and from which it does not act; both
-    #: within the reservoirs, or both beyond them for the law as printed, without reduction.
-    soft_level_m: Positive
-    #: Swing of the level up to which the law acts fully, and from which it does not act; both
-    #: within the reservoirs, or both beyond them for the law as printed, without reduction.
+    frequency_rad_s: Positive  #: w of the linear response of the output s.
+    damping_ratio: Positive  #: zeta of that response.
+    soft_level_m: Positive  #: Swing of the level up to which the law acts fully.
+    #: Swing from which it does not act; both limits are within the reservoirs, or both beyond them
+    #: for the law as printed, without reduction.
     hard_level_m: Positive
     shift_rad_m: NotNegative = 0.0  #: kL, zero or more.
     shift_length_m: Positive = 1.0  #: l.
@@ -91,16 +89,14 @@ class FeedbackLinearizationDesign:
 class FeedbackLinearization(FeedbackLinearizationDesign):
     """The law and its model; it measures roll, roll rate, level and level rate.
 
+    ValueError is raised if a parameter is out of its range, the reservoirs end between the soft and
+    the hard limit of the level, or the pump does not affect the shifted output within the hard
+    limit.
+
     Parameters
     ----------
     frequency_rad_s, ..., kind
         As in `FeedbackLinearizationDesign`.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of its range, the reservoirs end between the soft and the hard limit
-        of the level, or the pump does not affect the shifted output within the hard limit.
     """
 
     _: KW_ONLY

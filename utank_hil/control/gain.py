@@ -12,13 +12,7 @@ from utank_hil.dynamics.sampling import LinearModel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GainLaw:
-    """Constant feedback of the measured outputs, u(k) = -K y(k-1), with K of shape (r, m).
-
-    Raises
-    ------
-    ValueError
-        If a gain is not finite, or the sample time out of its range.
-    """
+    """Constant feedback of the measured outputs, u(k) = -K y(k-1), with K of shape (r, m)."""
 
     gain: FloatArray
     sample_time_s: SampleTime

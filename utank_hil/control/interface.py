@@ -129,8 +129,5 @@ class LawDesign(Protocol):
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Design the law for a plant.
 
-        Raises
-        ------
-        ValueError
-            If a parameter does not suit the plant; a `ParameterError` names it.
+        ValueError is raised if a parameter does not suit the plant; a `ParameterError` names it.
         """

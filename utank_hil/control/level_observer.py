@@ -30,11 +30,6 @@ class LevelObserver:
 
     `level_m` and `rate_m_s` are its estimates, `period_s` is the time between two measurements.
 
-    Raises
-    ------
-    ValueError
-        If the period is not positive.
-
     References
     ----------
     Y. Bar-Shalom, X. Li, T. Kirubarajan, Estimation with Applications to Tracking and Navigation,

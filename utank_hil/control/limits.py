@@ -11,13 +11,7 @@ _Limit = Annotated[float, Range(above=0, infinite=True)]
 
 @dataclass(frozen=True, slots=True)
 class PumpLimits:
-    """Limits on the pump's command.
-
-    Raises
-    ------
-    ValueError
-        If a limit is out of its range.
-    """
+    """Limits on the pump's command."""
 
     pressure_pa: _Limit = 50e3  #: Greatest pressure, either way.
     rate_pa_s: _Limit = 100e3  #: Greatest rate of change of the command.

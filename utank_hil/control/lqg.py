@@ -37,6 +37,9 @@ def design_lqr(
 ) -> GainLaw:
     """Linear-quadratic regulator of a discrete model whose whole state is measured.
 
+    ValueError is raised if the model is not discrete, or a weight has the wrong shape or is not
+    positive. numpy.linalg.LinAlgError is raised if no stabilizing gain exists.
+
     Parameters
     ----------
     system : control.StateSpace or LinearModel
@@ -52,13 +55,6 @@ def design_lqr(
     -------
     GainLaw
         ``gain`` K, shape (r, n); its controller is stepped with the state.
-
-    Raises
-    ------
-    ValueError
-        If the model is not discrete, or a weight has the wrong shape or is not positive.
-    numpy.linalg.LinAlgError
-        If no stabilizing gain exists.
     """
     from scipy.linalg import solve_discrete_are
 
@@ -83,6 +79,8 @@ def kalman_predictor(
 ) -> tuple[FloatArray, FloatArray]:
     """Stationary Kalman predictor of a discrete model with n states and m outputs.
 
+    The errors are those of `design_lqr`.
+
     Parameters
     ----------
     process_covariance : array_like, shape (n, n)
@@ -96,11 +94,6 @@ def kalman_predictor(
         L.
     innovation_covariance : ndarray, shape (m, m)
         Covariance of y(k) - C xhat(k) - D u(k), which is white for the true model and covariances.
-
-    Raises
-    ------
-    ValueError, numpy.linalg.LinAlgError
-        As `design_lqr`.
     """
     from scipy.linalg import solve_discrete_are
 
@@ -121,6 +114,8 @@ def design_lqg(
 ) -> "LQGLaw":
     """Combine a regulator with a Kalman predictor of the state from the outputs.
 
+    ValueError is raised if model and regulator do not match.
+
     Parameters
     ----------
     system : control.StateSpace or LinearModel
@@ -129,11 +124,6 @@ def design_lqg(
         From `design_lqr`, of the same states.
     process_covariance, measurement_covariance : array_like
         As in `kalman_predictor`.
-
-    Raises
-    ------
-    ValueError
-        If model and regulator do not match.
     """
     a, b, c, d, sample_time_s = discrete_matrices(system)
     if regulator.gain.shape != b.T.shape or regulator.sample_time_s != sample_time_s:
@@ -178,10 +168,8 @@ class LQGLaw:
         It is the steady input that brings the outputs nearest to the target (least squares), plus
         the gain times the resulting state.
 
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-            If the model has a pole at 1, and so no steady state of an input.
+        numpy.linalg.LinAlgError is raised if the model has a pole at 1, and so no steady state of
+        an input.
         """
         a, b, c, d, _ = self.model
         steady = np.linalg.solve(np.eye(len(a)) - a, b)
@@ -241,10 +229,7 @@ class LQGController:
         `reference`, shape (m,), is a constant target of the outputs, with a washout relative to
         their mean.
 
-        Raises
-        ------
-        ValueError
-            If there is a reference without a steady state (`reference_gain`).
+        ValueError is raised if there is a reference without a steady state (`reference_gain`).
         """
         memory, own = self._memory, self._own
         memory[own:] = y

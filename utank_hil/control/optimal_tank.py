@@ -28,13 +28,7 @@ _WAVES = np.geomspace(0.05, 5.0, 4000)
 
 @dataclass(frozen=True, slots=True)
 class ShipTankRatios:
-    """Ratios that determine the roll response, besides frequency and damping of the water.
-
-    Raises
-    ------
-    ValueError
-        If a ratio is out of its range.
-    """
+    """Ratios that determine the roll response, besides frequency and damping of the water."""
 
     mass_ratio: Annotated[float, Range(above=0, below=1)]  #: mu, between 0 and 1.
     coupling_ratio: Finite  #: G1.

@@ -13,13 +13,7 @@ from utank_hil.control.interface import BuiltLaw
 
 @dataclass(slots=True, eq=False)
 class PassiveController:
-    """Zero pressure for each of `inputs` pumps, for any measurement.
-
-    Raises
-    ------
-    ValueError
-        If one of the parameters is out of its range.
-    """
+    """Zero pressure for each of `inputs` pumps, for any measurement."""
 
     inputs: Annotated[int, Range(least=1)] = 1
     sample_time_s: SampleTime = 0.2

@@ -25,11 +25,6 @@ def design_pd(ship: RollShip, tank: Tank, sample_time_s: float = 0.02) -> GainLa
     """PD law on `PD_MEASURED` that gives the tank its best frequency and damping.
 
     The gains assume no delay, so the sample time must be short against the roll period.
-
-    Raises
-    ------
-    ValueError
-        If the sample time is out of its range.
     """
     ratios, ship_frequency = ship_ratios(ship, tank)
     best = passive_optimum(ratios)

@@ -49,14 +49,9 @@ class PumpWithValve(ClippedValve):
 
 @dataclass(frozen=True, slots=True)
 class PumpWithValveDesign:
-    """Pump and valve together, as a law of a configuration.
+    """Pump and valve together, as a law of a configuration."""
 
-    Parameters
-    ----------
-    pump : LawDesign
-        The law whose pressure they provide; it must have a linear form, by which it is judged.
-    """
-
+    #: The law whose pressure they provide; it must have a linear form, by which it is judged.
     pump: LawDesign
     kind: Literal["pump_with_valve"] = "pump_with_valve"
 

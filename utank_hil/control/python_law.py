@@ -37,10 +37,7 @@ _METHODS = ("step", "applied", "reset")
 class PythonDesign:
     """A law of a configuration that is user-defined code.
 
-    Raises
-    ------
-    ValueError
-        If `factory` is not of that form, or `measured` names no outputs.
+    ValueError is raised if `factory` is not of that form, or `measured` names no outputs.
     """
 
     #: ``package.module:function`` of an installed package, or ``./file.py:function`` of a file,
@@ -66,10 +63,8 @@ class PythonDesign:
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Call the factory and check that its result is a controller.
 
-        Raises
-        ------
-        ParameterError
-            If the factory cannot be imported or called, or its controller cannot be stepped.
+        ParameterError is raised if the factory cannot be imported or called, or its controller
+        cannot be stepped.
         """
         make = partial(_call, self.factory, dict(self.parameters), plant)
         controller = make()

@@ -37,13 +37,7 @@ _MEMORY_S = 160.0  # length of the impulse response that is used
 
 @dataclass(frozen=True, slots=True)
 class SeaModel:
-    """The sea of a predictor, on the beam of a ship without speed.
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its range.
-    """
+    """The sea of a predictor, on the beam of a ship without speed."""
 
     #: Centres of the spectrum's bands, two or more (`utank_hil.sea.Spectrum`).
     frequency_hz: tuple[Positive, ...]
@@ -122,10 +116,7 @@ class SeaModel:
 
         x(k) = A x(k-1) + B e(k), s(k) = C x(k): the newest noise is part of the state.
 
-        Raises
-        ------
-        ValueError
-            If 160 s hold too few samples for the order.
+        ValueError is raised if 160 s hold too few samples for the order.
         """
         samples = round(_MEMORY_S / sample_time_s)
         if not self.order < samples:

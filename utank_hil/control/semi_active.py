@@ -53,13 +53,7 @@ def throttled(valve: ValveRange, pressure_pa: float, flow_m_s: float) -> float:
 
 @dataclass(slots=True, eq=False)
 class OnOffValve:
-    """Energy law with a valve that is open or shut.
-
-    Raises
-    ------
-    ValueError
-        If the threshold is negative or not finite, or the sample time out of its range.
-    """
+    """Energy law with a valve that is open or shut."""
 
     valve: ValveRange
     #: The valve moves when the product of roll rate and level rate exceeds this, so that noise does

@@ -25,11 +25,6 @@ def slope_at_rest(controller: Callable[[], Controller], inputs: int) -> GainLaw:
         Makes a controller at rest, whose first command depends on its first measurement alone.
     inputs : int
         Number of measurements of the law.
-
-    Raises
-    ------
-    ValueError
-        If the slope is not finite.
     """
     columns = []
     for push in STEP * np.eye(inputs):

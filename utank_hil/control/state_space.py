@@ -29,10 +29,8 @@ from utank_hil.dynamics.transfer import state_space_response
 class StateSpaceLaw:
     """A law given by its matrices.
 
-    Raises
-    ------
-    ValueError
-        If the model is not discrete, its shapes are inconsistent, or a number is not finite.
+    ValueError is raised if the model is not discrete, its shapes are inconsistent, or a number is
+    not finite.
     """
 
     #: From the m measured outputs to the r commands; discrete, ``dt`` in seconds. D is the direct
@@ -107,13 +105,7 @@ _Matrix = tuple[tuple[Finite, ...], ...]
 
 @dataclass(frozen=True, slots=True)
 class SystemMatrices:
-    """Matrices of a discrete system, as rows of numbers in a file.
-
-    Raises
-    ------
-    ValueError
-        If the shapes are inconsistent, or a number is not finite.
-    """
+    """Matrices of a discrete system, as rows of numbers in a file."""
 
     D: _Matrix
     sample_time_s: SampleTime
@@ -146,10 +138,7 @@ class SystemMatrices:
 class StateSpaceDesign:
     """A law of a configuration that is given by its matrices.
 
-    Raises
-    ------
-    ValueError
-        If `measured` does not name one output for each column of D.
+    ValueError is raised if `measured` does not name one output for each column of D.
     """
 
     #: Measurements of the law, in the order of the columns of B and D; names of `STATES`.

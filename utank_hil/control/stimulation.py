@@ -45,15 +45,12 @@ SHORT = 0.01  # over the pressure's amplitude; a smaller shortfall is ignored
 class StimulationDesign:
     """Parameters of the wanted roll.
 
-    Raises
-    ------
-    ValueError
-        If a parameter is not positive, the amplitude is at or above the roll limit, or the duration
-        ends within the ramp in.
+    ValueError is raised if a parameter is not positive, the amplitude is at or above the roll
+    limit, or the duration ends within the ramp in.
     """
 
-    amplitude_rad: Positive  #: Wanted roll.
-    period_s: Positive  #: Wanted roll.
+    amplitude_rad: Positive  #: Amplitude of the wanted roll.
+    period_s: Positive  #: Period of the wanted roll.
     ramp_s: Positive  #: Time in which the amplitude goes from zero to full and back.
     roll_limit_rad: Positive  #: Roll at which the stimulation ends.
     correction_s: Positive = 120.0  #: T.
@@ -91,27 +88,20 @@ class StimulationDesign:
 class Stimulation(StimulationDesign):
     """A stimulation planned for a ship.
 
+    ValueError is raised if a parameter is out of its range, or by the model the amplitude requires
+    more pressure or level than is available.
+
     Parameters
     ----------
     amplitude_rad, ..., kind
         As in `StimulationDesign`.
-    pressure_pa : float
-        Greatest pressure.
-    level_limit_m : float
-        Level at which the stimulation ends.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of its range, or by the model the amplitude requires more pressure
-        or level than is available.
     """
 
     _: KW_ONLY
     ship: RollShip
     tank: Tank
-    pressure_pa: Positive
-    level_limit_m: Positive
+    pressure_pa: Positive  #: Greatest pressure.
+    level_limit_m: Positive  #: Level at which the stimulation ends.
     sample_time_s: SampleTime = 0.02
 
     def __post_init__(self) -> None:

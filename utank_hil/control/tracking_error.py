@@ -17,13 +17,7 @@ from utank_hil.base.parameters import Positive, range_problems, refuse
 
 @dataclass(frozen=True, slots=True)
 class ErrorDynamics:
-    """Wanted error dynamics and their Lyapunov function e' P e / 2.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is not positive.
-    """
+    """Wanted error dynamics and their Lyapunov function e' P e / 2."""
 
     frequency_rad_s: Positive  #: w and zeta.
     damping_ratio: Positive  #: w and zeta.

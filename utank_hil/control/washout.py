@@ -28,13 +28,7 @@ class WashableLaw(LinearLaw, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class WashoutLaw:
-    """A law on outputs without their mean.
-
-    Raises
-    ------
-    ValueError
-        If the corner is not positive.
-    """
+    """A law on outputs without their mean."""
 
     law: WashableLaw
     corner_rad_s: float  #: w0, far below the ship's roll frequency.

@@ -21,20 +21,15 @@ from utank_hil.dynamics.tank import Tank
 
 
 class HarmonicResponse(NamedTuple):
-    """Steady oscillation ``amplitude cos(omega t + phase)`` of roll and tank.
+    """Steady oscillation ``amplitude cos(omega t + phase)`` of roll and tank."""
 
-    Attributes
-    ----------
-    roll_rad, roll_phase_rad : ndarray, shape (n,)
-        Roll amplitude and phase, the phase in (-pi, pi].
-    tank_angle_rad, level_m, tank_phase_rad : ndarray, shape (n,)
-        Amplitudes of the tank angle and of the starboard level, and their common phase.
-    """
-
-    roll_rad: FloatArray
-    roll_phase_rad: FloatArray
+    roll_rad: FloatArray  #: shape (n,): Roll amplitude and phase, the phase in (-pi, pi].
+    roll_phase_rad: FloatArray  #: shape (n,): Roll amplitude and phase, the phase in (-pi, pi].
+    #: shape (n,): Amplitudes of the tank angle and of the starboard level, and their common phase.
     tank_angle_rad: FloatArray
+    #: shape (n,): Amplitudes of the tank angle and of the starboard level, and their common phase.
     level_m: FloatArray
+    #: shape (n,): Amplitudes of the tank angle and of the starboard level, and their common phase.
     tank_phase_rad: FloatArray
 
 

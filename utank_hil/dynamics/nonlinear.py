@@ -68,24 +68,14 @@ class RollCoefficients(NamedTuple):
 
 
 class Impact(NamedTuple):
-    """An impact of the water at a limit of the level.
-
-    Attributes
-    ----------
-    level_m : float
-        The limit; positive if starboard is full.
-    speed_m_s : float
-        dh/dt just before the impact.
-    roll_impulse_nms : float
-        Angular impulse of tank and water on the ship: its inertia times the jump of its roll rate.
-    stop_impulse_ns : float
-        Impulse of the stop on the water along h (pressure times reservoir area, over time).
-    """
+    """An impact of the water at a limit of the level."""
 
     time_s: float
-    level_m: float
-    speed_m_s: float
+    level_m: float  #: The limit; positive if starboard is full.
+    speed_m_s: float  #: dh/dt just before the impact.
+    #: Angular impulse of tank and water on the ship: its inertia times the jump of its roll rate.
     roll_impulse_nms: float
+    #: Impulse of the stop on the water along h (pressure times reservoir area, over time).
     stop_impulse_ns: float
 
 

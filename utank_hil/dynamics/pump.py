@@ -70,49 +70,26 @@ AT_REST = PumpState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
 class Pump:
     """Propeller pump, motor and drive.
 
-    Parameters
-    ----------
-    duct_area_m2 : float
-        Cross-section A that the propeller fills.
-    radius_m, pitch_m : float
-        Effective blade radius r, and advance p per radian without slip.
-    lift, friction : float
-        Blade coefficients for rho / 2: solidity times lift slope, and skin friction.
-    inertia_kg_m2 : float
-        Moment of inertia of rotor, motor (referred to the propeller) and entrained water.
-    max_speed_rad_s, max_torque_nm, max_power_w : float
-        Limits of motor and drive in either direction; the power is shaft power.
-    max_pressure_pa, max_pressure_rate_pa_s : float
-        Limits of the pressure reference.
-    lag_s : float
-        Time constant from set-point to pressure, inside the limits.
-    speed_bandwidth_rad_s : float
-        Bandwidth of the drive's speed loop.
-    pressure_gain, integral_time_s : float
-        Proportional gain and integral time of the pressure loop.
-
-    Raises
-    ------
-    ValueError
-        If a value is not positive and finite, the pitch makes the head curve ambiguous, or the loop
-        is slower than the lag.
+    ValueError is raised if a value is not positive and finite, the pitch makes the head curve
+    ambiguous, or the loop is slower than the lag.
     """
 
-    duct_area_m2: Positive
-    radius_m: Positive
-    pitch_m: Positive
-    lift: Positive
-    friction: Positive
+    duct_area_m2: Positive  #: Cross-section A that the propeller fills.
+    radius_m: Positive  #: Effective blade radius r.
+    pitch_m: Positive  #: Advance p per radian without slip.
+    lift: Positive  #: Blade coefficient for rho / 2: solidity times lift slope.
+    friction: Positive  #: Blade coefficient for rho / 2: skin friction.
+    #: Moment of inertia of rotor, motor (referred to the propeller) and entrained water.
     inertia_kg_m2: Positive
-    max_speed_rad_s: Positive
-    max_torque_nm: Positive
-    max_power_w: Positive
-    max_pressure_pa: Positive
-    max_pressure_rate_pa_s: Positive
-    lag_s: Positive = 0.1
-    speed_bandwidth_rad_s: Positive = 30.0
-    pressure_gain: Positive = 1.0
-    integral_time_s: Positive = 0.5
+    max_speed_rad_s: Positive  #: Limit of motor and drive, in either direction.
+    max_torque_nm: Positive  #: Limit of motor and drive, in either direction.
+    max_power_w: Positive  #: Limit of the shaft power, in either direction.
+    max_pressure_pa: Positive  #: Limit of the pressure reference.
+    max_pressure_rate_pa_s: Positive  #: Limit of the rate of the pressure reference.
+    lag_s: Positive = 0.1  #: Time constant from set-point to pressure, inside the limits.
+    speed_bandwidth_rad_s: Positive = 30.0  #: Bandwidth of the drive's speed loop.
+    pressure_gain: Positive = 1.0  #: Proportional gain of the pressure loop.
+    integral_time_s: Positive = 0.5  #: Integral time of the pressure loop.
     density_kg_m3: Positive = 1000.0
 
     def __post_init__(self) -> None:

@@ -31,22 +31,12 @@ class _Event:
 
 @dataclass(frozen=True, slots=True)
 class RollRun:
-    """Result of a simulation.
+    """Result of a simulation."""
 
-    Parameters
-    ----------
-    time_s : ndarray, shape (n,)
-    state : ndarray, shape (n, 4)
-        Roll, roll rate, level, level rate.
-    impacts : tuple of Impact
-        Impacts at the limits of the level.
-    capsized_s : float
-        Time at which the roll passed the capsize angle and the run ended; infinite if it did not.
-    """
-
-    time_s: FloatArray
-    state: FloatArray
-    impacts: tuple[Impact, ...]
+    time_s: FloatArray  #: shape (n,)
+    state: FloatArray  #: shape (n, 4): Roll, roll rate, level, level rate.
+    impacts: tuple[Impact, ...]  #: Impacts at the limits of the level.
+    #: Time at which the roll passed the capsize angle and the run ended; infinite if it did not.
     capsized_s: float
 
 

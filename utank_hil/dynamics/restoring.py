@@ -18,17 +18,12 @@ from utank_hil.dynamics.ship import RollShip
 
 
 class Restoring(NamedTuple):
-    """Pieces of the restoring moment.
+    """Pieces of the restoring moment."""
 
-    Attributes
-    ----------
-    piece_rad : float
-        Width of a piece; infinite for a polynomial. The last piece extends beyond its end.
-    coefficients_nm : ndarray, shape (pieces, powers)
-        Moment within a piece as a polynomial of the angle since the piece's start, lowest first.
-    """
-
+    #: Width of a piece; infinite for a polynomial. The last piece extends beyond its end.
     piece_rad: float
+    #: shape (pieces, powers): Moment within a piece as a polynomial of the angle since the piece's
+    #: start, lowest first.
     coefficients_nm: FloatArray
 
     def moment_nm(self, roll_rad: npt.ArrayLike) -> FloatArray:

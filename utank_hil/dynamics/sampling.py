@@ -49,6 +49,8 @@ def sampled_model(
 ) -> "StateSpace":
     """Discrete model from command to sampled outputs, with the timing of the module docstring.
 
+    ValueError is raised if a time is out of range, or the model is discrete or has feedthrough.
+
     Parameters
     ----------
     system : control.StateSpace
@@ -63,11 +65,6 @@ def sampled_model(
     -------
     control.StateSpace
         States: those of `system`, the lags of its inputs (if `lag_s` > 0), past commands.
-
-    Raises
-    ------
-    ValueError
-        If a time is out of range, or the model is discrete or has feedthrough.
     """
     from control import ss  # This import would bring plotting into the process.
 

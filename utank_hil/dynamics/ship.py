@@ -24,55 +24,31 @@ class RollShip:
     The restoring moment is ``k1 phi + k3 phi^3 + k5 phi^5 + ...`` or, if `gz_m` is given, the
     displacement times a spline through the righting levers. The linear models use only inertia,
     stiffness and linear damping.
-
-    Parameters
-    ----------
-    inertia_kg_m2 : float
-        Roll inertia I about the centre of gravity, added inertia included.
-    stiffness_nm_rad : float
-        Hydrostatic restoring moment k1 per roll angle at zero heel: displacement times GM.
-    damping_nms_rad : float
-        Linear roll damping d1, thesis b44.
-    quadratic_damping_nms2_rad2 : float
-        Damping moment per ``|roll rate| roll rate``, thesis b44q.
-    lift_damping_ns2_rad : float
-        Increase of the linear damping per speed ahead, by the lift on hull and keels: N m s/rad per
-        m/s. The linear models and the laws leave it out.
-    restoring_odd_nm : tuple of float
-        Higher coefficients (k3, k5, ...) of the restoring polynomial, N m per rad^3, rad^5, ...
-    displacement_n : float
-        Displacement as a weight; used with `gz_m` only.
-    gz_step_rad : float
-        Spacing of the heel angles of `gz_m`.
-    gz_m : tuple of float
-        Righting levers at heel 0, `gz_step_rad`, 2 `gz_step_rad`, ...; the first is 0.
-    offset_moment_nm : float
-        Moment of off-centre weight in the upright ship; varies with the cosine of the roll angle.
-    wind_moment_nm : float
-        Steady wind moment, the same at every angle.
-    sway_of_slope : float, optional
-        Lateral acceleration of the centre of gravity, as a share of g times the slope of the waves:
-        1 in long waves, 0.4 to 0.8 where ships roll most. Without it the ship does not sway, and
-        the monitors allow for every share up to `MOST_SWAY`.
-
-    Raises
-    ------
-    ValueError
-        If inertia or stiffness is not positive, a damping is negative, a number is not finite or
-        too large, or the table of levers is incomplete or given besides a polynomial.
     """
 
+    #: Roll inertia I about the centre of gravity, added inertia included.
     inertia_kg_m2: Annotated[float, Range(above=0, most=_MOST)]
+    #: Hydrostatic restoring moment k1 per roll angle at zero heel: displacement times GM.
     stiffness_nm_rad: Annotated[float, Range(above=0, most=_MOST)]
+    #: Linear roll damping d1, thesis b44.
     damping_nms_rad: Annotated[float, Range(least=0, most=_MOST)] = 0.0
+    #: Damping moment per ``|roll rate| roll rate``, thesis b44q.
     quadratic_damping_nms2_rad2: Annotated[float, Range(least=0, most=_MOST)] = 0.0
+    #: Increase of the linear damping per speed ahead, by the lift on hull and keels: N m s/rad per
+    #: m/s. The linear models and the laws leave it out.
     lift_damping_ns2_rad: Annotated[float, Range(least=0, most=_MOST)] = 0.0
+    #: Higher coefficients (k3, k5, ...) of the restoring polynomial, N m per rad^3, rad^5, ...
     restoring_odd_nm: tuple[Finite, ...] = ()
-    displacement_n: Finite = 0.0
-    gz_step_rad: Finite = 0.0
+    displacement_n: Finite = 0.0  #: Displacement as a weight; used with `gz_m` only.
+    gz_step_rad: Finite = 0.0  #: Spacing of the heel angles of `gz_m`.
+    #: Righting levers at heel 0, `gz_step_rad`, 2 `gz_step_rad`, ...; the first is 0.
     gz_m: tuple[Finite, ...] = ()
+    #: Moment of off-centre weight in the upright ship; varies with the cosine of the roll angle.
     offset_moment_nm: Finite = 0.0
-    wind_moment_nm: Finite = 0.0
+    wind_moment_nm: Finite = 0.0  #: Steady wind moment, the same at every angle.
+    #: Lateral acceleration of the centre of gravity, as a share of g times the slope of the waves:
+    #: 1 in long waves, 0.4 to 0.8 where ships roll most. Without it the ship does not sway, and the
+    #: monitors allow for every share up to `MOST_SWAY`.
     sway_of_slope: Annotated[float, Range(least=0, most=MOST_SWAY)] | None = None
 
     def __post_init__(self) -> None:

@@ -48,33 +48,16 @@ CALM = WaveMoment(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
 class BatchResult(NamedTuple):
-    """Results for a batch of n ships.
+    """Results for a batch of n ships."""
 
-    Attributes
-    ----------
-    state : ndarray, shape (n, 4)
-        Final state, or the state at capsizing.
-    capsized_s : ndarray, shape (n,)
-        Time of capsizing, infinite for a ship that survived.
-    max_roll_rad, max_level_m : ndarray, shape (n,)
-    strikes : ndarray of int, shape (n,)
-        Number of impacts at the limits of the level.
-    max_roll_impulse_nms : ndarray, shape (n,)
-        Greatest angular impulse of these impacts.
-    time_s : ndarray, shape (k,)
-        Times of `history`.
-    history : ndarray, shape (n, k, 4)
-        States, if `record_every` was given; else k = 0.
-    """
-
-    state: FloatArray
-    capsized_s: FloatArray
-    max_roll_rad: FloatArray
-    max_level_m: FloatArray
-    strikes: npt.NDArray[np.int64]
-    max_roll_impulse_nms: FloatArray
-    time_s: FloatArray
-    history: FloatArray
+    state: FloatArray  #: shape (n, 4): Final state, or the state at capsizing.
+    capsized_s: FloatArray  #: shape (n,): Time of capsizing, infinite for a ship that survived.
+    max_roll_rad: FloatArray  #: shape (n,)
+    max_level_m: FloatArray  #: shape (n,)
+    strikes: npt.NDArray[np.int64]  #: shape (n,): Number of impacts at the limits of the level.
+    max_roll_impulse_nms: FloatArray  #: shape (n,): Greatest angular impulse of these impacts.
+    time_s: FloatArray  #: shape (k,): Times of `history`.
+    history: FloatArray  #: shape (n, k, 4): States, if `record_every` was given; else k = 0.
 
 
 def simulate(
@@ -94,6 +77,8 @@ def simulate(
 
     The result lists the first 10,000 impacts at the level limits.
 
+    ValueError is raised if a duration is not a whole number of steps, or shapes do not match.
+
     Parameters
     ----------
     duration_s : float
@@ -108,11 +93,6 @@ def simulate(
         Steps between the recorded states.
     capsize_rad : float
         Roll angle at which the ship counts as capsized and the run ends.
-
-    Raises
-    ------
-    ValueError
-        If a duration is not a whole number of steps, or shapes do not match.
     """
     from utank_hil.dynamics import kernels
 

@@ -37,37 +37,21 @@ MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 class SixDegreeShip:
     """A rigid ship with linear hydrodynamics, without its tank water.
 
-    Parameters
-    ----------
-    roll : RollShip
-        Ship in roll; its inertia includes ``added_mass[3][3]``.
-    pitch_inertia_kg_m2, yaw_inertia_kg_m2 : float
-        Inertias about the centre of gravity, without added mass.
-    product_xz_kg_m2 : float
-        Product of inertia, the integral of x z dm.
-    added_mass : 6 x 6 nested tuple of float
-        Added mass about the centre of gravity, symmetric, SI units.
-    damping : 6 x 6 nested tuple of float
-        Linear damping in SI units; ``[3][3]`` must be zero, because `roll` has the roll damping.
-    heave_stiffness_n_m, heave_pitch_n, pitch_stiffness_nm_rad : float
-        Hydrostatic stiffnesses k_z, k_zt, k_t.
-
-    Raises
-    ------
-    ValueError
-        If a matrix has the wrong shape or symmetry, or the mass matrix is not positive definite.
+    ValueError is raised if a matrix has the wrong shape or symmetry, or the mass matrix is not
+    positive definite.
     """
 
-    roll: RollShip
+    roll: RollShip  #: Ship in roll; its inertia includes ``added_mass[3][3]``.
     mass_kg: float
-    pitch_inertia_kg_m2: float
-    yaw_inertia_kg_m2: float
-    product_xz_kg_m2: float = 0.0
-    added_mass: Matrix6 = ZERO6
+    pitch_inertia_kg_m2: float  #: Inertias about the centre of gravity, without added mass.
+    yaw_inertia_kg_m2: float  #: Inertias about the centre of gravity, without added mass.
+    product_xz_kg_m2: float = 0.0  #: Product of inertia, the integral of x z dm.
+    added_mass: Matrix6 = ZERO6  #: Added mass about the centre of gravity, symmetric, SI units.
+    #: Linear damping in SI units; ``[3][3]`` must be zero, because `roll` has the roll damping.
     damping: Matrix6 = ZERO6
-    heave_stiffness_n_m: float = 0.0
-    heave_pitch_n: float = 0.0
-    pitch_stiffness_nm_rad: float = 0.0
+    heave_stiffness_n_m: float = 0.0  #: Hydrostatic stiffnesses k_z, k_zt, k_t.
+    heave_pitch_n: float = 0.0  #: Hydrostatic stiffnesses k_z, k_zt, k_t.
+    pitch_stiffness_nm_rad: float = 0.0  #: Hydrostatic stiffnesses k_z, k_zt, k_t.
 
     def __post_init__(self) -> None:
         for name in ("added_mass", "damping"):
@@ -202,6 +186,8 @@ def simulate_six_degree(
 ) -> tuple[FloatArray, FloatArray]:
     """Integrate with Dormand-Prince 8(5,3) from `initial`, shape (14,).
 
+    RuntimeError is raised if the integrator fails.
+
     Parameters
     ----------
     pressure_pa, force : callable
@@ -213,11 +199,6 @@ def simulate_six_degree(
     -------
     time_s : ndarray, shape (samples,)
     state : ndarray, shape (samples, 14)
-
-    Raises
-    ------
-    RuntimeError
-        If the integrator fails.
     """
     from scipy.integrate import solve_ivp
 

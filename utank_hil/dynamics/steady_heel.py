@@ -22,17 +22,10 @@ class SteadyHeel(NamedTuple):
 
 
 class RightingRange(NamedTuple):
-    """Range of heel in which a ship rights itself with the water at rest in its tank.
+    """Range of heel in which a ship rights itself with the water at rest in its tank."""
 
-    Attributes
-    ----------
-    greatest_rad : float
-        Heel of the greatest righting moment.
-    vanishing_rad : float
-        Heel from which it capsizes; infinite if there is none up to 90 degrees.
-    """
-
-    greatest_rad: float
+    greatest_rad: float  #: Heel of the greatest righting moment.
+    #: Heel from which it capsizes; infinite if there is none up to 90 degrees.
     vanishing_rad: float
 
 

@@ -27,48 +27,22 @@ GRAVITY_M_S2 = 9.80665  # Standard gravity (ISO 80000-3).
 
 @dataclass(frozen=True, slots=True)
 class Tank:
-    """Geometry and losses of a U-tube tank.
+    """Geometry and losses of a U-tube tank."""
 
-    Parameters
-    ----------
-    width_m : float
-        Duct length L, the distance between the reservoirs' centre lines.
-    height_m : float
-        Still-water height H of the reservoirs above the duct.
-    reservoir_area_m2 : float
-        Horizontal area At of one reservoir.
-    duct_area_m2 : float
-        Cross-section Ap of the duct.
-    lx_m, lz_m : float
-        Duct centre forward of and below the ship's centre of gravity.
-    density_kg_m3 : float
-        Density of the tank water.
-    damping_ratio : float
-        Linear loss, as the damping ratio of the water's free oscillation in a fixed ship.
-    quadratic_loss : float
-        Coefficient zeta of the pressure loss ``zeta rho / 2 |u| u``, u the speed in the duct.
-    headroom_m : float
-        Height of the reservoirs' roof above the still level.
-    restitution : float
-        Coefficient of restitution of the level at its limits: 0 plastic, 1 elastic.
-
-    Raises
-    ------
-    ValueError
-        If a length, area or density is not positive, a loss is negative, or the restitution lies
-        outside 0 to 1.
-    """
-
-    width_m: Positive
-    height_m: Positive
-    reservoir_area_m2: Positive
-    duct_area_m2: Positive
-    lx_m: Finite = 0.0
-    lz_m: Finite = 0.0
-    density_kg_m3: Positive = 1000.0
+    width_m: Positive  #: Duct length L, the distance between the reservoirs' centre lines.
+    height_m: Positive  #: Still-water height H of the reservoirs above the duct.
+    reservoir_area_m2: Positive  #: Horizontal area At of one reservoir.
+    duct_area_m2: Positive  #: Cross-section Ap of the duct.
+    lx_m: Finite = 0.0  #: Duct centre forward of the ship's centre of gravity.
+    lz_m: Finite = 0.0  #: Duct centre below the ship's centre of gravity.
+    density_kg_m3: Positive = 1000.0  #: Density of the tank water.
+    #: Linear loss, as the damping ratio of the water's free oscillation in a fixed ship.
     damping_ratio: NotNegative = 0.0
+    #: Coefficient zeta of the pressure loss ``zeta rho / 2 |u| u``, u the speed in the duct.
     quadratic_loss: NotNegative = 0.0
+    #: Height of the reservoirs' roof above the still level.
     headroom_m: Annotated[float, Range(above=0, infinite=True)] = math.inf
+    #: Coefficient of restitution of the level at its limits: 0 plastic, 1 elastic.
     restitution: Share = 0.0
 
     def __post_init__(self) -> None:

@@ -19,21 +19,10 @@ STOPPING_S = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class ValveRange:
-    """Range of a valve's loss.
+    """Range of a valve's loss."""
 
-    Parameters
-    ----------
-    open_loss, shut_loss : float
-        Smallest and greatest loss in Pa per (m/s)^2 of dh/dt.
-
-    Raises
-    ------
-    ValueError
-        If the losses are negative or not in order.
-    """
-
-    open_loss: float
-    shut_loss: float
+    open_loss: float  #: Smallest loss in Pa per (m/s)^2 of dh/dt.
+    shut_loss: float  #: Greatest loss.
 
     def __post_init__(self) -> None:
         if not 0 <= self.open_loss < self.shut_loss < math.inf:
@@ -44,34 +33,18 @@ class ValveRange:
 
 @dataclass(frozen=True, slots=True)
 class Valve:
-    """Valve of a semi-active tank, with its actuator.
+    """Valve of a semi-active tank, with its actuator."""
 
-    Parameters
-    ----------
-    kind : str
-        "duct": a gate in the duct. "air": an orifice in the air pipe between the reservoirs.
-    opening_time_s : float
-        Time from shut to open, and back.
-    leakage : float
-        Open share that remains when the valve is shut.
-    fail_position : str
-        "open" or "shut": the position without a command or power.
-    pipe_area_m2 : float, optional
-        Area of an air valve, fully open.
-    discharge_coefficient : float
-        Coefficient of an air valve, see `air_valve_loss`.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of its range, or `pipe_area_m2` does not go with the kind.
-    """
-
+    #: "duct": a gate in the duct. "air": an orifice in the air pipe between the reservoirs.
     kind: Literal["air", "duct"]
+    #: Time from shut to open, and back.
     opening_time_s: Annotated[float, Range(least=0.05, most=60)]
+    #: Open share that remains when the valve is shut.
     leakage: Annotated[float, Range(above=0, below=1)]
+    #: "open" or "shut": the position without a command or power.
     fail_position: Literal["open", "shut"] = "open"
-    pipe_area_m2: Positive | None = None
+    pipe_area_m2: Positive | None = None  #: Area of an air valve, fully open.
+    #: Coefficient of an air valve, see `air_valve_loss`.
     discharge_coefficient: Annotated[float, Range(above=0, most=1)] = 0.6
 
     def __post_init__(self) -> None:
@@ -157,11 +130,6 @@ def air_valve_loss(
         Open fraction of that area, above 0 and up to 1.
     discharge_coefficient : float
         Contraction of the jet; 0.6 for a sharp edge.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
     """
     _check_opening(opening)
     for name, value in (

@@ -14,34 +14,20 @@ from utank_hil.dynamics.tank import Tank
 
 
 class WaterMoments(NamedTuple):
-    """Integrals over the mass of the water, and their derivatives with respect to the level.
-
-    Attributes
-    ----------
-    first_kgm : ndarray, shape (..., 3)
-        Integral of r dm about the ship's centre of gravity.
-    first_slope_kg : ndarray, shape (..., 3)
-        d first / dh; times dh/dt it is the momentum of the flow relative to the ship.
-    first_curvature_kg_m : ndarray, shape (3,)
-        d2 first / dh2.
-    inertia_kgm2 : ndarray, shape (..., 3, 3)
-        Inertia tensor about the ship's centre of gravity.
-    inertia_slope_kgm : ndarray, shape (..., 3, 3)
-        d inertia / dh.
-    swirl_kgm : ndarray, shape (..., 3)
-        Angular momentum of the flow relative to the ship per dh/dt.
-    swirl_slope_kg : ndarray, shape (3,)
-        d swirl / dh.
-    """
+    """Integrals over the mass of the water, and their derivatives with respect to the level."""
 
     mass_kg: float
-    first_kgm: FloatArray
+    first_kgm: FloatArray  #: shape (..., 3): Integral of r dm about the ship's centre of gravity.
+    #: shape (..., 3): d first / dh; times dh/dt it is the momentum of the flow relative to the
+    #: ship.
     first_slope_kg: FloatArray
-    first_curvature_kg_m: FloatArray
+    first_curvature_kg_m: FloatArray  #: shape (3,): d2 first / dh2.
+    #: shape (..., 3, 3): Inertia tensor about the ship's centre of gravity.
     inertia_kgm2: FloatArray
-    inertia_slope_kgm: FloatArray
+    inertia_slope_kgm: FloatArray  #: shape (..., 3, 3): d inertia / dh.
+    #: shape (..., 3): Angular momentum of the flow relative to the ship per dh/dt.
     swirl_kgm: FloatArray
-    swirl_slope_kg: FloatArray
+    swirl_slope_kg: FloatArray  #: shape (3,): d swirl / dh.
 
 
 def water_moments(tank: Tank, level_m: npt.ArrayLike) -> WaterMoments:

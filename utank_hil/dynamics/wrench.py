@@ -37,6 +37,8 @@ def tank_wrench(
 
     Exact in the level; leading shapes broadcast. Body axes at the ship's centre of gravity.
 
+    ValueError is raised if a vector argument does not end in an axis of length 3.
+
     Parameters
     ----------
     h, h_dot, h_ddot : array_like, shape (...)
@@ -62,11 +64,6 @@ def tank_wrench(
     residual : ndarray, shape (...)
         Line integral of (particle acceleration - g) from the port to the starboard surface in
         m^2/s^2. The water moves so that density times residual equals pump pressure minus losses.
-
-    Raises
-    ------
-    ValueError
-        If a vector argument does not end in an axis of length 3.
     """
     v0, omega, v0_dot, omega_dot = (
         _vector(name, value)

@@ -15,13 +15,7 @@ from utank_hil.base.arrays import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class DisturbanceBasis:
-    """Sine and cosine, polynomial and exponential functions of time.
-
-    Raises
-    ------
-    ValueError
-        If a frequency is not positive, a rate is zero, one is repeated, or the degree is negative.
-    """
+    """Sine and cosine, polynomial and exponential functions of time."""
 
     frequencies_rad_s: Sequence[float] = ()  #: Frequencies, with a sine and a cosine each.
     #: Degree of Legendre polynomials over the record: 0 for an offset (a steady heel, the bias of a

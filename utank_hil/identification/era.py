@@ -48,19 +48,16 @@ class Realization:
 def era(markov: FloatArray, order: int | None = None, *, sample_time_s: float) -> "StateSpace":
     """Realize a discrete state-space model by ERA.
 
+    ValueError is raised if the Markov parameters have the wrong shape or the order does not fit
+    them. IdentificationError is raised if the Markov parameters are zero, or too large or small for
+    the computation.
+
     Parameters
     ----------
     markov : array_like, shape (K, m, r)
         Markov parameters; ``markov[0]`` is D.
     order : int or None
         Number of states; None: `order_from_singular_values`.
-
-    Raises
-    ------
-    ValueError
-        If the Markov parameters have the wrong shape or the order does not fit them.
-    IdentificationError
-        If the Markov parameters are zero, or too large or small for the computation.
     """
     markov = _checked(markov)
     found = realize(markov, order)

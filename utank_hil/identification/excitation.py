@@ -24,6 +24,8 @@ def random_pulses(
 ) -> FloatArray:
     """Pulses of random amplitude and length, the excitation of thesis 3.7.
 
+    ValueError is raised if a duration or hold time is shorter than a sample.
+
     Parameters
     ----------
     limits : PumpLimits
@@ -35,11 +37,6 @@ def random_pulses(
     -------
     ndarray, shape (N,)
         Pressure in Pa.
-
-    Raises
-    ------
-    ValueError
-        If a duration or hold time is shorter than a sample.
     """
     samples = _samples(duration_s, sample_time_s)
     shortest, longest = (_samples(hold, sample_time_s) for hold in hold_s)
@@ -116,18 +113,15 @@ def chirp(
 def response_scale(pressure_pa: FloatArray, model: ARX, response_limits: FloatArray) -> float:
     """Factor, at most 1, that keeps the response to an excitation within limits.
 
+    ValueError is raised if the limits do not match the model's outputs or are not positive, or the
+    model has more than one input.
+
     Parameters
     ----------
     model : ARX
         Model from pressure to outputs; the response is simulated from rest, without waves.
     response_limits : array_like, shape (m,)
         Largest magnitude of each output, such as added roll in rad and level in m.
-
-    Raises
-    ------
-    ValueError
-        If the limits do not match the model's outputs or are not positive, or the model has more
-        than one input.
     """
     limits = np.asarray(response_limits, dtype=np.float64)
     if limits.shape != (model.outputs,) or not (limits > 0).all():

@@ -37,6 +37,8 @@ class LagRegression:
     Coefficients have shape (n, m), n = r + p q + d: beta_0 transposed, then alpha_i and beta_i
     transposed for each lag i = 1..p, then the rows of the basis.
 
+    IdentificationError is raised if no segment is longer than the order.
+
     Parameters
     ----------
     z : ndarray, shape (N, q)
@@ -47,11 +49,6 @@ class LagRegression:
         Order p of the model.
     basis : ndarray, shape (d, N)
         Disturbance basis at every sample.
-
-    Raises
-    ------
-    IdentificationError
-        If no segment is longer than the order.
     """
 
     def __init__(self, z: FloatArray, outputs: int, order: int, basis: FloatArray) -> None:

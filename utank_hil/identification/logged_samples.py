@@ -16,6 +16,8 @@ def logged_samples(
 ) -> FloatArray:
     """Return rows (mean command since the last sample, outputs...), the retuner's record.
 
+    ValueError is raised if the recording lacks a column or the part is empty.
+
     Parameters
     ----------
     columns : mapping of str to ndarray, shape (n,)
@@ -31,11 +33,6 @@ def logged_samples(
     -------
     ndarray, shape (N, 1 + m)
         Samples; NaN for missing values.
-
-    Raises
-    ------
-    ValueError
-        If the recording lacks a column or the part is empty.
     """
     if "level_m" in measured and "port_level_m" in columns:
         level_m = (columns["starboard_level_m"] - columns["port_level_m"]) / 2

@@ -72,10 +72,8 @@ def modal_confidence(result: OkidResult, order: int) -> ModalConfidence:
 
     The modes are those of ``modal_parameters(era(result.markov, order, sample_time_s))``.
 
-    Raises
-    ------
-    ValueError, IdentificationError
-        If `era` raises them, or poles coincide or lie at 0 or 1, where the gradient is not defined.
+    The errors are those of `era`; IdentificationError is also raised if poles coincide or lie at 0
+    or 1, where the gradient is not defined.
     """
     found = realize(result.markov, order)
     sample_time_s = result.arx.sample_time_s

@@ -92,6 +92,10 @@ def okid(
 ) -> OkidResult:
     """Identify a model from a record of inputs and outputs.
 
+    ValueError is raised if an argument has the wrong shape or value. IdentificationError is raised
+    if the record does not determine a model: too short, too many gaps, too little excitation, an
+    output that does not move or is clipped.
+
     Parameters
     ----------
     u : array_like, shape (N, r) or (N,)
@@ -110,14 +114,6 @@ def okid(
         0 fits an offset, 1 also a drift.
     disturbance_decay_rates_1_s : sequence of float
         Decay rates of exponential disturbances.
-
-    Raises
-    ------
-    ValueError
-        If an argument has the wrong shape or value.
-    IdentificationError
-        If the record does not determine a model: too short, too many gaps, too little excitation,
-        an output that does not move or is clipped.
     """
     fitted = _fitted(
         u,

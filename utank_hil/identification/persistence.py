@@ -16,17 +16,14 @@ def excitation_order(u: FloatArray, most: int) -> int:
     more; all coefficients of an ARX model of order p need p + 1. A narrow-band signal has a low
     order for any number of lines.
 
+    IdentificationError is raised if no segment without gaps has `most` samples.
+
     Parameters
     ----------
     u : array_like, shape (N,) or (N, r)
         Input; rows that are not finite are gaps.
     most : int
         Largest order to test.
-
-    Raises
-    ------
-    IdentificationError
-        If no segment without gaps has `most` samples.
     """
     signal = np.asarray(u, dtype=np.float64)
     signal = signal[:, None] if signal.ndim == 1 else signal

@@ -29,11 +29,8 @@ def stacked_record(u: FloatArray, y: FloatArray) -> tuple[FloatArray, int]:
 def channel_scale(z: FloatArray, outputs: int) -> FloatArray:
     """Root mean square of each channel, shape (q,), to scale pascals and radians alike.
 
-    Raises
-    ------
-    IdentificationError
-        If the record has no finite row, a channel is constant or far out of range, or an output is
-        clipped.
+    IdentificationError is raised if the record has no finite row, a channel is constant or far out
+    of range, or an output is clipped.
     """
     good = z[np.isfinite(z[:, 0])]
     if len(good) == 0:

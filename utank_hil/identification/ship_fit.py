@@ -74,6 +74,9 @@ def fit_ship(
 ) -> ShipFit:
     """Fit ship and tank to the result of OKID.
 
+    ValueError is raised if outputs or inputs do not match the model. IdentificationError is raised
+    if no ship can be fitted.
+
     Parameters
     ----------
     result : OkidResult
@@ -84,13 +87,6 @@ def fit_ship(
         Initial values; parameters that are not fitted keep these.
     measured : tuple of str
         Outputs of the model, names in `utank_hil.dynamics.linear.STATES`.
-
-    Raises
-    ------
-    ValueError
-        If outputs or inputs do not match the model.
-    IdentificationError
-        If no ship can be fitted.
     """
     arx, ship, tank = result.arx, plant.ship, plant.tank
     if (arx.outputs, arx.inputs) != (len(measured), 1):

@@ -52,6 +52,11 @@ def validate(
 ) -> Validation:
     """Validate a model on a record, preferably one that it was not identified from.
 
+    ValueError is raised if the record's channels do not match the model, or `lags` is below 1.
+    IdentificationError is raised if the record does not allow a validation: no segment longer than
+    order and lags, fewer predictions than lags, a channel that does not move, a clipped output, or
+    predictions that overflow.
+
     Parameters
     ----------
     u : array_like, shape (N, r) or (N,)
@@ -64,15 +69,6 @@ def validate(
     disturbance_polynomial_degree : int or None
         0 for an offset, 1 also for a drift, both fitted to this record: a heel or the bias of a
         sensor, which `okid` fits as well, is not an error of the model.
-
-    Raises
-    ------
-    ValueError
-        If the record's channels do not match the model, or `lags` is below 1.
-    IdentificationError
-        If the record does not allow a validation: no segment longer than order and lags, fewer
-        predictions than lags, a channel that does not move, a clipped output, or predictions that
-        overflow.
     """
     if int(lags) != lags or lags < 1:
         raise ValueError(f"lags must be a positive integer, got {lags}")

@@ -35,6 +35,9 @@ def find_disturbance_frequencies(
 ) -> tuple[float, ...]:
     """Frequencies of sinusoidal disturbances, an argument of `okid`.
 
+    ValueError is raised if the band does not lie between zero and the Nyquist frequency.
+    IdentificationError is raised if the record is too short or a channel does not move.
+
     Parameters
     ----------
     u : array_like, shape (N, r) or (N,)
@@ -49,13 +52,6 @@ def find_disturbance_frequencies(
     -------
     tuple of float
         rad/s, the strongest first; empty if no line is significant.
-
-    Raises
-    ------
-    ValueError
-        If the band does not lie between zero and the Nyquist frequency.
-    IdentificationError
-        If the record is too short or a channel does not move.
     """
     low, high = band_rad_s
     if not 0 < low < high < np.pi / sample_time_s:

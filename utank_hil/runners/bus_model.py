@@ -24,43 +24,27 @@ WINDOW_NS: Final = 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class BusStatistics:
-    """Traffic on the bus since time 0.
+    """Traffic on the bus since time 0."""
 
-    Attributes
-    ----------
-    frames : int
-        Frames whose transmission has begun.
-    load : float
-        Bus load, 0 to 1.
-    window_loads : tuple of float
-        Bus load of each complete window of 1 s, oldest first.
-    delay_p50_ns, delay_p99_ns, delay_max_ns : int
-        Percentiles of the queueing delay, up to the start of frame; exact; 0 without frames.
-    waiting : int
-        Frames in the queue.
-    """
-
-    frames: int
-    load: float
-    window_loads: tuple[float, ...]
+    frames: int  #: Frames whose transmission has begun.
+    load: float  #: Bus load, 0 to 1.
+    window_loads: tuple[float, ...]  #: Bus load of each complete window of 1 s, oldest first.
+    #: Percentiles of the queueing delay, up to the start of frame; exact; 0 without frames.
     delay_p50_ns: int
     delay_p99_ns: int
     delay_max_ns: int
-    waiting: int
+    waiting: int  #: Frames in the queue.
 
 
 class SimulatedBus:
     """A CAN bus in simulated time, which starts at 0.
 
+    ValueError is raised if the bit rate is not positive or a bit does not take whole nanoseconds.
+
     Parameters
     ----------
     bit_rate : int
         Bits per second; a bit must take whole nanoseconds.
-
-    Raises
-    ------
-    ValueError
-        If the bit rate is not positive or a bit does not take whole nanoseconds.
     """
 
     def __init__(self, bit_rate: int = 250_000) -> None:
@@ -87,10 +71,7 @@ class SimulatedBus:
 
         It keeps the bus for `more_bits` longer than its own bits take.
 
-        Raises
-        ------
-        ValueError
-            If the identifier or the payload is too long for CAN.
+        ValueError is raised if the identifier or the payload is too long for CAN.
         """
         duration_ns = (frame_bits(frame) + more_bits) * self._bit_ns
         self._order += 1

@@ -23,6 +23,8 @@ Receive = Callable[[Frame, int], None]
 class NodeGroup:
     """The nodes of one runner, in the order given.
 
+    ValueError is raised if there is no node, a name comes twice, or a period is not positive.
+
     Parameters
     ----------
     nodes : sequence of Node
@@ -36,11 +38,6 @@ class NodeGroup:
         Greatest common divisor of the nodes' periods.
     next_tick_ns : int
         Time at which the next node is due.
-
-    Raises
-    ------
-    ValueError
-        If there is no node, a name comes twice, or a period is not positive.
     """
 
     def __init__(self, nodes: Sequence[Node]) -> None:
@@ -83,13 +80,7 @@ class NodeGroup:
         self.next_tick_ns = now_ns
 
     def joined_by(self, nodes: Sequence[Node], now_ns: int) -> "NodeGroup":
-        """The group with more nodes: these are due now, the others when they were to be.
-
-        Raises
-        ------
-        ValueError
-            As of a new group.
-        """
+        """The group with more nodes: these are due now, the others when they were to be."""
         group = NodeGroup([*self._nodes, *nodes])
         group._due_ns = [*self._due_ns, *([now_ns] * len(nodes))]
         group.next_tick_ns = now_ns
@@ -101,10 +92,7 @@ class NodeGroup:
         An overdue node is ticked once and is next due at the next point of its own grid: missed
         ticks are dropped and do not shift the grid.
 
-        Raises
-        ------
-        NodeError
-            If a node raises, or `send` refuses its frame.
+        NodeError is raised if a node raises, or `send` refuses its frame.
         """
         due_ns = self._due_ns
         index = 0
@@ -123,10 +111,7 @@ class NodeGroup:
     def deliver(self, sender: int, frame: Frame, now_ns: int) -> None:
         """Deliver a frame to every node that hears it, except its sender.
 
-        Raises
-        ------
-        NodeError
-            If a node raises.
+        NodeError is raised if a node raises.
         """
         listeners = self._listeners[sender].get(frame.can_id)
         if listeners is None:
@@ -141,10 +126,7 @@ class NodeGroup:
     def link_error(self, now_ns: int, reason: str) -> None:
         """Notify every `LinkObserver` that the bus can't be reached.
 
-        Raises
-        ------
-        NodeError
-            If a node raises.
+        NodeError is raised if a node raises.
         """
         for node in self._nodes:
             if isinstance(node, LinkObserver):
@@ -162,10 +144,7 @@ class NodeGroup:
     def stop(self, now_ns: int, send: Send) -> None:
         """Stop every `Stoppable` node and pass its last frames to `send`.
 
-        Raises
-        ------
-        NodeError
-            If a node raises; the others are stopped nevertheless.
+        NodeError is raised if a node raises; the others are stopped nevertheless.
         """
         with ExitStack() as everyone:  # runs every callback even if one raises, last entered first
             for index in reversed(range(len(self._nodes))):

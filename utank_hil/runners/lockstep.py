@@ -48,11 +48,6 @@ class Lockstep:
         Simulated time; every event before it has happened.
     bus : Bus
         The bus between the nodes.
-
-    Raises
-    ------
-    ValueError
-        If there is no node, a name comes twice, or a period is not positive.
     """
 
     def __init__(
@@ -67,13 +62,7 @@ class Lockstep:
         self.now_ns = 0
 
     def join(self, nodes: Sequence[Node]) -> None:
-        """Have more nodes on the bus from now on, after the others; those keep their cycles.
-
-        Raises
-        ------
-        ValueError
-            If a name comes twice, or a period is not positive.
-        """
+        """Have more nodes on the bus from now on, after the others; those keep their cycles."""
         self._group = self._group.joined_by(nodes, self.now_ns)
 
     def run_until(self, time_ns: int) -> None:
@@ -81,12 +70,8 @@ class Lockstep:
 
         The result does not depend on how a run is divided into calls.
 
-        Raises
-        ------
-        ValueError
-            If `time_ns` is in the past.
-        NodeError
-            If a node raises; the run can't be continued then.
+        ValueError is raised if `time_ns` is in the past. NodeError is raised if a node raises; the
+        run can't be continued then.
         """
         if time_ns < self.now_ns:
             raise ValueError(f"time_ns {time_ns}: the run is at {self.now_ns} already")

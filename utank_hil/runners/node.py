@@ -11,18 +11,10 @@ from utank_hil.canbus.frame import Frame
 
 
 class Node(Protocol):
-    """A participant on the CAN bus.
+    """A participant on the CAN bus."""
 
-    Attributes
-    ----------
-    name : str
-        Name in traces and statistics.
-    period_ns : int
-        Time between two ticks.
-    """
-
-    name: str
-    period_ns: int
+    name: str  #: Name in traces and statistics.
+    period_ns: int  #: Time between two ticks.
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take one frame from the bus, received at `now_ns` (monotonic clock, nanoseconds)."""
@@ -37,14 +29,9 @@ class Selective(Protocol):
 
     Runner and kernel need not deliver other frames. A node that detects unknown identifiers or
     measures the bus load must not have a filter.
-
-    Attributes
-    ----------
-    hears : frozenset of int
-        Identifiers to receive; read once, before the first tick.
     """
 
-    hears: frozenset[int]
+    hears: frozenset[int]  #: Identifiers to receive; read once, before the first tick.
 
 
 def heard_by(nodes: Iterable[Node]) -> frozenset[int] | None:

@@ -29,36 +29,20 @@ _CPU_DMA_LATENCY: Final = Path("/dev/cpu_dma_latency")
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """One real-time setting.
-
-    Attributes
-    ----------
-    name : str
-    granted : bool
-        Whether it is in force.
-    detail : str
-        Value in force, or the reason and the remedy.
-    """
+    """One real-time setting."""
 
     name: str
-    granted: bool
-    detail: str
+    granted: bool  #: Whether it is in force.
+    detail: str  #: Value in force, or the reason and the remedy.
 
 
 @dataclass(frozen=True, slots=True)
 class SchedulingReport:
-    """Real-time settings of the loop process at its start.
+    """Real-time settings of the loop process at its start."""
 
-    Attributes
-    ----------
-    measures : tuple of Measure
-        In the order of the requests.
-    native_threads : int
-        Threads that are not Python's, such as those of a linear-algebra library; they do not hold
-        the interpreter.
-    """
-
-    measures: tuple[Measure, ...]
+    measures: tuple[Measure, ...]  #: In the order of the requests.
+    #: Threads that are not Python's, such as those of a linear-algebra library; they do not hold
+    #: the interpreter.
     native_threads: int
 
     @property
@@ -81,17 +65,13 @@ def real_time_scheduling(priority: int = PRIORITY) -> Iterator[SchedulingReport]
     Enter it when everything is imported and built: existing objects are frozen, and the garbage
     collector stays off. Leaving the context restores the former settings.
 
+    RuntimeError is raised if there is another Python thread: it would delay ticks whatever the
+    permissions. ValueError is raised if the priority is out of range.
+
     Parameters
     ----------
     priority : int
         SCHED_FIFO priority, 1 to 99.
-
-    Raises
-    ------
-    RuntimeError
-        If there is another Python thread: it would delay ticks whatever the permissions.
-    ValueError
-        If the priority is out of range.
     """
     if not 1 <= priority <= 99:
         raise ValueError(f"priority {priority}: SCHED_FIFO has 1 to 99")

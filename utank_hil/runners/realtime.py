@@ -41,11 +41,6 @@ class RealTimeLoop:
         Where ticks, latencies and frames are counted; new by default.
     clock : Clock, optional
         By default the monotonic clock.
-
-    Raises
-    ------
-    ValueError
-        If there is no node, a name comes twice, or a period is not positive.
     """
 
     def __init__(
@@ -69,6 +64,8 @@ class RealTimeLoop:
         Nodes receive the time of the grid point, not of the wake-up, so that jitter does not enter
         what they integrate or differentiate.
 
+        NodeError is raised if a node raises; the nodes' `stop` is called nevertheless.
+
         Parameters
         ----------
         stop : callable
@@ -76,11 +73,6 @@ class RealTimeLoop:
         duration_ns : int, optional
             Length of the run: it ticks at the start and at every grid point before its end. Points
             without a tick count as skipped.
-
-        Raises
-        ------
-        NodeError
-            If a node raises; the nodes' `stop` is called nevertheless.
         """
         clock, statistics, period_ns = self._clock, self.statistics, self._group.base_period_ns
         statistics.real_time = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK in _REAL_TIME

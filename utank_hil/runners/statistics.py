@@ -84,40 +84,20 @@ class Histogram:
 
 @dataclass(slots=True)
 class LoopStatistics:
-    """Counters of the real-time loop.
+    """Counters of the real-time loop."""
 
-    Attributes
-    ----------
-    lateness : Histogram
-        Latency from the deadline to the start of the tick.
-    duration : Histogram
-        Execution time of the tick.
-    ticks : int
-        Ticks of the loop's base period that were run.
-    overruns : int
-        Occasions on which one or more grid points were skipped.
-    skipped : int
-        Grid points without a tick.
-    frames_sent, frames_received : int
-    others_received : int
-        Received frames of other kinds, see `Port.others`.
-    send_errors, receive_errors : int
-        `PortError` exceptions of the port.
-    real_time : bool
-        Whether the operating system ran the loop with a real-time policy.
-    """
-
+    #: Latency from the deadline to the start of the tick.
     lateness: Histogram = field(default_factory=Histogram)
-    duration: Histogram = field(default_factory=Histogram)
-    ticks: int = 0
-    overruns: int = 0
-    skipped: int = 0
+    duration: Histogram = field(default_factory=Histogram)  #: Execution time of the tick.
+    ticks: int = 0  #: Ticks of the loop's base period that were run.
+    overruns: int = 0  #: Occasions on which one or more grid points were skipped.
+    skipped: int = 0  #: Grid points without a tick.
     frames_sent: int = 0
     frames_received: int = 0
-    others_received: int = 0
-    send_errors: int = 0
-    receive_errors: int = 0
-    real_time: bool = False
+    others_received: int = 0  #: Received frames of other kinds, see `Port.others`.
+    send_errors: int = 0  #: `PortError` exceptions of the port.
+    receive_errors: int = 0  #: `PortError` exceptions of the port.
+    real_time: bool = False  #: Whether the operating system ran the loop with a real-time policy.
 
     def begin_row(self) -> None:
         """Look at the ticks from here on for the next row of telemetry."""

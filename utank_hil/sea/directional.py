@@ -31,6 +31,9 @@ _NEAR_DEG: Final = 0.5
 def load_directional(path: Path, place: tuple[float, float] | None = None) -> MeasuredSpectra:
     """Load the directional spectra of one place.
 
+    ValueError is raised if the file can't be read, holds no spectra, or the place is none of its
+    places. OSError is raised if it can't be opened.
+
     Parameters
     ----------
     place : tuple of float, optional
@@ -41,13 +44,6 @@ def load_directional(path: Path, place: tuple[float, float] | None = None) -> Me
     MeasuredSpectra
         With the mean direction and the spread of each band. Heights are those of its bands, without
         a tail beyond the last one. Spectra without values are left out and named in its notes.
-
-    Raises
-    ------
-    ValueError
-        If the file can't be read, holds no spectra, or the place is none of its places.
-    OSError
-        If it can't be opened.
     """
     path.open("rb").close()  # Readers give a less precise reason.
     try:

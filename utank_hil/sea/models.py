@@ -37,11 +37,6 @@ def ittc_density(omega_rad_s: FloatArray, hs_m: float, tp_s: float) -> FloatArra
     -------
     ndarray
         Density S(omega) in m^2 s/rad, shape of `omega_rad_s`.
-
-    Raises
-    ------
-    ValueError
-        If the height or the period is not positive.
     """
     _require_positive(hs_m=hs_m, tp_s=tp_s)
     peak = 2 * math.pi / tp_s

@@ -33,11 +33,8 @@ class MomentTable:
     def read(cls, file: Path) -> "MomentTable":
         """Read a table.
 
-        Raises
-        ------
-        ValueError
-            If the file can't be read, a column is missing, a value is no number, or the pairs of
-            frequency and heading are no complete grid from 0 to 180 degrees.
+        ValueError is raised if the file can't be read, a column is missing, a value is no number,
+        or the pairs of frequency and heading are no complete grid from 0 to 180 degrees.
         """
         try:
             columns = read_number_table(file)

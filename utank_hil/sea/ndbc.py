@@ -65,6 +65,9 @@ class DataLine(NamedTuple):
 def load_ndbc(path: str | Path, direction_path: str | Path | None = None) -> MeasuredSpectra:
     """Load measured wave spectra, in NDBC's yearly or 45-day layout.
 
+    ValueError is raised if no row can be used, or the file is one of another quantity; the message
+    has file, line and reason. OSError is raised if a file cannot be read.
+
     Parameters
     ----------
     path : str or Path
@@ -78,14 +81,6 @@ def load_ndbc(path: str | Path, direction_path: str | Path | None = None) -> Mea
     MeasuredSpectra
         In order of time. Spectra without any value are left out; single missing values are nan.
         Rows that can't be used are left out and named in its notes.
-
-    Raises
-    ------
-    ValueError
-        If no row can be used, or the file is one of another quantity; the message has file, line
-        and reason.
-    OSError
-        If a file cannot be read.
     """
     notes: list[str] = []
     rows = _rows(Path(path), "spec", notes)

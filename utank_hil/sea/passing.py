@@ -47,6 +47,8 @@ class PassingSea:
     ) -> "PassingSea":
         """Draw the components as `Sea.irregular` does, common to all spectra.
 
+        ValueError is raised if a spectrum has no energy or an argument is out of range.
+
         Parameters
         ----------
         time_s : sequence of float
@@ -55,11 +57,6 @@ class PassingSea:
             Mean direction of travel of each spectrum, for all bands or for each band.
         spreading, components
             Arguments of `Sea.irregular`.
-
-        Raises
-        ------
-        ValueError
-            If a spectrum has no energy or an argument is out of range.
         """
         energy_m2, omega_rad_s, heading, phase_rad = drawn_components(
             spectra, seed, components, heading_rad, spreading

@@ -39,11 +39,6 @@ class EffectiveSlope:
     """Ratio r of effective to true wave slope.
 
     r = coefficient * exp(-k depth) * sinc(k ``|sin(heading)|`` beam / 2), sinc(x) = sin(x) / x.
-
-    Raises
-    ------
-    ValueError
-        If a value is negative or not finite, or the coefficient above `MOST_SLOPE_SHARE`.
     """
 
     #: Effective wave slope coefficient, the long-wave limit of r.
@@ -93,10 +88,7 @@ class Sea:
         speed_m_s: float = 0.0,
         phase_rad: float = 0.0,
     ) -> "Sea":
-        """One regular wave, by default with a crest at the ship at t = 0.
-
-        ValueError is raised if the amplitude is negative or the frequency is not positive.
-        """
+        """One regular wave, by default with a crest at the ship at t = 0."""
         if not (amplitude_m >= 0 and omega_rad_s > 0):
             raise ValueError(
                 "a regular wave needs amplitude_m zero or more and omega_rad_s greater than zero, "
@@ -128,6 +120,8 @@ class Sea:
         it, and a uniform phase. So every sea has exactly the variance m0, the mean over seeds has
         exactly the spectrum, and the sea does not repeat, since no frequencies are commensurate.
 
+        ValueError is raised if the spectrum has no energy or an argument is out of range.
+
         Parameters
         ----------
         seed : int
@@ -145,11 +139,6 @@ class Sea:
             direction, so the sea is ergodic.
         speed_m_s : float
             Speed of the ship.
-
-        Raises
-        ------
-        ValueError
-            If the spectrum has no energy or an argument is out of range.
         """
         energy_m2, omega_rad_s, heading, phase_rad = drawn_components(
             [spectrum], seed, components, [heading_rad], spreading

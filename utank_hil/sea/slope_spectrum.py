@@ -18,11 +18,8 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2
 class SlopeSpectrum:
     """Density of the effective wave slope in bands of equal width.
 
-    Raises
-    ------
-    ValueError
-        If the shapes differ, the frequencies are not equally spaced, or a value is negative or not
-        finite.
+    ValueError is raised if the shapes differ, the frequencies are not equally spaced, or a value is
+    negative or not finite.
     """
 
     #: shape (F,): centres of the bands: encounter frequencies, positive and equally spaced, F > 1.

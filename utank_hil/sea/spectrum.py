@@ -83,10 +83,8 @@ class Spread:
 class Spectrum:
     """Wave spectrum at a fixed point (earth frame).
 
-    Raises
-    ------
-    ValueError
-        If the shapes differ, the frequencies do not increase, or a value is not finite.
+    ValueError is raised if the shapes differ, the frequencies do not increase, or a value is not
+    finite.
     """
 
     #: shape (F,): centre frequencies of the bands, positive and increasing, F > 1.

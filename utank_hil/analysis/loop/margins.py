@@ -53,6 +53,8 @@ def margins(
 ) -> Margins:
     """Margins of the loop that a law with one input closes around a system.
 
+    ValueError is raised if the system has more than one input.
+
     Parameters
     ----------
     system : control.StateSpace or LinearModel
@@ -61,11 +63,6 @@ def margins(
         As in `sampled_model`.
     with_delay_margin : bool
         Search for the delay margin too, which takes most of the time.
-
-    Raises
-    ------
-    ValueError
-        If the system has more than one input.
     """
     if system.B.shape[1] != 1:
         raise ValueError(f"margins are those of one pump, the model has {system.B.shape[1]} inputs")

@@ -39,51 +39,28 @@ _EQUAL_WORK: Final = 4 / (3 * math.pi)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RollDecay:
-    """Result of a decay test; intervals are those of 95 %.
+    """Result of a decay test; intervals are those of 95 %."""
 
-    Attributes
-    ----------
-    period_s : float
-        Natural period of small roll, 2 pi / w0.
-    damping_ratio, quadratic_per_rad : float
-        zeta, and b2 in 1/rad: quadratic damping per roll inertia.
-    stiffening_per_rad2 : float
-        k3.
-    heel_rad, drift_rad_s : float
-        The line about which the ship rolls.
-    period_interval_s, ratio_interval, quadratic_interval_per_rad : tuple of 2 floats
-        Scatter of this record alone: not the error of the law of two terms.
-    amplitude_rad : ndarray, shape (3,)
-        Least, middle and greatest amplitude; outside of these the answer does not hold.
-    equivalent_ratio : ndarray, shape (3,)
-        Damping ratio of equal work at these amplitudes.
-    equivalent_interval : ndarray, shape (3, 2)
-        Interval of these.
-    halves_ratio : tuple of 2 floats or None
-        Equivalent ratio at the middle amplitude by each half of the record alone.
-    residual_share : float
-        RMS of what the fit leaves, per greatest amplitude.
-    time_s, roll_rad, fit_rad : ndarray, shape (n,)
-        Samples used, and the fit.
-    """
-
-    period_s: float
-    damping_ratio: float
-    quadratic_per_rad: float
-    stiffening_per_rad2: float
-    heel_rad: float
-    drift_rad_s: float
+    period_s: float  #: Natural period of small roll, 2 pi / w0.
+    damping_ratio: float  #: zeta.
+    quadratic_per_rad: float  #: b2: quadratic damping per roll inertia.
+    stiffening_per_rad2: float  #: k3.
+    heel_rad: float  #: Of the line about which the ship rolls.
+    drift_rad_s: float  #: Slope of that line.
+    #: Scatter of this record alone, as of the next two: not the error of the law of two terms.
     period_interval_s: Interval
     ratio_interval: Interval
     quadratic_interval_per_rad: Interval
+    #: shape (3,): Least, middle and greatest amplitude; outside of these the answer does not hold.
     amplitude_rad: FloatArray
-    equivalent_ratio: FloatArray
-    equivalent_interval: FloatArray
+    equivalent_ratio: FloatArray  #: shape (3,): Damping ratio of equal work at these amplitudes.
+    equivalent_interval: FloatArray  #: shape (3, 2): Interval of these.
+    #: Equivalent ratio at the middle amplitude by each half of the record alone.
     halves_ratio: Interval | None
-    residual_share: float
-    time_s: FloatArray
-    roll_rad: FloatArray
-    fit_rad: FloatArray
+    residual_share: float  #: RMS of what the fit leaves, per greatest amplitude.
+    time_s: FloatArray  #: shape (n,): Samples used, and the fit.
+    roll_rad: FloatArray  #: shape (n,): Samples used.
+    fit_rad: FloatArray  #: shape (n,)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -105,16 +82,14 @@ class RollDecay:
 def roll_decay(time_s: FloatArray, roll_rad: FloatArray) -> RollDecay:
     """Evaluate a decay test.
 
+    ValueError is raised if the record is too short or too sparse, heeled beyond its roll, driven or
+    growing.
+
     Parameters
     ----------
     time_s, roll_rad : ndarray, shape (n,)
         The free decay alone, without pull, release and end of the run. Times rise, even or not;
         samples that are not finite are left out.
-
-    Raises
-    ------
-    ValueError
-        If the record is too short or too sparse, heeled beyond its roll, driven or growing.
     """
     known = np.isfinite(time_s) & np.isfinite(roll_rad)
     time, roll = time_s[known], roll_rad[known]

@@ -29,6 +29,9 @@ class Inclining(NamedTuple):
 def inclining(moment_nm: FloatArray, heel_rad: FloatArray, displacement_n: float) -> Inclining:
     """Evaluate an inclining test.
 
+    ValueError is raised if there are fewer than five shifts, all to one side, too great a heel, or
+    no stability.
+
     Parameters
     ----------
     moment_nm, heel_rad : ndarray, shape (n,)
@@ -36,11 +39,6 @@ def inclining(moment_nm: FloatArray, heel_rad: FloatArray, displacement_n: float
         to the same side.
     displacement_n : float
         Weight of the ship.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than five shifts, all to one side, too great a heel, or no stability.
     """
     if len(moment_nm) < _LEAST_SHIFTS or moment_nm.max() * moment_nm.min() >= 0:
         raise ValueError("an inclining test needs five shifts or more, to both sides")

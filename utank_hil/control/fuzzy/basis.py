@@ -34,11 +34,6 @@ class FuzzyBasis:
     Attributes
     ----------
     ranges : ndarray, shape (n,)
-
-    Raises
-    ------
-    ValueError
-        If there are no inputs, or a range is not positive.
     """
 
     def __init__(self, ranges: tuple[float, ...]) -> None:

@@ -66,10 +66,8 @@ def weight_problems(name: str, weight: tuple[float, ...]) -> list[Problem]:
 def washed(law: WashableLaw, washout_rad_s: float, ship: RollShip) -> LinearLaw:
     """Return a law with its washout, or unchanged for a corner of zero.
 
-    Raises
-    ------
-    ValueError
-        If the corner is so near to the roll frequency that the washout removes the roll, too.
+    ValueError is raised if the corner is so near to the roll frequency that the washout removes the
+    roll, too.
     """
     if washout_rad_s == 0:
         return law
@@ -126,13 +124,7 @@ class Predictor:
 
 @dataclass(frozen=True, slots=True)
 class PredictiveDesign:
-    """Parameters of a predictive law.
-
-    Raises
-    ------
-    ValueError
-        If the kind is unknown, or DPC has a first output.
-    """
+    """Parameters of a predictive law."""
 
     kind: Literal["gpc", "dpc"]  #: Type of the law.
     predictor: Predictor

@@ -34,6 +34,9 @@ def finite_memory_arx(
 
         x(k+1) = A x(k) + B u(k) + w(k),    y(k) = C x(k) + D u(k) + v(k)
 
+    ValueError is raised if the model is not discrete or not stable, or an argument has the wrong
+    shape.
+
     Parameters
     ----------
     system : control.StateSpace or LinearModel
@@ -44,11 +47,6 @@ def finite_memory_arx(
         Covariance of the white noise v, positive definite.
     order : int
         p.
-
-    Raises
-    ------
-    ValueError
-        If the model is not discrete or not stable, or an argument has the wrong shape.
     """
     from scipy.linalg import solve_discrete_lyapunov
 

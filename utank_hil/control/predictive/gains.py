@@ -38,11 +38,6 @@ def design_gpc(
         Diagonal of Q, positive; 1 / (unit of u)^2.
     first_output : int
         Outputs before y(k + first_output) have no weight.
-
-    Raises
-    ------
-    ValueError
-        If a horizon or weight is out of its range or shape.
     """
     if not 1 <= control_horizon <= prediction_horizon:
         raise ValueError(
@@ -95,11 +90,6 @@ def design_dpc(
         Relaxes the deadbeat: the weighted squares of the outputs in the window are traded against
         the squares of the inputs. Outputs that the inputs cannot bring to zero, such as those due
         to a continuing wave, then cause no excessive effort.
-
-    Raises
-    ------
-    ValueError
-        If a horizon or weight is out of its range or shape.
     """
     if not 1 <= control_horizon < prediction_horizon:
         raise ValueError(

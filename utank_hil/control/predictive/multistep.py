@@ -33,13 +33,7 @@ class Prediction:
 
 
 def predict(arx: ARX, horizon: int) -> Prediction:
-    """Run the recursions under (3.7) over `horizon` samples.
-
-    Raises
-    ------
-    ValueError
-        If the horizon is below 1.
-    """
+    """Run the recursions under (3.7) over `horizon` samples."""
     if horizon < 1:
         raise ValueError(f"prediction horizon must be at least 1, got {horizon}")
     outputs = np.empty((horizon, *arx.alpha.shape))

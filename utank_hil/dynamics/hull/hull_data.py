@@ -32,67 +32,41 @@ _MOST_ASYMMETRY = 0.1
 class HullData:
     """Mass, restoring, radiation and excitation of a hull in waves, SI units.
 
-    Parameters
-    ----------
-    frequency_rad_s : ndarray, shape (n,)
-        Frequencies of motion (of encounter) of the coefficients, ascending, without 0 and infinity.
-    added_mass, damping : ndarray, shape (n, 6, 6)
-        Radiation about `reference_m`; first index: force.
-    wave_frequency_rad_s : ndarray, shape (k,)
-        Wave frequencies of the excitation, ascending.
-    heading_deg : ndarray, shape (m,)
-        Directions that the waves travel to, ascending, from above -180 up to 360.
-    excitation : ndarray, shape (m, k, 6), complex
-        Force and moment about `reference_m` per metre of wave amplitude.
-    hydrostatic : ndarray, shape (6, 6), optional
-        Restoring matrix C about `reference_m`, with the weight's part.
-    mass_kg : float, optional
-        Displaced mass.
-    inertia_kg_m2 : ndarray, shape (3, 3), optional
-        Inertia tensor about the centre of gravity: products of inertia with a negative sign.
-    gravity_centre_m : ndarray, shape (3,), optional
-        Centre of gravity from the origin.
-    reference_m : ndarray, shape (3,)
-        Point of the motions and moments, from the origin. Phases always refer to the origin.
-    infinite_added_mass, zero_added_mass : ndarray, shape (6, 6), optional
-        Limits of the added mass.
-    viscous_roll_nms_rad, quadratic_roll_nms2_rad2 : ndarray, shape (n,), optional
-        Roll damping beside radiation, where the source has it: B44 linear, and of the square.
-    water_depth_m : float
-        Infinite for deep water.
-    source : str
-        Where the data come from, for messages.
-    notes : tuple of str
-        What the reader left out, added or found odd.
-
-    Raises
-    ------
-    ParameterError
-        If a shape is wrong, a number is not finite, frequencies or headings do not ascend, or a
-        matrix that must be symmetric is not.
+    ParameterError is raised if a shape is wrong, a number is not finite, frequencies or headings do
+    not ascend, or a matrix that must be symmetric is not.
     """
 
+    #: shape (n,): Frequencies of motion (of encounter) of the coefficients, ascending, without 0
+    #: and infinity.
     frequency_rad_s: FloatArray
-    added_mass: FloatArray
-    damping: FloatArray
-    wave_frequency_rad_s: FloatArray
+    added_mass: FloatArray  #: shape (n, 6, 6): Radiation about `reference_m`; first index: force.
+    damping: FloatArray  #: shape (n, 6, 6)
+    wave_frequency_rad_s: FloatArray  #: shape (k,): Wave frequencies of the excitation, ascending.
+    #: shape (m,): Directions that the waves travel to, ascending, from above -180 up to 360.
     heading_deg: FloatArray
+    #: shape (m, k, 6): Force and moment about `reference_m` per metre of wave amplitude.
     excitation: ComplexArray
+    #: shape (6, 6): Restoring matrix C about `reference_m`, with the weight's part.
     hydrostatic: FloatArray | None = None
-    mass_kg: float | None = None
+    mass_kg: float | None = None  #: Displaced mass.
+    #: shape (3, 3): Inertia tensor about the centre of gravity: products of inertia with a negative
+    #: sign.
     inertia_kg_m2: FloatArray | None = None
-    gravity_centre_m: FloatArray | None = None
+    gravity_centre_m: FloatArray | None = None  #: shape (3,): Centre of gravity from the origin.
+    #: shape (3,): Point of the motions and moments, from the origin. Phases always refer to the
+    #: origin.
     reference_m: FloatArray = field(default_factory=lambda: np.zeros(3))
-    infinite_added_mass: FloatArray | None = None
-    zero_added_mass: FloatArray | None = None
+    infinite_added_mass: FloatArray | None = None  #: shape (6, 6): Limits of the added mass.
+    zero_added_mass: FloatArray | None = None  #: shape (6, 6)
+    #: shape (n,): Linear roll damping beside radiation, where the source has it.
     viscous_roll_nms_rad: FloatArray | None = None
-    quadratic_roll_nms2_rad2: FloatArray | None = None
+    quadratic_roll_nms2_rad2: FloatArray | None = None  #: shape (n,): Of the square of the rate.
     density_kg_m3: float = 1025.0
     gravity_m_s2: float = 9.81
-    water_depth_m: float = math.inf
+    water_depth_m: float = math.inf  #: Infinite for deep water.
     speed_m_s: float = 0.0
-    source: str = "hull"
-    notes: tuple[str, ...] = ()
+    source: str = "hull"  #: Where the data come from, for messages.
+    notes: tuple[str, ...] = ()  #: What the reader left out, added or found odd.
 
     def __post_init__(self) -> None:
         for name in self._shapes():

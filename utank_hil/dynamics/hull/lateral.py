@@ -42,20 +42,9 @@ _MOST_STIFFNESS_ERROR = 0.05
 
 @dataclass(frozen=True)
 class LateralHull:
-    """Sway, roll and yaw of a hull: what its data say, and the memory fitted to it.
+    """Sway, roll and yaw of a hull: what its data say, and the memory fitted to it."""
 
-    Parameters
-    ----------
-    data : HullData
-        Of the ship at rest in deep water, with mass, inertia and centre of gravity.
-
-    Raises
-    ------
-    ValueError
-        If something is missing.
-    """
-
-    data: HullData
+    data: HullData  #: Of the ship at rest in deep water, with mass, inertia and centre of gravity.
 
     @cached_property
     def about_g(self) -> HullData:
@@ -118,21 +107,13 @@ class LateralHull:
 class LateralModel:
     """A hull with the roll of a ship and a tank.
 
-    Parameters
-    ----------
-    hull : LateralHull
-    ship : RollShip
-        Righting moment, heeling moments and damping; of the linear damping, which a decay test
-        gives, radiation is taken off. Its inertia is the hull's.
-    tank : Tank
-
-    Raises
-    ------
-    ValueError
-        If the ship's stiffness is not that of the hull, or its damping less than radiation's.
+    ValueError is raised if the ship's stiffness is not that of the hull, or its damping less than
+    radiation's.
     """
 
     hull: LateralHull
+    #: Righting moment, heeling moments and damping; of the linear damping, which a decay test
+    #: gives, radiation is taken off. Its inertia is the hull's.
     ship: RollShip
     tank: Tank
 

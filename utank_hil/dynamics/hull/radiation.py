@@ -25,26 +25,14 @@ _MOST_STEPS = 200
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Radiation:
-    """Oscillators of a fitted radiation force on m motions.
+    """Oscillators of a fitted radiation force on m motions."""
 
-    Attributes
-    ----------
-    infinite_added_mass : ndarray, shape (m, m)
-    direction : ndarray, shape (n, m)
-        b.
-    frequency_rad_s : ndarray, shape (n,)
-        w0.
-    loss : ndarray, shape (n, m)
-        L.
-    error : float
-        Root mean square of what the fit leaves of K, per root mean square of K, each entry per root
-        of the diagonal's greatest damping.
-    """
-
-    infinite_added_mass: FloatArray
-    direction: FloatArray
-    frequency_rad_s: FloatArray
-    loss: FloatArray
+    infinite_added_mass: FloatArray  #: shape (m, m)
+    direction: FloatArray  #: shape (n, m): b.
+    frequency_rad_s: FloatArray  #: shape (n,): w0.
+    loss: FloatArray  #: shape (n, m): L.
+    #: Root mean square of what the fit leaves of K, per root mean square of K, each entry per root
+    #: of the diagonal's greatest damping.
     error: float
 
     def memory(self, omega_rad_s: FloatArray) -> ComplexArray:

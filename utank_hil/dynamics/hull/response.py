@@ -27,28 +27,17 @@ _MOST_TURN_DEG = 45.0
 
 @dataclass(frozen=True, slots=True)
 class RollResonance:
-    """Roll of a hull about its resonance in a beam sea from starboard.
+    """Roll of a hull about its resonance in a beam sea from starboard."""
 
-    Attributes
-    ----------
-    period_s : float
-        Natural period, sway and yaw free.
-    radiation_ratio, viscous_ratio : float
-        Damping ratios by waves and by what else the data hold.
-    effective_slope, effective_slope_phase_rad : float
-        Size and lead of the roll moment per stiffness times wave slope.
-    sway_share, sway_phase_rad : float
-        Lateral acceleration of the centre of gravity per minus g times slope, with `viscous_ratio`
-        or the ratio that was given: size and lead.
-    """
-
-    period_s: float
-    radiation_ratio: float
-    viscous_ratio: float
-    effective_slope: float
-    effective_slope_phase_rad: float
+    period_s: float  #: Natural period, sway and yaw free.
+    radiation_ratio: float  #: Damping ratio by waves.
+    viscous_ratio: float  #: Damping ratio by what else the data hold.
+    effective_slope: float  #: Size of the roll moment per stiffness times wave slope.
+    effective_slope_phase_rad: float  #: Lead of that moment.
+    #: Lateral acceleration of the centre of gravity per minus g times slope, with `viscous_ratio`
+    #: or the ratio that was given.
     sway_share: float
-    sway_phase_rad: float
+    sway_phase_rad: float  #: Lead of that acceleration.
 
 
 def wave_number(omega_rad_s: FloatArray, depth_m: float, gravity_m_s2: float) -> FloatArray:
@@ -66,10 +55,7 @@ def wave_number(omega_rad_s: FloatArray, depth_m: float, gravity_m_s2: float) ->
 def radiation_at(hull: HullData, omega_rad_s: float) -> tuple[FloatArray, FloatArray]:
     """Return added mass and damping, shape (6, 6), between the frequencies of the data.
 
-    Raises
-    ------
-    ValueError
-        If the frequency lies outside of the data.
+    ValueError is raised if the frequency lies outside of the data.
     """
     grid = hull.frequency_rad_s
     _inside(hull, "frequency_rad_s", grid, omega_rad_s)
@@ -122,16 +108,13 @@ def motions(
 def roll_resonance(hull: HullData, viscous_ratio: float | None = None) -> RollResonance:
     """Return roll at its resonance in a beam sea, ship at rest.
 
+    ValueError is raised if mass, inertia, centre of gravity, restoring or a frequency is not in the
+    data, the ship is not stable upright, or there is no viscous damping.
+
     Parameters
     ----------
     viscous_ratio : float, optional
         Share of critical damping besides radiation; without it that of the data.
-
-    Raises
-    ------
-    ValueError
-        If mass, inertia, centre of gravity, restoring or a frequency is not in the data, the ship
-        is not stable upright, or there is no viscous damping.
     """
     ship = hull.about_gravity_centre()
     stiffness = float(ship.known("hydrostatic")[3, 3])
