@@ -8,9 +8,10 @@ import pytest
 from rolling_ship import SHIP, TANK
 
 from tools.thesis.capsize.survival import controlled_run
+from tools.thesis.harmonic import harmonic_response
 from utank_hil.control import CommandLimiter, PumpLimits
 from utank_hil.control.stimulation import Stimulation
-from utank_hil.dynamics import RollModel, WaveMoment, harmonic_response
+from utank_hil.dynamics import RollModel, WaveMoment
 
 CALM = WaveMoment([], [], [])
 PLAN = Stimulation(

@@ -2,14 +2,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from utank_hil.dynamics import (
-    RollModel,
-    RollShip,
-    Tank,
-    coupled_model,
-    harmonic_response,
-    simulate,
-)
+from tools.thesis.harmonic import harmonic_response
+from utank_hil.dynamics import RollModel, RollShip, Tank, coupled_model, simulate
 from utank_hil.dynamics.linear import coupled_matrices
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)

@@ -13,14 +13,8 @@ from roll_energy import (
 )
 from scipy.integrate import simpson
 
-from utank_hil.dynamics import (
-    RollModel,
-    RollShip,
-    Tank,
-    coupled_model,
-    simulate_reference,
-    tank_wrench,
-)
+from tools.thesis.reference import simulate_reference
+from utank_hil.dynamics import RollModel, RollShip, Tank, coupled_model, tank_wrench
 from utank_hil.dynamics.valves import air_valve_loss, duct_valve_loss
 from utank_hil.dynamics.water import water_moments
 

@@ -8,7 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from roll_energy import LEVERS, PATTI, PATTI_TANK, THESIS_SHIP, THESIS_TANK
 
-from utank_hil.dynamics import RollModel, WaveMoment, simulate, simulate_batch, simulate_reference
+from tools.thesis.batch import simulate_batch
+from tools.thesis.reference import simulate_reference
+from utank_hil.dynamics import RollModel, WaveMoment, simulate
 
 SHIP = replace(THESIS_SHIP, damping_nms_rad=4.87e7, restoring_odd_nm=(-2e8,))
 TANK = replace(THESIS_TANK, damping_ratio=0.1)

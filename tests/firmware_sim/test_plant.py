@@ -12,12 +12,12 @@ from scipy.linalg import expm
 
 from firmware_sim import plant_kernel as kernel
 from firmware_sim.plant import Plant
+from tools.thesis.reference import simulate_reference
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.pump import AT_REST, pump_coast, pump_step
-from utank_hil.dynamics.reference import simulate_reference
 from utank_hil.dynamics.tank import negligible
 from utank_hil.sea import Harmonics
 

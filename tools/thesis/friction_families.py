@@ -7,11 +7,11 @@ from typing import Final
 import numpy as np
 
 from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict, peaks
+from tools.thesis.harmonic import HarmonicResponse, harmonic_response
 from tools.thesis.ships import ROLL_RAD_S, first_ship
 from tools.thesis.stimulation import tuned_tank
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics import RollModel, simulate
-from utank_hil.dynamics.harmonic import HarmonicResponse, harmonic_response
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank

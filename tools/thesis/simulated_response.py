@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tools.thesis.batch import simulate_batch
 from utank_hil.base.arrays import ComplexArray, FloatArray
-from utank_hil.dynamics import RollModel, WaveMoment, simulate_batch
+from utank_hil.dynamics import RollModel, WaveMoment
 
 SETTLE_PERIODS = 60  # wave periods before the analysed one
 SAMPLES = 256  # integration steps per wave period

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from tools.thesis.batch import simulate_batch
 from tools.thesis.capsize.contest import PATTI_B, WAVE_RAD_S, contest
 from tools.thesis.figure import Check, Curve, Figure, Panel, Verdict
 from tools.thesis.patti_b import (
@@ -24,7 +25,7 @@ from tools.thesis.patti_b import (
     run,
     told,
 )
-from utank_hil.dynamics import RollModel, WaveMoment, simulate_batch
+from utank_hil.dynamics import RollModel, WaveMoment
 
 SHOWN_S: Final = 120.0
 SHOWN_DEG: Final = 40.0

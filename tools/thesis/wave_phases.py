@@ -5,10 +5,10 @@ from typing import Final
 import numpy as np
 
 from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
+from tools.thesis.harmonic import HarmonicResponse, harmonic_response
 from tools.thesis.ships import first_ship
 from tools.thesis.stimulation import tuned_tank
 from utank_hil.control.optimal_tank import ship_ratios
-from utank_hil.dynamics.harmonic import HarmonicResponse, harmonic_response
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank

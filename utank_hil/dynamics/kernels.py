@@ -12,13 +12,11 @@ impulse is applied, and the rest of the step follows.
 import math
 
 import numpy as np
-from numba import prange
 
 from utank_hil.base import elementary
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.jit import njit
-from utank_hil.dynamics.nonlinear import RollCoefficients
-from utank_hil.dynamics.reference import INSIDE_M, REST_M_S
+from utank_hil.dynamics.nonlinear import INSIDE_M, REST_M_S, RollCoefficients
 
 REFRESH = 256  # This is a power of two.
 STRIKES_PER_STEP = 8  # The water comes to rest at the stop beyond these.
@@ -340,41 +338,3 @@ def advance(
     summary[MAX_ROLL], summary[MAX_LEVEL] = max_roll, max_level
     for k in range(4):
         state[k] = now[k]
-
-
-@njit(parallel=True, error_model="numpy")
-def advance_batch(
-    rows: FloatArray,
-    per_piece: FloatArray,
-    restoring: FloatArray,
-    amplitude: FloatArray,
-    frequency: FloatArray,
-    phase: FloatArray,
-    pressure: FloatArray,
-    valve_loss: FloatArray,
-    hold: int,
-    capsize: float,
-    first: int,
-    steps: int,
-    dt: float,
-    state: FloatArray,
-    summary: FloatArray,
-    out: FloatArray,
-    stride: int,
-) -> None:
-    """`advance` for every row of `state` (n, 4), on all cores.
-
-    Every other array has a leading axis of length n, or of length 1 for all ships.
-    """
-    for n in prange(state.shape[0]):
-        advance(
-            rows[n % rows.shape[0]],
-            per_piece[n % per_piece.shape[0]],
-            restoring[n % restoring.shape[0]],
-            amplitude[n % amplitude.shape[0]],
-            frequency[n % frequency.shape[0]],
-            phase[n % phase.shape[0]],
-            pressure[n % pressure.shape[0]],
-            valve_loss[n % valve_loss.shape[0]],
-            hold, capsize, first, steps, dt, state[n], summary[n], np.empty((0, 5)), out[n], stride,
-        )  # fmt: skip

@@ -44,6 +44,9 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.dynamics.water import water_moments
 
+REST_M_S = 1e-4  # A slower rebound ends at rest, which bounds the number of bounces.
+INSIDE_M = 1e-12  # Distance from the limit after an impact, so that the next is a sign change.
+
 
 class RollCoefficients(NamedTuple):
     """Coefficients of the equations of motion in SI units; the kernels rely on their order."""

@@ -4,7 +4,7 @@ The kernels are imported at the first run, so that importing this module imports
 """
 
 import math
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.nonlinear import Impact, RollModel
-from utank_hil.dynamics.reference import RollRun
 
 IMPACTS_KEPT = 10_000
 
@@ -47,17 +46,15 @@ class WaveMoment(NamedTuple):
 CALM = WaveMoment(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
-class BatchResult(NamedTuple):
-    """Results for a batch of n ships."""
+@dataclass(frozen=True, slots=True)
+class RollRun:
+    """Result of a simulation."""
 
-    state: FloatArray  #: shape (n, 4): Final state, or the state at capsizing.
-    capsized_s: FloatArray  #: shape (n,): Time of capsizing, infinite for a ship that survived.
-    max_roll_rad: FloatArray  #: shape (n,)
-    max_level_m: FloatArray  #: shape (n,)
-    strikes: npt.NDArray[np.int64]  #: shape (n,): Number of impacts at the limits of the level.
-    max_roll_impulse_nms: FloatArray  #: shape (n,): Greatest angular impulse of these impacts.
-    time_s: FloatArray  #: shape (k,): Times of `history`.
-    history: FloatArray  #: shape (n, k, 4): States, if `record_every` was given; else k = 0.
+    time_s: FloatArray  #: shape (n,)
+    state: FloatArray  #: shape (n, 4): Roll, roll rate, level, level rate.
+    impacts: tuple[Impact, ...]  #: Impacts at the limits of the level.
+    #: Time at which the roll passed the capsize angle and the run ended; infinite if it did not.
+    capsized_s: float
 
 
 def simulate(
@@ -101,14 +98,14 @@ def simulate(
     state = np.array(initial, dtype=np.float64)
     if state.shape != (4,):
         raise ValueError(f"initial must have shape (4,), got {state.shape}")
-    _check_record_every(record_every)
-    amplitude, frequency, phase = _sea(wave)
+    check_record_every(record_every)
+    amplitude, frequency, phase = sea_rows(wave)
     if not len(amplitude) == len(frequency) == len(phase) == 1:
         raise ValueError("the arrays of a wave for one ship must be one-dimensional")
     out = np.empty((-(-steps // record_every), 4))
-    summary = _blank_summary(1)[0]
+    summary = blank_summary(1)[0]
     impacts = np.empty((IMPACTS_KEPT, 5))
-    pressure, valve_loss = _rows(pressure_pa)[0], _rows(valve_loss_pa_per_m2_s2)[0]
+    pressure, valve_loss = rows_of(pressure_pa)[0], rows_of(valve_loss_pa_per_m2_s2)[0]
     kernels.advance(
         *model.packed, amplitude[0], frequency[0], phase[0], pressure, valve_loss, hold,
         capsize_rad, 0, steps, step_s, state, summary, impacts, out, record_every,
@@ -126,79 +123,6 @@ def simulate(
     return RollRun(time, history, tuple(Impact(*map(float, row)) for row in kept), capsized_s)
 
 
-def simulate_batch(
-    models: RollModel | Sequence[RollModel],
-    duration_s: float,
-    initial: npt.ArrayLike = (0.0, 0.0, 0.0, 0.0),
-    *,
-    wave: WaveComponents = CALM,
-    pressure_pa: npt.ArrayLike = 0.0,
-    valve_loss_pa_per_m2_s2: npt.ArrayLike = 0.0,
-    hold_s: float | None = None,
-    step_s: float = 0.02,
-    record_every: int | None = None,
-    capsize_rad: float = math.pi / 2,
-) -> BatchResult:
-    """Simulate many ships on all cores; the result does not depend on the number of cores.
-
-    Models, initial states, seas and inputs are each given once for all ships, or once per ship.
-    Results and errors are those of `simulate`.
-
-    Parameters
-    ----------
-    initial : array_like, shape (4,) or (n, 4)
-    wave : WaveMoment
-        Sea with arrays of shape (m,) or (n, m).
-    pressure_pa, valve_loss_pa_per_m2_s2 : array_like, shape (), (k,) or (n, k)
-        Samples, each held for `hold_s`, the last one to the end.
-    record_every : int, optional
-        Steps between recorded states; by default nothing is recorded.
-    """
-    from utank_hil.dynamics import kernels
-
-    steps = whole_steps("duration_s", duration_s, step_s)
-    hold = whole_steps("hold_s", step_s if hold_s is None else hold_s, step_s)
-    models = [models] if isinstance(models, RollModel) else list(models)
-    coefficients, pieces, tables = zip(*(model.packed for model in models), strict=True)
-    rows, per_piece, restoring = np.array(coefficients), np.array(pieces), _stacked(list(tables))
-    if record_every is not None:
-        _check_record_every(record_every)
-    amplitude, frequency, phase = _sea(wave)
-    pressure, valve_loss = _rows(pressure_pa), _rows(valve_loss_pa_per_m2_s2)
-    start = np.atleast_2d(np.asarray(initial, dtype=np.float64))
-    lengths = {len(x) for x in (rows, amplitude, frequency, phase, pressure, valve_loss, start)}
-    lengths.discard(1)
-    if len(lengths) > 1 or start.shape[1] != 4:
-        raise ValueError(
-            "models, initial states, seas and inputs must each be one or one per ship, initial "
-            f"states of shape (n, 4); got leading lengths {sorted(lengths)}, initial {start.shape}"
-        )
-    ships = max(lengths, default=1)
-    state = np.array(np.broadcast_to(start, (ships, 4)))
-    summary = _blank_summary(ships)
-    stride = record_every or steps
-    samples = -(-steps // stride) if record_every else 0
-    history = np.empty((ships, samples, 4))
-    chunk = max(1, round(steps / 50 / (stride * kernels.REFRESH))) * stride * kernels.REFRESH
-    for first in range(0, steps, chunk):  # Parts of the run allow Ctrl-C.
-        part = slice(first // stride, (first + chunk) // stride)
-        count = min(chunk, steps - first)
-        kernels.advance_batch(
-            rows, per_piece, restoring, amplitude, frequency, phase, pressure, valve_loss, hold,
-            capsize_rad, first, count, step_s, state, summary, history[:, part], stride,
-        )  # fmt: skip
-    return BatchResult(
-        state,
-        summary[:, kernels.CAPSIZED_S].copy(),
-        summary[:, kernels.MAX_ROLL].copy(),
-        summary[:, kernels.MAX_LEVEL].copy(),
-        summary[:, kernels.STRIKES].astype(np.int64),
-        summary[:, kernels.MAX_IMPULSE].copy(),
-        np.asarray(step_s * stride * np.arange(samples), dtype=np.float64),
-        history,
-    )
-
-
 def whole_steps(name: str, duration_s: float, step_s: float) -> int:
     """Return the whole number of steps in a duration.
 
@@ -212,7 +136,8 @@ def whole_steps(name: str, duration_s: float, step_s: float) -> int:
     return steps
 
 
-def _blank_summary(ships: int) -> FloatArray:
+def blank_summary(ships: int) -> FloatArray:
+    """Summaries of ships that have not moved, shape (ships, SUMMARY)."""
     from utank_hil.dynamics import kernels
 
     summary = np.zeros((ships, kernels.SUMMARY))
@@ -220,10 +145,10 @@ def _blank_summary(ships: int) -> FloatArray:
     return summary
 
 
-def _sea(wave: WaveComponents) -> tuple[FloatArray, FloatArray, FloatArray]:
+def sea_rows(wave: WaveComponents) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return amplitudes, frequencies and phases as rows of equal length."""
     amplitude, frequency, phase = (
-        _rows(x) for x in (wave.amplitude, wave.frequency_rad_s, wave.phase_rad)
+        rows_of(x) for x in (wave.amplitude, wave.frequency_rad_s, wave.phase_rad)
     )
     if not amplitude.shape[1] == frequency.shape[1] == phase.shape[1]:
         raise ValueError(
@@ -233,19 +158,12 @@ def _sea(wave: WaveComponents) -> tuple[FloatArray, FloatArray, FloatArray]:
     return amplitude, frequency, phase
 
 
-def _check_record_every(record_every: int) -> None:
+def check_record_every(record_every: int) -> None:
+    """Refuse a number of steps below 1."""
     if record_every < 1:
         raise ValueError(f"record_every must be 1 or more, got {record_every}")
 
 
-def _rows(values: npt.ArrayLike) -> FloatArray:
+def rows_of(values: npt.ArrayLike) -> FloatArray:
     """Return values as contiguous rows, shape (1 or n, k)."""
     return np.atleast_2d(np.ascontiguousarray(values, dtype=np.float64))
-
-
-def _stacked(restoring: list[FloatArray]) -> FloatArray:
-    """Return restoring coefficients of all ships as one array, zero-padded to the highest power."""
-    if len({len(table) for table in restoring}) > 1:
-        raise ValueError("the ships of a batch must have righting levers of the same length")
-    powers = max(table.shape[1] for table in restoring)
-    return np.stack([np.pad(table, ((0, 0), (0, powers - table.shape[1]))) for table in restoring])

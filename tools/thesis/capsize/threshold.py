@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from tools.thesis.batch import simulate_batch
 from utank_hil.base.arrays import FloatArray
-from utank_hil.dynamics import RollModel, WaveMoment, simulate_batch
+from utank_hil.dynamics import RollModel, WaveMoment
 from utank_hil.dynamics.simulate import WaveComponents
 from utank_hil.dynamics.tank import negligible
 

@@ -8,7 +8,7 @@ wave at the origin, and deep-water waves are ``exp(i w t - i k (x cos b + y sin 
 
     [-w^2 (M + A) + i w B + C] xi = X
 
-These are not the body axes of `SixDegreeModel` (y to starboard, z down): multiply vectors by
+These are not the body axes of `tank_wrench` (y to starboard, z down): multiply vectors by
 `TO_BODY_AXES`, and matrices by it on both sides, and headings by -1.
 """
 

@@ -11,7 +11,7 @@ import math
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.jit import njit
 from utank_hil.dynamics.kernels import sine_cosine
-from utank_hil.dynamics.reference import INSIDE_M, REST_M_S
+from utank_hil.dynamics.nonlinear import INSIDE_M, REST_M_S
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 ROLL, ROLL_RATE, LEVEL, LEVEL_RATE, SWAY, SWAY_RATE, YAW, YAW_RATE, WAVES = range(9)

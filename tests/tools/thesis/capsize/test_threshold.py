@@ -10,7 +10,8 @@ from tools.thesis.capsize.threshold import (
     safe_basin,
     without_tank,
 )
-from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment, simulate, simulate_reference
+from tools.thesis.reference import simulate_reference
+from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment, simulate
 
 # Table 4.1
 PATTI = RollShip(1.468e6, 2.366e6 * 0.2138, 3.206e3, 9.882e4, restoring_odd_nm=(-2.366e6 * 0.6713,))

@@ -11,10 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.dynamics.nonlinear import Impact, RollModel
-
-REST_M_S = 1e-4  # A slower rebound ends at rest, which bounds the number of bounces.
-INSIDE_M = 1e-12  # Distance from the limit after an impact, so that the next is a sign change.
+from utank_hil.dynamics.nonlinear import INSIDE_M, REST_M_S, Impact, RollModel
+from utank_hil.dynamics.simulate import RollRun
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,17 +25,6 @@ class _Event:
 
     def __call__(self, t: float, x: FloatArray) -> float:
         return self.value(t, x)
-
-
-@dataclass(frozen=True, slots=True)
-class RollRun:
-    """Result of a simulation."""
-
-    time_s: FloatArray  #: shape (n,)
-    state: FloatArray  #: shape (n, 4): Roll, roll rate, level, level rate.
-    impacts: tuple[Impact, ...]  #: Impacts at the limits of the level.
-    #: Time at which the roll passed the capsize angle and the run ended; infinite if it did not.
-    capsized_s: float
 
 
 def simulate_reference(

@@ -5,15 +5,10 @@ import pytest
 from roll_energy import LEVERS, ship_potential
 from streamline import GRAVITY, Motion, particles, rotation
 
-from utank_hil.dynamics import (
-    RollModel,
-    SixDegreeModel,
-    SixDegreeShip,
-    Tank,
-    simulate_reference,
-    simulate_six_degree,
-)
-from utank_hil.dynamics.kinematics import body_to_earth, euler_rates
+from tools.thesis.kinematics import body_to_earth, euler_rates
+from tools.thesis.reference import simulate_reference
+from tools.thesis.six_degree import SixDegreeModel, SixDegreeShip, simulate_six_degree
+from utank_hil.dynamics import RollModel, Tank
 
 pytestmark = pytest.mark.slow
 

@@ -20,8 +20,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tools.thesis.kinematics import body_to_earth, euler_rates
 from utank_hil.base.arrays import FloatArray
-from utank_hil.dynamics.kinematics import body_to_earth, euler_rates
 from utank_hil.dynamics.restoring import Restoring, restoring
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
