@@ -36,78 +36,47 @@ class NamedMessage(NamedTuple):
 
 
 class Catalogue:
-    """The compiled messages of one DBC; creates transmitters and receivers.
-
-    Attributes
-    ----------
-    version : int
-        Hash of the DBC, 0 to 4094, as HEARTBEAT and CTRL_STATUS carry it.
-    can_ids : frozenset of int
-        All identifiers of the catalogue.
-    messages : tuple of NamedMessage
-    """
+    """The compiled messages of one DBC; creates transmitters and receivers."""
 
     def __init__(self, codecs: Mapping[tuple[type, Address], Codec[Any]], version: int) -> None:
+        #: Hash of the DBC, 0 to 4094, as HEARTBEAT and CTRL_STATUS carry it.
         self.version = version
+        #: Codecs of all messages, by type and sender.
+        self.codecs: Mapping[tuple[type[Any], Address], Codec[Any]] = MappingProxyType(dict(codecs))
         self.can_ids = frozenset(codec.can_id for codec in codecs.values())
-        self._codecs = dict(codecs)
         self.messages = tuple(NamedMessage(*key, codec) for key, codec in codecs.items())
 
     def named(self, name: str) -> NamedMessage:
-        """Return the message of a name in the DBC.
-
-        Raises
-        ------
-        KeyError
-            If there is none.
-        """
+        """Return the message of a name in the DBC; KeyError is raised if there is none."""
         for message in self.messages:
             if message.codec.name == name:
                 return message
         raise KeyError(name)
 
-    @property
-    def codecs(self) -> Mapping[tuple[type[Any], Address], Codec[Any]]:
-        """Codecs of all messages, by type and sender."""
-        return MappingProxyType(self._codecs)
-
     def codec(self, message_type: type[T], source: Address | None = None) -> Codec[T]:
         """Return the codec of a message.
 
-        Parameters
-        ----------
-        message_type : type
-            One of the types of `utank_hil.canbus.messages`.
-        source : Address, optional
-            Sender; needed for the messages that every node sends, and for those of a second node of
-            a kind. Without it, the first node's message is meant.
-
-        Raises
-        ------
-        ValueError
-            If no such node sends the message, or several do and `source` is None.
+        `source` is the sender, needed for messages that every node sends, and for those of a second
+        node of a kind; without it, the first node's message is meant. ValueError is raised if no
+        such node sends the message, or several do and `source` is None.
         """
         found = {
             address: codec
-            for (kind, address), codec in self._codecs.items()
+            for (kind, address), codec in self.codecs.items()
             if kind is message_type
-            and (source is address or (source is None and not _is_second(address)))
+            and (source is address or (source is None and not address.name.endswith("_2")))
         }
         if len(found) == 1:
             return next(iter(found.values()))
         if found:
             senders = ", ".join(address.name for address in found)
-            msg = f"{message_type.__name__} is sent by {senders}: say whose is meant"
-        else:
-            sender = "" if source is None else f" sent by {source.name}"
-            msg = f"the catalogue has no message {message_type.__name__}{sender}"
-        raise ValueError(msg)
+            raise ValueError(f"{message_type.__name__} is sent by {senders}: say whose is meant")
+        sender = "" if source is None else f" sent by {source.name}"
+        raise ValueError(f"the catalogue has no message {message_type.__name__}{sender}")
 
     def ids_sent_by(self, address: Address) -> frozenset[int]:
         """Identifiers of all messages that a node sends."""
-        return frozenset(
-            codec.can_id for (_, source), codec in self._codecs.items() if source is address
-        )
+        return frozenset(each.codec.can_id for each in self.messages if each.source is address)
 
     def transmitter(self, message_type: type[T], source: Address | None = None) -> Transmitter[T]:
         """Return a new transmitter; see `codec`."""
@@ -122,12 +91,7 @@ class Catalogue:
 def load_catalogue(path: Path = DBC_PATH) -> Catalogue:
     """Read and compile a DBC; cached by path.
 
-    Raises
-    ------
-    ValueError
-        If the DBC doesn't match the message types; the message lists every difference.
-    OSError
-        If it can't be read.
+    ValueError lists every difference of the DBC and the message types.
     """
     from cantools.database.can import Database  # slow to import, and needed only here
 
@@ -159,8 +123,8 @@ def load_catalogue(path: Path = DBC_PATH) -> Catalogue:
     if not errors:
         errors = [f"{name}: missing" for kind, name in DBC_NAMES.items() if kind not in defined]
     if errors:
-        msg = f"{path.name} does not fit utank_hil/canbus/messages.py:\n" + "\n".join(errors)
-        raise ValueError(msg)
+        listed = "\n".join(errors)
+        raise ValueError(f"{path.name} does not fit utank_hil/canbus/messages.py:\n{listed}")
     digest = hashlib.sha256(content.replace(b"\r\n", b"\n")).digest()
     return Catalogue(codecs, int.from_bytes(digest, "big") % _VERSIONS)
 
@@ -171,17 +135,10 @@ def common_name(message: str, sender: str) -> str:
     return message.removesuffix(f"_{sender}").removesuffix(f"_{number}" if stem else "")
 
 
-def _is_second(address: Address) -> bool:
-    return address.name.endswith("_2")
-
-
 def read_data_ids(message: "DbcMessage") -> bytes | None:
     """Return the data IDs of a message of the DBC, None if it is unprotected.
 
-    Raises
-    ------
-    ValueError
-        If they are not hexadecimal.
+    ValueError is raised if they are not hexadecimal.
     """
     attribute = message.dbc.attributes.get("DataIDs") if message.dbc else None
     return None if attribute is None else bytes.fromhex(str(attribute.value))

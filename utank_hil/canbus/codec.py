@@ -30,28 +30,16 @@ _STRUCT: Final = struct.Struct("<BBHHH")
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """One signal of the DBC: unsigned, little endian, physical = raw * scale + offset.
+    """One signal of the DBC: unsigned, little endian, physical = raw * scale + offset."""
 
-    Attributes
-    ----------
-    name : str
-        Also the name of the message's field.
-    kind : type
-        `float`, `bool`, `int` or the IntEnum of its value table.
-    start, length : int
-        First bit and number of bits.
-    scale, offset : float
-        Used only if `kind` is float.
-    minimum, maximum : float
-        Range of the physical value; integers unless `kind` is float.
-    """
-
-    name: str
-    kind: type
-    start: int
-    length: int
+    name: str  #: Also the name of the message's field.
+    kind: type  #: `float`, `bool`, `int` or the IntEnum of its value table.
+    start: int  #: First bit.
+    length: int  #: Number of bits.
+    #: scale, offset: used only if `kind` is float.
     scale: float
     offset: float
+    #: minimum, maximum: range of the physical value; integers unless `kind` is float.
     minimum: float
     maximum: float
 
@@ -71,36 +59,16 @@ class Signal:
 
 @dataclass(frozen=True, slots=True)
 class Codec(Generic[T]):
-    """Encoding of one message of the catalogue.
+    """Encoding of one message of the catalogue."""
 
-    Attributes
-    ----------
-    name : str
-        Name in the DBC.
-    can_id : int
-        29-bit identifier.
-    cycle_ns : int
-        Cycle time; 0 for a message without one.
-    protected : bool
-        Whether byte 0 is a CRC and the low nibble of byte 1 a counter.
-    encode : Callable
-        ``encode(message, counter) -> bytes``, 8 bytes.
-    decode : Callable
-        ``decode(data) -> message``, or None if the CRC is wrong; `data` must be 8 bytes.
-    source : str
-        Text of both functions.
-    not_available : mapping of str to int
-        Raw value of each signal that says so: all ones, the largest that fits.
-    """
-
-    name: str
-    can_id: int
-    cycle_ns: int
-    protected: bool
-    encode: Callable[[T, int], bytes]
-    decode: Callable[[bytes], T | None]
-    source: str
-    not_available: Mapping[str, int]
+    name: str  #: Name in the DBC.
+    can_id: int  #: Identifier of 29 bits.
+    cycle_ns: int  #: Cycle time; 0 for a message without one.
+    protected: bool  #: Whether byte 0 is a CRC and the low nibble of byte 1 a counter.
+    encode: Callable[[T, int], bytes]  #: ``encode(message, counter)`` gives 8 bytes.
+    decode: Callable[[bytes], T | None]  #: Takes 8 bytes; None if the CRC is wrong.
+    source: str  #: Text of both functions.
+    not_available: Mapping[str, int]  #: Raw value of each signal that says so: all ones.
 
 
 def compile_codec(
@@ -114,16 +82,8 @@ def compile_codec(
 ) -> Codec[T]:
     """Generate the functions that encode and decode one message.
 
-    Parameters
-    ----------
-    message_type : type
-        NamedTuple with the signals' names as fields.
-    signals : iterable of Signal
-        All signals but CRC and counter, in the order of the fields.
-    name, can_id, cycle_ns
-        See `Codec`.
-    data_ids : bytes or None
-        Sixteen data IDs, or None for an unprotected message.
+    `message_type` is a NamedTuple; `signals` are all but CRC and counter, in the order of its
+    fields. There are sixteen `data_ids`, or None for an unprotected message.
     """
     signals = tuple(signals)
     kinds = [signal.kind for signal in signals if issubclass(signal.kind, IntEnum)]
@@ -146,10 +106,7 @@ def compile_codec(
 def field_kind(annotation: Any) -> type:
     """Return the kind of a field from its annotation: E for `E | None`, int for `int | None`.
 
-    Raises
-    ------
-    ValueError
-        If the annotation is not one of those in `utank_hil.canbus.messages`.
+    ValueError is raised if it is none of those in `utank_hil.canbus.messages`.
     """
     if annotation in (float, bool):
         return annotation  # type: ignore[no-any-return]  # narrowed by the line above
@@ -157,8 +114,7 @@ def field_kind(annotation: Any) -> type:
         kinds = [kind for kind in get_args(annotation) if kind is not NoneType]
         if len(kinds) == 1 and (kinds[0] is int or issubclass(kinds[0], IntEnum)):
             return kinds[0]  # type: ignore[no-any-return]  # a type, by the check before
-    msg = f"a field is float, bool, int | None or an IntEnum | None, not {annotation}"
-    raise ValueError(msg)
+    raise ValueError(f"a field is float, bool, int | None or an IntEnum | None, not {annotation}")
 
 
 def _members(kind: type[IntEnum], length: int) -> tuple[IntEnum | None, ...]:

@@ -85,32 +85,16 @@ def first_byte_table(data_ids: bytes) -> bytes:
     """Contribution of byte 1, of the data ID for its counter, and of the constants.
 
     The CRC of a frame with bytes b is ``table[b[1]] ^ A[b[2:4]] ^ B[b[4:6]] ^ C[b[6:8]]`` where
-    A, B, C are `WORD_TABLES`.
-
-    Parameters
-    ----------
-    data_ids : bytes
-        The message's sixteen data IDs, by counter.
-
-    Raises
-    ------
-    ValueError
-        If there are not sixteen of them.
+    A, B, C are `WORD_TABLES`. ValueError is raised if there are not sixteen data IDs.
     """
     if len(data_ids) != DATA_ID_COUNT:
-        msg = f"a message needs {DATA_ID_COUNT} data IDs, one a counter value; got {len(data_ids)}"
-        raise ValueError(msg)
+        raise ValueError(f"a message needs {DATA_ID_COUNT} data IDs, got {len(data_ids)}")
     return bytes(crc8(bytes((byte, 0, 0, 0, 0, 0, 0, data_ids[byte & 15]))) for byte in range(256))
 
 
 def profile2_crc(data: bytes, data_ids: bytes) -> int:
     """CRC of one frame computed byte by byte: the definition, for tools and tests.
 
-    Parameters
-    ----------
-    data : bytes
-        The whole frame, its CRC byte ignored; at least two bytes.
-    data_ids : bytes
-        The message's sixteen data IDs, by counter.
+    `data` is the whole frame of two bytes or more, its CRC byte ignored.
     """
     return crc8(data[1:] + data_ids[data[1] & 15 : (data[1] & 15) + 1])

@@ -34,23 +34,14 @@ class Rejection(Enum):
 
 
 class Transmitter(Generic[T]):
-    """Encodes messages of one type and sender into protected frames.
-
-    Attributes
-    ----------
-    can_id : int
-    cycle_ns : int
-        Cycle time by the catalogue; 0 for none.
-    counter : int
-        Sequence counter of the last frame.
-    """
+    """Encodes messages of one type and sender into protected frames."""
 
     __slots__ = ("_encode", "can_id", "counter", "cycle_ns")
 
     def __init__(self, codec: Codec[T]) -> None:
         self.can_id = codec.can_id
         self.cycle_ns = codec.cycle_ns
-        self.counter = 0
+        self.counter = 0  #: Sequence counter of the last frame.
         self._encode = codec.encode
 
     def frame(self, message: T) -> Frame:
@@ -69,22 +60,10 @@ class Receiver(Generic[T]):
     is less than ``16 - MAX_LOST - 1`` frames old; with four bits, an older one looks like the next
     one. The age of frames is judged elsewhere, since there is no clock here.
 
-    Attributes
-    ----------
-    can_id : int
-    cycle_ns : int
-        Cycle time by the catalogue; 0 for none.
-    valid : bool
-        State of the stream by a leaky bucket, +1 for a rejected and -1 for an accepted frame. False
-        before the first accepted frame, and from `BUCKET_LIMIT` until the bucket is empty again.
-    heard : int
-        Frames so far, accepted or not.
-    lost : int
-        Frames missing by the counter.
-    rejected : dict
-        Number of rejected frames by `Rejection`.
-    changes : int
-        0: new contents are counted by who knows of a message that is also sent on a change.
+    `heard` counts frames, accepted or not, `rejected` those that were not, by `Rejection`. `valid`
+    is the state of the stream by a leaky bucket, +1 for a rejected and -1 for an accepted frame:
+    False before the first accepted frame, and from `BUCKET_LIMIT` until the bucket is empty again.
+    `changes` is 0: only who knows of a message that is also sent on a change counts those.
     """
 
     changes: ClassVar[int] = 0

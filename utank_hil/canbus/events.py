@@ -15,53 +15,27 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class AlarmEvent:
-    """A state change of an alarm, or a reset that was refused.
+    """A state change of an alarm, or a reset that was refused."""
 
-    Attributes
-    ----------
-    time_ns : int
-        Time on the node's clock.
-    code : Fault
-    state : AlarmState or None
-        State entered; None: a reset was refused since this lasts.
-    mode : Mode
-        Of the controller.
-    """
-
-    time_ns: int
+    time_ns: int  #: Time on the node's clock.
     code: Fault
-    state: AlarmState | None
-    mode: Mode
+    state: AlarmState | None  #: State entered; None: a reset was refused since this lasts.
+    mode: Mode  #: Mode of the controller.
 
 
 @dataclass(frozen=True, slots=True)
 class ModelSummary:
-    """The identified ship, and the law's predicted performance.
+    """The identified ship, and the law's predicted performance."""
 
-    Attributes
-    ----------
-    roll_period_s : float
-        Natural roll period of the ship without tank water.
-    period_deviation : float
-        Relative standard deviation of that period.
-    inertia_kg_m2, stiffness_nm_rad, damping_nms_rad : float
-        Roll inertia, stiffness and linear damping of the ship.
-    held_out_fit : float
-        Worst one-step fit of an output on validation data.
-    peak_sensitivity : float
-        Peak of the sensitivity function on the identified ship.
-    roll_below_passive : float
-        Relative reduction of the roll RMS in the recorded waves, against the passive tank.
-    """
-
-    roll_period_s: float
-    period_deviation: float
+    roll_period_s: float  #: Natural roll period of the ship without tank water.
+    period_deviation: float  #: Relative standard deviation of that period.
     inertia_kg_m2: float
     stiffness_nm_rad: float
     damping_nms_rad: float
     tank_damping_ratio: float
-    held_out_fit: float
-    peak_sensitivity: float
+    held_out_fit: float  #: Worst one-step fit of an output on validation data.
+    peak_sensitivity: float  #: Peak of the sensitivity function on the identified ship.
+    #: Relative reduction of the roll RMS in the recorded waves, against the passive tank.
     roll_below_passive: float
 
     def ship(self, configured: "RollShip") -> "RollShip":
@@ -77,23 +51,12 @@ class ModelSummary:
 
 @dataclass(frozen=True, slots=True)
 class RetuningEvent:
-    """A state change of the retuning controller, or a message without one.
+    """A state change of the retuning controller, or a message without one."""
 
-    Attributes
-    ----------
-    time_ns : int
-        Time on the node's clock.
-    state : RetuningState
-        State entered; the present state for a message.
-    reasons : tuple of str
-        Why, in words.
-    found : ModelSummary or None
-        Identified ship that the law on trial, or the accepted law, was designed for.
-    """
-
-    time_ns: int
-    state: RetuningState
-    reasons: tuple[str, ...]
+    time_ns: int  #: Time on the node's clock.
+    state: RetuningState  #: State entered; the present state for a message.
+    reasons: tuple[str, ...]  #: Why, in words.
+    #: Ship that the law on trial, or the accepted law, was designed for.
     found: ModelSummary | None = None
 
     def as_json(self, start_ns: int = 0) -> dict[str, Any]:

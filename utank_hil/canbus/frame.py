@@ -14,15 +14,10 @@ LONGEST_STANDARD_ID: Final = (1 << 11) - 1
 
 
 class Frame(NamedTuple):
-    """One CAN 2.0 data frame.
+    """One CAN 2.0 data frame of at most 8 bytes.
 
-    Attributes
-    ----------
-    can_id : int
-        Identifier of 29 bits, or of 11 bits with the mark `STANDARD`; above `BUS_SHIFT` the number
-        of the interface.
-    data : bytes
-        Payload, at most 8 bytes.
+    `can_id` has 29 bits, or 11 bits with the mark `STANDARD`; above `BUS_SHIFT` stands the number
+    of the interface.
     """
 
     can_id: int

@@ -15,50 +15,25 @@ MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 
 @dataclass(slots=True, eq=False)
 class MotionSample:
-    """The last good sample of one motion sensor.
-
-    Attributes
-    ----------
-    roll_rad, roll_rate_rad_s : float
-        Zero before the first sample.
-    heard_ns : int
-        Time of receipt.
-    age_ms : float
-        Time since then.
-    valid : bool
-        The sensor's messages arrive intact and in order.
-    discarded : int
-        Samples so far that were no motion of a ship.
-    """
+    """The last good sample of one motion sensor; zero before the first."""
 
     roll_rad: Final[float] = 0.0
     roll_rate_rad_s: Final[float] = 0.0
-    heard_ns: Final[int] = 0
-    age_ms: Final[float] = 0.0
-    valid: Final[bool] = True
-    discarded: Final[int] = 0
+    heard_ns: Final[int] = 0  #: Time of receipt.
+    age_ms: Final[float] = 0.0  #: Time since then.
+    valid: Final[bool] = True  #: The sensor's messages arrive intact and in order.
+    discarded: Final[int] = 0  #: Samples so far that were no motion of a ship.
 
 
 class Wishes(NamedTuple):
-    """What the operator ordered since the last look.
+    """What the operator ordered since the last look."""
 
-    Attributes
-    ----------
-    armed : bool
-        The arm bit is set, and no frame since the last look disarmed.
-    stop : bool
-        The stop bit is set, or was in a frame since the last look.
-    arm_edge, reset_edge : bool
-        The arm bit, or the reset bit, was set since the last look.
-    passive_edge : bool
-        The mode asked for has changed to PASSIVE since the last look.
-    """
-
-    armed: bool = False
-    stop: bool = False
+    armed: bool = False  #: The arm bit is set, and no frame since the last look disarmed.
+    stop: bool = False  #: The stop bit is set, or was in a frame since the last look.
+    #: arm_edge, reset_edge: the arm bit, or the reset bit, was set since the last look.
     arm_edge: bool = False
     reset_edge: bool = False
-    passive_edge: bool = False
+    passive_edge: bool = False  #: The mode asked for has changed to PASSIVE since the last look.
 
 
 @dataclass(slots=True, eq=False)
@@ -67,62 +42,6 @@ class Measurements:
 
     Ages count from the last accepted frame with plausible content. An age of what is not on board
     is negative: it is never late. The first five fields are those of `Wishes`.
-
-    Attributes
-    ----------
-    now_ns : int
-        Time of the tick.
-    requested_mode : Mode
-        Mode that the operator asks for.
-    panel_age_ms : float
-    panel_matches : bool
-        The panel in command runs the controller's catalogue and configuration.
-    motions : tuple of MotionSample
-        Of the one or two motion sensors.
-    port_level_m, starboard_level_m : float
-        Above still water.
-    level_m : float
-        Starboard up: half the difference of the two gauges.
-    tank_ns, tank_cycles : int
-        Time of receipt of the levels, and cycles of their message since the first.
-    tank_age_ms : float
-    levels_discarded : int
-        Samples of the gauges so far that were no motion of water.
-    high_level : bool
-        A high-level switch is closed or broken.
-    pressure_pa : float
-        Across the pump.
-    pump_age_ms : float
-    drive_state : DriveState or None
-    drive_age_ms : float
-    drive_echo_ns, drive_echo : int, int or None
-        Command counter that the drive's status sends back, and when it first came.
-    drive_fault, drive_warns : bool
-        The drive reports a fault, or a warning.
-    drive_held_back : bool
-        The drive says that its power or its speed is at the limit.
-    power_w : float
-        Electric power that the drive takes.
-    valve_opening : float
-    valve_following, valve_fault : bool
-        The valve follows its commands; it reports a fault.
-    valve_echo_ns, valve_echo : int, int or None
-        Command counter that the valve's status sends back, and when it first came.
-    valve_heard_ns : int
-        Time of receipt of the last status with an opening.
-    hardwired_stop : bool
-        The hard-wired stop loop is open or broken, or was since the last look.
-    hardwired_age_ms : float
-    versions_match : bool
-        Drive, sensors and valve run the controller's catalogue and configuration.
-    protection_valid : bool
-        Messages of gauges and drive arrive intact and in order.
-    address_conflict, claimed_twice : bool
-        Another node sent with the controller's address; one claimed the address of another.
-    link_lost : bool
-        The bus could not be read or written in the last command cycle.
-    frames, foreign : int
-        Frames so far, of any kind, and those that are not in the catalogue.
     """
 
     armed: Final[bool]
@@ -130,41 +49,44 @@ class Measurements:
     arm_edge: Final[bool]
     reset_edge: Final[bool]
     passive_edge: Final[bool]
-    now_ns: Final[int]
+    now_ns: Final[int]  #: Time of the tick.
     requested_mode: Final[Mode]
     panel_age_ms: Final[float]
-    panel_matches: Final[bool]
-    motions: Final[tuple[MotionSample, ...]]
+    panel_matches: Final[bool]  #: The panel in command runs this catalogue and configuration.
+    motions: Final[tuple[MotionSample, ...]]  #: Of the one or two motion sensors.
+    #: port_level_m, starboard_level_m: above still water.
     port_level_m: Final[float]
     starboard_level_m: Final[float]
-    level_m: Final[float]
-    tank_ns: Final[int]
-    tank_cycles: Final[int]
+    level_m: Final[float]  #: Starboard up: half the difference of the two gauges.
+    tank_ns: Final[int]  #: Time of receipt of the levels.
+    tank_cycles: Final[int]  #: Cycles of their message since the first.
     tank_age_ms: Final[float]
-    levels_discarded: Final[int]
-    high_level: Final[bool]
-    pressure_pa: Final[float]
+    levels_discarded: Final[int]  #: Samples of the gauges that were no motion of water.
+    high_level: Final[bool]  #: A high-level switch is closed or broken.
+    pressure_pa: Final[float]  #: Across the pump.
     pump_age_ms: Final[float]
     drive_state: Final[DriveState | None]
     drive_age_ms: Final[float]
+    #: drive_echo_ns, drive_echo: command counter that the drive's status sends back, and when it
+    #: first came; of the valve likewise.
     drive_echo_ns: Final[int]
     drive_echo: Final[int | None]
     drive_fault: Final[bool]
     drive_warns: Final[bool]
-    drive_held_back: Final[bool]
-    power_w: Final[float]
+    drive_held_back: Final[bool]  #: The drive says that its power or its speed is at the limit.
+    power_w: Final[float]  #: Electric power that the drive takes.
     valve_opening: Final[float]
     valve_following: Final[bool]
     valve_fault: Final[bool]
     valve_echo_ns: Final[int]
     valve_echo: Final[int | None]
-    valve_heard_ns: Final[int]
-    hardwired_stop: Final[bool]
+    valve_heard_ns: Final[int]  #: Time of receipt of the last status with an opening.
+    hardwired_stop: Final[bool]  #: The stop loop is, or was since the last look, open or broken.
     hardwired_age_ms: Final[float]
-    versions_match: Final[bool]
-    protection_valid: Final[bool]
-    address_conflict: Final[bool]
-    claimed_twice: Final[bool]
-    link_lost: Final[bool]
-    frames: Final[int]
-    foreign: Final[int]
+    versions_match: Final[bool]  #: Of drive, sensors and valve, with the controller's.
+    protection_valid: Final[bool]  #: Messages of gauges and drive arrive intact and in order.
+    address_conflict: Final[bool]  #: Another node sent with the controller's address.
+    claimed_twice: Final[bool]  #: A node claimed the address of another.
+    link_lost: Final[bool]  #: The bus could not be read or written in the last command cycle.
+    frames: Final[int]  #: Frames so far, of any kind.
+    foreign: Final[int]  #: Those that are not in the catalogue.

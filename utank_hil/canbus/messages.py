@@ -38,9 +38,7 @@ from utank_hil.canbus.enumerations import (
 _T = TypeVar("_T", bound=type[tuple[Any, ...]])
 
 DBC_NAMES: Final[dict[type[tuple[Any, ...]], str]] = {}
-"""Message name in the DBC by type; for messages that several nodes send, without the node's name
-or number.
-"""
+"""Name in the DBC by type; of messages that several nodes send, without the node's name."""
 
 
 def _dbc_message(name: str) -> Callable[[_T], _T]:

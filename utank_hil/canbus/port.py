@@ -18,22 +18,10 @@ class Port(Protocol):
         """What was received so far and is no `Frame`: it loads the bus all the same."""
 
     def send(self, frame: Frame) -> None:
-        """Queue one frame for transmission.
-
-        Raises
-        ------
-        PortError
-            If the frame was not accepted.
-        """
+        """Queue one frame for transmission; PortError is raised if it was not accepted."""
 
     def receive(self) -> Sequence[Frame]:
-        """Return the frames received since the last call, oldest first.
-
-        Raises
-        ------
-        PortError
-            If the bus can no longer be read.
-        """
+        """Return the frames since the last call, oldest first; PortError if there is no bus."""
 
     def close(self) -> None:
         """Release the bus; idempotent."""

@@ -10,18 +10,9 @@ from utank_hil.canbus.profiles.foreign import ForeignDevices
 class BusPorts:
     """The controller's own interface and others, whose frames carry their numbers.
 
-    Parameters
-    ----------
-    ports : sequence of Port
-        The controller's own first.
-    vital : collection of int
-        Interfaces whose errors are those of the bus. An error of another one is kept in `errors`,
-        and the devices on it fall silent.
-
-    Attributes
-    ----------
-    errors : dict of int to PortError
-        Last error of each interface that is not vital.
+    The controller's own is the first of `ports`. `vital` are the interfaces whose errors are those
+    of the bus. An error of another one is kept in `errors`, by its number, and the devices on it
+    fall silent.
     """
 
     def __init__(self, ports: Sequence[Port], vital: Collection[int] = (0,)) -> None:
@@ -33,11 +24,11 @@ class BusPorts:
 
     @property
     def others(self) -> int:
-        """Frames of other kinds on the controller's own interface; see `Port`."""
+        """Frames of other kinds on the controller's own interface."""
         return self._ports[0].others
 
     def send(self, frame: Frame) -> None:
-        """Queue one frame on its interface; see `Port.send`."""
+        """Queue one frame on its interface."""
         number = frame.can_id >> BUS_SHIFT
         self._ports[number].send(Frame(frame.can_id & (OTHER_BUS - 1), frame.data))
 
@@ -84,18 +75,9 @@ class BusPorts:
 def open_buses(own: str, foreign: ForeignDevices, *, sends: bool = False) -> BusPorts:
     """Open the controller's own interface and those of the ship's devices.
 
-    Parameters
-    ----------
-    own : str
-        Name of the controller's interface.
-    foreign : ForeignDevices
-    sends : bool
-        Whether it is the devices' side, which sends where the controller is not to.
-
-    Raises
-    ------
-    PortError
-        If an interface is missing, or the controller's own stands in the ship's file, too.
+    `own` is the name of the controller's; with `sends` it is the devices' side, which sends where
+    the controller is not to. PortError is raised if an interface is missing, or the controller's
+    own stands in the ship's file, too.
     """
     from utank_hil.canbus.socketcan import SocketCanPort
 

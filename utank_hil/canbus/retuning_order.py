@@ -4,16 +4,9 @@ from typing import NamedTuple
 
 
 class RetuningOrder(NamedTuple):
-    """What the operator ordered since the last sample.
+    """What the operator ordered since the last sample."""
 
-    Attributes
-    ----------
-    retune, undo : bool
-        The button was pressed.
-    forbidden : bool
-        Retuning is forbidden, or was for a moment.
-    """
-
+    #: retune, undo: the button was pressed.
     retune: bool = False
     undo: bool = False
-    forbidden: bool = False
+    forbidden: bool = False  #: Retuning is forbidden, or was for a moment.

@@ -53,29 +53,10 @@ class SocketCanPort:
     An interface that was down is used again when it is up. One that was deleted is reopened by the
     first call after it exists again. Every call until then raises PortError.
 
-    Parameters
-    ----------
-    channel : str
-        Name of the interface, such as ``can0``.
-    can_ids : iterable of int, optional
-        Acceptance filter in the kernel, extended identifiers; none by default, for nodes that
-        detect unknown identifiers.
-    standard : bool
-        Whether frames with identifiers of 11 bits are handed on, and not only counted.
-    receive_only : bool
-        Whether nothing is ever sent.
-
-    Attributes
-    ----------
-    error_frames, standard_frames, remote_frames : int
-        Received frames that are not a `Frame`: error frames, 11-bit identifiers, remote frames.
-    others : int
-        All of these.
-
-    Raises
-    ------
-    PortError
-        If there is no such interface, or no CAN support in the kernel.
+    `can_ids` is an acceptance filter of extended identifiers in the kernel; there is none by
+    default, for nodes that detect unknown identifiers. Frames with identifiers of 11 bits are only
+    counted unless they are `standard`. PortError is raised if there is no such interface, or no CAN
+    support in the kernel.
     """
 
     def __init__(
@@ -88,9 +69,8 @@ class SocketCanPort:
     ) -> None:
         self.channel = channel
         self._standard, self._receive_only = standard, receive_only
-        self.error_frames = 0
-        self.standard_frames = 0
-        self.remote_frames = 0
+        #: Received frames that are not a `Frame`.
+        self.error_frames = self.standard_frames = self.remote_frames = 0
         self._can_ids = None if can_ids is None else tuple(can_ids)
         self._down = self._drained = False
         self._pending: PortError | None = None

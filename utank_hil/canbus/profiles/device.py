@@ -35,27 +35,15 @@ def _nobody(message: Any, now_ns: int) -> None:
 
 @dataclass(frozen=True, slots=True)
 class SignalPlan:
-    """One measured value: value = sign * (physical * factor + offset).
+    """One measured value: value = sign * (physical * factor + offset)."""
 
-    Attributes
-    ----------
-    place : int
-        Of the value in the message.
-    message : int
-        Place of its message in the device.
-    field : Field
-    factor, offset : float
-    sign : int
-    least, most : float
-        Range of the physical value, in the maker's unit; outside it is none.
-    """
-
-    place: int
-    message: int
+    place: int  #: Place of the value in the message.
+    message: int  #: Place of its message in the device.
     field: Field
     factor: float
     offset: float
     sign: int
+    #: least, most: range of the physical value, in the maker's unit; outside it there is none.
     least: float
     most: float
 
@@ -86,64 +74,33 @@ class MessagePlan:
 
 @dataclass(frozen=True, slots=True)
 class DevicePlan(Generic[T]):
-    """All that is needed to hear a device.
-
-    Attributes
-    ----------
-    name : str
-    kind : type
-        Message that it stands for.
-    messages : tuple of MessagePlan
-    signals : tuple of SignalPlan
-    conditions : tuple of ConditionPlan
-    cycle_ns, same_instant_ns : int
-        Of the measurement; frames that belong to one come within the second.
-    age_ms : float
-        A stamp that is later than others by more is too late.
-    unchanged_ns : int
-        Content that has been the same for longer is none; 0 where stamp or counter say more.
-    high_level_m : float
-        Level above which a reservoir counts as high where there are no switches.
-    derived : bool
-        Whether the rate is the difference of two rolls.
-    name_id : tuple of (int, int) or None
-        Identifier (priority 6) of the address claim of the device, and the NAME it must carry.
-    wake : Frame or None
-        Sent each second to a device that is silent, or has not said its name: start of a CANopen
-        node, request of an address claim.
-    """
+    """All that is needed to hear a device."""
 
     name: str
-    kind: type[T]
+    kind: type[T]  #: Message that it stands for.
     messages: tuple[MessagePlan, ...]
     signals: tuple[SignalPlan, ...]
     conditions: tuple[ConditionPlan, ...]
-    cycle_ns: int
-    same_instant_ns: int
-    age_ms: float
+    cycle_ns: int  #: Cycle of the measurement.
+    same_instant_ns: int  #: Frames that belong to one measurement come within this time.
+    age_ms: float  #: A stamp that is later than others by more is too late.
+    #: Content that has been the same for longer is none; 0 where stamp or counter say more.
     unchanged_ns: int = 0
+    #: Level above which a reservoir counts as high where there are no switches.
     high_level_m: float = math.inf
-    derived: bool = False
+    derived: bool = False  #: Whether the rate is the difference of two rolls.
+    #: Identifier (priority 6) of the device's address claim, and the NAME it must carry.
     name_id: tuple[int, int] | None = None
+    #: Sent each second to a device that is silent, or has not said its name: start of a CANopen
+    #: node, request of an address claim.
     wake: Frame | None = None
 
 
 class ProfiledDevice(Generic[T]):
     """Hears one device, and hands on each measurement that is complete.
 
-    Parameters
-    ----------
-    plan : DevicePlan
-
-    Attributes
-    ----------
-    deliver : callable
-        Called with each message and the time at which it was complete.
-    takes : dict of int to callable
-        What takes a frame and the time of its receipt, by identifier.
-    watched : tuple of HeardMessage
-        Counters of its messages.
-    cycle_ns : int
+    `deliver` is called with each message and the time at which it was complete. `takes` has, by
+    identifier, what takes a frame and the time of its receipt; `watched` counts its messages.
     """
 
     def __init__(self, plan: DevicePlan[T]) -> None:

@@ -10,23 +10,11 @@ _REAL: Final = {16: "<e", 32: "<f", 64: "<d"}
 class Field:
     """A signal as a DBC lays it out: physical = raw * scale + offset.
 
-    Parameters
-    ----------
-    start, bits : int
-        First bit as in a DBC, and number of bits: of a signal with the least byte first the least
-        bit, of one with the most byte first the most.
-    length : int
-        Bytes of the frame.
-    big_endian, signed, real : bool
-        Most byte first; two's complement; IEEE 754.
-    scale, offset : float
-    least_raw, most_raw : int, optional
-        Counts outside are not available, or an error; without them every count is a value.
-
-    Raises
-    ------
-    ValueError
-        If the signal does not fit its frame, or a real number has not 16, 32 or 64 bits.
+    `start` is the first bit as in a DBC: of a signal with the least byte first the least bit, of
+    one with the most byte first (`big_endian`) the most; `length` is that of the frame in bytes.
+    `signed` is two's complement, `real` IEEE 754. Counts outside `least_raw` and `most_raw` are not
+    available, or an error. ValueError is raised if the signal does not fit its frame, or a real
+    number has not 16, 32 or 64 bits.
     """
 
     __slots__ = (

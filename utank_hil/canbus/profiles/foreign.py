@@ -9,28 +9,16 @@ from utank_hil.canbus.profiles.device import DevicePlan
 
 @dataclass(frozen=True, slots=True)
 class ForeignDevices:
-    """What the controller node needs to hear the devices of a ship.
+    """What the controller node needs to hear the devices of a ship."""
 
-    Attributes
-    ----------
-    motions : tuple of DevicePlan or None
-        Of the one or two motion sensors; None for a native one.
-    levels, pump_sensor : DevicePlan or None
-    buses : tuple of str
-        Names of the interfaces by their numbers; the controller's own, the first, has none.
-    receive_only : frozenset of str
-        Interfaces on which nothing is sent.
-    other_ids : frozenset of int
-        Identifiers that are nobody's fault.
-    other_pgns : frozenset of int
-    """
-
+    #: Of the one or two motion sensors; None for a native one.
     motions: tuple[DevicePlan[SensorMotion] | None, ...] = (None, None)
     levels: DevicePlan[SensorTank] | None = None
     pump_sensor: DevicePlan[SensorPump] | None = None
+    #: Names of the interfaces by their numbers; the controller's own, the first, has none.
     buses: tuple[str, ...] = ("",)
-    receive_only: frozenset[str] = frozenset()
-    other_ids: frozenset[int] = frozenset()
+    receive_only: frozenset[str] = frozenset()  #: Interfaces on which nothing is sent.
+    other_ids: frozenset[int] = frozenset()  #: Identifiers that are nobody's fault.
     other_pgns: frozenset[int] = frozenset()
 
     @property

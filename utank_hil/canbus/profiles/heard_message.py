@@ -11,15 +11,10 @@ from utank_hil.canbus.profiles.field import Field
 class Crc8:
     """A checksum of eight bits over all other bytes of a frame, in their order.
 
-    Attributes
-    ----------
-    byte : int
-        Its place in the frame.
-    polynomial, start, final : int
-        As in the Rocksoft model, without reflection; SAE J1850 has 0x1D, 0xFF and 0xFF.
+    The numbers are those of the Rocksoft model, without reflection; SAE J1850 is the default.
     """
 
-    byte: int
+    byte: int  #: Place of the checksum in the frame.
     polynomial: int = 0x1D
     start: int = 0xFF
     final: int = 0xFF
@@ -39,22 +34,7 @@ class Crc8:
 class HeardMessage:
     """Length, checksum and counter of one message, and how its frames pass them.
 
-    Parameters
-    ----------
-    can_id, cycle_ns, length : int
-    counter : Field, optional
-    crc : Crc8, optional
-
-    Attributes
-    ----------
-    can_id, cycle_ns, length : int
-        As given.
-    heard, lost, changes : int
-        Frames so far, accepted or not; those missing by the counter; those sent on a change.
-    rejected : dict
-        Number of rejected frames by `Rejection`.
-    valid : bool
-        As of `Receiver`.
+    The counts `heard`, `lost`, `rejected` and `valid` are as of `Receiver`.
     """
 
     def __init__(
@@ -116,14 +96,8 @@ class Stamp:
     """The device's own time in a message: whether it moves on, and how late its frame came.
 
     The least delay so far counts as none. It is forgotten at the rate of two clocks that run apart.
-
-    Parameters
-    ----------
-    field : Field
-    unit_us : float
-        Microseconds a count.
-    late_ms : float
-        A frame that is later than others by more is not accepted.
+    A count is `unit_us` microseconds; a frame that is later than others by more than `late_ms` is
+    not accepted.
     """
 
     def __init__(self, field: Field, unit_us: float, late_ms: float) -> None:
