@@ -174,35 +174,19 @@ class ControllerConfig(Section):
         return problems
 
     def _limit_problems(self) -> list[Problem]:
-        pump = self.vessel.pump
-        pressure_pa = said_pa = math.inf
-        if pump is not None:
-            pressure_pa, said_pa = pump.max_pressure_pa, MOST_PRESSURE_PA
-        level_m = self.vessel.tank.level_limit_m
+        pump, level_m = self.vessel.pump, self.vessel.tank.level_limit_m
+        pressure_pa = math.inf if pump is None else pump.max_pressure_pa
+        said_pa = math.inf if pump is None else MOST_PRESSURE_PA
+        asked_pa = self.limits.pressure_pa
+        gives = f"the vessel's pump gives {pressure_pa:g} at most"
+        says = f"PUMP_CMD can ask for {said_pa:g} at most"
+        full = f"the vessel's tank is full or empty at {level_m:g}"
         return [
-            (
-                f"limits.{name}",
-                f"is {value:g}, but {why}: set it to {most:g} or less, or leave it out",
-            )
+            (name, f"is {value:g}, but {why}: set it to {most:g} or less, or leave it out")
             for name, value, most, why in (
-                (
-                    "pressure_pa",
-                    self.limits.pressure_pa,
-                    pressure_pa,
-                    f"the vessel's pump gives {pressure_pa:g} at most",
-                ),
-                (
-                    "pressure_pa",
-                    min(self.limits.pressure_pa, pressure_pa),
-                    said_pa,
-                    f"PUMP_CMD can ask for {said_pa:g} at most",
-                ),
-                (
-                    "level_m",
-                    self.limits.level_m,
-                    level_m,
-                    f"the vessel's tank is full or empty at {level_m:g}",
-                ),
+                ("limits.pressure_pa", asked_pa, pressure_pa, gives),
+                ("limits.pressure_pa", min(asked_pa, pressure_pa), said_pa, says),
+                ("limits.level_m", self.limits.level_m, level_m, full),
             )
             if value > most
         ]
@@ -225,47 +209,56 @@ class ControllerConfig(Section):
             return []
         if not isinstance(law, PredictiveDesign) or "roll_rad" not in law.predictor.measured:
             return [("retuning", "is for predictive laws (gpc, dpc) that measure roll_rad")]
-        problems = []
-        if settings.change_factor is not None and self.sea_estimate is None:
-            reason = "needs the section sea_estimate, which tells the ship: add `sea_estimate: {}`"
-            problems.append(("change_factor", reason))
-        period_s = law.predictor.sample_time_s
-        if settings.order > MOST_ORDER:
-            problems.append(("order", f"must be {MOST_ORDER} at most, got {settings.order}"))
+        period_s, length_s = law.predictor.sample_time_s, settings.identification_s
         shortest_s, longest_s = settings.pulse_hold_s
-        if not period_s / 2 < shortest_s <= longest_s <= settings.identification_s:
-            problems.append(
-                (
-                    "pulse_hold_s",
-                    f"must rise from the law's sample time, {period_s:g} s, to identification_s at "
-                    f"most, got {shortest_s:g} and {longest_s:g}",
-                )
-            )
-        if settings.every_s is not None and settings.every_s < LEAST_PAUSE_S:
-            reason = (
-                f"must be {LEAST_PAUSE_S:g} or more, got {settings.every_s:g}: during the pulses, "
-                "and for eight roll periods after, no law is compared with the passive ship"
-            )
-            problems.append(("every_s", reason))
+        every_s = math.inf if settings.every_s is None else settings.every_s
         highest_rad_s, excitation = math.pi / period_s, settings.excitation
         banded = excitation.kind in ("multisine", "chirp")
-        if banded and excitation.band[1] >= highest_rad_s:
-            reason = f"must stay below {highest_rad_s:.3g}, half of the law's sampling"
-            problems.append(("excitation.band_rad_s", reason))
-        if settings.identification_s > MOST_PULSES_S:
-            reason = f"must be {MOST_PULSES_S:g} at most, got {settings.identification_s:g}"
-            problems.append(("identification_s", reason))
-        longest_roll_s = settings.roll_period_range_s[1]
-        most_rad_s = WASHOUT_SHARE * 2 * math.pi / longest_roll_s
-        if law.washout_rad_s > most_rad_s:
-            reason = (
+        most_rad_s = WASHOUT_SHARE * 2 * math.pi / settings.roll_period_range_s[1]
+        checks = (
+            (
+                settings.change_factor is not None and self.sea_estimate is None,
+                "change_factor",
+                "needs the section sea_estimate, which tells the ship: add `sea_estimate: {}`",
+            ),
+            (
+                settings.order > MOST_ORDER,
+                "order",
+                f"must be {MOST_ORDER} at most, got {settings.order}",
+            ),
+            (
+                not period_s / 2 < shortest_s <= longest_s <= length_s,
+                "pulse_hold_s",
+                f"must rise from the law's sample time, {period_s:g} s, to identification_s at "
+                f"most, got {shortest_s:g} and {longest_s:g}",
+            ),
+            (
+                every_s < LEAST_PAUSE_S,
+                "every_s",
+                f"must be {LEAST_PAUSE_S:g} or more, got {every_s:g}: during the pulses, and for "
+                "eight roll periods after, no law is compared with the passive ship",
+            ),
+            (
+                banded and excitation.band[1] >= highest_rad_s,
+                "excitation.band_rad_s",
+                f"must stay below {highest_rad_s:.3g}, half of the law's sampling",
+            ),
+            (
+                length_s > MOST_PULSES_S,
+                "identification_s",
+                f"must be {MOST_PULSES_S:g} at most, got {length_s:g}",
+            ),
+            (
+                law.washout_rad_s > most_rad_s,
+                "roll_period_range_s",
                 f"must leave {most_rad_s:.4g} or more for the law's washout_rad_s, "
-                f"{law.washout_rad_s:g}: lower one of the two"
-            )
-            problems.append(("roll_period_range_s", reason))
+                f"{law.washout_rad_s:g}: lower one of the two",
+            ),
+        )
+        problems = [(name, reason) for wrong, name, reason in checks if wrong]
         problems += record_problems(
             settings.order,
-            round(settings.identification_s / period_s),
+            round(length_s / period_s),
             len(law.predictor.measured),
             period_s,
             settings.roll_period_range_s[0],

@@ -21,31 +21,29 @@ def shipped_profiles() -> tuple[str, ...]:
 
 
 @cache
-def _profile(name: str) -> Any:
+def _profile(name: str) -> dict[str, Any]:
     content, findings = parse_yaml((FOLDER / f"{name}.yaml").read_text(encoding="utf-8"))
     assert not findings, findings
+    assert isinstance(content, dict)
     return content
 
 
 def with_profile(content: dict[str, Any]) -> dict[str, Any]:
     """A device's section with what its profile or its DBC says, where it says nothing itself.
 
-    Raises
-    ------
-    ValueError
-        If there is no such profile, or the DBC can't be read, or has no such message.
+    ValueError is raised if there is no such profile, or the DBC can't be read, or has no such
+    message.
     """
     content = _as_written(content)
-    name = content.get("profile", "")
     if "dbc" in content:
         return _with_dbc(content)
+    name = content.get("profile", "")
     if not isinstance(name, str) or name in ("", NATIVE) or name.startswith(OF_A_DBC):
         return content
     if name not in shipped_profiles():
         known = ", ".join((NATIVE, *shipped_profiles()))
         raise ValueError(f"no profile {name!r}: there are {known}; or name a file by dbc")
-    merged: dict[str, Any] = _merged(_profile(name), content)
-    return merged
+    return _merged(_profile(name), content)
 
 
 def _as_written(value: Any) -> Any:
@@ -57,11 +55,12 @@ def _as_written(value: Any) -> Any:
     return value
 
 
-def _merged(below: Any, above: Any) -> Any:
-    if isinstance(below, dict) and isinstance(above, dict):
-        both = {key: _merged(below[key], above[key]) for key in below.keys() & above.keys()}
-        return {**below, **above, **both}
-    return above
+def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    both = {**below, **above}
+    for key in below.keys() & above.keys():
+        if isinstance(below[key], dict) and isinstance(above[key], dict):
+            both[key] = _merged(below[key], above[key])
+    return both
 
 
 def _with_dbc(content: dict[str, Any]) -> dict[str, Any]:
@@ -69,9 +68,7 @@ def _with_dbc(content: dict[str, Any]) -> dict[str, Any]:
     rest = {key: value for key, value in content.items() if key not in ("dbc", "messages")}
     named = content.get("messages")
     if not isinstance(named, dict) or not all(isinstance(each, str) for each in named.values()):
-        raise ValueError(
-            "with dbc, messages gives each message of the file a name: {name: MESSAGE}"
-        )
+        raise ValueError("with dbc, messages names messages of the file: {name: MESSAGE}")
     layouts = _dbc_layouts(str(content["dbc"]))
     for each in named.values():
         if each not in layouts:

@@ -25,6 +25,7 @@ from utank_hil.configuration.device_sections import (
     UNITS,
     ConditionSection,
     Cycle,
+    FieldSection,
     Id11,
     Id29,
     MessageSection,
@@ -48,8 +49,6 @@ PRIORITIES: Final = range(8)
 _NAME_PGN: Final = 0xEEFF
 """Address claimed, to all."""
 _REQUEST_PGN: Final = 0xEA00
-
-
 Noise = Annotated[float, Range(above=0, most=1.0)]
 
 
@@ -86,9 +85,7 @@ class DeviceSection(Section):
     """From the motion to the first bit on the bus."""
     same_instant_ms: Cycle | None = None
     """Frames of one measurement come within this time; half a cycle without it."""
-    noise: Annotated[
-        dict[str, Annotated[float, Range(above=0, most=1.0)]], Field(default_factory=dict)
-    ]
+    noise: Annotated[dict[str, Noise], Field(default_factory=dict)]
     """Standard deviation of a value, where it is more than `sensors` of the controller's file."""
     high_level_m: Annotated[float, Range(above=0, most=100)] | None = None
     """Level that counts as too high, where the levels come without switches."""
@@ -123,10 +120,8 @@ class DeviceSection(Section):
         """What is wrong with the device as a source of this message; native ones are right."""
         if self.native:
             if self.bus:
-                yield (
-                    "bus",
-                    "is for a device with a profile: native nodes are on the controller's bus",
-                )
+                reason = "is for a device with a profile: native nodes are on the controller's bus"
+                yield "bus", reason
             return
         for name in ("cycle_ms", "age_ms"):
             if getattr(self, name) is None:
@@ -145,11 +140,11 @@ class DeviceSection(Section):
                 yield "protection.crcs", f"there is no message {crc.message!r}"
         guards = self.protection
         if not self.protected and not self.accept_unprotected:
-            yield (
-                "accept_unprotected",
+            reason = (
                 "must be set to true: no counter or checksum tells frames of another sender, old "
-                "or spoilt ones. The pressure stays at half until a second motion sensor agrees",
+                "or spoilt ones. The pressure stays at half until a second motion sensor agrees"
             )
+            yield "accept_unprotected", reason
         if not (guards.counters or guards.stamps or guards.unchanged_ms):
             reason = "is required where nothing counts: a device that hangs sends the same for ever"
             yield "protection.unchanged_ms", reason
@@ -200,10 +195,14 @@ class DeviceSection(Section):
         yield from (("protection.counters", each) for each in self.protection.counters)
         yield from (("protection.stamps", each.from_) for each in self.protection.stamps)
 
-    def _field(self, path: str) -> Any:
+    def _field(self, path: str) -> FieldSection | None:
         message, _, signal = path.partition(".")
         section = self.messages.get(message)
         return None if section is None else section.signals.get(signal)
+
+    def _factor(self, signal: SignalSection, layout: FieldSection) -> float:
+        """Value, in the unit of its name, of one unit of the maker's."""
+        return UNITS.get(layout.unit, ("", 1.0))[1] if signal.scale is None else signal.scale
 
     def step(self, value: str) -> float:
         """The least step of a value, in its own unit; zero for a real number."""
@@ -211,8 +210,7 @@ class DeviceSection(Section):
         layout = self._field(signal.from_)
         if layout is None or layout.real:
             return 0.0
-        factor = UNITS.get(layout.unit, ("", 1.0))[1] if signal.scale is None else signal.scale
-        return abs(float(layout.scale) * factor)
+        return abs(layout.scale * self._factor(signal, layout))
 
     def _wake(self, bus: int) -> Frame | None:
         """What starts a CANopen node (CiA 301), or has an address claimed anew (J1939-81)."""
@@ -231,37 +229,31 @@ class DeviceSection(Section):
 
         Nothing is sent to it on a `silent` interface.
         """
+        assert self.age_ms is not None
         places = {each: place for place, each in enumerate(self.messages)}
         fields = {
             f"{message}.{signal}": layout.field(section.bytes)
             for message, section in self.messages.items()
             for signal, layout in section.signals.items()
         }
-        cycle_ms, age_ms = self.period_ms(), self.age_ms
-        assert age_ms is not None
         signals = []
         for value, signal in self.signals.items():
-            if signal.source == "derived":
-                continue
             layout = self._field(signal.from_)
-            factor = UNITS.get(layout.unit, ("", 1.0))[1] if signal.scale is None else signal.scale
+            if signal.source == "derived" or layout is None:
+                continue
+            place = places[signal.from_.partition(".")[0]]
+            factor = self._factor(signal, layout)
             signals.append(
                 SignalPlan(
-                    FIELDS[kind].index(value), places[signal.from_.partition(".")[0]],
-                    fields[signal.from_], factor, signal.offset, signal.sign, signal.least,
-                    signal.most,
+                    FIELDS[kind].index(value), place, fields[signal.from_], factor, signal.offset,
+                    signal.sign, signal.least, signal.most,
                 )
             )  # fmt: skip
-        conditions = [
-            ConditionPlan(
-                places[each.from_.partition(".")[0]], fields[each.from_], each.mask,
-                frozenset(each.in_),
-            )
-            for each in self.valid_when
-        ]  # fmt: skip
-        half_ms = cycle_ms / 2 if self.same_instant_ms is None else self.same_instant_ms
-        guards = self.protection
-        claim = None
+        conditions = []
+        for each in self.valid_when:
+            place, allowed = places[each.from_.partition(".")[0]], frozenset(each.in_)
+            conditions.append(ConditionPlan(place, fields[each.from_], each.mask, allowed))
+        cycle_ms, guards, claim = self.period_ms(), self.protection, None
         if guards.n2k_name is not None:
             assert self.source is not None
             claim = (bus << BUS_SHIFT) | 6 << 26 | _NAME_PGN << 8 | self.source, guards.n2k_name
@@ -272,8 +264,8 @@ class DeviceSection(Section):
             tuple(signals),
             tuple(conditions),
             round(cycle_ms * 1e6),
-            round(half_ms * 1e6),
-            age_ms,
+            round((cycle_ms / 2 if self.same_instant_ms is None else self.same_instant_ms) * 1e6),
+            self.age_ms,
             round((guards.unchanged_ms or 0.0) * 1e6),
             math.inf if self.high_level_m is None else self.high_level_m,
             any(each.source == "derived" for each in self.signals.values()),
@@ -362,14 +354,14 @@ class DevicesSection(Section):
                     f"monitors, which need {1e3 / MOST_MOTION_CYCLE_MS:g} Hz or more"
                 )
                 problems.append((f"{role}.cycle_ms", reason))
-        if len(self.buses()) > MOST_BUSES:
-            reason = f"are on {len(self.buses())} interfaces, {MOST_BUSES} is the most"
-            problems.append(("", reason))
+        buses = self.buses()
+        if len(buses) > MOST_BUSES:
+            problems.append(("", f"are on {len(buses)} interfaces, {MOST_BUSES} is the most"))
         for role, device in self.sensors().items():
             if device.protection.n2k_name is not None and device.bus in self.receive_only:
                 reason = f"has to be asked for, but {device.bus} is receive-only: leave one out"
                 problems.append((f"{role}.protection.n2k_name", reason))
-        strange = [name for name in self.receive_only if name not in self.buses()]
+        strange = [name for name in self.receive_only if name not in buses]
         problems += [("receive_only", f"no device is on {name}") for name in strange]
         refuse("devices", problems)
         return self
@@ -394,17 +386,15 @@ class DevicesSection(Section):
 
     def default_ages(self) -> dict[str, float]:
         """Limits of age where the controller's file says nothing, by `SafetyLimits`' names."""
-        ages = {}
-        if self.motion.age_ms is not None:
-            ages["motion_age_ms"] = self.motion.age_ms
+        ages = {
+            "motion_age_ms": self.motion.age_ms,
+            "tank_degraded_age_ms": self.levels.age_ms,
+            "pump_degraded_age_ms": self.pump_sensor.age_ms,
+        }
         both = [each.age_ms for each in (self.motion, self.motion_2) if each.age_ms is not None]
         if both:
             ages["motion_spare_age_ms"] = max(SafetyLimits().motion_spare_age_ms, 2 * max(both))
-        if self.levels.age_ms is not None:
-            ages["tank_degraded_age_ms"] = self.levels.age_ms
-        if self.pump_sensor.age_ms is not None:
-            ages["pump_degraded_age_ms"] = self.pump_sensor.age_ms
-        return ages
+        return {name: age_ms for name, age_ms in ages.items() if age_ms is not None}
 
     def noise(self, role: str, value: str) -> float:
         """Noise of a value: as given, or that of its least step."""
@@ -425,19 +415,12 @@ class DevicesSection(Section):
 
     def foreign(self) -> ForeignDevices:
         """The devices as the controller node hears them."""
-        buses = self.buses()
-        plans = {
-            role: None
-            if device.native
-            else device.plan(
-                _KINDS[role],
-                role,
-                buses.index(device.bus),
-                silent=device.bus in self.receive_only,
-            )
-            for role, device in self.sensors().items()
-        }
-        others = self.others
+        buses, others = self.buses(), self.others
+        plans: dict[str, DevicePlan[Any] | None] = dict.fromkeys(_KINDS)
+        for role, device in self.sensors().items():
+            if not device.native:
+                bus, silent = buses.index(device.bus), device.bus in self.receive_only
+                plans[role] = device.plan(_KINDS[role], role, bus, silent=silent)
         return ForeignDevices(
             (plans["motion"], plans["motion_2"]),
             plans["levels"],

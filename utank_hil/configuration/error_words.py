@@ -44,14 +44,9 @@ _LONGEST = 60
 
 
 def words_for(error: Any, model: type[BaseModel]) -> str:
-    """Describe an error of validation for the reader of a file.
+    """Describe an error of validation, one of `ValidationError.errors`, for the reader of a file.
 
-    Parameters
-    ----------
-    error : dict
-        One of `pydantic.ValidationError.errors`.
-    model : type of pydantic.BaseModel
-        Model of the whole configuration.
+    `model` is that of the whole configuration.
     """
     kind, value, context = error["type"], error["input"], error.get("ctx", {})
     if kind == "missing":

@@ -42,21 +42,11 @@ class Section(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class ConfigProblem:
-    """One problem of a configuration.
+    """One problem of a configuration."""
 
-    Attributes
-    ----------
-    file : Path
-        File of the value.
-    key : str
-        Dotted key within that file; empty for the file as a whole.
-    reason : str
-        What is wrong with the value, and what is expected.
-    """
-
-    file: Path
-    key: str
-    reason: str
+    file: Path  #: File of the value.
+    key: str  #: Dotted key within that file; empty for the file as a whole.
+    reason: str  #: What is wrong with the value, and what is expected.
 
     def __str__(self) -> str:
         place = f"{self.file}: {self.key}" if self.key else str(self.file)
@@ -74,21 +64,9 @@ class ConfigError(ValueError):
 def load_config(path: Path | str, model: type[ModelT], *, allow_code: bool = False) -> ModelT:
     """Read and validate a configuration file with all the files it names.
 
-    Parameters
-    ----------
-    path : Path or str
-        The YAML file.
-    model : type of pydantic.BaseModel
-        Model of its content.
-    allow_code : bool
-        Whether the file may name code to run (a law of the kind python).
-
-    Raises
-    ------
-    ConfigError
-        With every problem found: unreadable files, YAML errors, keys written twice, unknown or
-        missing keys and values out of range. The content of an unreadable file is not reported
-        missing.
+    `allow_code` says whether the file may name code to run (a law of the kind python). ConfigError
+    has every problem found: unreadable files, YAML errors, keys written twice, unknown or missing
+    keys and values out of range. The content of an unreadable file is not reported missing.
     """
     reader = _Reader()
     content = reader.read(Path(path))
@@ -114,14 +92,8 @@ def load_config(path: Path | str, model: type[ModelT], *, allow_code: bool = Fal
 def located(error: ParameterError, path: Path | str, key: str = "") -> ConfigError:
     """Return later problems of a configuration at the places where the values are written.
 
-    Parameters
-    ----------
-    error : ParameterError
-        Problems named by their keys in the configuration.
-    path : Path or str
-        The file of the configuration.
-    key : str
-        Place of the configuration in that file; empty for the file as a whole.
+    The problems of `error` are named by their keys in the configuration, which stands in the file
+    `path` at `key`, empty for the file as a whole.
     """
     reader = _Reader()
     reader.read(Path(path))
@@ -152,17 +124,8 @@ def problems_in_words(
 def kind_of(path: Path | str, models: dict[str, type[BaseModel]]) -> str:
     """Return the kind of a file: the one whose own keys, those of no other, occur most often.
 
-    Parameters
-    ----------
-    path : Path or str
-        The YAML file.
-    models : dict of str to type of pydantic.BaseModel
-        Models by the names of the kinds.
-
-    Raises
-    ------
-    ConfigError
-        If the file can't be read, or its keys decide for none of the kinds.
+    `models` are by the names of the kinds. ConfigError is raised if the file can't be read, or its
+    keys decide for none of the kinds.
     """
     reader = _Reader()
     content = reader.read(Path(path))
@@ -200,34 +163,20 @@ def _nouns(base: type[Section] = Section) -> Iterator[tuple[str, type[Section]]]
 
 
 class _Reader:
-    """Assembles the content of files and remembers where each part was written.
-
-    Attributes
-    ----------
-    unread : set of Key
-        Keys of the whole whose files could not be read.
-    origins : dict of Key to Path
-        Files by the keys of the whole at which their content stands.
-    """
+    """Assembles the content of files and remembers where each part was written."""
 
     def __init__(self) -> None:
         self.problems: list[ConfigProblem] = []
-        self.unread: set[Key] = set()
-        self.origins: dict[Key, Path] = {}
+        self.unread: set[Key] = set()  #: Keys of the whole whose files could not be read.
+        self.origins: dict[Key, Path] = {}  #: Files by the keys at which their content stands.
 
     def read(
         self, file: Path, key: Key = (), stack: tuple[Path, ...] = (), namer: Key | None = None
     ) -> Any:
         """Return the content of a file, with that of the files it names.
 
-        Parameters
-        ----------
-        key : tuple
-            Its place in the whole.
-        stack : tuple of Path
-            Files that led to this one.
-        namer : tuple, optional
-            Key of the value that names it.
+        `key` is its place in the whole; the files of `stack` led to it; `namer` is the key of the
+        value that names it.
         """
         try:
             resolved = file.resolve()
@@ -241,8 +190,8 @@ class _Reader:
             named = ConfigProblem(where, _dotted(within), f"names {file}, which {reason}")
             return self._give_up(key, named)
         if resolved in stack:
-            circle = ConfigProblem(file, "", "includes itself; break the circle")
-            return self._give_up(key, circle)
+            reason = "includes itself; break the circle"
+            return self._give_up(key, ConfigProblem(file, "", reason))
         try:
             content, findings = parse_yaml(text)
         except YamlError as error:
@@ -270,7 +219,9 @@ class _Reader:
                 continue
             why = f"has the keys {', '.join(own)}; a file for this has {', '.join(known)}"
             if key:
-                self.problems.append(self.problem_at_name(key, f"names {file}, which {why}"))
+                where, within = self._within(key[:-1])
+                at_name = _dotted((*within, key[-1]))
+                self.problems.append(ConfigProblem(where, at_name, f"names {file}, which {why}"))
             else:
                 noun, wanted = _kind(content, dict(_nouns())), getattr(model, "noun", "")
                 if noun and wanted and noun != wanted:
@@ -290,11 +241,6 @@ class _Reader:
         """Return a problem at the place where the value of a key is written."""
         file, within = self._within(key)
         return ConfigProblem(file, _dotted(within), reason)
-
-    def problem_at_name(self, key: Key, why: str) -> ConfigProblem:
-        """Return a problem of a whole file at the place where it is named."""
-        file, within = self._within(key[:-1])
-        return ConfigProblem(file, _dotted((*within, key[-1])), why)
 
     def _give_up(self, key: Key, problem: ConfigProblem) -> dict[str, Any]:
         self.problems.append(problem)

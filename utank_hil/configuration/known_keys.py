@@ -10,14 +10,9 @@ from pydantic import BaseModel
 
 
 def instead_of(model: type[BaseModel], location: tuple[str | int, ...]) -> str:
-    """Return advice for an unknown key; empty if none resembles it.
+    """Return advice for an unknown key of a model; empty if none resembles it.
 
-    Parameters
-    ----------
-    model : type of pydantic.BaseModel
-        Model of the whole configuration.
-    location : tuple
-        The key as a validation error gives it, with the kinds of sections chosen by kind.
+    `location` is the key as a validation error gives it, with the kinds of sections chosen by kind.
     """
     *parents, written = location
     near = nearest(str(written), sorted(known_keys(model, parents)))

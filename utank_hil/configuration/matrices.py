@@ -23,18 +23,11 @@ _AS_STRUCT: Final = (
 def read_system(path: Path) -> dict[str, Any]:
     """Matrices and sample time of a file, by the keys of `SystemMatrices`.
 
-    Parameters
-    ----------
-    path : Path
-        ``.json`` (an object), ``.npz`` (`numpy.savez`) or ``.mat`` (MATLAB's ``save`` of any
-        version, `scipy.io.savemat`): A, B, C, D and the sample time as ``sample_time_s``, ``dt`` or
-        ``Ts``, at the top or as fields of its only variable. Matrices may be sparse, or complex
-        with imaginary parts of zero; a vector is a column for B and a row for C.
-
-    Raises
-    ------
-    ValueError
-        If the file can't be read or holds no such system.
+    A file is ``.json`` (an object), ``.npz`` (`numpy.savez`) or ``.mat`` (MATLAB's ``save`` of any
+    version, `scipy.io.savemat`): A, B, C, D and the sample time as ``sample_time_s``, ``dt`` or
+    ``Ts``, at the top or as fields of its only variable. Matrices may be sparse, or complex with
+    imaginary parts of zero; a vector is a column for B and a row for C. ValueError is raised if the
+    file can't be read or holds no such system.
     """
     readers = {".json": _json, ".npz": _npz, ".mat": _mat}
     reader = readers.get(path.suffix.lower())
@@ -189,9 +182,9 @@ def _of_hdf5(item: Any) -> Any:
         from scipy.sparse import csc_array
 
         columns = item["jc"][()]
-        if "data" not in item:  # All elements are zero.
-            return np.zeros((int(item.attrs["MATLAB_sparse"]), len(columns) - 1))
         shape = (int(item.attrs["MATLAB_sparse"]), len(columns) - 1)
+        if "data" not in item:  # All elements are zero.
+            return np.zeros(shape)
         return csc_array((_complex(item["data"][()]), item["ir"][()], columns), shape=shape)
     if hasattr(item, "items"):
         return {name: _of_hdf5(field) for name, field in item.items()}

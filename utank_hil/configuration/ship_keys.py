@@ -51,12 +51,7 @@ def weather_criterion_period_s(
 ) -> float:
     """Return the roll period of the IS Code 2008 (part A, 2.3.4).
 
-    Parameters
-    ----------
-    beam_m, draught_m, length_m : float
-        Moulded breadth, mean moulded draught and length at the waterline.
-    gm_m : float
-        Metacentric height.
+    Breadth is moulded, draught the mean moulded one, length that at the waterline.
     """
     coefficient = 0.373 + 0.023 * beam_m / draught_m - 0.043 * length_m / 100
     return 2 * coefficient * beam_m / math.sqrt(gm_m)
@@ -118,9 +113,7 @@ class WrittenShip(RollShip):
     def ship(self) -> RollShip:
         """Return the ship as a `RollShip`, with its errors."""
         displacement_n = self._displacement_n
-        stiffness = self.stiffness_nm_rad
-        if self.gives("gm_m"):
-            stiffness = displacement_n * self.gm_m
+        stiffness = displacement_n * self.gm_m if self.gives("gm_m") else self.stiffness_nm_rad
         inertia = self.inertia_kg_m2
         if math.isnan(inertia):
             inertia = stiffness * (self._period_s(stiffness) / (2 * math.pi)) ** 2
@@ -149,9 +142,8 @@ class WrittenShip(RollShip):
 
     @property
     def _displacement_n(self) -> float:
-        if self.gives("displacement_t"):
-            return 1e3 * GRAVITY_M_S2 * self.displacement_t
-        return self.displacement_n
+        given = self.gives("displacement_t")
+        return 1e3 * GRAVITY_M_S2 * self.displacement_t if given else self.displacement_n
 
     def _period_s(self, stiffness_nm_rad: float) -> float:
         if self.gives("roll_period_s"):
@@ -191,15 +183,7 @@ class WrittenShip(RollShip):
 
 
 def in_written_keys(problems: list[Problem], written: Collection[str]) -> list[Problem]:
-    """Return problems of a vessel's ship at the keys of the file, with their units.
-
-    Parameters
-    ----------
-    problems : list of Problem
-        Problems by the keys of the vessel.
-    written : collection of str
-        Keys of the ship in its file.
-    """
+    """Return problems by the keys of a vessel at the keys `written` in its ship's file."""
     return [_in_written_key(name, reason, written) for name, reason in problems]
 
 

@@ -69,17 +69,12 @@ class Vessel(Section):
     @property
     def default_limits(self) -> dict[str, float]:
         """Limits of the pump's command for keys that the user does not set."""
-        level = {"level_m": self.tank.level_limit_m * _LEVEL_SHARE}
-        pump = self.pump
-        if pump is None:
-            return level
-        return {
-            "pressure_pa": pump.max_pressure_pa,
-            "rate_pa_s": min(
-                _RATE_PER_PRESSURE * pump.max_pressure_pa, pump.max_pressure_rate_pa_s
-            ),
-            **level,
-        }
+        limits = {"level_m": self.tank.level_limit_m * _LEVEL_SHARE}
+        if self.pump is not None:
+            pressure_pa, rate_pa_s = self.pump.max_pressure_pa, self.pump.max_pressure_rate_pa_s
+            limits["pressure_pa"] = pressure_pa
+            limits["rate_pa_s"] = min(_RATE_PER_PRESSURE * pressure_pa, rate_pa_s)
+        return limits
 
     @field_validator("pump", mode="before")
     @classmethod
@@ -142,10 +137,11 @@ class Vessel(Section):
         """Time between two samples of each motion sensor."""
         if self.devices is None:
             return TICK_S, TICK_S
-        first, second = self.devices.motion.cycle_ms, self.devices.motion_2.cycle_ms
-        return (TICK_S if first is None else first * 1e-3), (
-            TICK_S if second is None else second * 1e-3
+        first, second = (
+            TICK_S if each.cycle_ms is None else each.cycle_ms * 1e-3
+            for each in (self.devices.motion, self.devices.motion_2)
         )
+        return first, second
 
     @property
     def assumptions(self) -> tuple[str, ...]:

@@ -18,24 +18,13 @@ GRAVITY_M_S2 = 9.81
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What a user knows of the hull besides its file, for what the file lacks.
+    """What a user knows of the hull besides its file, for what the file lacks."""
 
-    Parameters
-    ----------
-    density_kg_m3 : float, optional
-        Of the water.
-    mass_kg : float, optional
-        Displaced mass.
-    gravity_centre_m : tuple of 3 floats, optional
-        Centre of gravity forward, to port and up of the place in the waterline that phases refer
-        to.
-    gyration_m : tuple of 3 floats, optional
-        Radii of gyration about the centre of gravity in roll, pitch and yaw.
-    """
-
-    density_kg_m3: Annotated[float, Range(least=900, most=1100)] | None = None
-    mass_kg: Positive | None = None
+    density_kg_m3: Annotated[float, Range(least=900, most=1100)] | None = None  #: Of the water.
+    mass_kg: Positive | None = None  #: Displaced mass.
+    #: Centre of gravity forward, to port and up of the place in the waterline that phases refer to.
     gravity_centre_m: tuple[Finite, Finite, Finite] | None = None
+    #: Radii of gyration about the centre of gravity in roll, pitch and yaw.
     gyration_m: tuple[Positive, Positive, Positive] | None = None
 
     def __post_init__(self) -> None:
@@ -78,10 +67,7 @@ def floats(line: str) -> list[float]:
 def table(path: Path, least_columns: int) -> list[list[float]]:
     """Return the rows of a file of numbers; a first line of text is left out.
 
-    Raises
-    ------
-    ValueError
-        With file and line, if another row has fewer numbers.
+    ValueError names file and line if another row has fewer numbers.
     """
     rows = []
     for number, line in enumerate(text(path).splitlines(), 1):

@@ -30,19 +30,10 @@ _SAME = 0.01
 def read_hull(path: Path, given: Given | None = None) -> HullData:
     """Read the hull data of a seakeeping code.
 
-    Parameters
-    ----------
-    path : Path
-        Capytaine's ``.nc``, WAMIT's ``.1``, NEMOH's ``Nemoh.cal``, AQWA's ``.AH1``, ShipX's
-        ``.re7`` or MSS's ``.mat``. Further files of the code are sought beside it.
-    given : Given, optional
-        What the file lacks.
-
-    Raises
-    ------
-    ValueError
-        If the file is of no known code, incomplete or wrong, or has a figure that `given` has
-        otherwise.
+    `path` is Capytaine's ``.nc``, WAMIT's ``.1``, NEMOH's ``Nemoh.cal``, AQWA's ``.AH1``, ShipX's
+    ``.re7`` or MSS's ``.mat``. Further files of the code are sought beside it; `given` is what they
+    lack. ValueError is raised if the file is of no known code, incomplete or wrong, or has a figure
+    that `given` has otherwise.
     """
     known = Given() if given is None else given
     reader = _READERS.get(path.suffix.lower())
