@@ -15,7 +15,7 @@ from utank_hil.console.common import Json, fail, load, print_json
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.telemetry.bus_census import BusCensus
-from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError, FrameKind
+from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError, of_message
 from utank_hil.telemetry.bus_files.log import READ, BusLog
 
 DEFAULT_BIT_RATE = 250_000
@@ -94,15 +94,8 @@ def _heard(interface: str, seconds: float) -> Iterator[BusFrame]:
         end_s = time.monotonic() + seconds
         while (left_s := end_s - time.monotonic()) > 0:
             message = listening.recv(left_s)
-            if message is None:
-                continue
-            kind = FrameKind.FD if message.is_fd else FrameKind.DATA
-            kind = FrameKind.REMOTE if message.is_remote_frame else kind
-            kind = FrameKind.ERROR if message.is_error_frame else kind
-            yield BusFrame(
-                round(message.timestamp * 1e9), interface, message.arbitration_id,
-                message.is_extended_id, kind, bytes(message.data), message.dlc,
-            )  # fmt: skip
+            if message is not None:
+                yield of_message(message, interface)
     finally:
         listening.shutdown()
 

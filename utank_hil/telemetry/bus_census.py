@@ -57,13 +57,8 @@ class Seen:
 class BusCensus:
     """Listens to one interface, live or from a log.
 
-    Parameters
-    ----------
-    bit_rate : int
-    vessel : Vessel, optional
-        Ship whose file is compared with what is heard.
-    interface : str
-        Name as in the ship's file; any other is the controller's own.
+    The file of `vessel` is compared with what is heard; `interface` is named as in that file, any
+    other name is the controller's own.
     """
 
     def __init__(self, bit_rate: int, vessel: Vessel | None = None, interface: str = "") -> None:

@@ -34,24 +34,10 @@ class LoggedController:
     """A controller on a logged bus; the log is read once here, and again by `entries`.
 
     A frame is the controller's by its identifier. Where those that are marked as transmitted all
-    have such identifiers, one of them that is not marked came from somebody else.
-
-    Parameters
-    ----------
-    log : BusLog
-        Log to read.
-    notes : list of str, optional
-        What was found in the log is appended.
-
-    Attributes
-    ----------
-    starts : bool
-        Whether the first frame that the controller sent is its address claim.
-
-    Raises
-    ------
-    BusLogError
-        As `BusLog.frames`; also if it holds several channels or no frame of the catalogue.
+    have such identifiers, one of them that is not marked came from somebody else. What was found in
+    the log is appended to `notes`. `starts` says whether the first frame that the controller sent
+    is its address claim. BusLogError is raised as by `BusLog.frames`; also if the log holds several
+    channels or no frame of the catalogue.
     """
 
     def __init__(self, log: BusLog, notes: list[str] | None = None) -> None:

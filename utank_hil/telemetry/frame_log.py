@@ -39,19 +39,11 @@ class FrameLogError(ValueError):
 
 
 class FrameLogWriter(Closing):
-    """Writes a frame log; every call of `write` adds one block and syncs it to the disk.
+    """Writes a frame log over `file`; every `write` adds one block and syncs it to the disk.
 
-    Raises `OSError` if the file can't be written, with its name; also raised by `write` and
-    `close`.
-
-    Parameters
-    ----------
-    file : Path
-        File to overwrite.
-    head : mapping
-        Origin of the records (`utank_hil.telemetry.replay_head`).
-    small : bool
-        Whether to compress as well as possible, for logs to be kept.
+    `head` is the origin of the records (`utank_hil.telemetry.replay_head`). Logs to be kept are
+    compressed as well as possible (`small`). `OSError`, also raised by `write` and `close`, names
+    the file.
     """
 
     def __init__(self, file: Path, head: Mapping[str, Any], *, small: bool = False) -> None:
@@ -117,13 +109,8 @@ class BlockSink:
 class FrameLog:
     """A frame log, read block by block; a log of several parts is read as one.
 
-    Raises `FrameLogError` if the file is no frame log, or its head is incomplete. Raises `OSError`
-    if the file can't be read.
-
-    Parameters
-    ----------
-    path : Path
-        The first part, or another to start from.
+    `path` is the first part, or another to start from. Raises `FrameLogError` if it is no frame
+    log, or its head is incomplete.
     """
 
     def __init__(self, path: Path) -> None:

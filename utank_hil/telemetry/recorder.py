@@ -47,21 +47,10 @@ _ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 def record_part(state: RecorderState) -> bool:
     """Record into one file until the ring ends, a signal comes or the next file is due.
 
-    The signals must be blocked. Returns whether there is a next part.
-
-    Parameters
-    ----------
-    state : RecorderState
-        State after the previous parts; updated with what has reached the file.
-
-    Raises
-    ------
-    RingError
-        If there is no such ring.
-    OSError
-        If the file can't be created, or there is no room for the beginning of a recording.
-    RuntimeError
-        If the file can't be finished.
+    The signals must be blocked. `state` is that after the previous parts, updated with what has
+    reached the file. Returns whether there is a next part. Raises `RingError` if there is no such
+    ring, `OSError` if the file can't be created or there is no room for its beginning, and
+    `RuntimeError` if it can't be finished.
     """
     task, report, places = state.task, state.report, state.places
     lost_before, records_lost_before = report.lost, report.records_lost

@@ -153,11 +153,8 @@ def replay_log(
 ) -> ReplayedLog:
     """Run `replay` with a controller as the log's head describes it.
 
-    Parameters
-    ----------
-    as_recorded : bool
-        Whether `config` is the recorded configuration: the recorded law then runs, if possible,
-        else the law designed for `config` here.
+    If `config` is the recorded configuration (`as_recorded`), the recorded law runs, if possible,
+    else the law designed for `config` here.
     """
     law = build_law(config)
     differences = law_differences(log.head, law)
@@ -187,18 +184,9 @@ def replay(
 ) -> ReplayResult:
     """Give recorded entries to a new controller and compare what it sends.
 
-    Parameters
-    ----------
-    entries : iterable of Entry
-        Records of a whole run, from the controller's start.
-    law : BuiltLaw
-        Law of the configuration.
-    retuner, estimating : bool
-        Whether the controller had a retuner, and an estimator of sea and ship.
-    commissioned : bool
-        Whether it could be armed.
-    open_end : bool
-        Whether the log may end before what the controller sent in its last tick.
+    `entries` are those of a whole run, `law` that of the configuration. `retuner`, `estimating` and
+    `commissioned` say what the controller had and whether it could be armed. With `open_end` the
+    log may end before what the controller sent in its last tick.
     """
     answers, estimates = RecordedRetuner(), RecordedRetuner()
     statistics = LoopStatistics()

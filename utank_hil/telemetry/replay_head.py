@@ -45,29 +45,11 @@ def replay_head(
 ) -> dict[str, Any]:
     """Describe a run so that it can be replayed elsewhere; ready for `json.dumps`.
 
-    Parameters
-    ----------
-    command : str
-        Name of the running command.
-    law : BuiltLaw
-        Law of the configuration.
-    folder : Path
-        Folder of the log.
-    options : mapping
-        Options of the command.
-    retuner, estimating : bool
-        Whether the controller has a retuner, and an estimator of sea and ship.
-    commissioned : bool
-        Whether it could be armed.
-    seed : int, optional
-        Seed of simulated waves and noise.
-
-    Returns
-    -------
-    dict
-        ``about`` (`utank_hil.base.provenance`), ``retuner``, ``estimating``, ``commissioned``,
-        ``packages``, ``catalogue`` (its version), ``law`` (every number of it), ``files`` (content
-        of the data files).
+    `command` has the `options`, `law` is that of the configuration, `folder` that of the log.
+    `retuner`, `estimating` and `commissioned` say what the controller has and whether it could be
+    armed; `seed` is that of simulated waves and noise. The head holds ``about``
+    (`utank_hil.base.provenance`), every number of the ``law`` and the content of the data
+    ``files``.
     """
     about = describe(command, config, folder, options=options, seed=seed)
     return {

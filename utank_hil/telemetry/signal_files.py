@@ -57,24 +57,11 @@ def read_signals(
 ) -> dict[str, Columns]:
     """Read the runs of a file by name; a file without names has one run, named by its stem.
 
-    Parameters
-    ----------
-    path : Path
-        Recording, frame log, table, or log of the bus of any name.
-    note : callable, optional
-        Called with what was not read as it stands: a cut, a step of a clock, and the columns of a
-        table that hold no numbers, which are an error without it.
-    channel : str, optional
-        Bus to read of a log with several.
-    from_s, to_s : float, optional
-        Part of a frame log or a log of the bus, in seconds from its first record.
-
-    Raises
-    ------
-    ValueError
-        If it can't be read, with its name, the line if any, and the remedy.
-    OSError
-        If it can't be opened.
+    `path` is a recording, frame log, table, or log of the bus of any name. `note` is called with
+    what was not read as it stands: a cut, a step of a clock, and the columns of a table that hold
+    no numbers, which are an error without it. `channel` is the bus to read of a log with several,
+    `from_s` and `to_s` a part of a frame log or a log of the bus, in seconds from its first record.
+    ValueError has the file's name, the line if any, and the remedy.
     """
     suffix = kind_of(path)
     path.open("rb").close()  # Readers may give a less precise reason.
@@ -145,20 +132,10 @@ def even_rows(
 ) -> Columns:
     """Return a part of a table, with rows on an even grid that divides the sample time.
 
-    Parameters
-    ----------
-    path : Path
-        Source of the table, for errors.
-    sample_time_s : float
-        Sample time of the law for which the ship is identified.
-    from_s, to_s : float, optional
-        Part to use; the returned ``time_s`` counts from its first row.
-
-    Raises
-    ------
-    TextFileError
-        If the times do not rise, have a gap, or are not even; or if the sample time is no whole
-        number of their steps. The line and the remedy are named.
+    `path` is the table's source, for errors; the sample time is that of the law for which the ship
+    is identified. The returned ``time_s`` counts from the first row of the part. TextFileError
+    names line and remedy if the times do not rise, have a gap, or are not even, or if the sample
+    time is no whole number of their steps.
     """
     if "time_s" not in columns:
         raise _lacks(path, "time_s", columns)

@@ -60,14 +60,10 @@ def signal_table(entries: Iterable[Entry]) -> dict[str, FloatArray]:
     """Decode the frames of a recording.
 
     A received frame counts from the next tick on, a sent one from its own. Frames appear as they
-    were on the bus, whatever the controller's checks of counter, quality or plausibility.
-
-    Returns
-    -------
-    dict
-        Arrays (n,), one value per tick: ``time_s`` since the first tick, the telemetry's columns,
-        and every other signal as ``<message>_<signal>``, in SI units, states and flags as numbers.
-        NaN before the first frame and where unavailable; all-NaN signals are left out.
+    were on the bus, whatever the controller's checks of counter, quality or plausibility. Returned
+    are arrays (n,), one value per tick: ``time_s`` since the first tick, the telemetry's columns,
+    and every other signal as ``<message>_<signal>``, in SI units, states and flags as numbers. NaN
+    before the first frame and where unavailable; all-NaN signals are left out.
     """
     codecs = load_catalogue().codecs
     heard = {codec.can_id: _Heard(codec) for codec in codecs.values()}

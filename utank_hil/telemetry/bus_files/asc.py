@@ -14,13 +14,17 @@ _FRAME_LIKE: Final = re.compile(
     r"\s*([-+.,\w]+)\s+(?:CANFD\s+)?\d+\s+(?!Statistic:|J1939TP|Start\b)\S", re.I
 )
 _CLASSIC: Final = re.compile(
-    r"\s*(-?\d{1,10})[.,](\d{1,9})\s+(\d+)\s+(?:([0-9A-F]+)(x?)\s+(Rx|Tx)\s+"
-    r"(?:(d)\s+([0-9A-F]+)((?:\s+[0-9A-F]{1,3})*)|r(?:\s+([0-9A-F]+))?)|(ErrorFrame))(?=\s|$).*\s*",
+    r"\s*-?\d{1,10}[.,]\d{1,9}\s+(?P<channel>\d+)\s+"
+    r"(?:(?P<number>[0-9A-F]+)(?P<extended>x?)\s+(?P<mark>Rx|Tx)\s+"
+    r"(?:d\s+(?P<code>[0-9A-F]+)(?P<data>(?:\s+[0-9A-F]{1,3})*)|"
+    r"(?P<remote>r)(?:\s+(?P<asked>[0-9A-F]+))?)|(?P<error>ErrorFrame))(?=\s|$).*\s*",
     re.I | re.A,
 )
 _FD: Final = re.compile(
-    r"\s*(-?\d{1,10})[.,](\d{1,9})\s+CANFD\s+(\d+)\s+(Rx|Tx)\s+(?:([0-9A-F]+)(x?)\s+"
-    r"(?:\S*[^\s\d]\S*\s+)?([01])\s+([01])\s+([0-9A-F])\s+(\d+)(.*)|(ErrorFrame)(?:\s.*)?)\s*",
+    r"\s*-?\d{1,10}[.,]\d{1,9}\s+CANFD\s+(?P<channel>\d+)\s+(?P<mark>Rx|Tx)\s+"
+    r"(?:(?P<number>[0-9A-F]+)(?P<extended>x?)\s+(?:\S*[^\s\d]\S*\s+)?(?P<switched>[01])\s+"
+    r"(?P<indicator>[01])\s+(?P<code>[0-9A-F])\s+(?P<size>\d+)(?P<data>.*)|"
+    r"(?P<error>ErrorFrame)(?:\s.*)?)\s*",
     re.I | re.A,
 )
 _REMOTE_FLAG: Final = 0x10
@@ -45,10 +49,8 @@ class AscParser:
         self._now_ns = time_ns(*stamp.groups()) + (self._now_ns if self._relative else 0)
         if self._base == 10 and not line.endswith("\n"):
             raise NotUnderstoodError("its last number may be cut")
-        if found := _CLASSIC.fullmatch(line):
-            return self._classic(*found.groups()[2:])
-        if found := _FD.fullmatch(line):
-            return self._of_fd(*found.groups()[2:])
+        if found := _CLASSIC.fullmatch(line) or _FD.fullmatch(line):
+            return self._frame(found.groupdict(default=""))
         if not _FRAME_LIKE.match(line):
             return None
         raise NotUnderstoodError(_why(line.split()))
@@ -60,53 +62,6 @@ class AscParser:
         elif (like := _FRAME_LIKE.match(line)) and re.search(r"\s(Rx|Tx)\s.*\n", line, re.I):
             raise NotReadableError(f"{like[1]!r} is no time in seconds")
 
-    def _classic(
-        self,
-        channel: str,
-        number: str,
-        extended: str,
-        mark: str,
-        data_mark: str | None,
-        length: str | None,
-        text: str | None,
-        asked: str | None,
-        error: str | None,
-    ) -> BusFrame:
-        if error:
-            return BusFrame(self._now_ns, channel, 0, False, FrameKind.ERROR, b"", 0)
-        sent = mark.lower() == "tx"
-        if data_mark is None:
-            code = int(asked or "0", self._base)
-            return self._frame(channel, number, extended, FrameKind.REMOTE, b"", code, sent)
-        code = int(length or "0", self._base)
-        data = self._bytes((text or "").split(), min(code, 8))
-        return self._frame(channel, number, extended, FrameKind.DATA, data, code, sent)
-
-    def _of_fd(
-        self,
-        channel: str,
-        mark: str,
-        number: str,
-        extended: str,
-        switched: str,
-        indicator: str,
-        code: str,
-        size: str,
-        rest: str,
-        error: str | None,
-    ) -> BusFrame:
-        sent = mark.lower() == "tx"
-        if error:
-            return BusFrame(self._now_ns, channel, 0, False, FrameKind.ERROR, b"", 0, sent)
-        count, words = int(size), rest.split()
-        data = self._bytes(words, count)
-        flags = int(words[count + 2], 16) if len(words) > count + 2 else _FD_FLAG
-        kind = FrameKind.FD if count > 8 or flags & _FD_FLAG else FrameKind.DATA
-        if kind is FrameKind.DATA and flags & _REMOTE_FLAG:
-            kind = FrameKind.REMOTE
-        speed = int(switched) + 2 * int(indicator)
-        return self._frame(channel, number, extended, kind, data, int(code, 16), sent, speed)
-
     def _bytes(self, words: list[str], count: int) -> bytes:
         words = words[:count]
         try:
@@ -116,24 +71,37 @@ class AscParser:
         except ValueError:
             raise NotUnderstoodError(f"has not the {count} bytes that it names") from None
 
-    def _frame(
-        self,
-        channel: str,
-        number: str,
-        extended: str,
-        kind: FrameKind,
-        data: bytes,
-        code: int,
-        sent: bool,
-        speed: int = 0,
-    ) -> BusFrame:
-        try:
-            value = int(number, self._base)
-        except ValueError:
-            value = -1
-        if not 0 <= value <= (0x1FFFFFFF if extended else 0x7FF) or code > 15:
-            raise NotUnderstoodError(f"{number}{extended} is no identifier of 11 or 29 bits")
-        return BusFrame(self._now_ns, channel, value, bool(extended), kind, data, code, sent, speed)
+    def _frame(self, cells: dict[str, str]) -> BusFrame:
+        channel, words = cells["channel"], cells.get("data", "").split()
+        sent = cells["mark"].lower() == "tx" if cells["mark"] else None
+        if cells["error"]:
+            return BusFrame(self._now_ns, channel, 0, False, FrameKind.ERROR, b"", 0, sent)
+        is_fd = "size" in cells
+        value, extended = _whole(cells["number"], self._base), bool(cells["extended"])
+        code = _whole(cells["code"] or cells["asked"] or "0", 16 if is_fd else self._base)
+        if not 0 <= value <= (0x1FFFFFFF if extended else 0x7FF) or not 0 <= code <= 15:
+            name = cells["number"] + cells["extended"]
+            raise NotUnderstoodError(f"{name} is no identifier of 11 or 29 bits")
+        if is_fd:
+            size, speed = int(cells["size"]), int(cells["switched"]) + 2 * int(cells["indicator"])
+            data = self._bytes(words, size)
+            flags = _whole(words[size + 2], 16) if len(words) > size + 2 else _FD_FLAG
+            kind = FrameKind.REMOTE if flags & _REMOTE_FLAG else FrameKind.DATA
+            kind = FrameKind.FD if size > 8 or flags & _FD_FLAG else kind
+            return BusFrame(self._now_ns, channel, value, extended, kind, data, code, sent, speed)
+        if cells["remote"]:
+            kind, data = FrameKind.REMOTE, b""
+        else:
+            kind, data = FrameKind.DATA, self._bytes(words, min(code, 8))
+        return BusFrame(self._now_ns, channel, value, extended, kind, data, code, sent)
+
+
+def _whole(text: str, base: int) -> int:
+    """Return a number; -1 if there is none in this base."""
+    try:
+        return int(text, base)
+    except ValueError:
+        return -1
 
 
 def _why(words: list[str]) -> str:

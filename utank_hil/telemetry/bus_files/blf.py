@@ -32,10 +32,7 @@ _TICK_NS: Final = 10_000
 class BlfLog:
     """Frames of a BLF file; objects of other types are not frames and are passed by.
 
-    Raises
-    ------
-    BusLogError
-        From the iteration, if there is no frame before the first damaged object.
+    The iteration raises BusLogError if there is no frame before the first damaged object.
     """
 
     def __init__(self, path: Path) -> None:

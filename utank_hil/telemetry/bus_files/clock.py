@@ -30,26 +30,10 @@ _SHOWN: Final = 3
 
 
 class OneClock:
-    """Frames with times on one clock, in the order of the file.
+    """Frames of a log of this name with times on one clock, in the order of the file.
 
-    Parameters
-    ----------
-    name : str
-        Name of the file, for notes and errors.
-    source : iterable of BusFrame
-        Frames as they are read.
-    place : callable
-        Return the place of the frame that was read last.
-
-    Attributes
-    ----------
-    notes : list of str
-        What was found, complete after the last frame.
-
-    Raises
-    ------
-    BusLogError
-        From the iteration, if the times can't be trusted.
+    `place` returns the place of the frame that was read last. What was found is in `notes`, after
+    the last frame. The iteration raises BusLogError if the times can't be trusted.
     """
 
     def __init__(self, name: str, source: Iterable[BusFrame], place: Callable[[], str]) -> None:

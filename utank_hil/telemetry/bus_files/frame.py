@@ -2,7 +2,10 @@
 
 from collections.abc import Iterator
 from enum import IntEnum
-from typing import Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
+
+if TYPE_CHECKING:
+    from can import Message
 
 FD_LENGTHS: Final = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 """Number of data bytes by length code (ISO 11898-1)."""
@@ -22,35 +25,17 @@ class FrameKind(IntEnum):
 
 
 class BusFrame(NamedTuple):
-    """One frame of a log.
+    """One frame of a log."""
 
-    Attributes
-    ----------
-    time_ns : int
-        Time as the log has it: since 1970, or since its own start.
-    channel : str
-        Name or number of the bus.
-    number : int
-        Identifier; of an error frame its class (Linux, can/error.h), 0 if unknown.
-    extended : bool
-        Whether the identifier has 29 bits.
-    code : int
-        Length code: number of bytes up to 8, else index in `FD_LENGTHS`.
-    sent : bool or None
-        Whether the logging program marks it as transmitted; None without mark.
-    speed : int
-        Of an FD frame: 1 if the bit rate was switched, plus 2 for the error state indicator.
-    """
-
-    time_ns: int
-    channel: str
-    number: int
-    extended: bool
+    time_ns: int  #: Time as the log has it: since 1970, or since its own start.
+    channel: str  #: Name or number of the bus.
+    number: int  #: Identifier; of an error frame its class (Linux, can/error.h), 0 if unknown.
+    extended: bool  #: Whether the identifier has 29 bits.
     kind: FrameKind
     data: bytes
-    code: int
-    sent: bool | None = None
-    speed: int = 0
+    code: int  #: Length code: number of bytes up to 8, else index in `FD_LENGTHS`.
+    sent: bool | None = None  #: Whether it is marked as transmitted; None without mark.
+    speed: int = 0  #: Of an FD frame: 1 if the bit rate was switched, plus 2 for the error state.
 
 
 class FrameSource(Protocol):
@@ -64,6 +49,26 @@ class FrameSource(Protocol):
         """Place of the last frame in the file, such as ``line 12``."""
 
     def __iter__(self) -> Iterator[BusFrame]: ...
+
+
+def of_message(message: "Message", channel: str) -> BusFrame:
+    """Return the frame of a message of python-can."""
+    kind = FrameKind.FD if message.is_fd else FrameKind.DATA
+    kind = FrameKind.REMOTE if message.is_remote_frame else kind
+    kind = FrameKind.ERROR if message.is_error_frame else kind
+    data = bytes(message.data)
+    size = message.dlc if kind is FrameKind.REMOTE else len(data)
+    return BusFrame(
+        round(message.timestamp * 1e9),
+        channel,
+        message.arbitration_id,
+        message.is_extended_id,
+        kind,
+        data,
+        size if size <= 8 else FD_LENGTHS.index(size),
+        not message.is_rx,
+        message.bitrate_switch + 2 * message.error_state_indicator,
+    )
 
 
 def time_ns(seconds: str, fraction: str) -> int:

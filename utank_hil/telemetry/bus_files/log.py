@@ -26,13 +26,7 @@ _LOOKED_AT: Final = 1 << 16
 
 
 def format_of(path: Path) -> str:
-    """Return the format of a log; empty if it looks like none.
-
-    Raises
-    ------
-    OSError
-        If it can't be read.
-    """
+    """Return the format of a log; empty if it looks like none."""
     with open_content(path, LIMIT_BYTES, _ignored) as content:
         mark = content.read(4)
     if mark in _MARKS:
@@ -46,16 +40,9 @@ def format_of(path: Path) -> str:
 
 @dataclass(frozen=True, slots=True)
 class BusLog:
-    """Frames of a log, or of one channel and a part of it; read anew by every call of `frames`.
+    """Frames of a log, compressed with gzip or not; read anew by every call of `frames`.
 
-    Attributes
-    ----------
-    path : Path
-        The file, compressed with gzip or not.
-    channel : str or None
-        Name of the bus; None for all.
-    from_s, to_s : float or None
-        Part to read, in seconds from the first frame.
+    Without a `channel` all are read; `from_s` and `to_s` are seconds from the first frame.
     """
 
     path: Path
@@ -66,17 +53,8 @@ class BusLog:
     def frames(self, notes: list[str] | None = None) -> Iterator[BusFrame]:
         """Yield the frames in the order of the file, on one clock.
 
-        Parameters
-        ----------
-        notes : list of str, optional
-            What was found is appended, after the last frame.
-
-        Raises
-        ------
-        BusLogError
-            If it is no log, holds no such frames, or its times can't be trusted.
-        TextFileError, OSError
-            If it can't be read.
+        What was found is appended to `notes`, after the last frame. BusLogError is raised if it is
+        no log, holds no such frames, or its times can't be trusted.
         """
         source = self._source()
         others: set[str] = set()

@@ -6,19 +6,13 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
-from utank_hil.telemetry.bus_files.frame import FD_LENGTHS, BusFrame, BusLogError, FrameKind
+from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError, of_message
 
 MARK: Final = b"MDF "
 
 
 class Mf4Log:
-    """Frames of an MF4 file.
-
-    Raises
-    ------
-    BusLogError
-        From the iteration, if it can't be read to its end or holds no frames.
-    """
+    """Frames of an MF4 file; BusLogError if it can't be read to its end or holds no frames."""
 
     def __init__(self, path: Path) -> None:
         self.notes: list[str] = []
@@ -41,22 +35,7 @@ class Mf4Log:
             with reader(self._path) as messages:
                 for message in messages:
                     self._count += 1
-                    kind = FrameKind.FD if message.is_fd else FrameKind.DATA
-                    kind = FrameKind.REMOTE if message.is_remote_frame else kind
-                    kind = FrameKind.ERROR if message.is_error_frame else kind
-                    data = bytes(message.data)
-                    size = message.dlc if kind is FrameKind.REMOTE else len(data)
-                    yield BusFrame(
-                        round(message.timestamp * 1e9),
-                        str(message.channel),
-                        message.arbitration_id,
-                        message.is_extended_id,
-                        kind,
-                        data,
-                        size if size <= 8 else FD_LENGTHS.index(size),
-                        not message.is_rx,
-                        message.bitrate_switch + 2 * message.error_state_indicator,
-                    )
+                    yield of_message(message, str(message.channel))
         except OSError:
             raise
         except Exception as error:  # The readers raise many kinds of exception at damaged bytes.

@@ -22,31 +22,14 @@ class NotReadableError(ValueError):
 class TextLog:
     """Frames of a log of text.
 
-    Parameters
-    ----------
-    path : Path
-        File to read.
-    parse : callable
-        Return the frame of a line, None for a line of another meaning; raises `NotUnderstoodError`
-        and `NotReadableError`. Lines end with their line feed.
-    counted : bool
-        Whether lines say how many bytes their frame has. Else the last line, without line feed, may
-        be cut, unless it has the 8 bytes of a full frame.
-
-    Raises
-    ------
-    BusLogError
-        From the iteration, if no line is a frame, or a line shows that the log can't be read.
-    TextFileError
-        If it is no text.
+    `parse` returns the frame of a line, with its line feed, or None for a line of another meaning;
+    it raises `NotUnderstoodError` and `NotReadableError`. Unless lines are `counted`, which say how
+    many bytes their frame has, a last line without line feed may be cut: it needs the 8 bytes of a
+    full frame. The iteration raises BusLogError if no line is a frame, or a line shows that the log
+    can't be read.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        parse: Callable[[str], BusFrame | None],
-        counted: bool,
-    ) -> None:
+    def __init__(self, path: Path, parse: Callable[[str], BusFrame | None], counted: bool) -> None:
         self.notes: list[str] = []
         self._path, self._parse, self._counted = path, parse, counted
         self._line = 0

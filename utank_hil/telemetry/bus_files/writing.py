@@ -19,15 +19,9 @@ _WALL_CLOCK_NS: Final = 631_152_000 * 10**9
 def write_frames(path: Path, frames: Iterable[BusFrame], notes: list[str] | None = None) -> int:
     """Write frames to a file, overwriting it, and return their number.
 
-    Times are kept to a microsecond. candump has them as they are. ASC counts from the millisecond
-    of the first frame where they are times of the day, BLF notes that in its head.
-
-    Parameters
-    ----------
-    path : Path
-        One of `SUFFIXES`.
-    notes : list of str, optional
-        What the format can't hold is appended.
+    The suffix, of `SUFFIXES`, says the format; what it can't hold is appended to `notes`. Times are
+    kept to a microsecond. candump has them as they are. ASC counts from the millisecond of the
+    first frame where they are times of the day, BLF notes that in its head.
     """
     suffix = path.suffix.lower()
     writer = {".log": _Candump, ".asc": _Asc, ".blf": _Blf}[suffix]
