@@ -72,6 +72,16 @@ class BusPorts:
             port.close()
 
 
+def open_port(own: str, foreign: ForeignDevices) -> Port:
+    """Open what the controller hears: its own interface, and those of devices on others.
+
+    PortError is raised as by `open_buses`.
+    """
+    from utank_hil.canbus.socketcan import SocketCanPort
+
+    return open_buses(own, foreign) if foreign.any else SocketCanPort(own)
+
+
 def open_buses(own: str, foreign: ForeignDevices, *, sends: bool = False) -> BusPorts:
     """Open the controller's own interface and those of the ship's devices.
 

@@ -79,8 +79,7 @@ def print_controller(judged: JudgedLaw) -> None:
         if judged.law.unjudged:
             _print_verdict(console, judged)
         else:
-            text = DISSIPATES if judged.law.dissipates else NO_LOOP
-            console.say(text)
+            console.say(DISSIPATES if judged.law.dissipates else NO_LOOP)
         return
     margin = report.nominal
     table = new_table(MARGINS, "value", "required")
@@ -109,8 +108,10 @@ def _print_verdict(console: Terminal, judged: JudgedLaw) -> None:
         verdict = "accepted by the configuration" if judged.accepted else "refused"
         console.say(f"This law is {verdict}.")
         _print_remedy(console, judged)
+    elif judged.law.adapts:
+        console.say("met by what the law starts from", yellow="What it learns is not judged:")
     else:
-        _print_met(console, judged.law)
+        console.say(green="All requirements are met.")
 
 
 def _print_remedy(console: Terminal, judged: JudgedLaw, whose: str = "") -> None:
@@ -129,14 +130,10 @@ def print_collection(kind: str, collection: Any, judged: Judged) -> None:
         console.say(line)
     if not judged:  # A passive tank has no law.
         return
-    figures = (
-        "peak\nsensitivity",
-        "pump gain\nfactor",
-        "phase\nmargin",
-        "delay\nmargin",
+    table = new_table(
+        MARGINS, "peak\nsensitivity", "pump gain\nfactor", "phase\nmargin", "delay\nmargin",
         "largest\neigenvalue",
-    )
-    table = new_table(MARGINS, *figures)
+    )  # fmt: skip
     table.add_column("", no_wrap=True)
     for each, one in judged.items():
         verdict = _verdict(one)
@@ -201,13 +198,6 @@ def _remarks(law: BuiltLaw, report: Robustness) -> list[str]:
     if gain < LEAST_LOOP_GAIN and not law.adapts:
         notes.append(f"It hardly acts: its loop gain is {gain:.2g} at most.")
     return notes
-
-
-def _print_met(console: Terminal, law: BuiltLaw) -> None:
-    if law.adapts:
-        console.say("met by what the law starts from", yellow="What it learns is not judged:")
-    else:
-        console.say(green="All requirements are met.")
 
 
 def _at_rest(law: BuiltLaw) -> str | None:

@@ -10,10 +10,9 @@ from rich.text import Text
 
 from utank_hil.assembly import build_commissioning_node
 from utank_hil.base.tick import TICK_S
-from utank_hil.canbus import AlarmState, Fault, PortError, SocketCanPort
+from utank_hil.canbus import AlarmState, Fault, PortError
 from utank_hil.canbus.events import AlarmEvent, RetuningEvent
-from utank_hil.canbus.port import Port
-from utank_hil.canbus.ports import open_buses
+from utank_hil.canbus.ports import open_port
 from utank_hil.commands.commissioning_record import (
     make_record,
     record_path,
@@ -23,7 +22,7 @@ from utank_hil.commands.commissioning_record import (
 )
 from utank_hil.commands.lines import Lines, printed_lines
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.console.common import Json, fail, load, print_json, why_not_writable
+from utank_hil.console.common import Bus, Config, Json, fail, load, print_json, why_not_writable
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, notes, shown
 from utank_hil.nodes.commissioning.node import CommissioningNode, Stage
@@ -35,8 +34,8 @@ SAY_TICKS: Final = 500
 
 
 def commission(
-    config: Annotated[Path, typer.Argument(help="Controller configuration.")],
-    channel: Annotated[str, typer.Option("--bus", help="SocketCAN interface, for example can0.")],
+    config: Config,
+    channel: Bus,
     record: Annotated[
         Path | None,
         typer.Option(
@@ -65,8 +64,7 @@ def commission(
     statistics = LoopStatistics()
     with ExitStack() as stack:
         try:
-            foreign = loaded.vessel.foreign
-            port: Port = open_buses(channel, foreign) if foreign.any else SocketCanPort(channel)
+            port = open_port(channel, loaded.vessel.foreign)
         except OSError as error:
             fail(error, ExitCode.NO_BUS)
         stack.callback(port.close)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from utank_hil.console.common import Channel, Json, fail, print_json
+from utank_hil.console.common import Channel, Json, Run, chosen_run, fail, print_json
 from utank_hil.console.terminal import notes, say_note, shown
 from utank_hil.telemetry.bus_files.frame import BusFrame
 from utank_hil.telemetry.bus_files.log import READ, BusLog
@@ -43,9 +43,7 @@ def export(
             help="Frames: .log (candump), .asc, .blf. Signals: .csv, .parquet. Overwritten.",
         ),
     ],
-    run: Annotated[
-        str | None, typer.Option(help="Run of a recording; without it the last one.")
-    ] = None,
+    run: Run = None,
     channel: Channel = None,
     from_s: Annotated[
         float | None,
@@ -77,9 +75,7 @@ def export(
             runs = read_signals(
                 recording, said.append, channel=channel, from_s=from_s, to_s=until_s
             )
-            name = list(runs)[-1] if run is None else run
-            if name not in runs:
-                fail(f"{recording} has no run {name!r}; it has {', '.join(runs)}")
+            name = chosen_run(recording, runs, run)
             require(recording, runs[name], "time_s")
             write_signals(to, runs[name])
             count, unit = len(runs[name]["time_s"]), "rows"
@@ -94,11 +90,7 @@ def export(
 
 
 def _frames(
-    recording: Path,
-    channel: str | None,
-    from_s: float | None,
-    to_s: float | None,
-    said: list[str],
+    recording: Path, channel: str | None, from_s: float | None, to_s: float | None, said: list[str]
 ) -> Iterator[BusFrame]:
     """Yield the frames of a recording; `said` gets what was not read as it stands."""
     suffix = recording.suffix.lower()

@@ -12,19 +12,18 @@ from typer.core import TyperGroup
 
 from utank_hil.assembly import retuning_task
 from utank_hil.base.provenance import describe
-from utank_hil.commands.identified import (
-    CONTROLLER,
-    VESSEL,
-    read_controller,
-    write_identified,
-)
+from utank_hil.commands.identified import CONTROLLER, VESSEL, read_controller, write_identified
 from utank_hil.commands.identify_report import figures, print_report
-from utank_hil.commands.identify_test import decay, inclining_test
+from utank_hil.commands.identify_test import decay, inclining_test, refuse
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.console.common import (
     OUT,
     Channel,
+    From,
     Json,
+    Run,
+    To,
+    chosen_run,
     fail,
     load,
     new_app,
@@ -32,7 +31,7 @@ from utank_hil.console.common import (
     print_json,
 )
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import Terminal, notes, say_note
+from utank_hil.console.terminal import Terminal, say_note
 from utank_hil.identification import IdentificationError
 from utank_hil.identification.logged_samples import logged_samples
 from utank_hil.retuning import Candidate
@@ -53,12 +52,10 @@ def identify_log(
     config: Annotated[
         Path, typer.Argument(help="Controller configuration: signals, design, ship to begin with.")
     ],
-    run: Annotated[
-        str | None, typer.Option(help="Run of the recording; without it the last one.")
-    ] = None,
+    run: Run = None,
     channel: Channel = None,
-    from_s: Annotated[float | None, typer.Option("--from", metavar="SECONDS")] = None,
-    to_s: Annotated[float | None, typer.Option("--to", metavar="SECONDS")] = None,
+    from_s: From = None,
+    to_s: To = None,
     order: Annotated[
         int | None, typer.Option(min=2, help="Of the ARX model, instead of the configuration's.")
     ] = None,
@@ -76,12 +73,7 @@ def identify_log(
     **Example:** utank-hil identify log out/bench.rrd configs/controllers/dpc.yaml --from 200
     """
     from utank_hil.pictures.identification import draw_identification
-    from utank_hil.telemetry.signal_files import (
-        even_rows,
-        is_table,
-        read_signals,
-        require,
-    )
+    from utank_hil.telemetry.signal_files import even_rows, is_table, read_signals, require
 
     for option, value in (("--from", from_s), ("--to", to_s)):
         if value is not None and not math.isfinite(value):
@@ -95,9 +87,7 @@ def identify_log(
     measured = task.design.predictor.measured
     try:
         runs = read_signals(log, say_note, channel=channel)
-        name = list(runs)[-1] if run is None else run
-        if name not in runs:
-            fail(f"{log} has no run {name!r}; it has {', '.join(runs)}")
+        name = chosen_run(log, runs, run)
         sample_time_s = task.design.predictor.sample_time_s
         signals = runs[name]
         require(log, signals, "time_s", "pressure_command_pa", *measured)
@@ -112,10 +102,7 @@ def identify_log(
     try:
         found = identify(record, task)
     except IdentificationError as error:
-        notes.say(str(error), red="refused:")
-        if json_:
-            print_json({"accepted": False, "reasons": [str(error)]})
-        raise typer.Exit(ExitCode.REFUSED) from None
+        refuse(str(error), json_)
     answer = judge(record, found, task)
     about = describe("identify", loaded, out, options=context.params)
     title = f"{log.name}, {name}"
@@ -133,7 +120,8 @@ def identify_log(
 
 def _keep_apart(results: list[Path], config: Path, content: dict[str, Any]) -> None:
     """Refuse to overwrite input files."""
-    given = [config, *(Path(content[key]) for key in ("vessel",) if isinstance(content[key], str))]
+    vessel = content["vessel"]
+    given = [config, *([Path(vessel)] if isinstance(vessel, str) else [])]
     for path in {path.resolve() for path in results} & {path.resolve() for path in given}:
         fail(f"{path} is what this begins with, and would be written over: choose another --out")
 

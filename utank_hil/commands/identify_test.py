@@ -13,7 +13,7 @@ from utank_hil.analysis.motion.inclining import inclining
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.provenance import describe
 from utank_hil.configuration import Vessel
-from utank_hil.console.common import OUT, Json, fail, load, prepare_out, print_json
+from utank_hil.console.common import OUT, From, Json, To, fail, load, prepare_out, print_json
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, new_table, notes
 from utank_hil.dynamics.tank import GRAVITY_M_S2
@@ -27,8 +27,8 @@ def decay(
     ship: Annotated[
         Path | None, typer.Option(help="Ship whose GM turns the quadratic part into its key.")
     ] = None,
-    from_s: Annotated[float | None, typer.Option("--from", metavar="SECONDS")] = None,
-    to_s: Annotated[float | None, typer.Option("--to", metavar="SECONDS")] = None,
+    from_s: From = None,
+    to_s: To = None,
     out: Annotated[Path, typer.Option(help="Folder for the picture.")] = OUT,
     json_: Json = False,
 ) -> None:
@@ -52,7 +52,7 @@ def decay(
     try:
         found = roll_decay(time_s[part], roll_rad[part])
     except ValueError as error:
-        _refuse(f"{record}: {error}; --from and --to choose a part", json_)
+        refuse(f"{record}: {error}; --from and --to choose a part", json_)
     about: dict[str, Any] = {}
     if vessel is not None:
         about = describe("identify decay", vessel, out, options=context.params)
@@ -102,7 +102,7 @@ def inclining_test(
     try:
         found = inclining(moment_nm, heel_rad, 1e3 * GRAVITY_M_S2 * displacement_t)
     except ValueError as error:
-        _refuse(f"{record}: {error}", json_)
+        refuse(f"{record}: {error}", json_)
     if json_:
         print_json(found._asdict())
         return
@@ -124,7 +124,8 @@ def _columns(path: Path, *names: str) -> list[FloatArray]:
     return [run[name] for name in names]
 
 
-def _refuse(reason: str, json_: bool) -> NoReturn:
+def refuse(reason: str, json_: bool) -> NoReturn:
+    """Print why nothing follows from a record, and end."""
     notes.say(reason, red="refused:")
     if json_:
         print_json({"accepted": False, "reasons": [reason]})
@@ -132,11 +133,7 @@ def _refuse(reason: str, json_: bool) -> NoReturn:
 
 
 def _print_decay(
-    terminal: Terminal,
-    found: RollDecay,
-    keys: dict[str, Any],
-    vessel: Vessel | None,
-    path: Path,
+    terminal: Terminal, found: RollDecay, keys: dict[str, Any], vessel: Vessel | None, path: Path
 ) -> None:
     table = new_table("Free decay", "value", "95 %")
     for name, value, (low, high), digits in (
@@ -146,11 +143,9 @@ def _print_decay(
          found.quadratic_interval_per_rad, 3),
     ):  # fmt: skip
         table.add_row(name, f"{value:.{digits}f}", f"{low:.{digits}f} to {high:.{digits}f}")
+    amplitudes_deg = np.degrees(found.amplitude_rad)
     for amplitude, ratio, (low, high) in zip(
-        np.degrees(found.amplitude_rad),
-        found.equivalent_ratio,
-        found.equivalent_interval,
-        strict=True,
+        amplitudes_deg, found.equivalent_ratio, found.equivalent_interval, strict=True
     ):
         name = f"damping ratio at {amplitude:.1f}°"
         table.add_row(name, f"{ratio:.4f}", f"{low:.4f} to {high:.4f}")
@@ -160,7 +155,7 @@ def _print_decay(
     table.add_row("heel", f"{math.degrees(found.heel_rad):.3f}°", "")
     table.add_row("left by the fit, per greatest roll", f"{found.residual_share:.2%}", "")
     terminal.table(table)
-    least, _, most = np.degrees(found.amplitude_rad)
+    least, _, most = amplitudes_deg
     terminal.say(f"It holds from {least:.1f} to {most:.1f}°, and nowhere else.")
     for warning in found.warnings:
         terminal.say(warning, yellow="warning:")

@@ -14,7 +14,7 @@ from utank_hil.canbus import SocketCanPort, Station, load_catalogue
 from utank_hil.commands.keyboard import HELP, Keyboard
 from utank_hil.commands.lines import printed_lines
 from utank_hil.configuration.vessel import Vessel
-from utank_hil.console.common import Duration, fail, load
+from utank_hil.console.common import Bus, Duration, fail, load
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.nodes.panel import OperatorPanel
 from utank_hil.runners import RealTimeLoop, stop_on_signals
@@ -25,7 +25,7 @@ LOOK_NS = 2 * TICK_NS
 
 def panel(
     vessel: Annotated[Path, typer.Argument(help="Ship, tank and pump: a file of configs/ships.")],
-    bus: Annotated[str, typer.Option(help="SocketCAN interface, for example can0.")],
+    bus: Bus,
     duration: Duration = None,
     second: Annotated[
         bool, typer.Option("--second", help="Be the second station; it watches until it takes.")

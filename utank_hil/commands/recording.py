@@ -45,12 +45,11 @@ class RunRecording:
     """Ring and recorder of a run; the constructor returns when the recorder is ready, or failed.
 
     Viewers read the ring too (`utank_hil.telemetry.live`). The folder is created if it is missing,
-    and its files are named by the time, so that a crashed run's recording is not overwritten;
-    without it there is a ring and no recorder. `events` is the name of the run's ring of events,
-    recorded beside the rows; `about` the origin of the rows (`utank_hil.base.provenance`); `head`
-    that of the frame log (`utank_hil.telemetry.replay_head`), without which there is none. Beyond
-    `keep_bytes` the folder's oldest recordings are removed. The recording is named by the time of
-    `log`, the log of the run's events, so that a report finds it.
+    and its files are named by the time of `log`, the log of the run's events; without a folder
+    there is a ring and no recorder. `events` is the name of the ring of events, recorded beside the
+    rows; `about` the origin of the rows (`utank_hil.base.provenance`); `head` that of the frame log
+    (`utank_hil.telemetry.replay_head`), without which there is none. Beyond `keep_bytes` the
+    folder's oldest recordings are removed.
     """
 
     def __init__(

@@ -4,7 +4,7 @@ import errno
 import os
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -15,21 +15,29 @@ import typer
 from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.base.provenance import describe
 from utank_hil.base.stamps import claimed_files
-from utank_hil.canbus import Fault, Mode, PortError, SocketCanPort
+from utank_hil.canbus import Fault, Mode, Port, PortError
 from utank_hil.canbus.events import AlarmEvent
-from utank_hil.canbus.port import Port
-from utank_hil.canbus.ports import BusPorts, open_buses
-from utank_hil.canbus.profiles.foreign import ForeignDevices
+from utank_hil.canbus.ports import BusPorts, open_port
 from utank_hil.commands import event_log
 from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.commissioning_record import why_not_commissioned
 from utank_hil.commands.identified import IdentifiedShips, read_controller
-from utank_hil.commands.lines import printed_lines
+from utank_hil.commands.lines import Lines, printed_lines
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.commands.service_manager import ServiceManager
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.console.admission import admit
-from utank_hil.console.common import AllowCode, Duration, Json, View, fail, load, print_json
+from utank_hil.console.common import (
+    AllowCode,
+    Bus,
+    Config,
+    Duration,
+    Json,
+    View,
+    fail,
+    load,
+    print_json,
+)
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, notes, shown
 from utank_hil.console.timing import timing_table
@@ -57,8 +65,8 @@ _COMMAND_LINE: Final = "from utank_hil.cli import main; main()"
 
 def run(
     context: typer.Context,
-    config: Annotated[Path, typer.Argument(help="Controller configuration.")],
-    bus: Annotated[str, typer.Option(help="SocketCAN interface, for example can0.")],
+    config: Config,
+    bus: Bus,
     duration: Duration = None,
     out: Annotated[
         Path | None,
@@ -110,15 +118,15 @@ def run(
     statistics = LoopStatistics()
     with _refusals_named(), ExitStack() as stack:
         manager = _service_manager(stack)
-        port = _port(stack, bus, loaded.vessel.foreign)
+        try:
+            port = open_port(bus, loaded.vessel.foreign)
+        except OSError as error:
+            fail(error, ExitCode.NO_BUS)
+        stack.callback(port.close)
         stop = stack.enter_context(stop_on_signals())
-        log = None if out is None else _log(out)
-        announcer = _announcer(stack, config, loaded, out, log)
-        commissioned = not refused
-        head = None
-        if out is not None:
-            head = _replay_head(loaded, law, out, context.params, commissioned=commissioned)
-        recording = _recording(stack, context, loaded, out, keep, announcer, head, log)
+        announcer, recording = _outputs(
+            stack, context, loaded, law, config, out, keep, commissioned=not refused
+        )
         if view:
             _show(stack)
         retuner, estimating = _desks(stack, loaded)
@@ -140,7 +148,7 @@ def run(
             sink=recording.write,
             sink_every=ROW_TICKS,
             event_sink=announce,
-            commissioned=commissioned,
+            commissioned=not refused,
         )
         on_bus: Node = node
         if recording.keeps_records:
@@ -150,14 +158,7 @@ def run(
             ticks = statistics.ticks
             manager.progress(ticks)
             if ticks % LOOK_TICKS == 0:
-                for error in port.take_errors() if isinstance(port, BusPorts) else ():
-                    alarms.say(f"a sensor's bus fails: {error}")
-                failure = recording.failure()
-                if failure:
-                    alarms.say(f"not recorded any longer: {failure}")
-                failure = "" if announcer is None else announcer.failure()
-                if failure:
-                    alarms.say(f"events are not logged any longer: {failure}")
+                _say_failures(alarms, port, recording, announcer)
             return stop()
 
         with real_time_scheduling() as scheduling:
@@ -210,15 +211,6 @@ def _service_manager(stack: ExitStack) -> ServiceManager:
         fail(f"NOTIFY_SOCKET: the service manager can't be reached: {error}", ExitCode.SYSTEM)
 
 
-def _port(stack: ExitStack, bus: str, foreign: ForeignDevices) -> Port:
-    try:
-        port = open_buses(bus, foreign) if foreign.any else SocketCanPort(bus)
-    except OSError as error:
-        fail(error, ExitCode.NO_BUS)
-    stack.callback(port.close)
-    return port
-
-
 def _log(folder: Path) -> Path | None:
     """Return the file of the event log; `folder` is created."""
     try:
@@ -230,64 +222,44 @@ def _log(folder: Path) -> Path | None:
     return log
 
 
-def _announcer(
-    stack: ExitStack,
-    config: Path,
-    loaded: ControllerConfig,
-    folder: Path | None,
-    log: Path | None,
-) -> Announcer | None:
-    """Start the process that prints events and writes ships identified by retuning to `folder`."""
-    if folder is None and all(work is None for work in works_of(loaded)):
-        return None
-    ships = None
-    if folder is not None:
-        ships = IdentifiedShips(folder.resolve(), loaded.vessel, read_controller(config))
-    announcer = Announcer(ships, log)
-    stack.callback(announcer.stop)
-    if announcer.error is not None:
-        notes.say(announcer.error, red="no log of events:")
-    return announcer
-
-
-def _replay_head(
-    loaded: ControllerConfig,
-    law: BuiltLaw,
-    folder: Path,
-    options: Mapping[str, object],
-    *,
-    commissioned: bool,
-) -> dict[str, Any]:
-    retunes, estimates = (work is not None for work in works_of(loaded))
-    return replay_head(
-        "run",
-        loaded,
-        law,
-        folder,
-        options=options,
-        retuner=retunes,
-        estimating=estimates,
-        commissioned=commissioned,
-    )
-
-
-def _recording(
+def _outputs(
     stack: ExitStack,
     context: typer.Context,
     loaded: ControllerConfig,
-    folder: Path | None,
+    law: BuiltLaw,
+    config: Path,
+    out: Path | None,
     keep_mb: float | None,
-    announcer: Announcer | None,
-    head: dict[str, Any] | None,
-    log: Path | None,
-) -> RunRecording:
-    """Open the ring that monitors read, and the recorder that writes it to `folder`."""
-    if head is None:
+    *,
+    commissioned: bool,
+) -> tuple[Announcer | None, RunRecording]:
+    """Start what logs, prints and records a run; what fails is said, and the run goes on."""
+    retunes, estimates = (work is not None for work in works_of(loaded))
+    log = ships = head = announcer = None
+    if out is None:
         about = describe("run", loaded, Path.cwd(), options=context.params)
     else:
+        log = _log(out)
+        content = read_controller(config)
+        ships = IdentifiedShips(out.resolve(), loaded.vessel, content)
+        head = replay_head(
+            "run",
+            loaded,
+            law,
+            out,
+            options=context.params,
+            retuner=retunes,
+            estimating=estimates,
+            commissioned=commissioned,
+        )
         about = head["about"]
+    if out is not None or retunes or estimates:
+        announcer = Announcer(ships, log)
+        stack.callback(announcer.stop)
+        if announcer.error is not None:
+            notes.say(announcer.error, red="no log of events:")
     recording = RunRecording(
-        folder,
+        out,
         events=None if announcer is None else announcer.ring,
         about=about,
         head=head,
@@ -297,7 +269,19 @@ def _recording(
     stack.callback(recording.stop)
     if recording.summary.error is not None:
         notes.say(recording.summary.error, red="no recording:")
-    return recording
+    return announcer, recording
+
+
+def _say_failures(
+    alarms: Lines, port: Port, recording: RunRecording, announcer: Announcer | None
+) -> None:
+    """Say once what has ended before the run."""
+    for error in port.take_errors() if isinstance(port, BusPorts) else ():
+        alarms.say(f"a sensor's bus fails: {error}")
+    if failure := recording.failure():
+        alarms.say(f"not recorded any longer: {failure}")
+    if announcer is not None and (failure := announcer.failure()):
+        alarms.say(f"events are not logged any longer: {failure}")
 
 
 def _desks(stack: ExitStack, loaded: ControllerConfig) -> tuple[Desk | None, Desk | None]:

@@ -47,6 +47,11 @@ Version = Annotated[
         "--version", is_eager=True, callback=_print_version, help="Print the version and end."
     ),
 ]
+Config = Annotated[Path, typer.Argument(help="Controller configuration.")]
+Bus = Annotated[str, typer.Option("--bus", help="SocketCAN interface, for example can0.")]
+Run = Annotated[str | None, typer.Option(help="Run of a recording; without it the last one.")]
+From = Annotated[float | None, typer.Option("--from", metavar="SECONDS")]
+To = Annotated[float | None, typer.Option("--to", metavar="SECONDS")]
 Channel = Annotated[
     str | None, typer.Option(metavar="NAME", help="Bus to read of a log with several, as it says.")
 ]
@@ -93,6 +98,14 @@ def fail(message: object, code: ExitCode = ExitCode.USAGE) -> NoReturn:
     raise typer.Exit(code)
 
 
+def chosen_run(file: Path, runs: Mapping[str, Any], run: str | None) -> str:
+    """Return the name of the run that is asked for, or of the last one; end if there is none."""
+    name = list(runs)[-1] if run is None else run
+    if name not in runs:
+        fail(f"{file} has no run {name!r}; it has {', '.join(runs)}")
+    return name
+
+
 def load(path: Path, model: type[ModelT], *, allow_code: bool = False) -> ModelT:
     """Read a configuration, or list everything that is wrong with it and end with exit code 2.
 
@@ -123,8 +136,7 @@ def fail_with(error: ConfigError) -> NoReturn:
 def why_not_writable(folder: Path, files: Iterable[str] = ()) -> str | None:
     """Make a folder and try whether files can be written there; the reason if they can't.
 
-    The folder is made with its parents; `files` are the names of the files to come, and those that
-    exist are left as they are.
+    `files` are the names of the files to come; those that exist are left as they are.
     """
     if folder.exists() and not folder.is_dir():
         return f"{folder}: is not a folder"

@@ -33,18 +33,12 @@ def ship_json(vessel: Vessel) -> dict[str, Any]:
 def ship_figures(vessel: Vessel) -> dict[str, Any]:
     """What ship, tank and pump are to each other, by the linear model.
 
-    Returns
-    -------
-    dict
-        Frequencies in rad/s of the ship without water and of the water in a ship held still; the
-        two motions that they make together (`modes`, from slow to fast); ratios as in
-        `TankFigures`; share of the ship's stiffness that the free surface takes; level at which a
-        reservoir is full or empty. Metacentric height and the water's share of the displacement
-        are None where that is not given, what is of the pump without one: heel that its greatest
-        pressure holds by the restoring curve, None also where it capsizes the ship, and whether a
-        reservoir is full or empty then; head that it holds; power that holds it in still water;
-        flow that moves the level from limit to limit at the roll period, and power of pressure and
-        flow, without losses. Damping ratios that a valve adds, None without one.
+    `modes` are the two motions of ship and water together, from slow to fast; ratios are as in
+    `TankFigures`. Metacentric height and the water's share of the displacement are None where that
+    is not given, what is of the pump without one: the heel that its greatest pressure holds by the
+    restoring curve, None also where it capsizes the ship, and whether a reservoir is full or empty
+    then; the flow that moves the level from limit to limit at the roll period, and the power of
+    pressure and flow, without losses.
     """
     ship, tank = vessel.ship, vessel.tank
     figures = tank_figures(ship, tank)
@@ -155,23 +149,21 @@ def print_ship(vessel: Vessel) -> None:
     figures = ship_figures(vessel)
     columns = ("frequency\nrad/s", "period\ns", "damping\nratio")
     table = new_table(f"{vessel.name}, linear model", *columns)
-    motions = [
-        ("roll of the ship without water", figures["roll_frequency_rad_s"], "roll_damping_ratio"),
-        ("water in the ship held still", figures["tank_frequency_rad_s"], "tank_damping_ratio"),
-    ]
-    for text, frequency, damping in motions:
-        table.add_row(text, *_motion(frequency, figures[damping]))
-    for mode in figures["modes"]:
-        motion = _motion(mode["frequency_rad_s"], mode["damping_ratio"])
-        table.add_row("ship and water moving together", *motion)
+    together = "ship and water moving together"
+    for text, motion, of in (
+        ("roll of the ship without water", figures, "roll_"),
+        ("water in the ship held still", figures, "tank_"),
+        *((together, mode, "") for mode in figures["modes"]),
+    ):
+        frequency_rad_s, ratio = motion[f"{of}frequency_rad_s"], motion[f"{of}damping_ratio"]
+        period_s = 2 * math.pi / frequency_rad_s
+        table.add_row(text, f"{frequency_rad_s:.3f}", f"{period_s:.2f}", f"{ratio:.3f}")
     console = Terminal()
     console.say(f"{vessel.name}: the ship is valid.")
     console.table(table)
     rest = new_table(None, "")
     rest.show_header = False
-    share = figures["water_share"]
-    gm_m = figures["gm_m"]
-    taken = figures["stability_taken"]
+    share, gm_m, taken = (figures[name] for name in ("water_share", "gm_m", "stability_taken"))
     for text, value in (
         ("metacentric height GM", "no displacement" if gm_m is None else f"{gm_m:.2f} m"),
         ("water in the tank", _tonnes(figures["water_kg"])),
@@ -219,8 +211,3 @@ def _tonnes(mass_kg: float) -> str:
 def power_words(power_w: float) -> str:
     """A power with the unit that suits it."""
     return f"{power_w / 1e6:.2f} MW" if power_w >= 1e6 else f"{power_w / 1e3:.3g} kW"
-
-
-def _motion(frequency_rad_s: float, damping_ratio: float) -> tuple[str, str, str]:
-    period_s = 2 * math.pi / frequency_rad_s
-    return f"{frequency_rad_s:.3f}", f"{period_s:.2f}", f"{damping_ratio:.3f}"
