@@ -1,5 +1,6 @@
 """Figure of a bench: roll reduction and its cost, and roll, level and pressure over time."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,10 +94,8 @@ def draw_bench(
     with picture(path, title, size_in, about) as whole_figure:
         figure: Figure | SubFigure = whole_figure
         if bars:
-            height_ratios = [bars_in + 0.24 * len(lines), curves_in]
-            top, figure = whole_figure.subfigures(2, 1, squeeze=False, height_ratios=height_ratios)[
-                :, 0
-            ]
+            heights = [bars_in + 0.24 * len(lines), curves_in]
+            top, figure = whole_figure.subfigures(2, 1, height_ratios=heights)
             if lines:
                 top.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=10, color=WRONG)
             _draw_bars(top, bars)
@@ -113,8 +112,9 @@ def draw_bench(
             unit_s, _ = _time_unit(whole)
             for axis in axes[:3, 0]:
                 axis.axvspan(zoom[0] / unit_s, zoom[1] / unit_s, color=HIGHLIGHT, alpha=0.35, lw=0)
-            part = _part_words((whole[1] - whole[0]) / WINDOWS)
-            axes[0, 0].set_title(f"Whole run: greatest in each {part}", loc="left", fontsize=10)
+            part_s = (whole[1] - whole[0]) / WINDOWS
+            part = f"Whole run: greatest in each {part_s:.{0 if part_s >= 2 else 1}f} s"
+            axes[0, 0].set_title(part, loc="left", fontsize=10)
             axes[0, 1].set_title(zoomed, loc="left", fontsize=10)
         for axis, label in zip(axes[:, 0], _LABELS, strict=False):
             axis.set_ylabel(label)
@@ -134,13 +134,11 @@ def draw_bench(
 
 def _centre(curves: Sequence[BenchCurve]) -> tuple[float, str]:
     """Return the centre of the enlarged part in s, and its title."""
-    trials = [
-        float(curve.time_s[curve.retuning == RetuningState.TRIAL][0])
-        for curve in curves
-        if curve.retuning is not None and (curve.retuning == RetuningState.TRIAL).any()
-    ]
-    if trials:
-        return min(trials), "Around the new law's first command"
+    known = [curve for curve in curves if curve.retuning is not None]
+    trials = [curve.time_s[curve.retuning == RetuningState.TRIAL] for curve in known]
+    if any(map(len, trials)):
+        first_s = min(float(times_s[0]) for times_s in trials if len(times_s))
+        return first_s, "Around the new law's first command"
     reference = curves[0]
     worst_s = float(reference.time_s[np.argmax(np.abs(reference.roll_rad))])
     return worst_s, "Around the largest roll"
@@ -154,42 +152,26 @@ def _around(centre_s: float, whole: tuple[float, float]) -> tuple[float, float]:
     return start_s, start_s + ZOOM_S
 
 
-def _part_words(part_s: float) -> str:
-    """Describe the length of a part of the run."""
-    return f"{part_s:.0f} s" if part_s >= 2 else f"{part_s:.1f} s"
-
-
 def _draw_bars(figure: "SubFigure", bars: Sequence[BenchBar]) -> None:
-    """Draw the roll of each run and the power it took."""
     rolls, powers = figure.subplots(1, 2, sharey=True, width_ratios=[3, 2])
     places = range(len(bars))
+    degrees = [None if bar.roll_rad is None else math.degrees(bar.roll_rad) for bar in bars]
     for axis, label, values, words in (
-        (
-            rolls,
-            "Roll, RMS (°)",
-            [None if bar.roll_rad is None else float(np.degrees(bar.roll_rad)) for bar in bars],
-            [bar.said for bar in bars],
-        ),
-        (
-            powers,
-            "Shaft power, mean",
-            [bar.power_w for bar in bars],
-            [bar.cost for bar in bars],
-        ),
+        (rolls, "Roll, RMS (°)", degrees, [bar.said for bar in bars]),
+        (powers, "Shaft power, mean", [bar.power_w for bar in bars], [bar.cost for bar in bars]),
     ):
         most = max((value for value in values if value is not None), default=0.0) or 1.0
-        axis.barh(places, [value or 0.0 for value in values], 0.62,
-                  color=[bar.color for bar in bars])  # fmt: skip
-        for place, value, word in zip(places, values, words, strict=True):
-            axis.text((value or 0.0) + 0.012 * most, place, word, va="center", fontsize=10)
-        axis.set_xlim(0.0, 1.45 * most)
+        lengths = [value or 0.0 for value in values]
+        axis.barh(places, lengths, 0.62, color=[bar.color for bar in bars])
+        for place, length, word in zip(places, lengths, words, strict=True):
+            axis.text(length + 0.012 * most, place, word, va="center", fontsize=10)
+        axis.set(xlim=(0.0, 1.45 * most), xticks=[])
         axis.set_title(label, loc="left", fontsize=10)
         axis.grid(visible=False)
         axis.spines["bottom"].set_visible(False)
-        axis.set_xticks([])
+        axis.tick_params(axis="y", length=0)
     rolls.set_yticks(places, [bar.name for bar in bars])
-    rolls.tick_params(axis="y", length=0, labelcolor="black")
-    powers.tick_params(axis="y", length=0)
+    rolls.tick_params(axis="y", labelcolor="black")
     rolls.invert_yaxis()
 
 
@@ -231,13 +213,11 @@ def _greatest(time: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def _draw_lanes(axis: "Axes", curves: Sequence[BenchCurve], span_s: tuple[float, float]) -> None:
-    """Draw the retuning states of each retuning run over time."""
     unit_s, _ = _time_unit(span_s)
-    lanes = [
-        (curve, c) for curve, c in zip(curves, COLORS, strict=False) if curve.retuning is not None
-    ]
-    for place, (curve, color) in enumerate(lanes):
-        assert curve.retuning is not None
+    place = 0
+    for curve, color in zip(curves, COLORS, strict=False):
+        if curve.retuning is None:
+            continue
         starts = np.flatnonzero(np.diff(curve.retuning, prepend=np.nan))
         ends_s = [*curve.time_s[starts[1:]], curve.time_s[-1]]
         for start, end_s in zip(starts, ends_s, strict=True):
@@ -245,25 +225,13 @@ def _draw_lanes(axis: "Axes", curves: Sequence[BenchCurve], span_s: tuple[float,
             begin_s, end_s = max(curve.time_s[start], span_s[0]), min(end_s, span_s[1])
             if not name or begin_s >= end_s:
                 continue
-            axis.barh(
-                place,
-                (end_s - begin_s) / unit_s,
-                0.8,
-                begin_s / unit_s,
-                color=color,
-                alpha=strength,
-                lw=0,
-            )
+            begin, length = begin_s / unit_s, (end_s - begin_s) / unit_s
+            axis.barh(place, length, 0.8, begin, color=color, alpha=strength, lw=0)
             if end_s - begin_s > len(name) * _LETTER * (span_s[1] - span_s[0]):
-                axis.text(
-                    (begin_s + end_s) / 2 / unit_s,
-                    place,
-                    name,
-                    ha="center",
-                    va="center",
-                    fontsize=9,
-                    color="white" if strength > 0.6 else "black",
-                )
-    axis.set_ylim(len(lanes) - 0.4, -0.6)
+                ink = "white" if strength > 0.6 else "black"
+                middle = begin + length / 2
+                axis.text(middle, place, name, ha="center", va="center", fontsize=9, color=ink)
+        place += 1
+    axis.set_ylim(place - 0.4, -0.6)
     axis.set_yticks([])
     axis.grid(visible=False)

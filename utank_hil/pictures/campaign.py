@@ -52,17 +52,16 @@ def draw_campaign(
             else:
                 _bars(left, number / max(len(runs), 1), run, color)
             _exceedance(right, run, color, dash)
+        rolled = "Roll RMS (°), 95 % interval of the mean"
         if along:
-            left.set_xlabel(axis)
-            left.set_ylabel("Roll RMS (°), 95 % interval of the mean")
+            left.set(xlabel=axis, ylabel=rolled)
             left.set_ylim(bottom=0)
         else:
             shown = [str(group) for group in groups[:MOST_GROUPS]]
             left.set_yticks(-np.arange(len(shown)) - 0.4, shown)
-            left.set_xlabel("Roll RMS (°), 95 % interval of the mean")
-        right.set_xlabel("Roll RMS of a case (°)")
-        right.set_ylabel("Share of the cases above it")
-        right.set_yscale("log")
+            left.set_xlabel(rolled)
+        ordinate = "Share of the cases above it"
+        right.set(xlabel="Roll RMS of a case (°)", ylabel=ordinate, yscale="log")
         figure.legend(*left.get_legend_handles_labels(), **BELOW)
     return path
 
@@ -72,9 +71,7 @@ def _curve(
 ) -> None:
     order = np.argsort(at)
     mean, width = (np.degrees(np.array(each))[order] for each in (run.mean_rad, run.half_width_rad))
-    axes.plot(
-        at[order], mean, color=color, linestyle=dash, marker="o", markersize=4, label=run.name
-    )
+    axes.plot(at[order], mean, "o", ls=dash, color=color, markersize=4, label=run.name)
     axes.fill_between(at[order], mean - width, mean + width, color=color, alpha=0.12, linewidth=0)
 
 
@@ -93,6 +90,4 @@ def _exceedance(axes: "Axes", run: CampaignRun, color: str, dash: Any) -> None:
     if len(rolls):
         above = 1.0 - np.arange(len(rolls)) / len(rolls)
         mark = "o" if rolls[0] == rolls[-1] else None  # a step would have no width
-        axes.step(
-            rolls, above, where="pre", color=color, linestyle=dash, label=run.name, marker=mark
-        )
+        axes.step(rolls, above, where="pre", color=color, ls=dash, label=run.name, marker=mark)

@@ -76,11 +76,9 @@ def write_report_page(
     """
     from jinja2 import Environment, StrictUndefined
 
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    page = environment.from_string(_TEMPLATE.read_text(encoding="utf-8")).render(
-        title=title, about=about, verdicts=verdicts, sections=sections
-    )
-    write_whole(path, page)
+    style = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
+    environment = Environment(undefined=StrictUndefined, **style)
+    template = environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
+    content = {"title": title, "about": about, "verdicts": verdicts, "sections": sections}
+    write_whole(path, template.render(content))
     return path

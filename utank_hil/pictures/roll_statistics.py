@@ -44,16 +44,13 @@ def draw_roll_statistics(
             except ValueError:  # the record has no half-cycle
                 continue
             shares.plot(levels, np.where(share > 0, 100 * share, np.nan), **style)
-        spectra.set_xscale("log")
         ticks = [4, 5, 6, 8, 10, 12, 15, 20, 30]
+        spectra.set(xscale="log", xlabel="Period (s)", ylabel="Spectrum of the roll (°²/Hz)")
         spectra.set_xticks(ticks, [str(tick) for tick in ticks])
         spectra.minorticks_off()
-        spectra.set_xlabel("Period (s)")
-        spectra.set_ylabel("Spectrum of the roll (°²/Hz)")
         spectra.set_ylim(bottom=0.0)
-        shares.set_yscale("log")
-        shares.set_xlabel("Single amplitude of the roll (°)")
-        shares.set_ylabel("Share of amplitudes above it (%)")
+        ordinate = "Share of amplitudes above it (%)"
+        shares.set(yscale="log", xlabel="Single amplitude of the roll (°)", ylabel=ordinate)
         shares.set_xlim(left=0.0)
         figure.legend(loc="outside lower left", ncols=len(rolls), frameon=False)
     return path

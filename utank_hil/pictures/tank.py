@@ -25,19 +25,14 @@ def draw_tank(
     """Draw roll over wave period, and roll in the sea over the ship's loading."""
     with picture(path, title, (WIDEST_IN, 4.6), about) as figure:
         waves, loading = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2)
-        waves.fill_between(
-            curves.sea_period_s,
-            curves.sea * 0.5 * curves.without_tank.max(),
-            color="#DDDDDD",
-            step="mid",
-            label="energy of the wave moment",
-        )
+        energy = curves.sea * 0.5 * curves.without_tank.max()
+        style = {"color": "#DDDDDD", "label": "energy of the wave moment"}
+        waves.fill_between(curves.sea_period_s, energy, step="mid", **style)
         rolls = (curves.without_tank, curves.passive, curves.active)
         for roll, name, color, dash in zip(rolls, _NAMES, COLORS, DASHES, strict=False):
             if roll is not None:
                 waves.plot(curves.period_s, roll, color=color, linestyle=dash, label=name)
-        waves.set_xlabel("Wave period (s)")
-        waves.set_ylabel("Roll per effective wave slope")
+        waves.set(xlabel="Wave period (s)", ylabel="Roll per effective wave slope")
         scales = [point.period_scale for point in loadings]
         series: tuple[Sequence[float | None], ...] = (
             [point.without_tank_rad for point in loadings],
@@ -56,10 +51,7 @@ def draw_tank(
 
 
 def draw_sweep(
-    points: Sequence[SweepPoint],
-    path: Path,
-    title: str,
-    about: Mapping[str, Any] | None = None,
+    points: Sequence[SweepPoint], path: Path, title: str, about: Mapping[str, Any] | None = None
 ) -> Path:
     """Draw roll in the sea over the water's frequency, a line for each share of stability."""
     with picture(path, title, (WIDEST_IN, 4.6), about) as figure:
@@ -68,13 +60,11 @@ def draw_sweep(
         _draw_shares(passive, points, [p.prediction.passive.roll_rms_rad for p in points])
         found = [p.prediction.active for p in points]
         _draw_shares(active, points, [np.nan if p is None else p.roll_rms_rad for p in found])
-        passive.axhline(
-            np.degrees(points[0].prediction.without_tank_rad), color=COLORS[0], linestyle="--"
-        )
+        none = np.degrees(points[0].prediction.without_tank_rad)
+        passive.axhline(none, color=COLORS[0], linestyle="--")
         passive.set_title("Passive tank; dashed: none", loc="left", fontsize=10)
-        active.set_title(
-            "Active tank, within the limits of pump and level", loc="left", fontsize=10
-        )
+        within = "Active tank, within the limits of pump and level"
+        active.set_title(within, loc="left", fontsize=10)
         passive.set_ylabel("Roll RMS in the sea (°)")
         passive.set_ylim(bottom=0)
         figure.legend(*passive.get_legend_handles_labels(), title="Stability taken", **BELOW)

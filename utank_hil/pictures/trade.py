@@ -52,7 +52,8 @@ def draw_trade(
 
 def _draw_trade(axes: "Axes", points: list[TradePoint], trade: Trade) -> None:
     sensitivity = [point.robustness.nominal.peak_sensitivity for point in points]
-    reduction = [100 * _roll_reduction(point) for point in points]
+    below = [point.roll_below_passive for point in points]
+    reduction = [np.nan if share is None else 100 * share for share in below]
     axes.plot(sensitivity, reduction, color="#BBBBBB", linewidth=1.4, zorder=1)
     edge = max(*sensitivity, 1.1 * PEAK_SENSITIVITY)
     axes.set_xlim(0.97, edge + 0.1 * (edge - 1))
@@ -67,39 +68,26 @@ def _draw_trade(axes: "Axes", points: list[TradePoint], trade: Trade) -> None:
             text = f"the design: {y:.0f} % less roll, peak sensitivity {x:.2f}"
         marks[text] = _mark(axes, x, y, point)
         if point.factor != 1 and math.log10(point.factor).is_integer():
-            axes.annotate(
-                f"×{point.factor:g}",
-                (x, y),
-                xytext=(9, -6),
-                textcoords="offset points",
-                va="center",
-                color="#777777",
-            )
+            away: dict[str, Any] = {"xytext": (9, -6), "textcoords": "offset points"}
+            axes.annotate(f"×{point.factor:g}", (x, y), va="center", color="#777777", **away)
     axes.figure.legend(marks.values(), marks.keys(), **BELOW)
     axes.set_ylim(min(0.0, *reduction) - 3, max(reduction) + 6)
-    axes.set_xlabel("Peak sensitivity")
-    axes.set_ylabel("Roll RMS below the passive tank (%)")
-    axes.set_title(
-        f"Linear prediction, no limits; passive roll {_degrees(trade.passive.roll_rms_rad)} RMS",
-        loc="left",
-        fontsize=10,
-    )
+    axes.set(xlabel="Peak sensitivity", ylabel="Roll RMS below the passive tank (%)")
+    passive_deg = math.degrees(trade.passive.roll_rms_rad)
+    text = f"Linear prediction, no limits; passive roll {passive_deg:.2f}° RMS"
+    axes.set_title(text, loc="left", fontsize=10)
 
 
 def _draw_costs(column: "list[Axes]", points: list[TradePoint]) -> None:
-    titles = (
-        "Largest eigenvalue over ships, gains, delays",
-        "Pressure RMS demanded (kPa)",
-        "Tank level RMS (m)",
-    )
     factor = [point.factor for point in points]
     motions = [point.motion for point in points if point.motion is not None]
-    values = (
-        [point.robustness.worst_radius for point in points],
-        [motion.pressure_rms_pa / 1e3 for motion in motions],
-        [motion.level_rms_m for motion in motions],
-    )
-    for axis, title, series in zip(column, titles, values, strict=True):
+    radii = [point.robustness.worst_radius for point in points]
+    costs = {
+        "Largest eigenvalue over ships, gains, delays": radii,
+        "Pressure RMS demanded (kPa)": [motion.pressure_rms_pa / 1e3 for motion in motions],
+        "Tank level RMS (m)": [motion.level_rms_m for motion in motions],
+    }
+    for axis, (title, series) in zip(column, costs.items(), strict=True):
         axis.plot(factor, series, color="#BBBBBB", linewidth=1.4, zorder=1)
         for point, x, y in zip(points, factor, series, strict=True):
             _mark(axis, x, y, point)
@@ -129,20 +117,5 @@ def _mark(axes: "Axes", x: float, y: float, point: TradePoint) -> "Line2D":
 
 def _limit(axes: "Axes", value: float, text: str) -> None:
     axes.axhline(value, color=_REFUSED, linewidth=0.9, linestyle="--", zorder=2)
-    axes.annotate(
-        text,
-        (0, value),
-        xycoords=("axes fraction", "data"),
-        xytext=(4, 3),
-        textcoords="offset points",
-        color=_REFUSED,
-        fontsize=9,
-    )
-
-
-def _roll_reduction(point: TradePoint) -> float:
-    return np.nan if point.roll_below_passive is None else point.roll_below_passive
-
-
-def _degrees(angle_rad: float) -> str:
-    return f"{math.degrees(angle_rad):.2f}°"
+    away: dict[str, Any] = {"xytext": (4, 3), "textcoords": "offset points", "fontsize": 9}
+    axes.annotate(text, (0, value), xycoords=("axes fraction", "data"), color=_REFUSED, **away)

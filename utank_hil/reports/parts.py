@@ -45,13 +45,11 @@ def printed(table: Table) -> ReportTable:
 
 def roll_figure(rolls: Mapping[str, FloatArray], step_s: float, scratch: Path) -> ReportSection:
     """Spectra of the roll and exceedance of its amplitudes, as a picture in `scratch`."""
-    file = draw_roll_statistics(
-        rolls, step_s, scratch / "roll.png", "Roll at which periods, how often"
-    )
+    title = "Roll at which periods, how often"
+    file = draw_roll_statistics(rolls, step_s, scratch / "roll.png", title)
     says = "Left: spectra of the roll over its period. Right: share of amplitudes above each angle."
-    return ReportSection(
-        "Spectra and exceedance", pictures=[ReportPicture(file.read_bytes(), says)]
-    )
+    picture = ReportPicture(file.read_bytes(), says)
+    return ReportSection("Spectra and exceedance", pictures=[picture])
 
 
 def about_section(about: Mapping[str, Any], configuration: Any) -> ReportSection:

@@ -35,8 +35,8 @@ def recording_report(file: Path, scratch: Path) -> Report:
     """The report of a recording.
 
     `file` is the `.rrd` of ``utank-hil run --out``, whose log of alarms is looked for beside it;
-    `scratch` is a folder for pictures that are made for the report. Raises `OSError, ValueError` if
-    the file is no recording, one of several runs, or one of hardly any rows.
+    `scratch` is a folder for pictures. Raises `OSError, ValueError` if the file is no recording,
+    one of several runs, or one of hardly any rows.
     """
     from utank_hil.telemetry.recording import read_about, read_recording
 
@@ -122,16 +122,10 @@ def _histories(rows: dict[str, FloatArray], scratch: Path, title: str) -> Report
     thin = {name: values[::every] for name, values in rows.items()}
     level_m = (thin["starboard_level_m"] - thin["port_level_m"]) / 2
     nothing = np.full_like(level_m, np.nan)
-    file = draw_bench(
-        [
-            BenchCurve("passive twin", thin["time_s"], thin["twin_roll_rad"], nothing, nothing),
-            BenchCurve(
-                "ship", thin["time_s"], thin["roll_rad"], level_m, thin["pressure_actual_pa"]
-            ),
-        ],
-        scratch / "histories.png",
-        title,
-    )
+    time_s, pressure_pa = thin["time_s"], thin["pressure_actual_pa"]
+    twin = BenchCurve("passive twin", time_s, thin["twin_roll_rad"], nothing, nothing)
+    ship = BenchCurve("ship", time_s, thin["roll_rad"], level_m, pressure_pa)
+    file = draw_bench([twin, ship], scratch / "histories.png", title)
     says = "Roll of the ship and of its passive twin, level and pressure"
     return ReportPicture(file.read_bytes(), says)
 
