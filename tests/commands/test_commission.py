@@ -15,7 +15,7 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.cli import app
 from utank_hil.commands import commission as module
-from utank_hil.commands import commissioning_record, run
+from utank_hil.commands import commissioning_record
 from utank_hil.commands.commissioning_record import (
     make_record,
     record_path,
@@ -255,7 +255,7 @@ class AtTheQuay:
 
 
 def commission(monkeypatch: pytest.MonkeyPatch, loop: type[AtTheQuay], *words: object) -> Any:
-    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", QuietBus)
     monkeypatch.setattr(module, "RealTimeLoop", loop)
     application = new_app()
     application.command()(module.commission)
@@ -420,7 +420,7 @@ def test_a_record_counts_on_its_own_interface(file: Path) -> None:
 
 
 def test_run_says_why_arming_will_be_refused(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run, "SocketCanPort", QuietBus)
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", QuietBus)
     words = ["run", str(file), "--bus", "any0", "--duration", "0.1", "--json"]
     result = CliRunner().invoke(app, words)
     assert json.loads(result.stdout)["not_commissioned"].startswith(f"{record_path(file)}: there")

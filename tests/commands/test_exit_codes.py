@@ -14,7 +14,6 @@ from typer.testing import CliRunner
 
 from utank_hil.canbus import Fault, Mode
 from utank_hil.cli import app
-from utank_hil.commands import commission as commissioning
 from utank_hil.commands import lines
 from utank_hil.commands import panel as operating
 from utank_hil.commands import run as module
@@ -46,7 +45,7 @@ def test_run_ends_with_a_code_of_its_own_for_a_fault_and_for_a_lost_bus(
 def test_run_on_a_bus_that_is_down_ends_with_the_code_of_a_lost_bus(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(module, "SocketCanPort", DeadBus)
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", DeadBus)
     words = ["run", str(GPC), "--bus", "any0", "--duration", "0.3", "--json"]
     result = CliRunner().invoke(app, words)
     assert result.exit_code == ExitCode.BUS_LOST
@@ -60,7 +59,7 @@ def test_run_that_the_system_refuses_memory_is_started_again(
     def refuse(*_: object, **__: object) -> None:
         raise OSError(errno.EMFILE, "Too many open files", "/psm_1")
 
-    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", QuietBus)
     monkeypatch.setattr(module, "RunRecording", refuse)
     result = CliRunner().invoke(app, ["run", str(GPC), "--bus", "any0"])
     assert result.exit_code == ExitCode.SYSTEM
@@ -83,7 +82,7 @@ def test_a_command_that_is_refused_a_process_can_be_started_again(
     def refuse() -> None:
         raise OSError(errno.EAGAIN, "Resource temporarily unavailable")
 
-    monkeypatch.setattr(commissioning, "SocketCanPort", QuietBus)
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", QuietBus)
     monkeypatch.setattr(operating, "SocketCanPort", QuietBus)
     monkeypatch.setattr(lines, "Lines", refuse)
     result = CliRunner().invoke(app, [word.format(tmp_path) for word in words])
@@ -99,7 +98,7 @@ def test_run_names_what_the_system_refuses_and_hides_no_defect(
     def refuse(*_: object, **__: object) -> None:
         raise OSError(number, "reason")
 
-    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", QuietBus)
     monkeypatch.setattr(module, "build_controller_node", refuse)
     result = CliRunner().invoke(app, ["run", str(GPC), "--bus", "any0"])
     assert isinstance(result.exception, SystemExit if named else OSError)

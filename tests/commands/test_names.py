@@ -10,7 +10,6 @@ from ports import QuietBus
 from typer.testing import CliRunner
 
 from utank_hil.cli import app
-from utank_hil.commands import run as module
 from utank_hil.console import admission
 from utank_hil.console.terminal import Terminal
 
@@ -55,7 +54,7 @@ def test_a_terminal_shows_that_a_law_is_being_designed(
 def test_run_goes_on_whatever_the_law_is_called(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", QuietBus)
     output = told("run", controller(tmp_path), "--bus", "any0", "--duration", "0.3")
     assert output.count(LAW) == 2
 

@@ -11,7 +11,6 @@ from ship_in_the_port import ShipInThePort
 from typer.testing import CliRunner, Result
 
 from utank_hil.canbus import Mode, PumpCommand, load_catalogue
-from utank_hil.commands import run as run_module
 from utank_hil.commands.replay import replay
 from utank_hil.commands.run import run
 from utank_hil.console.common import new_app
@@ -61,7 +60,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
     config = controller(folder)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_module, "SocketCanPort", ShipInThePort)
+        patch.setattr("utank_hil.canbus.socketcan.SocketCanPort", ShipInThePort)
         words = (config, "--bus", "vcan0", "--duration", 3.5, "--out", folder, "--json")
         result = invoke(run, *words)
     report = json.loads(result.stdout)

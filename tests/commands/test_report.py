@@ -18,7 +18,6 @@ from typer.testing import CliRunner
 from utank_hil.base.provenance import describe
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.cli import app
-from utank_hil.commands import run as run_module
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict, write_report_page
@@ -104,7 +103,7 @@ def test_alarms_of_a_later_part_are_those_of_the_run_and_without_a_log_not_known
 def test_the_log_of_a_run_is_found_by_the_name_of_its_recording(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run_module, "SocketCanPort", QuietBus)
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", QuietBus)
     words = ["run", "configs/controllers/gpc.yaml", "--bus", "any0", "--duration", "0.5"]
     assert CliRunner().invoke(app, [*words, "--out", str(tmp_path)]).exit_code == 0
     (log,), (file,) = tmp_path.glob("log-*.jsonl"), tmp_path.glob("run-*.rrd")

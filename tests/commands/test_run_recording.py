@@ -114,7 +114,7 @@ def test_run_hands_on_the_bound_of_its_recordings(
         given.append(named["keep_bytes"])
         raise OSError(errno.EMFILE, "Too many open files")
 
-    monkeypatch.setattr(command, "SocketCanPort", QuietBus)
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", QuietBus)
     monkeypatch.setattr(command, "RunRecording", refuse)
     CliRunner().invoke(app, ["run", "configs/controllers/gpc.yaml", "--bus", "any0", *words])
     assert given == [keep_bytes]

@@ -86,7 +86,7 @@ def test_run_that_the_manager_does_not_hear_is_started_again_and_controls_nothin
     def unheard(*_: object) -> None:
         raise TimeoutError("timed out")
 
-    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", QuietBus)
     monkeypatch.setattr(module, "RealTimeLoop", lambda *_, **__: pytest.fail("begun"))
     monkeypatch.setattr(ServiceManager, "ready", unheard)
     monkeypatch.setenv("NOTIFY_SOCKET", manager.getsockname())
@@ -131,7 +131,7 @@ def test_a_socket_that_is_not_there_is_said(tmp_path: Path) -> None:
 def test_run_tells_that_it_is_ready_alive_and_stopping_in_this_order(
     manager, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", QuietBus)
     for name, value in environment(manager).items():
         monkeypatch.setenv(name, value)
     words = ["run", str(GPC), "--bus", "any0", "--duration", "0.5", "--json"]
@@ -166,7 +166,7 @@ def test_an_error_in_the_loop_ends_the_watchdog_before_its_traceback(
         close(lines)
 
     monkeypatch.setattr(Lines, "close", closing)
-    monkeypatch.setattr(module, "SocketCanPort", Broken)
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", Broken)
     for name, value in environment(manager).items():
         monkeypatch.setenv(name, value)
     result = CliRunner().invoke(app, ["run", str(GPC), "--bus", "any0", "--duration", "5"])
@@ -197,10 +197,10 @@ def test_ready_is_told_when_nothing_but_the_loop_is_left_to_begin(
             pass
 
     before = (
-        *("SocketCanPort", "RunRecording", "retuner_process", "printed_lines"),
+        *("open_port", "RunRecording", "retuner_process", "printed_lines"),
         *("build_controller_node", "real_time_scheduling"),
     )
-    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", QuietBus)
     for step in before:
         monkeypatch.setattr(module, step, noting(step))
     monkeypatch.setattr(module, "RealTimeLoop", NoLoop)
@@ -224,7 +224,7 @@ def test_a_loop_that_stands_still_feeds_no_watchdog(
                 self._statistics.ticks = ticks
                 stop()
 
-    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", QuietBus)
     monkeypatch.setattr(module, "RealTimeLoop", Standing)
     for name, value in environment(manager).items():
         monkeypatch.setenv(name, value)

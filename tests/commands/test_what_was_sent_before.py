@@ -57,7 +57,7 @@ def test_the_loop_is_handed_no_frame_that_came_before_it_began(
 ) -> None:
     FirstLook.heard = []
     for module in (run, commission):
-        monkeypatch.setattr(module, "SocketCanPort", BusyBus)
+        monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", BusyBus)
         monkeypatch.setattr(module, "RealTimeLoop", FirstLook)
         monkeypatch.setattr(module, "real_time_scheduling", slow_scheduling)
     words = ["--record", str(tmp_path / "record.json")]
@@ -76,7 +76,7 @@ def test_commission_begins_on_a_bus_that_is_down(
         def run(self, *_: object) -> None:
             begun.append(self._port)
 
-    monkeypatch.setattr(commission, "SocketCanPort", DeadBus)
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", DeadBus)
     monkeypatch.setattr(commission, "RealTimeLoop", Loop)
     words = ["--record", str(tmp_path / "record.json")]
     CliRunner().invoke(app, ["commission", str(GPC), "--bus", "any0", *words])

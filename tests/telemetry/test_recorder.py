@@ -323,16 +323,12 @@ os.kill(os.getpid(), signal.SIGKILL)
 
 @pytest.mark.evidence("1", "15")
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_run_by_hand_it_ends_on_a_signal_with_all_rows(
-    tmp_path: Path, stop: signal.Signals
-) -> None:
+def test_it_ends_on_a_signal_with_all_rows(tmp_path: Path, stop: signal.Signals) -> None:
     file = tmp_path / "run.rrd"
-    module = "utank_hil.telemetry.recorder"
+    command = [sys.executable, "-W", "error", "-m", "utank_hil.telemetry.recorder"]
     with RowWriter(SIGNALS) as ring:
-        command = [sys.executable, "-W", "error", "-m", module, "--ring", ring.name]
-        process = subprocess.Popen(
-            [*command, "--file", str(file)], stdout=subprocess.PIPE, text=True
-        )
+        state = RecorderState(RecordingTask(ring.name, str(file))).as_input()
+        process = subprocess.Popen(command, stdin=state, stdout=subprocess.PIPE, text=True)
         process.stdout.readline()
         feed(ring, table(7))
         process.send_signal(stop)
@@ -418,11 +414,10 @@ if os.fork() == 0:
 
 
 def test_reason_of_a_failure_is_told_where_standard_error_takes_nothing(tmp_path: Path) -> None:
-    command = ["-m", "utank_hil.telemetry.recorder", "--ring", "utank-none", "--file", "run.rrd"]
+    state = RecorderState(RecordingTask("utank-none", str(tmp_path / "run.rrd"))).as_input()
+    command = [sys.executable, "-m", "utank_hil.telemetry.recorder"]
     with open("/dev/full", "w") as full:
-        ended = subprocess.run(
-            [sys.executable, *command], stdout=subprocess.PIPE, stderr=full, cwd=tmp_path
-        )
+        ended = subprocess.run(command, stdin=state, stdout=subprocess.PIPE, stderr=full)
     assert ended.returncode == 1
     assert "is its writer running" in json.loads(ended.stdout)["error"]
 
@@ -430,11 +425,11 @@ def test_reason_of_a_failure_is_told_where_standard_error_takes_nothing(tmp_path
 def test_a_full_disk_ends_the_recorder_and_leaves_what_was_written(tmp_path: Path) -> None:
     file = tmp_path / "run.rrd"
     limit = 400_000  # the layout takes most of it
-    module = "utank_hil.telemetry.recorder"
+    command = [sys.executable, "-X", "dev", "-m", "utank_hil.telemetry.recorder"]
     with RowWriter(SIGNALS) as ring:
-        command = ["-m", module, "--ring", ring.name, "--file", str(file)]
         process = subprocess.Popen(
-            ["prlimit", f"--fsize={limit}", sys.executable, "-X", "dev", *command],
+            ["prlimit", f"--fsize={limit}", *command],
+            stdin=RecorderState(RecordingTask(ring.name, str(file))).as_input(),
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

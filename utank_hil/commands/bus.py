@@ -83,7 +83,6 @@ def _ship(path: Path | None) -> tuple[Vessel | None, int | None]:
 
 
 def _heard(interface: str, seconds: float) -> Iterator[BusFrame]:
-    """Yield what comes on an interface within a time."""
     import socket
 
     from can.interfaces.socketcan import SocketcanBus

@@ -161,7 +161,6 @@ def print_collection(kind: str, collection: Any, judged: Judged) -> None:
 
 
 def _verdict(judged: JudgedLaw) -> str | Text:
-    """Return the verdict on a law in one word."""
     if judged.failures:
         return Text("accepted", "yellow") if judged.accepted else Text("refused", "red")
     if judged.robustness is None:
@@ -192,7 +191,6 @@ def _searched_s(law: BuiltLaw) -> float:
 
 
 def _remarks(law: BuiltLaw, report: Robustness) -> list[str]:
-    """Return notes on the margins besides those on missed ones."""
     notes = [note for note in (_at_rest(law),) if note is not None]
     gain = report.nominal.peak_loop_gain
     if gain < LEAST_LOOP_GAIN and not law.adapts:

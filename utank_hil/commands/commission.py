@@ -2,7 +2,7 @@
 
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, NoReturn
 
 import typer
 from rich.table import Table
@@ -95,14 +95,7 @@ def commission(
                 port.receive()  # Old frames must not look new.
             RealTimeLoop([node], port, statistics=statistics).run(lambda: guide.look() or stop())
     if node.stage is not Stage.DONE:
-        what = "ended before all was checked; there is no new record"
-        if node.stage is Stage.MOVING:  # Ending this stage must not contradict the record.
-            try:
-                remove_record(path)
-            except OSError as error:
-                fail(f"{what}, and the one before can't be removed: {error}; remove it")
-            what += ", and the one before is removed"
-        fail(what, ExitCode.INTERRUPTED)
+        _give_up(node.stage, path)
     # The previous record is void from now on, whatever this commissioning yields.
     with suppress(OSError):  # What can't be removed can't be replaced either, and that is reported.
         remove_record(path)
@@ -122,6 +115,18 @@ def commission(
     if unwritten:
         fail(unwritten)
     raise typer.Exit(ExitCode.OK if made["passed"] else ExitCode.REFUSED)
+
+
+def _give_up(stage: Stage, path: Path) -> NoReturn:
+    """End before all was checked; a record is void once pump and valve have moved."""
+    what = "ended before all was checked; there is no new record"
+    if stage is Stage.MOVING:
+        try:
+            remove_record(path)
+        except OSError as error:
+            fail(f"{what}, and the one before can't be removed: {error}; remove it")
+        what += ", and the one before is removed"
+    fail(what, ExitCode.INTERRUPTED)
 
 
 class Guide:

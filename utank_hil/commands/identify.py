@@ -119,7 +119,6 @@ def identify_log(
 
 
 def _keep_apart(results: list[Path], config: Path, content: dict[str, Any]) -> None:
-    """Refuse to overwrite input files."""
     vessel = content["vessel"]
     given = [config, *([Path(vessel)] if isinstance(vessel, str) else [])]
     for path in {path.resolve() for path in results} & {path.resolve() for path in given}:

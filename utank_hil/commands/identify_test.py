@@ -113,7 +113,6 @@ def inclining_test(
 
 
 def _columns(path: Path, *names: str) -> list[FloatArray]:
-    """Return columns of the last run of a file."""
     from utank_hil.telemetry.signal_files import read_signals, require
 
     try:

@@ -99,7 +99,6 @@ class Keyboard:
         return [line.decode(errors="replace").strip().lower() for line in lines]
 
     def _end(self, now_ns: int) -> None:
-        """React to the end of the input."""
         if self._terminal:  # without input a panel must not stay armed
             self._press(Action.STOP)
             self._leave_ns = self._leave_ns or now_ns + LEAVE_NS

@@ -104,7 +104,6 @@ def _said(viewer: "Viewer", at_s: float | None) -> "Viewer":
 
 
 def _open(file: Path) -> None:
-    """Show a recording, or that of a bench's folder."""
     from utank_hil.telemetry.highlight import highlight_s
 
     file = file / "bench.rrd" if file.is_dir() else file
@@ -118,7 +117,6 @@ def _open(file: Path) -> None:
 
 
 def _attach(pid: int | None) -> None:
-    """Show a run of this machine."""
     from utank_hil.telemetry.live import LiveStream, live_runs
 
     os.nice(_NICENESS)  # A loop may run on this machine.

@@ -161,22 +161,11 @@ def run(
                 _say_failures(alarms, port, recording, announcer)
             return stop()
 
-        with real_time_scheduling() as scheduling:
-            for line in scheduling.lines():
-                notes.say(line)
-            notes.say(f"{loaded.name} on {bus}; Ctrl-C ends it.")
-            try:
-                manager.ready(f"{loaded.name} on {bus}")
-            except OSError as error:
-                fail(f"NOTIFY_SOCKET: the manager does not answer: {error}", ExitCode.SYSTEM)
+        with _in_real_time(f"{loaded.name} on {bus}", manager):
             with suppress(PortError):  # The loop meets the error too, and its node reacts.
                 port.receive()  # Old frames must not look new.
-            try:
-                RealTimeLoop([on_bus], port, statistics=statistics).run(
-                    ended, None if duration is None else round(duration * 1e9)
-                )
-            finally:
-                manager.stopping()  # The watchdog must not interrupt an error message.
+            length_ns = None if duration is None else round(duration * 1e9)
+            RealTimeLoop([on_bus], port, statistics=statistics).run(ended, length_ns)
     kept = None if out is None else recording.summary
     # The exit code reports the end if the output is full or gone (Rich ends by SystemExit).
     with suppress(OSError, SystemExit):
@@ -188,6 +177,23 @@ def run(
         else:
             _print_summary(loaded.name, node, statistics, kept)
     raise typer.Exit(_code(node))
+
+
+@contextmanager
+def _in_real_time(name: str, manager: ServiceManager) -> Iterator[None]:
+    """Have the loop scheduled in real time, and the service manager know of it."""
+    with real_time_scheduling() as scheduling:
+        for line in scheduling.lines():
+            notes.say(line)
+        notes.say(f"{name}; Ctrl-C ends it.")
+        try:
+            manager.ready(name)
+        except OSError as error:
+            fail(f"NOTIFY_SOCKET: the manager does not answer: {error}", ExitCode.SYSTEM)
+        try:
+            yield
+        finally:
+            manager.stopping()  # The watchdog must not interrupt an error message.
 
 
 @contextmanager
@@ -298,7 +304,6 @@ def _as_json(
     recording: RecordingSummary | None,
     refused: str,
 ) -> dict[str, Any]:
-    """Return the result of a run for scripts."""
     return {
         "exit_code": _code(node),
         "mode": node.mode.name,
@@ -325,7 +330,6 @@ def _print_summary(
     statistics: LoopStatistics,
     recording: RecordingSummary | None,
 ) -> None:
-    """Print the result of a run for people."""
     console = Terminal()
     console.table(timing_table({name: statistics}))
     for event in node.law.events:

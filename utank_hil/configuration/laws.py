@@ -43,7 +43,6 @@ _AUTO_KEYS: Final = frozenset(each.name for each in fields(AutoDesign))
 
 
 def _tag(content: Any) -> Any:
-    """Return the tag of the design: its kind, or `_AUTO`."""
     given = content if isinstance(content, dict) else {"kind": getattr(content, "kind", None)}
     automatic = "tuning" in given or isinstance(content, AutoDesign)
     return _AUTO if automatic and given.get("kind") in LINEAR_KINDS else given.get("kind")

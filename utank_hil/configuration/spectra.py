@@ -76,7 +76,6 @@ class _GivenSea(Section):
 
 
 def _steepness(hs_m: float, tp_s: float) -> float:
-    """Return the significant height per length of a wave of the peak period."""
     return 2 * math.pi * hs_m / (GRAVITY_M_S2 * tp_s**2)
 
 

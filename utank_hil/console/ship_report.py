@@ -88,7 +88,6 @@ def _valve_figures(vessel: Vessel) -> dict[str, float | None]:
 
 
 def _pump_figures(vessel: Vessel) -> dict[str, Any]:
-    """What the pump can do with this tank and ship."""
     pump, tank = vessel.pump, vessel.tank
     names = ("heel_rad", "heel_at_the_end", "head_m", "flow_m3_s", "power_asked_w",
              "power_held_w", "power_w")  # fmt: skip

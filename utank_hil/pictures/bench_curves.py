@@ -95,7 +95,7 @@ def draw_bench(
         figure: Figure | SubFigure = whole_figure
         if bars:
             heights = [bars_in + 0.24 * len(lines), curves_in]
-            top, figure = whole_figure.subfigures(2, 1, height_ratios=heights)
+            top, figure = whole_figure.subfigures(2, 1, squeeze=False, height_ratios=heights)[:, 0]
             if lines:
                 top.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=10, color=WRONG)
             _draw_bars(top, bars)
@@ -176,7 +176,6 @@ def _draw_bars(figure: "SubFigure", bars: Sequence[BenchBar]) -> None:
 
 
 def _time_unit(span_s: tuple[float, float]) -> tuple[float, str]:
-    """Return the unit of a time axis: its length in s, and its name."""
     return (60.0, "min") if span_s[1] - span_s[0] > 600.0 else (1.0, "s")
 
 

@@ -4,7 +4,7 @@ import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from utank_hil.base.whole_file import write_whole
 from utank_hil.pictures.style import DPI, TEXT_PT
@@ -76,7 +76,7 @@ def write_report_page(
     """
     from jinja2 import Environment, StrictUndefined
 
-    style = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
+    style: dict[str, Any] = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
     environment = Environment(undefined=StrictUndefined, **style)
     template = environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
     content = {"title": title, "about": about, "verdicts": verdicts, "sections": sections}

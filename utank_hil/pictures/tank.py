@@ -26,8 +26,8 @@ def draw_tank(
     with picture(path, title, (WIDEST_IN, 4.6), about) as figure:
         waves, loading = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2)
         energy = curves.sea * 0.5 * curves.without_tank.max()
-        style = {"color": "#DDDDDD", "label": "energy of the wave moment"}
-        waves.fill_between(curves.sea_period_s, energy, step="mid", **style)
+        label = "energy of the wave moment"
+        waves.fill_between(curves.sea_period_s, energy, step="mid", color="#DDDDDD", label=label)
         rolls = (curves.without_tank, curves.passive, curves.active)
         for roll, name, color, dash in zip(rolls, _NAMES, COLORS, DASHES, strict=False):
             if roll is not None:

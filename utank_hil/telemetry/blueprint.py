@@ -78,16 +78,15 @@ SUBJECTS: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
 """Plots of the engineer's tabs: title and columns; the first column is shown for several runs."""
 
 # This is Okabe and Ito's colour-blind safe palette, in an order for a dark background.
-_PALETTE: Final = (
-    (0xB0, 0xB0, 0xB0),
-    (0xE6, 0x9F, 0x00),
-    (0x56, 0xB4, 0xE9),
-    (0x00, 0x9E, 0x73),
-    (0xF0, 0xE4, 0x42),
-    (0xCC, 0x79, 0xA7),
-)
-
-_COLOR_NAMES: Final = ("grey", "orange", "blue", "green", "yellow", "pink")
+_PALETTE: Final = {
+    "grey": (0xB0, 0xB0, 0xB0),
+    "orange": (0xE6, 0x9F, 0x00),
+    "blue": (0x56, 0xB4, 0xE9),
+    "green": (0x00, 0x9E, 0x73),
+    "yellow": (0xF0, 0xE4, 0x42),
+    "pink": (0xCC, 0x79, 0xA7),
+}
+_COLOR_NAMES: Final = tuple(_PALETTE)
 
 
 def make_blueprint(
@@ -106,22 +105,18 @@ def make_blueprint(
     live and follows the newest data. Without a `size` there are no scenes and no tab for the watch.
     `zero` are run and column of signals that are zero throughout and are not plotted.
     """
-    boundary = rr.TimeRangeBoundary
     if span_s is None:
-        around = boundary.cursor_relative(seconds=-3 * HALF_WINDOW_S), boundary.cursor_relative()
-        ranges = {"Live": around}
+        around = _axis(-3 * HALF_WINDOW_S, 0.0)
+        axes = {"Live": around}
     else:
-        first, last = (boundary.absolute(seconds=time_s) for time_s in span_s)
-        around = (
-            boundary.cursor_relative(seconds=-HALF_WINDOW_S),
-            boundary.cursor_relative(seconds=HALF_WINDOW_S),
-        )
-        ranges = {"At the cursor": around, "Whole run": (first, last)}
+        first, last = (rr.TimeRangeBoundary.absolute(seconds=time_s) for time_s in span_s)
+        whole = rrb.TimeAxis(view_range=rr.TimeRange(start=first, end=last))
+        around = _axis(-HALF_WINDOW_S, HALF_WINDOW_S)
+        axes = {"At the cursor": around, "Whole run": whole}
     pages: list[rrb.Container] = []
     if size is not None:
-        pages.append(_watch(*around, runs, size))
-    for name, (start, end) in ranges.items():
-        axis = rrb.TimeAxis(view_range=rr.TimeRange(start=start, end=end))
+        pages.append(_watch(around, runs, size))
+    for name, axis in axes.items():
         for first_run in range(0, len(runs), MOST_SHADES):
             shown = range(first_run, min(first_run + MOST_SHADES, len(runs)))
             beside = "" if len(runs) <= MOST_SHADES else f": {', '.join(runs[i] for i in shown)}"
@@ -136,6 +131,12 @@ def make_blueprint(
     )
 
 
+def _axis(from_s: float, to_s: float) -> rrb.TimeAxis:
+    """Return an axis of times relative to the cursor."""
+    from_to = (rr.TimeRangeBoundary.cursor_relative(seconds=each) for each in (from_s, to_s))
+    return rrb.TimeAxis(view_range=rr.TimeRange(*from_to))
+
+
 def columns_of(columns: Sequence[str], about: Mapping[str, Any] | None) -> list[str]:
     """Return the columns without those of parts that the recorded ship or controller lacks."""
     configuration = (about or {}).get("configuration", {})
@@ -148,17 +149,10 @@ def columns_of(columns: Sequence[str], about: Mapping[str, Any] | None) -> list[
     return [column for column in columns if column not in missing]
 
 
-def _watch(
-    start: rr.TimeRangeBoundary,
-    end: rr.TimeRangeBoundary,
-    runs: Sequence[str],
-    size: SceneSize,
-) -> rrb.Container:
+def _watch(axis: rrb.TimeAxis, runs: Sequence[str], size: SceneSize) -> rrb.Container:
     """Lay out the ships, words below them, and the plots that a watch-keeper needs."""
-    axis = rrb.TimeAxis(view_range=rr.TimeRange(start=start, end=end))
-    bounds = rrb.VisualBounds2D(
-        x_range=[-size.reach_m, size.reach_m], y_range=list(size.height_range_m)
-    )
+    across_m, upright_m = [-size.reach_m, size.reach_m], list(size.height_range_m)
+    bounds = rrb.VisualBounds2D(x_range=across_m, y_range=upright_m)
     shown = list(zip(run_paths(runs), runs, strict=True))[:MOST_SHADES]
     scenes = [
         rrb.Spatial2DView(origin=f"{path}/scene", name=run, visual_bounds=bounds)
@@ -196,6 +190,7 @@ def _subjects(
         if column not in (TIME_COLUMN, *STATE_COLUMNS)
     }
     left = {column: those for column, those in left.items() if those}
+    paths = [run_paths(runs)[i] for i in shown]
     tabs: list[rrb.Container | rrb.View] = []
     for subject, plots in SUBJECTS.items():
         views: list[rrb.View] = []
@@ -207,7 +202,6 @@ def _subjects(
                 views.append(_plot(title, fields, runs, left[fields[0].column], axis))
             for field in fields:
                 del left[field.column]
-        paths = [run_paths(runs)[i] for i in shown]
         if subject == MOTION and {"roll_rad", "roll_rate_rad_s"} <= set(columns):
             half = [_phase_plane(paths), _spectra(paths)]
             tabs.append(rrb.Horizontal(rrb.Vertical(*views), rrb.Vertical(*half),
@@ -219,17 +213,11 @@ def _subjects(
         tabs.append(rrb.Grid(*others, name=OTHERS))
     rows: list[rrb.Container | rrb.View] = [rrb.Tabs(*tabs, active_tab=0)] if tabs else []
     if has_state(columns):
-        paths = [run_paths(runs)[i] for i in shown]
         lanes = [f"{path}/{lane}" for path in paths for lane in (STATE, RETUNING)]
-        rows.append(
-            rrb.Horizontal(
-                rrb.StateTimelineView(
-                    contents=lanes, name="Mode and fault, retuning", time_view=axis
-                ),
-                rrb.TextLogView(contents=[f"{path}/{LOG}" for path in paths], name="Events"),
-                column_shares=[2, 1],
-            )
-        )
+        title = "Mode and fault, retuning"
+        states = rrb.StateTimelineView(contents=lanes, name=title, time_view=axis)
+        events = rrb.TextLogView(contents=[f"{path}/{LOG}" for path in paths], name="Events")
+        rows.append(rrb.Horizontal(states, events, column_shares=[2, 1]))
     return rrb.Vertical(*rows, row_shares=[100, 14 + 5 * len(shown)][: len(rows)], name=name)
 
 
@@ -264,7 +252,6 @@ def _phase_plane(paths: Sequence[str]) -> rrb.View:
 
 
 def _spectra(paths: Sequence[str]) -> rrb.View:
-    """Lay out spectra of the roll in the last minutes before the cursor."""
     return rrb.BarChartView(
         contents=[f"{path}/spectrum" for path in paths],
         name="Spectrum of the roll in the last 5 min, °²/Hz over Hz",
@@ -288,7 +275,7 @@ def _plot(
         colors = {i: [run_color(i)] for i in shown}
         named = [(runs[i], _COLOR_NAMES[i % MOST_SHADES]) for i in shown]
     else:
-        colors = {0: list(_PALETTE[1:])}
+        colors = {0: list(_PALETTE.values())[1:]}
         labels = _short_labels([field.label for field in fields])
         named = list(zip(labels, _COLOR_NAMES[1:], strict=False))
         named = [(label, color) for label, color in named if label]
@@ -320,7 +307,6 @@ def _short_labels(labels: Sequence[str]) -> list[str]:
 
 
 def _line(field: Field, name: str, color: tuple[int, int, int]) -> rrb.Visualizer:
-    """Draw one field of a run's struct as a line."""
     source = VisualizerComponentMapping(
         "Scalars:scalars",
         ComponentSourceKind.SourceComponent,
@@ -337,4 +323,4 @@ def _line(field: Field, name: str, color: tuple[int, int, int]) -> rrb.Visualize
 
 def run_color(number: int) -> tuple[int, int, int]:
     """Return the colour of a run among several, counted from 0; the reference is grey."""
-    return _PALETTE[number % MOST_SHADES]
+    return _PALETTE[_COLOR_NAMES[number % MOST_SHADES]]

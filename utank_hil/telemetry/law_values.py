@@ -203,7 +203,6 @@ def _path(path: str, name: str) -> str:
 
 
 def _parts(value: object) -> Iterator[tuple[str, object]]:
-    """Return the parts of an object by name."""
     if isinstance(value, str | bytes | type) or callable(value):
         return
     if isinstance(value, Mapping):

@@ -152,18 +152,7 @@ class RetunerTap:
 
 
 class Tapped:
-    """The desks of a controller, each with a tap if its answers are recorded.
-
-    Parameters
-    ----------
-    retuner, estimating : Retuner or None
-        Desks as for `build_controller_node`.
-
-    Attributes
-    ----------
-    retuner, estimating : Retuner or None
-        Desks for the controller.
-    """
+    """The desks for `build_controller_node`, each with a tap if its answers are recorded."""
 
     def __init__(
         self, retuner: Retuner | None, estimating: Retuner | None, *, wanted: bool

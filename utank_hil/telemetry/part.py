@@ -74,14 +74,14 @@ class RecordingPart(Closing):
         self._recording = open_stream(file.stem, rr.FileSink(file), columns, about)
         self._log = live_log(self._recording, columns, about, PICTURES_S)
 
-    def write(self, rows: FloatArray) -> None:
-        """Append rows, shape (n, width), n above zero."""
-        self._rows += len(rows)
-        self._log.write(rows)
-
-    def write_events(self, events: Sequence[Event]) -> None:
-        """Log events of retuning and alarms."""
+    def write(self, rows: FloatArray, events: Sequence[Event] = ()) -> None:
+        """Append rows, shape (n, width), and events of retuning and alarms, and flush them."""
+        if len(rows):
+            self._rows += len(rows)
+            self._log.write(rows)
         self._log.write_events(events)
+        if len(rows) or events:
+            self.flush()
 
     def note_lost(self, what: str, lost: int) -> None:
         """Log a warning if the total number lost of a kind has grown since the last call."""

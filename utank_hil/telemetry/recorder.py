@@ -1,10 +1,9 @@
 """The recorder: a process that writes rows and events to a Rerun file, and the frame log beside it.
 
 Without Rerun only the frame log is written. `RecorderProcess` (recorder_process.py) starts the
-recorder; `python -m utank_hil.telemetry.recorder --ring NAME --file OUT.rrd` attaches one by hand.
-It ends when the ring is closed, when the ring's writer dies, or on SIGINT, SIGTERM or SIGHUP, with
-all rows written. The controller never waits: rows read too late are overwritten and counted as
-lost.
+recorder. It ends when the ring is closed, when the ring's writer dies, or on SIGINT, SIGTERM or
+SIGHUP, with all rows written. The controller never waits: rows read too late are overwritten and
+counted as lost.
 
 The process replaces itself (`execv`) for each file of a long recording, because Rerun keeps memory
 and threads of finished files. After a failure, such as a full disk, it continues in another file as
@@ -12,7 +11,6 @@ soon as there is room; the ring holds the rows of 80 s. Its `RecorderState` pass
 standard input.
 """
 
-import argparse
 import json
 import os
 import shutil
@@ -28,7 +26,7 @@ from typing import Final, NoReturn
 from utank_hil.base.background import give_way
 from utank_hil.telemetry.events import EventReader
 from utank_hil.telemetry.frame_recording import FrameRecording
-from utank_hil.telemetry.recorder_state import RecorderState, RecordingTask
+from utank_hil.telemetry.recorder_state import RecorderState
 from utank_hil.telemetry.ring import RingKind, RingReader
 from utank_hil.telemetry.rotation import SUFFIXES, part_of
 from utank_hil.telemetry.rows import RowReader
@@ -81,19 +79,12 @@ def record_part(state: RecorderState) -> bool:
             rows = reader.read_rows()
             if len(rows):
                 begin_s = float(rows[0, time]) if begin_s is None else begin_s
-                full = task.rotation is not None and (
-                    rows[-1, time] - begin_s >= task.rotation.part_s
-                )
+                full = bool(task.rotation and rows[-1, time] - begin_s >= task.rotation.part_s)
             new_events = [] if events is None else events.read_events()
             if part is not None:
                 part.note_lost("rows", reader.lost)
-                if events is not None:
-                    part.note_lost("events", events.lost)
-                if len(rows):
-                    part.write(rows)
-                part.write_events(new_events)
-                if len(rows) or new_events:
-                    part.flush()
+                part.note_lost("events", 0 if events is None else events.lost)
+                part.write(rows, new_events)
                 report.parts = number
             report.rows += len(rows)
             report.lost = lost_before + reader.lost
@@ -111,22 +102,9 @@ def record_part(state: RecorderState) -> bool:
 
 
 def _main() -> None:
-    parser = argparse.ArgumentParser(
-        description="Record a telemetry ring into a Rerun file; without options as the state on "
-        "standard input says."
-    )
-    parser.add_argument("--ring", metavar="NAME")
-    parser.add_argument("--file", metavar="OUT.rrd")
-    arguments = parser.parse_args()
-    if (arguments.ring is None) != (arguments.file is None):
-        parser.error("--ring and --file belong together")
     os.environ.update(rerun_environment())
     signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)  # Rerun's threads inherit it
-    state = (
-        RecorderState.of_input()
-        if arguments.ring is None
-        else RecorderState(RecordingTask(arguments.ring, arguments.file))
-    )
+    state = RecorderState.of_input()
     if state.failure:
         _complain(state, f"; tried again every {RETRY_S:g} s")
         if signal.sigtimedwait(_ENDING, RETRY_S) is not None:

@@ -216,7 +216,8 @@ def replay(
             node.receive(Frame(number, data), time_ns)
         elif kind == Kind.TICK:
             sent, waiting = list(node.tick(time_ns)), True
-            comparison.at(result.ticks, (time_ns - node.start_ns) * 1e-9)
+            comparison.tick = result.ticks
+            comparison.time_s = (time_ns - node.start_ns) * 1e-9
             result.ticks += 1
             comparison.retuner("retuner", answers)
             comparison.retuner("estimator", estimates)
@@ -245,11 +246,7 @@ class _Comparison:
     def __init__(self, result: ReplayResult) -> None:
         self._result = result
         self._codecs = {codec.can_id: codec for codec in load_catalogue().codecs.values()}
-        self._tick, self._time_s = 0, 0.0
-
-    def at(self, tick: int, time_s: float) -> None:
-        """Advance to a tick."""
-        self._tick, self._time_s = tick, time_s
+        self.tick, self.time_s = 0, 0.0
 
     def received(self, can_id: int, data: bytes) -> None:
         """Count a received frame whose checksum is wrong."""
@@ -289,7 +286,7 @@ class _Comparison:
         result = self._result
         result.different[message] += 1
         if result.first is None:
-            result.first = Difference(self._tick, self._time_s, message, signal, recorded, replayed)
+            result.first = Difference(self.tick, self.time_s, message, signal, recorded, replayed)
 
     def _name(self, can_id: int) -> str:
         codec = self._codecs.get(can_id)
@@ -312,5 +309,4 @@ class _Comparison:
 
 
 def _said(value: Any) -> str:
-    """Return a signal's exact value as text."""
     return str(getattr(value, "name", None) or repr(value))

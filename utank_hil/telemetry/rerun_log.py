@@ -63,12 +63,10 @@ def _state_name(mode: float, fault: float) -> str:
 
 
 def _retuning_name(state: float) -> str:
-    """Return the name of a state of retuning; an unknown one as a number."""
     return RetuningState(int(state)).name if state in set(RetuningState) else f"{state:g}"
 
 
 def _level(mode: float, fault: float) -> rr.TextLogLevel:
-    """Return the log level of a state."""
     if mode == Mode.FAULT:
         return rr.TextLogLevel.ERROR
     return rr.TextLogLevel.INFO if fault == Fault.NONE else rr.TextLogLevel.WARN

@@ -26,6 +26,7 @@ NEEDED: Final = (
     "roll_rad", "twin_roll_rad", "port_level_m", "starboard_level_m", "pressure_actual_pa",
 )  # fmt: skip
 
+_RMS: Final = ("roll_rms_rad", "twin_roll_rms_rad")
 RESERVOIR, _BEYOND, _KEEL = 0.16, 0.12, 0.14
 """Widths of reservoir and of hull beyond it, and depth of keel below the duct, in tank widths."""
 _ARROW: Final = 0.6
@@ -195,10 +196,7 @@ class Scene(Figure):
             ("ship/duct", strips([size.duct()], colors=WATER, radii=duct, draw_order=2.0)),
             ("ship/water", strips.from_fields(colors=WATER, radii=column, draw_order=2.0)),
             ("ship/hull", strips([size.hull()], colors=HULL, radii=2 * thin, draw_order=3.0)),
-            (
-                "ship/limits",
-                strips(list(size.limits()), colors=LIMIT, radii=2 * thin, draw_order=4.0),
-            ),
+            ("ship/limits", strips([*size.limits()], colors=LIMIT, radii=2 * thin, draw_order=4.0)),
             ("ship/pump", arrow(colors=PUMP, radii=4 * thin, draw_order=5.0)),
         ):
             self._recording.log(f"{place}/{name}", looks, static=True, strict=True)
@@ -245,14 +243,11 @@ class Scene(Figure):
         mode, fault = int(row[self._at["mode"]]), int(row[self._at["fault"]])
         lines = [f"# {Mode(mode).name if mode in set(Mode) else mode}"]
         if fault != Fault.NONE:
-            name, _, remedy = (
-                fault_text(Fault(fault)) if fault in set(Fault) else str(fault)
-            ).partition(": ")
+            text = fault_text(Fault(fault)) if fault in set(Fault) else str(fault)
+            name, _, remedy = text.partition(": ")
             lines += [f"## {name}", f"{self._large}{remedy}"]
-        if "twin_roll_rms_rad" in self._at:
-            roll, twin = (
-                np.degrees(row[self._at[name]]) for name in ("roll_rms_rad", "twin_roll_rms_rad")
-            )
+        if set(_RMS) <= self._at.keys():
+            roll, twin = np.degrees([row[self._at[name]] for name in _RMS])
             if np.isfinite(roll + twin):
                 said = f"Roll **{roll:.2f}°** RMS; without the pump **{twin:.2f}°**"
                 share = 1 - roll / twin if twin > 0.05 else 0.0

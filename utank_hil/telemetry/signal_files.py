@@ -204,7 +204,7 @@ def require(path: Path, columns: Mapping[str, FloatArray], *names: str) -> None:
 def _lacks(path: Path, name: str, columns: Mapping[str, FloatArray]) -> TextFileError:
     other = {"roll_rad": " or roll_deg", "roll_rate_rad_s": " or roll_rate_deg_s"}.get(name, "")
     if name == "level_m":
-        other = f", or {_listed(_LEVEL_OF_GAUGES)}"
+        other = f", or {' and '.join(_LEVEL_OF_GAUGES)}"
     if name.endswith("_pa"):
         other = f" or {name.removesuffix('_pa')}_kpa"
     unclear = [column for column in columns if name == "time_s" and is_time(column)]
@@ -271,13 +271,8 @@ def _all_in_si(path: Path, columns: Iterable[_Column]) -> Columns:
 
 
 def _in_si(name: str, values: FloatArray) -> _Column:
-    """Return a column in SI units, and its name."""
     for suffix, (si, factor) in _OTHER_UNITS.items():
         if name.endswith(suffix):
             return name.removesuffix(suffix) + si, values * factor
     column, unit = column_of(name)
     return column, values if unit.scale == 1 or column == name else values / unit.scale
-
-
-def _listed(names: tuple[str, ...]) -> str:
-    return f"{', '.join(names[:-1])} or {names[-1]}" if len(names) > 2 else " and ".join(names)

@@ -185,6 +185,5 @@ _SIGN_MSS = np.outer(TO_BODY_AXES, TO_BODY_AXES)
 
 
 def _by_frequency(matrices: npt.ArrayLike, at_rest: int) -> FloatArray:
-    """Return matrices at rest, frequency first."""
     array = np.asarray(matrices, dtype=np.float64)
     return np.moveaxis(array[..., at_rest] if array.ndim == 4 else array, 2, 0)

@@ -109,7 +109,6 @@ def _option(config: str, name: str, default: int) -> int:
 
 
 def _unit_and_gravity(path: Path) -> tuple[float, float]:
-    """Return ULEN and GRAV of the ``.gdf``."""
     if (found := sibling(path, ".gdf")) is None:
         return 1.0, GRAVITY_M_S2
     lines = text(found).splitlines()

@@ -118,7 +118,6 @@ class _CutError(_DamagedError):
 
 
 def _checked(data: bytes, place: int) -> tuple[int, int]:
-    """Return size and type of an object."""
     if len(data) - place < _OBJECT.size:
         raise _CutError("the file ends in an object")
     mark, head_size, _, size, kind = _OBJECT.unpack_from(data, place)
@@ -128,7 +127,6 @@ def _checked(data: bytes, place: int) -> tuple[int, int]:
 
 
 def _unpacked(body: bytes) -> bytes:
-    """Return the content of a container."""
     method = int.from_bytes(body[:2], "little")
     if method == 0:
         return body[_CONTAINER_HEAD:]
