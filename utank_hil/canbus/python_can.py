@@ -7,8 +7,7 @@ import sys
 from types import ModuleType
 from typing import Final, cast
 
-_ABSENT: Final = cast(ModuleType, None)
-"""Entry of a module that can't be imported."""
+_ABSENT: Final = cast(ModuleType, None)  #: Entry of a module that can't be imported.
 
 if "asammdf" in sys.modules:
     import can

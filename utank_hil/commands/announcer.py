@@ -24,8 +24,7 @@ from utank_hil.console.terminal import shown
 from utank_hil.runners.stopping import SIGNALS, signals_waiting
 from utank_hil.telemetry.events import Event, EventReader, EventWriter, event_text
 
-LOOK_S: Final = 0.5
-"""Time between two reads of the ring, short enough for a reader."""
+LOOK_S: Final = 0.5  #: Time between two reads of the ring, short enough for a reader.
 _NICENESS: Final = 5
 _START_S, _END_S, _PRINTED_S = 30.0, 10.0, 5.0
 """Times for the process to start, to end, and to print the last lines, on a busy machine."""

@@ -29,8 +29,7 @@ from utank_hil.nodes.commissioning.node import CommissioningNode, Stage
 from utank_hil.runners import LoopStatistics, RealTimeLoop, real_time_scheduling, stop_on_signals
 from utank_hil.safety.faults import fault_text
 
-SAY_TICKS: Final = 500
-"""Ticks between two lines about one stage."""
+SAY_TICKS: Final = 500  #: Ticks between two lines about one stage.
 
 
 def commission(

@@ -18,8 +18,7 @@ from utank_hil.configuration import ControllerConfig
 from utank_hil.nodes.commissioning.checks import Check
 
 SUFFIX: Final = ".commissioning.json"
-EMULATED: Final = ("vcan", "vxcan")
-"""Beginnings of the names of interfaces without hardware."""
+EMULATED: Final = ("vcan", "vxcan")  #: Beginnings of the names of interfaces without hardware.
 INTERFACES: Final = Path("/sys/class/net")
 
 

@@ -19,8 +19,7 @@ from utank_hil.retuning import Candidate, Refusal
 from utank_hil.retuning.redesign import Identification, RetuningTask
 
 STATES: Final = 4
-QUANTILE: Final = 1.96
-"""Number of standard deviations to either side of a 95 % interval."""
+QUANTILE: Final = 1.96  #: Number of standard deviations to either side of a 95 % interval.
 
 
 def realized_modes(found: Identification) -> ModalConfidence | None:

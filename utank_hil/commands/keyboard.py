@@ -11,8 +11,7 @@ from utank_hil.safety.faults import fault_text
 
 ANSWER_NS: Final = 1_000_000_000
 """Time within which a reset is answered: 500 ms for the button, 100 ms for the status."""
-LEAVE_NS: Final = 3_000_000_000
-"""Time that a panel waits for the answer to a stop before it ends."""
+LEAVE_NS: Final = 3_000_000_000  #: Time that a panel waits for the answer to a stop before it ends.
 HELP: Final = """\
   arm, disarm          take charge; ramp to zero, pump enabled and passive
   stop                 zero at once, as what looks like it: s, stop!; on a terminal Enter alone

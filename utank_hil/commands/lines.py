@@ -11,8 +11,7 @@ from utank_hil.console.common import fail
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.telemetry.events import event_text
 
-_END_S: Final = 10.0
-"""Time for the last line on a slow terminal."""
+_END_S: Final = 10.0  #: Time for the last line on a slow terminal.
 _STANDARD_ERROR: Final = 2
 
 

@@ -15,12 +15,10 @@ if TYPE_CHECKING:
     from utank_hil.telemetry.live import LiveRun
     from utank_hil.telemetry.viewer import Viewer
 
-LIVE: Final = "rerun+http://"
-"""Beginning of the address of a live stream."""
+LIVE: Final = "rerun+http://"  #: Beginning of the address of a live stream.
 LOOKS: Final = "&theme=dark&hide_welcome_screen&notebook=0&persist=0"
 """Options of the viewer in a browser: a dark ground that suits the colours, and no menus."""
-_LOOK_S: Final = 0.25
-"""Time between two reads of the ring, short enough to appear smooth."""
+_LOOK_S: Final = 0.25  #: Time between two reads of the ring, short enough to appear smooth.
 _NICENESS: Final = 5
 
 

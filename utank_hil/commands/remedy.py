@@ -18,10 +18,8 @@ from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.gate import MOST_STEP_S, JudgedLaw
 
-GENTLER: Final = (0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4)
-"""Factors on a weight on outputs or states."""
-LONGER: Final = (1.3, 1.6, 2.0, 3.0)
-"""Factors on the control horizon of an exact deadbeat."""
+GENTLER: Final = (0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4)  #: Factors on a weight on outputs or states.
+LONGER: Final = (1.3, 1.6, 2.0, 3.0)  #: Factors on the control horizon of an exact deadbeat.
 
 
 def remedy(judged: JudgedLaw) -> str | None:

@@ -58,8 +58,7 @@ from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head
 
 _REFUSALS: Final = (errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE, errno.ENOSPC)
-LOOK_TICKS: Final = 100
-"""Ticks between two checks of the recorder."""
+LOOK_TICKS: Final = 100  #: Ticks between two checks of the recorder.
 _COMMAND_LINE: Final = "from utank_hil.cli import main; main()"
 
 

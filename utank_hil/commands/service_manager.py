@@ -9,8 +9,7 @@ from typing import Final
 from utank_hil.base.closing import Closing
 from utank_hil.base.tick import TICK_NS
 
-_FEEDS: Final = 4
-"""Number of notifications within the watchdog's time."""
+_FEEDS: Final = 4  #: Number of notifications within the watchdog's time.
 READY_S: Final = 30.0
 """Time limit of the ready notification: a third of systemd's for the start of a service."""
 

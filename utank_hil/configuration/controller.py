@@ -32,10 +32,8 @@ _WITHOUT_PUMP: Final = (PassiveDesign, OnOffValveDesign, ClippedValveDesign)
 
 MOST_PRESSURE_PA: Final = 250e3
 """Largest pressure of PUMP_CMD: the codec cuts larger ones without the controller's knowledge."""
-LEAST_PAUSE_S: Final = 600.0
-"""Shortest time between two scheduled retunings."""
-COMMAND_S: Final = 0.02
-"""Share of the delay that the cycle of the pump's commands takes."""
+LEAST_PAUSE_S: Final = 600.0  #: Shortest time between two scheduled retunings.
+COMMAND_S: Final = 0.02  #: Share of the delay that the cycle of the pump's commands takes.
 MOST_PULSES_S: Final = 3600.0
 """Longest identification, because pulses and record are kept in memory."""
 

@@ -9,8 +9,7 @@ from utank_hil.configuration.yaml_text import parse_yaml
 
 FOLDER: Final = Path(profiles.__file__).parent
 NATIVE: Final = "native"
-OF_A_DBC: Final = "DBC "
-"""Begins the name of a device whose layouts were read from a DBC."""
+OF_A_DBC: Final = "DBC "  #: Begins the name of a device whose layouts were read from a DBC.
 ENCODINGS: Final = ("utf-8", "cp1252")
 """A DBC has no mark of its encoding: UTF-8 fails on anything else, and then it is a Windows one."""
 

@@ -50,24 +50,15 @@ class FieldSection(_Part):
 
     start: Annotated[int, Range(least=0, most=63), _WHOLE]
     """First bit: the least of a signal with the least byte first, else the most."""
-    bits: Annotated[int, Range(least=1, most=64), _WHOLE]
-    """Number of bits."""
-    big_endian: bool = False
-    """Most byte first."""
-    signed: bool = False
-    """Two's complement."""
-    real: bool = False
-    """IEEE 754."""
-    scale: Finite = 1.0
-    """Physical value of one count."""
-    offset: Finite = 0.0
-    """Physical value of no counts."""
-    unit: str = ""
-    """Unit of the physical value."""
-    least_raw: Whole | None = None
-    """Least count that is a value."""
-    most_raw: Whole | None = None
-    """Counts outside of these two are not available, or an error."""
+    bits: Annotated[int, Range(least=1, most=64), _WHOLE]  #: Number of bits.
+    big_endian: bool = False  #: Most byte first.
+    signed: bool = False  #: Two's complement.
+    real: bool = False  #: IEEE 754.
+    scale: Finite = 1.0  #: Physical value of one count.
+    offset: Finite = 0.0  #: Physical value of no counts.
+    unit: str = ""  #: Unit of the physical value.
+    least_raw: Whole | None = None  #: Least count that is a value.
+    most_raw: Whole | None = None  #: Counts outside of these two are not available, or an error.
 
     def field(self, length: int) -> BusField:
         """The signal in a frame of so many bytes."""
@@ -77,18 +68,13 @@ class FieldSection(_Part):
 class MessageSection(_Part):
     """Layout and identifier of a message: by `id`, by `pgn` and source, or by `cob` and node."""
 
-    id: Id29 | None = None
-    """Identifier."""
-    format: Literal["11bit", "29bit"] = "11bit"
-    """Length of the identifier."""
-    pgn: Pgn | None = None
-    """Group by SAE J1939-21; any priority is accepted."""
-    cob: Id11 | None = None
-    """Identifier to which the node's number is added."""
+    id: Id29 | None = None  #: Identifier.
+    format: Literal["11bit", "29bit"] = "11bit"  #: Length of the identifier.
+    pgn: Pgn | None = None  #: Group by SAE J1939-21; any priority is accepted.
+    cob: Id11 | None = None  #: Identifier to which the node's number is added.
     bytes: Annotated[int, Range(least=1, most=8), _WHOLE] = 8
     """Length; a frame of another one is refused."""
-    cycle_ms: Cycle | None = None
-    """Of a message that has another cycle than the device's."""
+    cycle_ms: Cycle | None = None  #: Of a message that has another cycle than the device's.
     signals: Annotated[dict[str, FieldSection], Field(default_factory=dict)]
     """Layouts of its signals."""
 
@@ -96,18 +82,15 @@ class MessageSection(_Part):
 class SignalSection(_Part):
     """What one measured value is made of."""
 
-    from_: Annotated[str, Field(alias="from")] = ""
-    """Signal, as MESSAGE.SIGNAL."""
+    from_: Annotated[str, Field(alias="from")] = ""  #: Signal, as MESSAGE.SIGNAL.
     source: Literal["measured", "derived"] = "measured"
     """Measured, or derived as the slope of the roll."""
-    sign: Literal[1, -1] = 1
-    """-1 turns the value round."""
+    sign: Literal[1, -1] = 1  #: -1 turns the value round.
     scale: Annotated[float, Range(least=-1e9, most=1e9)] | None = None
     """In place of the factor of its unit."""
     offset: Annotated[float, Range(least=-1e9, most=1e9)] = 0.0
     """In the unit of the value, before the sign is applied."""
-    least: Finite = -1e300
-    """Least physical value, in the maker's unit, that is one."""
+    least: Finite = -1e300  #: Least physical value, in the maker's unit, that is one.
     most: Finite = 1e300
     """Range in the maker's unit, outside of which there is no value, as a broken 4-20 mA wire."""
 
@@ -115,10 +98,8 @@ class SignalSection(_Part):
 class ConditionSection(_Part):
     """What a status must say for the values to be valid."""
 
-    from_: Annotated[str, Field(alias="from")]
-    """Status word, as MESSAGE.SIGNAL."""
-    mask: Whole = (1 << 64) - 1
-    """Bits that count."""
+    from_: Annotated[str, Field(alias="from")]  #: Status word, as MESSAGE.SIGNAL.
+    mask: Whole = (1 << 64) - 1  #: Bits that count.
     in_: Annotated[tuple[Whole, ...], Field(alias="in", min_length=1)]
     """Values of these bits that are allowed."""
 
@@ -126,19 +107,15 @@ class ConditionSection(_Part):
 class StampSection(_Part):
     """The device's own time in a message."""
 
-    from_: Annotated[str, Field(alias="from")]
-    """Signal, as MESSAGE.SIGNAL."""
-    us: Annotated[float, Range(above=0, most=1e6)]
-    """Microseconds of one count."""
+    from_: Annotated[str, Field(alias="from")]  #: Signal, as MESSAGE.SIGNAL.
+    us: Annotated[float, Range(above=0, most=1e6)]  #: Microseconds of one count.
 
 
 class CrcSection(_Part):
     """A checksum of eight bits over all other bytes of a message."""
 
-    message: str
-    """Message that carries it."""
-    byte: Annotated[int, Range(least=0, most=7), _WHOLE]
-    """Its place in the frame."""
+    message: str  #: Message that carries it.
+    byte: Annotated[int, Range(least=0, most=7), _WHOLE]  #: Its place in the frame.
     polynomial: Annotated[int, Range(least=0, most=255), _WHOLE] = 0x1D
     """Polynomial without its highest bit."""
     start: Annotated[int, Range(least=0, most=255), _WHOLE] = 0xFF
@@ -150,14 +127,10 @@ class CrcSection(_Part):
 class ProtectionSection(_Part):
     """What tells frames that are wrong, old or not the device's."""
 
-    counters: tuple[str, ...] = ()
-    """Signals that count the frames of their message."""
-    crcs: tuple[CrcSection, ...] = ()
-    """Checksums."""
-    stamps: tuple[StampSection, ...] = ()
-    """The device's own times."""
-    unchanged_ms: Cycle | None = None
-    """Content that has been the same for longer is not used."""
+    counters: tuple[str, ...] = ()  #: Signals that count the frames of their message.
+    crcs: tuple[CrcSection, ...] = ()  #: Checksums.
+    stamps: tuple[StampSection, ...] = ()  #: The device's own times.
+    unchanged_ms: Cycle | None = None  #: Content that has been the same for longer is not used.
     n2k_name: Whole | None = None
     """NAME that the device claims its source address with, SAE J1939-81."""
 

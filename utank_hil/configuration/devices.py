@@ -43,11 +43,9 @@ from utank_hil.safety.safety_limits import SafetyLimits
 MOST_MOTION_CYCLE_MS: Final = 50.0
 """The monitors look at motion every 50 ms and take a gap of 100 ms as a loss: below 20 Hz they see
 nothing."""
-LEAST_AGE_CYCLES: Final = 2.0
-"""One lost frame must not end the run."""
+LEAST_AGE_CYCLES: Final = 2.0  #: One lost frame must not end the run.
 PRIORITIES: Final = range(8)
-_NAME_PGN: Final = 0xEEFF
-"""Address claimed, to all."""
+_NAME_PGN: Final = 0xEEFF  #: Address claimed, to all.
 _REQUEST_PGN: Final = 0xEA00
 Noise = Annotated[float, Range(above=0, most=1.0)]
 
@@ -57,30 +55,22 @@ class DeviceSection(Section):
 
     profile: str = NATIVE
     """Shipped profile, or `native` for a node of this project's own catalogue."""
-    bus: str = ""
-    """Interface that it is on; empty for the controller's own."""
-    device: str = ""
-    """Maker and kind, in the shipped profiles."""
-    documents: str = ""
-    """Public documents that the profile was made from."""
-    node: NodeNumber | None = None
-    """CANopen node."""
-    source: SourceAddress | None = None
-    """Source address, SAE J1939 and NMEA 2000."""
+    bus: str = ""  #: Interface that it is on; empty for the controller's own.
+    device: str = ""  #: Maker and kind, in the shipped profiles.
+    documents: str = ""  #: Public documents that the profile was made from.
+    node: NodeNumber | None = None  #: CANopen node.
+    source: SourceAddress | None = None  #: Source address, SAE J1939 and NMEA 2000.
     messages: Annotated[dict[str, MessageSection], Field(default_factory=dict)]
     """Layouts and identifiers by names of your own; with `dbc: FILE` the names in that file."""
     signals: Annotated[dict[str, SignalSection], Field(default_factory=dict)]
     """What each value is made of."""
-    valid_when: tuple[ConditionSection, ...] = ()
-    """Conditions on status words that must all hold."""
+    valid_when: tuple[ConditionSection, ...] = ()  #: Conditions on status words that must all hold.
     protection: ProtectionSection = ProtectionSection()
     """What tells frames that are wrong, old or not the device's."""
     accept_unprotected: bool = False
     """Whether a device without counter and checksum is used all the same."""
-    cycle_ms: Cycle | None = None
-    """Time between two measurements."""
-    age_ms: Cycle | None = None
-    """Longest age of the last measurement."""
+    cycle_ms: Cycle | None = None  #: Time between two measurements.
+    age_ms: Cycle | None = None  #: Longest age of the last measurement.
     latency_ms: Annotated[float, Range(least=0, most=1000)] = 0.0
     """From the motion to the first bit on the bus."""
     same_instant_ms: Cycle | None = None
@@ -307,12 +297,9 @@ NATIVE_NODE: Final = DeviceSection.model_validate({})
 class OthersSection(Section):
     """Devices on the controller's own bus that it has nothing to do with."""
 
-    ids_11bit: tuple[Id11, ...] = ()
-    """Identifiers of 11 bits."""
-    ids_29bit: tuple[Id29, ...] = ()
-    """Identifiers of 29 bits."""
-    pgns: tuple[Pgn, ...] = ()
-    """Groups by SAE J1939-21, of any source and priority."""
+    ids_11bit: tuple[Id11, ...] = ()  #: Identifiers of 11 bits.
+    ids_29bit: tuple[Id29, ...] = ()  #: Identifiers of 29 bits.
+    pgns: tuple[Pgn, ...] = ()  #: Groups by SAE J1939-21, of any source and priority.
 
 
 _KINDS: Final[dict[str, type[tuple[Any, ...]]]] = {
@@ -326,18 +313,12 @@ _KINDS: Final[dict[str, type[tuple[Any, ...]]]] = {
 class DevicesSection(Section):
     """Section ``devices`` of a ship's file."""
 
-    motion: DeviceSection = NATIVE_NODE
-    """Motion sensor."""
-    motion_2: DeviceSection = NATIVE_NODE
-    """Second motion sensor."""
-    levels: DeviceSection = NATIVE_NODE
-    """Level gauges."""
-    pump_sensor: DeviceSection = NATIVE_NODE
-    """Sensor of the pump's pressure."""
-    receive_only: tuple[str, ...] = ()
-    """Interfaces on which the controller sends nothing."""
-    others: OthersSection = OthersSection()
-    """Devices that the controller has nothing to do with."""
+    motion: DeviceSection = NATIVE_NODE  #: Motion sensor.
+    motion_2: DeviceSection = NATIVE_NODE  #: Second motion sensor.
+    levels: DeviceSection = NATIVE_NODE  #: Level gauges.
+    pump_sensor: DeviceSection = NATIVE_NODE  #: Sensor of the pump's pressure.
+    receive_only: tuple[str, ...] = ()  #: Interfaces on which the controller sends nothing.
+    others: OthersSection = OthersSection()  #: Devices that the controller has nothing to do with.
 
     @model_validator(mode="after")
     def _usable(self) -> "DevicesSection":

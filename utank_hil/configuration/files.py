@@ -32,8 +32,7 @@ class Section(BaseModel):
     """One mapping of a configuration file: unknown keys are errors, values never change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-    noun: ClassVar[str] = ""
-    """Name of this kind of file in one word; empty for a part of files."""
+    noun: ClassVar[str] = ""  #: Name of this kind of file in one word; empty for a part of files.
 
     def warnings(self) -> list[Problem]:
         """Return what is unusual but usable in the section, by keys within it."""

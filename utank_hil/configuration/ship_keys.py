@@ -23,8 +23,7 @@ from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
-NOT_GIVEN = math.nan
-"""Mark of a missing key; no key of a file can have this value."""
+NOT_GIVEN = math.nan  #: Mark of a missing key; no key of a file can have this value.
 
 _PAIRS = (
     ("displacement_t", "displacement_n"),

@@ -24,8 +24,7 @@ from utank_hil.dynamics.valves import Valve, valve_problems
 from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.safety.safety_limits import SafetyLimits
 
-NOT_AVAILABLE = 0xFFF
-"""Hash that means none: twelve bits carry it on the bus, and all are ones."""
+NOT_AVAILABLE = 0xFFF  #: Hash that means none: twelve bits carry it on the bus, and all are ones.
 
 # Default limits keep the first ship's ratios to its pump and tank,
 # because the laws were tuned within these.
@@ -48,8 +47,7 @@ class Vessel(Section):
     """Limit of the stability booklet on the metacentric height, tank water free to move."""
     redundancy: Redundancy = NO_REDUNDANCY
     """Equipment that the ship has twice, or with separate wires."""
-    devices: DevicesSection | None = None
-    """What is on the bus in the place of the native nodes."""
+    devices: DevicesSection | None = None  #: What is on the bus in the place of the native nodes.
     _written: frozenset[str] = frozenset()  # These are the keys of the ship in its file.
 
     @property

@@ -7,8 +7,7 @@ from typing import Any, Final
 import yaml
 
 Key = tuple[str | int, ...]
-Finding = tuple[Key, str]
-"""Key within the text, and what is wrong there."""
+Finding = tuple[Key, str]  #: Key within the text, and what is wrong there.
 
 _STRING = "tag:yaml.org,2002:str"
 _MERGE = "tag:yaml.org,2002:merge"

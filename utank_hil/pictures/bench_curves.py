@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-ZOOM_S: Final = 180.0
-"""Length of the enlarged part. Chosen; no study."""
+ZOOM_S: Final = 180.0  #: Length of the enlarged part. Chosen; no study.
 WINDOWS: Final = 60
 """Number of parts of the run whose greatest values are drawn; a curve of an hour would be a block.
 """

@@ -13,8 +13,7 @@ from utank_hil.pictures.style import BELOW, COLORS, DASHES, WIDEST_IN, picture
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MOST_GROUPS: Final = 40
-"""Limit on the named groups in a figure. Chosen; no study."""
+MOST_GROUPS: Final = 40  #: Limit on the named groups in a figure. Chosen; no study.
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,8 +20,7 @@ from utank_hil.pictures.style import COLORS, DASHES, WIDEST_IN, picture
 from utank_hil.retuning.record_length import estimation_samples
 from utank_hil.retuning.redesign import Identification, RetuningTask
 
-SHOWN_S = 120.0
-"""Length of the held-out record in the figure. Chosen; no study."""
+SHOWN_S = 120.0  #: Length of the held-out record in the figure. Chosen; no study.
 BAND_RAD_S = np.linspace(0.15, 1.5, 300)
 ORDERS = range(2, 21, 2)
 

@@ -38,8 +38,7 @@ DASHES: Final[tuple[str | tuple[float, tuple[float, ...]], ...]] = (
 """Strokes of the curves with these colours, which distinguish them in print without colour."""
 DPI: Final = 130
 TEXT_PT: Final = 10.0
-WIDEST_IN: Final = 10.0
-"""Greatest width of a picture; printed on A4, its text has seven points."""
+WIDEST_IN: Final = 10.0  #: Greatest width of a picture; printed on A4, its text has seven points.
 BELOW: "Final[dict[str, Any]]" = {"loc": "outside lower left", "ncols": 4, "frameon": False}
 """Arguments that place a legend where it covers no data."""
 NO_TANK: Final = "#BBBBBB"

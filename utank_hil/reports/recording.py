@@ -23,12 +23,9 @@ from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.highlight import in_service
 from utank_hil.telemetry.rotation import whole_of
 
-STEP_S: Final = 0.05
-"""Step between the samples that are drawn: ample for a ship."""
-LEAST_ROWS: Final = 3
-"""Rows that statistics and a spectrum need."""
-RUN, LOG = "run-", "log-"
-"""Beginnings of the names of a run's recording and of its log of alarms."""
+STEP_S: Final = 0.05  #: Step between the samples that are drawn: ample for a ship.
+LEAST_ROWS: Final = 3  #: Rows that statistics and a spectrum need.
+RUN, LOG = "run-", "log-"  #: Beginnings of the names of a run's recording and of its log of alarms.
 
 
 def recording_report(file: Path, scratch: Path) -> Report:

@@ -24,10 +24,8 @@ from utank_hil.telemetry.scene import SceneSize
 from utank_hil.telemetry.units import UNITS, Field, field_of
 from utank_hil.telemetry.viewer import TIMELINE
 
-HALF_WINDOW_S: Final = 60.0
-"""Half the width of the plots around the cursor: some ten rolls."""
-MOST_SHADES: Final = 4
-"""Most lines of a plot, and most ships that are shown side by side."""
+HALF_WINDOW_S: Final = 60.0  #: Half the width of the plots around the cursor: some ten rolls.
+MOST_SHADES: Final = 4  #: Most lines of a plot, and most ships that are shown side by side.
 WATCH_SHARES: Final = {1: (5, 4), MOST_SHADES: (5, 7, 4)}
 """Relative heights of ships, words and plot, for one ship and for several, such that no remedy of a
 fault is cut off."""

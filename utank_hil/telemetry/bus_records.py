@@ -29,36 +29,26 @@ RECORD: Final = np.dtype(
 LAYOUT: Final = struct.Struct("<I9pB2xq")
 """Layout of one packed record: number, length, data, kind and time."""
 
-Records = npt.NDArray[np.void]
-"""Records, shape (n,), of type `RECORD`."""
+Records = npt.NDArray[np.void]  #: Records, shape (n,), of type `RECORD`.
 
-IN_A_SLOT: Final = 32
-"""Number of records in one slot of a ring; five ticks have some 25."""
+IN_A_SLOT: Final = 32  #: Number of records in one slot of a ring; five ticks have some 25.
 
 
 class Kind(IntEnum):
     """Kind of a record; inputs come before their TICK and answers after it."""
 
-    RECEIVED = 1
-    """A frame was received."""
-    SENT = 2
-    """A frame was returned by the tick, or the stop, before."""
+    RECEIVED = 1  #: A frame was received.
+    SENT = 2  #: A frame was returned by the tick, or the stop, before.
     TICK = 3
-    OTHERS = 4
-    """`number` frames of other kinds were on the bus."""
+    OTHERS = 4  #: `number` frames of other kinds were on the bus.
     LINK_ERROR = 5
     STOP = 6
-    STARTED = 7
-    """First record: the first byte says whether the loop has a real-time policy."""
-    ALIVE = 8
-    """The controller asked whether the retuner lives; the first byte is the answer."""
-    ANSWER = 9
-    """The controller took this piece of the retuner's answer of `number` bytes."""
-    LOST = 10
-    """`number` rows were lost before they could be written."""
+    STARTED = 7  #: First record: the first byte says whether the loop has a real-time policy.
+    ALIVE = 8  #: The controller asked whether the retuner lives; the first byte is the answer.
+    ANSWER = 9  #: The controller took this piece of the retuner's answer of `number` bytes.
+    LOST = 10  #: `number` rows were lost before they could be written.
     ESTIMATOR_ALIVE = 11
-    ESTIMATE = 12
-    """The estimator of sea and ship answered; ALIVE and ANSWER are the retuner's."""
+    ESTIMATE = 12  #: The estimator of sea and ship answered; ALIVE and ANSWER are the retuner's.
 
 
 def frame_ring(slots: int) -> RingWriter:

@@ -15,8 +15,7 @@ from utank_hil.telemetry.ring import RingKind, RingReader, RingWriter
 _SLOTS: Final = 64
 """Number of slots: a retuning has four events in four minutes, and readers poll every 0.5 s."""
 _LONGEST_BYTES: Final = 8192
-_MOST_BYTES_A_CHARACTER: Final = 6
-"""Length of an escaped character in JSON."""
+_MOST_BYTES_A_CHARACTER: Final = 6  #: Length of an escaped character in JSON.
 _CUT: Final = _LONGEST_BYTES // (2 * _MOST_BYTES_A_CHARACTER)
 
 

@@ -16,8 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 Part = TypeVar("Part")
-Values = dict[str, npt.NDArray[Any]]
-"""Arrays by the path of attributes that leads to them."""
+Values = dict[str, npt.NDArray[Any]]  #: Arrays by the path of attributes that leads to them.
 
 _DEEPEST: Final = 12
 

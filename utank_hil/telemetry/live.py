@@ -20,8 +20,7 @@ from utank_hil.telemetry.viewer import LOOPBACK, hold_port, live_url, port_of
 
 MEMORY: Final = "64MiB"
 """History for a viewer that connects late; it bounds the memory of the stream."""
-_START_S: Final = 5.0
-"""Time in which the server of a stream starts, even on a busy machine."""
+_START_S: Final = 5.0  #: Time in which the server of a stream starts, even on a busy machine.
 
 
 @dataclass(frozen=True, slots=True)

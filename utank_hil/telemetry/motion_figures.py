@@ -16,13 +16,10 @@ from utank_hil.telemetry.scene import Figure, send_at
 from utank_hil.telemetry.viewer import TIMELINE
 
 NEEDED: Final = ("time_s", "roll_rad", "roll_rate_rad_s")
-STEP_S: Final = 0.2
-"""Step between two samples of both figures."""
-SPECTRUM_S: Final = 20.0
-"""Time between two spectra."""
+STEP_S: Final = 0.2  #: Step between two samples of both figures.
+SPECTRUM_S: Final = 20.0  #: Time between two spectra.
 RECORD_S: Final = 300.0
-SEGMENT: Final = 500
-"""Length of an averaged segment in samples; the bands are 0.01 Hz apart."""
+SEGMENT: Final = 500  #: Length of an averaged segment in samples; the bands are 0.01 Hz apart.
 BAND_HZ: Final = (0.02, 0.3)
 PHASE_AXES: Final = "/phase_axes"
 _CIRCLES_DEG: Final = (2.5, 5.0, 10.0)

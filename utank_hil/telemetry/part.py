@@ -26,10 +26,8 @@ Sink: TypeAlias = rr.FileSink | rr.GrpcServerSink
 
 _FLUSH_TIMEOUT_S: Final = 5.0
 """Time for a batch of 0.5 s to reach the disk; without a limit Rerun waits on a full disk."""
-_RESERVED_BYTES: Final = 1 << 18
-"""Space for the beginning of a recording, mostly its blueprint."""
-_FOOTER: Final = (b"FOOT", 64)
-"""Mark within the last bytes of a finished file."""
+_RESERVED_BYTES: Final = 1 << 18  #: Space for the beginning of a recording, mostly its blueprint.
+_FOOTER: Final = (b"FOOT", 64)  #: Mark within the last bytes of a finished file.
 
 
 def open_stream(

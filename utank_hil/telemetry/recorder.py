@@ -34,11 +34,9 @@ from utank_hil.telemetry.viewer import rerun_environment
 
 BATCH_S: Final = 0.5
 """Time between two writes: a write costs 1 kB of file, and a kill loses up to two batches."""
-RETRY_S: Final = 10.0
-"""Time between two attempts to begin a file."""
+RETRY_S: Final = 10.0  #: Time between two attempts to begin a file.
 _NICENESS: Final = 5
-_FULL_BYTES: Final = 1 << 20
-"""Free space below which a disk counts as full."""
+_FULL_BYTES: Final = 1 << 20  #: Free space below which a disk counts as full.
 _ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 

@@ -19,8 +19,7 @@ _START_TIMEOUT_S: Final = 30.0
 _STOP_TIMEOUT_S: Final = 30.0
 """Times for Rerun to load, and for the last rows to reach the disk, on a busy machine."""
 _FIELDS: Final = {each.name for each in fields(RecorderReport)}
-_READ_BYTES: Final = 1 << 16
-"""Capacity of a pipe."""
+_READ_BYTES: Final = 1 << 16  #: Capacity of a pipe.
 
 
 class RecorderError(RuntimeError):

@@ -37,8 +37,7 @@ from utank_hil.telemetry.viewer import TIMELINE, rerun_binary, rerun_environment
 
 _ROWS: Final = f"{ARCHETYPE}:{COMPONENT}"
 _TEXT: Final = "TextDocument:text"
-_BLOCK_ROWS: Final = 8192
-"""Number of rows per chunk, the unit in which the viewer loads a file."""
+_BLOCK_ROWS: Final = 8192  #: Number of rows per chunk, the unit in which the viewer loads a file.
 
 
 def write_recording(

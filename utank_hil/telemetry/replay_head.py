@@ -22,8 +22,7 @@ from utank_hil.control.python_law import PythonDesign
 from utank_hil.telemetry import law_values
 
 _PACKAGES: Final = ("numpy", "scipy", "daqp")
-_CODE: Final = "python"
-"""Kind of a law that is the user's own code."""
+_CODE: Final = "python"  #: Kind of a law that is the user's own code.
 _SHOWN: Final = 10
 
 

@@ -27,20 +27,17 @@ APPLICATION: Final = "utank-hil"
 TIME_COLUMN: Final = "time_s"
 ABOUT: Final = "about"
 """Property of a recording that holds its origin (`utank_hil.base.provenance`) as JSON."""
-LIVE_RUN: Final = "live"
-"""Name of a live run, also in its recordings."""
+LIVE_RUN: Final = "live"  #: Name of a live run, also in its recordings.
 ARCHETYPE: Final = "telemetry"
 COMPONENT: Final = "row"
 
 STATE, RETUNING, LOG = "state", "retuning", "log"
 """Names, below a run's entity, of the lanes of its state and of retuning, and of its text log."""
-STATE_COLUMNS: Final = ("mode", "fault")
-"""Columns that make up the state lane of a run."""
+STATE_COLUMNS: Final = ("mode", "fault")  #: Columns that make up the state lane of a run.
 
 PICTURES_S: Final = 60.0
 """Length of the drawings that are written to a file at once; a kill loses them, not the rows."""
-ONE_COLOR: Final = (0xE6, 0x9F, 0x00)
-"""Colour of a single run."""
+ONE_COLOR: Final = (0xE6, 0x9F, 0x00)  #: Colour of a single run.
 _ESCAPE: Final = re.compile(
     r"\\u\{(?P<code>[0-9A-Fa-f]+)\}|\\(?P<mark>.)"
 )  # an escape in entity paths

@@ -13,8 +13,7 @@ from typing import Final
 
 _GROWTH: Final = 1.05
 """Allowed growth of a file over the previous one: compression differs from file to file."""
-SUFFIXES: Final = (".rrd", ".frames")
-"""Suffixes of the files of one recording."""
+SUFFIXES: Final = (".rrd", ".frames")  #: Suffixes of the files of one recording.
 
 
 @dataclass(frozen=True, slots=True)

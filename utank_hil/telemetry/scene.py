@@ -18,8 +18,7 @@ from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.viewer import TIMELINE
 
-PERIOD_S: Final = 0.2
-"""Time between two pictures: a roll of some seconds appears smooth."""
+PERIOD_S: Final = 0.2  #: Time between two pictures: a roll of some seconds appears smooth.
 WORDS_PERIOD_S: Final = 2.0
 """Time between two texts, long enough to read; their figures are means of minutes."""
 NEEDED: Final = (
@@ -29,10 +28,8 @@ NEEDED: Final = (
 _RMS: Final = ("roll_rms_rad", "twin_roll_rms_rad")
 RESERVOIR, _BEYOND, _KEEL = 0.16, 0.12, 0.14
 """Widths of reservoir and of hull beyond it, and depth of keel below the duct, in tank widths."""
-_ARROW: Final = 0.6
-"""Length of the arrow at the pump's greatest pressure, in tank widths."""
-LINES: Final = 8
-"""Number of lines that fill the water of a reservoir."""
+_ARROW: Final = 0.6  #: Length of the arrow at the pump's greatest pressure, in tank widths.
+LINES: Final = 8  #: Number of lines that fill the water of a reservoir.
 
 HULL, TWIN, WATER = (0xE0, 0xE0, 0xE0), (0x70, 0x70, 0x70), (0x56, 0xB4, 0xE9)
 LIMIT, PUMP, SEA = (0xF0, 0xE4, 0x42), (0xA0, 0x28, 0x00), (0x2A, 0x5C, 0x7A)

@@ -41,10 +41,8 @@ _OTHER_UNITS: Final = {
 _LEVEL_OF_GAUGES: Final = ("port_level_m", "starboard_level_m")
 _JITTER: Final = 0.25
 """Largest deviation, in steps, of a row from its place in even steps. Chosen; no study."""
-_GAP: Final = 1.5
-"""Number of steps between two rows from which rows are missing."""
-_RATE: Final = 1e-3
-"""Largest relative error of a logger's clock: ten times a poor quartz's."""
+_GAP: Final = 1.5  #: Number of steps between two rows from which rows are missing.
+_RATE: Final = 1e-3  #: Largest relative error of a logger's clock: ten times a poor quartz's.
 
 
 def read_signals(

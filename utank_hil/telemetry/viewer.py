@@ -12,8 +12,7 @@ from urllib.parse import quote, urlsplit
 
 from utank_hil.base.closing import Closing
 
-TIMELINE: Final = "time"
-"""Name of the time line of all recordings."""
+TIMELINE: Final = "time"  #: Name of the time line of all recordings.
 _TRIES, _PAUSE_S = 20, 0.5
 """Number and interval of requests to a starting viewer to move its cursor: ten seconds in all."""
 LOOPBACK: Final = "127.0.0.1"

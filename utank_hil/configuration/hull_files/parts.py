@@ -12,8 +12,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import Finite, Positive, Range, range_problems, refuse
 from utank_hil.dynamics.hull.hull_data import HullData
 
-GRAVITY_M_S2 = 9.81
-"""For codes that write none into their numeric files."""
+GRAVITY_M_S2 = 9.81  #: For codes that write none into their numeric files.
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,8 +27,7 @@ from utank_hil.dynamics.hull.response import wave_number
 _FROM_SHIPX = np.array([-1.0, -1, 1, -1, -1, 1])
 _LEAST_OF_NEXT = 0.7
 """VERES may halve the lateral added mass of the longest wave: 0.52 of the next row was seen."""
-_INFINITE_RAD_S = 10.0
-"""MSS writes WAMIT's infinite frequency as this."""
+_INFINITE_RAD_S = 10.0  #: MSS writes WAMIT's infinite frequency as this.
 
 
 def read_shipx(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same for all readers

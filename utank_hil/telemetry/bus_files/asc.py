@@ -28,8 +28,7 @@ _FD: Final = re.compile(
     re.I | re.A,
 )
 _REMOTE_FLAG: Final = 0x10
-_FD_FLAG: Final = 0x1000
-"""Flags of a line of the kind CANFD, which may hold a frame without FD."""
+_FD_FLAG: Final = 0x1000  #: Flags of a line of the kind CANFD, which may hold a frame without FD.
 
 
 class AscParser:

@@ -21,12 +21,10 @@ _FD_64: Final = Struct("<BBBxL4xL20xBB4x")
 _ERROR: Final = Struct("<H8xB5xL4x8s")
 _CONTAINER: Final = 10
 _CONTAINER_HEAD: Final = 16
-_LIMIT: Final = 1 << 26
-"""Largest object: programs write containers of 128 kB."""
+_LIMIT: Final = 1 << 26  #: Largest object: programs write containers of 128 kB.
 _EXTENDED: Final = 0x80000000
 _MASK: Final = 0x1FFFFFFF
-_TICK_NS: Final = 10_000
-"""Unit of time of objects with the flag 1; of others it is 1 ns."""
+_TICK_NS: Final = 10_000  #: Unit of time of objects with the flag 1; of others it is 1 ns.
 
 
 class BlfLog:

@@ -41,8 +41,7 @@ class BusFrame(NamedTuple):
 class FrameSource(Protocol):
     """Frames of a file, read once from its begin."""
 
-    notes: list[str]
-    """What was not read as it stands, complete after the last frame."""
+    notes: list[str]  #: What was not read as it stands, complete after the last frame.
 
     @property
     def place(self) -> str:

@@ -12,8 +12,7 @@ from utank_hil.telemetry.bus_files.clock import OneClock
 from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError, FrameSource
 from utank_hil.telemetry.bus_files.text_log import LIMIT_BYTES, TextLog
 
-READ: Final = "candump, ASC, BLF, MF4, PEAK's .trc and SavvyCAN's .csv"
-"""Formats that are read."""
+READ: Final = "candump, ASC, BLF, MF4, PEAK's .trc and SavvyCAN's .csv"  #: Formats that are read.
 _LOOKS: Final[dict[str, re.Pattern[str]]] = {
     "savvycan": savvycan.LOOKS,
     "trc": trc.LOOKS,

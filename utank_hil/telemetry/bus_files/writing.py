@@ -10,8 +10,7 @@ from typing import Any, Final
 from utank_hil.base.whole_file import left_whole
 from utank_hil.telemetry.bus_files.frame import FD_LENGTHS, BusFrame, FrameKind
 
-SUFFIXES: Final = (".log", ".asc", ".blf")
-"""Formats that are written."""
+SUFFIXES: Final = (".log", ".asc", ".blf")  #: Formats that are written.
 _WALL_CLOCK_NS: Final = 631_152_000 * 10**9
 """Times from here on, 1990, count from 1970, others from the log's start, as BLF has it."""
 
