@@ -10,14 +10,7 @@ from utank_hil.canbus.profiles.device import DevicePlan
 class ForeignFrames:
     """Encodes what a device of the plan sends: values, status, counters, stamps and checksums.
 
-    Parameters
-    ----------
-    plan : DevicePlan
-
-    Raises
-    ------
-    ValueError
-        If a cycle is no whole number of ticks: an emulated device has no other.
+    ValueError is raised if a cycle is no whole number of ticks: an emulated device has no other.
     """
 
     def __init__(self, plan: DevicePlan[Any]) -> None:
@@ -32,19 +25,16 @@ class ForeignFrames:
 
     def frames(self, message: tuple[Any, ...], now_ns: int, tick: int) -> list[Frame]:
         """The frames that are due in this tick."""
-        plan = self._plan
         frames = []
-        for place, each in enumerate(plan.messages):
+        for place, each in enumerate(self._plan.messages):
             if tick % (each.cycle_ns // TICK_NS):
                 continue
             word = 0
-            for signal in plan.signals:
-                if signal.message == place:
-                    value = signal.sign * float(message[signal.place]) - signal.offset
-                    word = signal.field.put(word, value / signal.factor, each.length)
-            for condition in plan.conditions:
-                if condition.message == place:
-                    word = condition.field.put(word, min(condition.allowed), each.length)
+            for signal in each.signals:
+                value = signal.sign * float(message[signal.place]) - signal.offset
+                word = signal.field.put(word, value / signal.factor, each.length)
+            for condition in each.conditions:
+                word = condition.field.put(word, min(condition.allowed), each.length)
             if each.stamp is not None:
                 stamp = round(now_ns / (1e3 * each.stamp_us)) % (1 << each.stamp.bits)
                 word = each.stamp.put(word, stamp, each.length)

@@ -23,7 +23,6 @@ from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.recorder_process import RecorderError
 from utank_hil.telemetry.recorder_state import RecorderReport, RecordingTask
 from utank_hil.telemetry.recording import read_recording
-from utank_hil.telemetry.rotation import Rotation
 from utank_hil.telemetry.rows import RowReader
 
 SHM = Path("/dev/shm")
@@ -95,12 +94,12 @@ def test_a_recording_goes_on_in_another_file_each_hour_within_the_bound(
     given: list[object] = []
 
     def recorder(task: RecordingTask) -> Instant:
-        given.append(task.rotation)
+        given.append((task.part_s, task.keep_bytes))
         return Instant(task)
 
     monkeypatch.setattr(module, "RecorderProcess", recorder)
     RunRecording(tmp_path, keep_bytes=keep_bytes).stop()
-    assert given == [Rotation(3600.0, keep_bytes)]
+    assert given == [(3600.0, keep_bytes)]
 
 
 @pytest.mark.slow
@@ -194,10 +193,10 @@ def test_recorder_that_is_ended_is_told_once_while_the_run_goes_on(
     tmp_path: Path, number: int, words: str
 ) -> None:
     recording = RunRecording(tmp_path)
-    assert recording.recorder_pid is not None
+    assert recording._recorder.pid is not None
     assert recording.failure() == ""
-    os.kill(recording.recorder_pid, number)
-    os.waitid(os.P_PID, recording.recorder_pid, os.WEXITED | os.WNOWAIT)
+    os.kill(recording._recorder.pid, number)
+    os.waitid(os.P_PID, recording._recorder.pid, os.WEXITED | os.WNOWAIT)
     assert [recording.failure() for _ in range(3)] == [words, "", ""]
     for row in rows(10):
         recording.write(row)

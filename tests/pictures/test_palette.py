@@ -33,7 +33,8 @@ def test_the_runs_and_signals_of_a_viewers_plot_are_told_apart() -> None:
     assert (
         alike([(shade(run_color(number)), "") for number in range(MOST_SHADES)], grey=False) == []
     )
-    assert alike([(shade(color), "") for color in _PALETTE[1 : 1 + MOST_SHADES]], grey=False) == []
+    signals = list(_PALETTE.values())[1 : 1 + MOST_SHADES]
+    assert alike([(shade(color), "") for color in signals], grey=False) == []
 
 
 def test_the_parts_of_the_ships_section_are_told_apart() -> None:

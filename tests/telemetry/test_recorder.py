@@ -29,7 +29,6 @@ from utank_hil.telemetry.recorder import record_part
 from utank_hil.telemetry.recorder_process import RecorderError, RecorderProcess
 from utank_hil.telemetry.recorder_state import RecorderReport, RecorderState, RecordingTask
 from utank_hil.telemetry.recording import read_recording
-from utank_hil.telemetry.rotation import Rotation
 from utank_hil.telemetry.rows import RowWriter
 
 pytestmark = pytest.mark.slow
@@ -298,7 +297,6 @@ from utank_hil.canbus import RetuningState
 from utank_hil.canbus.events import RetuningEvent
 from utank_hil.telemetry.events import EventWriter
 from utank_hil.telemetry.rows import RowWriter
-from utank_hil.telemetry.rotation import Rotation
 ring, events = RowWriter({SIGNALS!r}), EventWriter()
 print(ring.name, events.name, flush=True)
 sys.stdin.readline()
@@ -487,7 +485,7 @@ def test_where_it_may_go_on_in_another_file_it_does_so_when_there_is_room_again(
 
     complaint: list[str] = []
     with RowWriter(SIGNALS) as ring:
-        recorder = RecorderProcess(RecordingTask(ring.name, str(file), rotation=Rotation(3600.0)))
+        recorder = RecorderProcess(RecordingTask(ring.name, str(file), part_s=3600.0))
         feed(ring, table(100))
         wait_for(lambda: any_recorded(file))
         limit("400000:unlimited")
@@ -515,7 +513,7 @@ def test_where_nobody_writes_any_more_no_further_file_is_tried(
     folder.mkdir()
     with RowWriter(SIGNALS) as ring:
         recorder = RecorderProcess(
-            RecordingTask(ring.name, str(folder / "run-a.rrd"), rotation=Rotation(3600.0))
+            RecordingTask(ring.name, str(folder / "run-a.rrd"), part_s=3600.0)
         )
         feed(ring, table(100))
         wait_for(lambda: any_recorded(folder / "run-a.rrd"))

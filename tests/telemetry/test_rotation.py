@@ -21,7 +21,7 @@ from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.recorder_process import RecorderProcess
 from utank_hil.telemetry.recorder_state import RecorderReport, RecordingTask
 from utank_hil.telemetry.recording import read_about, read_recording
-from utank_hil.telemetry.rotation import Rotation, part_of, remove_oldest
+from utank_hil.telemetry.rotation import make_room, part_of, remove_oldest
 from utank_hil.telemetry.rows import RowWriter
 
 TIME = SIGNALS.index("time_s")
@@ -58,7 +58,8 @@ def test_no_row_event_or_frame_is_lost_or_twice_between_files(tmp_path: Path) ->
                 ring.name,
                 str(tmp_path / "run-a.rrd"),
                 events=events.name,
-                rotation=Rotation(0.4, 2_200_000),
+                part_s=0.4,
+                keep_bytes=2_200_000,
                 frames=frames.name,
                 head=head,
             )
@@ -107,7 +108,7 @@ def test_a_stop_between_two_files_loses_no_row_of_a_ring_that_is_gone(tmp_path: 
     """When the signal comes, the process is a program that has not set anything up yet."""
     with RowWriter(SIGNALS) as ring:
         recorder = RecorderProcess(
-            RecordingTask(ring.name, str(tmp_path / "run-a.rrd"), rotation=Rotation(1.0))
+            RecordingTask(ring.name, str(tmp_path / "run-a.rrd"), part_s=1.0)
         )
         ring.write(rows(0, 110))
         deadline = time.monotonic() + 20.0
@@ -126,7 +127,7 @@ def test_the_parts_of_a_recording_stay_within_the_bound(sizes: list[int], keep_b
     with TemporaryDirectory() as folder:
         file = Path(folder) / "run-a.rrd"
         for number, size in enumerate(sizes, 1):
-            Rotation(1.0, keep_bytes).make_room(file, number)
+            make_room(file, number, keep_bytes)
             part = part_of(file, number)
             part.write_bytes(bytes(size))
             os.utime(part, ns=(number, number))

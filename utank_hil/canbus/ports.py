@@ -1,6 +1,6 @@
 """Several CAN interfaces as one port; no frame is ever handed from one to another."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 from utank_hil.canbus.frame import BUS_SHIFT, OTHER_BUS, Frame
 from utank_hil.canbus.port import Port, PortError
@@ -8,16 +8,13 @@ from utank_hil.canbus.profiles.foreign import ForeignDevices
 
 
 class BusPorts:
-    """The controller's own interface and others, whose frames carry their numbers.
+    """The controller's own interface, the first, and others, whose frames carry their numbers.
 
-    The controller's own is the first of `ports`. `vital` are the interfaces whose errors are those
-    of the bus. An error of another one is kept in `errors`, by its number, and the devices on it
-    fall silent.
+    An error of another one is kept in `errors`, by its number; the devices on it fall silent.
     """
 
-    def __init__(self, ports: Sequence[Port], vital: Collection[int] = (0,)) -> None:
+    def __init__(self, ports: Sequence[Port]) -> None:
         self._ports = tuple(ports)
-        self._vital = frozenset(vital)
         self.errors: dict[int, PortError] = {}
         self._told: dict[int, str] = {}
         self._pending: PortError | None = None
@@ -43,10 +40,10 @@ class BusPorts:
                 try:
                     heard = port.receive()
                 except PortError as error:
-                    if number in self._vital:
-                        self._pending = self._pending or error
-                    else:
+                    if number:
                         self.errors[number] = error
+                    else:
+                        self._pending = error
                     continue
                 if number:
                     tag = number << BUS_SHIFT
@@ -61,7 +58,7 @@ class BusPorts:
         return frames
 
     def take_errors(self) -> list[PortError]:
-        """Errors of interfaces that are not vital, each once until it is another one."""
+        """Errors of interfaces but the controller's own, each once until it is another one."""
         new = [each for number, each in self.errors.items() if str(each) != self._told.get(number)]
         self._told = {number: str(each) for number, each in self.errors.items()}
         return new

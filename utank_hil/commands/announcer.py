@@ -8,7 +8,7 @@ import multiprocessing
 import os
 import signal
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
@@ -43,30 +43,12 @@ class Announcer:
         self.error: str | None = None
         self._writer: EventWriter | None = None
         self._process: SpawnProcess | None = None
-        context = multiprocessing.get_context("spawn")
         try:
             self._writer = EventWriter()
             self.ring = self._writer.name
-            heard, says = context.Pipe(duplex=False)
+            self._process = _started(self.ring, ships, log)
         except OSError as error:
             self.error = str(error)
-            return
-        with heard:
-            try:
-                process = context.Process(target=announce, args=(self.ring, ships, log, says))
-                with signals_waiting():
-                    process.start()
-            except OSError as error:
-                self.error = str(error)
-                return
-            finally:
-                says.close()  # The process has its own copy, so that its end is detected.
-            if _ready(heard):
-                self._process = process
-            else:
-                process.kill()
-                process.join()
-                self.error = f"the process that logs events did not start ({process.exitcode})"
 
     def write(self, event: Event, start_ns: int) -> None:
         """Take one event; never waits."""
@@ -101,6 +83,25 @@ class Announcer:
             self.error = f"the process that logs events ended with code {process.exitcode}"
 
 
+def _started(ring: str, ships: IdentifiedShips | None, log: Path | None) -> SpawnProcess:
+    """Return the process when it listens; OSError says why it does not."""
+    context = multiprocessing.get_context("spawn")
+    heard, says = context.Pipe(duplex=False)
+    with heard:
+        process = context.Process(target=announce, args=(ring, ships, log, says))
+        try:
+            with signals_waiting():
+                process.start()
+        finally:
+            says.close()  # The process has its own copy, so that its end is detected.
+        with suppress(EOFError):
+            if heard.poll(_START_S) and heard.recv_bytes():
+                return process
+    process.kill()
+    process.join()
+    raise OSError(f"the process that logs events did not start ({process.exitcode})")
+
+
 def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: Connection) -> None:
     """Log and print events until their writer ends or dies, as main function of the process."""
     with EventReader(ring) as reader, ExitStack() as stack:
@@ -133,14 +134,6 @@ def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: 
             time.sleep(LOOK_S)
         if reader.lost:
             lines.say(f"{reader.lost} events were lost")
-
-
-def _ready(heard: Connection) -> bool:
-    """Wait until the process reports that it listens."""
-    try:
-        return heard.poll(_START_S) and bool(heard.recv_bytes())
-    except EOFError:
-        return False
 
 
 def _log(events: EventLog, event: Event, start_ns: int, lines: Lines) -> None:

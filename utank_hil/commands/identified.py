@@ -37,7 +37,8 @@ def write_identified(
     `vessel` is the configured one, `ship` and `tank` the identified ones, `content` that of the
     controller's file, from `read_controller`. Returns the paths of both: "vessel" and "config".
     """
-    return _write(folder / VESSEL, folder / CONTROLLER, vessel, ship, tank, content)
+    found = vessel.model_copy(update={"ship": ship, "tank": tank})
+    return _write(folder / VESSEL, folder / CONTROLLER, found, content)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,18 +60,13 @@ class IdentifiedShips:
         self.folder.mkdir(parents=True, exist_ok=True)
         names = [f"{Path(name).stem}-{{}}.yaml" for name in (VESSEL, CONTROLLER)]
         vessel_file, controller_file = claimed_files(self.folder, *names)
-        return _write(vessel_file, controller_file, self.vessel, ship, tank, self.content)
+        identified = self.vessel.model_copy(update={"ship": ship, "tank": tank})
+        return _write(vessel_file, controller_file, identified, self.content)
 
 
 def _write(
-    vessel_file: Path,
-    controller_file: Path,
-    vessel: Vessel,
-    ship: RollShip,
-    tank: Tank,
-    content: dict[str, Any],
+    vessel_file: Path, controller_file: Path, found: Vessel, content: dict[str, Any]
 ) -> dict[str, Path]:
-    found = vessel.model_copy(update={"ship": ship, "tank": tank})
     controller = content | {"vessel": vessel_file.name}
     with left_whole(controller_file), left_whole(vessel_file):
         for file, held in ((vessel_file, _vessel_content(found)), (controller_file, controller)):

@@ -15,7 +15,6 @@ from utank_hil.telemetry.frame_log import SUFFIX
 from utank_hil.telemetry.recorder_process import NEEDS_RERUN, RecorderError, RecorderProcess
 from utank_hil.telemetry.recorder_state import RecordingTask
 from utank_hil.telemetry.ring import RingWriter
-from utank_hil.telemetry.rotation import Rotation
 from utank_hil.telemetry.rows import RowWriter
 
 NAME: Final = "run-{}.rrd"
@@ -84,7 +83,8 @@ class RunRecording:
                 events=events,
                 frames=None if self._records is None else self._records.name,
                 head=head or {},
-                rotation=Rotation(PART_S, keep_bytes),
+                part_s=PART_S,
+                keep_bytes=keep_bytes,
             )
             self._recorder = RecorderProcess(task)
         except (OSError, RecorderError) as error:
@@ -102,11 +102,6 @@ class RunRecording:
         """Take one row of telemetry; never waits."""
         if self._ring is not None:
             self._ring.write(row)
-
-    @property
-    def recorder_pid(self) -> int | None:
-        """Process id of the recorder, if there is one."""
-        return None if self._recorder is None else self._recorder.pid
 
     @property
     def keeps_records(self) -> bool:

@@ -220,29 +220,6 @@ class DeviceSection(Section):
         Nothing is sent to it on a `silent` interface.
         """
         assert self.age_ms is not None
-        places = {each: place for place, each in enumerate(self.messages)}
-        fields = {
-            f"{message}.{signal}": layout.field(section.bytes)
-            for message, section in self.messages.items()
-            for signal, layout in section.signals.items()
-        }
-        signals = []
-        for value, signal in self.signals.items():
-            layout = self._field(signal.from_)
-            if signal.source == "derived" or layout is None:
-                continue
-            place = places[signal.from_.partition(".")[0]]
-            factor = self._factor(signal, layout)
-            signals.append(
-                SignalPlan(
-                    FIELDS[kind].index(value), place, fields[signal.from_], factor, signal.offset,
-                    signal.sign, signal.least, signal.most,
-                )
-            )  # fmt: skip
-        conditions = []
-        for each in self.valid_when:
-            place, allowed = places[each.from_.partition(".")[0]], frozenset(each.in_)
-            conditions.append(ConditionPlan(place, fields[each.from_], each.mask, allowed))
         cycle_ms, guards, claim = self.period_ms(), self.protection, None
         if guards.n2k_name is not None:
             assert self.source is not None
@@ -250,9 +227,7 @@ class DeviceSection(Section):
         return DevicePlan(
             name,
             kind,
-            tuple(self._message_plan(each, fields, bus) for each in self.messages),
-            tuple(signals),
-            tuple(conditions),
+            tuple(self._message_plan(each, kind, bus) for each in self.messages),
             round(cycle_ms * 1e6),
             round((cycle_ms / 2 if self.same_instant_ms is None else self.same_instant_ms) * 1e6),
             self.age_ms,
@@ -263,21 +238,39 @@ class DeviceSection(Section):
             None if silent else self._wake(bus),
         )
 
-    def _message_plan(self, name: str, fields: dict[str, Any], bus: int) -> MessagePlan:
+    def _message_plan(self, name: str, kind: type[tuple[Any, ...]], bus: int) -> MessagePlan:
         section, guards = self.messages[name], self.protection
-        counters = [fields[each] for each in guards.counters if each.partition(".")[0] == name]
-        crcs = [each for each in guards.crcs if each.message == name]
-        stamps = [each for each in guards.stamps if each.from_.partition(".")[0] == name]
+        layouts = {f"{name}.{key}": layout for key, layout in section.signals.items()}
+        fields = {key: layout.field(section.bytes) for key, layout in layouts.items()}
+        signals = tuple(
+            SignalPlan(
+                FIELDS[kind].index(value), fields[each.from_],
+                self._factor(each, layouts[each.from_]), each.offset, each.sign, each.least,
+                each.most,
+            )
+            for value, each in self.signals.items()
+            if each.source == "measured" and each.from_ in fields
+        )  # fmt: skip
+        conditions = tuple(
+            ConditionPlan(fields[each.from_], each.mask, frozenset(each.in_))
+            for each in self.valid_when
+            if each.from_ in fields
+        )
+        counter = next((fields[each] for each in guards.counters if each in fields), None)
+        crc = next((each for each in guards.crcs if each.message == name), None)
+        stamp = next((each for each in guards.stamps if each.from_ in fields), None)
         cycle_ms = self.period_ms() if section.cycle_ms is None else section.cycle_ms
         return MessagePlan(
             name,
             tuple(each | bus << BUS_SHIFT for each in self._can_ids(section)),
             section.bytes,
             round(cycle_ms * 1e6),
-            counters[0] if counters else None,
-            Crc8(crcs[0].byte, crcs[0].polynomial, crcs[0].start, crcs[0].final) if crcs else None,
-            fields[stamps[0].from_] if stamps else None,
-            stamps[0].us if stamps else 1.0,
+            signals,
+            conditions,
+            counter,
+            None if crc is None else Crc8(**crc.model_dump(exclude={"message"})),
+            None if stamp is None else fields[stamp.from_],
+            1.0 if stamp is None else stamp.us,
         )
 
     def _can_ids(self, section: MessageSection) -> tuple[int, ...]:

@@ -59,9 +59,9 @@ def print_devices(console: Terminal, devices: DevicesSection | None) -> None:
         console.say(f"{role}: {each['device']}{where}")
         console.say(f"  promises {each['rate_hz']:.3g} Hz, {each['latency_ms']:g} ms late at most")
         for name, step in each["steps"].items():
-            what = f"in steps of {step:.2g} {_UNITS.get(unit_of(name), '')}"
-            derived = name in each["derived"]
-            console.say(f"  {name}: " + ("derived, not measured" if derived else what.rstrip()))
+            what = f"in steps of {step:.2g} {_UNITS.get(unit_of(name), '')}".rstrip()
+            what = "derived, not measured" if name in each["derived"] else what
+            console.say(f"  {name}: {what}")
         console.say("  protected by " + ", ".join(each["protected_by"]))
         if each["not_protected_by"]:
             console.say(", ".join(each["not_protected_by"]), yellow="  not protected by")

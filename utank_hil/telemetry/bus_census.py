@@ -6,7 +6,6 @@ from typing import Any, Final
 
 from utank_hil.canbus import (
     Address,
-    AddressClaim,
     Frame,
     HardwiredInputs,
     Heartbeat,
@@ -66,9 +65,6 @@ class BusCensus:
         self._catalogue = load_catalogue()
         self._names = {each.codec.can_id: each for each in self._catalogue.messages}
         self._beats = {self._catalogue.codec(Heartbeat, each).can_id: each.name for each in Address}
-        self._claims = {
-            self._catalogue.codec(AddressClaim, each).can_id: each.name for each in Address
-        }
         self._seen: dict[int, Seen] = {}
         self._bits = 0
         self._begin_s: float | None = None

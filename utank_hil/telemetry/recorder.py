@@ -28,7 +28,7 @@ from utank_hil.telemetry.events import EventReader
 from utank_hil.telemetry.frame_recording import FrameRecording
 from utank_hil.telemetry.recorder_state import RecorderState
 from utank_hil.telemetry.ring import RingKind, RingReader
-from utank_hil.telemetry.rotation import SUFFIXES, part_of
+from utank_hil.telemetry.rotation import SUFFIXES, make_room, part_of
 from utank_hil.telemetry.rows import RowReader
 from utank_hil.telemetry.viewer import rerun_environment
 
@@ -52,8 +52,8 @@ def record_part(state: RecorderState) -> bool:
     lost_before, records_lost_before = report.lost, report.records_lost
     number = report.parts + 1
     file = part_of(Path(task.file), number)
-    if task.rotation is not None:
-        task.rotation.make_room(Path(task.file), number)
+    if task.keep_bytes is not None:
+        make_room(Path(task.file), number, task.keep_bytes)
     with ExitStack() as stack:
         reader = stack.enter_context(RowReader(task.rows, places.get(RingKind.ROWS)))
         events = log = part = None
@@ -77,7 +77,7 @@ def record_part(state: RecorderState) -> bool:
             rows = reader.read_rows()
             if len(rows):
                 begin_s = float(rows[0, time]) if begin_s is None else begin_s
-                full = bool(task.rotation and rows[-1, time] - begin_s >= task.rotation.part_s)
+                full = task.part_s is not None and rows[-1, time] - begin_s >= task.part_s
             new_events = [] if events is None else events.read_events()
             if part is not None:
                 part.note_lost("rows", reader.lost)
@@ -121,7 +121,8 @@ def _main() -> None:
         reason = _reason(error, file)
         state.complained = reason == state.failure
         state.failure = reason
-        if state.report.parts and state.task.rotation and not _writer_ended(state.task.rows):
+        several = state.task.part_s is not None
+        if state.report.parts and several and not _writer_ended(state.task.rows):
             begun = part_of(file, state.report.parts + 1)
             for suffix in SUFFIXES:  # Remove files of a part that is still empty.
                 begun.with_suffix(suffix).unlink(missing_ok=True)

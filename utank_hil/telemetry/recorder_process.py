@@ -39,15 +39,14 @@ class RecorderProcess(Closing):
             raise RecorderError(NEEDS_RERUN)
         self._end: RecorderReport | RecorderError | None = None
         state = RecorderState(task).as_input()
+        command = [sys.executable, "-m", _MODULE]
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", _MODULE],
-                stdin=state,
-                stdout=subprocess.PIPE,
-                start_new_session=True,
+                command, stdin=state, stdout=subprocess.PIPE, start_new_session=True
             )
         finally:
             os.close(state)
+        self.pid = self._process.pid
         output = self._process.stdout
         assert output is not None
         self._output = output
@@ -64,11 +63,6 @@ class RecorderProcess(Closing):
             ended = f"silent for {_START_TIMEOUT_S:g} s" if not waits else "it ended"
             reason = self._message("error").get("error", ended)
             raise RecorderError(f"the recorder of {task.file} did not start: {reason}")
-
-    @property
-    def pid(self) -> int:
-        """Id of the process."""
-        return self._process.pid
 
     @property
     def has_ended(self) -> bool:

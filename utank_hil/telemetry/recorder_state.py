@@ -8,7 +8,6 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from utank_hil.telemetry.ring import RingKind, held_ring
-from utank_hil.telemetry.rotation import Rotation
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +20,8 @@ class RecordingTask:
     events: str | None = None
     frames: str | None = None
     head: Mapping[str, Any] = field(default_factory=dict)  #: Head of the frame log (`replay_head`).
-    rotation: Rotation | None = None  #: Division into several files; None for a single one.
+    part_s: float | None = None  #: Length of a file of several; None for a single one.
+    keep_bytes: int | None = None  #: Size of the folder (`rotation.make_room`); None for no limit.
 
     def held(self) -> "RecordingTask":
         """Return the task with ring names that stay valid after `exec` in this process."""
@@ -66,9 +66,7 @@ class RecorderState:
     def of_input(cls) -> "RecorderState":
         """Read the state from standard input."""
         content = json.load(sys.stdin)
-        task = content.pop("task")
-        rotation = task.pop("rotation")
-        task = RecordingTask(**task, rotation=None if rotation is None else Rotation(**rotation))
+        task = RecordingTask(**content.pop("task"))
         report = RecorderReport(**content.pop("report"))
         places = {RingKind(kind): place for kind, place in content.pop("places").items()}
         return cls(task, report, places, **content)

@@ -210,13 +210,14 @@ class RingReader(Closing):
         self.lost = 0  #: Number of slots overwritten before they were read.
         self._slots: int = slots
         self._writer_start: int = start
-        self._next: int = max(0, self._words[_COUNT] - slots) if place is None else place
+        #: Number of slots read or lost, counted from the first that was ever written.
+        self.place: int = max(0, self._words[_COUNT] - slots) if place is None else place
 
     def read(self) -> list[bytes]:
         """Return what was written since the last call, by slot, oldest first; never blocks."""
         stop = self._words[_COUNT]
         found: list[bytes] = []
-        for number in range(max(self._next, stop - self._slots), stop):
+        for number in range(max(self.place, stop - self._slots), stop):
             start = self._first + number % self._slots * self._stride
             slot = self._map[start : start + self._stride]
             closing = int.from_bytes(slot[-8:], "little")
@@ -226,14 +227,9 @@ class RingReader(Closing):
             elif number > self._words[_COUNT] - self._slots:
                 stop = number  # This slot is written, but not yet visible to this processor.
                 break
-        self.lost += stop - self._next - len(found)
-        self._next = stop
+        self.lost += stop - self.place - len(found)
+        self.place = stop
         return found
-
-    @property
-    def place(self) -> int:
-        """Number of slots read or lost, counted from the first that was ever written."""
-        return self._next
 
     @property
     def ended(self) -> bool:

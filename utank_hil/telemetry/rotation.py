@@ -6,7 +6,6 @@ long recording has parts: `run-x.rrd`, `run-x-part002.rrd`, ...
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from os import stat_result
 from pathlib import Path
 from typing import Final
@@ -16,22 +15,15 @@ _GROWTH: Final = 1.05
 SUFFIXES: Final = (".rrd", ".frames")  #: Suffixes of the files of one recording.
 
 
-@dataclass(frozen=True, slots=True)
-class Rotation:
-    """Length of a file, and the size of its folder."""
+def make_room(file: Path, number: int, keep_bytes: int) -> None:
+    """Remove the oldest recordings before part `number` of the recording `file` begins.
 
-    part_s: float  #: Length of a file.
-    #: Size of the folder: before a file begins, the oldest recordings are removed until the others
-    #: and one as long as the last fit in. None removes none.
-    keep_bytes: int | None = None
-
-    def make_room(self, file: Path, number: int) -> None:
-        """Remove the oldest recordings before part `number` of the recording `file` begins."""
-        if self.keep_bytes is not None:
-            before = part_of(file, number - 1).with_suffix
-            files = [] if number == 1 else [before(suffix) for suffix in SUFFIXES]
-            last_bytes = sum(status.st_size for _, status in _found(files))
-            remove_oldest(part_of(file, number), self.keep_bytes - round(_GROWTH * last_bytes))
+    The others and one as long as the last part then fit into the folder.
+    """
+    before = part_of(file, number - 1).with_suffix
+    files = [] if number == 1 else [before(suffix) for suffix in SUFFIXES]
+    last_bytes = sum(status.st_size for _, status in _found(files))
+    remove_oldest(part_of(file, number), keep_bytes - round(_GROWTH * last_bytes))
 
 
 def part_of(file: Path, number: int) -> Path:

@@ -37,8 +37,7 @@ def _nobody(message: Any, now_ns: int) -> None:
 class SignalPlan:
     """One measured value: value = sign * (physical * factor + offset)."""
 
-    place: int  #: Place of the value in the message.
-    message: int  #: Place of its message in the device.
+    place: int  #: Place of the value in the measurement.
     field: Field
     factor: float
     offset: float
@@ -52,7 +51,6 @@ class SignalPlan:
 class ConditionPlan:
     """What a status must say: its counts under a mask are among those allowed."""
 
-    message: int
     field: Field
     mask: int
     allowed: frozenset[int]
@@ -60,12 +58,14 @@ class ConditionPlan:
 
 @dataclass(frozen=True, slots=True)
 class MessagePlan:
-    """One message: the identifiers that it may have, its length, cycle and protection."""
+    """One message: the identifiers that it may have, what it says, and its protection."""
 
     name: str
     can_ids: tuple[int, ...]
     length: int
     cycle_ns: int
+    signals: tuple[SignalPlan, ...] = ()
+    conditions: tuple[ConditionPlan, ...] = ()
     counter: Field | None = None
     crc: Crc8 | None = None
     stamp: Field | None = None
@@ -79,8 +79,6 @@ class DevicePlan(Generic[T]):
     name: str
     kind: type[T]  #: Message that it stands for.
     messages: tuple[MessagePlan, ...]
-    signals: tuple[SignalPlan, ...]
-    conditions: tuple[ConditionPlan, ...]
     cycle_ns: int  #: Cycle of the measurement.
     same_instant_ns: int  #: Frames that belong to one measurement come within this time.
     age_ms: float  #: A stamp that is later than others by more is too late.
@@ -116,10 +114,9 @@ class ProfiledDevice(Generic[T]):
             None if each.stamp is None else Stamp(each.stamp, each.stamp_us, plan.age_ms)
             for each in plan.messages
         ]
-        self._signals = [[s for s in plan.signals if s.message == m] for m in range(count)]
-        self._conditions = [[c for c in plan.conditions if c.message == m] for m in range(count)]
-        self._needed = [m for m in range(count) if self._signals[m] or self._stamps[m] is not None]
-        self._status = [m for m in range(count) if self._conditions[m]]
+        messages = list(enumerate(plan.messages))
+        self._needed = [m for m, each in messages if each.signals or each.stamp is not None]
+        self._status = [m for m, each in messages if each.conditions]
         self._came_ns = [_LONG_AGO] * count
         self._good_ns = [_LONG_AGO] * count
         self._values: list[float] = [math.nan] * len(FIELDS[plan.kind])
@@ -129,9 +126,8 @@ class ProfiledDevice(Generic[T]):
         self._last_roll_rad, self._last_ns = math.nan, 0
         self.named = plan.name_id is None
         self.takes: dict[int, Callable[[Frame, int], None]] = {}
-        for place, each in enumerate(plan.messages):
-            for can_id in each.can_ids:
-                self.takes[can_id] = partial(self._take, place)
+        for place, each in messages:
+            self.takes.update(dict.fromkeys(each.can_ids, partial(self._take, place)))
         if plan.name_id is not None:
             self.takes[plan.name_id[0]] = self._take_claim
 
@@ -155,10 +151,10 @@ class ProfiledDevice(Generic[T]):
         self.named = int.from_bytes(frame.data, "little") == self._plan.name_id[1]
 
     def _take(self, place: int, frame: Frame, now_ns: int) -> None:
-        data = frame.data
+        data, message = frame.data, self._plan.messages[place]
         if not self.watched[place].passes(data):
             return
-        for condition in self._conditions[place]:
+        for condition in message.conditions:
             if condition.field.raw(data) & condition.mask not in condition.allowed:
                 self._good_ns[place] = _LONG_AGO
                 break
@@ -169,7 +165,7 @@ class ProfiledDevice(Generic[T]):
             self._came_ns[place] = _LONG_AGO
             return
         values = self._values
-        for signal in self._signals[place]:
+        for signal in message.signals:
             physical = signal.field.value(data)
             if not signal.least <= physical <= signal.most:
                 physical = math.nan

@@ -35,14 +35,14 @@ def read_wamit(path: Path, given: Given) -> HullData:
     """Read the files beside a ``.1``."""
     rows = table(path, 4)
     config = text(found) if (found := sibling(path, ".cfg")) else ""
-    by_frequency = _option(config, "IPEROUT", 1)
+    by_frequency = _option(config, "IPEROUT")
     if by_frequency not in (1, 2):
         raise ValueError(f"{path}: first column is a wave number (IPEROUT {by_frequency}): use 1")
     unit_m, gravity = _unit_and_gravity(path)
     body: dict[str, Any] = {}
     density = given.density_kg_m3
     if force := sibling(path, ".frc"):
-        density, body = _body(force, _option(config, "IALTFRC", 1), given)
+        density, body = _body(force, _option(config, "IALTFRC"), given)
     if density is None:
         raise ValueError(f"{path}: density_kg_m3 is missing: WAMIT's numbers are non-dimensional")
     place, depth = _place(path)
@@ -103,9 +103,9 @@ def read_wamit(path: Path, given: Given) -> HullData:
     )
 
 
-def _option(config: str, name: str, default: int) -> int:
+def _option(config: str, name: str) -> int:
     found = re.search(rf"(?im)^\s*{name}\s*=\s*(\d+)", config)
-    return int(found.group(1)) if found else default
+    return int(found.group(1)) if found else 1
 
 
 def _unit_and_gravity(path: Path) -> tuple[float, float]:
