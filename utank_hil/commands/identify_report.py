@@ -143,11 +143,7 @@ def _ship_table(found: Identification, task: RetuningTask) -> Table:
 def _mode_table(found: Identification, task: RetuningTask) -> Table:
     """Return the table of modes of ship and tank together, with physics and without."""
     table = new_table(
-        "Modes of ship and tank together",
-        "configured",
-        "identified",
-        "without\nphysics",
-        "± 95 %",
+        "Modes of ship and tank together", "configured", "identified", "without\nphysics", "± 95 %"
     )
     configured = _modes(task.plant.ship, task.plant.tank)
     fitted = _modes(found.fit.ship, found.fit.tank)

@@ -14,8 +14,7 @@ def report(
         list[Path], typer.Argument(help="Folders of benches and campaigns, recordings (.rrd).")
     ],
     out: Annotated[
-        Path | None,
-        typer.Option(help="The page; beside the first run if not given."),
+        Path | None, typer.Option(help="The page; beside the first run if not given.")
     ] = None,
     json_: Json = False,
 ) -> None:

@@ -324,10 +324,7 @@ def _code(node: ControllerNode) -> ExitCode:
 
 
 def _print_summary(
-    name: str,
-    node: ControllerNode,
-    statistics: LoopStatistics,
-    recording: RecordingSummary | None,
+    name: str, node: ControllerNode, statistics: LoopStatistics, recording: RecordingSummary | None
 ) -> None:
     console = Terminal()
     console.table(timing_table({name: statistics}))

@@ -16,13 +16,7 @@ from utank_hil.base.finite import finite
 from utank_hil.base.machine import kernels, machine
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import headline
-from utank_hil.configuration.files import (
-    ConfigError,
-    ConfigProblem,
-    Section,
-    load_config,
-    located,
-)
+from utank_hil.configuration.files import ConfigError, ConfigProblem, Section, load_config, located
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import notes
 

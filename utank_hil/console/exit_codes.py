@@ -41,11 +41,7 @@ class ExitCode(IntEnum):
         "`run`, `commission`, `panel`, `bench`, `bus`, `faults`, `firmware-sim`",
         "The CAN interface can't be opened.",
     )
-    BUS_LOST = (
-        4,
-        "`run`",
-        "Ended while the CAN bus could not be used, or with its loss latched.",
-    )
+    BUS_LOST = (4, "`run`", "Ended while the CAN bus could not be used, or with its loss latched.")
     FAULT = 5, "`run`", "Ended with another fault latched."
     NOT_RANKED = (
         6,

@@ -38,8 +38,7 @@ def draw_trade(
         raise ValueError("no law of this trade is stable on its own ship: nothing to draw")
     with picture(path, title, (WIDEST_IN, 7.0), about) as figure:
         axes = figure.subplot_mosaic(
-            [["trade", "radius"], ["trade", "pressure"], ["trade", "level"]],
-            width_ratios=(1.45, 1),
+            [["trade", "radius"], ["trade", "pressure"], ["trade", "level"]], width_ratios=(1.45, 1)
         )
         _draw_trade(axes["trade"], points, trade)
         _draw_costs([axes[key] for key in ("radius", "pressure", "level")], points)

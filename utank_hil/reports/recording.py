@@ -12,12 +12,7 @@ from utank_hil.analysis.motion.statistics import roll_statistics
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.pictures import BenchCurve, draw_bench
-from utank_hil.pictures.report_page import (
-    ReportPicture,
-    ReportSection,
-    ReportTable,
-    Verdict,
-)
+from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
 from utank_hil.reports.parts import Report, about_section, roll_figure
 from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.highlight import in_service

@@ -4,14 +4,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from utank_hil.canbus import (
-    Address,
-    Frame,
-    HardwiredInputs,
-    Heartbeat,
-    Rejection,
-    load_catalogue,
-)
+from utank_hil.canbus import Address, Frame, HardwiredInputs, Heartbeat, Rejection, load_catalogue
 from utank_hil.canbus.frame import BUS_SHIFT, OTHER_BUS, STANDARD
 from utank_hil.configuration import Vessel
 from utank_hil.nodes.inbox import Inbox

@@ -17,10 +17,7 @@ class RowWriter(RingWriter):
     """
 
     def __init__(
-        self,
-        columns: Sequence[str],
-        slots: int = 8192,
-        about: Mapping[str, Any] | None = None,
+        self, columns: Sequence[str], slots: int = 8192, about: Mapping[str, Any] | None = None
     ) -> None:
         if not columns or len(set(columns)) != len(columns):
             raise ValueError(f"a ring needs columns with different names, got {tuple(columns)}")
