@@ -30,7 +30,7 @@ VESSEL = {
     "tank": {"width_m": 17.0, "height_m": 5.0, "lz_m": 2.0, "headroom_m": 4.0},
     "pump": {"max_pressure_pa": 5e4},
 }
-ORANGE, BLUE = _PALETTE[1:3]
+ORANGE, BLUE = _PALETTE["orange"], _PALETTE["blue"]
 BACKGROUND = (13, 13, 13)
 KNOWN = re.compile(
     "[Ss]oftware rasterizer|No available adapters"  # this machine has no graphics card

@@ -16,8 +16,6 @@ from utank_hil.canbus.python_can import SocketcanBus, can
 #: More than the kernel's receive buffer (about 280 frames); bounds the time on a babbling bus.
 MAX_FRAMES_PER_CALL: Final = 320
 
-_EXTENDED_MASK: Final = 0x1FFFFFFF
-
 #: A deleted interface: its sockets never recover, even if the interface is created again.
 _GONE: Final = (errno.ENODEV, errno.ENXIO)
 
@@ -71,7 +69,11 @@ class SocketCanPort:
         self._standard, self._receive_only = standard, receive_only
         #: Received frames that are not a `Frame`.
         self.error_frames = self.standard_frames = self.remote_frames = 0
-        self._can_ids = None if can_ids is None else tuple(can_ids)
+        self._filters: list[can.typechecking.CanFilter] | None = None
+        if can_ids is not None:
+            self._filters = [
+                {"can_id": can_id, "can_mask": LONGEST_ID, "extended": True} for can_id in can_ids
+            ]
         self._down = self._drained = False
         self._pending: PortError | None = None
         self._closed = False
@@ -162,12 +164,6 @@ class SocketCanPort:
         if self._closed:
             raise self._port_error("closed", "open a new port")
         if self._bus is None:
-            filters: list[can.typechecking.CanFilter] | None = None
-            if self._can_ids is not None:
-                filters = [
-                    {"can_id": can_id, "can_mask": _EXTENDED_MASK, "extended": True}
-                    for can_id in self._can_ids
-                ]
             try:
                 # python-can leaks its socket if it can't bind it: check the interface first
                 socket.if_nametoindex(self.channel)
@@ -176,7 +172,7 @@ class SocketCanPort:
                 raise self._port_error("not found", _REMEDIES[number], number) from error
             try:
                 self._bus = SocketcanBus(
-                    self.channel, receive_own_messages=False, can_filters=filters
+                    self.channel, receive_own_messages=False, can_filters=self._filters
                 )
             except OSError as error:
                 raise self._failure(error) from error

@@ -19,8 +19,7 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.nodes.panel import OperatorPanel
 from utank_hil.runners import RealTimeLoop, stop_on_signals
 
-LOOK_NS = 2 * TICK_NS
-"""Time between two reads of the keyboard: a frame leaves within 50 ms of its button."""
+LOOK_NS = 2 * TICK_NS  #: Time between two reads: a frame leaves within 50 ms of its button.
 
 
 def panel(

@@ -20,8 +20,7 @@ from utank_hil.telemetry.rows import RowWriter
 NAME: Final = "run-{}.rrd"
 FRAMES: Final = f"run-{{}}{SUFFIX}"
 PART_S: Final = 3600.0  #: Length of one file of a recording.
-RING_SLOTS: Final = 1640
-"""Number of slots per ring: 82 s at 20 Hz, a delay of the recorder without loss."""
+RING_SLOTS: Final = 1640  #: Slots per ring: 82 s at 20 Hz, a delay of the recorder without loss.
 
 
 @dataclass(slots=True)

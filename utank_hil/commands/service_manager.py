@@ -10,8 +10,7 @@ from utank_hil.base.closing import Closing
 from utank_hil.base.tick import TICK_NS
 
 _FEEDS: Final = 4  #: Number of notifications within the watchdog's time.
-READY_S: Final = 30.0
-"""Time limit of the ready notification: a third of systemd's for the start of a service."""
+READY_S: Final = 30.0  #: Limit of the ready notification: a third of systemd's for a start.
 
 
 class ServiceManager(Closing):

@@ -21,11 +21,9 @@ from utank_hil.configuration.yaml_text import Key, YamlError, parse_yaml
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
-_LIMIT_BYTES: Final = 1 << 22
-"""Largest file: a text of four megabytes takes half a minute to parse."""
+_LIMIT_BYTES: Final = 1 << 22  #: Largest file: four megabytes take half a minute to parse.
 _SUFFIXES: Final = (".yaml", ".yml")
-ALLOW_CODE: Final = "allow_code"
-"""Key of the validation's context: whether the file may name code to run."""
+ALLOW_CODE: Final = "allow_code"  #: Key of the context: whether the file may name code to run.
 
 
 class Section(BaseModel):

@@ -30,8 +30,7 @@ _LANES: Final[dict[int, tuple[str, float]]] = {
     RetuningState.UNDONE: ("undone", 0.1),
 }
 """Label and opacity of each retuning state."""
-_LETTER: Final = 0.014
-"""Width of a letter in a lane over the axis; a section too short for its label has none."""
+_LETTER: Final = 0.014  #: Width of a letter in a lane over the axis; a short section has no label.
 _LABELS: Final = ("Roll (°)", "Tank level (m)", "Pump pressure (kPa)")
 
 

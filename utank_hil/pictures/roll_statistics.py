@@ -10,8 +10,7 @@ from utank_hil.analysis.motion.exceedance import exceedance
 from utank_hil.base.arrays import FloatArray
 from utank_hil.pictures.style import COLORS, DASHES, NO_TANK, WIDEST_IN, picture
 
-SEGMENT_S: Final = 200.0
-"""Length of the segments of Welch's spectra, with a resolution of 0.03 rad/s."""
+SEGMENT_S: Final = 200.0  #: Segments of Welch's spectra, with a resolution of 0.03 rad/s.
 LONGEST_S, SHORTEST_S = 40.0, 3.0  #: Range of periods in the figure.
 
 

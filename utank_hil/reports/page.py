@@ -10,8 +10,7 @@ from utank_hil.pictures.report_page import write_report_page
 from utank_hil.reports.parts import Report, ReportKind
 from utank_hil.reports.recording import recording_report
 
-GROUP: Final = "utank_hil.reports"
-"""Entry points of kinds of runs that leave a folder (`ReportKind`)."""
+GROUP: Final = "utank_hil.reports"  #: Entry points of runs that leave a folder (`ReportKind`).
 PAGE: Final = "report.html"
 
 

@@ -12,8 +12,7 @@ from utank_hil.runners.wire_time import frame_bits
 from utank_hil.safety.monitors.senders import LEAST_PER_CYCLE, MOST_PER_CYCLE
 from utank_hil.telemetry.bus_files.frame import BusFrame, FrameKind
 
-LEAST_CYCLES: Final = 3.0
-"""A message of which so many cycles were not listened to has no rate yet."""
+LEAST_CYCLES: Final = 3.0  #: A message that was listened to for fewer cycles has no rate yet.
 _CLAIM_GROUP: Final = 0xEE00
 _HEARTBEATS: Final = range(0x701, 0x780)
 _STATES: Final = {0: "boot-up", 4: "stopped", 5: "operational", 127: "pre-operational"}

@@ -143,11 +143,8 @@ def frames_of(entries: Iterable[Entry], notes: list[str] | None = None) -> Itera
 def _only_stops(frames: list[Frame]) -> bool:
     """Whether frames are only the last commands, quick stop, of a controller that ends."""
     pump, valve = load_catalogue().codec(PumpCommand), load_catalogue().codec(ValveCommand)
-    words = [
-        pump.decode(frame.data)
-        for frame in frames
-        if frame.can_id == pump.can_id and len(frame.data) == FRAME_BYTES
-    ]
-    return {frame.can_id for frame in frames} <= {pump.can_id, valve.can_id} and any(
-        word is not None and word.control_word is ControlWord.QUICK_STOP for word in words
-    )
+    if not {frame.can_id for frame in frames} <= {pump.can_id, valve.can_id}:
+        return False
+    whole = [each.data for each in frames if each.can_id == pump.can_id and len(each.data) == 8]
+    words = [pump.decode(data) for data in whole]
+    return any(word and word.control_word is ControlWord.QUICK_STOP for word in words)

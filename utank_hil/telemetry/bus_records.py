@@ -26,8 +26,7 @@ RECORD: Final = np.dtype(
     ]
 )
 """Type of a record: `number` is a frame's identifier or a count, `time_ns` the node's time."""
-LAYOUT: Final = struct.Struct("<I9pB2xq")
-"""Layout of one packed record: number, length, data, kind and time."""
+LAYOUT: Final = struct.Struct("<I9pB2xq")  #: Packed record: number, length, data, kind and time.
 
 Records = npt.NDArray[np.void]  #: Records, shape (n,), of type `RECORD`.
 

@@ -145,9 +145,8 @@ class FrameLog:
                 raise FrameLogError(f"{path}: is no frame log of this version")
             while header := content.read(_BLOCK.size):
                 place = content.tell() - len(header)
-                kind, length, checksum = (
-                    _BLOCK.unpack(header) if len(header) == _BLOCK.size else (b"", 1, 0)
-                )
+                whole = len(header) == _BLOCK.size
+                kind, length, checksum = _BLOCK.unpack(header) if whole else (b"", 1, 0)
                 payload = content.read(length)
                 if len(payload) < length:
                     self.cut = f"{path.name} is cut at byte {place + len(header) + len(payload)}"

@@ -93,7 +93,11 @@ def differences(recorded: Values, designed: Values) -> list[ValueDifference]:
 def encoded(values: Values) -> dict[str, Any]:
     """Return the values exactly, ready for JSON."""
     return {
-        name: [str(value.dtype), list(value.shape), _packed(value.tobytes())]
+        name: [
+            str(value.dtype),
+            list(value.shape),
+            base64.b85encode(zlib.compress(value.tobytes(), 9)).decode(),
+        ]
         for name, value in values.items()
     }
 
@@ -104,10 +108,6 @@ def decoded(content: Mapping[str, Any]) -> Values:
         name: np.frombuffer(zlib.decompress(base64.b85decode(data)), np.dtype(dtype)).reshape(shape)
         for name, (dtype, shape, data) in content.items()
     }
-
-
-def _packed(data: bytes) -> str:
-    return base64.b85encode(zlib.compress(data, 9)).decode()
 
 
 def _alike(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> bool:

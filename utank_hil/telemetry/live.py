@@ -18,8 +18,7 @@ from utank_hil.telemetry.ring import RingKind, RingReader, ring_names
 from utank_hil.telemetry.rows import RowReader
 from utank_hil.telemetry.viewer import LOOPBACK, hold_port, live_url, port_of
 
-MEMORY: Final = "64MiB"
-"""History for a viewer that connects late; it bounds the memory of the stream."""
+MEMORY: Final = "64MiB"  #: History for late viewers, which bounds the memory of the stream.
 _START_S: Final = 5.0  #: Time in which the server of a stream starts, even on a busy machine.
 
 

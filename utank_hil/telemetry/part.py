@@ -24,8 +24,7 @@ from utank_hil.telemetry.scene import scene_size
 
 Sink: TypeAlias = rr.FileSink | rr.GrpcServerSink
 
-_FLUSH_TIMEOUT_S: Final = 5.0
-"""Time for a batch of 0.5 s to reach the disk; without a limit Rerun waits on a full disk."""
+_FLUSH_TIMEOUT_S: Final = 5.0  #: Time to reach the disk; without it Rerun waits on a full one.
 _RESERVED_BYTES: Final = 1 << 18  #: Space for the beginning of a recording, mostly its blueprint.
 _FOOTER: Final = (b"FOOT", 64)  #: Mark within the last bytes of a finished file.
 
@@ -64,7 +63,8 @@ class RecordingPart(Closing):
     def __init__(
         self, file: Path, columns: Sequence[str], about: Mapping[str, Any] | None = None
     ) -> None:
-        _reserve_file(file)
+        with file.open("wb") as begun:  # Rerun would wait forever on a full disk.
+            os.posix_fallocate(begun.fileno(), 0, _RESERVED_BYTES)
         self._file = file
         self._rows = 0
         self._lost = Counter[str]()
@@ -107,12 +107,6 @@ class RecordingPart(Closing):
                 f"its {self._rows} rows are written, but not the end of {self._file.name}: is the "
                 "disk full?"
             )
-
-
-def _reserve_file(file: Path) -> None:
-    """Reserve the first bytes, or raise: Rerun would wait forever on a full disk."""
-    with file.open("wb") as begun:
-        os.posix_fallocate(begun.fileno(), 0, _RESERVED_BYTES)
 
 
 def _is_finished(file: Path) -> bool:

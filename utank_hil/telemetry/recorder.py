@@ -32,8 +32,7 @@ from utank_hil.telemetry.rotation import SUFFIXES, make_room, part_of
 from utank_hil.telemetry.rows import RowReader
 from utank_hil.telemetry.viewer import rerun_environment
 
-BATCH_S: Final = 0.5
-"""Time between two writes: a write costs 1 kB of file, and a kill loses up to two batches."""
+BATCH_S: Final = 0.5  #: Time between two writes: one costs 1 kB, a kill loses two at most.
 RETRY_S: Final = 10.0  #: Time between two attempts to begin a file.
 _NICENESS: Final = 5
 _FULL_BYTES: Final = 1 << 20  #: Free space below which a disk counts as full.

@@ -79,12 +79,11 @@ def write_recording(
     recording.send_blueprint(blueprint)
     if about is not None:
         write_about(recording, about)
-    for number, (path_of_run, (run, rows)) in enumerate(
-        zip(run_paths(list(runs)), runs.items(), strict=True)
-    ):
+    paths = run_paths(list(runs))
+    for number, (run, rows) in enumerate(runs.items()):
         color = ONE_COLOR if len(runs) == 1 else run_color(number)
         beside = number % MOST_SHADES, min(len(runs), MOST_SHADES)
-        log = RunLog(recording, path_of_run, columns, about, PICTURES_S, color, beside)
+        log = RunLog(recording, paths[number], columns, about, PICTURES_S, color, beside)
         for start in range(0, len(rows), _BLOCK_ROWS):
             log.write(rows[start : start + _BLOCK_ROWS])
         log.write_events((events or {}).get(run, ()))

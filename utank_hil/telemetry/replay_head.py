@@ -127,9 +127,8 @@ def recorded_law(
 
 def law_differences(head: Mapping[str, Any], law: BuiltLaw) -> list[law_values.ValueDifference]:
     """Return the differences, array by array, of the recorded law and one designed here."""
-    return law_values.differences(
-        law_values.decoded(head["law"]), law_values.law_values(law.controller())
-    )
+    designed = law_values.law_values(law.controller())
+    return law_values.differences(law_values.decoded(head["law"]), designed)
 
 
 def causes(head: Mapping[str, Any], config: ControllerConfig, folder: Path) -> list[str]:
@@ -186,17 +185,12 @@ def _put(value: Any, places: Mapping[str, str]) -> Any:
 
 def _flat(value: Any, key: str = "") -> dict[str, Any]:
     """Yield values of a configuration by their dotted keys."""
-    if isinstance(value, dict):
-        parts = value.items()
-    elif isinstance(value, list):
-        parts = ((str(index), each) for index, each in enumerate(value))  # type: ignore[assignment]
-    else:
+    if not isinstance(value, dict | list):
         return {key: value}
-    return {
-        name: each
-        for part, content in parts
-        for name, each in _flat(content, f"{key}.{part}".lstrip(".")).items()
-    }
+    found: dict[str, Any] = {}
+    for part, content in value.items() if isinstance(value, dict) else enumerate(value):
+        found.update(_flat(content, f"{key}.{part}".lstrip(".")))
+    return found
 
 
 def _set(value: object) -> object:

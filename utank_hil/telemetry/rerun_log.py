@@ -25,8 +25,7 @@ from utank_hil.telemetry.units import field_of
 
 APPLICATION: Final = "utank-hil"
 TIME_COLUMN: Final = "time_s"
-ABOUT: Final = "about"
-"""Property of a recording that holds its origin (`utank_hil.base.provenance`) as JSON."""
+ABOUT: Final = "about"  #: Property that holds the origin (`utank_hil.base.provenance`) as JSON.
 LIVE_RUN: Final = "live"  #: Name of a live run, also in its recordings.
 ARCHETYPE: Final = "telemetry"
 COMPONENT: Final = "row"

@@ -10,8 +10,7 @@ from os import stat_result
 from pathlib import Path
 from typing import Final
 
-_GROWTH: Final = 1.05
-"""Allowed growth of a file over the previous one: compression differs from file to file."""
+_GROWTH: Final = 1.05  #: Growth of a file over the one before: compression differs.
 SUFFIXES: Final = (".rrd", ".frames")  #: Suffixes of the files of one recording.
 
 

@@ -19,8 +19,7 @@ from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.viewer import TIMELINE
 
 PERIOD_S: Final = 0.2  #: Time between two pictures: a roll of some seconds appears smooth.
-WORDS_PERIOD_S: Final = 2.0
-"""Time between two texts, long enough to read; their figures are means of minutes."""
+WORDS_PERIOD_S: Final = 2.0  #: Time between two texts, long enough to read them.
 NEEDED: Final = (
     "roll_rad", "twin_roll_rad", "port_level_m", "starboard_level_m", "pressure_actual_pa",
 )  # fmt: skip

@@ -135,8 +135,7 @@ def even_rows(
     names line and remedy if the times do not rise, have a gap, or are not even, or if the sample
     time is no whole number of their steps.
     """
-    if "time_s" not in columns:
-        raise _lacks(path, "time_s", columns)
+    require(path, columns, "time_s")
     time_s = columns["time_s"]
     low, high = -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s
     (kept,) = np.nonzero((time_s >= low) & (time_s <= high) | np.isnan(time_s))
@@ -258,10 +257,10 @@ def _all_in_si(path: Path, columns: Iterable[_Column]) -> Columns:
         column, in_si = _in_si(name, values)
         if column in found:
             other = sources[column]
-            reason = (
+            both = (
                 f"names {name!r} twice" if name == other else f"{other} and {name} are one signal"
             )
-            raise TextFileError(f"{path}: {reason}: remove or rename one")
+            raise TextFileError(f"{path}: {both}: remove or rename one")
         sources[column], found[column] = name, in_si
     if not found:
         raise TextFileError(f"{path}: has no column of numbers")

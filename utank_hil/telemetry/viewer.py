@@ -15,8 +15,7 @@ from utank_hil.base.closing import Closing
 TIMELINE: Final = "time"  #: Name of the time line of all recordings.
 _TRIES, _PAUSE_S = 20, 0.5
 """Number and interval of requests to a starting viewer to move its cursor: ten seconds in all."""
-LOOPBACK: Final = "127.0.0.1"
-"""Address on which viewers listen; Rerun's own default is every interface."""
+LOOPBACK: Final = "127.0.0.1"  #: Where viewers listen; Rerun's own default is every interface.
 
 
 class Viewer(Closing):

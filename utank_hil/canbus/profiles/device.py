@@ -21,8 +21,7 @@ FIELDS: Final[dict[type[tuple[Any, ...]], tuple[str, ...]]] = {
 }
 """What a device may measure, in the order of the message's fields before the quality."""
 SWITCHES: Final = ("port_high", "starboard_high")
-STATUS_CYCLES: Final = 3
-"""A status that is older by so many of its cycles says nothing any longer."""
+STATUS_CYCLES: Final = 3  #: A status that is older by this many cycles says nothing.
 SILENT_NS: Final = 1_000_000_000
 """A device that brings nothing for so long is woken: the time in which a node is back by itself."""
 _LONG_AGO: Final = -(1 << 62)

@@ -23,8 +23,7 @@ _READERS: dict[str, Callable[[Path, Given], HullData]] = {
     ".re7": read_shipx,
     ".mat": read_mss,
 }
-_SAME = 0.01
-"""Relative difference up to which a figure of the user's and of the file are the same."""
+_SAME = 0.01  #: Relative difference up to which figures of user and file are the same.
 
 
 def read_hull(path: Path, given: Given | None = None) -> HullData:

@@ -86,7 +86,10 @@ def read_wamit(path: Path, given: Given) -> HullData:
         hydrostatic = hydrostatic * density * gravity * unit_m ** (2.0 + _PAIR)
     return hull_of(
         path,
-        [_no_unit(path), "roll damping is that of waves alone: add the viscous part"],
+        [
+            "" if sibling(path, ".gdf") else "no .gdf beside it: ULEN is taken as 1 m, g as 9.81",
+            "roll damping is that of waves alone: add the viscous part",
+        ],
         frequency_rad_s=omega,
         added_mass=np.array([scale * first[w][0] for w in omega]),
         damping=np.array([scale * w * first[w][1] for w in omega]),
@@ -116,10 +119,6 @@ def _unit_and_gravity(path: Path) -> tuple[float, float]:
     if len(numbers) < 2:
         raise ValueError(f"{found}: line 2 must hold ULEN and GRAV")
     return numbers[0], numbers[1]
-
-
-def _no_unit(path: Path) -> str:
-    return "" if sibling(path, ".gdf") else "no .gdf beside it: ULEN is taken as 1 m, g as 9.81"
 
 
 def _body(path: Path, form: int, given: Given) -> tuple[float | None, dict[str, Any]]:

@@ -11,15 +11,12 @@ from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError
 
 _TICK_NS: Final = 10_000_000  #: Largest step back that is left as it is; the controller's tick.
 _NEAR_NS: Final = 20_000_000  #: Largest step ahead that is not looked at: a cycle of most sensors.
-_BURST_NS: Final = 1_000_000_000
-"""Largest lag of a few frames that a logger wrote late, as of a second channel."""
+_BURST_NS: Final = 1_000_000_000  #: Largest lag of frames written late, as of a second channel.
 _SILENCE_NS: Final = 10_000_000_000  #: Shortest silence that is reported.
-_UNUSUAL: Final = 20
-"""Length of such a silence in mean steps from frame to frame; a sparse log has many."""
+_UNUSUAL: Final = 20  #: Its length in mean steps from frame to frame; a sparse log has many.
 _DAY_NS: Final = 86_400_000_000_000
 _MINUTE_NS: Final = 60_000_000_000
-_STRAY: Final = 16
-"""Largest number of stamps in a row that are held for wrong when later ones go on as before."""
+_STRAY: Final = 16  #: Most stamps in a row that are wrong if later ones go on as before.
 _STEPS: Final = 100  #: Number of steps from which the times of a log can't be trusted.
 _SHOWN: Final = 3  #: Number of steps that are reported one by one.
 
@@ -58,9 +55,8 @@ class OneClock:
                 elif not waiting:
                     waiting.append(frame)
                     self._place = self._where()
-                elif (
-                    len(waiting) < _STRAY
-                    and -_TICK_NS <= frame.time_ns - waiting[-1].time_ns <= _NEAR_NS
+                elif len(waiting) < _STRAY and (
+                    -_TICK_NS <= frame.time_ns - waiting[-1].time_ns <= _NEAR_NS
                 ):
                     waiting.append(frame)
                 else:

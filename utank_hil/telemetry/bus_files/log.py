@@ -20,8 +20,7 @@ _LOOKS: Final[dict[str, re.Pattern[str]]] = {
     "asc": asc.LOOKS,
 }
 _MARKS: Final = {blf.MARK: "blf", mf4.MARK: "mf4"}
-_LOOKED_AT: Final = 1 << 16
-"""Number of characters at the begin of a file from which its format is seen."""
+_LOOKED_AT: Final = 1 << 16  #: Characters at the begin of a file that show its format.
 
 
 def format_of(path: Path) -> str:

@@ -6,8 +6,7 @@ from typing import Final
 from utank_hil.telemetry.bus_files.frame import FD_LENGTHS, BusFrame, FrameKind
 from utank_hil.telemetry.bus_files.text_log import NotUnderstoodError
 
-LOOKS: Final = re.compile(r"Time Stamp,\s*ID,\s*Extended,", re.I)
-"""What the first line of such a log looks like."""
+LOOKS: Final = re.compile(r"Time Stamp,\s*ID,\s*Extended,", re.I)  #: Look of the first line.
 _LINE: Final = re.compile(
     r"\s*(-?\d{1,18}),([0-9A-F]{1,8}),(true|false|[01]),(?:(Rx|Tx),)?(\d{1,3}),(\d{1,2})"
     r"((?:,[0-9A-F]{2})*),*\s*",

@@ -7,8 +7,7 @@ from typing import Final
 from utank_hil.base.text_files import lines_of, open_text
 from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError, FrameKind
 
-LIMIT_BYTES: Final = 1 << 37
-"""Largest text that is read: more than a month of a full bus at 500 kbit/s."""
+LIMIT_BYTES: Final = 1 << 37  #: Largest text: more than a month of a full bus at 500 kbit/s.
 
 
 class NotUnderstoodError(ValueError):

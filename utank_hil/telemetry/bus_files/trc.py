@@ -7,7 +7,7 @@ from utank_hil.telemetry.bus_files.frame import FD_LENGTHS, BusFrame, FrameKind
 from utank_hil.telemetry.bus_files.text_log import NotUnderstoodError
 
 LOOKS: Final = re.compile(r";\$FILEVERSION=|;#{20}|\s*\d+\)\s+\d")
-"""What a line of such a log looks like."""
+"""Look of a line of such a log."""
 _VERSION_1: Final = re.compile(
     r"\s*\d+\)\s+(?P<O>\d+(?:\.\d+)?)\s+(?:(?P<B>\d{1,2})\s+)?(?:(?P<d>Rx|Tx|Warng|Error)\s+)?"
     r"(?P<I>[0-9A-F]{8}|[0-9A-F]{4})\s+(?:-\s+)?(?P<L>\d)(?:\s+(?P<D>.*))?",
