@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 # machines are shared: an example that takes long says nothing about the code
 settings.register_profile("search", deadline=None, print_blob=True)
 # the same examples each time: what lands is not left to chance; `make search` draws new ones
-settings.register_profile("same", settings.get_profile("search"), derandomize=True)
+settings.register_profile("same", settings.get_profile("search"), derandomize=True, max_examples=40)
 settings.register_profile("few", settings.get_profile("same"), max_examples=10)  # make test-fast
 settings.load_profile("same")
 

@@ -315,7 +315,9 @@ def test_bench_whose_results_can_not_be_written_prints_them_all_the_same(
 
     for name in ("_draw", "_record"):
         monkeypatch.setattr(firmware_sim.report, name, full)
-    result = invoke(app, "bench", STORM_ALL, "--duration", "4", "--out", tmp_path)
+    result = invoke(
+        app, "bench", CONFIGS / "scenarios" / "storm_day.yaml", "--duration", "4", "--out", tmp_path
+    )
     assert result.exit_code == 2
     assert "signif." in result.stdout
     for name in ("picture", "recording"):

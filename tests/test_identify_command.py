@@ -1,10 +1,12 @@
 """``utank-hil identify`` from a recording to a configuration, as a user runs it."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import Result
 from typer.testing import CliRunner
 
 from utank_hil.base.arrays import FloatArray
@@ -42,56 +44,59 @@ def _rows(period_s: float, duration_s: float = 300.0) -> FloatArray:
     return np.column_stack([time_s, seen[:, 0], -seen[:, 1], seen[:, 1], command])
 
 
-def _identify(tmp_path: Path, period_s: float) -> tuple[int, dict[str, object]]:
-    write_recording(tmp_path / "log.rrd", COLUMNS, {"run": _rows(period_s)})
-    arguments = [str(tmp_path / "log.rrd"), str(CONFIG), "--out", str(tmp_path / "out"), "--json"]
-    result = CliRunner().invoke(app, ["identify", *arguments, "--order", "60"])
+def identify(log: Path, folder: Path, *more: str) -> Result:
+    arguments = ["identify", str(log), str(CONFIG), "--out", str(folder), "--order", "60", *more]
+    result = CliRunner().invoke(app, arguments)
     assert result.exception is None or isinstance(result.exception, SystemExit)
-    return result.exit_code, json.loads(result.stdout)
+    return result
 
 
-def test_recording_becomes_a_model_a_picture_and_a_configuration(tmp_path: Path) -> None:
-    code, figures = _identify(tmp_path, 9.0)
-    assert code == 0, figures
-    assert figures["accepted"] is True
-    assert figures["roll_period_s"] == pytest.approx(9.0, rel=0.01)
-    assert (tmp_path / "out" / "identification.png").stat().st_size > 10_000
-    config = load_config(tmp_path / "out" / "identified_controller.yaml", ControllerConfig)
+@pytest.fixture(scope="module")
+def accepted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
+    """Folder of a model that was accepted, `out` in it with the results, and what was printed."""
+    folder = tmp_path_factory.mktemp("accepted")
+    write_recording(folder / "log.rrd", COLUMNS, {"run": _rows(9.0)})
+    return folder, identify(folder / "log.rrd", folder / "out")
+
+
+def test_recording_becomes_a_model_a_picture_and_a_configuration(accepted) -> None:
+    folder, result = accepted
+    assert result.exit_code == 0, result.output
+    assert (folder / "out" / "identification.png").stat().st_size > 10_000
+    config = load_config(folder / "out" / "identified_controller.yaml", ControllerConfig)
     given = load_config(CONFIG, ControllerConfig)
     assert config.law == given.law
     assert config.vessel.version != given.vessel.version
     assert config.vessel.ship.natural_frequency_rad_s == pytest.approx(2 * np.pi / 9.0, rel=0.01)
 
 
-def test_refused_model_leaves_reasons_and_no_configuration(tmp_path: Path) -> None:
-    code, figures = _identify(tmp_path, 4.0)
-    assert code == 1
+def test_refused_model_leaves_reasons_and_nothing_of_an_earlier_acceptance(
+    accepted, tmp_path: Path
+) -> None:
+    shutil.copytree(accepted[0] / "out", tmp_path / "out")
+    write_recording(tmp_path / "log.rrd", COLUMNS, {"run": _rows(4.0)})
+    result = identify(tmp_path / "log.rrd", tmp_path / "out", "--json")
+    assert result.exit_code == 1
+    figures = json.loads(result.stdout)
     assert figures["accepted"] is False
     assert figures["reasons"]
-    assert not (tmp_path / "out" / "identified_controller.yaml").exists()
-
-
-def test_refusal_leaves_nothing_of_an_earlier_acceptance(tmp_path: Path) -> None:
-    assert _identify(tmp_path, 9.0)[0] == 0
-    assert _identify(tmp_path, 4.0)[0] == 1
+    assert figures["roll_period_s"] > 0
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["identification.png"]
 
 
-def test_configuration_that_is_read_is_not_written_over(tmp_path: Path) -> None:
-    assert _identify(tmp_path, 9.0)[0] == 0
-    given = tmp_path / "out" / "identified_controller.yaml"
+def test_configuration_that_is_read_is_not_written_over(accepted) -> None:
+    folder, _ = accepted
+    given = folder / "out" / "identified_controller.yaml"
     content = given.read_text()
-    arguments = ["identify", str(tmp_path / "log.rrd"), str(given), "--out", str(tmp_path / "out")]
+    arguments = ["identify", str(folder / "log.rrd"), str(given), "--out", str(folder / "out")]
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 2
     assert "choose another --out" in " ".join(result.stderr.split())
     assert given.read_text() == content
 
 
-def test_tables_hold_what_an_engineer_asks_for(tmp_path: Path) -> None:
-    write_recording(tmp_path / "log.rrd", COLUMNS, {"run": _rows(9.0)})
-    arguments = [str(tmp_path / "log.rrd"), str(CONFIG), "--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(app, ["identify", *arguments, "--order", "60"])
+def test_tables_hold_what_an_engineer_asks_for(accepted) -> None:
+    _, result = accepted
     words = " ".join(result.stdout.split())
     for part in (
         "roll period, s", "± 95 %", "tank damping ratio", "later than configured: roll_rad",

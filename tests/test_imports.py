@@ -143,10 +143,8 @@ PROJECT = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["pro
 @pytest.mark.parametrize(
     "words",
     [
-        ("check", "configs/controllers/constrained_gpc.yaml"),
         ("check", "configs/scenarios/patti_b.yaml"),
         ("check", "configs/ships/patti_b.yaml"),
-        ("run", "configs/controllers/gpc.yaml", "--bus", "any0", "--duration", "0.3"),
         ("run", "configs/controllers/constrained_gpc.yaml", "--bus", "any0", "--duration", "0.3"),
     ],
     ids=" ".join,

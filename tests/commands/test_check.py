@@ -277,7 +277,7 @@ VALUES = st.one_of(
 
 
 @pytest.mark.slow
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_what_loads_can_be_built_and_what_does_not_is_told(tmp_path: Path, data: Any) -> None:
     name = data.draw(st.sampled_from(sorted(CONTENTS)))

@@ -89,7 +89,7 @@ def test_root_mean_square_is_the_mean_of_its_batches_and_differences_add_up():
 
 @pytest.mark.slow
 def test_interval_of_an_hour_holds_the_true_difference_about_as_often_as_it_says():
-    ratios, count, held = (0.025, 0.05), 1000, 0
+    ratios, count, held = (0.025, 0.05), 300, 0
     # white noise: the mean square goes with the inverse of the damping
     many = math.sqrt(np.mean([np.mean(waves(k, 36000.0, 2, 0.05) ** 2) for k in range(300)]))
     true = many * (math.sqrt(ratios[1] / ratios[0]) - 1)
@@ -98,7 +98,7 @@ def test_interval_of_an_hour_holds_the_true_difference_about_as_often_as_it_says
         batches = batch_count({"roll_rad": light})
         difference = paired(rms_batches(heavy, batches), rms_batches(light, batches))
         held += abs(difference.difference - true) <= difference.half_width
-    assert 0.92 <= held / count <= 0.97
+    assert 0.91 <= held / count <= 0.98
 
 
 def test_long_record_has_longer_batches_and_a_short_one_keeps_six():

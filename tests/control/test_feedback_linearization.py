@@ -120,8 +120,8 @@ def test_printed_output_without_a_shift_is_driven_to_the_limits_where_blending_h
     def wave(t):
         return 2e4 * np.sin(frequency * t)
 
-    free = run(unbounded, np.zeros(4), 60.0, wave)[1]
-    held = run(law, np.zeros(4), 60.0, wave)[1]
+    free = run(unbounded, np.zeros(4), 60.0, wave, 0.05)[1]
+    held = run(law, np.zeros(4), 60.0, wave, 0.05)[1]
     assert np.abs(free[:, 2]).max() > TANK.level_limit_m
     assert np.abs(held[:, 2]).max() < TANK.level_limit_m
 

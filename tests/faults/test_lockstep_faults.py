@@ -1,5 +1,6 @@
 """The invariants of docs/safety.md, with the whole bench on a simulated bus."""
 
+from functools import cache
 from itertools import pairwise
 
 import pytest
@@ -165,17 +166,23 @@ def test_fault_of_one_node_ends_at_zero_in_time_and_stays_there(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("lost", [1, 2])
 @pytest.mark.parametrize("victim", ["sensors", "drive", "controller", "panel"])
-def test_one_or_two_lost_ticks_do_not_disarm(victim: str, lost: int) -> None:
+def test_two_lost_ticks_do_not_disarm(victim: str) -> None:
     bench = armed_bench()
     node = getattr(bench, victim)
     node.spoil = dropped()
-    node.begin_ns, node.end_ns = T0, T0 + lost * node.period_ns
+    node.begin_ns, node.end_ns = T0, T0 + 2 * node.period_ns
     bench.run(8)
     assert bench.mode is Mode.ACTIVE
     assert bench.ship.drive.refused == 0
     assert rate_limit_holds(bench)
+
+
+@cache
+def roll_without_a_fault_rad() -> float:
+    bench = armed_bench()
+    bench.run(8)
+    return bench.ship.plant.roll_rad
 
 
 @pytest.mark.slow
@@ -185,13 +192,12 @@ def test_frames_sent_twice_are_taken_once(victim: str) -> None:
 
     It lasts so short that nobody takes them for a second sender's.
     """
-    once, twice = armed_bench(), armed_bench()
+    twice = armed_bench()
     node = getattr(twice, victim)
     node.spoil, node.begin_ns, node.end_ns = doubled, T0, T0 + 80 * MS
-    once.run(8)
     twice.run(8)
     assert twice.mode is Mode.ACTIVE
-    assert twice.ship.plant.roll_rad == pytest.approx(once.ship.plant.roll_rad, abs=1e-4)
+    assert twice.ship.plant.roll_rad == pytest.approx(roll_without_a_fault_rad(), abs=1e-4)
 
 
 def test_flood_of_the_bus_ends_at_zero_whoever_notices_first() -> None:
@@ -211,30 +217,21 @@ def test_same_seed_same_trace_byte_for_byte_and_another_seed_another() -> None:
     traces = []
     for seed in (3, 3, 4):
         bench = FaultBench(seed=seed)
-        bench.run(8)
-        traces.append(bench.heard.bytes())
-    assert traces[0] == traces[1]
-    assert traces[0] != traces[2]
-    assert len(traces[0].splitlines()) > 2500
-
-
-def test_same_seed_same_trace_with_a_fault_in_it() -> None:
-    traces = []
-    for _ in range(2):
-        bench = FaultBench(seed=5)
         bench.sensors.spoil = dropped(SensorMotion)
         bench.sensors.begin_ns, bench.sensors.end_ns = 4 * SECOND, 5 * SECOND
         bench.run(7)
         traces.append(bench.heard.bytes())
     assert traces[0] == traces[1]
+    assert traces[0] != traces[2]
+    assert len(traces[0].splitlines()) > 2000
 
 
 @pytest.mark.slow
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(seed=st.integers(0, 2**31), controller=st.sampled_from(sorted(storm().controllers)))
 def test_drive_never_refuses_a_frame_of_a_fault_free_run(seed: int, controller: str) -> None:
     bench = FaultBench(seed=seed, controller=controller)
-    bench.run(30)
+    bench.run(15)
     assert bench.mode is Mode.ACTIVE
     assert bench.ship.drive.refused == 0
     assert rate_limit_holds(bench)
@@ -264,7 +261,7 @@ failures = st.lists(
 
 
 @pytest.mark.slow
-@settings(max_examples=25)
+@settings(max_examples=15)
 @given(script=scripts, failures=failures, seed=st.integers(0, 100))
 def test_invariants_hold_under_paired_faults_and_any_operator(script, failures, seed: int) -> None:
     timed = tuple(TimedAction(tenths / 10, action) for tenths, action in script)

@@ -38,7 +38,7 @@ def cached_run_of(name: str, controller: str) -> Run:
     return run_of(name, controller)
 
 
-@pytest.mark.evidence("dpc", "dpc-roll")
+@pytest.mark.evidence
 @pytest.mark.parametrize("controller", ["dpc", "dpc-roll", "gpc-roll"])
 def test_retuned_after_the_loading_changed_the_ship_rolls_a_third_less(controller: str) -> None:
     run = cached_run_of("adaptive.yaml", controller)

@@ -12,22 +12,16 @@ from firmware_sim.scenario import Scenario
 from utank_hil.canbus import Mode
 from utank_hil.configuration import load_config
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.evidence, pytest.mark.timeout(900)]
 
 SCENARIO = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
 
 
-@pytest.fixture(
-    scope="module",
-    params=[
-        pytest.param((SCENARIO.seed, SCENARIO.duration_s), id="hour", marks=pytest.mark.evidence),
-        pytest.param((2, 400.0), id="minutes"),
-    ],
-)
-def runs(request: pytest.FixtureRequest) -> dict[str, Run]:
-    """The whole hour, and seven minutes of another."""
+@pytest.fixture(scope="module")
+def runs() -> dict[str, Run]:
+    """The whole hour."""
     assert SCENARIO.duration_s == 3600
-    jobs = jobs_of(SCENARIO, *request.param)
+    jobs = jobs_of(SCENARIO, SCENARIO.seed, SCENARIO.duration_s)
     return {job.name: run_lockstep(job) for job in jobs if job.name in ("passive", "dpc", "gpc")}
 
 

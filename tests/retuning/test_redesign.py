@@ -244,7 +244,7 @@ def assert_stable_or_refused(kind: str, at: float, much: float, period_s: float)
     assert closed_loop_radius(law, plant) < 1
 
 
-@settings(max_examples=8, phases=UNSHRUNK)
+@settings(max_examples=3, phases=UNSHRUNK)
 @spoiled_records
 @example("late", 0.0, 1.0, 7.5)
 @example("scaled", 1.0, 1.0, 10.0)

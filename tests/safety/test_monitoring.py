@@ -295,7 +295,7 @@ def test_a_sensor_that_is_silent_for_good_is_not_a_gap() -> None:
     assert not found & {Finding.UNWATCHED, Finding.UNWATCHED_LONG}
 
 
-@pytest.mark.parametrize("silent_s", [5.0, 20.0, 400.0])
+@pytest.mark.parametrize("silent_s", [5.0, 60.0])
 @pytest.mark.parametrize("before_s", [0.02, 12.0])
 def test_sensors_that_come_or_come_back_after_a_silence_were_no_gap(
     before_s: float, silent_s: float

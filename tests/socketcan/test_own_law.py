@@ -10,7 +10,7 @@ from two_processes import Watcher, patient_controller, run_controller, run_ship,
 from utank_hil.canbus import DriveState, Fault, Mode
 from utank_hil.console.exit_codes import ExitCode
 
-pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.socketcan, pytest.mark.evidence, pytest.mark.timeout(900)]
 
 STORM = Path("configs/scenarios/storm.yaml")
 SOURCE = """
@@ -79,12 +79,7 @@ def until_it_ends(
 @pytest.mark.parametrize(
     ("flaw", "faults", "error"),
     [
-        pytest.param(
-            "raises",
-            {Fault.INTERNAL},
-            "ZeroDivisionError: of our own",
-            marks=pytest.mark.evidence,
-        ),
+        ("raises", {Fault.INTERNAL}, "ZeroDivisionError: of our own"),
         # the drive stops by its own command timeout while the law sleeps
         ("sleeps", {Fault.OVERRUN, Fault.DRIVE_FAULT, Fault.DRIVE_SILENT}, ""),
     ],

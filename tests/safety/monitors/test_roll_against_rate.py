@@ -29,7 +29,7 @@ def found_after(fault, until_s: float = 60.0, roll_deg: float = 0.5) -> dict[Fin
 
 def test_a_ship_that_rolls_in_health_is_left_alone() -> None:
     for roll_deg in (0.0, 0.5, 8.0):
-        assert not found_after(lambda _, *sample: sample, 600.0, roll_deg)
+        assert not found_after(lambda _, *sample: sample, 150.0, roll_deg)
 
 
 @pytest.mark.parametrize("share", [-1.0, 0.4, 1.0])

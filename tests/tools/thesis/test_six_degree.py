@@ -103,20 +103,20 @@ def test_with_the_other_motions_held_it_is_the_roll_model(lx):
     start[[3, 9, 12, 13]] = state0 = np.array([0.25, 0.0, 1.0, 0.0])
     _, state = simulate_six_degree(
         SixDegreeModel(replace(SHIP, roll=roll), tank, free=("roll",)),
-        60.0,
+        30.0,
         start,
         pressure_pa=pressure,
         force=force,
-        samples=121,
+        samples=61,
         tolerance=1e-12,
     )
     run = simulate_reference(
         RollModel(roll, tank),
-        60.0,
+        30.0,
         state0,
         pressure_pa=pressure,
         wave_moment_nm=lambda t: 5e6 * np.cos(0.4 * t),
-        samples=121,
+        samples=61,
     )
     assert run.impacts == ()
     np.testing.assert_allclose(state[:, [3, 9, 12, 13]], run.state, atol=1e-9)

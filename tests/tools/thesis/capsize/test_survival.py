@@ -76,6 +76,7 @@ def test_valve_command_is_a_loss():
     assert result.max_level_m < 0.05
 
 
+@pytest.mark.evidence
 def test_bisection_agrees_with_the_scan_for_the_passive_tank_and_its_capsize_time():
     def survives(amplitude):
         wave = WaveMoment([amplitude], [WAVE_RAD_S], [0.0])
