@@ -86,7 +86,7 @@ def _lockstep_run(
     return Run(
         job.name,
         side_by_side(log.rows, truth_log.rows),
-        lockstep.bus.statistics(lockstep.now_ns).load,
+        lockstep.bus.load(lockstep.now_ns),
         *ship_figures(ship, truth),
         retuning=controller.law.events,
         fallbacks=controller.law.fallbacks,

@@ -66,7 +66,7 @@ class FaultyBus:
     def __init__(self, bit_rate: int = 250_000, seed: int = 1) -> None:
         self._bus = SimulatedBus(bit_rate)
         #: Method of `SimulatedBus`; destroyed transmissions count as frames.
-        self.statistics = self._bus.statistics
+        self.load = self._bus.load
         self._draw = random.Random(seed).random
         self.disturbances: list[Disturbance] = []
         #: Share of the transmissions that are destroyed, for one sender or for all.

@@ -50,7 +50,7 @@ def test_same_seed_same_trace_byte_for_byte(seed):
     trace, run = random_run(seed, [50 * MS])
     again, rerun = random_run(seed, [50 * MS])
     assert trace == again
-    assert run.bus.statistics(50 * MS) == rerun.bus.statistics(50 * MS)
+    assert run.bus.load(50 * MS) == rerun.bus.load(50 * MS)
 
 
 def test_different_seeds_give_different_traces():
@@ -63,7 +63,7 @@ def test_run_in_slices_equals_run_in_one_go(seed, cuts):
     whole, run = random_run(seed, [50 * MS])
     sliced, rerun = random_run(seed, [*(BIT_NS * cut for cut in sorted(cuts)), 50 * MS])
     assert sliced == whole
-    assert run.bus.statistics(50 * MS) == rerun.bus.statistics(50 * MS)
+    assert run.bus.load(50 * MS) == rerun.bus.load(50 * MS)
     assert run.now_ns == rerun.now_ns == 50 * MS
 
 

@@ -43,7 +43,7 @@ def traffic(found, seconds=3):
     ship = build_ship_side(found, 1, ())
     run = Lockstep(list(ship.nodes), trace=trace)
     run.run_until(seconds * SECOND_NS)
-    return heard, run.bus.statistics(seconds * SECOND_NS).load
+    return heard, run.bus.load(seconds * SECOND_NS)
 
 
 def census(messages, vessel=None, bit_rate=250_000):

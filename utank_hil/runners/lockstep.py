@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from utank_hil.canbus.frame import Frame
-from utank_hil.runners.bus_model import BusStatistics, SimulatedBus
+from utank_hil.runners.bus_model import SimulatedBus
 from utank_hil.runners.group import NodeGroup
 from utank_hil.runners.node import Node
 
@@ -26,8 +26,8 @@ class Bus(Protocol):
     def carry_until(self, before_ns: int) -> list[tuple[int, int, Frame]]:
         """Advance, and return what has arrived: time, sender, frame."""
 
-    def statistics(self, now_ns: int) -> BusStatistics:
-        """Return the traffic since time 0."""
+    def load(self, now_ns: int) -> float:
+        """Return the bus load, 0 to 1, since time 0."""
 
 
 class Lockstep:

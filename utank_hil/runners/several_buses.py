@@ -1,7 +1,7 @@
 """Several simulated buses between the same nodes."""
 
 from utank_hil.canbus.frame import BUS_SHIFT, OTHER_BUS, Frame
-from utank_hil.runners.bus_model import BusStatistics, SimulatedBus
+from utank_hil.runners.bus_model import SimulatedBus
 from utank_hil.runners.lockstep import Bus
 
 
@@ -35,9 +35,9 @@ class SeveralBuses:
         ]
         return sorted(arrived, key=lambda each: each[0])
 
-    def statistics(self, now_ns: int) -> BusStatistics:
-        """Return the traffic on the controller's own bus."""
-        return self._buses[0].statistics(now_ns)
+    def load(self, now_ns: int) -> float:
+        """Return the load of the controller's own bus."""
+        return self._buses[0].load(now_ns)
 
 
 def with_more(first: Bus, more: int, bit_rate: int) -> Bus:

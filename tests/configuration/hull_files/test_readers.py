@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beam_sea import motions, roll_resonance
 from others import others_file
 
 from utank_hil.configuration.hull_files.parts import Given
 from utank_hil.configuration.hull_files.reader import read_hull
 from utank_hil.dynamics.hull.hull_data import HullData
-from utank_hil.dynamics.hull.response import excitation_at, motions, radiation_at, roll_resonance
+from utank_hil.dynamics.hull.response import excitation_at, radiation_at
 
 # centre of buoyancy and volume by WAMIT's own `.out`; the density is that of MSS
 FPSO = Given(1025.0, 1025 * 97960.9, (0.788631, 0.0, -1.0))
@@ -241,8 +242,5 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
         read_hull(tmp_path / "hull.nc")
 
 
-def test_roll_is_not_judged_without_viscous_damping():
-    hull = read_hull(hulls("wamit-fpso/fpso.1"), FPSO)
-    with pytest.raises(ValueError, match="viscous_roll_nms_rad is missing"):
-        roll_resonance(hull)
+def test_viscous_damping_of_a_strip_theory_file_is_read():
     assert roll_resonance(read_hull(hulls("shipx-supply/input.re7"))).viscous_ratio > 5e-4

@@ -1,16 +1,11 @@
 import numpy as np
 import pytest
+from beam_sea import motions, roll_resonance
 from hulls import made_up_hull
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.dynamics.hull.response import (
-    excitation_at,
-    motions,
-    radiation_at,
-    roll_resonance,
-    wave_number,
-)
+from utank_hil.dynamics.hull.response import excitation_at, free_roll, radiation_at, wave_number
 
 MIRROR = np.array([1, -1, 1, -1, 1, -1])
 
@@ -83,4 +78,4 @@ def test_at_resonance_roll_is_effective_slope_over_twice_the_damping():
 
 def test_an_unstable_ship_has_no_roll_period():
     with pytest.raises(ValueError, match="GM must be positive"):
-        roll_resonance(ship(hydrostatic=np.diag([0.0, 0, 5, -1, 9, 0])), 0.05)
+        free_roll(ship(hydrostatic=np.diag([0.0, 0, 5, -1, 9, 0])))

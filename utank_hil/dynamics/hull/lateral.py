@@ -24,13 +24,12 @@ from utank_hil.dynamics.hull.hull_data import TO_BODY_AXES, HullData
 from utank_hil.dynamics.hull.radiation import Radiation, fit_radiation
 from utank_hil.dynamics.hull.response import (
     excitation_at,
-    radiation_at,
-    roll_resonance,
+    free_roll,
     wave_number,
 )
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.water import water_moments
 
 LATERAL = np.array([1, 3, 5])
@@ -74,8 +73,8 @@ class LateralHull:
         )
 
     def radiated_nms_rad(self) -> float:
-        """Return the linear damping of free roll that radiation accounts for."""
-        found = roll_resonance(self.data, viscous_ratio=0.0)
+        """Linear damping of free roll that radiation accounts for."""
+        found = free_roll(self.data)
         stiffness = self.stiffness_nm_rad
         return found.radiation_ratio * stiffness * found.period_s / math.pi
 
@@ -156,48 +155,6 @@ class LateralModel:
         """Directions, square of the frequency, and losses, shape (n, 7)."""
         found = self.hull.radiation
         return np.column_stack([found.direction, found.frequency_rad_s**2, found.loss])
-
-    def response(
-        self, omega_rad_s: float, force: ComplexArray, *, fitted: bool = False
-    ) -> ComplexArray:
-        """Return sway, roll, yaw and level in the linear frequency domain, shape (4,).
-
-        Parameters
-        ----------
-        omega_rad_s : float
-            Frequency of encounter.
-        force : ndarray, shape (3,)
-            Sway force, roll and yaw moment.
-        fitted : bool
-            Whether radiation is that of the fitted memory, not of the data.
-        """
-        if fitted:
-            found = self.hull.radiation
-            memory = found.memory(np.array([omega_rad_s]))[0]
-            radiated = -(omega_rad_s**2) * found.infinite_added_mass + 1j * omega_rad_s * memory
-        else:
-            added, damping = (_lateral(m) for m in radiation_at(self.hull.about_g, omega_rad_s))
-            radiated = -(omega_rad_s**2) * added + 1j * omega_rad_s * damping
-        matrix = np.zeros((4, 4), dtype=np.complex128)
-        matrix[:3, :3] = radiated - omega_rad_s**2 * self.hull.rigid_mass
-        water, tank = water_moments(self.tank, 0.0), self.tank
-        area, density = tank.reservoir_area_m2, tank.density_kg_m3
-        mass = np.zeros((4, 4))
-        mass[0, 0] = water.mass_kg
-        mass[0, 1] = -water.first_kgm[2]
-        mass[0, 2] = water.first_kgm[0]
-        mass[1:3, 1:3] = water.inertia_kgm2[np.ix_([0, 2], [0, 2])]
-        mass[0, 3] = water.first_slope_kg[1]
-        mass[1:3, 3] = water.swirl_kgm[[0, 2]]
-        mass[3, 3] = density * area * tank.effective_length_m
-        matrix -= omega_rad_s**2 * (np.triu(mass) + np.triu(mass, 1).T)
-        matrix[1, 1] += self.ship.stiffness_nm_rad + GRAVITY_M_S2 * water.first_kgm[2]
-        matrix[1, 1] += 1j * omega_rad_s * self.viscous_nms_rad
-        matrix[1, 3] -= GRAVITY_M_S2 * water.first_slope_kg[1]
-        matrix[3, 1] = matrix[1, 3]
-        matrix[3, 3] += 2 * density * GRAVITY_M_S2 * area
-        matrix[3, 3] += 1j * omega_rad_s * area * tank.loss_pa_per_m_s
-        return np.asarray(np.linalg.solve(matrix, np.append(force, 0.0)))
 
 
 def _lateral(matrix: FloatArray) -> FloatArray:

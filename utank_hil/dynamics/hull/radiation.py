@@ -18,6 +18,7 @@ import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
 
+_OSCILLATORS = 3  # Number for each motion.
 _START_RATIO = 0.5
 """Damping ratio of the oscillators before the fit; radiation of hulls is a broad hump."""
 _MOST_STEPS = 200
@@ -35,19 +36,12 @@ class Radiation:
     #: of the diagonal's greatest damping.
     error: float
 
-    def memory(self, omega_rad_s: FloatArray) -> ComplexArray:
-        """Return K(i w), shape (k, m, m)."""
-        answer = _answer(omega_rad_s, self.frequency_rad_s, self.loss, self.direction)
-        found = 1j * omega_rad_s[:, None, None] * (self.direction.T @ answer)
-        return np.asarray(found, dtype=np.complex128)
-
 
 def fit_radiation(
     omega_rad_s: FloatArray,
     added_mass: FloatArray,
     damping: FloatArray,
     infinite_added_mass: FloatArray | None = None,
-    oscillators: int = 3,
 ) -> Radiation:
     """Fit oscillators to added mass and damping, by least squares.
 
@@ -57,13 +51,11 @@ def fit_radiation(
         At the frequencies `omega_rad_s`, symmetric.
     infinite_added_mass : ndarray, shape (m, m), optional
         Limit of the added mass; without it the one that fits best.
-    oscillators : int
-        Number for each of the m motions.
     """
     from scipy.optimize import least_squares
 
     size = added_mass.shape[1]
-    count = size * oscillators
+    count = size * _OSCILLATORS
     # Each motion in a unit in which its largest damping is 1.
     unit = np.sqrt(np.max(np.einsum("kaa->ka", damping), axis=0))
     scale = unit[:, None] * unit[None, :]
@@ -110,9 +102,9 @@ def fit_radiation(
         return flat(np.concatenate(shapes, axis=1)).T
 
     low, high = np.log(omega_rad_s[0]), np.log(omega_rad_s[-1])
-    centres = low + (high - low) * (np.arange(oscillators) + 1) / (oscillators + 1)
+    centres = low + (high - low) * (np.arange(_OSCILLATORS) + 1) / (_OSCILLATORS + 1)
     centres = np.tile(centres, size)
-    own = np.repeat(np.eye(size), oscillators, axis=0)
+    own = np.repeat(np.eye(size), _OSCILLATORS, axis=0)
     start = [own, own * np.sqrt(2 * _START_RATIO * np.exp(centres))[:, None], centres]
     if infinite_added_mass is None:
         start.append(limit[upper])

@@ -1,17 +1,13 @@
-"""Motions of a hull in regular waves, and what they say of roll at its resonance.
+"""Radiation and excitation of a hull between the points of its data, and its free roll.
 
 At the frequency of free roll w, the undamped mode v of sway, roll and yaw (v = 1 in roll) turns the
 coupled equations into one of roll alone, ``C44`` its stiffness::
 
-    w^2 = C44 / (v (M + A) v),    zeta = w v B v / (2 C44),    r = v X / (C44 slope)
-
-r is the effective wave slope in a beam sea. The share of sway is that of ``-g slope`` in the
-lateral acceleration of the centre of gravity: 1 where the ship moves as the water does.
+    w^2 = C44 / (v (M + A) v),    zeta = w v B v / (2 C44)
 """
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -25,19 +21,12 @@ _MOST_TURN_DEG = 45.0
 """Between headings farther apart than this, forces are not known: seakeeping runs have 10 to 30."""
 
 
-@dataclass(frozen=True, slots=True)
-class RollResonance:
-    """Roll of a hull about its resonance in a beam sea from starboard."""
+class FreeRoll(NamedTuple):
+    """Free roll of a hull, with the damping of the waves that it radiates."""
 
     period_s: float  #: Natural period, sway and yaw free.
-    radiation_ratio: float  #: Damping ratio by waves.
-    viscous_ratio: float  #: Damping ratio by what else the data hold.
-    effective_slope: float  #: Size of the roll moment per stiffness times wave slope.
-    effective_slope_phase_rad: float  #: Lead of that moment.
-    #: Lateral acceleration of the centre of gravity per minus g times slope, with `viscous_ratio`
-    #: or the ratio that was given.
-    sway_share: float
-    sway_phase_rad: float  #: Lead of that acceleration.
+    radiation_ratio: float  #: Damping ratio.
+    mode: FloatArray  #: shape (3,): sway, roll and yaw, 1 in roll.
 
 
 def wave_number(omega_rad_s: FloatArray, depth_m: float, gravity_m_s2: float) -> FloatArray:
@@ -84,37 +73,11 @@ def excitation_at(hull: HullData, omega_rad_s: float, heading_deg: float) -> Com
     return np.asarray(_between(around, force, heading), dtype=np.complex128)
 
 
-def motions(
-    hull: HullData, omega_rad_s: float, heading_deg: float, roll_damping_nms_rad: float
-) -> ComplexArray:
-    """Return the motions about `hull.reference_m` per metre of wave at rest, shape (6,), m and rad.
-
-    Parameters
-    ----------
-    roll_damping_nms_rad : float
-        Linear damping B44 besides radiation: data of potential theory have none.
-    """
-    added, damping = radiation_at(hull, omega_rad_s)
-    damping = damping.copy()
-    damping[3, 3] += roll_damping_nms_rad
-    matrix = (
-        -(omega_rad_s**2) * (hull.mass_matrix + added)
-        + 1j * omega_rad_s * damping
-        + hull.known("hydrostatic")
-    )
-    return np.asarray(np.linalg.solve(matrix, excitation_at(hull, omega_rad_s, heading_deg)))
-
-
-def roll_resonance(hull: HullData, viscous_ratio: float | None = None) -> RollResonance:
-    """Return roll at its resonance in a beam sea, ship at rest.
+def free_roll(hull: HullData) -> FreeRoll:
+    """Return the free roll of the ship at rest.
 
     ValueError is raised if mass, inertia, centre of gravity, restoring or a frequency is not in the
-    data, the ship is not stable upright, or there is no viscous damping.
-
-    Parameters
-    ----------
-    viscous_ratio : float, optional
-        Share of critical damping besides radiation; without it that of the data.
+    data, or the ship is not stable upright.
     """
     ship = hull.about_gravity_centre()
     stiffness = float(ship.known("hydrostatic")[3, 3])
@@ -129,27 +92,7 @@ def roll_resonance(hull: HullData, viscous_ratio: float | None = None) -> RollRe
         if abs(omega - before) < 1e-9 * omega:
             break
     radiated = float(mode @ damping[np.ix_(_LATERAL, _LATERAL)] @ mode)
-    if viscous_ratio is not None:
-        viscous = 2 * viscous_ratio * stiffness / omega
-    elif ship.viscous_roll_nms_rad is not None:
-        viscous = float(np.interp(omega, ship.frequency_rad_s, ship.viscous_roll_nms_rad))
-    else:
-        reason = "viscous_roll_nms_rad is missing, and roll cannot be judged without it"
-        raise ValueError(f"{hull.source}: {reason}")
-    k = float(wave_number(np.array(omega), hull.water_depth_m, hull.gravity_m_s2))
-    slope = -1j * k
-    force = excitation_at(ship, omega, 90.0)[_LATERAL]
-    effective = (mode @ force) / (stiffness * slope)
-    sway = motions(ship, omega, 90.0, viscous)[1] * omega**2 / (hull.gravity_m_s2 * slope)
-    return RollResonance(
-        period_s=2 * math.pi / omega,
-        radiation_ratio=omega * radiated / (2 * stiffness),
-        viscous_ratio=omega * viscous / (2 * stiffness),
-        effective_slope=float(abs(effective)),
-        effective_slope_phase_rad=float(np.angle(effective)),
-        sway_share=float(abs(sway)),
-        sway_phase_rad=float(np.angle(sway)),
-    )
+    return FreeRoll(2 * math.pi / omega, omega * radiated / (2 * stiffness), mode)
 
 
 def _mode(inertia: FloatArray) -> FloatArray:
