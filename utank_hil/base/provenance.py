@@ -80,24 +80,10 @@ def describe(
 ) -> dict[str, Any]:
     """Describe a result, ready for `json.dumps`.
 
-    Parameters
-    ----------
-    configuration : BaseModel
-        What it ran with, as loaded.
-    folder : Path
-        Where the result is written: paths of data files are relative to it.
-    options : mapping of str to any
-        Options and arguments of the command.
-    scenario : BaseModel, optional
-        Whose sea counted, where the configuration is not a scenario itself.
-
-    Returns
-    -------
-    dict
-        ``program``, ``version``, ``commit``, ``date`` (UTC), ``machine``, ``command``, ``options``,
-        ``seed``, ``configuration`` (a file of this content in `folder` loads as what ran),
-        ``scenario_configuration`` if there is one, ``data`` (SHA-256 of the data files that they
-        name).
+    `configuration` is what it ran with, as loaded; `scenario` is that whose sea counted, where the
+    configuration is none itself. Paths of data files are relative to `folder`, where the result is
+    written: a file there of the content ``configuration`` loads as what ran. ``data`` are SHA-256
+    of the data files.
     """
     parts = {"configuration": configuration.model_dump()}
     if scenario is not None:

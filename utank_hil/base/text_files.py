@@ -35,18 +35,9 @@ def open_content(
 ) -> Iterator[BinaryIO]:
     """Open a file, decompressed if it is compressed with gzip.
 
-    TextFileError is raised if it is larger, or compressed content is cut or damaged. OSError is
-    raised if it can't be read.
-
-    Parameters
-    ----------
-    path : Path
-        File to read.
-    limit_bytes : int
-        Largest number of bytes to read from it.
-    on_cut : callable, optional
-        Called with the place where compressed content is cut or damaged; reading then ends there as
-        at the end of the file. Without it that is an error.
+    `on_cut` is called with the place where compressed content is cut or damaged; reading then ends
+    there as at the end of the file. Without it that is an error. TextFileError is raised if it is
+    larger, or compressed content is cut or damaged. OSError is raised if it can't be read.
     """
     with path.open("rb") as file:
         compressed = file.peek(2)[:2] == _GZIP

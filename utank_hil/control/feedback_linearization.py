@@ -92,11 +92,6 @@ class FeedbackLinearization(FeedbackLinearizationDesign):
     ValueError is raised if a parameter is out of its range, the reservoirs end between the soft and
     the hard limit of the level, or the pump does not affect the shifted output within the hard
     limit.
-
-    Parameters
-    ----------
-    frequency_rad_s, ..., kind
-        As in `FeedbackLinearizationDesign`.
     """
 
     _: KW_ONLY

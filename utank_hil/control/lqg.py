@@ -81,19 +81,10 @@ def kalman_predictor(
 
     The errors are those of `design_lqr`.
 
-    Parameters
-    ----------
-    process_covariance : array_like, shape (n, n)
-        Covariance of the white noise w.
-    measurement_covariance : array_like, shape (m, m)
-        Covariance of the white noise v, positive definite.
-
-    Returns
-    -------
-    gain : ndarray, shape (n, m)
-        L.
-    innovation_covariance : ndarray, shape (m, m)
-        Covariance of y(k) - C xhat(k) - D u(k), which is white for the true model and covariances.
+    The white noises w and v have the covariances `process_covariance`, shape (n, n), and
+    `measurement_covariance`, shape (m, m), positive definite. Returns L, shape (n, m), and the
+    covariance of the innovation y(k) - C xhat(k) - D u(k), shape (m, m), which is white for the
+    true model and covariances.
     """
     from scipy.linalg import solve_discrete_are
 
@@ -185,11 +176,8 @@ class LQGController:
     Predicted state, mean of the outputs, last input and newest measurement are kept in one vector,
     so that a step is one product: from it to the next state, mean and input.
 
-    Parameters
-    ----------
-    washout_share : float
-        Weight of the newest sample in the mean that is subtracted from the outputs (`WashoutLaw`);
-        0 for no washout.
+    `washout_share` is the weight of the newest sample in the mean that is subtracted from the
+    outputs (`WashoutLaw`); 0 for no washout.
     """
 
     def __init__(self, law: LQGLaw, washout_share: float = 0.0) -> None:

@@ -79,14 +79,8 @@ class SeaModel:
     ) -> "SeaModel":
         """Return the model of a sea that is given by the density of its effective slope.
 
-        Parameters
-        ----------
-        omega_rad_s : ndarray, shape (F,)
-            Increasing, positive; F > 1.
-        slope_density : ndarray, shape (F,)
-            One-sided, rad^2 per rad/s.
-        **settings
-            Other parameters of the model.
+        The frequencies, shape (F,), F > 1, are positive and increasing; the density is one-sided,
+        in rad^2 per rad/s; `settings` are other parameters of the model.
         """
         density = 2 * np.pi * slope_density / (omega_rad_s**2 / GRAVITY_M_S2) ** 2
         return cls(

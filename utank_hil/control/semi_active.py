@@ -83,13 +83,8 @@ class OnOffValve:
 class ClippedValve:
     """A valve that replaces a pump as far as it can provide another law's pressure.
 
-    Parameters
-    ----------
-    pump : Controller
-        One input. Its `applied` receives the actual pressure of the valve.
-    measured : int, optional
-        Number of measurements, the last of which is the level rate, that belong to the pump law;
-        all by default.
+    `pump` has one input; its `applied` receives the actual pressure of the valve. The first
+    `measured` of the measurements belong to it, by default all; the last one is the level rate.
     """
 
     def __init__(self, valve: ValveRange, pump: Controller, measured: int | None = None) -> None:

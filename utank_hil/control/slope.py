@@ -19,12 +19,8 @@ STEP: Final = 1e-6
 def slope_at_rest(controller: Callable[[], Controller], inputs: int) -> GainLaw:
     """Linearize a law at rest, as a law of constant gain.
 
-    Parameters
-    ----------
-    controller : callable
-        Makes a controller at rest, whose first command depends on its first measurement alone.
-    inputs : int
-        Number of measurements of the law.
+    The first command of the controller must depend on its first measurement alone. ValueError is
+    raised if the slope is not finite.
     """
     columns = []
     for push in STEP * np.eye(inputs):

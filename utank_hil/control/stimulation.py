@@ -90,11 +90,6 @@ class Stimulation(StimulationDesign):
 
     ValueError is raised if a parameter is out of its range, or by the model the amplitude requires
     more pressure or level than is available.
-
-    Parameters
-    ----------
-    amplitude_rad, ..., kind
-        As in `StimulationDesign`.
     """
 
     _: KW_ONLY
@@ -140,12 +135,8 @@ class Stimulation(StimulationDesign):
 class StimulationController:
     """Stepping of a `Stimulation`.
 
-    Attributes
-    ----------
-    passed_limit : str
-        The measurement of `STATES` that passed its limit and ended the stimulation, or empty.
-    amplitude_rad : float
-        Measured amplitude of roll at the wanted period.
+    `passed_limit` is the measurement of `STATES` that passed its limit and ended the stimulation,
+    or empty; `amplitude_rad` is the measured amplitude of roll at the wanted period.
     """
 
     def __init__(self, plan: Stimulation) -> None:

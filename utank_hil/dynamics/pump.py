@@ -238,14 +238,8 @@ def pump_step(
 ) -> PumpState:
     """Advance drive and pump by one step with closed pressure loop.
 
-    Parameters
-    ----------
-    setpoint : float
-        Pressure set-point in Pa, held over the step.
-    flow : float
-        Flow to starboard Q = At dh/dt in m^3/s, held over the step.
-    step_s : float
-        Step, about 20 ms at most.
+    Set-point in Pa and flow to starboard Q = At dh/dt in m^3/s are held over the step, of about 20
+    ms at most.
     """
     target = min(max(setpoint, -c.max_pressure), c.max_pressure)
     change = (target - state.reference_pa) * (1.0 - exp(-step_s / c.reference_lag))

@@ -62,15 +62,7 @@ def greatest_held_pa(model: RollModel, most_pa: float, within_rad: float) -> flo
 
 
 def steady_heel(model: RollModel, pressure_pa: float = 0.0) -> SteadyHeel | None:
-    """Return the rest position on the side of the steady moment; None if the ship capsizes.
-
-    Parameters
-    ----------
-    model : RollModel
-        Ship with its steady moments.
-    pressure_pa : float
-        Held pressure of the pump.
-    """
+    """Return the rest position on the side of the steady moment; None if the ship capsizes."""
     side = float(np.sign(_at_rest(model, np.zeros(1), pressure_pa)[0][0]))
     if side == 0:
         return SteadyHeel(0.0, False)

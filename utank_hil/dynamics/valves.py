@@ -122,14 +122,9 @@ def air_valve_loss(
 
     It adds to the tank's quadratic loss.
 
-    Parameters
-    ----------
-    pipe_area_m2 : float
-        Area of the pipe with its valve fully open.
-    opening : float
-        Open fraction of that area, above 0 and up to 1.
-    discharge_coefficient : float
-        Contraction of the jet; 0.6 for a sharp edge.
+    `opening` is the open fraction, above 0 and up to 1, of the pipe's area; `discharge_coefficient`
+    is the contraction of the jet, 0.6 for a sharp edge. ValueError is raised if an argument is out
+    of its range.
     """
     _check_opening(opening)
     for name, value in (

@@ -37,18 +37,9 @@ class LagRegression:
     Coefficients have shape (n, m), n = r + p q + d: beta_0 transposed, then alpha_i and beta_i
     transposed for each lag i = 1..p, then the rows of the basis.
 
+    `z`, shape (N, q), holds outputs and inputs, the outputs first; a row with a value that is not
+    finite is a gap. `basis`, shape (d, N), is the disturbance basis at every sample.
     IdentificationError is raised if no segment is longer than the order.
-
-    Parameters
-    ----------
-    z : ndarray, shape (N, q)
-        Outputs and inputs; a row with a value that is not finite is a gap.
-    outputs : int
-        Number m of leading channels that are outputs.
-    order : int
-        Order p of the model.
-    basis : ndarray, shape (d, N)
-        Disturbance basis at every sample.
     """
 
     def __init__(self, z: FloatArray, outputs: int, order: int, basis: FloatArray) -> None:

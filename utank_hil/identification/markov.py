@@ -19,12 +19,8 @@ from utank_hil.control.arx import ARX
 def markov_parameters(arx: ARX, count: int) -> tuple[FloatArray, FloatArray]:
     """Return K = `count` Markov parameters of the system and of the observer gain.
 
-    Returns
-    -------
-    markov : ndarray, shape (K, m, r)
-        Parameters of the system: ``markov[0]`` is D, ``markov[k]`` is C A^(k-1) B.
-    observer_gain : ndarray, shape (K - 1, m, m)
-        Parameters of the observer: ``observer_gain[k - 1]`` is C A^(k-1) K.
+    The parameters of the system, shape (K, m, r), are D, then C A^(k-1) B; those of the observer,
+    shape (K - 1, m, m), C A^(k-1) K.
     """
     p, m, r = arx.order, arx.outputs, arx.inputs
     # Both recursions run at once, newest first, so that the last p responses are contiguous.

@@ -87,14 +87,9 @@ def fit_motion(
 ) -> MotionFit:
     """Fit ship and wave moment to a record.
 
-    Parameters
-    ----------
-    motion : ndarray, shape (N, 3)
-        Roll in rad, roll rate in rad/s and level in m, without gaps.
-    plant : DesignPlant
-        Ship of the prior, and the tank.
-    spread : tuple of float
-        Standard deviations of the prior.
+    `motion`, shape (N, 3), is roll in rad, roll rate in rad/s and level in m, without gaps. The
+    plant has the ship of the prior, and the tank; `spread` are the standard deviations of the
+    prior.
     """
     natural = plant.ship.natural_frequency_rad_s
     record = _Record(motion, plant, sample_time_s, BAND[1] * natural)

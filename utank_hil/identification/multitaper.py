@@ -22,12 +22,8 @@ def coefficients(
 ) -> ComplexArray:
     """Spectral coefficients, (m, tapers, F); their squares are one-sided density per rad/s.
 
-    Parameters
-    ----------
-    signals : ndarray, shape (N, m)
-        Signals without gaps; a straight line is subtracted from each.
-    omega_rad_s : ndarray, shape (F,)
-        Frequencies below the Nyquist frequency.
+    The signals, shape (N, m), have no gaps; a straight line is subtracted from each. The
+    frequencies, shape (F,), are below the Nyquist frequency.
     """
     count = len(signals)
     time = np.linspace(-1.0, 1.0, count)

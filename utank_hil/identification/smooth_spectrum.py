@@ -35,12 +35,8 @@ class LogSpectrum(NamedTuple):
 class SmoothSpectrum:
     """Finds the spectrum behind estimates at given frequencies.
 
-    Parameters
-    ----------
-    omega_rad_s : ndarray, shape (F,)
-        Frequencies, positive; the estimates there are taken as independent.
-    tapers : int
-        Averages K in each estimate.
+    The frequencies, shape (F,), are positive, and the estimates there are taken as independent;
+    each is the average of K `tapers`.
     """
 
     def __init__(self, omega_rad_s: FloatArray, tapers: int) -> None:

@@ -4,12 +4,7 @@
 class NodeError(RuntimeError):
     """A node raised; the original exception is the `__cause__`.
 
-    Attributes
-    ----------
-    node_name : str
-        The node that raised.
-    time_ns : int
-        The time that the node had been handed, nanoseconds.
+    `node_name` is the node that raised, `time_ns` the time that it was handed.
     """
 
     def __init__(self, node_name: str, method: str, time_ns: int, cause: Exception) -> None:

@@ -23,21 +23,8 @@ Receive = Callable[[Frame, int], None]
 class NodeGroup:
     """The nodes of one runner, in the order given.
 
+    `names` are by sender index; `next_tick_ns` is the time at which the next node is due.
     ValueError is raised if there is no node, a name comes twice, or a period is not positive.
-
-    Parameters
-    ----------
-    nodes : sequence of Node
-        At least one; names must differ, periods must be positive.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Names by sender index.
-    base_period_ns : int
-        Greatest common divisor of the nodes' periods.
-    next_tick_ns : int
-        Time at which the next node is due.
     """
 
     def __init__(self, nodes: Sequence[Node]) -> None:

@@ -33,21 +33,8 @@ class Bus(Protocol):
 class Lockstep:
     """Runs nodes in simulated time.
 
-    Parameters
-    ----------
-    nodes : sequence of Node
-        Names must differ. All tick at the start and every `period_ns` after it.
-    bus : Bus, optional
-        By default a new one of 250 kbit/s.
-    trace : callable, optional
-        Receives every frame before the nodes do, like a logger on the bus.
-
-    Attributes
-    ----------
-    now_ns : int
-        Simulated time; every event before it has happened.
-    bus : Bus
-        The bus between the nodes.
+    By default the bus is a new one of 250 kbit/s. `trace` receives every frame before the nodes do,
+    like a logger on the bus. Every event before `now_ns` has happened.
     """
 
     def __init__(

@@ -67,11 +67,6 @@ def real_time_scheduling(priority: int = PRIORITY) -> Iterator[SchedulingReport]
 
     RuntimeError is raised if there is another Python thread: it would delay ticks whatever the
     permissions. ValueError is raised if the priority is out of range.
-
-    Parameters
-    ----------
-    priority : int
-        SCHED_FIFO priority, 1 to 99.
     """
     if not 1 <= priority <= 99:
         raise ValueError(f"priority {priority}: SCHED_FIFO has 1 to 99")

@@ -31,16 +31,8 @@ class RealTimeLoop:
     order given, and their frames are sent. Last, each sent frame is delivered to the other nodes of
     the group, because the socket does not receive its own frames.
 
-    Parameters
-    ----------
-    nodes : sequence of Node
-        Names must differ. The grid's step is the greatest common divisor of their periods.
-    port : Port, optional
-        The bus; without one the nodes exchange frames among themselves only.
-    statistics : LoopStatistics, optional
-        Where ticks, latencies and frames are counted; new by default.
-    clock : Clock, optional
-        By default the monotonic clock.
+    The grid's step is the greatest common divisor of the nodes' periods. Without a port the nodes
+    exchange frames among themselves only.
     """
 
     def __init__(
@@ -64,15 +56,9 @@ class RealTimeLoop:
         Nodes receive the time of the grid point, not of the wake-up, so that jitter does not enter
         what they integrate or differentiate.
 
-        NodeError is raised if a node raises; the nodes' `stop` is called nevertheless.
-
-        Parameters
-        ----------
-        stop : callable
-            Called before every tick.
-        duration_ns : int, optional
-            Length of the run: it ticks at the start and at every grid point before its end. Points
-            without a tick count as skipped.
+        `stop` is called before every tick. In `duration_ns` the loop ticks at the start and at
+        every grid point before the end; points without a tick count as skipped. NodeError is raised
+        if a node raises; the nodes' `stop` is called nevertheless.
         """
         clock, statistics, period_ns = self._clock, self.statistics, self._group.base_period_ns
         statistics.real_time = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK in _REAL_TIME

@@ -35,14 +35,8 @@ class Histogram:
     Adding takes a few integer operations and allocates no memory. A percentile is at most 1/32
     above the true one and never below it; the maximum is exact.
 
-    Attributes
-    ----------
-    counts : ndarray of int64, shape (bins,)
-        Durations in each bin.
-    recent_ns : int
-        Longest duration since it was last set to zero.
-    max_ns : int
-        Longest duration; 0 if there is none.
+    `recent_ns` is the longest duration since it was last set to zero, `max_ns` the longest of all,
+    0 if there is none.
     """
 
     __slots__ = ("counts", "max_ns", "recent_ns")

@@ -105,17 +105,8 @@ def _after_bits_of(header: int, bits: int, length: int) -> tuple[int, int, Row, 
 def frame_bits(frame: Frame) -> int:
     """Return the number of bits of a frame, with stuff bits and intermission.
 
-    ValueError is raised if the identifier has more than 29 bits or there are more than 8 bytes.
-
-    Parameters
-    ----------
-    frame : Frame
-        Without a number of an interface, 0 to 8 data bytes.
-
-    Returns
-    -------
-    int
-        67 + 8 n bits without stuffing, at most 160 for eight data bytes.
+    They are 67 + 8 n bits without stuffing, and at most 160 for eight data bytes. ValueError is
+    raised if the identifier has more than 29 bits or there are more than 8 bytes.
     """
     can_id, data = frame
     crc_high, crc_low, row, bits = _after_header(can_id, len(data))

@@ -31,19 +31,11 @@ _NEAR_DEG: Final = 0.5
 def load_directional(path: Path, place: tuple[float, float] | None = None) -> MeasuredSpectra:
     """Load the directional spectra of one place.
 
-    ValueError is raised if the file can't be read, holds no spectra, or the place is none of its
-    places. OSError is raised if it can't be opened.
-
-    Parameters
-    ----------
-    place : tuple of float, optional
-        Latitude and longitude in degrees; may be omitted for a file of one place.
-
-    Returns
-    -------
-    MeasuredSpectra
-        With the mean direction and the spread of each band. Heights are those of its bands, without
-        a tail beyond the last one. Spectra without values are left out and named in its notes.
+    `place` is latitude and longitude in degrees, and may be omitted for a file of one place. Each
+    band has its mean direction and spread; heights are those of the bands, without a tail beyond
+    the last one. Spectra without values are left out and named in the notes. ValueError is raised
+    if the file can't be read, holds no spectra, or the place is none of its places. OSError is
+    raised if it can't be opened.
     """
     path.open("rb").close()  # Readers give a less precise reason.
     try:

@@ -55,14 +55,9 @@ class MeasuredSpectra:
     def at(self, time: str | np.datetime64, within_s: float = 0.0) -> Spectrum:
         """Spectrum measured at a time, or nearest to it.
 
-        ValueError is raised if there is none within that time, or the time cannot be parsed.
-
-        Parameters
-        ----------
-        time : str or datetime64
-            Time in UTC, such as ``"2019-02-10T05:40"``.
-        within_s : float
-            Largest distance in time to the nearest measurement.
+        `time` is in UTC, such as ``"2019-02-10T05:40"``; `within_s` is the largest distance in time
+        to the nearest measurement. ValueError is raised if there is none within that time, or the
+        time cannot be parsed.
         """
         wanted = np.datetime64(str(time), "s")
         index = int(np.argmin(np.abs(self.time - wanted)))

@@ -26,17 +26,7 @@ PHILLIPS = 8.1e-3  # Equilibrium-range constant of Pierson and Moskowitz (1964).
 def ittc_density(omega_rad_s: FloatArray, hs_m: float, tp_s: float) -> FloatArray:
     """ITTC two-parameter spectrum (Bretschneider; modified Pierson-Moskowitz), ITTC 1978.
 
-    Parameters
-    ----------
-    omega_rad_s : ndarray
-        Angular frequencies, zero or more.
-    hs_m, tp_s : float
-        Significant wave height and peak period.
-
-    Returns
-    -------
-    ndarray
-        Density S(omega) in m^2 s/rad, shape of `omega_rad_s`.
+    Returns S(omega) in m^2 s/rad at the angular frequencies, zero or more, of any shape.
     """
     _require_positive(hs_m=hs_m, tp_s=tp_s)
     peak = 2 * math.pi / tp_s

@@ -47,16 +47,10 @@ class PassingSea:
     ) -> "PassingSea":
         """Draw the components as `Sea.irregular` does, common to all spectra.
 
-        ValueError is raised if a spectrum has no energy or an argument is out of range.
-
-        Parameters
-        ----------
-        time_s : sequence of float
-            Times of the spectra.
-        heading_rad : sequence of float or ndarray, shape (F,)
-            Mean direction of travel of each spectrum, for all bands or for each band.
-        spreading, components
-            Arguments of `Sea.irregular`.
+        `time_s` are the times of the spectra. `heading_rad` is the mean direction of travel of each
+        spectrum, for all bands or, shape (F,), for each. Other arguments are those of
+        `Sea.irregular`. ValueError is raised if a spectrum has no energy or an argument is out of
+        range.
         """
         energy_m2, omega_rad_s, heading, phase_rad = drawn_components(
             spectra, seed, components, heading_rad, spreading

@@ -169,12 +169,8 @@ class Sea:
     ) -> Harmonics:
         """Wave moment on roll in N m.
 
-        Parameters
-        ----------
-        stiffness_nm_rad : float
-            Restoring stiffness k1 of the ship (`RollShip.stiffness_nm_rad`).
-        effective_slope : EffectiveSlope, optional
-            Effective slope; by default the true slope.
+        `stiffness_nm_rad` is the restoring stiffness k1 of the ship; by default the effective slope
+        is the true one.
         """
         slope = effective_slope or EffectiveSlope()
         moment = slope.moment(self.omega_rad_s, self.heading_rad, stiffness_nm_rad)
@@ -204,10 +200,8 @@ def drawn_components(
 
     The intervals are those of the mean of the spectra, each normalized to a total of one.
 
-    Returns
-    -------
-    energy_m2, omega_rad_s, heading_rad, phase_rad : ndarray
-        Shapes (K, N), (N,), (K, N) and (N,) for K spectra.
+    Returns variances in m^2, frequencies, headings and phases, of shapes (K, N), (N,), (K, N) and
+    (N,) for K spectra.
     """
     if components < 1:
         raise ValueError(f"a sea needs one component or more, got {components}")

@@ -56,14 +56,9 @@ class Spread:
     ) -> FloatArray:
         """Quantiles of the directions of bands, relative to their mean direction.
 
-        Parameters
-        ----------
-        mean_from_deg : ndarray, shape (F,)
-            Mean direction of each band.
-        band : ndarray of int, shape (N,)
-            Band of each quantile; `energy` has the shape (F, D).
-        probability : ndarray, shape (N,)
-            From 0, 180 degrees left of the mean, to 1. Energy is constant within a sector.
+        Means have shape (F,), band and probability of each quantile shape (N,); `energy` has the
+        shape (F, D) and is constant within a sector. The probability goes from 0, 180 degrees left
+        of the mean, to 1.
         """
         offset = np.zeros(len(band))
         for each in np.unique(band):

@@ -53,16 +53,9 @@ def margins(
 ) -> Margins:
     """Margins of the loop that a law with one input closes around a system.
 
-    ValueError is raised if the system has more than one input.
-
-    Parameters
-    ----------
-    system : control.StateSpace or LinearModel
-        Continuous, from the pump pressure to the law's measurements, in its order.
-    delay_s, lag_s : float
-        As in `sampled_model`.
-    with_delay_margin : bool
-        Search for the delay margin too, which takes most of the time.
+    `system` is continuous, from the pump pressure to the law's measurements, in its order;
+    `delay_s` and `lag_s` are as in `sampled_model`. The search for the delay margin takes most of
+    the time. ValueError is raised if the system has more than one input.
     """
     if system.B.shape[1] != 1:
         raise ValueError(f"margins are those of one pump, the model has {system.B.shape[1]} inputs")

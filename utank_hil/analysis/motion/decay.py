@@ -82,14 +82,9 @@ class RollDecay:
 def roll_decay(time_s: FloatArray, roll_rad: FloatArray) -> RollDecay:
     """Evaluate a decay test.
 
-    ValueError is raised if the record is too short or too sparse, heeled beyond its roll, driven or
-    growing.
-
-    Parameters
-    ----------
-    time_s, roll_rad : ndarray, shape (n,)
-        The free decay alone, without pull, release and end of the run. Times rise, even or not;
-        samples that are not finite are left out.
+    The record, shape (n,), is that of the free decay alone, without pull, release and end of the
+    run. Times rise, even or not; samples that are not finite are left out. ValueError is raised if
+    the record is too short or too sparse, heeled beyond its roll, driven or growing.
     """
     known = np.isfinite(time_s) & np.isfinite(roll_rad)
     time, roll = time_s[known], roll_rad[known]

@@ -32,17 +32,9 @@ def _slope(x: FloatArray, p: FloatArray, out: FloatArray) -> None:
 def decay_motion(time: FloatArray, p: FloatArray) -> FloatArray:
     """Return roll and rate, then the derivatives of both, at the samples.
 
-    Parameters
-    ----------
-    time : ndarray, shape (n,)
-    p : ndarray, shape (6,)
-        w0, zeta, b2, k3, first roll and rate.
-
-    Returns
-    -------
-    ndarray, shape (n, 14)
-        Roll, rate, derivatives of roll by the six parameters, derivatives of rate. Infinite from
-        where the roll grows beyond 2 rad.
+    `p`, shape (6,), is w0, zeta, b2, k3, first roll and rate. The result, shape (n, 14), is roll,
+    rate, the derivatives of roll by the six parameters and those of rate; infinite from where the
+    roll grows beyond 2 rad.
     """
     out = np.full((len(time), 14), np.inf)
     x, at, k, total = np.zeros(14), np.zeros(14), np.zeros(14), np.zeros(14)

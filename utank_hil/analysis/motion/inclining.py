@@ -29,16 +29,9 @@ class Inclining(NamedTuple):
 def inclining(moment_nm: FloatArray, heel_rad: FloatArray, displacement_n: float) -> Inclining:
     """Evaluate an inclining test.
 
-    ValueError is raised if there are fewer than five shifts, all to one side, too great a heel, or
-    no stability.
-
-    Parameters
-    ----------
-    moment_nm, heel_rad : ndarray, shape (n,)
-        Heeling moment of each position of the weights (weight times lever) and heel, both positive
-        to the same side.
-    displacement_n : float
-        Weight of the ship.
+    Heeling moment of each position of the weights (weight times lever) and heel, shape (n,), are
+    both positive to the same side; `displacement_n` is the weight of the ship. ValueError is raised
+    if there are fewer than five shifts, all to one side, too great a heel, or no stability.
     """
     if len(moment_nm) < _LEAST_SHIFTS or moment_nm.max() * moment_nm.min() >= 0:
         raise ValueError("an inclining test needs five shifts or more, to both sides")

@@ -26,14 +26,7 @@ WIDTH = 1 / math.sqrt(8 * log(2))
 class FuzzyBasis:
     """Basis of 3^n rules.
 
-    Parameters
-    ----------
-    ranges : sequence of float
-        c_i of the n inputs, each in its unit: the value from which "positive" holds fully.
-
-    Attributes
-    ----------
-    ranges : ndarray, shape (n,)
+    Each of `ranges` is c_i of an input, in its unit: the value from which "positive" holds fully.
     """
 
     def __init__(self, ranges: tuple[float, ...]) -> None:

@@ -36,13 +36,7 @@ _Gamma = Annotated[float, Range(above=0, below=1)]
 
 @dataclass(frozen=True, slots=True)
 class SmallGainFuzzy(FuzzyLaw):
-    """Law (4.20)-(4.22); q above 2.
-
-    Parameters
-    ----------
-    error, ranges, gain_rad_s2_pa, brake_pa_s_m, sample_time_s
-        As in `FuzzyLaw`.
-    """
+    """Law (4.20)-(4.22); q above 2."""
 
     gamma: _Gamma  #: Below 1.
     rho: Positive
@@ -78,13 +72,7 @@ class SmallGainFuzzy(FuzzyLaw):
 
 @dataclass(frozen=True, slots=True)
 class RobustFuzzy(FuzzyLaw):
-    """Law (4.23)-(4.24); q above 1.
-
-    Parameters
-    ----------
-    error, ranges, gain_rad_s2_pa, brake_pa_s_m, sample_time_s
-        As in `FuzzyLaw`.
-    """
+    """Law (4.23)-(4.24); q above 1."""
 
     gamma: _Gamma  #: Below 1.
     epsilon: Positive  #: Softness of the switching term.

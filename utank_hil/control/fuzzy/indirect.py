@@ -31,13 +31,7 @@ from utank_hil.control.fuzzy.law import FuzzyController, FuzzyInputs, FuzzyLaw
 
 @dataclass(frozen=True, slots=True)
 class IndirectFuzzy(FuzzyLaw):
-    """Law (4.25).
-
-    Parameters
-    ----------
-    error, ranges, gain_rad_s2_pa, brake_pa_s_m, sample_time_s
-        As in `FuzzyLaw`.
-    """
+    """Law (4.25)."""
 
     adaptation_f: Positive  #: gamma_f and gamma_g.
     adaptation_g: Positive  #: gamma_f and gamma_g.
@@ -62,12 +56,8 @@ class IndirectFuzzy(FuzzyLaw):
 class IndirectFuzzyController(FuzzyController):
     """Stepping of an `IndirectFuzzy`.
 
-    Attributes
-    ----------
-    drift : ndarray, shape (rules, inputs + 1)
-        A, the consequents of fhat.
-    gain : ndarray, shape (rules,)
-        b, the consequents of ghat.
+    `drift`, shape (rules, inputs + 1), is A, the consequents of fhat; `gain`, shape (rules,), is b,
+    those of ghat.
     """
 
     def __init__(self, law: IndirectFuzzy) -> None:

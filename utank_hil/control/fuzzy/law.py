@@ -87,10 +87,7 @@ class FuzzyController(ABC):
     Parameters adapted before a fault or a disarming may have caused it, so an armed law restarts
     from its initial parameters (`StartsAnew`).
 
-    Attributes
-    ----------
-    passed_limit : str
-        Empty, as the law has no limit that ends it.
+    `passed_limit` is empty, as the law has no limit that ends it.
     """
 
     passed_limit = ""

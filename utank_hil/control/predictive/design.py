@@ -213,11 +213,8 @@ class PredictiveDesign:
 def wave_plant(predictor: Predictor, plant: DesignPlant) -> tuple[LinearModel, FloatArray]:
     """Sampled model of ship, tank, drive and wave moment, and its process noise.
 
-    Returns
-    -------
-    model : LinearModel
-        From the pump's command to `STATES`; ship and tank, wave moment, lag and past commands.
-    process_covariance : ndarray, shape (n, n)
+    The model is from the pump's command to `STATES`, with states of ship and tank, wave moment, lag
+    and past commands; the covariance has shape (n, n).
     """
     a_ship, b_ship = state_matrices(plant.ship, plant.tank)
     pressure, wave = b_ship[:, :1], b_ship[:, 1:]

@@ -34,19 +34,10 @@ def finite_memory_arx(
 
         x(k+1) = A x(k) + B u(k) + w(k),    y(k) = C x(k) + D u(k) + v(k)
 
-    ValueError is raised if the model is not discrete or not stable, or an argument has the wrong
-    shape.
-
-    Parameters
-    ----------
-    system : control.StateSpace or LinearModel
-        Discrete and stable, n states, m outputs.
-    process_covariance : ndarray, shape (n, n)
-        Covariance of the white noise w.
-    measurement_covariance : ndarray, shape (m, m)
-        Covariance of the white noise v, positive definite.
-    order : int
-        p.
+    The model is discrete and stable, with n states and m outputs. The white noises w and v have the
+    covariances `process_covariance`, shape (n, n), and `measurement_covariance`, shape (m, m),
+    positive definite; `order` is p. ValueError is raised if the model is not discrete or not
+    stable, or an argument has the wrong shape.
     """
     from scipy.linalg import solve_discrete_lyapunov
 

@@ -64,11 +64,8 @@ class PredictiveController:
     i = 1 ... p + 1, with zero gains beyond 1 ... p. So the last result stands in front of the rows,
     and a step is still one product. References and the commands of `applied` are not part of a.
 
-    Parameters
-    ----------
-    washout_share : float
-        Weight of the newest sample in the mean that is subtracted from the outputs (`WashoutLaw`);
-        0 for no washout.
+    `washout_share` is the weight of the newest sample in the mean that is subtracted from the
+    outputs (`WashoutLaw`); 0 for no washout.
     """
 
     _ROOM = 512  # steps between two copies

@@ -75,14 +75,9 @@ def rates(
 ) -> None:
     """Write the rates of the state `x` to `out`.
 
-    Parameters
-    ----------
-    force : ndarray, shape (3,)
-        Waves' sway force, roll and yaw moment.
-    pump, valve : float
-        Reservoir area times pressure, and times valve loss.
-    m, q : ndarray, shapes (4, 4) and (4,)
-        Room to work in.
+    `force`, shape (3,), is the waves' sway force, roll and yaw moment; `pump` and `valve` are the
+    reservoir area times pressure, and times valve loss; `m`, shape (4, 4), and `q`, shape (4,), are
+    room to work in.
     """
     phi, roll, h, speed, sway, yaw = x[0], x[1], x[2], x[3], x[5], x[7]
     sin, cos = sine_cosine(phi)
@@ -231,14 +226,8 @@ def advance(
 ) -> None:
     """Advance the state `x` by a step, in place, and add to `books`.
 
-    Parameters
-    ----------
-    p, oscillators, per_piece, restoring
-        Of `LateralModel`.
-    forces : ndarray, shape (3, 3)
-        Waves' forces at start, middle and end of the step.
-    room : ndarray, shape (4, n)
-        Room to work in, n at least that of `x` and 29.
+    The parameters are those of `LateralModel`. `forces`, shape (3, 3), are the waves' at start,
+    middle and end of the step; `room`, shape (4, n), has n of at least the length of `x` and 29.
     """
     count = len(x)
     after = room[2, :count]

@@ -45,12 +45,8 @@ def fit_radiation(
 ) -> Radiation:
     """Fit oscillators to added mass and damping, by least squares.
 
-    Parameters
-    ----------
-    added_mass, damping : ndarray, shape (k, m, m)
-        At the frequencies `omega_rad_s`, symmetric.
-    infinite_added_mass : ndarray, shape (m, m), optional
-        Limit of the added mass; without it the one that fits best.
+    Added mass and damping, shape (k, m, m), are symmetric. Without the limit of the added mass,
+    shape (m, m), the one that fits best is taken.
     """
     from scipy.optimize import least_squares
 
