@@ -7,8 +7,7 @@ import numpy as np
 
 from utank_hil.dynamics.pump import Pump, pump_load, pump_speed
 
-_NODES: Final = 24
-"""Quadrature nodes for each variable. Chosen; no study."""
+_NODES: Final = 24  # Quadrature nodes for each variable. Chosen; no study.
 
 
 def mean_shaft_power_w(

@@ -21,8 +21,7 @@ _WAVES = np.geomspace(0.05, 5.0, 4000)
 class TankFigures:
     """Dimensionless numbers of a tank."""
 
-    #: mass_ratio, coupling_ratio: as in `ShipTankRatios`.
-    mass_ratio: float
+    mass_ratio: float  #: As in `ShipTankRatios`, and the next.
     coupling_ratio: float
     frequency_ratio: float  #: Natural frequency of the water over the ship's roll frequency.
     damping_ratio: float  #: Damping ratio of the water.

@@ -39,8 +39,7 @@ STABILITY_SHARES: Final = (0.04, 0.08, 0.12, 0.16, 0.2, MOST_STABILITY_SHARE)
 FREQUENCY_RATIOS: Final = (0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4)
 """Frequency ratios of a sweep. Chosen; no study."""
 
-_BANDS = 40
-"""Number of bands of the sea's energy in the curves. Chosen; no study."""
+_BANDS = 40  # Number of bands of the sea's energy in the curves. Chosen; no study.
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,16 +29,14 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.dynamics.water import water_moments
 
-STABILITY_SHARE: Final = 0.15
-"""Default share of the ship's stability that the free surface takes."""
+STABILITY_SHARE: Final = 0.15  #: Default share of the ship's stability that the free surface takes.
 LEAST_STABILITY_SHARE: Final = 0.03
 """Least share of stability worth the room; the first ship of the thesis has 0.05."""
 MOST_STABILITY_SHARE: Final = 0.25
 """Greatest share of stability that the free surface may take. Chosen; no study."""
 MOST_MASS_SHARE: Final = 0.04
 """Greatest mass of the water over the displacement. Chosen; no study."""
-LEAST_GM_M: Final = 0.15
-"""Metacentric height that must remain: IS Code 2008, part A, 2.2.4."""
+LEAST_GM_M: Final = 0.15  #: Metacentric height that must remain: IS Code 2008, part A, 2.2.4.
 USABLE_SHARE: Final = 3.85 / 4.88
 """Usable level over the level at which a reservoir is full or empty, as on the first ship."""
 MOST_DUCT_SPEED_M_S: Final = 45.0 / 6.22
@@ -54,10 +52,8 @@ EFFICIENCY: Final = 2.25 / 3.6
 _RESERVOIR_SHARE = 0.2  # greatest breadth of a reservoir over the room's
 _DUCT_SHARE = 0.25  # greatest height of the duct over the room's
 _STILL_SHARE = 0.25  # greatest share of the reservoirs in the water's effective length
-_ROUNDS = 20
-"""Limit on the iterations. Chosen; no study."""
-_TOLERANCE = 1e-3
-"""Relative change at which the iteration ends. Chosen; no study."""
+_ROUNDS = 20  # Limit on the iterations. Chosen; no study.
+_TOLERANCE = 1e-3  # Relative change at which the iteration ends. Chosen; no study.
 
 
 class TankImpossibleError(ValueError):
@@ -120,8 +116,7 @@ class TankCost:
     share_of_displacement: float | None
     stability_taken: float  #: Share of the stability that the free surface takes.
     gm_loss_m: float | None
-    #: water_period_s, damping_ratio: of the water in the ship held still.
-    water_period_s: float
+    water_period_s: float  #: Of the water in the ship held still, as the next.
     damping_ratio: float
     usable_level_m: float  #: As the function `usable_level_m`.
     slope_capacity_rad: float  #: Effective wave slope that the usable level holds.

@@ -19,10 +19,8 @@ NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+
 """A decimal number as any program writes it; no infinity, no underscores, no other digits."""
 _NO_DATE_S: Final = 1e7
 """Seconds below which a number beside dates is none: no measurement is of the year 1970."""
-_MISSING: Final = ("", "nan")
-"""Fields, in small letters, that stand for no value."""
-_TIME: Final = "time"
-"""Beginning, in small letters, of the names of columns that may hold dates."""
+_MISSING: Final = ("", "nan")  # Fields, in small letters, that stand for no value.
+_TIME: Final = "time"  # Beginning, in small letters, of the names of columns that may hold dates.
 
 
 def read_number_table(path: Path) -> dict[str, FloatArray]:

@@ -41,8 +41,7 @@ class ParameterError(ValueError):
 class Range:
     """Annotation of a number: where it must lie."""
 
-    #: least, most: bounds, themselves allowed.
-    least: float = -math.inf
+    least: float = -math.inf  #: Bounds, themselves allowed: this and the next.
     most: float = math.inf
     #: above, below: bounds that are not themselves allowed, instead of `least` and `most`.
     above: float | None = None

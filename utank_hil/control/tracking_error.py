@@ -19,8 +19,8 @@ from utank_hil.base.parameters import Positive, range_problems, refuse
 class ErrorDynamics:
     """Wanted error dynamics and their Lyapunov function e' P e / 2."""
 
-    frequency_rad_s: Positive  #: w and zeta.
-    damping_ratio: Positive  #: w and zeta.
+    frequency_rad_s: Positive  #: w.
+    damping_ratio: Positive  #: zeta.
     q: Positive  #: Factor of Q = q I.
 
     def __post_init__(self) -> None:

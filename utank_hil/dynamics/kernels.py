@@ -26,8 +26,7 @@ CAPSIZED_S, MAX_ROLL, MAX_LEVEL, STRIKES, MAX_IMPULSE, STRIKE_LOSS, DAMPED_AROUN
 SUMMARY = 7
 
 State = tuple[float, float, float, float]
-InStep = tuple[float, float, float]
-"""Values of a quantity at start, middle and end of a step."""
+InStep = tuple[float, float, float]  #: Values of a quantity at start, middle and end of a step.
 NO_SWAY = (0.0, 0.0, 0.0)
 # No kernel reorders or fuses sums (`fastmath`): processors would differ in their last digits.
 sine_cosine = njit(error_model="numpy")(elementary.sine_cosine)

@@ -10,14 +10,11 @@ from utank_hil.runners.errors import NodeError
 from utank_hil.runners.hooks import LinkObserver, LoadObserver, Stoppable
 from utank_hil.runners.node import Node, Selective
 
-OUTSIDE: Final = -1
-"""Sender index of a frame from outside the group."""
+OUTSIDE: Final = -1  #: Sender index of a frame from outside the group.
 
-Send = Callable[[int, Frame, int], None]
-"""Called as (sender's index, frame, time in ns)."""
+Send = Callable[[int, Frame, int], None]  #: Called as (sender's index, frame, time in ns).
 
-Receive = Callable[[Frame, int], None]
-"""A node's `receive`."""
+Receive = Callable[[Frame, int], None]  #: A node's `receive`.
 
 
 class NodeGroup:

@@ -18,8 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-PRIORITY: Final = 80
-"""Above the kernel's interrupt threads (50), as cyclictest is usually run."""
+PRIORITY: Final = 80  #: Above the kernel's interrupt threads (50), as cyclictest is usually run.
 
 _MCL_CURRENT: Final = 1
 _MCL_FUTURE: Final = 2

@@ -8,8 +8,7 @@ import numpy.typing as npt
 
 _STEPS: Final = 32
 """Bins to a factor of two, so a bin is at most 1/32 wide relative to its lower edge."""
-_LONGEST_BITS: Final = 36
-"""Values of 2**36 ns (69 s) and more share the last bin."""
+_LONGEST_BITS: Final = 36  # Values of 2**36 ns (69 s) and more share the last bin.
 _BINS: Final = _STEPS * (_LONGEST_BITS - _STEPS.bit_length() + 2)
 
 

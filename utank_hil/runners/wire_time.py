@@ -22,8 +22,7 @@ from typing import Final
 
 from utank_hil.canbus.frame import LONGEST_STANDARD_ID, STANDARD, Frame
 
-LONGEST_FRAME_BITS: Final = 160
-"""Of a frame with eight data bytes."""
+LONGEST_FRAME_BITS: Final = 160  #: Of a frame with eight data bytes.
 
 INTERMISSION_BITS: Final = 3
 _AFTER_CRC_BITS: Final = 10 + INTERMISSION_BITS

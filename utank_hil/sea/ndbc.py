@@ -58,8 +58,7 @@ class DataLine(NamedTuple):
     time: np.datetime64
     frequency_hz: tuple[float, ...]
     values: tuple[float, ...]
-    named: bool = False
-    """Whether the file names the quantity that it holds."""
+    named: bool = False  #: Whether the file names the quantity that it holds.
 
 
 def load_ndbc(path: str | Path, direction_path: str | Path | None = None) -> MeasuredSpectra:

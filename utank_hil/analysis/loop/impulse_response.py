@@ -40,19 +40,15 @@ from utank_hil.dynamics.sampling import LinearModel
 
 IMPULSES: Final[Mapping[str, float]] = dict(zip(STATES, (1e-3, 1e-3, 1e-2, 1e-2), strict=True))
 """Size of the impulse in each measurement, in its unit."""
-MOST_SAMPLES: Final = 200_000
-"""Limit on the steps of one response. Chosen; no study."""
-BUDGET_S: Final = 60.0
-"""Time limit for all steps together. Chosen; no study."""
-MOST_STATES: Final = 256
-"""Limit on the order of the realized model. Chosen; no study."""
+MOST_SAMPLES: Final = 200_000  #: Limit on the steps of one response. Chosen; no study.
+BUDGET_S: Final = 60.0  #: Time limit for all steps together. Chosen; no study.
+MOST_STATES: Final = 256  #: Limit on the order of the realized model. Chosen; no study.
 
 _QUIET = 1e-9  # share of the peak below which a response has decayed
 _LEAST_QUIET = 100  # samples that must be quiet, besides half of those before
 _BEYOND = 1e100  # response per unit impulse that counts as unbounded growth
 _LINEAR = 1e-6  # share of the peak by which a linear law's scaled responses may differ
-_FIRST_STATES = 16
-"""Random vectors of the first attempt, doubled until accurate. Chosen; no study."""
+_FIRST_STATES = 16  # Random vectors of the first attempt, doubled until accurate. Chosen; no study.
 _TRUNCATED = 1e-7  # share of the sum of singular values that may be truncated
 _ACCURACY = 1e-6  # error of the model's response over the greatest response
 _BLOCK = 256  # samples of the response summed at once

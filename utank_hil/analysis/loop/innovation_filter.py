@@ -55,8 +55,7 @@ _POLE: Final = 0.7
 _BOUND: Final = 0.85 * PEAK_SENSITIVITY
 """Peak sensitivity that the penalty aims at: the required one less 15 %. The 15 % is chosen; no
 study."""
-_POWER: Final = 16
-"""Exponent of the penalty on the ship's sensitivity. Chosen; no study."""
+_POWER: Final = 16  # Exponent of the penalty on the ship's sensitivity. Chosen; no study.
 _OTHERS_PEAK: Final = 40.0
 """Sensitivity on the other ships from which it is penalized; on these only stability is required.
 """
@@ -70,8 +69,7 @@ _MOST_ANGLE_RAD: Final = math.radians(80)
 """Limit on the angles a, so that a half plane does not pass zero between two frequencies."""
 _EXACT: Final = 1e-14
 """Newton decrement of the last step. Newton's method squares the remaining error."""
-_MOST_STEPS: Final = 200
-"""Limit on the Newton steps. Chosen; no study."""
+_MOST_STEPS: Final = 200  # Limit on the Newton steps. Chosen; no study.
 _SHORTEST: Final = 1e-6
 """Smallest share of a Newton step that is tried; below it only rounding error remains."""
 

@@ -26,8 +26,7 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.sea import Harmonics
 
-LEVEL_TICKS: Final = 2
-"""Cycle of the message SENSOR_TANK, in ticks."""
+LEVEL_TICKS: Final = 2  #: Cycle of the message SENSOR_TANK, in ticks.
 _LEVEL, _SPEED = STATES.index("level_m"), STATES.index("level_rate_m_s")
 
 

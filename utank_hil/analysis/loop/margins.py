@@ -16,8 +16,7 @@ from utank_hil.dynamics.transfer import state_space_response
 if TYPE_CHECKING:
     from control import StateSpace
 
-DELAY_SAMPLES = 25
-"""Largest delay in samples for which the delay margin is searched."""
+DELAY_SAMPLES = 25  #: Largest delay in samples for which the delay margin is searched.
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +29,7 @@ class Margins:
     #: Greatest abs(S) = abs(1 / (1 - L)); its inverse is the distance of L from the critical point.
     peak_sensitivity: float
     peak_frequency_rad_s: float
-    #: gain_low, gain_high: the loop is stable for any gain factor between these.
-    gain_low: float
+    gain_low: float  #: The loop is stable for any gain factor from this to `gain_high`.
     gain_high: float
     phase_margin_rad: float  #: Least lag or lead, taken alone, that destabilizes; inf if none does.
     #: Least extra delay that destabilizes; inf if none up to `DELAY_SAMPLES` samples does, nan if

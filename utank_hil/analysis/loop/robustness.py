@@ -19,8 +19,7 @@ EXTRA_DELAY_S = 0.020  # two base ticks of 10 ms
 PERIOD_SCALES = (0.7, 0.85, 1.0, 1.15, 1.3)
 """Factors on the roll period in the grid. Chosen; no study."""
 INERTIA_SCALES = (0.8, 1.25)  # load moved inwards, and outwards; chosen, no study
-GAINS = (0.8, 1.0, 1.2)
-"""Factors on the pump's gain in the grid. Chosen; no study."""
+GAINS = (0.8, 1.0, 1.2)  #: Factors on the pump's gain in the grid. Chosen; no study.
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,8 +25,7 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 STANDING: Final = 0.25
 """Tipping coefficient of a person standing and facing forward or aft, Graham (1990)."""
-EXPOSURE_S: Final = 7200.0
-"""Two hours, as in the experiments for the motion sickness incidence."""
+EXPOSURE_S: Final = 7200.0  #: Two hours, as in the experiments for the motion sickness incidence.
 
 
 class WorkLimit(NamedTuple):

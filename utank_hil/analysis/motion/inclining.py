@@ -14,8 +14,7 @@ from scipy.stats import t as student
 from utank_hil.base.arrays import FloatArray
 
 _LEAST_SHIFTS = 5
-_MOST_HEEL_RAD = math.radians(6)
-"""Tests heel 1 to 4 degrees: beyond, GZ is no straight line."""
+_MOST_HEEL_RAD = math.radians(6)  # Tests heel 1 to 4 degrees: beyond, GZ is no straight line.
 
 
 class Inclining(NamedTuple):

@@ -40,8 +40,8 @@ class SmallGainFuzzy(FuzzyLaw):
 
     gamma: _Gamma  #: Below 1.
     rho: Positive
-    adaptation: Positive  #: Gamma and sigma.
-    leakage: Positive  #: Gamma and sigma.
+    adaptation: Positive  #: Gamma.
+    leakage: Positive  #: sigma.
     initial: NotNegative = 0.0  #: lambda_0, zero or more.
     kind: Literal["fuzzy_small_gain"] = "fuzzy_small_gain"
 
@@ -76,8 +76,8 @@ class RobustFuzzy(FuzzyLaw):
 
     gamma: _Gamma  #: Below 1.
     epsilon: Positive  #: Softness of the switching term.
-    adaptation: tuple[Positive, Positive]  #: Gamma_1, Gamma_2 and sigma_1, sigma_2.
-    leakage: tuple[Positive, Positive]  #: Gamma_1, Gamma_2 and sigma_1, sigma_2.
+    adaptation: tuple[Positive, Positive]  #: Gamma_1, Gamma_2.
+    leakage: tuple[Positive, Positive]  #: sigma_1, sigma_2.
     initial: tuple[NotNegative, NotNegative] = (0.0, 0.0)  #: lambda_0, theta_0, zero or more.
     kind: Literal["fuzzy_robust"] = "fuzzy_robust"
 

@@ -33,8 +33,8 @@ from utank_hil.control.fuzzy.law import FuzzyController, FuzzyInputs, FuzzyLaw
 class IndirectFuzzy(FuzzyLaw):
     """Law (4.25)."""
 
-    adaptation_f: Positive  #: gamma_f and gamma_g.
-    adaptation_g: Positive  #: gamma_f and gamma_g.
+    adaptation_f: Positive  #: gamma_f.
+    adaptation_g: Positive  #: gamma_g.
     leakage: Positive  #: Per second.
     #: Least ghat over the nominal g; above 0, below 1.
     least_gain: Annotated[float, Range(above=0, below=1)] = 0.3

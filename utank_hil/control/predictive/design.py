@@ -40,8 +40,7 @@ MOST_ORDER: Final = 500
 """Limit on the order of a predictor; its law has as many states per output, and the cost of judging
 it grows with their cube."""
 
-MOST_SAMPLES: Final = 1000
-"""Limit on a horizon, far beyond the range of a wave forecast."""
+MOST_SAMPLES: Final = 1000  #: Limit on a horizon, far beyond the range of a wave forecast.
 
 WASHOUT_SHARE: Final = 0.25
 """Greatest corner frequency of a washout over the ship's roll frequency. There it removes 3 % of
@@ -154,35 +153,19 @@ class PredictiveDesign:
 
     def _horizon_problems(self) -> list[Problem]:
         control, prediction = self.control_horizon, self.prediction_horizon
-        if self.kind == "dpc":
-            problems = []
-            if control >= prediction:
-                problems.append(
-                    (
-                        "control_horizon",
-                        f"must be below prediction_horizon, got {control} and {prediction}",
-                    )
-                )
-            if self.first_output:
-                problems.append(
-                    ("first_output", "belongs to GPC; DPC weighs from control_horizon on")
-                )
-            return problems
-        if control > prediction:
-            return [
-                (
-                    "control_horizon",
-                    f"must be prediction_horizon at most, got {control} and {prediction}",
-                )
-            ]
-        if self.first_output >= prediction:
-            return [
-                (
-                    "first_output",
-                    f"must be below prediction_horizon, got {self.first_output} and {prediction}",
-                )
-            ]
-        return []
+        deadbeat = self.kind == "dpc"
+        problems = []
+        if control > prediction - deadbeat:
+            most = "below prediction_horizon" if deadbeat else "prediction_horizon at most"
+            reason = f"must be {most}, got {control} and {prediction}"
+            problems.append(("control_horizon", reason))
+        if deadbeat and self.first_output:
+            reason = "belongs to GPC; DPC weighs from control_horizon on"
+            problems.append(("first_output", reason))
+        elif self.first_output >= prediction:
+            reason = f"must be below prediction_horizon, got {self.first_output} and {prediction}"
+            problems.append(("first_output", reason))
+        return problems
 
     def law(self, plant: DesignPlant) -> LinearLaw:
         """Design the law for a plant."""

@@ -32,8 +32,7 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.water import water_moments
 
-LATERAL = np.array([1, 3, 5])
-"""Sway, roll and yaw among the six degrees."""
+LATERAL = np.array([1, 3, 5])  #: Sway, roll and yaw among the six degrees.
 SIGN = TO_BODY_AXES[LATERAL]
 _MOST_STIFFNESS_ERROR = 0.05
 """Inclining tests and hydrostatics of a mesh agree within some per cent."""
