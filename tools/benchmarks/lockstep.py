@@ -13,7 +13,7 @@ from collections.abc import Iterable
 
 from tools.printing import command_line, show
 from utank_hil.canbus.frame import Frame
-from utank_hil.runners import Lockstep
+from utank_hil.runners import Lockstep, SimulatedBus
 
 MS = 1_000_000
 
@@ -53,11 +53,13 @@ class Talker:
 
 def measure(ship_seconds: int, traffic: dict[str, list[tuple[int, int]]]) -> tuple[float, int]:
     """Return the processor time of a run, in seconds, and the frames it carried."""
-    run = Lockstep([Talker(name, sent, seed) for seed, (name, sent) in enumerate(traffic.items())])
+    nodes = [Talker(name, sent, seed) for seed, (name, sent) in enumerate(traffic.items())]
+    bus = SimulatedBus()
+    run = Lockstep(nodes, bus)
     end_ns = ship_seconds * 1000 * MS
     began = time.process_time()
     run.run_until(end_ns)
-    return time.process_time() - began, run.bus.frames
+    return time.process_time() - began, bus.frames
 
 
 def main() -> None:
