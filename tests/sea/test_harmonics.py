@@ -27,12 +27,10 @@ def test_direct_sum_does_not_depend_on_how_it_is_cut(elevation):
     np.testing.assert_allclose(elevation.at(times)[::1500], elevation.at(times[::1500]), rtol=1e-12)
 
 
-@given(st.integers(0, 300), st.floats(1e-3, 10.0), st.floats(-100, 4000))
-def test_series_is_the_direct_sum_on_any_grid(elevation, count, step, start):
-    times = start + step * np.arange(count)
-    assert (
-        np.max(np.abs(elevation.series(step, count, start) - elevation.at(times)), initial=0) < 1e-9
-    )
+@given(st.integers(0, 300), st.floats(1e-3, 10.0))
+def test_series_is_the_direct_sum_on_any_grid(elevation, count, step):
+    times = step * np.arange(count)
+    assert np.max(np.abs(elevation.series(step, count) - elevation.at(times)), initial=0) < 1e-9
 
 
 def test_an_hour_at_100_hz_is_exact(elevation):

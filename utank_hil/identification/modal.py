@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.identification.era import Realization, realize
@@ -51,9 +50,9 @@ class ModalConfidence:
     frequency_std_rad_s: FloatArray
     damping_ratio_std: FloatArray
 
-    def intervals(self, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
-        """Return confidence intervals of frequency and damping ratio, both of shape (k, 2)."""
-        reach = float(ndtri((1 + level) / 2)) * np.array([-1.0, 1.0])
+    def intervals(self) -> tuple[FloatArray, FloatArray]:
+        """Return intervals of 95 % of frequency and damping ratio, both of shape (k, 2)."""
+        reach = 1.96 * np.array([-1.0, 1.0])
         return (
             self.modes.frequency_rad_s[:, None] + self.frequency_std_rad_s[:, None] * reach,
             self.modes.damping_ratio[:, None] + self.damping_ratio_std[:, None] * reach,

@@ -8,8 +8,7 @@ periods.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,7 +76,7 @@ def arx(
         disturbance_frequencies_rad_s,
         disturbance_polynomial_degree,
         disturbance_decay_rates_1_s,
-    ).model
+    ).arx
 
 
 def okid(
@@ -126,40 +125,14 @@ def okid(
     )
     with np.errstate(over="ignore", invalid="ignore"):
         markov, observer_gain = markov_parameters(
-            fitted.model, max(_MARKOV_COUNT, 2 * fitted.model.order + 1)
+            fitted.arx, max(_MARKOV_COUNT, 2 * fitted.arx.order + 1)
         )
     if not (np.isfinite(markov).all() and np.isfinite(observer_gain).all()):
         raise IdentificationError(
             "the fitted model is violently unstable, so the record does not determine it; "
             "record longer, excite more or raise the order"
         )
-    solution = fitted.solution
-    return OkidResult(
-        fitted.model,
-        markov,
-        observer_gain,
-        fitted.basis,
-        fitted.disturbance,
-        fitted.residual_covariance,
-        solution.gram,
-        fitted.column_scale,
-        solution.penalty,
-        solution.rank,
-        solution.excitation_order,
-        fitted.rows,
-    )
-
-
-class _Fitted(NamedTuple):
-    """Least-squares solution in the units of the record."""
-
-    model: ARX
-    basis: DisturbanceBasis
-    disturbance: FloatArray
-    residual_covariance: FloatArray
-    column_scale: FloatArray
-    solution: Fit
-    rows: int
+    return replace(fitted, markov=markov, observer_gain=observer_gain)
 
 
 def _fitted(
@@ -170,7 +143,8 @@ def _fitted(
     frequencies_rad_s: Sequence[float],
     polynomial_degree: int | None,
     decay_rates_1_s: Sequence[float],
-) -> _Fitted:
+) -> OkidResult:
+    """Return the result, yet without Markov parameters."""
     if not (np.isfinite(sample_time_s) and sample_time_s > 0):
         raise ValueError(f"sample_time_s must be positive, got {sample_time_s}")
     basis = DisturbanceBasis(tuple(frequencies_rad_s), polynomial_degree, tuple(decay_rates_1_s))
@@ -193,7 +167,7 @@ def _in_units(
     scale: FloatArray,
     sample_time_s: float,
     basis: DisturbanceBasis,
-) -> _Fitted:
+) -> OkidResult:
     """Convert a solution to the units of the record."""
     p, m = regression.order, regression.outputs
     y_scale = scale[:m]
@@ -204,14 +178,19 @@ def _in_units(
     split = len(coefficients) - regression.basis_size
     by_lag = np.vstack([np.zeros((m, m)), coefficients[:split]]).reshape(p + 1, -1, m)
     by_lag = by_lag.transpose(0, 2, 1)
-    return _Fitted(
+    return OkidResult(
         ARX(by_lag[1:, :, :m], by_lag[:, :, m:], sample_time_s),
-        basis,
-        coefficients[split:],
-        solution.residual_covariance * np.outer(y_scale, y_scale),
-        column_scale,
-        solution,
-        regression.rows,
+        markov=np.empty(0),
+        observer_gain=np.empty(0),
+        basis=basis,
+        disturbance=coefficients[split:],
+        residual_covariance=solution.residual_covariance * np.outer(y_scale, y_scale),
+        gram=solution.gram,
+        column_scale=column_scale,
+        penalty=solution.penalty,
+        rank=solution.rank,
+        excitation_order=solution.excitation_order,
+        rows=regression.rows,
     )
 
 

@@ -38,8 +38,8 @@ class Harmonics:
             result[start : start + rows] = np.cos(angle, out=angle) @ self.amplitude
         return result.reshape(times.shape)
 
-    def series(self, step_s: float, count: int, start_s: float = 0.0) -> FloatArray:
-        """Evaluate on the uniform grid ``start_s + step_s * arange(count)``.
+    def series(self, step_s: float, count: int) -> FloatArray:
+        """Evaluate on the uniform grid ``step_s * arange(count)``.
 
         With t = T + s, T on a coarse and s on a fine grid, cos(w T + phase + w s) is expanded into
         two products. This takes sqrt(count) cosines per component and one matrix product. No error
@@ -50,7 +50,7 @@ class Harmonics:
             raise ValueError(f"series needs a positive step and count, got {step_s} and {count}")
         columns = max(1, int(np.sqrt(count)))
         rows = -(-count // columns)
-        coarse = start_s + step_s * columns * np.arange(rows)
+        coarse = step_s * columns * np.arange(rows)
         fine = step_s * np.arange(columns)
         slow = np.multiply.outer(coarse, self.frequency_rad_s) + self.phase_rad
         fast = np.multiply.outer(self.frequency_rad_s, fine)

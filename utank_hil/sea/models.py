@@ -38,15 +38,6 @@ def ittc_density(omega_rad_s: FloatArray, hs_m: float, tp_s: float) -> FloatArra
     return density
 
 
-def pierson_moskowitz_density(omega_rad_s: FloatArray, hs_m: float) -> FloatArray:
-    """Pierson-Moskowitz spectrum of a fully developed sea: the height determines the period.
-
-    S = alpha g^2 omega^-5 exp(-beta omega^-4), alpha = 8.1e-3, beta = 4 alpha (g / Hs)^2.
-    Parameters, result and errors as `ittc_density`.
-    """
-    return ittc_density(omega_rad_s, hs_m, developed_peak_period_s(hs_m))
-
-
 def jonswap_density(
     omega_rad_s: FloatArray, hs_m: float, tp_s: float, gamma: float = 3.3
 ) -> FloatArray:
@@ -71,9 +62,11 @@ def ittc(hs_m: float, tp_s: float) -> Spectrum:
 
 
 def pierson_moskowitz(hs_m: float) -> Spectrum:
-    """Pierson-Moskowitz `Spectrum` of given significant wave height."""
-    tp_s = developed_peak_period_s(hs_m)
-    return _sample(lambda omega: pierson_moskowitz_density(omega, hs_m), tp_s)
+    """Pierson-Moskowitz `Spectrum` of a fully developed sea: the height determines the period.
+
+    S = alpha g^2 omega^-5 exp(-beta omega^-4), alpha = 8.1e-3, beta = 4 alpha (g / Hs)^2.
+    """
+    return ittc(hs_m, developed_peak_period_s(hs_m))
 
 
 def jonswap(hs_m: float, tp_s: float, gamma: float = 3.3) -> Spectrum:

@@ -11,8 +11,6 @@ def test_half_width_is_that_of_the_table_of_student_s_distribution():
     found = mean_interval([1.0, 2.0, 3.0, 4.0, 5.0])
     assert found.mean == 3.0
     assert found.half_width == pytest.approx(2.776 * np.sqrt(2.5 / 5), rel=1e-3)
-    wide = mean_interval([1.0, 2.0, 3.0, 4.0, 5.0], confidence=0.99)
-    assert wide.half_width == pytest.approx(4.604 * np.sqrt(2.5 / 5), rel=1e-3)
 
 
 def test_interval_holds_the_true_mean_as_often_as_it_says():
@@ -21,8 +19,6 @@ def test_interval_holds_the_true_mean_as_often_as_it_says():
     assert hits / 4000 == pytest.approx(0.95, abs=0.015)
 
 
-def test_one_value_and_impossible_confidences_are_refused():
+def test_one_value_is_refused():
     with pytest.raises(ValueError, match="two or more values, got 1"):
         mean_interval([1.0])
-    with pytest.raises(ValueError, match="confidence"):
-        mean_interval([1.0, 2.0], confidence=1.0)

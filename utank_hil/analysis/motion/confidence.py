@@ -21,12 +21,11 @@ class Interval(NamedTuple):
     half_width: float
 
 
-def mean_interval(values: npt.ArrayLike, confidence: float = 0.95) -> Interval:
-    """Mean of independent, roughly normal values with its confidence interval (Student's t).
+def mean_interval(values: npt.ArrayLike) -> Interval:
+    """Mean of independent, roughly normal values with its interval of 95 % (Student's t).
 
-    `values`, shape (n,), are two or more, for a paired comparison the differences; `confidence` is
-    the probability that the interval holds the true mean. Raises `ValueError` if there are fewer
-    than two values, or the confidence is not between 0 and 1.
+    `values`, shape (n,), are two or more, for a paired comparison the differences. Raises
+    `ValueError` if there are fewer.
     """
     from scipy.stats import t as student
 
@@ -34,9 +33,7 @@ def mean_interval(values: npt.ArrayLike, confidence: float = 0.95) -> Interval:
     n = len(numbers)
     if n < 2:
         raise ValueError(f"a confidence interval needs two or more values, got {n}")
-    if not 0 < confidence < 1:
-        raise ValueError(f"confidence must be between 0 and 1, got {confidence}")
-    quantile = float(student.ppf((1 + confidence) / 2, n - 1))
+    quantile = float(student.ppf(0.975, n - 1))
     return Interval(float(numbers.mean()), quantile * float(numbers.std(ddof=1)) / math.sqrt(n))
 
 
