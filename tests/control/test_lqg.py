@@ -58,19 +58,17 @@ def test_innovation_is_white_on_the_nominal_model_and_has_the_foretold_covarianc
     model, rng = random_model(1), np.random.default_rng(1)
     process, measurement = 0.01 * positive(rng, 5), 0.1 * positive(rng, 3)
     law = design_lqg(model, design_lqr(model, 1.0, 1.0), process, measurement)
-    gain, covariance = kalman_predictor(model, process, measurement)
-    steps, controller = 20_000, law.controller()
+    controller = law.controller()
+    steps = 20_000
     w = rng.multivariate_normal(np.zeros(5), process, steps)
     v = rng.multivariate_normal(np.zeros(3), measurement, steps)
-    x, expected = np.zeros(5), np.zeros(5)
-    u, innovations = np.zeros(2), np.zeros((steps, 3))
+    x, u, innovations = np.zeros(5), np.zeros(2), np.zeros((steps, 3))
     for k in range(steps):
         y = model.C @ x + model.D @ u + v[k]
-        innovations[k] = y - model.C @ expected - model.D @ u
         x = model.A @ x + model.B @ u + w[k]
-        expected = model.A @ expected + model.B @ u + gain @ innovations[k]
         u = controller.step(y)
-    white = innovations[200:] @ np.linalg.inv(np.linalg.cholesky(covariance)).T
+        innovations[k] = controller.innovation
+    white = innovations[200:] @ np.linalg.inv(np.linalg.cholesky(law.innovation_covariance)).T
     count = len(white)
     np.testing.assert_allclose(white.T @ white / count, np.eye(3), atol=5 / np.sqrt(count))
     for lag in range(1, 20):

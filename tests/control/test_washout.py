@@ -75,6 +75,15 @@ def test_lqg_law_with_the_washout_folded_in_is_the_plain_form(corner_rad_s):
     assert_equal_to_the_plain_form(WashoutLaw(LQG.law, corner_rad_s), 2, 500, 1e6)
 
 
+def test_innovation_of_a_washed_lqg_law_is_that_of_the_outputs_without_their_mean():
+    washed, plain, mean = LQG.controller(), LQG.law.controller(), np.zeros(3)
+    for y in np.random.default_rng(3).normal(size=(50, 3)):
+        mean = mean + LQG.share * (y - mean)
+        washed.step(y)
+        plain.step(y - mean)
+    np.testing.assert_allclose(washed.innovation, plain.innovation, rtol=1e-8)
+
+
 def test_steady_list_ends_in_zero_pressure():
     controller, plain = WASHED.controller(), LAW.controller()
     for _ in range(3000):

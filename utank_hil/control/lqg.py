@@ -119,8 +119,8 @@ def design_lqg(
     a, b, c, d, sample_time_s = discrete_matrices(system)
     if regulator.gain.shape != b.T.shape or regulator.sample_time_s != sample_time_s:
         raise ValueError("the regulator was designed for other states or another sample time")
-    gain, _ = kalman_predictor(system, process_covariance, measurement_covariance)
-    return LQGLaw(LinearModel(a, b, c, d, sample_time_s), regulator.gain, gain)
+    gain, innovation = kalman_predictor(system, process_covariance, measurement_covariance)
+    return LQGLaw(LinearModel(a, b, c, d, sample_time_s), regulator.gain, gain, innovation)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,6 +130,8 @@ class LQGLaw:
     model: LinearModel  #: Discrete, from inputs to the measured outputs.
     gain: FloatArray  #: shape (r, n): K.
     observer_gain: FloatArray  #: shape (n, m): L.
+    #: shape (m, m): none for a predictor not designed for a known noise.
+    innovation_covariance: FloatArray | None = None
 
     @property
     def sample_time_s(self) -> float:
@@ -187,8 +189,8 @@ class LQGController:
         state, mean, command, measured = np.split(
             np.eye(self._own + outputs), [states, states + outputs, self._own]
         )
-        surprise = (1 - washout_share) * (measured - mean) - c @ state - d @ command
-        next_state = a @ state + b @ command + law.observer_gain @ surprise
+        self._surprise = (1 - washout_share) * (measured - mean) - c @ state - d @ command
+        next_state = a @ state + b @ command + law.observer_gain @ self._surprise
         next_mean = mean + washout_share * (measured - mean)
         self._advance = np.vstack([next_state, next_mean, -law.gain @ next_state])
         # computed here, as a step has no time for it; without one, steps without target still work
@@ -202,6 +204,12 @@ class LQGController:
     def reset(self) -> None:
         """Set state, mean and input to zero."""
         self._memory = np.zeros(self._advance.shape[1])
+        self._stepped = self._memory.copy()
+
+    @property
+    def innovation(self) -> FloatArray:
+        """Newest measurement less its prediction, shape (m,); white for the true model."""
+        return product(self._surprise, self._stepped)
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take the newest measurement, shape (m,), and return the command, shape (r,).
@@ -222,7 +230,9 @@ class LQGController:
                     "target with; step it without, or give the model's pole some decay"
                 )
             command += product(self._reference_gain, reference)
-        memory[:own] = following
+        # the previous vector is kept for the innovation
+        self._memory, self._stepped = self._stepped, memory
+        self._memory[:own] = following
         return command
 
     def applied(self, u: FloatArray) -> None:
