@@ -102,8 +102,8 @@ class Without:
 sys.meta_path[:] = [Without(finder) for finder in sys.meta_path]
 sys.path.insert(0, "tests/commands")
 import ports
-import utank_hil.commands.run
-utank_hil.commands.run.SocketCanPort = ports.QuietBus
+import utank_hil.canbus.socketcan
+utank_hil.canbus.socketcan.SocketCanPort = ports.QuietBus
 from {module}.cli import main
 sys.argv = {words!r}
 try:

@@ -7,8 +7,10 @@ import json
 from dataclasses import asdict, replace
 from typing import Any, Final, TypeAlias
 
-from utank_hil.canbus.enumerations import AlarmState, Fault, Mode, RetuningState
-from utank_hil.canbus.events import AlarmEvent, ModelSummary, RetuningEvent
+import msgspec
+
+from utank_hil.canbus.enumerations import AlarmState, RetuningState
+from utank_hil.canbus.events import AlarmEvent, RetuningEvent
 from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.ring import RingKind, RingReader, RingWriter
 
@@ -91,17 +93,5 @@ def _encoded(event: Event, start_ns: int) -> bytes:
 
 def _decoded(content: dict[str, Any]) -> Event:
     if "code" in content:
-        state = content["state"]
-        return AlarmEvent(
-            content["time_ns"],
-            Fault(content["code"]),
-            None if state is None else AlarmState(state),
-            Mode(content["mode"]),
-        )
-    found = content["found"]
-    return RetuningEvent(
-        content["time_ns"],
-        RetuningState(content["state"]),
-        tuple(content["reasons"]),
-        None if found is None else ModelSummary(**found),
-    )
+        return msgspec.convert(content, AlarmEvent)
+    return msgspec.convert(content, RetuningEvent)

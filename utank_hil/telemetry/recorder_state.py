@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+import msgspec
+
 from utank_hil.telemetry.ring import RingKind, held_ring
 
 
@@ -65,8 +67,4 @@ class RecorderState:
     @classmethod
     def of_input(cls) -> "RecorderState":
         """Read the state from standard input."""
-        content = json.load(sys.stdin)
-        task = RecordingTask(**content.pop("task"))
-        report = RecorderReport(**content.pop("report"))
-        places = {RingKind(kind): place for kind, place in content.pop("places").items()}
-        return cls(task, report, places, **content)
+        return msgspec.convert(json.load(sys.stdin), cls)
