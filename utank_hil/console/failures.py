@@ -15,16 +15,9 @@ from utank_hil.console.terminal import notes
 
 EXTRA_OF: Final = {
     "asammdf": "files",
-    "clarabel": "bench",
-    "control": "bench",
-    "dask": "bench",
-    "distributed": "bench",
-    "jinja2": "bench",
-    "matplotlib": "bench",
-    "numba": "bench",
-    "pyarrow": "viewer",
-    "rerun": "viewer",
-    "rerun_cli": "viewer",
+    **dict.fromkeys(("clarabel", "control", "dask", "distributed", "jinja2"), "bench"),
+    **dict.fromkeys(("matplotlib", "numba"), "bench"),
+    **dict.fromkeys(("pyarrow", "rerun", "rerun_cli"), "viewer"),
 }
 """Packages that are not needed to run the controller, and the extra that installs each."""
 KILLED: Final = "a process of this command was killed: too little memory?"

@@ -16,25 +16,12 @@ if TYPE_CHECKING:
 
 # Dark grey for the reference, then Okabe and Ito's palette safe for colour-blind readers.
 COLORS: Final = (
-    "#555555",
-    "#0072B2",
-    "#D55E00",
-    "#009E73",
-    "#CC79A7",
-    "#56B4E9",
-    "#E69F00",
-    "#000000",
-)
+    "#555555", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000",
+)  # fmt: skip
 DASHES: Final[tuple[str | tuple[float, tuple[float, ...]], ...]] = (
+    "-", "-", (0, (5, 1.5)), (0, (1.5, 1)), (0, (6, 1.5, 1, 1.5)), "-", (0, (4, 1, 1, 1, 1, 1)),
     "-",
-    "-",
-    (0, (5, 1.5)),
-    (0, (1.5, 1)),
-    (0, (6, 1.5, 1, 1.5)),
-    "-",
-    (0, (4, 1, 1, 1, 1, 1)),
-    "-",
-)
+)  # fmt: skip
 """Strokes of the curves with these colours, which distinguish them in print without colour."""
 DPI: Final = 130
 TEXT_PT: Final = 10.0

@@ -17,14 +17,10 @@ from utank_hil.telemetry.ring import RingKind, RingWriter
 PAYLOAD_BYTES: Final = 8
 RECORD: Final = np.dtype(
     [
-        ("number", "<u4"),
-        ("length", "u1"),
-        ("data", "u1", (PAYLOAD_BYTES,)),
-        ("kind", "u1"),
-        ("spare", "<u2"),
-        ("time_ns", "<i8"),
+        ("number", "<u4"), ("length", "u1"), ("data", "u1", (PAYLOAD_BYTES,)), ("kind", "u1"),
+        ("spare", "<u2"), ("time_ns", "<i8"),
     ]
-)
+)  # fmt: skip
 """Type of a record: `number` is a frame's identifier or a count, `time_ns` the node's time."""
 LAYOUT: Final = struct.Struct("<I9pB2xq")  #: Packed record: number, length, data, kind and time.
 

@@ -30,13 +30,9 @@ Columns = dict[str, FloatArray]
 _Column = tuple[str, FloatArray]
 
 _OTHER_UNITS: Final = {
-    "_mm": ("_m", 1e-3),
-    "_cm": ("_m", 1e-2),
-    "_bar": ("_pa", 1e5),
-    "_mbar": ("_pa", 1e2),
-    "_mpa": ("_pa", 1e6),
-    "_ms": ("_s", 1e-3),
-}
+    "_mm": ("_m", 1e-3), "_cm": ("_m", 1e-2), "_ms": ("_s", 1e-3),
+    "_bar": ("_pa", 1e5), "_mbar": ("_pa", 1e2), "_mpa": ("_pa", 1e6),
+}  # fmt: skip
 """Other units of tables: ending of the column, and SI ending and value of the unit."""
 _LEVEL_OF_GAUGES: Final = ("port_level_m", "starboard_level_m")
 _JITTER: Final = 0.25

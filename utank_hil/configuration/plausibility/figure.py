@@ -6,17 +6,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A figure of a vessel with its plausible range.
+    """A figure of a vessel; `low` and `high` say problem and remedy of a value out of range."""
 
-    Parameters
-    ----------
-    key : str
-        Key that is most likely wrong if the figure lies outside.
-    low, high : str
-        Problem and remedy of a value too low and too high.
-    """
-
-    key: str
+    key: str  #: Key that is most likely wrong if the figure lies outside.
     value: float
     refused_below: float = 0.0
     warned_below: float = 0.0
