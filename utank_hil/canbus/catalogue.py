@@ -159,16 +159,9 @@ def _compile(message: "DbcMessage", kind: type[T]) -> Codec[T]:
 def _signal(signal: "DbcSignal", hint: Any) -> Signal:
     kind = field_kind(hint)
     number = float if kind is float else int
-    return Signal(
-        signal.name,
-        kind,
-        signal.start,
-        signal.length,
-        float(signal.scale),
-        float(signal.offset),
-        number(signal.minimum or 0),
-        number(signal.maximum or 0),
-    )
+    scale, offset = float(signal.scale), float(signal.offset)
+    least, most = number(signal.minimum or 0), number(signal.maximum or 0)
+    return Signal(signal.name, kind, signal.start, signal.length, scale, offset, least, most)
 
 
 def _problems(message: "DbcMessage", kind: type, address: Address) -> list[str]:

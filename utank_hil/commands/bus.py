@@ -122,14 +122,9 @@ def _print(census: BusCensus, problems: list[tuple[str, str]], *, compared: bool
     console = Terminal()
     table = new_table(None, "frames/s", "gap ms", "bytes", names=("identifier", "message", "node"))
     for row in census.rows():
-        table.add_row(
-            row["id"],
-            row["message"],
-            row["node"],
-            f"{row['rate_hz']:.4g}",
-            f"{row['longest_gap_ms']:.4g}",
-            ",".join(map(str, row["bytes"])),
-        )
+        figures = f"{row['rate_hz']:.4g}", f"{row['longest_gap_ms']:.4g}"
+        lengths = ",".join(map(str, row["bytes"]))
+        table.add_row(row["id"], row["message"], row["node"], *figures, lengths)
     console.table(table)
     console.say(f"{census.duration_s:.3g} s, {census.load:.1%} of the bus in use")
     for node, (catalogue, configuration) in census.versions.items():

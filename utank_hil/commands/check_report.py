@@ -140,16 +140,10 @@ def print_collection(kind: str, collection: Any, judged: Judged) -> None:
         if one.robustness is None:
             table.add_row(each, *5 * ("",), verdict)
             continue
-        report, margin = one.robustness, one.robustness.nominal
-        table.add_row(
-            each,
-            f"{margin.peak_sensitivity:.2f}",
-            _gain(margin),
-            _phase(margin),
-            _delay(one.law, margin),
-            f"{report.worst_radius:.4f}",
-            verdict,
-        )
+        margin = one.robustness.nominal
+        peak, radius = f"{margin.peak_sensitivity:.2f}", f"{one.robustness.worst_radius:.4f}"
+        figures = peak, _gain(margin), _phase(margin), _delay(one.law, margin), radius
+        table.add_row(each, *figures, verdict)
     console.table(table)
     for each, one in judged.items():
         for remark in () if one.robustness is None else _remarks(one.law, one.robustness):

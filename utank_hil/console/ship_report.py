@@ -1,7 +1,7 @@
 """What ``utank-hil check`` says of a ship: what ship, tank and pump are to each other."""
 
 import math
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -16,6 +16,11 @@ from utank_hil.dynamics.steady_heel import steady_heel, upright
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.dynamics.valves import added_damping_ratio
 from utank_hil.dynamics.water import water_moments
+
+_OF_PUMP: Final = (
+    "pump_heel_rad", "pump_heel_at_the_end", "pump_head_m", "pump_flow_m3_s", "pump_power_asked_w",
+    "pump_power_held_w", "pump_power_w",
+)  # fmt: skip
 
 
 def ship_json(vessel: Vessel) -> dict[str, Any]:
@@ -89,23 +94,16 @@ def _valve_figures(vessel: Vessel) -> dict[str, float | None]:
 
 def _pump_figures(vessel: Vessel) -> dict[str, Any]:
     pump, tank = vessel.pump, vessel.tank
-    names = ("heel_rad", "heel_at_the_end", "head_m", "flow_m3_s", "power_asked_w",
-             "power_held_w", "power_w")  # fmt: skip
     if pump is None:
-        return {f"pump_{name}": None for name in names}
+        return dict.fromkeys(_OF_PUMP)
     pressure_pa = pump.max_pressure_pa
     heel = steady_heel(upright(RollModel(vessel.ship, tank)), pressure_pa)
     flow_m3_s = tank.reservoir_area_m2 * tank.level_limit_m * vessel.ship.natural_frequency_rad_s
-    figures = (
-        None if heel is None else abs(heel.roll_rad),
-        None if heel is None else heel.at_the_end,
-        pressure_pa / (tank.density_kg_m3 * GRAVITY_M_S2),
-        flow_m3_s,
-        pressure_pa * flow_m3_s,
-        holding(pump)[2],
-        pump.max_power_w,
-    )
-    return {f"pump_{name}": value for name, value in zip(names, figures, strict=True)}
+    heel_rad, at_the_end = (None, None) if heel is None else (abs(heel.roll_rad), heel.at_the_end)
+    head_m = pressure_pa / (tank.density_kg_m3 * GRAVITY_M_S2)
+    powers_w = pressure_pa * flow_m3_s, holding(pump)[2], pump.max_power_w
+    figures = heel_rad, at_the_end, head_m, flow_m3_s, *powers_w
+    return dict(zip(_OF_PUMP, figures, strict=True))
 
 
 def _pump_rows(vessel: Vessel, figures: dict[str, Any]) -> list[tuple[str, str]]:

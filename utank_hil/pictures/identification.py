@@ -68,20 +68,14 @@ def draw_identification(
         bode.set(xlabel="Frequency (rad/s)", ylabel="Roll for 10 kPa of the pump (°)")
         bode.legend(frameon=False)
         correlation = found.validation.residual_correlation
+        lags_s = np.arange(1, len(correlation) + 1) * step_s
         for column, name in enumerate(measured):
-            residuals.plot(
-                np.arange(1, len(correlation) + 1) * step_s,
-                correlation[:, column],
-                color=COLORS[1 + column],
-                linestyle=DASHES[1 + column],
-                marker=".",
-                label=name,
-            )
+            color, dash = COLORS[1 + column], DASHES[1 + column]
+            residuals.plot(lags_s, correlation[:, column], ".", ls=dash, color=color, label=name)
         bound = 1.96 / math.sqrt(found.validation.rows)
         residuals.axhspan(-bound, bound, color=COLORS[0], alpha=0.15, lw=0)
-        residuals.set(
-            xlabel="Lag (s)", ylabel="Autocorrelation of held-out errors", ylim=(-0.6, 0.6)
-        )
+        ordinate = "Autocorrelation of held-out errors"
+        residuals.set(xlabel="Lag (s)", ylabel=ordinate, ylim=(-0.6, 0.6))
         residuals.legend(frameon=False)
         for point in _stable_points(found):
             modes.plot(

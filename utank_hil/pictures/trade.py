@@ -100,17 +100,9 @@ def _draw_costs(column: "list[Axes]", points: list[TradePoint]) -> None:
 def _mark(axes: "Axes", x: float, y: float, point: TradePoint) -> "Line2D":
     """Draw one law: a star for the design itself, an open dot if it is refused."""
     color = _REFUSED if point.refused else _ARMED
-    star = point.factor == 1
-    (mark,) = axes.plot(
-        x,
-        y,
-        color=color,
-        linestyle="none",
-        marker="*" if star else "o",
-        markersize=19 if star else 6,
-        markerfacecolor=HIGHLIGHT if star else "white" if point.refused else color,
-        zorder=4 if star else 3,
-    )
+    face = "white" if point.refused else color
+    sign, size, face, order = ("*", 19, HIGHLIGHT, 4) if point.factor == 1 else ("o", 6, face, 3)
+    (mark,) = axes.plot(x, y, sign, c=color, markersize=size, markerfacecolor=face, zorder=order)
     return mark
 
 

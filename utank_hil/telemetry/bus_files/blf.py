@@ -171,17 +171,13 @@ def _frame(kind: int, head_size: int, body: bytes, begin_ns: int) -> BusFrame | 
         remote, is_fd, speed = fd_flags & 0x10, bool(fd_flags & 0x1000), fd_flags >> 13 & 3
     if size > FD_LENGTHS[-1]:
         raise _DamagedError(f"a frame of {size} bytes")
-    frame_kind = FrameKind.REMOTE if remote else FrameKind.FD if is_fd else FrameKind.DATA
+    of_kind = FrameKind.REMOTE if remote else FrameKind.FD if is_fd else FrameKind.DATA
     # Bytes that count and are not in the object are zero, as Vector's library reads them.
     data = b"" if remote else data[:size].ljust(size, b"\0")
-    return BusFrame(
-        now_ns,
-        str(channel),
+    value, extended, code, bus = (
         number & _MASK,
         bool(number & _EXTENDED),
-        frame_kind,
-        data,
         min(code, 15),
-        bool(sent),
-        speed,
+        str(channel),
     )
+    return BusFrame(now_ns, bus, value, extended, of_kind, data, code, bool(sent), speed)

@@ -61,17 +61,12 @@ def parse(line: str) -> BusFrame | None:
         code = FD_LENGTHS.index(len(data))
     if kind is not FrameKind.FD and (len(data) > 8 or (raw and len(data) != 8 and not remote)):
         raise NotUnderstoodError(f"a frame can't have {len(data)} bytes")
-    return BusFrame(
+    now_ns, extended, flags = (
         time_ns(seconds, fraction),
-        channel,
-        value & _MASK,
         len(number) == 8,
-        kind,
-        data,
-        code,
-        sent,
         int(speed or "0", 16) & 3,
     )
+    return BusFrame(now_ns, channel, value & _MASK, extended, kind, data, code, sent, flags)
 
 
 def _explained(line: str) -> ValueError:

@@ -57,17 +57,11 @@ def of_message(message: "Message", channel: str) -> BusFrame:
     kind = FrameKind.ERROR if message.is_error_frame else kind
     data = bytes(message.data)
     size = message.dlc if kind is FrameKind.REMOTE else len(data)
-    return BusFrame(
-        round(message.timestamp * 1e9),
-        channel,
-        message.arbitration_id,
-        message.is_extended_id,
-        kind,
-        data,
-        size if size <= 8 else FD_LENGTHS.index(size),
-        not message.is_rx,
-        message.bitrate_switch + 2 * message.error_state_indicator,
-    )
+    code = size if size <= 8 else FD_LENGTHS.index(size)
+    number, extended, sent = message.arbitration_id, message.is_extended_id, not message.is_rx
+    now_ns = round(message.timestamp * 1e9)
+    speed = message.bitrate_switch + 2 * message.error_state_indicator
+    return BusFrame(now_ns, channel, number, extended, kind, data, code, sent, speed)
 
 
 def time_ns(seconds: str, fraction: str) -> int:

@@ -28,13 +28,6 @@ def parse(line: str) -> BusFrame | None:
         raise NotUnderstoodError(f"has not the {size} bytes that it names")
     if value > (0x1FFFFFFF if is_extended else 0x7FF):
         raise NotUnderstoodError(f"{number} is no identifier of 11 or 29 bits")
-    return BusFrame(
-        int(microseconds) * 1000,
-        channel,
-        value,
-        is_extended,
-        FrameKind.FD if len(data) > 8 else FrameKind.DATA,
-        data,
-        FD_LENGTHS.index(len(data)),
-        None if mark is None else mark.lower() == "tx",
-    )
+    kind, code = FrameKind.FD if len(data) > 8 else FrameKind.DATA, FD_LENGTHS.index(len(data))
+    sent = None if mark is None else mark.lower() == "tx"
+    return BusFrame(int(microseconds) * 1000, channel, value, is_extended, kind, data, code, sent)

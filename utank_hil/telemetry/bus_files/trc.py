@@ -74,15 +74,7 @@ def _frame(cells: dict[str, str]) -> BusFrame:
     milliseconds, _, rest = cells["O"].partition(".")
     if not (cells["O"].isascii() and milliseconds.isdecimal() and (rest or "0").isdecimal()):
         raise ValueError(f"{cells['O']} is no time in ms")
-    mark = cells.get("d")
-    return BusFrame(
-        int(milliseconds + rest.ljust(6, "0")[:6]),
-        cells.get("B") or "1",
-        int(number, 16),
-        len(number) == 8,
-        kind,
-        data,
-        code,
-        None if mark is None else mark.lower() == "tx",
-        _SPEEDS.get(cells.get("T") or "", 0),
-    )
+    now_ns, bus = int(milliseconds + rest.ljust(6, "0")[:6]), cells.get("B") or "1"
+    mark, speed = cells.get("d"), _SPEEDS.get(cells.get("T") or "", 0)
+    sent = None if mark is None else mark.lower() == "tx"
+    return BusFrame(now_ns, bus, int(number, 16), len(number) == 8, kind, data, code, sent, speed)
