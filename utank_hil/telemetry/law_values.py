@@ -92,14 +92,11 @@ def differences(recorded: Values, designed: Values) -> list[ValueDifference]:
 
 def encoded(values: Values) -> dict[str, Any]:
     """Return the values exactly, ready for JSON."""
-    return {
-        name: [
-            str(value.dtype),
-            list(value.shape),
-            base64.b85encode(zlib.compress(value.tobytes(), 9)).decode(),
-        ]
-        for name, value in values.items()
-    }
+    found: dict[str, Any] = {}
+    for name, value in values.items():
+        packed = base64.b85encode(zlib.compress(value.tobytes(), 9)).decode()
+        found[name] = [str(value.dtype), list(value.shape), packed]
+    return found
 
 
 def decoded(content: Mapping[str, Any]) -> Values:

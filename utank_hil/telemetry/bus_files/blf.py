@@ -174,10 +174,6 @@ def _frame(kind: int, head_size: int, body: bytes, begin_ns: int) -> BusFrame | 
     of_kind = FrameKind.REMOTE if remote else FrameKind.FD if is_fd else FrameKind.DATA
     # Bytes that count and are not in the object are zero, as Vector's library reads them.
     data = b"" if remote else data[:size].ljust(size, b"\0")
-    value, extended, code, bus = (
-        number & _MASK,
-        bool(number & _EXTENDED),
-        min(code, 15),
-        str(channel),
-    )
+    bus, value, extended = str(channel), number & _MASK, bool(number & _EXTENDED)
+    code = min(code, 15)
     return BusFrame(now_ns, bus, value, extended, of_kind, data, code, bool(sent), speed)

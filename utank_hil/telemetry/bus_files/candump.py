@@ -61,11 +61,8 @@ def parse(line: str) -> BusFrame | None:
         code = FD_LENGTHS.index(len(data))
     if kind is not FrameKind.FD and (len(data) > 8 or (raw and len(data) != 8 and not remote)):
         raise NotUnderstoodError(f"a frame can't have {len(data)} bytes")
-    now_ns, extended, flags = (
-        time_ns(seconds, fraction),
-        len(number) == 8,
-        int(speed or "0", 16) & 3,
-    )
+    now_ns, extended = time_ns(seconds, fraction), len(number) == 8
+    flags = int(speed or "0", 16) & 3
     return BusFrame(now_ns, channel, value & _MASK, extended, kind, data, code, sent, flags)
 
 
