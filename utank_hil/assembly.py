@@ -102,7 +102,11 @@ def build_law(config: ControllerConfig) -> BuiltLaw:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             # an equation that was solved for another matrix than the one given
             warnings.simplefilter("error", RuntimeWarning)
-            law = config.law.build(config.plant)
+            law = (
+                config.law.first(config.plant)
+                if config.renews and isinstance(config.law, SelfTunedDesign)
+                else config.law.build(config.plant)
+            )
             if law.linear is None and law.closes_loop and not law.dissipates:
                 law = _by_impulse_response(law)
             finite = law.linear is None or all(
@@ -359,4 +363,4 @@ def _renewing(config: ControllerConfig, law: BuiltLaw, retuner: Retuner) -> Rene
     assert isinstance(law.linear, ConstrainedLaw)
     ship = ShipFigures.of(config.vessel.ship)
     roll = law.measured.index("roll_rad")
-    return RenewingController(law.linear, law.controller(), ship, roll, config.limits, retuner)
+    return RenewingController(law.linear, ship, roll, config.limits, retuner)

@@ -16,7 +16,12 @@ from retuning_toys import (
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState, Verdict
-from utank_hil.retuning import Candidate, MotionEstimate, Refusal, law_exchange
+from utank_hil.retuning import (
+    Candidate,
+    MotionEstimate,
+    Refusal,
+    law_exchange,
+)
 from utank_hil.retuning.admission import WARM_UP_CHUNK, WARM_UP_SAMPLES
 from utank_hil.retuning.law_bank import FADE_SAMPLES
 from utank_hil.retuning.law_exchange import TRIAL_PATIENCE
@@ -216,3 +221,14 @@ def test_the_last_events_are_kept_and_each_is_taken_once(monkeypatch: pytest.Mon
         rig.press(retune=True)
         rig.run(2)
     assert rig.controller.take_events() == list(rig.controller.events)
+
+
+@pytest.mark.parametrize(("longer", "kept"), [(1.0, True), (1.04, True), (1.1, False)])
+def test_a_ship_that_the_motion_contradicts_is_refused(longer: float, *, kept: bool) -> None:
+    rig = Rig(ToyRetuner(candidate_of(9e4)), stiffness=lambda k: longer**-2)
+    rig.retune_until(RETUNED if kept else REFUSED)
+    if not kept:
+        (reason,) = rig.controller.events[-1].reasons
+        assert "found, 8.89 s, is not that of the motion without pulses, 9.77 s" in reason
+        rig.controller.note(MotionEstimate(Verdict.OUTDATED, Verdict.OUTDATED))
+        rig.retune_until(RETUNED, after=10)

@@ -15,12 +15,13 @@ from typing import Final
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.canbus import RetuningState
+from utank_hil.base.elementary import log
+from utank_hil.canbus import RetuningState, Verdict
 from utank_hil.canbus.events import ModelSummary
 from utank_hil.control import Controller, LinearLaw
 from utank_hil.retuning.admission import Admission, WarmUp
 from utank_hil.retuning.answer import Answer, Candidate
-from utank_hil.retuning.change_monitor import ChangeMonitor
+from utank_hil.retuning.change_monitor import SIGNIFICANT, ChangeMonitor
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 from utank_hil.retuning.law_bank import MonitoredLaw
 from utank_hil.retuning.law_exchange import RETRY_NS, LawExchange
@@ -29,6 +30,9 @@ from utank_hil.retuning.settings import RetuningSettings
 
 MOST_TRIES: Final = 3
 """Identifications tried for one change of the ship; if all fail, the new ship counts as normal."""
+AGREES: Final = 1.05
+"""Factor between roll periods found by pulses and from the motion up to which they agree: the
+accuracy that a law's check asks of the period."""
 
 _NEW: Final = (RetuningState.TRIAL, RetuningState.RETUNED)
 # in Python 3.11 a member costs eight times as much to read from its class as from the module
@@ -65,6 +69,7 @@ class AdaptiveController(LawExchange):
         self._settings = settings
         self._pulses_pa = pulses_pa
         self._admission = Admission(law, self._history)
+        self._seen: ShipFigures | None = None
         self._pulses_given = 0
         self._tries = 0
 
@@ -84,6 +89,10 @@ class AdaptiveController(LawExchange):
 
     def note(self, estimate: MotionEstimate) -> None:
         """Take an estimate of the ship."""
+        if estimate.of_ship is Verdict.GOOD:
+            self._seen = estimate.ship
+        elif estimate.of_ship is Verdict.OUTDATED:
+            self._seen = None
         for law in self.laws.stepped:
             law.monitor.watch(estimate)
 
@@ -127,6 +136,14 @@ class AdaptiveController(LawExchange):
         warm_up = self._admission.admit(answer)
         if isinstance(warm_up, WarmUp):
             assert isinstance(answer, Candidate)
+            found, seen = ShipFigures.identified(answer.summary), self._seen
+            if seen is not None and abs(log(found.roll_period_s / seen.roll_period_s)) > max(
+                log(AGREES), SIGNIFICANT * seen.period_deviation
+            ):
+                return (
+                    f"the roll period found, {found.roll_period_s:.2f} s, is not that of the motion"
+                    f" without pulses, {seen.roll_period_s:.2f} s"
+                )
             self.candidate = answer
         return warm_up
 

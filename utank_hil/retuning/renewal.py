@@ -11,7 +11,7 @@ from utank_hil.analysis.loop.self_tuning import self_tuned
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import DesignPlant
 from utank_hil.retuning.answer import Refusal
-from utank_hil.retuning.estimate import MotionEstimate
+from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 from utank_hil.retuning.renewed_law import RenewedLaw
 from utank_hil.sea import SlopeSpectrum
 
@@ -50,7 +50,7 @@ class TailedSpectrum:
 
 
 def renew(estimate: MotionEstimate, task: RenewalTask) -> RenewedLaw | Refusal:
-    """Design a law for the estimated waves and ship."""
+    """Design a law for the estimated waves and ship; a configured ship may be loaded otherwise."""
     if estimate.waves is None or estimate.ship is None:
         return Refusal(("there is no estimate of the waves to design a law for",))
     plant = dataclasses.replace(task.plant, ship=estimate.ship.ship(task.plant.ship))
@@ -60,6 +60,7 @@ def renew(estimate: MotionEstimate, task: RenewalTask) -> RenewedLaw | Refusal:
             TailedSpectrum(estimate.waves),
             mean_power_w=task.mean_power_w,
             sample_time_s=task.sample_time_s,
+            any_load=estimate.ship == ShipFigures.of(task.plant.ship),
         )
     except ValueError as error:  # NoLawError and LinAlgError are ValueErrors.
         return Refusal((str(error),))

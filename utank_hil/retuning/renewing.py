@@ -4,9 +4,9 @@
 (`Estimator`). It is made when waves or ship differ from those that the present law was designed
 for.
 
-A law may be wrong for waves that are not known yet. If the ship rolls more than it would with the
-pump at rest, the pump rests until another law is tried, or for `RETRY_NS`. This precedes the
-monitor that ends active control by the same comparison (ROLL_AMPLIFIED).
+A law may be wrong for waves or a ship that are not known yet. So the pump gets that share of its
+command which pays (`Effort`), and a law plans at the limits only for an identified ship: on one
+loaded otherwise the plan swings the water from limit to limit, where the clipped law is stable.
 """
 
 import dataclasses
@@ -17,19 +17,19 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState, Verdict
-from utank_hil.control import Controller
 from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
 from utank_hil.control.limits import PumpLimits
 from utank_hil.retuning.admission import ANOTHER_QUESTION, WarmUp
 from utank_hil.retuning.answer import Answer
 from utank_hil.retuning.change_monitor import ChangeMonitor, ship_factor
+from utank_hil.retuning.effort import Effort
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 from utank_hil.retuning.law_bank import MonitoredLaw
 from utank_hil.retuning.law_exchange import RETRY_NS, LawExchange
 from utank_hil.retuning.renewed_law import RenewedLaw
 from utank_hil.retuning.retuner import Retuner
 from utank_hil.retuning.settings import TrialSettings
-from utank_hil.retuning.trial import NOISE_FLOOR, MovingWindow, WindowStatistics
+from utank_hil.retuning.trial import NOISE_FLOOR, WindowStatistics
 from utank_hil.sea import SlopeSpectrum
 
 SEA_DIFFERENCE: Final = 0.2
@@ -41,15 +41,6 @@ LONGER: Final = 1.3
 TRIAL: Final = TrialSettings(
     trial_s=180.0, roll_factor=1.25, effort_factor=1.5, answer_within_s=300.0
 )
-LOSING: Final = 1.2
-"""Ratio to the passive ship's roll at which a law has lost and the pump rests."""
-LOSING_PERIODS: Final = 4.0
-"""Length of this comparison in roll periods: half as many condemned sound laws by their first
-waves."""
-RECORD_PERIODS: Final = 12.0
-"""Roll periods over which the ship must also have rolled more than the passive one. In the lull
-after a group of waves, a law that halves the roll lost by 1.23 over four periods.
-"""
 LEAST_SHARE: Final = 1e-3
 """Smallest limits of a law relative to the pump's: below, it does nothing and is ill-conditioned.
 """
@@ -66,28 +57,25 @@ _AT_REST_AFTER: Final = (RetuningState.REFUSED, RetuningState.UNDONE)
 class RenewingController(LawExchange):
     """A constrained law that is renewed as waves and ship change.
 
-    `law` is the first one, for an unknown sea, `controller` its controller, at rest, `ship` the
-    configured one, `roll` the index of the roll among the outputs. No law may exceed `limits`.
+    `law` is the first one, for an unknown sea, `ship` the configured one, `roll` the index of the
+    roll among the outputs. No law may exceed `limits`.
     """
 
     def __init__(
         self,
         law: ConstrainedLaw,
-        controller: Controller,
         ship: ShipFigures,
         roll: int,
         limits: PumpLimits,
         retuner: Retuner,
     ) -> None:
-        first = MonitoredLaw(controller, ChangeMonitor(ship))
+        first = MonitoredLaw(law.unlimited().controller(), ChangeMonitor(ship))
         super().__init__(first, len(law.model.C), roll, TRIAL, retuner)
         self._law = law
         self._limits = limits
         self._configured = self._ship = ship
-        samples = ship.roll_period_s / self.sample_time_s
-        self._lately = MovingWindow(round(LOSING_PERIODS * samples))
-        self._record = MovingWindow(round(RECORD_PERIODS * samples))
-        self._rests_until_ns = 0
+        self.effort = Effort(ship.roll_period_s / self.sample_time_s)
+        self._allowed_pa = limits.pressure_pa
         self._latest: MotionEstimate | None = None
         self._seen: ShipFigures | None = None
         self._due = ""
@@ -97,6 +85,7 @@ class RenewingController(LawExchange):
 
     def allow(self, share: float) -> None:
         """Set the share of every law of the bank (`Plans`), as each may become active next."""
+        self._allowed_pa = share * self._limits.pressure_pa
         for law in self.laws.stepped:
             if isinstance(law.controller, ConstrainedController):
                 law.controller.allow(share)
@@ -104,42 +93,16 @@ class RenewingController(LawExchange):
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take the newest measurement and return the command; see `Controller`."""
         controller = self.laws.active.controller
-        assert isinstance(controller, ConstrainedController)
-        before = controller.fallbacks
-        command = super().step(y, reference)
-        self.fallbacks += controller.fallbacks - before
-        if not self._engaged or self.state is RetuningState.TRIAL:
-            self._forget()
-            self._rests_until_ns = 0
-        elif self.excused:
-            return np.zeros(1)
+        before = controller.fallbacks if isinstance(controller, ConstrainedController) else 0
+        command = float(super().step(y, reference)[0])
+        if isinstance(controller, ConstrainedController):
+            self.fallbacks += controller.fallbacks - before
+        if not self._engaged:
+            self.effort.clear()
         elif self._fresh:
-            self._rest_if_losing()
-        return command
-
-    def _rest_if_losing(self) -> None:
-        for window in (self._lately, self._record):
-            window.add(self._roll_rad, 0.0, self._passive_roll_rad)
-        now, record = self._lately.statistics, self._record.statistics
-        if (
-            self._lately.full
-            and now.roll_rad > max(LEAST_ROLL_RAD, LOSING * now.passive_roll_rad)
-            and now.passive_roll_rad > 0  # The passive roll is known.
-            and record.roll_rad > record.passive_roll_rad
-        ):
-            self._rests_until_ns = self._now_ns + RETRY_NS
-            self._forget()
-            self._log_event(
-                (
-                    f"the ship rolls {now.roll_rad / now.passive_roll_rad:.2f} times what it would "
-                    "with the pump at rest: it rests until another law is tried, "
-                    f"{RETRY_NS // 60_000_000_000} minutes at most",
-                )
-            )
-
-    def _forget(self) -> None:
-        self._lately.clear()
-        self._record.clear()
+            self.effort.update(self._roll_rad, self._passive_roll_rad)
+        command = self.effort.share * min(max(command, -self._allowed_pa), self._allowed_pa)
+        return np.array([command])
 
     def reset(self) -> None:
         """Reset all laws; a law on trial is dropped."""
@@ -148,8 +111,8 @@ class RenewingController(LawExchange):
 
     @property
     def excused(self) -> bool:
-        """Whether the pump rests."""
-        return self._now_ns < self._rests_until_ns
+        """False: the law is judged at all times."""
+        return False
 
     def note(self, estimate: MotionEstimate) -> None:
         """Take an estimate of waves and ship."""
@@ -199,16 +162,17 @@ class RenewingController(LawExchange):
             asked.rate_pa_s < LEAST_SHARE * most.rate_pa_s
         ):
             return "the law is for a pump that does next to nothing"
-        try:
-            controller = law.controller()
-        except (ValueError, ArithmeticError) as error:
-            return str(error)
         assert self._asked is not None
-        self.renewed, ship = answer, self._asked.ship
+        ship = self._asked.ship
         assert ship is not None
         found = None if ship is self._configured else ship
+        try:
+            controller = (law.unlimited() if found is None else law).controller()
+        except (ValueError, ArithmeticError) as error:
+            return str(error)
+        self.renewed = answer
         service = MonitoredLaw(controller, ChangeMonitor(ship), found, self._asked)
-        return WarmUp(service, self._history, controller.observe)
+        return WarmUp(service, self._history, controller.step)
 
     def _check_trial(self) -> None:
         before, now = self._baseline, self._trial_window.statistics
@@ -226,21 +190,23 @@ class RenewingController(LawExchange):
     def _to_compare_with(self, tried: WindowStatistics) -> WindowStatistics:
         """Return what the previous law would have had in the waves of the trial.
 
-        Its roll is scaled with that of the passive ship and limited to it. The pressure may be the
-        one predicted for the new law.
+        Roll and pressure are scaled with the roll of the passive ship, and the roll is limited to
+        it. The pressure may be the one predicted for the new law in these waves.
         """
         before, renewed = self._baseline, self.renewed
         assert renewed is not None
-        roll_rad = before.roll_rad
-        if min(before.passive_roll_rad, tried.passive_roll_rad) > NOISE_FLOOR.roll_rad:
-            share = min(1.0, roll_rad / before.passive_roll_rad)
-            roll_rad = share * tried.passive_roll_rad
-        predicted_pa = min(renewed.pressure_pa, self._limits.pressure_pa)
-        return WindowStatistics(
-            roll_rad,
-            max(before.pressure_pa, predicted_pa),
-            max(before.pressure_rms_pa, predicted_pa),
-        )
+        passive_rad, most_pa = tried.passive_roll_rad, self._limits.pressure_pa
+        roll_rad, grown, taller = before.roll_rad, 1.0, 1.0
+        if min(before.passive_roll_rad, passive_rad) > NOISE_FLOOR.roll_rad:
+            grown = passive_rad / before.passive_roll_rad
+            roll_rad = min(passive_rad, grown * roll_rad)
+            taller = max(1.0, passive_rad / max(renewed.passive_roll_rad, NOISE_FLOOR.roll_rad))
+        predicted_pa = taller * renewed.pressure_pa
+        pressures_pa = [
+            min(most_pa, max(max(1.0, grown) * pa, predicted_pa))
+            for pa in (before.pressure_pa, before.pressure_rms_pa)
+        ]
+        return WindowStatistics(roll_rad, *pressures_pa)
 
     def _on_trial(self) -> str:
         renewed, asked = self.renewed, self._asked
@@ -256,11 +222,6 @@ class RenewingController(LawExchange):
 
     def _accept(self) -> None:
         self._finish(RetuningState.RETUNED, self._on_trial())
-
-    def _undo(self) -> None:
-        self._rests_until_ns = 0  # The law that lost is gone.
-        self._forget()
-        super()._undo()
 
     def _finish(self, state: RetuningState, *reasons: str) -> None:
         if state in _AT_REST_AFTER:

@@ -1,14 +1,17 @@
 """Laws that design themselves: margins, predictions against other computations, budgets."""
 
 import functools
+import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from utank_hil.analysis.loop.closed_loop import closed_loop_radius
 from utank_hil.analysis.loop.innovation_filter import InnovationFilter
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
-from utank_hil.analysis.loop.robustness import robustness
+from utank_hil.analysis.loop.robustness import of_period, robustness
 from utank_hil.analysis.loop.sea_response import motion_in_sea
 from utank_hil.analysis.loop.self_tuning import (
     NoLawError,
@@ -22,10 +25,13 @@ from utank_hil.assembly import build_law
 from utank_hil.base.tick import TICK_S
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.lqg import LQGLaw
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.dynamics.linear import coupled_model
+from utank_hil.dynamics.linear import coupled_model, pump_model
+from utank_hil.dynamics.sampling import sample
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
 
+MEASURED = ("roll_rad", "roll_rate_rad_s", "level_m")
 CONTROLLERS = Path("configs/controllers")
 SHIPPED = load_config(CONTROLLERS / "constrained_gpc.yaml", ControllerConfig)
 PLANT = SHIPPED.plant
@@ -139,3 +145,19 @@ def test_a_file_names_a_sea_or_none(tmp_path):
     assert config.law.sea is None
     law = build_law(config)
     assert not robustness(law.linear, config.plant, law.measured).failures()
+
+
+def test_a_first_law_keeps_its_damping_on_other_loads_with_the_pump_at_its_limit():
+    def radius(law: LQGLaw) -> float:
+        found = []
+        for scale, share in itertools.product((0.85, 1.15, 1.3), (0.2, 0.4, 0.7, 1.0)):
+            plant = replace(PLANT, ship=of_period(PLANT.ship, scale))
+            clipped = LQGLaw(law.model, share * law.gain, law.observer_gain)
+            model = pump_model(plant.ship, plant.tank, MEASURED)
+            sampled = sample(model, law.sample_time_s, plant.delay_s, plant.lag_s)
+            found.append(closed_loop_radius(clipped, sampled, 1.0))
+        return max(found)
+
+    design = SelfTunedDesign("self_tuned")
+    assert radius(design.tuned(PLANT, any_load=True).law.unlimited()) < 1
+    assert radius(design.tuned(PLANT).law.unlimited()) > 1.001  # a limit cycle at 1.3

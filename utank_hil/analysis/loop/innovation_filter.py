@@ -35,6 +35,7 @@ from utank_hil.analysis.loop.robustness import (
     EXTRA_DELAY_S,
     GAINS,
     PEAK_SENSITIVITY,
+    of_period,
     ship_variants,
 )
 from utank_hil.base.arrays import ComplexArray, FloatArray
@@ -67,6 +68,15 @@ _TURNS: Final = 2
 """Number of solutions: with zero angles, then with the angles found. Chosen; no study."""
 _MOST_ANGLE_RAD: Final = math.radians(80)
 """Limit on the angles a, so that a half plane does not pass zero between two frequencies."""
+_LOADS: Final = (0.85, 1.0, 1.15, 1.3)
+"""Scales of the roll period that a ship may be loaded to, where it is not identified."""
+_SHARES: Final = (0.1, 0.2, 0.4, 0.7, 1.0)
+"""Shares of its command that a pump at its limit gives there."""
+_LOADS_PEAK: Final = 3.0
+"""Sensitivity from which these are penalized. With 40 the clipped law rolled a ship loaded to 1.3
+times its period 1.4 to 3.3 times the passive roll, with 6 up to 1.15 times, with 3 at most 0.98
+times; the storm's roll rises by 0, 0 and 4 %."""
+"""Shares of its command that a pump at its limit gives there."""
 _EXACT: Final = 1e-14
 """Newton decrement of the last step. Newton's method squares the remaining error."""
 _MOST_STEPS: Final = 200  # Limit on the Newton steps. Chosen; no study.
@@ -89,6 +99,8 @@ class InnovationFilter:
 
     `law` is stable on all ships of the grid (`robustness`), and that of `design`. `weights` are the
     cost weights on the squares of roll in rad, level in m, and pressure over the pump's maximum.
+    With `any_load` the law also keeps a moderate sensitivity on ships loaded otherwise, with the
+    pump at its limit or not.
     """
 
     def __init__(
@@ -97,8 +109,10 @@ class InnovationFilter:
         design: ConstrainedDesign,
         plant: DesignPlant,
         weights: tuple[float, float, float],
+        *,
+        any_load: bool = False,
     ) -> None:
-        self._law, self._plant = law, plant
+        self._law, self._plant, self._any_load = law, plant, any_load
         self._unit_pa = plant.limits.pressure_pa
         angle = plant.ship.natural_frequency_rad_s * law.sample_time_s
         omega, self._mean = _quadrature(angle)
@@ -113,11 +127,13 @@ class InnovationFilter:
             self._basis_a, self._basis_b[:, None], np.eye(_ORDER), np.zeros((_ORDER, 1)), 0.0
         )
         self._basis = state_space_response(basis, self._z)[..., 0]
-        self._law_parts()
         self._by_pump = self._pumped(plant, STATES)
         self._by_sea = self._in_sea(design)
+        self._law_parts()
         self._own_ship(np.asarray(weights))
-        self._other_ships()
+        turning, peaks = zip(*self._other_ships(), strict=True)
+        self._turning, self._others_peak = np.array(turning), np.array(peaks)
+        self._aim(np.zeros(self._others_peak.shape))
 
     def laws(self) -> Iterator[LQGLaw]:
         """Yield the law with its best filter, then with intermediate filters, best first."""
@@ -199,19 +215,21 @@ class InnovationFilter:
                 break
         return coefficients
 
-    def _law_parts(self) -> None:
+    def _law_parts(self, share: float = 1.0) -> None:
         """Compute transfers from command and innovations to the estimate's command and output.
 
-        The estimate is x = (z - A + B K)^-1 (B q + L nu), the command q - K x.
+        The estimate is x = (z - A + B K)^-1 (B q + L nu), the command q - K x. A pump at its limit
+        gives a share of both, which the estimate takes into account.
         """
         law, unit = self._law, self._unit_pa
         a, b, c, d, dt = law.model
-        expected = c - d @ law.gain
+        gain = share * law.gain
+        expected = c - d @ gain
         response = state_space_response(
             LinearModel(
-                a - b @ law.gain,
+                a - b @ gain,
                 np.hstack([b * unit, law.observer_gain]),
-                np.vstack([law.gain / unit, expected]),
+                np.vstack([gain / unit, expected]),
                 np.zeros((1 + len(c), 1 + len(c))),
                 dt,
             ),
@@ -263,19 +281,19 @@ class InnovationFilter:
         by_pump = self._along(np.einsum("wij,wj->wi", surprise, pump))
         self._sensitivities = self._command_by_command[:, None] * by_pump
 
-    def _other_ships(self) -> None:
-        """Compute how 1 - Q D and the sensitivity depend on the coefficients on the other ships."""
-        turning, peaks = [], []
+    def _other_ships(self) -> Iterator[tuple[ComplexArray, FloatArray]]:
+        """Yield how 1 - Q D depends on the coefficients on another ship, and its sensitivity."""
         names = tuple(STATES[row] for row in self._measured)
-        for ship, gain in _others(self._plant):
+        for ship, gain, share, peak in _others(self._plant, any_load=self._any_load):
+            self._law_parts(share)
             pump = gain * self._pumped(ship, names)
             surprise = self._surprise(pump)
             effect = pump * self._command_by_command[:, None] - self._expected_by_command
-            turning.append(-self._along(np.einsum("wij,wj->wi", surprise, effect)))
             start = np.einsum("wi,wij->wj", self._command_by_surprise, surprise)
-            peaks.append(np.abs(1 + np.einsum("wm,wm->w", start, pump)) / _OTHERS_PEAK)
-        self._turning, self._others_peak = np.array(turning), np.array(peaks)
-        self._aim(np.zeros(self._others_peak.shape))
+            yield (
+                -share * self._along(np.einsum("wij,wj->wi", surprise, effect)),
+                np.abs(1 + share * np.einsum("wm,wm->w", start, pump)) / peak,
+            )
 
     def _aim(self, angle_rad: FloatArray) -> None:
         """Set the half planes of 1 - Q D to these angles."""
@@ -353,13 +371,22 @@ def _quadrature(roll_angle: float) -> tuple[FloatArray, FloatArray]:
     return angles.ravel(), (half * weights).ravel() / math.pi
 
 
-def _others(plant: DesignPlant) -> Iterator[tuple[DesignPlant, float]]:
-    """Yield the other ships of the grid, each with and without extra delay, and the pump gains."""
+def _others(
+    plant: DesignPlant, *, any_load: bool
+) -> Iterator[tuple[DesignPlant, float, float, float]]:
+    """Yield the other ships, the pump's gain, its share of the command, and the peak to penalize.
+
+    The ships of the grid are taken with and without extra delay.
+    """
     late = replace(plant, delay_s=plant.delay_s + EXTRA_DELAY_S)
-    yield late, 1.0
+    yield late, 1.0, 1.0, _OTHERS_PEAK
     for period_scale, inertia_scale, ship in ship_variants(plant.ship):
         if period_scale == inertia_scale == 1:
             continue
         for gain in (GAINS[0], GAINS[-1]):
-            yield replace(plant, ship=ship), gain
-            yield replace(late, ship=ship), gain
+            yield replace(plant, ship=ship), gain, 1.0, _OTHERS_PEAK
+            yield replace(late, ship=ship), gain, 1.0, _OTHERS_PEAK
+    for scale in _LOADS if any_load else ():
+        loaded = replace(plant, ship=of_period(plant.ship, scale))
+        for share in _SHARES:
+            yield loaded, 1.0, share, _LOADS_PEAK

@@ -107,8 +107,12 @@ def ship_variants(ship: RollShip) -> Iterator[tuple[float, float, RollShip]]:
     Stability changes the stiffness and with it the period; the distribution of load the inertia.
     """
     for scale in PERIOD_SCALES:
-        stiffness = ship.stiffness_nm_rad / scale**2
-        yield scale, 1.0, dataclasses.replace(ship, stiffness_nm_rad=stiffness)
+        yield scale, 1.0, of_period(ship, scale)
     for scale in INERTIA_SCALES:
         inertia = ship.inertia_kg_m2 * scale
         yield 1.0, scale, dataclasses.replace(ship, inertia_kg_m2=inertia)
+
+
+def of_period(ship: RollShip, scale: float) -> RollShip:
+    """Return the ship with its roll period multiplied, by its stiffness."""
+    return dataclasses.replace(ship, stiffness_nm_rad=ship.stiffness_nm_rad / scale**2)

@@ -125,14 +125,16 @@ def self_tuned(
     *,
     mean_power_w: float = math.inf,
     sample_time_s: float | None = None,
+    any_load: bool = False,
 ) -> SelfTuned:
     """Design the constrained law of least predicted cost with all margins, within a mean power.
 
     `plant` has the limits of its pump; `mean_power_w` limits the predicted mean power, infinite for
-    the least cost; the default of `sample_time_s` follows from the roll frequency. Raises
-    `NoLawError` if no law has the margins, or the sea does not roll the ship.
+    the least cost; the default of `sample_time_s` follows from the roll frequency. With
+    `any_load` the ship may be loaded otherwise (`InnovationFilter`). Raises `NoLawError` if no law
+    has the margins, or the sea does not roll the ship.
     """
-    search, gentlest_w = _Search(plant, sea, sample_time_s), math.inf
+    search, gentlest_w = _Search(plant, sea, sample_time_s, any_load=any_load), math.inf
     first = search.least_cost()
     for power in range(_MOST_STEPS + 1):
         found = search.best(first * _COSTLIER**power)
@@ -180,24 +182,29 @@ class SelfTunedDesign:
     def __post_init__(self) -> None:
         refuse("self-tuned design", range_problems(self))
 
-    def tuned(self, plant: DesignPlant) -> SelfTuned:
+    def tuned(self, plant: DesignPlant, *, any_load: bool = False) -> SelfTuned:
         """The design and its law for a plant.
 
         Raises `NoLawError` as `self_tuned`.
         """
-        return _tuned(self, plant)
+        return _tuned(self, plant, any_load)
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Design the law for a plant."""
         law = self.tuned(plant).law
         return BuiltLaw(law.controller, _MEASURED, law)
 
+    def first(self, plant: DesignPlant) -> BuiltLaw:
+        """Design the law that leads until the ship is identified; it plans nothing."""
+        law = self.tuned(plant, any_load=True).law
+        return BuiltLaw(law.unlimited().controller, _MEASURED, law)
+
 
 @lru_cache(maxsize=16)
-def _tuned(design: SelfTunedDesign, plant: DesignPlant) -> SelfTuned:
+def _tuned(design: SelfTunedDesign, plant: DesignPlant, any_load: bool) -> SelfTuned:
     """Design as `SelfTunedDesign.tuned`; cached, as it takes seconds and several callers use it."""
     sea = design.sea or unknown_sea(plant.ship)
-    return self_tuned(plant, sea, mean_power_w=design.mean_power_w)
+    return self_tuned(plant, sea, mean_power_w=design.mean_power_w, any_load=any_load)
 
 
 def unknown_sea(ship: RollShip) -> SeaModel:
@@ -215,8 +222,15 @@ def unknown_sea(ship: RollShip) -> SeaModel:
 class _Search:
     """Repeated design, prediction and judgement of laws for one ship in one sea."""
 
-    def __init__(self, plant: DesignPlant, sea: SlopeDensity, sample_time_s: float | None) -> None:
-        noise = SensorNoise()
+    def __init__(
+        self,
+        plant: DesignPlant,
+        sea: SlopeDensity,
+        sample_time_s: float | None,
+        *,
+        any_load: bool = False,
+    ) -> None:
+        noise, self._any_load = SensorNoise(), any_load
         self._plant, self._std = plant, (noise.roll_rad, noise.roll_rate_rad_s, noise.level_m)
         self._roll_rad = passive_roll_rad(plant, sea)
         if not (math.isfinite(self._roll_rad) and self._roll_rad > 0):
@@ -253,7 +267,9 @@ class _Search:
             design = self._design(noise, costlier)
             if self._stands_hard_cases(design):
                 start = design.law(self._plant).unlimited()
-                search = InnovationFilter(start, design, self._plant, self._weights(costlier))
+                search = InnovationFilter(
+                    start, design, self._plant, self._weights(costlier), any_load=self._any_load
+                )
                 for linear in (*search.laws(), start):
                     judged = robustness(linear, self._plant, _MEASURED, with_delay_margin=False)
                     if not judged.failures():
