@@ -9,6 +9,7 @@ from retuning_toys import (
     QUIET,
     SAMPLE_TIME_S,
     SETTINGS,
+    SUMMARY,
     Rig,
     ToyRetuner,
     candidate_of,
@@ -182,6 +183,10 @@ def stiffer(k: int) -> float:
     return 1.0 if k < 12000 else 1.25
 
 
+CANDIDATE = replace(candidate_of(9e4), summary=replace(SUMMARY, stiffness_nm_rad=1.25e9))
+"""For the ship after it was loaded."""
+
+
 @pytest.mark.slow
 def test_change_is_not_forgotten_after_a_refusal_and_tried_a_bounded_number_of_times() -> None:
     retuner = ToyRetuner(Refusal(("no",)))
@@ -198,7 +203,7 @@ def test_change_is_not_forgotten_after_a_refusal_and_tried_a_bounded_number_of_t
 @pytest.mark.slow
 def test_identifications_that_told_nothing_of_the_ship_do_not_count() -> None:
     flags: list[int] = []
-    rig = Rig(ToyRetuner(candidate_of(9e4)), CHANGE, changing(flags), stiffer)
+    rig = Rig(ToyRetuner(CANDIDATE), CHANGE, changing(flags), stiffer)
     for _ in range(MOST_TRIES + 1):  # rolls above the limit, each time
         rig.run_until(IDENTIFY, 20000)
         flags[:] = [1]
@@ -222,7 +227,7 @@ def test_change_that_went_away_leaves_the_next_one_all_its_tries() -> None:
 
 def test_change_is_tried_again_after_a_refusal_and_found() -> None:
     flags: list[int] = [0]
-    retuner = ToyRetuner(candidate_of(9e4))
+    retuner = ToyRetuner(CANDIDATE)
     rig = Rig(retuner, CHANGE, changing(flags), stiffer)
     rig.run_until(IDENTIFY, 20000)
     flags[:] = [1]
@@ -233,7 +238,7 @@ def test_change_is_tried_again_after_a_refusal_and_found() -> None:
 
 @pytest.mark.parametrize("how", ["forbidden", "disarmed"])
 def test_change_is_not_forgotten_when_an_identification_is_given_up(how: str) -> None:
-    rig = Rig(ToyRetuner(candidate_of(9e4)), CHANGE, changing([]), stiffer)
+    rig = Rig(ToyRetuner(CANDIDATE), CHANGE, changing([]), stiffer)
     rig.run_until(IDENTIFY, 20000)
     rig.order = QUIET._replace(forbid_retuning=how == "forbidden")
     rig.engaged = how != "disarmed"

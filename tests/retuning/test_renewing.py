@@ -343,7 +343,7 @@ def test_a_law_that_only_rolls_the_ship_more_loses_its_pressure_and_gets_it_back
     rig.passive = lambda k: 0.2 if k < 1000 else 1.5
     rig.run(1000)
     assert LEAST <= rig.controller.effort.share < 0.2
-    rig.run(1500)
+    rig.run(2500)
     assert rig.controller.effort.share > 0.9
     assert rig.states == []
     rig.engaged = False

@@ -3,17 +3,18 @@
 The ship's roll is that of the passive twin plus the roll d that the pump made. With the share s of
 the command it made d, so with another share it would make about d times that ratio. The mean square
 of the roll is least at the share ``-s mean(twin d) / mean(d d)``, with means about the mean values
-and an exponential memory. A law that only rolls the ship more thus ends at `LEAST`, at a hundredth
-of its power, and comes back as soon as it helps. A ship that is not the twin's makes d wrong by as
-much as its answer to the pump differs; from 0.85 to 1.3 times the roll period the share stays right
-(docs/control.md).
+and an exponential memory. A law that only rolls the ship more thus ends at `LEAST`, next to no
+power, and comes back as soon as it helps. A ship that is not the
+twin's makes d wrong by as much as its answer to the pump differs: in short waves, loaded to 1.3
+times its roll period, it gets less pressure than would pay.
 """
 
 import math
 from typing import Final
 
-LEAST: Final = 0.1
-"""Least share, at which the pump's effect is still measurable; it adds a hundredth of the power."""
+LEAST: Final = 0.05
+"""Least share: the pump's effect is computed, so it needs no more to be known. With 0.25 a ship
+loaded to 1.3 times its period rolled 1.10 times the passive roll in short waves, with 0.05 1.05."""
 FIRST: Final = 0.5
 """Share before anything is known: a quarter of the power, three quarters of most of the gain."""
 MEMORY_PERIODS: Final = 8.0
