@@ -15,6 +15,7 @@ from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.place import Place
 from firmware_sim.scenario_sea import ScenarioSea
 from firmware_sim.sensors import SensorErrors
+from firmware_sim.unusual_encounter import moment_problems, unusual_encounter
 from firmware_sim.voyage import (
     Waypoint,
     ship_on_the_way,
@@ -367,7 +368,8 @@ class Scenario(Section):
         except ParameterError as error:
             return [(f"actual_ship.{name}", reason) for name, reason in error.problems]
         if unstable:
-            return [("actual_ship", f"with it, the tank {reason}") for _, reason in unstable]
+            keys = ", ".join(self.actual_ship) or "it"
+            return [("actual_ship", f"with {keys}, the tank {reason}") for _, reason in unstable]
         ships = {"vessel": self.vessel.ship}
         if self.actual_ship:
             ships["actual_ship"] = self.sailing_ship
@@ -396,6 +398,8 @@ class Scenario(Section):
             return [("sea", f"can't be made: {error}")]
         if not np.isfinite(amplitudes).all():
             return [("sea", "has waves too large to compute: check height, period and slope")]
+        if problems := moment_problems(self):
+            return problems
         waves = self.sea.sea(self.seed)
         steep = wavenumber_rad_m(waves.omega_rad_s) @ waves.amplitude_m
         if np.abs(amplitudes).max() > _NO_MOMENT * self.vessel.ship.stiffness_nm_rad * steep:
@@ -406,13 +410,18 @@ class Scenario(Section):
         return self.sea.without_moment() if steep > 0 and not turns else []
 
     def warnings(self) -> list[Problem]:
-        """Warnings of unusual values in vessel and sea."""
-        parts = {"vessel": self.vessel, "sea": self.sea}
-        return [
+        """Warnings of unusual values in vessel and sea, and of what they imply together."""
+        parts = {"vessel": self.vessel, "sea": self.sea} | {
+            f"voyage.{index}.sea": point.sea
+            for index, point in enumerate(self.voyage)
+            if point.sea is not None
+        }
+        found = [
             (f"{name}.{key}", reason)
             for name, part in parts.items()
             for key, reason in part.warnings()
         ]
+        return found + unusual_encounter(self)
 
     def _voyage_problems(self) -> list[Problem]:
         problems = waypoint_problems(self.voyage, self.duration_s)
@@ -442,7 +451,8 @@ class Scenario(Section):
             except ParameterError as error:
                 return [(f"voyage.{index}.ship.{name}", why) for name, why in error.problems]
             if unstable:
-                return [(f"voyage.{index}.ship", f"with it, the tank {unstable[0][1]}")]
+                keys = ", ".join(point.ship) or "it"
+                return [(f"voyage.{index}.ship", f"with {keys}, the tank {unstable[0][1]}")]
             if point.ship:
                 heels = self._heel_problems(self.ship_at(point.time_s))
                 problems += [(f"voyage.{index}.ship", why) for why in heels]

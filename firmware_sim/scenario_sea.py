@@ -45,6 +45,10 @@ Speed = Annotated[float, Range(least=0, most=40)]
 """Speed of a ship in m/s; the fastest ferries reach 30."""
 _FAST_M_S: Final = 20.0
 """Speed above which a warning is given. Chosen; no study."""
+LEAST_SPEED_M_S: Final = 0.05
+"""Speed below which a ship would be said to be at rest. Chosen; no study."""
+LEAST_SLOPE: Final = 0.05
+"""Effective slope that no ship falls short of near its roll period. Chosen; no study."""
 _STEEPEST: Final = 1 / 7
 """Steepness (height per length) at which a regular wave breaks in deep water (Michell 1893)."""
 
@@ -99,10 +103,15 @@ class _AnySea(Section):
 
     def warnings(self) -> list[Problem]:
         """Warnings of unusual values in the sea and its encounter."""
-        if self.speed_m_s <= _FAST_M_S:
-            return super().warnings()
+        found = super().warnings()
         knots = self.speed_m_s * 3600 / 1852
-        return [*super().warnings(), ("speed_m_s", f"is {knots:.0f} knots: it is in m/s")]
+        if self.speed_m_s > _FAST_M_S or 0 < self.speed_m_s < LEAST_SPEED_M_S:
+            found.append(("speed_m_s", f"is {knots:.2g} knots: it is in m/s"))
+        share = self.effective_slope.coefficient
+        if 0 < share < LEAST_SLOPE:
+            reason = f"of {share:g} hardly rolls the ship: ships have 0.2 to 1"
+            found.append(("effective_slope.coefficient", reason))
+        return found
 
     def without_moment(self) -> list[Problem]:
         """Problems of waves that do not roll the ship at all."""
@@ -120,6 +129,14 @@ class IrregularSea(_AnySea, ABC):
 
     spreading: NotNegative | None = None
     """Exponent s of the spreading cos^2s(theta / 2); the sea is long-crested without it."""
+
+    def warnings(self) -> list[Problem]:
+        """Warnings of unusual values in the sea, its encounter and its spreading."""
+        found, exponent = super().warnings(), self.spreading
+        if exponent is not None and not (exponent == 0 or 0.5 <= exponent <= 100):
+            reason = f"is {exponent:g}: wind seas have about 10, long swell 75 (Goda 1985)"
+            found.append(("spreading", reason))
+        return found
 
     @abstractmethod
     def spectrum(self) -> Spectrum:

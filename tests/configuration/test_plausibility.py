@@ -52,7 +52,7 @@ def thousandfold(value: float) -> float:
     ("ship", "changes", "key", "words"),
     [
         (FIRST, {"tank__width_m": 17100}, "tank.width_m", "17100 m, wider than any ship"),
-        (FIRST, {"tank__height_m": 4880}, "tank.height_m", "4880 m in a tank 17.1 m wide"),
+        (FIRST, {"tank__height_m": 4880}, "tank.height_m", "4880 m in a tank of width_m 17.1"),
         (FIRST, {"tank__density_kg_m3": 1.0}, "tank.density_kg_m3", "no liquid's density"),
         (FIRST, {"ship__inertia_kg_m2": thousandth}, "ship.inertia_kg_m2",
          "roll period of 0.4 s, short for a ship that holds a tank 17.1 m wide: inertia_kg_m2 is "
@@ -64,7 +64,7 @@ def thousandfold(value: float) -> float:
                  "ship__damping_nms_rad": thousandth}, "tank",
          "unless inertia_kg_m2 and stiffness_nm_rad are given in thousands (t m2, kN m)"),
         (FIRST, {"ship__damping_nms_rad": thousandfold}, "ship.damping_nms_rad",
-         "is a damping ratio of 25; hulls have 0.005 to 0.15"),
+         "is a damping ratio of 25 at 10 degrees of roll and 10 m/s; hulls have 0.005 to 0.15"),
         ("patti_b", {"ship__quadratic_damping_nms2_rad2": thousandfold},
          "ship.quadratic_damping_nms2_rad2", "at 10 degrees of roll"),
         (FIRST, {"ship__displacement_n": 4.1e4}, "ship.displacement_n",
@@ -73,7 +73,7 @@ def thousandfold(value: float) -> float:
                  "ship__stiffness_nm_rad": 2.4e10}, "ship.displacement_n", "m3 of water for a"),
         (FIRST, {"tank__damping_ratio": 10}, "tank.damping_ratio", "10 % is 0.10"),
         (FIRST, {"tank__lz_m": -20}, "tank.lz_m",
-         "puts the duct 20 m above the ship's centre of gravity, and the tank is 17.1 m wide"),
+         "puts the duct -20 m from the ship's centre of gravity, positive downwards"),
         (FIRST, {"tank__lx_m": 1000}, "tank.lx_m", "positive forward"),
         (FIRST, {"tank__duct_area_m2": thousandth}, "tank.duct_area_m2",
          "gives the water a period of 308 s, and the ship rolls in 12.6 s: about 4.26 m2 would "
@@ -85,8 +85,9 @@ def thousandfold(value: float) -> float:
          "25e3"),
         (FIRST, {"pump__max_pressure_pa": 50e6}, "pump.max_pressure_pa", "it is in Pa"),
         ("naval_vessel", {"pump__max_power_w": 225}, "pump.max_power_w",
-         "is 0.225 kW, and to hold max_pressure_pa, 20 kPa, takes 27.1 kW even in still water: "
-         "raise it, or lower max_pressure_pa; it is in W, 225 kW is 225e3"),
+         "is 0.225 kW, and to hold max_pressure_pa, 20 kPa, takes 27.1 kW even in still water "
+         "with a duct_area_m2 of 0.39: raise it, or lower max_pressure_pa; it is in W, 225 kW is "
+         "225e3"),
         (FIRST, {"pump__max_torque_nm": 200}, "pump.max_torque_nm", "it is in N m"),
         (FIRST, {"pump__max_pressure_rate_pa_s": 500}, "pump.max_pressure_rate_pa_s",
          "takes 100 s to the greatest pressure, and the ship rolls in 12.6 s"),
@@ -111,7 +112,7 @@ def test_what_can_not_be_is_refused_at_its_key_with_the_remedy(
     [
         ({"tank__damping_ratio": 0.8}, "tank.damping_ratio", "creep instead of swing"),
         ({"tank__damping_ratio": 0.0}, "tank.damping_ratio", "swing for ever"),
-        ({"tank__lz_m": 14.0}, "tank.lz_m", "14 m below"),
+        ({"tank__lz_m": 14.0}, "tank.lz_m", "the duct 14 m from"),
         ({"tank__duct_area_m2": 0.6, "pump__duct_area_m2": 0.6, "pump__radius_m": 0.3,
           "pump__pitch_m": 0.12}, "tank.duct_area_m2", "about 4.26 m2 would suit"),
         ({"pump__max_power_w": 225e3}, "pump.max_power_w", "is 225 kW, and to hold"),
@@ -132,7 +133,8 @@ def test_what_is_unusual_is_warned_of(
     ("hull", "key"),
     [
         ({"roll_period_s": 0.4}, "ship.roll_period_s"),
-        ({"beam_m": 0.02, "draught_m": 0.01, "length_m": 1.0}, "ship.beam_m"),
+        ({"beam_m": 0.02, "draught_m": 0.01, "length_m": 1.0}, "ship.displacement_t"),
+        ({"beam_m": 2.0, "draught_m": 200.0, "length_m": 100.0}, "ship.beam_m"),
         ({"inertia_kg_m2": 1.9e6}, "ship.inertia_kg_m2"),
         ({"roll_period_s": 12.6, "damping_ratio": 3.0}, "ship.damping_ratio"),
     ],
@@ -224,6 +226,24 @@ def test_unusual_sea_is_warned_of(
     refused, warned = told(tmp_path, {**STORM, "sea": sea}, Scenario)
     assert refused == {}
     assert words in warned[key]
+
+
+@pytest.mark.parametrize(("scale", "refused"), [(1.0, False), (1e-3, True), (1e3, True)])
+def test_moment_table_in_other_units_is_refused(
+    tmp_path: Path, scale: float, *, refused: bool
+) -> None:
+    full = 4.81875e8 / 9.80665  # stiffness times k / omega^2
+    rows = [
+        f"{omega},{heading},{scale * full * omega**2 * (heading == 90)},90"
+        for omega in (0.3, 0.6, 0.9)
+        for heading in (0, 90, 180)
+    ]
+    head = "omega_rad_s,heading_deg,moment_nm_per_m,phase_deg"
+    (tmp_path / "moments.csv").write_text("\n".join([head, *rows]))
+    sea = jonswap(3, 10, roll_moment_table="./moments.csv")
+    problems, _ = told(tmp_path, {**STORM, "sea": sea}, Scenario)
+    assert set(problems) == ({"sea.roll_moment_table"} if refused else set())
+    assert not refused or "not kN m" in problems["sea.roll_moment_table"]
 
 
 @pytest.mark.parametrize(

@@ -119,7 +119,7 @@ def test_a_quantity_given_twice_is_refused_by_both_names(
         ),
         (f"{{stiffness_nm_rad: 1.0e+7, {HULL}}}", {"displacement_t": "or else roll_period_s"}),
         (
-            "{displacement_t: 9, gm_m: 1, beam_m: 5, draught_m: 2, length_m: 2000}",
+            "{displacement_t: 12000, gm_m: 1, beam_m: 5, draught_m: 2, length_m: 2000}",
             {"length_m": "give roll_period_s"},
         ),
         (
@@ -148,7 +148,11 @@ def test_what_is_missing_or_wrong_is_said_in_the_keys_of_the_file(
             "roll_period_s",
             "short for a ship that holds a tank 8 m wide: it is in s",
         ),
-        (("roll_period_s: 9.5", "beam_m: 0.5, draught_m: 1, length_m: 9"), "beam_m", "in metres"),
+        (
+            ("roll_period_s: 9.5", "beam_m: 0.5, draught_m: 1, length_m: 9"),
+            "displacement_t",
+            "length_m 9, beam_m 0.5 and draught_m 1",
+        ),
         (("0.9", "90"), "gm_m", "radius of gyration of 44.9 m"),
         (("0.05", "5.0"), "damping_ratio", "10 % is 0.10"),
     ],

@@ -146,7 +146,7 @@ def test_a_tank_that_cannot_be_is_refused_with_the_reason(tmp_path: Path) -> Non
         ({"displacement": 1.9}, "--displacement: is 0.00317 m of water on 63 m by 9.5 m"),
         ({"displacement": 1.9e6}, "--displacement: is 3.17e+03 m of water"),
         ({"length": 63e3}, "--displacement: is 0.00317 m of water on 63000 m by 9.5 m"),
-        ({"duct-below-cg": -7}, "--duct-below-cg: puts the duct 7 m above"),
+        ({"duct-below-cg": -7}, "--duct-below-cg: puts the duct -7 m from"),
         ({"hs": 12, "tp": 8}, "--hs: of 12 m at a peak period of 8 s"),
         ({"tp": 60}, "--tp: must be above 0 and at most 40"),
         ({"hs": 0}, "--hs: must be positive"),

@@ -15,6 +15,7 @@ from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
 from utank_hil.base.tick import TICK_S, is_whole_ticks
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.laws import AnyDesign, sample_time
+from utank_hil.configuration.plausibility.controller import controller_warnings
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.control import DesignPlant, PassiveDesign, PredictiveDesign, PumpLimits
 from utank_hil.control.predictive.design import MOST_ORDER, WASHOUT_SHARE
@@ -105,6 +106,15 @@ class ControllerConfig(Section):
                 f"{self.safety.roll_limit_rad:g}, safety.roll_limit_rad: set it lower"
             )
             found.append(("retuning.roll_limit_rad", reason))
+        pump = self.vessel.pump
+        found += controller_warnings(
+            self.vessel.ship,
+            self.vessel.tank,
+            self.law,
+            self.limits,
+            None if pump is None else pump.max_pressure_pa,
+            self.retuning,
+        )
         return found + self.held_pressure_problems()
 
     def held_pressure_problems(self) -> list[Problem]:

@@ -35,12 +35,15 @@ _PAIRS = (
 
 _UNITS = {
     "displacement_t": "it is in tonnes",
-    "gm_m": "it is in metres, and the roll period in seconds",
+    "gm_m": "it is in metres, and roll_period_s in seconds",
     "roll_period_s": "it is in seconds, of a whole swing to both sides",
     "damping_ratio": "it is a share of critical damping, 10 % is 0.10",
     "beam_m": "it is in metres; give roll_period_s if it is known",
 }
 
+_SEA_WATER_T_M3 = 1.025
+_BLOCK = (0.2, 1.1)
+"""Block coefficients of any hull, from a sailing yacht's with its keel to a pontoon's."""
 _MOST = 1e30  # as for `RollShip`; the keys below keep what is computed from them within it
 _Length = Annotated[float, Range(above=0, most=1e4)]
 
@@ -98,7 +101,7 @@ class WrittenShip(RollShip):
             for own, other in _PAIRS
             if self.gives(own) and self.gives(other)
         ]
-        refuse("ship", twice or self._missing())
+        refuse("ship", twice or self._missing() or self._form_problems())
 
     def gives(self, name: str) -> bool:
         """Whether the file has a key."""
@@ -153,6 +156,21 @@ class WrittenShip(RollShip):
             reason = "is beyond the weather criterion's formula: give roll_period_s"
             refuse("ship", [("length_m", reason)])
         return period_s
+
+    def _form_problems(self) -> list[Problem]:
+        """Return a displacement that the hull's length, beam and draught can't hold."""
+        if not all(self.gives(name) for name in ("beam_m", "draught_m", "length_m")):
+            return []
+        box_t = _SEA_WATER_T_M3 * self.length_m * self.beam_m * self.draught_m
+        block = self._displacement_n / (1e3 * GRAVITY_M_S2 * box_t)
+        if math.isnan(block) or block == 0 or _BLOCK[0] <= block <= _BLOCK[1]:
+            return []
+        key = "displacement_t" if self.gives("displacement_t") else "displacement_n"
+        reason = (
+            f"gives a block coefficient of {block:.3g} with length_m {self.length_m:g}, beam_m "
+            f"{self.beam_m:g} and draught_m {self.draught_m:g}; hulls have 0.35 to 0.9"
+        )
+        return [(key, reason)]
 
     def _missing(self) -> list[Problem]:
         problems = []

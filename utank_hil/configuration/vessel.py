@@ -113,7 +113,7 @@ class Vessel(Section):
         written = content.get("ship") if isinstance(content, dict) else None
         if isinstance(written, dict):
             vessel._written = frozenset(written)
-        problems = vessel_problems(vessel.ship, vessel.tank, vessel.pump)
+        problems = vessel_problems(vessel.ship, vessel.tank, vessel.pump, vessel.valve)
         if vessel.valve is not None:
             wrong = valve_problems(vessel.tank, vessel.valve)
             problems += [(f"valve.{name}", reason) for name, reason in wrong]
@@ -154,7 +154,13 @@ class Vessel(Section):
 
     def warnings(self) -> list[Problem]:
         """Return what is unusual in the vessel."""
-        return in_written_keys(vessel_warnings(self.ship, self.tank, self.pump), self._written)
+        found = vessel_warnings(self.ship, self.tank, self.pump, self.valve)
+        if self.least_gm_m is not None:
+            gm_m = self.ship.stiffness_nm_rad / self.ship.displacement_n
+            if not 0.05 * gm_m <= self.least_gm_m <= gm_m:  # 0.15 m of 3 m to all of it
+                why = f"is {self.least_gm_m:g} m, and the ship's GM {gm_m:.3g} m: both in metres"
+                found.append(("least_gm_m", why))
+        return in_written_keys(found, self._written)
 
 
 def not_by_default(part: Any) -> dict[str, Any]:

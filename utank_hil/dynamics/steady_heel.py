@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -29,6 +30,7 @@ class RightingRange(NamedTuple):
     vanishing_rad: float
 
 
+@lru_cache(maxsize=16)  # a vessel's checks ask for it several times
 def righting_range(model: RollModel) -> RightingRange:
     """Return the righting range of a ship, without its steady moments."""
     push, _ = _at_rest(upright(model), _HEELS_RAD, 0.0)

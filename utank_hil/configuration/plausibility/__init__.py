@@ -18,10 +18,12 @@ from utank_hil.configuration.plausibility.drive import (
     of_motor,
     of_pump,
     of_quickness,
+    of_valve,
 )
 from utank_hil.configuration.plausibility.figure import Figure
 from utank_hil.configuration.plausibility.hull import (
     free_surface_nm_rad,
+    of_heights,
     of_ship,
     of_sizes,
     of_tank,
@@ -33,6 +35,7 @@ from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.steady_heel import righting_range
 from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics.valves import Valve
 
 __all__ = ["free_surface_nm_rad", "holding", "tank_problems", "vessel_problems", "vessel_warnings"]
 
@@ -40,9 +43,11 @@ LEAST_RIGHTING_RAD: Final = 0.01
 """Smallest range of righting: below, half a degree of heel would capsize the ship."""
 
 
-def vessel_problems(ship: RollShip, tank: Tank, pump: Pump | None) -> list[Problem]:
+def vessel_problems(
+    ship: RollShip, tank: Tank, pump: Pump | None, valve: Valve | None = None
+) -> list[Problem]:
     """Return why a vessel is impossible: the first cause, because dependent figures mislead."""
-    for stage in _stages(ship, tank, pump):
+    for stage in _stages(ship, tank, pump, valve):
         with np.errstate(all="ignore"):  # Overflowing numbers are refused by their figure.
             found = [(each.key, each.words) for each in stage() if each.refused]
         if found:
@@ -50,11 +55,13 @@ def vessel_problems(ship: RollShip, tank: Tank, pump: Pump | None) -> list[Probl
     return tank_problems(ship, tank)
 
 
-def vessel_warnings(ship: RollShip, tank: Tank, pump: Pump | None) -> list[Problem]:
+def vessel_warnings(
+    ship: RollShip, tank: Tank, pump: Pump | None, valve: Valve | None = None
+) -> list[Problem]:
     """Return what is unusual in a vessel without problems."""
     return [
         (each.key, each.words)
-        for stage in _stages(ship, tank, pump)
+        for stage in _stages(ship, tank, pump, valve)
         for each in stage()
         if each.warned
     ]
@@ -70,15 +77,16 @@ def tank_problems(ship: RollShip, tank: Tank) -> list[Problem]:
     if not (0 < water < mass[0, 0] and np.linalg.det(mass) > 0):
         reason = (
             f"has more roll inertia in its water than the ship, {water:.3g} of "
-            f"{ship.inertia_kg_m2:.3g} kg m2: make it smaller, unless inertia_kg_m2 and "
-            "stiffness_nm_rad are given in thousands (t m2, kN m)"
+            f"{ship.inertia_kg_m2:.3g} kg m2: make reservoir_area_m2 or width_m smaller, unless "
+            "inertia_kg_m2 and stiffness_nm_rad are given in thousands (t m2, kN m), or "
+            "displacement_t in kt"
         )
         return [("tank", reason)]
     if not (stiffness[0, 0] > 0 and np.linalg.det(stiffness) > 0):
         reason = (
             f"takes all of the ship's stability by its free surface, "
             f"{free_surface_nm_rad(ship, tank):.3g} of {ship.stiffness_nm_rad:.3g} N m/rad: lower "
-            "reservoir_area_m2 or width_m"
+            "reservoir_area_m2, width_m or height_m"
         )
         return [("tank", reason)]
     greatest_rad = righting_range(RollModel(ship, tank)).greatest_rad
@@ -92,10 +100,11 @@ def tank_problems(ship: RollShip, tank: Tank) -> list[Problem]:
 
 
 def _stages(
-    ship: RollShip, tank: Tank, pump: Pump | None
+    ship: RollShip, tank: Tank, pump: Pump | None, valve: Valve | None = None
 ) -> Iterator[Callable[[], Iterator[Figure]]]:
     """Return the parts of a vessel in an order in which each is judged with those before it."""
     yield partial(of_sizes, tank)
+    yield partial(of_heights, tank)
     yield partial(of_ship, ship, tank)
     yield partial(of_weight, ship, tank)
     yield partial(of_tank, ship, tank)
@@ -103,3 +112,5 @@ def _stages(
         yield partial(of_pump, tank, pump)
         yield partial(of_motor, pump)
         yield partial(of_quickness, ship, pump)
+    if valve is not None:
+        yield partial(of_valve, ship, tank, valve)

@@ -7,6 +7,7 @@ from utank_hil.configuration.plausibility.figure import Figure
 from utank_hil.dynamics.pump import Pump, pump_load, pump_speed
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.dynamics.valves import Valve
 
 
 def holding(pump: Pump) -> tuple[float, float, float]:
@@ -39,6 +40,16 @@ def of_pump(tank: Tank, pump: Pump) -> Iterator[Figure]:
         f"{math.sqrt(pump.duct_area_m2 / math.pi):.3g} m; it is about 0.7 of that"
     )
     yield Figure("pump.radius_m", radius, 0.1, 0.35, blade, 1, 3, blade)
+    lift = f"of {pump.lift:g} is no blade row's: a coefficient, about 1.4"
+    yield Figure("pump.lift", pump.lift, 0.01, 0.3, lift, 5, 100, lift)
+    drag = f"of {pump.friction:g} is no blade row's: a coefficient, about 0.005"
+    yield Figure("pump.friction", pump.friction, 0, 5e-4, drag, 0.03, 1, drag)
+    similar = Pump.for_duct(pump.duct_area_m2, pressure_pa).inertia_kg_m2
+    rotor = (
+        f"is {pump.inertia_kg_m2:.3g} kg m2; a rotor of this size with its water and motor has "
+        f"about {similar:.3g}"
+    )
+    yield Figure("pump.inertia_kg_m2", pump.inertia_kg_m2 / similar, 0, 0.1, rotor, 8, 1e4, rotor)
 
 
 def of_motor(pump: Pump) -> Iterator[Figure]:
@@ -55,13 +66,14 @@ def of_motor(pump: Pump) -> Iterator[Figure]:
         low = (
             f"is {given / scale:.4g} {unit}, and to hold max_pressure_pa, "
             f"{pump.max_pressure_pa / 1e3:.3g} kPa, takes {needed / scale:.3g} {unit} even in "
-            f"still water: raise it, or lower max_pressure_pa; {note}"
+            f"still water with a duct_area_m2 of {pump.duct_area_m2:g}: raise it, or lower "
+            f"max_pressure_pa; {note}"
         )
         high = (
             f"is {given / scale:.4g} {unit}, {given / needed:.3g} times what the greatest pressure "
             f"takes in still water; {note}"
         )
-        yield Figure(f"pump.{name}", given / needed, 0.03, 1, low, 50, 1e4, high)
+        yield Figure(f"pump.{name}", given / needed, 0.03, 1, low, 10, 1e4, high)
 
 
 def of_quickness(ship: RollShip, pump: Pump) -> Iterator[Figure]:
@@ -76,19 +88,41 @@ def of_quickness(ship: RollShip, pump: Pump) -> Iterator[Figure]:
         high=f"takes {rise_s:.3g} s to the greatest pressure, and the ship rolls in {roll_s:.3g} "
         "s: it is in Pa/s, 500 kPa/s is 500e3",
     )
+    yield Figure(
+        "pump.max_pressure_rate_pa_s",
+        rise_s / pump.lag_s,
+        warned_below=0.3,
+        low=f"takes {rise_s:.2g} s to the greatest pressure, and the pump's lag_s is "
+        f"{pump.lag_s:g} s: it is in Pa/s",
+    )
     spin_s = pump.inertia_kg_m2 * pump.max_speed_rad_s / pump.max_torque_nm
     yield Figure(
         "pump.inertia_kg_m2",
         spin_s / roll_s,
         warned_above=0.25,
         refused_above=2,
-        high=f"takes {spin_s:.3g} s to the greatest speed at the greatest torque, and the ship "
-        f"rolls in {roll_s:.3g} s: it is in kg m2, of rotor, motor and water",
+        high=f"takes {spin_s:.3g} s to max_speed_rad_s at max_torque_nm, and the ship rolls in "
+        f"{roll_s:.3g} s: it is in kg m2, of rotor, motor and water",
     )
+    late = f"is {pump.lag_s:g} s, and the ship rolls in {roll_s:.3g} s: it is in seconds"
+    yield Figure("pump.lag_s", pump.lag_s / roll_s, 0, 0, "", 0.1, 1, late)
+    # electric drives of pumps take 0.05 to 0.5 s
+    yield Figure("pump.lag_s", pump.lag_s, warned_above=0.8, high=late)
+
+
+def of_valve(ship: RollShip, tank: Tank, valve: Valve) -> Iterator[Figure]:
+    """Return figures of a valve, relative to ship and tank."""
+    roll_s = 2 * math.pi / ship.natural_frequency_rad_s
+    slow = f"is {valve.opening_time_s:g} s, and the ship rolls in {roll_s:.3g} s"
     yield Figure(
-        "pump.lag_s",
-        pump.lag_s / roll_s,
-        warned_above=0.1,
-        refused_above=1,
-        high=f"is {pump.lag_s:g} s, and the ship rolls in {roll_s:.3g} s: it is in seconds",
+        "valve.opening_time_s", valve.opening_time_s / roll_s, warned_above=0.25, high=slow
     )
+    tight = f"of {valve.leakage:g} is no gate's: it is a share of the open area"
+    yield Figure("valve.leakage", valve.leakage, warned_below=1e-3, low=tight)
+    sharp = f"of {valve.discharge_coefficient:g} is no orifice's: about 0.6"
+    key = "valve.discharge_coefficient"
+    yield Figure(key, valve.discharge_coefficient, warned_below=0.2, low=sharp)
+    if valve.pipe_area_m2 is not None:
+        share = valve.pipe_area_m2 / tank.reservoir_area_m2
+        pipe = f"is {valve.pipe_area_m2:g} m2 for a reservoir_area_m2 of {tank.reservoir_area_m2:g}"
+        yield Figure("valve.pipe_area_m2", share, 1e-6, 1e-4, pipe, 0.5, 5, pipe)

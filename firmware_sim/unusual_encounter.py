@@ -1,0 +1,140 @@
+"""What a scenario's ship, sea and times imply together, to find wrong units."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any, Final, Protocol
+
+import numpy as np
+
+from firmware_sim.scenario_sea import LEAST_SPEED_M_S
+from firmware_sim.voyage import Waypoint
+from utank_hil.base.parameters import Problem
+from utank_hil.configuration import Vessel
+from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.nodes.panel import TimedAction
+from utank_hil.sea.moment_table import MomentTable
+from utank_hil.sea.sea import EffectiveSlope
+
+_ROLL_DEG: Final = (0.05, 20.0)
+"""Static roll RMS of a sea that neither leaves the ship at rest nor is beyond the model."""
+_SLOPES_REFUSED: Final = (0.01, 30.0)
+_SLOPES: Final = (0.1, 4.0)
+"""Greatest moment of a table per that of the full wave slope: hulls have 0.3 to 2."""
+_PERIODS: Final = (0.5, 2.0)
+"""Roll period of a loading per that of the ship's file: from ballast to a deep draught."""
+
+
+class Encounter(Protocol):
+    """What a scenario brings together; its parts as in `firmware_sim.scenario`."""
+
+    @property
+    def vessel(self) -> Vessel:
+        """Ship, tank and pump."""
+
+    @property
+    def sea(self) -> Any:
+        """Section ``sea``."""
+
+    @property
+    def voyage(self) -> Sequence[Waypoint]:
+        """Changes under way."""
+
+    @property
+    def operator(self) -> Sequence[TimedAction]:
+        """Actions of the operator."""
+
+    @property
+    def actual_ship(self) -> dict[str, float]:
+        """Parameters that differ from the vessel's."""
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the run."""
+
+    def figures(self) -> dict[str, float]:
+        """Effect of the sea on the ship."""
+
+
+def moment_problems(scenario: Encounter) -> list[Problem]:
+    """Return why the roll moments of a table can't be those of the ship."""
+    slope = _slope_of_table(scenario)
+    if slope is None or _SLOPES_REFUSED[0] <= slope <= _SLOPES_REFUSED[1]:
+        return []
+    return [("sea.roll_moment_table", _of_table(slope))]
+
+
+def unusual_encounter(scenario: Encounter) -> list[Problem]:
+    """Return what is unusual in a scenario without problems."""
+    found = []
+    slope = _slope_of_table(scenario)
+    if slope is not None and not _SLOPES[0] <= slope <= _SLOPES[1]:
+        found.append(("sea.roll_moment_table", _of_table(slope)))
+    figures = scenario.figures()
+    roll_deg = math.degrees(figures["static_roll_rms_rad"])
+    if figures["hs_m"] > 0 and not _ROLL_DEG[0] <= roll_deg <= _ROLL_DEG[1]:
+        keys = sorted(scenario.sea.model_fields_set & {"hs_m", "amplitude_m", "tp_s", "period_s"})
+        reason = (
+            f"would heel the ship {roll_deg:.2g} degrees RMS, standing still: check "
+            f"{', '.join([*keys, 'effective_slope'])} and the ship's stiffness; heights are in "
+            "metres, periods in seconds"
+        )
+        found.append(("sea", reason))
+    for index, point in enumerate(scenario.voyage):
+        if point.sea is not None and not 0.05 <= point.sea.spectrum().hs_m / figures["hs_m"] <= 20:
+            reason = f"passes from {figures['hs_m']:.2g} m to {point.sea.spectrum().hs_m:.2g} m"
+            found.append((f"voyage.{index}.sea", f"{reason}: hs_m is in metres"))
+        if point.speed_m_s is not None and 0 < point.speed_m_s < LEAST_SPEED_M_S:
+            found.append((f"voyage.{index}.speed_m_s", f"is {point.speed_m_s:g}: it is in m/s"))
+    found += [
+        (f"operator.{index}.time_s", f"is {action.time_s:g}, after duration_s")
+        for index, action in enumerate(scenario.operator)
+        if action.time_s > scenario.duration_s
+    ]
+    return found + list(_loadings(scenario))
+
+
+def _loadings(scenario: Encounter) -> Iterator[Problem]:
+    """Return what is unusual in ships that differ from the vessel's, by their keys."""
+    own, tank = scenario.vessel.ship, scenario.vessel.tank
+    usual = {key for key, _ in vessel_warnings(own, tank, None)}
+    given = {"actual_ship": scenario.actual_ship} | {
+        f"voyage.{index}.ship": point.ship for index, point in enumerate(scenario.voyage)
+    }
+    for place, changed in given.items():
+        if not changed:
+            continue
+        ship: RollShip = replace(own, **changed)  # type: ignore[arg-type]  # floats only
+        judged = vessel_problems(ship, tank, None) or vessel_warnings(ship, tank, None)
+        yield from (
+            (f"{place}.{key.removeprefix('ship.')}", why)
+            for key, why in judged
+            if key not in usual and key.startswith("ship.")
+        )
+        ratio = own.natural_frequency_rad_s / ship.natural_frequency_rad_s
+        if not _PERIODS[0] <= ratio <= _PERIODS[1]:
+            reason = (
+                f"rolls in {ratio:.3g} times the period of the ship's file: check "
+                f"{' and '.join(changed)}, in kg m2, N m/rad and N"
+            )
+            yield place, reason
+
+
+def _slope_of_table(scenario: Encounter) -> float | None:
+    """Return the greatest moment of a table per that of the full slope of the wave."""
+    if scenario.sea.roll_moment_table is None:
+        return None
+    table = MomentTable.read(scenario.sea.roll_moment_table)
+    omega = table.omega_rad_s
+    beam = np.full(omega.shape, math.pi / 2)
+    stiffness = scenario.vessel.ship.stiffness_nm_rad
+    full = EffectiveSlope(1.0).moment(omega, beam, stiffness_nm_rad=stiffness)
+    return float(np.abs(table.moment(omega, beam)).max() / np.abs(full).max())
+
+
+def _of_table(slope: float) -> str:
+    return (
+        f"has {slope:.2g} times the moment that the full slope of the waves has on this ship; "
+        "hulls have 0.3 to 2: moment_nm_per_m is in N m per m of amplitude, not kN m"
+    )
