@@ -7,7 +7,8 @@ FUZZY = {
 }
 WRONG: list[tuple[str, dict[str, object], dict[str, str]]] = [
     ("gpc", {"law__prediction_horizon": 5},
-     {"law.control_horizon": "must be prediction_horizon at most, got 58 and 5"}),
+     {"law.control_horizon": "must be prediction_horizon at most, got 58 and 5",
+      "law.first_output": "must be below prediction_horizon, got 28 and 5"}),
     ("gpc", {"law__control_horizon": 400_000}, {"law.control_horizon": "must be 1 to 1000"}),
     ("gpc", {"law__first_output": 71}, {"law.first_output": "must be below prediction_horizon"}),
     ("gpc", {"law__output_weight": None}, {"law.output_weight": "GPC needs an output_weight"}),

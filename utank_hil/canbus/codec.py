@@ -87,13 +87,10 @@ def compile_codec(
     """
     signals = tuple(signals)
     kinds = [signal.kind for signal in signals if issubclass(signal.kind, IntEnum)]
-    source = "\n".join(
-        [
-            *_tables(name, message_type, signals, data_ids),
-            *_encoder(name, signals, data_ids is not None),
-            *_decoder(name, signals, data_ids is not None),
-        ]
-    )
+    tables = _tables(name, message_type, signals, data_ids)
+    encoder = _encoder(name, signals, data_ids is not None)
+    decoder = _decoder(name, signals, data_ids is not None)
+    source = "\n".join([*tables, *encoder, *decoder])
     scope = {**COMMON, **{kind.__name__: kind for kind in (message_type, *kinds)}}
     functions = compiled_codecs().get(source)
     if functions is None:

@@ -163,14 +163,10 @@ def _print(record: dict[str, Any], path: Path, config: Path) -> None:
     for heading in ("check", "measured", "expected", "unit", "verdict"):
         table.add_column(heading, justify="right" if "ed" in heading else "left", no_wrap=True)
     for check in record["checks"]:
-        measured = check["measured"]
-        table.add_row(
-            check["what"],
-            "none" if measured is None else f"{measured:.3g}",
-            f"{check['expected']:.3g} ± {check['tolerance']:.2g}",
-            check["unit"],
-            check["verdict"] if check["verdict"] == "pass" else Text("FAIL", "red"),
-        )
+        measured = "none" if check["measured"] is None else f"{check['measured']:.3g}"
+        expected = f"{check['expected']:.3g} ± {check['tolerance']:.2g}"
+        verdict = "pass" if check["verdict"] == "pass" else Text("FAIL", "red")
+        table.add_row(check["what"], measured, expected, check["unit"], verdict)
     console.table(table)
     for check in record["checks"]:
         if check["verdict"] != "pass":

@@ -83,13 +83,8 @@ def _as_written(design: Any, sections: dict[Any, Any]) -> Any:
         for each in fields(design)
         if each.name in own
     ]
-    written = make_dataclass(
-        design.__name__,
-        parameters,
-        bases=(design,),
-        namespace={"__doc__": design.__doc__},
-        frozen=True,
-    )
+    name, known = design.__name__, {"__doc__": design.__doc__}
+    written = make_dataclass(name, parameters, bases=(design,), namespace=known, frozen=True)
 
     def read(content: Any, checked: Callable[[Any], Any]) -> Any:
         if isinstance(content, design):

@@ -13,12 +13,9 @@ def timing_table(loops: dict[str, LoopStatistics]) -> Table:
     for name, loop in loops.items():
         for what, histogram in (("wake-up late", loop.lateness), ("tick lasts", loop.duration)):
             summary = histogram.summary()
+            times = [summary[key] / 1e3 for key in ("p50_ns", "p99_ns", "p99_9_ns", "max_ns")]
             counts = (str(loop.ticks), f"{loop.overruns} / {loop.skipped}")
-            table.add_row(
-                name if what == "wake-up late" else "",
-                what,
-                *(f"{summary[key] / 1e3:.0f}" for key in ("p50_ns", "p99_ns", "p99_9_ns")),
-                f"{summary['max_ns'] / 1e3:.0f}",
-                *(counts if what == "wake-up late" else ("", "")),
-            )
+            first = what == "wake-up late"
+            cells = [f"{time_us:.0f}" for time_us in times]
+            table.add_row(name if first else "", what, *cells, *(counts if first else ("", "")))
     return table

@@ -11,7 +11,7 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import RetuningState
-from utank_hil.pictures.style import COLORS, DASHES, HIGHLIGHT, WIDEST_IN, WRONG, picture
+from utank_hil.pictures.style import BELOW, COLORS, DASHES, HIGHLIGHT, WIDEST_IN, WRONG, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -97,13 +97,8 @@ def draw_bench(
             if lines:
                 top.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=10, color=WRONG)
             _draw_bars(top, bars)
-        axes = figure.subplots(
-            3 + retuning,
-            len(spans),
-            sharex="col",
-            squeeze=False,
-            height_ratios=[2.0, 2.0, 2.0, lane][: 3 + retuning],
-        )
+        shape, ratios = (3 + retuning, len(spans)), [2.0, 2.0, 2.0, lane][: 3 + retuning]
+        axes = figure.subplots(*shape, sharex="col", squeeze=False, height_ratios=ratios)
         for column, span_s in zip(axes.T, spans, strict=True):
             _draw_column(column, curves, span_s, as_they_were=span_s == spans[-1])
         if len(spans) > 1:
@@ -120,13 +115,8 @@ def draw_bench(
             axes[-1, 0].set_ylabel("Retuning", rotation=0, ha="right", va="center")
         figure.align_ylabels()
         handles = axes[0, -1].get_lines()[: len(curves)]
-        whole_figure.legend(
-            handles,
-            [bar.name for bar in bars[-len(curves) :]] or [curve.label for curve in curves],
-            loc="outside lower left",
-            ncols=len(curves),
-            frameon=False,
-        )
+        names = [bar.name for bar in bars[-len(curves) :]] or [curve.label for curve in curves]
+        whole_figure.legend(handles, names, **BELOW | {"ncols": len(curves)})
     return path
 
 

@@ -78,18 +78,13 @@ def draw_identification(
         residuals.set(xlabel="Lag (s)", ylabel=ordinate, ylim=(-0.6, 0.6))
         residuals.legend(frameon=False)
         for point in _stable_points(found):
-            modes.plot(
-                point.frequency_rad_s,
-                point.order,
-                "o" if point.frequency_stable and point.damping_stable else "x",
-                color=COLORS[1 if point.frequency_stable else 0],
-            )
+            mark = "o" if point.frequency_stable and point.damping_stable else "x"
+            color = COLORS[1 if point.frequency_stable else 0]
+            modes.plot(point.frequency_rad_s, point.order, mark, color=color)
         modes.axvline(found.fit.ship.natural_frequency_rad_s, color=COLORS[2], lw=1)
-        modes.set(
-            xlabel="Frequency (rad/s)",
-            ylabel="Model order (o: stable; line: identified ship)",
-            xlim=(BAND_RAD_S[0], BAND_RAD_S[-1]),
-        )
+        ordinate = "Model order (o: stable; line: identified ship)"
+        modes.set(xlabel="Frequency (rad/s)", ylabel=ordinate)
+        modes.set_xlim(BAND_RAD_S[0], BAND_RAD_S[-1])
     return path
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from utank_hil.analysis.motion.exceedance import exceedance
 from utank_hil.base.arrays import FloatArray
-from utank_hil.pictures.style import COLORS, DASHES, NO_TANK, WIDEST_IN, picture
+from utank_hil.pictures.style import BELOW, COLORS, DASHES, NO_TANK, WIDEST_IN, picture
 
 SEGMENT_S: Final = 200.0  #: Segments of Welch's spectra, with a resolution of 0.03 rad/s.
 LONGEST_S, SHORTEST_S = 40.0, 3.0  #: Range of periods in the figure.
@@ -50,5 +50,5 @@ def draw_roll_statistics(
         ordinate = "Share of amplitudes above it (%)"
         shares.set(yscale="log", xlabel="Single amplitude of the roll (°)", ylabel=ordinate)
         shares.set_xlim(left=0.0)
-        figure.legend(loc="outside lower left", ncols=len(rolls), frameon=False)
+        figure.legend(**BELOW | {"ncols": len(rolls)})
     return path

@@ -160,15 +160,10 @@ def _alarm_section(alarms: list[dict[str, Any]], file: Path) -> ReportSection:
         log = _log_of(file)
         absent = f"Not known: there is no {log.name} beside it."
         return ReportSection("Alarms", [f"None in {log.name}." if log.exists() else absent])
-    rows = [
-        [
-            f"{alarm['time_s']:.1f} s",
-            alarm["fault"],
-            alarm["state"] or alarm["event"],
-            f"{alarm['happened']} {alarm['remedy']}",
-        ]
-        for alarm in alarms
-    ]
+    rows = []
+    for alarm in alarms:
+        at, words = f"{alarm['time_s']:.1f} s", f"{alarm['happened']} {alarm['remedy']}"
+        rows.append([at, alarm["fault"], alarm["state"] or alarm["event"], words])
     return ReportSection("Alarms", tables=[ReportTable(["at", "", "", ""], rows, text=True)])
 
 

@@ -66,13 +66,9 @@ def write_recording(
     for column in columns:
         field_of(column)  # A column that is not in SI units is refused before there is a file.
     time_s = np.concatenate([rows[:, time_index(columns)] for rows in runs.values()])
-    blueprint = make_blueprint(
-        columns_of(columns, about),
-        list(runs),
-        span_s=(time_s.min(), time_s.max()),
-        size=scene_size(columns, about),
-        zero=_zero(columns, runs),
-    )
+    shown, size = columns_of(columns, about), scene_size(columns, about)
+    span_s, zero = (time_s.min(), time_s.max()), _zero(columns, runs)
+    blueprint = make_blueprint(shown, list(runs), span_s, size, zero)
     recording = rr.RecordingStream(APPLICATION, recording_id=path.stem)
     memory = recording.memory_recording()  # Rerun's writer of files waits forever on a full disk.
     # The recording comes first, because a browser shows what comes first.

@@ -193,14 +193,9 @@ class ProfiledDevice(Generic[T]):
         quality = Quality.GOOD if usable else Quality.BAD
         content: tuple[Any, ...] = (*values, quality)
         if self._tank:
-            port_m, starboard_m, port_high, starboard_high = values
-            content = (
-                port_m,
-                starboard_m,
-                self._switch(port_high, port_m),
-                self._switch(starboard_high, starboard_m),
-                quality,
-            )
+            port_m, starboard_m, *raw = values
+            switches = self._switch(raw[0], port_m), self._switch(raw[1], starboard_m)
+            content = (port_m, starboard_m, *switches, quality)
         self.deliver(_new(self._plan.kind, content), now_ns)
 
     def _changes(self, now_ns: int) -> bool:
