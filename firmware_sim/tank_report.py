@@ -94,11 +94,6 @@ def loading_table(points: Sequence[LoadingPoint]) -> Table:
     return table
 
 
-def loading_json(points: Sequence[LoadingPoint]) -> list[dict[str, Any]]:
-    """Roll at other loadings in SI units."""
-    return [asdict(point) for point in points]
-
-
 def sweep_tables(points: Sequence[SweepPoint]) -> list[Table]:
     """Tables of other tanks' roll, passive and active: by share of stability and by frequency."""
     tables = []

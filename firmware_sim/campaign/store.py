@@ -56,8 +56,7 @@ class Store:
             left.unlink()
         with _replacing(self.folder / STUDY) as file:
             file.write_bytes(loaded.path.read_bytes())
-        with _replacing(self.folder / ABOUT) as file:
-            file.write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
+        self.write_json(ABOUT, about)
         names = list(dict.fromkeys(key for case in loaded.cases for key in case.parameters))
         columns: dict[str, list[Any]] = {
             "case": [case.name for case in loaded.cases],

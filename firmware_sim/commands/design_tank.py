@@ -47,7 +47,7 @@ def tank(
 
     **Example:** utank-hil design tank configs/ships/naval_vessel.yaml --sweep
     """
-    from firmware_sim.tank_report import loading_json, loading_table, sweep_json, sweep_tables
+    from firmware_sim.tank_report import loading_table, sweep_json, sweep_tables
     from utank_hil.analysis.tank_design import best_passive_tank
     from utank_hil.analysis.tank_prediction import (
         loading_sensitivity,
@@ -95,7 +95,7 @@ def tank(
     figures |= about | {
         "scenario": name,
         **{key: _figures(loaded, each, found[key]) for key, each in tanks.items()},
-        "loading": loading_json(loadings),
+        "loading": [asdict(point) for point in loadings],
         "sweep": sweep_json(points),
         "files": {key: str(file) for key, file in files.items()},
     }

@@ -183,7 +183,3 @@ def _print(results: Sequence["Result"], on_bus: Sequence[Mapping[str, Any]]) -> 
             f"{told['id']}: {told['verdict']}, found {told['found_ms']} ms, drive off "
             f"{told['zero_ms']} ms, limit {told['limit_ms']} ms {'; '.join(told['problems'])}"
         )
-
-
-if __name__ == "__main__":  # run as a part of the evidence
-    typer.run(faults)

@@ -112,10 +112,15 @@ class MessageFault(Fault):
         """Name of the sender."""
         return (NODE_OF[self.named.source],)
 
-    def spoil_frames(self, bench: Bench, span: Span, spoil: Spoil) -> None:
+    @abstractmethod
+    def _spoil(self, seed: int) -> Spoil:
+        """Return the function that spoils a frame."""
+
+    def place(self, bench: Bench, span: Span, seed: int) -> None:
         """Spoil the message's frames at the output of their node."""
         _, source, codec = self.named
-        bench.nodes[NODE_OF[source]].spoiled.append(Spoiled(span, spoil, codec.can_id))
+        spoiled = Spoiled(span, self._spoil(seed), codec.can_id)
+        bench.nodes[NODE_OF[source]].spoiled.append(spoiled)
 
 
 def whole_cycles(by_s: float, cycle_ns: int) -> int:

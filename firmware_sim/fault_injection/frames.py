@@ -9,8 +9,7 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 
 from firmware_sim.fault_injection.fault import MessageFault, intact
-from firmware_sim.fault_injection.faulty_node import Span, Spoil
-from firmware_sim.fault_injection.place import Bench
+from firmware_sim.fault_injection.faulty_node import Spoil
 from utank_hil.base.parameters import Range
 from utank_hil.canbus import Frame
 from utank_hil.canbus.codec import FRAME_BYTES
@@ -20,38 +19,24 @@ _FOREIGN_DATA_IDS: Final = data_ids(127)
 """Data IDs that no message of the catalogue has."""
 
 
-class FrameFault(MessageFault):
-    """Fault of a message's frames."""
-
-    @abstractmethod
-    def spoil(self, seed: int) -> Spoil:
-        """Function that spoils a frame."""
-
-    def place(self, bench: Bench, span: Span, seed: int) -> None:
-        """Spoil the frames at the output of their node."""
-        self.spoil_frames(bench, span, self.spoil(seed))
-
-
-class Lost(FrameFault):
+class Lost(MessageFault):
     """Frames are lost: all of them, or a share by chance."""
 
     kind: Literal["lost"]
     share: Annotated[float, Field(gt=0, le=1)] = 1.0
     """Share of the frames lost at random."""
 
-    def spoil(self, seed: int) -> Spoil:
-        """Return the function that loses frames."""
+    def _spoil(self, seed: int) -> Spoil:
         draw = random.Random(seed).random
         return lambda frame, _: () if draw() < self.share else (frame,)
 
 
-class Frozen(FrameFault):
+class Frozen(MessageFault):
     """The same frame is sent again and again."""
 
     kind: Literal["frozen"]
 
-    def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        """Return the function that repeats the first frame."""
+    def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         first: list[Frame] = []
 
         def freeze(frame: Frame, _: float) -> Iterable[Frame]:
@@ -61,15 +46,14 @@ class Frozen(FrameFault):
         return freeze
 
 
-class Replayed(FrameFault):
+class Replayed(MessageFault):
     """The first frames of the fault are repeated in place of the new ones."""
 
     kind: Literal["replayed"]
     frames: Annotated[int, Field(ge=2)]
     """Number of frames that are repeated."""
 
-    def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        """Return the function that replays frames."""
+    def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         kept: list[Frame] = []
         count = [0]
 
@@ -83,27 +67,25 @@ class Replayed(FrameFault):
         return replay
 
 
-class Doubled(FrameFault):
+class Doubled(MessageFault):
     """Every frame is sent several times."""
 
     kind: Literal["doubled"]
     times: Annotated[int, Range(least=2, most=100)] = 2
     """Number of times that each frame is sent."""
 
-    def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        """Return the function that repeats each frame."""
+    def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         return lambda frame, _: (frame,) * self.times
 
 
-class Inserted(FrameFault):
+class Inserted(MessageFault):
     """An old frame is sent beside each new one."""
 
     kind: Literal["inserted"]
     back: Annotated[int, Range(least=1, most=10_000)]
     """Age of the old frame in cycles."""
 
-    def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        """Return the function that inserts old frames."""
+    def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         old: deque[Frame] = deque(maxlen=self.back + 1)
 
         def insert(frame: Frame, _: float) -> Iterable[Frame]:
@@ -113,7 +95,7 @@ class Inserted(FrameFault):
         return insert
 
 
-class Counter(FrameFault):
+class Counter(MessageFault):
     """The counter has a wrong step, with a correct CRC; with step zero it stands still."""
 
     kind: Literal["counter"]
@@ -122,8 +104,7 @@ class Counter(FrameFault):
     one_of: Annotated[int, Field(ge=1)] = 1
     """Only one frame in this number is sent, as by a node that is slower than its cycle."""
 
-    def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        """Return the function that sets the counter."""
+    def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         codec = self.named.codec
         counter: list[int] = []
         left_out = [self.one_of - 1]
@@ -141,24 +122,23 @@ class Counter(FrameFault):
         return count
 
 
-class Damaged(FrameFault):
+class Damaged(MessageFault):
     """Base of faults that damage one frame in `every`."""
 
     every: Annotated[int, Field(ge=1)] = 1
 
     @abstractmethod
-    def damage(self, data: bytes) -> bytes:
-        """Return the damaged bytes of a frame."""
+    def _damage(self, data: bytes) -> bytes:
+        """Return the damaged bytes of a frame, which another fault may have shortened."""
 
-    def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        """Return the function that damages frames."""
+    def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         count = [-1]
 
         def harm(frame: Frame, _: float) -> Iterable[Frame]:
             count[0] += 1
             if count[0] % self.every:
                 return (frame,)
-            return (Frame(frame.can_id, self.damage(frame.data)),)
+            return (Frame(frame.can_id, self._damage(frame.data)),)
 
         return harm
 
@@ -170,8 +150,7 @@ class Corrupted(Damaged):
     byte: Annotated[int, Field(ge=0, lt=FRAME_BYTES)] = 3
     """Index of the damaged byte."""
 
-    def damage(self, data: bytes) -> bytes:
-        """Flip two bits; a frame that another fault has shortened too much is left as it is."""
+    def _damage(self, data: bytes) -> bytes:
         wrong = bytearray(data)
         if self.byte < len(wrong):
             wrong[self.byte] ^= 0x24
@@ -183,8 +162,7 @@ class WrongDataId(Damaged):
 
     kind: Literal["data_id"]
 
-    def damage(self, data: bytes) -> bytes:
-        """Replace the CRC; a frame that another fault has shortened is left as it is."""
+    def _damage(self, data: bytes) -> bytes:
         if len(data) < FRAME_BYTES:
             return data
         return bytes([profile2_crc(data, _FOREIGN_DATA_IDS)]) + data[1:]
@@ -197,6 +175,5 @@ class WrongLength(Damaged):
     length: Annotated[int, Field(ge=0, lt=FRAME_BYTES)]
     """Number of bytes left."""
 
-    def damage(self, data: bytes) -> bytes:
-        """Shorten the frame."""
+    def _damage(self, data: bytes) -> bytes:
         return data[: self.length]

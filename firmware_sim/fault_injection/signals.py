@@ -16,8 +16,7 @@ from firmware_sim.fault_injection.fault import (
     signal_problems,
     whole_cycles,
 )
-from firmware_sim.fault_injection.faulty_node import Span, Spoil
-from firmware_sim.fault_injection.place import Bench
+from firmware_sim.fault_injection.faulty_node import Spoil
 from utank_hil.base.parameters import Finite, Positive, refuse
 from utank_hil.canbus import Frame
 from utank_hil.canbus.catalogue import NamedMessage
@@ -50,14 +49,13 @@ class SignalFault(MessageFault):
         return True
 
     @abstractmethod
-    def change(self, seed: int) -> Change:
-        """Function that changes the values."""
+    def _change(self, seed: int) -> Change:
+        """Return the function that changes the values."""
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:
-        """Alter the message at the output of its node."""
+    def _spoil(self, seed: int) -> Spoil:
         kind = self.named.kind
         places = [kind._fields.index(name) for name in self.signals]  # type: ignore[attr-defined]
-        change = self.change(seed)
+        change = self._change(seed)
 
         def changed(message: Any, since_s: float) -> Any:
             values = list(message)
@@ -66,7 +64,7 @@ class SignalFault(MessageFault):
                 values[place] = value
             return kind(*values)
 
-        self.spoil_frames(bench, span, _altered(self.named, changed))
+        return _altered(self.named, changed)
 
 
 def _altered(named: NamedMessage, change: Callable[[Any, float], Any]) -> Spoil:
@@ -92,8 +90,7 @@ class Stuck(SignalFault):
     def _measured(self) -> bool:
         return False
 
-    def change(self, seed: int) -> Change:  # noqa: ARG002
-        """Return the function that holds the values."""
+    def _change(self, seed: int) -> Change:  # noqa: ARG002
         held: list[Sequence[Any]] = []
 
         def stay(values: Sequence[Any], _: float) -> Sequence[Any]:
@@ -110,8 +107,7 @@ class Offset(SignalFault):
     by: Finite
     """Offset of each signal in its unit."""
 
-    def change(self, seed: int) -> Change:  # noqa: ARG002
-        """Return the function that adds the offset."""
+    def _change(self, seed: int) -> Change:  # noqa: ARG002
         return lambda values, _: [value + self.by for value in values]
 
 
@@ -122,8 +118,7 @@ class Scale(SignalFault):
     times: Finite
     """Factor on each signal."""
 
-    def change(self, seed: int) -> Change:  # noqa: ARG002
-        """Return the function that scales the values."""
+    def _change(self, seed: int) -> Change:  # noqa: ARG002
         return lambda values, _: [value * self.times for value in values]
 
 
@@ -134,8 +129,7 @@ class Drift(SignalFault):
     by_per_s: Finite
     """Drift of each signal in its unit per second."""
 
-    def change(self, seed: int) -> Change:  # noqa: ARG002
-        """Return the function that adds the drift."""
+    def _change(self, seed: int) -> Change:  # noqa: ARG002
         return lambda values, since_s: [value + self.by_per_s * since_s for value in values]
 
 
@@ -146,8 +140,7 @@ class Noise(SignalFault):
     deviation: Positive
     """Standard deviation in the signals' unit."""
 
-    def change(self, seed: int) -> Change:
-        """Return the function that adds noise."""
+    def _change(self, seed: int) -> Change:
         draw = random.Random(seed).gauss
         return lambda values, _: [value + draw(0.0, self.deviation) for value in values]
 
@@ -160,8 +153,7 @@ class Spikes(SignalFault):
     """Offset of that sample in the signal's unit."""
     every: Annotated[int, Field(ge=2)]
 
-    def change(self, seed: int) -> Change:  # noqa: ARG002
-        """Return the function that adds spikes."""
+    def _change(self, seed: int) -> Change:  # noqa: ARG002
         count = [-1]
 
         def strike(values: Sequence[Any], _: float) -> Sequence[Any]:
@@ -176,8 +168,7 @@ class Sign(SignalFault):
 
     kind: Literal["sign"]
 
-    def change(self, seed: int) -> Change:  # noqa: ARG002
-        """Return the function that inverts the sign."""
+    def _change(self, seed: int) -> Change:  # noqa: ARG002
         return lambda values, _: [-value for value in values]
 
 
@@ -187,8 +178,7 @@ class Swapped(SignalFault):
     kind: Literal["swapped"]
     signals: Annotated[tuple[str, ...], Field(min_length=2, max_length=2)]
 
-    def change(self, seed: int) -> Change:  # noqa: ARG002
-        """Return the function that exchanges the values."""
+    def _change(self, seed: int) -> Change:  # noqa: ARG002
         return lambda values, _: values[::-1]
 
 
@@ -199,8 +189,7 @@ class Late(SignalFault):
     by_s: FaultSpan
     """Delay, rounded up to whole cycles of the message."""
 
-    def change(self, seed: int) -> Change:  # noqa: ARG002
-        """Return the function that delays the values."""
+    def _change(self, seed: int) -> Change:  # noqa: ARG002
         cycles = whole_cycles(self.by_s, self.named.codec.cycle_ns)
         line: deque[Sequence[Any]] = deque(maxlen=cycles + 1)
 
@@ -246,8 +235,7 @@ class Value(MessageFault):
         refuse("", value_problems(self.named, self.values))
         return self
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Alter the message at the output of its node."""
+    def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         hints = get_type_hints(self.named.kind)
         values = {name: value_of(hints[name], written) for name, written in self.values.items()}
         count = [-1]
@@ -256,8 +244,7 @@ class Value(MessageFault):
             count[0] += 1
             return message if count[0] % self.every else message._replace(**values)
 
-        alter = _altered(self.named, say)
-        self.spoil_frames(bench, span, alter)
+        return _altered(self.named, say)
 
 
 def value_problems(named: Any, values: dict[str, Any]) -> list[tuple[str, str]]:
