@@ -74,8 +74,6 @@ PARTS: Final = {
     **{
         f"cost_{name}": Part(f"python -m tools.benchmarks.{name} {options}--json", minutes)
         for name, options, minutes in (
-            ("controllers", "--steps 5000 ", 1),
-            ("lockstep", "", 1),
             ("monitors", "--minutes 5 ", 1),
             ("realtime", "--seconds 200 ", 20),
             ("retuning", "--turns 8 ", 15),

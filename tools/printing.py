@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from rich.table import Table
@@ -32,15 +32,6 @@ def show(figures: Any, arguments: argparse.Namespace) -> None:
         return
     console = Terminal() if sys.stdout.isatty() else Terminal(width=WIDTH)
     _show("", figures, console)
-
-
-def print_tables(text: str | None, tables: Mapping[str, Callable[[], Any]]) -> None:
-    """Make and print the table that the command line names, or all; `text` is its help."""
-    parser = command_line(text)
-    parser.add_argument("table", nargs="?", choices=tables, help="all if left out")
-    arguments = parser.parse_args()
-    wanted = [arguments.table] if arguments.table else list(tables)
-    show({name: tables[name]() for name in wanted}, arguments)
 
 
 def _show(title: str, figures: Any, console: Terminal) -> None:

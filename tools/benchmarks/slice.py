@@ -7,20 +7,47 @@ Example: .venv/bin/python -m tools.benchmarks.slice --seconds 120
 """
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from tools.printing import command_line, show
-from tools.timed_node import TimedNode
 from utank_hil.assembly import build_controller_node
 from utank_hil.base.compiled import in_use
+from utank_hil.canbus import Frame
 from utank_hil.configuration import load_config
-from utank_hil.runners import Lockstep
+from utank_hil.runners import Lockstep, Node
 
 STORM = Path(__file__).resolve().parents[2] / "configs" / "scenarios" / "storm.yaml"
 WARM_UP_S = 10
+
+
+class TimedNode:
+    """A node whose ticks are timed, with the frames before each; `clock_ns` is the clock."""
+
+    def __init__(self, node: Node, clock_ns: Callable[[], int]) -> None:
+        self.name, self.period_ns = node.name, node.period_ns
+        self._node, self._clock_ns = node, clock_ns
+        self._heard_ns = 0
+        self.ticks_ns: list[int] = []
+        self.frames_ns: list[int] = []
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Take a frame, on the next tick's account."""
+        begin = self._clock_ns()
+        self._node.receive(frame, now_ns)
+        self.frames_ns.append(self._clock_ns() - begin)
+        self._heard_ns += self.frames_ns[-1]
+
+    def tick(self, now_ns: int) -> list[Frame]:
+        """Tick and note what this and the frames before it cost."""
+        begin = self._clock_ns()
+        frames = list(self._node.tick(now_ns))
+        self.ticks_ns.append(self._clock_ns() - begin + self._heard_ns)
+        self._heard_ns = 0
+        return frames
 
 
 def slice_speed(scenario: Scenario, seconds: int) -> float:

@@ -7,7 +7,7 @@ the part of the way from the passive tank to the best pressure history known in 
 same limits on pressure, rate, level (4 m) and power; with it the 95 % confidence interval of its
 mean. Constrained laws differ in the sea they expect: the hour's own spectrum, one of hours before,
 a JONSWAP spectrum of the hour's height and period, or none (white wave slope). What a step of each
-costs says tools/benchmarks/controllers.py.
+costs says `utank-hil check`.
 
 The causal bound is that of a law that knows the hour's spectrum as the shipped configuration has it
 (8 states, floor 1.3e-3) and has the bench's sensors, over records of ten minutes. Takes about 7
