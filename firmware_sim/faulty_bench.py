@@ -34,10 +34,7 @@ class FaultyBench:
     self-tuning controller, whose law cannot be made to fail. `tapped` wraps each controller before
     its faults do.
 
-    Attributes
-    ----------
-    node : ControllerNode
-        Controller that currently runs.
+    `node` is the controller that currently runs.
     """
 
     def __init__(

@@ -178,13 +178,7 @@ class Plant:
         self._state[kernel.MODE] = kernel.IMPOSED
 
     def set_valve_loss(self, loss_pa_per_m2_s2: float) -> None:
-        """Set the throttling of the water from now on.
-
-        Parameters
-        ----------
-        loss_pa_per_m2_s2 : float
-            Pressure loss per ``|dh/dt| dh/dt``, see `utank_hil.dynamics.valves`.
-        """
+        """Set the pressure loss per ``|dh/dt| dh/dt`` from now on, see `dynamics.valves`."""
         self._state[kernel.VALVE_LOSS] = loss_pa_per_m2_s2
 
     @property

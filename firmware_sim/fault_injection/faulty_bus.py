@@ -56,11 +56,8 @@ class Disturbance:
 class FaultyBus:
     """Simulated bus with faults.
 
-    Attributes
-    ----------
-    warn, cut_off : callable
-        Functions of time and sender, called when it becomes error-passive and while it is off the
-        bus.
+    `warn` and `cut_off` take time and sender, when it becomes error-passive and while it is off the
+    bus.
     """
 
     def __init__(self, bit_rate: int = 250_000, seed: int = 1) -> None:

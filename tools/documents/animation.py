@@ -48,13 +48,7 @@ Color = tuple[int, int, int]
 
 
 class Section:
-    """One ship in the picture; `show` sets it to an instant.
-
-    Parameters
-    ----------
-    name : str
-        Title.
-    """
+    """One ship in the picture; `show` sets it to an instant."""
 
     def __init__(self, axes: Axes, size: SceneSize, name: str) -> None:
         self._axes, self._size = axes, size

@@ -136,19 +136,9 @@ CASES: Final = (
 
 
 def record(case: Case, folder: Path, home: Path | None = None) -> Path:
-    """Run a case and write its frame log; the same bytes every time.
+    """Run a case, write its frame log and return it; the same bytes every time.
 
-    Parameters
-    ----------
-    folder : Path
-        Where it is written.
-    home : Path, optional
-        Where it is to be kept, if that is elsewhere: data files are named from there.
-
-    Returns
-    -------
-    Path
-        The log.
+    Data files are named from `home`, if the log is to be kept elsewhere than in `folder`.
     """
     scenario, config = scenario_of(case), config_of(case)
     law = build_law(config)

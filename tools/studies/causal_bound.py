@@ -115,19 +115,8 @@ class CausalBound:
 class CausalProblem:
     """A ship in a sea, and what its sensors tell.
 
-    Parameters
-    ----------
-    plant : DesignPlant
-        With the limits that the bounds keep; a delay below the sample time.
-    sea : SeaModel
-        As it is.
-    noise : SensorNoise
-        White, once a sample.
-
-    Attributes
-    ----------
-    passive_rad : float
-        Roll RMS of the ship with the passive tank.
+    The plant has the limits that the bounds keep, and a delay below the sample time; the noise is
+    white, once a sample. `passive_rad` is the roll RMS of the ship with the passive tank.
     """
 
     def __init__(
@@ -219,13 +208,7 @@ class CausalProblem:
 
 
 def causal_bound(problem: CausalProblem, runs: Sequence[CausalRun]) -> CausalBound:
-    """The bounds over records, the share with the 95 % confidence interval of a jackknife.
-
-    Parameters
-    ----------
-    runs : sequence of CausalRun
-        Of the problem, two or more.
-    """
+    """The bounds over two or more records, the share with the 95 % interval of a jackknife."""
     squares = np.array([[run.passive, run.clairvoyant, run.causal] for run in runs])
     count, total = len(squares), squares.sum(axis=0)
     passive = problem.passive_rad

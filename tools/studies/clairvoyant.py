@@ -55,12 +55,8 @@ def clairvoyant_bound(
 
     Raises `ValueError` if nothing keeps within the limits, or the solver fails.
 
-    Parameters
-    ----------
-    plant : DesignPlant
-        Its delay makes no difference where the whole record is known.
-    wave_motion : ndarray, shape (N + 1, 4)
-        `STATES` with the tank passive (`passive_motion`), at 0, Ts, ... N Ts.
+    `wave_motion`, shape (N + 1, 4), is `STATES` with the tank passive (`passive_motion`) at 0, Ts,
+    ... N Ts. The plant's delay makes no difference where the whole record is known.
     """
     model = pump_with_lag(plant, sample_time_s, delay_s=0.0)
     return best_history(plant, model, wave_motion[1:])

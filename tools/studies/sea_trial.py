@@ -138,10 +138,7 @@ def run_trials(
     The calling module must be importable (`if __name__ == "__main__"`): processes are spawned.
     Raises `ValueError` as `run_trial`.
 
-    Parameters
-    ----------
-    progress : callable, optional
-        Told the finished share after each trial.
+    `progress` takes the finished share after each trial.
     """
     context = multiprocessing.get_context("spawn")
     with (

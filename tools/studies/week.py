@@ -124,16 +124,8 @@ def sail(
 ) -> tuple[list[Sample], Counter[str]]:
     """Run, and take samples; what happened besides, counted.
 
-    Parameters
-    ----------
-    seconds, sample_s : float
-        Ship time in all, and from one sample to the next.
-    retune : callable
-        Identifies and designs.
-    settings : optional
-        Of the retuning, in the place of the configuration's.
-    episode_s, cargo_s : float
-        From one fault, and from one load change, to the next.
+    Samples are `sample_s` of ship time apart, faults `episode_s`, load changes `cargo_s`.
+    `settings` of the retuning replace the configuration's.
     """
     draw, counts = random.Random(seed), Counter[str]()
     scenario = load_config(SCENARIO, Scenario)

@@ -27,13 +27,7 @@ _DENSE: Final = 6
 
 
 def draw_figure(figure: Figure, path: Path, title: str) -> None:
-    """Draw the panels of a figure; legends stand above their panels, never on the data.
-
-    Parameters
-    ----------
-    figure : Figure
-        With one panel or more.
-    """
+    """Draw the panels of a figure; legends stand above their panels, never on the data."""
     columns = min(figure.columns, len(figure.panels))
     rows = math.ceil(len(figure.panels) / columns)
     size_in = (

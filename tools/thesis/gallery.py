@@ -23,19 +23,7 @@ _SIGNS: Final = {Verdict.HOLDS: "✓", Verdict.PARTLY: "◐", Verdict.FAILS: "�
 def write_gallery(
     entries: Sequence[Entry], figures: Mapping[str, Figure], folder: Path, path: Path
 ) -> None:
-    """Write the page.
-
-    Parameters
-    ----------
-    entries : sequence of Entry
-        What the page holds, sketches included.
-    figures : mapping of str to Figure
-        Made figures by key.
-    folder : Path
-        Where their pictures are, as `KEY.png`.
-    path : Path
-        The `.html` file; overwritten.
-    """
+    """Write the page of some entries, with the figures made and their pictures `KEY.png`."""
     contents = [_contents_row(entry, figures.get(entry.key)) for entry in entries]
     headings = ("figure", "", "greatest deviation", "statements")
     sections = [ReportSection("Figures", tables=[ReportTable(headings, contents, text=True)])]

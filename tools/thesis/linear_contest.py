@@ -135,11 +135,8 @@ def regular_wave_run(
 
     The moment is held over each step at its middle value.
 
-    Parameters
-    ----------
-    entrant : Entrant or None
-        None for the passive tank. Its delay is none or one sample, and its sample time a whole
-        number of steps.
+    The entrant's delay is none or one sample, and its sample time a whole number of steps; None is
+    the passive tank.
     """
     a, b = transition_and_step(*state_matrices(ship, tank), STEP_S)
     count = round(duration_s / STEP_S)

@@ -92,13 +92,7 @@ def changed(ship: RollShip) -> RollShip:
 
 
 def voyage(ship: RollShip, tank: Tank, adaptation: Adaptation, wave: Wave) -> Voyage:
-    """Sail the whole of it.
-
-    Parameters
-    ----------
-    ship : RollShip
-        Before the change.
-    """
+    """Sail the whole of it, with the ship as it is before the change."""
     measured = adaptation.measured
     sea = _Sea(changed(ship), tank, wave)
     before, pressure = sea.controlled(adaptation.old_law(ship, tank), measured, PULSES_S)
@@ -125,12 +119,7 @@ def with_noise(
 ) -> tuple[tuple[float, ...], float]:
     """Frequencies found from noisy sensors, rad/s, and the greatest eigenvalue of the new loop.
 
-    Parameters
-    ----------
-    ship, tank, adaptation, wave
-        As in `voyage`.
-    noise : float
-        Standard deviation of the white noise, per that of each signal.
+    `noise` is the standard deviation of the white noise, per that of each signal.
     """
     sea = _Sea(changed(ship), tank, wave)
     sea.controlled(adaptation.old_law(ship, tank), adaptation.measured, PULSES_S)

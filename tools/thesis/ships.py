@@ -16,15 +16,7 @@ ROLL_RAD_S: Final = 0.5
 def first_ship(
     damping_nms_rad: float, tank_damping: float, reservoir_area_m2: float = 17.11
 ) -> tuple[RollShip, Tank]:
-    """The first ship with what the source leaves open.
-
-    Parameters
-    ----------
-    damping_nms_rad : float
-        Roll damping of the ship.
-    tank_damping : float
-        Damping ratio of the water.
-    """
+    """The first ship with what the source leaves open: damping of the roll and of the water."""
     tank = Tank(17.1, 4.88, reservoir_area_m2, 6.22, lz_m=1.83, damping_ratio=tank_damping)
     return RollShip(INERTIA_KG_M2, INERTIA_KG_M2 * ROLL_RAD_S**2, damping_nms_rad), tank
 

@@ -25,12 +25,7 @@ class ResponseAmplitude(NamedTuple):
 def simulated_response(
     model: RollModel, frequency_rad_s: FloatArray, amplitude_nm: float
 ) -> ResponseAmplitude:
-    """Simulate each frequency to the steady state, and take the first harmonic.
-
-    Parameters
-    ----------
-    frequency_rad_s : ndarray, shape (n,)
-    """
+    """Simulate each frequency to the steady state, and take the first harmonic."""
     first = np.empty((2, len(frequency_rad_s)), dtype=np.complex128)
     angle = math.tau * np.arange(SAMPLES) / SAMPLES
     weights = np.exp(-1j * angle) * 2 / SAMPLES / amplitude_nm

@@ -43,13 +43,6 @@ def stimulate_on_still_water(
     """Drive the roll with a sinusoidal pressure from rest, stop the pump, and let the roll decay.
 
     Raises `ValueError` if the pump runs for less than one cycle, or to the end.
-
-    Parameters
-    ----------
-    pressure_pa : float
-        Amplitude of the pump pressure.
-    off_s : float
-        Time at which the pump stops.
     """
     cycle_s = math.tau / frequency_rad_s
     if not cycle_s < off_s < DURATION_S:

@@ -58,14 +58,9 @@ def contest(law: str, pump_pa: float = math.inf, duration_s: float = 300.0) -> C
 
     Raises `ValueError` if there is no such law.
 
-    Parameters
-    ----------
-    law : str
-        One of `LAWS`.
-    pump_pa : float
-        Largest pressure. The rate limit is ten times that per second, and the level barrier of
-        `CommandLimiter` keeps the water within `LEVEL_M`, also with the passive law. Infinite: a
-        pump without limits, and a passive tank without a pump.
+    `pump_pa` is the largest pressure. The rate limit is ten times that per second, and the level
+    barrier of `CommandLimiter` keeps the water within `LEVEL_M`, also with the passive law.
+    Infinite: a pump without limits, and a passive tank without a pump.
     """
     model = without_tank(PATTI_B) if law == "no tank" else PATTI_B
     build = law_factory(law, unlimited=math.isinf(pump_pa))
@@ -84,16 +79,9 @@ def contest(law: str, pump_pa: float = math.inf, duration_s: float = 300.0) -> C
 
 
 def law_factory(law: str, *, unlimited: bool) -> Callable[[], Controller]:
-    """Factory of new controllers of a law, at rest.
+    """Factory of new controllers of one of `LAWS`, at rest; `ValueError` if it is none.
 
-    Raises `ValueError` if there is no such law.
-
-    Parameters
-    ----------
-    law : str
-        One of `LAWS`.
-    unlimited : bool
-        Whether the pump has no limits; the fuzzy laws have other parameters then.
+    The fuzzy laws have other parameters for a pump that is `unlimited`.
     """
     c = PATTI_B.coefficients
     gain = -c.coupling * c.area / (c.inertia * c.level_inertia - c.coupling**2)

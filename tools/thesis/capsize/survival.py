@@ -48,27 +48,10 @@ def controlled_run(
     Raises `ValueError` if the duration is not a whole number of samples, or the sample time of
     steps.
 
-    Parameters
-    ----------
-    controller : Controller
-        Its outputs are roll, roll rate, level and level rate; one command.
-    wave : WaveMoment
-        One sea, arrays of shape (m,).
-    duration_s : float
-        A whole number of sample times.
-    limiter : CommandLimiter, optional
-        Limiter between controller and pump, with the controller's sample time as its period. None
-        for a pump without limits, or a valve.
-    initial : ndarray, shape (4,), optional
-        By default upright and at rest.
-    valve : bool
-        Whether the command is a valve loss (`semi_active`), not a pressure.
-    step_s : float
-        Integration step; the sample time is a whole number of steps.
-    capsize_rad : float
-        Roll angle at which the run ends.
-    each_step : callable, optional
-        Called with time, state and command at every sample.
+    The controller sees roll, roll rate, level and level rate. Its command is a pressure, or with
+    `valve` a valve's loss. A `limiter` has the controller's sample time as its period; without one
+    the pump has no limits. The run begins upright and at rest unless `initial`, shape (4,), is
+    given, and ends at `capsize_rad`. `each_step` takes time, state and command at every sample.
     """
     from utank_hil.dynamics import kernels
 
@@ -114,19 +97,8 @@ def largest_survivable_wave(
 
     The survived amplitudes need not form one interval; bisection finds one of its ends.
 
-    Parameters
-    ----------
-    survives : callable
-        Function that returns whether the ship survives an amplitude in N m.
-    highest_nm : float
-        Upper end of the search.
-    tolerance : float
-        Relative width of the final bracket.
-
-    Returns
-    -------
-    float
-        In N m; infinite if `highest_nm` is survived.
+    `survives` takes an amplitude in N m; `tolerance` is the relative width of the final bracket.
+    The result is infinite if `highest_nm` is survived.
     """
     if survives(highest_nm):
         return math.inf

@@ -43,12 +43,9 @@ def without_tank(model: RollModel) -> RollModel:
 
 
 def equilibria(model: RollModel) -> tuple[Equilibrium, ...]:
-    """Equilibria of ship and water without pressure and waves, up to 89 degrees to either side.
+    """Equilibria without pressure and waves, up to 89 degrees, from port to starboard.
 
-    Returns
-    -------
-    tuple of Equilibrium
-        From port to starboard. The level may be at its limit.
+    The level may be at its limit.
     """
     from scipy.optimize import brentq
 
@@ -130,16 +127,8 @@ def safe_basin(
 ) -> npt.NDArray[np.bool_]:
     """Safe basin: the starts that survive, with the water flat and at rest relative to the ship.
 
-    Parameters
-    ----------
-    roll_rad : ndarray, shape (a,)
-    roll_rate_rad_s : ndarray, shape (b,)
-    wave : WaveMoment, optional
-        One sea for all starts; by default calm water.
-
-    Returns
-    -------
-    ndarray of bool, shape (b, a)
+    The result has shape (b, a) for rolls of shape (a,) and rates of shape (b,); the sea is calm
+    unless a wave is given.
     """
     limit = model.coefficients.level_limit
     roll, rate = np.meshgrid(roll_rad, roll_rate_rad_s)
