@@ -17,17 +17,8 @@ _NAMED_ABOVE = re.compile(r"`([^`\s]+)`:\s*\Z")
 class Block:
     """A fenced block.
 
-    Attributes
-    ----------
-    language : str
-        First word after the fence.
-    note : str
-        The other words after the fence, for example a file name, or ``slow``.
-    file : str
-        File that the block shows: the note, or the path of a line "`path`:" right above.
-    line : int
-        Of the opening fence, from 1.
-    text : str
+    `language` is the first word after the fence, `note` the others, such as a name or ``slow``.
+    `file` is the note, or the path of a line "`path`:" right above; `line` is the fence's, from 1.
     """
 
     language: str

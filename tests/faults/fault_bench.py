@@ -48,19 +48,8 @@ def controller_config(name: str = "gpc") -> ControllerConfig:
 class Failing:
     """A node whose frames are spoiled, or that hangs or restarts, between two times.
 
-    Attributes
-    ----------
-    node : Node
-    begin_ns, end_ns : int
-        Time of the fault.
-    spoil : callable, optional
-        What becomes of each of its frames meanwhile.
-    hangs : bool
-        Whether it neither hears nor ticks meanwhile.
-    restarted : callable, optional
-        Builds the node that takes its place when the fault ends.
-    delay_ticks : int
-        Its frames leave so many ticks late from `begin_ns` on.
+    `restarted` builds the node that takes its place when the fault ends; `delay_ticks` holds from
+    `begin_ns` on.
     """
 
     node: Node
@@ -209,16 +198,7 @@ class Listener:
 class FaultBench:
     """Ship's side and controller on one simulated bus, each behind a `Failing`.
 
-    Parameters
-    ----------
-    seed : int
-    script : tuple of TimedAction
-    controller : str
-        Name in the storm's scenario.
-    extra : sequence of Node
-        More nodes on the bus.
-    scenario : Scenario, optional
-        Another one than the storm.
+    The controller is one of the scenario, by default the storm; `extra` nodes are on the bus, too.
     """
 
     def __init__(

@@ -28,12 +28,7 @@ class TooBusyError(Exception):
 def lost(share: float, longest_s: float) -> str:
     """What the machine did that it must not; empty if it kept time.
 
-    Parameters
-    ----------
-    share : float
-        Of the time for which it held processes up.
-    longest_s : float
-        For how long at a time.
+    `share` is that of the time for which it held processes up, `longest_s` how long at a time.
     """
     if share <= LOST_SHARE and longest_s <= HELD_UP_S:
         return ""
@@ -73,15 +68,8 @@ class Timekeeping:
 def judged_by(failure: Callable[[], str]) -> Iterator[None]:
     """Let what is asserted inside fail only where the machine kept time.
 
-    Parameters
-    ----------
-    failure : callable
-        What the machine did that it must not, empty if it kept time.
-
-    Raises
-    ------
-    TooBusyError
-        In place of AssertionError if it did not.
+    `failure` says what the machine did that it must not, empty if it kept time; if it did not,
+    `TooBusyError` is raised in place of AssertionError.
     """
     try:
         yield
@@ -95,12 +83,7 @@ def judged_by(failure: Callable[[], str]) -> Iterator[None]:
 def first_that_can_be_judged(attempt: Callable[[Path], T], folder: Path) -> T:
     """What the first attempt gives that the machine was not too busy for.
 
-    Parameters
-    ----------
-    attempt : callable
-        Does in a folder of its own what is judged, and raises `TooBusyError`.
-    folder : Path
-        Where the attempts get their folders.
+    `attempt` does what is judged, in a folder of its own inside `folder`; it raises `TooBusyError`.
     """
     for number in range(ATTEMPTS):
         own = folder / str(number)

@@ -19,15 +19,7 @@ THRESHOLDS: MonitorThresholds = thresholds_of(
 
 
 class MovingShip:
-    """Roll, its rate, level and pressure at any time, with the sensors' noise on demand.
-
-    Parameters
-    ----------
-    roll_rms_rad : float
-    pressure_rms_pa : float
-    frequency_rad_s : float
-    noise : bool
-    """
+    """Roll, its rate, level and pressure at any time, with the sensors' noise on demand."""
 
     def __init__(
         self,

@@ -17,12 +17,7 @@ DRIFTS = replace(THRESHOLDS, drift_rad=D)
 
 
 class Fed:
-    """A monitor that is fed with what the roll moves and what the rate says.
-
-    Parameters
-    ----------
-    step_s : float
-    """
+    """A monitor that is fed with what the roll moves and what the rate says."""
 
     def __init__(self, step_s: float, thresholds: MonitorThresholds = DRIFTS) -> None:
         self.monitor = RollAgainstRate(thresholds)
