@@ -26,6 +26,7 @@ from utank_hil.telemetry.recording import read_about
 
 CONFIGS = Path("configs")
 PATTI_B = CONFIGS / "scenarios" / "patti_b.yaml"
+ONE_LAW = CONFIGS / "scenarios" / "storm_day.yaml"
 SHIPPED = [
     (path, model)
     for folder, model in (
@@ -143,13 +144,13 @@ def test_both_commands_have_a_version(application) -> None:
 def test_figures_picture_and_recording_of_a_bench_hold_the_configuration_that_ran(
     tmp_path: Path,
 ) -> None:
-    words = ["bench", str(PATTI_B), "--seed", "3", "--duration", "20", "--out", str(tmp_path)]
+    words = ["bench", str(ONE_LAW), "--seed", "3", "--duration", "10", "--out", str(tmp_path)]
     result = CliRunner().invoke(app, [*words, "--json"])
     assert result.exit_code == 0, result.output
     told = json.loads((tmp_path / "bench.json").read_text())
     again = loaded_again(told["configuration"], Scenario, tmp_path)
-    ran = load_config(PATTI_B, Scenario)
-    changes = {"seed": 3, "duration_s": 20.0, "settle_s": 10.0}
+    ran = load_config(ONE_LAW, Scenario)
+    changes = {"seed": 3, "duration_s": 10.0, "settle_s": 5.0}
     assert values(again) == values(ran.model_copy(update=changes))
     assert told["options"]["seed"] == told["seed"] == 3
     picture = json.loads(Image.open(tmp_path / "bench.png").text["Description"])

@@ -1,4 +1,4 @@
-"""The default designs in the storm hour: a quarter less roll than the passive tank, within limits.
+"""The default designs in the storm: a quarter less roll than the passive tank, within limits.
 
 The loop is closed by hand here: exact plant on a 10 ms grid, 50 ms of delay, 0.1 s of lag, sensor
 noise and quantization, level observer and limiter; no bus and no nodes.
@@ -17,7 +17,7 @@ from utank_hil.sea import EffectiveSlope, Sea, load_ndbc
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
-STEP_S, DELAY_STEPS, LAG_S, WARM_UP_S = 0.01, 5, 0.1, 200
+STEP_S, DELAY_STEPS, LAG_S, WARM_UP_S, JUDGED_S = 0.01, 5, 0.1, 200, 1200
 SPECTRA = Path(__file__).parents[2] / "configs/seas/ndbc_41010_2019-02_spectral_density.txt"
 
 
@@ -25,11 +25,11 @@ SPECTRA = Path(__file__).parents[2] / "configs/seas/ndbc_41010_2019-02_spectral_
 def wave_moment():
     sea = Sea.irregular(load_ndbc(SPECTRA).at("2019-02-10T05:40"), seed=7)
     moment = sea.roll_moment(SHIP.stiffness_nm_rad, EffectiveSlope(0.5))
-    return moment.series(STEP_S, round((3600 + WARM_UP_S) / STEP_S))
+    return moment.series(STEP_S, round((JUDGED_S + WARM_UP_S) / STEP_S))
 
 
 def storm(wave_moment, design=None):
-    """Roll (rad), level (m) and command (Pa) over the hour; without a design, passive."""
+    """Roll (rad), level (m) and command (Pa) after `WARM_UP_S`; without a design, passive."""
     model = coupled_model(SHIP, TANK)
     chain = np.zeros((5, 5))
     chain[:4, :4], chain[:4, 4], chain[4, 4] = model.A, model.B[:, 0], -1 / LAG_S

@@ -1,4 +1,4 @@
-"""A shorter week with tighter bounds: twenty minutes, retuned and disturbed all the while."""
+"""A shorter week with tighter bounds: twelve minutes, retuned and disturbed all the while."""
 
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
@@ -37,7 +37,7 @@ def sailed() -> tuple[list[Sample], Counter[str]]:
     def retune(record: FloatArray) -> Answer:
         return candidate
 
-    return sail(1200, 60, retune, 3, settings=SETTINGS, episode_s=75.0, cargo_s=150.0)
+    return sail(700, 35, retune, 3, settings=SETTINGS, episode_s=40.0, cargo_s=100.0)
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Over an hour of the bench's plant the energy adds up."""
+"""Over ten minutes of the bench's plant the energy adds up."""
 
 import math
 from dataclasses import replace
@@ -27,13 +27,13 @@ def test_work_of_waves_and_pump_less_losses_is_the_change_of_energy() -> None:
     plant = Plant(ship, tank, vessel.pump, heavy)
     plant.advance(0)
     upright_j = float(energy(ship, tank, [[0.0] * 4])[0])
-    for tick in range(360_000):
+    for tick in range(60_000):
         plant.drive_pump(25e3 * math.sin(0.55 * tick * 0.01), enabled=tick % 50_000 < 40_000)
         plant.advance((tick + 1) * TICK_NS)
-    assert plant.strikes > 100
+    assert plant.strikes > 15
     rate_m_s = plant.flow_m3_s / tank.reservoir_area_m2
     state = [plant.roll_rad, plant.roll_rate_rad_s, plant.level_m, rate_m_s]
     gained_j = float(energy(ship, tank, [state])[0]) - upright_j
     work_j = plant.wave_work_j + plant.pump_work_j
-    assert plant.wave_work_j > 1e9
+    assert plant.wave_work_j > 1e8
     assert work_j - plant.losses_j == pytest.approx(gained_j, abs=1e-6 * plant.wave_work_j)
