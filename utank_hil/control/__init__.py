@@ -11,7 +11,6 @@ from utank_hil.control.fuzzy.indirect import IndirectFuzzy as IndirectFuzzy
 from utank_hil.control.gain import GainLaw as GainLaw
 from utank_hil.control.interface import BuiltLaw as BuiltLaw
 from utank_hil.control.interface import Controller as Controller
-from utank_hil.control.interface import LawDesign as LawDesign
 from utank_hil.control.interface import LinearLaw as LinearLaw
 from utank_hil.control.level_observer import LevelObserver as LevelObserver
 from utank_hil.control.limiter import CommandLimiter as CommandLimiter
@@ -19,11 +18,6 @@ from utank_hil.control.limits import PumpLimits as PumpLimits
 from utank_hil.control.lqg import LQGLaw as LQGLaw
 from utank_hil.control.lqg import design_lqg as design_lqg
 from utank_hil.control.lqg import design_lqr as design_lqr
-from utank_hil.control.lqg_design import LQGDesign as LQGDesign
-from utank_hil.control.optimal_tank import PassiveOptimum as PassiveOptimum
-from utank_hil.control.optimal_tank import ShipTankRatios as ShipTankRatios
-from utank_hil.control.optimal_tank import passive_optimum as passive_optimum
-from utank_hil.control.optimal_tank import ship_ratios as ship_ratios
 from utank_hil.control.passive import PassiveController as PassiveController
 from utank_hil.control.passive import PassiveDesign as PassiveDesign
 from utank_hil.control.pd import PD_MEASURED as PD_MEASURED
@@ -33,7 +27,6 @@ from utank_hil.control.predictive.design import Predictor as Predictor
 from utank_hil.control.predictive.design import wave_arx as wave_arx
 from utank_hil.control.predictive.gains import design_dpc as design_dpc
 from utank_hil.control.predictive.gains import design_gpc as design_gpc
-from utank_hil.control.predictive.law import PredictiveController as PredictiveController
 from utank_hil.control.predictive.law import PredictiveLaw as PredictiveLaw
 from utank_hil.control.sea_model import SeaModel as SeaModel
 from utank_hil.control.semi_active import ClippedValve as ClippedValve

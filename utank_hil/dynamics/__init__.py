@@ -1,7 +1,6 @@
 """Ship and tank: parameters, linear and nonlinear coupled models, six-degree forces."""
 
 from utank_hil.dynamics.linear import coupled_model as coupled_model
-from utank_hil.dynamics.nonlinear import Impact as Impact
 from utank_hil.dynamics.nonlinear import RollModel as RollModel
 from utank_hil.dynamics.sampling import sampled_model as sampled_model
 from utank_hil.dynamics.ship import RollShip as RollShip

@@ -41,6 +41,19 @@ def unpacked(row: FloatArray) -> RollCoefficients:
     )  # fmt: skip
 
 
+@njit(error_model="numpy", inline="always")
+def righting_moment(per_piece: float, restoring: FloatArray, phi: float) -> float:
+    """Restoring moment, from the pieces of `utank_hil.dynamics.restoring.Restoring`."""
+    heel = abs(phi)
+    piece = min(int(heel * per_piece), restoring.shape[0] - 1)
+    if piece > 0:
+        heel -= piece / per_piece
+    righting = 0.0
+    for k in range(restoring.shape[1] - 1, -1, -1):
+        righting = righting * heel + restoring[piece, k]
+    return -righting if phi < 0 else righting
+
+
 # Passing the coefficients four times a step would cost a third of the step.
 @njit(error_model="numpy", inline="always")
 def accelerations(
@@ -62,15 +75,7 @@ def accelerations(
     water it turns gravity (`utank_hil.dynamics.nonlinear`).
     """
     sin, cos = sine_cosine(phi)
-    heel = abs(phi)
-    piece = min(int(heel * per_piece), restoring.shape[0] - 1)
-    if piece > 0:
-        heel -= piece / per_piece
-    righting = 0.0
-    for k in range(restoring.shape[1] - 1, -1, -1):
-        righting = righting * heel + restoring[piece, k]
-    if phi < 0:
-        righting = -righting
+    righting = righting_moment(per_piece, restoring, phi)
     roll_inertia = c.inertia + c.inertia_h2 * h * h
     roll_moment = (
         moment
@@ -160,7 +165,7 @@ def sway_work_j(c: RollCoefficients, before: State, after: State, sway: float) -
 
 
 @njit(error_model="numpy")
-def _within(values: InStep, begin: float, end: float) -> InStep:
+def within(values: InStep, begin: float, end: float) -> InStep:
     """Interpolate quadratically at start, middle and end of a part of the step."""
     a, b, c = values
     slope, curvature = 4 * b - 3 * a - c, 2 * (a + c - 2 * b)
@@ -197,7 +202,7 @@ def step_with_impacts(
     limit = c.level_limit
     for strike in range(STRIKES_PER_STEP + 1):
         left = 1.0 - done
-        moment, sway = _within(moments, done, 1.0), _within(sways, done, 1.0)
+        moment, sway = within(moments, done, 1.0), within(sways, done, 1.0)
         after = rk4(c, per_piece, restoring, state, moment, sway, pump, valve, left * dt)
         if abs(after[2]) <= limit:
             summary[DAMPED_AROUND] += _damped_j(c, state, after, valve, left * dt)
@@ -209,7 +214,7 @@ def step_with_impacts(
             if g_high < 1e-13 or high - low < 1e-15 or g_low >= 0:
                 break
             s = high - g_high * (high - low) / (g_high - g_low)
-            moment, sway = _within(moments, done, done + s), _within(sways, done, done + s)
+            moment, sway = within(moments, done, done + s), within(sways, done, done + s)
             candidate = rk4(c, per_piece, restoring, state, moment, sway, pump, valve, s * dt)
             g = side * candidate[2] - limit
             if g > 0:
@@ -242,7 +247,7 @@ def step_with_impacts(
         # next impact is a change of sign.
         h = side * (limit if rebound == 0.0 else limit - INSIDE_M)
         state = (x, v + roll_jump, h, rebound)
-    moment, sway = _within(moments, done, 1.0), _within(sways, done, 1.0)
+    moment, sway = within(moments, done, 1.0), within(sways, done, 1.0)
     left = 1.0 - done
     x, v, h, w = rk4(c, per_piece, restoring, state, moment, sway, pump, valve, left * dt)
     return x, v, math.copysign(min(abs(h), limit), h), w

@@ -15,7 +15,6 @@ from utank_hil.identification.excitation import random_pulses as random_pulses
 from utank_hil.identification.excitation import response_scale as response_scale
 from utank_hil.identification.markov import markov_parameters as markov_parameters
 from utank_hil.identification.modal import ModalConfidence as ModalConfidence
-from utank_hil.identification.modal import ModalParameters as ModalParameters
 from utank_hil.identification.modal import modal_assurance as modal_assurance
 from utank_hil.identification.modal import modal_confidence as modal_confidence
 from utank_hil.identification.modal import modal_parameters as modal_parameters

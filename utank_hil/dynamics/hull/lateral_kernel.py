@@ -10,7 +10,7 @@ import math
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.jit import njit
-from utank_hil.dynamics.kernels import sine_cosine
+from utank_hil.dynamics.kernels import righting_moment, sine_cosine, within
 from utank_hil.dynamics.nonlinear import INSIDE_M, REST_M_S
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
@@ -83,15 +83,7 @@ def rates(
     sin, cos = sine_cosine(phi)
     flow, across, lx = p[12], p[12] * p[13], p[11]
     side, down = across * h, p[14] - flow * h * h
-    heel = abs(phi)
-    piece = min(int(heel * per_piece), restoring.shape[0] - 1)
-    if piece > 0:
-        heel -= piece / per_piece
-    righting = 0.0
-    for k in range(restoring.shape[1] - 1, -1, -1):
-        righting = righting * heel + restoring[piece, k]
-    if phi < 0:
-        righting = -righting
+    righting = righting_moment(per_piece, restoring, phi)
     mass_matrix(p, phi, h, m)
     # Derivatives of the mass matrix by roll and level.
     lever_phi = down * sin - side * cos
@@ -204,10 +196,8 @@ def _rk4(
 def _within(forces: FloatArray, begin: float, end: float, part: FloatArray) -> None:
     """Interpolate forces at start, middle and end of a part of the step, quadratically."""
     for i in range(3):
-        a, b, c = forces[0, i], forces[1, i], forces[2, i]
-        slope, curvature = 4 * b - 3 * a - c, 2 * (a + c - 2 * b)
-        for n, at in enumerate((begin, 0.5 * (begin + end), end)):
-            part[n, i] = a + at * (slope + at * curvature)
+        values = (forces[0, i], forces[1, i], forces[2, i])
+        part[0, i], part[1, i], part[2, i] = within(values, begin, end)
 
 
 @njit(error_model="numpy")
