@@ -69,12 +69,8 @@ class FeedbackLinearizationDesign:
     def __post_init__(self) -> None:
         problems = range_problems(self)
         if not self.soft_level_m < self.hard_level_m:
-            problems.append(
-                (
-                    "soft_level_m",
-                    f"must be below hard_level_m, got {self.soft_level_m} and {self.hard_level_m}",
-                )
-            )
+            reason = f"must be below hard_level_m, got {self.soft_level_m} and {self.hard_level_m}"
+            problems.append(("soft_level_m", reason))
         refuse("feedback linearization", problems)
 
     def build(self, plant: DesignPlant) -> BuiltLaw:

@@ -35,9 +35,8 @@ class LQGDesign:
     def __post_init__(self) -> None:
         problems = range_problems(self)
         if len(self.state_weight) != len(STATES):
-            problems.append(
-                ("state_weight", f"must have {len(STATES)} numbers, got {self.state_weight}")
-            )
+            reason = f"must have {len(STATES)} numbers, got {self.state_weight}"
+            problems.append(("state_weight", reason))
         else:
             problems += weight_problems("state_weight", self.state_weight)
         refuse("LQG design", problems)

@@ -22,14 +22,7 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.elementary import sine_cosine
-from utank_hil.base.parameters import (
-    Positive,
-    Problem,
-    Range,
-    SampleTime,
-    range_problems,
-    refuse,
-)
+from utank_hil.base.parameters import Positive, Problem, Range, SampleTime, range_problems, refuse
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import BuiltLaw
 from utank_hil.dynamics.linear import STATES, coupled_matrices

@@ -49,12 +49,7 @@ def random_pulses(
 
 
 def prbs(
-    duration_s: float,
-    limits: PumpLimits,
-    seed: int,
-    clock_s: float = 1.0,
-    *,
-    sample_time_s: float,
+    duration_s: float, limits: PumpLimits, seed: int, clock_s: float = 1.0, *, sample_time_s: float
 ) -> FloatArray:
     """Pseudo-random binary signal of full pressure, with a random sign every `clock_s`.
 

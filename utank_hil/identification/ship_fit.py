@@ -67,10 +67,7 @@ class ShipFit:
 
 
 def fit_ship(
-    result: OkidResult,
-    u: FloatArray,
-    plant: DesignPlant,
-    measured: tuple[str, ...],
+    result: OkidResult, u: FloatArray, plant: DesignPlant, measured: tuple[str, ...]
 ) -> ShipFit:
     """Fit ship and tank to the result of OKID.
 

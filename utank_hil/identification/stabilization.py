@@ -21,11 +21,9 @@ class StabilizationPoint:
     order: int
     frequency_rad_s: float
     damping_ratio: float
-    #: frequency_stable, damping_stable, shape_stable: whether it changes by 1 % in frequency or
-    #: less, by 5 % in damping ratio or less, and has a modal assurance of 0.98 or more.
-    frequency_stable: bool
-    damping_stable: bool
-    shape_stable: bool
+    frequency_stable: bool  #: Whether it changes by 1 % or less in frequency,
+    damping_stable: bool  #: by 5 % or less in damping ratio,
+    shape_stable: bool  #: and has a modal assurance of 0.98 or more.
 
 
 def stabilization(

@@ -38,10 +38,7 @@ class Lockstep:
     """
 
     def __init__(
-        self,
-        nodes: Sequence[Node],
-        bus: Bus | None = None,
-        trace: Trace | None = None,
+        self, nodes: Sequence[Node], bus: Bus | None = None, trace: Trace | None = None
     ) -> None:
         self._group = NodeGroup(nodes)
         self._trace = trace

@@ -77,12 +77,7 @@ def real_time_scheduling(priority: int = PRIORITY) -> Iterator[SchedulingReport]
         )
     with ExitStack() as undo:
         collector = _garbage_collector_off(undo)
-        measures = (
-            _fifo(undo, priority),
-            _memory_lock(undo),
-            _no_cpu_sleep(undo),
-            collector,
-        )
+        measures = (_fifo(undo, priority), _memory_lock(undo), _no_cpu_sleep(undo), collector)
         native_threads = len(os.listdir("/proc/self/task")) - 1
         yield SchedulingReport(measures, native_threads)
 

@@ -66,11 +66,7 @@ class Robustness:
 
 
 def robustness(
-    law: LinearLaw,
-    plant: DesignPlant,
-    measured: tuple[str, ...],
-    *,
-    with_delay_margin: bool = True,
+    law: LinearLaw, plant: DesignPlant, measured: tuple[str, ...], *, with_delay_margin: bool = True
 ) -> Robustness:
     """Judge a law on its ship, with extra delay, and on a grid of ships, pump gains and delays.
 

@@ -82,10 +82,7 @@ def washed(law: WashableLaw, washout_rad_s: float, ship: RollShip) -> LinearLaw:
 
 def per_output(name: str, values: tuple[float, ...], measured: tuple[str, ...]) -> Problem:
     """Error of a parameter that does not have one value for each output."""
-    return (
-        name,
-        f"must have one value per measured output, {len(measured)} of them, got {values}",
-    )
+    return (name, f"must have one value per measured output, {len(measured)} of them, got {values}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,9 +139,8 @@ class PredictiveDesign:
         if self.kind not in ("gpc", "dpc"):
             problems.append(("kind", f"must be gpc or dpc, got {self.kind}"))
         if self.kind == "gpc" and self.output_weight is None:
-            problems.append(
-                ("output_weight", "GPC needs an output_weight for each measured output")
-            )
+            reason = "GPC needs an output_weight for each measured output"
+            problems.append(("output_weight", reason))
         if self.output_weight is not None and len(self.output_weight) != len(measured):
             problems.append(per_output("output_weight", self.output_weight, measured))
         elif self.output_weight is not None:

@@ -13,7 +13,7 @@ These are not the body axes of `tank_wrench` (y to starboard, z down): multiply 
 """
 
 import math
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -140,11 +140,6 @@ class HullData:
             if value is not None and (found := _asymmetry(value)) > _MOST_ASYMMETRY:
                 problems.append((name, f"is not symmetric: halves differ by {100 * found:.0f} %"))
         return problems
-
-    @property
-    def missing(self) -> tuple[str, ...]:
-        """Names of the fields that the source does not have."""
-        return tuple(each.name for each in fields(self) if getattr(self, each.name) is None)
 
     def known(self, name: str) -> Any:
         """Return a field, or raise `ParameterError` naming it if the source does not have it."""
