@@ -268,6 +268,30 @@ def test_answer_is_finite_for_any_measurement_up_to_1e50(name, states):
         controller.applied(np.clip(u, -50e3, 50e3))
 
 
+@every_law
+@settings(max_examples=10, deadline=None)
+@given(
+    st.lists(
+        st.sampled_from([0.05, math.nan, math.inf, -math.inf, 1e50, -1e300]),
+        min_size=4,
+        max_size=4,
+    ).map(np.array)
+)
+def test_what_no_sensor_can_measure_is_one_bad_answer_at_most(name, broken):
+    controller, untouched = ALL[name][0](), ALL[name][0]()
+    for k in range(40):
+        y = measured(name, motion(k * controller.sample_time_s))
+        with np.errstate(all="ignore"):
+            answer = controller.step(measured(name, broken) if k == 5 else y)
+        expected = untouched.step(y)
+        if k != 5:
+            assert np.isfinite(answer).all()
+        for law, u in ((controller, answer), (untouched, expected)):
+            law.applied(np.clip(np.nan_to_num(u), -50e3, 50e3))
+    if name in {"passive", "pd", "lqr", "feedback linearization", "on-off valve", "clipped valve"}:
+        np.testing.assert_array_equal(answer, expected)  # nothing is remembered
+
+
 @pytest.mark.parametrize("name", sorted(set(ALL) - {"stimulation"}))
 def test_the_upright_ship_at_rest_is_left_alone(name):
     controller = ALL[name][0]()

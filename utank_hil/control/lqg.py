@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray, plausible
 from utank_hil.base.ordered_sums import product
 from utank_hil.control.arx import discrete_matrices
 from utank_hil.control.gain import GainLaw
@@ -220,7 +220,7 @@ class LQGController:
         ValueError is raised if there is a reference without a steady state (`reference_gain`).
         """
         memory, own = self._memory, self._own
-        memory[own:] = y
+        memory[own:] = plausible(y)
         following = product(self._advance, memory)
         command = following[self._command]
         if reference is not None:

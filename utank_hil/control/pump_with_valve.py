@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from utank_hil.base.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray, plausible
 from utank_hil.base.parameters import ParameterError
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import PRESSURE, VALVE, BuiltLaw, LawDesign
@@ -34,6 +34,7 @@ class PumpWithValve(ClippedValve):
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Pressure and loss, shape (2,), for the pump law's measurements and the level rate."""
+        y = plausible(y)
         flow = float(y[-1])
         pressure = float(self._pump.step(y[: self._measured], reference)[0])
         loss = throttled(self._valve, pressure, flow)

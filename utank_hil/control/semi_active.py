@@ -22,7 +22,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from utank_hil.base.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray, plausible
 from utank_hil.base.parameters import (
     NotNegative,
     ParameterError,
@@ -96,6 +96,7 @@ class ClippedValve:
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Loss, shape (1,), for the pump law's measurements `y`."""
+        y = plausible(y)
         flow = float(y[-1])
         pressure = float(self._pump.step(y[: self._measured], reference)[0])
         self._flow = abs(flow) * flow

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray, plausible
 from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import Finite, Problem, SampleTime, range_problems, refuse
 from utank_hil.control.arx import discrete_matrices
@@ -87,6 +87,7 @@ class StateSpaceController:
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Return C x + D (y - reference), shape (r,), and advance the state."""
+        y = plausible(y)
         error = y if reference is None else y - reference
         u = product(self._c, self._state) + product(self._d, error)
         self._state = product(self._a, self._state) + product(self._b, error)

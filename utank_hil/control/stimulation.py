@@ -20,7 +20,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from utank_hil.base.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray, plausible
 from utank_hil.base.elementary import sine_cosine
 from utank_hil.base.parameters import Positive, Problem, Range, SampleTime, range_problems, refuse
 from utank_hil.control.design_plant import DesignPlant
@@ -168,7 +168,7 @@ class StimulationController:
 
         `reference`, one number, overrides the wanted amplitude: 0 ramps out.
         """
-        plan = self._plan
+        plan, y = self._plan, plausible(y)
         self._lock_in(float(y[0]))
         if not self.ended and self._steps_in_charge > 1:  # not while another law is active
             self.passed_limit = self._beyond(y)

@@ -20,7 +20,7 @@ from typing import Annotated
 
 import numpy as np
 
-from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import MOST_MEASURED, ComplexArray, FloatArray
 from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import Positive, Range, range_problems, refuse
 from utank_hil.control.constrained.horizon import Horizon, condense
@@ -241,11 +241,11 @@ class ConstrainedController:
     def observe(self, y: FloatArray) -> None:
         """Update the estimate by a measurement as `step` does, without planning.
 
-        A measurement with any output that is not finite corrects nothing.
+        A measurement with any output that is none (`MOST_MEASURED`) corrects nothing.
         """
         state, mean = self._state, self._mean_pa
         surprise = y - product(self._c, state) - self._d * mean
-        if not math.isfinite(surprise.sum()):
+        if not np.abs(y).max() < MOST_MEASURED:  # so for NaN, too
             surprise = np.zeros(len(surprise))
         ahead = product(self._a, state) + self._b * mean
         self._state = ahead + product(self._observer_gain, surprise)

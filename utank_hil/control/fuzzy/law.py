@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from utank_hil.base.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray, plausible
 from utank_hil.base.parameters import (
     NotNegative,
     Positive,
@@ -109,6 +109,7 @@ class FuzzyController(ABC):
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Pressure, shape (1,), for the fuzzy inputs `y`; the target of roll is one number."""
+        y = plausible(y)
         x = np.minimum(np.maximum(y, -self._reach), self._reach)
         beyond = bool((x != y).any())
         # The error is that of the limited inputs, so that an extreme measurement cannot make

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray, plausible
 from utank_hil.base.ordered_sums import product
 from utank_hil.dynamics.sampling import LinearModel
 
@@ -104,7 +104,7 @@ class PredictiveController:
         or one for each sample of it. With a washout it is relative to the mean.
         """
         flat, newest, answers, width = self._flat, self._newest, self._answers, self._width
-        flat[newest + self._inputs : newest + width] = y
+        flat[newest + self._inputs : newest + width] = plausible(y)
         u = product(self._gains, flat[newest - answers : newest + self._window])
         if newest < width + answers:
             kept = self._window - width
