@@ -93,3 +93,11 @@ def test_lost_samples_are_no_harm_and_many_are_a_short_record():
 def test_what_tells_nothing_is_named(motion: FloatArray, verdict: Verdict):
     found = estimate(request(motion), TASK)
     assert (found.of_sea, found.of_ship, found.waves) == (verdict, verdict, None)
+
+
+@pytest.mark.parametrize(("tp_s", "told"), [(18.0, True), (32.0, False)])
+def test_no_height_is_told_of_waves_longer_than_any_swell(tp_s: float, *, told: bool):
+    found = estimate(request(motion_in(wave_moment_nm(jonswap(4.0, tp_s), 900.0, 3))[500:]), TASK)
+    assert found.waves is not None
+    assert np.isfinite([found.hs_m, found.tp_s]).tolist() == [told, told]
+    assert found.waves.rms_rad > 0

@@ -79,7 +79,7 @@ class MotionEstimate:
     #: Relative standard deviation of the root mean square of `waves`.
     rms_deviation: float = math.nan
     #: hs_m, tp_s: significant height and peak period of beam waves at the configured effective
-    #: slope.
+    #: slope; NaN if beam waves can't be so long.
     hs_m: float = math.nan
     tp_s: float = math.nan
     duration_s: float = 0.0  #: Length of the record.

@@ -1,6 +1,7 @@
 """Estimation of waves and ship from a record of the motion."""
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -32,6 +33,12 @@ SEA_DEVIATION: Final = 0.2
 """Largest relative deviation of the moment's root mean square for a sea that counts as known."""
 CONTRADICTED: Final = 20.0
 """Log-likelihood ratio from which another ship contradicts the known one."""
+LONGEST_S: Final = 25.0
+"""Longest period of ocean swell (WMO-No. 702). A moment of longer encounter is that of waves which
+a ship under way overtakes or runs with: their height does not follow from it."""
+MOST_LONGER: Final = 0.1
+"""Share of longer waves in the energy of the beam waves up to which there are a height and a peak.
+Chosen; no study."""
 SAME: Final = 3.0
 """Standard deviations within which the ships of the last half and the whole record agree."""
 
@@ -82,6 +89,9 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
     if fit.clear < LEAST_CLEAR:
         return MotionEstimate(Verdict.MOTION_SMALL, Verdict.MOTION_SMALL)
     ship, waves = fit.ship, fit.waves
+    elevation = waves.elevation_density(task.effective_slope)
+    longer = float(elevation[waves.omega_rad_s < 2 * np.pi / LONGEST_S].sum())
+    beam = longer <= MOST_LONGER * float(elevation.sum())
     sea_known = fit.rms_deviation <= SEA_DEVIATION and not contradicted
     return MotionEstimate(
         Verdict.GOOD if sea_known else Verdict.UNCERTAIN,
@@ -95,8 +105,8 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
         ),
         waves,
         fit.rms_deviation,
-        waves.hs_m(task.effective_slope),
-        2 * np.pi / float(waves.omega_rad_s[np.argmax(waves.elevation_density(1.0))]),
+        waves.hs_m(task.effective_slope) if beam else math.nan,
+        2 * np.pi / float(waves.omega_rad_s[np.argmax(elevation)]) if beam else math.nan,
         len(motion) * task.sample_time_s,
     )
 

@@ -213,8 +213,11 @@ class RenewingController(LawExchange):
         assert renewed is not None
         assert asked is not None
         assert asked.ship is not None
+        height = f"Hs {asked.hs_m:.2f} m, Tp {asked.tp_s:.1f} s"
+        if math.isnan(asked.hs_m):
+            height = "waves of unknown height"
         return (
-            f"renewed for Hs {asked.hs_m:.2f} m, Tp {asked.tp_s:.1f} s, roll period "
+            f"renewed for {height}, roll period "
             f"{asked.ship.roll_period_s:.2f} s: predicted roll "
             f"{math.degrees(renewed.roll_rad):.2f} degrees, with the passive tank "
             f"{math.degrees(renewed.passive_roll_rad):.2f}"
