@@ -3,6 +3,7 @@
 from utank_hil.console.interruptible import quietly_interruptible
 
 with quietly_interruptible():
+    import math
     from dataclasses import asdict
     from pathlib import Path
     from typing import Annotated
@@ -123,7 +124,8 @@ def firmware_sim(
         else f"{ship.refused_commands} commands refused"
     )
     console.say(
-        f"roll RMS {roll.rms_rad:.4f} rad, largest {roll.maximum_rad:.4f} rad; "
+        f"roll RMS {math.degrees(roll.rms_rad):.2f}°, largest "
+        f"{math.degrees(roll.maximum_rad):.2f}°; "
         f"pressure RMS {pump.pressure_rms_pa / 1e3:.1f} kPa; {drive}"
     )
 

@@ -16,7 +16,7 @@ from utank_hil.dynamics.water import water_moments
 
 Rows = list[tuple[str, str]]
 
-_ACTIVE = "  active tank, less than passive"
+_ACTIVE = "  active tank, against passive"
 _NEEDS = (
     "level it needs, significant",
     "pressure it needs, significant",
@@ -59,7 +59,7 @@ def roll_rows(found: RollPrediction) -> Rows:
         ("roll RMS without tank", _degrees(found.without_tank_rad)),
         (
             "  passive tank",
-            f"{_degrees(found.passive.roll_rms_rad)}, {found.passive_below_no_tank:.0%} less",
+            f"{_degrees(found.passive.roll_rms_rad)}, {less(found.passive_below_no_tank)}",
         ),
     ]
     if active is None or found.mean_power_w is None:
@@ -68,7 +68,7 @@ def roll_rows(found: RollPrediction) -> Rows:
         *rows,
         (
             _ACTIVE,
-            f"{_degrees(active.roll_rms_rad)}, {found.active_below_passive:.0%} less",
+            f"{_degrees(active.roll_rms_rad)}, {less(found.active_below_passive)}",
         ),
         *zip(
             _NEEDS,
@@ -145,6 +145,13 @@ def prediction_json(found: RollPrediction) -> dict[str, Any]:
         "active_below_passive": found.active_below_passive,
         "no_law": found.no_law or None,
     }
+
+
+def less(share: float | None) -> str:
+    """Reduction of roll in words, also a negative one; empty without one."""
+    if share is None:
+        return ""
+    return f"{abs(share):.0%} {'more' if share < 0 else 'less'}"
 
 
 def power(value_w: float) -> str:

@@ -99,7 +99,8 @@ def test_tables_hold_what_an_engineer_asks_for(accepted) -> None:
     _, result = accepted
     words = " ".join(result.stdout.split())
     for part in (
-        "roll period, s", "± 95 %", "tank damping ratio", "later than configured: roll_rad",
+        "roll period, s", "± 95 %", "tank damping ratio",
+        "delay against the configured one: roll_rad",
         "1: frequency, rad/s", "2: frequency, rad/s", "white", "with the",
         "predictions", "Waves:", "Accepted: peak sensitivity",
     ):  # fmt: skip

@@ -58,7 +58,7 @@ def campaign(
     except ConfigError as error:
         fail_with(error)
     folder = OUT / study.stem if out is None else out
-    prepare_out(folder, FILES)
+    prepare_out(folder, FILES, keep=False)
     store = Store(folder)
     try:
         store.begin(loaded, _about(loaded, folder, context.params), resume=resume)

@@ -65,7 +65,7 @@ def controller(
     if path is None:
         fail(f"no shipped scenario is for {vessel.name}: say with --scenario which sea counts")
     sea = load(path, Scenario, allow_code=True)  # laws are not built from it
-    prepare_out(out, (PICTURE, FIGURES))
+    out = prepare_out(out, (PICTURE, FIGURES))
     try:
         with progress_bar() as bar:
             task = bar.add_task("designing", total=1.0)

@@ -14,6 +14,7 @@ from utank_hil.base.provenance import describe
 from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import Vessel
 from utank_hil.console.common import OUT, Json, fail, load, prepare_out, print_json
+from utank_hil.console.ship_report import order_words
 from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.dynamics.tank import Tank
 
@@ -81,7 +82,7 @@ def tank(
     plants = {key: _plant(loaded, each) for key, each in tanks.items()}
     pump = loaded.pump is not None
     found = {key: predict_roll(plant, sea, pump=pump) for key, plant in plants.items()}
-    prepare_out(out, (PICTURE, SWEEP, FIGURES))
+    out = prepare_out(out, (PICTURE, SWEEP, FIGURES))
     plant, own = plants["present"], found["present"]
     loadings = loading_sensitivity(plant, sea, own)
     title = f"{loaded.name}: {name}"
@@ -104,6 +105,8 @@ def tank(
         print_json(figures)
         return
     console.table(_table(loaded, tanks, found, f"roll: linear prediction for {name}"))
+    if loaded.pump is not None:
+        console.say(f"pump: net head, flow, shaft, duty: {order_words(loaded)}")
     if left_out := _left_out(loaded.ship):
         console.say(f"left out of the roll: {left_out}; utank-hil bench has it")
     console.table(loading_table(loadings))

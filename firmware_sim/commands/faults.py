@@ -72,7 +72,7 @@ def faults(
     chosen = [row for row in chosen if row not in too_long]
     _refuse_names(loaded, names, chosen, live, bus)
     if out is not None:
-        prepare_out(out, [f"{row.id}.rrd" for row in chosen])
+        out = prepare_out(out, [f"{row.id}.rrd" for row in chosen])
     began = time.monotonic()
     with progress_bar(MofNCompleteColumn()) as bar, stop_on_signals() as stopped:
         task = bar.add_task("faults", total=len(chosen) * seeds)

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
 import typer
 from rich.table import Table
 
-from firmware_sim.tank_report import cost_rows, power, prediction_json, roll_rows
+from firmware_sim.tank_report import cost_rows, prediction_json, roll_rows
 from utank_hil.analysis.tank_sizing import tank_cost
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.whole_file import write_whole
 from utank_hil.console.common import Json, fail, prepare_out, print_json
 from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.ship_report import order_words
 from utank_hil.console.terminal import Terminal, new_table, notes, shown
 
 if TYPE_CHECKING:
@@ -227,8 +228,7 @@ def _as_json(project: "StarterProject") -> dict[str, Any]:
 
 
 def _table(project: "StarterProject") -> Table:
-    sized, demand, law, pump = project.sized, project.demand, project.law, project.vessel.pump
-    assert pump is not None
+    sized, demand, law = project.sized, project.demand, project.law
     sea = f"{project.sea['hs_m']:g} m, {project.sea['tp_s']:g} s"
     caption = (
         f"roll: linear prediction in a sea of {sea}, with a gentler law than the self-tuned one"
@@ -247,9 +247,8 @@ def _table(project: "StarterProject") -> Table:
         *cost_rows(tank_cost(ship, tank)),
         ("pump moves the water by", f"{demand.level_m:.2f} m"),
         (
-            "  with",
-            f"{pump.max_pressure_pa / 1e3:.3g} kPa, {demand.flow_m3_s:.3g} m³/s, "
-            f"{power(pump.max_power_w)}",
+            "pump: net head, flow, shaft, duty",
+            order_words(project.vessel),
         ),
         ("law", "self-tuned"),
         ("peak sensitivity, 2 at most", f"{law.robustness.nominal.peak_sensitivity:.2f}"),

@@ -19,10 +19,11 @@ MAX_FRAMES_PER_CALL: Final = 320
 #: A deleted interface: its sockets never recover, even if the interface is created again.
 _GONE: Final = (errno.ENODEV, errno.ENXIO)
 
+_CREATE: Final = "plug in the adapter, or create the interface; a vcan0 without root: tools/vcan"
 _REMEDIES: Final = {
     errno.ENETDOWN: "bring it up: ip link set {channel} up",
-    errno.ENODEV: "plug in the adapter, or create the interface",
-    errno.ENXIO: "plug in the adapter, or create the interface",
+    errno.ENODEV: _CREATE,
+    errno.ENXIO: _CREATE,
     errno.ENOBUFS: "transmit queue full: no node acknowledges, or the bus is overloaded",
     errno.EAFNOSUPPORT: "the kernel has no CAN: modprobe can_raw",
 }

@@ -90,7 +90,7 @@ def print_controller(judged: JudgedLaw) -> None:
     table.add_row("delay margin", _delay(judged.law, margin), "over 20 ms")
     table.add_row("disk margin", f"{margin.disk_margin:.2f}", "")
     table.add_row("greatest loop gain", f"{margin.peak_loop_gain:.3g}", "")
-    table.add_row("largest eigenvalue of the grid", f"{report.worst_radius:.4f}", "less than 1")
+    table.add_row("largest eigenvalue of the grid", _radius(report.worst_radius), "less than 1")
     table.caption = (
         "grid: roll period 0.7 to 1.3, or inertia 0.8 to 1.25;\n"
         "pump gain 0.8 to 1.2, 0 or 20 ms more delay"
@@ -160,6 +160,11 @@ def _verdict(judged: JudgedLaw) -> str | Text:
     if judged.robustness is None:
         return "dissipates" if judged.law.dissipates else "no loop"
     return "at rest" if judged.law.adapts else Text("ok", "green")
+
+
+def _radius(radius: float) -> str:
+    near = abs(radius - 1) < 5e-5  # would print as 1.0000
+    return f"1 {'-' if radius < 1 else '+'} {abs(1 - radius):.0e}" if near else f"{radius:.4f}"
 
 
 def _gain(margin: Margins) -> str:

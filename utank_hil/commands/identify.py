@@ -81,9 +81,7 @@ def identify_log(
     loaded = load(config, ControllerConfig, allow_code=True)  # Code is refused, not run.
     task = _task(loaded, order)
     content = read_controller(config)
-    results = [out / name for name in (PICTURE, VESSEL, CONTROLLER)]
-    _keep_apart(results, config, content)
-    prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
+    out = prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
     measured = task.design.predictor.measured
     try:
         runs = read_signals(log, say_note, channel=channel)
@@ -95,8 +93,6 @@ def identify_log(
             signals = even_rows(log, signals, sample_time_s, from_s, to_s)
             from_s = to_s = None
         record = logged_samples(signals, measured, sample_time_s, from_s, to_s)
-        for path in results:  # Later content of these files is of this recording.
-            path.unlink(missing_ok=True)
     except (OSError, ValueError) as error:
         fail(error)
     try:
@@ -116,13 +112,6 @@ def identify_log(
         print_report(Terminal(), found, task, answer, files)
     if not isinstance(answer, Candidate):
         raise typer.Exit(ExitCode.REFUSED)
-
-
-def _keep_apart(results: list[Path], config: Path, content: dict[str, Any]) -> None:
-    vessel = content["vessel"]
-    given = [config, *([Path(vessel)] if isinstance(vessel, str) else [])]
-    for path in {path.resolve() for path in results} & {path.resolve() for path in given}:
-        fail(f"{path} is what this begins with, and would be written over: choose another --out")
 
 
 def _task(config: ControllerConfig, order: int | None) -> RetuningTask:

@@ -134,7 +134,8 @@ def _ship_table(found: Identification, task: RetuningTask) -> Table:
         for name, late_s in zip(measured, fit.extra_delay_s.tolist(), strict=True)
     )
     table.caption = (
-        f"later than configured: {later}; pressure {fit.pressure_gain - 1:+.1%} of the command; "
+        f"delay against the configured one: {later}; "
+        f"pressure {fit.pressure_gain - 1:+.1%} of the command; "
         f"misfit {fit.dispersion:.1f} times its uncertainty (limit {task.limits.dispersion:g})"
     )
     return table

@@ -44,7 +44,7 @@ def decay(
     from utank_hil.pictures.decay import draw_decay
 
     vessel = None if ship is None else load(ship, Vessel)
-    prepare_out(out, (PICTURE,))
+    out = prepare_out(out, (PICTURE,))
     time_s, roll_rad = _columns(record, "time_s", "roll_rad")
     part = np.ones(len(time_s), dtype=bool)
     part &= True if from_s is None else time_s >= from_s

@@ -1,10 +1,12 @@
 """What the commands share: their options, reading of files, errors."""
 
+import fcntl
 import json
 import os
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from itertools import count
 from pathlib import Path
 from typing import Annotated, Any, Final, NoReturn, TypeVar
 
@@ -18,11 +20,13 @@ from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import headline
 from utank_hil.configuration.files import ConfigError, ConfigProblem, Section, load_config, located
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import notes
+from utank_hil.console.terminal import notes, shown
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
 OUT: Final = Path("out")
+_CLAIMS: Final[dict[tuple[int, int], int]] = {}
+"""Open descriptors of the folders that this process has claimed, by device and inode."""
 
 
 def _print_version(wanted: bool) -> None:
@@ -148,8 +152,40 @@ def why_not_writable(folder: Path, files: Iterable[str] = ()) -> str | None:
     return None
 
 
-def prepare_out(folder: Path, files: Iterable[str]) -> None:
-    """Make the folder for results, or end with exit code 2 before anything is computed in vain."""
-    reason = why_not_writable(folder, files)
-    if reason is not None:
-        fail(f"{reason}; choose another folder with --out")
+def prepare_out(folder: Path, files: Collection[str], *, keep: bool = True) -> Path:
+    """Make the folder for results, or end with exit code 2 before anything is computed in vain.
+
+    Former results are kept: where one of `files` is there, or another command still writes, the
+    folder is the first of ``NAME-2``, ``NAME-3``, ... without. With `keep` false it is `folder`.
+    """
+    first = folder if folder.name else folder.resolve()
+    for number in count(2):
+        if reason := why_not_writable(folder, files):
+            fail(f"{reason}; choose another folder with --out")
+        former = keep and any((folder / file).exists() for file in files)
+        if not former and _claimed(folder):
+            break
+        if not keep:
+            fail(f"{folder}: another command writes there; choose another folder with --out")
+        folder = first.with_name(f"{first.name}-{number}")
+    if number > 2:
+        notes.say(f"former results are kept: these are in {shown(folder)}")
+    return folder
+
+
+def _claimed(folder: Path) -> bool:
+    """Claim a folder for the rest of the process; whether no other process has claimed it."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    status = os.fstat(descriptor)
+    if (place := (status.st_dev, status.st_ino)) in _CLAIMS:
+        os.close(descriptor)
+        return True
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(descriptor)
+        return False
+    except OSError:
+        pass  # a file system without locks: nothing can be claimed there
+    _CLAIMS[place] = descriptor
+    return True

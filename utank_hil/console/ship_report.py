@@ -6,6 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from utank_hil.analysis.tank_design import tank_figures
+from utank_hil.analysis.tank_sizing import pump_demand, pump_level_m
 from utank_hil.configuration import Vessel
 from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
 from utank_hil.console.device_report import devices_json, print_devices
@@ -42,8 +43,8 @@ def ship_figures(vessel: Vessel) -> dict[str, Any]:
     `TankFigures`. Metacentric height and the water's share of the displacement are None where that
     is not given, what is of the pump without one: the heel that its greatest pressure holds by the
     restoring curve, None also where it capsizes the ship, and whether a reservoir is full or empty
-    then; the flow that moves the level from limit to limit at the roll period, and the power of
-    pressure and flow, without losses.
+    then; the flow of `pump_demand`, for which `init` sizes the pump, and the power of pressure and
+    flow, without losses.
     """
     ship, tank = vessel.ship, vessel.tank
     figures = tank_figures(ship, tank)
@@ -98,7 +99,7 @@ def _pump_figures(vessel: Vessel) -> dict[str, Any]:
         return dict.fromkeys(_OF_PUMP)
     pressure_pa = pump.max_pressure_pa
     heel = steady_heel(upright(RollModel(vessel.ship, tank)), pressure_pa)
-    flow_m3_s = tank.reservoir_area_m2 * tank.level_limit_m * vessel.ship.natural_frequency_rad_s
+    flow_m3_s = pump_demand(vessel.ship, tank, pump_level_m(vessel.ship, tank)).flow_m3_s
     heel_rad, at_the_end = (None, None) if heel is None else (abs(heel.roll_rad), heel.at_the_end)
     head_m = pressure_pa / (tank.density_kg_m3 * GRAVITY_M_S2)
     powers_w = pressure_pa * flow_m3_s, holding(pump)[2], pump.max_power_w
@@ -113,7 +114,10 @@ def _pump_rows(vessel: Vessel, figures: dict[str, Any]) -> list[tuple[str, str]]
         ("pump's greatest pressure", f"{vessel.pump.max_pressure_pa / 1e3:.1f} kPa"),
         ("  in metres of water", f"{figures['pump_head_m']:.2f} m"),
         ("heel that it holds", _held(figures["pump_heel_rad"], figures["pump_heel_at_the_end"])),
-        ("flow from full to empty at the roll period", f"{figures['pump_flow_m3_s']:.3g} m³/s"),
+        (
+            "flow that `init` sizes a pump for",
+            f"{figures['pump_flow_m3_s']:.3g} m³/s",
+        ),
         ("power of pressure and flow, without losses", power_words(figures["pump_power_asked_w"])),
         ("power to hold the pressure in still water", power_words(figures["pump_power_held_w"])),
         ("power of the motor", power_words(figures["pump_power_w"])),
@@ -203,6 +207,15 @@ def ship_line(vessel: Vessel) -> str:
 
 def _tonnes(mass_kg: float) -> str:
     return f"{mass_kg / 1e3:.3g} t"
+
+
+def order_words(vessel: Vessel) -> str:
+    """Return net head, flow, shaft power and duty of a vessel's pump, to order it by."""
+    figures = _pump_figures(vessel)
+    return (
+        f"{figures['pump_head_m']:.2f} m, {figures['pump_flow_m3_s']:.3g} m³/s, "
+        f"{power_words(figures['pump_power_w'])}, reversing"
+    )
 
 
 def power_words(power_w: float) -> str:
