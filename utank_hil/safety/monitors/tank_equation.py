@@ -5,22 +5,28 @@ With the level h, the roll phi and the pump's pressure P, thesis (2.19) per mass
     Le h'' + (c + q |h'|) h' + 2 g h  =  P / rho  +  g L phi + L (H + Lz) phi''
               y, what the water shows      p                 x
 
-A ship that sways takes c u from the right side, with u = L g times the slope of the waves, as the
-moment that rolls the ship tells it (`SlopePush`), and c anything from 0 to `most_sway`.
-All three are low-pass filtered alike, with both poles at 2 w0, which gives the derivatives without
-differentiating. Sums with a memory of 0.4 roll periods tell the gains::
+A ship that sways takes k u from the right side, with u = L g times the slope of the waves, as the
+moment that rolls the ship tells it, and k from 0 to `most_sway`, nearly constant (`SlopePush`).
+All are low-pass filtered alike, with both poles at 2 w0, which gives the derivatives without
+differentiating. Sums with a memory of 0.4 roll periods tell what each of four cases leaves::
 
-    roll   sum((y - p) x) / sum(x x)               1; -1 with the motion sensor's sign wrong
-    pump   sum((y - x) p) / sum(p p)               1; -1 with the pump's sensor wrong
-    level  sum(y (p + x)) / sum((p + x) (p + x))   1; -1 with the gauges swapped, 0 if stuck
+    sound            y - p - x + k u
+    motion reversed  y - p + x + k u'       u' by the reversed roll
+    gauges swapped  -y - p - x - k u'       the levels are reversed instead
+    pump reversed    y + p - x + k u
 
-and what leads y - p - x the measured roll tells the motion sensor's delay, over 1.5 roll periods.
-Where the roll has not moved for a quarter of a period, y - p - x itself tells that it should have.
-No sensor's zero is quite right: y - p - x may hold any constant up to +-z, as a commissioning lets
-pass. Something is found only if no constant of that size explains it.
-The sums hold the middle of the range, and no sway within it may explain what is found: for each
-frequency a c within a circle about the middle, since sway need not be in phase with the slope.
-The ship's inertia, stiffness and load stand in u alone. A gain is judged only where its own
+with the k, and the constant within +-z, that leave the least: no sensor's zero is quite right, and
+a commissioning lets z pass. A sign is wrong if the sound case leaves far more of the push in
+question than another one does. For water that answers a push with the gain g, that is g below
+`SIGN_GAIN`. So one k and one z have to explain all of the last half period, in phase with the
+slope: reversed signs would take a negative one, or one that changes with the frequency.
+
+The level's gain, sum(y (p + x)) / sum((p + x) (p + x)), is 0 if the level is stuck. What leads
+y - p - x the measured roll tells the motion sensor's delay, over 1.5 roll periods. Both hold for
+every k. Where the roll has not moved for a quarter of a period, what the sound case leaves tells
+that it should have.
+
+The ship's inertia, stiffness and load stand in u alone. A case is judged only where its own
 push is large enough, in itself and beside the other one: an error of the model of 3 % of a push
 sixteen times as large is half of it. What a valve holds back is known less well than what a pump
 presses: the roll's push has to be larger beside it.
@@ -35,8 +41,8 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.safety.monitors.derivative_filter import DerivativeFilter
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.monitors.noise import within
-from utank_hil.safety.monitors.sway import SlopePush, most_sway
+from utank_hil.safety.monitors.misfit import Misfit
+from utank_hil.safety.monitors.sway import SPREAD, SlopePush, most_sway
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
 SIGN_GAIN: Final = -0.25
@@ -45,6 +51,10 @@ VALVE_SIGN_GAIN: Final = -0.5
 SETTLED: Final = 6.0
 """Time constants of the filters after which their start is forgotten."""
 STUCK_GAIN: Final = 0.3
+FILLED: Final = 0.5
+"""Of the memory, before anything is judged: a moment of a slow wave is like a zero that is off."""
+UNEXPLAINED: Final = 0.5
+"""Of a push: what the model's errors may leave of it."""
 STILL_PERIODS: Final = 0.25
 STILL_PUSHES: Final = 4.0
 """Of the least push, root mean square: so much must be left unexplained by a roll that is still."""
@@ -91,15 +101,17 @@ class TankEquation:
 
     Attributes
     ----------
-    roll_gain, pump_gain, level_gain : float
+    doubt : float
+        Power over that at which a sign is found wrong; NaN as long as no push is large enough.
+    level_gain : float
         See the module; NaN as long as the push is too small to tell. With the constant within +-z
-        that speaks most for sound sensors.
+        and the sway that speak most for sound sensors.
     late_s : float
         Delay of the motion sensor, the same; NaN as long as the roll is too small to tell.
     sign_gain : float
         Gain below which a sign is wrong.
     obeyed : bool
-        Whether roll or level gain is now of a size that no zeros of wrong sensors explain.
+        Whether reversed motion or swapped gauges now leave far more than sound sensors do.
     settled : bool
         Whether the filters have forgotten their start, the first one or that after a gap.
     """
@@ -116,13 +128,16 @@ class TankEquation:
         share = VALVE_SHARE if valve else LEAST_SHARE
         self._pump_share = share * share
         self.sign_gain = VALVE_SIGN_GAIN if valve else SIGN_GAIN
+        ratio = (1 - self.sign_gain) / (1 + self.sign_gain)
+        self._clearly, self._far = ratio * ratio, 2 * math.sqrt(-self.sign_gain)
         mass, _, stiffness = coupled_matrices(ship, tank)
         density = tank.density_kg_m3
         water_kg_m = density * tank.reservoir_area_m2
         self._density = density
         self._inertia = float(mass[1, 1] / water_kg_m)
         self._slope = SlopePush(ship, tank, period_s)
-        self._sway = most_sway(ship) / 2
+        self._most_sway = most_sway(ship)
+        self._spread = SPREAD * self._most_sway
         self._loss = tank.loss_pa_per_m_s / density
         self._quadratic_loss = tank.quadratic_loss_pa_per_m2_s2 / density
         self._stiffness = float(stiffness[1, 1] / water_kg_m)
@@ -143,6 +158,7 @@ class TankEquation:
         self._least_xx, self._least_pp = (x * x / (1 - self._keep) for x in (roll, pump))
         late_share = LATE_PUSHES * thresholds.least_roll_push_m2_s2 * frequency_rad_s
         self._least_dd = late_share * late_share / (1 - self._late_keep)
+        self._filled = FILLED / (1 - self._keep)
         self._zero = thresholds.zero_push_m2_s2
         self._still_rad = thresholds.roll_still_rad
         self._still_samples = round(STILL_PERIODS * thresholds.tank_period_s / period_s)
@@ -157,17 +173,18 @@ class TankEquation:
         """Begin anew after a gap."""
         self._wait = -1
         self.settled = self.obeyed = False
-        self._xx = self._pp = self._vv = self._rest_x = self._rest_p = 0.0
-        self._both = self._level_both = 0.0
-        self._uu = self._late_uu = 0.0
+        self._sound, self._reversed, self._swapped, self._pump_reversed = (
+            Misfit() for _ in range(4)
+        )
+        self._xx = self._pp = self._vv = self._both = 0.0
+        self._level_both = self._push_sum = self._slope_both = 0.0
+        self._slope_lead = self._late_uu = 0.0
         self._slope.restart()
         self.slope_push = 0.0
-        self._x = self._p = self._left = self._weight = 0.0
         self._forget_lead()
         self._still = 0
         self._roll_rad = math.inf
-        self._unmoved = 0.0
-        self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
+        self.doubt = self.level_gain = self.late_s = math.nan
 
     def _forget_lead(self) -> None:
         """Begin anew with what leads the roll."""
@@ -220,7 +237,8 @@ class TankEquation:
         p = self._pump.value
         x = self._push * roll.value + self._push_inertia * roll_rad_s2
         push = p + x
-        self.slope_push = u = self._slope.update(roll, roll_rad_s2, level.value, level_m_s2)
+        of_roll, of_level = self._slope.update(roll, roll_rad_s2, level.value, level_m_s2)
+        self.slope_push = u = of_roll + of_level
         if self._wait > 0:
             self._wait -= 1
             self.settled = self.settled or self._wait == 0
@@ -231,70 +249,88 @@ class TankEquation:
         rate_m_s = level.rate
         loss = self._loss + self._quadratic_loss * abs(rate_m_s)
         y = self._inertia * level_m_s2 + loss * rate_m_s + self._stiffness * level.value
-        y += self._sway * u  # and no more than as much is left of it, either way
-        keep = self._keep
-        self._xx = xx = keep * self._xx + x * x
-        self._pp = pp = keep * self._pp + p * p
-        self._rest_x = keep * self._rest_x + (y - p) * x
-        self._rest_p = keep * self._rest_p + (y - x) * p
+        left, keep = y - push, self._keep
+        self._sound.add(left, u, keep)
+        self._reversed.add(left + 2 * x, of_level - of_roll, keep)
+        self._swapped.add(left - 2 * y, of_roll - of_level, keep)
+        self._pump_reversed.add(left + 2 * p, u, keep)
+        self._xx = keep * self._xx + x * x
+        self._pp = keep * self._pp + p * p
         if self._held is not None:
             self._vv = keep * self._vv + self._held.value * self._held.value
-        self._both = both = keep * self._both + push * push
+        self._both = keep * self._both + push * push
         self._level_both = keep * self._level_both + y * push
-        left = y - push
-        self._x = keep * self._x + x
-        self._p = keep * self._p + p
-        self._left = keep * self._left + left
-        self._weight = keep * self._weight + 1.0
-        self._uu = keep * self._uu + u * u
-        self._late_uu = self._late_keep * self._late_uu + u * u
+        self._push_sum = keep * self._push_sum + push
+        self._slope_both = keep * self._slope_both + u * push
         d = self._push_at_w0 * roll.rate
         self._lead = self._late_keep * self._lead + left * d
         self._d = self._late_keep * self._d + d
-        self._dd = dd = self._late_keep * self._dd + d * d
+        self._dd = self._late_keep * self._dd + d * d
+        self._slope_lead = self._late_keep * self._slope_lead + u * d
+        self._late_uu = self._late_keep * self._late_uu + u * u
         self._samples += 1
         self._still += 1
         if abs(roll_rad - self._roll_rad) > self._still_rad:
             self._roll_rad = roll_rad
             self._still = 0
-        self._unmoved = keep * self._unmoved + left * left
-        return self._judge(xx, pp, both, dd)
+        return self._judge()
 
-    def _judge(self, xx: float, pp: float, both: float, dd: float) -> int:
+    def _judge(self) -> int:
         found = 0
         self.obeyed = False
-        zero, sway = self._zero, self._sway * math.sqrt(self._uu)
-        self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
+        self.doubt = self.level_gain = self.late_s = math.nan
+        if self._sound.weight < self._filled:
+            return 0
+        zero, most_sway, xx, pp, both = self._zero, self._most_sway, self._xx, self._pp, self._both
+        sound = self._sound.least(most_sway, zero)
+        spread = self._spread * math.sqrt(self._sound.uu)
         held = LEAST_SHARE * LEAST_SHARE * pp + HELD_SHARE * HELD_SHARE * self._vv
-        if xx > self._least_xx and xx > held:
-            feigned = zero * abs(self._x) + sway * math.sqrt(xx)
-            self.roll_gain = gain = (self._rest_x + feigned) / xx
-            self.obeyed = self._rest_x - feigned > STUCK_GAIN * xx
-            if gain < self.sign_gain:
-                found = _WATER_SIGN
-        if pp > self._least_pp and pp > self._pump_share * xx:
-            feigned = zero * abs(self._p) + sway * math.sqrt(pp)
-            self.pump_gain = gain = (self._rest_p + feigned) / pp
-            if gain < self.sign_gain:
-                found |= _PUMP_SIGN
-        if both > self._least_xx + self._least_pp:
-            feigned = zero * abs(self._x + self._p) + sway * math.sqrt(both)
+        enough_p, enough_both = self._least_pp, self._least_xx + self._least_pp
+        cases = (
+            (self._reversed, xx, xx > self._least_xx and xx > held, _WATER_SIGN),
+            (self._pump_reversed, pp, pp > enough_p and pp > self._pump_share * xx, _PUMP_SIGN),
+            (self._swapped, both, both > enough_both, _WATER_SIGN),
+        )
+        judged = [
+            (case.least(most_sway, zero), power, case.uu, finding)
+            for case, power, enough, finding in cases
+            if enough
+        ]
+        best = min([other for other, *_ in judged], default=0.0)
+        for other, power, uu, finding in judged:
+            doubt = self._excess(sound, other, power, self._sound.uu)
+            if doubt > 1 and other <= self._clearly * best:
+                found |= finding
+            if not self.doubt >= doubt:
+                self.doubt = doubt
+            if finding == _WATER_SIGN and self._excess(other, sound, power, uu) > 1:
+                self.obeyed = True
+        if both > enough_both:
+            feigned = zero * abs(self._push_sum) + spread * math.sqrt(both)
+            feigned += max(most_sway * self._slope_both, 0.0)
             self.level_gain = gain = (self._level_both + feigned) / both
-            self.obeyed = self.obeyed or self._level_both - feigned > STUCK_GAIN * both
-            if gain < self.sign_gain:
-                found |= _WATER_SIGN
-            elif gain < STUCK_GAIN:
+            if gain < STUCK_GAIN and not found & _WATER_SIGN:
                 found |= _LEVEL_STUCK
         if self._still > self._still_samples:
-            weight = self._weight
-            mean = within(self._left / weight, zero)
-            unmoved = self._unmoved + mean * (weight * mean - 2 * self._left)
-            most = math.sqrt(self._most_unmoved) + sway
-            if unmoved > most * most:
+            most = math.sqrt(self._most_unmoved) + spread
+            if sound > most * most:
                 found |= _ROLL_STUCK
+        dd = self._dd
         if dd > self._least_dd and self._samples > self._late_samples:
-            feigned = zero * abs(self._d) + self._sway * math.sqrt(self._late_uu * dd)
+            feigned = zero * abs(self._d) + self._spread * math.sqrt(self._late_uu * dd)
+            feigned -= min(most_sway * self._slope_lead, 0.0)
             self.late_s = late_s = (self._lead - feigned) / dd
             if late_s > self._late_limit_s:
                 found |= _LATE
         return found
+
+    def _excess(self, worse: float, better: float, power: float, uu: float) -> float:
+        """Return how far one case leaves more than another, which has the true signs from 1 on.
+
+        The difference is judged, in which what jumps or is wrong otherwise cancels, and the ratio,
+        which tells the cases apart in long waves, where sway may hide most of the difference.
+        """
+        push, spread = math.sqrt(power), self._spread * math.sqrt(uu)
+        far, near = self._far * push + spread, UNEXPLAINED * push + spread
+        ratio = worse / (self._clearly * better + 1e-30)
+        return max((worse - better) / (far * far), min(ratio, worse / (near * near)))
