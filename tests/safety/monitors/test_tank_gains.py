@@ -59,13 +59,9 @@ def test_a_gain_of_roll_or_pump_is_found_and_judged_by_its_sign(
     valve: bool, gain: float, found: int
 ) -> None:
     """The other push is three times as large, so that the level's own gain is sound."""
-    equation, said = equation_of(3.0, 9j, gain_x=gain, valve=valve)
-    assert equation.roll_gain == pytest.approx(gain, abs=0.015)
-    assert equation.pump_gain > 0.5
+    _, said = equation_of(3.0, 9j, gain_x=gain, valve=valve)
     assert said & ~Finding.MOTION_LATE == found * Finding.WATER_SIGN
-    equation, said = equation_of(9j, 3.0, gain_p=gain, valve=valve)
-    assert equation.pump_gain == pytest.approx(gain, abs=0.015)
-    assert equation.roll_gain > 0.5
+    _, said = equation_of(9j, 3.0, gain_p=gain, valve=valve)
     assert said & ~Finding.MOTION_LATE == found * Finding.PUMP_SIGN
 
 
@@ -78,8 +74,6 @@ def test_the_level_has_a_gain_where_only_both_pushes_together_are_large_enough(
     gain: float, found: int
 ) -> None:
     equation, said = equation_of(0.8 * LEAST, 0.8 * LEAST, gain, gain)
-    assert math.isnan(equation.roll_gain)
-    assert math.isnan(equation.pump_gain)
     assert equation.level_gain == pytest.approx(gain, abs=0.015)
     assert said == found
 
@@ -94,14 +88,15 @@ def test_a_push_that_is_small_in_itself_or_beside_the_other_tells_nothing(
 ) -> None:
     """The sums swell and ebb by a fifth: what is far enough above or below is as said."""
     for times, told in ((0.75, False), (1.35, True)):
-        for x, p, which in (
-            (times * LEAST, 0.0, "roll_gain"),
-            (0.0, times * LEAST, "pump_gain"),
-            (times * share * 60 * LEAST, 60j * LEAST, "roll_gain"),
-            (60j * LEAST, times * pumps * 60 * LEAST, "pump_gain"),
+        small, large = times * LEAST, 60j * LEAST
+        for x, p, gain_x, gain_p, sign in (
+            (small, 0.0, -1.0, 1.0, Finding.WATER_SIGN),
+            (0.0, small, 1.0, -1.0, Finding.PUMP_SIGN),
+            (share * 60 * small, large, -1.0, 1.0, Finding.WATER_SIGN),
+            (large, pumps * 60 * small, 1.0, -1.0, Finding.PUMP_SIGN),
         ):
-            equation, _ = equation_of(x, p, valve=valve, held=held)
-            assert math.isfinite(getattr(equation, which)) is told, (which, times)
+            _, said = equation_of(x, p, gain_x, gain_p, valve=valve, held=held)
+            assert (sign in said) is told, (sign, times)
 
 
 @pytest.mark.parametrize("frequency_rad_s", [0.3, 1.2, 3.0])

@@ -8,12 +8,13 @@ With the level h, the roll phi and the pump's pressure P, thesis (2.19) per mass
 A ship that sways takes k u from the right side, with u = L g times the slope of the waves, as the
 moment that rolls the ship tells it, and k from 0 to `most_sway`, nearly constant (`SlopePush`).
 All are low-pass filtered alike, with both poles at 2 w0, which gives the derivatives without
-differentiating. Sums with a memory of 0.4 roll periods tell what each of four cases leaves::
+differentiating. Sums with a memory of 0.4 roll periods tell what each of five cases leaves::
 
     sound            y - p - x + k u
     motion reversed  y - p + x + k u'       u' by the reversed roll
     gauges swapped  -y - p - x - k u'       the levels are reversed instead
     pump reversed    y + p - x + k u
+    roll late        y - p - x+ + k u      x+ a quarter of the tank's period ahead of x
 
 with the k, and the constant within +-z, that leave the least: no sensor's zero is quite right, and
 a commissioning lets z pass. A sign is wrong if the sound case leaves far more of the push in
@@ -144,6 +145,7 @@ class TankEquation:
         self._push = float(-stiffness[1, 0] / water_kg_m)
         self._push_inertia = float(-mass[1, 0] / water_kg_m)
         frequency_rad_s = tank.natural_frequency_rad_s
+        self._w0 = frequency_rad_s
         self._push_at_w0 = roll_push_at_natural_frequency(ship, tank)
         self._most_m = FULL_SHARE * tank.level_limit_m
         self._level = DerivativeFilter(2 * frequency_rad_s, period_s)
@@ -173,8 +175,8 @@ class TankEquation:
         """Begin anew after a gap."""
         self._wait = -1
         self.settled = self.obeyed = False
-        self._sound, self._reversed, self._swapped, self._pump_reversed = (
-            Misfit() for _ in range(4)
+        self._sound, self._reversed, self._swapped, self._pump_reversed, self._quarter_late = (
+            Misfit() for _ in range(5)
         )
         self._xx = self._pp = self._vv = self._both = 0.0
         self._level_both = self._push_sum = self._slope_both = 0.0
@@ -263,6 +265,7 @@ class TankEquation:
         self._push_sum = keep * self._push_sum + push
         self._slope_both = keep * self._slope_both + u * push
         d = self._push_at_w0 * roll.rate
+        self._quarter_late.add(left + x - d / self._w0, u, keep)
         self._lead = self._late_keep * self._lead + left * d
         self._d = self._late_keep * self._d + d
         self._dd = self._late_keep * self._dd + d * d
@@ -285,11 +288,14 @@ class TankEquation:
         sound = self._sound.least(most_sway, zero)
         spread = self._spread * math.sqrt(self._sound.uu)
         held = LEAST_SHARE * LEAST_SHARE * pp + HELD_SHARE * HELD_SHARE * self._vv
+        enough_x = xx > self._least_xx and xx > held
+        steady = self._samples > self._late_samples
         enough_p, enough_both = self._least_pp, self._least_xx + self._least_pp
         cases = (
-            (self._reversed, xx, xx > self._least_xx and xx > held, _WATER_SIGN),
+            (self._reversed, xx, enough_x, _WATER_SIGN),
             (self._pump_reversed, pp, pp > enough_p and pp > self._pump_share * xx, _PUMP_SIGN),
             (self._swapped, both, both > enough_both, _WATER_SIGN),
+            (self._quarter_late, xx, enough_x and steady, _LATE),
         )
         judged = [
             (case.least(most_sway, zero), power, case.uu, finding)
@@ -299,7 +305,7 @@ class TankEquation:
         best = min([other for other, *_ in judged], default=0.0)
         for other, power, uu, finding in judged:
             doubt = self._excess(sound, other, power, self._sound.uu)
-            if doubt > 1 and other <= self._clearly * best:
+            if doubt > 1 and other <= (1.0 if finding == _LATE else self._clearly) * best:
                 found |= finding
             if not self.doubt >= doubt:
                 self.doubt = doubt
@@ -316,7 +322,7 @@ class TankEquation:
             if sound > most * most:
                 found |= _ROLL_STUCK
         dd = self._dd
-        if dd > self._least_dd and self._samples > self._late_samples:
+        if dd > self._least_dd and steady:
             feigned = zero * abs(self._d) + self._spread * math.sqrt(self._late_uu * dd)
             feigned -= min(most_sway * self._slope_lead, 0.0)
             self.late_s = late_s = (self._lead - feigned) / dd
