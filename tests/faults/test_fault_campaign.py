@@ -413,15 +413,9 @@ def assert_all_passed(results: Mapping[str, Result]) -> None:
         assert each.wire or not each.row.fault.inject
 
 
-OPEN_DEFECTS = {"roll-2-s-late", "both-signs-flipped"}
-"""Rows that the monitors miss on a ship that states no sway, since any sway might explain them; the
-test of every row stays red for them until the range of the sway is narrower."""
-
-
 @pytest.mark.slow
 def test_a_row_of_each_requirement_is_passed_in_one_sea(results: dict[str, Result]) -> None:
-    assert {name for name in OPEN_DEFECTS if not results[name].passed} == OPEN_DEFECTS
-    assert_all_passed({name: each for name, each in results.items() if name not in OPEN_DEFECTS})
+    assert_all_passed(results)
 
 
 @pytest.mark.evidence

@@ -31,14 +31,18 @@ def swaying(share: float, w: float, slope_rad: float, pressure_pa: float, effect
     return (*q, pressure)
 
 
-def found_in(ship, phasors, w: float, sign: float = 1.0, until_s: float = 120.0):
+def found_in(
+    ship, phasors, w: float, sign: float = 1.0, until_s: float = 120.0, noise_share: float = 1.0
+):
     equation = TankEquation(ship, TANK, THRESHOLDS, STEP_S)
     stuck = LevelStuck(ship, TANK, THRESHOLDS, STEP_S)
     noise = np.random.default_rng(1)
     first: dict[Finding, float] = {}
     for k in range(round(until_s / STEP_S)):
         at = [(each * cmath.exp(1j * w * k * STEP_S)).real for each in phasors]
-        roll, level, pressure = np.array(at) + noise.standard_normal(3) * [2e-4, 0.0035, 100.0]
+        roll, level, pressure = np.array(at) + noise_share * noise.standard_normal(3) * [
+            2e-4, 0.0035, 100.0
+        ]  # fmt: skip
         found = equation.update(sign * roll, level, pressure)
         found |= stuck.update(sign * roll, level, pressure, equation.slope_push)
         for finding in Finding:
@@ -65,8 +69,18 @@ def test_without_the_term_a_swaying_ship_is_told_to_check_its_wiring() -> None:
     assert not found_in(UNSTATED, phasors, 0.3)
 
 
-@pytest.mark.parametrize("share", [0.3, 0.5, 0.7, 0.9, 1.0])
-@pytest.mark.parametrize("w", [0.5, 0.6])
+@pytest.mark.parametrize("slope_rad", [0.02, 0.05])
+@pytest.mark.parametrize("pressure_pa", [0.0, 20e3])
+def test_the_most_sway_in_a_long_swell_without_noise_is_no_fault(
+    slope_rad: float, pressure_pa: float
+) -> None:
+    w = 2 * np.pi / 20.0
+    phasors = swaying(1.0, w, slope_rad, pressure_pa, effective=0.5)
+    assert not found_in(UNSTATED, phasors, w, noise_share=0.0)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.5, 0.7, 0.9, 1.0])
+@pytest.mark.parametrize("w", [0.45, 0.5, 0.6, 0.8])
 @pytest.mark.parametrize("pressure_pa", [0.0, 10e3])
 def test_reversed_motion_sensor_is_found_within_two_roll_periods(
     share: float, w: float, pressure_pa: float
