@@ -52,7 +52,7 @@ VALVE_SIGN_GAIN: Final = -0.5
 SETTLED: Final = 6.0
 """Time constants of the filters after which their start is forgotten."""
 STUCK_GAIN: Final = 0.3
-FILLED: Final = 0.5
+FILLED: Final = 0.25
 """Of the memory, before anything is judged: a moment of a slow wave is like a zero that is off."""
 UNEXPLAINED: Final = 0.5
 """Of a push: what the model's errors may leave of it."""
