@@ -7,12 +7,15 @@ package beside this one adds commands of its own.
 from utank_hil.console.interruptible import end_as_by_ctrl_c, quietly_interruptible
 
 with quietly_interruptible():
+    import ast
     from functools import cache
     from importlib.metadata import EntryPoint, entry_points
+    from importlib.util import find_spec
+    from pathlib import Path
     from typing import Any
 
     import typer
-    from typer.core import TyperGroup
+    from typer.core import TyperCommand, TyperGroup
 
     import utank_hil.console.single_thread  # noqa: F401, first: it must run before numpy loads
     from utank_hil.console.common import Version, new_app
@@ -27,22 +30,50 @@ def commands() -> dict[str, EntryPoint]:
     return {point.name: point for point in sorted(entry_points(group=GROUP))}
 
 
+def loaded(name: str) -> Any:
+    """Import the module of a command and return the command."""
+    with quietly_interruptible():
+        found = commands()[name].load()
+    if not isinstance(found, typer.Typer):
+        application = new_app()
+        application.command(name)(found)
+        found = application
+    command = typer.main.get_command(found)
+    command.name = name
+    return command
+
+
+def _help(point: EntryPoint) -> str | None:
+    """Docstring of a command's function, or the text of its `new_app`, read and not imported."""
+    spec = find_spec(point.module)
+    if spec is None or spec.origin is None:
+        return None
+    for node in ast.parse(Path(spec.origin).read_text(encoding="utf-8")).body:
+        match node:
+            case ast.FunctionDef(name=point.attr):
+                return ast.get_docstring(node)
+            case ast.Assign(
+                targets=[ast.Name(id=point.attr)],
+                value=ast.Call(args=[ast.Constant(value=str() as text), *_]),
+            ):
+                return text
+    return None
+
+
+class _Unloaded(TyperCommand):
+    """A command that stands in a list; its module is imported once the command is parsed."""
+
+    def make_context(self, info_name: Any, args: Any, parent: Any = None, **extra: Any) -> Any:
+        return loaded(str(self.name)).make_context(info_name, args, parent, **extra)
+
+
 class _Commands(TyperGroup):
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
         return list(commands())
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
-        if cmd_name not in commands():
-            return None
-        with quietly_interruptible():
-            loaded = commands()[cmd_name].load()
-        if not isinstance(loaded, typer.Typer):
-            application = new_app()
-            application.command(cmd_name)(loaded)
-            loaded = application
-        command = typer.main.get_command(loaded)
-        command.name = cmd_name
-        return command
+        point = commands().get(cmd_name)
+        return point and _Unloaded(cmd_name, help=_help(point), rich_markup_mode="markdown")
 
 
 app = new_app(

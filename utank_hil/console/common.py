@@ -8,19 +8,20 @@ import tempfile
 from collections.abc import Collection, Iterable, Mapping
 from itertools import count
 from pathlib import Path
-from typing import Annotated, Any, Final, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn, TypeVar
 
 import typer
 from pydantic import BaseModel
 from typer.core import TyperGroup
 
 from utank_hil.base.finite import finite
-from utank_hil.base.machine import kernels, machine
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import headline
-from utank_hil.configuration.files import ConfigError, ConfigProblem, Section, load_config, located
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import notes, shown
+
+if TYPE_CHECKING:  # it loads every law: `--help` has no use for them
+    from utank_hil.configuration.files import ConfigError, ConfigProblem
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
@@ -31,6 +32,8 @@ _CLAIMS: Final[dict[tuple[int, int], int]] = {}
 
 def _print_version(wanted: bool) -> None:
     if wanted:
+        from utank_hil.base.machine import kernels, machine
+
         sys.stdout.write(f"{headline()}\n{kernels(machine())}\n")
         raise typer.Exit
 
@@ -109,6 +112,8 @@ def load(path: Path, model: type[ModelT], *, allow_code: bool = False) -> ModelT
 
     What is unusual in it is a note. `allow_code` as in `load_config`.
     """
+    from utank_hil.configuration.files import ConfigError, load_config
+
     try:
         loaded = load_config(path, model, allow_code=allow_code)
     except ConfigError as error:
@@ -118,13 +123,15 @@ def load(path: Path, model: type[ModelT], *, allow_code: bool = False) -> ModelT
     return loaded
 
 
-def warnings_of(loaded: BaseModel, path: Path) -> list[ConfigProblem]:
+def warnings_of(loaded: BaseModel, path: Path) -> "list[ConfigProblem]":
     """What is unusual in a configuration, at the places where the values are written."""
+    from utank_hil.configuration.files import Section, located
+
     found = loaded.warnings() if isinstance(loaded, Section) else []
     return located(ParameterError("", found), path).problems
 
 
-def fail_with(error: ConfigError) -> NoReturn:
+def fail_with(error: "ConfigError") -> NoReturn:
     """List everything that is wrong with a configuration and end with exit code 2."""
     for problem in error.problems:
         notes.say(str(problem), red="error:")
