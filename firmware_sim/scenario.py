@@ -14,7 +14,7 @@ from firmware_sim.drive_limits import DriveLimits
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.place import Place
 from firmware_sim.scenario_sea import ScenarioSea
-from firmware_sim.sensors import SensorErrors
+from firmware_sim.sensor_errors import SensorErrors
 from firmware_sim.unusual_encounter import moment_problems, unusual_encounter
 from firmware_sim.voyage import (
     Waypoint,

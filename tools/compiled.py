@@ -33,6 +33,7 @@ PATTERNS: Final = (
     "firmware_sim/drive.py",
     "firmware_sim/drive_states.py",
     "firmware_sim/plant.py",
+    "firmware_sim/sensors.py",
     "firmware_sim/truth.py",
     "firmware_sim/waves.py",
     "utank_hil/canbus/endpoints.py",
@@ -41,15 +42,18 @@ PATTERNS: Final = (
     "utank_hil/safety/alarms.py",
     "utank_hil/runners/bus_model.py",
     "utank_hil/nodes/actuators.py",
+    "utank_hil/nodes/command_echo.py",
     "utank_hil/nodes/controller.py",
     "utank_hil/nodes/drive_sequence.py",
     "utank_hil/safety/faults.py",
     "utank_hil/runners/group.py",
+    "utank_hil/nodes/hardwired.py",
     "utank_hil/nodes/housekeeping.py",
     "utank_hil/nodes/inbox.py",
     "utank_hil/nodes/plausibility.py",
     "utank_hil/nodes/running_law.py",
     "utank_hil/safety/bus_load.py",
+    "utank_hil/safety/judge.py",
     "utank_hil/safety/judging.py",
     "utank_hil/runners/lockstep.py",
     "utank_hil/safety/monitoring.py",
@@ -63,7 +67,7 @@ PATTERNS: Final = (
     "utank_hil/telemetry/memory_log.py",
 )
 NOT: Final = frozenset(["utank_hil/safety/monitors/thresholds.py"])
-"""No file with a dataclass that a configuration holds, as `firmware_sim/sensors.py` is one:
+"""No file with a dataclass that a configuration holds, as `sensor_errors.py` is one:
 pydantic needs its `__dict__`, and pickle can't fill a frozen one that is compiled.
 """
 

@@ -10,7 +10,7 @@ from utank_hil.nodes.command_echo import CommandEcho
 from utank_hil.nodes.drive_sequence import DriveSequence
 from utank_hil.nodes.plausibility import MILLISECOND_NS
 from utank_hil.nodes.valve_command import ValveCommander
-from utank_hil.safety.judge import Judgement
+from utank_hil.safety.judgement import Judgement
 from utank_hil.safety.situation import NO_VALVE, ValveReport
 from utank_hil.safety.supervisor import Demand
 

@@ -32,7 +32,8 @@ from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.nodes.running_law import RunningLaw, is_fresh
 from utank_hil.nodes.signals import Telemetry
 from utank_hil.retuning.estimator import SAMPLE_TIME_S, EstimateFigures, Estimator
-from utank_hil.safety.judge import Judgement, Safety
+from utank_hil.safety.judge import Safety
+from utank_hil.safety.judgement import Judgement
 from utank_hil.safety.monitoring import STALE_MS
 from utank_hil.safety.situation import OwnState
 from utank_hil.safety.supervisor import Demand

@@ -19,7 +19,7 @@ from utank_hil.nodes.actuators import Actuators
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 from utank_hil.retuning.law_exchange import LawExchange
 from utank_hil.safety.faults import FAULTS
-from utank_hil.safety.judge import Judgement
+from utank_hil.safety.judgement import Judgement
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 from utank_hil.safety.safety_limits import SafetyLimits
 from utank_hil.safety.supervisor import Demand

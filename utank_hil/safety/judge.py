@@ -1,7 +1,6 @@
 """From measurements to judgement: what the controller may do with the pump, and why not."""
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
 from utank_hil.base.tick import TICK_NS, TICK_S
@@ -16,12 +15,13 @@ from utank_hil.safety.alarms import (
     stopping_faults,
 )
 from utank_hil.safety.bus_load import BusLoad
+from utank_hil.safety.judgement import Judgement
 from utank_hil.safety.monitoring import Monitors
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.thresholds import DEGRADED_SHARE
 from utank_hil.safety.safety_limits import SafetyLimits
 from utank_hil.safety.situation import MILLISECOND_NS, OwnState, Situation
-from utank_hil.safety.supervisor import Demand, Supervisor
+from utank_hil.safety.supervisor import Supervisor
 
 HEEL_TIME_CONSTANT_S: Final = 60.0
 """Three roll periods of a ship that rolls slowly: waves are gone from the mean, a list is not."""
@@ -42,41 +42,6 @@ _INIT: Final = Mode.INIT
 _ACTIVE: Final = Mode.ACTIVE
 _NO_FAULT: Final = Fault.NONE
 _DISAGREE: Final = int(Finding.SENSORS_DISAGREE)
-
-
-@dataclass(slots=True, eq=False)
-class Judgement:
-    """What the controller obeys in one tick.
-
-    Attributes
-    ----------
-    mode, fault : Mode, Fault
-        As `Supervisor` has them.
-    demand : Demand
-    drive_wanted : bool
-        Whether the drive should be in operation enabled.
-    motion : int
-        Place of the motion sensor that is to be used.
-    share : float
-        Share of the greatest pressure that is allowed by what is degraded.
-    unconfirmed_share : float or None
-        Share that is allowed in its place until the water was seen to move as roll and pressure
-        push it; None from then on.
-    standing : int
-        Conditions of the fault table that hold, bits of `judging.standing`.
-    passive_roll_rad : float
-        What the ship would roll without the pump; NaN if that is not known.
-    """
-
-    mode: Final[Mode]
-    fault: Final[Fault]
-    demand: Final[Demand]
-    drive_wanted: Final[bool]
-    motion: Final[int]
-    share: Final[float]
-    unconfirmed_share: Final[float | None]
-    standing: Final[int]
-    passive_roll_rad: Final[float]
 
 
 class Lateness:
