@@ -20,6 +20,7 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, say_note
 from utank_hil.telemetry.bus_files.log import BusLog
 from utank_hil.telemetry.bus_logs import LoggedController
+from utank_hil.telemetry.explained_tick import ExplainedTick, Number
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
 from utank_hil.telemetry.replay import LawVerdict, ReplayResult, replay_log
 from utank_hil.telemetry.replay import replay as run_replay
@@ -39,6 +40,12 @@ def replay(
         typer.Option(help="Controller configuration to replay with, instead of the recorded one."),
     ] = None,
     channel: Channel = None,
+    explain: Annotated[
+        int | None,
+        typer.Option(
+            min=0, metavar="TICK", help="Print the way of a tick, from its frames to its command."
+        ),
+    ] = None,
     json_: Json = False,
     allow_code: AllowCode = False,
 ) -> None:
@@ -51,15 +58,16 @@ def replay(
     printed with its tick, message and signal, and what may be its cause. 2: the log or an option is
     wrong.
 
-    **Example:** utank-hil replay out/gpc.frames
+    **Example:** utank-hil replay out/gpc.frames --explain 6000
     """
     cut = elsewhere = ""
+    explained = None if explain is None else ExplainedTick(explain)
     named = None if config is None else load(config, ControllerConfig, allow_code=allow_code)
     try:
         if log.suffix.lower() == ".rrd":
             fail(f"{log} holds no frames: give the {SUFFIX} file beside it")
         if log.suffix.lower() != SUFFIX:
-            (result, why), law = _replay_bus_log(BusLog(log, channel), named), None
+            (result, why), law = _replay_bus_log(BusLog(log, channel), named, explained), None
         else:
             recording = FrameLog(log)
             if not recording.first_part:
@@ -69,7 +77,11 @@ def replay(
                 )
             with nullcontext(named) if named else recorded_config(recording.head) as chosen:
                 result, why, law = replay_log(
-                    recording, chosen, log.parent, as_recorded=named is None
+                    recording,
+                    chosen,
+                    log.parent,
+                    as_recorded=named is None,
+                    explained=explained,
                 )
             cut, elsewhere = recording.cut, _other_machine(recording.head)
     except (OSError, ValueError) as error:
@@ -78,17 +90,26 @@ def replay(
         fail(f"{log}: there is no tick in it to compare{f': {cut}' if cut else ''}")
     if result.lost_rows:
         why.insert(0, f"the recorder lost {result.lost_rows} rows of the log")
+    if explained is not None and not explained.ended:
+        fail(f"{log}: there is no tick {explain}: its ticks are 0 to {result.ticks - 1}")
+    numbers = [] if explained is None else explained.numbers
     if json_:
-        sys.stdout.write(json.dumps(_as_json(result, why, cut, law, elsewhere)) + "\n")
+        content = _as_json(result, why, cut, law, elsewhere)
+        if explained is not None:
+            content["explained"] = [number._asdict() for number in numbers]
+        sys.stdout.write(json.dumps(content) + "\n")
     else:
         console = Terminal()
         if elsewhere:
             console.say(f"{elsewhere}; here {kernels(machine())}", yellow="another machine's log:")
         _print(console, result, why, cut, law)
+        _print_numbers(console, numbers)
     raise typer.Exit(ExitCode.OK if result.exact else ExitCode.REFUSED)
 
 
-def _replay_bus_log(log: BusLog, chosen: ControllerConfig | None) -> tuple[ReplayResult, list[str]]:
+def _replay_bus_log(
+    log: BusLog, chosen: ControllerConfig | None, explained: ExplainedTick | None
+) -> tuple[ReplayResult, list[str]]:
     """Replay a log without configuration and ticks."""
     if chosen is None:
         fail(f"{log.path} says nothing of the controller: name its configuration by --config")
@@ -101,7 +122,9 @@ def _replay_bus_log(log: BusLog, chosen: ControllerConfig | None) -> tuple[Repla
             f"{log.path} begins in the middle of a run, or has no controller in it: its first "
             "frame of the controller must be the address claim, with which it starts"
         )
-    result = run_replay(controller.entries(), chosen, build_law(chosen), open_end=True)
+    result = run_replay(
+        controller.entries(), chosen, build_law(chosen), open_end=True, explained=explained
+    )
     if result.exact:
         return result, []
     return result, [
@@ -131,6 +154,21 @@ def _as_json(
         "cut": cut,
         "other_machine": elsewhere,
     }
+
+
+def _print_numbers(console: Terminal, numbers: list[Number]) -> None:
+    """Print the numbers of an explained tick: side by side where both are known."""
+    stage = ""
+    for number in numbers:
+        if number.stage != stage:
+            stage = number.stage
+            console.say("", green=f"{stage}:")
+        if number.recorded in ("", number.replayed):
+            console.say(f"  {number.name} = {number.replayed}")
+        else:
+            console.say(
+                f"recorded {number.recorded}, replayed {number.replayed}", red=f"  {number.name}:"
+            )
 
 
 def _print_law(console: Terminal, law: LawVerdict) -> None:

@@ -66,6 +66,12 @@ _put_quick: Final = Struct(f"{len(_QUICK)}d").pack_into
 _put_slow: Final = Struct(f"{len(_SLOW)}d").pack_into
 _SLOW_AT: Final = 8 * len(_QUICK)
 
+
+def shown_by(node: object) -> tuple[float, ...]:
+    """Values of `SIGNALS` of a `ControllerNode`."""
+    return _quick(node) + _slow(node)
+
+
 RowSink = Callable[[FloatArray], None]
 EventSink = Callable[[RetuningEvent | AlarmEvent, int], None]
 

@@ -9,7 +9,7 @@ from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.canbus import Frame, load_catalogue
@@ -20,6 +20,7 @@ from utank_hil.retuning.answer import Answer, read_answer
 from utank_hil.retuning.retuner import Request
 from utank_hil.runners import LoopStatistics
 from utank_hil.telemetry.bus_records import LAYOUT, PAYLOAD_BYTES, Kind, Records
+from utank_hil.telemetry.explained_tick import ExplainedTick, said
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.law_values import ValueDifference
 from utank_hil.telemetry.replay_head import causes, law_differences, recorded_law
@@ -149,7 +150,12 @@ def entries_of(blocks: Iterable[Records]) -> Iterator[Entry]:
 
 
 def replay_log(
-    log: FrameLog, config: ControllerConfig, folder: Path, *, as_recorded: bool = True
+    log: FrameLog,
+    config: ControllerConfig,
+    folder: Path,
+    *,
+    as_recorded: bool = True,
+    explained: ExplainedTick | None = None,
 ) -> ReplayedLog:
     """Run `replay` with a controller as the log's head describes it.
 
@@ -168,6 +174,7 @@ def replay_log(
         retuner=log.head["retuner"],
         estimating=log.head.get("estimating", False),
         commissioned=log.head.get("commissioned", True),
+        explained=explained,
     )
     return ReplayedLog(result, causes(log.head, config, folder), LawVerdict(why_not, differences))
 
@@ -181,12 +188,14 @@ def replay(
     estimating: bool = False,
     commissioned: bool = True,
     open_end: bool = False,
+    explained: ExplainedTick | None = None,
 ) -> ReplayResult:
     """Give recorded entries to a new controller and compare what it sends.
 
     `entries` are those of a whole run, `law` that of the configuration. `retuner`, `estimating` and
     `commissioned` say what the controller had and whether it could be armed. With `open_end` the
-    log may end before what the controller sent in its last tick.
+    log may end before what the controller sent in its last tick. `explained` takes the numbers of
+    its tick.
     """
     answers, estimates = RecordedRetuner(), RecordedRetuner()
     statistics = LoopStatistics()
@@ -203,18 +212,29 @@ def replay(
     sent: list[Frame] = []
     recorded: list[Frame] = []
     waiting = False
+    wanted = -1 if explained is None else explained.tick
+
+    def compare() -> None:
+        comparison.compare(recorded, sent)
+        if explained is not None and result.ticks == wanted + 1 and not explained.ended:
+            explained.end(node, recorded, sent)
+
     for number, data, kind, time_ns in entries:
         if kind == Kind.SENT:
             recorded.append(Frame(number, data))
             continue
         if waiting:
-            comparison.compare(recorded, sent)
+            compare()
             waiting = False
             recorded = []
         if kind == Kind.RECEIVED:
             comparison.received(number, data)
+            if explained is not None and result.ticks == wanted:
+                explained.received(Frame(number, data))
             node.receive(Frame(number, data), time_ns)
         elif kind == Kind.TICK:
+            if explained is not None and result.ticks == wanted:
+                explained.begin(node)
             sent, waiting = list(node.tick(time_ns)), True
             comparison.tick = result.ticks
             comparison.time_s = (time_ns - node.start_ns) * 1e-9
@@ -236,7 +256,7 @@ def replay(
         elif kind == Kind.LOST:
             result.lost_rows += number
     if waiting and (recorded or not open_end):
-        comparison.compare(recorded, sent)
+        compare()
     return result
 
 
@@ -300,13 +320,9 @@ class _Comparison:
         now = codec.decode(again) if codec and whole else None
         if before is not None and now is not None:
             for name in before._fields:
-                values = _said(getattr(before, name)), _said(getattr(now, name))
+                values = said(getattr(before, name)), said(getattr(now, name))
                 if values[0] != values[1]:
                     return name, *values
             if data[1] & 15 != again[1] & 15:
                 return "counter", str(data[1] & 15), str(again[1] & 15)
         return "bytes", data.hex(" "), again.hex(" ")
-
-
-def _said(value: Any) -> str:
-    return str(getattr(value, "name", None) or repr(value))

@@ -1,0 +1,95 @@
+"""The way of one tick of a replay as numbers: what came in, what was made of it, what was sent."""
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from utank_hil.canbus import Frame, load_catalogue
+from utank_hil.nodes.controller import ControllerNode
+from utank_hil.nodes.signals import SIGNALS, shown_by
+from utank_hil.telemetry.bus_records import PAYLOAD_BYTES
+from utank_hil.telemetry.law_values import Values, differences, law_values
+
+NONE: Final = "none"
+
+
+def said(value: object) -> str:
+    """Return a value exactly as text, a member of an enumeration by its name."""
+    return str(getattr(value, "name", None) or repr(value))
+
+
+class Number(NamedTuple):
+    """A value of the explained tick, exact as text; what was not recorded stands under replayed."""
+
+    stage: str  #: "received", "controller", "law" or "sent".
+    name: str
+    recorded: str
+    replayed: str
+
+
+class ExplainedTick:
+    """Takes what happens in one tick of a replay.
+
+    Parameters
+    ----------
+    tick : int
+        Number of the controller's tick, from 0.
+
+    Attributes
+    ----------
+    numbers : list of Number
+        In the order of their way.
+    ended : bool
+        Whether the replay came to this tick.
+    """
+
+    def __init__(self, tick: int) -> None:
+        self.tick = tick
+        self.numbers: list[Number] = []
+        self.ended = False
+        self._codecs = {codec.can_id: codec for codec in load_catalogue().codecs.values()}
+        self._before: Values = {}
+
+    def received(self, frame: Frame) -> None:
+        """Take a frame that came in before the tick."""
+        for name, value in self._signals(frame).items():
+            self.numbers.append(Number("received", name, value, value))
+
+    def begin(self, node: ControllerNode) -> None:
+        """Take the law's numbers before the tick."""
+        self._before = {name: np.copy(value) for name, value in law_values(node.law.law).items()}
+
+    def end(self, node: ControllerNode, recorded: Sequence[Frame], sent: Sequence[Frame]) -> None:
+        """Take the controller's values after the tick, and the frames of both runs."""
+        self.ended = True
+        values = dict(zip(SIGNALS, shown_by(node), strict=True))
+        values["law_pressure_pa"] = node.law.pressure_pa
+        values["pressure_share"] = node.law.share(node.judgement)
+        self.numbers += [Number("controller", name, "", said(x)) for name, x in values.items()]
+        now = law_values(node.law.law)
+        changed = {each.name.partition("[")[0] for each in differences(self._before, now)}
+        self.numbers += [
+            Number("law", name, "", said(now[name].tolist()))
+            for name in sorted(changed & now.keys())
+        ]
+        before, again = self._all_signals(recorded), self._all_signals(sent)
+        for name in dict.fromkeys((*before, *again)):
+            both = before.get(name, NONE), again.get(name, NONE)
+            self.numbers.append(Number("sent", name, *both))
+
+    def _all_signals(self, frames: Sequence[Frame]) -> dict[str, str]:
+        return {name: value for frame in frames for name, value in self._signals(frame).items()}
+
+    def _signals(self, frame: Frame) -> dict[str, str]:
+        """Signals of a frame by name; its bytes if it is none of the catalogue, or damaged."""
+        codec = self._codecs.get(frame.can_id)
+        message = None
+        if codec is not None and len(frame.data) == PAYLOAD_BYTES:
+            message = codec.decode(frame.data)
+        if codec is None or message is None:
+            return {f"{frame.can_id:08X}": frame.data.hex(" ")}
+        return {
+            f"{codec.name}.{name}": said(value)
+            for name, value in zip(message._fields, message, strict=True)
+        }
