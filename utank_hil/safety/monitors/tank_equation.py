@@ -59,6 +59,8 @@ UNEXPLAINED: Final = 0.5
 STILL_PERIODS: Final = 0.25
 STILL_PUSHES: Final = 4.0
 """Of the least push, root mean square: so much must be left unexplained by a roll that is still."""
+CREST_PERIODS: Final = 0.1
+"""A level of 0.3 m stays within its noise for so long at a crest; a longer one has no sign."""
 MEMORY_PERIODS: Final = 0.4
 LATE_PERIODS: Final = 1.5
 LATE_PUSHES: Final = 1.75
@@ -163,6 +165,8 @@ class TankEquation:
         self._filled = FILLED / (1 - self._keep)
         self._zero = thresholds.zero_push_m2_s2
         self._still_rad = thresholds.roll_still_rad
+        self._level_still_m = thresholds.level_still_m
+        self._crest_samples = round(CREST_PERIODS * thresholds.tank_period_s / period_s)
         self._still_samples = round(STILL_PERIODS * thresholds.tank_period_s / period_s)
         self._most_unmoved = STILL_PUSHES * STILL_PUSHES * self._least_xx
         self._late_limit_s = thresholds.motion_late_s
@@ -184,8 +188,8 @@ class TankEquation:
         self._slope.restart()
         self.slope_push = 0.0
         self._forget_lead()
-        self._still = 0
-        self._roll_rad = math.inf
+        self._still = self._level_still = 0
+        self._roll_rad = self._level_m = math.inf
         self.doubt = self.level_gain = self.late_s = math.nan
 
     def _forget_lead(self) -> None:
@@ -272,6 +276,10 @@ class TankEquation:
         self._slope_lead = self._late_keep * self._slope_lead + u * d
         self._late_uu = self._late_keep * self._late_uu + u * u
         self._samples += 1
+        self._level_still += 1
+        if abs(level_m - self._level_m) > self._level_still_m:
+            self._level_m = level_m
+            self._level_still = 0
         self._still += 1
         if abs(roll_rad - self._roll_rad) > self._still_rad:
             self._roll_rad = roll_rad
@@ -302,10 +310,11 @@ class TankEquation:
             for case, power, enough, finding in cases
             if enough
         ]
+        moves = self._level_still <= self._crest_samples
         best = min([other for other, *_ in judged], default=0.0)
         for other, power, uu, finding in judged:
             doubt = self._excess(sound, other, power, self._sound.uu)
-            if doubt > 1 and other <= (1.0 if finding == _LATE else self._clearly) * best:
+            if moves and doubt > 1 and other <= (1.0 if finding == _LATE else self._clearly) * best:
                 found |= finding
             if not self.doubt >= doubt:
                 self.doubt = doubt
