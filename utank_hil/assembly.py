@@ -363,4 +363,6 @@ def _renewing(config: ControllerConfig, law: BuiltLaw, retuner: Retuner) -> Rene
     assert isinstance(law.linear, ConstrainedLaw)
     ship = ShipFigures.of(config.vessel.ship)
     roll = law.measured.index("roll_rad")
-    return RenewingController(law.linear, ship, roll, config.limits, retuner)
+    assert isinstance(config.law, SelfTunedDesign)
+    shared = config.law.bears_shares(config.plant)
+    return RenewingController(law.linear, ship, roll, config.limits, retuner, shared=shared)

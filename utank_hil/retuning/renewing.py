@@ -58,7 +58,8 @@ class RenewingController(LawExchange):
     """A constrained law that is renewed as waves and ship change.
 
     `law` is the first one, for an unknown sea, `ship` the configured one, `roll` the index of the
-    roll among the outputs. No law may exceed `limits`.
+    roll among the outputs. No law may exceed `limits`. A law that is not `shared` plans from the
+    start and gets its whole command, as it is unstable with less.
     """
 
     def __init__(
@@ -68,8 +69,12 @@ class RenewingController(LawExchange):
         roll: int,
         limits: PumpLimits,
         retuner: Retuner,
+        *,
+        shared: bool = True,
     ) -> None:
-        first = MonitoredLaw(law.unlimited().controller(), ChangeMonitor(ship))
+        self._shared = shared
+        first_law = law.unlimited() if shared else law
+        first = MonitoredLaw(first_law.controller(), ChangeMonitor(ship))
         super().__init__(first, len(law.model.C), roll, TRIAL, retuner)
         self._law = law
         self._limits = limits
@@ -99,9 +104,10 @@ class RenewingController(LawExchange):
             self.fallbacks += controller.fallbacks - before
         if not self._engaged:
             self.effort.clear()
-        elif self._fresh:
+        elif self._fresh and self._shared:
             self.effort.update(self._roll_rad, self._passive_roll_rad)
-        command = self.effort.share * min(max(command, -self._allowed_pa), self._allowed_pa)
+        share = self.effort.share if self._shared else 1.0
+        command = share * min(max(command, -self._allowed_pa), self._allowed_pa)
         return np.array([command])
 
     def reset(self) -> None:
@@ -167,7 +173,7 @@ class RenewingController(LawExchange):
         assert ship is not None
         found = None if ship is self._configured else ship
         try:
-            controller = (law.unlimited() if found is None else law).controller()
+            controller = (law.unlimited() if found is None and self._shared else law).controller()
         except (ValueError, ArithmeticError) as error:
             return str(error)
         self.renewed = answer

@@ -43,6 +43,7 @@ from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import BuiltLaw
 from utank_hil.control.limits import PumpLimits
+from utank_hil.control.lqg import LQGLaw
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import pump_model, state_matrices
 from utank_hil.dynamics.sampling import LinearModel, sample
@@ -94,6 +95,8 @@ _PARTS: Final = np.linspace(0.02, 1.0, 50)
 _LEAST_STIFFNESS: Final = 1 / 3
 """Least stiffness of ship and water at the longest roll period over the nominal one; below it a
 heel and a load cannot be distinguished."""
+_SHARES: Final = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7)
+"""Shares of its command that a clipped law may get."""
 _MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 
 
@@ -195,9 +198,21 @@ class SelfTunedDesign:
         return BuiltLaw(law.controller, _MEASURED, law)
 
     def first(self, plant: DesignPlant) -> BuiltLaw:
-        """Design the law that leads until the ship is identified; it plans nothing."""
+        """Design the law that leads until the ship is identified.
+
+        It plans nothing where it `bears_shares`.
+        """
+        if not self.bears_shares(plant):
+            return self.build(plant)
         law = self.tuned(plant, any_load=True).law
         return BuiltLaw(law.unlimited().controller, _MEASURED, law)
+
+    def bears_shares(self, plant: DesignPlant) -> bool:
+        """Whether the first law is stable with any share of its command; not so on Patti-B."""
+        law = self.tuned(plant, any_load=True).law.unlimited()
+        model = plant.sampled(_MEASURED, law.sample_time_s)
+        shared = (LQGLaw(law.model, share * law.gain, law.observer_gain) for share in _SHARES)
+        return all(closed_loop_radius(each, model, 1.0) < 1 for each in shared)
 
 
 @lru_cache(maxsize=16)
