@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beam_sea import motions, roll_resonance
 from others import others_file
 
 from utank_hil.configuration.hull_files.parts import Given
 from utank_hil.configuration.hull_files.reader import read_hull
-from utank_hil.dynamics.hull.response import motions, roll_resonance
 from utank_hil.safety.monitors.sway import LEAST_SLOPE, SPREAD
 
 HULLS = {
