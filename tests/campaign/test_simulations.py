@@ -50,7 +50,8 @@ def test_linear_and_nonlinear_simulations_agree_where_motions_are_small(tmp_path
 
 
 def test_nonlinear_simulation_is_near_the_bus_and_has_the_same_bare_ship(tmp_path: Path):
-    long = {"duration_s": 40.0, "settle_s": 20.0}
+    # on the bus the law has a quarter of its pressure until the water was seen to obey it
+    long = {"duration_s": 120.0, "settle_s": 60.0}
     bus, fast = (computed(tmp_path, simulation, **long) for simulation in ("bus", "nonlinear"))
     assert bus["no tank"] == pytest.approx(fast["no tank"], nan_ok=True)
     assert bus["passive"]["roll_rms_rad"] == pytest.approx(

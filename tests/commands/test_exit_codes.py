@@ -113,8 +113,8 @@ def test_run_goes_on_and_keeps_its_code_where_its_terminal_is_full_or_gone(
     stream: str, gone: str
 ) -> None:
     program = (
-        "import ports, utank_hil.commands.run\n"
-        "utank_hil.commands.run.SocketCanPort = ports.DeadBus\n"
+        "import ports, utank_hil.canbus.socketcan\n"
+        "utank_hil.canbus.socketcan.SocketCanPort = ports.DeadBus\n"
         "from utank_hil.cli import main; main()"
     )
     words = ["run", str(GPC), "--bus", "any0", "--duration", "0.3"]

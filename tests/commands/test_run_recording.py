@@ -209,8 +209,8 @@ def test_run_says_within_a_second_that_nothing_is_recorded_or_logged_any_longer(
     tmp_path: Path,
 ) -> None:
     program = (
-        "import ports, utank_hil.commands.run\n"
-        "utank_hil.commands.run.SocketCanPort = ports.QuietBus\n"
+        "import ports, utank_hil.canbus.socketcan\n"
+        "utank_hil.canbus.socketcan.SocketCanPort = ports.QuietBus\n"
         "from utank_hil.cli import main; main()"
     )
     gpc = "configs/controllers/gpc.yaml"
