@@ -194,7 +194,7 @@ def test_a_command_whose_extra_is_missing_names_it_and_shows_no_traceback(
     (tmp_path / "x.rrd").touch()
     done = without_extras(module, *(str(tmp_path / w) if w == "x.rrd" else w for w in words))
     assert done.returncode == ExitCode.USAGE
-    told = done.stderr.splitlines()[0]
+    told = next(line for line in done.stderr.splitlines() if line.startswith("error:"))
     extra = EXTRA_OF[package]
     assert told.startswith(f"error: this needs {package}, which is not installed: ")
     assert told.endswith(f"pip install 'utank-hil[{extra}]'")

@@ -364,5 +364,5 @@ def _renewing(config: ControllerConfig, law: BuiltLaw, retuner: Retuner) -> Rene
     ship = ShipFigures.of(config.vessel.ship)
     roll = law.measured.index("roll_rad")
     assert isinstance(config.law, SelfTunedDesign)
-    shared = config.law.bears_shares(config.plant)
+    shared = config.law.clips(config.plant)
     return RenewingController(law.linear, ship, roll, config.limits, retuner, shared=shared)

@@ -178,7 +178,7 @@ def test_wrong_length_is_on_the_wire() -> None:
 def test_bit_errors_cost_time_on_the_bus_and_no_frame() -> None:
     bus = Bus({"kind": "bit_errors", "share": 0.1})
     assert len(bus.of(MOTION)) == len(sound().of(MOTION))
-    loads = [each.bench.bus.statistics(round(END_S * SECOND)).load for each in (bus, sound())]
+    loads = [each.bench.bus.load(round(END_S * SECOND)) for each in (bus, sound())]
     assert loads[0] > loads[1]
     assert 0 < max(bus.bench.bus.error_counts.values()) < 128
 
@@ -229,7 +229,7 @@ def test_a_bench_without_faults_has_the_frames_of_the_plain_one() -> None:
 def test_flood_takes_its_share_of_the_bus(form: str) -> None:
     bus = Bus({"kind": "flood", "identifier": "7FF", "share": 0.5, "format": form})
     at_ns = round(END_S * SECOND)
-    busy_s = [each.bench.bus.statistics(at_ns).load * END_S for each in (bus, sound())]
+    busy_s = [each.bench.bus.load(at_ns) * END_S for each in (bus, sound())]
     assert busy_s[0] - busy_s[1] == pytest.approx(0.25, abs=0.03)
     assert bus.bench.node.inbox.foreign > 100
 

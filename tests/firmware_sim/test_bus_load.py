@@ -20,11 +20,11 @@ def test_the_stated_load_covers_every_message_that_the_four_nodes_send():
     bus = SimulatedBus(bit_rate=250_000)
     run = Lockstep([*ship.nodes, build_controller_node(scenario.controllers["gpc"])], bus)
     run.run_until(1_000_000_000)
-    before = bus.statistics(run.now_ns).frames
+    before = bus.frames
     run.run_until(3_000_000_000)
-    frames_a_second = (bus.statistics(run.now_ns).frames - before) / 2
+    frames_a_second = (bus.frames - before) / 2
 
     row = r"\| controller, drive, sensors, panel \| (\d+) \| ([\d.]+)% \|"
     stated, load_percent = re.search(row, PAGE.read_text(encoding="utf-8")).groups()
     assert abs(frames_a_second + ESTIMATES - int(stated)) <= 1
-    assert bus.statistics(run.now_ns).load <= float(load_percent) / 100
+    assert bus.load(run.now_ns) <= float(load_percent) / 100

@@ -48,6 +48,7 @@ from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import pump_model, state_matrices
 from utank_hil.dynamics.sampling import LinearModel, sample
 from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea import ittc
 
 _PRESSURE_COST: Final = 0.106
@@ -198,17 +199,21 @@ class SelfTunedDesign:
         return BuiltLaw(law.controller, _MEASURED, law)
 
     def first(self, plant: DesignPlant) -> BuiltLaw:
-        """Design the law that leads until the ship is identified.
-
-        It plans nothing where it `bears_shares`.
-        """
-        if not self.bears_shares(plant):
+        """Design the law that leads until the ship is identified; it may be clipped (`clips`)."""
+        if not self.clips(plant):
             return self.build(plant)
         law = self.tuned(plant, any_load=True).law
         return BuiltLaw(law.unlimited().controller, _MEASURED, law)
 
-    def bears_shares(self, plant: DesignPlant) -> bool:
-        """Whether the first law is stable with any share of its command; not so on Patti-B."""
+    def clips(self, plant: DesignPlant) -> bool:
+        """Whether the first law is clipped: where that passes no level, and any share is stable.
+
+        A pump whose pressure alone holds the water beyond the level limit needs a plan to keep it,
+        as the naval vessel's. Patti-B's law is unstable with a share of its command.
+        """
+        limits, tank = plant.limits, plant.tank
+        if limits.pressure_pa > 2 * tank.density_kg_m3 * GRAVITY_M_S2 * limits.level_m:
+            return False
         law = self.tuned(plant, any_load=True).law.unlimited()
         model = plant.sampled(_MEASURED, law.sample_time_s)
         shared = (LQGLaw(law.model, share * law.gain, law.observer_gain) for share in _SHARES)
