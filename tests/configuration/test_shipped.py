@@ -77,6 +77,27 @@ def test_controller_arms_and_acts_on_the_bus_within_the_drives_limits(path: Path
     assert ship.valve is None or ship.valve.refused == 0
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("ship", "seed"), [("patti_b", 53), ("naval_vessel", 51)])
+def test_self_tuning_law_keeps_roll_and_level_after_it_was_armed(ship: str, seed: int) -> None:
+    # these seeds ended in HEEL_LIMIT at 17 degrees, and in LEVEL_LIMIT
+    scenario = load_config(CONFIGS / "scenarios" / f"{ship}.yaml", Scenario)
+    most_rad = []
+    for config in (None, scenario.controllers["self-tuning"]):
+        node = build_controller_node(
+            config or scenario.controllers["self-tuning"], commissioned=True
+        )
+        script = PASSIVE_SCRIPT if config is None else scenario.operator
+        lockstep = Lockstep([*build_ship_side(scenario, seed, script).nodes, node])
+        largest = 0.0
+        for second in range(1, 31):
+            lockstep.run_until(second * SECOND_NS)
+            largest = max(largest, abs(node.motion.roll_rad))
+        most_rad.append(largest)
+        assert node.fault is Fault.NONE
+    assert most_rad[1] < 1.1 * most_rad[0]
+
+
 def roll_rms_rad(scenario: Scenario, config: ControllerConfig | None, duration_s: int) -> float:
     """Measured roll, the first minute left out, with a controller or with the tank alone."""
     controller = config or next(iter(scenario.controllers.values()))

@@ -59,7 +59,7 @@ class RenewingController(LawExchange):
 
     `law` is the first one, for an unknown sea, `ship` the configured one, `roll` the index of the
     roll among the outputs. No law may exceed `limits`. A law that is not `shared` plans from the
-    start and gets its whole command, as it is unstable with less.
+    start and gets its whole command, as only its plan keeps the level.
     """
 
     def __init__(

@@ -111,6 +111,17 @@ def test_no_oscillation_goes_on_by_itself_after_the_pump_was_at_its_limit():
     assert rolls[15_000:].max() < 0.1 * rolls[:15_000].max()
 
 
+@pytest.mark.parametrize("any_load", [False, True])
+def test_a_law_is_stable_with_any_share_of_its_command(any_load):
+    # Patti-B's law of least cost has all margins and is not, from 0.05 to 0.3
+    config = load_config(Path("configs/controllers/patti_b_self_tuning.yaml"), ControllerConfig)
+    law = config.law.tuned(config.plant, any_load=any_load).law.unlimited()
+    model = config.plant.sampled(("roll_rad", "roll_rate_rad_s", "level_m"), law.sample_time_s)
+    for share in np.linspace(0.01, 1.0, 30):
+        clipped = LQGLaw(law.model, share * law.gain, law.observer_gain)
+        assert closed_loop_radius(clipped, model, 1.0) < 1, share
+
+
 def test_a_heel_is_looked_for_where_the_water_leaves_the_ship_her_stability():
     assert tuned().design.heel_std_rad > 0
     assert patti_b()[1].design.heel_std_rad == 0
