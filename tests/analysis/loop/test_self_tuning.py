@@ -102,7 +102,7 @@ def test_no_oscillation_goes_on_by_itself_after_the_pump_was_at_its_limit():
         plant.ship.stiffness_nm_rad, EffectiveSlope(BOAT_SEA.effective_slope)
     )
     motion = passive_motion(plant.ship, plant.tank, waves, TICK_S, 30_001)
-    motion[:10_000] *= 4.0
+    motion[:10_000] *= 6.0
     motion[10_000:] *= 0.05
     law, measured = found.law.controller(), found.design.measured
     run = simulate_loop(plant, motion, law, measured, pump_gain=0.8)
