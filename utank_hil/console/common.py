@@ -1,5 +1,6 @@
 """What the commands share: their options, reading of files, errors."""
 
+import errno
 import fcntl
 import json
 import os
@@ -180,6 +181,10 @@ def prepare_out(folder: Path, files: Collection[str], *, keep: bool = True) -> P
     return folder
 
 
+_NO_LOCKS: Final = (errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
+"""Of a file system without locks, such as some network shares: nothing can be claimed there."""
+
+
 def _claimed(folder: Path) -> bool:
     """Claim a folder for the rest of the process; whether no other process has claimed it."""
     descriptor = os.open(folder, os.O_RDONLY)
@@ -192,7 +197,8 @@ def _claimed(folder: Path) -> bool:
     except BlockingIOError:
         os.close(descriptor)
         return False
-    except OSError:
-        pass  # a file system without locks: nothing can be claimed there
+    except OSError as error:
+        if error.errno not in _NO_LOCKS:
+            raise
     _CLAIMS[place] = descriptor
     return True

@@ -4,9 +4,9 @@ The ship's roll is that of the passive twin plus the roll d that the pump made. 
 the command it made d, so with another share it would make about d times that ratio. The mean square
 of the roll is least at the share ``-s mean(twin d) / mean(d d)``, with means about the mean values
 and an exponential memory. A law that only rolls the ship more thus ends at `LEAST`, next to no
-power, and comes back as soon as it helps. A ship that is not the
-twin's makes d wrong by as much as its answer to the pump differs: in short waves, loaded to 1.3
-times its roll period, it gets less pressure than would pay.
+power, and comes back as soon as it helps. A ship that is not the twin's makes d wrong by as much as
+its answer to the pump differs: in short waves, loaded to 1.3 times its roll period, it gets less
+pressure than would pay.
 """
 
 import math

@@ -12,7 +12,7 @@ from utank_hil.base.parameters import Problem
 from utank_hil.control.limits import PumpLimits
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 _PERIODS: Final = (0.2, 5.0)
 """Range of a period of waves or of a wanted motion per the ship's roll period."""
@@ -90,7 +90,7 @@ def _of_sea(key: str, sea: SeaModel, roll_rad_s: float, width_m: float) -> Itera
     spectrum = sea.spectrum
     peak_s = 1 / float(spectrum.frequency_hz[spectrum.density.argmax()])
     ratio = peak_s * roll_rad_s / (2 * math.pi)
-    steep = 2 * math.pi * spectrum.hs_m / (9.81 * peak_s**2)
+    steep = 2 * math.pi * spectrum.hs_m / (GRAVITY_M_S2 * peak_s**2)
     if not _PERIODS[0] <= ratio <= _PERIODS[1] or steep > 0.08 or spectrum.hs_m < 0.02 * width_m:
         reason = (
             f"is of {spectrum.hs_m:.2g} m and {peak_s:.3g} s, and the ship rolls in "
