@@ -1,0 +1,52 @@
+"""The share of a command that pays, on rolls whose best share is known in closed form."""
+
+import math
+
+import numpy as np
+import pytest
+
+from utank_hil.retuning.effort import FIRST, LEAST, Effort
+
+SAMPLES = 60
+
+
+def ended(made_with_all: complex, periods: int = 60) -> float:
+    """Share in the end, where the whole command adds this phasor to a passive roll of one."""
+    effort = Effort(SAMPLES)
+    for n in range(periods * SAMPLES):
+        turn = np.exp(2j * np.pi * n / SAMPLES)
+        passive_rad = float(turn.real)
+        effort.update(passive_rad + effort.share * float((made_with_all * turn).real), passive_rad)
+    return effort.share
+
+
+@pytest.mark.parametrize(
+    ("made", "best"),
+    [
+        (-0.8 + 0.0j, 1.0),  # the best share is 1.25
+        (-2.0 + 0.0j, 0.5),  # with all of it the roll would be turned round
+        (-0.5 + 1.0j, 0.4),  # Re(-made) / |made|^2
+        (0.3 + 0.0j, LEAST),  # it only adds roll
+        (0.0 + 1.0j, LEAST),
+    ],
+)
+def test_it_ends_at_the_share_of_the_least_roll(made: complex, best: float) -> None:
+    assert ended(made) == pytest.approx(best, abs=0.03)
+
+
+def test_a_law_that_helps_again_comes_back() -> None:
+    effort = Effort(SAMPLES)
+    for made in (0.5, -0.8):
+        for n in range(80 * SAMPLES):
+            passive_rad = math.sin(2 * math.pi * n / SAMPLES)
+            effort.update(passive_rad * (1 + effort.share * made), passive_rad)
+        assert (effort.share > 0.95) == (made < 0)
+
+
+def test_an_unknown_passive_roll_gives_the_whole_command_and_clearing_forgets() -> None:
+    effort = Effort(SAMPLES)
+    for _ in range(40 * SAMPLES):
+        effort.update(0.1, math.nan)
+    assert effort.share == pytest.approx(1.0, abs=0.01)
+    effort.clear()
+    assert effort.share == FIRST
