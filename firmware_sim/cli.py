@@ -40,8 +40,7 @@ with quietly_interruptible():
             print_json,
         )
         from utank_hil.console.exit_codes import ExitCode
-        from utank_hil.console.terminal import Terminal, notes
-        from utank_hil.console.timing import timing_table
+        from utank_hil.console.terminal import Terminal, notes, timing_table
         from utank_hil.runners import (
             LoopStatistics,
             Node,

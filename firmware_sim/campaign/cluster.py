@@ -10,7 +10,7 @@ from typing import Final
 import dask
 from distributed import Client, LocalCluster, Status
 
-from utank_hil.base.one_thread import one_thread_each
+from utank_hil.base.background import one_thread_each
 from utank_hil.runners.stopping import signals_waiting
 
 LOOPBACK: Final = "127.0.0.1"

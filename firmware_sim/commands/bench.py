@@ -27,9 +27,7 @@ from utank_hil.console.common import (
     why,
 )
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.progress import progress_bar
-from utank_hil.console.terminal import Terminal
-from utank_hil.console.timing import timing_table
+from utank_hil.console.terminal import Terminal, progress_bar, timing_table
 from utank_hil.control import BuiltLaw
 from utank_hil.telemetry.ring import RingError
 

@@ -10,8 +10,7 @@ from utank_hil.base.provenance import describe
 from utank_hil.configuration import ConfigError
 from utank_hil.console.common import OUT, AllowCode, Json, fail, fail_with, prepare_out, print_json
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.progress import progress_bar
-from utank_hil.console.terminal import Terminal, notes, shown
+from utank_hil.console.terminal import Terminal, notes, progress_bar, shown
 
 if TYPE_CHECKING:
     from firmware_sim.campaign.study import LoadedStudy

@@ -17,8 +17,7 @@ from utank_hil.base.provenance import describe
 from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import ControllerConfig
 from utank_hil.console.common import OUT, Json, fail, load, prepare_out, print_json
-from utank_hil.console.progress import progress_bar
-from utank_hil.console.terminal import Terminal, new_table
+from utank_hil.console.terminal import Terminal, new_table, progress_bar
 
 if TYPE_CHECKING:
     from utank_hil.analysis.loop.trade import Trade, TradePoint

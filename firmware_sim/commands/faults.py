@@ -16,8 +16,7 @@ from utank_hil.configuration.shipped import CONFIGS
 from utank_hil.console.common import Json, fail, load, prepare_out, why
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.failures import KILLED
-from utank_hil.console.progress import progress_bar
-from utank_hil.console.terminal import Terminal, notes, shown
+from utank_hil.console.terminal import Terminal, notes, progress_bar, shown
 
 if TYPE_CHECKING:
     from firmware_sim.fault_campaign.campaign import Campaign, LiveRow, Row

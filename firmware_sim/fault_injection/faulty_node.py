@@ -6,8 +6,7 @@ from typing import Final, NamedTuple
 
 from utank_hil.canbus import Frame
 from utank_hil.runners import Node
-from utank_hil.runners.hooks import LinkObserver
-from utank_hil.runners.node import Selective
+from utank_hil.runners.node import LinkObserver, Selective
 
 NEVER_NS: Final = 1 << 62
 """Time beyond the end of every run."""

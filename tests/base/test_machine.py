@@ -5,12 +5,14 @@ import os
 import subprocess
 import sys
 
-from utank_hil.base.machine import kernels, machine
+from utank_hil.base.provenance import kernels, machine
 
 
 def test_kernels_of_an_older_processor_are_said() -> None:
     older = {"NPY_DISABLE_CPU_FEATURES": "X86_V3", "OPENBLAS_CORETYPE": "Nehalem"}
-    code = "import json; from utank_hil.base.machine import machine; print(json.dumps(machine()))"
+    code = (
+        "import json; from utank_hil.base.provenance import machine; print(json.dumps(machine()))"
+    )
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", code],
         env=os.environ | older, capture_output=True, text=True, check=True,

@@ -17,8 +17,7 @@ from typer.testing import CliRunner
 from firmware_sim.cli import app as ship_app
 from firmware_sim.scenario import Scenario
 from utank_hil.base import provenance
-from utank_hil.base.machine import kernels, machine
-from utank_hil.base.provenance import commit, describe, headline, version
+from utank_hil.base.provenance import commit, describe, headline, kernels, machine, version
 from utank_hil.cli import app
 from utank_hil.commands.recording import RunRecording
 from utank_hil.configuration import ControllerConfig, Vessel, load_config

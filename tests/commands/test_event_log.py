@@ -11,7 +11,7 @@ import pytest
 
 from utank_hil.canbus import AlarmState, Fault, Mode, RetuningState
 from utank_hil.canbus.events import AlarmEvent, RetuningEvent
-from utank_hil.commands.event_log import EventLog
+from utank_hil.commands.announcer import EventLog
 from utank_hil.safety.faults import FAULTS
 
 

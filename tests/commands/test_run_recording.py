@@ -20,8 +20,7 @@ from utank_hil.commands import recording as module
 from utank_hil.commands import run as command
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.recorder_process import RecorderError
-from utank_hil.telemetry.recorder_state import RecorderReport, RecordingTask
+from utank_hil.telemetry.recorder_process import RecorderError, RecorderReport, RecordingTask
 from utank_hil.telemetry.recording import read_recording
 from utank_hil.telemetry.rows import RowReader
 

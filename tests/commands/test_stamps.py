@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from utank_hil.base import stamps
-from utank_hil.base.stamps import claimed_files
+from utank_hil.base.whole_file import claimed_files
 
 
 def test_files_share_the_time_and_are_made(tmp_path: Path) -> None:

@@ -26,8 +26,13 @@ from utank_hil.telemetry.events import EventWriter
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.part import RecordingPart
 from utank_hil.telemetry.recorder import record_part
-from utank_hil.telemetry.recorder_process import RecorderError, RecorderProcess
-from utank_hil.telemetry.recorder_state import RecorderReport, RecorderState, RecordingTask
+from utank_hil.telemetry.recorder_process import (
+    RecorderError,
+    RecorderProcess,
+    RecorderReport,
+    RecorderState,
+    RecordingTask,
+)
 from utank_hil.telemetry.recording import read_recording
 from utank_hil.telemetry.rows import RowWriter
 

@@ -18,8 +18,7 @@ from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.bus_records import LAYOUT, Kind, frame_ring
 from utank_hil.telemetry.events import EventWriter
 from utank_hil.telemetry.frame_log import FrameLog
-from utank_hil.telemetry.recorder_process import RecorderProcess
-from utank_hil.telemetry.recorder_state import RecorderReport, RecordingTask
+from utank_hil.telemetry.recorder_process import RecorderProcess, RecorderReport, RecordingTask
 from utank_hil.telemetry.recording import read_about, read_recording
 from utank_hil.telemetry.rotation import make_room, part_of, remove_oldest
 from utank_hil.telemetry.rows import RowWriter

@@ -8,8 +8,7 @@ import pytest
 
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.highlight import highlight_s
-from utank_hil.telemetry.recording import _read_chunks, write_recording
+from utank_hil.telemetry.recording import _read_chunks, highlight_s, write_recording
 from utank_hil.telemetry.scene import PERIOD_S, SceneSize, scene_size
 
 SIZE = SceneSize(width_m=17.0, height_m=5.0, lz_m=2.0, level_limit_m=4.0, pressure_pa=5e4)

@@ -29,7 +29,7 @@ from firmware_sim.scenario import Scenario
 from tools.evidence import ROOT, commit
 from tools.printing import command_line, show
 from tools.studies.monitor_margins import margins
-from utank_hil.base.one_thread import one_thread_each
+from utank_hil.base.background import one_thread_each
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.nodes.panel import Action, TimedAction
 

@@ -36,7 +36,7 @@ from tools.studies.trial_setup import (
 )
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.analysis.motion.confidence import Interval, mean_interval
-from utank_hil.base.one_thread import one_thread_each
+from utank_hil.base.background import one_thread_each
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics import RollShip
 from utank_hil.sea import EffectiveSlope, Sea, Spectrum, jonswap

@@ -29,7 +29,7 @@ from tools.studies.many_seas import SIXTEEN, seas
 from tools.studies.trial_setup import CONFIGS, chosen, shipped
 from utank_hil.analysis.motion.confidence import mean_interval
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.one_thread import one_thread_each
+from utank_hil.base.background import one_thread_each
 from utank_hil.canbus.enumerations import Mode, RetuningState
 from utank_hil.configuration import load_config
 from utank_hil.sea import Spectrum

@@ -26,7 +26,7 @@ from utank_hil.analysis.loop.loop_simulation import (
 )
 from utank_hil.analysis.motion.bare_ship import roll_without_tank
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.one_thread import one_thread_each
+from utank_hil.base.background import one_thread_each
 from utank_hil.base.tick import TICK_S
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import LinearLaw

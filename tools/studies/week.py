@@ -28,7 +28,7 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from tools.printing import command_line, show
 from utank_hil.assembly import build_controller_node, retuner_work
-from utank_hil.base.one_thread import one_thread_each
+from utank_hil.base.background import one_thread_each
 from utank_hil.canbus import Frame
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.nodes.panel import Action, TimedAction

@@ -1,12 +1,16 @@
-"""Processes beside the loop: they give way to it, for the processor and for memory."""
+"""Processes beside the loop: they give way to it and compute in one thread each."""
 
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
 _SCORE: Final = Path("/proc/self/oom_score_adj")
 _FIRST_TO_GO: Final = 500
+
+
+_THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def give_way(niceness: int) -> None:
@@ -18,3 +22,22 @@ def give_way(niceness: int) -> None:
     os.nice(niceness)
     with suppress(OSError):  # a score that is higher already may not be lowered; there is no /proc
         _SCORE.write_text(str(_FIRST_TO_GO), encoding="ascii")
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Processes started meanwhile keep their linear algebra to one thread.
+
+    Spread over all cores it takes them from the loop, and from one another; and on a busy machine
+    its threads wait for one another and take twenty times as long.
+    """
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

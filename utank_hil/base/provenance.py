@@ -3,11 +3,13 @@
 Figures, recordings and pictures carry it, so that they still say what ran when files have moved on.
 """
 
+import ctypes
 import hashlib
 import importlib.metadata
 import json
 import math
 import os
+import platform
 import subprocess
 from collections.abc import Iterator, Mapping
 from datetime import UTC, date, datetime
@@ -16,14 +18,18 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 from pydantic import BaseModel
-
-from utank_hil.base.machine import machine
 
 PROGRAM: Final = "utank-hil"
 UNKNOWN: Final = "unknown"
 _ROOT: Final = Path(__file__).resolve().parents[2]
 _GIT_S: Final = 5.0
+
+
+_CORE_NAMES: Final = tuple(
+    f"{prefix}openblas_get_corename{suffix}" for prefix in ("scipy_", "") for suffix in ("64_", "")
+)
 
 
 def version() -> str:
@@ -145,3 +151,49 @@ def _plain(value: Any, folder: Path) -> Any:
     if isinstance(value, date):
         return value.isoformat()
     return value
+
+
+@cache
+def machine() -> dict[str, Any]:
+    """Platform, processor, and the kernels that libraries chose for it, ready for `json.dumps`."""
+    found: Any = np.show_config(mode="dicts")
+    return {
+        "platform": platform.platform(),
+        "python": platform.python_version(),
+        "cpus": os.cpu_count(),
+        "processor": _processor(),
+        "numpy": " ".join(found["SIMD Extensions"].get("found", [])) or "baseline",
+        "blas": f"{found['Build Dependencies']['blas']['name']} {_blas_core()}".strip(),
+        "libm": " ".join(platform.libc_ver()).strip() or "unknown",
+    }
+
+
+def kernels(of: dict[str, Any]) -> str:
+    """Processor and kernels of a `machine` in words; empty if it does not say them."""
+    if "processor" not in of:
+        return ""
+    return f"{of['processor']}, numpy {of['numpy']}, {of['blas']}, libm {of['libm']}"
+
+
+def _processor() -> str:
+    lines = _lines("/proc/cpuinfo")
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def _blas_core() -> str:
+    """Kind of processor whose kernels OpenBLAS runs; empty for another library."""
+    for path in {line.split()[-1] for line in _lines("/proc/self/maps") if "openblas" in line}:
+        library = ctypes.CDLL(path)
+        for name in _CORE_NAMES:
+            if hasattr(library, name):
+                core_name = getattr(library, name)
+                core_name.restype = ctypes.c_char_p
+                return str(core_name().decode())
+    return ""
+
+
+def _lines(path: str) -> list[str]:
+    """Lines of a file that only Linux has."""
+    file = Path(path)
+    return file.read_text().splitlines() if file.exists() else []

@@ -12,10 +12,10 @@ from utank_hil.canbus.endpoints import Rejection as Rejection
 from utank_hil.canbus.endpoints import Transmitter as Transmitter
 from utank_hil.canbus.enumerations import *  # noqa: F403 - every value table
 from utank_hil.canbus.frame import Frame as Frame
+from utank_hil.canbus.measurements import RetuningOrder as RetuningOrder
 from utank_hil.canbus.messages import *  # noqa: F403 - every message
 from utank_hil.canbus.port import Port as Port
 from utank_hil.canbus.port import PortError as PortError
-from utank_hil.canbus.retuning_order import RetuningOrder as RetuningOrder
 
 if TYPE_CHECKING:
     from utank_hil.canbus.socketcan import SocketCanPort as SocketCanPort

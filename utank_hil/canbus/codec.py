@@ -137,8 +137,7 @@ COMMON: Final[dict[str, Any]] = {
     "clamp": _clamp,
     "members": _members,
     **dict(zip("ABC", WORD_TABLES, strict=True)),
-}
-"""What the text of every message names."""
+}  #: What the text of every message names.
 
 
 def _overlaps(signal: Signal) -> list[tuple[str, int, int]]:

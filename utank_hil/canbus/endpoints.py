@@ -11,11 +11,9 @@ T = TypeVar("T", bound=tuple[Any, ...])
 #: Frames that may be missing between two accepted ones; after more, `RESYNC_FRAMES` applies.
 MAX_LOST: Final = 3
 
-#: Consecutive frames after which a new counter value is accepted.
-RESYNC_FRAMES: Final = 3
+RESYNC_FRAMES: Final = 3  #: Consecutive frames after which a new counter value is accepted.
 
-#: Level of the leaky bucket at which a stream becomes invalid.
-BUCKET_LIMIT: Final = 5
+BUCKET_LIMIT: Final = 5  #: Level of the leaky bucket at which a stream becomes invalid.
 
 _COUNTER_MASK: Final = 15
 

@@ -36,6 +36,15 @@ class Wishes(NamedTuple):
     passive_edge: bool = False  #: The mode asked for has changed to PASSIVE since the last look.
 
 
+class RetuningOrder(NamedTuple):
+    """What the operator ordered since the last sample."""
+
+    #: retune, undo: the button was pressed.
+    retune: bool = False
+    undo: bool = False
+    forbidden: bool = False  #: Retuning is forbidden, or was for a moment.
+
+
 @dataclass(slots=True, eq=False)
 class Measurements:
     """Everything that was received, plausible, with its age, at one tick.

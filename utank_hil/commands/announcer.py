@@ -4,30 +4,89 @@ The loop writes an event into shared memory. This process logs it, prints it if 
 and writes the identified ship to files. It reads the remaining events even if the loop was killed.
 """
 
+import json
 import multiprocessing
 import os
 import signal
 import time
 from contextlib import ExitStack, suppress
+from datetime import UTC, datetime
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from utank_hil.base.background import give_way
 from utank_hil.canbus import RetuningState
-from utank_hil.canbus.events import RetuningEvent
-from utank_hil.commands.event_log import EventLog
+from utank_hil.canbus.events import AlarmEvent, RetuningEvent
 from utank_hil.commands.identified import IdentifiedShips
 from utank_hil.commands.lines import Lines
 from utank_hil.console.terminal import shown
 from utank_hil.runners.stopping import SIGNALS, signals_waiting
+from utank_hil.safety.faults import FAULTS
 from utank_hil.telemetry.events import Event, EventReader, EventWriter, event_text
+
+LOG_NAME: Final = "log-{}.jsonl"
+_WORDS: Final = {row.code: (row.happened, row.remedy) for row in FAULTS}
+
 
 LOOK_S: Final = 0.5  #: Time between two reads of the ring, short enough for a reader.
 _NICENESS: Final = 5
 _START_S, _END_S, _PRINTED_S = 30.0, 10.0, 5.0
 """Times for the process to start, to end, and to print the last lines, on a busy machine."""
+
+
+class EventLog:
+    """The log of a run: one JSON object per line for each event, with monotonic time and UTC.
+
+    Appends and syncs each event to a file at once; raises OSError if it can't be opened.
+    """
+
+    def __init__(self, file: Path) -> None:
+        self._file = file.open("ab", buffering=0)  # A write that did not fit is not repeated.
+
+    def write(self, event: Event, start_ns: int) -> None:
+        """Append an event whose `time_ns` counts from `start_ns` on this machine's monotonic clock.
+
+        OSError is raised if there is no room; then no part of the event is left.
+        """
+        monotonic_ns = start_ns + event.time_ns
+        utc_ns = time.time_ns() - time.monotonic_ns() + monotonic_ns
+        line = {
+            "utc": datetime.fromtimestamp(utc_ns * 1e-9, UTC).isoformat(timespec="milliseconds"),
+            "monotonic_ns": monotonic_ns,
+            "time_s": event.time_ns * 1e-9,
+            **_content(event),
+        }
+        left = (json.dumps(line, ensure_ascii=False) + "\n").encode(errors="replace")
+        begin = self._file.seek(0, os.SEEK_END)
+        try:
+            while left:  # A partial write is followed by one that gives the reason.
+                left = left[self._file.write(left) :]
+            os.fsync(self._file.fileno())
+        except OSError:
+            with suppress(OSError):
+                self._file.truncate(begin)
+            raise
+
+    def close(self) -> None:
+        """Close the file; idempotent."""
+        self._file.close()
+
+
+def _content(event: Event) -> dict[str, Any]:
+    if not isinstance(event, AlarmEvent):
+        return {"event": "retuning", **{k: v for k, v in event.as_json().items() if k != "time_s"}}
+    happened, remedy = _WORDS.get(event.code, ("", ""))
+    return {
+        "event": "reset refused" if event.state is None else "alarm",
+        "state": None if event.state is None else event.state.name,
+        "code": int(event.code),
+        "fault": event.code.name,
+        "mode": event.mode.name,
+        "happened": happened,
+        "remedy": remedy,
+    }
 
 
 class Announcer:

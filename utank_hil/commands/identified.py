@@ -9,8 +9,7 @@ import yaml
 
 from utank_hil.base.parameters import refuse
 from utank_hil.base.provenance import headline
-from utank_hil.base.stamps import claimed_files
-from utank_hil.base.whole_file import left_whole
+from utank_hil.base.whole_file import claimed_files, left_whole
 from utank_hil.configuration.plausibility import tank_problems
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.dynamics.ship import RollShip

@@ -41,7 +41,7 @@ def decay(
 
     **Example:** utank-hil identify decay roll.csv --from 25 --ship configs/ships/naval_vessel.yaml
     """
-    from utank_hil.pictures.decay import draw_decay
+    from utank_hil.pictures.identification import draw_decay
 
     vessel = None if ship is None else load(ship, Vessel)
     out = prepare_out(out, (PICTURE,))

@@ -102,7 +102,7 @@ def _said(viewer: "Viewer", at_s: float | None) -> "Viewer":
 
 
 def _open(file: Path) -> None:
-    from utank_hil.telemetry.highlight import highlight_s
+    from utank_hil.telemetry.recording import highlight_s
 
     file = file / "bench.rrd" if file.is_dir() else file
     if not file.is_file():

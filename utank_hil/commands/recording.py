@@ -7,13 +7,17 @@ from pathlib import Path
 from typing import Any, Final
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.stamps import claimed_files
+from utank_hil.base.whole_file import claimed_files
 from utank_hil.console.common import why_not_writable
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.bus_records import frame_ring
 from utank_hil.telemetry.frame_log import SUFFIX
-from utank_hil.telemetry.recorder_process import NEEDS_RERUN, RecorderError, RecorderProcess
-from utank_hil.telemetry.recorder_state import RecordingTask
+from utank_hil.telemetry.recorder_process import (
+    NEEDS_RERUN,
+    RecorderError,
+    RecorderProcess,
+    RecordingTask,
+)
 from utank_hil.telemetry.ring import RingWriter
 from utank_hil.telemetry.rows import RowWriter
 

@@ -12,8 +12,8 @@ from typing import Annotated, Any
 import typer
 
 from utank_hil.assembly import build_law
-from utank_hil.base.machine import kernels, machine
 from utank_hil.base.parameters import ParameterError
+from utank_hil.base.provenance import kernels, machine
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.console.common import AllowCode, Channel, Json, fail, load
 from utank_hil.console.exit_codes import ExitCode

@@ -14,12 +14,11 @@ import typer
 
 from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.base.provenance import describe
-from utank_hil.base.stamps import claimed_files
+from utank_hil.base.whole_file import claimed_files
 from utank_hil.canbus import Fault, Mode, Port, PortError
 from utank_hil.canbus.events import AlarmEvent
 from utank_hil.canbus.ports import BusPorts, open_port
-from utank_hil.commands import event_log
-from utank_hil.commands.announcer import Announcer
+from utank_hil.commands.announcer import LOG_NAME, Announcer
 from utank_hil.commands.commissioning_record import why_not_commissioned
 from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.commands.lines import Lines, printed_lines
@@ -39,8 +38,7 @@ from utank_hil.console.common import (
     print_json,
 )
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import Terminal, notes, shown
-from utank_hil.console.timing import timing_table
+from utank_hil.console.terminal import Terminal, notes, shown, timing_table
 from utank_hil.control import BuiltLaw
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.signals import ROW_TICKS
@@ -220,7 +218,7 @@ def _log(folder: Path) -> Path | None:
     """Return the file of the event log; `folder` is created."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (log,) = claimed_files(folder.resolve(), event_log.NAME)
+        (log,) = claimed_files(folder.resolve(), LOG_NAME)
     except OSError as error:
         notes.say(str(error), red="no log of events:")
         return None

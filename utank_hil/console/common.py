@@ -33,7 +33,7 @@ _CLAIMS: Final[dict[tuple[int, int], int]] = {}
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from utank_hil.base.machine import kernels, machine
+        from utank_hil.base.provenance import kernels, machine
 
         sys.stdout.write(f"{headline()}\n{kernels(machine())}\n")
         raise typer.Exit

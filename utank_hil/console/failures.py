@@ -18,8 +18,7 @@ EXTRA_OF: Final = {
     **dict.fromkeys(("clarabel", "control", "dask", "distributed", "jinja2"), "bench"),
     **dict.fromkeys(("matplotlib", "numba"), "bench"),
     **dict.fromkeys(("pyarrow", "rerun", "rerun_cli"), "viewer"),
-}
-"""Packages that are not needed to run the controller, and the extra that installs each."""
+}  #: Packages that are not needed to run the controller, and the extra that installs each.
 KILLED: Final = "a process of this command was killed: too little memory?"
 
 

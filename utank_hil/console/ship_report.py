@@ -1,4 +1,4 @@
-"""What ``utank-hil check`` says of a ship: what ship, tank and pump are to each other."""
+"""What ``utank-hil check`` says of a ship and of its devices."""
 
 import math
 from typing import Any, Final
@@ -8,8 +8,9 @@ import numpy as np
 from utank_hil.analysis.tank_design import tank_figures
 from utank_hil.analysis.tank_sizing import pump_demand, pump_level_m
 from utank_hil.configuration import Vessel
+from utank_hil.configuration.device_sections import unit_of
+from utank_hil.configuration.devices import DeviceSection, DevicesSection
 from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
-from utank_hil.console.device_report import devices_json, print_devices
 from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.nonlinear import RollModel
@@ -22,6 +23,9 @@ _OF_PUMP: Final = (
     "pump_heel_rad", "pump_heel_at_the_end", "pump_head_m", "pump_flow_m3_s", "pump_power_asked_w",
     "pump_power_held_w", "pump_power_w",
 )  # fmt: skip
+
+
+_UNITS = {"rad": "rad", "rad_s": "rad/s", "m": "m", "pa": "Pa", "m3_s": "m³/s"}
 
 
 def ship_json(vessel: Vessel) -> dict[str, Any]:
@@ -221,3 +225,63 @@ def order_words(vessel: Vessel) -> str:
 def power_words(power_w: float) -> str:
     """A power with the unit that suits it."""
     return f"{power_w / 1e6:.2f} MW" if power_w >= 1e6 else f"{power_w / 1e3:.3g} kW"
+
+
+def devices_json(devices: DevicesSection | None) -> dict[str, Any]:
+    """Devices by their roles; those that are native nodes are left out."""
+    sensors = {} if devices is None else devices.sensors()
+    return {role: _figures(each) for role, each in sensors.items() if not each.native}
+
+
+def _figures(device: DeviceSection) -> dict[str, Any]:
+    has, lacks = _protection(device)
+    return {
+        "profile": device.profile,
+        "device": device.device or device.profile,
+        "documents": device.documents,
+        "bus": device.bus,
+        "rate_hz": 1e3 / device.period_ms(),
+        "latency_ms": device.latency_ms,
+        "age_ms": device.age_ms,
+        "steps": {name: device.step(name) for name in device.signals},
+        "derived": [name for name, each in device.signals.items() if each.source == "derived"],
+        "protected_by": has,
+        "not_protected_by": lacks,
+    }
+
+
+def _protection(device: DeviceSection) -> tuple[list[str], list[str]]:
+    guards = device.protection
+    there = {
+        "counter": bool(guards.counters),
+        "checksum": bool(guards.crcs),
+        "time stamp": bool(guards.stamps),
+        "status": bool(device.valid_when),
+        "codes for not available": any(
+            layout.most_raw is not None or layout.least_raw is not None
+            for message in device.messages.values()
+            for layout in message.signals.values()
+        ),
+        f"limit on unchanged content ({guards.unchanged_ms or 0:g} ms)": bool(guards.unchanged_ms),
+        "identity": guards.n2k_name is not None,
+    }
+    has = [name for name, given in there.items() if given]
+    lacks = ("counter", "checksum", "time stamp", "status", "identity")
+    return ["length", "range", "cycle", *has], [name for name in lacks if not there[name]]
+
+
+def print_devices(console: Terminal, devices: DevicesSection | None) -> None:
+    """Print each device in a few lines."""
+    for role, each in devices_json(devices).items():
+        where = f" on {each['bus']}" if each["bus"] else ""
+        console.say(f"{role}: {each['device']}{where}")
+        console.say(f"  promises {each['rate_hz']:.3g} Hz, {each['latency_ms']:g} ms late at most")
+        for name, step in each["steps"].items():
+            what = f"in steps of {step:.2g} {_UNITS.get(unit_of(name), '')}".rstrip()
+            what = "derived, not measured" if name in each["derived"] else what
+            console.say(f"  {name}: {what}")
+        console.say("  protected by " + ", ".join(each["protected_by"]))
+        if each["not_protected_by"]:
+            console.say(", ".join(each["not_protected_by"]), yellow="  not protected by")
+    if devices is not None and devices.unprotected:
+        console.say("Half the pressure is allowed until a second motion sensor agrees.")

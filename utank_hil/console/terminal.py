@@ -5,7 +5,7 @@ import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from rich.console import Console
 from rich.measure import Measurement
@@ -13,6 +13,11 @@ from rich.table import Table
 from rich.text import Text
 
 from utank_hil.console.exit_codes import ExitCode
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, ProgressColumn
+
+    from utank_hil.runners import LoopStatistics
 
 UNLIMITED: Final = 10_000
 
@@ -108,10 +113,38 @@ class _Notes(Terminal):
         self.quiet = True
 
 
-# progress, notes and errors; standard output is for results
-notes: Final = _Notes(stderr=True)
+notes: Final = _Notes(stderr=True)  # progress, notes and errors; standard output is for results
 
 
 def say_note(note: str) -> None:
     """Print what of a file was not read, or not written, as it stands."""
     notes.say(note, yellow="note:")
+
+
+def timing_table(loops: "dict[str, LoopStatistics]") -> Table:
+    """Table of how real-time loops kept their time, in microseconds."""
+    figures = ("p50", "p99", "p99.9", "max", "ticks", "overruns\nskipped")
+    table = new_table("Deadlines, µs", *figures, names=("", ""))
+    for name, loop in loops.items():
+        for what, histogram in (("wake-up late", loop.lateness), ("tick lasts", loop.duration)):
+            summary = histogram.summary()
+            times = [summary[key] / 1e3 for key in ("p50_ns", "p99_ns", "p99_9_ns", "max_ns")]
+            counts = (str(loop.ticks), f"{loop.overruns} / {loop.skipped}")
+            first = what == "wake-up late"
+            cells = [f"{time_us:.0f}" for time_us in times]
+            table.add_row(name if first else "", what, *cells, *(counts if first else ("", "")))
+    return table
+
+
+def progress_bar(*columns: "str | ProgressColumn") -> "Progress":
+    """A bar with what these columns say before the remaining time; on a terminal only."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    return Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        *columns,
+        TimeRemainingColumn(),
+        console=notes,
+        disable=not notes.is_terminal,
+    )

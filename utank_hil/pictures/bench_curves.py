@@ -28,8 +28,7 @@ _LANES: Final[dict[int, tuple[str, float]]] = {
     RetuningState.RETUNED: ("retuned", 1.0),
     RetuningState.REFUSED: ("refused", 0.1),
     RetuningState.UNDONE: ("undone", 0.1),
-}
-"""Label and opacity of each retuning state."""
+}  # Label and opacity of each retuning state.
 _LETTER: Final = 0.014  #: Width of a letter in a lane over the axis; a short section has no label.
 _LABELS: Final = ("Roll (°)", "Tank level (m)", "Pump pressure (kPa)")
 

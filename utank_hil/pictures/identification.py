@@ -1,4 +1,4 @@
-"""Figure of an identification: validation of the model on held-out data."""
+"""Figures of identifications: validation of a model on held-out data, and a decay test."""
 
 import math
 from collections.abc import Mapping
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from utank_hil.analysis.motion.decay import RollDecay
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control import DesignPlant
 from utank_hil.dynamics.transfer import state_space_response
@@ -16,7 +17,7 @@ from utank_hil.identification import (
     hankel_singular_values,
     stabilization,
 )
-from utank_hil.pictures.style import COLORS, DASHES, WIDEST_IN, picture
+from utank_hil.pictures.style import BELOW, COLORS, DASHES, WIDEST_IN, picture
 from utank_hil.retuning.record_length import estimation_samples
 from utank_hil.retuning.redesign import Identification, RetuningTask
 
@@ -97,3 +98,19 @@ def _stable_points(found: Identification) -> tuple[StabilizationPoint, ...]:
     rank = len(hankel_singular_values(found.okid.markov))
     orders = [order for order in ORDERS if order <= rank]
     return stabilization(found.okid.markov, orders, found.okid.arx.sample_time_s)
+
+
+def draw_decay(
+    found: RollDecay, path: Path, title: str, about: Mapping[str, Any] | None = None
+) -> Path:
+    """Draw measured roll, the fit, and what the fit leaves."""
+    with picture(path, title, (WIDEST_IN, 5.5), about) as figure:
+        top, low = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+        for n, (name, roll) in enumerate((("measured", found.roll_rad), ("fit", found.fit_rad))):
+            style: dict[str, Any] = {"linestyle": DASHES[2 * n], "color": COLORS[2 * n]}
+            top.plot(found.time_s, np.degrees(roll), label=name, **style)
+        top.set_ylabel("Roll (°)")
+        low.plot(found.time_s, np.degrees(found.roll_rad - found.fit_rad), color=COLORS[0], lw=0.8)
+        low.set(xlabel="Time (s)", ylabel="Left (°)")
+        figure.legend(**BELOW)
+    return path

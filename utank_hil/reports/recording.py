@@ -15,7 +15,6 @@ from utank_hil.pictures import BenchCurve, draw_bench
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
 from utank_hil.reports.parts import Report, about_section, roll_figure
 from utank_hil.safety.faults import fault_text
-from utank_hil.telemetry.highlight import in_service
 from utank_hil.telemetry.rotation import whole_of
 
 STEP_S: Final = 0.05  #: Step between the samples that are drawn: ample for a ship.
@@ -70,6 +69,8 @@ def _verdict(rows: dict[str, FloatArray], alarms: list[dict[str, Any]]) -> Verdi
         lines.append(f"In charge for {active.mean():.0%} of the time: {_rolled(rows, active)}.")
     else:
         lines.append("The controller was never in charge.")
+    from utank_hil.telemetry.recording import in_service  # It imports Rerun.
+
     codes = np.unique(rows["fault"][in_service(rows)])
     faults = [Fault(int(code)) for code in codes if code != Fault.NONE]
     lines += [fault_text(fault) for fault in faults]

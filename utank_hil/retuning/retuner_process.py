@@ -17,8 +17,8 @@ import time
 from contextlib import suppress
 from typing import Final
 
+from utank_hil.base.background import one_thread_each
 from utank_hil.base.closing import Closing
-from utank_hil.base.one_thread import one_thread_each
 from utank_hil.retuning.desk import Desk
 from utank_hil.retuning.retuner import Work
 from utank_hil.retuning.worker import run_watchdog

@@ -6,9 +6,7 @@ from math import gcd
 from typing import Final
 
 from utank_hil.canbus.frame import Frame
-from utank_hil.runners.errors import NodeError
-from utank_hil.runners.hooks import LinkObserver, LoadObserver, Stoppable
-from utank_hil.runners.node import Node, Selective
+from utank_hil.runners.node import LinkObserver, LoadObserver, Node, NodeError, Selective, Stoppable
 
 OUTSIDE: Final = -1  #: Sender index of a frame from outside the group.
 

@@ -42,3 +42,51 @@ def heard_by(nodes: Iterable[Node]) -> frozenset[int] | None:
             return None
         heard |= node.hears
     return heard
+
+
+class NodeError(RuntimeError):
+    """A node raised; the original exception is the `__cause__`.
+
+    `node_name` is the node that raised, `time_ns` the time that it was handed.
+    """
+
+    def __init__(self, node_name: str, method: str, time_ns: int, cause: Exception) -> None:
+        super().__init__(
+            f"node '{node_name}' failed in {method}() at {time_ns * 1e-9:.6f} s: "
+            f"{type(cause).__name__}: {cause}"
+        )
+        self.node_name = node_name
+        self.time_ns = time_ns
+        self._arguments = node_name, method, time_ns, cause
+
+    def __reduce__(self) -> tuple[type["NodeError"], tuple[str, str, int, Exception]]:
+        # benches run in processes of their own, and the error has to come back from there
+        return NodeError, self._arguments
+
+
+@runtime_checkable
+class LinkObserver(Protocol):
+    """A node that is notified when the bus can't be reached."""
+
+    def link_error(self, now_ns: int, reason: str) -> None:
+        """Handle a frame that could not be sent, or a bus that could not be read.
+
+        Called in the same tick: a receive error before the nodes are ticked, a send error after
+        `tick` has returned the frame.
+        """
+
+
+@runtime_checkable
+class LoadObserver(Protocol):
+    """A node that measures the load of the bus."""
+
+    def other_frames(self, count: int) -> None:
+        """Take note of what was received and is no `Frame`: other identifiers, remote, errors."""
+
+
+@runtime_checkable
+class Stoppable(Protocol):
+    """A node that sends last frames before the process ends."""
+
+    def stop(self, now_ns: int) -> Iterable[Frame]:
+        """Return the last frames to send; called once, however the run ends."""

@@ -5,13 +5,13 @@ is fixed at the start of the run: a late tick does not shift it, and skipped tic
 """
 
 import os
+import time
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Final
+from typing import Final, Protocol
 
 from utank_hil.canbus.frame import Frame
 from utank_hil.canbus.port import Port, PortError
-from utank_hil.runners.clock import Clock, MonotonicClock
 from utank_hil.runners.group import OUTSIDE, NodeGroup
 from utank_hil.runners.node import Node
 from utank_hil.runners.statistics import LoopStatistics
@@ -22,6 +22,29 @@ _REAL_TIME: Final = (os.SCHED_FIFO, os.SCHED_RR)
 
 def _never() -> bool:
     return False
+
+
+class Clock(Protocol):
+    """A clock that never goes back, and a way to wait for it."""
+
+    def now_ns(self) -> int:
+        """Return the time in nanoseconds since an arbitrary instant."""
+
+    def sleep_until(self, time_ns: int) -> None:
+        """Return at `time_ns` or later, never earlier; at once if it has passed."""
+
+
+class MonotonicClock:
+    """CLOCK_MONOTONIC: not touched by changes of the wall clock."""
+
+    def now_ns(self) -> int:
+        """Return `time.monotonic_ns()`."""
+        return time.monotonic_ns()
+
+    def sleep_until(self, time_ns: int) -> None:
+        """Sleep until an absolute time; `time.sleep` is clock_nanosleep on the monotonic clock."""
+        while (left_ns := time_ns - time.monotonic_ns()) > 0:
+            time.sleep(left_ns * 1e-9)
 
 
 class RealTimeLoop:

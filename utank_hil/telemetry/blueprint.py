@@ -40,8 +40,7 @@ WATCHED: Final = tuple((title, names[:2]) for title, names in (_ROLL, _LEVEL, _P
 PARTS: Final = {
     "valve": ("valve_opening",),
     "pump": ("pressure_command_pa", "pressure_actual_pa", "pump_power_w"),
-}
-"""Columns of parts that a ship may lack."""
+}  #: Columns of parts that a ship may lack.
 ESTIMATES: Final = (
     "sea_verdict", "significant_height_m", "peak_period_s", "wave_moment_rms_rad",
     "wave_moment_deviation", "sea_age_s", "ship_verdict", "roll_period_s",
@@ -72,8 +71,7 @@ SUBJECTS: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
         ("Overruns", ("overruns",)),
         ("Bus load, %", ("bus_load",)),
     ),
-}
-"""Plots of the engineer's tabs: title and columns; the first column is shown for several runs."""
+}  #: Plots of the engineer's tabs: title and columns; the first column is shown for several runs.
 
 # This is Okabe and Ito's colour-blind safe palette, in an order for a dark background.
 _PALETTE: Final = {

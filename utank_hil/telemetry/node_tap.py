@@ -23,8 +23,7 @@ _FIELDS: Final = 4  #: Number of fields of a record, in the order of `LAYOUT`.
 _RECEIVED, _SENT, _TICK = int(Kind.RECEIVED), int(Kind.SENT), int(Kind.TICK)
 _PACKING: Final = [
     Struct(f"<{count * LAYOUT.format.lstrip('<')}").pack for count in range(IN_A_SLOT + 1)
-]
-"""Functions that pack the fields of a number of records at once, up to a slot of the ring."""
+]  # Functions that pack the fields of a number of records at once, up to a slot of the ring.
 _AT_ONCE: Final = IN_A_SLOT * _FIELDS
 
 

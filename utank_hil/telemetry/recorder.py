@@ -25,8 +25,8 @@ from typing import Final, NoReturn
 
 from utank_hil.base.background import give_way
 from utank_hil.telemetry.events import EventReader
-from utank_hil.telemetry.frame_recording import FrameRecording
-from utank_hil.telemetry.recorder_state import RecorderState
+from utank_hil.telemetry.frame_log import FrameRecording
+from utank_hil.telemetry.recorder_process import RecorderState
 from utank_hil.telemetry.ring import RingKind, RingReader
 from utank_hil.telemetry.rotation import SUFFIXES, make_room, part_of
 from utank_hil.telemetry.rows import RowReader

@@ -28,8 +28,7 @@ _NAMES: Final = {
     ("PASSIVE_TWIN", "twin_roll_rad"): "twin_roll_rad",
     ("PASSIVE_TWIN", "twin_rms_rad"): "twin_roll_rms_rad",
     ("PASSIVE_TWIN", "roll_rms_rad"): "roll_rms_rad",
-}
-"""Signals with the name of a telemetry column; others are named after their message."""
+}  # Signals with the name of a telemetry column; others are named after their message.
 
 
 class _Heard:

@@ -8,8 +8,7 @@ from utank_hil.telemetry.bus_files.text_log import NotReadableError, NotUndersto
 
 LOOKS: Final = re.compile(
     r"\s*\([^)]*\)\s+\S+\s+(\S+#|.*[\[{]\d)|\s*\S+\s+([0-9A-F]{3}|[0-9A-F]{8})\s+\[\d+\]", re.I
-)
-"""What a line of such a log looks like."""
+)  #: What a line of such a log looks like.
 _STAMP: Final = r"\s*\((\d{1,10})\.(\d{1,9})\)\s+(\S+)\s+"
 _NUMBER: Final = r"([0-9A-F]{3}|[0-9A-F]{8})"
 _LOGGED: Final = re.compile(

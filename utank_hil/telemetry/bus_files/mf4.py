@@ -29,7 +29,7 @@ class Mf4Log:
         if find_spec("asammdf") is None:  # The reader would not name the package.
             raise ModuleNotFoundError("asammdf is not installed", name="asammdf")
 
-        # It was imported without asammdf (`utank_hil.canbus.python_can`).
+        # It was imported without asammdf (`utank_hil.canbus.socketcan`).
         reader = reload(can.io.mf4).MF4Reader
         try:
             with reader(self._path) as messages:
