@@ -26,10 +26,10 @@ with quietly_interruptible():
             roll_statistics,
         )
         from utank_hil.base.arrays import FloatArray
-        from utank_hil.canbus import SocketCanPort
-        from utank_hil.canbus.port import Port
+        from utank_hil.canbus.frame import Port
         from utank_hil.canbus.ports import open_buses
         from utank_hil.canbus.profiles.foreign import ForeignDevices
+        from utank_hil.canbus.socketcan import SocketCanPort
         from utank_hil.console.common import (
             Duration,
             Json,
@@ -147,7 +147,7 @@ def _run(
         fail(error, ExitCode.NO_BUS)
     try:
         with stop_on_signals() as stop, real_time_scheduling() as scheduling:
-            for line in scheduling.lines():
+            for line in scheduling:
                 notes.say(line)
             emulated = ", ".join(node.name for node in nodes if node.name in NODE_NAMES)
             notes.say(

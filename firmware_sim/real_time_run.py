@@ -27,9 +27,9 @@ from utank_hil.assembly import retuner_process
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.provenance import describe
 from utank_hil.base.tick import TICK_NS, TICK_S
-from utank_hil.canbus import SocketCanPort
-from utank_hil.canbus.port import Port
+from utank_hil.canbus.frame import Port
 from utank_hil.canbus.ports import open_buses
+from utank_hil.canbus.socketcan import SocketCanPort
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import RetuningEvent

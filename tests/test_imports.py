@@ -22,7 +22,7 @@ COMMAND = "import utank_hil.cli, utank_hil.commands.run, utank_hil.commands.pane
 
 LOOP = """
 from pathlib import Path
-from utank_hil.canbus import SocketCanPort
+from utank_hil.canbus.socketcan import SocketCanPort
 from utank_hil.console.common import load
 from utank_hil.commands.recording import RunRecording
 from utank_hil.commands.run import run

@@ -3,8 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
-from utank_hil.canbus.frame import Frame
-from utank_hil.canbus.port import PortError
+from utank_hil.canbus.frame import Frame, PortError
 
 MS = 1_000_000
 BIT_NS = 4_000

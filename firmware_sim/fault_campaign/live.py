@@ -27,9 +27,9 @@ from utank_hil.canbus import (
     Mode,
     PumpCommand,
     SensorMotion,
-    SocketCanPort,
     load_catalogue,
 )
+from utank_hil.canbus.socketcan import SocketCanPort
 from utank_hil.configuration.shipped import CONFIGS
 
 STORM: Final = CONFIGS / "scenarios" / "storm.yaml"

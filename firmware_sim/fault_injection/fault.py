@@ -137,7 +137,7 @@ def signal_problems(
     message: NamedMessage, signals: dict[str, Any] | tuple[str, ...]
 ) -> list[Problem]:
     """Problems of names that are no signals of a message."""
-    known = message.kind._fields  # type: ignore[attr-defined]  # a NamedTuple
+    known = message.kind._fields
     return [
         (
             f"signals.{place}" if isinstance(signals, tuple) else f"values.{name}",

@@ -54,7 +54,7 @@ class SignalFault(MessageFault):
 
     def _spoil(self, seed: int) -> Spoil:
         kind = self.named.kind
-        places = [kind._fields.index(name) for name in self.signals]  # type: ignore[attr-defined]
+        places = [kind._fields.index(name) for name in self.signals]
         change = self._change(seed)
 
         def changed(message: Any, since_s: float) -> Any:

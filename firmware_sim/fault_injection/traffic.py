@@ -223,9 +223,7 @@ class Impostor(Fault):
         problems = value_problems(named, self.values)
         defaults: Any = getattr(named.kind, "_field_defaults", {})
         missing = [
-            name
-            for name in named.kind._fields  # type: ignore[attr-defined]  # a NamedTuple
-            if name not in self.values and name not in defaults
+            name for name in named.kind._fields if name not in self.values and name not in defaults
         ]
         problems += [(f"values.{name}", "is required but missing") for name in missing]
         refuse("", problems)

@@ -7,7 +7,8 @@ import socket
 import can
 import pytest
 
-from utank_hil.canbus import Frame, PortError, SocketCanPort, socketcan
+from utank_hil.canbus import Frame, PortError, socketcan
+from utank_hil.canbus.socketcan import SocketCanPort
 
 FRAME = Frame(0x18FF0081, bytes(range(8)))
 

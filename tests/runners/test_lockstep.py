@@ -160,7 +160,6 @@ def test_node_that_raises_in_its_tick_is_named():
         NodeError, match=r"'broken' failed in tick\(\) at 0.0.*no such gain"
     ) as error:
         Lockstep(nodes).run_until(1)
-    assert error.value.node_name == "broken"
     assert isinstance(error.value.__cause__, KeyError)
 
 
@@ -168,9 +167,9 @@ def test_node_that_raises_in_receive_is_named_with_the_time():
     sent = frame(1)
     deaf = ToyNode("deaf")
     deaf.receive = broken
-    with pytest.raises(NodeError, match=r"'deaf' failed in receive\(\)") as error:
+    time_s = (frame_bits(sent) - 3) * BIT_NS * 1e-9
+    with pytest.raises(NodeError, match=rf"'deaf' failed in receive\(\) at {time_s:.6f} s"):
         Lockstep([ToyNode("talker", says=lambda now: [sent]), ToyNode("b"), deaf]).run_until(MS)
-    assert error.value.time_ns == (frame_bits(sent) - 3) * BIT_NS
 
 
 @pytest.mark.parametrize(
@@ -182,9 +181,8 @@ def test_node_that_raises_in_receive_is_named_with_the_time():
     ],
 )
 def test_frame_that_can_carries_not_is_its_senders_fault(sent, message):
-    with pytest.raises(NodeError, match=f"'wild'.*{message}") as error:
+    with pytest.raises(NodeError, match=f"'wild'.*{message}"):
         Lockstep([ToyNode("wild", says=lambda now: [sent])]).run_until(1)
-    assert error.value.node_name == "wild"
 
 
 def test_time_does_not_go_back():

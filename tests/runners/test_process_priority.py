@@ -30,8 +30,9 @@ before = state()
 HOLD = """
 with real_time_scheduling() as report:
     inside = state()
-    measures = {m.name: [m.granted, m.detail] for m in report.measures}
-print(json.dumps([before, inside, state(), measures, report.granted, report.lines()]))
+    named = [line.partition(": ") for line in report]
+    measures = {name: [said.startswith("yes"), said.partition(", ")[2]] for name, _, said in named}
+print(json.dumps([before, inside, state(), measures]))
 """
 
 UNPRIVILEGED = """
@@ -53,7 +54,7 @@ def run(script: str):
 
 
 def test_report_says_what_is_really_in_force():
-    _, inside, _, measures, _, _ = run(HOLD)
+    _, inside, _, measures = run(HOLD)
     assert (inside["policy"] == 1) == measures["SCHED_FIFO"][0]  # SCHED_FIFO is 1
     assert (inside["priority"] == 80) == measures["SCHED_FIFO"][0]
     assert inside["locked"] == measures["memory locked"][0]
@@ -96,8 +97,7 @@ except KeyError:
 
 
 def test_without_permission_it_says_why_and_goes_on():
-    before, inside, after, measures, granted, lines = run(UNPRIVILEGED + HOLD)
-    assert not granted
+    before, inside, after, measures = run(UNPRIVILEGED + HOLD)
     assert measures["SCHED_FIFO"] == [
         False,
         "real-time priority limit is 0, needs 80 (LimitRTPRIO=)",
@@ -108,8 +108,7 @@ def test_without_permission_it_says_why_and_goes_on():
     assert measures["garbage collector off"][0] is True
     assert (inside["policy"], inside["locked"], inside["gc"]) == (0, False, False)
     assert after == before
-    assert len(lines) == 4
-    assert sum(": NO, " in line for line in lines) == 3
+    assert len(measures) == 4
 
 
 def test_collector_that_was_off_stays_off():
@@ -136,9 +135,3 @@ def test_another_python_thread_is_refused_by_name():
     finally:
         release.set()
         thread.join()
-
-
-@pytest.mark.parametrize("priority", [0, 100])
-def test_priority_out_of_range_is_refused(priority):
-    with pytest.raises(ValueError, match="1 to 99"), real_time_scheduling(priority):
-        pass

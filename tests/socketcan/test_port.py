@@ -10,7 +10,8 @@ import pytest
 from can.interfaces.socketcan import SocketcanBus
 
 from utank_hil.base.tick import TICK_NS
-from utank_hil.canbus import Frame, PortError, SocketCanPort
+from utank_hil.canbus import Frame, PortError
+from utank_hil.canbus.socketcan import SocketCanPort
 from utank_hil.runners import RealTimeLoop
 
 pytestmark = pytest.mark.socketcan

@@ -22,7 +22,8 @@ from firmware_sim.ship_side import build_ship_side
 from tools.reference_recordings.cases import Case, config_of, scenario_of, ship_nodes
 from utank_hil.assembly import build_law
 from utank_hil.base.tick import TICK_NS
-from utank_hil.canbus import ControllerStatus, Fault, Mode, SocketCanPort, load_catalogue
+from utank_hil.canbus import ControllerStatus, Fault, Mode, load_catalogue
+from utank_hil.canbus.socketcan import SocketCanPort
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.nodes.panel import Action
 from utank_hil.runners import RealTimeLoop, heard_by

@@ -23,9 +23,9 @@ from utank_hil.canbus import (
     DriveStatus1,
     Mode,
     PortError,
-    SocketCanPort,
     load_catalogue,
 )
+from utank_hil.canbus.socketcan import SocketCanPort
 from utank_hil.console.exit_codes import ExitCode
 
 CHANNEL = "vcan0"

@@ -121,7 +121,7 @@ def compared(turns: int) -> dict[str, Any]:
     of_turns = np.diff(np.array(counts), axis=0, prepend=0)
     interval = {"p99_9_ns of loop to bare, 90 % interval": ratio_interval(of_turns)}
     counted = {"overruns": statistics.overruns, "ticks": statistics.ticks}
-    return {**rows, "loop to bare": ratios, **interval, **counted, "scheduling": report.lines()}
+    return {**rows, "loop to bare": ratios, **interval, **counted, "scheduling": report}
 
 
 def ratio_interval(of_turns: npt.NDArray[np.int64]) -> list[float]:

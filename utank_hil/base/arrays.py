@@ -7,7 +7,6 @@ import numpy.typing as npt
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 ComplexArray: TypeAlias = npt.NDArray[np.complex128]
-
 MOST_MEASURED: Final = 1e6
 """Magnitude from which a number is no measurement: no ship's roll in rad or level in m comes near.
 """

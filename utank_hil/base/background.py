@@ -8,16 +8,13 @@ from typing import Final
 
 _SCORE: Final = Path("/proc/self/oom_score_adj")
 _FIRST_TO_GO: Final = 500
-
-
 _THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def give_way(niceness: int) -> None:
     """Have this process, and those it starts, run after the loop and be killed before it.
 
-    Where memory is short the kernel kills the process with the highest score, and the service gives
-    all of its processes one that hardly any other has.
+    Where memory is short the kernel kills the process with the highest score.
     """
     os.nice(niceness)
     with suppress(OSError):  # a score that is higher already may not be lowered; there is no /proc
@@ -28,8 +25,8 @@ def give_way(niceness: int) -> None:
 def one_thread_each() -> Iterator[None]:
     """Processes started meanwhile keep their linear algebra to one thread.
 
-    Spread over all cores it takes them from the loop, and from one another; and on a busy machine
-    its threads wait for one another and take twenty times as long.
+    More take cores from the loop, wait for one another on a busy machine and take twenty times as
+    long.
     """
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))

@@ -1,9 +1,8 @@
 """Compiled copies of the modules of a tick, where `tools.compiled` has made them.
 
 mypyc makes one extension library of the same source. It is loaded only while every source file of
-both packages is what it was made of and it is whole, so that what runs is always what the files
-say. A run in lockstep then takes 0.4 of the time and gives the same result, bit for bit. The
-variable UTANK_HIL_COMPILED=0 in the environment leaves it out.
+both packages is what it was made of and it is whole. A run in lockstep then takes 0.4 of the time
+and gives the same result, bit for bit. UTANK_HIL_COMPILED=0 in the environment leaves it out.
 """
 
 import hashlib
@@ -88,7 +87,6 @@ class _Finder(MetaPathFinder):
 
 
 def _modules_in(library: Path) -> list[str]:
-    """Names of the modules in a library, which is loaded."""
     spec = spec_from_file_location(f"{GROUP}__mypyc", library)
     assert spec is not None
     sys.modules[spec.name] = group = module_from_spec(spec)

@@ -27,10 +27,7 @@ def read_number_table(path: Path) -> dict[str, FloatArray]:
     """Return the columns of a table by their names; a field without a value is NaN.
 
     A column of times may hold dates by ISO 8601, in UTC unless they name another zone; it becomes
-    ``time_s``, in seconds from its first row.
-
-    TextFileError is raised if it is no such table; the message has the line, the cause and the
-    remedy. OSError is raised if it can't be read.
+    ``time_s``, in seconds from its first row. TextFileError has the line, the cause and the remedy.
     """
     with open_text(path) as text:
         first = text.readline()
@@ -51,10 +48,7 @@ def read_number_table(path: Path) -> dict[str, FloatArray]:
 
 
 def since_first(path: Path, name: str, seconds: FloatArray) -> tuple[str, FloatArray]:
-    """Return a column of dates as ``time_s``, in seconds from its first row.
-
-    TextFileError is raised if the first row has no date.
-    """
+    """Return a column of dates as ``time_s``, from its first row on, which needs one."""
     if math.isnan(seconds[0]):
         raise TextFileError(f"{path}: {name} has no date in its first row: fill it in")
     return "time_s", seconds - seconds[0]
@@ -92,7 +86,6 @@ def _check_names(path: Path, names: list[str]) -> None:
 
 
 def _append_row(path: Path, names: list[str], row: list[str], line: int, values: Any) -> set[int]:
-    """Append the numbers of a row to `values`, and return the columns with dates in it."""
     if len(row) != len(names):
         raise TextFileError(f"{path}: line {line} has {len(row)} fields, line 1 names {len(names)}")
     dated = set()

@@ -1,9 +1,8 @@
 """Ranges of parameters: each stands once, at its field, and holds in code and in files alike.
 
 A dataclass annotates its fields (``inertia_kg_m2: Positive``) and hands its `range_problems`, and
-what else must hold, to `refuse`. A number that is out of its range raises `ParameterError`, a
-ValueError. Where a file is read, each field is checked by the same annotation before the dataclass
-is made: so every wrong number of a file is found at once, also around a part that can't be made.
+what else must hold, to `refuse`. Where a file is read, each field is checked by the same annotation
+before the dataclass is made: so every wrong number of a file is found at once.
 """
 
 import math
@@ -22,11 +21,7 @@ Problem = tuple[str, str]
 
 
 class ParameterError(ValueError):
-    """Parameters that can't be used.
-
-    `owner` says in a word whose they are; `problems` are the name of each parameter and what is
-    wrong with it.
-    """
+    """Parameters of an `owner` that can't be used: `problems` are their names and what is wrong."""
 
     def __init__(self, owner: str, problems: list[Problem]) -> None:
         super().__init__("; ".join(" ".join(filter(None, (owner, *each))) for each in problems))
@@ -79,7 +74,6 @@ class Range:
 
     @property
     def _between(self) -> str:
-        """The two ends of a range that has an upper one, in words."""
         high = f"at most {self.most:g}" if self.below is None else f"below {self.below:g}"
         if self.above is not None:
             return f"above {self.above:g} and {high}"
@@ -126,10 +120,7 @@ def range_problems(instance: "DataclassInstance") -> list[Problem]:
 
 
 def _outside(name: str, hint: Any, value: Any) -> Iterator[Problem]:
-    """The numbers in a value that lie outside the `Range` of its annotation, as problems.
-
-    `name` is that of the value; that of a number within it is followed by its place.
-    """
+    """The numbers in a value outside the `Range` of its annotation, by its name and their place."""
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is Annotated:
         marks = [mark for mark in arguments[1:] if isinstance(mark, Range)]

@@ -5,8 +5,7 @@ class Schedule:
     """Points of time a period apart, from the first look on.
 
     Told by the time and not by counting ticks: where the machine left ticks out, what was due is
-    done late once and the next is due at its own point again, so that the period of a sampled law
-    does not stretch with every tick that is lost.
+    done late once and the next is due at its own point again.
     """
 
     __slots__ = ("_due_ns", "_period_ns")

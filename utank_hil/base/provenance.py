@@ -1,7 +1,4 @@
-"""Where a result comes from: program, machine, command and the whole configuration, as one mapping.
-
-Figures, recordings and pictures carry it, so that they still say what ran when files have moved on.
-"""
+"""Where a result comes from: program, machine, command and whole configuration, as a mapping."""
 
 import ctypes
 import hashlib
@@ -25,8 +22,6 @@ PROGRAM: Final = "utank-hil"
 UNKNOWN: Final = "unknown"
 _ROOT: Final = Path(__file__).resolve().parents[2]
 _GIT_S: Final = 5.0
-
-
 _CORE_NAMES: Final = tuple(
     f"{prefix}openblas_get_corename{suffix}" for prefix in ("scipy_", "") for suffix in ("64_", "")
 )
@@ -86,10 +81,10 @@ def describe(
 ) -> dict[str, Any]:
     """Describe a result, ready for `json.dumps`.
 
-    `configuration` is what it ran with, as loaded; `scenario` is that whose sea counted, where the
+    `configuration` is what it ran with; `scenario` is that whose sea counted, where the
     configuration is none itself. Paths of data files are relative to `folder`, where the result is
-    written: a file there of the content ``configuration`` loads as what ran. ``data`` are SHA-256
-    of the data files.
+    written: a file there of the content ``configuration`` loads as what ran. ``data`` are their
+    SHA-256.
     """
     parts = {"configuration": configuration.model_dump()}
     if scenario is not None:
@@ -129,7 +124,6 @@ def _paths(value: Any) -> Iterator[Path]:
 
 
 def _relative(path: Path, folder: Path) -> str:
-    """A path as a configuration in `folder` names it."""
     relative = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
     return relative if relative.startswith("../") else f"./{relative}"
 
@@ -194,6 +188,5 @@ def _blas_core() -> str:
 
 
 def _lines(path: str) -> list[str]:
-    """Lines of a file that only Linux has."""
     file = Path(path)
     return file.read_text().splitlines() if file.exists() else []

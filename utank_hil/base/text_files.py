@@ -1,9 +1,9 @@
 """Files of other programs: one convention for gzip, encodings, line ends, sizes and damaged ends.
 
-A file may be compressed with gzip, whatever its name. Text is UTF-8 with or without a byte order
-mark, or UTF-16 with one; lines end with LF, CR LF or CR.
+Text is UTF-8 with or without a byte order mark, or UTF-16 with one; lines end with LF, CR LF or CR.
 """
 
+import gzip
 import io
 import zlib
 from collections.abc import Callable, Iterator
@@ -13,7 +13,6 @@ from typing import BinaryIO, Final, TextIO
 
 _GZIP: Final = b"\x1f\x8b"
 _UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
-_CHUNK_BYTES: Final = 1 << 16
 LIMIT_BYTES: Final = 1 << 30
 """Largest content that is read whole: a table of a day at 10 Hz with a hundred columns."""
 LINE_LIMIT: Final = 1 << 16
@@ -33,11 +32,10 @@ def kind_of(path: Path) -> str:
 def open_content(
     path: Path, limit_bytes: int = LIMIT_BYTES, on_cut: Callable[[str], None] | None = None
 ) -> Iterator[BinaryIO]:
-    """Open a file, decompressed if it is compressed with gzip.
+    """Open a file, decompressed if it is compressed with gzip, whatever its name.
 
-    `on_cut` is called with the place where compressed content is cut or damaged; reading then ends
-    there as at the end of the file. Without it that is an error. TextFileError is raised if it is
-    larger, or compressed content is cut or damaged. OSError is raised if it can't be read.
+    `on_cut` is called with the place where compressed content is cut or damaged, at which reading
+    ends; without it that is a TextFileError, as is larger content.
     """
     with path.open("rb") as file:
         compressed = file.peek(2)[:2] == _GZIP
@@ -53,10 +51,7 @@ def open_text(
 ) -> Iterator[TextIO]:
     """Open a text as `open_content` does; a line that is read ends with a line feed.
 
-    Bytes that are no text are an error, or replaced (`errors`, as of `open`).
-
-    The errors are those of `open_content`; TextFileError is raised too if the text is not UTF-8, or
-    UTF-16 with its byte order mark.
+    Bytes that are no text are a TextFileError, or replaced (`errors`, as of `open`).
     """
     with open_content(path, limit_bytes, on_cut) as content:
         begin = content.peek(2)[:2]  # type: ignore[attr-defined]  # of a BufferedReader
@@ -68,10 +63,7 @@ def open_text(
 
 
 def lines_of(path: Path, text: TextIO) -> Iterator[tuple[int, str]]:
-    """Yield the number, from 1, and the content of each line, its line feed included.
-
-    TextFileError is raised if a line is longer than `LINE_LIMIT`, as in no log.
-    """
+    """Yield number, from 1, and content of each line; TextFileError for one beyond `LINE_LIMIT`."""
     for number, line in enumerate(iter(lambda: text.readline(LINE_LIMIT), ""), start=1):
         yield number, line
         if len(line) == LINE_LIMIT:
@@ -81,8 +73,6 @@ def lines_of(path: Path, text: TextIO) -> Iterator[tuple[int, str]]:
 
 
 class _Content(io.RawIOBase):
-    """Bytes of a file, decompressed if asked for, up to a limit."""
-
     def __init__(
         self,
         file: BinaryIO,
@@ -93,7 +83,7 @@ class _Content(io.RawIOBase):
     ) -> None:
         self._file, self._path, self._left, self._on_cut = file, path, limit_bytes, on_cut
         self._limit_bytes, self._ended = limit_bytes, False
-        self._gzip = zlib.decompressobj(wbits=31) if compressed else None
+        self._archive = gzip.GzipFile(fileobj=file, mode="rb") if compressed else None
 
     def readable(self) -> bool:
         return True
@@ -101,7 +91,8 @@ class _Content(io.RawIOBase):
     def readinto(self, buffer: bytearray | memoryview) -> int:  # type: ignore[override]
         """Read up to a buffer's size; 0 is the end."""
         size = len(buffer)
-        content = self._file.read(size) if self._gzip is None else self._decompressed(size)
+        archive = self._archive
+        content = self._file.read(size) if archive is None else self._decompressed(archive, size)
         self._left -= len(content)
         if self._left < 0:
             raise TextFileError(
@@ -111,27 +102,14 @@ class _Content(io.RawIOBase):
         buffer[: len(content)] = content
         return len(content)
 
-    def _decompressed(self, size: int) -> bytes:
+    def _decompressed(self, archive: gzip.GzipFile, size: int) -> bytes:
         """Return the next bytes, of all members of the archive; empty at its end."""
-        while not self._ended:
-            assert self._gzip is not None
-            given = self._gzip.unconsumed_tail or self._gzip.unused_data
-            given = given or self._file.read(_CHUNK_BYTES)
-            if self._gzip.eof:  # Another member may follow; zeros fill up a tape's block.
-                given = given.lstrip(b"\0")
-                if not given:
-                    self._ended = not self._file.peek(1)  # type: ignore[attr-defined]
-                    continue
-                self._gzip = zlib.decompressobj(wbits=31)
-            try:
-                content = self._gzip.decompress(given, size)
-            except zlib.error:
-                return self._cut("damaged")
-            if content:
-                return content
-            if not given:
-                return self._cut("cut")
-        return b""
+        try:
+            return b"" if self._ended else archive.read1(size)
+        except EOFError:
+            return self._cut("cut")
+        except (zlib.error, gzip.BadGzipFile):
+            return self._cut("damaged")
 
     def _cut(self, how: str) -> bytes:
         self._ended = True

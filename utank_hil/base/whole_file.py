@@ -2,28 +2,35 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
+from io import FileIO
 from itertools import count
 from pathlib import Path
 
 
 def write_whole(path: Path, content: bytes | str) -> None:
-    """Write a file; on a full disk none is left, since half of it would be taken for the whole.
-
-    `path` is overwritten; a text is written in UTF-8. Raises `OSError` if it can't be written, with
-    its name.
-    """
+    """Write a file over `path`, a text in UTF-8; on a full disk no half of it is left."""
     with left_whole(path):
         path.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
+def append_whole(file: FileIO, content: bytes) -> None:
+    """Append to an unbuffered file and sync it; without room OSError, and no part of it is left."""
+    begin, left = file.seek(0, os.SEEK_END), memoryview(content)
+    try:
+        while left:  # A partial write is followed by one that gives the reason.
+            left = left[file.write(left) :]
+        os.fsync(file.fileno())
+    except OSError:
+        with suppress(OSError):
+            file.truncate(begin)
+        raise
+
+
 @contextmanager
 def left_whole(path: Path) -> Iterator[None]:
-    """While a file is written: whatever ends that, no half of it is left.
-
-    Raises `OSError` if it can't be written, with its name.
-    """
+    """While a file is written: whatever ends that, no half is left; an `OSError` has its name."""
     with errors_name(path):
         try:
             yield
@@ -46,8 +53,7 @@ def errors_name(path: Path) -> Iterator[None]:
 def claimed_files(folder: Path, *names: str, stamp: str | None = None) -> tuple[Path, ...]:
     """Files named by the time (UTC), numbered where that is taken; all are made, and empty.
 
-    `names` have `{}` in the time's place. `stamp` is in the place of the present time, for files
-    that belong to others. Raises `OSError` if one can't be made.
+    `names` have `{}` in place of the time, or of `stamp`, that of files of others.
     """
     now = stamp = stamp or f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
     for number in count(2):

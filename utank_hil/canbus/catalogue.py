@@ -1,16 +1,16 @@
 """The catalogue of messages: the DBC, checked against the message types and compiled."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Sequence
 from enum import IntEnum
 from functools import cache
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar, get_type_hints
 
 from utank_hil.canbus.codec import FRAME_BYTES, Codec, Signal, compile_codec, field_kind
 from utank_hil.canbus.endpoints import Receiver, Transmitter
 from utank_hil.canbus.enumerations import Address
+from utank_hil.canbus.frame import Frame
 from utank_hil.canbus.messages import DBC_NAMES
 
 if TYPE_CHECKING:
@@ -18,19 +18,16 @@ if TYPE_CHECKING:
     from cantools.database.can.signal import Signal as DbcSignal
 
 T = TypeVar("T", bound=tuple[Any, ...])
-
 DBC_PATH: Final = Path(__file__).with_name("utank.dbc")
-
 #: Number of catalogue hashes: 12 bits without all ones, which means "not available".
 _VERSIONS: Final = (1 << 12) - 1
-
 _PROTECTION: Final = {"crc": (0, 8), "counter": (8, 4)}
 
 
 class NamedMessage(NamedTuple):
     """A message of the catalogue: its type, who sends it, how it is encoded."""
 
-    kind: type[tuple[Any, ...]]
+    kind: type[Any]
     source: Address
     codec: Codec[Any]
 
@@ -38,31 +35,32 @@ class NamedMessage(NamedTuple):
 class Catalogue:
     """The compiled messages of one DBC; creates transmitters and receivers."""
 
-    def __init__(self, codecs: Mapping[tuple[type, Address], Codec[Any]], version: int) -> None:
+    def __init__(self, messages: Sequence[NamedMessage], version: int) -> None:
         #: Hash of the DBC, 0 to 4094, as HEARTBEAT and CTRL_STATUS carry it.
         self.version = version
-        #: Codecs of all messages, by type and sender.
-        self.codecs: Mapping[tuple[type[Any], Address], Codec[Any]] = MappingProxyType(dict(codecs))
-        self.can_ids = frozenset(codec.can_id for codec in codecs.values())
-        self.messages = tuple(NamedMessage(*key, codec) for key, codec in codecs.items())
+        self.messages = tuple(messages)
+        self.by_id = {each.codec.can_id: each for each in messages}
+        self.can_ids = frozenset(self.by_id)
 
     def named(self, name: str) -> NamedMessage:
         """Return the message of a name in the DBC; KeyError is raised if there is none."""
-        for message in self.messages:
-            if message.codec.name == name:
-                return message
-        raise KeyError(name)
+        return {each.codec.name: each for each in self.messages}[name]
+
+    def decoded(self, frame: Frame) -> Any:
+        """Return the message of a frame; None if it is not of the catalogue, or damaged."""
+        known = self.by_id.get(frame.can_id)
+        return known.codec.decode(frame.data) if known and len(frame.data) == FRAME_BYTES else None
 
     def codec(self, message_type: type[T], source: Address | None = None) -> Codec[T]:
         """Return the codec of a message.
 
-        `source` is the sender, needed for messages that every node sends, and for those of a second
-        node of a kind; without it, the first node's message is meant. ValueError is raised if no
-        such node sends the message, or several do and `source` is None.
+        `source` is needed for messages that every node sends, and for those of a second node of a
+        kind; without it, the first node's is meant. ValueError is raised if there is no such one,
+        or several.
         """
         found = {
             address: codec
-            for (kind, address), codec in self.codecs.items()
+            for kind, address, codec in self.messages
             if kind is message_type
             and (source is address or (source is None and not address.name.endswith("_2")))
         }
@@ -89,10 +87,7 @@ class Catalogue:
 
 @cache
 def load_catalogue(path: Path = DBC_PATH) -> Catalogue:
-    """Read and compile a DBC; cached by path.
-
-    ValueError lists every difference of the DBC and the message types.
-    """
+    """Read and compile a DBC; ValueError lists every difference from the message types."""
     from cantools.database.can import Database  # slow to import, and needed only here
 
     content = path.read_bytes()
@@ -107,7 +102,7 @@ def load_catalogue(path: Path = DBC_PATH) -> Catalogue:
         if addresses.get(address.name) != address
     ]
     types = {name: kind for kind, name in DBC_NAMES.items()}
-    codecs: dict[tuple[type, Address], Codec[Any]] = {}
+    found: list[NamedMessage] = []
     for message in database.messages:
         sender = message.senders[0] if message.senders else ""
         kind = types.get(message.name) or types.get(common_name(message.name, sender))
@@ -118,15 +113,15 @@ def load_catalogue(path: Path = DBC_PATH) -> Catalogue:
         problems = _problems(message, kind, address)
         errors += [f"{message.name}: {problem}" for problem in problems]
         if not problems:
-            codecs[kind, address] = _compile(message, kind)
-    defined = {kind for kind, _ in codecs}
+            found.append(NamedMessage(kind, address, _compile(message, kind)))
+    defined = {each.kind for each in found}
     if not errors:
         errors = [f"{name}: missing" for kind, name in DBC_NAMES.items() if kind not in defined]
     if errors:
         listed = "\n".join(errors)
         raise ValueError(f"{path.name} does not fit utank_hil/canbus/messages.py:\n{listed}")
     digest = hashlib.sha256(content.replace(b"\r\n", b"\n")).digest()
-    return Catalogue(codecs, int.from_bytes(digest, "big") % _VERSIONS)
+    return Catalogue(found, int.from_bytes(digest, "big") % _VERSIONS)
 
 
 def common_name(message: str, sender: str) -> str:
@@ -136,10 +131,7 @@ def common_name(message: str, sender: str) -> str:
 
 
 def read_data_ids(message: "DbcMessage") -> bytes | None:
-    """Return the data IDs of a message of the DBC, None if it is unprotected.
-
-    ValueError is raised if they are not hexadecimal.
-    """
+    """Return the data IDs of a message, None if unprotected; ValueError if not hexadecimal."""
     attribute = message.dbc.attributes.get("DataIDs") if message.dbc else None
     return None if attribute is None else bytes.fromhex(str(attribute.value))
 
@@ -165,7 +157,6 @@ def _signal(signal: "DbcSignal", hint: Any) -> Signal:
 
 
 def _problems(message: "DbcMessage", kind: type, address: Address) -> list[str]:
-    """Return the reasons why a message does not match its type."""
     problems = []
     if message.length != FRAME_BYTES or not message.is_extended_frame:
         problems.append("must have 8 bytes and an extended identifier")

@@ -1,11 +1,9 @@
 """Encodes and decodes frames with functions generated from the DBC.
 
-The messages of the catalogue are compiled at start: one Python function to encode and one to
-decode, over the frame's CRC byte, counter byte and three 16-bit words. They take a tenth of
-cantools' time, which control loop and lockstep runs need. Tests compare both with cantools.
-
-`make compiled` has mypyc compile the same text, for which its names have types; see
-`utank_hil.base.compiled`.
+The messages are compiled at start: one Python function to encode and one to decode, over the
+frame's CRC byte, counter byte and three 16-bit words. They take a tenth of cantools' time, which
+control loop and lockstep runs need. Tests compare both with cantools. `make compiled` has mypyc
+compile the same text (`utank_hil.base.compiled`).
 """
 
 import math
@@ -20,9 +18,7 @@ from utank_hil.base.compiled import compiled_codecs
 from utank_hil.canbus.e2e import WORD_TABLES, first_byte_table
 
 T = TypeVar("T", bound=tuple[Any, ...])
-
 FRAME_BYTES: Final = 8
-
 #: Parts of a frame: name, first bit, number of bits.
 _PARTS: Final = (("crc", 0, 8), ("b1", 8, 8), ("w1", 16, 16), ("w2", 32, 16), ("w3", 48, 16))
 _STRUCT: Final = struct.Struct("<BBHHH")
@@ -80,10 +76,10 @@ def compile_codec(
     cycle_ns: int,
     data_ids: bytes | None,
 ) -> Codec[T]:
-    """Generate the functions that encode and decode one message.
+    """Generate the functions that encode and decode one message, a NamedTuple.
 
-    `message_type` is a NamedTuple; `signals` are all but CRC and counter, in the order of its
-    fields. There are sixteen `data_ids`, or None for an unprotected message.
+    `signals` are all but CRC and counter, in the order of its fields. There are sixteen `data_ids`,
+    or None for an unprotected message.
     """
     signals = tuple(signals)
     kinds = [signal.kind for signal in signals if issubclass(signal.kind, IntEnum)]

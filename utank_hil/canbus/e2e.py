@@ -93,8 +93,5 @@ def first_byte_table(data_ids: bytes) -> bytes:
 
 
 def profile2_crc(data: bytes, data_ids: bytes) -> int:
-    """CRC of one frame computed byte by byte: the definition, for tools and tests.
-
-    `data` is the whole frame of two bytes or more, its CRC byte ignored.
-    """
+    """CRC of one frame computed byte by byte: the definition, for tools and tests."""
     return crc8(data[1:] + data_ids[data[1] & 15 : (data[1] & 15) + 1])

@@ -7,16 +7,11 @@ from utank_hil.canbus.codec import FRAME_BYTES, Codec
 from utank_hil.canbus.frame import Frame
 
 T = TypeVar("T", bound=tuple[Any, ...])
-
 #: Frames that may be missing between two accepted ones; after more, `RESYNC_FRAMES` applies.
 MAX_LOST: Final = 3
-
 RESYNC_FRAMES: Final = 3  #: Consecutive frames after which a new counter value is accepted.
-
 BUCKET_LIMIT: Final = 5  #: Level of the leaky bucket at which a stream becomes invalid.
-
 _COUNTER_MASK: Final = 15
-
 # a NamedTuple's own constructor takes twice the time
 _new: Final = tuple.__new__
 _NO_COUNTER: Final = -1
@@ -108,10 +103,7 @@ class Receiver(Generic[T]):
         return self._accept_out_of_step(message, counter)
 
     def intact(self, frame: Frame) -> T | None:
-        """Return the message of a frame that is whole, whatever its counter; nothing changes.
-
-        For what must act even out of sequence, as a stop.
-        """
+        """Return the message of a whole frame, also out of sequence, as a stop; nothing changes."""
         return self._decode(frame.data) if len(frame.data) == FRAME_BYTES else None
 
     def _accept_out_of_step(self, message: T, counter: int) -> T | None:
@@ -135,7 +127,6 @@ class Receiver(Generic[T]):
         return message
 
     def _drain(self) -> None:
-        """Decrement the bucket after an accepted frame."""
         self._run = 0
         self._bucket = max(self._bucket - 1, 0)
         if not self._bucket:

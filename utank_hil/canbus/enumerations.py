@@ -35,9 +35,8 @@ class Mode(IntEnum):
 class Fault(IntEnum):
     """What stopped the controller, or degrades it.
 
-    A code that is found has one row in the fault table, `utank_hil.safety.faults`; the others are
-    reserved, so that finding them needs no other catalogue. A number that was once sent keeps its
-    meaning.
+    A code that is found has a row in `utank_hil.safety.faults`; the others are reserved. A number
+    that was once sent keeps its meaning.
     """
 
     NONE = 0

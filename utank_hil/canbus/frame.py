@@ -1,6 +1,7 @@
-"""The CAN frame of nodes and ports."""
+"""The CAN frame of nodes and ports, and the interface of a port."""
 
-from typing import Final, NamedTuple
+from collections.abc import Sequence
+from typing import Final, NamedTuple, Protocol
 
 STANDARD: Final = 1 << 29  #: Mark of an identifier of 11 bits.
 BUS_SHIFT: Final = 30  #: Above it stands the number of the interface; the controller's own is 0.
@@ -19,3 +20,24 @@ class Frame(NamedTuple):
 
     can_id: int
     data: bytes
+
+
+class PortError(OSError):
+    """The bus can't be reached: no such interface, interface down, transmit queue full."""
+
+
+class Port(Protocol):
+    """A bus as seen by a runner; never blocks."""
+
+    @property
+    def others(self) -> int:
+        """What was received so far and is no `Frame`: it loads the bus all the same."""
+
+    def send(self, frame: Frame) -> None:
+        """Queue one frame for transmission; PortError is raised if it was not accepted."""
+
+    def receive(self) -> Sequence[Frame]:
+        """Return the frames since the last call, oldest first; PortError if there is no bus."""
+
+    def close(self) -> None:
+        """Release the bus; idempotent."""

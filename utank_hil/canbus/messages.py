@@ -1,8 +1,7 @@
 """The messages of the catalogue: one typed tuple each, declared here and in the DBC only.
 
 Field names are the DBC's signal names; what a field means is the signal's comment there, and stands
-in docs/can-catalogue.md. `utank_hil.canbus` exports every message of this file.
-Types of fields:
+in docs/can-catalogue.md. `utank_hil.canbus` exports every message of this file. Types of fields:
 
 * `float`: a value in the unit of the name. NaN is "not available"; a raw value out of range decodes
   to NaN; encoding saturates at the range.
@@ -36,13 +35,11 @@ from utank_hil.canbus.enumerations import (
 )
 
 _T = TypeVar("_T", bound=type[tuple[Any, ...]])
-
 DBC_NAMES: Final[dict[type[tuple[Any, ...]], str]] = {}
 """Name in the DBC by type; of messages that several nodes send, without the node's name."""
 
 
 def _dbc_message(name: str) -> Callable[[_T], _T]:
-    """Declare that a type is the message of this name."""
 
     def declare(kind: _T) -> _T:
         DBC_NAMES[kind] = name

@@ -2,8 +2,7 @@
 
 from collections.abc import Sequence
 
-from utank_hil.canbus.frame import BUS_SHIFT, OTHER_BUS, Frame
-from utank_hil.canbus.port import Port, PortError
+from utank_hil.canbus.frame import BUS_SHIFT, OTHER_BUS, Frame, Port, PortError
 from utank_hil.canbus.profiles.foreign import ForeignDevices
 
 
@@ -70,10 +69,7 @@ class BusPorts:
 
 
 def open_port(own: str, foreign: ForeignDevices) -> Port:
-    """Open what the controller hears: its own interface, and those of devices on others.
-
-    PortError is raised as by `open_buses`.
-    """
+    """Open the controller's own interface and those of devices on others (`open_buses`)."""
     from utank_hil.canbus.socketcan import SocketCanPort
 
     return open_buses(own, foreign) if foreign.any else SocketCanPort(own)
@@ -82,9 +78,8 @@ def open_port(own: str, foreign: ForeignDevices) -> Port:
 def open_buses(own: str, foreign: ForeignDevices, *, sends: bool = False) -> BusPorts:
     """Open the controller's own interface and those of the ship's devices.
 
-    `own` is the name of the controller's; with `sends` it is the devices' side, which sends where
-    the controller is not to. PortError is raised if an interface is missing, or the controller's
-    own stands in the ship's file, too.
+    With `sends` it is the devices' side, which sends where the controller is not to. PortError is
+    raised if an interface is missing, or the controller's own stands in the ship's file, too.
     """
     from utank_hil.canbus.socketcan import SocketCanPort
 

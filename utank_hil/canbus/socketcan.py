@@ -11,8 +11,7 @@ from collections.abc import Iterable, Sequence
 from types import ModuleType
 from typing import Final, cast
 
-from utank_hil.canbus.frame import LONGEST_ID, STANDARD, Frame
-from utank_hil.canbus.port import PortError
+from utank_hil.canbus.frame import LONGEST_ID, STANDARD, Frame, PortError
 
 # python-can imports asammdf where that is installed, and pandas with it. No reader of measurements
 # belongs in the controller's process.
@@ -29,10 +28,8 @@ else:
 
 #: More than the kernel's receive buffer (about 280 frames); bounds the time on a babbling bus.
 MAX_FRAMES_PER_CALL: Final = 320
-
 #: A deleted interface: its sockets never recover, even if the interface is created again.
 _GONE: Final = (errno.ENODEV, errno.ENXIO)
-
 _CREATE: Final = "plug in the adapter, or create the interface; a vcan0 without root: tools/vcan"
 _REMEDIES: Final = {
     errno.ENETDOWN: "bring it up: ip link set {channel} up",
@@ -41,7 +38,6 @@ _REMEDIES: Final = {
     errno.ENOBUFS: "transmit queue full: no node acknowledges, or the bus is overloaded",
     errno.EAFNOSUPPORT: "the kernel has no CAN: modprobe can_raw",
 }
-
 #: Error classes of <linux/can/error.h> after which no frame is transmitted.
 _ERROR_CLASSES: Final = {
     0x001: "transmit timeout",
@@ -64,12 +60,9 @@ class SocketCanPort:
     """A SocketCAN interface; see `Port` for `send`, `receive` and `close`.
 
     An interface that was down is used again when it is up. One that was deleted is reopened by the
-    first call after it exists again. Every call until then raises PortError.
-
-    `can_ids` is an acceptance filter of extended identifiers in the kernel; there is none by
-    default, for nodes that detect unknown identifiers. Frames with identifiers of 11 bits are only
-    counted unless they are `standard`. PortError is raised if there is no such interface, or no CAN
-    support in the kernel.
+    first call after it exists again; until then, or if there never was one, calls raise PortError.
+    `can_ids` is an acceptance filter of extended identifiers in the kernel. Frames with identifiers
+    of 11 bits are only counted unless they are `standard`.
     """
 
     def __init__(
@@ -207,7 +200,6 @@ class SocketCanPort:
         return None
 
     def _failure(self, error: can.CanError | OSError) -> PortError:
-        """Record what an error says about the interface, and convert it with its remedy."""
         number = error.error_code if isinstance(error, can.CanError) else error.errno
         if number in _GONE:
             self._close_bus()

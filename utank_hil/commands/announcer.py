@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from utank_hil.base.background import give_way
+from utank_hil.base.whole_file import append_whole
 from utank_hil.canbus import RetuningState
 from utank_hil.canbus.events import AlarmEvent, RetuningEvent
 from utank_hil.commands.identified import IdentifiedShips
@@ -28,8 +29,6 @@ from utank_hil.telemetry.events import Event, EventReader, EventWriter, event_te
 
 LOG_NAME: Final = "log-{}.jsonl"
 _WORDS: Final = {row.code: (row.happened, row.remedy) for row in FAULTS}
-
-
 LOOK_S: Final = 0.5  #: Time between two reads of the ring, short enough for a reader.
 _NICENESS: Final = 5
 _START_S, _END_S, _PRINTED_S = 30.0, 10.0, 5.0
@@ -37,16 +36,13 @@ _START_S, _END_S, _PRINTED_S = 30.0, 10.0, 5.0
 
 
 class EventLog:
-    """The log of a run: one JSON object per line for each event, with monotonic time and UTC.
-
-    Appends and syncs each event to a file at once; raises OSError if it can't be opened.
-    """
+    """A log of one JSON object a line for each event, synced at once, in monotonic time and UTC."""
 
     def __init__(self, file: Path) -> None:
         self._file = file.open("ab", buffering=0)  # A write that did not fit is not repeated.
 
     def write(self, event: Event, start_ns: int) -> None:
-        """Append an event whose `time_ns` counts from `start_ns` on this machine's monotonic clock.
+        """Append an event, with times from `start_ns` on this machine's monotonic clock.
 
         OSError is raised if there is no room; then no part of the event is left.
         """
@@ -58,16 +54,8 @@ class EventLog:
             "time_s": event.time_ns * 1e-9,
             **_content(event),
         }
-        left = (json.dumps(line, ensure_ascii=False) + "\n").encode(errors="replace")
-        begin = self._file.seek(0, os.SEEK_END)
-        try:
-            while left:  # A partial write is followed by one that gives the reason.
-                left = left[self._file.write(left) :]
-            os.fsync(self._file.fileno())
-        except OSError:
-            with suppress(OSError):
-                self._file.truncate(begin)
-            raise
+        data = (json.dumps(line, ensure_ascii=False) + "\n").encode(errors="replace")
+        append_whole(self._file, data)
 
     def close(self) -> None:
         """Close the file; idempotent."""
@@ -90,10 +78,7 @@ def _content(event: Event) -> dict[str, Any]:
 
 
 class Announcer:
-    """Event ring of a run, and the process that prints its events, ready at once.
-
-    `ships` are where a ship goes that a law was retuned for; `log` is the file of the log.
-    """
+    """Event ring of a run, and the process that logs and prints its events, ready at once."""
 
     def __init__(self, ships: IdentifiedShips | None = None, log: Path | None = None) -> None:
         #: Name of the ring, for a recorder; None if there was no room for it.
@@ -143,7 +128,6 @@ class Announcer:
 
 
 def _started(ring: str, ships: IdentifiedShips | None, log: Path | None) -> SpawnProcess:
-    """Return the process when it listens; OSError says why it does not."""
     context = multiprocessing.get_context("spawn")
     heard, says = context.Pipe(duplex=False)
     with heard:
@@ -184,8 +168,11 @@ def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: 
         while True:
             last = reader.ended
             for event in reader.read_events():
-                if events is not None:
-                    _log(events, event, reader.start_ns, lines)
+                try:
+                    if events is not None:
+                        events.write(event, reader.start_ns)
+                except OSError as error:  # A full disk does not end it.
+                    lines.say(f"an event was not logged: {error}")
                 if isinstance(event, RetuningEvent):  # The run prints alarms itself, at once.
                     _print(event, ships, lines)
             if last:
@@ -193,13 +180,6 @@ def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: 
             time.sleep(LOOK_S)
         if reader.lost:
             lines.say(f"{reader.lost} events were lost")
-
-
-def _log(events: EventLog, event: Event, start_ns: int, lines: Lines) -> None:
-    try:
-        events.write(event, start_ns)
-    except OSError as error:  # A full disk does not end it.
-        lines.say(f"an event was not logged: {error}")
 
 
 def _print(event: RetuningEvent, ships: IdentifiedShips | None, lines: Lines) -> None:

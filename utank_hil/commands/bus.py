@@ -69,7 +69,6 @@ def bus(
 
 
 def _ship(path: Path | None) -> tuple[Vessel | None, int | None]:
-    """The ship of a file, and the bit rate where the file says it."""
     if path is None:
         return None, None
     try:

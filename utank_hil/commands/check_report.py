@@ -30,16 +30,10 @@ DISSIPATES = (
     "no loop can become unstable, and there are no margins. It may still roll the ship more than "
     "the valve at rest; see what a bench says."
 )
-
 LEAST_LOOP_GAIN = 0.05
 """Loop gain below which a law with all margins hardly acts; the shipped laws have 1.3 and more."""
-
 GENTLER: Final = (0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4)  #: Factors on a weight on outputs or states.
-
-
 LONGER: Final = (1.3, 1.6, 2.0, 3.0)  #: Factors on the control horizon of an exact deadbeat.
-
-
 Judged = dict[str, JudgedLaw]
 
 
@@ -210,7 +204,6 @@ def _remarks(law: BuiltLaw, report: Robustness) -> list[str]:
 
 
 def _at_rest(law: BuiltLaw) -> str | None:
-    """Return which state the margins of a nonlinear law are for; None for a linear one."""
     if not law.at_rest:
         return None
     learning = " with the parameters it starts from" if law.adapts else ""
@@ -249,7 +242,6 @@ def remedy(judged: JudgedLaw) -> str | None:
 
 
 def _automatic(design: Design, plant: DesignPlant) -> str | None:
-    """Return the law of the kind that finds its own numbers; None if there is none."""
     try:
         if isinstance(design, ConstrainedDesign):
             SelfTunedDesign("self_tuned", design.sea).tuned(plant)

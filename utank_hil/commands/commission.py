@@ -88,7 +88,7 @@ def commission(
             "nothing is recorded; once pump and valve move, an older record is void."
         )
         with real_time_scheduling() as scheduling:
-            for line in scheduling.lines():
+            for line in scheduling:
                 notes.say(line)
             with suppress(PortError):  # The loop meets the error too, and its node reacts.
                 port.receive()  # Old frames must not look new.
@@ -157,7 +157,6 @@ class Guide:
 
 
 def _print(record: dict[str, Any], path: Path, config: Path) -> None:
-    """Print the checks as a table, then the remedies of those that failed."""
     console = Terminal()
     table = Table(title=f"Commissioning of {record['vessel']}")
     for heading in ("check", "measured", "expected", "unit", "verdict"):

@@ -44,8 +44,7 @@ def make_record(
 ) -> dict[str, Any]:
     """Return the record of a commissioning, ready for `json.dumps`.
 
-    `file` is that of the configuration, `bus` the interface on which it was done; `ended` says why
-    it ended early, and is empty if it did not.
+    `bus` is the interface on which it was done; `ended` says why it ended early, if it did.
     """
     return {
         "program": PROGRAM,
@@ -90,10 +89,7 @@ def why_not_replaceable(path: Path) -> str:
 
 
 def write_record(path: Path, record: dict[str, Any]) -> None:
-    """Write a record atomically: at any time the old or the new one is complete.
-
-    OSError is raised if it can't be written.
-    """
+    """Write a record atomically: at any time the old or the new one is complete."""
     with tempfile.NamedTemporaryFile(
         "w", dir=path.parent, prefix=path.name, delete=False, encoding="utf-8"
     ) as file:
@@ -117,7 +113,6 @@ def remove_record(path: Path) -> None:
 
 
 def _sync(folder: Path) -> None:
-    """Sync a folder's entries to the disk, which a file's own sync does not."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -128,9 +123,8 @@ def _sync(folder: Path) -> None:
 def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: Path | None) -> str:
     """Return why a controller must not be armed, with the remedy; empty if it may.
 
-    `bus` is the interface of the run: on an emulated one no record is required unless `path` is
-    given, because the emulated ship is made from the same files. `file` is that of the
-    configuration, `path` the place of the record, by default `record_path`.
+    On an emulated bus no record is required unless its `path` is given, because the emulated ship
+    is made from the same files. `file` is that of the configuration.
     """
     vessel = config.vessel
     if (vessel.pump is None and vessel.valve is None) or (path is None and _is_emulated(bus)):
@@ -163,8 +157,6 @@ class _Verdict(BaseModel):
 
 
 class _Record(BaseModel):
-    """The required parts of a record."""
-
     commissioned_for: dict[str, Any]
     passed: bool
     ended: str
@@ -185,7 +177,6 @@ def _is_emulated(bus: str) -> bool:
 
 
 def _differences(before: Any, now: Any, key: str = "") -> list[str]:
-    """Return the keys of a configuration that differ."""
     if isinstance(before, dict) and isinstance(now, dict):
         return [
             found

@@ -9,6 +9,7 @@ import typer
 
 from utank_hil.console.common import Channel, Json, Run, chosen_run, fail, print_json
 from utank_hil.console.terminal import notes, say_note, shown
+from utank_hil.telemetry import signal_files
 from utank_hil.telemetry.bus_files.frame import BusFrame
 from utank_hil.telemetry.bus_files.log import READ, BusLog
 from utank_hil.telemetry.bus_files.writing import SUFFIXES as BUS_SUFFIXES
@@ -16,16 +17,8 @@ from utank_hil.telemetry.bus_files.writing import write_frames
 from utank_hil.telemetry.bus_logs import frames_of
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
 from utank_hil.telemetry.replay import entries_of
-from utank_hil.telemetry.signal_files import (
-    TABLE_SUFFIXES,
-    is_table,
-    part_of_entries,
-    read_signals,
-    require,
-    write_signals,
-)
 
-_FORMATS = ", ".join((*BUS_SUFFIXES, *TABLE_SUFFIXES))
+_FORMATS = ", ".join((*BUS_SUFFIXES, *signal_files.TABLE_SUFFIXES))
 
 
 def export(
@@ -60,7 +53,7 @@ def export(
     **Example:** utank-hil export out/gpc.frames --to gpc.blf
     """
     kind = to.suffix.lower()
-    if kind not in (*BUS_SUFFIXES, *TABLE_SUFFIXES):
+    if kind not in (*BUS_SUFFIXES, *signal_files.TABLE_SUFFIXES):
         fail(f"--to {to}: its suffix says the format, one of {_FORMATS}")
     if to.exists() and recording.exists() and os.path.samefile(recording, to):
         fail(f"--to {to} is what is read: name another file")
@@ -72,12 +65,12 @@ def export(
             frames = _frames(recording, channel, from_s, until_s, said)
             count, unit = write_frames(to, frames, said), "frames"
         else:
-            runs = read_signals(
+            runs = signal_files.read_signals(
                 recording, said.append, channel=channel, from_s=from_s, to_s=until_s
             )
             name = chosen_run(recording, runs, run)
-            require(recording, runs[name], "time_s")
-            write_signals(to, runs[name])
+            signal_files.require(recording, runs[name], "time_s")
+            signal_files.write_signals(to, runs[name])
             count, unit = len(runs[name]["time_s"]), "rows"
     except (OSError, ValueError) as error:
         fail(error)
@@ -96,8 +89,8 @@ def _frames(
     suffix = recording.suffix.lower()
     if suffix == SUFFIX:
         entries = entries_of(FrameLog(recording).blocks(said.append))
-        yield from frames_of(part_of_entries(entries, from_s, to_s), said)
-    elif suffix == ".rrd" or is_table(recording):
+        yield from frames_of(signal_files.part_of_entries(entries, from_s, to_s), said)
+    elif suffix == ".rrd" or signal_files.is_table(recording):
         beside = recording.with_suffix(SUFFIX)
         hint = f": give {beside}" if suffix == ".rrd" and beside.exists() else ""
         raise ValueError(f"{recording}: holds signals and no frames{hint}")

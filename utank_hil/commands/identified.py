@@ -7,6 +7,7 @@ from typing import Any, Final
 
 import yaml
 
+from utank_hil.base.finite import mapped
 from utank_hil.base.parameters import refuse
 from utank_hil.base.provenance import headline
 from utank_hil.base.whole_file import claimed_files, left_whole
@@ -19,30 +20,24 @@ from utank_hil.retuning import ModelSummary
 
 VESSEL: Final = "identified_vessel.yaml"
 CONTROLLER: Final = "identified_controller.yaml"
+_RELATIVE: Final = ("./", "../")
 
 
 def read_controller(config: Path) -> dict[str, Any]:
     """Read the content of a controller's file, with absolute paths of the files that it names."""
-    content: dict[str, Any] = yaml.safe_load(config.read_text(encoding="utf-8"))
-    whole: dict[str, Any] = _with_whole_paths(content, config.resolve().parent)
-    return whole
+    folder = config.resolve().parent
 
+    def whole(value: Any) -> Any:  # as `configuration.files` knows the name of a file
+        names = isinstance(value, str) and (value.endswith(".yaml") or value.startswith(_RELATIVE))
+        return str(folder / value) if names else value
 
-def write_identified(
-    folder: Path, vessel: Vessel, ship: RollShip, tank: Tank, content: dict[str, Any]
-) -> dict[str, Path]:
-    """Write vessel and controller of an identified ship.
-
-    `vessel` is the configured one, `ship` and `tank` the identified ones, `content` that of the
-    controller's file, from `read_controller`. Returns the paths of both: "vessel" and "config".
-    """
-    found = vessel.model_copy(update={"ship": ship, "tank": tank})
-    return _write(folder / VESSEL, folder / CONTROLLER, found, content)
+    content: dict[str, Any] = mapped(yaml.safe_load(config.read_text(encoding="utf-8")), whole)
+    return content
 
 
 @dataclasses.dataclass(frozen=True)
 class IdentifiedShips:
-    """Files of the ships that retuning identified under way, each with files of its own."""
+    """Files of identified ships: a vessel, and a controller that names it."""
 
     folder: Path  #: Folder of the files; created if missing.
     vessel: Vessel  #: The configured vessel.
@@ -51,30 +46,27 @@ class IdentifiedShips:
     def write(self, found: ModelSummary) -> dict[str, Path]:
         """Write vessel and controller, named by the time (UTC); return paths by both names.
 
-        Raises `OSError` if they can't be written. Raises `ParameterError` if a file may not hold
-        such a ship.
+        Raises `ParameterError` if a file may not hold such a ship.
         """
         ship, tank = found.ship(self.vessel.ship), found.tank(self.vessel.tank)
         refuse("vessel", tank_problems(ship, tank))
         self.folder.mkdir(parents=True, exist_ok=True)
         names = [f"{Path(name).stem}-{{}}.yaml" for name in (VESSEL, CONTROLLER)]
-        vessel_file, controller_file = claimed_files(self.folder, *names)
-        identified = self.vessel.model_copy(update={"ship": ship, "tank": tank})
-        return _write(vessel_file, controller_file, identified, self.content)
+        return self.write_to(claimed_files(self.folder, *names), ship, tank)
 
-
-def _write(
-    vessel_file: Path, controller_file: Path, found: Vessel, content: dict[str, Any]
-) -> dict[str, Path]:
-    controller = content | {"vessel": vessel_file.name}
-    with left_whole(controller_file), left_whole(vessel_file):
-        for file, held in ((vessel_file, _vessel_content(found)), (controller_file, controller)):
-            text = f"# Identified by {headline()}.\n{yaml.safe_dump(held, sort_keys=False)}"
-            with file.open("w", encoding="utf-8") as written:
-                written.write(text)
-                written.flush()
-                os.fsync(written.fileno())  # a rare result must survive a power cut
-    return {"vessel": vessel_file, "config": controller_file}
+    def write_to(self, files: tuple[Path, ...], ship: RollShip, tank: Tank) -> dict[str, Path]:
+        """Write vessel and controller; return the paths of both as "vessel" and "config"."""
+        vessel_file, controller_file = files
+        vessel = self.vessel.model_copy(update={"ship": ship, "tank": tank})
+        contents = _vessel_content(vessel), self.content | {"vessel": vessel_file.name}
+        with left_whole(controller_file), left_whole(vessel_file):
+            for file, held in zip(files, contents, strict=True):
+                text = f"# Identified by {headline()}.\n{yaml.safe_dump(held, sort_keys=False)}"
+                with file.open("w", encoding="utf-8") as written:
+                    written.write(text)
+                    written.flush()
+                    os.fsync(written.fileno())  # a rare result must survive a power cut
+        return {"vessel": vessel_file, "config": controller_file}
 
 
 def _vessel_content(vessel: Vessel) -> dict[str, Any]:
@@ -92,14 +84,3 @@ def _vessel_content(vessel: Vessel) -> dict[str, Any]:
             if getattr(part, field.name) != field.default
         }
     return content
-
-
-def _with_whole_paths(value: Any, folder: Path) -> Any:
-    """Return content of a file in `folder` with absolute paths (`configuration.files`)."""
-    if isinstance(value, dict):
-        return {key: _with_whole_paths(item, folder) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_with_whole_paths(item, folder) for item in value]
-    if isinstance(value, str) and (value.endswith(".yaml") or value.startswith(("./", "../"))):
-        return str(folder / value)
-    return value

@@ -12,24 +12,11 @@ from typer.core import TyperGroup
 
 from utank_hil.assembly import retuning_task
 from utank_hil.base.provenance import describe
-from utank_hil.commands.identified import CONTROLLER, VESSEL, read_controller, write_identified
+from utank_hil.commands.identified import CONTROLLER, VESSEL, IdentifiedShips, read_controller
 from utank_hil.commands.identify_report import figures, print_report
 from utank_hil.commands.identify_test import decay, inclining_test, refuse
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.console.common import (
-    OUT,
-    Channel,
-    From,
-    Json,
-    Run,
-    To,
-    chosen_run,
-    fail,
-    load,
-    new_app,
-    prepare_out,
-    print_json,
-)
+from utank_hil.console import common
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, say_note
 from utank_hil.identification import IdentificationError
@@ -52,15 +39,15 @@ def identify_log(
     config: Annotated[
         Path, typer.Argument(help="Controller configuration: signals, design, ship to begin with.")
     ],
-    run: Run = None,
-    channel: Channel = None,
-    from_s: From = None,
-    to_s: To = None,
+    run: common.Run = None,
+    channel: common.Channel = None,
+    from_s: common.From = None,
+    to_s: common.To = None,
     order: Annotated[
         int | None, typer.Option(min=2, help="Of the ARX model, instead of the configuration's.")
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for picture and configuration.")] = OUT,
-    json_: Json = False,
+    out: Annotated[Path, typer.Option(help="Folder for picture and configuration.")] = common.OUT,
+    json_: common.Json = False,
 ) -> None:
     """Identify ship and tank from a recording, validate, and write a configuration for them.
 
@@ -77,15 +64,15 @@ def identify_log(
 
     for option, value in (("--from", from_s), ("--to", to_s)):
         if value is not None and not math.isfinite(value):
-            fail(f"{option} must be a number of seconds, got {value}")
-    loaded = load(config, ControllerConfig, allow_code=True)  # Code is refused, not run.
+            common.fail(f"{option} must be a number of seconds, got {value}")
+    loaded = common.load(config, ControllerConfig, allow_code=True)  # Code is refused, not run.
     task = _task(loaded, order)
     content = read_controller(config)
-    out = prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
+    out = common.prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
     measured = task.design.predictor.measured
     try:
         runs = read_signals(log, say_note, channel=channel)
-        name = chosen_run(log, runs, run)
+        name = common.chosen_run(log, runs, run)
         sample_time_s = task.design.predictor.sample_time_s
         signals = runs[name]
         require(log, signals, "time_s", "pressure_command_pa", *measured)
@@ -94,7 +81,7 @@ def identify_log(
             from_s = to_s = None
         record = logged_samples(signals, measured, sample_time_s, from_s, to_s)
     except (OSError, ValueError) as error:
-        fail(error)
+        common.fail(error)
     try:
         found = identify(record, task)
     except IdentificationError as error:
@@ -104,10 +91,10 @@ def identify_log(
     title = f"{log.name}, {name}"
     files = {"picture": draw_identification(record, found, task, out / PICTURE, title, about)}
     if isinstance(answer, Candidate):
-        fit = found.fit
-        files.update(write_identified(out, loaded.vessel, fit.ship, fit.tank, content))
+        ships = IdentifiedShips(out, loaded.vessel, content)
+        files |= ships.write_to((out / VESSEL, out / CONTROLLER), found.fit.ship, found.fit.tank)
     if json_:
-        print_json(about | figures(found, answer, files))
+        common.print_json(about | figures(found, answer, files))
     else:
         print_report(Terminal(), found, task, answer, files)
     if not isinstance(answer, Candidate):
@@ -122,18 +109,16 @@ def _task(config: ControllerConfig, order: int | None) -> RetuningTask:
     try:
         return retuning_task(config, order, period_range_s)
     except ValueError as error:
-        fail(error)
+        common.fail(error)
 
 
 class _LogUnlessNamed(TyperGroup):
-    """Commands of which the one for a log needs no name."""
-
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         named = not args or args[0] in self.commands or args[0] in ctx.help_option_names
         return super().parse_args(ctx, args if named else ["log", *args])
 
 
-application = new_app(
+application = common.new_app(
     "Identify ship and tank from a recording (LOG CONFIG), or from a test of the ship.",
     cls=_LogUnlessNamed,
 )

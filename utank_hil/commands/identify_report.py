@@ -142,7 +142,6 @@ def _ship_table(found: Identification, task: RetuningTask) -> Table:
 
 
 def _mode_table(found: Identification, task: RetuningTask) -> Table:
-    """Return the table of modes of ship and tank together, with physics and without."""
     table = new_table(
         "Modes of ship and tank together", "configured", "identified", "without\nphysics", "± 95 %"
     )
@@ -169,7 +168,6 @@ def _mode_table(found: Identification, task: RetuningTask) -> Table:
 
 
 def _modes(ship: RollShip, tank: Tank) -> list[tuple[float, float]]:
-    """Return undamped frequency and damping ratio of the two modes, by rising frequency."""
     poles = np.linalg.eigvals(state_matrices(ship, tank)[0])
     frequency = abs(poles)
     order = np.argsort(frequency)[::2]  # One of each pair is taken.

@@ -74,7 +74,7 @@ def ship_keys(found: RollDecay, vessel: Vessel | None) -> dict[str, float]:
     """Return the keys of a ship's file that a decay test gives.
 
     A negative linear part, which no file can have, is replaced by the equivalent ratio in the
-    middle of the amplitudes, without a quadratic part.
+    middle.
     """
     keys = {"roll_period_s": found.period_s, "damping_ratio": found.damping_ratio}
     if found.damping_ratio < 0:

@@ -16,11 +16,10 @@ _STANDARD_ERROR: Final = 2
 
 
 class Lines:
-    """Prints lines through a separate process.
+    """Prints lines through a separate process, ``cat``; OSError if it can't be started.
 
     A terminal or a journal may block, and the loop must not wait for it: it writes into a pipe, and
-    ``cat`` copies from there. A line is dropped when the pipe is full. OSError is raised if the
-    process can't be started.
+    drops a line when that is full.
     """
 
     def __init__(self) -> None:

@@ -52,10 +52,9 @@ def monitor(
 def watch(
     source: Path | str, at_s: float | None = None, send: Callable[[], bool] | None = None
 ) -> None:
-    """Show a recording or a stream until the viewer is closed or Ctrl-C.
+    """Show a recording or a stream, as `open_viewer`, until the viewer is closed or Ctrl-C.
 
-    `source` and `at_s` are those of `open_viewer`; `send` sends new data, and returns whether more
-    may come.
+    `send` sends new data, and returns whether more may come.
     """
     from utank_hil.runners import stop_on_signals
     from utank_hil.telemetry.viewer import open_viewer
@@ -88,7 +87,6 @@ def watch(
 
 
 def _said(viewer: "Viewer", at_s: float | None) -> "Viewer":
-    """Return a viewer after printing its address and the time to look at."""
     if viewer.url is not None:
         tunnel = " ".join(f"-L {port}:127.0.0.1:{port}" for port in viewer.ports)
         notes.say(
@@ -126,7 +124,6 @@ def _attach(pid: int | None) -> None:
 
 
 def _chosen(runs: "list[LiveRun]", pid: int | None) -> "LiveRun":
-    """Return the run with a process number, or the only one."""
     found = [run for run in runs if pid in (None, run.pid)]
     if not found and pid is None:
         fail(

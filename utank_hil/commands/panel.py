@@ -10,7 +10,8 @@ from typing import Annotated
 import typer
 
 from utank_hil.base.tick import TICK_NS
-from utank_hil.canbus import SocketCanPort, Station, load_catalogue
+from utank_hil.canbus import Station, load_catalogue
+from utank_hil.canbus.socketcan import SocketCanPort
 from utank_hil.commands.keyboard import HELP, Keyboard
 from utank_hil.commands.lines import printed_lines
 from utank_hil.configuration.vessel import Vessel

@@ -45,12 +45,11 @@ class RecordingSummary:
 class RunRecording:
     """Ring and recorder of a run; the constructor returns when the recorder is ready, or failed.
 
-    Viewers read the ring too (`utank_hil.telemetry.live`). The folder is created if it is missing,
-    and its files are named by the time of `log`, the log of the run's events; without a folder
-    there is a ring and no recorder. `events` is the name of the ring of events, recorded beside the
-    rows; `about` the origin of the rows (`utank_hil.base.provenance`); `head` that of the frame log
-    (`utank_hil.telemetry.replay_head`), without which there is none. Beyond `keep_bytes` the
-    folder's oldest recordings are removed.
+    The files are named by the time of `log`, the log of the run's events; without a folder there is
+    a ring, for viewers, and no recorder. `events` is the name of the ring of events, recorded
+    beside the rows; `about` the origin of the rows (`utank_hil.base.provenance`); `head` that of
+    the frame log (`replay_head`), without which there is none. Beyond `keep_bytes` the folder's
+    oldest recordings are removed.
     """
 
     def __init__(

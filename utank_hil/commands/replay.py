@@ -110,7 +110,6 @@ def replay(
 def _replay_bus_log(
     log: BusLog, chosen: ControllerConfig | None, explained: ExplainedTick | None
 ) -> tuple[ReplayResult, list[str]]:
-    """Replay a log without configuration and ticks."""
     if chosen is None:
         fail(f"{log.path} says nothing of the controller: name its configuration by --config")
     said: list[str] = []
@@ -157,7 +156,6 @@ def _as_json(
 
 
 def _print_numbers(console: Terminal, numbers: list[Number]) -> None:
-    """Print the numbers of an explained tick: side by side where both are known."""
     stage = ""
     for number in numbers:
         if number.stage != stage:
@@ -172,7 +170,6 @@ def _print_numbers(console: Terminal, numbers: list[Number]) -> None:
 
 
 def _print_law(console: Terminal, law: LawVerdict) -> None:
-    """Print which law answered, and how far the design made here is from the recorded law."""
     if law.why_not_recorded:
         console.say(f"the law designed here answered: {law.why_not_recorded}")
     if not law.differences:

@@ -25,18 +25,8 @@ from utank_hil.commands.lines import Lines, printed_lines
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.commands.service_manager import ServiceManager
 from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.console import common
 from utank_hil.console.admission import admit
-from utank_hil.console.common import (
-    AllowCode,
-    Bus,
-    Config,
-    Duration,
-    Json,
-    View,
-    fail,
-    load,
-    print_json,
-)
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, notes, shown, timing_table
 from utank_hil.control import BuiltLaw
@@ -62,9 +52,9 @@ _COMMAND_LINE: Final = "from utank_hil.cli import main; main()"
 
 def run(
     context: typer.Context,
-    config: Config,
-    bus: Bus,
-    duration: Duration = None,
+    config: common.Config,
+    bus: common.Bus,
+    duration: common.Duration = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -88,24 +78,23 @@ def run(
             help="Record of utank-hil commission, if it is not beside the configuration.",
         ),
     ] = None,
-    json_: Json = False,
-    view: View = False,
-    allow_code: AllowCode = False,
+    json_: common.Json = False,
+    view: common.View = False,
+    allow_code: common.AllowCode = False,
 ) -> None:
     """Run the controller on a CAN bus until Ctrl-C; the pump is left at zero.
 
     It starts in STANDBY. Only an operator at the panel arms it, and only if utank-hil commission
     was passed with this vessel and these sensors; on an emulated bus (vcan0) no record of it is
-    asked for unless --record names one. Recordings are named by the time
-    (UTC) of their start and go on in another file every hour; one that fails is reported, and the
-    controller runs without. A controller that retunes itself prints each step with its reasons when
-    it happens; so does one that raises an alarm, and both are logged in the folder of --out. A
-    fault that is latched at the end, or a lost bus, has an exit code of its own
-    (docs/deployment.md).
+    asked for unless --record names one. Recordings are named by the time (UTC) of their start and
+    go on in another file every hour; one that fails is reported, and the controller runs without. A
+    controller that retunes itself prints each step with its reasons when it happens; so does one
+    that raises an alarm, and both are logged in the folder of --out. A fault that is latched at the
+    end, or a lost bus, has an exit code of its own (docs/deployment.md).
 
     **Example:** utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
     """
-    loaded = load(config, ControllerConfig, allow_code=allow_code)
+    loaded = common.load(config, ControllerConfig, allow_code=allow_code)
     law = admit(loaded, config)
     if loaded.safety.overruns_in_ten is None:
         notes.say("safety.overruns_in_ten", yellow="repeated late ticks are not judged:")
@@ -118,7 +107,7 @@ def run(
         try:
             port = open_port(bus, loaded.vessel.foreign)
         except OSError as error:
-            fail(error, ExitCode.NO_BUS)
+            common.fail(error, ExitCode.NO_BUS)
         stack.callback(port.close)
         stop = stack.enter_context(stop_on_signals())
         announcer, recording = _outputs(
@@ -170,7 +159,7 @@ def run(
         if unlogged is not None:
             notes.say(unlogged, red="events were not logged:")
         if json_:
-            print_json(_as_json(node, statistics, kept, refused) | {"log_error": unlogged})
+            common.print_json(_as_json(node, statistics, kept, refused) | {"log_error": unlogged})
         else:
             _print_summary(loaded.name, node, statistics, kept)
     raise typer.Exit(_code(node))
@@ -178,15 +167,14 @@ def run(
 
 @contextmanager
 def _in_real_time(name: str, manager: ServiceManager) -> Iterator[None]:
-    """Have the loop scheduled in real time, and the service manager know of it."""
     with real_time_scheduling() as scheduling:
-        for line in scheduling.lines():
+        for line in scheduling:
             notes.say(line)
         notes.say(f"{name}; Ctrl-C ends it.")
         try:
             manager.ready(name)
         except OSError as error:
-            fail(f"NOTIFY_SOCKET: the manager does not answer: {error}", ExitCode.SYSTEM)
+            common.fail(f"NOTIFY_SOCKET: the manager does not answer: {error}", ExitCode.SYSTEM)
         try:
             yield
         finally:
@@ -204,18 +192,19 @@ def _refusals_named() -> Iterator[None]:
     except OSError as error:
         if error.filename is None and error.errno not in _REFUSALS:
             raise
-        fail(error, ExitCode.SYSTEM)
+        common.fail(error, ExitCode.SYSTEM)
 
 
 def _service_manager(stack: ExitStack) -> ServiceManager:
     try:
         return stack.enter_context(ServiceManager())
     except OSError as error:
-        fail(f"NOTIFY_SOCKET: the service manager can't be reached: {error}", ExitCode.SYSTEM)
+        common.fail(
+            f"NOTIFY_SOCKET: the service manager can't be reached: {error}", ExitCode.SYSTEM
+        )
 
 
 def _log(folder: Path) -> Path | None:
-    """Return the file of the event log; `folder` is created."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         (log,) = claimed_files(folder.resolve(), LOG_NAME)
@@ -278,7 +267,6 @@ def _outputs(
 def _say_failures(
     alarms: Lines, port: Port, recording: RunRecording, announcer: Announcer | None
 ) -> None:
-    """Say once what has ended before the run."""
     for error in port.take_errors() if isinstance(port, BusPorts) else ():
         alarms.say(f"a sensor's bus fails: {error}")
     if failure := recording.failure():
@@ -288,7 +276,6 @@ def _say_failures(
 
 
 def _desks(stack: ExitStack, loaded: ControllerConfig) -> tuple[Desk | None, Desk | None]:
-    """Open the retuner's and the estimator's desks in this process, if configured."""
     desks = stack.enter_context(retuner_process(loaded))
     if any(desk is not None and not desk.alive for desk in desks):
         notes.say("nothing will be retuned or estimated", red="the retuner did not start:")
@@ -315,7 +302,6 @@ def _as_json(
 
 
 def _code(node: ControllerNode) -> ExitCode:
-    """Return the exit code of ``run`` by the controller's state after its last tick."""
     if node.measured.link_lost or node.fault is Fault.BUS_LOST:
         return ExitCode.BUS_LOST
     return ExitCode.FAULT if node.mode is Mode.FAULT else ExitCode.OK

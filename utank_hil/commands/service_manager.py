@@ -17,7 +17,7 @@ class ServiceManager(Closing):
     """The socket of the service manager; without one, nothing is sent.
 
     `environment` has ``NOTIFY_SOCKET`` and ``WATCHDOG_USEC`` as systemd sets them. Raises `OSError`
-    if there is such a socket and it can't be reached.
+    if the socket can't be reached.
     """
 
     def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
@@ -40,8 +40,8 @@ class ServiceManager(Closing):
     def ready(self, status: str) -> None:
         """Report that the loop begins; from here on the watchdog waits for ticks.
 
-        It is reported once, and a manager that misses it ends the program after a while, so this
-        waits for a busy manager. OSError is raised if the manager does not take it in time.
+        A manager that misses it ends the program after a while, so this waits for a busy one;
+        OSError is raised if that does not take it in time.
         """
         if self._socket is not None:
             self._socket.settimeout(READY_S)
@@ -50,10 +50,7 @@ class ServiceManager(Closing):
             self._socket.setblocking(False)
 
     def progress(self, ticks: int) -> None:
-        """Notify the watchdog while the count of ticks advances; to be called before each tick.
-
-        It costs a datagram in a fraction of the watchdog's time and never waits.
-        """
+        """Notify the watchdog of progress in the count of ticks, before each tick; never waits."""
         if self._every_ticks and ticks % self._every_ticks == 0:
             self._send("WATCHDOG=1")
 

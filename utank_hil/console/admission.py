@@ -16,8 +16,7 @@ def judge_law(
 ) -> JudgedLaw:
     """The law of a configuration, judged; one that can't be ends the command with exit code 2.
 
-    `path` is the file it was read from and `key` where in it, empty for the file as a whole, to
-    name the place of what is wrong; `with_delay_margin` is as in `margins`.
+    `path` is the file it was read from and `key` where in it, to name the place of what is wrong.
     """
     try:
         with notes.busy(f"{config.name}: designing its law"):  # takes seconds at times

@@ -25,7 +25,6 @@ if TYPE_CHECKING:  # it loads every law: `--help` has no use for them
     from utank_hil.configuration.files import ConfigError, ConfigProblem
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
-
 OUT: Final = Path("out")
 _CLAIMS: Final[dict[tuple[int, int], int]] = {}
 """Open descriptors of the folders that this process has claimed, by device and inode."""
@@ -109,10 +108,7 @@ def chosen_run(file: Path, runs: Mapping[str, Any], run: str | None) -> str:
 
 
 def load(path: Path, model: type[ModelT], *, allow_code: bool = False) -> ModelT:
-    """Read a configuration, or list everything that is wrong with it and end with exit code 2.
-
-    What is unusual in it is a note. `allow_code` as in `load_config`.
-    """
+    """Read a configuration, noting what is unusual; list all that is wrong and end with code 2."""
     from utank_hil.configuration.files import ConfigError, load_config
 
     try:
@@ -140,10 +136,7 @@ def fail_with(error: "ConfigError") -> NoReturn:
 
 
 def why_not_writable(folder: Path, files: Iterable[str] = ()) -> str | None:
-    """Make a folder and try whether files can be written there; the reason if they can't.
-
-    `files` are the names of the files to come; those that exist are left as they are.
-    """
+    """Make a folder; the reason if files of these names can't be written there."""
     if folder.exists() and not folder.is_dir():
         return f"{folder}: is not a folder"
     try:
@@ -186,7 +179,7 @@ _NO_LOCKS: Final = (errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
 
 
 def _claimed(folder: Path) -> bool:
-    """Claim a folder for the rest of the process; whether no other process has claimed it."""
+    """Claim a folder for the rest of the process; False if another process has."""
     descriptor = os.open(folder, os.O_RDONLY)
     status = os.fstat(descriptor)
     if (place := (status.st_dev, status.st_ino)) in _CLAIMS:

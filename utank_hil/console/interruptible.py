@@ -9,11 +9,7 @@ from types import FrameType
 
 @contextmanager
 def quietly_interruptible() -> Iterator[None]:
-    """Let Ctrl-C end the process at once, as it does any program, instead of by a traceback.
-
-    Only where Python's own handler is in place: what is ignored, or is handled by somebody, stays
-    so.
-    """
+    """Let Ctrl-C end the process at once instead of by a traceback, if Python handles it."""
     handler = signal.getsignal(signal.SIGINT)
     if (
         handler is not signal.default_int_handler
@@ -29,10 +25,7 @@ def quietly_interruptible() -> Iterator[None]:
 
 
 def end_as_by_ctrl_c() -> None:
-    """Let SIGTERM, and SIGHUP unless it is ignored, end the process as Ctrl-C does.
-
-    Files are left whole and processes ended. A second one does not disturb that.
-    """
+    """Let SIGTERM, and SIGHUP unless it is ignored, end the process once as Ctrl-C does."""
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, _interrupt)

@@ -23,8 +23,6 @@ _OF_PUMP: Final = (
     "pump_heel_rad", "pump_heel_at_the_end", "pump_head_m", "pump_flow_m3_s", "pump_power_asked_w",
     "pump_power_held_w", "pump_power_w",
 )  # fmt: skip
-
-
 _UNITS = {"rad": "rad", "rad_s": "rad/s", "m": "m", "pa": "Pa", "m3_s": "m³/s"}
 
 
@@ -45,10 +43,9 @@ def ship_figures(vessel: Vessel) -> dict[str, Any]:
 
     `modes` are the two motions of ship and water together, from slow to fast; ratios are as in
     `TankFigures`. Metacentric height and the water's share of the displacement are None where that
-    is not given, what is of the pump without one: the heel that its greatest pressure holds by the
-    restoring curve, None also where it capsizes the ship, and whether a reservoir is full or empty
-    then; the flow of `pump_demand`, for which `init` sizes the pump, and the power of pressure and
-    flow, without losses.
+    is not given, what is of the pump without one: the heel that its greatest pressure holds (None
+    where it capsizes the ship) and whether a reservoir is full or empty then; the flow of
+    `pump_demand`, and the power of pressure and flow, without losses.
     """
     ship, tank = vessel.ship, vessel.tank
     figures = tank_figures(ship, tank)

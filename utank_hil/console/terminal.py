@@ -41,10 +41,7 @@ def new_table(
 
 
 class Terminal(Console):
-    """Rich's console without its markup: names and paths are the user's, brackets and all.
-
-    Its options are those of `rich.console.Console`.
-    """
+    """Rich's console without its markup: names and paths are the user's, brackets and all."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(markup=False, emoji=False, highlight=False, **options)
@@ -79,10 +76,7 @@ class Terminal(Console):
             self.say(f"  utank-hil {shlex.join(words)}")
 
     def table(self, table: Table) -> None:
-        """Print a table, or the same as a list where the terminal is too narrow for it.
-
-        Nothing is cut: each row becomes its name with one line a figure.
-        """
+        """Print a table, or the same as a list where the terminal is too narrow: nothing is cut."""
         unlimited = self.options.update(max_width=UNLIMITED)  # else the answer is what there is
         if Measurement.get(self, unlimited, table).maximum <= self.width:
             self.print(table)

@@ -1,7 +1,4 @@
-"""Figures in one style; no other package except the commands imports this one.
-
-Each `draw_...` function overwrites a `.png` file at `path` and stores `about` in it (`picture`).
-"""
+"""Figures in one style: `draw_...` overwrites a `.png` file at `path` and stores `about` in it."""
 
 from utank_hil.pictures.bench_curves import BenchBar as BenchBar
 from utank_hil.pictures.bench_curves import BenchCurve as BenchCurve

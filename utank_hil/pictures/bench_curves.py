@@ -70,11 +70,11 @@ def draw_bench(
     """Draw the roll and cost of all runs as bars, and their roll, level and pressure over time.
 
     The whole run is drawn as the greatest value in each of `WINDOWS` parts, and three minutes in
-    full, around the largest roll, or around the first trial of a new law if a run retuned. Lanes
-    below show the retuning states of each run. The first curve is the reference, the passive tank:
-    drawn in grey, and searched for the largest roll. `bars` are the runs of the summary, those of
-    the curves last, or none; the problems in `wrong` are written above them. Raises `ValueError` if
-    there are no curves, or more than there are colours.
+    full, around the largest roll, or around the first trial of a new law. Lanes below show the
+    retuning states. The first curve is the reference, the passive tank: drawn in grey, and searched
+    for the largest roll. `bars` are the runs of the summary, those of the curves last, or none; the
+    problems in `wrong` are written above them. Raises `ValueError` without curves, or for more than
+    there are colours.
     """
     if not 1 <= len(curves) <= len(COLORS):
         raise ValueError(f"can draw 1 to {len(COLORS)} runs in one picture, got {len(curves)}")
@@ -120,7 +120,6 @@ def draw_bench(
 
 
 def _centre(curves: Sequence[BenchCurve]) -> tuple[float, str]:
-    """Return the centre of the enlarged part in s, and its title."""
     known = [curve for curve in curves if curve.retuning is not None]
     trials = [curve.time_s[curve.retuning == RetuningState.TRIAL] for curve in known]
     if any(map(len, trials)):
@@ -132,7 +131,6 @@ def _centre(curves: Sequence[BenchCurve]) -> tuple[float, str]:
 
 
 def _around(centre_s: float, whole: tuple[float, float]) -> tuple[float, float]:
-    """Return a span of `ZOOM_S` around a time, or the whole of a short run."""
     if whole[1] - whole[0] < 2 * ZOOM_S:
         return whole
     start_s = min(max(centre_s - ZOOM_S / 2, whole[0]), whole[1] - ZOOM_S)
@@ -173,7 +171,6 @@ def _draw_column(
     *,
     as_they_were: bool,
 ) -> None:
-    """Draw roll, level and pressure over one span of time, or their greatest values."""
     unit_s, unit = _time_unit(span_s)
     for curve, color, dashes in zip(curves, COLORS, DASHES, strict=False):
         shown = (curve.time_s >= span_s[0]) & (curve.time_s <= span_s[1])

@@ -37,8 +37,7 @@ def draw_campaign(
 ) -> Path:
     """Draw the roll RMS of groups of cases, and the share of cases above a roll.
 
-    Groups are numbers along an axis named `axis`, or names one below the other, of which the first
-    `MOST_GROUPS` are drawn.
+    Groups are numbers along an axis named `axis`, or up to `MOST_GROUPS` names one below the other.
     """
     along = len(groups) > 1 and all(isinstance(group, float | int) for group in groups)
     height = 5.0 if along else min(2.5 + 0.3 * len(groups) * max(len(runs), 2), 16.0)

@@ -19,8 +19,7 @@ def draw_roll_statistics(
 ) -> Path:
     """Draw spectra of the roll over its period, and shares of its amplitudes above each angle.
 
-    `rolls` in radians, shape (n,), are in the order of the colours; one without colour, "no tank",
-    may come first. `step_s` is their sample time.
+    `rolls` in radians, shape (n,), are in the order of the colours; "no tank" may come first.
     """
     from scipy.signal import welch
 

@@ -51,8 +51,8 @@ def picture(
 ) -> "Iterator[Figure]":
     """Yield an empty figure with constrained layout; at the end its title is set and it is written.
 
-    `path` is a `.png` file, overwritten; `size_in` its width and height in inches. The origin of
-    the data, `about` (`utank_hil.base.provenance`), is kept in the file's text ``Description``.
+    The origin of the data, `about` (`utank_hil.base.provenance`), is the file's text
+    ``Description``.
     """
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -26,11 +26,10 @@ def draw_trade(
     level_limit_m: float,
     about: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Draw roll reduction over peak sensitivity, and the cost of each law.
+    """Draw roll reduction over peak sensitivity, and the cost of each law that is stable.
 
     Filled dots meet every required margin, open ones miss one, and the star is the design itself.
-    Laws that are unstable on their own ship are left out. `pressure_limit_pa` and `level_limit_m`
-    are drawn as lines; the RMS values are those of linear theory, without limits. Raises
+    The limits are drawn as lines; RMS values are those of linear theory, without limits. Raises
     `ValueError` if no law is stable.
     """
     points = [point for point in trade.points if point.motion is not None]

@@ -15,18 +15,12 @@ PAGE: Final = "report.html"
 
 
 def write_page(runs: list[Path], page: Path) -> Path:
-    """Write the page of these runs.
-
-    Raises `OSError, ValueError` if a run can't be read or the page can't be written; says which.
-    """
+    """Write the page of these runs; OSError or ValueError says which can't be read, or written."""
     return write_reports([_report(run) for run in runs], page)
 
 
 def write_reports(reports: Sequence[Report], page: Path) -> Path:
-    """Write the page of these reports, one after the other.
-
-    Raises `OSError` if the page can't be written.
-    """
+    """Write the page of these reports, one after the other."""
     title, below = reports[0].title, reports[0].below
     if len(reports) > 1:
         title = ", ".join(each.title for each in reports)

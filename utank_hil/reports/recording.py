@@ -23,9 +23,8 @@ RUN, LOG = "run-", "log-"  #: Beginnings of the names of a run's recording and o
 
 
 def recording_report(file: Path, scratch: Path) -> Report:
-    """The report of a recording.
+    """The report of a recording of ``utank-hil run --out``, with its log of alarms beside it.
 
-    `file` is the `.rrd` of ``utank-hil run --out``, whose log of alarms is looked for beside it;
     `scratch` is a folder for pictures. Raises `OSError, ValueError` if the file is no recording,
     one of several runs, or one of hardly any rows.
     """
@@ -80,7 +79,6 @@ def _verdict(rows: dict[str, FloatArray], alarms: list[dict[str, Any]]) -> Verdi
 
 
 def _rolled(rows: dict[str, FloatArray], active: npt.NDArray[np.bool_]) -> str:
-    """The roll in these rows, in words, as far as it is known."""
     known = active & np.isfinite(rows["roll_rad"])
     if not known.any():
         return "the roll is not known"
@@ -124,7 +122,6 @@ def _histories(rows: dict[str, FloatArray], scratch: Path, title: str) -> Report
 
 
 def _modes(rows: dict[str, FloatArray]) -> ReportTable:
-    """Times at which modes and faults began."""
     state = np.column_stack([rows["mode"], rows["fault"]])
     begins = np.flatnonzero(np.any(np.diff(state, axis=0, prepend=np.nan) != 0, axis=1))
     table = [

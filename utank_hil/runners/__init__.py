@@ -4,7 +4,6 @@ from utank_hil.runners.bus_model import SimulatedBus as SimulatedBus
 from utank_hil.runners.lockstep import Lockstep as Lockstep
 from utank_hil.runners.node import Node as Node
 from utank_hil.runners.node import NodeError as NodeError
-from utank_hil.runners.node import Stoppable as Stoppable
 from utank_hil.runners.node import heard_by as heard_by
 from utank_hil.runners.process_priority import real_time_scheduling as real_time_scheduling
 from utank_hil.runners.realtime import MonotonicClock as MonotonicClock

@@ -2,11 +2,9 @@
 
 Modelled: bit rate, arbitration by identifier, non-preemptive transmission, bit stuffing and
 intermission. Every queued frame of every node takes part in every arbitration, as in a CAN
-controller with one mailbox per message. Frames of equal identifier are sent in queueing order.
-Transmit queues are unbounded.
-
-Not modelled: collisions of two nodes that send the same identifier. Errors and retransmission are
-those of `firmware_sim.fault_injection.faulty_bus`.
+controller with one mailbox per message; frames of equal identifier in queueing order. Not modelled:
+limits of queues, collisions of two nodes that send the same identifier. Errors and retransmission
+are those of `firmware_sim.fault_injection.faulty_bus`.
 """
 
 from heapq import heappop, heappush
@@ -37,9 +35,8 @@ class SimulatedBus:
     def queue(self, sender: int, frame: Frame, now_ns: int, more_bits: int = 0) -> None:
         """Queue a frame for transmission from `now_ns` on; calls must be in order of time.
 
-        It keeps the bus for `more_bits` longer than its own bits take.
-
-        ValueError is raised if the identifier or the payload is too long for CAN.
+        It keeps the bus for `more_bits` longer than its own bits take. ValueError is raised if the
+        identifier or the payload is too long for CAN.
         """
         duration_ns = (frame_bits(frame) + more_bits) * self._bit_ns
         self._order += 1

@@ -9,17 +9,21 @@ from utank_hil.canbus.frame import Frame
 from utank_hil.runners.node import LinkObserver, LoadObserver, Node, NodeError, Selective, Stoppable
 
 OUTSIDE: Final = -1  #: Sender index of a frame from outside the group.
-
 Send = Callable[[int, Frame, int], None]  #: Called as (sender's index, frame, time in ns).
-
 Receive = Callable[[Frame, int], None]  #: A node's `receive`.
+
+
+def _failure(name: str, method: str, now_ns: int, error: Exception) -> NodeError:
+    reason = f"{type(error).__name__}: {error}"
+    return NodeError(f"node '{name}' failed in {method}() at {now_ns * 1e-9:.6f} s: {reason}")
 
 
 class NodeGroup:
     """The nodes of one runner, in the order given.
 
     `names` are by sender index; `next_tick_ns` is the time at which the next node is due.
-    ValueError is raised if there is no node, a name comes twice, or a period is not positive.
+    ValueError is raised if there is no node, a name comes twice, or a period is not positive. Every
+    method raises NodeError if a node raises, or `send` refuses its frame.
     """
 
     def __init__(self, nodes: Sequence[Node]) -> None:
@@ -71,10 +75,7 @@ class NodeGroup:
     def tick(self, now_ns: int, send: Send) -> None:
         """Tick every due node once and pass its frames to `send`.
 
-        An overdue node is ticked once and is next due at the next point of its own grid: missed
-        ticks are dropped and do not shift the grid.
-
-        NodeError is raised if a node raises, or `send` refuses its frame.
+        A node that missed ticks is ticked once, and next due at the next point of its own grid.
         """
         due_ns = self._due_ns
         index = 0
@@ -87,14 +88,11 @@ class NodeGroup:
                     for frame in tick(now_ns):
                         send(index, frame, now_ns)
         except Exception as error:
-            raise NodeError(self.names[index], "tick", now_ns, error) from error
+            raise _failure(self.names[index], "tick", now_ns, error) from error
         self.next_tick_ns = min(due_ns)
 
     def deliver(self, sender: int, frame: Frame, now_ns: int) -> None:
-        """Deliver a frame to every node that hears it, except its sender.
-
-        NodeError is raised if a node raises.
-        """
+        """Deliver a frame to every node that hears it, except its sender."""
         listeners = self._listeners[sender].get(frame.can_id)
         if listeners is None:
             listeners = self._listeners_to_others[sender]
@@ -103,19 +101,16 @@ class NodeGroup:
             for index, receive in listeners:  # noqa: B007 - names the node that raised
                 receive(frame, now_ns)
         except Exception as error:
-            raise NodeError(self.names[index], "receive", now_ns, error) from error
+            raise _failure(self.names[index], "receive", now_ns, error) from error
 
     def link_error(self, now_ns: int, reason: str) -> None:
-        """Notify every `LinkObserver` that the bus can't be reached.
-
-        NodeError is raised if a node raises.
-        """
+        """Notify every `LinkObserver` that the bus can't be reached."""
         for node in self._nodes:
             if isinstance(node, LinkObserver):
                 try:
                     node.link_error(now_ns, reason)
                 except Exception as error:
-                    raise NodeError(node.name, "link_error", now_ns, error) from error
+                    raise _failure(node.name, "link_error", now_ns, error) from error
 
     def other_frames(self, count: int) -> None:
         """Tell every `LoadObserver` of frames that no node is handed."""
@@ -124,10 +119,7 @@ class NodeGroup:
                 node.other_frames(count)
 
     def stop(self, now_ns: int, send: Send) -> None:
-        """Stop every `Stoppable` node and pass its last frames to `send`.
-
-        NodeError is raised if a node raises; the others are stopped nevertheless.
-        """
+        """Stop every `Stoppable` node, even if one raises, and pass its last frames to `send`."""
         with ExitStack() as everyone:  # runs every callback even if one raises, last entered first
             for index in reversed(range(len(self._nodes))):
                 everyone.callback(self._stop_one, index, now_ns, send)
@@ -140,4 +132,4 @@ class NodeGroup:
             for frame in node.stop(now_ns):
                 send(index, frame, now_ns)
         except Exception as error:
-            raise NodeError(node.name, "stop", now_ns, error) from error
+            raise _failure(node.name, "stop", now_ns, error) from error

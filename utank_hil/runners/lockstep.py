@@ -31,10 +31,9 @@ class Bus(Protocol):
 
 
 class Lockstep:
-    """Runs nodes in simulated time.
+    """Runs nodes in simulated time; every event before `now_ns` has happened.
 
-    By default the bus is a new one of 250 kbit/s. `trace` receives every frame before the nodes do,
-    like a logger on the bus. Every event before `now_ns` has happened.
+    By default the bus is a new one of 250 kbit/s. `trace` receives every frame before the nodes do.
     """
 
     def __init__(
@@ -50,12 +49,9 @@ class Lockstep:
         self._group = self._group.joined_by(nodes, self.now_ns)
 
     def run_until(self, time_ns: int) -> None:
-        """Run every event before `time_ns`.
+        """Run every event before `time_ns`, in one call or in many.
 
-        The result does not depend on how a run is divided into calls.
-
-        ValueError is raised if `time_ns` is in the past. NodeError is raised if a node raises; the
-        run can't be continued then.
+        ValueError is raised if it is in the past, NodeError if a node raises, which ends the run.
         """
         if time_ns < self.now_ns:
             raise ValueError(f"time_ns {time_ns}: the run is at {self.now_ns} already")

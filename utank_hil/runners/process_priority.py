@@ -1,9 +1,8 @@
 """Real-time settings of the loop process, requested from Linux and reported.
 
-Each setting removes a measured cause of late ticks: other processes (SCHED_FIFO), page faults
-(mlockall), deep CPU sleep states (/dev/cpu_dma_latency), the garbage collector, and other Python
-threads, which hold the interpreter for 5 ms at a time. A refused setting is reported, and the loop
-runs without it.
+Each removes a measured cause of late ticks: other processes (SCHED_FIFO), page faults (mlockall),
+deep CPU sleep states (/dev/cpu_dma_latency), the garbage collector, and other Python threads, which
+hold the interpreter for 5 ms at a time. Without a refused setting the loop runs on.
 """
 
 import ctypes
@@ -14,61 +13,30 @@ import struct
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 PRIORITY: Final = 80  #: Above the kernel's interrupt threads (50), as cyclictest is usually run.
-
 _MCL_CURRENT: Final = 1
 _MCL_FUTURE: Final = 2
 _CAP_IPC_LOCK: Final = 14
 _CPU_DMA_LATENCY: Final = Path("/dev/cpu_dma_latency")
 
 
-@dataclass(frozen=True, slots=True)
-class Measure:
-    """One real-time setting."""
-
-    name: str
-    granted: bool  #: Whether it is in force.
-    detail: str  #: Value in force, or the reason and the remedy.
-
-
-@dataclass(frozen=True, slots=True)
-class SchedulingReport:
-    """Real-time settings of the loop process at its start."""
-
-    measures: tuple[Measure, ...]  #: In the order of the requests.
-    #: Threads that are not Python's, such as those of a linear-algebra library; they do not hold
-    #: the interpreter.
-    native_threads: int
-
-    @property
-    def granted(self) -> bool:
-        """Whether every setting is in force."""
-        return all(measure.granted for measure in self.measures)
-
-    def lines(self) -> list[str]:
-        """Return one line a measure, for people."""
-        return [
-            f"{measure.name}: {'yes' if measure.granted else 'NO'}, {measure.detail}"
-            for measure in self.measures
-        ]
+def _said(name: str, granted: bool, detail: str) -> str:
+    """Return a setting in words; `detail` is the value in force, or the reason and the remedy."""
+    return f"{name}: {'yes' if granted else 'NO'}, {detail}"
 
 
 @contextmanager
-def real_time_scheduling(priority: int = PRIORITY) -> Iterator[SchedulingReport]:
+def real_time_scheduling() -> Iterator[list[str]]:
     """Apply the real-time settings for the duration of the context, as far as permitted.
 
     Enter it when everything is imported and built: existing objects are frozen, and the garbage
-    collector stays off. Leaving the context restores the former settings.
-
-    RuntimeError is raised if there is another Python thread: it would delay ticks whatever the
-    permissions. ValueError is raised if the priority is out of range.
+    collector stays off. It yields a line for each setting, whether it is in force or why it is not.
+    Leaving the context restores the former settings. RuntimeError is raised if there is another
+    Python thread: it would delay ticks whatever the permissions.
     """
-    if not 1 <= priority <= 99:
-        raise ValueError(f"priority {priority}: SCHED_FIFO has 1 to 99")
     others = [t.name for t in threading.enumerate() if t is not threading.current_thread()]
     if others:
         raise RuntimeError(
@@ -77,34 +45,32 @@ def real_time_scheduling(priority: int = PRIORITY) -> Iterator[SchedulingReport]
         )
     with ExitStack() as undo:
         collector = _garbage_collector_off(undo)
-        measures = (_fifo(undo, priority), _memory_lock(undo), _no_cpu_sleep(undo), collector)
-        native_threads = len(os.listdir("/proc/self/task")) - 1
-        yield SchedulingReport(measures, native_threads)
+        yield [_fifo(undo), _memory_lock(undo), _no_cpu_sleep(undo), collector]
 
 
-def _garbage_collector_off(undo: ExitStack) -> Measure:
+def _garbage_collector_off(undo: ExitStack) -> str:
     if gc.isenabled():
         undo.callback(gc.enable)
     undo.callback(gc.unfreeze)
     gc.collect()
     gc.freeze()
     gc.disable()
-    return Measure("garbage collector off", True, f"{gc.get_freeze_count()} objects frozen")
+    return _said("garbage collector off", True, f"{gc.get_freeze_count()} objects frozen")
 
 
-def _fifo(undo: ExitStack, priority: int) -> Measure:
+def _fifo(undo: ExitStack) -> str:
     name = "SCHED_FIFO"
     found = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
         # Not for children: a stuck real-time child could not be ended on a busy machine.
-        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
     except PermissionError:
         limit, _ = resource.getrlimit(resource.RLIMIT_RTPRIO)
-        return Measure(
-            name, False, f"real-time priority limit is {limit}, needs {priority} (LimitRTPRIO=)"
+        return _said(
+            name, False, f"real-time priority limit is {limit}, needs {PRIORITY} (LimitRTPRIO=)"
         )
     undo.callback(_restore_scheduler, *found)
-    return Measure(name, True, f"priority {priority}")
+    return _said(name, True, f"priority {PRIORITY}")
 
 
 def _restore_scheduler(policy: int, param: os.sched_param) -> None:
@@ -114,39 +80,35 @@ def _restore_scheduler(policy: int, param: os.sched_param) -> None:
         os.sched_setscheduler(0, policy | os.SCHED_RESET_ON_FORK, param)
 
 
-def _memory_lock(undo: ExitStack) -> Measure:
+def _memory_lock(undo: ExitStack) -> str:
     name = "memory locked"
     limit, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
-    if limit != resource.RLIM_INFINITY and not _may_lock_any_memory():
+    may_lock_any = int(_field("self/status", "CapEff"), 16) >> _CAP_IPC_LOCK & 1
+    if limit != resource.RLIM_INFINITY and not may_lock_any:
         # A finite limit would make a later allocation fail: worse than a page fault.
-        return Measure(name, False, f"memory lock limit is {limit} bytes (LimitMEMLOCK=infinity)")
+        return _said(name, False, f"memory lock limit is {limit} bytes (LimitMEMLOCK=infinity)")
     size_kib = int(_field("self/status", "VmSize"))
     if size_kib > int(_field("meminfo", "MemAvailable")):
-        return Measure(
+        return _said(
             name, False, f"{size_kib >> 10} MiB of address space exceed the memory available"
         )
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
-        return Measure(name, False, os.strerror(ctypes.get_errno()))
+        return _said(name, False, os.strerror(ctypes.get_errno()))
     undo.callback(libc.munlockall)
-    return Measure(name, True, f"{int(_field('self/status', 'VmLck')) >> 10} MiB")
-
-
-def _may_lock_any_memory() -> bool:
-    return bool(int(_field("self/status", "CapEff"), 16) >> _CAP_IPC_LOCK & 1)
+    return _said(name, True, f"{int(_field('self/status', 'VmLck')) >> 10} MiB")
 
 
 def _field(file: str, key: str) -> str:
-    """Return the first word after `key:` in a file of /proc; sizes there are in KiB."""
     with (Path("/proc") / file).open() as lines:
         return next(line.split()[1] for line in lines if line.startswith(f"{key}:"))
 
 
-def _no_cpu_sleep(undo: ExitStack) -> Measure:
+def _no_cpu_sleep(undo: ExitStack) -> str:
     name = "no deep CPU sleep"
     try:
         request = undo.enter_context(_CPU_DMA_LATENCY.open("wb", buffering=0))
         request.write(struct.pack("i", 0))  # in force for as long as the file stays open
     except OSError as error:
-        return Measure(name, False, f"{_CPU_DMA_LATENCY}: {error.strerror}")
-    return Measure(name, True, f"{_CPU_DMA_LATENCY} held at 0 us")
+        return _said(name, False, f"{_CPU_DMA_LATENCY}: {error.strerror}")
+    return _said(name, True, f"{_CPU_DMA_LATENCY} held at 0 us")

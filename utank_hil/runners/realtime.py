@@ -10,18 +10,13 @@ import warnings
 from collections.abc import Callable, Sequence
 from typing import Final, Protocol
 
-from utank_hil.canbus.frame import Frame
-from utank_hil.canbus.port import Port, PortError
+from utank_hil.canbus.frame import Frame, Port, PortError
 from utank_hil.runners.group import OUTSIDE, NodeGroup
 from utank_hil.runners.node import Node
 from utank_hil.runners.statistics import LoopStatistics
 
 _NEVER_NS: Final = 1 << 63
 _REAL_TIME: Final = (os.SCHED_FIFO, os.SCHED_RR)
-
-
-def _never() -> bool:
-    return False
 
 
 class Clock(Protocol):
@@ -52,10 +47,8 @@ class RealTimeLoop:
 
     At every grid point, arrived frames are delivered to every node. Then the due nodes tick in the
     order given, and their frames are sent. Last, each sent frame is delivered to the other nodes of
-    the group, because the socket does not receive its own frames.
-
-    The grid's step is the greatest common divisor of the nodes' periods. Without a port the nodes
-    exchange frames among themselves only.
+    the group, because the socket does not receive its own frames. The grid's step is the greatest
+    common divisor of the nodes' periods.
     """
 
     def __init__(
@@ -73,15 +66,13 @@ class RealTimeLoop:
         self._sent: list[tuple[int, Frame]] = []
         self._others = 0 if port is None else port.others
 
-    def run(self, stop: Callable[[], bool] = _never, duration_ns: int | None = None) -> None:
+    def run(self, stop: Callable[[], bool] = lambda: False, duration_ns: int | None = None) -> None:
         """Run until `stop()` is true or the time is up; then let the nodes send their last frames.
 
         Nodes receive the time of the grid point, not of the wake-up, so that jitter does not enter
-        what they integrate or differentiate.
-
-        `stop` is called before every tick. In `duration_ns` the loop ticks at the start and at
-        every grid point before the end; points without a tick count as skipped. NodeError is raised
-        if a node raises; the nodes' `stop` is called nevertheless.
+        what they integrate or differentiate. `stop` is called before every tick. In `duration_ns`
+        the loop ticks at the start and at every grid point before the end. NodeError is raised if a
+        node raises.
         """
         clock, statistics, period_ns = self._clock, self.statistics, self._group.base_period_ns
         statistics.real_time = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK in _REAL_TIME

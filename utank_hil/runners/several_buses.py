@@ -6,17 +6,7 @@ from utank_hil.runners.lockstep import Bus
 
 
 class SeveralBuses:
-    """A bus and more of them: the identifier of a frame tells which one carries it.
-
-    Parameters
-    ----------
-    first : Bus
-        The controller's own.
-    more : int
-        Number of the others.
-    bit_rate : int
-        Of the others.
-    """
+    """The controller's own bus and more of them: a frame's identifier tells which carries it."""
 
     def __init__(self, first: Bus, more: int, bit_rate: int) -> None:
         self._buses = (first, *(SimulatedBus(bit_rate) for _ in range(more)))

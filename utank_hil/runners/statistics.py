@@ -21,7 +21,6 @@ def _bin_of(value_ns: int) -> int:
 
 
 def _largest_in(index: int) -> int:
-    """Return the largest value in a bin, the inverse of `_bin_of`."""
     if index < 2 * _STEPS:
         return index
     shift = index // _STEPS - 1
@@ -32,10 +31,8 @@ class Histogram:
     """Distribution of durations over fixed, logarithmically spaced bins.
 
     Adding takes a few integer operations and allocates no memory. A percentile is at most 1/32
-    above the true one and never below it; the maximum is exact.
-
-    `recent_ns` is the longest duration since it was last set to zero, `max_ns` the longest of all,
-    0 if there is none.
+    above the true one and never below it; the maximum is exact. `recent_ns` is the longest duration
+    since it was last set to zero, `max_ns` the longest of all, 0 if there is none.
     """
 
     __slots__ = ("counts", "max_ns", "recent_ns")

@@ -13,8 +13,7 @@ SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 def stop_on_signals() -> Iterator[Callable[[], bool]]:
     """Yield a function that returns whether SIGINT, SIGTERM or SIGHUP (a closed terminal) arrived.
 
-    A SIGHUP that is ignored stays so: ``nohup`` asks for it. The former handlers are restored at
-    the end. Main thread only, as Python requires.
+    A SIGHUP that is ignored stays so: ``nohup`` asks for it. Main thread only, as Python requires.
     """
     stopped = False
 

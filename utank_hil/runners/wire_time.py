@@ -23,17 +23,14 @@ from typing import Final
 from utank_hil.canbus.frame import LONGEST_STANDARD_ID, STANDARD, Frame
 
 LONGEST_FRAME_BITS: Final = 160  #: Of a frame with eight data bytes.
-
 INTERMISSION_BITS: Final = 3
 _AFTER_CRC_BITS: Final = 10 + INTERMISSION_BITS
 _CRC_BITS: Final = 15
 _CRC_POLYNOMIAL: Final = 0x4599
 _HEADER_BITS: Final = 39
 _SHORT_HEADER_BITS: Final = 19
-
 Row = list[tuple["Row", int]]
 """Of one state of the stuffing rule, by byte: the row of the next state, and the stuff bits."""
-
 # State of the stuffing rule: 5 * (last bit) + (number of equal bits so far, 0 to 4).
 _STATES: Final = 10
 
@@ -53,7 +50,6 @@ def _after_bits(state: int, bits: int, length: int) -> tuple[int, int]:
 
 
 def _stuffing_rows() -> list[Row]:
-    """Return the row of each state."""
     rows: list[Row] = [[] for _ in range(_STATES)]
     # rows share the same few pairs, so that they stay in the cache
     pairs = [[(row, stuffed) for stuffed in range(3)] for row in rows]
@@ -65,7 +61,6 @@ def _stuffing_rows() -> list[Row]:
 
 
 def _crc(register: int, bits: int, length: int) -> int:
-    """Return the CRC register, 15 bits, after the last `length` bits of `bits`."""
     for position in range(length - 1, -1, -1):
         feedback = (bits >> position ^ register >> (_CRC_BITS - 1)) & 1
         register = (register << 1 & 0x7FFF) ^ (_CRC_POLYNOMIAL * feedback)

@@ -8,18 +8,8 @@ import rerun.blueprint as rrb
 from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
 from rerun.encodings import EntityPath
 
+from utank_hil.telemetry import rerun_log
 from utank_hil.telemetry.motion_figures import PHASE_AXES
-from utank_hil.telemetry.rerun_log import (
-    ARCHETYPE,
-    COMPONENT,
-    LOG,
-    RETUNING,
-    STATE,
-    STATE_COLUMNS,
-    TIME_COLUMN,
-    has_state,
-    run_paths,
-)
 from utank_hil.telemetry.scene import SceneSize
 from utank_hil.telemetry.units import UNITS, Field, field_of
 from utank_hil.telemetry.viewer import TIMELINE
@@ -29,7 +19,6 @@ MOST_SHADES: Final = 4  #: Most lines of a plot, and most ships that are shown s
 WATCH_SHARES: Final = {1: (5, 4), MOST_SHADES: (5, 7, 4)}
 """Relative heights of ships, words and plot, for one ship and for several, such that no remedy of a
 fault is cut off."""
-
 _ROLL: Final = ("Roll, °", ("roll_rad", "twin_roll_rad", "true_roll_rad"))
 _LEVEL: Final = ("Tank level, m", ("port_level_m", "starboard_level_m", "true_level_m"))
 _PRESSURE: Final = (
@@ -72,7 +61,6 @@ SUBJECTS: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
         ("Bus load, %", ("bus_load",)),
     ),
 }  #: Plots of the engineer's tabs: title and columns; the first column is shown for several runs.
-
 # This is Okabe and Ito's colour-blind safe palette, in an order for a dark background.
 _PALETTE: Final = {
     "grey": (0xB0, 0xB0, 0xB0),
@@ -94,12 +82,11 @@ def make_blueprint(
 ) -> rrb.Blueprint:
     """Lay out the views of one run, or of several on one time line.
 
-    The first tab, for the watch, has the rolling section of the ship, words, and a few plots around
-    the cursor. The others, for the engineer, have every signal by subject. A colour stands for a
-    run if there are several, else for a signal. `span_s` is the first and last time of a finished
-    recording, shown in one tab as a whole and in another around the cursor; by default the view is
-    live and follows the newest data. Without a `size` there are no scenes and no tab for the watch.
-    `zero` are run and column of signals that are zero throughout and are not plotted.
+    The first tab, for the watch, has the ships, words and a few plots around the cursor; without a
+    `size` there is none. The others, for the engineer, have every signal by subject. A colour
+    stands for a run if there are several, else for a signal. `span_s` is the first and last time of
+    a finished recording, shown as a whole and around the cursor; by default the view follows the
+    newest data. `zero` are run and column of signals that are zero throughout and are not plotted.
     """
     if span_s is None:
         around = _axis(-3 * HALF_WINDOW_S, 0.0)
@@ -128,7 +115,6 @@ def make_blueprint(
 
 
 def _axis(from_s: float, to_s: float) -> rrb.TimeAxis:
-    """Return an axis of times relative to the cursor."""
     from_to = (rr.TimeRangeBoundary.cursor_relative(seconds=each) for each in (from_s, to_s))
     return rrb.TimeAxis(view_range=rr.TimeRange(*from_to))
 
@@ -146,10 +132,9 @@ def columns_of(columns: Sequence[str], about: Mapping[str, Any] | None) -> list[
 
 
 def _watch(axis: rrb.TimeAxis, runs: Sequence[str], size: SceneSize) -> rrb.Container:
-    """Lay out the ships, words below them, and the plots that a watch-keeper needs."""
     across_m, upright_m = [-size.reach_m, size.reach_m], list(size.height_range_m)
     bounds = rrb.VisualBounds2D(x_range=across_m, y_range=upright_m)
-    shown = list(zip(run_paths(runs), runs, strict=True))[:MOST_SHADES]
+    shown = list(zip(rerun_log.run_paths(runs), runs, strict=True))[:MOST_SHADES]
     scenes = [
         rrb.Spatial2DView(origin=f"{path}/scene", name=run, visual_bounds=bounds)
         for path, run in shown
@@ -183,10 +168,10 @@ def _subjects(
     left = {
         column: [i for i in shown if (runs[i], column) not in zero]
         for column in columns
-        if column not in (TIME_COLUMN, *STATE_COLUMNS)
+        if column not in (rerun_log.TIME_COLUMN, *rerun_log.STATE_COLUMNS)
     }
     left = {column: those for column, those in left.items() if those}
-    paths = [run_paths(runs)[i] for i in shown]
+    paths = [rerun_log.run_paths(runs)[i] for i in shown]
     tabs: list[rrb.Container | rrb.View] = []
     for subject, plots in SUBJECTS.items():
         views: list[rrb.View] = []
@@ -208,11 +193,15 @@ def _subjects(
     if others:
         tabs.append(rrb.Grid(*others, name=OTHERS))
     rows: list[rrb.Container | rrb.View] = [rrb.Tabs(*tabs, active_tab=0)] if tabs else []
-    if has_state(columns):
-        lanes = [f"{path}/{lane}" for path in paths for lane in (STATE, RETUNING)]
+    if rerun_log.has_state(columns):
+        lanes = [
+            f"{path}/{lane}" for path in paths for lane in (rerun_log.STATE, rerun_log.RETUNING)
+        ]
         title = "Mode and fault, retuning"
         states = rrb.StateTimelineView(contents=lanes, name=title, time_view=axis)
-        events = rrb.TextLogView(contents=[f"{path}/{LOG}" for path in paths], name="Events")
+        events = rrb.TextLogView(
+            contents=[f"{path}/{rerun_log.LOG}" for path in paths], name="Events"
+        )
         rows.append(rrb.Horizontal(states, events, column_shares=[2, 1]))
     return rrb.Vertical(*rows, row_shares=[100, 14 + 5 * len(shown)][: len(rows)], name=name)
 
@@ -232,7 +221,6 @@ def _others(
 
 
 def _phase_plane(paths: Sequence[str]) -> rrb.View:
-    """Lay out the phase plane, roll rate over roll, of the last half minute before the cursor."""
     boundary = rr.TimeRangeBoundary
     trail = rrb.VisibleTimeRange(
         TIMELINE,
@@ -262,11 +250,8 @@ def _plot(
     shown: Sequence[int],
     axis: rrb.TimeAxis,
 ) -> rrb.TimeSeriesView:
-    """Plot fields of runs; the title names the colours, because a legend would cover data.
-
-    Colours stand for runs of one field if there are several runs, else for fields.
-    """
-    paths = run_paths(runs)
+    """Plot fields of runs, or of one; the title names the colours: a legend would cover data."""
+    paths = rerun_log.run_paths(runs)
     if len(runs) > 1:
         colors = {i: [run_color(i)] for i in shown}
         named = [(runs[i], _COLOR_NAMES[i % MOST_SHADES]) for i in shown]
@@ -306,7 +291,7 @@ def _line(field: Field, name: str, color: tuple[int, int, int]) -> rrb.Visualize
     source = VisualizerComponentMapping(
         "Scalars:scalars",
         ComponentSourceKind.SourceComponent,
-        source_component=f"{ARCHETYPE}:{COMPONENT}",
+        source_component=f"{rerun_log.ARCHETYPE}:{rerun_log.COMPONENT}",
         selector=f".{field.name}",
     )
     return rr.SeriesLines(

@@ -46,16 +46,14 @@ class Seen:
 
 
 class BusCensus:
-    """Listens to one interface, live or from a log.
+    """Listens to one interface, live or from a log, and compares it with the file of `vessel`.
 
-    The file of `vessel` is compared with what is heard; `interface` is named as in that file, any
-    other name is the controller's own.
+    `interface` is named as in that file; any other name is the controller's own.
     """
 
     def __init__(self, bit_rate: int, vessel: Vessel | None = None, interface: str = "") -> None:
         self._bit_rate, self._vessel = bit_rate, vessel
         self._catalogue = load_catalogue()
-        self._names = {each.codec.can_id: each for each in self._catalogue.messages}
         self._beats = {self._catalogue.codec(Heartbeat, each).can_id: each.name for each in Address}
         self._seen: dict[int, Seen] = {}
         self._bits = 0
@@ -101,7 +99,6 @@ class BusCensus:
             self._inbox.receive(Frame(self._tag | can_id, data), heard.time_ns)
 
     def _identify(self, frame: Frame) -> None:
-        """Keep versions, NAMEs and states that a frame tells."""
         can_id, data = frame
         if can_id & STANDARD:
             number = can_id & ~STANDARD
@@ -109,11 +106,10 @@ class BusCensus:
                 state = _STATES.get(data[0] & 0x7F, f"state {data[0]:#x}")
                 self.states[number - 0x700] = state
             return
-        if can_id in self._beats and len(data) == 8:
-            beat = self._names[can_id].codec.decode(data)
-            if beat is not None:
-                versions = beat.catalogue_version, beat.configuration_version
-                self.versions[self._beats[can_id]] = versions
+        beat = self._catalogue.decoded(frame) if can_id in self._beats else None
+        if beat is not None:
+            versions = beat.catalogue_version, beat.configuration_version
+            self.versions[self._beats[can_id]] = versions
         if can_id >> 8 & 0x3FF00 == _CLAIM_GROUP and len(data) == 8:
             name = int.from_bytes(data, "little")
             self.identities.setdefault(can_id & 0xFF, set()).add(name)
@@ -144,8 +140,8 @@ class BusCensus:
         ]
 
     def _name(self, can_id: int) -> str:
-        if can_id in self._names:
-            return str(self._names[can_id].codec.name)
+        if can_id in self._catalogue.by_id:
+            return str(self._catalogue.by_id[can_id].codec.name)
         if can_id & STANDARD:
             node = (can_id & ~STANDARD) - 0x700
             return "CANopen heartbeat" if node in self.states else ""
@@ -153,8 +149,8 @@ class BusCensus:
         return f"PGN {group if group & 0xFF00 >= 0xF000 else group & 0x3FF00}"
 
     def _node(self, can_id: int) -> str:
-        if can_id in self._names:
-            return self._names[can_id].source.name
+        if can_id in self._catalogue.by_id:
+            return self._catalogue.by_id[can_id].source.name
         if can_id & STANDARD:
             return f"node {can_id & 0x7F}"
         return f"source {can_id & 0xFF:#04x}"

@@ -80,8 +80,7 @@ class LoggedController:
     def entries(self) -> Iterator[Entry]:
         """Yield what the controller received and sent, with its ticks; frames follow their tick.
 
-        The last tick is the first after the last frame. What the controller sent in it may not be
-        in the log.
+        What it sent in the last tick, the first after the last frame, may not be in the log.
         """
         yield Entry(0, bytes([self._real_time]), Kind.STARTED, self._begin_ns)
         tick, last = 0, -((self._begin_ns - self._last_ns) // TICK_NS)
@@ -118,10 +117,9 @@ class LoggedController:
 
 
 def frames_of(entries: Iterable[Entry], notes: list[str] | None = None) -> Iterator[BusFrame]:
-    """Yield the frames of a recording; times count from its first record.
+    """Yield the frames of a recording, the controller's as transmitted, since its first record.
 
-    Frames of the controller are marked as transmitted. The number of those of other kinds, which a
-    recording only counts, is appended to `notes`.
+    The number of frames of other kinds, which a recording only counts, is appended to `notes`.
     """
     begin_ns, others = None, 0
     for number, data, kind, time_ns in entries:
@@ -142,9 +140,10 @@ def frames_of(entries: Iterable[Entry], notes: list[str] | None = None) -> Itera
 
 def _only_stops(frames: list[Frame]) -> bool:
     """Whether frames are only the last commands, quick stop, of a controller that ends."""
-    pump, valve = load_catalogue().codec(PumpCommand), load_catalogue().codec(ValveCommand)
-    if not {frame.can_id for frame in frames} <= {pump.can_id, valve.can_id}:
-        return False
-    whole = [each.data for each in frames if each.can_id == pump.can_id and len(each.data) == 8]
-    words = [pump.decode(data) for data in whole]
-    return any(word and word.control_word is ControlWord.QUICK_STOP for word in words)
+    catalogue = load_catalogue()
+    last = {catalogue.codec(kind).can_id for kind in (PumpCommand, ValveCommand)}
+    words = [catalogue.decoded(frame) for frame in frames]
+    return {frame.can_id for frame in frames} <= last and any(
+        isinstance(word, PumpCommand) and word.control_word is ControlWord.QUICK_STOP
+        for word in words
+    )

@@ -1,8 +1,7 @@
 """Inputs and answers of a controller node, as records of one fixed layout.
 
-A node without I/O is a function of its inputs, so these records, in order, and its configuration
-determine its behaviour: frames received and sent, ticks, bus errors, frames of other kinds, and
-the answers of retuner and estimator.
+A node without I/O is a function of its inputs: these records, in order, and its configuration
+determine its behaviour.
 """
 
 import struct
@@ -23,9 +22,7 @@ RECORD: Final = np.dtype(
 )  # fmt: skip
 """Type of a record: `number` is a frame's identifier or a count, `time_ns` the node's time."""
 LAYOUT: Final = struct.Struct("<I9pB2xq")  #: Packed record: number, length, data, kind and time.
-
 Records = npt.NDArray[np.void]  #: Records, shape (n,), of type `RECORD`.
-
 IN_A_SLOT: Final = 32  #: Number of records in one slot of a ring; five ticks have some 25.
 
 

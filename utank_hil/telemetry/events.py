@@ -1,6 +1,6 @@
-"""The ring of events from the loop: a record is the JSON text of one event.
+"""The ring of events of retuning and alarms: a record is the JSON text of one event.
 
-Events are those of retuning and of the alarm list. A write takes some twenty microseconds.
+A write takes some twenty microseconds.
 """
 
 import json
@@ -18,10 +18,7 @@ _SLOTS: Final = 64  #: A retuning has four events in four minutes; readers poll 
 _LONGEST_BYTES: Final = 8192
 _MOST_BYTES_A_CHARACTER: Final = 6  #: Length of an escaped character in JSON.
 _CUT: Final = _LONGEST_BYTES // (2 * _MOST_BYTES_A_CHARACTER)
-
-
 Event: TypeAlias = RetuningEvent | AlarmEvent
-
 _ALARM_WORDS: Final = {
     AlarmState.ACTIVE_UNACKNOWLEDGED: "ALARM",
     AlarmState.ACTIVE_ACKNOWLEDGED: "alarm accepted",

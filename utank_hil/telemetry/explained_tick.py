@@ -8,7 +8,6 @@ import numpy as np
 from utank_hil.canbus import Frame, load_catalogue
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.signals import SIGNALS, shown_by
-from utank_hil.telemetry.bus_records import PAYLOAD_BYTES
 from utank_hil.telemetry.law_values import Values, differences, law_values
 
 NONE: Final = "none"
@@ -29,26 +28,12 @@ class Number(NamedTuple):
 
 
 class ExplainedTick:
-    """Takes what happens in one tick of a replay.
-
-    Parameters
-    ----------
-    tick : int
-        Number of the controller's tick, from 0.
-
-    Attributes
-    ----------
-    numbers : list of Number
-        In the order of their way.
-    ended : bool
-        Whether the replay came to this tick.
-    """
+    """Takes the `numbers` of a `tick` of a replay, from 0; `ended` if the replay came to it."""
 
     def __init__(self, tick: int) -> None:
         self.tick = tick
         self.numbers: list[Number] = []
         self.ended = False
-        self._codecs = {codec.can_id: codec for codec in load_catalogue().codecs.values()}
         self._before: Values = {}
 
     def received(self, frame: Frame) -> None:
@@ -83,13 +68,8 @@ class ExplainedTick:
 
     def _signals(self, frame: Frame) -> dict[str, str]:
         """Signals of a frame by name; its bytes if it is none of the catalogue, or damaged."""
-        codec = self._codecs.get(frame.can_id)
-        message = None
-        if codec is not None and len(frame.data) == PAYLOAD_BYTES:
-            message = codec.decode(frame.data)
-        if codec is None or message is None:
+        message = load_catalogue().decoded(frame)
+        if message is None:
             return {f"{frame.can_id:08X}": frame.data.hex(" ")}
-        return {
-            f"{codec.name}.{name}": said(value)
-            for name, value in zip(message._fields, message, strict=True)
-        }
+        name = load_catalogue().by_id[frame.can_id].codec.name
+        return {f"{name}.{field}": said(getattr(message, field)) for field in message._fields}

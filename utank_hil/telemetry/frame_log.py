@@ -1,13 +1,11 @@
 """The frame log: a file that grows by blocks and is readable up to its last whole block.
 
 After the file's mark come blocks: kind, length, CRC-32, then that many compressed bytes. The first
-block is the head, JSON that describes the log's origin; the others hold `bus_records`. A block is
-written every half second, so a file cut at any byte lacks less than a second.
+is the head, JSON that describes the log's origin; the others hold `bus_records`, of half a second.
 """
 
 import json
 import lzma
-import os
 import struct
 import zlib
 from collections.abc import Callable, Iterator, Mapping
@@ -17,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from utank_hil.base.closing import Closing
-from utank_hil.base.whole_file import errors_name
+from utank_hil.base.whole_file import append_whole, errors_name
 from utank_hil.telemetry.bus_records import IN_A_SLOT, RECORD, Kind, Records, pack, unpack
 from utank_hil.telemetry.ring import RingKind, RingReader
 from utank_hil.telemetry.rotation import part_of, whole_of
@@ -42,9 +40,8 @@ class FrameLogError(ValueError):
 class FrameLogWriter(Closing):
     """Writes a frame log over `file`; every `write` adds one block and syncs it to the disk.
 
-    `head` is the origin of the records (`utank_hil.telemetry.replay_head`). Logs to be kept are
-    compressed as well as possible (`small`). `OSError`, also raised by `write` and `close`, names
-    the file.
+    `head` is that of `replay_head`. Logs to be kept are compressed as well as possible (`small`).
+    `OSError`, also raised by `write` and `close`, names the file.
     """
 
     def __init__(self, file: Path, head: Mapping[str, Any], *, small: bool = False) -> None:
@@ -70,17 +67,8 @@ class FrameLogWriter(Closing):
 
     def _append(self, kind: bytes, payload: bytes) -> None:
         header = _BLOCK.pack(kind, len(payload), zlib.crc32(payload, zlib.crc32(kind)))
-        left = memoryview(header + payload)
-        with errors_name(Path(self._content.name)):
-            before = self._content.tell()
-            try:
-                while left:
-                    left = left[self._content.write(left) :]
-                os.fsync(self._content.fileno())
-            except OSError:  # Half a block would end the reading, also of later parts.
-                self._content.truncate(before)
-                self._content.seek(before)
-                raise
+        with errors_name(Path(self._content.name)):  # Half a block would end the reading.
+            append_whole(self._content, header + payload)
 
 
 class BlockSink:
@@ -108,10 +96,9 @@ class BlockSink:
 
 
 class FrameLog:
-    """A frame log, read block by block; a log of several parts is read as one.
+    """A frame log, read block by block, from part `path` on; its parts are read as one.
 
-    `path` is the first part, or another to start from. Raises `FrameLogError` if it is no frame
-    log, or its head is incomplete.
+    Raises `FrameLogError` if it is no frame log, or its head is incomplete.
     """
 
     def __init__(self, path: Path) -> None:
@@ -159,11 +146,7 @@ class FrameLog:
 
 
 class FrameRecording(Closing):
-    """Writes a ring of `bus_records` into a frame log.
-
-    The log is written beside the recording `file`; `place` is the place in the ring to start from
-    (`RingReader`).
-    """
+    """Writes a ring of `bus_records`, from `place` on, into a frame log beside recording `file`."""
 
     def __init__(
         self, ring: str, file: Path, head: Mapping[str, Any], place: int | None = None

@@ -10,27 +10,18 @@ import math
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Protocol, TypeVar, cast, runtime_checkable
+from typing import Any, Final, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 
 Part = TypeVar("Part")
 Values = dict[str, npt.NDArray[Any]]  #: Arrays by the path of attributes that leads to them.
-
 _DEEPEST: Final = 12
 
 
 class LawValuesError(ValueError):
     """Recorded numbers do not fit the law."""
-
-
-@runtime_checkable
-class Derives(Protocol):
-    """A part of a controller with values that are derived from its numbers."""
-
-    def derive(self) -> None:
-        """Recompute the derived values."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,18 +42,14 @@ class ValueDifference:
 
 
 def law_values(controller: object) -> Values:
-    """Return every number that a controller at rest holds: gains, models, weights, state.
-
-    Attributes without numbers, functions and the insides of compiled code are left out.
-    """
+    """Return every number that a controller at rest holds: gains, models, weights, state."""
     return dict(_walk(controller, "", 0, set()))
 
 
 def restored(controller: Part, values: Values) -> Part:
     """Return a copy of a controller at rest whose `law_values` are `values`.
 
-    The given controller and the arrays of its law stay unchanged. LawValuesError is raised if the
-    controller has other arrays, or arrays of other shapes.
+    LawValuesError is raised if the controller has other arrays, or arrays of other shapes.
     """
     own = law_values(controller)
     for name in dict.fromkeys((*values, *own)):
@@ -90,19 +77,28 @@ def differences(recorded: Values, designed: Values) -> list[ValueDifference]:
     return found
 
 
+def packed(content: bytes) -> str:
+    """Return bytes compressed, as text for JSON."""
+    return base64.b85encode(zlib.compress(content, 9)).decode()
+
+
+def unpacked(text: str) -> bytes:
+    """Invert `packed`."""
+    return zlib.decompress(base64.b85decode(text))
+
+
 def encoded(values: Values) -> dict[str, Any]:
     """Return the values exactly, ready for JSON."""
-    found: dict[str, Any] = {}
-    for name, value in values.items():
-        packed = base64.b85encode(zlib.compress(value.tobytes(), 9)).decode()
-        found[name] = [str(value.dtype), list(value.shape), packed]
-    return found
+    return {
+        name: [str(value.dtype), list(value.shape), packed(value.tobytes())]
+        for name, value in values.items()
+    }
 
 
 def decoded(content: Mapping[str, Any]) -> Values:
     """Invert `encoded`."""
     return {
-        name: np.frombuffer(zlib.decompress(base64.b85decode(data)), np.dtype(dtype)).reshape(shape)
+        name: np.frombuffer(unpacked(data), np.dtype(dtype)).reshape(shape)
         for name, (dtype, shape, data) in content.items()
     }
 
@@ -177,8 +173,8 @@ def _restored(
         new = copy.copy(value)
         for name, part in parts.items():
             object.__setattr__(new, name, part)
-        if isinstance(new, Derives):
-            new.derive()
+        if derive := getattr(new, "derive", None):  # Values that follow from its numbers.
+            derive()
     done[id(value)] = new, value
     return new
 

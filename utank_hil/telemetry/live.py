@@ -1,7 +1,4 @@
-"""Runs on this machine, found by their rings in shared memory and streamed to viewers.
-
-A run is independent of its viewers: a ring has any number of readers.
-"""
+"""Runs on this machine, found by their rings in shared memory and streamed to viewers."""
 
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -56,10 +53,9 @@ def live_runs() -> list[LiveRun]:
 
 
 class LiveStream(Closing):
-    """Streams a run to viewers, also to those that connect late.
+    """Streams a run to viewers at `url`, on loopback, also to those that connect late.
 
-    `url` is the address for viewers, on loopback. OSError is raised if the run has ended meanwhile,
-    or another program took the port.
+    OSError is raised if the run has ended meanwhile, or another program took the port.
     """
 
     def __init__(self, run: LiveRun) -> None:

@@ -1,8 +1,4 @@
-"""Phase plane and spectra of the roll, for the engineer.
-
-The phase plane shows samples as dots, roll in degrees to the right and its rate in degrees per
-second upwards. Spectra are those of the last five minutes.
-"""
+"""Phase plane, roll (°) to the right and its rate (°/s) upwards, and spectra of five minutes."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -29,10 +25,9 @@ _BAR_HZ: Final = 1 / (SEGMENT * STEP_S)
 
 
 class MotionFigures(Figure):
-    """Writes both figures of one run.
+    """Writes both figures of the run of an entity path; columns `NEEDED` are among its own.
 
-    `path` is the entity path of the run, `columns` the names of a row's values, `NEEDED` among
-    them; `beside` is the number of the run, and that of runs whose bars stand side by side.
+    `beside` is the number of the run, and that of runs whose bars stand side by side.
     """
 
     def __init__(
@@ -105,7 +100,6 @@ def _in_band() -> slice:
 
 
 def _draw_axes(recording: rr.RecordingStream) -> None:
-    """Draw circles labelled in degrees, for all runs."""
     turn = np.linspace(0.0, 2 * np.pi, 61)
     circle = np.column_stack([np.cos(turn), np.sin(turn)])
     far = 1.5 * _CIRCLES_DEG[-1]

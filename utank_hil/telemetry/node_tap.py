@@ -1,7 +1,6 @@
-"""Taps that record the inputs and answers of a controller node.
+"""Taps that record inputs and answers of a controller node, which behaves as without them.
 
-They stand between runner and node, and between controller and retuner. They change nothing, so
-the node behaves as without them.
+They stand between runner and node, and between controller and retuner.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -17,7 +16,6 @@ from utank_hil.telemetry.bus_records import IN_A_SLOT, LAYOUT, PAYLOAD_BYTES, Ki
 
 Sink = Callable[[bytes, int], None]
 """Function that takes the packed records of ticks and the time of the last; it must not wait."""
-
 _FIELDS: Final = 4  #: Number of fields of a record, in the order of `LAYOUT`.
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _RECEIVED, _SENT, _TICK = int(Kind.RECEIVED), int(Kind.SENT), int(Kind.TICK)
@@ -28,10 +26,9 @@ _AT_ONCE: Final = IN_A_SLOT * _FIELDS
 
 
 class NodeTap:
-    """A controller node whose inputs and outputs are recorded.
+    """A controller node whose inputs and outputs are recorded, with the records of `taps`.
 
-    `taps` are those whose records belong among the node's. The records of `every` ticks are passed
-    on together; the stop passes on the rest.
+    The records of `every` ticks are passed on together; the stop passes on the rest.
     """
 
     def __init__(
@@ -105,10 +102,7 @@ class NodeTap:
 
 
 class RetunerTap:
-    """A retuner, or an estimator, whose answers are recorded.
-
-    `alive` and `answer` are the kinds of its records.
-    """
+    """A retuner, or an estimator, whose answers are recorded, as these kinds of records."""
 
     def __init__(
         self, retuner: Retuner, alive: Kind = Kind.ALIVE, answer: Kind = Kind.ANSWER

@@ -10,20 +10,12 @@ import rerun as rr
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.closing import Closing
+from utank_hil.telemetry import rerun_log
 from utank_hil.telemetry.blueprint import columns_of, make_blueprint
 from utank_hil.telemetry.events import Event
-from utank_hil.telemetry.rerun_log import (
-    APPLICATION,
-    LIVE_RUN,
-    PICTURES_S,
-    RunLog,
-    run_paths,
-    write_about,
-)
 from utank_hil.telemetry.scene import scene_size
 
 Sink: TypeAlias = rr.FileSink | rr.GrpcServerSink
-
 _FLUSH_TIMEOUT_S: Final = 5.0  #: Time to reach the disk; without it Rerun waits on a full one.
 _RESERVED_BYTES: Final = 1 << 18  #: Space for the beginning of a recording, mostly its blueprint.
 _FOOTER: Final = (b"FOOT", 64)  #: Mark within the last bytes of a finished file.
@@ -33,9 +25,9 @@ def open_stream(
     name: str, sink: Sink, columns: Sequence[str], about: Mapping[str, Any] | None
 ) -> rr.RecordingStream:
     """Open a stream of one run, with its layout, to a file or to viewers."""
-    stream = rr.RecordingStream(APPLICATION, recording_id=name)
+    stream = rr.RecordingStream(rerun_log.APPLICATION, recording_id=name)
     size = scene_size(columns, about)
-    layout = make_blueprint(columns_of(columns, about), [LIVE_RUN], size=size)
+    layout = make_blueprint(columns_of(columns, about), [rerun_log.LIVE_RUN], size=size)
     stream.set_sinks(sink, default_blueprint=layout)
     return stream
 
@@ -45,19 +37,20 @@ def live_log(
     columns: Sequence[str],
     about: Mapping[str, Any] | None,
     batch_s: float = 0.0,
-) -> RunLog:
+) -> rerun_log.RunLog:
     """Write the run's origin to its stream and return its log."""
     if about:
-        write_about(stream, about)
-    return RunLog(stream, run_paths([LIVE_RUN])[0], columns, about, batch_s)
+        rerun_log.write_about(stream, about)
+    return rerun_log.RunLog(
+        stream, rerun_log.run_paths([rerun_log.LIVE_RUN])[0], columns, about, batch_s
+    )
 
 
 class RecordingPart(Closing):
-    """Writes one file of a recording, complete in itself.
+    """Writes one file of a recording, complete in itself, over `file`, a `.rrd`.
 
-    `file` is a `.rrd`, overwritten; `columns` are the names of a row's values; `about` is the
-    origin of the rows (`utank_hil.base.provenance`). Raises `OSError` if the file can't be created,
-    or there is no room for its beginning. Raises `RuntimeError` if the file can't be finished.
+    `about` is the origin of the rows (`utank_hil.base.provenance`). Raises `OSError` if the file
+    can't be created, or has no room for its beginning, and `RuntimeError` if it can't be finished.
     """
 
     def __init__(
@@ -70,7 +63,7 @@ class RecordingPart(Closing):
         self._lost = Counter[str]()
         self._open = True
         self._recording = open_stream(file.stem, rr.FileSink(file), columns, about)
-        self._log = live_log(self._recording, columns, about, PICTURES_S)
+        self._log = live_log(self._recording, columns, about, rerun_log.PICTURES_S)
 
     def write(self, rows: FloatArray, events: Sequence[Event] = ()) -> None:
         """Append rows, shape (n, width), and events of retuning and alarms, and flush them."""
@@ -110,7 +103,6 @@ class RecordingPart(Closing):
 
 
 def _is_finished(file: Path) -> bool:
-    """Whether a recording has its footer; a truncated one has none."""
     mark, length = _FOOTER
     with file.open("rb") as content:
         content.seek(0, os.SEEK_END)

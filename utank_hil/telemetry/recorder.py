@@ -1,14 +1,12 @@
 """The recorder: a process that writes rows and events to a Rerun file, and the frame log beside it.
 
-Without Rerun only the frame log is written. `RecorderProcess` (recorder_process.py) starts the
-recorder. It ends when the ring is closed, when the ring's writer dies, or on SIGINT, SIGTERM or
-SIGHUP, with all rows written. The controller never waits: rows read too late are overwritten and
-counted as lost.
+Without Rerun only the frame log is written. It ends when the ring is closed, when the ring's writer
+dies, or on SIGINT, SIGTERM or SIGHUP, with all rows written. The controller never waits: rows read
+too late are overwritten and counted as lost.
 
 The process replaces itself (`execv`) for each file of a long recording, because Rerun keeps memory
 and threads of finished files. After a failure, such as a full disk, it continues in another file as
-soon as there is room; the ring holds the rows of 80 s. Its `RecorderState` passes as JSON on
-standard input.
+soon as there is room; the ring holds the rows of 80 s.
 """
 
 import json
@@ -42,10 +40,9 @@ _ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 def record_part(state: RecorderState) -> bool:
     """Record into one file until the ring ends, a signal comes or the next file is due.
 
-    The signals must be blocked. `state` is that after the previous parts, updated with what has
-    reached the file. Returns whether there is a next part. Raises `RingError` if there is no such
-    ring, `OSError` if the file can't be created or there is no room for its beginning, and
-    `RuntimeError` if it can't be finished.
+    The signals must be blocked. `state` is updated with what has reached the file. Returns whether
+    there is a next part. Raises `RingError` if there is no such ring, `OSError` if the file can't
+    be created or has no room for its beginning, and `RuntimeError` if it can't be finished.
     """
     task, report, places = state.task, state.report, state.places
     lost_before, records_lost_before = report.lost, report.records_lost
@@ -142,7 +139,6 @@ def _complain(state: RecorderState, more: str = "") -> None:
 
 
 def _writer_ended(ring: str) -> bool:
-    """Whether the writer of a ring has closed it or is dead."""
     try:
         with RingReader(ring) as reader:
             return reader.ended

@@ -89,11 +89,10 @@ class RecorderError(RuntimeError):
 
 
 class RecorderProcess(Closing):
-    """A recorder in a separate process; ready when the constructor returns.
+    """A recorder in a separate process; ready when the constructor returns, after about a second.
 
-    Start it before the loop: it takes about a second, mostly for importing Rerun. Its session is
-    separate, so that Ctrl-C in the terminal does not end it before the loop's last rows.
-    RecorderError is raised, with the reason, if it does not start.
+    Its session is separate, so that Ctrl-C in the terminal does not end it before the loop's last
+    rows. RecorderError is raised, with the reason, if it does not start.
     """
 
     def __init__(self, task: RecordingTask) -> None:
@@ -132,10 +131,7 @@ class RecorderProcess(Closing):
         return self._process.poll() is not None
 
     def stop(self) -> RecorderReport:
-        """Write the last rows and wait for the end of the process; idempotent.
-
-        RecorderError is raised, with the reason, if the process failed or does not end.
-        """
+        """Write the last rows and wait for the end; RecorderError if it failed; idempotent."""
         if self._end is None:
             self._end = self._ended()
         if isinstance(self._end, RecorderError):
@@ -173,10 +169,7 @@ class RecorderProcess(Closing):
         return bool(heard)
 
     def _message(self, *keys: str) -> dict[str, Any]:
-        """Return the last message with one of these keys; empty if there is none.
-
-        Other output, as of a library or an incomplete line, is ignored.
-        """
+        """Return the last message with one of these keys, or {}; other output is ignored."""
         for line in reversed(self._said.split(b"\n")):
             try:
                 message = json.loads(line)

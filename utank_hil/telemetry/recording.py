@@ -18,26 +18,13 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.whole_file import write_whole
 from utank_hil.canbus.enumerations import Fault, Mode, RetuningState
 from utank_hil.canbus.events import RetuningEvent
+from utank_hil.telemetry import rerun_log
 from utank_hil.telemetry.blueprint import MOST_SHADES, columns_of, make_blueprint, run_color
-from utank_hil.telemetry.rerun_log import (
-    ABOUT,
-    APPLICATION,
-    ARCHETYPE,
-    COMPONENT,
-    ONE_COLOR,
-    PICTURES_S,
-    TIME_COLUMN,
-    RunLog,
-    run_of,
-    run_paths,
-    time_index,
-    write_about,
-)
 from utank_hil.telemetry.scene import scene_size
 from utank_hil.telemetry.units import column_of, field_of
 from utank_hil.telemetry.viewer import TIMELINE, rerun_binary, rerun_environment
 
-_ROWS: Final = f"{ARCHETYPE}:{COMPONENT}"
+_ROWS: Final = f"{rerun_log.ARCHETYPE}:{rerun_log.COMPONENT}"
 _TEXT: Final = "TextDocument:text"
 _BLOCK_ROWS: Final = 8192  #: Number of rows per chunk, the unit in which the viewer loads a file.
 
@@ -49,14 +36,13 @@ def write_recording(
     events: Mapping[str, Sequence[RetuningEvent]] | None = None,
     about: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write runs side by side on one time line into a recording, with its blueprint.
+    """Write runs side by side on one time line into a `.rrd` file, with its blueprint.
 
-    `path` is a `.rrd` file, overwritten. The columns are in SI units, `time_s` among them. `runs`
-    has the rows of each, shape (n, columns), by name; the first is the reference. `events` are
-    those of retuning, `time_ns` on the clock of `time_s`; `about` is the origin of the runs
-    (`utank_hil.base.provenance`). Raises `ValueError` if there is no run, a table is empty or does
-    not fit the columns, `time_s` is missing, or a column is not in SI units. Raises `OSError` if
-    the file can't be written; it is then removed.
+    The columns are in SI units, `time_s` among them. `runs` has the rows of each, shape (n,
+    columns), by name; the first is the reference. `events` are those of retuning, `time_ns` on the
+    clock of `time_s`; `about` is the origin of the runs (`utank_hil.base.provenance`). Raises
+    `ValueError` if there is no run, or a table or a column does not fit. Raises `OSError` if the
+    file can't be written; it is then removed.
     """
     if not runs:
         raise ValueError("a recording needs at least one run")
@@ -67,21 +53,23 @@ def write_recording(
             raise ValueError(f"run {run!r} has no rows")
     for column in columns:
         field_of(column)  # A column that is not in SI units is refused before there is a file.
-    time_s = np.concatenate([rows[:, time_index(columns)] for rows in runs.values()])
+    time_s = np.concatenate([rows[:, rerun_log.time_index(columns)] for rows in runs.values()])
     shown, size = columns_of(columns, about), scene_size(columns, about)
     span_s, zero = (time_s.min(), time_s.max()), _zero(columns, runs)
     blueprint = make_blueprint(shown, list(runs), span_s, size, zero)
-    recording = rr.RecordingStream(APPLICATION, recording_id=path.stem)
+    recording = rr.RecordingStream(rerun_log.APPLICATION, recording_id=path.stem)
     memory = recording.memory_recording()  # Rerun's writer of files waits forever on a full disk.
     # The recording comes first, because a browser shows what comes first.
     recording.send_blueprint(blueprint)
     if about is not None:
-        write_about(recording, about)
-    paths = run_paths(list(runs))
+        rerun_log.write_about(recording, about)
+    paths = rerun_log.run_paths(list(runs))
     for number, (run, rows) in enumerate(runs.items()):
-        color = ONE_COLOR if len(runs) == 1 else run_color(number)
+        color = rerun_log.ONE_COLOR if len(runs) == 1 else run_color(number)
         beside = number % MOST_SHADES, min(len(runs), MOST_SHADES)
-        log = RunLog(recording, paths[number], columns, about, PICTURES_S, color, beside)
+        log = rerun_log.RunLog(
+            recording, paths[number], columns, about, rerun_log.PICTURES_S, color, beside
+        )
         for start in range(0, len(rows), _BLOCK_ROWS):
             log.write(rows[start : start + _BLOCK_ROWS])
         log.write_events((events or {}).get(run, ()))
@@ -110,11 +98,11 @@ def read_recording(path: Path) -> dict[str, dict[str, FloatArray]]:
     for chunk in _chunks(path, _ROWS):
         batch = chunk.to_record_batch()
         row = batch.column(_ROWS).flatten()
-        block = {TIME_COLUMN: batch.column(TIMELINE).to_numpy().astype(np.int64) / 1e9}
+        block = {rerun_log.TIME_COLUMN: batch.column(TIMELINE).to_numpy().astype(np.int64) / 1e9}
         for field in row.type:
             column, unit = column_of(field.name)
             block[column] = row.field(field.name).to_numpy() / unit.scale
-        blocks.setdefault(run_of(chunk.entity_path), []).append(block)
+        blocks.setdefault(rerun_log.run_of(chunk.entity_path), []).append(block)
     if not blocks:
         raise ValueError(f"{path}: no telemetry in this recording")
     return {run: _in_order(parts) for run, parts in blocks.items()}
@@ -123,17 +111,14 @@ def read_recording(path: Path) -> dict[str, dict[str, FloatArray]]:
 def _in_order(parts: list[dict[str, FloatArray]]) -> dict[str, FloatArray]:
     """Return blocks of rows in order of time; repair of a cut file may exchange them."""
     table = {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
-    order = np.argsort(table[TIME_COLUMN], kind="stable")
+    order = np.argsort(table[rerun_log.TIME_COLUMN], kind="stable")
     return {column: values[order] for column, values in table.items()}
 
 
 def read_about(path: Path) -> dict[str, Any]:
-    """Read a recording's origin (`utank_hil.base.provenance`).
-
-    ValueError is raised if the file is no recording, or has no origin.
-    """
+    """Read a recording's origin (`utank_hil.base.provenance`); ValueError if it has none."""
     for chunk in _chunks(path, _TEXT):
-        if chunk.entity_path == f"/__properties/{ABOUT}":
+        if chunk.entity_path == f"/__properties/{rerun_log.ABOUT}":
             (text,) = chunk.to_record_batch().column(_TEXT).flatten().to_pylist()
             found: dict[str, Any] = json.loads(text)
             return found
@@ -177,10 +162,7 @@ def _read_chunks(path: Path, component: str) -> list[Chunk]:
 
 
 def highlight_s(file: Path) -> float:
-    """Time of the first fault of any run, else of the first trial of a law, else of most roll.
-
-    Raises `ValueError` if the file is no recording.
-    """
+    """Time of the first fault of any run, else of the first trial of a law, else of most roll."""
     runs = list(read_recording(file).values())
     faults = [_first(rows, in_service(rows) & (rows["fault"] != Fault.NONE)) for rows in runs]
     trials = [_first(rows, rows["retuning"] == RetuningState.TRIAL) for rows in runs]

@@ -1,8 +1,7 @@
 """Replay: recorded inputs are given to the controller again, and its answers are compared.
 
-The controller gets each record in the order of the log and at its recorded time, so that the result
-does not depend on the machine or on the present. Every frame that it returns is compared with the
-recorded one, byte by byte.
+The controller gets each record in the order of the log and at its recorded time, so the result does
+not depend on machine or present. Every frame that it returns is compared byte by byte.
 """
 
 from collections import Counter, deque
@@ -159,8 +158,8 @@ def replay_log(
 ) -> ReplayedLog:
     """Run `replay` with a controller as the log's head describes it.
 
-    If `config` is the recorded configuration (`as_recorded`), the recorded law runs, if possible,
-    else the law designed for `config` here.
+    If `config` is the recorded one (`as_recorded`), the recorded law runs if possible, else that of
+    `config`.
     """
     law = build_law(config)
     differences = law_differences(log.head, law)
@@ -190,12 +189,11 @@ def replay(
     open_end: bool = False,
     explained: ExplainedTick | None = None,
 ) -> ReplayResult:
-    """Give recorded entries to a new controller and compare what it sends.
+    """Give recorded entries of a whole run to a new controller and compare what it sends.
 
-    `entries` are those of a whole run, `law` that of the configuration. `retuner`, `estimating` and
-    `commissioned` say what the controller had and whether it could be armed. With `open_end` the
-    log may end before what the controller sent in its last tick. `explained` takes the numbers of
-    its tick.
+    `law` is that of the configuration. `retuner`, `estimating` and `commissioned` say what the
+    controller had and whether it could be armed. With `open_end` the log may end before what the
+    controller sent in its last tick. `explained` takes the numbers of its tick.
     """
     answers, estimates = RecordedRetuner(), RecordedRetuner()
     statistics = LoopStatistics()
@@ -212,11 +210,11 @@ def replay(
     sent: list[Frame] = []
     recorded: list[Frame] = []
     waiting = False
-    wanted = -1 if explained is None else explained.tick
+    explained = explained or ExplainedTick(-2)  # that of no tick
 
     def compare() -> None:
         comparison.compare(recorded, sent)
-        if explained is not None and result.ticks == wanted + 1 and not explained.ended:
+        if result.ticks == explained.tick + 1 and not explained.ended:
             explained.end(node, recorded, sent)
 
     for number, data, kind, time_ns in entries:
@@ -229,11 +227,11 @@ def replay(
             recorded = []
         if kind == Kind.RECEIVED:
             comparison.received(number, data)
-            if explained is not None and result.ticks == wanted:
+            if result.ticks == explained.tick:
                 explained.received(Frame(number, data))
             node.receive(Frame(number, data), time_ns)
         elif kind == Kind.TICK:
-            if explained is not None and result.ticks == wanted:
+            if result.ticks == explained.tick:
                 explained.begin(node)
             sent, waiting = list(node.tick(time_ns)), True
             comparison.tick = result.ticks
@@ -265,24 +263,22 @@ class _Comparison:
 
     def __init__(self, result: ReplayResult) -> None:
         self._result = result
-        self._codecs = {codec.can_id: codec for codec in load_catalogue().codecs.values()}
+        self._catalogue = load_catalogue()
         self.tick, self.time_s = 0, 0.0
 
     def received(self, can_id: int, data: bytes) -> None:
         """Count a received frame whose checksum is wrong."""
-        codec = self._codecs.get(can_id)
-        if codec is not None and len(data) == PAYLOAD_BYTES and codec.decode(data) is None:
-            self._result.damaged.append((self._result.ticks, codec.name))
+        known = can_id in self._catalogue.can_ids and len(data) == PAYLOAD_BYTES
+        if known and self._catalogue.decoded(Frame(can_id, data)) is None:
+            self._result.damaged.append((self._result.ticks, self._name(can_id)))
 
     def retuner(self, who: str, answers: RecordedRetuner) -> None:
-        """Compare the requests to the retuner or the estimator."""
         left = answers.left_over()
         if answers.astray or left:
             self._note(who, "asked", left or _NOTHING, answers.astray or _NOTHING)
             answers.astray = ""
 
     def compare(self, recorded: list[Frame], sent: list[Frame]) -> None:
-        """Compare the frames of a tick."""
         self._result.frames += len(recorded)
         if recorded == sent:
             return
@@ -309,15 +305,11 @@ class _Comparison:
             result.first = Difference(self.tick, self.time_s, message, signal, recorded, replayed)
 
     def _name(self, can_id: int) -> str:
-        codec = self._codecs.get(can_id)
-        return f"{can_id:08X}" if codec is None else codec.name
+        known = self._catalogue.by_id.get(can_id)
+        return f"{can_id:08X}" if known is None else known.codec.name
 
     def _signal(self, can_id: int, data: bytes, again: bytes) -> tuple[str, str, str]:
-        """Return the first signal that differs, and its two values."""
-        codec = self._codecs.get(can_id)
-        whole = codec is not None and len(data) == len(again) == PAYLOAD_BYTES
-        before = codec.decode(data) if codec and whole else None
-        now = codec.decode(again) if codec and whole else None
+        before, now = (self._catalogue.decoded(Frame(can_id, each)) for each in (data, again))
         if before is not None and now is not None:
             for name in before._fields:
                 values = said(getattr(before, name)), said(getattr(now, name))

@@ -1,11 +1,9 @@
 """The head of a frame log: inputs of a replay beside the frames, and values to compare it with."""
 
-import base64
 import hashlib
 import importlib.metadata
 import platform
 import tempfile
-import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -14,12 +12,14 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
+from utank_hil.base.finite import mapped
 from utank_hil.base.provenance import commit, describe, version
 from utank_hil.canbus import load_catalogue
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
 from utank_hil.control.python_law import PythonDesign
 from utank_hil.telemetry import law_values
+from utank_hil.telemetry.law_values import packed, unpacked
 
 _PACKAGES: Final = ("numpy", "scipy", "daqp")
 _CODE: Final = "python"  #: Kind of a law that is the user's own code.
@@ -44,11 +44,10 @@ def replay_head(
 ) -> dict[str, Any]:
     """Describe a run so that it can be replayed elsewhere; ready for `json.dumps`.
 
-    `command` has the `options`, `law` is that of the configuration, `folder` that of the log.
-    `retuner`, `estimating` and `commissioned` say what the controller has and whether it could be
-    armed; `seed` is that of simulated waves and noise. The head holds ``about``
-    (`utank_hil.base.provenance`), every number of the ``law`` and the content of the data
-    ``files``.
+    `command` has the `options`, `folder` is that of the log, `seed` that of simulated waves and
+    noise. `retuner`, `estimating` and `commissioned` say what the controller has and whether it
+    could be armed. The head holds ``about`` (`utank_hil.base.provenance`), every number of the
+    ``law`` and the content of the data ``files``.
     """
     about = describe(command, config, folder, options=options, seed=seed)
     return {
@@ -59,10 +58,7 @@ def replay_head(
         "packages": _packages(),
         "catalogue": load_catalogue().version,
         "law": law_values.encoded(law_values.law_values(law.controller())),
-        "files": {
-            name: base64.b85encode(zlib.compress((folder / name).read_bytes(), 9)).decode()
-            for name in about["data"]
-        },
+        "files": {name: packed((folder / name).read_bytes()) for name in about["data"]},
     }
 
 
@@ -76,7 +72,7 @@ def recorded_config(head: Mapping[str, Any]) -> Iterator[ControllerConfig]:
         places = {}
         for number, (name, data) in enumerate(head["files"].items()):
             places[name] = str(Path(folder, f"{number}-{Path(name).name}"))
-            Path(places[name]).write_bytes(zlib.decompress(base64.b85decode(data)))
+            Path(places[name]).write_bytes(unpacked(data))
         content = _put(head["about"]["configuration"], places)
         if code := next(_code(content.get("law")), None):
             raise ReplayHeadError(
@@ -111,8 +107,7 @@ def recorded_law(
 ) -> tuple[BuiltLaw, str]:
     """Return the recorded law and an empty text, or the given law and why it replaces it.
 
-    `config` is the recorded one, `law` the one designed for it here. Its controller takes the
-    recorded numbers; its `linear`, for loop analysis, stays the one designed here.
+    `law` is designed for the recorded `config` here; its `linear`, for loop analysis, stays.
     """
     if isinstance(config.law, PythonDesign):
         return law, "the law is Python code of one's own, which keeps its numbers where it likes"
@@ -145,8 +140,7 @@ def causes(head: Mapping[str, Any], config: ControllerConfig, folder: Path) -> l
         if recorded not in (None, here)
     ]
     digests = {
-        name: hashlib.sha256(zlib.decompress(base64.b85decode(data))).hexdigest()
-        for name, data in head["files"].items()
+        name: hashlib.sha256(unpacked(data)).hexdigest() for name, data in head["files"].items()
     }
     here = describe("replay", config, folder, options={})
     recorded_keys = _flat(_put(about["configuration"], digests))
@@ -175,16 +169,10 @@ def _packages() -> dict[str, str]:
 
 
 def _put(value: Any, places: Mapping[str, str]) -> Any:
-    """Return a configuration with some strings replaced."""
-    if isinstance(value, dict):
-        return {name: _put(each, places) for name, each in value.items()}
-    if isinstance(value, list):
-        return [_put(each, places) for each in value]
-    return places.get(value, value) if isinstance(value, str) else value
+    return mapped(value, lambda each: places.get(each, each) if isinstance(each, str) else each)
 
 
 def _flat(value: Any, key: str = "") -> dict[str, Any]:
-    """Yield values of a configuration by their dotted keys."""
     if not isinstance(value, dict | list):
         return {key: value}
     found: dict[str, Any] = {}

@@ -2,8 +2,8 @@
 
 A run is one entity, `/<number>/<name>`, with one component: a struct with a field for each column.
 One entity for all signals makes the file two to three times smaller at a live recorder's batch
-size. Changes of mode and fault are also logged by name, to a state lane and to a text log, which
-holds the events of retuning and alarms as well.
+size. Changes of mode and fault are also logged by name, to a state lane and to a text log of
+events.
 """
 
 import json
@@ -29,18 +29,15 @@ ABOUT: Final = "about"  #: Property that holds the origin (`utank_hil.base.prove
 LIVE_RUN: Final = "live"  #: Name of a live run, also in its recordings.
 ARCHETYPE: Final = "telemetry"
 COMPONENT: Final = "row"
-
 STATE, RETUNING, LOG = "state", "retuning", "log"
 """Names, below a run's entity, of the lanes of its state and of retuning, and of its text log."""
 STATE_COLUMNS: Final = ("mode", "fault")  #: Columns that make up the state lane of a run.
-
 PICTURES_S: Final = 60.0
 """Length of the drawings that are written to a file at once; a kill loses them, not the rows."""
 ONE_COLOR: Final = (0xE6, 0x9F, 0x00)  #: Colour of a single run.
 _ESCAPE: Final = re.compile(
     r"\\u\{(?P<code>[0-9A-Fa-f]+)\}|\\(?P<mark>.)"
 )  # an escape in entity paths
-
 _MODE_COLORS: Final = {
     Mode.INIT: 0x777777FF,
     Mode.STANDBY: 0x999999FF,
@@ -71,9 +68,8 @@ def _level(mode: float, fault: float) -> rr.TextLogLevel:
 class RunLog:
     """Writes the rows of one run.
 
-    `path` is the entity path of the run, from `run_paths`; `time_s` is among the columns of a row.
-    If the origin of the run, `about` (`utank_hil.base.provenance`), has the ship, a scene is drawn.
-    `batch_s` is the batch of figures (`Figure`); by default figures are sent at once. `color` is
+    `path` is one of `run_paths`; `time_s` is among the columns of a row. With the ship in the run's
+    origin, `about`, a scene is drawn. Figures come in batches of `batch_s` (`Figure`). `color` is
     that of the run among several, `beside` its number and that of runs (`MotionFigures`). Raises
     `ValueError` if there is no `time_s`, or a column is not in SI units.
     """
@@ -149,7 +145,6 @@ class RunLog:
     def _write_states(
         self, lane: str, time_s: FloatArray, states: FloatArray, name: Callable[..., str]
     ) -> list[str]:
-        """Log states by name to a lane and return the names."""
         names = [name(*state) for state in states]
         if names:
             columns = rr.StateChange.columns(state=names)
@@ -165,7 +160,6 @@ class RunLog:
 
 
 def _changed(states: FloatArray, before: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return which rows of states differ from the row before."""
     changed: npt.NDArray[np.bool_] = (np.diff(states, axis=0, prepend=before) != 0).any(axis=1)
     return changed
 

@@ -1,9 +1,9 @@
 """A ring of records in shared memory: one writer that never waits, any number of readers.
 
-It is a broadcast ring of slots: the writer overwrites the oldest, never blocks and has no
-information about readers. A slot holds the records of one write: several at once cost hardly more
-than one. Each reader has its own cursor, detects when the writer has overtaken it, and counts the
-slots it lost. Readers map the segment read-only, so they cannot affect the writer.
+The writer overwrites the oldest slot, never blocks and has no information about readers. A slot
+holds the records of one write: several at once cost hardly more than one. Each reader has its own
+cursor, detects when the writer has overtaken it, and counts the slots it lost. Readers map the
+segment read-only.
 
 Layout, in 8-byte words: header (`_Word`), kind and content as JSON, then the slots: room for some
 bytes and one word that closes the slot, in its upper half how many bytes there are, in its lower
@@ -12,15 +12,15 @@ part of one, fails it.
 
 Ordering. The writer stores the bytes, then the closing word, then the count of writes; a reader
 loads the count and then the slots. Count and closing word are aligned 8-byte words, which x86-64
-and AArch64 store and load atomically. x86-64 also keeps the order of stores and of loads, so a slot
-below the count is complete. AArch64 may reorder both, and Python has no memory fence: there the
-checksum decides. A slot with a wrong checksum is never returned: it was either overwritten
-meanwhile (lost, as the count shows) or is not visible yet (left for the next read).
+and AArch64 store and load atomically. x86-64 also keeps the order, so a slot below the count is
+complete. AArch64 may reorder, and Python has no memory fence: there the checksum decides. A slot
+with a wrong checksum is never returned: it was either overwritten meanwhile (lost, as the count
+shows) or is not visible yet (left for the next read).
 
 Lifetime. The writer owns the segment: `close` marks it closed and unlinks it, and attached readers
-drain the rest. If the writer is killed, its `multiprocessing` resource tracker unlinks it; if that
-is killed with it, the next writer of the same user does. Readers open the segment as a file, not as
-`SharedMemory`, whose tracker (Python below 3.13) would unlink it when a reader exits.
+drain the rest. If the writer is killed, its `multiprocessing` resource tracker unlinks it, else the
+next writer of the same user does. Readers open the segment as a file, not as `SharedMemory`, whose
+tracker (Python below 3.13) would unlink it when a reader exits.
 """
 
 import json
@@ -139,8 +139,8 @@ class RingWriter(Closing):
     def write(self, records: FloatArray | bytes | bytearray) -> None:
         """Append one or more records, overwriting the oldest if the ring is full; never blocks.
 
-        Records that do not fit into a slot go into the next ones. ValueError is raised if there are
-        no records, incomplete ones, or the ring is closed.
+        What does not fit into a slot goes into the next. ValueError is raised if there are no
+        records, incomplete ones, or the ring is closed.
         """
         data = records.tobytes() if isinstance(records, np.ndarray) else records
         if len(data) % self._record_bytes or not data:
@@ -172,11 +172,9 @@ class RingWriter(Closing):
 
 
 class RingReader(Closing):
-    """Reading end with its own cursor.
+    """Reading end with its own cursor, from `place` of another reader or the oldest slot on.
 
-    It continues at `place` of another reader, and by default starts at the oldest slot. `kind` is
-    the only accepted one. Raises `RingError` if there is no such ring, or the segment is not a ring
-    of this version and kind.
+    Raises `RingError` if there is no such ring, or it is not of this version and `kind`.
     """
 
     def __init__(self, name: str, place: int | None = None, kind: RingKind | None = None) -> None:
@@ -251,18 +249,13 @@ class RingReader(Closing):
 
 
 def held_ring(name: str) -> str:
-    """Return a name of a ring for this process, and for programs that it becomes by `exec`.
-
-    The name stays valid after the writer has closed the ring. RingError is raised without such a
-    ring.
-    """
+    """Return a name of a ring that stays valid in this process, through `exec` and writer's end."""
     descriptor = _opened(name)
     os.set_inheritable(descriptor, True)
     return f"{_HELD}{descriptor}"
 
 
 def _opened(name: str) -> int:
-    """Return the descriptor of a ring's segment for reading."""
     # Another user's file may be a pipe, which waits for a writer, or a link to a device.
     flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK
     flags |= 0 if name.startswith(_HELD) else os.O_NOFOLLOW
@@ -282,7 +275,6 @@ def ring_names() -> list[str]:
 
 
 def _first_slot_byte(text_bytes: int) -> int:
-    """Return the byte at which the slots begin, on a cache line."""
     return 8 * _HEADER_WORDS + 64 * -(-text_bytes // 64)
 
 
@@ -296,10 +288,7 @@ def _reserve(name: str, size: int) -> None:
 
 
 def _process_start(pid: int) -> int | None:
-    """Return the start of a living process, in clock ticks since boot; None if dead or a zombie.
-
-    With the pid it identifies a process uniquely, since pids are reused.
-    """
+    """Return a living process's start in clock ticks since boot, as pids are reused; else None."""
     try:
         status = Path(f"/proc/{pid}/stat").read_text()
     except (FileNotFoundError, ProcessLookupError):

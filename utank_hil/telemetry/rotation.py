@@ -1,7 +1,7 @@
 """Rotation of the files of a recording: their length, and how many are kept.
 
-A recording is a `.rrd` file, a frame log, or both under one name; they come and go together. A
-long recording has parts: `run-x.rrd`, `run-x-part002.rrd`, ...
+A recording is a `.rrd` file, a frame log, or both under one name. A long one has parts:
+`run-x.rrd`, `run-x-part002.rrd`, ...
 """
 
 from collections.abc import Iterable, Iterator
@@ -46,8 +46,8 @@ def _found(paths: Iterable[Path]) -> Iterator[tuple[Path, stat_result]]:
 def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
     """Remove the oldest recordings of a folder until its size is within a limit; return them.
 
-    `file` is a recording of the folder, existing or not, which stays; other parts of it go last.
-    Only recordings whose names begin alike, up to the first hyphen, are counted and removed.
+    Only names like that of `file` up to the first hyphen count. It stays; other parts of it go
+    last.
     """
     alike: dict[str, dict[Path, stat_result]] = {}
     for suffix in SUFFIXES:

@@ -10,10 +10,10 @@ from utank_hil.telemetry.ring import RingError, RingKind, RingReader, RingWriter
 
 
 class RowWriter(RingWriter):
-    """Writing end of a ring of rows.
+    """Writing end of a ring of rows; by default seven minutes at 20 Hz, some 2 MB.
 
-    The columns are one or more different names. The ring has `slots` rows; the default is seven
-    minutes at 20 Hz, some 2 MB. `about` is the origin of the rows (`utank_hil.base.provenance`).
+    The columns are one or more different names. `about` is the origin of the rows
+    (`utank_hil.base.provenance`).
     """
 
     def __init__(

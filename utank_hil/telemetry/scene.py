@@ -1,8 +1,7 @@
 """The rolling section of the ship, with the water in its tank: a watch-keeper's first view.
 
 It is drawn to scale, from aft, starboard to the right, centred in the ship's centre of gravity. The
-hull around the tank is a sketch; tank, water, and roll are as recorded. A light outline is the
-passive twin.
+hull is a sketch; tank, water, and roll are as recorded. A light outline is the passive twin.
 """
 
 from abc import ABC, abstractmethod
@@ -23,13 +22,11 @@ WORDS_PERIOD_S: Final = 2.0  #: Time between two texts, long enough to read them
 NEEDED: Final = (
     "roll_rad", "twin_roll_rad", "port_level_m", "starboard_level_m", "pressure_actual_pa",
 )  # fmt: skip
-
 _RMS: Final = ("roll_rms_rad", "twin_roll_rms_rad")
 RESERVOIR, _BEYOND, _KEEL = 0.16, 0.12, 0.14
 """Widths of reservoir and of hull beyond it, and depth of keel below the duct, in tank widths."""
 _ARROW: Final = 0.6  #: Length of the arrow at the pump's greatest pressure, in tank widths.
 LINES: Final = 8  #: Number of lines that fill the water of a reservoir.
-
 HULL, TWIN, WATER = (0xE0, 0xE0, 0xE0), (0x70, 0x70, 0x70), (0x56, 0xB4, 0xE9)
 LIMIT, PUMP, SEA = (0xF0, 0xE4, 0x42), (0xA0, 0x28, 0x00), (0x2A, 0x5C, 0x7A)
 
@@ -124,10 +121,10 @@ class SceneSize:
 
 
 class Figure(ABC):
-    """A figure that is redrawn at even steps of time.
+    """A figure of rows of `columns` that is redrawn every `step_s`.
 
-    `columns` are the names of a row's values; two drawings are `step_s` apart. They are sent in
-    batches of `batch_s`, the last by `close`: small chunks cost a file more than their content.
+    Drawings are sent in batches of `batch_s`, the last by `close`: small chunks cost a file more
+    than their content.
     """
 
     def __init__(self, columns: Sequence[str], step_s: float, batch_s: float) -> None:
@@ -158,10 +155,7 @@ class Figure(ABC):
 
 
 class Scene(Figure):
-    """Writes the scene of one run.
-
-    `path` is the entity path of the run. A ship that is shown `alone` has room for larger words.
-    """
+    """Writes the scene of the run of an entity path; one shown `alone` has larger words."""
 
     def __init__(
         self,
@@ -226,7 +220,6 @@ class Scene(Figure):
         send_at(self._recording, f"{self._path}/{name}", rows[:, self._at["time_s"]], columns)
 
     def _is_news(self, row: FloatArray) -> bool:
-        """Whether words are due, or mode or fault have changed."""
         now_s = row[self._at["time_s"]]
         state = (row[self._at["mode"]], row[self._at["fault"]])
         if state == self._said and now_s < self._words_due_s - 1e-9:
@@ -235,7 +228,6 @@ class Scene(Figure):
         return True
 
     def _words(self, row: FloatArray) -> str:
-        """Return mode, roll beside the twin's, and alarms as text."""
         mode, fault = int(row[self._at["mode"]]), int(row[self._at["fault"]])
         lines = [f"# {Mode(mode).name if mode in set(Mode) else mode}"]
         if fault != Fault.NONE:

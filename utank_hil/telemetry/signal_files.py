@@ -1,8 +1,7 @@
 """Signals of any supported file: recordings, frame logs, logs of the bus, tables.
 
 A run is a mapping of columns in SI units, with the unit in their names and ``time_s`` among them.
-Tables (CSV, Parquet) may have columns in other units, according to their names (``roll_deg``,
-``pressure_command_kpa``); their times are checked before use.
+Tables (CSV, Parquet) may have other units, by their names (``roll_deg``, ``pressure_command_kpa``).
 """
 
 import csv
@@ -25,10 +24,8 @@ from utank_hil.telemetry.signal_table import signal_table
 from utank_hil.telemetry.units import column_of
 
 TABLE_SUFFIXES: Final = (".csv", ".parquet")
-
 Columns = dict[str, FloatArray]
 _Column = tuple[str, FloatArray]
-
 _OTHER_UNITS: Final = {
     "_mm": ("_m", 1e-3), "_cm": ("_m", 1e-2), "_ms": ("_s", 1e-3),
     "_bar": ("_pa", 1e5), "_mbar": ("_pa", 1e2), "_mpa": ("_pa", 1e6),
@@ -51,11 +48,10 @@ def read_signals(
 ) -> dict[str, Columns]:
     """Read the runs of a file by name; a file without names has one run, named by its stem.
 
-    `path` is a recording, frame log, table, or log of the bus of any name. `note` is called with
-    what was not read as it stands: a cut, a step of a clock, and the columns of a table that hold
-    no numbers, which are an error without it. `channel` is the bus to read of a log with several,
-    `from_s` and `to_s` a part of a frame log or a log of the bus, in seconds from its first record.
-    ValueError has the file's name, the line if any, and the remedy.
+    `note` is called with what was not read as it stands: a cut, a step of a clock, and the columns
+    of a table that hold no numbers, which are an error without it. `channel` is the bus to read of
+    a log with several, `from_s` and `to_s` a part of a frame log or a log of the bus, in seconds
+    from its first record. ValueError has the file's name, the line if any, and the remedy.
     """
     suffix = kind_of(path)
     path.open("rb").close()  # Readers may give a less precise reason.
@@ -98,10 +94,7 @@ def part_of_entries(
 
 
 def write_signals(path: Path, columns: Mapping[str, FloatArray]) -> None:
-    """Write columns as a table, exactly; NaN is an empty field of a CSV and a null of Parquet.
-
-    The suffix selects the format; an existing file is overwritten.
-    """
+    """Write columns exactly, as CSV or Parquet; NaN is an empty field or a null."""
     if path.suffix.lower() == ".parquet":
         import pyarrow
         from pyarrow import parquet
@@ -124,12 +117,11 @@ def even_rows(
     from_s: float | None = None,
     to_s: float | None = None,
 ) -> Columns:
-    """Return a part of a table, with rows on an even grid that divides the sample time.
+    """Return a part of a table, with rows on an even grid that divides a law's sample time.
 
-    `path` is the table's source, for errors; the sample time is that of the law for which the ship
-    is identified. The returned ``time_s`` counts from the first row of the part. TextFileError
-    names line and remedy if the times do not rise, have a gap, or are not even, or if the sample
-    time is no whole number of their steps.
+    `path` is for errors. The returned ``time_s`` counts from the first row of the part.
+    TextFileError names line and remedy if the times do not rise, have a gap, or are not even, or if
+    the sample time is no whole number of their steps.
     """
     require(path, columns, "time_s")
     time_s = columns["time_s"]
@@ -184,10 +176,7 @@ def even_rows(
 
 
 def require(path: Path, columns: Mapping[str, FloatArray], *names: str) -> None:
-    """Raise TextFileError, with missing and present columns, for a file that lacks columns.
-
-    A level may be given as that of both gauges.
-    """
+    """Raise TextFileError for a file that lacks columns; a level may be that of both gauges."""
     for name in names:
         both = all(each in columns for each in _LEVEL_OF_GAUGES)
         if name not in columns and not (name == "level_m" and both):

@@ -56,16 +56,15 @@ class _Heard:
 
 
 def signal_table(entries: Iterable[Entry]) -> dict[str, FloatArray]:
-    """Decode the frames of a recording.
+    """Decode the frames of a recording, whatever the controller's checks said of them.
 
-    A received frame counts from the next tick on, a sent one from its own. Frames appear as they
-    were on the bus, whatever the controller's checks of counter, quality or plausibility. Returned
-    are arrays (n,), one value per tick: ``time_s`` since the first tick, the telemetry's columns,
-    and every other signal as ``<message>_<signal>``, in SI units, states and flags as numbers. NaN
-    before the first frame and where unavailable; all-NaN signals are left out.
+    A received frame counts from the next tick on, a sent one from its own. Returned are arrays
+    (n,), one value per tick: ``time_s`` since the first tick, the telemetry's columns, and every
+    other signal as ``<message>_<signal>``, in SI units, states and flags as numbers. NaN before the
+    first frame and where unavailable; all-NaN signals are left out.
     """
-    codecs = load_catalogue().codecs
-    heard = {codec.can_id: _Heard(codec) for codec in codecs.values()}
+    messages = load_catalogue().messages
+    heard = {codec.can_id: _Heard(codec) for _, _, codec in messages}
     times_ns = array("q")
     for number, data, kind, time_ns in entries:
         if kind == Kind.TICK:
@@ -74,7 +73,7 @@ def signal_table(entries: Iterable[Entry]) -> dict[str, FloatArray]:
             heard[number].add(len(times_ns) - (kind == Kind.SENT), data)
     ticks_ns = np.asarray(times_ns, dtype=np.int64)
     columns: dict[str, FloatArray] = {}
-    for (message, _), codec in codecs.items():
+    for message, _, codec in messages:
         if message is AddressClaim:
             continue
         fields: tuple[str, ...] = message._fields

@@ -1,8 +1,7 @@
-"""Display units and plots of telemetry columns.
+"""Display units and plots of telemetry columns, by the suffix of their names alone.
 
-Columns carry SI values and end in their unit (`roll_rad`); recordings hold the displayed values
-(`roll_deg`), because the viewer cannot convert. The suffix alone determines unit and plot, so a new
-column needs no entry here.
+Columns carry SI values (`roll_rad`); recordings hold the displayed values (`roll_deg`), because the
+viewer cannot convert.
 """
 
 import math

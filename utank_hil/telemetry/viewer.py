@@ -34,10 +34,7 @@ class Viewer(Closing):
         self.ports = ports  #: Ports on loopback that such a browser needs.
 
     def wait(self, longest_s: float) -> bool:
-        """Wait for the end of the viewer and return whether it ended, closed or failed.
-
-        One in a browser runs until `close`.
-        """
+        """Wait for the end of the viewer, in a browser by `close`, and return whether it ended."""
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(longest_s)
         return self._process.poll() is not None
@@ -58,10 +55,10 @@ class Viewer(Closing):
 def open_viewer(source: Path | str, at_s: float | None = None, *, window: bool = True) -> Viewer:
     """Show a recording or a live stream in a window, or in a browser if there is no display.
 
-    Without a display the viewer is served on loopback at `Viewer.url`, for a browser on this
-    machine or through an ssh tunnel. FileNotFoundError is raised if there is no such file. `source`
-    is a file, or the `url` of a `LiveStream`; `at_s` the position of the cursor in a recording, by
-    default its beginning; `window` says whether a window is allowed.
+    In a browser it is served on loopback at `Viewer.url`, for this machine or an ssh tunnel.
+    FileNotFoundError is raised if there is no such file. `source` is a file, or the `url` of a
+    `LiveStream`; `at_s` the position of the cursor in a recording, by default its beginning;
+    `window` says whether a window is allowed.
     """
     if isinstance(source, Path) and not source.is_file():
         raise FileNotFoundError(f"no recording {source}")
@@ -123,8 +120,8 @@ def live_url(port: int) -> str:
 def hold_port() -> socket.socket:
     """Return a socket that holds a free TCP port of the loopback interface until it is closed.
 
-    It does not listen. A server with SO_REUSEADDR, as Rerun's, may listen on the port; the kernel
-    assigns it to no other socket.
+    A server with SO_REUSEADDR, as Rerun's, may listen on it; the kernel gives it to no other
+    socket.
     """
     held = socket.socket()
     held.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

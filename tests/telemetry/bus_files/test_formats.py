@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from utank_hil.base.text_files import TextFileError
-from utank_hil.telemetry.bus_files import blf as blf_files
+from utank_hil.telemetry.bus_files import binary
 from utank_hil.telemetry.bus_files.frame import FD_LENGTHS, BusFrame, BusLogError, FrameKind
 from utank_hil.telemetry.bus_files.log import BusLog
 from utank_hil.telemetry.bus_files.writing import write_frames
@@ -216,7 +216,7 @@ def test_a_cut_blf_is_read_up_to_there_and_a_damaged_one_is_an_error(
             read(tmp_path, blf(blf_message(1) + blf_message(2, size=size)), "a.blf")
     with pytest.raises(BusLogError, match="no object where one should begin"):
         read(tmp_path, blf(blf_message(1) + bytes(60)), "a.blf")
-    monkeypatch.setattr(blf_files, "_LIMIT", 1000)
+    monkeypatch.setattr(binary, "_LIMIT", 1000)
     with pytest.raises(BusLogError, match="more than 1000 bytes"):
         read(tmp_path, blf(blf_message(1), bytes(2000)), "a.blf")
 

@@ -3,8 +3,13 @@
 import re
 from typing import Final
 
-from utank_hil.telemetry.bus_files.frame import BusFrame, FrameKind, time_ns
-from utank_hil.telemetry.bus_files.text_log import NotReadableError, NotUnderstoodError
+from utank_hil.telemetry.bus_files.frame import (
+    BusFrame,
+    FrameKind,
+    NotReadableError,
+    NotUnderstoodError,
+    time_ns,
+)
 
 LOOKS: Final = re.compile(r"(date\s+\S+\s|base\s+(hex|dec)\b|\s*-?[\d.,]+\s+(\d+|CANFD)\s)", re.I)
 """What a line of such a log looks like."""
@@ -96,7 +101,6 @@ class AscParser:
 
 
 def _whole(text: str, base: int) -> int:
-    """Return a number; -1 if there is none in this base."""
     try:
         return int(text, base)
     except ValueError:
@@ -104,7 +108,6 @@ def _whole(text: str, base: int) -> int:
 
 
 def _why(words: list[str]) -> str:
-    """Return why a line that looks like a frame is none."""
     if not {"rx", "tx"} & {word.lower() for word in words}:
         return "says neither Rx nor Tx"
     identifier = words[2 + 2 * (words[1].upper() == "CANFD")]

@@ -3,8 +3,14 @@
 import re
 from typing import Final
 
-from utank_hil.telemetry.bus_files.frame import FD_LENGTHS, BusFrame, FrameKind, time_ns
-from utank_hil.telemetry.bus_files.text_log import NotReadableError, NotUnderstoodError
+from utank_hil.telemetry.bus_files.frame import (
+    FD_LENGTHS,
+    BusFrame,
+    FrameKind,
+    NotReadableError,
+    NotUnderstoodError,
+    time_ns,
+)
 
 LOOKS: Final = re.compile(
     r"\s*\([^)]*\)\s+\S+\s+(\S+#|.*[\[{]\d)|\s*\S+\s+([0-9A-F]{3}|[0-9A-F]{8})\s+\[\d+\]", re.I
@@ -66,7 +72,6 @@ def parse(line: str) -> BusFrame | None:
 
 
 def _explained(line: str) -> ValueError:
-    """Return why a line is no frame."""
     if _TIMELESS.match(line):
         return NotReadableError("has no times: log with candump -l, or show them by candump -ta")
     stamp = _STAMPED.match(line)

@@ -24,8 +24,8 @@ _SHOWN: Final = 3  #: Number of steps that are reported one by one.
 class OneClock:
     """Frames of a log of this name with times on one clock, in the order of the file.
 
-    `place` returns the place of the frame that was read last. What was found is in `notes`, after
-    the last frame. The iteration raises BusLogError if the times can't be trusted.
+    `place` returns the place of the last frame; `notes` are complete after it. The iteration raises
+    BusLogError if the times can't be trusted.
     """
 
     def __init__(self, name: str, source: Iterable[BusFrame], place: Callable[[], str]) -> None:

@@ -7,10 +7,15 @@ from pathlib import Path
 from typing import Final
 
 from utank_hil.base.text_files import open_content, open_text
-from utank_hil.telemetry.bus_files import asc, blf, candump, mf4, savvycan, trc
+from utank_hil.telemetry.bus_files import asc, binary, candump, savvycan, trc
 from utank_hil.telemetry.bus_files.clock import OneClock
-from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError, FrameSource
-from utank_hil.telemetry.bus_files.text_log import LIMIT_BYTES, TextLog
+from utank_hil.telemetry.bus_files.frame import (
+    LIMIT_BYTES,
+    BusFrame,
+    BusLogError,
+    FrameSource,
+    TextLog,
+)
 
 READ: Final = "candump, ASC, BLF, MF4, PEAK's .trc and SavvyCAN's .csv"  #: Formats that are read.
 _LOOKS: Final[dict[str, re.Pattern[str]]] = {
@@ -19,7 +24,7 @@ _LOOKS: Final[dict[str, re.Pattern[str]]] = {
     "candump": candump.LOOKS,
     "asc": asc.LOOKS,
 }
-_MARKS: Final = {blf.MARK: "blf", mf4.MARK: "mf4"}
+_MARKS: Final = {binary.BLF_MARK: "blf", binary.MF4_MARK: "mf4"}
 _LOOKED_AT: Final = 1 << 16  #: Characters at the begin of a file that show its format.
 
 
@@ -49,10 +54,9 @@ class BusLog:
     to_s: float | None = None
 
     def frames(self, notes: list[str] | None = None) -> Iterator[BusFrame]:
-        """Yield the frames in the order of the file, on one clock.
+        """Yield the frames in the order of the file, on one clock; `notes` gets what was found.
 
-        What was found is appended to `notes`, after the last frame. BusLogError is raised if it is
-        no log, holds no such frames, or its times can't be trusted.
+        BusLogError is raised if it is no log, has no such frames, or its times can't be trusted.
         """
         source = self._source()
         others: set[str] = set()
@@ -91,9 +95,9 @@ class BusLog:
     def _source(self) -> FrameSource:
         name = format_of(self.path)
         if name == "blf":
-            return blf.BlfLog(self.path)
+            return binary.BlfLog(self.path)
         if name == "mf4":
-            return mf4.Mf4Log(self.path)
+            return binary.Mf4Log(self.path)
         if name == "candump":
             return TextLog(self.path, candump.parse, counted=False)
         if name == "savvycan":
@@ -107,7 +111,6 @@ class BusLog:
 
 
 def _begin(path: Path) -> list[str]:
-    """Return the first lines that are not blank."""
     with open_text(path, LIMIT_BYTES, _ignored, errors="replace") as text:
         return [line for line in text.read(_LOOKED_AT).splitlines() if line.strip()]
 

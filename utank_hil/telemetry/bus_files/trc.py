@@ -3,8 +3,7 @@
 import re
 from typing import Final
 
-from utank_hil.telemetry.bus_files.frame import FD_LENGTHS, BusFrame, FrameKind
-from utank_hil.telemetry.bus_files.text_log import NotUnderstoodError
+from utank_hil.telemetry.bus_files.frame import FD_LENGTHS, BusFrame, FrameKind, NotUnderstoodError
 
 LOOKS: Final = re.compile(r";\$FILEVERSION=|;#{20}|\s*\d+\)\s+\d")
 """Look of a line of such a log."""

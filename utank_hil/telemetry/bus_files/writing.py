@@ -19,8 +19,8 @@ def write_frames(path: Path, frames: Iterable[BusFrame], notes: list[str] | None
     """Write frames to a file, overwriting it, and return their number.
 
     The suffix, of `SUFFIXES`, says the format; what it can't hold is appended to `notes`. Times are
-    kept to a microsecond. candump has them as they are. ASC counts from the millisecond of the
-    first frame where they are times of the day, BLF notes that in its head.
+    kept to a microsecond: in candump as they are; in ASC from the millisecond of the first frame
+    where they are times of the day; BLF notes that in its head.
     """
     suffix = path.suffix.lower()
     writer = {".log": _Candump, ".asc": _Asc, ".blf": _Blf}[suffix]
@@ -64,7 +64,6 @@ class _Writer:
         raise NotImplementedError
 
     def _microseconds(self, time_ns: int) -> int:
-        """Return a time rounded, from the origin on."""
         time_us = (time_ns - (self._origin_ns or 0) + 500) // 1000
         if time_us < 0:
             self._lost["stamps are before the log's start and written as that"] += 1

@@ -1,17 +1,26 @@
-"""Logs in BLF, the binary format of Vector's programs: objects in compressed containers."""
+"""Logs in binary formats: BLF of Vector's programs, and MDF 4 (``.mf4``)."""
 
 import zlib
 from collections.abc import Iterator
 from datetime import UTC, datetime
-from pathlib import Path
+from importlib import reload
+from importlib.util import find_spec
 from struct import Struct
 from typing import BinaryIO, Final
 
 from utank_hil.base.text_files import open_content
-from utank_hil.telemetry.bus_files.frame import FD_LENGTHS, BusFrame, BusLogError, FrameKind
-from utank_hil.telemetry.bus_files.text_log import LIMIT_BYTES
+from utank_hil.telemetry.bus_files.frame import (
+    FD_LENGTHS,
+    LIMIT_BYTES,
+    BusFrame,
+    BusLogError,
+    FrameKind,
+    FrameSource,
+    of_message,
+)
 
-MARK: Final = b"LOGG"
+BLF_MARK: Final = b"LOGG"
+MF4_MARK: Final = b"MDF "
 _FILE: Final = Struct("<4sL32x8H")  # mark, size of the head; when the log was begun
 _OBJECT: Final = Struct("<4sHHLL")  # mark, size of the head, its version, size, type
 _TIME: Final = Struct("<L4xQ")  # flags; time
@@ -27,20 +36,10 @@ _MASK: Final = 0x1FFFFFFF
 _TICK_NS: Final = 10_000  #: Unit of time of objects with the flag 1; of others it is 1 ns.
 
 
-class BlfLog:
-    """Frames of a BLF file; objects of other types are not frames and are passed by.
+class BlfLog(FrameSource):
+    """Frames of a BLF file; BusLogError if there is none before the first damaged object."""
 
-    The iteration raises BusLogError if there is no frame before the first damaged object.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.notes: list[str] = []
-        self._path, self._count, self._byte = path, 0, 0
-
-    @property
-    def place(self) -> str:
-        """Number of the last frame."""
-        return f"frame {self._count}"
+    _byte = 0
 
     def __iter__(self) -> Iterator[BusFrame]:
         cut = ""
@@ -66,7 +65,7 @@ class BlfLog:
 
     def _begin_ns(self, content: BinaryIO) -> int:
         head = content.read(_FILE.size)
-        if len(head) < _FILE.size or head[:4] != MARK:
+        if len(head) < _FILE.size or head[:4] != BLF_MARK:
             raise BusLogError(f"{self._path}: is no BLF file, or its head is cut")
         _, size, year, month, _, *day_to_milliseconds = _FILE.unpack(head)
         self._byte = len(head) + len(content.read(max(0, min(size, _LIMIT) - len(head))))
@@ -141,7 +140,6 @@ def _unpacked(body: bytes) -> bytes:
 
 
 def _frame(kind: int, head_size: int, body: bytes, begin_ns: int) -> BusFrame | None:
-    """Return the frame of an object; None if it is of another type."""
     layout = {1: _CLASSIC, 86: _CLASSIC, 100: _FD, 101: _FD_64, 73: _ERROR, 2: None}.get(kind, 0)
     if layout == 0:
         return None
@@ -177,3 +175,29 @@ def _frame(kind: int, head_size: int, body: bytes, begin_ns: int) -> BusFrame | 
     bus, value, extended = str(channel), number & _MASK, bool(number & _EXTENDED)
     code = min(code, 15)
     return BusFrame(now_ns, bus, value, extended, of_kind, data, code, bool(sent), speed)
+
+
+class Mf4Log(FrameSource):
+    """Frames of an MF4 file; BusLogError if it can't be read to its end or holds no frames."""
+
+    def __iter__(self) -> Iterator[BusFrame]:
+        import can.io.mf4
+
+        if find_spec("asammdf") is None:  # The reader would not name the package.
+            raise ModuleNotFoundError("asammdf is not installed", name="asammdf")
+
+        # It was imported without asammdf (`utank_hil.canbus.socketcan`).
+        reader = reload(can.io.mf4).MF4Reader
+        try:
+            with reader(self._path) as messages:
+                for message in messages:
+                    self._count += 1
+                    yield of_message(message, str(message.channel))
+        except OSError:
+            raise
+        except Exception as error:  # The readers raise many kinds of exception at damaged bytes.
+            raise BusLogError(
+                f"{self._path}: can't be read as MF4 after frame {self._count}"
+            ) from error
+        if not self._count:
+            raise BusLogError(f"{self._path}: no frames of a bus in it")
