@@ -8,6 +8,7 @@ import re
 import socket
 import subprocess
 import sys
+import zipfile
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -131,7 +132,30 @@ def test_commit_is_that_of_the_tree_and_unknown_where_there_is_none(
     (tmp_path / ".git").mkdir()
     commit.cache_clear()
     assert commit() == "unknown"  # no repository
+    (tmp_path / ".git").rmdir()
+    (tmp_path / "utank_hil").mkdir()
+    (tmp_path / "utank_hil" / "commit.txt").write_text("v1.2-3-g0123456789ab\n")
     commit.cache_clear()
+    assert commit() == "v1.2-3-g0123456789ab"  # as a wheel brings it
+    commit.cache_clear()
+
+
+def test_a_wheel_brings_its_commit_configurations_and_pages(tmp_path: Path) -> None:
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--quiet"]
+    source = Path(__file__).parents[2]
+    copy = tmp_path / "source"
+    subprocess.run(["git", "clone", "--quiet", "--depth=1", f"file://{source}", copy], check=True)
+    options = ["--no-deps", "--no-build-isolation", "-w", str(tmp_path), str(copy)]
+    subprocess.run([*pip, *options], check=True)
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as names:
+        commit_of_wheel = names.read("utank_hil/commit.txt").decode().strip()
+        found = {name.partition("/share/utank-hil/")[2] for name in names.namelist()}
+    head = subprocess.run(
+        ["git", "-C", copy, "rev-parse", "HEAD"], capture_output=True, text=True, check=True
+    ).stdout
+    assert head.startswith(commit_of_wheel.rpartition("-g")[2])
+    assert {"configs/scenarios/storm.yaml", "docs/deployment.md", "docs/how-to/buy.md"} <= found
 
 
 @pytest.mark.parametrize("application", [app, ship_app], ids=["utank-hil", "firmware-sim"])

@@ -40,7 +40,8 @@ def commit() -> str:
     """The commit that the program is of.
 
     As ``git describe`` says it of the source tree, with ``-dirty`` if that was changed since; else
-    the one that pip noted when it installed from a repository; else `UNKNOWN`.
+    the one that the wheel was built from; else the one that pip noted when it installed from a
+    repository; else `UNKNOWN`.
     """
     if (_ROOT / ".git").exists():
         try:
@@ -50,6 +51,9 @@ def commit() -> str:
         except (OSError, subprocess.SubprocessError):
             return UNKNOWN
         return f"{tree}-dirty" if changed else tree
+    of_wheel = _ROOT / "utank_hil" / "commit.txt"
+    if of_wheel.exists():
+        return of_wheel.read_text(encoding="utf-8").strip()
     try:
         origin = importlib.metadata.distribution(PROGRAM).read_text("direct_url.json")
     except importlib.metadata.PackageNotFoundError:

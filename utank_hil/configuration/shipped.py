@@ -1,11 +1,16 @@
-"""Place of the shipped configurations."""
+"""Places of the shipped configurations and pages."""
 
-import sys
 from pathlib import Path
 from typing import Final
 
-_CHECKOUT: Final = Path(__file__).resolve().parents[2] / "configs"
-CONFIGS: Final = (
-    _CHECKOUT if _CHECKOUT.is_dir() else Path(sys.prefix) / "share" / "utank-hil" / "configs"
-)
-"""Folder of the shipped configurations: in the checkout, or installed with the package."""
+_HERE: Final = Path(__file__).resolve()
+_PLACES: Final = [
+    _HERE.parents[2],
+    *(above / "share" / "utank-hil" for above in _HERE.parents),
+]
+# a checkout has both, an installation has them below its prefix, whichever that is
+_SHARE: Final = next((place for place in _PLACES if (place / "configs").is_dir()), _PLACES[0])
+CONFIGS: Final = _SHARE / "configs"
+"""Folder of the shipped configurations."""
+DOCS: Final = _SHARE / "docs"
+"""Folder of the pages that messages point to."""

@@ -1,0 +1,28 @@
+"""What a wheel has and a checkout has not: the commit that it was built from, as a file."""
+
+import subprocess
+from pathlib import Path
+
+from setuptools import setup
+from setuptools.command.build_py import build_py
+
+
+class BuildWithCommit(build_py):
+    """Copies the packages and writes ``utank_hil/commit.txt`` beside them."""
+
+    def run(self) -> None:
+        """Build as setuptools does, then note the commit, where there is one."""
+        super().run()
+        if self.editable_mode or not (Path(__file__).parent / ".git").exists():
+            return
+        described = subprocess.run(
+            ["git", "describe", "--always", "--abbrev=12", "--dirty"],
+            cwd=Path(__file__).parent,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        Path(self.build_lib, "utank_hil", "commit.txt").write_text(described, encoding="utf-8")
+
+
+setup(cmdclass={"build_py": BuildWithCommit})
