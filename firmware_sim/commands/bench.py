@@ -10,9 +10,9 @@ import typer
 from rich.progress import TaskProgressColumn
 
 from utank_hil.base.provenance import describe
+from utank_hil.base.shipped import CONFIGS
 from utank_hil.commands.monitor import watch
 from utank_hil.configuration.files import files_named
-from utank_hil.configuration.shipped import CONFIGS
 from utank_hil.console.admission import admit
 from utank_hil.console.common import (
     OUT,

@@ -12,7 +12,7 @@ import typer
 from rich.progress import MofNCompleteColumn
 
 from utank_hil.base.provenance import describe
-from utank_hil.configuration.shipped import CONFIGS
+from utank_hil.base.shipped import CONFIGS
 from utank_hil.console.common import Json, fail, load, prepare_out, why
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.failures import KILLED

@@ -19,6 +19,7 @@ from can.interfaces.socketcan import SocketcanBus
 
 from firmware_sim.fault_campaign.campaign import LiveRow
 from firmware_sim.fault_campaign.live_log import HELD_UP_S, LiveLog, LiveTimes, Stream, times_of
+from utank_hil.base.shipped import CONFIGS
 from utank_hil.canbus import (
     ControllerStatus,
     DriveState,
@@ -30,7 +31,6 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.canbus.socketcan import SocketCanPort
-from utank_hil.configuration.shipped import CONFIGS
 
 STORM: Final = CONFIGS / "scenarios" / "storm.yaml"
 CONTROLLER: Final = CONFIGS / "controllers" / "gpc.yaml"

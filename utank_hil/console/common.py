@@ -18,6 +18,7 @@ from typer.core import TyperGroup
 from utank_hil.base.finite import finite
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import headline
+from utank_hil.base.shipped import DOCS
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import notes, shown
 
@@ -83,6 +84,7 @@ def new_app(
         rich_markup_mode="markdown",
         context_settings={"help_option_names": ["-h", "--help"]},
         help=help_text,
+        epilog=f"Pages that messages point to (docs/): {DOCS}",
     )
 
 
