@@ -103,7 +103,7 @@ def make_starter(
         displacement_t=ship.displacement_t,
         gm_m=ship.gm_m,
         roll_period_s=float(f"{ship.period_s:.4g}"),
-        damping_ratio=ship.roll_damping_ratio,
+        damping_ratio=ship.damping[0],
     )
     bare = written.ship()
     sized = size_tank(bare, room, stability_share)

@@ -38,6 +38,7 @@ def ship_file(
     tank, bare = sized.tank, written.ship()
     water_t = water_moments(tank, 0.0).mass_kg / 1e3
     share, taken = water_t / ship.displacement_t, stability_taken(bare, tank)
+    damping_ratio, where_from = ship.damping
     period = "as given"
     if ship.roll_period_s is None:
         period = "weather criterion's formula (IS Code 2008, A 2.3.4): measure it"
@@ -52,7 +53,8 @@ ship:  # without the tank's water
   displacement_t: {number(ship.displacement_t)}
   gm_m: {number(ship.gm_m)}
   roll_period_s: {number(written.roll_period_s)}  # {period}
-  damping_ratio: {number(ship.roll_damping_ratio)}  # of the roll: a decay test tells
+  damping_ratio: {number(damping_ratio)}  # of the roll: a decay test tells
+  # {where_from}
 # Room: {room.breadth_m:.2f} m across, {room.height_m:.2f} m high, {length_m:.2f} m along the ship.
 # Size by {sized.bound_by}.
 # Water {water_t:.1f} t, {share:.1%} of the displacement.

@@ -54,7 +54,13 @@ def init(
         ),
     ] = None,
     draught: Annotated[float | None, typer.Option(help="Mean moulded draught, m.")] = None,
-    roll_damping: Annotated[float, typer.Option(help="Damping ratio of the roll.")] = 0.05,
+    roll_damping: Annotated[
+        float | None,
+        typer.Option(
+            help="Damping ratio of the roll.",
+            show_default="Ikeda's method, with --draught; else 0.05",
+        ),
+    ] = None,
     tank_breadth: Annotated[
         float | None,
         typer.Option(help="Room across the ship, m.", show_default="0.9 of the beam"),
