@@ -1,6 +1,7 @@
 """Estimated roll damping against values computed elsewhere and against measurements."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -37,12 +38,14 @@ def test_parts_are_those_of_another_computation(hull, roll, expected) -> None:
     assert [1e3 * part for part in parts] == pytest.approx(expected, abs=6e-4)
 
 
-def test_a_tanker_outside_the_ranges_gets_nearly_twice_what_was_measured() -> None:
-    # the bare KVLCC2, 1:68, at 9 degrees: 1.62e-3 measured, 2.99e-3 published for the regression
+def test_a_tanker_outside_the_ranges_is_estimated_at_their_end() -> None:
+    # the bare KVLCC2, 1:68, at 9 degrees: 1.62e-3 measured; the formula beyond its range 2.99e-3
     tanker = HullForm(320 / 68, 58 / 68, 20.8 / 68, 0.8098, 0.998, (20.8 - 18.6) / 68)
     frequency = 2 * math.pi / 2.5532
     found = estimated_roll_damping(tanker, math.radians(9), frequency).total
-    assert 1e3 * found == pytest.approx(2.99, rel=0.03)
+    assert 1.62 < 1e3 * found < 1.62 * 2  # the factor that is said outside
+    within = replace(tanker, midship_coefficient=0.99)
+    assert found == estimated_roll_damping(within, math.radians(9), frequency).total
     assert tanker.outside(frequency) == ["midship coefficient 0.998, made for 0.9 to 0.99"]
     assert PATROL.outside(2 * math.pi / 10) == []
 

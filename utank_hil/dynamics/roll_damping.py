@@ -5,18 +5,18 @@ Ships on the Basis of Ikeda's Method and Its Limitation*, STAB 2009, from main p
 speed. The coefficients below are those of the authors' program. A coefficient is made non-
 dimensional by ``rho V B^2 sqrt(2 g / B)``.
 
-How good it is: a bare tanker measured 1.62e-3 at 9 degrees where the regression gives 2.99e-3, and
-Ikeda's full method 1.07e-3. So an estimate carries a factor of 1.5 either way, outside the
+How good it is: a bare tanker measured 1.62e-3 at 9 degrees where this gives 2.53e-3, and Ikeda's
+full method 1.07e-3. So an estimate carries a factor of 1.5 either way, outside the
 regression's ranges 2.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 WATER_KG_M3: Final = 1025.0
@@ -28,7 +28,7 @@ RANGES: Final = {
     "block coefficient": (0.5, 0.85),
     "midship coefficient": (0.9, 0.99),
     "roll axis below the waterline per draught": (-1.5, 0.2),
-    "roll frequency times sqrt(beam / 2 g)": (0.0, 1.0),
+    "roll frequency times sqrt(beam / 2 g)": (0.1, 1.0),
     "keel breadth per beam": (0.01, 0.06),
     "keel length per length": (0.05, 0.4),
 }
@@ -112,7 +112,7 @@ class HullForm:
         """
         volume_m3 = 1e3 * displacement_t / WATER_KG_M3
         block = volume_m3 / (length_m * beam_m * draught_m)
-        midship = 1.006 - 0.0056 * block**-3.56
+        midship = max(1.006 - 0.0056 * block**-3.56, 0.5)
         waterline = (1 + 2 * block) / 3
         buoyancy_m = draught_m * (0.9 - 0.3 * midship - 0.1 * block)
         inertia_m4 = length_m * beam_m**3 / 12 * (0.096 + 0.89 * waterline**2)
@@ -171,14 +171,20 @@ class RollDamping:
 def estimated_roll_damping(
     hull: HullForm, amplitude_rad: float, frequency_rad_s: float
 ) -> RollDamping:
-    """Estimate the equivalent damping of a roll of one amplitude and frequency at zero speed."""
-    bd, cb, cm, ogd, omega, breadth, length = hull._ratios(frequency_rad_s)
+    """Estimate the equivalent damping of a roll of one amplitude and frequency at zero speed.
+
+    A ratio outside its range counts as the range's end: the polynomials say nothing beyond.
+    """
+    bd, cb, cm, ogd, omega, breadth, length = (
+        min(max(ratio, least), most)
+        for ratio, (least, most) in zip(hull._ratios(frequency_rad_s), RANGES.values(), strict=True)
+    )
     degrees = math.degrees(amplitude_rad)
     return RollDamping(
         _friction(hull, amplitude_rad, frequency_rad_s),
         _wave(bd, cb, cm, ogd, omega),
         _eddy(bd, cb, cm, ogd) * omega * amplitude_rad,
-        _keels(bd, cb, cm, ogd, breadth, length, degrees) * omega if breadth else 0.0,
+        _keels(bd, cb, cm, ogd, breadth, length, degrees) * omega if hull.keel_breadth_m else 0.0,
     )
 
 
@@ -195,50 +201,55 @@ def _friction(hull: HullForm, amplitude_rad: float, frequency_rad_s: float) -> f
     return 1.328 / math.sqrt(reynolds) * moment / made_of * math.sqrt(hull.beam_m / _2G)
 
 
+def _polynomial(coefficients: Sequence[float], at: float) -> float:
+    """Polynomial, the highest power first."""
+    return float(np.polyval(np.array(coefficients), at))
+
+
 def _of_both(table: tuple[tuple[float, ...], ...], outer: float, inner: float) -> float:
     """Polynomial in `outer` whose coefficients are polynomials in `inner`."""
-    return float(np.polyval([np.polyval(row, inner) for row in table], outer))
+    return _polynomial([_polynomial(row, inner) for row in table], outer)
 
 
 def _wave(bd: float, cb: float, cm: float, ogd: float, omega: float) -> float:
     height = 1 - ogd
     midship = _of_both(_AA11, cb, bd) * cm + _of_both(_AA12, cb, bd)
-    a1 = np.polyval([_of_both(table, cb, bd) for table in (_A11, _A12, _A13)], height)
+    a1 = _polynomial([_of_both(table, cb, bd) for table in (_A11, _A12, _A13)], height)
     a1 *= midship * (1 - height) + 1
-    a2 = np.polyval((-1.402, 7.189, -10.993, 9.45), height)
+    a2 = _polynomial((-1.402, 7.189, -10.993, 9.45), height)
     a3 = _of_both(_A3, cb, height) + _wave_shift(bd, cb, height)
-    return float(a1 / omega * np.exp(-a2 * (math.log(omega) - a3) ** 2 / 1.44))
+    return a1 / omega * math.exp(-a2 * (math.log(omega) - a3) ** 2 / 1.44)
 
 
-def _wave_shift(bd: float, cb: float, height: float) -> FloatArray:
-    block = np.polyval((-17.102, 41.495, -33.234, 8.8007), cb) * height
-    block += np.polyval((36.566, -89.203, 71.8, -18.108), cb)
-    scale = np.polyval((-0.3767, 3.39, -10.356, 11.588), bd) * block
-    moved = height - np.polyval((-0.0727, 0.7, -1.2818), bd)
-    last = np.polyval((-0.0495, 0.4518, -0.61655), bd)
-    return np.asarray(scale * np.polyval((*_AA3, last), moved))
+def _wave_shift(bd: float, cb: float, height: float) -> float:
+    block = _polynomial((-17.102, 41.495, -33.234, 8.8007), cb) * height
+    block += _polynomial((36.566, -89.203, 71.8, -18.108), cb)
+    scale = _polynomial((-0.3767, 3.39, -10.356, 11.588), bd) * block
+    moved = height - _polynomial((-0.0727, 0.7, -1.2818), bd)
+    last = _polynomial((-0.0495, 0.4518, -0.61655), bd)
+    return scale * _polynomial((*_AA3, last), moved)
 
 
 def _eddy(bd: float, cb: float, cm: float, ogd: float) -> float:
     a = (-0.0182 * cb + 0.0155) * (bd - 1.8) ** 3
-    a += np.polyval((-79.414, 215.695, -215.883, 93.894, -14.848), cb)
+    a += _polynomial((-79.414, 215.695, -215.883, 93.894, -14.848), cb)
     b1 = (3.98 * cb - 5.1525) * (1.6 - 0.2 * bd) * ogd
-    b1 *= np.polyval((0.9717, -1.55, 0.723), cb) * ogd + 0.04567 * cb + 0.9408
-    b2 = (0.25 * ogd + 0.95) * ogd + np.polyval((-219.2, 443.7, -283.3, 59.6), cb)
+    b1 *= _polynomial((0.9717, -1.55, 0.723), cb) * ogd + 0.04567 * cb + 0.9408
+    b2 = (0.25 * ogd + 0.95) * ogd + _polynomial((-219.2, 443.7, -283.3, 59.6), cb)
     b3 = -15 * cb * bd + 46.5 * cb + 11.2 * bd - 28.6
-    return float(4 * a * np.exp(b1 + b2 * cm**b3) / (3 * math.pi * cb * bd**3))
+    return 4 * a * math.exp(b1 + b2 * cm**b3) / (3 * math.pi * cb * bd**3)
 
 
 def _keels(
     bd: float, cb: float, cm: float, ogd: float, breadth: float, length: float, degrees: float
 ) -> float:
     a = (0.3907 - 0.3651 * cb) * (bd - 2.83) ** 2 - 2.21 * cb + 2.632
-    a *= np.polyval((0.00255, 0.122, 0.4794), degrees)
+    a *= _polynomial((0.00255, 0.122, 0.4794), degrees)
     a *= (
-        np.polyval((-0.8913, -0.0733, 0), breadth) * length**2
-        + np.polyval((5.2857, -0.01185, 0.00189), breadth) * length
+        _polynomial((-0.8913, -0.0733, 0), breadth) * length**2
+        + _polynomial((5.2857, -0.01185, 0.00189), breadth) * length
     )
     b1 = 5 * breadth + 0.3 * bd - 0.2 * length
-    b1 = (b1 + np.polyval((0.00125, -0.0425, -1.86), degrees)) * ogd
-    b2 = -15 * breadth + 1.2 * cb - 0.1 * bd + np.polyval((-0.0657, 0.0586, 1.6164), ogd)
-    return float(a * np.exp(b1 + b2 * cm ** (2.5 * ogd + 15.75)))
+    b1 = (b1 + _polynomial((0.00125, -0.0425, -1.86), degrees)) * ogd
+    b2 = -15 * breadth + 1.2 * cb - 0.1 * bd + _polynomial((-0.0657, 0.0586, 1.6164), ogd)
+    return a * math.exp(b1 + b2 * cm ** (2.5 * ogd + 15.75))
