@@ -4,6 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Final
 
+from firmware_sim.canopen_drive import CanopenPumpDrive
 from firmware_sim.drive import PumpDrive
 from firmware_sim.external_nodes import ExternalDrive, ExternalValve
 from firmware_sim.hardwired import HardwiredNode
@@ -35,7 +36,7 @@ class ShipSide:
     vessel: Vessel
     plant: Plant
     sensors: SensorNode
-    drive: PumpDrive | None
+    drive: PumpDrive | CanopenPumpDrive | None
     panel: OperatorPanel
     valve: ValveNode | None = None
     second_motion: SensorNode | None = None
@@ -103,8 +104,11 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
     )
     version = vessel.version
     foreign = vessel.foreign
-    drive = valve = None
-    if vessel.pump is not None:
+    drive: PumpDrive | CanopenPumpDrive | None = None
+    valve = None
+    if vessel.pump is not None and foreign.pump is not None:
+        drive = CanopenPumpDrive(plant, vessel.pump, foreign.pump)
+    elif vessel.pump is not None:
         drive = PumpDrive(plant, scenario.drive, catalogue, configuration_version=version)
     if vessel.valve is not None:
         valve = ValveNode(

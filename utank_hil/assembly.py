@@ -17,12 +17,15 @@ from utank_hil.base.parameters import ParameterError
 from utank_hil.base.tick import TICK_S, is_whole_ticks
 from utank_hil.canbus import load_catalogue
 from utank_hil.canbus.measurements import MEASURED, Measurements, MotionSample
+from utank_hil.canbus.profiles.drive_plan import COMMAND_MS
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign
 from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.interface import PRESSURE, VALVE
 from utank_hil.control.level_observer import LevelObserver
+from utank_hil.control.pressure_loop import PressureLoop
 from utank_hil.nodes.actuators import Actuators
+from utank_hil.nodes.canopen_drive import CanopenDrive
 from utank_hil.nodes.commissioning.node import CommissioningNode
 from utank_hil.nodes.commissioning.pulses import PulseLaw, plan_pulses, plan_stroke
 from utank_hil.nodes.controller import ControllerNode, ControllerSettings
@@ -201,6 +204,11 @@ def build_controller_node(
         else ExchangedLaw(exchange, measure, limits=config.safety, thresholds=thresholds)
     )
     limiter = CommandLimiter(config.limits, tank, TICK_S)
+    foreign, drive = vessel.foreign, None
+    if foreign.pump is not None and vessel.pump is not None:
+        plan = foreign.pump
+        loop = PressureLoop(vessel.pump, COMMAND_MS * 1e-3, plan.delay_s, torque=plan.mode.torque)
+        drive = CanopenDrive(plan, loop, tank.reservoir_area_m2)
     return ControllerNode(
         running,
         Safety(
@@ -211,11 +219,9 @@ def build_controller_node(
             motion_cycles_s=vessel.motion_cycles_s,
             unprotected=vessel.devices is not None and vessel.devices.unprotected,
         ),
-        Actuators(limiter, catalogue, timeout_s, pump=pump, valve=valve),
+        Actuators(limiter, catalogue, timeout_s, pump=pump, valve=valve, drive=drive),
         Telemetry(statistics, sink, sink_every, event_sink),
-        ControllerSettings(
-            config.vessel.version, commissioned, tank, vessel.redundancy, vessel.foreign
-        ),
+        ControllerSettings(config.vessel.version, commissioned, tank, vessel.redundancy, foreign),
         catalogue,
         estimator,
     )

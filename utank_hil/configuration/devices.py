@@ -36,7 +36,15 @@ from utank_hil.configuration.device_sections import (
     SourceAddress,
     unit_of,
 )
+from utank_hil.configuration.drive_section import (
+    LEAST_GAIN,
+    LEAST_PHASE_DEG,
+    NATIVE_DRIVE,
+    DriveSection,
+)
 from utank_hil.configuration.files import Section
+from utank_hil.control.pressure_loop import LoopMargins
+from utank_hil.dynamics.pump import Pump
 from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.safety.safety_limits import SafetyLimits
 
@@ -45,6 +53,7 @@ MOST_MOTION_CYCLE_MS: Final = 50.0
 nothing."""
 LEAST_AGE_CYCLES: Final = 2.0  #: One lost frame must not end the run.
 PRIORITIES: Final = range(8)
+NATIVE_PUMP_MS: Final = 20.0  #: Cycle of SENSOR_PUMP.
 _NAME_PGN: Final = 0xEEFF  #: Address claimed, to all.
 _REQUEST_PGN: Final = 0xEA00
 Noise = Annotated[float, Range(above=0, most=1.0)]
@@ -310,6 +319,7 @@ class DevicesSection(Section):
     motion_2: DeviceSection = NATIVE_NODE  #: Second motion sensor.
     levels: DeviceSection = NATIVE_NODE  #: Level gauges.
     pump_sensor: DeviceSection = NATIVE_NODE  #: Sensor of the pump's pressure.
+    pump: DriveSection = NATIVE_DRIVE  #: Drive of the pump.
     receive_only: tuple[str, ...] = ()  #: Interfaces on which the controller sends nothing.
     others: OthersSection = OthersSection()  #: Devices that the controller has nothing to do with.
 
@@ -328,6 +338,11 @@ class DevicesSection(Section):
                     f"monitors, which need {1e3 / MOST_MOTION_CYCLE_MS:g} Hz or more"
                 )
                 problems.append((f"{role}.cycle_ms", reason))
+        problems += [(f"pump.{name}", reason) for name, reason in self.pump.problems()]
+        if not self.pump.native:
+            problems += self._loop_problems()
+        if self.pump.bus in self.receive_only:
+            problems.append(("pump.bus", f"{self.pump.bus} is receive-only: it can't be commanded"))
         buses = self.buses()
         if len(buses) > MOST_BUSES:
             problems.append(("", f"are on {len(buses)} interfaces, {MOST_BUSES} is the most"))
@@ -339,6 +354,23 @@ class DevicesSection(Section):
         problems += [("receive_only", f"no device is on {name}") for name in strange]
         refuse("devices", problems)
         return self
+
+    def pressure_margins(self) -> LoopMargins:
+        """Margins of the pressure loop around the drive, with the pump sensor's own delay."""
+        sensor = self.pump_sensor
+        cycle_ms = NATIVE_PUMP_MS if sensor.cycle_ms is None else sensor.cycle_ms
+        return self.pump.margins((cycle_ms + sensor.latency_ms) * 1e-3)
+
+    def _loop_problems(self) -> Iterator[Problem]:
+        margins = self.pressure_margins()
+        phase_deg = math.degrees(margins.phase_rad)
+        if phase_deg < LEAST_PHASE_DEG or margins.gain < LEAST_GAIN:
+            reason = (
+                f"is {self.pump.delay_ms:g}, and the pressure loop's margins are {phase_deg:.0f} "
+                f"degrees and {margins.gain:.2g}, less than {LEAST_PHASE_DEG:g} and "
+                f"{LEAST_GAIN:g}: raise it, or take a faster pump sensor"
+            )
+            yield "pump.delay_ms", reason
 
     def sensors(self) -> dict[str, DeviceSection]:
         """The sensors by their roles."""
@@ -384,12 +416,14 @@ class DevicesSection(Section):
 
     def buses(self) -> tuple[str, ...]:
         """Interfaces, the controller's own first, which has no name."""
-        named = sorted({each.bus for each in self.sensors().values() if each.bus})
+        devices = (*self.sensors().values(), self.pump)
+        named = sorted({each.bus for each in devices if each.bus})
         return ("", *named)
 
-    def foreign(self) -> ForeignDevices:
-        """The devices as the controller node hears them."""
+    def foreign(self, pump: Pump | None = None) -> ForeignDevices:
+        """The devices as the controller node hears them, with the drive of a pump if there is one."""
         buses, others = self.buses(), self.others
+        bus_of_pump = buses.index(self.pump.bus)
         plans: dict[str, DevicePlan[Any] | None] = dict.fromkeys(_KINDS)
         for role, device in self.sensors().items():
             if not device.native:
@@ -403,4 +437,5 @@ class DevicesSection(Section):
             frozenset(self.receive_only),
             frozenset((*others.ids_29bit, *(STANDARD | each for each in others.ids_11bit))),
             frozenset(others.pgns),
+            None if self.pump.native or pump is None else self.pump.plan(bus_of_pump, pump),
         )

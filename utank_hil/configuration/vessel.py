@@ -60,7 +60,8 @@ class Vessel(Section):
         if self.redundancy != NO_REDUNDANCY:
             content.append({"redundancy": asdict(self.redundancy)})
         if self.devices is not None:
-            content.append({"devices": self.devices.model_dump(mode="json")})
+            native = {"pump"} if self.devices.pump.native else None
+            content.append({"devices": self.devices.model_dump(mode="json", exclude=native)})
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).digest()
         return int.from_bytes(digest[:4], "big") % NOT_AVAILABLE
 
@@ -122,13 +123,14 @@ class Vessel(Section):
         if vessel.devices is not None:
             lacking = vessel.devices.redundancy_problems(vessel.redundancy)
             problems += [(f"devices.{name}", reason) for name, reason in lacking]
+            problems += vessel.devices.pump.pump_problems(vessel.pump)
         refuse("", in_written_keys(problems, vessel._written))
         return vessel
 
     @property
     def foreign(self) -> ForeignDevices:
         """Devices that are not nodes of the catalogue."""
-        return NO_FOREIGN_DEVICES if self.devices is None else self.devices.foreign()
+        return NO_FOREIGN_DEVICES if self.devices is None else self.devices.foreign(self.pump)
 
     @property
     def motion_cycles_s(self) -> tuple[float, float]:

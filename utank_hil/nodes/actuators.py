@@ -6,6 +6,7 @@ from utank_hil.canbus.measurements import Measurements
 from utank_hil.control.interface import VALVE
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limiter import CommandLimiter
+from utank_hil.nodes.canopen_drive import CanopenDrive
 from utank_hil.nodes.command_echo import CommandEcho
 from utank_hil.nodes.drive_sequence import DriveSequence
 from utank_hil.nodes.plausibility import MILLISECOND_NS
@@ -32,11 +33,14 @@ class Actuators:
         Whether the tank has a pump.
     valve : ValveCommander, optional
         If the tank has a valve.
+    drive : CanopenDrive, optional
+        Drive of another maker.
 
     Attributes
     ----------
     pump : bool
     valve : ValveCommander or None
+    drive : CanopenDrive or None
     command_pa : float
         Pressure commanded.
     limiting : bool
@@ -53,9 +57,11 @@ class Actuators:
         *,
         pump: bool = True,
         valve: ValveCommander | None = None,
+        drive: CanopenDrive | None = None,
     ) -> None:
         self.pump = pump
-        self.valve = valve
+        self.valve, self.drive = valve, drive
+        self._rate_m_s = 0.0
         self.command_pa = 0.0
         self._limiter = limiter
         self._timeout_s = timeout_s
@@ -80,9 +86,11 @@ class Actuators:
             The drive was commanded off in vain.
         valve : ValveReport
         """
-        self._echo.heard(measured.drive_echo, measured.drive_echo_ns)
+        if self.drive is None:
+            self._echo.heard(measured.drive_echo, measured.drive_echo_ns)
+        echo_ns = self._echo.heard_ns if self.drive is None else self.drive.echo_ns
         return (
-            (measured.now_ns - self._echo.heard_ns) / MILLISECOND_NS,
+            (measured.now_ns - echo_ns) / MILLISECOND_NS,
             self.pump and self._sequence.ignored,
             NO_VALVE if self.valve is None else self.valve.observe(measured),
         )
@@ -125,6 +133,7 @@ class Actuators:
         """
         if not self.pump:
             return
+        self._rate_m_s = level.rate_m_s
         if judgement.demand is _CONTROL:
             self.command_pa = self._limiter.limit(wanted_pa, level.level_m, level.rate_m_s, share)
         elif judgement.demand is _RAMP:
@@ -135,18 +144,27 @@ class Actuators:
     def frames(self, judgement: Judgement, measured: Measurements) -> list[Frame]:
         """The next commands of what is on board."""
         word = self._sequence.next_word(measured.drive_state, wanted=judgement.drive_wanted)
-        return self._frames(word, faulted=measured.valve_fault, follow=judgement.demand is _CONTROL)
+        frames = self._valve_frames(
+            faulted=measured.valve_fault, follow=judgement.demand is _CONTROL
+        )
+        if self.drive is None:
+            return self._pump_frames(word) + frames
+        return self.drive.command(self.command_pa, word, measured, self._rate_m_s) + frames
 
     def stop(self) -> list[Frame]:
         """Leave the pump at zero, the valve at its fail position."""
         self.command_pa = 0.0
-        return self._frames(ControlWord.QUICK_STOP, faulted=False, follow=False)
+        frames = self._valve_frames(faulted=False, follow=False)
+        if self.drive is None:
+            return self._pump_frames(ControlWord.QUICK_STOP) + frames
+        return self.drive.stop() + frames
 
-    def _frames(self, word: ControlWord, *, faulted: bool, follow: bool) -> list[Frame]:
-        frames = []
-        if self.pump:
-            frames.append(self._commands.frame(PumpCommand(self.command_pa, word, self._timeout_s)))
-            self._echo.sent(self._commands.counter)
-        if self.valve is not None:
-            frames.append(self.valve.frame(faulted=faulted, follow=follow))
-        return frames
+    def _pump_frames(self, word: ControlWord) -> list[Frame]:
+        if not self.pump:
+            return []
+        command = self._commands.frame(PumpCommand(self.command_pa, word, self._timeout_s))
+        self._echo.sent(self._commands.counter)
+        return [command]
+
+    def _valve_frames(self, *, faulted: bool, follow: bool) -> list[Frame]:
+        return [] if self.valve is None else [self.valve.frame(faulted=faulted, follow=follow)]

@@ -133,6 +133,7 @@ class ControllerNode:
             thresholds=None if monitors is None else monitors.thresholds,
             redundancy=settings.redundancy,
             foreign=settings.foreign,
+            drive=actuators.drive,
         )
         if monitors is not None:
             monitors.watch(self.inbox.watched, self.inbox.expected)
@@ -290,6 +291,8 @@ class ControllerNode:
         frames = self._housekeeping.frames(now_ns, faulted=judgement.mode is _FAULT)
         if self._wake_schedule.due(now_ns):
             frames += self.inbox.wakes(now_ns)
+        if self.actuators.drive is not None:
+            frames += self.actuators.drive.frames(now_ns)
         if self._command_schedule.due(now_ns):
             frames += self.actuators.frames(judgement, measured)
         if self._status_schedule.due(now_ns):

@@ -33,6 +33,7 @@ from utank_hil.canbus.frame import OTHER_BUS, STANDARD
 from utank_hil.canbus.measurements import Measurements
 from utank_hil.canbus.profiles.device import ProfiledDevice
 from utank_hil.canbus.profiles.foreign import NO_FOREIGN_DEVICES, ForeignDevices
+from utank_hil.nodes.canopen_drive import CanopenDrive, DriveReport
 from utank_hil.nodes.hardwired import HardwiredHeard
 from utank_hil.nodes.plausibility import (
     MILLISECOND_NS,
@@ -97,6 +98,8 @@ class Inbox:
     redundancy : Redundancy
     foreign : ForeignDevices
         Devices of other makers.
+    drive : CanopenDrive, optional
+        The drive of `foreign` as it is commanded.
 
     Attributes
     ----------
@@ -126,6 +129,7 @@ class Inbox:
         thresholds: MonitorThresholds | None = None,
         redundancy: Redundancy = NO_REDUNDANCY,
         foreign: ForeignDevices = NO_FOREIGN_DEVICES,
+        drive: CanopenDrive | None = None,
     ) -> None:
         self._most_level_m = LEVEL_MARGIN * level_limit_m
         self._most_sum_m = SUM_SHARE * level_limit_m
@@ -154,11 +158,17 @@ class Inbox:
         if foreign.motions[0] is None or levels is None or (pump and pump_sensor is None):
             matched.append(Address.SENSORS)
         if pump:
-            matched.append(Address.DRIVE)
             pressure = catalogue.receiver(SensorPump)
             self._hear(
                 pressure if pump_sensor is None else ProfiledDevice(pump_sensor), self._on_pump
             )
+        self.canopen_drive = drive or (foreign.pump and CanopenDrive(foreign.pump))
+        if pump and self.canopen_drive is not None:
+            self.canopen_drive.deliver = self._on_drive_report
+            self._devices |= self.canopen_drive.takes
+            self.watched += self.canopen_drive.watched
+        elif pump:
+            matched.append(Address.DRIVE)
             self._drive = self._subscribe(catalogue.receiver(DriveStatus1), self._on_drive_1)
             self._subscribe(catalogue.receiver(DriveStatus2), self._on_drive_2)
         if valve:
@@ -186,7 +196,8 @@ class Inbox:
                 self._second_beat = heartbeat.can_id
                 self._matched_ns[heartbeat.can_id] = _ABSENT_NS
             self._subscribe(heartbeat, partial(self._on_heartbeat, heartbeat.can_id))
-        self.expected = frozenset((catalogue.codec(DriveStatus2).can_id, *self._matched_ns))
+        slow = () if self._drive is None else (catalogue.codec(DriveStatus2).can_id,)
+        self.expected = frozenset((*slow, *self._matched_ns))
         for station, address in ADDRESSES.items():
             beats = catalogue.receiver(Heartbeat, address)
             self._subscribe(beats, partial(self.stations.beat, station))
@@ -206,7 +217,7 @@ class Inbox:
         self._valve_echo: int | None = None
         self._drive_state = None if pump else _ENABLED
         self._drive_fault: DriveFault | None = DriveFault.NONE
-        self._drive_2_heard = not pump
+        self._drive_2_heard = self._drive is None
         self._drive_echo: int | None = None
         self._tank_ns = NEVER_HEARD_NS
         self._pump_ns = self._drive_ns = NEVER_HEARD_NS if pump else _ABSENT_NS
@@ -398,6 +409,16 @@ class Inbox:
             or status.sensor_warning
         )
         self._power_w = status.bus_voltage_v * status.current_a
+
+    def _on_drive_report(self, report: DriveReport | None, now_ns: int) -> None:
+        if report is None:  # configured, or refused
+            assert self.canopen_drive is not None
+            refused = bool(self.canopen_drive.setup.problem)
+        else:
+            self._drive_state, refused, self._drive_held_back, warns, self._power_w = report
+            self._drive_warns = warns
+            self._drive_ns = now_ns
+        self._drive_fault = DriveFault.INTERNAL if refused else _NO_DRIVE_FAULT
 
     def _on_valve(self, status: ValveStatus, now_ns: int) -> None:
         self._valve_state = status.state

@@ -5,6 +5,7 @@ from typing import Final
 
 from utank_hil.canbus.messages import SensorMotion, SensorPump, SensorTank
 from utank_hil.canbus.profiles.device import DevicePlan
+from utank_hil.canbus.profiles.drive_plan import DrivePlan
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +21,7 @@ class ForeignDevices:
     receive_only: frozenset[str] = frozenset()  #: Interfaces on which nothing is sent.
     other_ids: frozenset[int] = frozenset()  #: Identifiers that are nobody's fault.
     other_pgns: frozenset[int] = frozenset()
+    pump: DrivePlan | None = None  #: Drive of the pump.
 
     @property
     def any(self) -> bool:

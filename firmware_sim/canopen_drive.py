@@ -1,0 +1,192 @@
+"""Pump drive by CiA 402 as a CANopen node: it follows torque or speed, and knows of no pressure."""
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from firmware_sim.canopen_node import CanopenNode, Entry
+from firmware_sim.drive_states import DriveStates
+from utank_hil.base.elementary import exp
+from utank_hil.base.tick import TICK_NS, TICK_S
+from utank_hil.canbus import ControlWord, DriveFault, DriveState, Frame
+from utank_hil.canbus.profiles.canopen import NetworkState, Place
+from utank_hil.canbus.profiles.drive_plan import (
+    CONTROL_WORD,
+    MODE,
+    MODE_SHOWN,
+    MODES,
+    MODES_SUPPORTED,
+    PROFILE,
+    SPEED,
+    STATUS_WORD,
+    TORQUE,
+    DrivePlan,
+)
+from utank_hil.dynamics.pump import Pump, pump_load, pump_pressure
+
+if TYPE_CHECKING:
+    from firmware_sim.plant import Plant  # compiled: a scenario is read without it
+
+_ENABLED: Final = DriveState.OPERATION_ENABLED
+STOPPED_SHARE: Final = 0.02
+"""Share of the greatest pressure below which the pump counts as stopped, as of `PumpDrive`."""
+STEPS: Final = 2  #: Of the rotor in a tick: its load is integrated implicitly.
+HEARTBEAT_LOST: Final = 0x8130  #: Emergency code by CiA 301.
+INTERNAL_ERROR: Final = 0x6100
+_VOLTAGE, _REMOTE, _AT_LIMIT = 1 << 4, 1 << 9, 1 << 11
+_MODE_BITS: Final = sum({1 << each.number - 1 for each in MODES.values()})
+
+
+class CanopenPumpDrive(CanopenNode):
+    """The drive of a ship's file on the plant's pump.
+
+    Rotor and water are those of `dynamics.pump`, and the plant gets the pressure.
+    """
+
+    name = "drive"
+    period_ns = TICK_NS
+
+    def __init__(self, plant: "Plant", pump: Pump, plan: DrivePlan) -> None:
+        self._plant, self._pump, self._c, self._plan = plant, pump, pump.coefficients, plan
+        self._per_nm = self._per_rad_s = plan.units_per_si
+        if plan.mode.torque:
+            self._per_rad_s = 1 / plan.speed_rad_s_per_unit
+        else:  # per mille of the greatest
+            self._per_nm = 1000 / pump.max_torque_nm
+        entries = {
+            CONTROL_WORD: Entry(0, 2, writable=True),
+            STATUS_WORD: Entry(0, 2),
+            MODE: Entry(0, 1, writable=True),
+            MODE_SHOWN: Entry(0, 1),
+            MODES_SUPPORTED: Entry(_MODE_BITS, 4),
+            SPEED: Entry(0, 4),
+            TORQUE: Entry(0, 2),
+            Place(0x6007): Entry(1, 2, writable=True),
+            Place(0x605A): Entry(2, 2, writable=True),
+            Place(0x605E): Entry(2, 2, writable=True),
+            Place(0x1018): Entry(4, 1),
+        }
+        for mode in MODES.values():
+            entries[mode.target] = Entry(0, mode.bits // 8, writable=True)
+            entries[mode.demand] = Entry(0, mode.bits // 8)
+        for subindex in range(1, 5):
+            given = plan.identity[subindex - 1] if subindex <= len(plan.identity) else None
+            entries[Place(0x1018, subindex)] = Entry(given or 0, 4)
+        super().__init__(plan.node, plan.bus, entries)
+        entries[Place(0x1000)].value = 2 << 16 | PROFILE  # servo drive
+        self._states = DriveStates()
+        self._speed_rad_s = self._torque_nm = 0.0
+        self._limited = self._connected = False
+        self.refused = 0  #: It has no limits on pressure of its own.
+
+    @property
+    def enabled(self) -> bool:
+        """Whether the drive runs the pump, even at zero pressure."""
+        return self._states.state is _ENABLED
+
+    @property
+    def setpoint_pa(self) -> float:
+        """Pressure that it makes while it is enabled."""
+        return self._plant.pressure_pa if self.enabled else 0.0
+
+    def fail(self, fault: DriveFault) -> None:
+        """Inject a fault: trip the drive, or switch it off for `DriveFault.NONE`."""
+        if fault is DriveFault.NONE:
+            self._states.command(ControlWord.DISABLE_VOLTAGE)
+        else:
+            self._trip(fault, INTERNAL_ERROR)
+
+    def taken(self, now_ns: int) -> None:  # noqa: ARG002
+        """Follow the control word."""
+        faulted = self._states.state is DriveState.FAULT
+        self._states.command(control_word(self.entries[CONTROL_WORD].value))
+        if faulted and self._states.state is not DriveState.FAULT:
+            self.emergency(0)
+
+    def tick(self, now_ns: int) -> list[Frame]:
+        """Watch the controller, drive the pump, and send what is due."""
+        entries, states, plant = self.entries, self._states, self._plant
+        plant.advance(now_ns)
+        entries[MODE_SHOWN].value = entries[MODE].value
+        stopped = abs(plant.pressure_pa) < STOPPED_SHARE * self._pump.max_pressure_pa
+        states.tick(stopped=stopped)
+        connected = self.state is NetworkState.OPERATIONAL and not self.lost_controller
+        if self._connected and not connected and self.enabled:
+            self._abort_connection()
+        self._connected = connected
+        if states.stopping:
+            plant.brake_pump()
+        elif not self.enabled:
+            plant.drive_pump(0.0, enabled=False)
+        if self.enabled:
+            plant.impose_pressure(self._turn())
+        else:
+            self._speed_rad_s, self._torque_nm = plant.pump_speed_rad_s, 0.0
+            self._limited = False
+        self._show()
+        return super().tick(now_ns)
+
+    def _abort_connection(self) -> None:
+        """React as 6007h says."""
+        code = self.entries[Place(0x6007)].value
+        if code == 1:
+            self._trip(DriveFault.COMMAND_TIMEOUT, HEARTBEAT_LOST)
+        elif code in (2, 3):
+            words = {2: ControlWord.DISABLE_VOLTAGE, 3: ControlWord.QUICK_STOP}
+            self._states.command(words[code])
+            self.emergency(HEARTBEAT_LOST)
+
+    def _trip(self, fault: DriveFault, code: int) -> None:
+        self._states.trip(fault)
+        self.emergency(code)
+
+    def _turn(self) -> float:
+        """Turn the rotor for a tick; return the pressure."""
+        c, flow_m3_s, step_s = self._c, self._plant.flow_m3_s, TICK_S / STEPS
+        number = self.entries[MODE].value
+        mode = next((each for each in MODES.values() if each.number == number), None)
+        target = 0.0
+        if mode is not None:
+            per_si = self._per_nm if mode.torque else self._per_rad_s
+            target = self.entries[mode.target].signed / per_si
+            self.entries[mode.demand].value = self.entries[mode.target].value
+        speed = self._speed_rad_s
+        for _ in range(STEPS):
+            load, slope = pump_load(speed, flow_m3_s, c)
+            stiffness = c.inertia / step_s + slope
+            demanded = target
+            if mode is not None and not mode.torque:
+                aim = min(max(target, -c.max_speed), c.max_speed)
+                demanded = load + stiffness * (aim - speed) * (1 - exp(-step_s * c.speed_bandwidth))
+            most_nm = min(c.max_torque, c.max_power / max(abs(speed), 1e-9))
+            self._torque_nm = min(max(demanded, -most_nm), most_nm)
+            self._limited = self._torque_nm != demanded
+            speed += (self._torque_nm - load) / stiffness
+        self._speed_rad_s = speed
+        return pump_pressure(speed, flow_m3_s, c)
+
+    def _show(self) -> None:
+        entries = self.entries
+        if not self.enabled:
+            for mode in MODES.values():
+                entries[mode.demand].value = 0
+        entries[STATUS_WORD].value = (
+            self._states.state | _VOLTAGE | _REMOTE | (_AT_LIMIT if self._limited else 0)
+        )
+        for place, value in (
+            (SPEED, self._speed_rad_s * self._per_rad_s),
+            (TORQUE, self._torque_nm * self._per_nm),
+        ):
+            entries[place].value = math.floor(value + 0.5) & (1 << 8 * entries[place].size) - 1
+
+
+def control_word(word: int) -> ControlWord:
+    """The command of a control word, by its bits (CiA 402-2, table of device control commands)."""
+    if word & 0x80:
+        return ControlWord.FAULT_RESET
+    if not word & 0x02:
+        return ControlWord.DISABLE_VOLTAGE
+    if not word & 0x04:
+        return ControlWord.QUICK_STOP
+    if not word & 0x01:
+        return ControlWord.SHUTDOWN
+    return ControlWord.ENABLE_OPERATION if word & 0x08 else ControlWord.SWITCH_ON

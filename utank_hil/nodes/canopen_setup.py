@@ -1,0 +1,134 @@
+"""Configures a drive by SDO: each entry is read, written where it differs, and read back.
+
+One request is in flight; nothing waits. What the drive lacks or does not keep is said with object,
+index, value and remedy, and tried again after a while: somebody may have mended it.
+"""
+
+from collections.abc import Generator
+from typing import Final
+
+from utank_hil.canbus import Frame
+from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
+from utank_hil.canbus.profiles.canopen import (
+    NMT,
+    SDO_REQUEST,
+    Abort,
+    Answer,
+    NodeCommand,
+    Place,
+    abort_words,
+    answer,
+    read_request,
+    write_request,
+)
+from utank_hil.canbus.profiles.drive_plan import DrivePlan, Step
+
+ANSWER_NS: Final = 300_000_000  #: CiA 301 names no time; servers of drives answer within 50 ms.
+PATIENCE_NS: Final = 300_000_000  #: For a mode to be entered, likewise.
+AGAIN_NS: Final = 2_000_000_000  #: From a refusal, or from silence, to the next try.
+
+_Talk = Generator[tuple[Place, bytes], Answer, None]
+
+
+class _Refused(Exception):
+    pass
+
+
+class CanopenSetup:
+    """The start of one drive: `done`, or the `problem` that it was refused for."""
+
+    def __init__(self, plan: DrivePlan) -> None:
+        self._plan = plan
+        self._tag = plan.bus << BUS_SHIFT | STANDARD
+        self.problem = ""
+        self.restart(0)
+
+    def restart(self, begin_ns: int) -> None:
+        """Begin anew, not before this time: the drive has started, or was refused."""
+        self.done = False
+        self._begin_ns = begin_ns
+        self._talk: _Talk | None = None
+        self._request: tuple[Place, bytes] | None = None
+        self._asked_ns: int | None = None
+        self._now_ns = begin_ns
+
+    def order(self, command: NodeCommand) -> Frame:
+        """Network management for this node."""
+        return Frame(self._tag | NMT, bytes((command, self._plan.node)))
+
+    def frames(self, now_ns: int) -> list[Frame]:
+        """What is to be sent now: the next request, if the last one is answered or out of time."""
+        self._now_ns = now_ns
+        if self.done or now_ns < self._begin_ns:
+            return []
+        if self._talk is None:
+            self._talk = self._conversation()
+            self._request = next(self._talk)
+            return [self.order(NodeCommand.PRE_OPERATIONAL)]
+        if self._asked_ns is not None:
+            if now_ns - self._asked_ns <= ANSWER_NS:
+                return []
+            assert self._request is not None
+            self._advance(Answer(self._request[0], abort=Abort.NO_ANSWER_IN_TIME))
+        if self._request is None:
+            if self._talk is None:
+                return []
+            self.done, self.problem = True, ""
+            return [self.order(NodeCommand.START)]
+        self._asked_ns = now_ns
+        return [Frame(self._tag | SDO_REQUEST + self._plan.node, self._request[1])]
+
+    def take(self, data: bytes) -> None:
+        """Take what the drive's server says; what was not asked for is nothing."""
+        got = answer(data)
+        asked = self._request if self._asked_ns is not None else None
+        if got is not None and asked is not None and got.place == asked[0]:
+            self._advance(got)
+
+    def _advance(self, got: Answer) -> None:
+        assert self._talk is not None
+        self._asked_ns = self._request = None
+        try:
+            self._request = self._talk.send(got)
+        except StopIteration:
+            pass  # all is written: the node can be started
+        except _Refused as refused:
+            self.problem = str(refused)
+            self.restart(self._now_ns + AGAIN_NS)
+
+    def _conversation(self) -> _Talk:
+        for number, step in enumerate(self._plan.steps()):
+            got = yield step.place, read_request(step.place)
+            if not number and got.abort == Abort.NO_ANSWER_IN_TIME:
+                raise _Refused  # nobody is there: DRIVE_SILENT says so
+            said = ""
+            first_ns = self._now_ns
+            while not step.writes and not self._kept(step, got):
+                if got.abort or self._now_ns - first_ns > PATIENCE_NS:
+                    break
+                got = yield step.place, read_request(step.place)
+            if step.writes and not self._kept(step, got) and (got.size or step.size):
+                value = (got.value or 0) & ~step.equal_bits | step.value & step.equal_bits
+                size = got.size or step.size
+                written = yield step.place, write_request(step.place, value, size)
+                said = f", and writing it gave {abort_words(written.abort)}" * bool(written.abort)
+                got = yield step.place, read_request(step.place)
+            if step.needed and not self._kept(step, got):
+                raise _Refused(self._words(step, got) + said + f": {step.remedy}")
+
+    @staticmethod
+    def _kept(step: Step, got: Answer) -> bool:
+        """Whether an entry has the value, and the length."""
+        if got.value is None or (step.size and got.size != step.size):
+            return False
+        return not (got.value ^ step.value) & step.equal_bits & (1 << 8 * got.size) - 1
+
+    def _words(self, step: Step, got: Answer) -> str:
+        if got.value is None:
+            what = f"can't be read ({abort_words(got.abort)})"
+        elif step.size and got.size != step.size:
+            what = f"has {got.size} bytes"
+        else:
+            bits = (1 << 8 * got.size) - 1
+            what = f"is {got.value:#x}, not {step.value & step.equal_bits & bits:#x}"
+        return f"node {self._plan.node}: {step.place} {what}"
