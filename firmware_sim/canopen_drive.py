@@ -21,7 +21,7 @@ from utank_hil.canbus.profiles.drive_plan import (
     TORQUE,
     DrivePlan,
 )
-from utank_hil.dynamics.pump import Pump, pump_load, pump_pressure
+from utank_hil.dynamics.pump import Pump, pump_load, pump_pressure, pump_speed
 
 if TYPE_CHECKING:
     from firmware_sim.plant import Plant  # compiled: a scenario is read without it
@@ -71,6 +71,8 @@ class CanopenPumpDrive(CanopenNode):
         for subindex in range(1, 5):
             given = plan.identity[subindex - 1] if subindex <= len(plan.identity) else None
             entries[Place(0x1018, subindex)] = Entry(given or 0, 4)
+        for place, _ in plan.require:
+            entries.setdefault(place, Entry(0, 4, writable=True))
         super().__init__(plan.node, plan.bus, entries)
         entries[Place(0x1000)].value = 2 << 16 | PROFILE  # servo drive
         self._states = DriveStates()
@@ -113,15 +115,7 @@ class CanopenPumpDrive(CanopenNode):
         if self._connected and not connected and self.enabled:
             self._abort_connection()
         self._connected = connected
-        if states.stopping:
-            plant.brake_pump()
-        elif not self.enabled:
-            plant.drive_pump(0.0, enabled=False)
-        if self.enabled:
-            plant.impose_pressure(self._turn())
-        else:
-            self._speed_rad_s, self._torque_nm = plant.pump_speed_rad_s, 0.0
-            self._limited = False
+        plant.impose_pressure(self._turn())
         self._show()
         return super().tick(now_ns)
 
@@ -142,21 +136,26 @@ class CanopenPumpDrive(CanopenNode):
     def _turn(self) -> float:
         """Turn the rotor for a tick; return the pressure."""
         c, flow_m3_s, step_s = self._c, self._plant.flow_m3_s, TICK_S / STEPS
-        number = self.entries[MODE].value
-        mode = next((each for each in MODES.values() if each.number == number), None)
-        target = 0.0
-        if mode is not None:
-            per_si = self._per_nm if mode.torque else self._per_rad_s
-            target = self.entries[mode.target].signed / per_si
-            self.entries[mode.demand].value = self.entries[mode.target].value
+        mode = next((m for m in MODES.values() if m.number == self.entries[MODE].value), None)
+        aim, target = None, 0.0
+        if self._states.stopping:  # its ramp ends where the water turns the rotor
+            aim = pump_speed(0.0, flow_m3_s, c)
+        elif mode is not None and self.enabled:
+            entry = self.entries[mode.target]
+            self.entries[mode.demand].value = entry.value
+            if mode.torque:
+                target = entry.signed / self._per_nm
+            else:
+                aim = min(max(entry.signed / self._per_rad_s, -c.max_speed), c.max_speed)
+        # a stop brakes at the motor's limit
+        toward = 1.0 if self._states.stopping else 1 - exp(-step_s * c.speed_bandwidth)
         speed = self._speed_rad_s
         for _ in range(STEPS):
             load, slope = pump_load(speed, flow_m3_s, c)
             stiffness = c.inertia / step_s + slope
             demanded = target
-            if mode is not None and not mode.torque:
-                aim = min(max(target, -c.max_speed), c.max_speed)
-                demanded = load + stiffness * (aim - speed) * (1 - exp(-step_s * c.speed_bandwidth))
+            if aim is not None:
+                demanded = load + stiffness * (aim - speed) * toward
             most_nm = min(c.max_torque, c.max_power / max(abs(speed), 1e-9))
             self._torque_nm = min(max(demanded, -most_nm), most_nm)
             self._limited = self._torque_nm != demanded

@@ -149,7 +149,7 @@ class CanopenNode:
         command, place, value, size = parts(data)
         entry = self.entries.get(place)
         if entry is None:
-            known = any(each.index == place.index for each in self.entries)
+            known = any(each.number == place.number for each in self.entries)
             return refusal(place, Abort.NO_SUBINDEX if known else Abort.NO_OBJECT)
         if command == 0x40:
             return value_answer(place, entry.value, entry.size)
@@ -163,19 +163,19 @@ class CanopenNode:
             return Abort.READ_ONLY
         if size != entry.size:
             return Abort.WRONG_LENGTH
-        if place.index in (0x1600, 0x1A00, 0x1A01):
+        if place.number in (0x1600, 0x1A00, 0x1A01):
             if not place.subindex:
-                mapping = [self.entries.get(Place(place.index, n + 1)) for n in range(value)]
+                mapping = [self.entries.get(Place(place.number, n + 1)) for n in range(value)]
                 if sum(64 if each is None else each.value & 0xFF for each in mapping) > 64:
                     return Abort.TOO_LONG_A_PDO
-            elif self.entries[Place(place.index)].value:
+            elif self.entries[Place(place.number)].value:
                 return Abort.NOT_IN_THIS_STATE
             else:
                 what = self.entries.get(Place(value >> 16, value >> 8 & 0xFF))
                 if what is None or 8 * what.size != value & 0xFF:
                     return Abort.NOT_TO_BE_MAPPED
         if place in (Place(0x1400, 1), Place(0x1800, 1), Place(0x1801, 1)):
-            cob = {0x1400: RECEIVED_1, 0x1800: SENT_1, 0x1801: SENT_2}[place.index]
+            cob = {0x1400: RECEIVED_1, 0x1800: SENT_1, 0x1801: SENT_2}[place.number]
             if value & ~DISABLED != cob + self.node:
                 return Abort.VALUE_OUT_OF_RANGE
         entry.value = value

@@ -416,12 +416,12 @@ class DevicesSection(Section):
 
     def buses(self) -> tuple[str, ...]:
         """Interfaces, the controller's own first, which has no name."""
-        devices = (*self.sensors().values(), self.pump)
-        named = sorted({each.bus for each in devices if each.bus})
+        names = {each.bus for each in self.sensors().values()} | {self.pump.bus}
+        named = sorted(names - {""})
         return ("", *named)
 
     def foreign(self, pump: Pump | None = None) -> ForeignDevices:
-        """The devices as the controller node hears them, with the drive of a pump if there is one."""
+        """The devices as the controller node hears them, with the drive of the pump."""
         buses, others = self.buses(), self.others
         bus_of_pump = buses.index(self.pump.bus)
         plans: dict[str, DevicePlan[Any] | None] = dict.fromkeys(_KINDS)

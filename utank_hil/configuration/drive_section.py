@@ -9,7 +9,7 @@ from utank_hil.base.parameters import Problem, Range
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus.profiles.canopen import Place
 from utank_hil.canbus.profiles.drive_plan import COMMAND_MS, MODES, DrivePlan
-from utank_hil.configuration.device_files import NATIVE, with_profile
+from utank_hil.configuration.device_files import NATIVE
 from utank_hil.configuration.device_sections import NodeNumber, Whole
 from utank_hil.configuration.files import Section
 from utank_hil.control.pressure_loop import LoopMargins, loop_margins
@@ -18,7 +18,9 @@ from utank_hil.dynamics.pump import Pump
 LEAST_PHASE_DEG: Final = 45.0
 LEAST_GAIN: Final = 2.0
 """Least margins of the pressure loop: the pump's map may be off by a factor of two."""
-DRIVE_PROFILE: Final = "cia402"
+REQUIRE: Final = {"0x6007": 3, "0x605A": 2, "0x605E": 2}
+"""Quick stop where the controller's heartbeat ends or the node is stopped; it brakes on its ramp,
+then the drive switches off; so it does at a fault. CiA 402-2; 35 EDS of seven makers."""
 
 
 class DriveSection(Section):
@@ -27,8 +29,6 @@ class DriveSection(Section):
     profile: Literal["native", "cia402"] = NATIVE
     """`cia402`, or `native` for the drive of this project's own catalogue."""
     bus: str = ""  #: Interface that it is on; empty for the controller's own.
-    device: str = ""  #: Kind, in the shipped profile.
-    documents: str = ""  #: Public documents that the profile was made from.
     node: NodeNumber | None = None  #: CANopen node of the drive.
     controller_node: NodeNumber = 127  #: CANopen node that the controller's heartbeat is from.
     mode: Literal["torque", "cyclic_torque", "velocity", "cyclic_velocity"] | None = None
@@ -44,7 +44,8 @@ class DriveSection(Section):
     identity: Annotated[tuple[Whole | None, ...], Field(max_length=4)] = ()
     """Vendor, product, revision and serial number in 1018h; null for any."""
     require: Annotated[dict[str, Whole | None], Field(default_factory=dict)]
-    """Objects, as "0x605A" or "0x1400:5", that are written and must read back so; null to leave."""
+    """Objects, as "0x605A" or "0x1400:5", that are written and must read back so, beside 6007h: 3,
+    605Ah: 2, 605Eh: 2; null where the drive lacks one."""
     echo: Literal["command", "demand"] = "command"
     """What the drive sends back: control word and target, or its demand (6074h, 606Bh)."""
     synchronous: bool = True  #: The drive sends at SYNC, else by its event timer.
@@ -52,7 +53,10 @@ class DriveSection(Section):
     @model_validator(mode="before")
     @classmethod
     def _complete(cls, content: Any) -> Any:
-        return with_profile(content) if isinstance(content, dict) else content
+        if not isinstance(content, dict) or content.get("profile", NATIVE) == NATIVE:
+            return content
+        given = content.get("require", {})
+        return content | {"require": REQUIRE | given if isinstance(given, dict) else given}
 
     @property
     def native(self) -> bool:
@@ -125,6 +129,6 @@ NATIVE_DRIVE: Final = DriveSection.model_validate({})
 def _place(written: str) -> Place:
     index, _, subindex = written.partition(":")
     place = Place(int(index, 16), int(subindex or "0", 0))
-    if not (0x1000 <= place.index <= 0xFFFF and 0 <= place.subindex <= 0xFF):
+    if not (0x1000 <= place.number <= 0xFFFF and 0 <= place.subindex <= 0xFF):
         raise ValueError(written)
     return place

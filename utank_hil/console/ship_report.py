@@ -227,7 +227,15 @@ def power_words(power_w: float) -> str:
 def devices_json(devices: DevicesSection | None) -> dict[str, Any]:
     """Devices by their roles; those that are native nodes are left out."""
     sensors = {} if devices is None else devices.sensors()
-    return {role: _figures(each) for role, each in sensors.items() if not each.native}
+    found = {role: _figures(each) for role, each in sensors.items() if not each.native}
+    if devices is not None and not devices.pump.native:
+        margins = devices.pressure_margins()
+        found["pump"] = devices.pump.model_dump(mode="json") | {
+            "loop_crossover_rad_s": margins.crossover_rad_s,
+            "loop_phase_margin_deg": math.degrees(margins.phase_rad),
+            "loop_gain_margin": margins.gain,
+        }
+    return found
 
 
 def _figures(device: DeviceSection) -> dict[str, Any]:
@@ -271,6 +279,9 @@ def print_devices(console: Terminal, devices: DevicesSection | None) -> None:
     """Print each device in a few lines."""
     for role, each in devices_json(devices).items():
         where = f" on {each['bus']}" if each["bus"] else ""
+        if role == "pump":
+            _print_drive(console, each, where)
+            continue
         console.say(f"{role}: {each['device']}{where}")
         console.say(f"  promises {each['rate_hz']:.3g} Hz, {each['latency_ms']:g} ms late at most")
         for name, step in each["steps"].items():
@@ -282,3 +293,20 @@ def print_devices(console: Terminal, devices: DevicesSection | None) -> None:
             console.say(", ".join(each["not_protected_by"]), yellow="  not protected by")
     if devices is not None and devices.unprotected:
         console.say("Half the pressure is allowed until a second motion sensor agrees.")
+
+
+def _print_drive(console: Terminal, drive: dict[str, Any], where: str) -> None:
+    console.say(f"pump: {drive['profile']}, node {drive['node']}, {drive['mode']}{where}")
+    required = (f"{key} {value}" for key, value in drive["require"].items() if value is not None)
+    console.say("  written and read back before arming: " + ", ".join(required))
+    known = any(each is not None for each in drive["identity"])
+    console.say(
+        f"  protected by heartbeats of {drive['heartbeat_ms']} ms both ways, echo of the "
+        f"{drive['echo']}, mode" + (", identity" if known else "")
+    )
+    if not known:
+        console.say("identity, counter, checksum", yellow="  not protected by")
+    console.say(
+        f"  pressure loop: {drive['loop_crossover_rad_s']:.3g} rad/s, margins "
+        f"{drive['loop_phase_margin_deg']:.0f} degrees and {drive['loop_gain_margin']:.2g}"
+    )

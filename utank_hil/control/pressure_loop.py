@@ -3,8 +3,8 @@
 The set-point is filtered to a reference; the inverse head curve at the present flow turns reference
 and correction into a speed. Torque is that of the water at this speed, of the rotor's acceleration,
 and of a speed loop. What is measured is compared with what the reference has led to so far, which
-is late by the way through bus and drive: only what the model lacks is corrected. With a delay T both
-loops are those of the SIMC rule (Skogestad, J. Process Control 13 (2003) 291) for the tightest
+is late by the way through bus and drive: only what the model lacks is corrected. With a delay T
+both loops are those of the SIMC rule (Skogestad, J. Process Control 13 (2003) 291) for the tightest
 closed loop that it recommends: an open loop of exp(-sT) / (2 T s).
 """
 

@@ -30,6 +30,9 @@ KEPT: Final = 16  #: Commands that an echo is looked for among: those of a third
 MARKS: Final = 4
 """The lowest two bits of the target count the commands: 3 of 1000 of the rated torque."""
 LATE_BEATS: Final = 2  #: Heartbeats that may be missing, as a consumer by CiA 301 takes them.
+IGNORED: Final = 3
+"""Commands to stop after which a drive that still runs is stopped by network management: they may
+be lost, and 6007h brakes it all the same."""
 START_NS: Final = 500_000_000  #: For a node to say that it is operational.
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
@@ -91,7 +94,7 @@ class CanopenDrive:
         self.takes: dict[int, Callable[[Frame, int], None]] = {
             self._tag | cob + plan.node: take for cob, take in takers.items()
         }
-        self._sent: deque[tuple[int, int]] = deque([], KEPT)
+        self._sent: deque[tuple[int, int]] = deque(maxlen=KEPT)
         self._count = 0
         self._echo = -1
         self.echo_ns = self._beat_ns = self._now_ns = NEVER_HEARD_NS
@@ -99,8 +102,8 @@ class CanopenDrive:
         self._started_ns = NEVER_HEARD_NS
         self._speed_rad_s = self._torque = math.nan
         self._mode_shown = plan.mode.number
-        self._status = 0
-        self._emergency = ""
+        self._status = self._ignored = 0
+        self._emergency = self._told = ""
 
     @property
     def words(self) -> str:
@@ -116,19 +119,17 @@ class CanopenDrive:
         """What the drive's configuration needs in this tick, usually nothing."""
         self._now_ns = now_ns
         setup = self.setup
-        if not setup.done:
-            was = setup.problem
-            frames = setup.frames(now_ns)
-            if setup.problem and setup.problem != was:
-                self.deliver(None, now_ns)
-            if setup.done:
-                self._started_ns = now_ns
-                self._emergency = ""
-                self.deliver(None, now_ns)
-            return frames
-        if not self._operational and now_ns - self._started_ns > START_NS:
-            setup.restart(now_ns)
-        return []
+        if setup.done:
+            if not self._operational and now_ns - self._started_ns > START_NS:
+                setup.restart(now_ns)
+            return []
+        frames = setup.frames(now_ns)
+        if setup.done:
+            self._started_ns, self._emergency = now_ns, ""
+        if setup.problem != self._told:
+            self._told = setup.problem
+            self.deliver(None, now_ns)
+        return frames
 
     def command(
         self, pressure_pa: float, word: ControlWord, measured: Measurements, rate_m_s: float
@@ -145,7 +146,12 @@ class CanopenDrive:
             )
         elif self._loop is not None:
             self._loop.reset()
-        return self._command(target, word)
+        stays = word is not _ENABLE and state_of(self._status) is _ENABLED
+        self._ignored = self._ignored + 1 if stays else 0
+        frames = self._command(target, word)
+        if self._ignored > IGNORED:
+            frames.append(self.setup.order(NodeCommand.STOP))
+        return frames
 
     def stop(self) -> list[Frame]:
         """Leave the drive braking, and its node stopped."""
@@ -163,13 +169,9 @@ class CanopenDrive:
         self._count += 1
         content = word | (counts & (1 << bits) - 1) << 16
         self._sent.append((content if plan.echoes_command else content >> 16, self._now_ns))
-        frames = [
-            beat,
-            Frame(tag | RECEIVED_1 + plan.node, content.to_bytes(2 + bits // 8, "little")),
-        ]
-        if plan.synchronous:
-            frames.append(Frame(tag | SYNC, b""))
-        return frames
+        command = Frame(tag | RECEIVED_1 + plan.node, content.to_bytes(2 + bits // 8, "little"))
+        # SYNC first: what it asks for is sampled before the command, whoever is in front on the bus
+        return [beat, *([Frame(tag | SYNC, b"")] if plan.synchronous else []), command]
 
     def _on_status(self, frame: Frame, now_ns: int) -> None:
         data, plan = frame.data, self._plan
@@ -202,9 +204,11 @@ class CanopenDrive:
         if echo == self._echo:
             return
         self._echo = echo
+        # after SYNC it is a cycle old; else the middle of what its phase can be
+        phase_ns = 0 if self._plan.synchronous else COMMAND_MS * MILLISECOND_NS // 2
         for content, sent_ns in reversed(self._sent):
             if content == echo:
-                self.echo_ns = sent_ns
+                self.echo_ns = sent_ns - phase_ns
                 return
 
     def _on_measured(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002

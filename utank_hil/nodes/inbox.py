@@ -162,7 +162,9 @@ class Inbox:
             self._hear(
                 pressure if pump_sensor is None else ProfiledDevice(pump_sensor), self._on_pump
             )
-        self.canopen_drive = drive or (foreign.pump and CanopenDrive(foreign.pump))
+        if drive is None and foreign.pump is not None:
+            drive = CanopenDrive(foreign.pump)
+        self.canopen_drive = drive
         if pump and self.canopen_drive is not None:
             self.canopen_drive.deliver = self._on_drive_report
             self._devices |= self.canopen_drive.takes

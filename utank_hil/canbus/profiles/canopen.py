@@ -58,11 +58,11 @@ def abort_words(code: int) -> str:
 class Place(NamedTuple):
     """An entry of the object dictionary."""
 
-    index: int
+    number: int  #: Its index.
     subindex: int = 0
 
     def __str__(self) -> str:
-        return f"{self.index:04X}h:{self.subindex}"
+        return f"{self.number:04X}h:{self.subindex}"
 
 
 class Answer(NamedTuple):
@@ -100,7 +100,7 @@ def refusal(place: Place, abort: int) -> bytes:
 
 
 def _sdo(command: int, place: Place, value: int) -> bytes:
-    head = bytes((command, place.index & 0xFF, place.index >> 8, place.subindex))
+    head = bytes((command, place.number & 0xFF, place.number >> 8, place.subindex))
     return head + value.to_bytes(4, "little")
 
 
@@ -126,4 +126,4 @@ def answer(data: bytes) -> Answer | None:
 
 def mapped(place: Place, bits: int) -> int:
     """An entry of a PDO's mapping."""
-    return place.index << 16 | place.subindex << 8 | bits
+    return place.number << 16 | place.subindex << 8 | bits

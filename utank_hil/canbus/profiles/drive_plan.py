@@ -1,4 +1,4 @@
-"""A pump drive by CiA 402: its objects, its PDOs, and what is written and read back at the start."""
+"""A pump drive by CiA 402: its objects, its PDOs, what is written and read back at the start."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

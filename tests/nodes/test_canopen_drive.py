@@ -1,0 +1,144 @@
+"""A drive that canopen plays: configured, commanded, heard; what it lacks is said by name."""
+
+import re
+from itertools import pairwise
+
+import pytest
+
+from tests.nodes.canopen_peers import Line
+from utank_hil.base.tick import TICK_NS
+from utank_hil.canbus import ControlWord, DriveState
+from utank_hil.nodes.canopen_drive import state_of
+
+MS = 1_000_000
+
+
+def test_it_is_configured_and_led_to_operation():
+    line = Line().run(400)
+    assert line.drive.setup.done, line.drive.words
+    sdo = line.node.sdo
+    assert [sdo[0x1600][n].raw for n in range(3)] == [2, 0x60400010, 0x60710010]
+    assert [sdo[0x1A00][n].raw for n in range(4)] == [3, 0x60410010, 0x60400010, 0x60710010]
+    assert [sdo[0x1800][n].raw & 0xBFFFFFFF for n in (1, 2, 3, 5)] == [0x185, 1, 0, 0]
+    assert sdo[0x1802][1].raw >> 31
+    assert sdo[0x1016][1].raw == 127 << 16 | 50
+    assert [sdo[index].raw for index in (0x1017, 0x6007, 0x605A, 0x605E, 0x6060)] == [
+        50, 3, 2, 2, 4
+    ]  # fmt: skip
+    for word in (ControlWord.SHUTDOWN, ControlWord.SWITCH_ON, ControlWord.ENABLE_OPERATION):
+        line.run(4, word, 1000.0)
+    assert line.reports[-1][1].state is DriveState.OPERATION_ENABLED
+    target = line.node.sdo[0x6071].raw
+    assert target * 80.0 * 0.4 * 6.22 == pytest.approx(1000.0, abs=3 * 80 * 0.4 * 6.22)
+    line.run(6, ControlWord.QUICK_STOP)
+    assert line.reports[-1][1].state is DriveState.SWITCH_ON_DISABLED
+
+
+@pytest.mark.parametrize(
+    ("tweak", "words"),
+    [
+        (lambda od: od.indices.pop(0x1016), "1016h:1 .*no object.*heartbeat.*another drive"),
+        (lambda od: setattr(od[0x1018][2], "default", 0x23), "1018h:2 is 0x23, not 0x22.*product"),
+        (lambda od: setattr(od[0x1000], "default", 0x191), "1000h:0 is 0x191, not 0x192"),
+        (lambda od: setattr(od[0x6502], "default", 4), "6502h:0 is 0x4.*mode 4"),
+        (lambda od: od.indices.pop(0x6007), "6007h:0 .*no object.*null"),
+        (lambda od: setattr(od[0x605A], "access_type", "ro"),
+         "605Ah:0 is 0x0, not 0x2, and writing it gave .*read only"),
+        (lambda od: setattr(od[0x1A00][2], "access_type", "ro"), "1A00h:2 .*choose another echo"),
+        (lambda od: setattr(od[0x6071], "data_type", 7), "6071h:0 has 4 bytes.*16 bits"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_refused_by_name(tweak, words):
+    line = Line(tweak=tweak).run(400)
+    assert not line.drive.setup.done
+    assert re.search(rf"node 5: {words}", line.drive.words), line.drive.words
+    assert {report for _, report in line.reports} == {None}
+    assert line.node.nmt.state != "OPERATIONAL"
+
+
+def test_what_reads_back_otherwise_is_refused():
+    line = Line()
+    line.node.add_read_callback(lambda index, **_: 1 if index == 0x605E else None)
+    assert "605Eh:0 is 0x1, not 0x2: set require" in line.run(400).drive.words
+
+
+def test_a_drive_that_was_mended_is_started_again():
+    line = Line(tweak=lambda od: setattr(od[0x605E], "access_type", "ro")).run(400)
+    assert line.drive.setup.problem
+    line.node.object_dictionary[0x605E].access_type = "rw"
+    line.run(500)
+    assert line.drive.setup.done
+    assert line.reports[-1][1].state is DriveState.SWITCH_ON_DISABLED
+
+
+def longest_echo(line, ticks, word=ControlWord.ENABLE_OPERATION):
+    """Greatest age of an echo in milliseconds, at the ends of the ticks."""
+    ages = []
+    for k in range(ticks):
+        line.run(1, word, 3e3 + 10 * k)
+        ages.append((line.now_ns - line.drive.echo_ns) / MS)
+    return max(ages)
+
+
+def test_four_of_five_lost_commands_are_found_within_100_ms():
+    line = Line().run(400)
+    assert longest_echo(line, 100) <= 50
+    lost_ns, first = [], line.sent + 1
+
+    def passes(number):
+        lost_ns.append(line.now_ns)
+        return (number - first) % 5 == 4
+
+    line.passes = passes
+    while (line.now_ns - line.drive.echo_ns) / MS <= 100:  # the limit echo_age_ms
+        line.run(1, ControlWord.ENABLE_OPERATION, 3e3)
+        assert line.now_ns - lost_ns[0] <= 100 * MS
+
+
+@pytest.mark.parametrize("target", [0.0, 3e3])
+def test_a_drive_that_hangs_on_an_old_command_has_no_echo(target):
+    line = Line().run(400).run(10, ControlWord.ENABLE_OPERATION, target)
+    line.passes = lambda _: False
+    line.run(100, ControlWord.ENABLE_OPERATION, target)
+    assert (line.now_ns - line.drive.echo_ns) / MS > 100
+
+
+def test_an_altered_control_word_is_no_echo():
+    line = Line().run(400)
+    line.node.add_write_callback(
+        lambda index, **_: setattr(line, "wrong", index) if index == 0x6040 else None
+    )
+    line.node.add_read_callback(lambda index, **_: 0x1F if index == 0x6040 else None)
+    assert longest_echo(line, 30) > 100
+
+
+def test_without_heartbeat_its_status_does_not_count():
+    line = Line().run(400)
+    line.beats = False
+    last_ns = line.now_ns
+    line.run(60)
+    assert last_ns < line.reports[-1][0] <= last_ns + 100 * MS
+
+
+def test_the_controller_beats_with_each_command_and_stops_the_node():
+    line = Line().run(400)
+    frames = line.drive._command(0.0, ControlWord.SHUTDOWN)
+    assert [each.can_id & 0x7FF for each in frames] == [0x77F, 0x80, 0x205]
+    *_, last = line.drive.stop()
+    assert last.data == bytes((2, 5))
+
+
+def test_marks_change_the_target_by_three_counts_at_most():
+    line = Line().run(400).run(40, ControlWord.ENABLE_OPERATION, 50e3)
+    counts = [int.from_bytes(data[2:], "little", signed=True) for data in line.commands[-10:]]
+    exact = 50e3 / (80 * 0.4 * 6.22)
+    assert all(abs(each - exact) < 3 for each in counts)
+    assert all((b - a) % 4 == 1 for a, b in pairwise(counts))
+
+
+def test_states_are_those_of_the_status_word():
+    assert state_of(0x0250) is DriveState.SWITCH_ON_DISABLED
+    assert state_of(0x0637) is DriveState.OPERATION_ENABLED
+    assert state_of(0x0028) is DriveState.FAULT
+    assert state_of(0x0061) is None
+    assert TICK_NS == 10 * MS
