@@ -29,13 +29,11 @@ POLL_S: Final = 0.1
 """Interval of the progress display and the check for Ctrl-C in s; no deadline depends on it."""
 BEGIN_AFTER_NS: Final = 200_000_000
 """Time in ns from both sides being ready to their common first tick: 20 polls of each side."""
-READY_POLL_S: Final = 0.01
-"""Polling interval of each side in s: one tick."""
+READY_POLL_S: Final = 0.01  #: Polling interval of each side in s: one tick.
 
 LEAST_REACH: Final = 0.5
 """Least share of the longest run that a run must reach to shorten the window compared."""
-LEAST_ROWS: Final = 0.9
-"""Least share of its rows in the window with which a run is compared."""
+LEAST_ROWS: Final = 0.9  #: Least share of its rows in the window with which a run is compared.
 
 Progress = Callable[[str, float], None]
 """Callback that takes the name of a run and its simulated or elapsed time in s."""

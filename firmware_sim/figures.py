@@ -33,8 +33,7 @@ from utank_hil.nodes.panel import Action
 from utank_hil.safety.faults import fault_text
 
 NO_TANK: Final = "no tank"
-LEAST_ROLL_RAD: Final = 1e-6
-"""Roll below which a ratio of rolls is meaningless."""
+LEAST_ROLL_RAD: Final = 1e-6  #: Roll below which a ratio of rolls is meaningless.
 LEAST_IN_CHARGE: Final = 0.9
 """Least share of the time ordered by the operator in which the controller must be in charge."""
 

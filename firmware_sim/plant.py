@@ -20,8 +20,7 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.dynamics.water import water_moments
 from utank_hil.sea import Harmonics
 
-SAILING_TICKS = 100
-"""Ticks between updates of the ship's parameters: 1 s."""
+SAILING_TICKS = 100  #: Ticks between updates of the ship's parameters: 1 s.
 
 
 class Plant:

@@ -29,8 +29,7 @@ from utank_hil.dynamics.pump import PumpCoefficients, PumpState, compile_pump
 STEP_S = 1e-3
 STEPS = round(TICK_S / STEP_S)
 
-# entries of the state vector
-ROLL, ROLL_RATE, LEVEL, LEVEL_RATE = range(4)
+ROLL, ROLL_RATE, LEVEL, LEVEL_RATE = range(4)  # entries of the state vector
 SPEED, REFERENCE, INTEGRAL, PRESSURE, TORQUE, POWER, LIMITED = range(4, 11)  # PumpState
 SETPOINT, MODE = 11, 12
 MOMENTS = slice(13, 17)  # wave moment at t - 1, t, t + 1 and t + 2 ticks

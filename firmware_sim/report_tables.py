@@ -14,8 +14,7 @@ from utank_hil.console.terminal import new_table
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 _PREFIXES: Final = (("M", 1e6), ("k", 1e3), ("", 1.0))
-_SHOWN: Final = (1, 3)
-"""Indices of the exceedance levels in the table: 5 and 10 degrees."""
+_SHOWN: Final = (1, 3)  # Indices of the exceedance levels in the table: 5 and 10 degrees.
 
 
 def tables(found: BenchFigures) -> list[RichTable]:

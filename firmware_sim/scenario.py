@@ -49,8 +49,7 @@ from utank_hil.sea.sea import slope_per_m
 MOST_CONTROLLERS = 7
 """Most controllers: more runs with the passive one cannot be distinguished in a picture."""
 
-PASSIVE = "passive"
-"""Name of the run with the passive tank."""
+PASSIVE = "passive"  #: Name of the run with the passive tank.
 
 SAILED: Final = (
     "inertia_kg_m2",
@@ -63,16 +62,12 @@ SAILED: Final = (
 )
 """Parameters of the ship that may differ from the vessel's; the last two heel it."""
 
-SWAY: Final = "sway_of_slope"
-"""Another one, which does not change under way."""
+SWAY: Final = "sway_of_slope"  #: Another one, which does not change under way.
 
-LONGEST_S: Final = 86_400.0
-"""Longest run in s, a day: its rows are kept in memory."""
+LONGEST_S: Final = 86_400.0  #: Longest run in s, a day: its rows are kept in memory.
 
-_TINY: Final = 1e-30
-"""Term that keeps a quotient finite on still water."""
-_NO_MOMENT: Final = 1e-9
-"""Share of the waves' slope below which they do not act on the ship."""
+_TINY: Final = 1e-30  # Term that keeps a quotient finite on still water.
+_NO_MOMENT: Final = 1e-9  # Share of the waves' slope below which they do not act on the ship.
 
 # default limits of drive and high-level switch relative to pump and tank are the first ship's
 _DRIVE_RATE_PER_PRESSURE: Final = 5.0
@@ -102,8 +97,7 @@ class HullFile(Section):
     """Capytaine's netCDF, WAMIT's .1, Nemoh.cal, AQWA's .AH1, ShipX's .re7 or MSS's .mat."""
     density_kg_m3: Annotated[float, Range(least=900, most=1100)] | None = None
     """Density of the water."""
-    mass_kg: Positive | None = None
-    """Mass of the ship without the tank's water."""
+    mass_kg: Positive | None = None  #: Mass of the ship without the tank's water.
     gravity_centre_m: tuple[Finite, Finite, Finite] | None = None
     """Centre of gravity forward, to port and up of the origin in the waterline."""
     gyration_m: tuple[Positive, Positive, Positive] | None = None
@@ -139,23 +133,20 @@ class Scenario(Section):
     operator: tuple[TimedAction, ...] = ()
     """Actions of the operator in the runs with a controller; the passive run is never armed."""
     duration_s: Annotated[float, Range(above=0, most=LONGEST_S)]
-    settle_s: NotNegative
-    """Time at the start that is left out of the statistics."""
+    settle_s: NotNegative  #: Time at the start that is left out of the statistics.
     seed: Annotated[int, Range(least=0)] = 1
     place: Place | None = None
     """Place where comfort is judged; the deck over the starboard reservoir by default."""
     plant: Literal["roll", "linear", "sway_roll_yaw"] = "roll"
     """Equations of the emulated ship: roll, its small-motion limit, or three degrees of `hull`."""
-    hull: HullFile | None = None
-    """Hull data of the ship at rest, for plant: sway_roll_yaw."""
+    hull: HullFile | None = None  #: Hull data of the ship at rest, for plant: sway_roll_yaw.
     actual_ship: dict[str, Finite] = Field(default_factory=dict)
     """Parameters of the actual ship that differ from the vessel's, on which the controller relies.
 
     Allowed keys are those of `SAILED`, and ``sway_of_slope``, which holds from the start."""
     actual_from_s: NotNegative = 0.0
     """Time at which the difference arises, as by shifted cargo or burnt fuel."""
-    voyage: tuple[Waypoint, ...] = ()
-    """Changes of course, speed, loading and sea under way."""
+    voyage: tuple[Waypoint, ...] = ()  #: Changes of course, speed, loading and sea under way.
     faults: tuple[AnyFault, ...] = ()
     """Faults in simulated runs with a controller; the passive run has none."""
 

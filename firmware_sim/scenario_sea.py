@@ -43,8 +43,7 @@ from utank_hil.sea.passing import PassingSea
 Bearing = Annotated[float, Range(least=-360, most=360)]
 Speed = Annotated[float, Range(least=0, most=40)]
 """Speed of a ship in m/s; the fastest ferries reach 30."""
-_FAST_M_S: Final = 20.0
-"""Speed above which a warning is given. Chosen; no study."""
+_FAST_M_S: Final = 20.0  # Speed above which a warning is given. Chosen; no study.
 LEAST_SPEED_M_S: Final = 0.05
 """Speed below which a ship would be said to be at rest. Chosen; no study."""
 LEAST_SLOPE: Final = 0.05
@@ -203,8 +202,7 @@ class MeasuredSea(MeasuredSpectrum, IrregularSea):
     direction_file: Path | None = None
     """File of the same station's mean directions; it requires `course_deg` instead of
     `heading_deg`. A file of directional spectra needs none."""
-    course_deg: Bearing | None = None
-    """Ship's course, degrees clockwise from true north."""
+    course_deg: Bearing | None = None  #: Ship's course, degrees clockwise from true north.
     until: datetime | None = None
     """Time of the last record: the sea passes linearly from each record to the next."""
 

@@ -27,14 +27,12 @@ from utank_hil.nodes.housekeeping import Housekeeping
 if TYPE_CHECKING:
     from firmware_sim.plant import Plant  # compiled: a scenario is read without it
 
-NOISE_BLOCK = 4096
-"""Number of random values drawn at once. Chosen; no study."""
+NOISE_BLOCK = 4096  #: Number of random values drawn at once. Chosen; no study.
 
 # bound once: in Python 3.11 class access to an enum member is eight times slower
 _GOOD = Quality.GOOD
 _CLOSED, _OPEN = Switch.ON, Switch.OFF
-# a NamedTuple's own constructor takes twice the time
-_new: Final = tuple.__new__
+_new: Final = tuple.__new__  # a NamedTuple's own constructor takes twice the time
 
 _M = TypeVar("_M", bound=tuple[Any, ...])
 

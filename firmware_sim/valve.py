@@ -32,8 +32,7 @@ MISCODED_COMMANDS_TO_TRIP: Final = 5
 """Consecutive rejected commands that cause a fault, as in the drive."""
 STUCK_OFF: Final = 0.05
 """Deviation from the target above which the valve must move. Chosen; no study."""
-STUCK_NS: Final = 200_000_000
-"""Time in ns in which it must move. Chosen; no study."""
+STUCK_NS: Final = 200_000_000  #: Time in ns in which it must move. Chosen; no study.
 _AT_END: Final = 1e-3
 """Distance from an end position below which its limit switch is set. Chosen; no study."""
 

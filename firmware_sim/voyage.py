@@ -24,14 +24,12 @@ class Waypoint(Section):
     """
 
     time_s: Positive
-    heading_deg: Bearing | None = None
-    """Direction in which the waves go relative to the ship."""
+    heading_deg: Bearing | None = None  #: Direction in which the waves go relative to the ship.
     course_deg: Bearing | None = None
     """Ship's course where the sea has directions, instead of the heading: degrees clockwise from
     true north."""
     speed_m_s: Speed | None = None
-    sea: AnySpectrum | None = None
-    """Spectrum of the sea; its other keys are the scenario's."""
+    sea: AnySpectrum | None = None  #: Spectrum of the sea; its other keys are the scenario's.
     ship: dict[str, Finite] = Field(default_factory=dict)
     """Parameters of the ship, with the keys of ``actual_ship``."""
 

@@ -15,8 +15,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 _shared: list[Any] = []
-_PR_SET_PDEATHSIG: Final = 1
-"""Option of Linux's prctl for the signal at the parent's death."""
+_PR_SET_PDEATHSIG: Final = 1  # Option of Linux's prctl for the signal at the parent's death.
 
 
 class WorkerPool(ProcessPoolExecutor):

@@ -26,8 +26,7 @@ from typing import Any, Final, NamedTuple
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 FOLDER: Final = ROOT / "docs" / "evidence"
-LAST_LINES: Final = 400
-"""Lines that are kept of a command that prints no JSON object."""
+LAST_LINES: Final = 400  #: Lines that are kept of a command that prints no JSON object.
 
 
 class Part(NamedTuple):

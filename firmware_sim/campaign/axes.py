@@ -13,12 +13,10 @@ from utank_hil.base.parameters import Finite, Positive, Range, refuse
 from utank_hil.configuration import Section
 from utank_hil.configuration.spectra import read_spectra, utc
 
-Value = Any
-"""Number, text, time, truth value, or content of a file that the study names."""
+Value = Any  #: Number, text, time, truth value, or content of a file that the study names.
 MOST_CASES: Final = 1_000_000
 """Most cases of a study: their list is kept in memory. Chosen; no study."""
-WEIGHT: Final = "weight"
-"""Column of a table of draws: relative probability of a row."""
+WEIGHT: Final = "weight"  #: Column of a table of draws: relative probability of a row.
 
 _Count = Annotated[int, Range(least=1, most=MOST_CASES)]
 
@@ -85,17 +83,14 @@ def _listed(written: Any) -> Any:
     )
 
 
-Axis = Annotated[list[Value], BeforeValidator(_listed), Field(min_length=1)]
-"""Values of one key."""
+Axis = Annotated[list[Value], BeforeValidator(_listed), Field(min_length=1)]  #: Values of one key.
 
 
 class Uniform(Section):
     """Uniformly distributed numbers."""
 
-    low: Finite
-    """Lower bound."""
-    high: Finite
-    """Upper bound."""
+    low: Finite  #: Lower bound.
+    high: Finite  #: Upper bound.
 
     def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:
         """Draw `count` values."""
@@ -105,10 +100,8 @@ class Uniform(Section):
 class Normal(Section):
     """Normally distributed numbers."""
 
-    mean: Finite
-    """Mean of the distribution."""
-    std: Positive
-    """Standard deviation."""
+    mean: Finite  #: Mean of the distribution.
+    std: Positive  #: Standard deviation.
 
     def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:
         """Draw `count` values."""
@@ -118,8 +111,7 @@ class Normal(Section):
 class Consecutive(Section):
     """Consecutive whole numbers, one for each sample, such as seeds."""
 
-    first: Annotated[int, Range(least=0)]
-    """The first number."""
+    first: Annotated[int, Range(least=0)]  #: The first number.
 
     def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:  # noqa: ARG002
         """Draw `count` values."""
@@ -129,8 +121,7 @@ class Consecutive(Section):
 class Choice(Section):
     """Equally likely choice among given values."""
 
-    one_of: Annotated[list[Value], Field(min_length=1)]
-    """The values."""
+    one_of: Annotated[list[Value], Field(min_length=1)]  #: The values.
 
     def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:
         """Draw `count` values."""
@@ -140,8 +131,7 @@ class Choice(Section):
 class Draws(Section):
     """Samples of keys drawn independently of one another and of the rows of a table."""
 
-    samples: _Count
-    """Number of samples."""
+    samples: _Count  #: Number of samples.
     seed: Annotated[int, Range(least=0)] = 1
     """Seed of the draws, independent of the seed of the waves."""
     keys: dict[str, Uniform | Normal | Consecutive | Choice] = Field(default_factory=dict)

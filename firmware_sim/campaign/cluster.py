@@ -18,8 +18,7 @@ MOST_DEATHS: Final = 10
 """Worker deaths after which a batch is abandoned; three is too few for preemptible workers."""
 RESTART_S: Final = 120
 """Time in s allowed for a worker to restart: imports are slow on a busy machine."""
-CONNECT_S: Final = 10.0
-"""Time in s allowed for the scheduler to answer. Chosen; no study."""
+CONNECT_S: Final = 10.0  #: Time in s allowed for the scheduler to answer. Chosen; no study.
 
 
 @contextmanager

@@ -19,14 +19,10 @@ if TYPE_CHECKING:
 
 BATCH_S: Final = 0.5
 """Work per batch in s: large beside the 10 ms of sending it, small enough to lose."""
-MOST_TOGETHER: Final = 200
-"""Most cases in a batch. Chosen; no study."""
-AHEAD: Final = 2
-"""Number of batches queued or running at each worker."""
-LOOK_S: Final = 5.0
-"""Interval in s at which dead workers are replaced."""
-FLUSH_S: Final = 1.0
-"""Longest delay in s between the return of rows and their writing to disk."""
+MOST_TOGETHER: Final = 200  #: Most cases in a batch. Chosen; no study.
+AHEAD: Final = 2  #: Number of batches queued or running at each worker.
+LOOK_S: Final = 5.0  #: Interval in s at which dead workers are replaced.
+FLUSH_S: Final = 1.0  #: Longest delay in s between the return of rows and their writing to disk.
 
 Work = Callable[[Batch], list[Row]]
 

@@ -7,8 +7,7 @@ from firmware_sim.scenario import Scenario
 from utank_hil.configuration.known_keys import known_keys, nearest
 
 Content = dict[str, Any]
-WHOLE: Final = "scenario"
-"""Key whose value replaces the whole scenario."""
+WHOLE: Final = "scenario"  #: Key whose value replaces the whole scenario.
 _VESSEL: Final = "vessel"
 _EVERY: Final = "*"
 

@@ -10,8 +10,7 @@ from firmware_sim.scenario import PASSIVE
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
 from utank_hil.reports.parts import Report, ReportKind, about_section, printed
 
-MOST_LINES: Final = 8
-"""Most lines of the verdict. Chosen; no study."""
+MOST_LINES: Final = 8  #: Most lines of the verdict. Chosen; no study.
 
 
 def campaign_report(folder: Path, scratch: Path) -> Report:  # noqa: ARG001

@@ -10,8 +10,7 @@ from utank_hil.analysis.motion.confidence import mean_interval
 
 _NOTHING: Final[Mapping[str, float]] = {}
 
-Figures = Mapping[str, float]
-"""Metric by run; empty for a failed case."""
+Figures = Mapping[str, float]  #: Metric by run; empty for a failed case.
 
 
 def figures_of(rows: Iterable[Mapping[str, Any]], metric: str) -> dict[str, float]:

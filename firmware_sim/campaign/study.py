@@ -38,14 +38,12 @@ class Stop(Section):
     on which cases return first.
     """
 
-    metric: str
-    """Column of the results whose interval is judged."""
+    metric: str  #: Column of the results whose interval is judged.
     half_width: Positive | None = None
     """Largest half width of the 95 % confidence interval, in the metric's unit."""
     relative: Positive | None = None
     """Largest half width as a share of the mean, instead of `half_width`."""
-    least: Annotated[int, Range(least=3)] = 10
-    """Least number of cases computed."""
+    least: Annotated[int, Range(least=3)] = 10  #: Least number of cases computed.
 
     @model_validator(mode="after")
     def _one_measure(self) -> "Stop":
@@ -64,22 +62,18 @@ class Study(Section):
     noun: ClassVar = "study"
 
     name: str
-    scenario: Content
-    """Scenario file that is varied."""
+    scenario: Content  #: Scenario file that is varied.
     simulation: Literal["bus", "linear", "nonlinear"]
     """Kind of simulation, which determines the effects that are left out."""
-    set: Content = Field(default_factory=dict)
-    """Values by dotted key that apply to every case."""
+    set: Content = Field(default_factory=dict)  #: Values by dotted key that apply to every case.
     cases: Annotated[tuple[Content, ...], Field(min_length=1)] = ({},)
     """Sets of values by dotted key; each set is combined with all of `grid`."""
     grid: dict[str, Axis] = Field(default_factory=dict)
     """Lists of values by dotted key; all combinations are computed."""
-    random: Draws | None = None
-    """Random samples, each combined with all of `cases` and `grid`."""
+    random: Draws | None = None  #: Random samples, each combined with all of `cases` and `grid`.
     average_over: tuple[str, ...] = (SEED,)
     """Keys that are averaged over and define no group; drawn keys always belong to them."""
-    stop: Stop | None = None
-    """Rule by which a group needs no more cases."""
+    stop: Stop | None = None  #: Rule by which a group needs no more cases.
 
     @model_validator(mode="after")
     def _consistent(self) -> "Study":

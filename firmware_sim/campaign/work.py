@@ -20,10 +20,8 @@ from utank_hil.configuration.files import ALLOW_CODE, problems_in_words
 from utank_hil.control import BuiltLaw
 
 OK: Final = "ok"
-FAILED: Final = "failed"
-"""Status of a case that cannot be computed; it would fail again."""
-LOST: Final = "lost"
-"""Status of a case that was ended from outside; `--resume` tries it again."""
+FAILED: Final = "failed"  #: Status of a case that cannot be computed; it would fail again.
+LOST: Final = "lost"  #: Status of a case that was ended from outside; `--resume` tries it again.
 
 
 class OtherCodeError(Exception):

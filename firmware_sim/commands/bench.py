@@ -37,12 +37,10 @@ if TYPE_CHECKING:
     from firmware_sim.scenario import Scenario
 
 STORM = CONFIGS / "scenarios" / "storm.yaml"
-_ROLL_DAMPING: Final = 0.1
-"""Damping ratio of the roll of the shipped ships with their tanks."""
+_ROLL_DAMPING: Final = 0.1  # Damping ratio of the roll of the shipped ships with their tanks.
 _LEAST_INTERVAL: Final = 0.1
 """Interval of the roll RMS from which it is said; an hour of the first ship has 0.07."""
-REAL_TIME_S = 120.0
-"""Default length of a run in real time. Chosen; no study."""
+REAL_TIME_S = 120.0  #: Default length of a run in real time. Chosen; no study.
 
 
 def bench(

@@ -19,8 +19,7 @@ from firmware_sim.comparison.difference import (
     same_runs,
 )
 
-_Figures = dict[str, dict[str, float]]
-"""Metrics by the waves of a case."""
+_Figures = dict[str, dict[str, float]]  # Metrics by the waves of a case.
 
 
 def compare_campaigns(reference: Path, others: list[Path]) -> list[Comparison]:

@@ -32,8 +32,7 @@ With half of it, the 95 % interval of an hour contains the true difference of tw
 LEAST_PERIODS: Final = 20
 """Batch length in mean roll periods for a shorter record, down to `LEAST_BATCHES`. Chosen; no
 study."""
-MOST_BATCHES, LEAST_BATCHES = 30, 6
-"""Most and least batches of a run. Chosen; no study."""
+MOST_BATCHES, LEAST_BATCHES = 30, 6  #: Most and least batches of a run. Chosen; no study.
 _WAVES: Final = ("sea", "voyage")
 """Sections of a scenario that draw the waves, together with the seed."""
 

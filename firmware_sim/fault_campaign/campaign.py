@@ -19,10 +19,8 @@ from utank_hil.retuning import EstimateSettings
 
 LONG_S: Final = 300.0
 """Follow-up time in s above which a row takes more than a minute of CPU time per sea."""
-_PHASES: Final = 100
-"""Number of ticks in a second, the slowest message cycle."""
-_PHASE_STRIDE: Final = 37
-"""Ticks from one seed's fault to the next one's: coprime to 100 and to 5."""
+_PHASES: Final = 100  # Number of ticks in a second, the slowest message cycle.
+_PHASE_STRIDE: Final = 37  # Ticks from one seed's fault to the next one's: coprime to 100 and to 5.
 
 
 def _fault_name(name: str) -> str:
@@ -51,8 +49,7 @@ class Requirement(Section):
     found_by: str = ""
     within: str = ""
     reaction: str = ""
-    elsewhere: str = ""
-    """Test or document that verifies it, where no row of the campaign does."""
+    elsewhere: str = ""  #: Test or document that verifies it, where no row of the campaign does.
 
 
 class Setup(Section):

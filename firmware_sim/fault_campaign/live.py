@@ -39,8 +39,7 @@ START_S: Final = 180.0
 STARTS: Final = 3
 """Most starts: a machine that delays processes may end a run before its fault is injected, the only
 cause of a new start."""
-ATTEMPTS: Final = 3
-"""Most attempts at a row: such a machine may also spoil what is judged."""
+ATTEMPTS: Final = 3  #: Most attempts at a row: such a machine may also spoil what is judged.
 DRIVEN_PA: Final = 5e3
 """Pressure above which the pump works: a tenth of the limit of the storm's ship."""
 RESTED_S: Final = 1.0
@@ -49,8 +48,7 @@ WATCHED_S: Final = 3.0
 """Time in s for which the bus is watched after the fault: two seconds more than the pause."""
 _RECENT_S: Final = 0.5
 """Largest age in s of the last CTRL_STATUS of a controller in charge: five cycles."""
-_LOOK_S: Final = 0.002
-"""Polling interval in s: a fifth of the shortest message cycle."""
+_LOOK_S: Final = 0.002  # Polling interval in s: a fifth of the shortest message cycle.
 _EXTENDED_MASK: Final = 0x1FFFFFFF
 _BUS_OFF: Final = struct.pack("=IB3x8s", 0x20000040, 8, bytes(8))
 """Error frame that reports bus-off, in the form of a kernel driver."""

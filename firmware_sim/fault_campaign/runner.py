@@ -18,13 +18,11 @@ from firmware_sim.worker_pool import WorkerPool, shared, whole_first
 from utank_hil.assembly import build_law
 from utank_hil.control import BuiltLaw
 
-POLL_S: Final = 0.1
-"""Interval in s of the progress display and the check for an early end."""
+POLL_S: Final = 0.1  #: Interval in s of the progress display and the check for an early end.
 ROWS_A_TASK: Final = 30
 """Most rows that share one ship under way: few enough for the cores to end together."""
 
-Progress = Callable[[int], None]
-"""Callback that takes the number of completed trials."""
+Progress = Callable[[int], None]  #: Callback that takes the number of completed trials.
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,12 +39,10 @@ SAMPLE_TICKS: Final = 5
 """Ticks between samples of a passive ship's roll and of a recording: 50 ms."""
 SAMPLE_NS: Final = SAMPLE_TICKS * TICK_NS
 COLUMNS: Final = (*SIGNALS, *TRUTH[1:])
-_LOOK_S: Final = 0.1
-"""Interval in s at which Ctrl-C is checked while a copy works."""
+_LOOK_S: Final = 0.1  # Interval in s at which Ctrl-C is checked while a copy works.
 REARMED_S: Final = 20.0
 """Time in s after the fault for which the campaign's first sea checks that nothing arms again."""
-COMMANDS_NS: Final = 40_000_000
-"""Two cycles of PUMP_CMD."""
+COMMANDS_NS: Final = 40_000_000  #: Two cycles of PUMP_CMD.
 FLAGS: Final = get_args(StatusFlag)
 RECORDED_S: Final = 10.0
 """Time in s before the fault at which a recording begins. Chosen; no study."""

@@ -11,8 +11,7 @@ from firmware_sim.fault_campaign.trial import FLAGS, Outcome
 from utank_hil.canbus import PumpCommand, load_catalogue
 from utank_hil.safety.faults import FAULTS, Reaction
 
-STOP_ZERO_MS: Final = 250.0
-"""Latest zero pressure in ms after a stop was triggered."""
+STOP_ZERO_MS: Final = 250.0  #: Latest zero pressure in ms after a stop was triggered.
 CUT_MS: Final = 100.0
 """Latest zero pressure in ms after a fault that always stops: a ramp instead would take longer."""
 RAMP_ZERO_MS: Final = 1040.0
@@ -31,8 +30,7 @@ RATE_SHARE: Final = 1.001
 """Share of the rate limit that commands may reach, with the limiter's rounding."""
 STATUS_MS: Final = 200.0
 """Two cycles of CTRL_STATUS in ms: a shorter state need not appear in one."""
-ALARM_MS: Final = 100.0
-"""Period in ms at which the list of alarms is updated and checked."""
+ALARM_MS: Final = 100.0  #: Period in ms at which the list of alarms is updated and checked.
 COMMAND: Final = load_catalogue().codec(PumpCommand).name
 _TIME_OF: Final[dict[Asked, str]] = {
     "stop": "found",
@@ -43,8 +41,7 @@ _TIME_OF: Final[dict[Asked, str]] = {
     "drive": "zero",
 }
 """Field of `Times` with the start of each reaction."""
-_GO_ON: Final = ("halve", "alarm", "note", "none")
-"""Reactions after which control continues."""
+_GO_ON: Final = ("halve", "alarm", "note", "none")  # Reactions after which control continues.
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,16 +20,14 @@ from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.safety.supervisor import Demand
 
-Heard = tuple[int, int, bytes]
-"""Time in ns, identifier and data of a frame on the bus."""
+Heard = tuple[int, int, bytes]  #: Time in ns, identifier and data of a frame on the bus.
 
 _COMMANDS = load_catalogue().codec(PumpCommand)
 _STATUS = load_catalogue().codec(ControllerStatus)
 _ALARMS = load_catalogue().codec(Alarm)
 ROUNDING_PA = 8.0
 """Resolution of the pressure in PUMP_CMD: each of two commands is rounded by half of it."""
-JITTER_S = 0.002
-"""Extra delay of a command in s on a loaded bus of 250 kbit/s: four frames."""
+JITTER_S = 0.002  #: Extra delay of a command in s on a loaded bus of 250 kbit/s: four frames.
 
 
 class BusLog:

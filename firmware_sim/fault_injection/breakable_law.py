@@ -8,8 +8,7 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.interface import Controller
 
-LEANING_PA: Final = 1e4
-"""Answer of a law that leans to one side. Chosen; no study."""
+LEANING_PA: Final = 1e4  #: Answer of a law that leans to one side. Chosen; no study.
 
 
 @dataclass(slots=True)

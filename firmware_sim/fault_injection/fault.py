@@ -16,8 +16,7 @@ from utank_hil.configuration import Section
 from utank_hil.configuration.known_keys import nearest
 
 SECOND_NS: Final = 1_000_000_000
-LONGEST_FAULT_S: Final = 86_400.0
-"""Latest time of a fault: a day, the longest run of a scenario."""
+LONGEST_FAULT_S: Final = 86_400.0  #: Latest time of a fault: a day, the longest run of a scenario.
 
 NODE_OF: Final = {
     Address.SENSORS: "sensors",

@@ -21,10 +21,8 @@ from utank_hil.runners import SimulatedBus
 
 ERROR_FRAME_BITS: Final = 17
 """Error flag and delimiter, at most 20 bits, minus the end of frame that is not sent."""
-PASSIVE: Final = 128
-"""Transmit error counter of an error-passive node (ISO 11898-1)."""
-OFF: Final = 256
-"""Transmit error counter of a node in bus-off (ISO 11898-1)."""
+PASSIVE: Final = 128  #: Transmit error counter of an error-passive node (ISO 11898-1).
+OFF: Final = 256  #: Transmit error counter of a node in bus-off (ISO 11898-1).
 
 Arrived = tuple[int, int, Frame]
 

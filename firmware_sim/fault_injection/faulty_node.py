@@ -8,8 +8,7 @@ from utank_hil.canbus import Frame
 from utank_hil.runners import Node
 from utank_hil.runners.node import LinkObserver, Selective
 
-NEVER_NS: Final = 1 << 62
-"""Time beyond the end of every run."""
+NEVER_NS: Final = 1 << 62  #: Time beyond the end of every run.
 
 Spoil = Callable[[Frame, float], Iterable[Frame]]
 """Function of a frame and the time in s since the fault that gives the frames sent instead."""

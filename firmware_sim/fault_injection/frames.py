@@ -15,16 +15,14 @@ from utank_hil.canbus import Frame
 from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.canbus.e2e import data_ids, profile2_crc
 
-_FOREIGN_DATA_IDS: Final = data_ids(127)
-"""Data IDs that no message of the catalogue has."""
+_FOREIGN_DATA_IDS: Final = data_ids(127)  # Data IDs that no message of the catalogue has.
 
 
 class Lost(MessageFault):
     """Frames are lost: all of them, or a share by chance."""
 
     kind: Literal["lost"]
-    share: Annotated[float, Field(gt=0, le=1)] = 1.0
-    """Share of the frames lost at random."""
+    share: Annotated[float, Field(gt=0, le=1)] = 1.0  #: Share of the frames lost at random.
 
     def _spoil(self, seed: int) -> Spoil:
         draw = random.Random(seed).random
@@ -50,8 +48,7 @@ class Replayed(MessageFault):
     """The first frames of the fault are repeated in place of the new ones."""
 
     kind: Literal["replayed"]
-    frames: Annotated[int, Field(ge=2)]
-    """Number of frames that are repeated."""
+    frames: Annotated[int, Field(ge=2)]  #: Number of frames that are repeated.
 
     def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         kept: list[Frame] = []
@@ -71,8 +68,7 @@ class Doubled(MessageFault):
     """Every frame is sent several times."""
 
     kind: Literal["doubled"]
-    times: Annotated[int, Range(least=2, most=100)] = 2
-    """Number of times that each frame is sent."""
+    times: Annotated[int, Range(least=2, most=100)] = 2  #: Number of times that each frame is sent.
 
     def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         return lambda frame, _: (frame,) * self.times
@@ -82,8 +78,7 @@ class Inserted(MessageFault):
     """An old frame is sent beside each new one."""
 
     kind: Literal["inserted"]
-    back: Annotated[int, Range(least=1, most=10_000)]
-    """Age of the old frame in cycles."""
+    back: Annotated[int, Range(least=1, most=10_000)]  #: Age of the old frame in cycles.
 
     def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         old: deque[Frame] = deque(maxlen=self.back + 1)
@@ -147,8 +142,7 @@ class Corrupted(Damaged):
     """Two bits of a byte are wrong, undetected by the CAN controllers."""
 
     kind: Literal["corrupted"]
-    byte: Annotated[int, Field(ge=0, lt=FRAME_BYTES)] = 3
-    """Index of the damaged byte."""
+    byte: Annotated[int, Field(ge=0, lt=FRAME_BYTES)] = 3  #: Index of the damaged byte.
 
     def _damage(self, data: bytes) -> bytes:
         wrong = bytearray(data)
@@ -172,8 +166,7 @@ class WrongLength(Damaged):
     """The frame is too short."""
 
     kind: Literal["length"]
-    length: Annotated[int, Field(ge=0, lt=FRAME_BYTES)]
-    """Number of bytes left."""
+    length: Annotated[int, Field(ge=0, lt=FRAME_BYTES)]  #: Number of bytes left.
 
     def _damage(self, data: bytes) -> bytes:
         return data[: self.length]

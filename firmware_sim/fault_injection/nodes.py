@@ -80,10 +80,8 @@ class Link(NodeFault):
     """
 
     kind: Literal["link"]
-    reason: str
-    """Text of the error that the interface reports."""
-    warns: bool = False
-    """Whether the error is a warning and frames are still carried."""
+    reason: str  #: Text of the error that the interface reports.
+    warns: bool = False  #: Whether the error is a warning and frames are still carried.
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Cut the node off."""
@@ -99,14 +97,10 @@ class Pump(Fault):
 
     needs = ("drive",)
     kind: Literal["pump"]
-    times: Finite = 1.0
-    """Factor on the set-point; negative for reversed pressure."""
-    plus_pa: Finite = 0.0
-    """Pressure added to it."""
-    lag_s: NotNegative = 0.0
-    """Time constant of the faulty pressure."""
-    off_too: bool = False
-    """Whether the pressure is present while the pump is off."""
+    times: Finite = 1.0  #: Factor on the set-point; negative for reversed pressure.
+    plus_pa: Finite = 0.0  #: Pressure added to it.
+    lag_s: NotNegative = 0.0  #: Time constant of the faulty pressure.
+    off_too: bool = False  #: Whether the pressure is present while the pump is off.
 
     @property
     def beyond_commands(self) -> bool:
@@ -141,8 +135,7 @@ class Drive(Fault):
 
     needs = ("drive",)
     kind: Literal["drive"]
-    fault: str
-    """Name of the fault in DRIVE_STATUS_2."""
+    fault: str  #: Name of the fault in DRIVE_STATUS_2.
 
     @field_validator("fault")
     @classmethod
@@ -163,8 +156,7 @@ class Valve(Fault):
 
     needs = ("valve",)
     kind: Literal["valve"]
-    fails: Literal["stuck", "powerless"]
-    """Kind of failure."""
+    fails: Literal["stuck", "powerless"]  #: Kind of failure.
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Break the valve, and repair it at the end."""
@@ -183,8 +175,7 @@ class Law(Fault):
     replayable = False
     needs = ("controller",)
     kind: Literal["law"]
-    fails: Literal["raises", "answers_nan", "opposite", "leans"]
-    """Kind of failure."""
+    fails: Literal["raises", "answers_nan", "opposite", "leans"]  #: Kind of failure.
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Break the law, and repair it at the end."""

@@ -104,8 +104,7 @@ class Offset(SignalFault):
     """The signals have a constant offset."""
 
     kind: Literal["offset"]
-    by: Finite
-    """Offset of each signal in its unit."""
+    by: Finite  #: Offset of each signal in its unit.
 
     def _change(self, seed: int) -> Change:  # noqa: ARG002
         return lambda values, _: [value + self.by for value in values]
@@ -115,8 +114,7 @@ class Scale(SignalFault):
     """The signals are too great or too small by a factor."""
 
     kind: Literal["scale"]
-    times: Finite
-    """Factor on each signal."""
+    times: Finite  #: Factor on each signal.
 
     def _change(self, seed: int) -> Change:  # noqa: ARG002
         return lambda values, _: [value * self.times for value in values]
@@ -126,8 +124,7 @@ class Drift(SignalFault):
     """The signals drift."""
 
     kind: Literal["drift"]
-    by_per_s: Finite
-    """Drift of each signal in its unit per second."""
+    by_per_s: Finite  #: Drift of each signal in its unit per second.
 
     def _change(self, seed: int) -> Change:  # noqa: ARG002
         return lambda values, since_s: [value + self.by_per_s * since_s for value in values]
@@ -137,8 +134,7 @@ class Noise(SignalFault):
     """White Gaussian noise is added to the signals."""
 
     kind: Literal["noise"]
-    deviation: Positive
-    """Standard deviation in the signals' unit."""
+    deviation: Positive  #: Standard deviation in the signals' unit.
 
     def _change(self, seed: int) -> Change:
         draw = random.Random(seed).gauss
@@ -149,8 +145,7 @@ class Spikes(SignalFault):
     """One sample in `every` has an offset."""
 
     kind: Literal["spikes"]
-    by: Finite
-    """Offset of that sample in the signal's unit."""
+    by: Finite  #: Offset of that sample in the signal's unit.
     every: Annotated[int, Field(ge=2)]
 
     def _change(self, seed: int) -> Change:  # noqa: ARG002
@@ -186,8 +181,7 @@ class Late(SignalFault):
     """The signals are delayed."""
 
     kind: Literal["late"]
-    by_s: FaultSpan
-    """Delay, rounded up to whole cycles of the message."""
+    by_s: FaultSpan  #: Delay, rounded up to whole cycles of the message.
 
     def _change(self, seed: int) -> Change:  # noqa: ARG002
         cycles = whole_cycles(self.by_s, self.named.codec.cycle_ns)
@@ -227,8 +221,7 @@ class Value(MessageFault):
 
     kind: Literal["value"]
     values: Annotated[dict[str, float | bool | str | None], Field(min_length=1)]
-    every: Annotated[int, Field(ge=1)] = 1
-    """Only one message in this number has these values."""
+    every: Annotated[int, Field(ge=1)] = 1  #: Only one message in this number has these values.
 
     @model_validator(mode="after")
     def _known_values(self) -> "Value":

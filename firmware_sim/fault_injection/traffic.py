@@ -23,8 +23,7 @@ from utank_hil.canbus import Frame, Station, load_catalogue
 from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.nodes.panel import OperatorPanel, TimedAction
 
-BIT_RATE: Final = 250_000
-"""Bit rate of the bus in bit/s (docs/can-catalogue.md)."""
+BIT_RATE: Final = 250_000  #: Bit rate of the bus in bit/s (docs/can-catalogue.md).
 _SHARE = Annotated[float, Field(gt=0, le=1)]
 
 
@@ -51,14 +50,10 @@ class Disturbed(BusFault):
     """A gateway loses, delays, doubles or swaps a share of the frames."""
 
     kind: Literal["gateway"]
-    does: Literal["loses", "delays", "doubles", "swaps"]
-    """Kind of disturbance."""
-    share: _SHARE = 1.0
-    """Share of the frames disturbed at random."""
-    message: MessageName | None = None
-    """Message that is disturbed; all if none is named."""
-    by_s: FaultSpan | None = None
-    """Delay of a frame."""
+    does: Literal["loses", "delays", "doubles", "swaps"]  #: Kind of disturbance.
+    share: _SHARE = 1.0  #: Share of the frames disturbed at random.
+    message: MessageName | None = None  #: Message that is disturbed; all if none is named.
+    by_s: FaultSpan | None = None  #: Delay of a frame.
 
     @model_validator(mode="after")
     def _delay(self) -> "Disturbed":
@@ -84,8 +79,7 @@ class BitErrors(BusFault):
     """A share of the transmissions is destroyed; with `node`, as by a broken transceiver."""
 
     kind: Literal["bit_errors"]
-    share: _SHARE
-    """Share of the transmissions destroyed at random."""
+    share: _SHARE  #: Share of the transmissions destroyed at random.
     node: NodeName | None = None
     """Node with the broken transceiver; without it the frames of all nodes are concerned."""
 
@@ -242,8 +236,7 @@ class SecondPanel(Fault):
     """A second operator's station, whose times count from its first frame of the controller."""
 
     kind: Literal["second_panel"]
-    operator: tuple[TimedAction, ...] = ()
-    """Actions at that station."""
+    operator: tuple[TimedAction, ...] = ()  #: Actions at that station.
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Add the station to the bus, and remove it at the end."""

@@ -10,8 +10,7 @@ from utank_hil.configuration import load_config
 from utank_hil.runners import Lockstep, SimulatedBus
 
 PAGE = Path("docs/can-catalogue.md")
-ESTIMATES = 2
-"""Frames a second of a controller that estimates sea and ship, as this one does not."""
+ESTIMATES = 2  #: Frames a second of a controller that estimates sea and ship, as this one does not.
 
 
 def test_the_stated_load_covers_every_message_that_the_four_nodes_send():

@@ -23,8 +23,7 @@ ADAPTIVE = load_config(Path("configs/scenarios/adaptive.yaml"), Scenario)
 IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED, UNDONE = list(RetuningState)
 FOUND = ModelSummary(7.6, 0.01, 1.9e9, 1.3e9, 4.9e7, 0.11, 0.99, 1.2, 0.2)
 LATER = ModelSummary(7.4, 0.02, 1.8e9, 1.3e9, 4.7e7, 0.09, 0.99, 1.2, 0.2)
-CLOCK_S = 123_456.0
-"""Of the controller, when the ship's is at 0."""
+CLOCK_S = 123_456.0  #: Of the controller, when the ship's is at 0.
 
 Step = tuple[float, RetuningState, float, tuple[str, ...], ModelSummary | None]
 GOOD: tuple[Step, ...] = (

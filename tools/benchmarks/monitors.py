@@ -43,8 +43,7 @@ from utank_hil.safety.passive_twin import PassiveTwin
 LAW: Final = "gpc"
 AGAIN: Final = 1000
 ROUNDS: Final = 100
-HELD_UP: Final = 10.0
-"""A call of so many medians was held up by something else on the machine."""
+HELD_UP: Final = 10.0  #: A call of so many medians was held up by something else on the machine.
 
 
 class Empty:

@@ -39,8 +39,7 @@ SECONDS: Final = 10.0
 FRAMES_A_SECOND: Final = 10
 SIZE_IN: Final = (7.2, 3.1)
 DPI: Final = 100
-PALETTE: Final = 24
-"""Colours of a frame: a third of the size of 256."""
+PALETTE: Final = 24  #: Colours of a frame: a third of the size of 256.
 BACKGROUND: Final = "#0d0d0d"
 WORDS: Final = "#e0e0e0"
 

@@ -37,8 +37,7 @@ CACHE = ROOT / ".cache" / "false_alarms"
 HOUR_S = 3600.0
 ORDER_RETUNING_S = 400.0
 AIM_PER_HOUR = 1e-3
-ENDS = {"ROLL_AMPLIFIED", "LEVEL_LIMIT"}
-"""Findings of this study that end control."""
+ENDS = {"ROLL_AMPLIFIED", "LEVEL_LIMIT"}  #: Findings of this study that end control.
 ENDED_BY_ITSELF = {"roll over twin": "ROLL_AMPLIFIED"}
 DIGITS = 4
 SEAS = {"calm": 0.2, "ordinary": 0.5, "storm": 1.0}

@@ -47,8 +47,7 @@ HOURS: Final = (
     *("06T08", "06T20", "07T08", "07T20", "08T08", "09T04", "09T12", "09T19"),
 )  # of February 2019, significant heights of 0.65 to 1.4 m
 SIXTEEN: Final = 16
-PERIODS: Final = (0.7, 0.85, 1.15, 1.3)
-"""Of the ship's roll period, by its loading."""
+PERIODS: Final = (0.7, 0.85, 1.15, 1.3)  #: Of the ship's roll period, by its loading.
 HEADINGS_DEG: Final = {"nearly following": 20.0, "quartering": 45.0, "bow": 135.0}
 SPEED_M_S: Final = 6.0
 CAUSAL: Final = "causal bound"
@@ -56,8 +55,7 @@ CAUSAL_RECORDS: Final = 6
 CAUSAL_RECORD_S: Final = 600.0
 CAUSAL_SEA: Final = {"order": 24, "floor": 1e-3}
 _STEP_RAD_S: Final = 0.01
-_COMPONENTS: Final = 16384
-"""Of the sea whose waves the law is told as they meet the ship."""
+_COMPONENTS: Final = 16384  # Of the sea whose waves the law is told as they meet the ship.
 
 
 @dataclass(frozen=True)

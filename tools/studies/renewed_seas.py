@@ -38,8 +38,7 @@ LAWS: Final = {"GPC, roll": "gpc", "constrained": "constrained_gpc", "renewed": 
 """Of configs/controllers."""
 FROM_S: Final = 1200.0
 TO_S: Final = 2400.0
-STEP_S: Final = 0.2
-"""Of the motion that the bound is computed for."""
+STEP_S: Final = 0.2  #: Of the motion that the bound is computed for.
 
 
 class GivenSea(IrregularSea):

@@ -44,8 +44,7 @@ LEAST_HOURS = 8
 CARGO_S = 4 * 3600.0
 MOST_GROWTH_MB = 4.0
 MOST_OBJECTS = 1.01
-MOST_COST = 1.1
-"""Last quarter over the second: objects kept, and median cost of the node's tick."""
+MOST_COST = 1.1  #: Last quarter over the second: objects kept, and median cost of the node's tick.
 
 
 class Mutable:

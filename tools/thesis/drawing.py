@@ -22,8 +22,7 @@ _STROKES: Final[tuple[dict[str, Any], ...]] = (
 _COLORS: Final = 48
 _LETTERS: Final = 22
 """Of the longest names of which a legend has two beside one another, in a half of a picture."""
-_DENSE: Final = 6
-"""Swings of a curve from which on its panel has whole strokes."""
+_DENSE: Final = 6  # Swings of a curve from which on its panel has whole strokes.
 
 
 def draw_figure(figure: Figure, path: Path, title: str) -> None:

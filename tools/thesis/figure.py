@@ -9,8 +9,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-MOST_CURVES: Final = 4
-"""Curves of one panel that can still be distinguished."""
+MOST_CURVES: Final = 4  #: Curves of one panel that can still be distinguished.
 
 
 class Verdict(StrEnum):

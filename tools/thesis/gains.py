@@ -19,8 +19,7 @@ from utank_hil.control.optimal_tank import ship_ratios
 from utank_hil.control.predictive.gains import design_dpc, design_gpc
 from utank_hil.control.predictive.law import PredictiveLaw
 
-ROLL_DAMPING: Final = 4.87e8
-"""As printed; a tenth of it fits."""
+ROLL_DAMPING: Final = 4.87e8  #: As printed; a tenth of it fits.
 
 
 def figure_gains() -> Figure:

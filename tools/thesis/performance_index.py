@@ -19,8 +19,7 @@ from utank_hil.control.interface import LinearLaw
 from utank_hil.control.optimal_tank import ship_ratios
 from utank_hil.dynamics.linear import coupled_model
 
-FREQUENCY_RATIOS: Final = np.linspace(0.01, 2.0, 2000)
-"""The source does not say how far it went."""
+FREQUENCY_RATIOS: Final = np.linspace(0.01, 2.0, 2000)  #: The source does not say how far it went.
 
 
 def performance_index(law: LinearLaw, plant: DesignPlant, measured: tuple[str, ...]) -> float:

@@ -26,11 +26,9 @@ from utank_hil.dynamics.tank import Tank
 
 FRICTION: Final = 0.1
 PRINTED_RANGE: Final = (0.02, 0.04)
-_MOMENT_NM: Final = 0.02 * 4.81875e8
-"""As the static heel by 0.02 rad takes."""
+_MOMENT_NM: Final = 0.02 * 4.81875e8  # As the static heel by 0.02 rad takes.
 _SHARES: Final = np.geomspace(0.2, 3.0, 400)
-_SMALL_M2: Final = 10.2
-"""Reservoirs whose best duct lies in the middle of the printed range."""
+_SMALL_M2: Final = 10.2  # Reservoirs whose best duct lies in the middle of the printed range.
 
 
 def figure_2_7() -> Figure:

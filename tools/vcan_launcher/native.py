@@ -17,10 +17,7 @@ def enter() -> None:
     namespace of its own that has a loopback and a ``vcan0`` and vanishes with it; without root,
     inside a user namespace that keeps the user's id.
 
-    Raises
-    ------
-    NativeUnavailableError
-        Nothing has been changed then.
+    NativeUnavailableError is raised: nothing has been changed then.
     """
     if linux.can_is_usable("vcan0"):
         return
