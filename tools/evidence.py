@@ -44,7 +44,6 @@ def _study(name: str) -> str:
 PARTS: Final = {
     # what the laws are worth
     "share_of_possible": Part("python -m tools.studies.share_of_possible --seeds 8 --json", 6),
-    "many_seas": Part("python -m tools.studies.many_seas --seconds 900 --seeds 3 --json", 15),
     "renewed_seas": Part("python -m tools.studies.renewed_seas --seeds 3 --json", 30),
     "february_hours": Part(_study("february_hours"), 80),
     "storm_seeds": Part(_study("storm_seeds"), 30),
@@ -60,7 +59,6 @@ PARTS: Final = {
         10,
     ),
     "week": Part("python -m tools.studies.week --days 7 --json", 120),
-    "same_digits": Part("python -m tools.studies.same_digits --seconds 120", 60),
     "search": Part("make search", 60),
     "mutants": Part("make mutants", 90),
     "coverage": Part("make coverage", 5),
@@ -73,9 +71,8 @@ PARTS: Final = {
     **{
         f"cost_{name}": Part(f"python -m tools.benchmarks.{name} {options}--json", minutes)
         for name, options, minutes in (
-            ("monitors", "--minutes 5 ", 1),
             ("realtime", "--seconds 200 ", 20),
-            ("retuning", "--turns 8 ", 15),
+            ("retuning", "", 4),
             ("slice", "", 1),
         )
     },

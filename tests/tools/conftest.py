@@ -7,9 +7,6 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from tools.studies import trial_setup
-from tools.studies.sea_trial import run_trial
-
 
 class Ended(NamedTuple):
     """How a tool ended, and what it printed."""
@@ -29,14 +26,11 @@ class Ended(NamedTuple):
 def tool(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Callable[..., Ended]:
-    """Call as ``tool("studies.model_errors", "--seeds", "2")``; trials run one after the other."""
+    """Call as ``tool("studies.share_of_possible", "--seeds", "2")``."""
 
     def run(name: str, *arguments: str) -> Ended:
         module = importlib.import_module(f"tools.{name}")
         monkeypatch.setattr("sys.argv", [name, *arguments])
-        monkeypatch.setattr(
-            trial_setup, "run_trials", lambda trials, _: list(map(run_trial, trials))
-        )
         try:
             code = module.main() or 0
         except SystemExit as ended:

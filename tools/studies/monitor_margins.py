@@ -1,6 +1,6 @@
 """How near the monitors come to a false alarm: largest statistic over threshold, run by run.
 
-    python -m tools.studies.monitor_margins configs/scenarios/storm.yaml --hours 50
+    python -m tools.studies.monitor_margins configs/scenarios/storm.yaml --minutes 600
     python -m tools.studies.monitor_margins configs/scenarios/*.yaml --minutes 10
 
 In lockstep, with bus, nodes, sensors, retuning and the scenario's operator. One is the threshold. A
@@ -111,18 +111,15 @@ def main() -> int:
     """Run the study."""
     parser = command_line(__doc__)
     parser.add_argument("scenarios", type=Path, nargs="+")
-    length = parser.add_mutually_exclusive_group(required=True)
-    length.add_argument("--hours", type=float)
-    length.add_argument("--minutes", type=float)
+    parser.add_argument("--minutes", type=float, required=True)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    seconds = options.hours * 3600 if options.hours else options.minutes * 60
     try:
         scenarios = [load_config(path, Scenario) for path in options.scenarios]
     except ConfigError as error:
         parser.error(str(error))
     runs = [
-        margins(scenario, name, options.seed, seconds)
+        margins(scenario, name, options.seed, 60 * options.minutes)
         for scenario in scenarios
         for name in scenario.controllers
     ]

@@ -2,10 +2,11 @@
 
     python -m tools.studies.renewed_seas --json     # --seeds, --only "6.5 s", --workers
 
-Every sea of `many_seas` comes from abeam, on bus, plant and sensors of the bench, in lockstep. The
-renewed law knows neither sea nor ship's condition at first; it is designed anew for what it
-estimates. Shares are of the clairvoyant bound for the passive ship's own motion; roll, share and
-the power that the shaft draws are of the time from 20 to 40 minutes.
+Sixteen seas of ordinary weather, storm and formulas, and more: swell from afar, two systems at
+once, short and steep seas. Each comes from abeam, on bus, plant and sensors of the bench, in
+lockstep. The renewed law knows neither sea nor ship's condition at first; it is designed anew for
+what it estimates. Shares are of the clairvoyant bound for the passive ship's own motion; roll,
+share and the power that the shaft draws are of the time from 20 to 40 minutes.
 """
 
 import math
@@ -25,20 +26,50 @@ from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.scenario_sea import IrregularSea
 from tools.printing import command_line, show
 from tools.studies.clairvoyant import clairvoyant_bound
-from tools.studies.many_seas import SIXTEEN, seas
-from tools.studies.trial_setup import CONFIGS, chosen, shipped
+from tools.studies.share_of_possible import CONFIGS, STORM_HOUR, measured_hour, shipped
 from utank_hil.analysis.motion.confidence import mean_interval
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.background import one_thread_each
 from utank_hil.canbus.enumerations import Mode, RetuningState
 from utank_hil.configuration import load_config
-from utank_hil.sea import Spectrum
+from utank_hil.sea import Spectrum, jonswap
 
 LAWS: Final = {"GPC, roll": "gpc", "constrained": "constrained_gpc", "renewed": "self_tuning"}
 """Of configs/controllers."""
 FROM_S: Final = 1200.0
 TO_S: Final = 2400.0
 STEP_S: Final = 0.2  #: Of the motion that the bound is computed for.
+HOURS: Final = (
+    *("06T08", "06T20", "07T08", "07T20", "08T08", "09T04", "09T12", "09T19"),
+)  # of February 2019, significant heights of 0.65 to 1.4 m
+SIXTEEN: Final = 16
+
+
+def both(first: Spectrum, second: Spectrum) -> Spectrum:
+    """Two systems at once."""
+    frequency_hz = np.arange(0.03, 0.6, 0.0025)
+    density = sum(
+        np.interp(frequency_hz, each.frequency_hz, each.density, left=0.0, right=0.0)
+        for each in (first, second)
+    )
+    return Spectrum(frequency_hz, density)
+
+
+def seas() -> dict[str, Spectrum]:
+    """The sixteen, then the others."""
+    found = {f"February {hour}:40": measured_hour(f"2019-02-{hour}:40") for hour in HOURS}
+    found["storm hour"] = measured_hour(STORM_HOUR)
+    for hs_m, tp_s in ((2.0, 6.5), (3, 8), (4, 9.5), (5, 11), (4, 12.5), (3, 14), (3, 17)):
+        found[f"JONSWAP {hs_m} m {tp_s} s"] = jonswap(hs_m, tp_s)
+    for hs_m, tp_s, gamma in ((1.5, 15.0, 7), (2, 18, 6), (1, 12.5, 7), (2.5, 13.5, 5)):
+        found[f"swell {hs_m} m {tp_s} s"] = jonswap(hs_m, tp_s, gamma)
+    found["2 m 14 s and 1.5 m 6 s"] = both(jonswap(2, 14, 5), jonswap(1.5, 6))
+    found["1.5 m 11 s and 1.5 m 7 s"] = both(jonswap(1.5, 11, 5), jonswap(1.5, 7))
+    found["1 m 17 s and 2.5 m 8.5 s"] = both(jonswap(1, 17, 5), jonswap(2.5, 8.5))
+    found["2 m 12.5 s and 2.5 m 9 s"] = both(jonswap(2, 12.5, 5), jonswap(2.5, 9))
+    for hs_m, tp_s in ((3.5, 7.5), (2.5, 7.0), (1.5, 5.5), (5, 9)):
+        found[f"steep {hs_m} m {tp_s} s"] = jonswap(hs_m, tp_s)
+    return found
 
 
 class GivenSea(IrregularSea):
@@ -132,10 +163,9 @@ def main() -> None:
     arguments = parser.parse_args()
     if arguments.seeds < 2:
         parser.error("--seeds must be 2 or more: one value has no confidence interval")
-    try:
-        wanted = chosen(seas(), arguments.only)
-    except ValueError as error:
-        parser.error(str(error))
+    wanted = {name: sea for name, sea in seas().items() if arguments.only in name}
+    if not wanted:
+        parser.error(f"--only {arguments.only!r}: no sea's name; there are {'; '.join(seas())}")
     cases = [
         (name, spectrum, seed)
         for name, spectrum in wanted.items()
