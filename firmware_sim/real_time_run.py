@@ -2,27 +2,25 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-
 from firmware_sim.run import (
-    COLUMNS,
+    RECORD_NS,
     SECOND_NS,
+    ControllerRun,
     Job,
     Run,
-    ShipFigures,
+    ShipRun,
     Watch,
     controller_of,
+    controller_run,
     frame_log,
-    ship_figures,
-    ship_of,
-    side_by_side,
+    join,
+    ship_run,
 )
 from firmware_sim.ship_side import ShipSide, build_ship_side
-from firmware_sim.truth import TruthRecorder
+from firmware_sim.truth import TRUTH, TruthRecorder
 from utank_hil.assembly import retuner_process
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.provenance import describe
@@ -32,7 +30,6 @@ from utank_hil.canbus.ports import open_buses
 from utank_hil.canbus.socketcan import SocketCanPort
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.retuning import RetuningEvent
 from utank_hil.runners import (
     LoopStatistics,
     MonotonicClock,
@@ -53,98 +50,39 @@ class Meeting(Watch, Protocol):
         """Report that this side is ready; return the common start on the monotonic clock."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ShipRun:
-    """Ship's half of a run on a real bus; `start_ns` is on the monotonic clock."""
-
-    rows: FloatArray
-    start_ns: int
-    figures: ShipFigures
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ControllerRun:
-    """Controller's half of a run on a real bus; `start_ns` is on the monotonic clock."""
-
-    rows: FloatArray
-    start_ns: int
-    loop: LoopStatistics
-    retuning: tuple[RetuningEvent, ...]
-    fallbacks: int | None = None
-    law_error: str = ""
-
-
 def run_in_one_process(job: Job, watch: Watch | None = None) -> Run:
     """Run with all nodes in one loop, without a bus."""
-    _load_kernel(job)
-    ship, truth, truth_log = ship_of(job)
+    ship, truth, truth_log = _ship_of(job)
     statistics = LoopStatistics()
     with _real_time_controller(job, statistics) as (controller, log, node):
-        loop = _run_loop(job, [*ship.nodes, node, truth], None, statistics, watch)
-    return join(job.name, _ship_run(ship, truth, truth_log), _controller_run(controller, log, loop))
+        _run_loop(job, [*ship.nodes, node, truth], None, statistics, watch)
+    its = controller_run(controller, log, statistics)
+    return join(job.name, ship_run(ship, truth, truth_log), its)
 
 
 def run_ship(job: Job, channel: str, meeting: Meeting) -> ShipRun:
     """Run the ship's side on a SocketCAN interface."""
-    _load_kernel(job)
-    ship, truth, truth_log = ship_of(job)
+    ship, truth, truth_log = _ship_of(job)
     nodes: list[Node] = [*ship.nodes, truth]
     _run_loop(job, nodes, channel, LoopStatistics(), meeting, meeting.begin_ns)
-    return _ship_run(ship, truth, truth_log)
+    return ship_run(ship, truth, truth_log)
 
 
 def run_controller(job: Job, channel: str, meeting: Meeting) -> ControllerRun:
     """Run the controller's side on a SocketCAN interface."""
     statistics = LoopStatistics()
     with _real_time_controller(job, statistics) as (controller, log, node):
-        loop = _run_loop(job, [node], channel, statistics, meeting, meeting.begin_ns)
-    return _controller_run(controller, log, loop)
+        _run_loop(job, [node], channel, statistics, meeting, meeting.begin_ns)
+    return controller_run(controller, log, statistics)
 
 
-def join(name: str, ship: ShipRun, controller: ControllerRun) -> Run:
-    """Join the halves of a run on a real bus, on the ship's time."""
-    shift_s = (controller.start_ns - ship.start_ns) / SECOND_NS
-    rows = side_by_side(controller.rows, ship.rows, shift_s)
-    return Run(
-        name,
-        rows,
-        float(np.mean(rows[:, COLUMNS.index("bus_load")])) if len(rows) else 0.0,
-        *ship.figures,
-        controller.loop,
-        controller.retuning,
-        controller.fallbacks,
-        controller.law_error,
-    )
-
-
-def _ship_run(ship: ShipSide, truth: TruthRecorder, log: MemoryLog) -> ShipRun:
-    return ShipRun(log.rows, truth.start_ns, ship_figures(ship, truth))
-
-
-def _controller_run(
-    controller: ControllerNode, log: MemoryLog, loop: LoopStatistics
-) -> ControllerRun:
-    return ControllerRun(
-        log.rows,
-        controller.start_ns,
-        loop,
-        controller.law.events,
-        controller.law.fallbacks,
-        controller.law.error,
-    )
-
-
-def _load_kernel(job: Job) -> None:
-    """Load the plant's compiled code, which would otherwise delay the first ticks of a run."""
-    plant = build_ship_side(job.scenario, job.seed, ()).plant
-    for now_ns in (0, TICK_NS):
-        plant.advance(now_ns)
-
-
-def _ring(job: Job) -> RowWriter:
-    """Ring of a run in real time, for `utank-hil monitor`."""
-    about = describe("bench", job.controller, Path.cwd(), options={"run": job.name}, seed=job.seed)
-    return RowWriter(SIGNALS, about=about)
+def _ship_of(job: Job) -> tuple[ShipSide, TruthRecorder, MemoryLog]:
+    """Ship's side of a run, the recorder of its truth, and the rows of that."""
+    first = build_ship_side(job.scenario, job.seed, ()).plant
+    for now_ns in (0, TICK_NS):  # its compiled code loads here, and not in the first ticks of a run
+        first.advance(now_ns)
+    ship, log = build_ship_side(job.scenario, job.seed, job.script), job.log_of(TRUTH)
+    return ship, TruthRecorder(ship.plant, log, RECORD_NS), log
 
 
 @contextmanager
@@ -156,8 +94,17 @@ def _real_time_controller(
         desks = Tapped(retuner, estimating, wanted=job.frames is not None)
         # the loop must not wait for a disk: its records are written after its end
         block_ns = job.ticks * TICK_NS + SECOND_NS
-        with frame_log(job, desks, block_ns) as tapped, _ring(job) as ring:
-            controller, log = controller_of(job, desks, statistics, ring)
+        about = describe(
+            "bench", job.controller, Path.cwd(), options={"run": job.name}, seed=job.seed
+        )
+        with frame_log(job, desks, block_ns) as tapped, RowWriter(SIGNALS, about=about) as ring:
+            log = job.log_of(SIGNALS)
+
+            def shown(row: FloatArray) -> None:
+                log.write(row)
+                ring.write(row)  # for `utank-hil monitor`
+
+            controller = controller_of(job, desks, shown, statistics)
             yield controller, log, tapped(controller)
 
 
@@ -168,7 +115,7 @@ def _run_loop(
     statistics: LoopStatistics,
     watch: Watch | None,
     begin_ns: Callable[[], int] | None = None,
-) -> LoopStatistics:
+) -> None:
     port: Port | None = None
     foreign = job.controller.vessel.foreign
     if channel is not None and foreign.any:
@@ -189,4 +136,3 @@ def _run_loop(
     finally:
         if port is not None:
             port.close()
-    return statistics

@@ -1,10 +1,10 @@
-"""Run of a bench: a ship in a sea with one controller; its job and its results.
+"""Run of a bench: a ship in a sea with one controller, its job and results; in simulated time.
 
-It is executed by `lockstep_run` in simulated time and by `real_time_run` in real time.
+`real_time_run` executes it in real time.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,11 +13,11 @@ from typing import Final, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from firmware_sim.faulty_bench import Tap
-from firmware_sim.scenario import Scenario
+from firmware_sim.faulty_bench import FaultyBench, Tap
+from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.ship_side import ShipSide, bare_plant, build_ship_side
 from firmware_sim.truth import TRUTH, TruthRecorder
-from utank_hil.assembly import build_controller_node
+from utank_hil.assembly import build_controller_node, works_of
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.tick import TICK_NS
 from utank_hil.configuration import ControllerConfig
@@ -25,18 +25,20 @@ from utank_hil.control import BuiltLaw
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.panel import TimedAction
 from utank_hil.nodes.signals import ROW_TICKS, SIGNALS
-from utank_hil.retuning import RetuningEvent
-from utank_hil.runners import LoopStatistics
+from utank_hil.retuning import RetuningEvent, SimulatedRetuner
+from utank_hil.runners import Lockstep, LoopStatistics, SimulatedBus
+from utank_hil.runners.several_buses import with_more
 from utank_hil.telemetry.frame_log import BlockSink, FrameLogWriter
 from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head
-from utank_hil.telemetry.ring import RingWriter
 
 SECOND_NS: Final = 1_000_000_000
 RECORD_NS: Final = ROW_TICKS * TICK_NS
 RECORD_S: Final = RECORD_NS / SECOND_NS
 COLUMNS: Final = (*SIGNALS, *TRUTH[1:])
+FRAME_BLOCK_NS: Final = 10 * SECOND_NS
+"""Time span of a block in a frame log in simulated time: each block waits for the disk."""
 
 
 class Watch(Protocol):
@@ -64,16 +66,9 @@ class Job:
         """Number of the controller's ticks in the run."""
         return round(self.duration_s * SECOND_NS / TICK_NS)
 
-
-class ShipFigures(NamedTuple):
-    """Fields of `Run` that the ship's side gives, in order."""
-
-    refused_commands: int
-    energy_j: float
-    strikes: int = 0
-    capsized_s: float = math.inf
-    max_strike_impulse_nms: float = 0.0
-    pump_speed_rad_s: float = 0.0
+    def log_of(self, columns: tuple[str, ...]) -> MemoryLog:
+        """Empty log for the rows of the run."""
+        return MemoryLog(len(columns), -(-self.ticks // ROW_TICKS))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,6 +108,35 @@ class Run:
         return (time_s > start_s - half_s) & (time_s < end_s - half_s)
 
 
+class ShipRun(NamedTuple):
+    """Ship's half of a run; `start_ns` is on the clock of its runner, as the controller's."""
+
+    rows: FloatArray
+    start_ns: int
+    #: Fields of `Run` that the ship's side gives, in order.
+    figures: tuple[int, float, int, float, float, float]
+
+
+class ControllerRun(NamedTuple):
+    """Controller's half of a run, whose last fields are those of `Run`, in order."""
+
+    rows: FloatArray
+    start_ns: int
+    loop: LoopStatistics | None
+    retuning: tuple[RetuningEvent, ...] = ()
+    fallbacks: int | None = None
+    law_error: str = ""
+
+
+def join(name: str, ship: ShipRun, controller: ControllerRun, bus_load: float | None = None) -> Run:
+    """Join the halves of a run on the ship's time; without a bus load with the mean one shown."""
+    shift_s = (controller.start_ns - ship.start_ns) / SECOND_NS
+    rows = side_by_side(controller.rows, ship.rows, shift_s)
+    if bus_load is None:
+        bus_load = float(np.mean(rows[:, COLUMNS.index("bus_load")])) if len(rows) else 0.0
+    return Run(name, rows, bus_load, *ship.figures, *controller[2:])
+
+
 def roll_without_tank(scenario: Scenario, seed: int, count: int) -> tuple[FloatArray, float]:
     """Roll of the ship without tank every `RECORD_S`, shape (count,), and `capsized_s`."""
     plant = bare_plant(scenario, seed)
@@ -123,38 +147,41 @@ def roll_without_tank(scenario: Scenario, seed: int, count: int) -> tuple[FloatA
     return roll_rad, plant.capsized_s
 
 
-def ship_of(job: Job) -> tuple[ShipSide, TruthRecorder, MemoryLog]:
-    """Ship's side of a run, recorder of the truth, and its log."""
-    ship = build_ship_side(job.scenario, job.seed, job.script)
-    log = MemoryLog(len(TRUTH), -(-job.ticks // ROW_TICKS))
-    return ship, TruthRecorder(ship.plant, log, RECORD_NS), log
+def ship_run(ship: ShipSide, truth: TruthRecorder, log: MemoryLog) -> ShipRun:
+    """Ship's half of a run that ended."""
+    plant = ship.plant
+    figures = (
+        ship.refused_commands, plant.pump_energy_j, plant.strikes, plant.capsized_s,
+        plant.max_strike_impulse_nms, truth.pump_speed_rad_s,
+    )  # fmt: skip
+    return ShipRun(log.rows, truth.start_ns, figures)
+
+
+def controller_run(
+    node: ControllerNode, log: MemoryLog, loop: LoopStatistics | None = None
+) -> ControllerRun:
+    """Controller's half of a run that ended."""
+    law = node.law
+    return ControllerRun(log.rows, node.start_ns, loop, law.events, law.fallbacks, law.error)
 
 
 def controller_of(
     job: Job,
     desks: Tapped,
+    sink: Callable[[FloatArray], None],
     statistics: LoopStatistics | None = None,
-    ring: RingWriter | None = None,
-) -> tuple[ControllerNode, MemoryLog]:
-    """Controller of a run, and its log; the rows also go to `ring` if given."""
-    log = MemoryLog(len(SIGNALS), -(-job.ticks // ROW_TICKS))
-
-    def shown(row: FloatArray) -> None:
-        log.write(row)
-        if ring is not None:
-            ring.write(row)
-
-    node = build_controller_node(
+) -> ControllerNode:
+    """Controller of a run, whose telemetry goes to `sink`."""
+    return build_controller_node(
         job.controller,
         job.law,
         retuner=desks.retuner,
         estimating=desks.estimating,
         statistics=statistics,
-        sink=shown,
+        sink=sink,
         sink_every=ROW_TICKS,
         commissioned=True,
     )
-    return node, log
 
 
 @contextmanager
@@ -173,17 +200,40 @@ def frame_log(job: Job, desks: Tapped, block_ns: int) -> Iterator[Tap]:
         sink.flush()
 
 
-def ship_figures(ship: ShipSide, truth: TruthRecorder) -> ShipFigures:
-    """Results of the ship's side of a run, without its rows."""
-    plant = ship.plant
-    return ShipFigures(
-        ship.refused_commands,
-        plant.pump_energy_j,
-        plant.strikes,
-        plant.capsized_s,
-        plant.max_strike_impulse_nms,
-        truth.pump_speed_rad_s,
-    )
+def run_lockstep(job: Job, watch: Watch | None = None) -> Run:
+    """Run in simulated time, with the scenario's faults unless the run is passive.
+
+    The same job gives the same rows, bit for bit.
+    """
+    retuner, estimating = (work and SimulatedRetuner(work[0]) for work in works_of(job.controller))
+    desks = Tapped(retuner, estimating, wanted=job.frames is not None)
+    log, truth_log, bench = job.log_of(SIGNALS), job.log_of(TRUTH), None
+    with frame_log(job, desks, FRAME_BLOCK_NS) as tapped:
+        if job.scenario.faults and job.name != PASSIVE:
+            bench = FaultyBench(
+                job.scenario, job.controller, job.law, seed=job.seed, script=job.script,
+                sink=log.write, sink_every=ROW_TICKS, retuner=retuner, estimating=estimating,
+                tapped=tapped,
+            )  # fmt: skip
+            ship, controller, lockstep = bench.ship, bench.node, bench.lockstep
+            bench.place(job.scenario.faults)
+        else:
+            ship = build_ship_side(job.scenario, job.seed, job.script)
+            controller = controller_of(job, desks, log.write)
+            bit_rate, buses = job.controller.bit_rate, job.controller.vessel.foreign.buses
+            bus = with_more(SimulatedBus(bit_rate=bit_rate), len(buses) - 1, bit_rate)
+            lockstep = Lockstep([*ship.nodes, tapped(controller)], bus)
+        truth = TruthRecorder(ship.plant, truth_log, RECORD_NS)
+        lockstep.join([truth])
+        end_ns = job.ticks * TICK_NS
+        while lockstep.now_ns < end_ns:
+            if watch is not None and watch.stopped(lockstep.now_ns / SECOND_NS):
+                break
+            lockstep.run_until(min(lockstep.now_ns + SECOND_NS, end_ns))
+    if bench is not None:
+        controller = bench.node  # a fault may have replaced it
+    ours = ship_run(ship, truth, truth_log)
+    return join(job.name, ours, controller_run(controller, log), lockstep.bus.load(lockstep.now_ns))
 
 
 def side_by_side(shown_rows: FloatArray, truth: FloatArray, shift_s: float = 0.0) -> FloatArray:

@@ -14,7 +14,7 @@ RUN = """
 import hashlib, json, pickle
 from pathlib import Path
 from firmware_sim.bench import jobs_of
-from firmware_sim.lockstep_run import run_lockstep
+from firmware_sim.run import run_lockstep
 from firmware_sim.scenario import Scenario
 from utank_hil.base.compiled import in_use
 from utank_hil.configuration import load_config

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from firmware_sim.bench import jobs_of
-from firmware_sim.lockstep_run import run_lockstep
 from firmware_sim.retuning_figures import retuning_figures
-from firmware_sim.run import Run
+from firmware_sim.run import Run, run_lockstep
 from firmware_sim.scenario import Scenario
 from utank_hil.canbus import Mode, RetuningState
 from utank_hil.configuration import load_config

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware_sim.real_time_run import ControllerRun, ShipRun, join
-from firmware_sim.run import COLUMNS, RECORD_S, Run, ShipFigures
+from firmware_sim.run import COLUMNS, RECORD_S, ControllerRun, Run, ShipRun, join
 from firmware_sim.truth import TRUTH
 from utank_hil.nodes.signals import SIGNALS
 
@@ -19,8 +18,8 @@ def joined(ship_s: np.ndarray, told_s: np.ndarray, shift_s: float) -> Run:
     truth[:, 0] = truth[:, TRUTH.index("true_roll_rad")] = ship_s
     told[:, 0] = told_s
     told[:, SIGNALS.index("roll_rad")] = told_s + shift_s
-    ship = ShipRun(truth, START_NS, ShipFigures(3, 7.0))
-    controller = ControllerRun(told, START_NS + round(shift_s * 1e9), None, ())  # type: ignore[arg-type]
+    ship = ShipRun(truth, START_NS, (3, 7.0, 0, np.inf, 0.0, 0.0))
+    controller = ControllerRun(told, START_NS + round(shift_s * 1e9), None)
     return join("test", ship, controller)
 
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from firmware_sim.bench import jobs_of
-from firmware_sim.lockstep_run import run_lockstep
-from firmware_sim.run import RECORD_S, roll_without_tank
+from firmware_sim.run import RECORD_S, roll_without_tank, run_lockstep
 from firmware_sim.scenario import Scenario
 from utank_hil.configuration import load_config
 from utank_hil.dynamics import RollModel

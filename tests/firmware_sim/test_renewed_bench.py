@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from firmware_sim.bench import jobs_of
-from firmware_sim.lockstep_run import run_lockstep
-from firmware_sim.run import Job
+from firmware_sim.run import Job, run_lockstep
 from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_sea import JonswapSea
 from utank_hil.canbus import Mode, RetuningState

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from firmware_sim.bench import jobs_of
-from firmware_sim.lockstep_run import run_lockstep
-from firmware_sim.run import RECORD_S, Run
+from firmware_sim.run import RECORD_S, Run, run_lockstep
 from firmware_sim.scenario import Scenario
 from utank_hil.canbus import Mode
 from utank_hil.configuration import load_config

@@ -10,8 +10,7 @@ from busy_machine import first_that_can_be_judged, judged_by, lost
 from two_processes import CHANNEL, CONFIGS, Program, patient_controller
 
 from firmware_sim.bench import jobs_of
-from firmware_sim.lockstep_run import run_lockstep
-from firmware_sim.run import RECORD_S, Run
+from firmware_sim.run import RECORD_S, Run, run_lockstep
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis.motion.bare_ship import roll_without_tank
 from utank_hil.canbus import Mode

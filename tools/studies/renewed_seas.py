@@ -20,8 +20,7 @@ import numpy as np
 from pydantic import ConfigDict
 
 from firmware_sim.bench import jobs_of
-from firmware_sim.lockstep_run import run_lockstep
-from firmware_sim.run import RECORD_S, Job, Run
+from firmware_sim.run import RECORD_S, Job, Run, run_lockstep
 from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.scenario_sea import IrregularSea
 from tools.printing import command_line, show
