@@ -6,8 +6,8 @@ from typing import Annotated, Any, ClassVar, Final
 
 from pydantic import AfterValidator
 
+from firmware_sim.fault_injection.bench_parts import Bench
 from firmware_sim.fault_injection.faulty_node import NEVER_NS, Span, Spoil, Spoiled
-from firmware_sim.fault_injection.place import Bench
 from utank_hil.base.parameters import Problem, Range
 from utank_hil.canbus import Address, Frame, load_catalogue
 from utank_hil.canbus.catalogue import NamedMessage
@@ -72,12 +72,6 @@ class Fault(Section, ABC):
     at_s: FaultTime = 0.0
     for_s: FaultSpan | None = None
 
-    def span(self, start_ns: int) -> Span:
-        """Time span in a run whose faults count from `start_ns`."""
-        begin_ns = start_ns + round(self.at_s * SECOND_NS)
-        lasts_ns = NEVER_NS if self.for_s is None else round(self.for_s * SECOND_NS)
-        return Span(begin_ns, begin_ns + lasts_ns)
-
     def node_names(self) -> tuple[str, ...]:
         """Nodes that must be emulated for this fault."""
         return self.needs
@@ -92,9 +86,15 @@ class Fault(Section, ABC):
         """Message that it alone alters; None if it alters none, or all."""
         return getattr(self, "message", None)
 
-    @abstractmethod
-    def place(self, bench: Bench, span: Span, seed: int) -> None:
+    def place(self, bench: Bench, start_ns: int, seed: int) -> None:
         """Place the fault in a bench; `seed` determines its random values."""
+        begin_ns = start_ns + round(self.at_s * SECOND_NS)
+        lasts_ns = NEVER_NS if self.for_s is None else round(self.for_s * SECOND_NS)
+        self._place(bench, Span(begin_ns, begin_ns + lasts_ns), seed)
+
+    @abstractmethod
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:
+        """Place the fault for a span of time."""
 
 
 class MessageFault(Fault):
@@ -115,8 +115,7 @@ class MessageFault(Fault):
     def _spoil(self, seed: int) -> Spoil:
         """Return the function that spoils a frame."""
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:
-        """Spoil the message's frames at the output of their node."""
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:
         _, source, codec = self.named
         spoiled = Spoiled(span, self._spoil(seed), codec.can_id)
         bench.nodes[NODE_OF[source]].spoiled.append(spoiled)

@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import Field
 
 from firmware_sim.fault_injection import frames, nodes, signals, traffic
-from firmware_sim.fault_injection.place import Bench
+from firmware_sim.fault_injection.bench_parts import Bench
 
 AnyFault = Annotated[
     signals.Stuck
@@ -49,4 +49,4 @@ AnyFault = Annotated[
 def place_all(faults: Sequence[AnyFault], bench: Bench, start_ns: int, seed: int) -> None:
     """Place faults in a bench; their times count from `start_ns`."""
     for number, fault in enumerate(faults):
-        fault.place(bench, fault.span(start_ns), seed * 1000 + number)
+        fault.place(bench, start_ns, seed * 1000 + number)

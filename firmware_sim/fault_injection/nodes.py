@@ -5,9 +5,9 @@ from typing import Literal
 
 from pydantic import field_validator
 
+from firmware_sim.fault_injection.bench_parts import Bench
 from firmware_sim.fault_injection.fault import Fault, NodeName
 from firmware_sim.fault_injection.faulty_node import Span, Spoiled
-from firmware_sim.fault_injection.place import Bench
 from utank_hil.base.parameters import Finite, NotNegative
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import DriveFault
@@ -33,8 +33,7 @@ class Hangs(NodeFault):
         """Whether the node is the drive, which keeps its last pressure while it hangs."""
         return self.node == "drive"
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Stop the node for the span."""
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         bench.nodes[self.node].hangs.append(span)
 
 
@@ -45,8 +44,7 @@ class Killed(Fault):
     needs = ("controller",)
     kind: Literal["killed"]
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Stop the controller, then start another."""
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         node = bench.nodes["controller"]
         node.hangs.append(span)
         assert bench.restart is not None
@@ -58,8 +56,7 @@ class Mute(NodeFault):
 
     kind: Literal["mute"]
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Discard all frames that the node sends."""
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         bench.nodes[self.node].spoiled.append(Spoiled(span, lambda *_: ()))
 
 
@@ -68,8 +65,7 @@ class Deaf(NodeFault):
 
     kind: Literal["deaf"]
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Block all frames to the node."""
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         bench.nodes[self.node].deaf.append(span)
 
 
@@ -83,8 +79,7 @@ class Link(NodeFault):
     reason: str  #: Text of the error that the interface reports.
     warns: bool = False  #: Whether the error is a warning and frames are still carried.
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Cut the node off."""
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         node = bench.nodes[self.node]
         (node.warned if self.warns else node.cut_off).append((span, self.reason))
 
@@ -107,8 +102,7 @@ class Pump(Fault):
         """Whether the pressure is present while the pump is off."""
         return self.off_too
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Break the pump, and repair it at the end."""
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         share = 1.0 - math.exp(-TICK_S / self.lag_s) if self.lag_s else 1.0
         pressure_pa = [0.0]
 
@@ -144,8 +138,7 @@ class Drive(Fault):
             raise ValueError(f"must be one of {', '.join(DriveFault.__members__)}")
         return name
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Trip the drive."""
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         drive = bench.drive
         assert drive is not None
         bench.nodes["drive"].at(span.begin_ns, lambda: drive.fail(DriveFault[self.fault]))
@@ -158,8 +151,7 @@ class Valve(Fault):
     kind: Literal["valve"]
     fails: Literal["stuck", "powerless"]  #: Kind of failure.
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Break the valve, and repair it at the end."""
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         name, broken = ("stuck", True) if self.fails == "stuck" else ("powered", False)
         node = bench.nodes["valve"]
         node.at(span.begin_ns, lambda: setattr(bench.valve, name, broken))
@@ -177,8 +169,7 @@ class Law(Fault):
     kind: Literal["law"]
     fails: Literal["raises", "answers_nan", "opposite", "leans"]  #: Kind of failure.
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Break the law, and repair it at the end."""
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         node = bench.nodes["controller"]
         node.at(span.begin_ns, lambda: setattr(bench.law, self.fails, True))
         node.at(span.end_ns, lambda: setattr(bench.law, self.fails, False))

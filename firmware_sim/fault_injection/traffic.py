@@ -5,6 +5,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from firmware_sim.fault_injection.bench_parts import Bench
 from firmware_sim.fault_injection.fault import (
     NODE_OF,
     SECOND_NS,
@@ -16,7 +17,6 @@ from firmware_sim.fault_injection.fault import (
 )
 from firmware_sim.fault_injection.faulty_bus import Disturbance, OtherFrame
 from firmware_sim.fault_injection.faulty_node import NEVER_NS, FaultyNode, Span, Spoiled
-from firmware_sim.fault_injection.place import Bench
 from firmware_sim.fault_injection.signals import value_of, value_problems
 from utank_hil.base.parameters import refuse
 from utank_hil.canbus import Frame, Station, load_catalogue
@@ -67,8 +67,7 @@ class Disturbed(BusFault):
             return self.needs
         return (*self.needs, NODE_OF[load_catalogue().named(self.message).source])
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Disturb the bus."""
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         assert bench.bus is not None
         can_id = None if self.message is None else load_catalogue().named(self.message).codec.can_id
         by_ns = round((self.by_s or 0.0) * SECOND_NS)
@@ -87,8 +86,7 @@ class BitErrors(BusFault):
         """Names of the required nodes, with that of the broken transceiver."""
         return self.needs if self.node is None else (*self.needs, self.node)
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Disturb the bus; the nodes' interfaces report what their kernel would."""
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         assert bench.bus is not None
         names = list(bench.nodes)
         sender = None if self.node is None else names.index(self.node)
@@ -144,8 +142,7 @@ class Flood(Fault):
             refuse("", [("identifier", "must be below 800 in a standard frame")])
         return self
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Add the node to the bus."""
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         from utank_hil.runners import frame_bits
 
         # a standard identifier wins over the extended ones that begin with it
@@ -223,8 +220,7 @@ class Impostor(Fault):
         refuse("", problems)
         return self
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Add the node to the bus."""
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         sender = _Sender(f"impostor {len(bench.joining)}", self, span)
         real = bench.nodes.get(NODE_OF.get(load_catalogue().named(self.message).source, ""))
         if real is not None:
@@ -238,8 +234,7 @@ class SecondPanel(Fault):
     kind: Literal["second_panel"]
     operator: tuple[TimedAction, ...] = ()  #: Actions at that station.
 
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Add the station to the bus, and remove it at the end."""
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         panel = OperatorPanel(
             load_catalogue(),
             configuration_version=bench.version,

@@ -10,9 +10,9 @@ from typing import Any, Final
 
 from pydantic import TypeAdapter
 
+from firmware_sim.fault_injection.bench_parts import Bench
 from firmware_sim.fault_injection.faulty_node import FaultyNode, Span
 from firmware_sim.fault_injection.kinds import AnyFault, place_all
-from firmware_sim.fault_injection.place import Bench
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node, build_law, works_of
