@@ -57,9 +57,9 @@ def faults(
     """
     # imported late: `--help` needs none of it
     from firmware_sim.fault_campaign.campaign import Campaign
-    from firmware_sim.fault_campaign.report import as_json
+    from firmware_sim.fault_campaign.report import as_json, write_recordings
     from firmware_sim.fault_campaign.runner import run_rows
-    from firmware_sim.fault_campaign.trial import Window, write_recordings
+    from firmware_sim.fault_campaign.trial import Window
     from firmware_sim.fault_campaign.verdict import judged
     from utank_hil.runners import stop_on_signals
 

@@ -1,12 +1,14 @@
-"""Results of a campaign as JSON and as a table."""
+"""Results of a campaign as JSON, as a table and as recordings."""
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 from rich.text import Text
 
+from firmware_sim.fault_campaign.trial import COLUMNS, Outcome
 from firmware_sim.fault_campaign.verdict import Result
 
 
@@ -31,11 +33,6 @@ def as_json(
     }
 
 
-def milliseconds(value: float | None) -> str:
-    """Time for a table; empty where there is none."""
-    return "" if value is None else f"{value:.0f}"
-
-
 def table(results: Sequence[Result]) -> Table:
     """Table with one line per row."""
     drawn = Table(title="Faults")
@@ -50,15 +47,29 @@ def table(results: Sequence[Result]) -> Table:
         "the valve's following; variance of the roll over that of the passive ship, at most 1.05"
     )
     for result in results:
+        limit_ms = result.row.limit.found_ms
+        times_ms = (result.found_ms, limit_ms, result.zero_ms, result.zero_limit_ms)
         drawn.add_row(
             result.row.id,
             result.row.expect.reaction,
-            milliseconds(result.found_ms),
-            milliseconds(result.row.limit.found_ms),
-            milliseconds(result.zero_ms),
-            milliseconds(result.zero_limit_ms),
+            *("" if time_ms is None else f"{time_ms:.0f}" for time_ms in times_ms),
             "" if math.isnan(result.roll_ratio) else f"{result.roll_ratio:.2f}",
             " ".join(result.codes),
             Text("pass", "green") if result.passed else Text("fail", "red"),
         )
     return drawn
+
+
+def write_recordings(
+    folder: Path, outcomes: Mapping[str, Sequence[Outcome]], about: Mapping[str, Any]
+) -> dict[str, Path]:
+    """Write the recordings of the rows that have one; return the files by row."""
+    from utank_hil.telemetry.recording import write_recording
+
+    files = {}
+    for name, each in outcomes.items():
+        kept = {f"seed {one.seed}": one.rows for one in each if one.rows is not None}
+        if kept:
+            files[name] = folder / f"{name}.rrd"
+            write_recording(files[name], COLUMNS, kept, about=about)
+    return files

@@ -10,9 +10,8 @@ import pickle
 import select
 import signal
 import traceback
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any, Final, TypeVar, cast, get_args
 
 import numpy as np
@@ -58,77 +57,37 @@ class Window:
 
 
 @dataclass(frozen=True, slots=True)
-class Times:
-    """First times of events in ms from the row's time zero; None where there is none."""
+class Outcome:
+    """Outcome of a row in one sea; what was said on the bus counts from the fault on."""
 
-    #: found, halved, noted, alarm: events of `Watch.first_ns`.
+    row: str
+    seed: int
+    #: found, halved, noted, alarm: first times of the events of `Watch.first_ns` in ms from the
+    #: row's time zero; None where there is none.
     found: float | None = None
     halved: float | None = None
     noted: float | None = None
     alarm: float | None = None
-    zero: float | None = None  #: Final stop of drive or valve.
-    commanded: float = 0.0  #: Last command with a pressure other than zero.
-
-
-@dataclass(frozen=True, slots=True)
-class Said:
-    """Information about the controller that was on the bus since the fault."""
-
-    status: str = ""  #: Mode and fault in the last CTRL_STATUS.
-    alarms: tuple[str, ...] = ()
-    flags: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Excess:
-    """Commands beyond the permitted range."""
-
-    #: Largest excess of the drive's set-point over the halved pressure limit.
-    beyond_share_pa: float = 0.0
-    refused: int = 0
-    steepest_pa_s: float = 0.0  #: Largest rate of the commands, cuts excepted.
-
-
-@dataclass(frozen=True, slots=True)
-class Rolls:
-    """Roll variances in rad^2 of the ship and of the passive one, over a window."""
-
-    variance: float = math.nan
-    passive_variance: float = math.nan
-    window_s: float = math.nan
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """Outcome of a row in one sea."""
-
-    row: str
-    seed: int
-    times: Times = Times()
+    zero: float | None = None  #: Final stop of drive or valve in ms.
+    commanded: float = 0.0  #: Last command with a pressure other than zero in ms.
     #: mode, code: final mode, and the fault that was latched or shown.
     mode: str = ""
     code: str = ""
     was_active: bool = False
     armed_again: bool = False
-    said: Said = Said()
-    excess: Excess = Excess()
-    rolls: Rolls = Rolls()
+    status: str = ""  #: Mode and fault in the last CTRL_STATUS.
+    alarms: tuple[str, ...] = ()
+    flags: tuple[str, ...] = ()
+    beyond_share_pa: float = 0.0  #: Largest excess of the set-point over the halved limit.
+    refused: int = 0
+    steepest_pa_s: float = 0.0  #: Largest rate of the commands, cuts excepted.
+    #: variance, passive_variance: roll variances in rad^2 of the ship and of the passive one.
+    variance: float = math.nan
+    passive_variance: float = math.nan
+    window_s: float = math.nan
     wire: str = ""  #: First frame that the fault changed; empty if none differs.
     error: str = ""
     rows: FloatArray | None = None  #: Recording with columns `COLUMNS`, if requested.
-
-
-class Recorder:
-    """Telemetry sink that adds the truth."""
-
-    def __init__(self) -> None:
-        self.bench: FaultyBench | None = None
-        self.rows: list[FloatArray] = []
-
-    def __call__(self, row: FloatArray) -> None:
-        """Store a row of the controller."""
-        if self.bench is not None:
-            self.rows.append(np.array([*row, *true_values(self.bench.ship.plant)]))
 
 
 @dataclass(slots=True)
@@ -137,7 +96,7 @@ class Underway:
 
     bench: FaultyBench
     log: BusLog
-    recorder: Recorder
+    recorded: list[FloatArray] = field(default_factory=list)
     reference: list[Heard] = field(default_factory=list)
 
 
@@ -171,24 +130,26 @@ class Sea:
         self._passive: dict[bool, FloatArray] = {}
 
     def _start(self) -> Underway:
-        log, recorder = BusLog(), Recorder()
-        scenario = self._setup.scenario_of(self._fault_s)
-        config = self._setup.config
+        log, rows, config = BusLog(), list[FloatArray](), self._setup.config
         work = estimator_work(config)
+
+        def record(row: FloatArray) -> None:
+            rows.append(np.array([*row, *true_values(bench.ship.plant)]))
+
         bench = FaultyBench(
-            scenario,
+            self._setup.scenario_of(self._fault_s),
             config,
             self._law,
             seed=self._seed,
             script=(TimedAction(self._campaign.arm_s, Action.ARM),),
             trace=log,
-            sink=recorder if self._recorded else None,
+            sink=record if self._recorded else None,
             sink_every=SAMPLE_TICKS,
             estimating=work and SimulatedRetuner(work[0]),
             commissioned=self._setup.commissioned,
         )
-        recorder.bench, log.node = bench, bench.node
-        return Underway(bench, log, recorder)
+        log.node = bench.node
+        return Underway(bench, log, rows)
 
     def prepare(self, rows: list[Row]) -> None:
         """Simulate the references of the rows: the bus without a fault, and the passive ship."""
@@ -265,12 +226,7 @@ class Sea:
             alone_ns = max(watched_ns, start_ns + round(REARMED_S * SECOND_NS))
             bench.run(alone_ns)
         stopped = self._stopped_at(bench)
-        outcome = Outcome(
-            row.id,
-            self._seed,
-            times_of(row, watch, log, start_ns),
-            was_active="active" in watch.first_ns,
-        )
+        times, was_active = times_of(row, watch, log, start_ns), "active" in watch.first_ns
         refused = bench.ship.refused_commands - refused
         steepest_pa_s = log.steepest_pa_s(start_ns)
         window_s = self._window.stopped_s if stopped else self._window.running_s
@@ -288,14 +244,21 @@ class Sea:
         if row.fault.on_bus:
             difference = first_difference(reference, log.frames, watched_ns)
             wire = "" if difference is None else _words(*difference, start_ns)
-        return replace(
-            outcome,
+        return Outcome(
+            row.id,
+            self._seed,
+            **times,
             mode=bench.node.mode.name,
             code=watch.code.name,
+            was_active=was_active,
             armed_again=watch.armed_again,
-            said=_said(log, start_ns),
-            excess=Excess(watch.beyond_share_pa, refused, steepest_pa_s),
-            rolls=Rolls(watch.rolls.variance, float(passive.var()), window_s),
+            **_said(log, start_ns),
+            beyond_share_pa=watch.beyond_share_pa,
+            refused=refused,
+            steepest_pa_s=steepest_pa_s,
+            variance=watch.rolls.variance,
+            passive_variance=float(passive.var()),
+            window_s=window_s,
             wire=wire,
             rows=self._recorded_rows(underway, start_ns),
         )
@@ -305,7 +268,7 @@ class Sea:
         if not self._recorded:
             return None
         first_s = start_ns / SECOND_NS - RECORDED_S
-        return np.array([each for each in underway.recorder.rows if each[0] >= first_s])
+        return np.array([each for each in underway.recorded if each[0] >= first_s])
 
     def _passive_beside(self, bench: FaultyBench, seconds: float, stopped: bool) -> FloatArray:
         """Roll of the passive ship with pump and valve in the final state of a bench."""
@@ -330,52 +293,31 @@ class Sea:
         return bench.ship.drive is not None and bench.ship.drive.enabled
 
 
-def times_of(row: Row, watch: Watch, log: BusLog, start_ns: int) -> Times:
-    """Times of a row whose fault began at `start_ns`; earlier detection counts as in time."""
+def times_of(row: Row, watch: Watch, log: BusLog, start_ns: int) -> dict[str, Any]:
+    """Times in `Outcome` of a row whose fault began at `start_ns`.
+
+    Earlier detection counts as in time.
+    """
     begin_ns = start_ns
     if row.fault.from_start:
         begin_ns = watch.first_ns.get("active", start_ns)
     if row.limit.counts_from:
         known = [each for each in (watch.over_ns, watch.first_ns.get("found")) if each is not None]
         begin_ns = max([begin_ns, min(known, default=begin_ns)])
-
-    def after(time_ns: int | None) -> float | None:
-        return None if time_ns is None else max((time_ns - begin_ns) / 1e6, 0.0)
-
-    first = {name: after(time_ns) for name, time_ns in watch.first_ns.items()}
-    return Times(
-        first.get("found"),
-        first.get("halved"),
-        first.get("noted"),
-        first.get("alarm"),
-        zero=after(watch.pressed_ns + TICK_NS),
-        commanded=after(log.commanded_until(start_ns)) or 0.0,
-    )
+    events = {name: at_ns for name, at_ns in watch.first_ns.items() if name != "active"}
+    events |= {"zero": watch.pressed_ns + TICK_NS, "commanded": log.commanded_until(start_ns)}
+    return {name: max((time_ns - begin_ns) / 1e6, 0.0) for name, time_ns in events.items()}
 
 
-def _said(log: BusLog, start_ns: int) -> Said:
+def _said(log: BusLog, start_ns: int) -> dict[str, Any]:
+    """What the controller said on the bus, in the words of `Outcome`."""
     shown = [status for time_ns, status in log.shown if time_ns >= start_ns]
     status = ""
     if shown and shown[-1].mode is not None and shown[-1].fault is not None:
         status = f"{shown[-1].mode.name} {shown[-1].fault.name}"
     alarms = {fault.name for time_ns, fault in log.told if time_ns >= start_ns}
     flags = tuple(flag for flag in FLAGS if any(getattr(each, flag) for each in shown))
-    return Said(status, tuple(sorted(alarms)), flags)
-
-
-def write_recordings(
-    folder: Path, outcomes: Mapping[str, Sequence[Outcome]], about: Mapping[str, Any]
-) -> dict[str, Path]:
-    """Write the recordings of the rows that have one; return the files by row."""
-    from utank_hil.telemetry.recording import write_recording
-
-    files = {}
-    for name, each in outcomes.items():
-        kept = {f"seed {one.seed}": one.rows for one in each if one.rows is not None}
-        if kept:
-            files[name] = folder / f"{name}.rrd"
-            write_recording(files[name], COLUMNS, kept, about=about)
-    return files
+    return {"status": status, "alarms": tuple(sorted(alarms)), "flags": flags}
 
 
 def _words(there: Heard | None, here: Heard | None, start_ns: int) -> str:

@@ -98,7 +98,7 @@ def judged(campaign: Campaign, row: Row, outcomes: Sequence[Outcome]) -> Result:
     sound = [each for each in outcomes if not each.error]
     found = [_reaction_ms(row, each) for each in sound]
     ends = row.expect.latched or row.expect.reaction == "drive"
-    zero = [each.times.zero for each in sound] if ends and not row.fault.hardwired_stop else []
+    zero = [each.zero for each in sound] if ends and not row.fault.hardwired_stop else []
     zero_limit_ms = row.limit.zero_ms
     if zero_limit_ms is None and zero and row.expect.latched:
         limits = (_zero_limit_ms(row, each) for each in sound)
@@ -106,8 +106,8 @@ def judged(campaign: Campaign, row: Row, outcomes: Sequence[Outcome]) -> Result:
     problems = [f"seed {each.seed}: {each.error}" for each in outcomes if each.error]
     for each in sound:
         problems += [f"seed {each.seed}: {why}" for why in _problems(row, setup, each)]
-    passive = sum(each.rolls.passive_variance for each in sound)
-    ratio = sum(each.rolls.variance for each in sound) / passive if passive else math.nan
+    passive = sum(each.passive_variance for each in sound)
+    ratio = sum(each.variance for each in sound) / passive if passive else math.nan
     if not ratio <= row.limit.roll:
         problems.append(f"rolls {ratio:.2f} times the passive ship's variance")
     return Result(
@@ -119,7 +119,7 @@ def judged(campaign: Campaign, row: Row, outcomes: Sequence[Outcome]) -> Result:
         tuple(sorted({each.code for each in sound if each.code != "NONE"})),
         next((each.wire for each in sound), ""),
         ratio,
-        max((each.rolls.window_s for each in sound), default=math.nan),
+        max((each.window_s for each in sound), default=math.nan),
         tuple(problems),
         tuple(outcomes),
     )
@@ -135,7 +135,7 @@ def _reaction_ms(row: Row, outcome: Outcome) -> float | None:
     if row.fault.from_start and row.expect.latched and not outcome.was_active:
         return 0.0 if outcome.code != "NONE" else None
     time = _TIME_OF.get(row.expect.reaction)
-    return None if time is None else getattr(outcome.times, time)
+    return None if time is None else getattr(outcome, time)
 
 
 def _zero_limit_ms(row: Row, outcome: Outcome) -> float | None:
@@ -160,21 +160,21 @@ def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
     yield from _late(row, outcome)
     yield from _unsaid(row, outcome)
     yield from _ended_wrongly(row, outcome)
-    reaction, excess = row.expect.reaction, outcome.excess
-    if reaction != "stop" and excess.steepest_pa_s > RATE_SHARE * setup.config.limits.rate_pa_s:
-        yield f"commands changed at {excess.steepest_pa_s:.3g} Pa/s"
+    reaction = row.expect.reaction
+    if reaction != "stop" and outcome.steepest_pa_s > RATE_SHARE * setup.config.limits.rate_pa_s:
+        yield f"commands changed at {outcome.steepest_pa_s:.3g} Pa/s"
     spoiled = [fault.spoiled_message for fault in row.fault.inject]
-    if excess.refused and COMMAND not in spoiled:
-        yield f"the drive refused {excess.refused} commands"
-    if excess.beyond_share_pa > 0:
-        yield f"commanded {excess.beyond_share_pa:.0f} Pa more than it may while degraded"
+    if outcome.refused and COMMAND not in spoiled:
+        yield f"the drive refused {outcome.refused} commands"
+    if outcome.beyond_share_pa > 0:
+        yield f"commanded {outcome.beyond_share_pa:.0f} Pa more than it may while degraded"
     if not outcome.wire and row.fault.inject:
         yield "the fault did not reach the bus"
 
 
 def _late(row: Row, outcome: Outcome) -> Iterator[str]:
     """Yield reactions that were late or missing."""
-    times, limit = outcome.times, row.limit
+    limit = row.limit
     found_ms = _reaction_ms(row, outcome)
     if row.expect.reaction not in ("none", "refuse"):
         if found_ms is None:
@@ -182,27 +182,27 @@ def _late(row: Row, outcome: Outcome) -> Iterator[str]:
         elif limit.found_ms is not None and found_ms > limit.found_ms:
             yield f"found after {found_ms:.0f} ms, {limit.found_ms:.0f} allowed"
     if limit.halved_ms is not None:
-        halved = [each for each in (times.halved, times.found) if each is not None]
+        halved = [each for each in (outcome.halved, outcome.found) if each is not None]
         if min(halved, default=math.inf) > limit.halved_ms:
             yield f"pressure not halved within {limit.halved_ms:.0f} ms"
     limit_ms = _zero_limit_ms(row, outcome) if row.expect.latched else None
     if limit_ms is not None:
-        zero_ms = math.inf if times.zero is None else times.zero
+        zero_ms = math.inf if outcome.zero is None else outcome.zero
         if not row.fault.hardwired_stop and zero_ms > limit_ms:
             yield f"pressure at zero after {zero_ms:.0f} ms, {limit_ms:.0f} allowed"
-        if not row.expect.unheard and times.commanded > limit_ms:
-            yield f"pressure commanded until {times.commanded:.0f} ms, {limit_ms:.0f} allowed"
+        if not row.expect.unheard and outcome.commanded > limit_ms:
+            yield f"pressure commanded until {outcome.commanded:.0f} ms, {limit_ms:.0f} allowed"
 
 
 def _ended_wrongly(row: Row, outcome: Outcome) -> Iterator[str]:
     """Yield wrong final modes, actions and fault codes of the controller."""
-    expect, times = row.expect, outcome.times
-    if expect.latched and times.found is not None and outcome.mode != "FAULT":
+    expect = row.expect
+    if expect.latched and outcome.found is not None and outcome.mode != "FAULT":
         yield f"not latched: ended in {outcome.mode}"
-    ended_late = times.found is None and outcome.code in expect.may_end
+    ended_late = outcome.found is None and outcome.code in expect.may_end
     if expect.reaction in _GO_ON and outcome.mode != "ACTIVE" and not ended_late:
         yield f"ended in {outcome.mode}, {outcome.code}"
-    if expect.reaction in _GO_ON and expect.reaction != "halve" and times.halved is not None:
+    if expect.reaction in _GO_ON and expect.reaction != "halve" and outcome.halved is not None:
         yield "halved the pressure"
     if expect.reaction == "refuse" and outcome.was_active:
         yield "was armed"
@@ -217,31 +217,31 @@ def _ended_wrongly(row: Row, outcome: Outcome) -> Iterator[str]:
 
 def _named_in_time(row: Row, outcome: Outcome) -> bool:
     """Whether an alarm had one of the row's names by the time of detection, or its deadline."""
-    if outcome.times.alarm is None:
+    if outcome.alarm is None:
         return False
     latest_ms = max(row.limit.found_ms or 0.0, _reaction_ms(row, outcome) or 0.0) + ALARM_MS
-    return row.expect.reaction == "refuse" or outcome.times.alarm <= latest_ms
+    return row.expect.reaction == "refuse" or outcome.alarm <= latest_ms
 
 
 def _unsaid(row: Row, outcome: Outcome) -> Iterator[str]:
     """Yield missing or wrong information on the bus."""
-    expect, said, times = row.expect, outcome.said, outcome.times
+    expect = row.expect
     if expect.unheard:
         return
-    if expect.latched and times.found is not None:
-        if said.status != f"FAULT {outcome.code}":
-            yield f"CTRL_STATUS shows {said.status or 'nothing'} in the end"
-        if outcome.code not in said.alarms:
+    if expect.latched and outcome.found is not None:
+        if outcome.status != f"FAULT {outcome.code}":
+            yield f"CTRL_STATUS shows {outcome.status or 'nothing'} in the end"
+        if outcome.code not in outcome.alarms:
             yield f"no alarm {outcome.code} was sent"
-    named = {*expect.codes, *expect.also} & set(said.alarms)
+    named = {*expect.codes, *expect.also} & set(outcome.alarms)
     if expect.reaction in ("alarm", "halve") and expect.codes and not named:
         yield "no alarm with its name was sent"
-    halved = row.limit.halved_ms is not None and times.halved is not None
-    if halved and times.found is not None:  # long enough before the latch to appear in a status
-        halved = times.found - (times.halved or 0.0) > STATUS_MS
+    halved = row.limit.halved_ms is not None and outcome.halved is not None
+    if halved and outcome.found is not None:  # long enough before the latch to appear in a status
+        halved = outcome.found - (outcome.halved or 0.0) > STATUS_MS
     degraded = ["degraded"] if halved or expect.reaction == "halve" else []
     for name in (*expect.also, *degraded):
-        if name in FLAGS and name not in said.flags:
+        if name in FLAGS and name not in outcome.flags:
             yield f"CTRL_STATUS never said {name}"
-        elif name not in FLAGS and name not in said.alarms:
+        elif name not in FLAGS and name not in outcome.alarms:
             yield f"no alarm {name} was sent"

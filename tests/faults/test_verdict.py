@@ -1,7 +1,9 @@
 """What passes a row of the campaign, and what does not."""
 
+from dataclasses import replace
+
 import pytest
-from judged_rows import CAMPAIGN, GOOD, ROWS, changed, said, spoken, verdict
+from judged_rows import CAMPAIGN, GOOD, ROWS, said, spoken, verdict
 
 
 @pytest.mark.parametrize(
@@ -26,55 +28,55 @@ from judged_rows import CAMPAIGN, GOOD, ROWS, changed, said, spoken, verdict
 )
 def test_one_seed_of_two_fails_the_row(change: dict[str, object], words: str) -> None:
     assert spoken("both-signs-flipped", GOOD, GOOD).passed
-    result = spoken("both-signs-flipped", GOOD, changed(GOOD, seed=2, **change))
+    result = spoken("both-signs-flipped", GOOD, replace(GOOD, seed=2, **change))
     assert not result.passed
     assert any(words in problem for problem in result.problems)
 
 
 def test_commands_that_change_faster_than_the_limit_fail_a_ramp() -> None:
     limit_pa_s = CAMPAIGN.setups["pump"].config.limits.rate_pa_s
-    ramp = changed(GOOD, row="motion-silent", found=50.0, zero=240.0, code="MOTION_SILENT")
-    assert spoken("motion-silent", changed(ramp, steepest_pa_s=limit_pa_s)).passed
-    fast = spoken("motion-silent", changed(ramp, steepest_pa_s=1.01 * limit_pa_s))
+    ramp = replace(GOOD, row="motion-silent", found=50.0, zero=240.0, code="MOTION_SILENT")
+    assert spoken("motion-silent", replace(ramp, steepest_pa_s=limit_pa_s)).passed
+    fast = spoken("motion-silent", replace(ramp, steepest_pa_s=1.01 * limit_pa_s))
     assert [why.partition(" at ")[0] for why in fast.problems] == ["seed 1: commands changed"]
 
 
 def test_each_reaction_asks_for_its_own() -> None:
-    calm = changed(GOOD, mode="ACTIVE", found=None, code="NONE")
-    assert spoken("roll-spike", changed(calm, noted=10.0)).passed
-    assert not spoken("roll-spike", changed(calm, noted=10.0, halved=20.0)).passed
+    calm = replace(GOOD, mode="ACTIVE", found=None, code="NONE")
+    assert spoken("roll-spike", replace(calm, noted=10.0)).passed
+    assert not spoken("roll-spike", replace(calm, noted=10.0, halved=20.0)).passed
     assert not spoken("roll-spike", calm).passed
     assert spoken("roll-100-ms-late", calm).passed
     assert not spoken("roll-100-ms-late", GOOD).passed
-    assert spoken("noise-10-fold", changed(calm, halved=50.0, alarm=100.0)).passed
-    lossy = changed(calm, alarm=900.0)
+    assert spoken("noise-10-fold", replace(calm, halved=50.0, alarm=100.0)).passed
+    lossy = replace(calm, alarm=900.0)
     assert spoken("gateway-loses-5-percent", lossy).passed
-    assert not spoken("gateway-loses-5-percent", changed(lossy, alarm=5100.0)).passed
-    assert not spoken("gateway-loses-5-percent", changed(lossy, alarm=None)).passed
-    assert not spoken("gateway-loses-5-percent", changed(lossy, halved=20.0)).passed
-    ramp = changed(GOOD, code="TANK_SILENT", found=990.0, zero=1500.0, halved=100.0)
+    assert not spoken("gateway-loses-5-percent", replace(lossy, alarm=5100.0)).passed
+    assert not spoken("gateway-loses-5-percent", replace(lossy, alarm=None)).passed
+    assert not spoken("gateway-loses-5-percent", replace(lossy, halved=20.0)).passed
+    ramp = replace(GOOD, code="TANK_SILENT", found=990.0, zero=1500.0, halved=100.0)
     assert spoken("tank-silent", ramp).passed
-    assert not spoken("tank-silent", changed(ramp, halved=130.0)).passed
-    assert not spoken("tank-silent", changed(ramp, steepest_pa_s=300e3)).passed
-    assert spoken("controller-killed", changed(GOOD, code="NONE", zero=60.0)).passed
-    assert not spoken("controller-killed", changed(GOOD, code="NONE", zero=110.0)).passed
-    refused = changed(calm, was_active=False, mode="STANDBY")
+    assert not spoken("tank-silent", replace(ramp, halved=130.0)).passed
+    assert not spoken("tank-silent", replace(ramp, steepest_pa_s=300e3)).passed
+    assert spoken("controller-killed", replace(GOOD, code="NONE", zero=60.0)).passed
+    assert not spoken("controller-killed", replace(GOOD, code="NONE", zero=110.0)).passed
+    refused = replace(calm, was_active=False, mode="STANDBY")
     assert spoken("held-arm-bit", refused).passed
-    assert not spoken("held-arm-bit", changed(refused, was_active=True)).passed
+    assert not spoken("held-arm-bit", replace(refused, was_active=True)).passed
 
 
 def test_a_fault_that_is_latched_has_a_name_of_the_row() -> None:
-    other = changed(GOOD, code="OVERRUN", alarm=600.0)
+    other = replace(GOOD, code="OVERRUN", alarm=600.0)
     assert spoken("both-signs-flipped", other).problems == ("seed 1: called OVERRUN",)
 
 
 def test_where_nothing_is_latched_an_alarm_has_the_row_s_name_in_time() -> None:
-    halved = changed(GOOD, mode="ACTIVE", found=None, code="NONE", halved=50.0)
-    assert spoken("noise-10-fold", changed(halved, alarm=2100.0)).passed
-    late = spoken("noise-10-fold", changed(halved, alarm=2101.0))
+    halved = replace(GOOD, mode="ACTIVE", found=None, code="NONE", halved=50.0)
+    assert spoken("noise-10-fold", replace(halved, alarm=2100.0)).passed
+    late = spoken("noise-10-fold", replace(halved, alarm=2101.0))
     assert late.problems == ("seed 1: called NONE",)
-    refused = changed(GOOD, mode="INIT", was_active=False, found=None, code="MOTION_SILENT")
-    assert spoken("high-level-before-ready", changed(refused, alarm=9000.0)).passed
+    refused = replace(GOOD, mode="INIT", was_active=False, found=None, code="MOTION_SILENT")
+    assert spoken("high-level-before-ready", replace(refused, alarm=9000.0)).passed
     assert not spoken("high-level-before-ready", refused).passed
 
 
@@ -98,16 +100,16 @@ def test_what_the_bus_was_not_told_fails_the_row(
 ) -> None:
     outcome = {
         "both-signs-flipped": GOOD,
-        "level-offset": changed(GOOD, code="SIGNAL_DELAYED", found=31e3, halved=1e3,
+        "level-offset": replace(GOOD, code="SIGNAL_DELAYED", found=31e3, halved=1e3,
                                 zero=31.5e3),
-        "saturated": changed(GOOD, mode="ACTIVE", found=None, code="NONE", halved=10.1e3,
+        "saturated": replace(GOOD, mode="ACTIVE", found=None, code="NONE", halved=10.1e3,
                              alarm=10.1e3),
-        "drive-warns": changed(GOOD, mode="ACTIVE", found=None, code="NONE", alarm=100.0),
+        "drive-warns": replace(GOOD, mode="ACTIVE", found=None, code="NONE", alarm=100.0),
     }[row]  # fmt: skip
     sound = said(row, outcome)
-    sound = changed(sound, flags=(*sound.said.flags, *ROWS[row].expect.also))
+    sound = replace(sound, flags=(*sound.flags, *ROWS[row].expect.also))
     assert verdict(row, sound).passed
-    wrong = verdict(row, changed(sound, **change))
+    wrong = verdict(row, replace(sound, **change))
     assert [words in why for why in wrong.problems] == [True]
 
 
@@ -115,48 +117,48 @@ def test_what_the_bus_was_not_told_fails_the_row(
 def test_what_was_halved_for_less_than_two_cycles_need_not_be_in_a_status(
     halved_ms: float | None, *, passed: bool
 ) -> None:
-    latched = changed(GOOD, code="VOLUME", found=1000.0, zero=1200.0, halved=halved_ms)
-    assert verdict("naval-level-offset", changed(said("naval-level-offset", latched), flags=())
+    latched = replace(GOOD, code="VOLUME", found=1000.0, zero=1200.0, halved=halved_ms)
+    assert verdict("naval-level-offset", replace(said("naval-level-offset", latched), flags=())
                    ).passed is passed  # fmt: skip
 
 
 def test_where_the_bus_is_full_nothing_is_asked_of_what_was_said() -> None:
-    full = changed(GOOD, code="BUS_OVERLOAD", found=800.0, zero=820.0)
+    full = replace(GOOD, code="BUS_OVERLOAD", found=800.0, zero=820.0)
     assert verdict("flood-by-known-identifier", full).passed
-    assert not verdict("bus-off", changed(full, code="BUS_LOST", found=0.0, zero=50.0)).passed
+    assert not verdict("bus-off", replace(full, code="BUS_LOST", found=0.0, zero=50.0)).passed
 
 
 @pytest.mark.parametrize("mode", ["STANDBY", "PASSIVE", "ACTIVE"])
 def test_a_reset_that_was_obeyed_while_the_cause_lasts_fails_the_row(mode: str) -> None:
-    kept = changed(GOOD, row="reset-under-high-level", code="LEVEL_LIMIT", found=10, zero=30)
+    kept = replace(GOOD, row="reset-under-high-level", code="LEVEL_LIMIT", found=10, zero=30)
     assert spoken("reset-under-high-level", kept).passed
-    assert not spoken("reset-under-high-level", changed(kept, mode=mode)).passed
+    assert not spoken("reset-under-high-level", replace(kept, mode=mode)).passed
 
 
 def test_minutes_later_a_run_may_end_in_the_faults_that_the_row_names() -> None:
-    noisy = changed(GOOD, found=None, halved=50.0, alarm=100.0, code="DRIFT")
+    noisy = replace(GOOD, found=None, halved=50.0, alarm=100.0, code="DRIFT")
     assert spoken("noise-10-fold", noisy).passed
-    assert not spoken("noise-10-fold", changed(noisy, code="OVERRUN")).passed
-    assert not spoken("noise-10-fold", changed(noisy, found=3000.0)).passed
+    assert not spoken("noise-10-fold", replace(noisy, code="OVERRUN")).passed
+    assert not spoken("noise-10-fold", replace(noisy, found=3000.0)).passed
     assert not spoken("level-noise", noisy).passed
 
 
 def test_a_ramp_that_comes_before_the_stop_has_the_stops_time() -> None:
-    ramp = changed(GOOD, code="DRIFT", found=100.0, zero=1200.0)
+    ramp = replace(GOOD, code="DRIFT", found=100.0, zero=1200.0)
     assert spoken("both-signs-flipped", ramp).passed
     assert spoken("both-signs-flipped", ramp).zero_limit_ms == 10950.0
     assert spoken("both-signs-flipped", GOOD).zero_limit_ms == 600.0
 
 
 def test_a_fault_that_refuses_arming_is_found() -> None:
-    refused = changed(GOOD, found=None, zero=0.0, mode="STANDBY", was_active=False)
+    refused = replace(GOOD, found=None, zero=0.0, mode="STANDBY", was_active=False)
     assert spoken("both-signs-from-start", refused).passed
-    assert not spoken("both-signs-from-start", changed(refused, code="NONE")).passed
+    assert not spoken("both-signs-from-start", replace(refused, code="NONE")).passed
     assert not spoken("both-signs-flipped", refused).passed
 
 
 def test_the_worst_seed_counts_and_none_where_one_was_not_found() -> None:
-    later = changed(GOOD, seed=2, found=700.0, zero=730.0)
+    later = replace(GOOD, seed=2, found=700.0, zero=730.0)
     assert spoken("both-signs-flipped", GOOD, later).found_ms == 700.0
-    missed = changed(GOOD, seed=2, found=None)
+    missed = replace(GOOD, seed=2, found=None)
     assert spoken("both-signs-flipped", GOOD, missed).as_json()["found_ms"] is None
