@@ -1,11 +1,21 @@
-"""Driver of a campaign: runs the missing cases of a study and stores their rows as they come."""
+"""Driver of a campaign: runs the missing cases of a study and stores their rows as they come.
 
+The workers are one process per core of this machine, or an existing cluster.
+"""
+
+import logging
+import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from multiprocessing import resource_tracker
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+import dask
+from distributed import Client, Future, KilledWorker, LocalCluster, Status
 
 from firmware_sim.campaign.case_name import as_text, code_digest
 from firmware_sim.campaign.simulations import Row
@@ -13,9 +23,8 @@ from firmware_sim.campaign.stopping import Stopping
 from firmware_sim.campaign.store import Store
 from firmware_sim.campaign.study import Case, LoadedStudy
 from firmware_sim.campaign.work import FAILED, LOST, Batch, failed_row, run_batch
-
-if TYPE_CHECKING:
-    from distributed import Client, Future
+from utank_hil.base.one_thread import one_thread_each
+from utank_hil.runners.stopping import signals_waiting
 
 BATCH_S: Final = 0.5
 """Work per batch in s: large beside the 10 ms of sending it, small enough to lose."""
@@ -23,6 +32,13 @@ MOST_TOGETHER: Final = 200  #: Most cases in a batch. Chosen; no study.
 AHEAD: Final = 2  #: Number of batches queued or running at each worker.
 LOOK_S: Final = 5.0  #: Interval in s at which dead workers are replaced.
 FLUSH_S: Final = 1.0  #: Longest delay in s between the return of rows and their writing to disk.
+
+LOOPBACK: Final = "127.0.0.1"
+MOST_DEATHS: Final = 10
+"""Worker deaths after which a batch is abandoned; three is too few for preemptible workers."""
+RESTART_S: Final = 120
+"""Time in s allowed for a worker to restart: imports are slow on a busy machine."""
+CONNECT_S: Final = 10.0  #: Time in s allowed for the scheduler to answer. Chosen; no study.
 
 Work = Callable[[Batch], list[Row]]
 
@@ -73,12 +89,10 @@ class Driver:
         self._waiting = deque(case for case in missing.values() if self.stopping.needs(case))
         self.count = Count(len(self._waiting))
 
-    def run(self, client: "Client") -> None:
+    def run(self, client: Client) -> None:
         """Compute the missing cases; raise `OtherCodeError` if a worker has different code."""
-        from firmware_sim.campaign.cluster import replace_lost
-
         self._written_s = looked_s = time.monotonic()
-        ended: SimpleQueue[Future[list[Row]]] = SimpleQueue()
+        ended: SimpleQueue["Future[list[Row]]"] = SimpleQueue()
         batches: dict[str, list[Case]] = {}
         try:
             self._send(client, ended, batches)
@@ -98,8 +112,8 @@ class Driver:
 
     def _send(
         self,
-        client: "Client",
-        ended: "SimpleQueue[Future[list[Row]]]",
+        client: Client,
+        ended: SimpleQueue["Future[list[Row]]"],
         batches: dict[str, list[Case]],
     ) -> None:
         most = AHEAD * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
@@ -122,11 +136,7 @@ class Driver:
                 self.count.needed -= 1
         return taken
 
-    def _rows(self, client: "Client", future: "Future[list[Row]]", cases: list[Case]) -> list[Row]:
-        from distributed import KilledWorker
-
-        from firmware_sim.campaign.cluster import replace_lost
-
+    def _rows(self, client: Client, future: "Future[list[Row]]", cases: list[Case]) -> list[Row]:
         while True:
             try:
                 return future.result(timeout=LOOK_S)
@@ -160,3 +170,52 @@ def batch_of(loaded: LoadedStudy, cases: Iterable[Case]) -> Batch:
         loaded.allow_code,
         tuple((case.name, case.seed, as_text(case.values)) for case in cases),
     )
+
+
+@contextmanager
+def workers(scheduler: str | None, count: int | None) -> Iterator[Client]:
+    """Connect to a scheduler, or start a local one that no other machine can reach.
+
+    `scheduler` is an address such as ``tcp://10.0.0.5:8786``; without it there are `count` local
+    processes, one per core by default. Raises `OSError` if the scheduler does not answer.
+    """
+    if scheduler is not None:
+        with Client(scheduler, timeout=CONNECT_S) as client:
+            yield client
+        return
+    # the campaign itself reports workers that die and are restarted
+    settings = {
+        "distributed.scheduler.allowed-failures": MOST_DEATHS,
+        "distributed.deploy.lost-worker-timeout": f"{RESTART_S}s",
+        "logging.distributed": "error",
+    }
+    resource_tracker.ensure_running()  # its start would unblock Ctrl-C
+    with one_thread_each(), dask.config.set(settings):
+        with signals_waiting():  # Ctrl-C reaches the whole process group: the driver decides
+            cluster = LocalCluster(
+                n_workers=count or len(os.sched_getaffinity(0)),
+                threads_per_worker=1,
+                processes=True,
+                host=LOOPBACK,
+                dashboard_address=f"{LOOPBACK}:0",
+                silence_logs=logging.CRITICAL,
+            )
+        with cluster, Client(cluster) as client:
+            yield client
+
+
+def replace_lost(client: Client) -> None:
+    """Restart local workers that no nanny watches any more.
+
+    A nanny restarts a worker that dies, but gives up when the restart fails or takes too long.
+    """
+    cluster = client.cluster
+    if cluster is not None:
+        cluster.loop.add_callback(_replace_lost, cluster)
+
+
+def _replace_lost(cluster: LocalCluster) -> None:
+    for name, nanny in list(cluster.workers.items()):
+        if nanny.status in (Status.closed, Status.failed):
+            del cluster.workers[name]
+    cluster.scale(len(cluster.worker_spec))

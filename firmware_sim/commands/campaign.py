@@ -45,7 +45,7 @@ def campaign(
     was. A case that fails is recorded with its reason and ends nothing.
     """
     # imported late: `--help` needs none of it
-    from firmware_sim.campaign.picture import draw
+    from firmware_sim.campaign.report_page import draw
     from firmware_sim.campaign.store import FILES, PICTURE, SUMMARY, Store, StoreError, read_results
     from firmware_sim.campaign.study import load_study
     from firmware_sim.campaign.summary import failures, summary
@@ -100,8 +100,7 @@ def _about(loaded: "LoadedStudy", folder: Path, given: dict[str, Any]) -> dict[s
 
 def _run(loaded: "LoadedStudy", store: Any, scheduler: str | None, count: int | None) -> bool:
     """Compute the missing cases with a progress bar; return whether it was interrupted."""
-    from firmware_sim.campaign.cluster import workers
-    from firmware_sim.campaign.driver import Count, Driver
+    from firmware_sim.campaign.driver import Count, Driver, workers
     from firmware_sim.campaign.work import OtherCodeError
 
     bar = progress_bar(MofNCompleteColumn(), "{task.fields[failed]}")

@@ -14,8 +14,7 @@ from distributed import Client
 from studies import small, written
 from typer.testing import CliRunner, Result
 
-from firmware_sim.campaign.cluster import workers
-from firmware_sim.campaign.driver import Count, Driver, batch_of
+from firmware_sim.campaign.driver import Count, Driver, batch_of, workers
 from firmware_sim.campaign.store import Store, read_results
 from firmware_sim.campaign.tables import pairs_table
 from firmware_sim.campaign.work import run_batch
@@ -87,7 +86,7 @@ def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
         ) as client:
             yield client
 
-    monkeypatch.setattr("firmware_sim.campaign.cluster.workers", here)
+    monkeypatch.setattr("firmware_sim.campaign.driver.workers", here)
     app = new_app()
     app.command()(campaign)
 
@@ -208,7 +207,7 @@ def test_wrong_study_ends_before_anything_is_computed(run, tmp_path: Path):
 
 
 def test_scheduler_that_does_not_answer_is_named(tmp_path: Path, monkeypatch):
-    monkeypatch.setattr("firmware_sim.campaign.cluster.CONNECT_S", 0.2)
+    monkeypatch.setattr("firmware_sim.campaign.driver.CONNECT_S", 0.2)
     app = new_app()
     app.command()(campaign)
     path = written(tmp_path)
