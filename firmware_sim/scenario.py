@@ -15,7 +15,12 @@ from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.place import Place
 from firmware_sim.scenario_sea import ScenarioSea
 from firmware_sim.sensor_errors import SensorErrors
-from firmware_sim.unusual_encounter import moment_problems, unusual_encounter
+from firmware_sim.unusual_encounter import (
+    moment_problems,
+    unusual_loadings,
+    unusual_sea,
+    unusual_waypoints,
+)
 from firmware_sim.voyage import (
     Waypoint,
     ship_on_the_way,
@@ -162,12 +167,9 @@ class Scenario(Section):
     @classmethod
     def _as_the_pump_can(cls, drive: Any, info: ValidationInfo) -> Any:
         vessel = info.data.get("vessel")
-        if vessel is None or not isinstance(drive, dict):
+        if vessel is None or vessel.pump is None or not isinstance(drive, dict):
             return drive
-        pump = vessel.pump
-        if pump is None:
-            return drive
-        pressure_pa = pump.max_pressure_pa
+        pump, pressure_pa = vessel.pump, vessel.pump.max_pressure_pa
         rate_pa_s = min(_DRIVE_RATE_PER_PRESSURE * pressure_pa, pump.max_pressure_rate_pa_s)
         return {"pressure_pa": pressure_pa, "pressure_rate_pa_s": rate_pa_s, **drive}
 
@@ -201,15 +203,8 @@ class Scenario(Section):
                 problems.append(("controllers", reason))
             problems += self._controller_problems(name, controller)
         refuse("", [*problems, *self._hull_problems()])
-        refuse(
-            "",
-            [
-                *self._ship_problems(),
-                *self._sea_problems(),
-                *self._voyage_problems(),
-                *self._fault_problems(),
-            ],
-        )
+        problems = [*self._ship_problems(), *self._sea_problems(), *self._voyage_problems()]
+        refuse("", [*problems, *self._fault_problems()])
         return self
 
     @property
@@ -310,32 +305,24 @@ class Scenario(Section):
         """Reasons why a controller would never arm, or the drive would refuse its commands."""
         problems = []
         if controller.vessel.version != self.vessel.version:
-            problems.append(
-                (
-                    f"controllers.{name}",
-                    f"is for another ship, {controller.vessel.name}: it would never arm on "
-                    f"{self.vessel.name}; name the same ship file in both",
-                )
+            reason = (
+                f"is for another ship, {controller.vessel.name}: it would never arm on "
+                f"{self.vessel.name}; name the same ship file in both"
             )
+            problems.append((f"controllers.{name}", reason))
         limits, drive = controller.limits, self.drive
+        timeout_ms = controller.command_timeout_ms
         for key, taken, sender, sent in (
             ("pressure_pa", drive.pressure_pa, "limits.pressure_pa", limits.pressure_pa),
             ("pressure_rate_pa_s", drive.pressure_rate_pa_s, "limits.rate_pa_s", limits.rate_pa_s),
-            (
-                "longest_timeout_ms",
-                drive.longest_timeout_ms,
-                "command_timeout_ms",
-                controller.command_timeout_ms,
-            ),
+            ("longest_timeout_ms", drive.longest_timeout_ms, "command_timeout_ms", timeout_ms),
         ):
             if sent > taken:
-                problems.append(
-                    (
-                        f"drive.{key}",
-                        f"takes {taken:g} at most, but controllers.{name}.{sender} is {sent:g}: "
-                        "lower that, or raise this",
-                    )
+                reason = (
+                    f"takes {taken:g} at most, but controllers.{name}.{sender} is {sent:g}: "
+                    "lower that, or raise this"
                 )
+                problems.append((f"drive.{key}", reason))
         return problems
 
     def _fault_problems(self) -> list[Problem]:
@@ -389,7 +376,7 @@ class Scenario(Section):
             return [("sea", f"can't be made: {error}")]
         if not np.isfinite(amplitudes).all():
             return [("sea", "has waves too large to compute: check height, period and slope")]
-        if problems := moment_problems(self):
+        if problems := moment_problems(self.sea, self.vessel.ship):
             return problems
         waves = self.sea.sea(self.seed)
         steep = wavenumber_rad_m(waves.omega_rad_s) @ waves.amplitude_m
@@ -412,7 +399,18 @@ class Scenario(Section):
             for name, part in parts.items()
             for key, reason in part.warnings()
         ]
-        return found + unusual_encounter(self)
+        figures = self.figures()
+        hs_m, roll_rad = figures["hs_m"], figures["static_roll_rms_rad"]
+        found += unusual_sea(self.sea, self.vessel.ship, hs_m, roll_rad)
+        found += unusual_waypoints(self.voyage, hs_m)
+        found += [
+            (f"operator.{index}.time_s", f"is {action.time_s:g}, after duration_s")
+            for index, action in enumerate(self.operator)
+            if action.time_s > self.duration_s
+        ]
+        loadings = {f"voyage.{index}.ship": point.ship for index, point in enumerate(self.voyage)}
+        loadings = {"actual_ship": self.actual_ship, **loadings}
+        return [*found, *unusual_loadings(self.vessel, loadings)]
 
     def _voyage_problems(self) -> list[Problem]:
         problems = waypoint_problems(self.voyage, self.duration_s)

@@ -1,9 +1,9 @@
 """What a scenario's ship, sea and times imply together, to find wrong units."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from utank_hil.base.parameters import Problem
 from utank_hil.configuration import Vessel
 from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.nodes.panel import TimedAction
 from utank_hil.sea.moment_table import MomentTable
 from utank_hil.sea.sea import EffectiveSlope
 
@@ -26,82 +25,47 @@ _PERIODS: Final = (0.5, 2.0)
 """Roll period of a loading per that of the ship's file: from ballast to a deep draught."""
 
 
-class Encounter(Protocol):
-    """What a scenario brings together; its parts as in `firmware_sim.scenario`."""
-
-    @property
-    def vessel(self) -> Vessel:
-        """Ship, tank and pump."""
-
-    @property
-    def sea(self) -> Any:
-        """Section ``sea``."""
-
-    @property
-    def voyage(self) -> Sequence[Waypoint]:
-        """Changes under way."""
-
-    @property
-    def operator(self) -> Sequence[TimedAction]:
-        """Actions of the operator."""
-
-    @property
-    def actual_ship(self) -> dict[str, float]:
-        """Parameters that differ from the vessel's."""
-
-    @property
-    def duration_s(self) -> float:
-        """Length of the run."""
-
-    def figures(self) -> dict[str, float]:
-        """Effect of the sea on the ship."""
-
-
-def moment_problems(scenario: Encounter) -> list[Problem]:
-    """Return why the roll moments of a table can't be those of the ship."""
-    slope = _slope_of_table(scenario)
+def moment_problems(sea: Any, ship: RollShip) -> list[Problem]:
+    """Return why the roll moments of a table can't be those of the ship; `sea` is the section."""
+    slope = _slope_of_table(sea, ship)
     if slope is None or _SLOPES_REFUSED[0] <= slope <= _SLOPES_REFUSED[1]:
         return []
     return [("sea.roll_moment_table", _of_table(slope))]
 
 
-def unusual_encounter(scenario: Encounter) -> list[Problem]:
-    """Return what is unusual in a scenario without problems."""
+def unusual_sea(sea: Any, ship: RollShip, hs_m: float, static_roll_rad: float) -> list[Problem]:
+    """Return what is unusual in the effect of a sea without problems on the ship."""
     found = []
-    slope = _slope_of_table(scenario)
+    slope, roll_deg = _slope_of_table(sea, ship), math.degrees(static_roll_rad)
     if slope is not None and not _SLOPES[0] <= slope <= _SLOPES[1]:
         found.append(("sea.roll_moment_table", _of_table(slope)))
-    figures = scenario.figures()
-    roll_deg = math.degrees(figures["static_roll_rms_rad"])
-    if figures["hs_m"] > 0 and not _ROLL_DEG[0] <= roll_deg <= _ROLL_DEG[1]:
-        keys = sorted(scenario.sea.model_fields_set & {"hs_m", "amplitude_m", "tp_s", "period_s"})
+    if hs_m > 0 and not _ROLL_DEG[0] <= roll_deg <= _ROLL_DEG[1]:
+        keys = sorted(sea.model_fields_set & {"hs_m", "amplitude_m", "tp_s", "period_s"})
         reason = (
             f"would heel the ship {roll_deg:.2g} degrees RMS, standing still: check "
             f"{', '.join([*keys, 'effective_slope'])} and the ship's stiffness; heights are in "
             "metres, periods in seconds"
         )
         found.append(("sea", reason))
-    for index, point in enumerate(scenario.voyage):
-        if point.sea is not None and not 0.05 <= point.sea.spectrum().hs_m / figures["hs_m"] <= 20:
-            reason = f"passes from {figures['hs_m']:.2g} m to {point.sea.spectrum().hs_m:.2g} m"
+    return found
+
+
+def unusual_waypoints(voyage: Sequence[Waypoint], hs_m: float) -> list[Problem]:
+    """Return what is unusual in seas and speeds under way, from a sea of `hs_m` on."""
+    found = []
+    for index, point in enumerate(voyage):
+        if point.sea is not None and not 0.05 <= point.sea.spectrum().hs_m / hs_m <= 20:
+            reason = f"passes from {hs_m:.2g} m to {point.sea.spectrum().hs_m:.2g} m"
             found.append((f"voyage.{index}.sea", f"{reason}: hs_m is in metres"))
         if point.speed_m_s is not None and 0 < point.speed_m_s < LEAST_SPEED_M_S:
             found.append((f"voyage.{index}.speed_m_s", f"is {point.speed_m_s:g}: it is in m/s"))
-    found += [
-        (f"operator.{index}.time_s", f"is {action.time_s:g}, after duration_s")
-        for index, action in enumerate(scenario.operator)
-        if action.time_s > scenario.duration_s
-    ]
-    return found + list(_loadings(scenario))
+    return found
 
 
-def _loadings(scenario: Encounter) -> Iterator[Problem]:
-    """Return what is unusual in ships that differ from the vessel's, by their keys."""
-    own, tank = scenario.vessel.ship, scenario.vessel.tank
+def unusual_loadings(vessel: Vessel, given: Mapping[str, dict[str, float]]) -> Iterator[Problem]:
+    """Yield what is unusual in ships that differ from the vessel's, by the keys that say so."""
+    own, tank = vessel.ship, vessel.tank
     usual = {key for key, _ in vessel_warnings(own, tank, None)}
-    given = {"actual_ship": scenario.actual_ship} | {
-        f"voyage.{index}.ship": point.ship for index, point in enumerate(scenario.voyage)
-    }
     for place, changed in given.items():
         if not changed:
             continue
@@ -121,15 +85,14 @@ def _loadings(scenario: Encounter) -> Iterator[Problem]:
             yield place, reason
 
 
-def _slope_of_table(scenario: Encounter) -> float | None:
+def _slope_of_table(sea: Any, ship: RollShip) -> float | None:
     """Return the greatest moment of a table per that of the full slope of the wave."""
-    if scenario.sea.roll_moment_table is None:
+    if sea.roll_moment_table is None:
         return None
-    table = MomentTable.read(scenario.sea.roll_moment_table)
+    table = MomentTable.read(sea.roll_moment_table)
     omega = table.omega_rad_s
     beam = np.full(omega.shape, math.pi / 2)
-    stiffness = scenario.vessel.ship.stiffness_nm_rad
-    full = EffectiveSlope(1.0).moment(omega, beam, stiffness_nm_rad=stiffness)
+    full = EffectiveSlope(1.0).moment(omega, beam, stiffness_nm_rad=ship.stiffness_nm_rad)
     return float(np.abs(table.moment(omega, beam)).max() / np.abs(full).max())
 
 

@@ -92,7 +92,7 @@ class Driver:
     def run(self, client: Client) -> None:
         """Compute the missing cases; raise `OtherCodeError` if a worker has different code."""
         self._written_s = looked_s = time.monotonic()
-        ended: SimpleQueue["Future[list[Row]]"] = SimpleQueue()
+        ended: SimpleQueue[Future[list[Row]]] = SimpleQueue()
         batches: dict[str, list[Case]] = {}
         try:
             self._send(client, ended, batches)
