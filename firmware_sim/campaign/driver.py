@@ -23,7 +23,7 @@ from firmware_sim.campaign.stopping import Stopping
 from firmware_sim.campaign.store import Store
 from firmware_sim.campaign.study import Case, LoadedStudy
 from firmware_sim.campaign.work import FAILED, LOST, Batch, failed_row, run_batch
-from utank_hil.base.one_thread import one_thread_each
+from utank_hil.base.background import one_thread_each
 from utank_hil.runners.stopping import signals_waiting
 
 BATCH_S: Final = 0.5

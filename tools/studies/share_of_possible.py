@@ -34,7 +34,7 @@ from utank_hil.analysis.motion.bare_ship import roll_without_tank
 from utank_hil.analysis.motion.confidence import mean_interval
 from utank_hil.assembly import build_law
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.one_thread import one_thread_each
+from utank_hil.base.background import one_thread_each
 from utank_hil.base.tick import TICK_S
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import BuiltLaw, ConstrainedDesign, PumpLimits
