@@ -1,10 +1,11 @@
 """Sections 4.5 and 5.1: by how much each tank and law is said to raise the roll damping."""
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from tools.thesis.batch import simulate_batch
 from tools.thesis.capsize.contest import PATTI_B, law_factory
 from tools.thesis.capsize.threshold import without_tank
 from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
@@ -12,9 +13,8 @@ from tools.thesis.linear_contest import PASSIVE as PASSIVE_TANK
 from tools.thesis.linear_contest import PD, entrants, responses
 from tools.thesis.patti_b import LINEARIZED, NO_TANK, PASSIVE, ROBUST, run_controller
 from tools.thesis.ships import AS_PRINTED, GREATER
-from tools.thesis.simulated_response import simulated_response
-from utank_hil.base.arrays import FloatArray
-from utank_hil.dynamics import WaveMoment
+from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.dynamics import RollModel, WaveMoment
 
 START_RAD: Final = math.radians(10)
 DURATION_S: Final = 400.0
@@ -25,7 +25,42 @@ LAWS: Final = {
     "fuzzy (4.23)": ROBUST,
     "feedback linearization": LINEARIZED,
 }
+SETTLE_PERIODS = 60  # wave periods before the analysed one
+SAMPLES = 256  # integration steps per wave period
 _RATIOS: Final = np.linspace(0.3, 1.8, 3001)
+
+
+class ResponseAmplitude(NamedTuple):
+    """First harmonic of the steady oscillation per wave moment."""
+
+    #: roll_rad_per_nm, level_m_per_nm: shape (n,): complex amplitude relative to the wave moment;
+    #: NaN where the ship capsized.
+    roll_rad_per_nm: ComplexArray
+    level_m_per_nm: ComplexArray
+
+
+def simulated_response(
+    model: RollModel, frequency_rad_s: FloatArray, amplitude_nm: float
+) -> ResponseAmplitude:
+    """Simulate each frequency to the steady state, and take the first harmonic."""
+    first = np.empty((2, len(frequency_rad_s)), dtype=np.complex128)
+    angle = math.tau * np.arange(SAMPLES) / SAMPLES
+    weights = np.exp(-1j * angle) * 2 / SAMPLES / amplitude_nm
+    for n, frequency in enumerate(frequency_rad_s):
+        step_s = math.tau / frequency / SAMPLES
+        result = simulate_batch(
+            model,
+            (SETTLE_PERIODS + 1) * SAMPLES * step_s,
+            wave=WaveMoment([amplitude_nm], [frequency], [0.0]),
+            step_s=step_s,
+            record_every=1,
+        )
+        if np.isfinite(result.capsized_s[0]):
+            first[:, n] = np.nan
+        else:
+            steady = result.history[0, -SAMPLES:]
+            first[:, n] = steady[:, [0, 2]].T @ weights
+    return ResponseAmplitude(first[0], first[1])
 
 
 def _decay(law: str, *, strong: bool = True) -> tuple[FloatArray, FloatArray]:

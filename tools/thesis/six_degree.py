@@ -15,12 +15,12 @@ upright ship is in equilibrium. Tank force, moment and residual are linear in (n
 system of seven equations. The limits of the level are not modelled here.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from tools.thesis.kinematics import body_to_earth, euler_rates
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.restoring import Restoring, restoring
 from utank_hil.dynamics.ship import RollShip
@@ -221,3 +221,33 @@ def _skew(vector: FloatArray) -> FloatArray:
     """Cross-product matrix of a vector."""
     x, y, z = vector
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def body_to_earth(roll_rad: float, pitch_rad: float, yaw_rad: float) -> FloatArray:
+    """Rotation matrix, shape (3, 3): earth components of a vector given in body axes.
+
+    Euler angles are in the order of Fossen: earth to body by yaw, then pitch, then roll (thesis
+    (2.5 ff.), corrected).
+    """
+    sf, cf = math.sin(roll_rad), math.cos(roll_rad)
+    st, ct = math.sin(pitch_rad), math.cos(pitch_rad)
+    sp, cp = math.sin(yaw_rad), math.cos(yaw_rad)
+    return np.array(
+        [
+            [cp * ct, cp * st * sf - sp * cf, sp * sf + cp * cf * st],
+            [sp * ct, cp * cf + sp * st * sf, sp * st * cf - cp * sf],
+            [-st, ct * sf, ct * cf],
+        ]
+    )
+
+
+def euler_rates(roll_rad: float, pitch_rad: float) -> FloatArray:
+    """Matrix, shape (3, 3), from body rates (p, q, r) to rates of (roll, pitch, yaw).
+
+    ValueError is raised at a pitch of 90 degrees, where Euler angles are singular.
+    """
+    sf, cf = math.sin(roll_rad), math.cos(roll_rad)
+    ct, tt = math.cos(pitch_rad), math.tan(pitch_rad)
+    if abs(ct) < 1e-9:
+        raise ValueError(f"Euler angles are singular at a pitch of {pitch_rad} rad")
+    return np.array([[1.0, sf * tt, cf * tt], [0.0, cf, -sf], [0.0, sf / ct, cf / ct]])

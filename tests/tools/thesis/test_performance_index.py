@@ -3,8 +3,14 @@
 import numpy as np
 import pytest
 
-from tools.thesis.performance_index import FREQUENCY_RATIOS, performance_index
-from tools.thesis.printed_laws import DPC_BOTH, PRINTED, SAMPLE_TIME_S, designed_laws
+from tools.thesis.printed_laws import (
+    DPC_BOTH,
+    FREQUENCY_RATIOS,
+    PRINTED,
+    SAMPLE_TIME_S,
+    designed_laws,
+    performance_index,
+)
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.control import DesignPlant, PredictiveLaw
 from utank_hil.dynamics import RollShip, Tank, coupled_model

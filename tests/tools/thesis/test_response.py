@@ -1,8 +1,8 @@
 import numpy as np
 from rolling_ship import SHIP, TANK
 
+from tools.thesis.damping import simulated_response
 from tools.thesis.harmonic import harmonic_response
-from tools.thesis.simulated_response import simulated_response
 from utank_hil.dynamics import RollModel, RollShip, Tank
 
 FREQUENCY = np.array([0.3, 0.45, 0.5, 0.7])

@@ -5,9 +5,14 @@ import pytest
 from roll_energy import LEVERS, ship_potential
 from streamline import GRAVITY, Motion, particles, rotation
 
-from tools.thesis.kinematics import body_to_earth, euler_rates
 from tools.thesis.reference import simulate_reference
-from tools.thesis.six_degree import SixDegreeModel, SixDegreeShip, simulate_six_degree
+from tools.thesis.six_degree import (
+    SixDegreeModel,
+    SixDegreeShip,
+    body_to_earth,
+    euler_rates,
+    simulate_six_degree,
+)
 from utank_hil.dynamics import RollModel, Tank
 
 pytestmark = pytest.mark.slow
