@@ -5,7 +5,6 @@ A bench that passes a limit still runs; the limit is reported under the tables.
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -21,16 +20,6 @@ MOST_LINEAR_ROLL_RAD: Final = math.radians(10.0)
 """Roll up to which the linear plant is used. Chosen; no study."""
 OVERSPEED: Final = 1.02
 """Ratio to the pump's speed limit up to which the speed loop lets the rotor overshoot."""
-
-
-@dataclass(frozen=True, slots=True)
-class ModelLimit:
-    """Limit of the model."""
-
-    limit: str  #: The limit, and what is not modelled beyond it.
-    #: Function of a bench that describes what passed the limit, with the figure; empty if nothing
-    #: did.
-    passed: Callable[[BenchResult], Iterator[str]]
 
 
 def steepness(spectrum: Spectrum) -> tuple[float, float]:
@@ -95,23 +84,23 @@ def _pump(result: BenchResult) -> Iterator[str]:
             )
 
 
-MODEL_LIMITS: Final = (
-    ModelLimit(
+MODEL_LIMITS: Final[tuple[tuple[str, Callable[[BenchResult], Iterator[str]]], ...]] = (
+    (
         f"roll beyond {math.degrees(MOST_ROLL_RAD):.0f}°: neither deck in the water nor shifting "
         "cargo, and waves and damping as for an upright ship",
         _roll,
     ),
-    ModelLimit(
+    (
         f"roll beyond {math.degrees(MOST_LINEAR_ROLL_RAD):.0f}° by linear equations: neither the "
         "restoring curve nor quadratic damping (plant: roll has both)",
         _linear_roll,
     ),
-    ModelLimit(
+    (
         "level at the tank's end: a strike is one impulse, without sloshing or trapped air",
         _level,
     ),
-    ModelLimit("steeper sea than there is: waves are linear and do not break", _sea),
-    ModelLimit("pump beyond its speed: blades neither cavitate nor burst", _pump),
+    ("steeper sea than there is: waves are linear and do not break", _sea),
+    ("pump beyond its speed: blades neither cavitate nor burst", _pump),
 )
 """All limits, in the order of their report."""
 
@@ -119,7 +108,7 @@ MODEL_LIMITS: Final = (
 def passed_limits(result: BenchResult) -> list[str]:
     """Descriptions of all limits that were passed, with run and amount."""
     return [
-        f"limit of the model passed, {each.limit}: {'; '.join(found)}"
-        for each in MODEL_LIMITS
-        if (found := list(each.passed(result)))
+        f"limit of the model passed, {limit}: {'; '.join(found)}"
+        for limit, passed in MODEL_LIMITS
+        if (found := list(passed(result)))
     ]

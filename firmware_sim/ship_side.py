@@ -2,6 +2,7 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 from firmware_sim.canopen_drive import CanopenPumpDrive
@@ -14,7 +15,8 @@ from firmware_sim.sensors import SensorNode
 from firmware_sim.valve import ValveNode
 from utank_hil.canbus import load_catalogue
 from utank_hil.configuration import Vessel
-from utank_hil.dynamics.tank import negligible
+from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.tank import Tank, negligible
 from utank_hil.nodes.panel import Action, OperatorPanel, TimedAction
 from utank_hil.runners import Node
 
@@ -77,11 +79,14 @@ class ShipSide:
 
 def bare_plant(scenario: Scenario, seed: int) -> Plant:
     """Ship of the scenario without its tank, in the waves of a seed."""
-    tank = negligible(scenario.vessel.tank)
+    return _plant(scenario, seed, negligible(scenario.vessel.tank), None)
+
+
+def _plant(scenario: Scenario, seed: int, tank: Tank, pump: Pump | None) -> Plant:
     return Plant(
         scenario.ship_at,
         tank,
-        None,
+        pump,
         scenario.waves(seed),
         linear=scenario.plant == "linear",
         hull=scenario.lateral_hull,
@@ -94,14 +99,7 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
     `seed` is that of sea and sensor noise.
     """
     vessel, catalogue = scenario.vessel, load_catalogue()
-    plant = Plant(
-        scenario.ship_at,
-        vessel.tank,
-        vessel.pump,
-        scenario.waves(seed),
-        linear=scenario.plant == "linear",
-        hull=scenario.lateral_hull,
-    )
+    plant = _plant(scenario, seed, vessel.tank, vessel.pump)
     version = vessel.version
     foreign = vessel.foreign
     drive: PumpDrive | CanopenPumpDrive | None = None
@@ -114,17 +112,17 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
         valve = ValveNode(
             plant, vessel.tank, vessel.valve, catalogue, configuration_version=version
         )
+    sensors = partial(
+        SensorNode,
+        plant,
+        scenario.sensors,
+        catalogue,
+        configuration_version=version,
+        foreign=foreign,
+    )
     second_motion = hardwired = None
     if vessel.redundancy.second_motion_sensor:
-        second_motion = SensorNode(
-            plant,
-            scenario.sensors,
-            catalogue,
-            configuration_version=version,
-            seed=seed + 2,
-            second=True,
-            foreign=foreign,
-        )
+        second_motion = sensors(seed=seed + 2, second=True)
     if vessel.redundancy.hardwired_inputs:
         hardwired = HardwiredNode(
             plant, scenario.sensors.high_level_m, catalogue, configuration_version=version
@@ -132,14 +130,7 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
     return ShipSide(
         vessel,
         plant,
-        SensorNode(
-            plant,
-            scenario.sensors,
-            catalogue,
-            configuration_version=version,
-            seed=seed + 1,
-            foreign=foreign,
-        ),
+        sensors(seed=seed + 1),
         drive,
         OperatorPanel(catalogue, configuration_version=version, script=script),
         valve,

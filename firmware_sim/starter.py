@@ -12,11 +12,7 @@ from firmware_sim.pooled_waves import pooled_wave_moment
 from firmware_sim.scenario import Scenario
 from firmware_sim.starter_ship import StarterShip
 from utank_hil.analysis.loop.self_tuning import SelfTuned, SelfTunedDesign
-from utank_hil.analysis.tank_prediction import (
-    RollPrediction,
-    SeaState,
-    predict_roll,
-)
+from utank_hil.analysis.tank_prediction import RollPrediction, SeaState, predict_roll
 from utank_hil.analysis.tank_sizing import (
     STABILITY_SHARE,
     PumpDemand,

@@ -66,10 +66,7 @@ def roll_rows(found: RollPrediction) -> Rows:
         return [*rows, (_ACTIVE, "none"), *((text, "") for text in _NEEDS)]
     return [
         *rows,
-        (
-            _ACTIVE,
-            f"{_degrees(active.roll_rms_rad)}, {less(found.active_below_passive)}",
-        ),
+        (_ACTIVE, f"{_degrees(active.roll_rms_rad)}, {less(found.active_below_passive)}"),
         *zip(
             _NEEDS,
             (

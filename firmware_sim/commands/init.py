@@ -252,10 +252,7 @@ def _table(project: "StarterProject") -> Table:
         ("duct, still water, roof at", _heights(sized)),
         *cost_rows(tank_cost(ship, tank)),
         ("pump moves the water by", f"{demand.level_m:.2f} m"),
-        (
-            "pump: net head, flow, shaft, duty",
-            order_words(project.vessel),
-        ),
+        ("pump: net head, flow, shaft, duty", order_words(project.vessel)),
         ("law", "self-tuned"),
         ("peak sensitivity, 2 at most", f"{law.robustness.nominal.peak_sensitivity:.2f}"),
         *roll_rows(project.prediction),
