@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 import pyarrow as pa  # It ships no annotations.
 import rerun as rr
 
@@ -94,9 +93,9 @@ class RunLog:
         self._time = time_index(columns)
         self._fields = [(i, field_of(c)) for i, c in enumerate(columns) if c != TIME_COLUMN]
         self._state = [columns.index(c) for c in STATE_COLUMNS if has_state(columns)]
-        self._last_state = np.full((1, 2), np.nan)
         self._retuning = [columns.index("retuning")] if "retuning" in columns else []
-        self._last_retuning = np.full((1, 1), float(RetuningState.IDLE))
+        idle = np.full((1, 1), float(RetuningState.IDLE))
+        self._last = {STATE: np.full((1, 2), np.nan), RETUNING: idle}  # Last states by lane.
         if self._state:
             colors = {_state_name(m, f): _MODE_COLORS[m] for m in Mode for f in Fault}
             style = rr.StateConfiguration(values=list(colors), colors=list(colors.values()))
@@ -112,16 +111,10 @@ class RunLog:
         columns = rr.DynamicArchetype.columns(archetype=ARCHETYPE, components={COMPONENT: row})
         send_at(self._recording, self._path, time_s, columns)
         if self._state:
-            states = rows[:, self._state]
-            changed = _changed(states, self._last_state)
-            self._last_state = states[-1:].copy()
-            names = self._write_states(STATE, time_s[changed], states[changed], _state_name)
-            self._write_text(time_s[changed], names, [_level(*each) for each in states[changed]])
+            changed, states, names = self._write_states(STATE, rows, self._state, _state_name)
+            self._write_text(changed, names, [_level(*each) for each in states])
         if self._retuning:
-            states = rows[:, self._retuning]
-            changed = _changed(states, self._last_retuning)
-            self._last_retuning = states[-1:].copy()
-            self._write_states(RETUNING, time_s[changed], states[changed], _retuning_name)
+            self._write_states(RETUNING, rows, self._retuning, _retuning_name)
         for figure in self._figures:
             figure.write(rows)
 
@@ -143,13 +136,17 @@ class RunLog:
         self._recording.log(f"{self._path}/{LOG}", rr.TextLog(text, level=rr.TextLogLevel.WARN))
 
     def _write_states(
-        self, lane: str, time_s: FloatArray, states: FloatArray, name: Callable[..., str]
-    ) -> list[str]:
-        names = [name(*state) for state in states]
+        self, lane: str, rows: FloatArray, places: list[int], name: Callable[..., str]
+    ) -> tuple[FloatArray, FloatArray, list[str]]:
+        """Log states where they change; return times, states and names of these changes."""
+        states = rows[:, places]
+        changed = (np.diff(states, axis=0, prepend=self._last[lane]) != 0).any(axis=1)
+        self._last[lane] = states[-1:].copy()
+        time_s, names = rows[changed, self._time], [name(*state) for state in states[changed]]
         if names:
             columns = rr.StateChange.columns(state=names)
             send_at(self._recording, f"{self._path}/{lane}", time_s, columns)
-        return names
+        return time_s, states[changed], names
 
     def _write_text(
         self, time_s: FloatArray, texts: list[str], levels: Sequence[rr.TextLogLevel]
@@ -157,11 +154,6 @@ class RunLog:
         if texts:
             columns = rr.TextLog.columns(text=texts, level=[str(level) for level in levels])
             send_at(self._recording, f"{self._path}/{LOG}", time_s, columns)
-
-
-def _changed(states: FloatArray, before: FloatArray) -> npt.NDArray[np.bool_]:
-    changed: npt.NDArray[np.bool_] = (np.diff(states, axis=0, prepend=before) != 0).any(axis=1)
-    return changed
 
 
 def write_about(recording: rr.RecordingStream, about: Mapping[str, Any]) -> None:
