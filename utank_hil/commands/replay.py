@@ -77,11 +77,7 @@ def replay(
                 )
             with nullcontext(named) if named else recorded_config(recording.head) as chosen:
                 result, why, law = replay_log(
-                    recording,
-                    chosen,
-                    log.parent,
-                    as_recorded=named is None,
-                    explained=explained,
+                    recording, chosen, log.parent, as_recorded=named is None, explained=explained
                 )
             cut, elsewhere = recording.cut, _other_machine(recording.head)
     except (OSError, ValueError) as error:

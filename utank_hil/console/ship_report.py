@@ -115,10 +115,7 @@ def _pump_rows(vessel: Vessel, figures: dict[str, Any]) -> list[tuple[str, str]]
         ("pump's greatest pressure", f"{vessel.pump.max_pressure_pa / 1e3:.1f} kPa"),
         ("  in metres of water", f"{figures['pump_head_m']:.2f} m"),
         ("heel that it holds", _held(figures["pump_heel_rad"], figures["pump_heel_at_the_end"])),
-        (
-            "flow that `init` sizes a pump for",
-            f"{figures['pump_flow_m3_s']:.3g} m³/s",
-        ),
+        ("flow that `init` sizes a pump for", f"{figures['pump_flow_m3_s']:.3g} m³/s"),
         ("power of pressure and flow, without losses", power_words(figures["pump_power_asked_w"])),
         ("power to hold the pressure in still water", power_words(figures["pump_power_held_w"])),
         ("power of the motor", power_words(figures["pump_power_w"])),

@@ -7,16 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from utank_hil import identification
 from utank_hil.analysis.motion.decay import RollDecay
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control import DesignPlant
 from utank_hil.dynamics.transfer import state_space_response
-from utank_hil.identification import (
-    DisturbanceBasis,
-    StabilizationPoint,
-    hankel_singular_values,
-    stabilization,
-)
 from utank_hil.pictures.style import BELOW, COLORS, DASHES, WIDEST_IN, picture
 from utank_hil.retuning.record_length import estimation_samples
 from utank_hil.retuning.redesign import Identification, RetuningTask
@@ -44,7 +39,9 @@ def draw_identification(
     split = estimation_samples(len(record))
     shown = slice(split, min(len(record), split + arx.order + round(SHOWN_S / step_s)))
     here = np.nan_to_num(record[shown])
-    basis = DisturbanceBasis(found.wave_frequencies_rad_s, 0).evaluate(len(here), step_s)
+    basis = identification.DisturbanceBasis(found.wave_frequencies_rad_s, 0).evaluate(
+        len(here), step_s
+    )
     predicted = arx.predict(here[:, :1], here[:, 1:])[arx.order :, roll]
     waves, measured_roll = basis[:, arx.order :].T, here[arx.order :, roll + 1]
     predicted = predicted + waves @ np.linalg.lstsq(waves, measured_roll - predicted, rcond=None)[0]
@@ -94,10 +91,10 @@ def _ship_response(task: RetuningTask, plant: DesignPlant, z: ComplexArray) -> C
     return state_space_response(plant.sampled(predictor.measured, predictor.sample_time_s), z)
 
 
-def _stable_points(found: Identification) -> tuple[StabilizationPoint, ...]:
-    rank = len(hankel_singular_values(found.okid.markov))
+def _stable_points(found: Identification) -> tuple[identification.StabilizationPoint, ...]:
+    rank = len(identification.hankel_singular_values(found.okid.markov))
     orders = [order for order in ORDERS if order <= rank]
-    return stabilization(found.okid.markov, orders, found.okid.arx.sample_time_s)
+    return identification.stabilization(found.okid.markov, orders, found.okid.arx.sample_time_s)
 
 
 def draw_decay(

@@ -8,17 +8,8 @@ from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from typing import Final
 
+from utank_hil import canbus
 from utank_hil.base.tick import TICK_NS
-from utank_hil.canbus import (
-    Address,
-    AddressClaim,
-    ControllerStatus,
-    ControlWord,
-    Frame,
-    PumpCommand,
-    ValveCommand,
-    load_catalogue,
-)
 from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.canbus.frame import BUS_SHIFT, LONGEST_ID, STANDARD
 from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError, FrameKind
@@ -41,9 +32,9 @@ class LoggedController:
     """
 
     def __init__(self, log: BusLog, notes: list[str] | None = None) -> None:
-        catalogue = load_catalogue()
-        self._log, self._own_ids = log, catalogue.ids_sent_by(Address.CONTROLLER)
-        status = catalogue.codec(ControllerStatus)
+        catalogue = canbus.load_catalogue()
+        self._log, self._own_ids = log, catalogue.ids_sent_by(canbus.Address.CONTROLLER)
+        status = catalogue.codec(canbus.ControllerStatus)
         channels: Counter[str] = Counter()
         own: dict[bool, list[BusFrame]] = {}  # first and last frame of the controller, by mark
         known, foreign_mark, said = False, False, None
@@ -74,7 +65,7 @@ class LoggedController:
         self._begin_ns = min(times_ns, default=begin_ns or 0)
         self._last_own = (max(times_ns, default=self._begin_ns) - self._begin_ns) + _EARLY_NS
         self._real_time = said is None or not said.not_realtime
-        claim = catalogue.codec(AddressClaim, Address.CONTROLLER).can_id
+        claim = catalogue.codec(canbus.AddressClaim, canbus.Address.CONTROLLER).can_id
         self.starts = bool(sent) and min(sent, key=lambda each: each.time_ns).number == claim
 
     def entries(self) -> Iterator[Entry]:
@@ -85,7 +76,7 @@ class LoggedController:
         yield Entry(0, bytes([self._real_time]), Kind.STARTED, self._begin_ns)
         tick, last = 0, -((self._begin_ns - self._last_ns) // TICK_NS)
         received: deque[Entry] = deque()
-        sent: list[Frame] = []
+        sent: list[canbus.Frame] = []
         for frame in self._log.frames():
             while self._begin_ns + (tick + 1) * TICK_NS - _EARLY_NS <= frame.time_ns:
                 yield from self._tick(tick, received, sent)
@@ -96,7 +87,7 @@ class LoggedController:
             if frame.kind is not FrameKind.DATA:
                 received.append(Entry(1, b"", Kind.OTHERS, frame.time_ns))
             elif number in self._own_ids and (bool(frame.sent) or not self._marked):
-                sent.append(Frame(number, frame.data))
+                sent.append(canbus.Frame(number, frame.data))
             else:
                 received.append(Entry(number, frame.data, Kind.RECEIVED, frame.time_ns))
             while received and frame.time_ns <= self._begin_ns:  # The log may begin days before.
@@ -105,7 +96,7 @@ class LoggedController:
             yield from self._tick(rest, received, sent)
             sent = []
 
-    def _tick(self, tick: int, received: deque[Entry], sent: list[Frame]) -> Iterator[Entry]:
+    def _tick(self, tick: int, received: deque[Entry], sent: list[canbus.Frame]) -> Iterator[Entry]:
         now_ns = self._begin_ns + tick * TICK_NS
         while received and received[0].time_ns <= now_ns:
             yield received.popleft()
@@ -138,12 +129,12 @@ def frames_of(entries: Iterable[Entry], notes: list[str] | None = None) -> Itera
         )
 
 
-def _only_stops(frames: list[Frame]) -> bool:
+def _only_stops(frames: list[canbus.Frame]) -> bool:
     """Whether frames are only the last commands, quick stop, of a controller that ends."""
-    catalogue = load_catalogue()
-    last = {catalogue.codec(kind).can_id for kind in (PumpCommand, ValveCommand)}
+    catalogue = canbus.load_catalogue()
+    last = {catalogue.codec(kind).can_id for kind in (canbus.PumpCommand, canbus.ValveCommand)}
     words = [catalogue.decoded(frame) for frame in frames]
     return {frame.can_id for frame in frames} <= last and any(
-        isinstance(word, PumpCommand) and word.control_word is ControlWord.QUICK_STOP
+        isinstance(word, canbus.PumpCommand) and word.control_word is canbus.ControlWord.QUICK_STOP
         for word in words
     )
