@@ -25,6 +25,7 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.configuration import ControllerConfig
+from utank_hil.nodes.commissioning.node import CommissioningNode, Stage
 from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.runners import Lockstep
 
@@ -331,6 +332,19 @@ def test_commissioning_ends_where_the_second_sensor_falls_silent_during_the_puls
     begin_ns = round((ARM_S + 8.0) * SECOND)
     node = commissioned(naval_with_both(), spoil={"sensors_2": dropped()}, begin_ns=begin_ns)
     assert node.ended.startswith("A motion sensor is silent.")
+
+
+def test_a_sensor_that_falls_silent_in_the_tick_of_active_ends_the_commissioning(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    said = "A motion sensor is silent."
+
+    def missing(node: CommissioningNode) -> str:
+        return said if node.node.mode is Mode.ACTIVE else ""
+
+    monkeypatch.setattr(CommissioningNode, "missing", property(missing))
+    node = commissioned(naval_with_both())
+    assert (node.stage, node.ended) == (Stage.DONE, said)
 
 
 @pytest.mark.slow

@@ -219,6 +219,8 @@ class CommissioningNode:
         passed_s = (now_ns - self._since_ns) * 1e-9
         if self.stage is Stage.MOVING:
             self._move(passed_s - SETTLE_S, now_ns)
+        elif self.stage is Stage.ARM and mode is Mode.ACTIVE:
+            self._enter(Stage.MOVING, now_ns)  # whatever fell silent now ends it as under way
         elif mode in (Mode.INIT, Mode.FAULT) or self.missing:
             if self.stage is not Stage.WAITING:
                 self._enter(Stage.WAITING, now_ns)
@@ -229,8 +231,6 @@ class CommissioningNode:
             zeros = judge_rest(self.rest, self._plant, self._plan, self._volume_m)
             passed = all(check.passed for check in zeros)
             self._enter(Stage.ARM if passed else Stage.DONE, now_ns)
-        elif self.stage is Stage.ARM and mode is Mode.ACTIVE:
-            self._enter(Stage.MOVING, now_ns)
 
     def _move(self, time_s: float, now_ns: int) -> None:
         """Command what is due, and end when all is done or something is wrong."""
