@@ -75,6 +75,8 @@ tank:
 pump:
   max_pressure_pa: {number(pump.max_pressure_pa)}
   max_power_w: {number(pump.max_power_w)}
+# A bench: no commissioning is asked for. On board take this line out, then commission.
+emulated: true
 """
 
 

@@ -1,5 +1,6 @@
 """``utank-hil commission`` and its record: what it says, what it writes, what run makes of it."""
 
+import copy
 import json
 import os
 import stat
@@ -13,9 +14,9 @@ from typer.testing import CliRunner
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
+from utank_hil.canbus.bit_rate import why_other_bit_rate
 from utank_hil.cli import app
 from utank_hil.commands import commission as module
-from utank_hil.commands import commissioning_record
 from utank_hil.commands.commissioning_record import (
     make_record,
     record_path,
@@ -30,7 +31,8 @@ from utank_hil.nodes.commissioning.checks import Check
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.runners import Lockstep
 
-SHIPS = Path("configs/ships").resolve()
+SHIP = yaml.safe_load(Path("configs/ships/naval_vessel.yaml").read_text())
+ON_BOARD = {key: value for key, value in SHIP.items() if key != "emulated"}
 GOOD = Check("roll", "roll, by what it does to the water", 1.01, 1.0, 0.3, "1", "Turn it round.")
 BAD = Check("port_level", "port level", float("nan"), 1.0, 0.15, "1", "Look at the gauge.")
 
@@ -39,7 +41,7 @@ BAD = Check("port_level", "port level", float("nan"), 1.0, 0.15, "1", "Look at t
 def file(tmp_path: Path) -> Path:
     content = yaml.safe_load(Path("configs/controllers/naval_constrained_gpc.yaml").read_text())
     path = tmp_path / "naval.yaml"
-    path.write_text(yaml.safe_dump(content | {"vessel": str(SHIPS / "naval_vessel.yaml")}))
+    path.write_text(yaml.safe_dump(content | {"vessel": ON_BOARD}))
     return path
 
 
@@ -95,18 +97,16 @@ def test_one_that_was_not_passed_does_not_admit(
 def test_what_a_commissioning_stands_for_makes_it_void_when_it_changes(file: Path) -> None:
     path = passed(file)
     content = yaml.safe_load(file.read_text())
-    vessel = yaml.safe_load((SHIPS / "naval_vessel.yaml").read_text())
+    vessel = copy.deepcopy(ON_BOARD)
     vessel["tank"]["width_m"] = 6.5
     vessel["name"] = "Renamed"
     (file.parent / "ship.yaml").write_text(yaml.safe_dump(vessel))
     file.write_text(yaml.safe_dump(content | {"vessel": "ship.yaml"}))
     assert "these changed: tank.width_m; run utank-hil commission" in reason(file)
-    vessel["tank"]["width_m"] = yaml.safe_load((SHIPS / "naval_vessel.yaml").read_text())["tank"][
-        "width_m"
-    ]
+    vessel["tank"]["width_m"] = ON_BOARD["tank"]["width_m"]
     both = {"second_motion_sensor": True, "hardwired_inputs": True}
     (file.parent / "ship.yaml").write_text(yaml.safe_dump(vessel | {"redundancy": both}))
-    changed = "redundancy.hardwired_inputs, redundancy.second_motion_sensor"
+    changed = "redundancy.second_motion_sensor"
     assert f"these changed: {changed}" in reason(file)
     (file.parent / "ship.yaml").write_text(yaml.safe_dump(vessel))
     file.write_text(yaml.safe_dump(content | {"sensors": {"level_noise_m": 0.006}}))
@@ -147,15 +147,6 @@ def test_a_default_that_a_later_version_changes_makes_it_void(file: Path) -> Non
     assert record["ship"]["wind_moment_nm"] == 0.0
 
 
-def test_hardware_under_the_name_of_an_emulated_bus_asks_for_one(
-    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(commissioning_record, "INTERFACES", tmp_path / "net")
-    assert reason(file, "vcan_pump") == ""
-    (tmp_path / "net/vcan_pump/device").mkdir(parents=True)
-    assert "there is no record" in reason(file, "vcan_pump")
-
-
 @pytest.mark.parametrize(
     "content", ["", "{", "[]", "{}", '{"passed": true}', "\x00", "[" * 100_000]
 )
@@ -164,16 +155,24 @@ def test_a_file_that_is_no_record_does_not_admit(file: Path, content: str) -> No
     assert "is no record of a commissioning that can be read; run" in reason(file)
 
 
-def test_an_emulated_bus_asks_only_for_a_record_that_was_named(file: Path, tmp_path: Path) -> None:
-    assert reason(file, "vcan0") == ""
-    assert "there is no record" in reason(file, "vcan0", tmp_path / "none.json")
-    path = passed(file, "vcan0")
-    assert reason(file, "vcan0", path) == ""
-    assert "was made on vcan0, where no hardware is" in reason(file, "can0")
+@pytest.mark.parametrize("bus", ["can0", "vcan0"])
+def test_only_a_ship_declared_to_be_emulated_asks_for_none(
+    file: Path, tmp_path: Path, bus: str
+) -> None:
+    assert "there is no record" in reason(file, bus)  # whatever the interface is named
+    content, on_board = yaml.safe_load(file.read_text()), loaded(file).vessel.version
+    file.write_text(yaml.safe_dump(content | {"vessel": SHIP}))
+    assert reason(file, bus) == ""
+    assert loaded(file).vessel.version != on_board  # with nodes of that version it never arms
+    assert "there is no record" in reason(file, bus, tmp_path / "none.json")
+    path = passed(file, bus)
+    assert reason(file, bus, path) == ""
+    file.write_text(yaml.safe_dump(content))
+    assert "these changed: emulated" in reason(file, bus)
 
 
 def test_a_ship_with_nothing_to_arm_needs_none(file: Path) -> None:
-    vessel = yaml.safe_load((SHIPS / "naval_vessel.yaml").read_text())
+    vessel = copy.deepcopy(ON_BOARD)
     del vessel["pump"]
     content = {"name": "none", "vessel": vessel, "law": {"kind": "passive"}}
     file.write_text(yaml.safe_dump(content))
@@ -234,8 +233,9 @@ class AtTheQuay:
     stop_after_s = 300.0
 
     def __init__(self, nodes: list[Any], port: object, statistics: object) -> None:
-        config = load_config(Path("configs/controllers/naval_constrained_gpc.yaml"),
-                             ControllerConfig)  # fmt: skip
+        config = ControllerConfig.model_validate(
+            {"name": "any", "vessel": ON_BOARD, "law": {"kind": "passive"}}
+        )
         scenario = Scenario.model_validate(
             {
                 "name": "quay",
@@ -416,7 +416,7 @@ def test_a_record_is_json_that_anybody_reads(file: Path) -> None:
 def test_a_record_counts_on_its_own_interface(file: Path) -> None:
     path = passed(file, "can1")
     assert "was made on can1, and this is other hardware; run" in reason(file, "can0")
-    assert reason(file, "can1") == reason(file, "vcan0", path) == ""
+    assert reason(file, "can1") == reason(file, "can1", path) == ""
 
 
 def test_run_says_why_arming_will_be_refused(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -429,3 +429,21 @@ def test_run_says_why_arming_will_be_refused(file: Path, monkeypatch: pytest.Mon
     result = CliRunner().invoke(app, words)
     assert json.loads(result.stdout)["not_commissioned"] == ""
     assert "refused" not in result.stderr
+
+
+def test_a_bit_rate_that_the_interface_has_not_is_refused(
+    file: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    link = [{"linkinfo": {"info_data": {"bittiming": {"bitrate": 500_000}}}}]
+    ip = tmp_path / "ip"
+    ip.write_text(f"#!/bin/sh\necho '{json.dumps(link)}'\n")
+    ip.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    for command in ("run", "commission"):
+        result = CliRunner().invoke(app, [command, str(file), "--bus", "any0"])
+        assert result.exit_code == ExitCode.USAGE
+        said = result.output.replace("\n", " ")
+        assert "bit_rate: is 250000, but any0 runs at 500000" in said
+    assert why_other_bit_rate("any0", 500_000) == ""
+    ip.write_text("#!/bin/sh\necho '[{}]'\n")  # a virtual interface
+    assert why_other_bit_rate("any0", 500_000) == ""

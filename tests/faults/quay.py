@@ -6,6 +6,7 @@ from pathlib import Path
 from fault_bench import SECOND, Failing, Fault
 
 from firmware_sim.drive import PumpDrive
+from firmware_sim.hardwired import HardwiredNode
 from firmware_sim.plant import Plant
 from firmware_sim.scenario import Scenario
 from firmware_sim.sensors import SensorNode
@@ -72,6 +73,9 @@ def another_ship(config: ControllerConfig, ship: RollShip, tank: Tank) -> tuple[
     version = config.vessel.version
     return (
         SensorNode(plant, scenario.sensors, catalogue, configuration_version=version, seed=2),
+        HardwiredNode(
+            plant, scenario.sensors.high_level_m, catalogue, configuration_version=version
+        ),
         PumpDrive(plant, scenario.drive, catalogue, configuration_version=version),
         OperatorPanel(catalogue, configuration_version=version, script=scenario.operator),
     )

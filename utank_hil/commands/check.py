@@ -27,8 +27,9 @@ def check(
 ) -> None:
     """Validate a controller, scenario or ship file; design the laws and print their margins.
 
-    Exit code 0: fit to be used. 1: a law misses the required margins. 2: the file is wrong; every
-    error is listed with file, key and reason.
+    Exit code 0: fit to be used. 1: a law misses the required margins, or the pump's pressure, held
+    at its limit, takes the ship beyond its roll limit and no hard-wired cut is declared. 2: the
+    file is wrong; every error is listed with file, key and reason.
 
     **Example:** utank-hil check configs/controllers/gpc.yaml
     """
@@ -36,35 +37,46 @@ def check(
     from utank_hil.console.ship_report import print_ship, ship_json
 
     loaded: BaseModel
+    pumped: dict[str, Vessel | ControllerConfig]
     collections = {point.name: point.load() for point in entry_points(group=GROUP)}
     try:
         kind = kind_of(config, {"controller": ControllerConfig, "ship": Vessel, **collections})
     except ConfigError as error:
         fail(error)
     if kind == "ship":
-        loaded = load(config, Vessel)
-        content = ship_json(loaded)
+        loaded = ship = load(config, Vessel)
+        content, pumped = ship_json(ship), {"": ship}
         if not json_:
-            print_ship(loaded)
+            print_ship(ship)
     elif kind in collections:
         collection = load(config, collections[kind], allow_code=allow_code)
         judged = {
             name: judge_law(each, config, f"controllers.{name}")
             for name, each in collection.controllers.items()
         }
+        pumped = {f"controllers.{name}.": each for name, each in collection.controllers.items()}
         loaded, content = collection, report.collection_json(collection, judged)
         if not json_:
             report.print_collection(kind, collection, judged)
     else:
-        loaded = load(config, ControllerConfig, allow_code=allow_code)
-        controller = judge_law(loaded, config)
+        loaded = only = load(config, ControllerConfig, allow_code=allow_code)
+        controller, pumped = judge_law(only, config), {"": only}
         content = report.controller_json(controller)
         if not json_:
             report.print_controller(controller)
+    held = [
+        f"{config}: {where}{key} {reason}"
+        for where, each in pumped.items()
+        for key, reason in each.held_pressure_problems()
+    ]
+    content["accepted"] = content.get("accepted", True) and not held
     if json_:
         unusual = [str(warning) for warning in warnings_of(loaded, config)]
         print_json({"kind": kind, **content, "warnings": unusual})
-    if not content.get("accepted", True):
+    else:
+        for reason in held:
+            Terminal().say(reason, red="refused:")
+    if not content["accepted"]:
         raise typer.Exit(ExitCode.REFUSED)
     if not json_:
         following: dict[str, tuple[str | Path, ...]] = {

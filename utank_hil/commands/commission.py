@@ -11,6 +11,7 @@ from rich.text import Text
 from utank_hil.assembly import build_commissioning_node
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import AlarmState, Fault, PortError
+from utank_hil.canbus.bit_rate import why_other_bit_rate
 from utank_hil.canbus.events import AlarmEvent, RetuningEvent
 from utank_hil.canbus.ports import open_port
 from utank_hil.commands.commissioning_record import (
@@ -56,6 +57,8 @@ def commission(
     **Example:** utank-hil commission configs/controllers/gpc.yaml --bus can0
     """
     loaded = load(config, ControllerConfig, allow_code=True)  # The law is not built.
+    if other := why_other_bit_rate(channel, loaded.bit_rate):
+        fail(f"{config}: bit_rate: {other}")
     path = record or record_path(config)
     reason = why_not_replaceable(path) or why_not_writable(path.parent, (path.name,))
     if reason:

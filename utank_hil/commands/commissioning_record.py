@@ -18,8 +18,6 @@ from utank_hil.configuration import ControllerConfig
 from utank_hil.nodes.commissioning.checks import Check
 
 SUFFIX: Final = ".commissioning.json"
-EMULATED: Final = ("vcan", "vxcan")  #: Beginnings of the names of interfaces without hardware.
-INTERFACES: Final = Path("/sys/class/net")
 
 
 def record_path(config: Path) -> Path:
@@ -36,6 +34,7 @@ def commissioned_for(config: ControllerConfig) -> dict[str, Any]:
         **{name: asdict(part) for name, part in parts.items() if part is not None},
         "redundancy": asdict(vessel.redundancy),
         "sensors": asdict(config.sensors),
+        **({"emulated": True} if vessel.emulated else {}),
     }
 
 
@@ -123,11 +122,13 @@ def _sync(folder: Path) -> None:
 def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: Path | None) -> str:
     """Return why a controller must not be armed, with the remedy; empty if it may.
 
-    On an emulated bus no record is required unless its `path` is given, because the emulated ship
-    is made from the same files. `file` is that of the configuration.
+    Of a ship that its file declares to be emulated no record is required unless `path` is given:
+    the controller then stays in INIT until all nodes send the version of an emulated ship. `bus` is
+    the interface of the run, `file` that of the configuration, `path` the place of the record, by
+    default `record_path`.
     """
     vessel = config.vessel
-    if (vessel.pump is None and vessel.valve is None) or (path is None and _is_emulated(bus)):
+    if (vessel.pump is None and vessel.valve is None) or (path is None and vessel.emulated):
         return ""
     for key, reason in config.held_pressure_problems():
         return f"{file}: {key} {reason}"
@@ -145,9 +146,7 @@ def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: P
         return f"{path}: since {record.date} these changed: {', '.join(changed)}; {remedy}"
     if not record.whole:
         return f"{path}: the commissioning of {record.date} was not passed; {remedy}"
-    if _is_emulated(record.bus) and not _is_emulated(bus):
-        return f"{path}: was made on {record.bus}, where no hardware is; {remedy}"
-    if record.bus != bus and not _is_emulated(bus):
+    if record.bus != bus:
         return f"{path}: was made on {record.bus}, and this is other hardware; {remedy}"
     return ""
 
@@ -169,11 +168,6 @@ class _Record(BaseModel):
         """Whether it was passed, by each of its checks."""
         passed = [check.verdict == "pass" for check in self.checks]
         return self.passed and not self.ended and bool(passed) and all(passed)
-
-
-def _is_emulated(bus: str) -> bool:
-    # Any interface may have such a name; one with hardware has a device.
-    return bus.startswith(EMULATED) and not (INTERFACES / bus / "device").exists()
 
 
 def _differences(before: Any, now: Any, key: str = "") -> list[str]:

@@ -16,6 +16,7 @@ from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.base.provenance import describe
 from utank_hil.base.whole_file import claimed_files
 from utank_hil.canbus import Fault, Mode, Port, PortError
+from utank_hil.canbus.bit_rate import why_other_bit_rate
 from utank_hil.canbus.events import AlarmEvent
 from utank_hil.canbus.ports import BusPorts, open_port
 from utank_hil.commands.announcer import LOG_NAME, Announcer
@@ -85,12 +86,13 @@ def run(
     """Run the controller on a CAN bus until Ctrl-C; the pump is left at zero.
 
     It starts in STANDBY. Only an operator at the panel arms it, and only if utank-hil commission
-    was passed with this vessel and these sensors; on an emulated bus (vcan0) no record of it is
-    asked for unless --record names one. Recordings are named by the time (UTC) of their start and
-    go on in another file every hour; one that fails is reported, and the controller runs without. A
-    controller that retunes itself prints each step with its reasons when it happens; so does one
-    that raises an alarm, and both are logged in the folder of --out. A fault that is latched at the
-    end, or a lost bus, has an exit code of its own (docs/deployment.md).
+    was passed with this vessel and these sensors; of a ship whose file says `emulated: true`, and
+    whose nodes prove it, no record is asked for unless --record names one. Recordings are named by
+    the time (UTC) of their start and go on in another file every hour; one that fails is reported,
+    and the controller runs without. A controller that retunes itself prints each step with its
+    reasons when it happens; so does one that raises an alarm, and both are logged in the folder of
+    --out. A fault that is latched at the end, or a lost bus, has an exit code of its own
+    (docs/deployment.md).
 
     **Example:** utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
     """
@@ -98,7 +100,11 @@ def run(
     law = admit(loaded, config)
     if loaded.safety.overruns_in_ten is None:
         notes.say("safety.overruns_in_ten", yellow="repeated late ticks are not judged:")
+    if other := why_other_bit_rate(bus, loaded.bit_rate):
+        fail(f"{config}: bit_rate: {other}")
     refused = why_not_commissioned(loaded, bus, config, record)
+    if loaded.vessel.emulated:
+        notes.say("no node on board counts as one of this ship", yellow="vessel.emulated: true:")
     if refused:
         notes.say(refused, yellow="arming will be refused:")
     statistics = LoopStatistics()

@@ -20,8 +20,6 @@ from utank_hil.configuration.vessel import Vessel
 from utank_hil.control import DesignPlant, PassiveDesign, PredictiveDesign, PumpLimits
 from utank_hil.control.predictive.design import MOST_ORDER, WASHOUT_SHARE
 from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign
-from utank_hil.dynamics.nonlinear import RollModel
-from utank_hil.dynamics.steady_heel import greatest_held_pa
 from utank_hil.retuning.estimator import EstimateSettings
 from utank_hil.retuning.record_length import record_problems
 from utank_hil.retuning.settings import RetuningSettings
@@ -118,24 +116,13 @@ class ControllerConfig(Section):
         return found + self.held_pressure_problems()
 
     def held_pressure_problems(self) -> list[Problem]:
-        """What is wrong with a pump that could capsize the ship: no monitor stops a drive.
+        """Return what is wrong with a pump that could capsize the ship: no monitor stops a drive.
 
-        It is a warning on an emulated bus. On hardware such a ship is not armed until it has a cut.
+        A bench warns of it. Check refuses it, and so does run to be armed on hardware.
         """
         most_pa, roll_rad = self.limits.pressure_pa, self.safety.roll_limit_rad
-        if self.vessel.pump is None or self.vessel.redundancy.hardwired_inputs:
-            return []
-        model = RollModel(self.vessel.ship, self.vessel.tank)
-        held_pa = greatest_held_pa(model, most_pa, roll_rad)
-        if held_pa == most_pa:
-            return []
-        reason = (
-            f"is {most_pa / 1e3:.4g} kPa, and over {math.floor(held_pa / 10) / 100:g} kPa takes "
-            f"the ship beyond {roll_rad:g} rad, safety.roll_limit_rad, if it is held, as by a "
-            "drive that hangs: lower it here and in the drive, or have a hard-wired stop cut its "
-            "power and declare it in the ship's file, redundancy: {hardwired_inputs: true}"
-        )
-        return [("limits.pressure_pa", reason)]
+        reason = self.vessel.why_not_held(most_pa, roll_rad)
+        return [("limits.pressure_pa", reason)] if reason else []
 
     @property
     def renews(self) -> bool:

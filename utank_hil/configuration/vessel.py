@@ -18,7 +18,7 @@ from utank_hil.configuration.plausibility import vessel_problems, vessel_warning
 from utank_hil.configuration.ship_keys import ShipFromFile, in_written_keys
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.pump import Pump
-from utank_hil.dynamics.steady_heel import RightingRange, righting_range
+from utank_hil.dynamics.steady_heel import RightingRange, greatest_held_pa, righting_range
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve, valve_problems
 from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
@@ -47,6 +47,10 @@ class Vessel(Section):
     """Limit of the stability booklet on the metacentric height, tank water free to move."""
     redundancy: Redundancy = NO_REDUNDANCY
     """Equipment that the ship has twice, or with separate wires."""
+    emulated: bool = False
+    """Whether every node is an emulated one, for which no commissioning is asked; never on board.
+
+    The nodes prove it by their version, which differs from that of the same ship on board."""
     devices: DevicesSection | None = None  #: What is on the bus in the place of the native nodes.
     _written: frozenset[str] = frozenset()  # These are the keys of the ship in its file.
 
@@ -59,6 +63,8 @@ class Vessel(Section):
             content.append(not_by_default(self.valve))
         if self.redundancy != NO_REDUNDANCY:
             content.append({"redundancy": asdict(self.redundancy)})
+        if self.emulated:
+            content.append({"emulated": True})
         if self.devices is not None:
             native = {"pump"} if self.devices.pump.native else None
             content.append({"devices": self.devices.model_dump(mode="json", exclude=native)})
@@ -106,6 +112,32 @@ class Vessel(Section):
             "heel_limit_rad": min(most.heel_limit_rad, greatest_rad / 2),
             **ages,
         }
+
+    def why_not_held(self, most_pa: float, roll_rad: float) -> str:
+        """Return why a pump's pressure may not be held at its limit; empty if it may.
+
+        It may if it heels the ship no further than to `roll_rad`, or if the pump has a cut by wires
+        of its own.
+        """
+        if self.pump is None or self.redundancy.hardwired_inputs:
+            return ""
+        held_pa = greatest_held_pa(RollModel(self.ship, self.tank), most_pa, roll_rad)
+        if held_pa == most_pa:
+            return ""
+        return (
+            f"is {most_pa / 1e3:.4g} kPa, and over {math.floor(held_pa / 10) / 100:g} kPa takes "
+            f"the ship beyond {roll_rad:g} rad, safety.roll_limit_rad, if it is held, as by a "
+            "drive that hangs: lower it here and in the drive, or have a hard-wired stop cut its "
+            "power and declare it in the ship's file, redundancy: {hardwired_inputs: true}"
+        )
+
+    def held_pressure_problems(self) -> list[Problem]:
+        """Return what is wrong with the pump at its own limit; see `why_not_held`."""
+        if self.pump is None:
+            return []
+        most_pa = self.pump.max_pressure_pa
+        reason = self.why_not_held(most_pa, self.default_safety["roll_limit_rad"])
+        return [("pump.max_pressure_pa", reason)] if reason else []
 
     @model_validator(mode="wrap")
     @classmethod
