@@ -161,6 +161,8 @@ class PumpDrive:
         """Check the command timeout, drive the pump and send the status."""
         states, plant = self._states, self._plant
         plant.advance(now_ns)
+        if plant.power_cut:
+            states.command(ControlWord.DISABLE_VOLTAGE)
         states.tick(stopped=self._stopped(now_ns))
         enabled = states.state is _ENABLED
         if enabled and now_ns - self._accepted_ns > self._timeout_ns:

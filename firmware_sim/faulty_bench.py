@@ -57,7 +57,7 @@ class FaultyBench:
         self._sink, self._sink_every = sink, sink_every
         self._retuner, self._estimating = retuner, estimating
         self._commissioned = commissioned
-        self.ship: ShipSide = build_ship_side(scenario, seed, script)
+        self.ship: ShipSide = build_ship_side(scenario, seed, script, config)
         self._law_failures = LawFailures()
         self._tapped = tapped
         self._controller = FaultyNode(self._new_controller())

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class HardwiredNode:
     """Node that sends the state of the wires.
 
-    A reservoir's switch closes at `high_level_m` above still water.
+    A reservoir's switch closes at `high_level_m` above still water. The stop cuts the drive.
     """
 
     name = "hardwired"
@@ -42,6 +42,7 @@ class HardwiredNode:
         self._cycle_ticks = self._transmitter.cycle_ns // self.period_ns
         self._housekeeping = Housekeeping(Address.HARDWIRED, catalogue, configuration_version)
         self._ticks = 0
+        self._was_open = False
         self.stop_pressed = False  #: Whether the hard-wired stop is pressed, which opens its loop.
 
     def receive(self, frame: Frame, now_ns: int) -> None:
@@ -50,13 +51,16 @@ class HardwiredNode:
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Read the inputs, and send them when due."""
         self._plant.advance(now_ns)
+        self._plant.cut_power(self.name, cut=self.stop_pressed)
         frames: list[Frame] = []
-        if self._ticks % self._cycle_ticks == 0:
+        is_open = self.stop_pressed
+        if self._ticks % self._cycle_ticks == 0 or is_open is not self._was_open:
+            self._was_open = is_open
             level_m, limit_m = self._plant.level_m, self._high_level_m
             inputs = HardwiredInputs(
                 _switch(-level_m > limit_m),
                 _switch(level_m > limit_m),
-                _switch(self.stop_pressed),
+                _switch(is_open),
                 Quality.GOOD,
             )
             frames.append(self._transmitter.frame(inputs))

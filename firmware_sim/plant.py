@@ -95,6 +95,7 @@ class Plant:
         self._now_ns: int | None = None
         self.broken_pump: Callable[[float], float] | None = None
         self.presses_off = False
+        self._cuts: set[str] = set()
 
     def _load(self, ship: RollShip) -> None:
         tank = self._tank
@@ -157,11 +158,26 @@ class Plant:
 
     def drive_pump(self, setpoint_pa: float, *, enabled: bool) -> None:
         """Set the pump's command from now on; a pump not `enabled` turns freely."""
-        if self.broken_pump is not None and (enabled or self.presses_off):
+        if self._cuts:
+            self._state[kernel.MODE] = kernel.FREE
+        elif self.broken_pump is not None and (enabled or self.presses_off):
             self.impose_pressure(self.broken_pump(setpoint_pa))
         elif self._has_pump:
             self._state[kernel.SETPOINT] = setpoint_pa
             self._state[kernel.MODE] = kernel.DRIVEN if enabled else kernel.FREE
+
+    @property
+    def power_cut(self) -> bool:
+        """Whether a wire cuts the drive's power: then nothing presses, whatever the drive does."""
+        return bool(self._cuts)
+
+    def cut_power(self, by: str, *, cut: bool) -> None:
+        """Cut the drive's power, or end the cut of the one who made it."""
+        if cut and self._has_pump:
+            self._cuts.add(by)
+            self._state[kernel.MODE] = kernel.FREE
+        else:
+            self._cuts.discard(by)
 
     def brake_pump(self) -> None:
         """Brake at the motor's limit, without the pressure loop's lag and rate limit."""

@@ -81,7 +81,8 @@ def _ship_of(job: Job) -> tuple[ShipSide, TruthRecorder, MemoryLog]:
     first = build_ship_side(job.scenario, job.seed, ()).plant
     for now_ns in (0, TICK_NS):  # its compiled code loads here, and not in the first ticks of a run
         first.advance(now_ns)
-    ship, log = build_ship_side(job.scenario, job.seed, job.script), job.log_of(TRUTH)
+    ship = build_ship_side(job.scenario, job.seed, job.script, job.controller)
+    log = job.log_of(TRUTH)
     return ship, TruthRecorder(ship.plant, log, RECORD_NS), log
 
 

@@ -218,7 +218,7 @@ def run_lockstep(job: Job, watch: Watch | None = None) -> Run:
             ship, controller, lockstep = bench.ship, bench.node, bench.lockstep
             bench.place(job.scenario.faults)
         else:
-            ship = build_ship_side(job.scenario, job.seed, job.script)
+            ship = build_ship_side(job.scenario, job.seed, job.script, job.controller)
             controller = controller_of(job, desks, log.write)
             bit_rate, buses = job.controller.bit_rate, job.controller.vessel.foreign.buses
             bus = with_more(SimulatedBus(bit_rate=bit_rate), len(buses) - 1, bit_rate)

@@ -135,6 +135,8 @@ class Scenario(Section):
         dict[str, ControllerConfig], Field(default_factory=dict, max_length=MOST_CONTROLLERS)
     ]
     """Controllers to be run, at least one; optional where the vessel has no pump."""
+    guard: bool = False
+    """Whether a guard hears the frames and may cut the drive's power (docs/safety.md)."""
     operator: tuple[TimedAction, ...] = ()
     """Actions of the operator in the runs with a controller; the passive run is never armed."""
     duration_s: Annotated[float, Range(above=0, most=LONGEST_S)]
@@ -186,6 +188,9 @@ class Scenario(Section):
                 )
             if "operator" not in self.model_fields_set:
                 problems.append(("operator", "is required but missing: who arms the controllers"))
+        if self.guard and (self.vessel.pump is None or self.vessel.foreign.any):
+            reason = "is for a ship with a pump, and with native messages only: leave it out"
+            problems.append(("guard", reason))
         if self.plant == "linear" and self.vessel.valve is not None:
             reason = (
                 "is linear, but the loss of the vessel's valve is quadratic and would change "

@@ -8,13 +8,15 @@ from typing import Final
 from firmware_sim.canopen_drive import CanopenPumpDrive
 from firmware_sim.drive import PumpDrive
 from firmware_sim.external_nodes import ExternalDrive, ExternalValve
+from firmware_sim.guard.node import GuardNode
+from firmware_sim.guard.parameters import guard_parameters
 from firmware_sim.hardwired import HardwiredNode
 from firmware_sim.plant import Plant
 from firmware_sim.scenario import Scenario
 from firmware_sim.sensors import SensorNode
 from firmware_sim.valve import ValveNode
 from utank_hil.canbus import load_catalogue
-from utank_hil.configuration import Vessel
+from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.tank import Tank, negligible
 from utank_hil.nodes.panel import Action, OperatorPanel, TimedAction
@@ -43,12 +45,13 @@ class ShipSide:
     valve: ValveNode | None = None
     second_motion: SensorNode | None = None
     hardwired: HardwiredNode | None = None
+    guard: GuardNode | None = None
 
     @property
     def nodes(self) -> tuple[Node, ...]:
         """Nodes in the order of their ticks."""
         optional: tuple[Node | None, ...] = (
-            self.second_motion, self.hardwired, self.drive, self.valve,
+            self.second_motion, self.hardwired, self.guard, self.drive, self.valve,
         )  # fmt: skip
         return self.sensors, *(node for node in optional if node is not None), self.panel
 
@@ -93,10 +96,16 @@ def _plant(scenario: Scenario, seed: int, tank: Tank, pump: Pump | None) -> Plan
     )
 
 
-def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ...]) -> ShipSide:
+def build_ship_side(
+    scenario: Scenario,
+    seed: int,
+    script: tuple[TimedAction, ...],
+    controller: ControllerConfig | None = None,
+) -> ShipSide:
     """Build the emulated ship and its nodes.
 
-    `seed` is that of sea and sensor noise.
+    `seed` is that of sea and sensor noise. The guard of a scenario has the limits of `controller`,
+    by default the scenario's first.
     """
     vessel, catalogue = scenario.vessel, load_catalogue()
     plant = _plant(scenario, seed, vessel.tank, vessel.pump)
@@ -127,6 +136,10 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
         hardwired = HardwiredNode(
             plant, scenario.sensors.high_level_m, catalogue, configuration_version=version
         )
+    guard = None
+    if scenario.guard:
+        controller = controller or next(iter(scenario.controllers.values()))
+        guard = GuardNode(guard_parameters(controller), plant)
     return ShipSide(
         vessel,
         plant,
@@ -136,4 +149,5 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
         valve,
         second_motion,
         hardwired,
+        guard,
     )

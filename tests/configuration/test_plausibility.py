@@ -321,7 +321,8 @@ def test_a_pump_that_could_capsize_her_is_warned_of(
     tmp_path: Path, pressure_pa: float, warned: bool
 ) -> None:
     limits = {"pressure_pa": pressure_pa, "level_m": 1.64, "brake_share": 1.0, "sharpness": 4.0}
-    law = controller("patti_b_self_tuning", limits=limits)
+    without_a_cut = {key: value for key, value in SHIPS["patti_b"].items() if key != "redundancy"}
+    law = controller("patti_b_self_tuning", limits=limits) | {"vessel": without_a_cut}
     refused, warnings = told(tmp_path, law, ControllerConfig)
     assert refused == {}
     assert ("limits.pressure_pa" in warnings) == warned

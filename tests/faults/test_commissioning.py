@@ -4,10 +4,11 @@ import tracemalloc
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from itertools import count
+from typing import Any
 
 import numpy as np
 import pytest
-from fault_bench import SECOND, altered, dropped
+from fault_bench import SECOND, FaultBench, altered, dropped
 from quay import ARM_S, another_ship, commissioned, controller, still_water
 
 from firmware_sim.scenario_sea import RegularSea
@@ -29,7 +30,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.events import AlarmEvent, RetuningEvent
 from utank_hil.nodes.commissioning.node import REST_S, ROW_S, CommissioningNode, Stage
-from utank_hil.nodes.commissioning.pulse_checks import Each, remedies_of
+from utank_hil.nodes.commissioning.pulse_checks import RATE_SCALE, SCALE, Each, remedies_of
 from utank_hil.nodes.commissioning.pulses import plan_pulses
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.nodes.redundancy import Redundancy
@@ -41,6 +42,7 @@ from utank_hil.telemetry.replay import entries_of, replay
 
 NAVAL = controller("naval_constrained_gpc")
 LEVELS = ("port_level_m", "starboard_level_m")
+SIDES = ("port_level", "starboard_level")
 MOTION = ("roll_rad", "roll_rate_rad_s")
 
 Record = dict[str, FloatArray]
@@ -98,8 +100,14 @@ def swapped(record: Record) -> Record:
         (scaled(MOTION[:1], -1), {"roll", "roll_rate"}, "The roll has the wrong sign"),
         (scaled(MOTION[1:], -1), {"roll_rate"}, "The roll rate has the wrong sign"),
         (scaled(MOTION[1:], 180 / np.pi), {"roll_rate"}, "scaling of the roll rate"),
+        (scaled(MOTION[1:], 0.9), {"roll_rate"}, "Correct the scaling of the roll rate"),
+        (scaled(MOTION[1:], 1.05), {"roll_rate"}, "Correct the scaling of the roll rate"),
+        (scaled(LEVELS, 1.1), {"port_level", "starboard_level"}, "gauge's scaling"),
+        (scaled(("pressure_pa",), 0.9), {"pressure", "port_level", "starboard_level"},
+         "correct the pressure sensor's scaling"),
         (scaled(MOTION, 2), {"roll"}, "Correct the roll's scaling"),
-        (scaled(MOTION, 0), {"roll", "roll_rate", "roll_period"}, "The motion sensor shows no"),
+        (scaled(MOTION, 0), {*SIDES, "roll", "roll_rate", "roll_period"},
+         "The motion sensor shows no"),
         (scaled(("pressure_pa",), -1), {"pressure", *(f"{x}_level" for x in ("port", "starboard")),
                                         "roll"}, "exchange its sides"),
         (scaled(("pressure_pa",), 0.5), {"pressure", "port_level", "starboard_level", "roll"},
@@ -378,3 +386,25 @@ def test_arming_is_refused_until_it_was_passed_and_the_bus_and_the_alarm_say_so(
     assert replay(entries_of(blocks), NAVAL, law, commissioned=False).exact
     armed = replay(entries_of(blocks), NAVAL, law)
     assert armed.first is not None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "factors"),
+    [
+        (SensorMotion, {"roll_rate_rad_s": 1 + RATE_SCALE}),
+        (SensorMotion, {"roll_rate_rad_s": 1 - RATE_SCALE}),
+        (SensorTank, dict.fromkeys(LEVELS, (1 + SCALE) ** 2)),
+        (SensorPump, {"pressure_pa": 1 - SCALE}),
+    ],
+)
+def test_what_passes_at_the_quay_does_not_trip_at_sea(
+    kind: type, factors: dict[str, float]
+) -> None:
+    def wrong(message: Any) -> Any:
+        return message._replace(**{name: f * getattr(message, name) for name, f in factors.items()})
+
+    bench = FaultBench(seed=2)
+    bench.sensors.begin_ns, bench.sensors.spoil = 0, altered(kind, wrong)
+    bench.run(100.0)
+    assert (bench.mode, bench.node.fault) == (Mode.ACTIVE, Fault.NONE)

@@ -26,7 +26,10 @@ from utank_hil.nodes.commissioning.checks import Check, Record
 from utank_hil.nodes.commissioning.pulses import PulsePlan
 from utank_hil.safety.monitors.derivative_filter import DerivativeFilter
 
-SCALE: Final = 0.15
+SCALE: Final = 0.06
+"""Of pressure, and of levels by it: at sea the monitors bear 10 % of either, not 15 (the storm)."""
+RATE_SCALE: Final = 0.03
+"""At sea the monitors bear it, and not 4 % (Patti-B); at the quay it is found to 1 %."""
 ROLL_SCALE: Final = 0.3
 ROLL_2_SCALE: Final = 0.05
 """Two sensors that are farther apart disagree at sea: half a degree at a roll of ten."""
@@ -109,7 +112,7 @@ def judge_pulses(
             _scale_check("roll_2", "second sensor's roll, by the first's",
                          _slope(roll_2[_VALUE], roll[_VALUE]), ROLL_2_SCALE, remedy),
             _scale_check("roll_rate_2", "second sensor's rate, by its roll",
-                         _slope(rate_2[_VALUE], roll_2[_RATE]), SCALE, remedy),
+                         _slope(rate_2[_VALUE], roll_2[_RATE]), RATE_SCALE, remedy),
         ]  # fmt: skip
     tank_period_s = _period_s(_mean([float(fit[_VALUE] / fit[_BEND]) for fit in good]))
     ship_period_s = math.nan
@@ -145,7 +148,7 @@ def _scale_checks(scales: Each[float]) -> list[Check]:
                 ("port_level", "port level, by the pump pressure", SCALE),
                 ("starboard_level", "starboard level, by the pump pressure", SCALE),
                 ("roll", "roll, by what it does to the water", ROLL_SCALE),
-                ("roll_rate", "roll rate, by the roll", SCALE),
+                ("roll_rate", "roll rate, by the roll", RATE_SCALE),
             ),
             scales,
             remedies,
@@ -200,6 +203,8 @@ def remedies_of(scales: Each[float]) -> Each[str]:
         if scale < 0
         else f"The {side} gauge does not move: check it, its pipe and its cable."
         if scale == 0
+        else "The motion sensor shows no roll, and its push on the water is missing here."
+        if roll == 0
         else f"Correct the {side} gauge's scaling."
         for side, scale in (("port", port), ("starboard", starboard))
     ]

@@ -1,0 +1,132 @@
+"""Parameters of the guard, from a controller's configuration, in the numbers of the frames."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from cantools.database.can import Database
+
+from utank_hil.base.tick import TICK_NS
+from utank_hil.canbus import (
+    Address,
+    DriveStatus1,
+    HardwiredInputs,
+    OperatorCommand,
+    PumpCommand,
+    SensorMotion,
+    SensorPump,
+    SensorTank,
+    load_catalogue,
+)
+from utank_hil.canbus.catalogue import DBC_PATH, read_data_ids
+from utank_hil.configuration import ControllerConfig
+from utank_hil.safety.monitors.thresholds import thresholds_of
+
+TICK_MS: Final = TICK_NS / 1e6
+PRESSURE_PA: Final = 8.0
+ROLL_RAD: Final = 1e-4
+RATE_RAD_S: Final = 3.125e-5
+LEVEL_M: Final = 1e-3
+"""Units of the frames."""
+MOST_RATE: Final = 32000
+LEVEL_SHARE: Final = 0.97
+"""Of the level at which a reservoir is full or empty; the shipped switches close at 0.943."""
+STREAMS: Final = (
+    (PumpCommand, Address.CONTROLLER),
+    (DriveStatus1, Address.DRIVE),
+    (SensorMotion, Address.SENSORS),
+    (SensorMotion, Address.SENSORS_2),
+    (SensorTank, Address.SENSORS),
+    (SensorPump, Address.SENSORS),
+    (OperatorCommand, Address.OPERATOR),
+    (OperatorCommand, Address.OPERATOR_2),
+    (HardwiredInputs, Address.HARDWIRED),
+)
+"""Messages in the order of the enumeration in guard.h."""
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message that the guard hears."""
+
+    can_id: int
+    patience: int  #: Greatest age under pressure in ticks; 0: its silence is not judged.
+    data_ids: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class GuardParameters:
+    """The table `struct guard_parameters` of guard.h."""
+
+    messages: tuple[Message, ...]
+    pressure: int
+    step: int
+    error: int
+    free_rotor: int
+    level: int
+    roll: int
+    roll_rate: int
+    heel: int
+    second_station: int
+
+    @property
+    def header(self) -> str:
+        """The table as a C header."""
+        rows = "".join(
+            f"    {{0x{each.can_id:08X}U, {each.patience}U, "
+            f"{{{', '.join(f'{number}U' for number in each.data_ids)}}}}},\n"
+            for each in self.messages
+        )
+        numbers = ", ".join(str(getattr(self, name)) for name in self.__slots__[1:])
+        return (
+            "/* Written by python -m firmware_sim.guard; do not edit. */\n"
+            '#include "guard.h"\n\n'
+            "static const struct guard_parameters GUARD_PARAMETERS = {\n"
+            f"    {{\n{rows}    }},\n    {numbers}\n}};\n"
+        )
+
+
+def guard_parameters(config: ControllerConfig) -> GuardParameters:
+    """Return the parameters for a ship and the limits of its controller.
+
+    The guard is more patient than the controller: its ages end after the controller's ramps.
+    ValueError is raised if the ship has no pump, or devices of other makers, whose frames the guard
+    does not read.
+    """
+    vessel, safety, limits = config.vessel, config.safety, config.limits
+    if vessel.pump is None:
+        raise ValueError("the ship has no pump: there is nothing to guard")
+    if vessel.foreign.any:
+        raise ValueError("the guard reads native messages only: leave out devices")
+    patience_ms = (
+        150.0,
+        safety.drive_age_ms + 140,
+        safety.motion_age_ms + 300,
+        0.0,  # of either motion sensor
+        safety.tank_age_ms + 1200,
+        safety.pump_age_ms + 1200,
+        safety.panel_age_armed_ms + 1200,
+        0.0,  # of either station
+        safety.hardwired_age_ms + 150 if vessel.redundancy.hardwired_inputs else 0.0,
+    )
+    thresholds = thresholds_of(config.plant, safety.roll_limit_rad, config.sensors)
+    database = Database()
+    database.add_dbc_string(DBC_PATH.read_text(encoding="utf-8"))
+    catalogue, messages = load_catalogue(), []
+    for (kind, source), patience in zip(STREAMS, patience_ms, strict=True):
+        codec = catalogue.codec(kind, source)
+        data_ids = read_data_ids(database.get_message_by_name(codec.name))
+        assert data_ids is not None  # the catalogue has checked it
+        messages.append(Message(codec.can_id, math.ceil(patience / TICK_MS), data_ids))
+    return GuardParameters(
+        tuple(messages),
+        pressure=math.ceil(limits.pressure_pa / PRESSURE_PA) + 1,
+        step=math.ceil(limits.rate_pa_s * 0.02 / PRESSURE_PA) + 2,  # a cycle, rounded twice
+        error=round(thresholds.pressure_error_pa / PRESSURE_PA),
+        free_rotor=round(thresholds.free_rotor_pa_m / PRESSURE_PA),
+        level=round(2 * LEVEL_SHARE * vessel.tank.level_limit_m / LEVEL_M),
+        roll=round(safety.roll_limit_rad / ROLL_RAD),
+        roll_rate=min(round(thresholds.roll_most_rad_s / RATE_RAD_S), MOST_RATE),
+        heel=round(safety.heel_limit_rad / ROLL_RAD),
+        second_station=int(vessel.redundancy.second_station),
+    )

@@ -1,0 +1,285 @@
+"""The guard judges the same in C and in Python, and as its table says."""
+
+import subprocess
+import sys
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from guard_in_c import FLAGS, SOURCE, GuardInC
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from firmware_sim.guard.parameters import STREAMS, GuardParameters, guard_parameters
+from firmware_sim.guard.reference import OLDEST, Guard, Reason, Stream
+from utank_hil.canbus import (
+    Address,
+    ControlWord,
+    DriveState,
+    DriveStatus1,
+    Frame,
+    HardwiredInputs,
+    Mode,
+    OperatorCommand,
+    PumpCommand,
+    Quality,
+    SensorMotion,
+    SensorPump,
+    SensorTank,
+    Switch,
+    load_catalogue,
+)
+from utank_hil.canbus.e2e import profile2_crc
+from utank_hil.configuration import ControllerConfig, load_config
+
+CATALOGUE = load_catalogue()
+PATTI = load_config("configs/controllers/patti_b_constrained_gpc.yaml", ControllerConfig)
+TABLE = guard_parameters(PATTI)
+OFF = Switch.OFF
+SOUND: dict[Stream, Any] = {
+    Stream.COMMAND: PumpCommand(0.0, ControlWord.ENABLE_OPERATION, 0.05),
+    Stream.DRIVE: DriveStatus1(
+        0.0, 0.0, DriveState.OPERATION_ENABLED, 0, False, False, False, False
+    ),
+    Stream.MOTION: SensorMotion(0.0, 0.0, Quality.GOOD),
+    Stream.TANK: SensorTank(0.0, 0.0, OFF, OFF, Quality.GOOD),
+    Stream.PUMP: SensorPump(0.0, 0.0, Quality.GOOD),
+    Stream.ORDER: OperatorCommand(Mode.ACTIVE, False, False, False, False),
+    Stream.HARDWIRED: HardwiredInputs(OFF, OFF, OFF, Quality.GOOD),
+}
+
+
+class Bench:
+    """Both guards, which are to agree, and what is sent to them every 20 ms."""
+
+    def __init__(self, folder: Path, table: GuardParameters = TABLE) -> None:
+        self.guards = Guard(table), GuardInC(table, folder)
+        self.senders = {
+            stream: CATALOGUE.transmitter(kind, source)
+            for stream, (kind, source) in zip(Stream, STREAMS, strict=True)
+        }
+        self.says = dict(SOUND)
+
+    def send(self, frame: Frame) -> None:
+        self.guards[0].receive(frame)
+        self.guards[1].receive(frame.can_id, frame.data)
+
+    def say(self, stream: Stream, **changes: Any) -> None:
+        self.says[stream] = self.says[stream]._replace(**changes)
+
+    def tick(self) -> int:
+        reasons = self.guards[0].tick()
+        assert self.guards[1].tick() == reasons
+        return reasons
+
+    def run(self, ticks: int, without: Iterable[Stream] = ()) -> int:
+        """Reasons of the last tick."""
+        reasons = 0
+        for index in range(ticks):
+            if index % 2 == 0:
+                for stream, message in self.says.items():
+                    if stream not in without:
+                        self.send(self.senders[stream].frame(message))
+            reasons = self.tick()
+        return reasons
+
+    def press(self, pressure_pa: float) -> None:
+        """Arm, and command a pressure that the pump follows."""
+        self.run(4)
+        self.say(Stream.ORDER, arm=True)
+        for share in range(1, 51):
+            pressure = pressure_pa * share / 50
+            self.say(Stream.COMMAND, pressure_pa=pressure)
+            self.say(Stream.DRIVE, pressure_pa=pressure)
+            self.say(Stream.PUMP, pressure_pa=pressure)
+            assert self.run(2) == 0
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("guard")
+
+
+@pytest.fixture
+def bench(folder: Path) -> Bench:
+    return Bench(folder)
+
+
+def test_it_allows_once_all_was_heard_and_what_is_armed_may_press(bench: Bench) -> None:
+    assert bench.tick() == Reason.WAITING
+    assert bench.run(10, without=[Stream.TANK]) == Reason.WAITING
+    bench.press(15e3)
+    assert bench.run(200) == 0
+
+
+@pytest.mark.parametrize(
+    ("stream", "changes", "reason", "within"),
+    [
+        (Stream.ORDER, {"stop": True}, Reason.STOP, 1),
+        (Stream.HARDWIRED, {"stop_loop": Switch.ON}, Reason.STOP, 1),
+        (Stream.HARDWIRED, {"stop_loop": None}, Reason.STOP, 1),
+        (Stream.ORDER, {"arm": False}, Reason.DISARMED, 122),
+        (Stream.COMMAND, {"pressure_pa": 20_500.0}, Reason.COMMANDED, 1),
+        (Stream.COMMAND, {"pressure_pa": -10e3}, Reason.COMMANDED, 1),
+        (Stream.DRIVE, {"pressure_pa": -4e3}, Reason.PRESSURE, 62),
+        (Stream.PUMP, {"pressure_pa": 16e3}, Reason.PRESSURE, 62),
+        (Stream.TANK, {"port_high": Switch.ON}, Reason.LEVEL, 12),
+        (Stream.TANK, {"starboard_high": None}, Reason.LEVEL, 12),
+        (Stream.HARDWIRED, {"port_high": Switch.ERROR}, Reason.LEVEL, 12),
+        (Stream.TANK, {"port_level_m": -1.98, "starboard_level_m": 1.98}, Reason.LEVEL, 12),
+        (Stream.MOTION, {"roll_rad": -0.2}, Reason.ROLL, 12),
+        (Stream.MOTION, {"roll_rate_rad_s": 0.3}, Reason.ROLL, 12),
+        (Stream.MOTION, {"roll_rad": 0.15}, Reason.ROLL, 6500),
+    ],
+)
+def test_each_reason_is_found_in_its_time(
+    bench: Bench, stream: Stream, changes: dict[str, Any], reason: Reason, within: int
+) -> None:
+    bench.press(10e3)
+    bench.say(stream, **changes)
+    if within > 1:
+        assert bench.run(min(within // 2, 60) - within // 2 % 2) == 0
+    assert bench.run(within) & reason
+
+
+@pytest.mark.parametrize("stream", SOUND)
+def test_what_is_silent_under_pressure_cuts(bench: Bench, stream: Stream) -> None:
+    bench.press(10e3)
+    patience = TABLE.messages[stream].patience
+    assert bench.run(patience - 3, without=[stream]) == 0
+    assert bench.run(10, without=[stream]) & Reason.SILENT
+
+
+def test_a_pump_that_is_off_and_a_saturated_one_are_let_on(bench: Bench) -> None:
+    bench.press(15e3)
+    bench.say(Stream.DRIVE, pressure_pa=6e3)
+    bench.say(Stream.PUMP, pressure_pa=6e3)
+    assert bench.run(300) == 0
+
+
+def test_a_cut_stays_until_a_reset_and_then_nothing_is_armed(bench: Bench) -> None:
+    bench.press(10e3)
+    bench.say(Stream.HARDWIRED, stop_loop=Switch.ON)
+    assert bench.run(2) == Reason.STOP
+    bench.say(Stream.COMMAND, pressure_pa=0.0)
+    bench.say(Stream.DRIVE, pressure_pa=0.0, state=DriveState.SWITCH_ON_DISABLED)
+    bench.say(Stream.PUMP, pressure_pa=0.0)
+    bench.say(Stream.ORDER, reset=True)
+    assert bench.run(2) == Reason.STOP  # its cause still holds
+    bench.say(Stream.ORDER, reset=False)
+    bench.say(Stream.HARDWIRED, stop_loop=OFF)
+    assert bench.run(20) == Reason.STOP
+    bench.say(Stream.ORDER, reset=True)
+    assert bench.run(2) == 0
+    bench.say(Stream.DRIVE, state=DriveState.OPERATION_ENABLED)
+    bench.say(Stream.COMMAND, pressure_pa=500.0)  # the arm bit is still set, and no edge came
+    assert bench.run(124) == Reason.DISARMED
+
+
+def test_a_disarm_out_of_sequence_acts_and_no_frame_out_of_sequence_arms(bench: Bench) -> None:
+    bench.press(10e3)
+    sender = CATALOGUE.transmitter(OperatorCommand)
+    sender.counter = bench.senders[Stream.ORDER].counter + 8
+    bench.send(sender.frame(SOUND[Stream.ORDER]))
+    assert bench.run(124) == Reason.DISARMED
+
+
+def test_a_second_station_arms_only_where_it_is_declared(folder: Path) -> None:
+    for declared in (0, 1):
+        bench = Bench(folder, replace(TABLE, second_station=declared))
+        bench.says[Stream.ORDER_2] = SOUND[Stream.ORDER]
+        bench.run(4)
+        bench.say(Stream.ORDER_2, arm=True)
+        bench.run(2)
+        bench.say(Stream.COMMAND, pressure_pa=500.0)
+        assert bench.run(130) == (0 if declared else Reason.DISARMED)
+
+
+_FRAMES = st.tuples(st.sampled_from(list(Stream)), st.binary(min_size=6, max_size=6))
+_STEPS = st.one_of(
+    st.tuples(st.just("sound"), st.integers(0, 130)),
+    st.tuples(st.just("words"), _FRAMES),
+    st.tuples(st.just("raw"), st.tuples(st.sampled_from(list(Stream)), st.binary(max_size=9))),
+    st.tuples(st.just("skip"), st.tuples(st.sampled_from(list(Stream)), st.integers(1, 15))),
+    st.tuples(st.just("tick"), st.integers(1, 40)),
+    st.tuples(st.just("arm"), st.booleans()),
+    st.tuples(st.just("press"), st.integers(-2600, 2600)),
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(steps=st.lists(_STEPS, max_size=16), second=st.integers(0, 1))
+def test_any_frames_are_judged_alike_in_both(
+    folder: Path, steps: list[tuple[str, Any]], second: int
+) -> None:
+    bench = Bench(folder, replace(TABLE, second_station=second))
+    bench.run(4)
+    for kind, what in steps:
+        if kind == "sound":
+            bench.run(what)
+        elif kind == "words":  # rightly protected, whatever it says
+            stream, content = what
+            sender = bench.senders[stream]
+            sender.counter = (sender.counter + 1) & 15
+            data = protected(stream, content[0] & 0xF0 | sender.counter, content)
+            bench.send(Frame(sender.can_id, data))
+        elif kind == "raw":
+            bench.send(Frame(TABLE.messages[what[0]].can_id, what[1]))
+        elif kind == "skip":
+            bench.senders[what[0]].counter += what[1]
+        elif kind == "tick":
+            for _ in range(what):
+                bench.tick()
+        elif kind == "arm":
+            bench.say(Stream.ORDER, arm=what)
+        else:
+            bench.say(Stream.COMMAND, pressure_pa=8.0 * what)
+            bench.say(Stream.DRIVE, pressure_pa=8.0 * what)
+
+
+def protected(stream: Stream, second: int, content: bytes) -> bytes:
+    data = bytes((0, second)) + content
+    return bytes((profile2_crc(data, TABLE.messages[stream].data_ids),)) + data[1:]
+
+
+@pytest.mark.slow
+def test_an_age_is_held_at_its_end(bench: Bench) -> None:
+    for _ in range(OLDEST + 3):
+        bench.tick()
+    assert bench.run(4) == 0
+
+
+def test_the_header_compiles_into_a_freestanding_program(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "firmware_sim.guard", "configs/controllers/gpc.yaml"]
+    made = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    (tmp_path / "guard_parameters.h").write_text(made)
+    main = tmp_path / "main.c"
+    main.write_text(
+        '#include "guard_parameters.h"\n'
+        "uint8_t run(struct guard *guard);\n"
+        "uint8_t run(struct guard *guard) { guard_start(guard, &GUARD_PARAMETERS);"
+        " return guard_tick(guard); }\n"
+    )
+    out = tmp_path / "all.o"
+    subprocess.run(["cc", *FLAGS, f"-I{SOURCE}", "-c", main, "-o", out], check=True)
+    subprocess.run(["cc", *FLAGS, "-c", SOURCE / "guard.c", "-o", out], check=True)
+    undefined = subprocess.run(["nm", "-u", out], capture_output=True, text=True, check=True)
+    assert undefined.stdout.split() == []  # it calls nothing
+
+
+@pytest.mark.parametrize(("change", "word"), [({"pump": None}, "no pump")])
+def test_a_ship_without_a_pump_has_no_guard(change: dict[str, Any], word: str) -> None:
+    config = PATTI.model_copy(update={"vessel": PATTI.vessel.model_copy(update=change)})
+    with pytest.raises(ValueError, match=word):
+        guard_parameters(config)
+
+
+def test_the_streams_are_those_of_the_header() -> None:
+    text = (SOURCE / "guard.h").read_text()
+    names = [f"GUARD_{stream.name}," for stream in Stream]
+    assert [line.strip() for line in text.splitlines() if line.strip() in names] == names
+    assert STREAMS[Stream.ORDER_2] == (OperatorCommand, Address.OPERATOR_2)
+    for reason in Reason:
+        assert f"#define GUARD_{reason.name} {reason.value}U" in text
