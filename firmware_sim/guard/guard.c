@@ -344,6 +344,9 @@ uint8_t guard_tick(struct guard *guard)
     if ((guard->reasons == GUARD_WAITING) && (silent(guard) == 0U)) {
         guard->reasons = 0U;
     }
+    if (drive_heard == 0U) { /* nobody knows what it does; it is waited for again */
+        guard->reasons |= GUARD_WAITING;
+    }
     if ((guard->reset != 0U) && (reasons == 0U)) {
         guard->reasons &= GUARD_WAITING;
     }

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from cantools.database.can import Database
 
@@ -31,7 +31,7 @@ LEVEL_M: Final = 1e-3
 MOST_RATE: Final = 32000
 LEVEL_SHARE: Final = 0.97
 """Of the level at which a reservoir is full or empty; the shipped switches close at 0.943."""
-STREAMS: Final = (
+STREAMS: Final[tuple[tuple[type[tuple[Any, ...]], Address], ...]] = (
     (PumpCommand, Address.CONTROLLER),
     (DriveStatus1, Address.DRIVE),
     (SensorMotion, Address.SENSORS),

@@ -208,6 +208,8 @@ class Guard:
         reasons = sum(int(reason) for reason, held in holds.items() if held)
         if self.reasons == Reason.WAITING and not silent:
             self.reasons = 0
+        if not heard:  # nobody knows what the drive does; it is waited for again
+            self.reasons |= int(Reason.WAITING)
         if self._reset and not reasons:
             self.reasons &= int(Reason.WAITING)
         self.reasons |= reasons
