@@ -123,12 +123,12 @@ def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: P
     """Return why a controller must not be armed, with the remedy; empty if it may.
 
     Of a ship that its file declares to be emulated no record is required unless `path` is given:
-    the controller then stays in INIT until all nodes send the version of an emulated ship. `bus` is
-    the interface of the run, `file` that of the configuration, `path` the place of the record, by
-    default `record_path`.
+    the controller then stays in INIT until all nodes send the version of an emulated ship. A drive
+    of another maker sends none, so it proves nothing. `file` is that of the configuration.
     """
     vessel = config.vessel
-    if (vessel.pump is None and vessel.valve is None) or (path is None and vessel.emulated):
+    proves = vessel.emulated and vessel.foreign.pump is None
+    if (vessel.pump is None and vessel.valve is None) or (path is None and proves):
         return ""
     for key, reason in config.held_pressure_problems():
         return f"{file}: {key} {reason}"
