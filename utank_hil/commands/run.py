@@ -101,7 +101,7 @@ def run(
     if loaded.safety.overruns_in_ten is None:
         notes.say("safety.overruns_in_ten", yellow="repeated late ticks are not judged:")
     if other := why_other_bit_rate(bus, loaded.bit_rate):
-        fail(f"{config}: bit_rate: {other}")
+        common.fail(f"{config}: bit_rate: {other}")
     refused = why_not_commissioned(loaded, bus, config, record)
     if loaded.vessel.emulated:
         notes.say("no node on board counts as one of this ship", yellow="vessel.emulated: true:")
