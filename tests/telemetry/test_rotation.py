@@ -174,6 +174,22 @@ def test_a_clock_that_was_set_back_does_not_cost_the_run_its_own_parts(tmp_path:
     assert remove_oldest(part_of(file, 3), 1500) == [file]
 
 
+def test_runs_of_a_computer_without_a_clock_are_removed_in_their_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each start begins in the year 2000; one run has had the time from the network."""
+    starts = [2e9, 1e9, 1e9 + 5, 2.1e9, 1e9 + 1]
+    for number, start_s in enumerate(starts):
+        file = tmp_path / f"run-{9 - number}.rrd"  # names tell nothing either
+        monkeypatch.setattr(time, "time_ns", lambda now=start_s: int(now * 1e9))
+        make_room(file, 1, 10_000)
+        for part in (file, part_of(file, 2)):
+            part.write_bytes(bytes(1000))
+            os.utime(part, (start_s + 3600, start_s + 3600))
+    removed = remove_oldest(tmp_path / "run-0.rrd", 2000)
+    assert [int(path.stem[4]) for path in removed] == [9, 9, 8, 8, 7, 7, 6, 6]
+
+
 def test_a_file_that_somebody_else_removes_meanwhile_ends_no_recording(tmp_path: Path) -> None:
     """A link to nowhere is as such a file: it has a name, and nothing is known of it."""
     (tmp_path / "run-1.rrd").symlink_to(tmp_path / "gone")

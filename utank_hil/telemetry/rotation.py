@@ -4,6 +4,8 @@ A recording is a `.rrd` file, a frame log, or both under one name. A long one ha
 `run-x.rrd`, `run-x-part002.rrd`, ...
 """
 
+import os
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from os import stat_result
@@ -19,6 +21,8 @@ def make_room(file: Path, number: int, keep_bytes: int) -> None:
 
     The others and one as long as the last part then fit into the folder.
     """
+    if number == 1:
+        _put_before(file, time.time_ns())
     before = part_of(file, number - 1).with_suffix
     files = [] if number == 1 else [before(suffix) for suffix in SUFFIXES]
     last_bytes = sum(status.st_size for _, status in _found(files))
@@ -43,6 +47,26 @@ def _found(paths: Iterable[Path]) -> Iterator[tuple[Path, stat_result]]:
             yield path, path.stat()
 
 
+def _alike(file: Path) -> Iterator[tuple[Path, stat_result]]:
+    """Return other files of names like that of `file` up to the first hyphen, and their status."""
+    for suffix in SUFFIXES:
+        for path, status in _found(file.parent.glob(f"{file.stem.partition('-')[0]}-*{suffix}")):
+            if path.stem != file.stem:
+                yield path, status
+
+
+def _put_before(file: Path, now_ns: int) -> None:
+    """Give recordings whose time is still to come, as the clock was set back, times before now.
+
+    So they stay in the order of their runs, before this one.
+    """
+    ages = sorted((status.st_mtime_ns, path) for path, status in _alike(file))
+    late = [path for time_ns, path in ages if time_ns >= now_ns]
+    for before, path in enumerate(reversed(late), 1):
+        with suppress(FileNotFoundError):
+            os.utime(path, ns=(now_ns - before, now_ns - before))
+
+
 def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
     """Remove the oldest recordings of a folder until its size is within a limit; return them.
 
@@ -50,10 +74,8 @@ def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
     last.
     """
     alike: dict[str, dict[Path, stat_result]] = {}
-    for suffix in SUFFIXES:
-        for path, status in _found(file.parent.glob(f"{file.stem.partition('-')[0]}-*{suffix}")):
-            if path.stem != file.stem:
-                alike.setdefault(path.stem, {})[path] = status
+    for path, status in _alike(file):
+        alike.setdefault(path.stem, {})[path] = status
     own, _ = whole_of(file)  # It is newer than all others, even by a clock that was set back.
 
     def age(stem: str) -> tuple[bool, int, str]:
