@@ -73,6 +73,15 @@ def browser() -> "Iterator[Browser]":
         yield started
 
 
+@pytest.fixture
+def one_process() -> Iterator[None]:
+    """Run benches and campaigns in this process (`one_process.py`)."""
+    from one_process import in_one_process
+
+    with in_one_process():
+        yield
+
+
 _MCL_ONFAULT = 0x4
 
 

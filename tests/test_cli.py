@@ -307,6 +307,7 @@ def test_bench_that_could_not_write_its_results_does_not_begin(tmp_path: Path, p
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("one_process")
 def test_bench_whose_results_can_not_be_written_prints_them_all_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

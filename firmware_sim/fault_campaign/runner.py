@@ -70,24 +70,22 @@ def run_rows(
     stopped: Callable[[], bool],
     *,
     recorded: bool = False,
-    workers: int | None = None,
 ) -> dict[str, list[Outcome]]:
     """Run rows in the seas of some seeds.
 
     `stopped` says whether to end early; `recorded`, whether the outcomes of the first seed contain
-    recordings. There are `workers` processes, by default as many as cores. The outcomes of a row
-    are in the order of the seeds, and incomplete after an early end or a killed process.
+    recordings. There is a process for each core. The outcomes of a row are in the order of the
+    seeds, and incomplete after an early end or a killed process.
     """
     context = multiprocessing.get_context("spawn")
     done, stop = context.Value("i", 0), context.Value("b", 0, lock=False)
     by_setup: dict[str, list[Row]] = defaultdict(list)
     for row in rows:
         by_setup[row.fault.setup].append(row)
-    workers = workers or len(os.sched_getaffinity(0))
     futures: list[Future[list[Outcome]]] = []
     outcomes: list[Outcome] = []
     common = _Shared(campaign, window, recorded, done, stop)
-    with suppress(BrokenProcessPool), WorkerPool(workers, common) as pool:
+    with suppress(BrokenProcessPool), WorkerPool(len(os.sched_getaffinity(0)), common) as pool:
         for seed in seeds:
             for setup, its in by_setup.items():
                 tasks = -(-len(its) // ROWS_A_TASK)

@@ -166,6 +166,7 @@ def test_both_commands_have_a_version(application) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("one_process")
 def test_figures_picture_and_recording_of_a_bench_hold_the_configuration_that_ran(
     tmp_path: Path,
 ) -> None:

@@ -47,6 +47,7 @@ def refused(*words: str) -> str:
     return " ".join(result.stderr.split())
 
 
+@pytest.mark.usefixtures("one_process")
 @pytest.mark.parametrize(
     "command",
     ["monitor", "bench configs/scenarios/storm_day.yaml --duration 1 --view --json --out"],

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browsing import A4_PX, DESK, PHONE, WIDE, of_color, opened, pixels
+from one_process import in_one_process
 from playwright.sync_api import Browser
 
 from firmware_sim.bench import BenchOptions, run_bench
@@ -33,7 +34,8 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> str:
     gpc = scenario.controllers["gpc"]  # a fourth curve that costs no design
     controllers = {"dpc": scenario.controllers["dpc"], "gpc": gpc, "gpc again": gpc}
     scenario = scenario.model_copy(update={"settle_s": 20.0, "controllers": controllers})
-    result = run_bench(scenario, BenchOptions(duration_s=60.0), lambda *_: None)
+    with in_one_process():
+        result = run_bench(scenario, BenchOptions(duration_s=60.0), lambda *_: None)
     about = describe("bench", result.scenario, folder, options={}, seed=result.seed)
     files, failures = write_report(result, figures(result), folder, about)
     assert failures == []

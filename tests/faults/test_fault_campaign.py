@@ -436,11 +436,12 @@ def test_every_fault_of_the_table_was_the_name_of_one(results: dict[str, Result]
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("one_process")
 def test_the_same_rows_again_give_the_same_to_the_last_digit(results: dict[str, Result]) -> None:
     names = ("noise-10-fold", "flood-80-percent", "gateway-loses-5-percent", "rate-stuck")
     again = run_rows(
         CAMPAIGN, [ROWS[name] for name in names], [1], Window(60.0, 20.0), lambda _: None,
-        lambda: False, workers=1,
+        lambda: False,
     )  # fmt: skip
     for name in names:
         assert verdict(name, *again[name]).as_json() == results[name].as_json()
@@ -463,6 +464,7 @@ def invoke(*arguments: str):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("one_process")
 def test_command_prints_one_object_and_writes_recordings(tmp_path: Path) -> None:
     done = invoke("--rows", "roll-spike,F26", "--seeds", "1", "--json", "--out", str(tmp_path))
     assert done.exit_code == ExitCode.OK, done.output
@@ -477,6 +479,7 @@ def test_command_prints_one_object_and_writes_recordings(tmp_path: Path) -> None
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("one_process")
 def test_a_row_that_fails_is_told_by_the_exit_code(tmp_path: Path) -> None:
     before, _, after = TEXT.partition("id: roll-spike,")
     strict = f"{before}id: roll-spike,{after.replace('found_ms: 30', 'found_ms: 1', 1)}"
@@ -488,6 +491,7 @@ def test_a_row_that_fails_is_told_by_the_exit_code(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("one_process")
 def test_a_bus_that_cannot_be_used_loses_no_results() -> None:
     done = invoke("--rows", "held-arm-bit,live-controller-killed", "--seeds", "1", "--json",
                   "--bus", "nosuch0")  # fmt: skip

@@ -364,6 +364,7 @@ def test_bare_ship_is_loaded_differently_when_the_ship_is() -> None:
     np.testing.assert_allclose(bare, expected, rtol=0, atol=1e-9)
 
 
+@pytest.mark.usefixtures("one_process")
 def test_an_interface_that_is_not_there_ends_the_bench_with_its_name() -> None:
     options = BenchOptions(real_time=True, channel="nowhere0", duration_s=60.0)
     alone = STORM.model_copy(update={"controllers": {}})

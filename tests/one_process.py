@@ -1,0 +1,34 @@
+"""Benches and campaigns in this process: a new one takes seconds to import all."""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager, nullcontext
+from types import SimpleNamespace
+
+import pytest
+
+from firmware_sim import bench
+from firmware_sim.fault_campaign import runner
+
+
+def _submit(function: Callable[..., object], *arguments: object) -> Future[object]:
+    future = Future[object]()
+    try:
+        future.set_result(function(*arguments))
+    except Exception as error:  # the caller asks for it, as for that of a process
+        future.set_exception(error)
+    return future
+
+
+@contextmanager
+def in_one_process() -> Iterator[None]:
+    """What is submitted to a pool is done at once."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (bench, runner):
+
+            def pool(_: int, common: object, module=module) -> nullcontext[SimpleNamespace]:
+                patch.setattr(module, "shared", lambda: common)
+                return nullcontext(SimpleNamespace(submit=_submit))
+
+            patch.setattr(module, "WorkerPool", pool)
+        yield
