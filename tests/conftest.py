@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 # machines are shared: an example that takes long says nothing about the code
-settings.register_profile("search", deadline=None, print_blob=True)
+settings.register_profile("search", deadline=None, print_blob=True, max_examples=200)
 # the same examples each time: what lands is not left to chance; `make search` draws new ones
-settings.register_profile("same", settings.get_profile("search"), derandomize=True, max_examples=40)
+settings.register_profile("same", settings.get_profile("search"), derandomize=True, max_examples=25)
 settings.register_profile("few", settings.get_profile("same"), max_examples=10)  # make test-fast
 settings.load_profile("same")
 

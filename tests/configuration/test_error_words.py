@@ -63,7 +63,7 @@ def refused(folder: Path, text: str, model: type[Any]) -> dict[str, str]:
     return {problem.key: problem.reason for problem in caught.value.problems}
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     place=st.sampled_from(NUMBERS),
     value=st.sampled_from(
@@ -79,7 +79,7 @@ def test_no_number_is_taken_from_what_is_none(tmp_path: Path, place: Any, value:
     assert not any(word in reason for reason in found.values() for word in FOREIGN_WORDS)
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     place=st.sampled_from(PLACES),
     value=st.sampled_from(

@@ -3,7 +3,7 @@
 import control
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.control import ARX
@@ -31,7 +31,6 @@ def respond(system, x, u):
     return np.array(y)
 
 
-@settings(max_examples=60)
 @given(
     seed=st.integers(0, 2**32 - 1),
     states=st.integers(1, 6),
@@ -78,7 +77,6 @@ def test_continuous_model_is_refused():
         ARX.from_state_space(control.ss(-1, 1, 1, 0), 1)
 
 
-@settings(max_examples=40)
 @given(
     seed=st.integers(0, 2**32 - 1),
     order=st.integers(1, 5),

@@ -252,7 +252,6 @@ def test_answer_is_one_command_of_the_caller_s_own(name):
 
 @pytest.mark.slow
 @every_law
-@settings(max_examples=30)
 @given(
     st.lists(
         st.lists(st.floats(-1e50, 1e50), min_size=4, max_size=4).map(np.array),

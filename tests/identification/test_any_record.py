@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from roll_plant import plant, pulses
@@ -85,7 +85,6 @@ def model_of(u: FloatArray, y: FloatArray, order: int) -> OkidResult | None:
         return None
 
 
-@settings(max_examples=200)
 @given(spoiled(), st.integers(1, 30))
 def test_okid_ends_in_a_finite_model_or_a_refusal(record: Record, order: int) -> None:
     result = model_of(*record, order)
@@ -95,7 +94,6 @@ def test_okid_ends_in_a_finite_model_or_a_refusal(record: Record, order: int) ->
         assert np.isfinite(result.residual_covariance).all()
 
 
-@settings(max_examples=200)
 @given(spoiled(), st.integers(1, 12), st.integers(1, 40))
 @example((np.array([0.0, 0, 0, 1, 0, 1e-295, 0])[:, None], np.eye(7)[:, 5:6]), 1, 1)
 def test_validation_ends_in_figures_or_a_refusal(record: Record, order: int, lags: int) -> None:
@@ -118,7 +116,6 @@ def test_validation_ends_in_figures_or_a_refusal(record: Record, order: int, lag
         assert ((probability >= 0) & (probability <= 1)).all()
 
 
-@settings(max_examples=100)
 @given(spoiled(), st.integers(3, 20))
 def test_what_follows_okid_takes_every_model_it_makes(record: Record, order: int) -> None:
     result = model_of(*record, order)
@@ -135,7 +132,6 @@ def test_what_follows_okid_takes_every_model_it_makes(record: Record, order: int
     assert np.isfinite(known.modes.frequency_rad_s).all()
 
 
-@settings(max_examples=100)
 @given(
     arrays(
         np.float64,
@@ -154,7 +150,6 @@ def test_era_ends_in_a_finite_model_or_a_refusal(markov: FloatArray) -> None:
         assert np.isfinite(matrix).all()
 
 
-@settings(max_examples=100)
 @given(spoiled())
 def test_waves_are_looked_for_in_any_record(record: Record) -> None:
     try:

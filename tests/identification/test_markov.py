@@ -1,7 +1,7 @@
 """Pulse responses of an ARX model, and their gradient."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.control import ARX
@@ -31,7 +31,6 @@ def test_markov_parameters_are_the_pulse_response(seed: int, count: int) -> None
     np.testing.assert_allclose(observer_gain, response[1:], atol=1e-12)
 
 
-@settings(max_examples=25)
 @given(st.integers(0, 2**31))
 def test_gradient_is_the_finite_difference(seed: int) -> None:
     arx = _arx(seed)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from controller_bench import CATALOGUE, ControllerBench, ToyLaw
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.base.arrays import FloatArray
@@ -308,7 +308,6 @@ EVENTS: dict[str, Callable[[ValveBench], object]] = {
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None)
 @given(st.lists(st.tuples(st.sampled_from(sorted(EVENTS)), st.integers(1, 40)), max_size=25))
 def test_whatever_comes_the_valve_is_told_to_follow_only_while_the_controller_is_active(
     events: list[tuple[str, int]],

@@ -217,5 +217,5 @@ class EveryWay(RuleBasedStateMachine):
         assert self.rig.commands[-5:] == answers
 
 
-EveryWay.TestCase.settings = settings(max_examples=40, stateful_step_count=30)
+EveryWay.TestCase.settings = settings(stateful_step_count=30)
 TestEveryWay = EveryWay.TestCase

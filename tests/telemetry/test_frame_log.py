@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from little_room import little_room
 
@@ -76,7 +76,6 @@ def test_cut_at_200_random_bytes_it_lacks_less_than_a_second(tmp_path: Path) -> 
         assert bool(log.cut) == (place not in {size for size, _ in sizes})
 
 
-@settings(max_examples=60)
 @given(st.data())
 def test_a_flipped_bit_ends_the_reading_before_it(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject

@@ -83,7 +83,7 @@ class BroadcastModel(RuleBasedStateMachine):
 
 
 TestBroadcastModel = BroadcastModel.TestCase
-TestBroadcastModel.settings = settings(max_examples=40, stateful_step_count=30)
+TestBroadcastModel.settings = settings(stateful_step_count=30)
 
 
 def test_reader_drains_a_ring_after_its_writer_closed_it() -> None:

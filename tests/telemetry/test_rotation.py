@@ -135,7 +135,7 @@ def test_the_parts_of_a_recording_stay_within_the_bound(sizes: list[int], keep_b
             assert sum(left) + 2 * 1050 > keep_bytes or len(left) == number
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     sizes=st.lists(st.integers(0, 500), max_size=8),
     keep_bytes=st.integers(0, 2000),

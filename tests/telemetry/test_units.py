@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.nodes.signals import SIGNALS
@@ -11,7 +11,6 @@ from utank_hil.telemetry.units import UNITS, column_of, field_of
 STEMS = st.from_regex(r"[a-z]{1,8}(_[a-z]{3,8}){0,2}", fullmatch=True)
 
 
-@settings(max_examples=50)
 @given(stem=STEMS, suffix=st.sampled_from([unit.suffix for unit in UNITS]))
 def test_a_recorded_name_leads_back_to_its_column(stem: str, suffix: str) -> None:
     column = stem + suffix

@@ -7,7 +7,7 @@ import clarabel
 import numpy as np
 import pytest
 from arx_law import arx_law
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import sparse
 
@@ -34,7 +34,6 @@ def respond(arx, u, y, newest_u):
     return now
 
 
-@settings(max_examples=40)
 @given(
     seed=st.integers(0, 2**32 - 1),
     order=st.integers(1, 5),

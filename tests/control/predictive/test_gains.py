@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tools.thesis.printed_laws import DPC_ROLL, GPC_ROLL, PRINTED, PRINTED_ARX
@@ -56,7 +56,6 @@ def test_default_dpc_is_the_printed_one():
     np.testing.assert_allclose(law.output_gains[:, 0, 0], PRINTED[DPC_ROLL].roll_gains, rtol=1e-4)
 
 
-@settings(max_examples=60)
 @given(**shapes, horizon=st.integers(1, 25))
 def test_multi_step_prediction_equals_brute_force_recursion(seed, order, outputs, inputs, horizon):
     arx = random_arx(seed, order, outputs, inputs)
@@ -73,7 +72,6 @@ def test_multi_step_prediction_equals_brute_force_recursion(seed, order, outputs
     np.testing.assert_allclose(predicted, expected, atol=1e-9 * (1 + np.abs(expected).max()))
 
 
-@settings(max_examples=40)
 @given(
     **shapes,
     horizon=st.integers(2, 12),
@@ -122,7 +120,6 @@ def close_loop(arx: ARX, law, past_u, past_y, steps):
     return np.array(u[arx.order :]), np.array(y[arx.order :])
 
 
-@settings(max_examples=60)
 @given(**shapes, spare=st.integers(0, 3))
 def test_dpc_brings_random_systems_to_rest_in_finite_time(seed, order, outputs, inputs, spare):
     # As many inputs as the state needs: then the law that is applied anew each step follows its

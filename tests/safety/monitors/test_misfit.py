@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.safety.monitors.misfit import Misfit
 
 
-@settings(max_examples=40, deadline=None)
 @given(
     share=st.floats(-1.0, 3.0), zero=st.floats(-2.0, 2.0), seed=st.integers(0, 1000),
     most=st.floats(0.5, 2.0),

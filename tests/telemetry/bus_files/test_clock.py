@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.telemetry.bus_files.clock import OneClock
@@ -42,7 +42,6 @@ def test_a_log_in_order_is_left_as_it_is() -> None:
         assert notes == []
 
 
-@settings(max_examples=40)
 @given(at=st.integers(20, 350), step_s=st.sampled_from([-7200.0, -0.5, 2 * DAY_S, 1.7e9, -DAY_S]))
 def test_a_step_is_said_with_its_place_and_times_go_on(at: int, step_s: float) -> None:
     times = EVEN.copy() + 10.0
@@ -56,7 +55,6 @@ def test_a_step_is_said_with_its_place_and_times_go_on(at: int, step_s: float) -
         np.testing.assert_allclose(found, EVEN + 10.0, atol=1e-6)
 
 
-@settings(max_examples=40)
 @given(
     at=st.integers(20, 350),
     count=st.integers(1, 16),

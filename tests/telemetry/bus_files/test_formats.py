@@ -350,7 +350,6 @@ SEEDS = [
 ]
 
 
-@settings(max_examples=60)
 @given(
     seed=st.sampled_from(SEEDS),
     edits=st.lists(
