@@ -30,6 +30,7 @@ from utank_hil.configuration import ControllerConfig
 from utank_hil.runners import RealTimeLoop, real_time_scheduling, stop_on_signals
 from utank_hil.assembly import build_controller_node
 from utank_hil.nodes.signals import SIGNALS
+from utank_hil.retuning import SimulatedRetuner
 from utank_hil.telemetry.rows import RowWriter
 
 assert SocketCanPort
@@ -38,7 +39,8 @@ configs = [load(path, ControllerConfig) for path in files]
 # one of each kind
 for config in {(type(each.law), each.retuning is None): each for each in configs}.values():
     with RowWriter(SIGNALS, slots=64) as ring:
-        node = build_controller_node(config, sink=ring.write)
+        retuner = None if config.retuning is None else SimulatedRetuner(print, 1.0)
+        node = build_controller_node(config, sink=ring.write, retuner=retuner)
         with stop_on_signals() as stop, real_time_scheduling():
             RealTimeLoop([node]).run(stop, 300_000_000)
         assert ring.count >= 10
@@ -143,7 +145,7 @@ PROJECT = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["pro
 @pytest.mark.parametrize(
     "words",
     [
-        ("check", "configs/scenarios/patti_b.yaml"),
+        ("check", "configs/scenarios/voyage.yaml"),
         ("check", "configs/ships/patti_b.yaml"),
         ("run", "configs/controllers/constrained_gpc.yaml", "--bus", "any0", "--duration", "0.3"),
     ],

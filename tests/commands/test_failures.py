@@ -84,7 +84,7 @@ def test_other_errors_are_those_of_the_program() -> None:
         raise OSError(errno.ECONNRESET, "reset")
 
 
-@pytest.mark.parametrize("words", [("check", GPC), ("check", SHIP, "--json")])
+@pytest.mark.parametrize("words", [("check", SHIP), ("check", SHIP, "--json")])
 def test_a_full_disk_behind_standard_output_is_said(words: tuple[str, ...]) -> None:
     with Path("/dev/full").open("w") as full:
         done = started(words, stdout=full)
@@ -96,7 +96,7 @@ def test_a_pipe_that_nobody_reads_is_no_refusal() -> None:
     read, written = os.pipe()
     os.close(read)
     with os.fdopen(written, "w") as closed:
-        assert started(("check", GPC), stdout=closed).returncode == ExitCode.USAGE
+        assert started(("check", SHIP), stdout=closed).returncode == ExitCode.USAGE
 
 
 @pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
@@ -119,7 +119,7 @@ def test_a_closed_standard_stream_is_nothing_and_its_number_is_not_another_file_
 
 def test_no_output_at_all_ends_with_the_same_code() -> None:
     with Path("/dev/full").open("w") as full:
-        assert started(("check", GPC), stdout=full, stderr=full).returncode == ExitCode.USAGE
+        assert started(("check", SHIP), stdout=full, stderr=full).returncode == ExitCode.USAGE
 
 
 def test_a_terminal_that_lacks_a_sign_gets_a_question_mark() -> None:

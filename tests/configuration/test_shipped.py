@@ -10,7 +10,7 @@ from firmware_sim.drive_limits import DriveLimits
 from firmware_sim.scenario import Scenario
 from firmware_sim.sensor_errors import SensorErrors
 from firmware_sim.ship_side import PASSIVE_SCRIPT, build_ship_side
-from utank_hil.assembly import build_controller_node
+from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Fault, Mode
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
@@ -82,12 +82,10 @@ def test_controller_arms_and_acts_on_the_bus_within_the_drives_limits(path: Path
 def test_self_tuning_law_keeps_roll_and_level_after_it_was_armed(ship: str, seed: int) -> None:
     # these seeds ended in HEEL_LIMIT at 17 degrees, and in LEVEL_LIMIT
     scenario = load_config(CONFIGS / "scenarios" / f"{ship}.yaml", Scenario)
-    most_rad = []
-    for config in (None, scenario.controllers["self-tuning"]):
-        node = build_controller_node(
-            config or scenario.controllers["self-tuning"], commissioned=True
-        )
-        script = PASSIVE_SCRIPT if config is None else scenario.operator
+    config = scenario.controllers["self-tuning"]
+    law, most_rad = build_law(config), []
+    for script in (PASSIVE_SCRIPT, scenario.operator):
+        node = build_controller_node(config, law, commissioned=True)
         lockstep = Lockstep([*build_ship_side(scenario, seed, script).nodes, node])
         largest = 0.0
         for second in range(1, 31):

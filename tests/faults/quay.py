@@ -49,6 +49,7 @@ def commissioned(
     begin_ns: int = 0,
     seed: int = 1,
     nodes: tuple[Node, ...] | None = None,
+    end_s: int = 300,
 ) -> CommissioningNode:
     """Commission a ship, with what becomes of the frames of some nodes."""
     node = build_commissioning_node(config)
@@ -61,7 +62,7 @@ def commissioned(
             for each in (*ship, node)
         ]
     )
-    while node.stage is not Stage.DONE and lockstep.now_ns < 300 * SECOND:
+    while node.stage is not Stage.DONE and lockstep.now_ns < end_s * SECOND:
         lockstep.run_until(lockstep.now_ns + SECOND)
     return node
 

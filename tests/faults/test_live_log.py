@@ -1,17 +1,16 @@
 """What follows from the frames of a live bus: from logs made by hand."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from judged_rows import CAMPAIGN
 
 from firmware_sim.fault_campaign import live
-from firmware_sim.fault_campaign.campaign import Campaign, LiveRow
+from firmware_sim.fault_campaign.campaign import LiveRow
 from firmware_sim.fault_campaign.live_log import LiveLog, LiveTimes, times_of
 from utank_hil.canbus import DriveState, Mode
-from utank_hil.configuration import load_config
 
-ROWS = {row.id: row for row in load_config(Path("configs/faults/campaign.yaml"), Campaign).live}
+ROWS = {row.id: row for row in CAMPAIGN.live}
 FAULT_S = 100.0
 OFF = DriveState.FAULT
 

@@ -16,7 +16,6 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.failures import KILLED
 from utank_hil.runners.stopping import SIGNALS
 
-BUSY_S = 2.0
 COMMANDS = {
     "bench": ("configs/scenarios/storm_all.yaml", "--duration", "36000", "--out"),
     "faults": ("--rows", "motion", "--seeds", "30", "--out"),
@@ -85,11 +84,11 @@ def at_work(name: str, out: Path) -> "subprocess.Popen[str]":
     )
 
 
-def a_worker(process: "subprocess.Popen[str]") -> int:
-    """One of the command's processes, when it is busy."""
+def a_worker(process: "subprocess.Popen[str]", busy_s: float = 2.0) -> int:
+    """One of the command's processes, when it has computed for so long."""
     while True:
         for pid, seconds in in_session(process.pid).items():
-            if pid != process.pid and seconds > BUSY_S:
+            if pid != process.pid and seconds > busy_s:
                 return pid
         assert process.poll() is None
         time.sleep(0.02)
@@ -122,7 +121,7 @@ def test_a_process_that_is_killed_is_said_with_a_code_of_its_own(tmp_path: Path,
 @pytest.mark.slow
 def test_processes_end_with_the_command_that_is_killed(tmp_path: Path) -> None:
     with at_work("faults", tmp_path) as process:  # whose processes have copies of their own
-        a_worker(process)
+        a_worker(process, 0.1)
         process.kill()
         process.communicate()
     while in_session(process.pid):

@@ -1,7 +1,7 @@
-"""The invariants of docs/safety.md under every pair of faults, begun in every phase of the modes.
+"""The invariants of docs/safety.md under pairs of faults, begun in every phase of the modes.
 
 A controller node with the emulated drive behind it, on a table. A walk, drawn from a seed, brings
-it into each phase, lets each fault and each order begin there and every other fault follow. Each
+it into each phase, lets each fault and each order begin there and other faults follow. Each
 tick is judged by the fault table and by the bench's own knowledge of what was ordered. What only
 monitors find, or a valve, a second sensor or hard-wired inputs have, is put into what is
 judged: here are none of them to say it. `utank-hil faults` has the real ones.
@@ -412,13 +412,15 @@ class Walk:
         self.pairs[events[0], events[-1]] += 1
         table.run(10 * draw.randint(0, 10))
 
-    def all_pairs(self) -> None:
-        """Every fault after every fault, the first in one phase after the other."""
+    def pairs_of_faults(self, most: int) -> None:
+        """Faults after every fault, so many of them, the first in one phase after the other."""
         faults, phases = list(BEGIN_AND_END), list(PHASES)
         pairs = [(first, then) for first in faults for then in faults if first != then]
         self.draw.shuffle(pairs)
         turn: Counter[str] = Counter()
         for first, then in pairs:
+            if turn[first] == most and "found" not in first:  # that is one condition each time
+                continue
             phase = phases[(turn[first] + faults.index(first)) % len(phases)]
             turn[first] += 1
             self.go(phase, (first, then))
@@ -438,10 +440,12 @@ def printed(cells: Counter[tuple[str, str]]) -> str:
 
 
 @pytest.mark.slow
-def test_invariants_hold_in_every_phase_under_every_pair_of_faults() -> None:
+@pytest.mark.evidence("every-pair")
+@pytest.mark.parametrize("most", [len(PHASES), len(BEGIN_AND_END)], ids=["some", "every-pair"])
+def test_invariants_hold_in_every_phase_under_pairs_of_faults(most: int) -> None:
     walk = Walk(SEED)
     try:
-        walk.all_pairs()
+        walk.pairs_of_faults(most)
     except AssertionError:
         print(f"seed {SEED}, at {walk.table.ms:.0f} ms: {list(walk.cells)[-3:]}")
         raise
@@ -451,7 +455,8 @@ def test_invariants_hold_in_every_phase_under_every_pair_of_faults() -> None:
               if not walk.cells[phase, event]]  # fmt: skip
     assert not missed
     faults = list(BEGIN_AND_END)
-    assert all(walk.pairs[one, two] for one in faults for two in faults if one != two)
+    followers = Counter(one for one, two in walk.pairs if two in faults and one != two)
+    assert min(followers[one] for one in faults) == min(most, len(faults) - 1)
     known = {row.code for row in FAULTS}
     assert walk.table.named - {Fault.NONE} == known, known - walk.table.named
     assert all(walk.table.began[each] for row in FAULTS for each in row.conditions if each.findings)

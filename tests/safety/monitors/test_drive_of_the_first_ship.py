@@ -33,7 +33,7 @@ def drive_findings(
         found = monitor.update(
             command, actual(t, right), 0.0, rate_m_s, enabled=True, limited=limited
         )
-        for finding in Finding:
+        for finding in Finding if found else ():
             if found & finding:
                 first.setdefault(finding, t)
     return first
@@ -81,7 +81,7 @@ def off_findings(pressure_pa, level_m=0.0, seconds: float = 3.0, limited: bool =
         t = k * STEP_S
         off = {"enabled": False, "limited": limited}
         found = monitor.update(0.0, pressure_pa(t), level_m, 0.0, **off)
-        for finding in Finding:
+        for finding in Finding if found else ():
             if found & finding:
                 first.setdefault(finding, t)
     return first

@@ -21,7 +21,7 @@ def found_after(fault, until_s: float = 60.0, roll_deg: float = 0.5) -> dict[Fin
         if t >= FAULT_S:
             sample = fault(t - FAULT_S, *sample)
         found = monitor.update(*sample, STEP_S)
-        for finding in Finding:
+        for finding in Finding if found else ():
             if found & finding:
                 first.setdefault(finding, t - FAULT_S)
     return first

@@ -24,7 +24,7 @@ def found_after(ship: MovingShip, fault, until_s: float = 60.0) -> dict[Finding,
             sample = fault(t, *sample)
         found = equation.update(*sample)
         found |= stuck.update(*sample, equation.slope_push)
-        for finding in Finding:
+        for finding in Finding if found else ():
             if found & finding:
                 first.setdefault(finding, t - FAULT_S)
     return first
