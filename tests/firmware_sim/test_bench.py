@@ -100,7 +100,7 @@ def test_plans_that_were_not_found_in_time_are_told() -> None:
     starved = hurried.model_copy(
         update={"law": dataclasses.replace(hurried.law, iteration_limit=1)}
     )
-    changes = {"controllers": {"starved": starved}, "settle_s": 5.0, "duration_s": 60.0}
+    changes = {"controllers": {"starved": starved}, "settle_s": 5.0, "duration_s": 20.0}
     result = run_in_turn(scenario.model_copy(update=changes), scenario.seed)
     passive, run = result.runs
     assert passive.fallbacks is None

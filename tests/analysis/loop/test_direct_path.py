@@ -143,12 +143,13 @@ def test_margins_are_those_of_python_control_and_where_the_loop_turns_unstable(l
     assert found.peak_sensitivity == pytest.approx(1 / distance, rel=1e-3)
     assert closed_loop_radius(law, plant, found.gain_high * 0.999) < 1
     assert closed_loop_radius(law, plant, found.gain_high * 1.001) > 1
-    late = [
-        closed_loop_radius(law, sample(system, 0.1, DELAY_S + extra_s, LAG_S))
-        for extra_s in 0.01 * np.arange(251)
-    ]
-    first = 0.01 * np.argmax(np.array(late) >= 1) if max(late) >= 1 else np.inf
-    assert found.delay_margin_s == pytest.approx(first, abs=0.011)
+
+    def late(extra_s):
+        return closed_loop_radius(law, sample(system, 0.1, DELAY_S + extra_s, LAG_S))
+
+    sound_s = min(found.delay_margin_s - 0.01, 2.5)
+    assert max(map(late, [*np.arange(0, sound_s, 0.05), sound_s])) < 1
+    assert found.delay_margin_s == np.inf or late(found.delay_margin_s + 0.01) >= 1
 
 
 def test_direct_paths_that_leave_the_command_undetermined_are_an_error():
