@@ -30,8 +30,7 @@ _PAIRS = (
     ("gm_m", "stiffness_nm_rad"),
     ("roll_period_s", "inertia_kg_m2"),
     ("damping_ratio", "damping_nms_rad"),
-)
-"""Pairs of a naval architect's key and `RollShip`'s for the same quantity."""
+)  # Pairs of a naval architect's key and `RollShip`'s for the same quantity.
 
 _UNITS = {
     "displacement_t": "it is in tonnes",
@@ -63,36 +62,25 @@ def weather_criterion_period_s(
 class WrittenShip(RollShip):
     """A ship as written in a file: each quantity by one of its possible keys.
 
-    Parameters
-    ----------
-    displacement_t : float
-        Displacement of the ship without the tank's water; instead of `displacement_n`.
-    gm_m : float
-        Metacentric height without the tank's water; with `displacement_t` instead of
-        `stiffness_nm_rad`.
-    roll_period_s : float
-        Natural roll period without the tank's water; instead of `inertia_kg_m2`.
-    beam_m, draught_m, length_m : float
-        Dimensions of the hull at the waterline; instead of `roll_period_s`.
-    damping_ratio : float
-        Damping ratio of the ship's roll; instead of `damping_nms_rad`.
-
-    Raises
-    ------
-    ValueError
-        If a quantity is given twice or not at all.
+    ValueError is raised if a quantity is given twice or not at all.
     """
 
     inertia_kg_m2: Annotated[float, Range(above=0, most=_MOST)] = NOT_GIVEN
     stiffness_nm_rad: Annotated[float, Range(above=0, most=_MOST)] = NOT_GIVEN
     damping_nms_rad: Annotated[float, Range(least=0, most=_MOST)] = NOT_GIVEN
     displacement_n: Annotated[float, Range(least=0, most=_MOST)] = NOT_GIVEN
+    #: Displacement of the ship without the tank's water; instead of `displacement_n`.
     displacement_t: Annotated[float, Range(above=0, most=1e9)] = NOT_GIVEN
+    #: Metacentric height without the tank's water; with `displacement_t` instead of
+    #: `stiffness_nm_rad`.
     gm_m: Annotated[float, Range(above=0, most=1e3)] = NOT_GIVEN
+    #: Natural roll period without the tank's water; instead of `inertia_kg_m2`.
     roll_period_s: Annotated[float, Range(above=0, most=1e4)] = NOT_GIVEN
+    #: Dimensions of the hull at the waterline; instead of `roll_period_s`.
     beam_m: _Length = NOT_GIVEN
     draught_m: _Length = NOT_GIVEN
     length_m: _Length = NOT_GIVEN
+    #: Damping ratio of the ship's roll; instead of `damping_nms_rad`.
     damping_ratio: Annotated[float, Range(least=0, most=1e3)] = NOT_GIVEN
 
     def __post_init__(self) -> None:

@@ -188,8 +188,7 @@ AnySpectrum = Annotated[
     | IttcSpectrum
     | PiersonMoskowitzSpectrum,
     Field(discriminator="kind"),
-]
-"""A spectrum, chosen by its kind."""
+]  #: A spectrum, chosen by its kind.
 
 _SPECTRUM: Final[TypeAdapter[Any]] = TypeAdapter(AnySpectrum)
 

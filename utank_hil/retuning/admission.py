@@ -16,10 +16,8 @@ from utank_hil.retuning.law_bank import MonitoredLaw
 
 WARM_UP_SAMPLES: Final = 1000
 """Past samples that a new law is stepped through: more than the memory of any law or washout."""
-WARM_UP_CHUNK: Final = 50
-"""Number of warm-up samples processed in one sample time."""
-GAIN_FACTOR: Final = 30.0
-"""Largest gains of a candidate, relative to the configured law's."""
+WARM_UP_CHUNK: Final = 50  #: Number of warm-up samples processed in one sample time.
+GAIN_FACTOR: Final = 30.0  #: Largest gains of a candidate, relative to the configured law's.
 ANOTHER_QUESTION: Final = "the retuner answered another question"
 MOST_COEFFICIENTS: Final = 1e9
 """Largest sum of the gains on a reference; it prevents an overflow. Chosen; no study."""

@@ -28,8 +28,7 @@ LONGEST_BYTES: Final = OVERHEAD_BYTES + max(
     8 * (MOST_ORDER * (1 + _MOST_OUTPUTS) + MOST_SAMPLES * _MOST_OUTPUTS),
     8 * max(MOST_NUMBERS, 3 * MOST_BANDS),
     4 * _MOST_REASONS * _MOST_CHARACTERS,  # A character has up to four bytes.
-)
-"""Length of the longest answer that can be read."""
+)  #: Length of the longest answer that can be read.
 
 
 @dataclass(frozen=True, slots=True, eq=False)

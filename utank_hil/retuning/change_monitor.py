@@ -12,8 +12,7 @@ from utank_hil.base.elementary import exp, log
 from utank_hil.canbus import Verdict
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 
-SIGNIFICANT: Final = 3.0
-"""Number of standard deviations from which a difference is significant."""
+SIGNIFICANT: Final = 3.0  #: Number of standard deviations from which a difference is significant.
 
 
 class ChangeMonitor:

@@ -19,8 +19,7 @@ FIRST: Final = 0.5
 """Share before anything is known: a quarter of the power, three quarters of most of the gain."""
 MEMORY_PERIODS: Final = 8.0
 """Roll periods in the means; five and eight gave the same roll in eleven seas."""
-PACE: Final = 2.0
-"""Speed of the share over that of the means."""
+PACE: Final = 2.0  #: Speed of the share over that of the means.
 
 
 class Effort:

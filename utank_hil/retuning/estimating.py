@@ -14,10 +14,8 @@ from utank_hil.identification.motion_fit import KNOWN_SPREAD, MotionFit, fit_mot
 from utank_hil.retuning.estimate import EstimateRequest, MotionEstimate, ShipFigures
 from utank_hil.retuning.estimator import COLUMNS
 
-LEAST_PERIODS: Final = 45.0
-"""Shortest record in natural roll periods."""
-MOST_MISSING: Final = 0.05
-"""Largest share of missing samples; gaps are interpolated."""
+LEAST_PERIODS: Final = 45.0  #: Shortest record in natural roll periods.
+MOST_MISSING: Final = 0.05  #: Largest share of missing samples; gaps are interpolated.
 LEAST_CLEAR: Final = 0.8
 """Smallest share of the wave moment's energy in bands above the sensors' noise."""
 STIFFNESS_DEVIATION: Final = 0.03

@@ -26,10 +26,8 @@ COLUMNS: Final = ("pressure_pa", "roll_rad", "roll_rate_rad_s", "level_m")
 """Columns of the motion record."""
 SAMPLE_TIME_S: Final = 0.2
 """Sample time of the record; its Nyquist frequency is six times `motion_fit.TOP_RAD_S`."""
-LONGEST_RECORD_S: Final = 3600.0
-"""Longest record: a sea counts as stationary for one hour."""
-OUTDATED: Final = 3.0
-"""Number of intervals after which an estimate is outdated: two may fail."""
+LONGEST_RECORD_S: Final = 3600.0  #: Longest record: a sea counts as stationary for one hour.
+OUTDATED: Final = 3.0  #: Number of intervals after which an estimate is outdated: two may fail.
 SHIP_OUTDATED_S: Final = 3600.0
 """Time for which an identified ship is shown, or three intervals if that is longer. Within an hour
 loading and tanks hardly change a ship at sea.
@@ -70,8 +68,7 @@ class EstimateFigures:
     #: of_sea, of_ship: whether the estimate of waves and ship is good now.
     of_sea: Verdict = Verdict.RECORD_SHORT
     of_ship: Verdict = Verdict.RECORD_SHORT
-    #: hs_m, tp_s: significant height and peak period of beam waves.
-    hs_m: float = nan
+    hs_m: float = nan  #: hs_m, tp_s: significant height and peak period of beam waves.
     tp_s: float = nan
     #: moment_rms_rad, moment_deviation: root mean square of the wave moment per roll stiffness; its
     #: relative standard deviation.

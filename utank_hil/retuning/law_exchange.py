@@ -47,8 +47,7 @@ EARLY_FACTOR: Final = 1.5
 """A law this much worse than the trial allows is dropped before the end of the trial."""
 TRIAL_PATIENCE: Final = 1.5
 """Times its length at which a trial without enough measurements is given up."""
-MOST_EVENTS: Final = 1000
-"""Number of events kept: two days of one retuning every three minutes."""
+MOST_EVENTS: Final = 1000  #: Number of events kept: two days of one retuning every three minutes.
 RETRY_NS: Final = 600_000_000_000
 """Shortest time from a failed or undone exchange to the next one without an order."""
 BUSY_NS: Final = 30_000_000_000

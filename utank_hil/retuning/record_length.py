@@ -9,12 +9,10 @@ from typing import Final
 
 from utank_hil.base.parameters import Problem
 
-VALIDATION_SHARE: Final = 0.2
-"""Share of the record, at its end, that validates the model."""
+VALIDATION_SHARE: Final = 0.2  #: Share of the record, at its end, that validates the model.
 LEAST_PREDICTIONS: Final = 100
 """Smallest number of predictions on validation data. Chosen; no study."""
-LAGS: Final = 25
-"""Largest lag of the whiteness test, in samples."""
+LAGS: Final = 25  #: Largest lag of the whiteness test, in samples.
 
 _OFFSET_AND_WAVE: Final = 3  # These are the disturbance functions that are fitted with the model.
 

@@ -40,20 +40,16 @@ from utank_hil.retuning.record_length import (
 )
 from utank_hil.retuning.recorded_waves import RecordedWaves, RmsResponse
 
-MOST_MISSING = 0.2
-"""Largest share of missing samples. Chosen; no study."""
+MOST_MISSING = 0.2  #: Largest share of missing samples. Chosen; no study.
 LEAST_MOTION = (10.0, 1e-6)
 """Smallest peak-to-peak value of the command in Pa, and of each output in its unit."""
-OFFSET = 0
-"""Degree of the polynomial disturbance: it models a steady heel and a sensor's bias."""
-LARGEST = 1e9
-"""Largest command and output in SI units; larger values mean a wrong unit."""
+OFFSET = 0  #: Degree of the polynomial disturbance: it models a steady heel and a sensor's bias.
+LARGEST = 1e9  #: Largest command and output in SI units; larger values mean a wrong unit.
 LEAST_GAIN = 0.05
 """Smallest relative reduction of the roll against the configured law; less is within the error of
 the simulation in the recorded waves.
 """
-ROLL_PART = 1.02
-"""Largest roll in the recorded waves, relative to the passive tank's."""
+ROLL_PART = 1.02  #: Largest roll in the recorded waves, relative to the passive tank's.
 EFFORT_PART = 0.9
 """Largest pressure RMS in the recorded waves, relative to the pump's greatest pressure."""
 

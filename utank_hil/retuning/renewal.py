@@ -17,8 +17,7 @@ from utank_hil.sea import SlopeSpectrum
 
 TAIL_SHARE: Final = 0.15
 """Share of the bands, at the upper end, from which the tail is computed. Chosen; no study."""
-ROLL_PART: Final = 1.0
-"""Largest predicted roll, relative to the passive tank's."""
+ROLL_PART: Final = 1.0  #: Largest predicted roll, relative to the passive tank's.
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,8 +33,7 @@ MOST_NUMBERS: Final = (
     MOST_STATES * (3 + 3 * MOST_STATES + 2 * _MOST_OUTPUTS + MOST_KNOTS)
     + MOST_KNOTS * (1 + MOST_KNOTS + MOST_SAMPLES * _MOST_OUTPUTS)
     + 2 * _MOST_OUTPUTS
-)
-"""Most numbers in the arrays of a message."""
+)  #: Most numbers in the arrays of a message.
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,8 +10,7 @@ from utank_hil.retuning.estimate import EstimateRequest, MotionEstimate
 Request = FloatArray | EstimateRequest | MotionEstimate
 """A record, shape (N, 1 + m), rows (command, outputs...); or the input of estimate or renewal."""
 
-RetuneFunction = Callable[[Any], Answer]
-"""Function from a request to an answer."""
+RetuneFunction = Callable[[Any], Answer]  #: Function from a request to an answer.
 
 
 class Work(NamedTuple):

@@ -11,8 +11,7 @@ EARLIEST_VERDICT_S: Final = 30.0
 """Shortest time after which a trial is judged: a few roll periods."""
 
 _SWEPT: Final = ("multisine", "chirp")
-_BAND_RAD_S: Final = (0.2, 1.2)
-"""Band of ship and tank: roll periods of 5 to 31 s."""
+_BAND_RAD_S: Final = (0.2, 1.2)  # Band of ship and tank: roll periods of 5 to 31 s.
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,8 +20,7 @@ _NETCDF: Final = {
     "spectral_wave_density": "read_ndbc",
     "density": "read_ncswan",
     "efth": "read_ww3",
-}
-"""Readers of netCDF files, by a variable that the file of the program has."""
+}  # Readers of netCDF files, by a variable that the file of the program has.
 _TEXT: Final = {"SWAN": "read_swan", "'WAVEWATCH": "read_ww3_station"}
 """Readers of ``.spec`` files, by their first word."""
 _NEAR_DEG: Final = 0.5

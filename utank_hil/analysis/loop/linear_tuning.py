@@ -51,10 +51,8 @@ LinearKind = Literal["gpc", "dpc", "lqg"]
 LINEAR_KINDS: Final[tuple[LinearKind, ...]] = get_args(LinearKind)
 LinearDesign = PredictiveDesign | LQGDesign
 
-STEP: Final = 2.0
-"""Factor between successive trials of the weights. Chosen; no study."""
-MOST_TRIALS: Final = 16
-"""Limit on trials, down to weights of 2^-15. Chosen; no study."""
+STEP: Final = 2.0  #: Factor between successive trials of the weights. Chosen; no study.
+MOST_TRIALS: Final = 16  #: Limit on trials, down to weights of 2^-15. Chosen; no study.
 
 
 class _Shipped(NamedTuple):
@@ -82,16 +80,12 @@ _SHIPPED: Final[dict[LinearKind, _Shipped]] = {
 }
 _STEPS: Final = (4.0, 2.0, 1.15, 2.0)
 """First step of each factor: on weights, noises, peak and damping. Chosen; no study."""
-_SIZES: Final = 3
-"""Number of step sizes, each the square root of the one before. Chosen; no study."""
-_SWEEPS: Final = 3
-"""Limit on passes over the factors with one step size. Chosen; no study."""
-_MOST_DAMPING: Final = 1.0
-"""Limit on the damping of the predictor's waves: critical damping."""
+_SIZES: Final = 3  # Number of step sizes, each the square root of the one before. Chosen; no study.
+_SWEEPS: Final = 3  # Limit on passes over the factors with one step size. Chosen; no study.
+_MOST_DAMPING: Final = 1.0  # Limit on the damping of the predictor's waves: critical damping.
 _SLOPE: Final = 1.46
 """Significant slope of the sea assumed for the scaled law, over the passive roll's RMS."""
-_OMEGA: Final = np.geomspace(0.1, 10.0, 600)
-"""Wave frequencies over the roll frequency."""
+_OMEGA: Final = np.geomspace(0.1, 10.0, 600)  # Wave frequencies over the roll frequency.
 
 
 @dataclass(frozen=True, slots=True)

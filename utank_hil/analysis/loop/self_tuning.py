@@ -51,23 +51,17 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea import ittc
 
-_PRESSURE_COST: Final = 0.106
-"""Cost of constant pressure at its limit, over s^2."""
-_LEVEL_COST: Final = 0.33
-"""Cost of a constant level at its limit h, over s^2."""
+_PRESSURE_COST: Final = 0.106  # Cost of constant pressure at its limit, over s^2.
+_LEVEL_COST: Final = 0.33  # Cost of a constant level at its limit h, over s^2.
 _PRESSURE_NOISE: Final = 11.0
 """White pressure disturbance over P s / sqrt(w), s in rad; it stands for what the model neglects.
 """
-_SLOPE_NOISE: Final = 0.046
-"""Least white noise of the slope, over s / sqrt(w)."""
-_HEEL: Final = 0.13
-"""Standard deviation of the heel over s."""
+_SLOPE_NOISE: Final = 0.046  # Least white noise of the slope, over s / sqrt(w).
+_HEEL: Final = 0.13  # Standard deviation of the heel over s.
 _SMOOTHING: Final = 0.028
 """Smoothing width of the sea's density over w: 0.014 rad/s at a roll period of 12.6 s."""
-_KNOB: Final = (1e-4, 3.0)
-"""Range of the squared added slope noise over s^2 / w."""
-_BISECTIONS: Final = 5
-"""Number of bisections, which bring the range of `_KNOB` to a factor of 1.4."""
+_KNOB: Final = (1e-4, 3.0)  # Range of the squared added slope noise over s^2 / w.
+_BISECTIONS: Final = 5  # Number of bisections, which bring the range of `_KNOB` to a factor of 1.4.
 _ORDER: Final = 16
 """States of the sea, twice the default of `SeaModel`, because the noise provides the margins."""
 _LEAST_FLOOR: Final = 1.3e-4
@@ -79,16 +73,12 @@ _UNKNOWN: Final = ((0.5, 0.017), (0.8, 0.017), (1.4, 0.0026))
 """Wave systems assumed for an unknown sea: peak periods over the roll period, and heights in m per
 square second of the peak period: 0.7, 1.7 and 0.8 m at 6, 10 and 18 s for a roll period of 12.6 s.
 """
-_UNKNOWN_SLOPE: Final = 0.5
-"""Effective slope of an unknown sea: the default of `SeaModel`."""
+_UNKNOWN_SLOPE: Final = 0.5  # Effective slope of an unknown sea: the default of `SeaModel`.
 _MORE_NOISE: Final = 1.5
 """Factor on the least noise; at the edge of stability a filter has no freedom."""
-_MORE_NOISES: Final = 6
-"""Limit on the number of noise levels tried. Chosen; no study."""
-_COSTLIER: Final = 3.0
-"""Factor between successive trial weights on pressure."""
-_MOST_STEPS: Final = 8
-"""Limit on the number of trial weights. Chosen; no study."""
+_MORE_NOISES: Final = 6  # Limit on the number of noise levels tried. Chosen; no study.
+_COSTLIER: Final = 3.0  # Factor between successive trial weights on pressure.
+_MOST_STEPS: Final = 8  # Limit on the number of trial weights. Chosen; no study.
 _MOST_GROWTH: Final = 1.5
 """Allowed growth over a plan of an oscillation with the pump at its limit; the plan predicts it."""
 _PARTS: Final = np.linspace(0.02, 1.0, 50)

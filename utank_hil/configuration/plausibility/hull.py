@@ -14,8 +14,7 @@ _ROLL_RAD = math.radians(10)
 _SPEED_M_S = 10.0  # a usual service speed
 _RIGHTING_RAD = math.radians(15)
 """Half of the 30 degrees at which the IS Code 2008 (part A, 2.2.2) asks for a righting lever."""
-_NOTHING = 1e-3
-"""Share of the tank's width below which a distance that is given has no effect."""
+_NOTHING = 1e-3  # Share of the tank's width below which a distance that is given has no effect.
 _PER_1000 = math.sqrt(1000)  # period factor if inertia or stiffness is in thousands
 
 

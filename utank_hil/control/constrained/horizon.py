@@ -98,6 +98,8 @@ def condense(
 ) -> Horizon:
     """Compute cost and predictions of a plan.
 
+    ValueError is raised if the knots or a weight are out of their range.
+
     Parameters
     ----------
     model : LinearModel
@@ -116,11 +118,6 @@ def condense(
         L.
     correction : ndarray, shape (n,), optional
         From the state to an addition to each sample's command, which does not depend on commands.
-
-    Raises
-    ------
-    ValueError
-        If the knots or a weight are out of their range.
     """
     weights = np.append(output_weight, input_weight)
     if not (np.isfinite(weights).all() and np.min(output_weight) >= 0 and input_weight > 0):

@@ -43,10 +43,8 @@ _FOLLOWED = 0.02  # over the greatest pressure; a mean command this near the pla
 class ConstrainedLaw:
     """Parameters of a `ConstrainedController`; a linear law while no limit is active.
 
-    Raises
-    ------
-    ValueError
-        If a value is out of its range, or the power is limited and no level is measured.
+    ValueError is raised if a value is out of its range, or the power is limited and no level is
+    measured.
     """
 
     model: LinearModel  #: Discrete, from the pump's command to the m measured outputs.
