@@ -11,7 +11,7 @@ import numpy as np
 
 from firmware_sim.place import Place
 from utank_hil.analysis.motion.comfort import Comfort, comfort
-from utank_hil.analysis.motion.exceedance import exceedance, rayleigh_exceedance
+from utank_hil.analysis.motion.statistics import exceedance, rayleigh_exceedance
 from utank_hil.base.arrays import FloatArray
 
 LEVELS_RAD: Final = tuple(math.radians(degrees) for degrees in (2.5, 5.0, 7.5, 10.0, 15.0, 20.0))

@@ -16,8 +16,7 @@ from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
-from utank_hil.dynamics.water import water_moments
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank, water_moments
 from utank_hil.sea import Harmonics
 
 SAILING_TICKS = 100  #: Ticks between updates of the ship's parameters: 1 s.

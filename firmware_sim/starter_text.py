@@ -15,7 +15,7 @@ from utank_hil.analysis.tank_sizing import (
 )
 from utank_hil.configuration.ship_keys import WrittenShip
 from utank_hil.dynamics.pump import Pump
-from utank_hil.dynamics.water import water_moments
+from utank_hil.dynamics.tank import water_moments
 
 
 def number(value: float) -> str:

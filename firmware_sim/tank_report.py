@@ -7,12 +7,12 @@ from typing import Any
 
 from rich.table import Table
 
-from utank_hil.analysis.tank_design import TankFigures
 from utank_hil.analysis.tank_prediction import LoadingPoint, RollPrediction, SweepPoint
 from utank_hil.analysis.tank_sizing import TankCost
 from utank_hil.base.finite import finite
 from utank_hil.console.terminal import new_table
-from utank_hil.dynamics.water import water_moments
+from utank_hil.control.optimal_tank import TankFigures
+from utank_hil.dynamics.tank import water_moments
 
 Rows = list[tuple[str, str]]
 

@@ -272,7 +272,7 @@ def retuning_task(
     `order` is that of the ARX model, `roll_period_range_s` that of the ships that the stability
     booklet covers. Raises `ValueError` if the law is not one that can be designed anew.
     """
-    from utank_hil.identification.acceptance import ModelLimits  # here: scipy.optimize
+    from utank_hil.identification.ship_fit import ModelLimits  # here: scipy.optimize
     from utank_hil.retuning.redesign import RetuningTask
 
     design = config.law

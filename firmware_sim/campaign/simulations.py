@@ -12,13 +12,13 @@ from firmware_sim.figures import LEAST_ROLL_RAD, NO_TANK, bare_figures, run_figu
 from firmware_sim.plant import Plant
 from firmware_sim.run import RECORD_S, roll_without_tank
 from firmware_sim.scenario import PASSIVE, Scenario
+from utank_hil.analysis.loop import sea_response
 from utank_hil.analysis.loop.loop_simulation import (
     SensorNoise,
     passive_motion,
     run_law,
     simulate_loop,
 )
-from utank_hil.analysis.motion import bare_ship
 from utank_hil.analysis.motion.statistics import (
     PumpStatistics,
     RollStatistics,
@@ -155,7 +155,7 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
     at_rest = np.zeros(count)
     yield _Record(
         NO_TANK,
-        bare_ship.roll_without_tank(ship, moment, RECORD_S, count),
+        sea_response.roll_without_tank(ship, moment, RECORD_S, count),
         at_rest,
         at_rest,
         at_rest,

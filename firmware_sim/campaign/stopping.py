@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from firmware_sim.campaign.study import Case, Scalar, Stop
 from firmware_sim.figures import NO_TANK
-from utank_hil.analysis.motion.confidence import mean_interval
+from utank_hil.analysis.motion.statistics import mean_interval
 
 _NOTHING: Final[Mapping[str, float]] = {}
 

@@ -12,7 +12,7 @@ from firmware_sim.campaign.store import Results
 from firmware_sim.campaign.study import Case, Scalar, Stop
 from firmware_sim.campaign.work import FAILED, OK
 from firmware_sim.figures import LEAST_ROLL_RAD, NO_TANK
-from utank_hil.analysis.motion.confidence import mean_interval
+from utank_hil.analysis.motion.statistics import mean_interval
 
 ROLL: Final = "roll_rms_rad"
 Figure = dict[str, float | int | None]

@@ -49,13 +49,13 @@ def tank(
     **Example:** utank-hil design tank configs/ships/naval_vessel.yaml --sweep
     """
     from firmware_sim.tank_report import loading_table, sweep_json, sweep_tables
-    from utank_hil.analysis.tank_design import best_passive_tank
     from utank_hil.analysis.tank_prediction import (
         loading_sensitivity,
         predict_roll,
         roll_curves,
         sweep_tank,
     )
+    from utank_hil.control.optimal_tank import best_passive_tank
     from utank_hil.pictures.tank import draw_sweep, draw_tank
 
     loaded = load(vessel, Vessel)
@@ -148,8 +148,8 @@ def _plant(vessel: Vessel, tank: Tank) -> "DesignPlant":
 
 def _figures(vessel: Vessel, tank: Tank, found: "RollPrediction | None") -> dict[str, Any]:
     from firmware_sim.tank_report import prediction_json
-    from utank_hil.analysis.tank_design import tank_figures
     from utank_hil.analysis.tank_sizing import tank_cost
+    from utank_hil.control.optimal_tank import tank_figures
 
     return {
         **asdict(tank_figures(vessel.ship, tank)),
@@ -163,8 +163,8 @@ def _table(
 ) -> Table:
     """Table of the present tank beside the best passive one."""
     from firmware_sim.tank_report import cost_rows, figure_rows, roll_rows
-    from utank_hil.analysis.tank_design import tank_figures
     from utank_hil.analysis.tank_sizing import tank_cost
+    from utank_hil.control.optimal_tank import tank_figures
 
     table = new_table(f"Tank of {vessel.name}", *tanks, caption=caption)
     columns = []

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from utank_hil.analysis.motion.confidence import mean_interval
+from utank_hil.analysis.motion.statistics import mean_interval
 from utank_hil.base.arrays import FloatArray
 
 

@@ -18,7 +18,7 @@ from firmware_sim.comparison.difference import (
     same_runs,
 )
 from firmware_sim.plant_kernel import CAPSIZE_RAD
-from utank_hil.analysis.motion.confidence import batch_means, rms_batches
+from utank_hil.analysis.motion.statistics import batch_means, rms_batches
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Mode
 from utank_hil.telemetry.recording import read_about

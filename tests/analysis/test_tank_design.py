@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rolling_ship import SHIP, TANK
 
-from utank_hil.analysis.tank_design import best_passive_tank, tank_figures
+from utank_hil.control.optimal_tank import best_passive_tank, tank_figures
 from utank_hil.dynamics import Tank, coupled_model
 from utank_hil.dynamics.linear import coupled_matrices
 

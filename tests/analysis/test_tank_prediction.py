@@ -17,7 +17,7 @@ from utank_hil.analysis.tank_sizing import TankRoom, size_tank, stability_taken
 from utank_hil.configuration.ship_keys import WrittenShip
 from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.control.optimal_tank import ship_ratios
-from utank_hil.dynamics import RollModel, coupled_model, simulate
+from utank_hil.dynamics import RollModel, simulate
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.pump import AT_REST, Pump, pump_step
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea, jonswap
@@ -130,9 +130,7 @@ def test_loading_changes_the_roll_and_the_nominal_one_is_the_prediction() -> Non
     assert points[0.7].without_tank_rad == pytest.approx(other.without_tank_rad)
     # the law is the one made for the nominal ship
     law, measured = FOUND.law.design.law(PLANT), FOUND.law.design.predictor.measured
-    active = motion_in_sea(
-        law, coupled_model(stiff, TANK), measured, moment, PLANT.delay_s, PLANT.lag_s
-    )
+    active = motion_in_sea(law, dataclasses.replace(PLANT, ship=stiff), measured, moment)
     assert points[0.7].active_rad == pytest.approx(active.roll_rms_rad)
 
 

@@ -17,7 +17,7 @@ from firmware_sim.campaign.work import run_batch
 from firmware_sim.commands.compare import compare
 from firmware_sim.comparison.difference import independent, paired
 from firmware_sim.comparison.records import batch_count
-from utank_hil.analysis.motion.confidence import batch_means, rms_batches
+from utank_hil.analysis.motion.statistics import batch_means, rms_batches
 from utank_hil.canbus.enumerations import Mode
 from utank_hil.console.common import new_app
 from utank_hil.telemetry.recording import write_recording

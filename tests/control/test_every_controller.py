@@ -23,11 +23,11 @@ from utank_hil.control import (
 from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
 from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.indirect import IndirectFuzzy
+from utank_hil.control.fuzzy.law import ErrorDynamics
 from utank_hil.control.interface import StartsAnew
 from utank_hil.control.lqg import design_lqr
 from utank_hil.control.semi_active import ClippedValve, OnOffValve
 from utank_hil.control.stimulation import Stimulation
-from utank_hil.control.tracking_error import ErrorDynamics
 from utank_hil.dynamics import RollModel
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import sample

@@ -6,10 +6,10 @@ from rolling_ship import SHIP, TANK
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.analysis.loop.margins import margins
+from utank_hil.control import DesignPlant
 from utank_hil.control.gain import GainLaw
 from utank_hil.control.optimal_tank import passive_optimum, ship_ratios
 from utank_hil.control.pd import PD_MEASURED, design_pd
-from utank_hil.dynamics import coupled_model
 from utank_hil.dynamics.linear import coupled_matrices, pump_model
 
 
@@ -27,7 +27,7 @@ def test_level_in_a_ship_held_still_has_the_optimal_frequency_and_damping():
 def test_roll_over_frequency_peaks_at_the_optimum_when_the_loop_is_fast():
     law = design_pd(SHIP, TANK, sample_time_s=1e-3)
     ratios, ship_frequency = ship_ratios(SHIP, TANK)
-    model = coupled_model(SHIP, TANK)
+    model = DesignPlant(SHIP, TANK, delay_s=0.0, lag_s=0.0)
     w = np.linspace(0.3, 0.9, 4000)
     motions, _ = closed_loop_response(law, model, PD_MEASURED, w)
     static_heel = 1 / coupled_matrices(SHIP, TANK)[2][0, 0]

@@ -12,8 +12,7 @@ from test_semi_active import PLANT, VALVE
 
 from utank_hil.analysis.loop.robustness import robustness
 from utank_hil.control.passive import PassiveDesign
-from utank_hil.control.pump_with_valve import PumpWithValve, PumpWithValveDesign
-from utank_hil.control.semi_active import OnOffValveDesign
+from utank_hil.control.semi_active import OnOffValveDesign, PumpWithValve, PumpWithValveDesign
 
 
 @dataclass

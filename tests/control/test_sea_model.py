@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import solve_discrete_lyapunov, solve_toeplitz
 
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.dynamics.transfer import state_space_response
+from utank_hil.dynamics.sampling import state_space_response
 from utank_hil.sea import jonswap
 
 SPECTRUM = jonswap(4.7, 10.0)

@@ -5,11 +5,10 @@ import pytest
 from rolling_ship import SHIP, TANK
 
 from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
-from utank_hil.control.fuzzy.basis import FuzzyBasis
 from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.indirect import IndirectFuzzy
-from utank_hil.control.slope import slope_at_rest
-from utank_hil.control.tracking_error import ErrorDynamics
+from utank_hil.control.fuzzy.law import ErrorDynamics, FuzzyBasis
+from utank_hil.control.gain import slope_at_rest
 from utank_hil.dynamics import RollModel
 from utank_hil.dynamics.linear import state_matrices
 

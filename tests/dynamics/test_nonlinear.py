@@ -15,8 +15,8 @@ from scipy.integrate import simpson
 
 from tools.thesis.reference import simulate_reference
 from utank_hil.dynamics import RollModel, RollShip, Tank, coupled_model, tank_wrench
+from utank_hil.dynamics.tank import water_moments
 from utank_hil.dynamics.valves import air_valve_loss, duct_valve_loss
-from utank_hil.dynamics.water import water_moments
 
 PAIRS = {
     "thesis_first": (THESIS_SHIP, THESIS_TANK),

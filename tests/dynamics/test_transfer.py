@@ -5,8 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from utank_hil.dynamics.sampling import LinearModel
-from utank_hil.dynamics.transfer import state_space_response
+from utank_hil.dynamics.sampling import LinearModel, state_space_response
 
 RANDOM = np.random.default_rng(5)
 

@@ -3,7 +3,7 @@ import pytest
 from streamline import GRAVITY, Motion, apply, particles, rotation
 
 from utank_hil.dynamics import Tank, tank_wrench
-from utank_hil.dynamics.water import water_moments
+from utank_hil.dynamics.tank import water_moments
 
 STEP = 0.01
 FIRST = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280]) / STEP

@@ -15,7 +15,7 @@ from utank_hil.analysis.loop.sea_response import motion_in_sea
 from utank_hil.base.tick import TICK_NS
 from utank_hil.cli import app
 from utank_hil.configuration import ConfigError, load_config
-from utank_hil.dynamics import coupled_model
+from utank_hil.control import DesignPlant
 
 DURATION_S = 60.0
 
@@ -46,8 +46,8 @@ def test_bench_runs_its_tank_passive(tmp_path: Path) -> None:
     vessel = scenario.vessel
     steady = run.between(DURATION_S - 12.0, DURATION_S)
     roll = run.column("true_roll_rad")[steady]
-    system = coupled_model(vessel.ship, vessel.tank)
-    expected = motion_in_sea(None, system, ("roll_rad",), scenario.wave_moment(1)).roll_rms_rad
+    plant = DesignPlant(vessel.ship, vessel.tank)
+    expected = motion_in_sea(None, plant, ("roll_rad",), scenario.wave_moment(1)).roll_rms_rad
     assert np.sqrt(np.mean(roll**2)) == pytest.approx(expected, rel=0.05)
 
 

@@ -5,8 +5,7 @@ import pytest
 
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.identification import Validation
-from utank_hil.identification.acceptance import ModelLimits, model_objections
-from utank_hil.identification.ship_fit import ShipFit
+from utank_hil.identification.ship_fit import ModelLimits, ShipFit, model_objections
 
 GOOD = Validation(
     one_step_fit=np.array([0.99, 0.95]),

@@ -11,7 +11,7 @@ from roll_plant import SAMPLE_TIME_S, plant
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ARX
-from utank_hil.control.limits import PumpLimits
+from utank_hil.control.design_plant import PumpLimits
 from utank_hil.identification import (
     chirp,
     excitation_order,

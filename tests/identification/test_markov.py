@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from utank_hil.control import ARX
 from utank_hil.identification import markov_parameters
-from utank_hil.identification.markov import markov_gradient
+from utank_hil.identification.okid import markov_gradient
 
 
 def _arx(seed: int) -> ARX:

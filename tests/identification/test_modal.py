@@ -12,7 +12,7 @@ from roll_plant import FAST_PUMP, SLOW_PUMP, Plant, noisy, plant, pulses
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ARX
-from utank_hil.control.limits import PumpLimits
+from utank_hil.control.design_plant import PumpLimits
 from utank_hil.identification import (
     IdentificationError,
     era,

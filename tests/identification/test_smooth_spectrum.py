@@ -7,8 +7,7 @@ from scipy.signal import welch
 from scipy.stats import norm
 
 from utank_hil.identification import smooth_spectrum
-from utank_hil.identification.multitaper import bandwidth_rad_s, coefficients
-from utank_hil.identification.smooth_spectrum import SmoothSpectrum
+from utank_hil.identification.smooth_spectrum import SmoothSpectrum, bandwidth_rad_s, coefficients
 
 
 def test_coefficients_are_a_one_sided_density():

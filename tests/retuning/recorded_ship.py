@@ -12,7 +12,7 @@ from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import coupled_model
 from utank_hil.dynamics.sampling import sample
 from utank_hil.identification import random_pulses
-from utank_hil.identification.acceptance import ModelLimits
+from utank_hil.identification.ship_fit import ModelLimits
 from utank_hil.retuning.redesign import LEAST_GAIN, RetuningTask
 
 SAMPLE_TIME_S = 0.2

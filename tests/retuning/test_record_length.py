@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from utank_hil.configuration import ConfigError, ControllerConfig, load_config
 from utank_hil.identification import okid, validate
-from utank_hil.retuning.record_length import (
+from utank_hil.retuning.settings import (
     LAGS,
     estimation_samples,
     least_samples,

@@ -7,7 +7,7 @@ from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import CommandLimiter, DesignPlant, PumpLimits, pump_model
 from utank_hil.control.interface import LinearLaw
-from utank_hil.dynamics.linear import STATES, coupled_model, state_matrices
+from utank_hil.dynamics.linear import STATES, state_matrices
 from utank_hil.dynamics.sampling import sample
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.retuning.recorded_waves import RecordedWaves, tank_motion
@@ -24,7 +24,7 @@ UNLIMITED = PumpLimits(pressure_pa=1e9, rate_pa_s=1e12, level_m=1e6)
 def _record(pressure_pa: float) -> np.ndarray:
     """Steady waves' part of the outputs, plus what a pump pushing at random does."""
     time_s = 0.2 * np.arange(6000)
-    passive = closed_loop_response(None, coupled_model(CONFIGURED, TANK), MEASURED, OMEGA)[0][0]
+    passive = closed_loop_response(None, DesignPlant(CONFIGURED, TANK), MEASURED, OMEGA)[0][0]
     waves = np.real(1e7 * np.outer(np.exp(1j * OMEGA[0] * time_s), passive[[0, 2]]))
     u = pressure_pa * np.random.default_rng(1).standard_normal(len(time_s))
     state, outputs = np.zeros(len(PLANT.A)), np.empty((len(u), 2))
@@ -45,9 +45,9 @@ def _waves(
 
 @pytest.mark.parametrize("pressure_pa", [0.0, 1e4])
 def test_simulated_roll_is_that_of_the_frequency_response(pressure_pa: float) -> None:
-    model = coupled_model(CONFIGURED, TANK)
+    model = DesignPlant(CONFIGURED, TANK, DELAY_S, LAG_S)
     passive = closed_loop_response(None, model, MEASURED, OMEGA)[0][0, 0]
-    motions, pressure = closed_loop_response(LAW, model, MEASURED, OMEGA, DELAY_S, LAG_S)
+    motions, pressure = closed_loop_response(LAW, model, MEASURED, OMEGA)
     result = _waves(_record(pressure_pa), UNLIMITED).simulate(LAW)
     assert result.passive_roll_rad == pytest.approx(1e7 * abs(passive) / np.sqrt(2), rel=0.01)
     assert result.roll_rad == pytest.approx(1e7 * abs(motions[0, 0]) / np.sqrt(2), rel=0.02)

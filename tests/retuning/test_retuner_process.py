@@ -24,7 +24,6 @@ from utank_hil.retuning import (
     RetunerProcess,
     Work,
     retuner_process,
-    worker,
 )
 
 pytestmark = pytest.mark.slow
@@ -346,4 +345,4 @@ def test_a_worker_whose_heart_beats_is_left_alone_however_long_it_has_run(
     if child == 0:
         time.sleep(1.5)
         os._exit(3)
-    assert worker._watch(child, Desk(), os.getppid(), 0.5) == told  # type: ignore[arg-type]
+    assert retuner_process._watch(child, Desk(), os.getppid(), 0.5) == told  # type: ignore[arg-type]

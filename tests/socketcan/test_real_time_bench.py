@@ -12,7 +12,7 @@ from two_processes import CHANNEL, CONFIGS, Program, patient_controller
 from firmware_sim.bench import jobs_of
 from firmware_sim.run import RECORD_S, Run, run_lockstep
 from firmware_sim.scenario import Scenario
-from utank_hil.analysis.motion.bare_ship import roll_without_tank
+from utank_hil.analysis.loop.sea_response import roll_without_tank
 from utank_hil.canbus import Mode
 from utank_hil.configuration import load_config
 from utank_hil.console.exit_codes import ExitCode

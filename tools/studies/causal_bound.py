@@ -36,9 +36,9 @@ import numpy as np
 
 from tools.studies.clairvoyant import best_history, clairvoyant_bound, pump_with_lag
 from utank_hil.analysis.loop.loop_simulation import SensorNoise
-from utank_hil.analysis.motion.confidence import Interval, mean_interval
+from utank_hil.analysis.motion.statistics import Interval, mean_interval
 from utank_hil.base.arrays import FloatArray
-from utank_hil.control.constrained.sea_plant import sea_plant
+from utank_hil.control.constrained.design import sea_plant
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.lqg import kalman_predictor
 from utank_hil.control.sea_model import SeaModel

@@ -26,7 +26,7 @@ from firmware_sim.scenario_sea import IrregularSea
 from tools.printing import command_line, show
 from tools.studies.clairvoyant import clairvoyant_bound
 from tools.studies.share_of_possible import CONFIGS, STORM_HOUR, measured_hour, shipped
-from utank_hil.analysis.motion.confidence import mean_interval
+from utank_hil.analysis.motion.statistics import mean_interval
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.background import one_thread_each
 from utank_hil.canbus.enumerations import Mode, RetuningState

@@ -30,8 +30,8 @@ from tools.studies.causal_bound import CausalBound, CausalProblem, causal_bound
 from tools.studies.clairvoyant import clairvoyant_bound
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.analysis.loop.robustness import robustness
-from utank_hil.analysis.motion.bare_ship import roll_without_tank
-from utank_hil.analysis.motion.confidence import mean_interval
+from utank_hil.analysis.loop.sea_response import roll_without_tank
+from utank_hil.analysis.motion.statistics import mean_interval
 from utank_hil.assembly import build_law
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.background import one_thread_each

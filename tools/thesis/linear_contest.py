@@ -20,13 +20,14 @@ from tools.thesis.printed_laws import (
 )
 from utank_hil.analysis.loop.closed_loop import closed_loop_radius, closed_loop_response
 from utank_hil.base.arrays import FloatArray
+from utank_hil.control import DesignPlant
 from utank_hil.control.gain import GainLaw
 from utank_hil.control.interface import Controller, LinearLaw
 from utank_hil.control.lqg import design_lqr
 from utank_hil.control.optimal_tank import ship_ratios
 from utank_hil.control.pd import PD_MEASURED, design_pd
 from utank_hil.control.predictive.law import PredictiveLaw
-from utank_hil.dynamics.linear import STATES, coupled_model, pump_model, state_matrices
+from utank_hil.dynamics.linear import STATES, pump_model, state_matrices
 from utank_hil.dynamics.sampling import sample, transition_and_step
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
@@ -96,8 +97,7 @@ def responses(
 ) -> dict[str, Response]:
     """Answers of the passive tank and of all laws, exact for the sampled loop."""
     w = ratio * ship_ratios(ship, tank)[1]
-    system = coupled_model(ship, tank)
-    row = system.output_labels.index("roll_rad")
+    row = STATES.index("roll_rad")
     stiffness = ship.stiffness_nm_rad
     found = {}
     everyone: dict[str, tuple[LinearLaw | None, tuple[str, ...], float]] = {
@@ -105,7 +105,9 @@ def responses(
     }
     everyone |= {name: (each.law, each.measured, each.delay_s) for name, each in laws.items()}
     for name, (law, measured, delay_s) in everyone.items():
-        motion, pressure = closed_loop_response(law, system, measured, w, delay_s, 0.0)
+        motion, pressure = closed_loop_response(
+            law, DesignPlant(ship, tank, delay_s, 0.0), measured, w
+        )
         found[name] = Response(
             ratio, stiffness * np.abs(motion[:, row]), stiffness * np.abs(pressure)
         )

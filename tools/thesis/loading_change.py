@@ -16,7 +16,7 @@ from tools.thesis.linear_contest import Entrant, radius
 from tools.thesis.printed_laws import SAMPLE_TIME_S, held_model
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
-from utank_hil.control.limits import PumpLimits
+from utank_hil.control.design_plant import PumpLimits
 from utank_hil.control.predictive.law import PredictiveLaw
 from utank_hil.dynamics.linear import STATES, state_matrices
 from utank_hil.dynamics.sampling import LinearModel, transition_and_step

@@ -7,7 +7,7 @@ import numpy as np
 
 from tools.thesis.figure import Check, Curve, Figure, Panel, Verdict
 from utank_hil.base.arrays import FloatArray
-from utank_hil.control.fuzzy.basis import WIDTH, FuzzyBasis
+from utank_hil.control.fuzzy.law import WIDTH, FuzzyBasis
 
 RANGE: Final = math.pi / 6
 _NAMES: Final = ("negative", "zero", "positive")

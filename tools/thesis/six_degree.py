@@ -24,8 +24,7 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.restoring import Restoring, restoring
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
-from utank_hil.dynamics.water import water_moments
+from utank_hil.dynamics.tank import Tank, water_moments
 from utank_hil.dynamics.wrench import gravity_body, tank_wrench
 
 Matrix6 = tuple[tuple[float, ...], ...]

@@ -23,15 +23,12 @@ from utank_hil.analysis.loop.sea_response import (
     roll_response_without_tank,
 )
 from utank_hil.analysis.loop.self_tuning import NoLawError
-from utank_hil.analysis.shaft_power import mean_shaft_power_w
 from utank_hil.analysis.tank_sizing import MOST_STABILITY_SHARE, stability_taken
 from utank_hil.base.arrays import ComplexArray, FloatArray
-from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control import DesignPlant
 from utank_hil.control.optimal_tank import ship_ratios
-from utank_hil.dynamics.linear import coupled_model
-from utank_hil.dynamics.pump import Pump
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.dynamics import GRAVITY_M_S2, STATES, RollShip, Tank
+from utank_hil.dynamics.pump import Pump, pump_load, pump_speed
 from utank_hil.sea import Harmonics
 
 STABILITY_SHARES: Final = (0.04, 0.08, 0.12, 0.16, 0.2, MOST_STABILITY_SHARE)
@@ -40,6 +37,9 @@ FREQUENCY_RATIOS: Final = (0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4)
 """Frequency ratios of a sweep. Chosen; no study."""
 
 _BANDS = 40  # Number of bands of the sea's energy in the curves. Chosen; no study.
+
+
+_NODES: Final = 24  # Quadrature nodes for each variable. Chosen; no study.
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,10 +133,10 @@ class RollCurves:
 
 def roll_curves(plant: DesignPlant, sea: SeaState, law: TunedLaw | None) -> RollCurves:
     """Roll over static roll in regular waves of half to twice the roll period."""
-    ship, system = plant.ship, coupled_model(plant.ship, plant.tank)
+    ship = plant.ship
     own = ship.natural_frequency_rad_s
     w = own * np.geomspace(0.5, 2.0, 300)
-    roll = system.output_labels.index("roll_rad")
+    roll = STATES.index("roll_rad")
 
     def magnified(response: ComplexArray) -> FloatArray:
         size: FloatArray = np.abs(response) * ship.stiffness_nm_rad
@@ -145,11 +145,9 @@ def roll_curves(plant: DesignPlant, sea: SeaState, law: TunedLaw | None) -> Roll
     active = None
     if law is not None:
         measured = law.design.predictor.measured
-        motions, _ = closed_loop_response(
-            law.design.law(plant), system, measured, w, plant.delay_s, plant.lag_s
-        )
+        motions, _ = closed_loop_response(law.design.law(plant), plant, measured, w)
         active = magnified(motions[:, roll])
-    passive, _ = closed_loop_response(None, system, (), w)
+    passive, _ = closed_loop_response(None, plant, (), w)
     waves, edges = sea.wave_moment, own * np.geomspace(0.5, 2.0, _BANDS + 1)
     energy, _ = np.histogram(waves.frequency_rad_s, edges, weights=np.square(waves.amplitude))
     density = energy / np.diff(edges)
@@ -167,7 +165,7 @@ def predict_roll(plant: DesignPlant, sea: SeaState, *, pump: bool = True) -> Rol
     """Predict the roll of a ship without, with a passive and, given a pump, an active tank."""
     ship, waves = plant.ship, sea.wave_moment
     without = rms(roll_response_without_tank(ship, waves.frequency_rad_s), waves)
-    passive = motion_in_sea(None, coupled_model(ship, plant.tank), (), waves)
+    passive = motion_in_sea(None, plant, (), waves)
     if not pump:
         return RollPrediction(without, passive, None, None, None, "there is no pump")
 
@@ -207,7 +205,7 @@ def loading_sensitivity(
             LoadingPoint(
                 scale,
                 rms(roll_response_without_tank(ship, waves.frequency_rad_s), waves),
-                motion_in_sea(None, coupled_model(ship, plant.tank), (), waves).roll_rms_rad,
+                motion_in_sea(None, loaded, (), waves).roll_rms_rad,
                 active,
             )
         )
@@ -259,27 +257,19 @@ def _active(
     design_plant: DesignPlant | None = None,
 ) -> MotionInSea:
     """Linear motion with a law, which may have been designed for another plant."""
-    return motion_in_sea(
-        design.law(design_plant or plant),
-        coupled_model(plant.ship, plant.tank),
-        design.predictor.measured,
-        waves,
-        plant.delay_s,
-        plant.lag_s,
-    )
+    law = design.law(design_plant or plant)
+    return motion_in_sea(law, plant, design.predictor.measured, waves)
 
 
 def pump_moments(
     plant: DesignPlant, design: LinearDesign, waves: Harmonics
 ) -> tuple[float, float, float]:
     """RMS of pressure in Pa and flow in m^3/s, and mean power to the water in W; linear loop."""
-    law, system = design.law(plant), coupled_model(plant.ship, plant.tank)
+    law = design.law(plant)
     w = waves.frequency_rad_s
     seen = (w > 0) & (w < math.pi / law.sample_time_s)
-    motions, pressure = closed_loop_response(
-        law, system, design.predictor.measured, w[seen], plant.delay_s, plant.lag_s
-    )
-    rate = motions[:, system.output_labels.index("level_rate_m_s")]
+    motions, pressure = closed_loop_response(law, plant, design.predictor.measured, w[seen])
+    rate = motions[:, STATES.index("level_rate_m_s")]
     flow = plant.tank.reservoir_area_m2 * rate
     square = waves.amplitude[seen] ** 2 / 2
     return (
@@ -293,3 +283,30 @@ def _mean_power_w(plant: DesignPlant, design: LinearDesign, waves: Harmonics) ->
     """Mean shaft power of a pump for this duct, similar to the first ship's."""
     pump = Pump.for_duct(plant.tank.duct_area_m2, plant.limits.pressure_pa)
     return mean_shaft_power_w(pump, *pump_moments(plant, design, waves))
+
+
+def mean_shaft_power_w(
+    pump: Pump, pressure_rms_pa: float, flow_rms_m3_s: float, water_power_w: float
+) -> float:
+    """Mean shaft power for Gaussian pressure and flow, with the rotor in equilibrium at each value.
+
+    Power from the water counts as zero, as on the bench. In waves the shaft power is several times
+    the mean power `water_power_w` (pressure times flow), because a pump is efficient at its rated
+    point, not while pressure or flow changes sign.
+    """
+    if not (pressure_rms_pa > 0 and flow_rms_m3_s > 0):
+        return 0.0
+    correlation = min(1.0, max(-1.0, water_power_w / (pressure_rms_pa * flow_rms_m3_s)))
+    rest = math.sqrt(1 - correlation**2)
+    nodes, weights = np.polynomial.hermite_e.hermegauss(_NODES)
+    mean_w = 0.0
+    for first, share in zip(nodes.tolist(), weights.tolist(), strict=True):
+        if first < 0:
+            continue  # the power is symmetric in the sign
+        for second, part in zip(nodes.tolist(), weights.tolist(), strict=True):
+            pressure_pa = pressure_rms_pa * first
+            flow_m3_s = flow_rms_m3_s * (correlation * first + rest * second)
+            speed = pump_speed(pressure_pa, flow_m3_s, pump.coefficients)
+            torque_nm, _ = pump_load(speed, flow_m3_s, pump.coefficients)
+            mean_w += 2 * share * part * max(speed * torque_nm, 0.0)
+    return mean_w / math.tau

@@ -21,13 +21,11 @@ from typing import Annotated, Final
 
 import numpy as np
 
-from utank_hil.analysis.tank_design import best_passive_tank
 from utank_hil.base.parameters import Finite, Positive, Range, range_problems, refuse
-from utank_hil.control.optimal_tank import ship_ratios
+from utank_hil.control.optimal_tank import best_passive_tank, ship_ratios
+from utank_hil.dynamics import GRAVITY_M_S2, RollShip, Tank
 from utank_hil.dynamics.pump import Pump
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
-from utank_hil.dynamics.water import water_moments
+from utank_hil.dynamics.tank import water_moments
 
 STABILITY_SHARE: Final = 0.15  #: Default share of the ship's stability that the free surface takes.
 LEAST_STABILITY_SHARE: Final = 0.03

@@ -21,8 +21,7 @@ from utank_hil.control import DesignPlant, PassiveDesign, PredictiveDesign, Pump
 from utank_hil.control.predictive.design import MOST_ORDER, WASHOUT_SHARE
 from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign
 from utank_hil.retuning.estimator import EstimateSettings
-from utank_hil.retuning.record_length import record_problems
-from utank_hil.retuning.settings import RetuningSettings
+from utank_hil.retuning.settings import RetuningSettings, record_problems
 from utank_hil.runners.bus_model import SimulatedBus
 from utank_hil.safety.monitors.thresholds import SensorFigures
 from utank_hil.safety.safety_limits import SafetyLimits

@@ -3,7 +3,8 @@
 With ``tuning: auto`` the kinds `LINEAR_KINDS` take no numbers but a sea.
 
 Laws of installed packages join by entry points of the group ``utank_hil.laws``: the name is the
-kind, the value a design as `utank_hil.control.registry` lists them.
+kind, the value a design as in `LAWS`: a frozen dataclass with its kind, its parameters with their
+ranges, and `build`, which designs the law for a plant (`LawDesign`).
 """
 
 from collections.abc import Callable
@@ -28,13 +29,39 @@ from utank_hil.base.parameters import refuse
 from utank_hil.configuration.files import ALLOW_CODE
 from utank_hil.configuration.matrices import SystemFile
 from utank_hil.configuration.spectra import LawSea
+from utank_hil.control.constrained.design import ConstrainedDesign
+from utank_hil.control.feedback_linearization import FeedbackLinearizationDesign
+from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
+from utank_hil.control.fuzzy.indirect import IndirectFuzzy
 from utank_hil.control.interface import LawDesign
-from utank_hil.control.pump_with_valve import PumpWithValveDesign
+from utank_hil.control.lqg_design import LQGDesign
+from utank_hil.control.passive import PassiveDesign
+from utank_hil.control.pd import PDDesign
+from utank_hil.control.predictive.design import PredictiveDesign
 from utank_hil.control.python_law import PythonDesign
-from utank_hil.control.registry import LAWS
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign
-from utank_hil.control.state_space import SystemMatrices
+from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign, PumpWithValveDesign
+from utank_hil.control.state_space import StateSpaceDesign, SystemMatrices
+from utank_hil.control.stimulation import StimulationDesign
+
+LAWS: Final[tuple[type[LawDesign], ...]] = (
+    PassiveDesign,
+    PDDesign,
+    LQGDesign,
+    PredictiveDesign,
+    ConstrainedDesign,
+    FeedbackLinearizationDesign,
+    SmallGainFuzzy,
+    RobustFuzzy,
+    IndirectFuzzy,
+    StimulationDesign,
+    StateSpaceDesign,
+    PythonDesign,
+    OnOffValveDesign,
+    ClippedValveDesign,
+    PumpWithValveDesign,
+)
+
 
 GROUP: Final = "utank_hil.laws"
 

@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import PlainSerializer, WrapValidator
 
 from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.dynamics import GRAVITY_M_S2, RollShip
 
 NOT_GIVEN = math.nan  #: Mark of a missing key; no key of a file can have this value.
 
@@ -78,7 +77,9 @@ class WrittenShip(RollShip):
     roll_period_s: Annotated[float, Range(above=0, most=1e4)] = NOT_GIVEN
     #: Dimensions of the hull at the waterline; instead of `roll_period_s`.
     beam_m: _Length = NOT_GIVEN
+    #: Dimensions of the hull at the waterline; instead of `roll_period_s`.
     draught_m: _Length = NOT_GIVEN
+    #: Dimensions of the hull at the waterline; instead of `roll_period_s`.
     length_m: _Length = NOT_GIVEN
     #: Damping ratio of the ship's roll; instead of `damping_nms_rad`.
     damping_ratio: Annotated[float, Range(least=0, most=1e3)] = NOT_GIVEN

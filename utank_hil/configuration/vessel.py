@@ -16,10 +16,9 @@ from utank_hil.configuration.devices import DevicesSection
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
 from utank_hil.configuration.ship_keys import ShipFromFile, in_written_keys
-from utank_hil.dynamics.nonlinear import RollModel
+from utank_hil.dynamics import RollModel, Tank
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.steady_heel import RightingRange, greatest_held_pa, righting_range
-from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve, valve_problems
 from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.safety.safety_limits import SafetyLimits

@@ -5,19 +5,18 @@ from typing import Any, Final
 
 import numpy as np
 
-from utank_hil.analysis.tank_design import tank_figures
 from utank_hil.analysis.tank_sizing import pump_demand, pump_level_m
 from utank_hil.configuration import Vessel
 from utank_hil.configuration.device_sections import unit_of
 from utank_hil.configuration.devices import DeviceSection, DevicesSection
 from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
 from utank_hil.console.terminal import Terminal, new_table
+from utank_hil.control.optimal_tank import tank_figures
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.steady_heel import steady_heel, upright
-from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.dynamics.tank import GRAVITY_M_S2, water_moments
 from utank_hil.dynamics.valves import added_damping_ratio
-from utank_hil.dynamics.water import water_moments
 
 _OF_PUMP: Final = (
     "pump_heel_rad", "pump_heel_at_the_end", "pump_head_m", "pump_flow_m3_s", "pump_power_asked_w",

@@ -3,18 +3,19 @@
 from utank_hil.control.arx import ARX as ARX
 from utank_hil.control.constrained.design import ConstrainedDesign as ConstrainedDesign
 from utank_hil.control.design_plant import DesignPlant as DesignPlant
+from utank_hil.control.design_plant import PumpLimits as PumpLimits
 from utank_hil.control.feedback_linearization import FeedbackLinearization as FeedbackLinearization
 from utank_hil.control.feedback_linearization import level_brake as level_brake
 from utank_hil.control.fuzzy.direct import RobustFuzzy as RobustFuzzy
 from utank_hil.control.fuzzy.direct import SmallGainFuzzy as SmallGainFuzzy
 from utank_hil.control.fuzzy.indirect import IndirectFuzzy as IndirectFuzzy
+from utank_hil.control.fuzzy.law import ErrorDynamics as ErrorDynamics
 from utank_hil.control.gain import GainLaw as GainLaw
 from utank_hil.control.interface import BuiltLaw as BuiltLaw
 from utank_hil.control.interface import Controller as Controller
 from utank_hil.control.interface import LinearLaw as LinearLaw
 from utank_hil.control.level_observer import LevelObserver as LevelObserver
 from utank_hil.control.limiter import CommandLimiter as CommandLimiter
-from utank_hil.control.limits import PumpLimits as PumpLimits
 from utank_hil.control.lqg import LQGLaw as LQGLaw
 from utank_hil.control.lqg import design_lqg as design_lqg
 from utank_hil.control.lqg import design_lqr as design_lqr
@@ -33,6 +34,5 @@ from utank_hil.control.semi_active import ClippedValve as ClippedValve
 from utank_hil.control.semi_active import OnOffValve as OnOffValve
 from utank_hil.control.state_space import StateSpaceLaw as StateSpaceLaw
 from utank_hil.control.stimulation import Stimulation as Stimulation
-from utank_hil.control.tracking_error import ErrorDynamics as ErrorDynamics
 from utank_hil.control.washout import WashoutLaw as WashoutLaw
 from utank_hil.dynamics.linear import pump_model as pump_model

@@ -43,12 +43,9 @@ from utank_hil.base.elementary import sine_cosine
 from utank_hil.base.parameters import NotNegative, Positive, SampleTime, range_problems, refuse
 from utank_hil.base.tick import TICK_S
 from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.gain import slope_at_rest
 from utank_hil.control.interface import BuiltLaw
-from utank_hil.control.slope import slope_at_rest
-from utank_hil.dynamics.linear import STATES
-from utank_hil.dynamics.nonlinear import RollModel
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.dynamics import GRAVITY_M_S2, STATES, RollModel, RollShip, Tank
 
 
 @dataclass(frozen=True, slots=True)

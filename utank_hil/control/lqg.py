@@ -22,8 +22,7 @@ from utank_hil.base.arrays import ComplexArray, FloatArray, plausible
 from utank_hil.base.ordered_sums import product
 from utank_hil.control.arx import discrete_matrices
 from utank_hil.control.gain import GainLaw
-from utank_hil.dynamics.sampling import LinearModel
-from utank_hil.dynamics.transfer import state_space_response
+from utank_hil.dynamics.sampling import LinearModel, state_space_response
 
 if TYPE_CHECKING:
     from control import StateSpace

@@ -14,9 +14,7 @@ from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.gain import GainLaw
 from utank_hil.control.interface import BuiltLaw
 from utank_hil.control.optimal_tank import passive_optimum, ship_ratios
-from utank_hil.dynamics.linear import coupled_matrices
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics import RollShip, Tank, coupled_matrices
 
 PD_MEASURED: Final = ("level_m", "level_rate_m_s")
 

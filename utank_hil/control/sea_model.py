@@ -26,8 +26,7 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import NotNegative, Positive, Problem, Range, range_problems, refuse
-from utank_hil.dynamics.sampling import LinearModel
-from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.dynamics import GRAVITY_M_S2, LinearModel
 from utank_hil.sea import Spectrum
 
 # Seconds, not samples, because the sea's bandwidth does not depend on the sample time.

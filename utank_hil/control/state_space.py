@@ -21,8 +21,7 @@ from utank_hil.control.arx import discrete_matrices
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import BuiltLaw
 from utank_hil.control.predictive.design import measured_problems
-from utank_hil.dynamics.sampling import LinearModel
-from utank_hil.dynamics.transfer import state_space_response
+from utank_hil.dynamics.sampling import LinearModel, state_space_response
 
 
 @dataclass(frozen=True, slots=True, eq=False)

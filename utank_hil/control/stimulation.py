@@ -25,9 +25,7 @@ from utank_hil.base.elementary import sine_cosine
 from utank_hil.base.parameters import Positive, Problem, Range, SampleTime, range_problems, refuse
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import BuiltLaw
-from utank_hil.dynamics.linear import STATES, coupled_matrices
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics import STATES, RollShip, Tank, coupled_matrices
 
 FACTOR = (0.25, 3.0)  # range of the correction m; beyond it the model is invalid
 _ROLL, _LEVEL = STATES.index("roll_rad"), STATES.index("level_m")

@@ -1,7 +1,10 @@
 """Ship and tank: parameters, linear and nonlinear coupled models, six-degree forces."""
 
+from utank_hil.dynamics.linear import STATES as STATES
+from utank_hil.dynamics.linear import coupled_matrices as coupled_matrices
 from utank_hil.dynamics.linear import coupled_model as coupled_model
 from utank_hil.dynamics.nonlinear import RollModel as RollModel
+from utank_hil.dynamics.sampling import LinearModel as LinearModel
 from utank_hil.dynamics.sampling import sampled_model as sampled_model
 from utank_hil.dynamics.ship import RollShip as RollShip
 from utank_hil.dynamics.simulate import RollRun as RollRun

@@ -20,8 +20,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.ordered_sums import product
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
-from utank_hil.dynamics.water import water_moments
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank, water_moments
 
 if TYPE_CHECKING:
     from control import StateSpace

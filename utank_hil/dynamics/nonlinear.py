@@ -41,8 +41,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.elementary import sines_cosines
 from utank_hil.dynamics.restoring import Restoring, restoring
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
-from utank_hil.dynamics.water import water_moments
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank, water_moments
 
 REST_M_S = 1e-4  # A slower rebound ends at rest, which bounds the number of bounces.
 INSIDE_M = 1e-12  # Distance from the limit after an impact, so that the next is a sign change.

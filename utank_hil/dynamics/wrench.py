@@ -17,8 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
-from utank_hil.dynamics.water import water_moments
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank, water_moments
 
 
 def tank_wrench(

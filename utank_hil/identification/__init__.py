@@ -4,30 +4,30 @@ No CAN, clocks or files: arrays in, models out.
 """
 
 from utank_hil.identification.disturbance import DisturbanceBasis as DisturbanceBasis
+from utank_hil.identification.disturbance import (
+    find_disturbance_frequencies as find_disturbance_frequencies,
+)
 from utank_hil.identification.era import era as era
 from utank_hil.identification.era import hankel_singular_values as hankel_singular_values
 from utank_hil.identification.era import order_from_singular_values as order_from_singular_values
-from utank_hil.identification.errors import IdentificationError as IdentificationError
 from utank_hil.identification.excitation import chirp as chirp
 from utank_hil.identification.excitation import multisine as multisine
 from utank_hil.identification.excitation import prbs as prbs
 from utank_hil.identification.excitation import random_pulses as random_pulses
 from utank_hil.identification.excitation import response_scale as response_scale
-from utank_hil.identification.markov import markov_parameters as markov_parameters
+from utank_hil.identification.lag_regression import excitation_order as excitation_order
 from utank_hil.identification.modal import ModalConfidence as ModalConfidence
+from utank_hil.identification.modal import StabilizationPoint as StabilizationPoint
 from utank_hil.identification.modal import modal_assurance as modal_assurance
 from utank_hil.identification.modal import modal_confidence as modal_confidence
 from utank_hil.identification.modal import modal_parameters as modal_parameters
+from utank_hil.identification.modal import stabilization as stabilization
 from utank_hil.identification.okid import OkidResult as OkidResult
 from utank_hil.identification.okid import arx as arx
+from utank_hil.identification.okid import markov_parameters as markov_parameters
 from utank_hil.identification.okid import okid as okid
-from utank_hil.identification.persistence import excitation_order as excitation_order
+from utank_hil.identification.record import IdentificationError as IdentificationError
 from utank_hil.identification.ship_fit import ShipFit as ShipFit
 from utank_hil.identification.ship_fit import fit_ship as fit_ship
-from utank_hil.identification.stabilization import StabilizationPoint as StabilizationPoint
-from utank_hil.identification.stabilization import stabilization as stabilization
 from utank_hil.identification.validation import Validation as Validation
 from utank_hil.identification.validation import validate as validate
-from utank_hil.identification.wave_lines import (
-    find_disturbance_frequencies as find_disturbance_frequencies,
-)

@@ -9,8 +9,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import minimize_scalar
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.identification.lag_regression import LagRegression
+from utank_hil.identification.record import channel_scale, stacked_record
+
+_ORDER = 12  # Three times the states of ship and tank: their memory, but not a wave's.
+_RIDGE = 1e-4  # Squared relative noise of 1 %.
+_STEPS_A_CYCLE = 4  # Trial frequencies per DFT bin (one cycle over the record).
+_EVIDENCE = 30.0  # Smallest F statistic of a line; noise reaches 6, an irregular sea 20.
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,3 +71,108 @@ class DisturbanceBasis:
             # The value is 1 at the end where the function is largest, so that none overflows.
             rows.append(np.exp(-abs(rate) * (time_s if rate > 0 else time_s[::-1])))
         return np.array(rows).reshape(len(rows), samples)
+
+
+def find_disturbance_frequencies(
+    u: FloatArray,
+    y: FloatArray,
+    sample_time_s: float,
+    most: int = 3,
+    band_rad_s: tuple[float, float] = (0.2, 2.0),
+) -> tuple[float, ...]:
+    """Frequencies of sinusoidal disturbances, an argument of `okid`.
+
+    For each trial frequency the regression is solved with and without a sine and cosine. The
+    reduction of the squared prediction error is the evidence for a spectral line (variable
+    projection, without computing the coefficients)::
+
+        reduction(w) = e^T Psi (Psi^T P Psi)^-1 Psi^T e,   e = P y
+        P = I - Phi (Phi^T Phi + mu I)^-1 Phi^T
+
+    The order is low, because a high-order ARX model predicts any sine wave from its own past. The
+    small ridge parameter mu represents measurement noise in data without noise.
+
+    ValueError is raised if the band does not lie between zero and the Nyquist frequency.
+    IdentificationError is raised if the record is too short or a channel does not move.
+
+    Parameters
+    ----------
+    u : array_like, shape (N, r) or (N,)
+    y : array_like, shape (N, m) or (N,)
+        NaN rows are gaps, as in `okid`.
+    most : int
+        Largest number of lines; the search ends where no further one is significant.
+    band_rad_s : tuple of float
+        Search band.
+
+    Returns
+    -------
+    tuple of float
+        rad/s, the strongest first; empty if no line is significant.
+    """
+    low, high = band_rad_s
+    if not 0 < low < high < np.pi / sample_time_s:
+        raise ValueError(
+            f"band_rad_s must rise and lie between 0 and {np.pi / sample_time_s:.3g}, "
+            f"got {band_rad_s}"
+        )
+    z, m = stacked_record(u, y)
+    z = z / channel_scale(z, m)
+    step = 2 * np.pi / (len(z) * sample_time_s) / _STEPS_A_CYCLE
+    grid = np.arange(low, high + step, step)
+    lines: list[float] = []
+    while len(lines) < most:
+        search = _Search(z, m, lines, sample_time_s)
+        # No second line is allowed within one DFT bin of another.
+        candidates = [w for w in grid if all(abs(w - old) > _STEPS_A_CYCLE * step for old in lines)]
+        if not candidates:
+            break
+        line = search.refined(max(candidates, key=search.reduction), step)
+        if search.reduction(line) < _EVIDENCE * 2 * m:
+            break
+        lines.append(line)
+        if len(lines) > 1:  # Lines interact, so each one is refined with the others in place.
+            for i, old in enumerate(lines):
+                others = lines[:i] + lines[i + 1 :]
+                lines[i] = _Search(z, m, others, sample_time_s).refined(old, step)
+    return tuple(lines)
+
+
+class _Search:
+    """Evidence for one more line in addition to known ones."""
+
+    def __init__(self, z: FloatArray, m: int, lines: list[float], sample_time_s: float) -> None:
+        time_s = np.arange(len(z), dtype=np.float64) * sample_time_s
+        known = DisturbanceBasis(lines).evaluate(len(z), sample_time_s)
+        self._regression = LagRegression(z, m, _ORDER, known)
+        gram, right = self._regression.gram()
+        ridge = np.full(len(gram), _RIDGE * self._regression.rows)
+        self._factor = cho_factor(gram + np.diag(ridge))
+        self._errors = self._regression.residuals(cho_solve(self._factor, right))
+        squares = sum(np.sum(e**2, axis=1) for e in self._errors)
+        self._variance = squares / self._regression.rows + _RIDGE
+        # These are the times of the regression's rows, for the sines and cosines.
+        marks = LagRegression(z, m, _ORDER, time_s[None])
+        self._times = [segment.basis[0] for segment in marks.segments]
+
+    def reduction(self, frequency_rad_s: float) -> float:
+        """Return the reduction of the squared error over its variance, summed over outputs."""
+        waves = [
+            np.array([np.sin(frequency_rad_s * t), np.cos(frequency_rad_s * t)])
+            for t in self._times
+        ]
+        shared = self._regression.transposed(waves)
+        inner = sum(w @ w.T for w in waves) - shared.T @ cho_solve(self._factor, shared)
+        seen = sum(w @ e.T for w, e in zip(waves, self._errors, strict=True))
+        gain = np.sum(seen * np.linalg.solve(inner, seen), axis=0)
+        return float(np.sum(gain / self._variance))
+
+    def refined(self, frequency_rad_s: float, step: float) -> float:
+        """Return the frequency of the largest reduction within a step of a trial frequency."""
+        found = minimize_scalar(
+            lambda w: -self.reduction(w),
+            bounds=(max(frequency_rad_s - step, step / 2), frequency_rad_s + step),
+            method="bounded",
+            options={"xatol": 1e-3 * step},
+        )
+        return float(found.x)

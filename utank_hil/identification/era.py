@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg import svdvals
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.identification.errors import IdentificationError
+from utank_hil.identification.record import IdentificationError
 
 if TYPE_CHECKING:
     from control import StateSpace

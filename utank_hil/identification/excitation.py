@@ -10,8 +10,7 @@ import math
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.control.arx import ARX
-from utank_hil.control.limits import PumpLimits
+from utank_hil.control import ARX, PumpLimits
 
 
 def random_pulses(

@@ -34,12 +34,15 @@ import numpy as np
 from scipy.optimize import minimize
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.control import DesignPlant
+from utank_hil.dynamics import RollShip, coupled_matrices
 from utank_hil.dynamics.restoring import restoring
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.identification.multitaper import bandwidth_rad_s, coefficients
-from utank_hil.identification.smooth_spectrum import LogSpectrum, SmoothSpectrum
+from utank_hil.identification.smooth_spectrum import (
+    LogSpectrum,
+    SmoothSpectrum,
+    bandwidth_rad_s,
+    coefficients,
+)
 from utank_hil.sea import SlopeSpectrum
 
 SPREAD: Final = (0.7, 0.1, 0.5)

@@ -3,11 +3,14 @@
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.identification.errors import IdentificationError
 
 _SMALLEST, _LARGEST = 1e-60, 1e60  # Products of squares stay finite in this range.
 _CLIPPED = 0.01  # largest share; at twice that a model of roll has errors of 2 %
 _FEWEST = 4  # Fewer equal samples are chance.
+
+
+class IdentificationError(ValueError):
+    """The record does not determine a model; the message says why and what would help."""
 
 
 def stacked_record(u: FloatArray, y: FloatArray) -> tuple[FloatArray, int]:

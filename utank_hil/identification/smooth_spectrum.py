@@ -12,7 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
-from utank_hil.base.arrays import FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
+
+_PADDING = 8  # finer grid of the transform: a coefficient is that of its frequency
+
 
 _SPREAD = 2.0  # Standard deviation of the logarithm about its level: a factor of 7.
 _LENGTH = 0.3  # Matern length over the logarithm of frequency: a third of an octave.
@@ -21,6 +24,39 @@ _START = 0.1  # Level about which the logarithm is spread, relative to the mean 
 _STEPS = 60  # Largest number of Newton steps.
 _CONVERGED = 1e-4  # Largest last change of the logarithm.
 _TINY = 1e-9  # This keeps the prior and the weights positive definite.
+
+
+def bandwidth_rad_s(samples: int, sample_time_s: float, tapers: int) -> float:
+    """Full bandwidth of a coefficient."""
+    return (tapers + 1) * np.pi / (samples * sample_time_s)
+
+
+def coefficients(
+    signals: FloatArray, sample_time_s: float, omega_rad_s: FloatArray, tapers: int
+) -> ComplexArray:
+    """Spectral coefficients, (m, tapers, F); their squares are one-sided density per rad/s.
+
+    The squared magnitudes of the coefficients of one frequency, averaged over the tapers, estimate
+    the one-sided density there with two degrees of freedom per taper (Riedel and Sidorenko, 1995).
+    Frequencies `bandwidth_rad_s` apart are nearly independent.
+
+    The signals, shape (N, m), have no gaps; a straight line is subtracted from each. The
+    frequencies, shape (F,), are below the Nyquist frequency.
+    """
+    count = len(signals)
+    time = np.linspace(-1.0, 1.0, count)
+    line = np.column_stack([np.ones(count), time])
+    signals = signals - line @ np.linalg.lstsq(line, signals, rcond=None)[0]
+    padded = _PADDING * count
+    index = np.rint(omega_rad_s * padded * sample_time_s / (2 * np.pi)).astype(np.intp)
+    order = np.arange(1, tapers + 1)[:, None]
+    taper = np.sin(np.pi * order * np.arange(1, count + 1) / (count + 1))
+    scale = np.sqrt(2 / (count + 1) * sample_time_s / np.pi)
+    found = [
+        [np.fft.rfft(scale * each * signal, padded)[index] for each in taper]
+        for signal in signals.T
+    ]
+    return np.array(found)
 
 
 class LogSpectrum(NamedTuple):

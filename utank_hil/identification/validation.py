@@ -14,9 +14,8 @@ from scipy.special import chdtrc
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
 from utank_hil.identification.disturbance import DisturbanceBasis
-from utank_hil.identification.errors import IdentificationError
 from utank_hil.identification.lag_regression import LagRegression
-from utank_hil.identification.record import channel_scale, stacked_record
+from utank_hil.identification.record import IdentificationError, channel_scale, stacked_record
 
 _STILL = 1e-12  # smallest peak-to-peak value, relative to a channel's root mean square
 

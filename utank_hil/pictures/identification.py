@@ -11,10 +11,10 @@ from utank_hil import identification
 from utank_hil.analysis.motion.decay import RollDecay
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control import DesignPlant
-from utank_hil.dynamics.transfer import state_space_response
+from utank_hil.dynamics.sampling import state_space_response
 from utank_hil.pictures.style import BELOW, COLORS, DASHES, WIDEST_IN, picture
-from utank_hil.retuning.record_length import estimation_samples
 from utank_hil.retuning.redesign import Identification, RetuningTask
+from utank_hil.retuning.settings import estimation_samples
 
 SHOWN_S = 120.0  #: Length of the held-out record in the figure. Chosen; no study.
 BAND_RAD_S = np.linspace(0.15, 1.5, 300)

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.analysis.motion.exceedance import exceedance
+from utank_hil.analysis.motion.statistics import exceedance
 from utank_hil.base.arrays import FloatArray
 from utank_hil.pictures.style import BELOW, COLORS, DASHES, NO_TANK, WIDEST_IN, picture
 

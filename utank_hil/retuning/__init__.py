@@ -7,6 +7,7 @@ of their own and are not imported here.
 from utank_hil.canbus.events import ModelSummary as ModelSummary
 from utank_hil.canbus.events import RetuningEvent as RetuningEvent
 from utank_hil.retuning.adaptive import AdaptiveController as AdaptiveController
+from utank_hil.retuning.adaptive import make_pulses as make_pulses
 from utank_hil.retuning.answer import Answer as Answer
 from utank_hil.retuning.answer import Candidate as Candidate
 from utank_hil.retuning.answer import Refusal as Refusal
@@ -17,7 +18,6 @@ from utank_hil.retuning.estimator import EstimateFigures as EstimateFigures
 from utank_hil.retuning.estimator import EstimateSettings as EstimateSettings
 from utank_hil.retuning.estimator import Estimator as Estimator
 from utank_hil.retuning.law_exchange import LawExchange as LawExchange
-from utank_hil.retuning.pulses import make_pulses as make_pulses
 from utank_hil.retuning.renewed_law import RenewedLaw as RenewedLaw
 from utank_hil.retuning.renewing import RenewingController as RenewingController
 from utank_hil.retuning.retuner import RetuneFunction as RetuneFunction

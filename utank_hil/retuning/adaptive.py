@@ -18,7 +18,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.elementary import log
 from utank_hil.canbus import RetuningState, Verdict
 from utank_hil.canbus.events import ModelSummary
-from utank_hil.control import Controller, LinearLaw
+from utank_hil.control import ARX, Controller, DesignPlant, LinearLaw, PumpLimits
 from utank_hil.retuning.admission import Admission, WarmUp
 from utank_hil.retuning.answer import Answer, Candidate
 from utank_hil.retuning.change_monitor import SIGNIFICANT, ChangeMonitor
@@ -61,7 +61,7 @@ class AdaptiveController(LawExchange):
             MonitoredLaw(controller, ChangeMonitor(ship)),
             law.matrices().B.shape[1],
             roll,
-            settings.trial,
+            settings,
             retuner,
             len(pulses_pa),
         )
@@ -184,3 +184,38 @@ class AdaptiveController(LawExchange):
     @property
     def _found(self) -> ModelSummary | None:
         return self.candidate.summary if self.candidate and self.state in _NEW else None
+
+
+def make_pulses(settings: RetuningSettings, plant: DesignPlant, sample_time_s: float) -> FloatArray:
+    """Return the excitation pressure in Pa, shape (N,), within all limits of pump, roll and level.
+
+    Roll and level are predicted for the pulses alone, in still water on the given plant. In service
+    the limiter applies the level limit to the sum of waves, law and pulses. A ValueError is raised
+    if the signal does not fit the sample time, such as a band beyond its Nyquist frequency.
+    """
+    # scipy.optimize is slow to import and needed with retuning only
+    from utank_hil.identification import chirp, multisine, prbs, random_pulses, response_scale
+
+    limits = plant.limits
+    bounds = PumpLimits(
+        pressure_pa=min(settings.pulse_pa, limits.pressure_pa), rate_pa_s=limits.rate_pa_s
+    )
+    duration_s, seed = settings.identification_s, settings.seed
+    match settings.excitation.kind:
+        case "random_pulses":
+            pulses = random_pulses(
+                duration_s, bounds, seed, settings.pulse_hold_s, sample_time_s=sample_time_s
+            )
+        case "prbs":
+            clock_s = settings.pulse_hold_s[0]
+            pulses = prbs(duration_s, bounds, seed, clock_s, sample_time_s=sample_time_s)
+        case "multisine":
+            band = settings.excitation.band
+            pulses = multisine(duration_s, bounds, seed, band, sample_time_s=sample_time_s)
+        case "chirp":
+            band = settings.excitation.band
+            pulses = chirp(duration_s, bounds, band, sample_time_s=sample_time_s)
+    sampled = plant.sampled(("roll_rad", "level_m"), sample_time_s)
+    model = ARX.from_state_space(sampled, len(sampled.A))
+    response_limits = np.array([settings.added_roll_rad, limits.level_m])
+    return pulses * response_scale(pulses, model, response_limits)

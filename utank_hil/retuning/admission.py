@@ -6,8 +6,7 @@ from typing import Final
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.control import LinearLaw, PredictiveLaw
-from utank_hil.control.washout import WashoutLaw
+from utank_hil.control import LinearLaw, PredictiveLaw, WashoutLaw
 from utank_hil.retuning.answer import Answer, Candidate
 from utank_hil.retuning.change_monitor import ChangeMonitor
 from utank_hil.retuning.estimate import ShipFigures

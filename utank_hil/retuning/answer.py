@@ -11,10 +11,9 @@ from typing import Annotated, Final
 import msgspec
 
 from utank_hil.canbus.events import ModelSummary
-from utank_hil.control import LinearLaw, PredictiveLaw
+from utank_hil.control import LinearLaw, PredictiveLaw, WashoutLaw
 from utank_hil.control.predictive.design import MOST_ORDER, MOST_SAMPLES
-from utank_hil.control.washout import WashoutLaw
-from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics import STATES
 from utank_hil.retuning.estimate import MOST_BANDS, MotionEstimate
 from utank_hil.retuning.renewed_law import MOST_NUMBERS, RenewedLaw, RenewedLawMessage
 from utank_hil.retuning.wire import OVERHEAD_BYTES, decoder, encode, refuse_shapes, refuse_sizes

@@ -13,10 +13,8 @@ import numpy as np
 
 from utank_hil.base.parameters import Range, range_problems, refuse
 from utank_hil.canbus import SeaEstimate, ShipEstimate, Verdict
-from utank_hil.dynamics.linear import coupled_matrices
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
-from utank_hil.dynamics.water import water_moments
+from utank_hil.dynamics import GRAVITY_M_S2, RollShip, Tank, coupled_matrices
+from utank_hil.dynamics.tank import water_moments
 from utank_hil.retuning.answer import Refusal
 from utank_hil.retuning.estimate import EstimateRequest, MotionEstimate, ShipFigures
 from utank_hil.retuning.history import SampleHistory

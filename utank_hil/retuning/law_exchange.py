@@ -40,7 +40,7 @@ from utank_hil.retuning.estimate import MotionEstimate
 from utank_hil.retuning.history import SampleHistory
 from utank_hil.retuning.law_bank import LawBank, MonitoredLaw
 from utank_hil.retuning.retuner import Request, Retuner
-from utank_hil.retuning.settings import EARLIEST_VERDICT_S, TrialSettings
+from utank_hil.retuning.settings import EARLIEST_VERDICT_S, RetuningSettings, TrialSettings
 from utank_hil.retuning.trial import MovingWindow, WindowStatistics, worsening
 
 EARLY_FACTOR: Final = 1.5
@@ -74,7 +74,7 @@ class LawExchange(ABC):
         first: MonitoredLaw,
         outputs: int,
         roll: int,
-        settings: TrialSettings,
+        settings: TrialSettings | RetuningSettings,
         retuner: Retuner,
         history_samples: int = 0,
     ) -> None:

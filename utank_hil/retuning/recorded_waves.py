@@ -12,13 +12,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import LinearLaw
-from utank_hil.control.limiter import CommandLimiter
-from utank_hil.dynamics.linear import STATES, coupled_matrices
-from utank_hil.dynamics.sampling import LinearModel
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
+from utank_hil.control import CommandLimiter, DesignPlant, LinearLaw
+from utank_hil.dynamics import STATES, LinearModel, RollShip, Tank, coupled_matrices
 
 SUBSTEPS: Final = 10
 """Limiter steps in a sample time of the law: the level barrier acts between samples as well."""

@@ -28,17 +28,16 @@ from utank_hil.identification import (
     okid,
     validate,
 )
-from utank_hil.identification.acceptance import ModelLimits, model_objections
 from utank_hil.identification.lag_regression import segment_bounds
-from utank_hil.identification.ship_fit import ShipFit, fit_ship
+from utank_hil.identification.ship_fit import ModelLimits, ShipFit, fit_ship, model_objections
 from utank_hil.retuning import Candidate, ModelSummary, Refusal
-from utank_hil.retuning.record_length import (
+from utank_hil.retuning.recorded_waves import RecordedWaves, RmsResponse
+from utank_hil.retuning.settings import (
     LAGS,
     LEAST_PREDICTIONS,
     estimation_samples,
     record_problems,
 )
-from utank_hil.retuning.recorded_waves import RecordedWaves, RmsResponse
 
 MOST_MISSING = 0.2  #: Largest share of missing samples. Chosen; no study.
 LEAST_MOTION = (10.0, 1e-6)

@@ -13,11 +13,10 @@ import msgspec
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.control import PumpLimits
 from utank_hil.control.constrained.horizon import Horizon, predictions
 from utank_hil.control.constrained.law import ConstrainedLaw
-from utank_hil.control.limits import PumpLimits
-from utank_hil.dynamics.linear import STATES
-from utank_hil.dynamics.sampling import LinearModel
+from utank_hil.dynamics import STATES, LinearModel
 from utank_hil.retuning.wire import refuse_shapes, refuse_sizes
 
 MOST_STATES: Final = 64

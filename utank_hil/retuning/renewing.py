@@ -18,7 +18,7 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState, Verdict
 from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
-from utank_hil.control.limits import PumpLimits
+from utank_hil.control.design_plant import PumpLimits
 from utank_hil.retuning.admission import ANOTHER_QUESTION, WarmUp
 from utank_hil.retuning.answer import Answer
 from utank_hil.retuning.change_monitor import ChangeMonitor, ship_factor

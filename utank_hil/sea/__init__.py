@@ -9,5 +9,5 @@ from utank_hil.sea.models import pierson_moskowitz as pierson_moskowitz
 from utank_hil.sea.ndbc import load_ndbc as load_ndbc
 from utank_hil.sea.sea import EffectiveSlope as EffectiveSlope
 from utank_hil.sea.sea import Sea as Sea
-from utank_hil.sea.slope_spectrum import SlopeSpectrum as SlopeSpectrum
+from utank_hil.sea.spectrum import SlopeSpectrum as SlopeSpectrum
 from utank_hil.sea.spectrum import Spectrum as Spectrum

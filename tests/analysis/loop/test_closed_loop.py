@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import expm
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_radius, closed_loop_response
-from utank_hil.control import ARX, PredictiveLaw, design_gpc, pump_model
+from utank_hil.control import ARX, DesignPlant, PredictiveLaw, design_gpc, pump_model
 from utank_hil.dynamics import RollShip, Tank, coupled_model, sampled_model
 from utank_hil.dynamics.sampling import sample
 
@@ -56,9 +56,8 @@ def test_response_equals_time_simulation(samples_a_period):
     last = record[-round(period_s / 0.01) :]
     k = np.arange(len(last)) + len(record) - len(last)
     component = 2 * np.mean(last * np.exp(-1j * w * 0.01 * k)[:, None], axis=0) / (-1j * 1e6)
-    motions, pressure = closed_loop_response(
-        LAW, coupled_model(SHIP, TANK), MEASURED, np.array([w]), DELAY_S, LAG_S
-    )
+    plant = DesignPlant(SHIP, TANK, DELAY_S, LAG_S)
+    motions, pressure = closed_loop_response(LAW, plant, MEASURED, np.array([w]))
     expected = np.append(motions[0], pressure[0])
     # the sum over a period stands for its integral; pressure has corners at the commands
     np.testing.assert_allclose(component, expected, rtol=1e-3)
@@ -82,14 +81,14 @@ def test_radius_is_the_decay_of_the_simulated_loop():
 def test_passive_response_is_the_open_loop():
     system = coupled_model(SHIP, TANK)
     w = np.array([0.3, 0.6])
-    motions, pressure = closed_loop_response(None, system, MEASURED, w)
+    motions, pressure = closed_loop_response(None, DesignPlant(SHIP, TANK), MEASURED, w)
     np.testing.assert_allclose(motions, system(1j * w)[:, 1].T, rtol=1e-12)
     assert not pressure.any()
 
 
 def test_frequency_above_half_the_sampling_frequency_is_refused():
     with pytest.raises(ValueError, match="frequencies must lie in"):
-        closed_loop_response(LAW, coupled_model(SHIP, TANK), MEASURED, np.array([16.0]))
+        closed_loop_response(LAW, DesignPlant(SHIP, TANK), MEASURED, np.array([16.0]))
 
 
 def test_model_without_python_control_is_the_coupled_model():

@@ -15,8 +15,7 @@ from utank_hil.control.gain import GainLaw
 from utank_hil.control.state_space import StateSpaceLaw
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import pump_model
-from utank_hil.dynamics.sampling import LinearModel, sample
-from utank_hil.dynamics.transfer import state_space_response
+from utank_hil.dynamics.sampling import LinearModel, sample, state_space_response
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)

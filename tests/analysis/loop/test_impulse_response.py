@@ -25,12 +25,11 @@ from utank_hil.control import (
     SeaModel,
     design_pd,
 )
-from utank_hil.control.slope import slope_at_rest
+from utank_hil.control.gain import slope_at_rest
 from utank_hil.control.state_space import StateSpaceLaw
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import STATES, pump_model
-from utank_hil.dynamics.sampling import LinearModel, sample
-from utank_hil.dynamics.transfer import state_space_response
+from utank_hil.dynamics.sampling import LinearModel, sample, state_space_response
 from utank_hil.sea import jonswap
 
 pytestmark = pytest.mark.slow

@@ -17,8 +17,7 @@ from utank_hil.analysis.loop.innovation_filter import (
 from utank_hil.analysis.loop.robustness import GAINS, ship_variants
 from utank_hil.analysis.loop.self_tuning import SelfTuned, self_tuned
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.control.constrained.design import ConstrainedDesign
-from utank_hil.control.constrained.sea_plant import sea_plant
+from utank_hil.control.constrained.design import ConstrainedDesign, sea_plant
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import STATES
 from utank_hil.sea import jonswap

@@ -17,7 +17,6 @@ from utank_hil.analysis.loop.self_tuning import (
 from utank_hil.assembly import build_law
 from utank_hil.configuration import ConfigError, ControllerConfig, load_config
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.dynamics.linear import coupled_model
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
 
 CONTROLLERS = Path("configs/controllers").resolve()
@@ -58,14 +57,8 @@ def test_the_cost_is_that_of_the_sum_over_random_components(short_search):
     moment = Sea.irregular(SPECTRUM, 1, components=4096).roll_moment(
         PLANT.ship.stiffness_nm_rad, EffectiveSlope(SEA.effective_slope)
     )
-    motion = motion_in_sea(
-        found.design.law(PLANT),
-        coupled_model(PLANT.ship, PLANT.tank),
-        found.design.predictor.measured,
-        moment,
-        PLANT.delay_s,
-        PLANT.lag_s,
-    )
+    measured = found.design.predictor.measured
+    motion = motion_in_sea(found.design.law(PLANT), PLANT, measured, moment)
     passive_rad, limits = passive_roll_rad(PLANT, SEA), PLANT.limits
     pressure = motion.pressure_rms_pa / limits.pressure_pa
     squares = np.square([motion.roll_rms_rad, motion.level_rms_m, pressure])

@@ -13,6 +13,7 @@ from utank_hil.sea import Harmonics
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 TS, DELAY_S, LAG_S, STEP_S = 0.2, 0.05, 0.1, 0.01
+PLANT = DesignPlant(SHIP, TANK, DELAY_S, LAG_S)
 # whole cycles in 400 s, so that a mean over it is exact
 WAVES = Harmonics(
     np.array([2e6, 3e6, 1e6]), 2 * np.pi / 400 * np.array([29, 40, 63]), np.array([0.3, 2.0, 4.0])
@@ -51,8 +52,8 @@ def simulated_rms(law):
 
 @pytest.mark.slow
 def test_closed_form_is_the_simulated_loop():
-    law = GPC_ROLL.law(DesignPlant(SHIP, TANK, DELAY_S, LAG_S))
-    motion = motion_in_sea(law, coupled_model(SHIP, TANK), ("roll_rad",), WAVES, DELAY_S, LAG_S)
+    law = GPC_ROLL.law(PLANT)
+    motion = motion_in_sea(law, PLANT, ("roll_rad",), WAVES)
     roll, level, pressure = simulated_rms(law)
     assert motion.roll_rms_rad == pytest.approx(roll, rel=1e-3)
     assert motion.level_rms_m == pytest.approx(level, rel=1e-3)
@@ -61,7 +62,7 @@ def test_closed_form_is_the_simulated_loop():
 
 def test_one_harmonic_on_the_passive_tank_is_its_amplitude_over_root_two():
     system, wave = coupled_model(SHIP, TANK), Harmonics(*(np.array([x]) for x in (4e6, 0.6, 1.0)))
-    motion = motion_in_sea(None, system, (), wave)
+    motion = motion_in_sea(None, PLANT, (), wave)
     answer = system(0.6j)[:, 1]
     assert motion.roll_rms_rad == pytest.approx(4e6 * abs(answer[0]) / np.sqrt(2))
     assert motion.level_rms_m == pytest.approx(4e6 * abs(answer[2]) / np.sqrt(2))
@@ -70,16 +71,15 @@ def test_one_harmonic_on_the_passive_tank_is_its_amplitude_over_root_two():
 
 def test_a_law_of_zero_gain_leaves_the_passive_tank():
     zero = PredictiveLaw(np.zeros((1, 1, 1)), np.zeros((1, 1, 1)), np.zeros((1, 1, 1)), TS)
-    system = coupled_model(SHIP, TANK)
-    assert motion_in_sea(zero, system, ("roll_rad",), WAVES) == motion_in_sea(
-        None, system, (), WAVES
-    )
+    passive = motion_in_sea(None, PLANT, (), WAVES)
+    assert motion_in_sea(zero, PLANT, ("roll_rad",), WAVES) == passive
 
 
 def test_waves_faster_than_the_samples_meet_the_passive_tank():
-    law, system = GPC_ROLL.law(DesignPlant(SHIP, TANK)), coupled_model(SHIP, TANK)
+    law = GPC_ROLL.law(PLANT)
     fast = Harmonics(*(np.array([x]) for x in (4e6, 1.01 * np.pi / TS, 0.0)))
-    assert motion_in_sea(law, system, ("roll_rad",), fast) == motion_in_sea(None, system, (), fast)
+    passive = motion_in_sea(None, PLANT, (), fast)
+    assert motion_in_sea(law, PLANT, ("roll_rad",), fast) == passive
 
 
 def test_ship_without_tank_is_the_roll_equation():

@@ -27,7 +27,7 @@ from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.lqg import LQGLaw
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.dynamics.linear import coupled_model, pump_model
+from utank_hil.dynamics.linear import pump_model
 from utank_hil.dynamics.sampling import sample
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
 
@@ -56,8 +56,7 @@ def test_the_law_has_all_margins_and_its_roll_is_that_of_another_computation():
     found = tuned()
     measured = found.design.measured
     assert not robustness(found.law, PLANT, measured, with_delay_margin=False).failures()
-    system = coupled_model(PLANT.ship, PLANT.tank)
-    motion = motion_in_sea(found.law, system, measured, moment(), PLANT.delay_s, PLANT.lag_s)
+    motion = motion_in_sea(found.law, PLANT, measured, moment())
     assert found.prediction.roll_rad == pytest.approx(motion.roll_rms_rad, rel=0.03)
     assert found.prediction.level_m == pytest.approx(motion.level_rms_m, rel=0.03)
     # what the sensors' noise makes of it is in the prediction alone
@@ -66,8 +65,7 @@ def test_the_law_has_all_margins_and_its_roll_is_that_of_another_computation():
 
 
 def test_passive_roll_is_that_of_the_sum_over_components():
-    system = coupled_model(PLANT.ship, PLANT.tank)
-    motion = motion_in_sea(None, system, ("roll_rad",), moment())
+    motion = motion_in_sea(None, PLANT, ("roll_rad",), moment())
     assert passive_roll_rad(PLANT, SEA) == pytest.approx(motion.roll_rms_rad, rel=0.01)
 
 

@@ -11,8 +11,7 @@ from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL, LQG_ROLL_RATE_LEVEL
 
 from utank_hil.analysis.loop.trade import scaled, trade, varied
 from utank_hil.control import DesignPlant
-from utank_hil.control.constrained.design import ConstrainedDesign
-from utank_hil.control.constrained.sea_plant import SeaModel
+from utank_hil.control.constrained.design import ConstrainedDesign, SeaModel
 from utank_hil.pictures.trade import draw_trade
 from utank_hil.sea import EffectiveSlope, Sea, ittc
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from integrated_roll import integrated_roll
 
-from utank_hil.analysis.motion.bare_ship import roll_without_tank
+from utank_hil.analysis.loop.sea_response import roll_without_tank
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea, jonswap
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from utank_hil.analysis.motion.confidence import mean_interval
+from utank_hil.analysis.motion.statistics import mean_interval
 
 
 def test_half_width_is_that_of_the_table_of_student_s_distribution():

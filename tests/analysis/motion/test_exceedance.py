@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from utank_hil.analysis.motion.exceedance import exceedance, rayleigh_exceedance
+from utank_hil.analysis.motion.statistics import exceedance, rayleigh_exceedance
 
 
 def test_half_the_amplitudes_of_two_alternating_waves_are_above_the_smaller():

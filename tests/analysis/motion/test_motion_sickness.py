@@ -6,7 +6,7 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from utank_hil.analysis.motion.motion_sickness import (
+from utank_hil.analysis.motion.comfort import (
     motion_sickness_dose,
     motion_sickness_incidence,
     vertical_weighting,

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from utank_hil.control.constrained.active_set import ActiveSetSolver
+from utank_hil.control.constrained.plan_programme import ActiveSetSolver
 
 
 def interior_point(hessian, gradient, rows, lower, upper):

@@ -9,8 +9,7 @@ from rolling_ship import SHIP, TANK
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.base.tick import TICK_S
 from utank_hil.control import DesignPlant, PumpLimits
-from utank_hil.control.constrained.design import ConstrainedDesign
-from utank_hil.control.constrained.sea_plant import sea_plant
+from utank_hil.control.constrained.design import ConstrainedDesign, sea_plant
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import coupled_model
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea, jonswap

@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.control.fuzzy.basis import FuzzyBasis
 from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
-from utank_hil.control.tracking_error import ErrorDynamics
+from utank_hil.control.fuzzy.law import ErrorDynamics, FuzzyBasis
 
 ERROR = ErrorDynamics(0.8, 0.6, 2.5)
 RANGES = (0.5, 0.5)

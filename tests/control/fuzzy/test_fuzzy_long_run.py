@@ -7,7 +7,7 @@ import pytest
 
 from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.indirect import IndirectFuzzy
-from utank_hil.control.tracking_error import ErrorDynamics
+from utank_hil.control.fuzzy.law import ErrorDynamics
 
 pytestmark = pytest.mark.slow
 

@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.control.fuzzy.basis import FuzzyBasis
 from utank_hil.control.fuzzy.indirect import IndirectFuzzy
-from utank_hil.control.tracking_error import ErrorDynamics
+from utank_hil.control.fuzzy.law import ErrorDynamics, FuzzyBasis
 
 ERROR = ErrorDynamics(1.0, 0.7, 2.0)
 RANGES = (0.5, 0.5)

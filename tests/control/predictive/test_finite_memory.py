@@ -4,7 +4,7 @@ import control
 import numpy as np
 import pytest
 
-from utank_hil.control.predictive.finite_memory import finite_memory_arx
+from utank_hil.control.predictive.design import finite_memory_arx
 
 RNG = np.random.default_rng(2)
 A = np.array([[0.9, 0.3, 0.0], [-0.3, 0.9, 0.2], [0.0, 0.0, 0.7]])

@@ -13,7 +13,7 @@ from tools.thesis.printed_laws import (
 )
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.control import DesignPlant, PredictiveLaw
-from utank_hil.dynamics import RollShip, Tank, coupled_model
+from utank_hil.dynamics import RollShip, Tank
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 5.8e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.08)
@@ -21,14 +21,14 @@ TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.08)
 
 def test_index_is_the_integral_of_amplitude_taken_away_per_pressure():
     law, measured = designed_laws(SHIP, TANK)[DPC_BOTH], PRINTED[DPC_BOTH].measured
-    system, roll_rad_s = coupled_model(SHIP, TANK), 0.496
+    plant, roll_rad_s = DesignPlant(SHIP, TANK, SAMPLE_TIME_S, 0.0), 0.496
     total, step = 0.0, FREQUENCY_RATIOS[1] - FREQUENCY_RATIOS[0]
     for q in FREQUENCY_RATIOS[::20]:
         w = np.array([q * roll_rad_s])
-        passive = closed_loop_response(None, system, measured, w)[0][0, 0]
-        active, pressure = closed_loop_response(law, system, measured, w, SAMPLE_TIME_S, 0)
+        passive = closed_loop_response(None, plant, measured, w)[0][0, 0]
+        active, pressure = closed_loop_response(law, plant, measured, w)
         total += 20 * step * abs(abs(passive) - abs(active[0, 0])) / abs(pressure[0])
-    found = performance_index(law, DesignPlant(SHIP, TANK, SAMPLE_TIME_S, 0.0), measured)
+    found = performance_index(law, plant, measured)
     assert found == pytest.approx(total, rel=0.02)
 
 

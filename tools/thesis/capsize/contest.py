@@ -14,14 +14,14 @@ import numpy as np
 
 from tools.thesis.capsize.survival import Survival, controlled_run, largest_survivable_wave
 from tools.thesis.capsize.threshold import without_tank
+from utank_hil.control.design_plant import PumpLimits
 from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
 from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.indirect import IndirectFuzzy
+from utank_hil.control.fuzzy.law import ErrorDynamics
 from utank_hil.control.interface import Controller
 from utank_hil.control.limiter import CommandLimiter
-from utank_hil.control.limits import PumpLimits
 from utank_hil.control.passive import PassiveController
-from utank_hil.control.tracking_error import ErrorDynamics
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.simulate import WaveMoment

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
-from utank_hil.control.interface import LinearLaw
-from utank_hil.dynamics.sampling import LinearModel, sample
-from utank_hil.dynamics.transfer import state_space_response
+from utank_hil.control import DesignPlant, LinearLaw
+from utank_hil.dynamics.linear import STATES, state_matrices
+from utank_hil.dynamics.sampling import LinearModel, state_space_response
 
 if TYPE_CHECKING:
     from control import StateSpace
@@ -63,40 +63,34 @@ def closed_loop_radius(
 
 def closed_loop_response(
     law: LinearLaw | None,
-    system: "StateSpace",
+    plant: DesignPlant,
     measured: tuple[str, ...],
     frequency_rad_s: FloatArray,
-    delay_s: float = 0.0,
-    lag_s: float = 0.0,
 ) -> tuple[ComplexArray, ComplexArray]:
     """Motions and pump pressure per unit of wave moment, at the wave's frequency.
 
-    Without a law the tank is passive. `system` is continuous with the inputs pressure_pa and
-    wave_moment_nm (`coupled_model`); the frequencies, shape (N,), are positive and below pi / Ts;
-    `delay_s` and `lag_s` are as in `sampled_model`. Returns motions, shape (N, outputs of system),
-    and the actual pressure, shape (N,), after delay and lag. Raises `ValueError` if a frequency is
-    outside (0, pi / Ts).
+    Without a law the tank is passive. The frequencies, shape (N,), are positive and below pi / Ts.
+    Returns motions, shape (N, 4), of `STATES`, and the actual pressure, shape (N,), after delay and
+    lag. Raises `ValueError` if a frequency is outside (0, pi / Ts).
     """
     w = np.asarray(frequency_rad_s, dtype=np.float64)
-    s = np.asarray(1j * w, dtype=np.complex128)
-    open_loop = state_space_response(system, s)
-    pressure_column = system.input_labels.index("pressure_pa")
-    wave_column = system.input_labels.index("wave_moment_nm")
-    from_wave, from_pressure = open_loop[:, :, wave_column], open_loop[:, :, pressure_column]
+    a, b = state_matrices(plant.ship, plant.tank)
+    system = LinearModel(a, b, np.eye(len(a)), np.zeros(b.shape), 0.0)
+    open_loop = state_space_response(system, np.asarray(1j * w, dtype=np.complex128))
+    from_pressure, from_wave = open_loop[:, :, 0], open_loop[:, :, 1]
     if law is None:
         return from_wave, np.zeros(len(w), dtype=np.complex128)
     sample_time_s = law.sample_time_s
     if not ((w > 0) & (w < np.pi / sample_time_s)).all():
         raise ValueError(f"frequencies must lie in (0, {np.pi / sample_time_s:.3f}) rad/s")
-    rows = [system.output_labels.index(name) for name in measured]
+    rows = [STATES.index(name) for name in measured]
     z = np.exp(1j * w * sample_time_s)
-    seen = system[list(measured), ["pressure_pa"]]
-    plant = sample(seen, sample_time_s, delay_s, lag_s)
     compensator = law.response(z)
-    loop = (compensator @ state_space_response(plant, z))[:, 0, 0]
+    sampled = plant.sampled(measured, sample_time_s)
+    loop = (compensator @ state_space_response(sampled, z))[:, 0, 0]
     command = (compensator @ from_wave[:, rows, None])[:, 0, 0] / (1 - loop)
     # v(k) is held over [t_{k-1} + d, t_k + d)
     hold = (1 - np.exp(-1j * w * sample_time_s)) / (1j * w * sample_time_s)
-    path = hold * np.exp(-1j * w * (delay_s - sample_time_s)) / (1 + 1j * w * lag_s)
+    path = hold * np.exp(-1j * w * (plant.delay_s - sample_time_s)) / (1 + 1j * w * plant.lag_s)
     pressure = path * command
     return from_wave + from_pressure * pressure[:, None], pressure

@@ -34,9 +34,8 @@ import numpy as np
 from scipy.fft import next_fast_len
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
-from utank_hil.control.interface import Controller
-from utank_hil.dynamics.linear import STATES
-from utank_hil.dynamics.sampling import LinearModel
+from utank_hil.control import Controller
+from utank_hil.dynamics import STATES, LinearModel
 
 IMPULSES: Final[Mapping[str, float]] = dict(zip(STATES, (1e-3, 1e-3, 1e-2, 1e-2), strict=True))
 """Size of the impulse in each measurement, in its unit."""

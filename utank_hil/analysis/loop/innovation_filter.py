@@ -39,13 +39,10 @@ from utank_hil.analysis.loop.robustness import (
     ship_variants,
 )
 from utank_hil.base.arrays import ComplexArray, FloatArray
-from utank_hil.control.constrained.design import ConstrainedDesign
-from utank_hil.control.constrained.sea_plant import sea_plant
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.lqg import LQGLaw
-from utank_hil.dynamics.linear import STATES
-from utank_hil.dynamics.sampling import LinearModel
-from utank_hil.dynamics.transfer import state_space_response
+from utank_hil.control import ConstrainedDesign, DesignPlant, LQGLaw
+from utank_hil.control.constrained.design import sea_plant
+from utank_hil.dynamics import STATES, LinearModel
+from utank_hil.dynamics.sampling import state_space_response
 
 _ORDER: Final = 14
 """Number of filter states. From 8 to 14 the predicted roll of the shipped laws falls by 1.5 %, to

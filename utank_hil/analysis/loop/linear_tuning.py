@@ -39,12 +39,9 @@ from utank_hil.analysis.loop.self_tuning import (
     unknown_sea,
 )
 from utank_hil.analysis.loop.trade import scaled
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import BuiltLaw
+from utank_hil.control import BuiltLaw, DesignPlant, PredictiveDesign, Predictor, SeaModel
 from utank_hil.control.lqg_design import LQGDesign
-from utank_hil.control.predictive.design import PredictiveDesign, Predictor
-from utank_hil.control.sea_model import SeaModel
-from utank_hil.dynamics.linear import STATES, coupled_model
+from utank_hil.dynamics import STATES
 from utank_hil.sea import Harmonics
 
 LinearKind = Literal["gpc", "dpc", "lqg"]
@@ -210,12 +207,12 @@ class _Search:
 
     def __init__(self, kind: LinearKind, plant: DesignPlant, sea: SlopeDensity) -> None:
         self._least_std = asdict(SensorNoise())
-        self._plant, self._system = plant, coupled_model(plant.ship, plant.tank)
+        self._plant = plant
         w = plant.ship.natural_frequency_rad_s * _OMEGA
         slope = np.sqrt(2 * sea.slope_density(w) * np.gradient(w))
         self._moment = Harmonics(plant.ship.stiffness_nm_rad * slope, w, np.zeros(len(w)))
-        answers, _ = closed_loop_response(None, self._system, (), w)
-        roll = np.abs(answers[:, self._system.output_labels.index("roll_rad")])
+        answers, _ = closed_loop_response(None, plant, (), w)
+        roll = np.abs(answers[:, STATES.index("roll_rad")])
         energy = np.square(roll * self._moment.amplitude) / 2
         self._passive_rad = math.sqrt(float(energy.sum()))
         if not self._passive_rad > 0:
@@ -245,14 +242,8 @@ class _Search:
 
     def _cost(self, design: LinearDesign) -> float:
         plant, limits = self._plant, self._plant.limits
-        motion = motion_in_sea(
-            design.law(plant),
-            self._system,
-            design.predictor.measured,
-            self._moment,
-            plant.delay_s,
-            plant.lag_s,
-        )
+        law, measured = design.law(plant), design.predictor.measured
+        motion = motion_in_sea(law, plant, measured, self._moment)
         pressure = motion.pressure_rms_pa / limits.pressure_pa
         squares = np.square([motion.roll_rms_rad, motion.level_rms_m, pressure])
         return float(squares @ self._weights) / self._passive_rad**2

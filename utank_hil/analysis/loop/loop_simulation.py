@@ -15,15 +15,10 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.tick import TICK_S
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import Controller
-from utank_hil.control.level_observer import LevelObserver
-from utank_hil.control.limiter import CommandLimiter
-from utank_hil.dynamics.linear import STATES, state_matrices
-from utank_hil.dynamics.nonlinear import RollModel
+from utank_hil.control import CommandLimiter, Controller, DesignPlant, LevelObserver
+from utank_hil.dynamics import STATES, RollModel, RollShip, Tank
+from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.sampling import transition_and_step
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
 from utank_hil.sea import Harmonics
 
 LEVEL_TICKS: Final = 2  #: Cycle of the message SENSOR_TANK, in ticks.

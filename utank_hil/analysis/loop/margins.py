@@ -10,8 +10,7 @@ import numpy as np
 from utank_hil.analysis.loop.closed_loop import closed_loop_eigenvalues, closed_loop_radius
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control.interface import LinearLaw
-from utank_hil.dynamics.sampling import LinearModel, sample
-from utank_hil.dynamics.transfer import state_space_response
+from utank_hil.dynamics.sampling import LinearModel, sample, state_space_response
 
 if TYPE_CHECKING:
     from control import StateSpace

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from utank_hil.analysis.loop.margins import Margins, margins, radius_and_peak, stability_grid
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import LinearLaw
+from utank_hil.control import DesignPlant, LinearLaw
+from utank_hil.dynamics import RollShip
 from utank_hil.dynamics.linear import pump_model
 from utank_hil.dynamics.sampling import sample
-from utank_hil.dynamics.ship import RollShip
 
 PEAK_SENSITIVITY = 2.0
 """Greatest allowed peak sensitivity: L stays at least 0.5 from the critical point."""

@@ -4,19 +4,17 @@ The mean square of a linear response to a sum of harmonics is sum |H(w)|^2 a^2 /
 rate and level are neglected.
 """
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.base.arrays import ComplexArray, FloatArray
-from utank_hil.control.interface import LinearLaw
-from utank_hil.dynamics.ship import RollShip
+from utank_hil.control import DesignPlant, LinearLaw
+from utank_hil.dynamics import STATES, RollShip
 from utank_hil.sea import Harmonics
-
-if TYPE_CHECKING:
-    from control import StateSpace
 
 LEAST_ROLL_RAD: Final = 1e-6
 """Roll RMS below which the sea counts as calm, as a ratio to it is meaningless. Chosen; no study.
@@ -37,27 +35,19 @@ class MotionInSea:
 
 
 def motion_in_sea(
-    law: LinearLaw | None,
-    system: "StateSpace",
-    measured: tuple[str, ...],
-    wave_moment: Harmonics,
-    delay_s: float = 0.05,
-    lag_s: float = 0.1,
+    law: LinearLaw | None, plant: DesignPlant, measured: tuple[str, ...], wave_moment: Harmonics
 ) -> MotionInSea:
     """Linear motion with a law that stabilizes its loop.
 
-    Without a law the tank is passive; for an unstable loop the result is meaningless. `system` is
-    the `coupled_model` of ship and tank. `wave_moment` is in N m; above the Nyquist frequency pi /
-    Ts the tank is taken as passive. `delay_s` and `lag_s` are as in `sampled_model`.
+    Without a law the tank is passive; for an unstable loop the result is meaningless. `wave_moment`
+    is in N m; above the Nyquist frequency pi / Ts the tank is taken as passive.
     """
     w = wave_moment.frequency_rad_s
-    motions, pressure = closed_loop_response(None, system, measured, w)
+    motions, pressure = closed_loop_response(None, plant, measured, w)
     if law is not None:
         seen = (w > 0) & (w < np.pi / law.sample_time_s)
-        motions[seen], pressure[seen] = closed_loop_response(
-            law, system, measured, w[seen], delay_s, lag_s
-        )
-    roll, level = (motions[:, system.output_labels.index(name)] for name in ("roll_rad", "level_m"))
+        motions[seen], pressure[seen] = closed_loop_response(law, plant, measured, w[seen])
+    roll, level = (motions[:, STATES.index(name)] for name in ("roll_rad", "level_m"))
     return MotionInSea(*(rms(answer, wave_moment) for answer in (roll, level, pressure)))
 
 
@@ -82,3 +72,29 @@ def roll_response_without_tank(ship: RollShip, frequency_rad_s: FloatArray) -> C
         ship.stiffness_nm_rad - ship.inertia_kg_m2 * w**2 + 1j * ship.damping_nms_rad * w
     )
     return 1 / impedance
+
+
+def roll_without_tank(
+    ship: RollShip, wave_moment: Harmonics, step_s: float, count: int
+) -> FloatArray:
+    """Linear roll from rest at time 0 under a sum of harmonics in N m, exact for any step.
+
+    It is the sum of the steady response to each component, the steady heel, and the free decay that
+    matches rest at the start. Returns the roll in
+    radians at 0, step_s, 2 step_s, ..., shape (count,). Raises `ValueError` if it is overdamped.
+    """
+    omega = wave_moment.frequency_rad_s
+    compliance = roll_response_without_tank(ship, omega)
+    response = wave_moment.amplitude * np.exp(1j * wave_moment.phase_rad) * compliance
+    decay = ship.damping_nms_rad / (2.0 * ship.inertia_kg_m2)
+    if decay >= ship.natural_frequency_rad_s:
+        raise ValueError("the ship's roll is overdamped; this closed form needs damping below one")
+    damped = math.sqrt(ship.natural_frequency_rad_s**2 - decay**2)
+    steady = Harmonics(np.abs(response), omega, np.angle(response))
+    steady_rate = Harmonics(np.abs(response) * omega, omega, np.angle(response) + math.pi / 2)
+    heel = ship.heeling_moment_nm / ship.stiffness_nm_rad
+    angle = -heel - float(steady.at(0.0))  # start of the free decay
+    sine_part = (-float(steady_rate.at(0.0)) + decay * angle) / damped
+    time_s = step_s * np.arange(count, dtype=float)
+    free = angle * np.cos(damped * time_s) + sine_part * np.sin(damped * time_s)
+    return np.asarray(heel + steady.series(step_s, count) + np.exp(-decay * time_s) * free)

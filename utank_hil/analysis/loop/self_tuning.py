@@ -38,17 +38,11 @@ from utank_hil.analysis.loop.robustness import (
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import Range, range_problems, refuse
 from utank_hil.base.tick import TICK_S
-from utank_hil.control.constrained.design import ConstrainedDesign
+from utank_hil.control import BuiltLaw, ConstrainedDesign, DesignPlant, LQGLaw, PumpLimits, SeaModel
 from utank_hil.control.constrained.law import ConstrainedLaw
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import BuiltLaw
-from utank_hil.control.limits import PumpLimits
-from utank_hil.control.lqg import LQGLaw
-from utank_hil.control.sea_model import SeaModel
+from utank_hil.dynamics import GRAVITY_M_S2, LinearModel, RollShip
 from utank_hil.dynamics.linear import pump_model, state_matrices
-from utank_hil.dynamics.sampling import LinearModel, sample
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.dynamics.sampling import sample
 from utank_hil.sea import ittc
 
 _PRESSURE_COST: Final = 0.106  # Cost of constant pressure at its limit, over s^2.

@@ -8,11 +8,8 @@ import numpy as np
 
 from utank_hil.analysis.loop.robustness import Robustness, robustness
 from utank_hil.analysis.loop.sea_response import MotionInSea, motion_in_sea, require_roll
-from utank_hil.control.constrained.design import ConstrainedDesign
-from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control import ConstrainedDesign, DesignPlant, PredictiveDesign
 from utank_hil.control.lqg_design import LQGDesign
-from utank_hil.control.predictive.design import PredictiveDesign
-from utank_hil.dynamics.linear import coupled_model
 from utank_hil.sea import Harmonics
 
 Design = PredictiveDesign | ConstrainedDesign | LQGDesign
@@ -94,11 +91,10 @@ def trade(
         factors = HORIZON_FACTORS if horizon else WEIGHT_FACTORS
     # a longer horizon means less effort
     factors = sorted(factors, reverse=horizon)
-    system = coupled_model(plant.ship, plant.tank)
     measured = (
         design.measured if isinstance(design, ConstrainedDesign) else design.predictor.measured
     )
-    passive = motion_in_sea(None, system, measured, wave_moment)
+    passive = motion_in_sea(None, plant, measured, wave_moment)
     require_roll(passive)
     points = []
     for number, factor in enumerate(factors, 1):
@@ -106,7 +102,7 @@ def trade(
         judged = robustness(law, plant, measured)
         motion = less = None
         if judged.nominal.radius < 1:
-            motion = motion_in_sea(law, system, measured, wave_moment, plant.delay_s, plant.lag_s)
+            motion = motion_in_sea(law, plant, measured, wave_moment)
             less = 1 - motion.roll_rms_rad / passive.roll_rms_rad
         points.append(TradePoint(factor, motion, less, judged))
         if progress is not None:

@@ -1,8 +1,11 @@
 """Statistics of a run: roll and pump."""
 
+import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
 
@@ -72,3 +75,79 @@ def pump_statistics(
         power_peak_w=float(drawn.max()),
         level_peak_m=float(np.max(np.abs(level_m))),
     )
+
+
+def exceedance(signal: FloatArray, levels: FloatArray) -> FloatArray:
+    """Share of single amplitudes of a record above each level, shape (k,).
+
+    A single amplitude is the largest deviation from the mean between two crossings of it, to either
+    side. The parts before the first crossing and after the last are left out. Raises `ValueError`
+    if the record crosses its mean less than twice.
+    """
+    centred = signal - signal.mean()
+    crossings = np.flatnonzero(np.diff(np.signbit(centred))) + 1
+    if len(crossings) < 2:
+        raise ValueError("the record holds no whole half-cycle: exceedance needs a longer one")
+    size = np.abs(centred[: crossings[-1]])
+    amplitudes = np.maximum.reduceat(size, crossings[:-1])
+    share: FloatArray = np.mean(amplitudes[:, None] > np.asarray(levels), axis=0)
+    return share
+
+
+def rayleigh_exceedance(standard_deviation: float, levels: FloatArray) -> FloatArray:
+    """Share exp(-x^2 / 2 s^2) of amplitudes above x, for a narrow-banded Gaussian motion.
+
+    Longuet-Higgins (1952), "On the statistical distribution of the heights of sea waves".
+    """
+    share: FloatArray = np.exp(-np.square(levels) / (2 * standard_deviation**2))
+    return share
+
+
+class Interval(NamedTuple):
+    """Confidence interval of a mean: mean - half_width ... mean + half_width."""
+
+    mean: float
+    half_width: float
+
+
+def mean_interval(values: npt.ArrayLike) -> Interval:
+    """Mean of independent, roughly normal values with its interval of 95 % (Student's t).
+
+    `values`, shape (n,), are two or more, for a paired comparison the differences. Raises
+    `ValueError` if there are fewer.
+    """
+    from scipy.stats import t as student
+
+    numbers = np.asarray(values, dtype=np.float64)
+    n = len(numbers)
+    if n < 2:
+        raise ValueError(f"a confidence interval needs two or more values, got {n}")
+    quantile = float(student.ppf(0.975, n - 1))
+    return Interval(float(numbers.mean()), quantile * float(numbers.std(ddof=1)) / math.sqrt(n))
+
+
+def batch_means(values: FloatArray, batches: int) -> FloatArray:
+    """Means of equal parts of a record, shape (batches,); a remainder at its end is left out.
+
+    The samples of a record are correlated. Means over batches that are long against the correlation
+    time are hardly correlated, so their Student's t gives the interval of the record's mean (A. M.
+    Law, Simulation Modeling and Analysis, 5th ed., section 9.5.3).
+
+    Raises `ValueError` if the record has fewer values than batches.
+    """
+    length = len(values) // batches
+    if length < 1:
+        raise ValueError(f"{len(values)} values make no {batches} batches")
+    means: FloatArray = values[: batches * length].reshape(batches, length).mean(axis=1)
+    return means
+
+
+def rms_batches(values: FloatArray, batches: int) -> FloatArray:
+    """Express the RMS of a record as the mean of one value for each batch, shape (batches,).
+
+    The values are linear about the mean square (the delta method), so the differences of such
+    values of two records in the same waves have the interval of the difference of their RMS.
+    """
+    squares = batch_means(np.square(values), batches)
+    rms = math.sqrt(float(squares.mean()))
+    return rms + (squares - rms**2) / (2.0 * rms) if rms > 0 else np.zeros(batches)

@@ -9,10 +9,8 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from utank_hil.base.parameters import Problem
-from utank_hil.control.limits import PumpLimits
-from utank_hil.control.sea_model import SeaModel
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.control import PumpLimits, SeaModel
+from utank_hil.dynamics import GRAVITY_M_S2, RollShip, Tank
 
 _PERIODS: Final = (0.2, 5.0)
 """Range of a period of waves or of a wanted motion per the ship's roll period."""

@@ -4,9 +4,8 @@ import math
 from collections.abc import Iterator
 
 from utank_hil.configuration.plausibility.figure import Figure
+from utank_hil.dynamics import GRAVITY_M_S2, RollShip, Tank
 from utank_hil.dynamics.pump import Pump, pump_load, pump_speed
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.dynamics.valves import Valve
 
 

@@ -4,11 +4,8 @@ import math
 from collections.abc import Iterator
 
 from utank_hil.configuration.plausibility.figure import Figure
-from utank_hil.dynamics.linear import coupled_matrices
-from utank_hil.dynamics.nonlinear import RollModel
-from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics import GRAVITY_M_S2, RollModel, RollShip, Tank, coupled_matrices
 from utank_hil.dynamics.steady_heel import righting_range
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 _ROLL_RAD = math.radians(10)
 _SPEED_M_S = 10.0  # a usual service speed

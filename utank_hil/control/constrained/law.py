@@ -25,7 +25,7 @@ from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import Positive, Range, range_problems, refuse
 from utank_hil.control.constrained.horizon import Horizon, condense
 from utank_hil.control.constrained.plan_programme import PlanProgramme
-from utank_hil.control.limits import PumpLimits
+from utank_hil.control.design_plant import PumpLimits
 from utank_hil.control.lqg import LQGLaw
 from utank_hil.dynamics.sampling import LinearModel
 

@@ -6,6 +6,7 @@ may be added. Adaptation pauses after a limited command, because the response is
 law's own command.
 """
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, dataclass
 from typing import NamedTuple
@@ -13,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray, plausible
+from utank_hil.base.elementary import exp, log
 from utank_hil.base.parameters import (
     NotNegative,
     Positive,
@@ -23,15 +25,108 @@ from utank_hil.base.parameters import (
 )
 from utank_hil.base.tick import TICK_S
 from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.fuzzy.basis import FuzzyBasis
+from utank_hil.control.gain import slope_at_rest
 from utank_hil.control.interface import BuiltLaw, Controller
-from utank_hil.control.slope import slope_at_rest
-from utank_hil.control.tracking_error import ErrorDynamics
 from utank_hil.dynamics.linear import STATES
 
+SETS = 3
+# Neighbouring sets cross at a membership of one half; the thesis gives no width.
+WIDTH = 1 / math.sqrt(8 * log(2))
 _OBEYED = 0.9  # share of a command that must be sent for adaptation to continue
 _REACH = 2.0  # the inputs are limited to this multiple of their ranges
 _LEVEL_RATE = STATES.index("level_rate_m_s")
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorDynamics:
+    """Wanted error dynamics and their Lyapunov function e' P e / 2.
+
+    With e = (phi - y_d, phi'), the wanted dynamics e'' + 2 zeta w e' + w^2 e = 0 and ::
+
+        A = [0 1; -w^2 -2 zeta w],    B = (0, 1),    A' P + P A = -q I
+
+    the laws are driven by the scalar s = B' P e = p12 e + p22 e'. Thesis (4.13), (4.14).
+    """
+
+    frequency_rad_s: Positive  #: w.
+    damping_ratio: Positive  #: zeta.
+    q: Positive  #: Factor of Q = q I.
+
+    def __post_init__(self) -> None:
+        refuse("error dynamics", range_problems(self))
+
+    @property
+    def gains(self) -> tuple[float, float]:
+        """Gains k of the outer loop: w^2 and 2 zeta w."""
+        w = self.frequency_rad_s
+        return w * w, 2 * self.damping_ratio * w
+
+    @property
+    def lyapunov(self) -> FloatArray:
+        """P, shape (2, 2)."""
+        k1, k2 = self.gains
+        p12 = self.q / (2 * k1)
+        p22 = (self.q / 2 + p12) / k2
+        return np.array([[k2 * p12 + k1 * p22, p12], [p12, p22]])
+
+
+class FuzzyBasis:
+    """Basis of 3^n rules.
+
+    Each input x_i has three linguistic values, negative, zero and positive, with Gaussian
+    memberships exp(-((x_i - c) / sigma)^2 / 2) about the centres -c_i, 0, c_i; the outer two stay 1
+    beyond their centres. Thesis (4.15), (4.26); the latter misprints the square, and centres that
+    are all at or below zero. A rule's weight is the product of its memberships over the sum of all
+    rules' products. The sum factors::
+
+        xi_{jk...}(x) = nu_1j(x_1) nu_2k(x_2) ...,    nu_ij = mu_ij / sum_j mu_ij
+
+    so the basis takes three exponentials per input and sums to one by construction, and xi xi' =
+    prod_i sum_j nu_ij^2 needs no rules.
+
+    Each of `ranges` is c_i of an input, in its unit: the value from which "positive" holds fully.
+    """
+
+    def __init__(self, ranges: tuple[float, ...]) -> None:
+        if not ranges or not all(math.isfinite(c) and c > 0 for c in ranges):
+            raise ValueError(f"fuzzy ranges must be positive and finite, got {ranges}")
+        self.ranges = np.array(ranges, dtype=np.float64)
+        self.rules = SETS ** len(ranges)  #: 3^n; 81 for four inputs.
+        self._scales = [1 / c for c in ranges]
+
+    def memberships(self, x: FloatArray) -> list[tuple[float, float, float]]:
+        """Normalised memberships nu of each input (negative, zero, positive), summing to one."""
+        # Plain arithmetic on a dozen numbers is several times faster than arrays.
+        return [
+            _degrees(value * scale) for value, scale in zip(x.tolist(), self._scales, strict=True)
+        ]
+
+    def __call__(self, x: FloatArray) -> FloatArray:
+        """Basis xi, shape (3^n,), of inputs of shape (n,); the last input's set changes fastest."""
+        xi: FloatArray = np.ones(1)
+        for row in self.memberships(x):
+            xi = np.multiply.outer(xi, row).ravel()
+        return xi
+
+    def square(self, x: FloatArray) -> float:
+        """Squared length xi xi' of the basis: near 1 at a lone rule, less between rules."""
+        square = 1.0
+        for negative, zero, positive in self.memberships(x):
+            square *= negative * negative + zero * zero + positive * positive
+        return square
+
+
+def _degrees(x: float) -> tuple[float, float, float]:
+    """Normalised memberships of an input that is given in units of its range."""
+    negative = 1.0 if x <= -1 else _gauss(x + 1)
+    zero = _gauss(x)
+    positive = 1.0 if x >= 1 else _gauss(x - 1)
+    total = negative + zero + positive
+    return negative / total, zero / total, positive / total
+
+
+def _gauss(distance: float) -> float:
+    return exp(-(distance * distance) / (2 * WIDTH * WIDTH))
 
 
 @dataclass(frozen=True, slots=True)
