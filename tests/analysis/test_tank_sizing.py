@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pump_losses import pump_losses
 
 from utank_hil.analysis.tank_sizing import (
     LEAST_GM_M,
@@ -23,7 +24,7 @@ from utank_hil.analysis.tank_sizing import (
 )
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 from utank_hil.dynamics.linear import coupled_matrices
-from utank_hil.dynamics.pump import AT_REST, pump_losses, pump_speed, pump_step
+from utank_hil.dynamics.pump import AT_REST, pump_speed, pump_step
 
 G = 9.80665
 

@@ -13,7 +13,7 @@ from roll_energy import (
 )
 from scipy.integrate import simpson
 
-from tools.thesis.reference import simulate_reference
+from tools.thesis.reference import after_impact, simulate_reference
 from utank_hil.dynamics import RollModel, RollShip, Tank, coupled_model, tank_wrench
 from utank_hil.dynamics.tank import water_moments
 from utank_hil.dynamics.valves import air_valve_loss, duct_valve_loss
@@ -178,7 +178,7 @@ def test_a_strike_is_an_internal_impulse(restitution):
     """The roll momentum of ship and water stays; the ship gets what the water loses."""
     tank = replace(THESIS_TANK, headroom_m=4.0, restitution=restitution)
     before = np.array([0.3, 0.1, 4.0, 1.5])
-    after, impact = RollModel(THESIS_SHIP, tank).strike(7.0, before)
+    after, impact = after_impact(RollModel(THESIS_SHIP, tank), 7.0, before)
     water = water_moments(tank, 4.0)
     rate_jump, level_jump = after[1] - before[1], after[3] - before[3]
     assert after[3] == pytest.approx(-restitution * 1.5)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pump_losses import pump_losses
 
 from utank_hil.dynamics.pump import (
     AT_REST,
@@ -13,7 +14,6 @@ from utank_hil.dynamics.pump import (
     compile_pump,
     pump_coast,
     pump_load,
-    pump_losses,
     pump_pressure,
     pump_speed,
     pump_step,

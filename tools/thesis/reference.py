@@ -101,10 +101,25 @@ def simulate_reference(
             capsized_s = time
         elif run.t_events[0].size and not stopped:
             state[2] = np.copysign(c.level_limit - INSIDE_M, state[2])
-            state, impact = model.strike(time, state)
+            state, impact = after_impact(model, time, state)
             impacts.append(impact)
             if c.restitution < 1 and abs(state[3]) < REST_M_S:
                 state[3], stopped = 0.0, True
         elif run.t_events[0].size:
             stopped = False
     return RollRun(times[:filled], out[:filled], tuple(impacts), capsized_s)
+
+
+def after_impact(model: RollModel, time_s: float, state: FloatArray) -> tuple[FloatArray, Impact]:
+    """Return the state after an impact, and the impact.
+
+    The state before, shape (4,), has its level at the limit and moving outward.
+    """
+    c = model.coefficients
+    phi, phi_dot, h, h_dot = (float(x) for x in state)
+    roll_inertia = c.inertia + c.inertia_h2 * h * h
+    jump = -(1 + c.restitution) * h_dot
+    roll_jump = -c.coupling / roll_inertia * jump
+    after = np.array([phi, phi_dot + roll_jump, h, h_dot + jump])
+    stop_impulse = (c.level_inertia - c.coupling * c.coupling / roll_inertia) * jump
+    return after, Impact(time_s, h, h_dot, c.ship_inertia * roll_jump, stop_impulse)

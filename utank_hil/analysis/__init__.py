@@ -5,6 +5,5 @@
 
 from utank_hil.analysis.loop.loop_simulation import LinearShip as LinearShip
 from utank_hil.analysis.loop.loop_simulation import LoopRun as LoopRun
-from utank_hil.analysis.loop.loop_simulation import NonlinearShip as NonlinearShip
 from utank_hil.analysis.loop.loop_simulation import SensorNoise as SensorNoise
 from utank_hil.analysis.loop.loop_simulation import run_law as run_law

@@ -44,7 +44,7 @@ from utank_hil.base.parameters import NotNegative, Positive, SampleTime, range_p
 from utank_hil.base.tick import TICK_S
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.gain import slope_at_rest
-from utank_hil.control.interface import BuiltLaw
+from utank_hil.control.interface import BuiltLaw, Memoryless
 from utank_hil.dynamics import GRAVITY_M_S2, STATES, RollModel, RollShip, Tank
 
 
@@ -116,11 +116,6 @@ class FeedbackLinearization(FeedbackLinearizationDesign):
             )
             refuse("feedback linearization", [("shift_rad_m", reason)])
 
-    @property
-    def zero_dynamics_rad_s(self) -> float:
-        """Frequency sqrt(g / (H + Lz)) of the level under zero roll, (4.10)."""
-        return math.sqrt(GRAVITY_M_S2 / (self.tank.height_m + self.tank.lz_m))
-
     def pressure_pa(self, state: FloatArray, target_rad: float = 0.0) -> float:
         """Linearizing pressure, before reduction, for a target of the output.
 
@@ -179,7 +174,7 @@ def level_brake(model: RollModel, damping_ratio: float) -> float:
     return 2 * damping_ratio * frequency * inertia
 
 
-class FeedbackLinearizationController:
+class FeedbackLinearizationController(Memoryless):
     """Stepping of a `FeedbackLinearization`, which has no memory."""
 
     def __init__(self, law: FeedbackLinearization) -> None:
@@ -194,9 +189,3 @@ class FeedbackLinearizationController:
             return np.zeros(1)
         target = 0.0 if reference is None else float(reference[0])
         return np.array([share * law.pressure_pa(y, target)])
-
-    def applied(self, u: FloatArray) -> None:
-        """Ignore the command; the law has no memory."""
-
-    def reset(self) -> None:
-        """Do nothing; the law has no memory."""

@@ -9,7 +9,7 @@ import numpy as np
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import SampleTime, range_problems, refuse
-from utank_hil.control.interface import Controller
+from utank_hil.control.interface import Controller, Memoryless
 from utank_hil.dynamics.sampling import LinearModel
 
 STEP: Final = 1e-6
@@ -51,7 +51,7 @@ class GainLaw:
         )
 
 
-class GainController:
+class GainController(Memoryless):
     """Stepping of a `GainLaw`, which has no memory."""
 
     def __init__(self, law: GainLaw) -> None:
@@ -62,12 +62,6 @@ class GainController:
         """Return -K (y - reference)."""
         error = y if reference is None else y - reference
         return product(self._gain, error)
-
-    def applied(self, u: FloatArray) -> None:
-        """Ignore the command; the law has no memory."""
-
-    def reset(self) -> None:
-        """Do nothing; the law has no memory."""
 
 
 def slope_at_rest(controller: Callable[[], Controller], inputs: int) -> GainLaw:

@@ -36,6 +36,18 @@ class Controller(Protocol):
         """Return to the initial state."""
 
 
+class Memoryless:
+    """What a controller without memory does with a sent command and a reset: nothing."""
+
+    __slots__ = ()
+
+    def applied(self, u: FloatArray) -> None:
+        """Ignore the command; the law has no memory."""
+
+    def reset(self) -> None:
+        """Do nothing; the law has no memory."""
+
+
 @runtime_checkable
 class Plans(Protocol):
     """A controller that plans each sample within limits and an iteration limit."""

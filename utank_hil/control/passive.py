@@ -8,11 +8,11 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import Range, SampleTime, range_problems, refuse
 from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import BuiltLaw
+from utank_hil.control.interface import BuiltLaw, Memoryless
 
 
 @dataclass(slots=True, eq=False)
-class PassiveController:
+class PassiveController(Memoryless):
     """Zero pressure for each of `inputs` pumps, for any measurement."""
 
     inputs: Annotated[int, Range(least=1)] = 1
@@ -24,12 +24,6 @@ class PassiveController:
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:  # noqa: ARG002
         """Return zero pressure, shape (r,)."""
         return np.zeros(self.inputs)
-
-    def applied(self, u: FloatArray) -> None:
-        """Ignore the command; the law has no memory."""
-
-    def reset(self) -> None:
-        """Do nothing; the law has no memory."""
 
 
 @dataclass(frozen=True, slots=True)

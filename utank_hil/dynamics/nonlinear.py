@@ -153,20 +153,6 @@ class RollModel:
             h_ddot = (roll_inertia * level_force - c.coupling * roll_moment) / determinant
         return np.stack(np.broadcast_arrays(phi_dot, phi_ddot, h_dot, h_ddot), axis=-1)
 
-    def strike(self, time_s: float, state: FloatArray) -> tuple[FloatArray, Impact]:
-        """Return the state after an impact, and the impact.
-
-        The state before, shape (4,), has its level at the limit and moving outward.
-        """
-        c = self.coefficients
-        phi, phi_dot, h, h_dot = (float(x) for x in state)
-        roll_inertia = c.inertia + c.inertia_h2 * h * h
-        jump = -(1 + c.restitution) * h_dot
-        roll_jump = -c.coupling / roll_inertia * jump
-        after = np.array([phi, phi_dot + roll_jump, h, h_dot + jump])
-        stop_impulse = (c.level_inertia - c.coupling * c.coupling / roll_inertia) * jump
-        return after, Impact(time_s, h, h_dot, c.ship_inertia * roll_jump, stop_impulse)
-
 
 def _coefficients(ship: RollShip, tank: Tank) -> RollCoefficients:
     flow, at = tank.density_kg_m3 * tank.reservoir_area_m2, tank.reservoir_area_m2

@@ -202,15 +202,6 @@ def pump_load(speed: float, flow: float, c: PumpCoefficients) -> tuple[float, fl
     return c.area * w * drag, max(slope, 0.0)
 
 
-def pump_losses(speed: float, flow: float, c: PumpCoefficients) -> float:
-    """Shaft power minus hydraulic power in W: slip and blade friction, never negative."""
-    u = flow / c.area
-    rn = c.radius * speed
-    slip = c.pitch * speed - u
-    per_speed = c.half_rho_lift * slip * slip + c.half_rho_friction * rn * rn
-    return c.area * _length(rn, u) * per_speed
-
-
 def pump_speed(pressure: float, flow: float, c: PumpCoefficients) -> float:
     """Speed in rad/s that gives a pressure rise at a flow: the inverse of `pump_pressure`."""
     u = flow / c.area

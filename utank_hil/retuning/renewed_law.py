@@ -6,7 +6,7 @@ transfer takes.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Annotated, Final
 
 import msgspec
@@ -14,7 +14,7 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import PumpLimits
-from utank_hil.control.constrained.horizon import Horizon, predictions
+from utank_hil.control.constrained.horizon import Horizon, Predictions, predictions
 from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.dynamics import STATES, LinearModel
 from utank_hil.retuning.wire import refuse_shapes, refuse_sizes
@@ -44,6 +44,12 @@ class RenewedLaw:
     roll_rad: float
     pressure_pa: float
     passive_roll_rad: float  #: Predicted root mean square of the roll with the passive tank.
+
+
+_CONDENSED: Final = {"knots", *Predictions._fields}
+_OF_HORIZON: Final = [each.name for each in fields(Horizon) if each.name not in _CONDENSED]
+_OF_LAW: Final = [each.name for each in fields(ConstrainedLaw) if each.name != "horizon"]
+_PREDICTED: Final = [each.name for each in fields(RenewedLaw) if each.name != "law"]
 
 
 class RenewedLawMessage(
@@ -79,28 +85,11 @@ class RenewedLawMessage(
         """Return the message of a law."""
         law, horizon = renewed.law, renewed.law.horizon
         return cls(
-            model=law.model,
-            observer_gain=law.observer_gain,
             knots=tuple(horizon.knots.tolist()),
             samples=len(horizon.interpolation),
-            output_weight=horizon.output_weight,
-            input_weight=float(horizon.input_weight),
-            first_output=horizon.first_output,
-            terminal=horizon.terminal,
-            correction=horizon.correction,
-            hessian=horizon.hessian,
-            unlimited_state=horizon.unlimited_state,
-            unlimited_target=horizon.unlimited_target,
-            limits=law.limits,
-            level_output=law.level_output,
-            level_penalty=float(law.level_penalty),
-            reservoir_area_m2=float(law.reservoir_area_m2),
-            steady_state=law.steady_state,
-            steady_command=law.steady_command,
-            iteration_limit=law.iteration_limit,
-            roll_rad=renewed.roll_rad,
-            pressure_pa=renewed.pressure_pa,
-            passive_roll_rad=renewed.passive_roll_rad,
+            **{name: getattr(horizon, name) for name in _OF_HORIZON},
+            **{name: getattr(law, name) for name in _OF_LAW},
+            **{name: getattr(renewed, name) for name in _PREDICTED},
         )
 
     @property
@@ -126,35 +115,14 @@ class RenewedLawMessage(
             ("steady_state", self.steady_state, (n, n)),
             ("steady_command", self.steady_command, (n,)),
         )
-        predicted = self.roll_rad, self.pressure_pa, self.passive_roll_rad
+        predicted = [getattr(self, name) for name in _PREDICTED]
         if not (sample_time_s > 0 and all(map(math.isfinite, (sample_time_s, *predicted)))):
             raise ValueError("the sample time or what is predicted is not finite")
         with np.errstate(all="ignore"):
             motions = predictions(self.model, self.knots, self.samples)
         if not all(np.isfinite(each).all() for each in motions):
             raise ValueError("the answer's law is not finite")
-        horizon = Horizon(
-            np.array(self.knots),
-            *motions,
-            self.hessian,
-            self.unlimited_state,
-            self.unlimited_target,
-            self.output_weight,
-            self.input_weight,
-            self.first_output,
-            self.terminal,
-            self.correction,
-        )
-        law = ConstrainedLaw(
-            model=self.model,
-            observer_gain=self.observer_gain,
-            horizon=horizon,
-            limits=self.limits,
-            level_output=self.level_output,
-            level_penalty=self.level_penalty,
-            reservoir_area_m2=self.reservoir_area_m2,
-            steady_state=self.steady_state,
-            steady_command=self.steady_command,
-            iteration_limit=self.iteration_limit,
-        )
+        parts = {name: getattr(self, name) for name in _OF_HORIZON}
+        horizon = Horizon(np.array(self.knots), *motions, **parts)
+        law = ConstrainedLaw(horizon=horizon, **{name: getattr(self, name) for name in _OF_LAW})
         return RenewedLaw(law, *predicted)

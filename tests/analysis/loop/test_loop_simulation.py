@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from rolling_ship import SHIP, TANK
 from scipy.integrate import solve_ivp
-from shipped_designs import GPC_ROLL
 
-from utank_hil.analysis import LinearShip, NonlinearShip, SensorNoise, run_law
+from utank_hil.analysis import SensorNoise
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
-from utank_hil.base.tick import TICK_S
 from utank_hil.control import DesignPlant, PassiveController, PumpLimits
 from utank_hil.dynamics.linear import STATES, coupled_model, pump_model
 from utank_hil.dynamics.sampling import sample
@@ -85,33 +83,3 @@ def test_a_delay_between_the_ticks_is_refused():
             PassiveController(),
             ("roll_rad",),
         )
-
-
-def test_a_nonlinear_ship_in_small_waves_moves_as_the_linear_one():
-    small = Harmonics(WAVES.amplitude / 50, WAVES.frequency_rad_s, WAVES.phase_rad)
-    plant, ticks = DesignPlant(SHIP, TANK, limits=FREE), 6000
-    commands = 300.0 * np.sin(0.3 * np.arange(ticks // 20))
-    linear = LinearShip(plant, passive_motion(SHIP, TANK, small, TICK_S, ticks), noise=SILENT)
-    nonlinear = NonlinearShip(plant, small, ticks, noise=SILENT)
-    one, other = (
-        run_law(ship, Script(commands), STATES, plant, ticks) for ship in (linear, nonlinear)
-    )
-    np.testing.assert_allclose(other.motion, one.motion, atol=0.01 * np.abs(one.motion).max())
-    np.testing.assert_allclose(other.pressure_pa, one.pressure_pa, atol=1e-6)
-    assert nonlinear.strikes == 0
-    assert nonlinear.capsized_s == np.inf
-
-
-def test_a_law_quiets_the_nonlinear_ship_in_waves():
-    plant, ticks = DesignPlant(SHIP, TANK, limits=FREE), 30_000
-    law = GPC_ROLL.law(plant)
-    waves = Harmonics(np.array([2e7]), np.array([0.5]), np.array([0.0]))
-    passive, ruled = (
-        run_law(NonlinearShip(plant, waves, ticks), controller, measured, plant, ticks)
-        for controller, measured in (
-            (PassiveController(sample_time_s=0.2), ("roll_rad",)),
-            (law.controller(), GPC_ROLL.predictor.measured),
-        )
-    )
-    late = slice(ticks // 2, None)
-    assert np.std(ruled.motion[late, 0]) < 0.7 * np.std(passive.motion[late, 0])

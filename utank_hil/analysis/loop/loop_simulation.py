@@ -1,13 +1,11 @@
 """A closed loop of law, limiter and ship in waves, without bus and nodes.
 
-`run_law` runs a controller on any ship that moves tick by tick. `NonlinearShip` is ship and tank
-with their nonlinear equations in a wave moment. `LinearShip` is for long runs in many seas: its
-motion is the known one with passive tank plus the response to the pump. Sensors, limiter and drive
-run every tick, level gauges and level observer every `LEVEL_TICKS`, the controller at its own
-sample time. Their order within a tick is that of the controller node.
+`run_law` runs a controller on any ship that moves tick by tick. `LinearShip` is for long runs in
+many seas: its motion is the known one with passive tank plus the response to the pump. Sensors,
+limiter and drive run every tick, level gauges and level observer every `LEVEL_TICKS`, the
+controller at its own sample time. Their order within a tick is that of the controller node.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -16,7 +14,7 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.tick import TICK_S
 from utank_hil.control import CommandLimiter, Controller, DesignPlant, LevelObserver
-from utank_hil.dynamics import STATES, RollModel, RollShip, Tank
+from utank_hil.dynamics import STATES, RollShip, Tank
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.sampling import transition_and_step
 from utank_hil.sea import Harmonics
@@ -128,73 +126,6 @@ class LinearShip:
         """Move by one tick."""
         self._by_pump[-1] = command_pa
         self._by_pump[:-1] = self._advance.dot(self._by_pump)
-        self._tick += 1
-
-
-class NonlinearShip:
-    """Ship and tank with their nonlinear equations, from rest, in a wave moment in N m.
-
-    Attributes
-    ----------
-    capsized_s : float
-        Time at which the roll passed 90 degrees; infinite until then.
-    strikes : int
-        Impacts of the water at the limits of its level.
-    """
-
-    def __init__(
-        self,
-        plant: DesignPlant,
-        wave_moment: Harmonics,
-        ticks: int,
-        *,
-        noise: SensorNoise | None = None,
-        seed: int = 0,
-    ) -> None:
-        from utank_hil.dynamics import kernels  # here, because it loads a compiler
-
-        self._kernels, self._packed = kernels, RollModel(plant.ship, plant.tank).packed
-        self._wave = (
-            np.ascontiguousarray(wave_moment.amplitude, dtype=np.float64),
-            np.ascontiguousarray(wave_moment.frequency_rad_s, dtype=np.float64),
-            np.ascontiguousarray(wave_moment.phase_rad, dtype=np.float64),
-        )
-        self._noise = _noise(noise, ticks, seed)
-        self._decay = math.exp(-TICK_S / plant.lag_s) if plant.lag_s else 0.0
-        self._state, self._pressure, self._loss = np.zeros(len(STATES)), np.zeros(1), np.zeros(1)
-        self._summary = np.zeros(kernels.SUMMARY)
-        self._summary[kernels.CAPSIZED_S] = math.inf
-        self._tick = 0
-
-    @property
-    def capsized_s(self) -> float:
-        """Time of capsizing."""
-        return float(self._summary[self._kernels.CAPSIZED_S])
-
-    @property
-    def strikes(self) -> int:
-        """Number of impacts."""
-        return int(self._summary[self._kernels.STRIKES])
-
-    def truth(self) -> FloatArray:
-        """`STATES` and the actual pressure."""
-        return np.append(self._state, self._pressure)
-
-    def sensed(self) -> FloatArray:
-        """`truth` with the sensors' noise."""
-        found: FloatArray = self.truth() + self._noise[self._tick]
-        return found
-
-    def advance(self, command_pa: float) -> None:
-        """Move by one tick with the pressure's mean over it."""
-        before = float(self._pressure[0])
-        after = command_pa + (before - command_pa) * self._decay
-        self._pressure[0] = (before + after) / 2
-        self._kernels.advance(
-            *self._packed, *self._wave, self._pressure, self._loss, 1, math.pi / 2, self._tick, 1,
-            TICK_S, self._state, self._summary, np.empty((0, 5)), np.empty((0, 4)), 1,
-        )  # fmt: skip
-        self._pressure[0] = after
         self._tick += 1
 
 

@@ -1,0 +1,14 @@
+"""Losses of the pump, by the blade model's own formula."""
+
+import math
+
+from utank_hil.dynamics.pump import PumpCoefficients
+
+
+def pump_losses(speed: float, flow: float, c: PumpCoefficients) -> float:
+    """Shaft power minus hydraulic power in W: slip and blade friction, never negative."""
+    u = flow / c.area
+    rn = c.radius * speed
+    slip = c.pitch * speed - u
+    per_speed = c.half_rho_lift * slip * slip + c.half_rho_friction * rn * rn
+    return c.area * math.hypot(rn, u) * per_speed
