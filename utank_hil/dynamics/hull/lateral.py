@@ -3,7 +3,7 @@
 Body axes of the project (y to starboard, z down) about the centre of gravity of the ship without
 its tank's water. With the velocities u = (sway, roll, yaw, level), mass matrix M(phi, h) of hull
 and water, potential V of `utank_hil.dynamics.nonlinear`, oscillators e of the radiated waves with
-directions b (`utank_hil.dynamics.hull.radiation`) and wave forces F, Lagrange's equations are ::
+directions b (`fit_radiation`) and wave forces F, Lagrange's equations are ::
 
     d/dt (M u)_i = 1/2 u dM/dq_i u - dV/dq_i + F_i - damping_i - (b' e')_i
 
