@@ -22,7 +22,6 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.identification import (
     IdentificationError,
     OkidResult,
-    arx,
     era,
     find_disturbance_frequencies,
     okid,
@@ -103,18 +102,15 @@ def test_without_its_basis_a_low_order_is_ruined_by_a_wave_and_a_high_one_is_not
     assert error[120] < 0.01
 
 
-def test_offset_drift_and_decaying_transient_are_taken_out_by_their_bases() -> None:
+def test_offset_and_drift_are_taken_out_by_their_basis() -> None:
     u, truth = pulses(1), plant()
     time_s = np.arange(len(u)) * SAMPLE_TIME_S
     still = truth.respond(u, np.zeros_like(u))
     heel = still + np.outer(0.02 + 1e-5 * time_s, [1.0, 5.0])
-    decay = still + np.outer(np.exp(-0.02 * time_s), [0.1, 0.3])
     markov = truth.markov(401)
     found = okid(u, heel, 8, disturbance_polynomial_degree=1, sample_time_s=SAMPLE_TIME_S)
     assert _relative(found.markov, markov) < 1e-8
-    found = okid(u, decay, 8, disturbance_decay_rates_1_s=[0.02], sample_time_s=SAMPLE_TIME_S)
-    assert _relative(found.markov, markov) < 1e-8
-    assert found.disturbance.shape == (1, 2)
+    assert found.disturbance.shape == (2, 2)
 
 
 def test_arx_predicts_the_record_and_markov_parameters_are_its_pulse_response() -> None:
@@ -129,21 +125,6 @@ def test_arx_predicts_the_record_and_markov_parameters_are_its_pulse_response() 
     np.testing.assert_allclose(
         result.markov[:300, :, 0], result.arx.simulate(pulse), atol=1e-12 * result.markov.max()
     )
-
-
-def test_arx_is_the_model_that_okid_begins_with() -> None:
-    rng = np.random.default_rng(3)
-    u, y = rng.standard_normal((800, 2)), rng.standard_normal((800, 2)).cumsum(axis=0)
-    known = {
-        "sample_time_s": SAMPLE_TIME_S,
-        "disturbance_frequencies_rad_s": (0.6,),
-        "disturbance_polynomial_degree": 0,
-    }
-    found, whole = arx(u, y, 12, **known), okid(u, y, 12, **known)
-    assert np.array_equal(found.alpha, whole.arx.alpha)
-    assert np.array_equal(found.beta, whole.arx.beta)
-    with pytest.raises(IdentificationError, match="rows"):
-        arx(u[:30], y[:30], 12, sample_time_s=SAMPLE_TIME_S)
 
 
 def test_observer_of_the_identified_model_predicts_like_the_arx_model() -> None:
@@ -239,7 +220,6 @@ def test_records_that_tell_nothing_are_refused_with_the_reason() -> None:
         ({"sample_time_s": 0.0}, "sample_time_s must be positive"),
         ({"disturbance_frequencies_rad_s": [0.0]}, "must be positive"),
         ({"disturbance_frequencies_rad_s": [0.5, 0.5]}, "distinct"),
-        ({"disturbance_decay_rates_1_s": [0.0]}, "must not be zero"),
         ({"disturbance_polynomial_degree": -1}, "0 or more"),
     ],
 )
@@ -252,7 +232,7 @@ def test_bad_arguments_are_named(arguments: dict[str, object], message: str) -> 
         )
 
 
-@pytest.mark.parametrize("function", [okid, arx, era, find_disturbance_frequencies])
+@pytest.mark.parametrize("function", [okid, era, find_disturbance_frequencies])
 def test_no_sample_time_is_assumed(function: Callable[..., object]) -> None:
     parameter = inspect.signature(function).parameters["sample_time_s"]
     assert parameter.default is inspect.Parameter.empty

@@ -14,7 +14,7 @@ import numpy as np
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.analysis.loop.linear_tuning import LinearDesign, TunedLaw, first_law
-from utank_hil.analysis.loop.robustness import PERIOD_SCALES
+from utank_hil.analysis.loop.robustness import PERIOD_SCALES, of_period
 from utank_hil.analysis.loop.sea_response import (
     CalmSeaError,
     MotionInSea,
@@ -193,8 +193,7 @@ def loading_sensitivity(
     """
     points = []
     for scale in PERIOD_SCALES:
-        stiffness = plant.ship.stiffness_nm_rad / scale**2
-        ship = replace(plant.ship, stiffness_nm_rad=stiffness)
+        ship = of_period(plant.ship, scale)
         waves = replace(sea.wave_moment, amplitude=sea.wave_moment.amplitude / scale**2)
         loaded = replace(plant, ship=ship)
         active = None

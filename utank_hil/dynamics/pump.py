@@ -101,24 +101,20 @@ class Pump:
     def _blade_problems(self) -> list[Problem]:
         if 1 / math.sqrt(8) < self.pitch_m / self.radius_m < math.sqrt(8):
             return []
-        return [
-            (
-                "pitch_m",
-                f"must be 0.354 to 2.83 times radius_m, got {self.pitch_m} and "
-                f"{self.radius_m}: outside, one pressure belongs to several speeds",
-            )
-        ]
+        reason = (
+            f"must be 0.354 to 2.83 times radius_m, got {self.pitch_m} and {self.radius_m}: "
+            "outside, one pressure belongs to several speeds"
+        )
+        return [("pitch_m", reason)]
 
     def _lag_problems(self) -> list[Problem]:
         if self.reference_lag_s > 0:
             return []
-        return [
-            (
-                "lag_s",
-                f"= {self.lag_s} must exceed the loop's own lag of {self._loop_lag_s:g} s: raise "
-                "it, speed_bandwidth_rad_s or pressure_gain",
-            )
-        ]
+        reason = (
+            f"= {self.lag_s} must exceed the loop's own lag of {self._loop_lag_s:g} s: raise it, "
+            "speed_bandwidth_rad_s or pressure_gain"
+        )
+        return [("lag_s", reason)]
 
     @classmethod
     def for_duct(cls, area_m2: float, max_pressure_pa: float = 50e3) -> "Pump":

@@ -23,7 +23,6 @@ from utank_hil.identification.modal import modal_confidence as modal_confidence
 from utank_hil.identification.modal import modal_parameters as modal_parameters
 from utank_hil.identification.modal import stabilization as stabilization
 from utank_hil.identification.okid import OkidResult as OkidResult
-from utank_hil.identification.okid import arx as arx
 from utank_hil.identification.okid import markov_parameters as markov_parameters
 from utank_hil.identification.okid import okid as okid
 from utank_hil.identification.record import IdentificationError as IdentificationError

@@ -2,7 +2,7 @@
 
 The observer Markov parameters of (3.12) are the coefficients of an ARX model: with
 A_o = A - K C they are alpha_i = C A_o^(i-1) K and beta_i = C A_o^(i-1) (B - K D). They are fitted
-by least squares together with a disturbance basis (`arx`). The Markov parameters of the system
+by least squares together with a disturbance basis. The Markov parameters of the system
 follow by recursion. The order p must cover the observer's memory: p = 120 at 0.2 s is two roll
 periods.
 """
@@ -104,29 +104,6 @@ class OkidResult:
     rows: int  #: Number of equations, without gaps.
 
 
-def arx(
-    u: FloatArray,
-    y: FloatArray,
-    order: int = 120,
-    *,
-    sample_time_s: float,
-    disturbance_frequencies_rad_s: Sequence[float] = (),
-    disturbance_polynomial_degree: int | None = None,
-    disturbance_decay_rates_1_s: Sequence[float] = (),
-) -> ARX:
-    """Fit an ARX model by least squares: the first step of `okid`.
-
-    Parameters and errors are those of `okid`, except that strongly unstable models, whose one-step
-    predictions are valid, are not refused. The result is `OkidResult.arx` of the same record.
-    """
-    basis = DisturbanceBasis(
-        tuple(disturbance_frequencies_rad_s),
-        disturbance_polynomial_degree,
-        tuple(disturbance_decay_rates_1_s),
-    )
-    return _fitted(u, y, order, sample_time_s, basis).arx
-
-
 def okid(
     u: FloatArray,
     y: FloatArray,
@@ -135,7 +112,6 @@ def okid(
     sample_time_s: float,
     disturbance_frequencies_rad_s: Sequence[float] = (),
     disturbance_polynomial_degree: int | None = None,
-    disturbance_decay_rates_1_s: Sequence[float] = (),
 ) -> OkidResult:
     """Identify a model from a record of inputs and outputs.
 
@@ -159,15 +135,21 @@ def okid(
         Frequencies of regular waves; see `find_disturbance_frequencies`.
     disturbance_polynomial_degree : int or None
         0 fits an offset, 1 also a drift.
-    disturbance_decay_rates_1_s : sequence of float
-        Decay rates of exponential disturbances.
     """
-    basis = DisturbanceBasis(
-        tuple(disturbance_frequencies_rad_s),
-        disturbance_polynomial_degree,
-        tuple(disturbance_decay_rates_1_s),
-    )
-    fitted = _fitted(u, y, order, sample_time_s, basis)
+    if not (np.isfinite(sample_time_s) and sample_time_s > 0):
+        raise ValueError(f"sample_time_s must be positive, got {sample_time_s}")
+    basis = DisturbanceBasis(tuple(disturbance_frequencies_rad_s), disturbance_polynomial_degree)
+    z, m = stacked_record(u, y)
+    scale = channel_scale(z, m)
+    functions = basis.evaluate(len(z), sample_time_s)
+    regression = LagRegression(z / scale, m, checked_order(order), functions)
+    solution = fit(regression)
+    if solution.excitation_order < min(_LEAST_EXCITATION, order + 1):
+        raise IdentificationError(
+            f"the input is persistently exciting of order {solution.excitation_order} only, "
+            f"one oscillation takes {_LEAST_EXCITATION}; use random pulses or a PRBS"
+        )
+    fitted = _in_units(solution, regression, scale, sample_time_s, basis)
     with np.errstate(over="ignore", invalid="ignore"):
         markov, observer_gain = markov_parameters(
             fitted.arx, max(_MARKOV_COUNT, 2 * fitted.arx.order + 1)
@@ -180,25 +162,6 @@ def okid(
     return replace(fitted, markov=markov, observer_gain=observer_gain)
 
 
-def _fitted(
-    u: FloatArray, y: FloatArray, order: int, sample_time_s: float, basis: DisturbanceBasis
-) -> OkidResult:
-    """Return the result, yet without Markov parameters."""
-    if not (np.isfinite(sample_time_s) and sample_time_s > 0):
-        raise ValueError(f"sample_time_s must be positive, got {sample_time_s}")
-    z, m = stacked_record(u, y)
-    scale = channel_scale(z, m)
-    functions = basis.evaluate(len(z), sample_time_s)
-    regression = LagRegression(z / scale, m, checked_order(order), functions)
-    solution = fit(regression)
-    if solution.excitation_order < min(_LEAST_EXCITATION, order + 1):
-        raise IdentificationError(
-            f"the input is persistently exciting of order {solution.excitation_order} only, "
-            f"one oscillation takes {_LEAST_EXCITATION}; use random pulses or a PRBS"
-        )
-    return _in_units(solution, regression, scale, sample_time_s, basis)
-
-
 def _in_units(
     solution: Fit,
     regression: LagRegression,
@@ -206,7 +169,7 @@ def _in_units(
     sample_time_s: float,
     basis: DisturbanceBasis,
 ) -> OkidResult:
-    """Convert a solution to the units of the record."""
+    """Convert a solution to the units of the record, yet without Markov parameters."""
     p, m = regression.order, regression.outputs
     y_scale = scale[:m]
     column_scale = np.concatenate([np.tile(scale, p + 1)[m:], np.ones(regression.basis_size)])

@@ -104,13 +104,11 @@ class RetuningSettings:
         if self.excitation.kind == "multisine":
             least_s = 2 * math.pi / (self.excitation.band[1] - self.excitation.band[0])
             if self.identification_s < least_s:  # The band holds at least one harmonic.
-                problems.append(
-                    (
-                        "identification_s",
-                        f"must be {least_s:.0f} or more for a multisine in the band "
-                        f"{self.excitation.band}, got {self.identification_s:g}",
-                    )
+                reason = (
+                    f"must be {least_s:.0f} or more for a multisine in the band "
+                    f"{self.excitation.band}, got {self.identification_s:g}"
                 )
+                problems.append(("identification_s", reason))
         refuse("retuning", problems)
 
 
@@ -128,23 +126,19 @@ def record_problems(
     problems = []
     if order * sample_time_s < shortest_period_s:
         # Such a model is fitted to the waves, with small stated errors.
-        problems.append(
-            (
-                "order",
-                f"{order} remembers {order * sample_time_s:g} s, less than the shortest roll "
-                f"period of {shortest_period_s:g} s: raise it to "
-                f"{math.ceil(shortest_period_s / sample_time_s)} or more",
-            )
+        reason = (
+            f"{order} remembers {order * sample_time_s:g} s, less than the shortest roll period of "
+            f"{shortest_period_s:g} s: raise it to {math.ceil(shortest_period_s / sample_time_s)} "
+            "or more"
         )
+        problems.append(("order", reason))
     least = least_samples(order, outputs)
     if samples < least:
-        problems.append(
-            (
-                "identification_s",
-                f"is too short: order {order} needs {least * sample_time_s:.0f} s, it has "
-                f"{samples * sample_time_s:.0f}",
-            )
+        reason = (
+            f"is too short: order {order} needs {least * sample_time_s:.0f} s, it has "
+            f"{samples * sample_time_s:.0f}"
         )
+        problems.append(("identification_s", reason))
     return problems
 
 

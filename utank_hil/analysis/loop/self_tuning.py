@@ -19,7 +19,7 @@ Kalman filter without the added noise predicts the waves for the plan at the lim
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Annotated, Final, Literal, Protocol
 
@@ -33,6 +33,7 @@ from utank_hil.analysis.loop.robustness import (
     GAINS,
     PERIOD_SCALES,
     Robustness,
+    of_period,
     robustness,
 )
 from utank_hil.base.arrays import FloatArray
@@ -342,7 +343,7 @@ class _Search:
     def _tells_heel(self) -> bool:
         """Whether the heel under a steady moment hardly depends on the ship's loading."""
         ship = self._plant.ship
-        slower = replace(ship, stiffness_nm_rad=ship.stiffness_nm_rad / PERIOD_SCALES[-1] ** 2)
+        slower = of_period(ship, PERIOD_SCALES[-1])
         least, known = (_steady_stiffness(each, self._plant) for each in (slower, ship))
         return least > _LEAST_STIFFNESS * known
 
@@ -350,8 +351,7 @@ class _Search:
         """Yield the cases that usually fail first: the longest and the shortest roll period."""
         ship, plant = self._plant.ship, self._plant
         for scale in (PERIOD_SCALES[-1], PERIOD_SCALES[0]):
-            other = replace(ship, stiffness_nm_rad=ship.stiffness_nm_rad / scale**2)
-            model = pump_model(other, plant.tank, _MEASURED)
+            model = pump_model(of_period(ship, scale), plant.tank, _MEASURED)
             late_s = plant.delay_s + (EXTRA_DELAY_S if scale < 1 else 0.0)
             sampled = sample(model, self._step_s, late_s, plant.lag_s)
             yield from ((sampled, gain) for gain in (GAINS[0], GAINS[-1]))

@@ -176,13 +176,8 @@ class ConstrainedDesign:
             problems.append(("knots", f"{reason}, got {len(self.knots)}"))
         rising = all(early < late for early, late in pairwise(self.knots))
         if not (self.knots and self.knots[0] == 0 and rising and self.knots[-1] < self.horizon):
-            problems.append(
-                (
-                    "knots",
-                    f"must increase from 0 and stay below the horizon of {self.horizon} samples, "
-                    f"got {self.knots}",
-                )
-            )
+            reason = f"must increase from 0 and stay below the horizon of {self.horizon} samples"
+            problems.append(("knots", f"{reason}, got {self.knots}"))
         refuse("constrained design", problems)
 
     def law(self, plant: DesignPlant) -> ConstrainedLaw:
