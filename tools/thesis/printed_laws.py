@@ -22,7 +22,7 @@ from utank_hil.control.interface import LinearLaw
 from utank_hil.control.optimal_tank import ship_ratios
 from utank_hil.control.predictive.gains import design_dpc, design_gpc
 from utank_hil.control.predictive.law import PredictiveLaw
-from utank_hil.dynamics.linear import coupled_model, pump_model
+from utank_hil.dynamics.linear import STATES, pump_model
 from utank_hil.dynamics.sampling import LinearModel, transition_and_step
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
@@ -170,10 +170,9 @@ def performance_index(law: LinearLaw, plant: DesignPlant, measured: tuple[str, .
         Names of the outputs that the law sees, in its order.
     """
     w = FREQUENCY_RATIOS * ship_ratios(plant.ship, plant.tank)[1]
-    system = coupled_model(plant.ship, plant.tank)
-    row = system.output_labels.index("roll_rad")
-    passive, _ = closed_loop_response(None, system, measured, w)
-    active, pressure = closed_loop_response(law, system, measured, w, plant.delay_s, plant.lag_s)
+    row = STATES.index("roll_rad")
+    passive, _ = closed_loop_response(None, plant, measured, w)
+    active, pressure = closed_loop_response(law, plant, measured, w)
     gain = np.abs(np.abs(passive[:, row]) - np.abs(active[:, row])) / np.abs(pressure)
     return float(np.sum((gain[1:] + gain[:-1]) / 2 * np.diff(FREQUENCY_RATIOS)))
 
