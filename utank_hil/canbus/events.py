@@ -21,6 +21,7 @@ class AlarmEvent:
     code: Fault
     state: AlarmState | None  #: State entered; None: a reset was refused since this lasts.
     mode: Mode  #: Mode of the controller.
+    received: str = ""  #: Node, message and value that it is raised for, as far as they are known.
 
 
 @dataclass(frozen=True, slots=True)

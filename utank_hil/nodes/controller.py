@@ -1,7 +1,7 @@
 """The controller on the bus: from the frames that come in to the pump command that goes out."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from utank_hil.base.periodic import Schedule
@@ -193,9 +193,9 @@ class ControllerNode:
         """Take note of frames of other kinds on the bus."""
         self.inbox.other_frames(count)
 
-    def link_error(self, now_ns: int, reason: str) -> None:  # noqa: ARG002
+    def link_error(self, now_ns: int, reason: str) -> None:
         """Take note that the bus could not be read or written."""
-        self.inbox.link_error(now_ns, self.actuators.cycle_ns)
+        self.inbox.link_error(now_ns, self.actuators.cycle_ns, reason)
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Do one tick: the way of a sample from measurement to pump command, top to bottom."""
@@ -299,7 +299,8 @@ class ControllerNode:
             self.telemetry.renew_slow()
             accepted = self.inbox.stations.take_accepted()
             for event in safety.update_alarms(accepted, self.law.fault, now_ns):
-                self.telemetry.tell(event, self.start_ns)
+                received = self.inbox.received(event.code)
+                self.telemetry.tell(replace(event, received=received), self.start_ns)
             frames.append(self._alarm_frames.frame(safety.alarms.next_message(now_ns)))
             frames.append(self._status.frame(self._status_message(measured, judgement)))
             if safety.monitors is not None:

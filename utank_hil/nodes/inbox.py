@@ -17,6 +17,7 @@ from utank_hil.canbus import (
     DriveState,
     DriveStatus1,
     DriveStatus2,
+    Fault,
     Frame,
     HardwiredInputs,
     Heartbeat,
@@ -230,6 +231,7 @@ class Inbox:
         self._conflict_ns = self._claimed_twice_ns = NEVER_HEARD_NS
         self._link_lost_until_ns = NEVER_HEARD_NS
         self.frames = self.foreign = 0
+        self._received: dict[Fault, str] = {}
 
     def snapshot(self, now_ns: int) -> Measurements:
         """What is known at a tick; takes the operators' edges, which come once.
@@ -327,9 +329,22 @@ class Inbox:
         """Time from one measurement of the levels to the next."""
         return self._tank.cycle_ns
 
-    def link_error(self, now_ns: int, period_ns: int) -> None:
+    def link_error(self, now_ns: int, period_ns: int, reason: str = "") -> None:
         """Take note that the bus could not be read or written; it counts as lost for a period."""
         self._link_lost_until_ns = now_ns + period_ns
+        self._received[Fault.BUS_LOST] = reason
+
+    def received(self, code: Fault) -> str:
+        """Node, message and value that a fault was last judged by, in words."""
+        if code in (Fault.DRIVE_FAULT, Fault.DRIVE_SILENT):
+            if self.canopen_drive is not None:
+                return self.canopen_drive.words
+            if self._drive is not None:
+                return (
+                    f"drive: state {_said(self._drive_state)} in DRIVE_STATUS_1, fault "
+                    f"{_said(self._drive_fault)} in DRIVE_STATUS_2"
+                )
+        return self._received.get(code, "")
 
     def other_frames(self, count: int) -> None:
         """Take note of frames of other kinds on the bus."""
@@ -352,6 +367,7 @@ class Inbox:
             take(frame, now_ns)
         elif can_id & SOURCE_ADDRESS == _OWN_ADDRESS and can_id < STANDARD:
             self._conflict_ns = now_ns
+            self._received[Fault.ADDRESS_CONFLICT] = f"identifier 0x{can_id:08X}"
         elif can_id < OTHER_BUS and can_id not in self._known and not self._foreign.knows(can_id):
             self.foreign += 1
 
@@ -433,6 +449,12 @@ class Inbox:
     def _on_heartbeat(self, can_id: int, beat: Heartbeat, now_ns: int) -> None:
         versions = (beat.catalogue_version, beat.configuration_version)
         matches = versions == self._versions
+        if not matches:
+            self._received[Fault.VERSION_MISMATCH] = (
+                f"{Address(can_id & SOURCE_ADDRESS).name.lower()}: heartbeat 0x{can_id:08X}, "
+                f"catalogue {versions[0]} and ship {versions[1]}, here {self._versions[0]} and "
+                f"{self._versions[1]}"
+            )
         if can_id == self._second_beat:  # silent, it is not waited for
             self._strange_ns = NEVER_HEARD_NS if matches else now_ns
             return
@@ -442,4 +464,13 @@ class Inbox:
         self.stations.started(address)
         if self._names.setdefault(can_id, claim.name) != claim.name:
             self._claimed_twice_ns = now_ns
+            was = self._names[can_id]
+            self._received[Fault.FOREIGN_SENDER] = (
+                f"{Address(address).name.lower()}: address claim 0x{can_id:08X}, name "
+                f"{claim.name} after {was}"
+            )
             self._names[can_id] = claim.name  # of a device that was replaced
+
+
+def _said(value: DriveState | DriveFault | None) -> str:
+    return "not available" if value is None else f"{value:d} ({value.name})"

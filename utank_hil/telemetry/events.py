@@ -38,7 +38,8 @@ def warns(event: Event) -> bool:
 def event_text(event: Event) -> str:
     """Return the text of an event, such as `retuning REFUSED: the record is too short`."""
     if isinstance(event, AlarmEvent):
-        return f"{_ALARM_WORDS[event.state]} in {event.mode.name}: {fault_text(event.code)}"
+        text = f"{_ALARM_WORDS[event.state]} in {event.mode.name}: {fault_text(event.code)}"
+        return f"{text} Received: {event.received}" if event.received else text
     text = f"retuning {event.state.name}"
     return f"{text}: {'; '.join(event.reasons)}" if event.reasons else text
 
