@@ -4,6 +4,7 @@ import errno
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict
@@ -15,7 +16,17 @@ import typer
 from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.base.provenance import describe
 from utank_hil.base.whole_file import claimed_files
-from utank_hil.canbus import Fault, Mode, Port, PortError
+from utank_hil.canbus import (
+    Address,
+    ControllerStatus,
+    Fault,
+    Heartbeat,
+    Mode,
+    Port,
+    PortError,
+    PumpCommand,
+    load_catalogue,
+)
 from utank_hil.canbus.bit_rate import why_other_bit_rate
 from utank_hil.canbus.events import AlarmEvent
 from utank_hil.canbus.ports import BusPorts, open_port
@@ -47,6 +58,8 @@ from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head
 
 _REFUSALS: Final = (errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE, errno.ENOSPC)
+LISTEN_S: Final = 0.35  #: Three cycles of a controller's status.
+_LOOK_S: Final = 0.01
 LOOK_TICKS: Final = 100  #: Ticks between two checks of the recorder.
 _COMMAND_LINE: Final = "from utank_hil.cli import main; main()"
 
@@ -116,6 +129,7 @@ def run(
             common.fail(error, ExitCode.NO_BUS)
         stack.callback(port.close)
         stop = stack.enter_context(stop_on_signals())
+        _refuse_beside_another(port, bus)
         announcer, recording = _outputs(
             stack, context, loaded, law, config, out, keep, commissioned=not refused
         )
@@ -169,6 +183,23 @@ def run(
         else:
             _print_summary(loaded.name, node, statistics, kept)
     raise typer.Exit(_code(node))
+
+
+def _refuse_beside_another(port: Port, bus: str) -> None:
+    """Listen before talking: a second controller would take the drive out of operation."""
+    catalogue = load_catalogue()
+    sent = {catalogue.codec(message).can_id for message in (ControllerStatus, PumpCommand)}
+    sent.add(catalogue.receiver(Heartbeat, Address.CONTROLLER).can_id)
+    until_s = time.monotonic() + LISTEN_S
+    while time.monotonic() < until_s:
+        with suppress(PortError):  # The loop meets it, too.
+            for frame in port.receive():
+                if frame.can_id in sent:
+                    common.fail(
+                        f"{bus}: another controller is on this bus: it sent {frame}; end it first",
+                        ExitCode.NO_BUS,
+                    )
+        time.sleep(_LOOK_S)
 
 
 @contextmanager

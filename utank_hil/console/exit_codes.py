@@ -39,7 +39,7 @@ class ExitCode(IntEnum):
     NO_BUS = (
         3,
         "`run`, `commission`, `panel`, `bench`, `bus`, `faults`, `firmware-sim`",
-        "The CAN interface can't be opened.",
+        "The CAN interface can't be opened; of `run`, another controller is on it.",
     )
     BUS_LOST = (4, "`run`", "Ended while the CAN bus could not be used, or with its loss latched.")
     FAULT = 5, "`run`", "Ended with another fault latched."
