@@ -212,14 +212,13 @@ class FaultBench:
         scenario = storm() if scenario is None else scenario
         self.config = scenario.controllers[controller]
         self.ship: ShipSide = build_ship_side(scenario, seed, script)
-        self.sensors, self.drive, self.panel, self.controller = (
-            Failing(node)
-            for node in (*self.ship.nodes, build_controller_node(self.config, commissioned=True))
+        nodes = {id(node): Failing(node) for node in self.ship.nodes}
+        self.sensors, self.drive, self.panel = (
+            nodes[id(node)] for node in (self.ship.sensors, self.ship.drive, self.ship.panel)
         )
+        self.controller = Failing(build_controller_node(self.config, commissioned=True))
         self.heard = Listener()
-        self.lockstep = Lockstep(
-            [self.sensors, self.drive, self.panel, self.controller, *extra], trace=self.heard
-        )
+        self.lockstep = Lockstep([*nodes.values(), self.controller, *extra], trace=self.heard)
 
     def run(self, until_s: float) -> None:
         """Run to a time."""

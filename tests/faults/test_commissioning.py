@@ -387,23 +387,39 @@ def test_arming_is_refused_until_it_was_passed_and_the_bus_and_the_alarm_say_so(
     assert armed.first is not None
 
 
+LEVELS_BY_PUMP = dict.fromkeys(LEVELS, (1 + SCALE) ** 2)
+"""Gauges that pass by a pressure that passes, too."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "factors"),
+    "scaled",
     [
-        (SensorMotion, {"roll_rate_rad_s": 1 + RATE_SCALE}),
-        (SensorMotion, {"roll_rate_rad_s": 1 - RATE_SCALE}),
-        (SensorTank, dict.fromkeys(LEVELS, (1 + SCALE) ** 2)),
-        (SensorPump, {"pressure_pa": 1 - SCALE}),
+        {SensorMotion: {"roll_rate_rad_s": 1 + RATE_SCALE}},
+        {SensorMotion: {"roll_rate_rad_s": 1 - RATE_SCALE}},
+        {SensorTank: dict.fromkeys(LEVELS, 1 + SCALE)},
+        {SensorTank: LEVELS_BY_PUMP, SensorPump: {"pressure_pa": 1 + SCALE}},
+        {SensorPump: {"pressure_pa": 1 - SCALE}},
     ],
+    ids=["rate too great", "rate too small", "levels", "levels and pressure", "pressure"],
 )
 def test_what_passes_at_the_quay_does_not_trip_at_sea(
-    kind: type, factors: dict[str, float]
+    scaled: dict[type, dict[str, float]],
 ) -> None:
-    def wrong(message: Any) -> Any:
-        return message._replace(**{name: f * getattr(message, name) for name, f in factors.items()})
+    def by(factors: dict[str, float]) -> Callable[[Any], Any]:
+        return lambda message: message._replace(
+            **{name: factor * getattr(message, name) for name, factor in factors.items()}
+        )
+
+    spoilt = [altered(kind, by(factors)) for kind, factors in scaled.items()]
+
+    def spoil(frame: Frame) -> Iterable[Frame]:
+        frames: Iterable[Frame] = (frame,)
+        for each in spoilt:
+            frames = [changed for one in frames for changed in each(one)]
+        return frames
 
     bench = FaultBench(seed=2)
-    bench.sensors.begin_ns, bench.sensors.spoil = 0, altered(kind, wrong)
+    bench.sensors.begin_ns, bench.sensors.spoil = 0, spoil
     bench.run(100.0)
     assert (bench.mode, bench.node.fault) == (Mode.ACTIVE, Fault.NONE)

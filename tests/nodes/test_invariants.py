@@ -50,7 +50,7 @@ SAFETY = SafetyLimits()
 PLANT: Any = SimpleNamespace(
     advance=lambda now_ns: None, drive_pump=lambda *_, **__: None, brake_pump=lambda: None,
     pressure_pa=0.0, pump_speed_rad_s=0.0, pump_power_w=0.0, pressure_limited=False,
-    speed_limited=False, rate_limited=False, power_limited=False,
+    speed_limited=False, rate_limited=False, power_limited=False, power_cut=False,
 )  # fmt: skip
 
 

@@ -62,8 +62,8 @@ class Vessel(Section):
             content.append(not_by_default(self.valve))
         if self.redundancy != NO_REDUNDANCY:
             content.append({"redundancy": asdict(self.redundancy)})
-        if self.emulated:
-            content.append({"emulated": True})
+        if not self.emulated:
+            content.append({"emulated": False})
         if self.devices is not None:
             native = {"pump"} if self.devices.pump.native else None
             content.append({"devices": self.devices.model_dump(mode="json", exclude=native)})

@@ -73,7 +73,7 @@ def recorded_config(head: Mapping[str, Any]) -> Iterator[ControllerConfig]:
         for number, (name, data) in enumerate(head["files"].items()):
             places[name] = str(Path(folder, f"{number}-{Path(name).name}"))
             Path(places[name]).write_bytes(unpacked(data))
-        content = _put(head["about"]["configuration"], places)
+        content = _put(_in_full(head["about"]["configuration"]), places)
         if code := next(_code(content.get("law")), None):
             raise ReplayHeadError(
                 f"its law is Python code, {code}, which a log must not choose: name the "
@@ -89,6 +89,17 @@ def recorded_config(head: Mapping[str, Any]) -> Iterator[ControllerConfig]:
                 "that it takes by --config, or replay it with the version that recorded it"
             ) from error
         yield config
+
+
+def _in_full(configuration: dict[str, Any]) -> dict[str, Any]:
+    """Return a recorded configuration with the key that it may be too old for.
+
+    Before it a ship had one version: that of an emulated one now.
+    """
+    vessel = configuration.get("vessel")
+    if not isinstance(vessel, dict):
+        return configuration
+    return configuration | {"vessel": {"emulated": True} | vessel}
 
 
 def _code(law: Any) -> Iterator[str]:
@@ -143,7 +154,7 @@ def causes(head: Mapping[str, Any], config: ControllerConfig, folder: Path) -> l
         name: hashlib.sha256(unpacked(data)).hexdigest() for name, data in head["files"].items()
     }
     here = describe("replay", config, folder, options={})
-    recorded_keys = _flat(_put(about["configuration"], digests))
+    recorded_keys = _flat(_put(_in_full(about["configuration"]), digests))
     replayed_keys = _flat(_put(here["configuration"], here["data"]))
     return found + few(
         [
