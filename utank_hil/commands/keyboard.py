@@ -26,8 +26,6 @@ _READ_BYTES: Final = 4096
 _STOP: Final = Action.STOP.value
 _LONGEST_LINE: Final = 256
 _WORDS: Final = (*(action.value for action in Action), "help", "quit")
-_ANYWHERE: Final = (Action.STOP, Action.ACCEPT, Action.TAKE, Action.FORBID, Action.PERMIT)
-"""Actions that are allowed to a station without the command."""
 _LASTING: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.ACTIVE_ACKNOWLEDGED)
 _UNACCEPTED: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.RECTIFIED_UNACKNOWLEDGED)
 
@@ -138,23 +136,12 @@ class Keyboard:
         return False
 
     def _press(self, action: Action) -> None:
-        node = self._node
-        if action is Action.ARM and self._silent:
-            self._say("not armed: no controller is heard")
-        elif action is Action.ARM and node.stopping:
-            self._say("not armed: the controller has not answered the stop yet")
-        elif action not in _ANYWHERE and self._elsewhere:
-            self._say("the other station has the command: take")
-        else:
-            node.press(action)
-            self._say(action.value)
+        refusal = self._node.why_not(action, self._now_ns)
+        self._say(refusal or action.value)
+        if not refusal:
+            self._node.press(action)
             if action is Action.RESET:
                 self._reset_ns = self._now_ns
-
-    @property
-    def _elsewhere(self) -> bool:
-        status = self._node.status
-        return status is not None and status.station not in (None, self._node.station)
 
     def _show(self, now_ns: int) -> None:
         node = self._node

@@ -49,6 +49,8 @@ class Action(Enum):
     PERMIT = "permit"
 
 
+_ANYWHERE = (Action.STOP, Action.ACCEPT, Action.TAKE, Action.FORBID, Action.PERMIT)
+"""Actions that are allowed to a station without the command."""
 _EDGES = (Action.RESET, Action.ACCEPT, Action.TAKE, Action.RETUNE, Action.UNDO)
 
 
@@ -76,7 +78,8 @@ class OperatorPanel:
     """Sends OPERATOR_CMD in its cycle of the catalogue, and on change.
 
     Stop is held until the controller answers with a mode without power, and for `EDGE_NS` at least,
-    `RAMP_NS` in FAULT. Until then arming is refused.
+    `RAMP_NS` in FAULT. Until then arming is refused. While nobody attends it the panel is silent,
+    but for a stop.
 
     Parameters
     ----------
@@ -100,6 +103,9 @@ class OperatorPanel:
         Whether stop is held.
     heard_ns : int or None
         When that status came.
+    attended : bool
+        Whether a person can see the panel. A controller in charge ramps down after a silence of
+        five seconds; a shorter one changes nothing.
     """
 
     name = "panel"
@@ -137,6 +143,7 @@ class OperatorPanel:
         self._ticks = 0
         self.status: ControllerStatus | None = None
         self.heard_ns: int | None = None
+        self.attended = self._spoke = True
 
     @property
     def in_command(self) -> bool:
@@ -158,6 +165,19 @@ class OperatorPanel:
     def silent(self, now_ns: int) -> bool:
         """Whether no controller is heard."""
         return self.heard_ns is None or now_ns - self.heard_ns > SILENT_NS
+
+    def why_not(self, action: Action, now_ns: int) -> str:
+        """Why a button must not be pressed now; empty if it may."""
+        if not self.attended and action is not Action.STOP:
+            return "nobody attends this panel: open its page"
+        if action is Action.ARM and self.silent(now_ns):
+            return "not armed: no controller is heard"
+        if action is Action.ARM and self.stopping:
+            return "not armed: the controller has not answered the stop yet"
+        station = None if self.status is None else self.status.station
+        if action not in _ANYWHERE and station not in (None, self.station):
+            return "the other station has the command: take"
+        return ""
 
     def press(self, action: Action) -> None:
         """Press a button; it takes effect with the next tick."""
@@ -191,6 +211,12 @@ class OperatorPanel:
         for action in self._pressed:
             self._take(action, now_ns)
         self._pressed.clear()
+        speaks = self.attended or self.stopping
+        if speaks and not self._spoke and self._armed and not self._in_charge(now_ns):
+            self._mode, self._armed = Mode.STANDBY, False
+        self._spoke = speaks
+        if not speaks:
+            return ()
         command = OperatorCommand(
             mode_request=self._asked(now_ns),
             arm=self._armed and now_ns >= self._arms_ns,
@@ -224,6 +250,14 @@ class OperatorPanel:
         self._alarms = {
             code: kept for code, kept in self._alarms.items() if alarms and kept[1] >= oldest_ns
         }
+
+    def _in_charge(self, now_ns: int) -> bool:
+        """Whether a controller is heard that is in charge."""
+        return (
+            not self.silent(now_ns)
+            and self.status is not None
+            and (self.status.mode is Mode.ACTIVE)
+        )
 
     def _controller_is_ready(self) -> bool:
         return self.status is not None and self.status.mode not in (None, Mode.INIT)

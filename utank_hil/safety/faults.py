@@ -632,9 +632,12 @@ FAULTS: Final = (
 )
 
 
+def fault_words(fault: Fault) -> tuple[str, str]:
+    """Return what happened and what to do, for people; empty for a code without a row."""
+    return next(((row.happened, row.remedy) for row in FAULTS if row.code == fault), ("", ""))
+
+
 def fault_text(fault: Fault) -> str:
     """Return the fault's name and, for people, what happened and what to do."""
-    for row in FAULTS:
-        if row.code == fault:
-            return f"{fault.name}: {row.happened} {row.remedy}"
-    return fault.name
+    happened, remedy = fault_words(fault)
+    return f"{fault.name}: {happened} {remedy}" if happened else fault.name

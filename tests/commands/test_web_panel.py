@@ -1,0 +1,377 @@
+"""The panel's page as a plain HTTP client sees it, on a bus in this process."""
+
+import http.client
+import json
+import os
+import signal
+import statistics
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from ship_of_a_page import Bench, bench
+
+from utank_hil.canbus import AlarmState, Fault, Mode, Station
+from utank_hil.commands.keyboard import Keyboard
+from utank_hil.commands.web_panel.server import MOST_PAGES
+
+pytestmark = pytest.mark.slow
+
+
+class Client:
+    """A page without a browser: follows the states, answers them, and orders."""
+
+    def __init__(self, url: str) -> None:
+        parts = urlsplit(url)
+        assert parts.hostname is not None
+        self.host = parts.netloc
+        self.path = parts.path
+        self.address = (parts.hostname, parts.port)
+        self.number = 0
+        self.state: dict[str, Any] = {}
+        self.stream = http.client.HTTPConnection(*self.address, timeout=20)
+        self.orders = http.client.HTTPConnection(*self.address, timeout=20)
+
+    def ask(
+        self,
+        name: str,
+        body: bytes | None = None,
+        *,
+        path: str | None = None,
+        headers: Mapping[str, str] = {},
+    ) -> tuple[int, bytes]:
+        """One request; a body makes it a POST. A header that is empty is left out."""
+        method = "GET" if body is None else "POST"
+        given = {"Host": self.host} | ({"Origin": f"http://{self.host}"} if body else {}) | headers
+        self.orders.putrequest(method, (path or self.path) + name, skip_host=True)
+        for key, value in given.items():
+            if value:
+                self.orders.putheader(key, value)
+        if body is not None and "Content-Length" not in given:
+            self.orders.putheader("Content-Length", str(len(body)))
+        self.orders.endheaders(body)
+        answer = self.orders.getresponse()
+        self.headers = answer.headers
+        content = answer.read()
+        if answer.will_close:
+            self.orders.close()
+        return answer.status, content
+
+    def order(self, action: str | None = None, number: int | None = None) -> tuple[int, bytes]:
+        content = {"number": self.number if number is None else number, "action": action}
+        return self.ask("order", json.dumps(content).encode())
+
+    def open(self) -> "Client":
+        self.stream.request("GET", f"{self.path}states")
+        self.lines = self.stream.getresponse()
+        assert self.lines.status == 200, self.lines.read()
+        return self
+
+    def follow(self) -> dict[str, Any]:
+        """The next state, answered."""
+        while True:
+            name, _, content = self.lines.readline().decode().strip().partition(": ")
+            if name == "id":
+                self.number = int(content)
+            elif name == "data":
+                self.state = json.loads(content)
+                break
+        self.order()
+        return self.state
+
+    def until(self, what: str) -> dict[str, Any]:
+        """Follow until an expression in the state is true."""
+        for _ in range(150):
+            if eval(what, {"state": self.follow()}):
+                return self.state
+        raise AssertionError(f"{what}: {self.state}")
+
+    def close(self) -> None:
+        self.stream.close()
+        if hasattr(self, "lines"):
+            self.lines.close()  # else the response keeps the connection
+        self.orders.close()
+
+
+@pytest.fixture(scope="module")
+def running() -> Iterator[tuple[Bench, str]]:
+    with bench() as made:
+        yield made
+
+
+@contextmanager
+def page(url: str) -> Iterator[Client]:
+    client = Client(url).open()
+    try:
+        yield client
+    finally:
+        client.close()
+
+
+@pytest.fixture
+def at(running: tuple[Bench, str]) -> Iterator[tuple[Bench, Client]]:
+    """A bench in STANDBY with an open page, and nobody else."""
+    made, url = running
+    made.wait("not node.attended")
+    made.ship.mode, made.ship.alarms, made.ship.station = Mode.STANDBY, {}, Station.OPERATOR
+    with page(url) as client:
+        client.until("state['mode'] == 'STANDBY' and state['in_command']")
+        made.wait("node.attended")
+        yield made, client
+
+
+def test_arm_disarm_and_stop(at: tuple[Bench, Client]) -> None:
+    made, client = at
+    assert client.order("arm") == (204, b"")
+    client.until("state['mode'] == 'ACTIVE'")
+    client.order("disarm")
+    client.until("state['mode'] == 'PASSIVE'")
+    client.order("arm")
+    client.until("state['mode'] == 'ACTIVE'")
+    client.order("stop")
+    assert client.until("state['mode'] == 'STANDBY'")["said"]["lines"][-1] == "stop"
+    assert made.ship.heard[-1][1].stop
+
+
+def test_figures_are_of_the_bus_and_none_is_of_what_is_not_heard(at: tuple[Bench, Client]) -> None:
+    made, client = at
+    figures = client.until("abs(state['figures']['roll_deg']) > 1.0")["figures"]
+    assert abs(figures["roll_deg"]) <= 3.45
+    assert figures["starboard_m"] == pytest.approx(-figures["port_m"], abs=2e-3)
+    assert figures["gm_m"] == pytest.approx(1.62, abs=0.01)
+    assert figures["passive_rms_deg"] == pytest.approx(2.41, abs=0.01)
+    client.order("arm")
+    figures = client.until("abs(state['figures']['given_kpa'] or 0) > 5")["figures"]
+    assert figures["power_kw"] == pytest.approx(0.02 * 700 * abs(figures["given_kpa"]), rel=0.3)
+    client.order("stop")
+    made.ship.mute = True
+    try:
+        state = client.until("state['figures']['roll_deg'] is None and not state['heard']")
+        shown = {"roll_deg", "heel_deg", "port_m", "given_kpa", "asked_kpa", "power_kw", "load"}
+        assert {state["figures"][name] for name in shown} == {None}
+    finally:
+        made.ship.mute = False
+
+
+def test_an_alarm_is_shown_in_words_and_accepted(at: tuple[Bench, Client]) -> None:
+    made, client = at
+    made.ship.alarms = {Fault.MOTION_SILENT: AlarmState.ACTIVE_UNACKNOWLEDGED}
+    (alarm,) = client.until("state['alarms']")["alarms"]
+    assert alarm["code"] == "MOTION_SILENT"
+    assert alarm["words"][0] == "No usable measurement comes from the motion sensor."
+    assert (alarm["lasts"], alarm["accepted"]) == (True, False)
+    client.order("accept")
+    client.until("state['alarms'] and state['alarms'][0]['accepted']")
+
+
+def test_a_lost_page_silences_the_panel_and_one_that_returns_goes_on(
+    at: tuple[Bench, Client],
+) -> None:
+    made, client = at
+    client.order("arm")
+    client.until("state['mode'] == 'ACTIVE'")
+    client.close()
+    lost_ns = time.monotonic_ns()
+    made.wait("not node.attended")
+    assert time.monotonic_ns() - lost_ns < 1.5e9
+    time.sleep(0.05)
+    before = len(made.ship.frames)
+    time.sleep(0.5)
+    assert len(made.ship.frames) == before  # neither orders nor a heartbeat
+    with page(f"http://{client.host}{client.path}") as again:
+        again.follow()
+        made.wait("node.attended")
+        again.until("state['mode'] == 'ACTIVE'")
+        assert made.ship.heard[-1][1].arm
+        again.order("stop")
+        again.until("state['mode'] == 'STANDBY'")
+
+
+def test_a_panel_that_was_lost_while_the_controller_left_active_asks_for_nothing(
+    at: tuple[Bench, Client],
+) -> None:
+    made, client = at
+    client.order("arm")
+    client.until("state['mode'] == 'ACTIVE'")
+    client.close()
+    made.wait("not node.attended")
+    made.ship.mode = Mode.FAULT
+    time.sleep(0.3)
+    with page(f"http://{client.host}{client.path}") as again:
+        again.until("state['mode'] == 'FAULT'")
+        made.wait("node.attended and not ship.heard[-1][1].arm")
+        made.ship.mode = Mode.STANDBY
+        again.until("state['mode'] == 'STANDBY'")
+        assert not made.ship.heard[-1][1].arm
+
+
+def test_stop_is_sent_without_an_open_page(running: tuple[Bench, str]) -> None:
+    made, url = running
+    made.wait("not node.attended")
+    made.ship.mode = Mode.ACTIVE
+    time.sleep(0.2)
+    client = Client(url)
+    assert client.order("arm") == (409, b"late: what this page shows is old")
+    assert client.order("stop") == (204, b"")
+    made.wait("ship.mode is Mode.STANDBY")
+    client.close()
+
+
+def test_two_pages_both_see_and_either_stops(at: tuple[Bench, Client]) -> None:
+    made, client = at
+    with page(f"http://{client.host}{client.path}") as other:
+        client.order("arm")
+        other.until("state['mode'] == 'ACTIVE' and state['said']['lines'][-1] == 'arm'")
+        client.follow()
+        other.order("stop")
+        other.until("state['mode'] == 'STANDBY'")
+        client.until("state['mode'] == 'STANDBY' and state['said']['lines'][-1] == 'stop'")
+    for _ in range(20):  # one that closes does not take the other with it
+        client.follow()
+    assert made.node.attended
+
+
+def test_no_more_pages_than_leave_a_connection_for_orders(at: tuple[Bench, Client]) -> None:
+    _, client = at
+    url = f"http://{client.host}{client.path}"
+    others = [Client(url).open() for _ in range(MOST_PAGES - 1)]
+    refused = Client(url)
+    with pytest.raises(AssertionError, match="too many pages"):
+        refused.open()
+    for other in (refused, *others):
+        other.close()
+
+
+def test_orders_of_a_station_without_the_command_are_refused_in_words(
+    at: tuple[Bench, Client],
+) -> None:
+    made, client = at
+    made.ship.station = Station.OPERATOR_2
+    client.until("not state['in_command']")
+    client.order("arm")
+    client.until("state['said']['lines'][-1] == 'the other station has the command: take'")
+    client.order("stop")
+    client.until("state['said']['lines'][-1] == 'stop'")
+
+
+def test_an_order_to_an_old_state_is_refused_but_stop(at: tuple[Bench, Client]) -> None:
+    _, client = at
+    late = (409, b"late: what this page shows is old")
+    for number in (client.number - 50, client.number + 50):
+        assert client.order("arm", number) == late
+        assert client.order(None, number) == late
+        assert client.order("stop", number)[0] == 204
+
+
+@pytest.mark.parametrize(
+    ("status", "change"),
+    [
+        (404, {"path": "/wrong/"}),
+        (404, {"path": "/"}),
+        (403, {"headers": {"Host": "ship.example"}}),
+        (403, {"headers": {"Host": ""}}),
+        (403, {"headers": {"Origin": "http://ship.example"}}),
+        (403, {"headers": {"Origin": "null"}}),
+        (403, {"headers": {"Origin": ""}}),
+        (411, {"headers": {"Transfer-Encoding": "chunked"}}),
+        (411, {"headers": {"Content-Length": "-1"}}),
+        (413, {"headers": {"Content-Length": "257"}}),
+    ],
+)
+def test_an_order_of_a_stranger_is_refused(
+    at: tuple[Bench, Client], status: int, change: dict[str, Any]
+) -> None:
+    made, client = at
+    made.said.clear()
+    order = json.dumps({"number": client.number, "action": "stop"}).encode()
+    assert client.ask("order", order, **change)[0] == status
+    assert not any("stop" in line for line in made.said)
+
+
+@pytest.mark.parametrize(
+    "body", [b"{}", b'{"number": 1, "action": "sink"}', b"[" * 200, b"\xff", b'{"number":1,"x":2}']
+)
+def test_what_is_no_order_is_refused(at: tuple[Bench, Client], body: bytes) -> None:
+    _, client = at
+    assert client.ask("order", body)[0] == 400
+    client.follow()
+
+
+def test_pages_are_served_with_their_policy_and_orders_only_by_post(
+    at: tuple[Bench, Client],
+) -> None:
+    _, client = at
+    for name in ("", "page.css", "page.js", "view.js"):
+        status, content = client.ask(name)
+        assert status == 200
+        assert content
+        assert "default-src 'none'; script-src 'self'" in client.headers["Content-Security-Policy"]
+        assert "Access-Control-Allow-Origin" not in client.headers
+    assert client.ask("", headers={"Host": "ship.example"})[0] == 403
+    assert client.ask("", headers={"Origin": "http://ship.example"})[0] == 403
+    assert client.ask("order")[0] == 404
+    for name in ("server.py", "../web_panel/page.html", "%2e%2e/page.css", "?x"):
+        assert client.ask(name)[0] == 404
+    assert client.ask("", path=client.path.rstrip("/"))[0] == 404
+
+
+def test_stop_reaches_the_bus_as_fast_as_from_the_keyboard(at: tuple[Bench, Client]) -> None:
+    """Both on one bus in one run: from the key, or the request, to the frame."""
+    made, client = at
+    reading, writing = os.pipe()
+    keyboard = Keyboard(made.node, reading, made.said.append, terminal=False)
+    look = made.desk.look
+    made.desk.look = lambda now_ns: look(now_ns) or keyboard.look(now_ns)
+    taken: dict[str, list[float]] = {"keyboard": [], "page": []}
+    try:
+        for way in ("keyboard", "page") * 10:
+            client.until("state['mode'] == 'STANDBY' and not state['stopping']")
+            client.order("arm")
+            client.until("state['mode'] == 'ACTIVE'")
+            began_ns = time.monotonic_ns()
+            if way == "page":
+                client.order("stop")
+            else:
+                os.write(writing, b"stop\n")
+            made.wait("ship.heard[-1][1].stop")
+            stopped_ns = next(
+                at_ns for at_ns, order in made.ship.heard if order.stop and at_ns > began_ns
+            )
+            taken[way].append((stopped_ns - began_ns) * 1e-6)
+    finally:
+        made.desk.look = look
+        os.close(writing)
+        os.close(reading)
+    medians = {way: statistics.median(times) for way, times in taken.items()}
+    print(medians, {way: max(times) for way, times in taken.items()})
+    assert medians["keyboard"] < 50
+    assert medians["page"] < 50  # what docs/how-to/panel.md asks of a panel
+
+
+def test_a_server_that_hangs_or_dies_silences_the_panel() -> None:
+    with bench() as (made, url), page(url) as client:
+        client.until("state['mode'] == 'STANDBY'")
+        made.wait("node.attended")
+        pid = next(each for each in children() if each != os.getpid())
+        os.kill(pid, signal.SIGSTOP)
+        made.wait("not node.attended")
+        os.kill(pid, signal.SIGKILL)
+        made.wait("desk.ended")
+
+
+def children() -> list[int]:
+    """Processes that serve a page, the newest first."""
+    found = []
+    for entry in os.listdir("/proc"):
+        if entry.isdigit():
+            try:
+                with open(f"/proc/{entry}/stat") as stat, open(f"/proc/{entry}/cmdline") as words:
+                    parent = int(stat.read().rpartition(")")[2].split()[1])
+                    if parent == os.getpid() and "spawn_main" in words.read():
+                        found.append(int(entry))
+            except OSError:
+                continue
+    return sorted(found, reverse=True)
