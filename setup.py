@@ -13,15 +13,17 @@ class BuildWithCommit(build_py):
     def run(self) -> None:
         """Build as setuptools does, then note the commit, where there is one."""
         super().run()
-        if self.editable_mode or not (Path(__file__).parent / ".git").exists():
+        folder = Path(__file__).parent
+        if self.editable_mode or not (folder / ".git").exists():
             return
-        described = subprocess.run(
-            ["git", "describe", "--always", "--abbrev=12", "--dirty"],
-            cwd=Path(__file__).parent,
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
+        words = ["git", "describe", "--always", "--abbrev=12", "--dirty"]
+        try:
+            described = subprocess.run(
+                words, cwd=folder, capture_output=True, text=True, check=True
+            ).stdout
+        except (OSError, subprocess.CalledProcessError) as error:
+            print(f"the wheel will name no commit: {error}")
+            return
         Path(self.build_lib, "utank_hil", "commit.txt").write_text(described, encoding="utf-8")
 
 

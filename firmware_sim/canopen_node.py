@@ -27,7 +27,7 @@ from utank_hil.canbus.profiles.canopen import (
 )
 
 MS_NS = 1_000_000
-_STATES = {
+_STATES: dict[int, NetworkState] = {
     NodeCommand.START: NetworkState.OPERATIONAL,
     NodeCommand.STOP: NetworkState.STOPPED,
     NodeCommand.PRE_OPERATIONAL: NetworkState.PRE_OPERATIONAL,
@@ -143,7 +143,7 @@ class CanopenNode:
         if command in _RESETS:
             self.state = NetworkState.BOOT_UP
         else:
-            self.state = _STATES.get(NodeCommand(command), self.state)
+            self.state = _STATES.get(command, self.state)
 
     def _serve(self, data: bytes) -> bytes:
         command, place, value, size = parts(data)

@@ -12,7 +12,10 @@ from utank_hil.console.failures import failures_named
 
 
 def main(config: Annotated[Path, typer.Argument(help="Controller.")]) -> None:
-    """Print guard_parameters.h, the guard's table for a controller and its ship."""
+    """Print guard_parameters.h, the guard's table for a controller and its ship.
+
+    Example: python -m firmware_sim.guard configs/controllers/gpc.yaml > guard_parameters.h
+    """
     try:
         print(guard_parameters(load(config, ControllerConfig, allow_code=True)).header, end="")
     except ValueError as error:

@@ -167,15 +167,21 @@ def test_an_alarm_is_shown_in_words_and_accepted(at: tuple[Bench, Client]) -> No
     client.until("state['alarms'] and state['alarms'][0]['accepted']")
 
 
-def test_a_lost_page_silences_the_panel_and_one_that_returns_goes_on(
-    at: tuple[Bench, Client],
-) -> None:
-    made, client = at
+def lose_the_page_that_armed(made: Bench, client: Client) -> int:
+    """Arm, close the page, and wait until the panel knows; return when it was closed."""
     client.order("arm")
     client.until("state['mode'] == 'ACTIVE'")
     client.close()
     lost_ns = time.monotonic_ns()
     made.wait("not node.attended")
+    return lost_ns
+
+
+def test_a_lost_page_silences_the_panel_and_one_that_returns_goes_on(
+    at: tuple[Bench, Client],
+) -> None:
+    made, client = at
+    lost_ns = lose_the_page_that_armed(made, client)
     assert time.monotonic_ns() - lost_ns < 1.5e9
     time.sleep(0.05)
     before = len(made.ship.frames)
@@ -194,10 +200,7 @@ def test_a_panel_that_was_lost_while_the_controller_left_active_asks_for_nothing
     at: tuple[Bench, Client],
 ) -> None:
     made, client = at
-    client.order("arm")
-    client.until("state['mode'] == 'ACTIVE'")
-    client.close()
-    made.wait("not node.attended")
+    lose_the_page_that_armed(made, client)
     made.ship.mode = Mode.FAULT
     time.sleep(0.3)
     with page(f"http://{client.host}{client.path}") as again:

@@ -157,6 +157,13 @@ def test_without_the_masters_heartbeat_it_does_what_6007h_says(master, code, bra
     assert lost == ([b"\x30\x81"] if code else [])
 
 
+def test_an_order_of_the_network_that_is_none_changes_nothing(master):
+    master.run(3)
+    before = master.drive.state
+    master.send_message(0, [0x7F, 5])
+    assert master.drive.state is before
+
+
 def test_control_words_are_judged_by_their_bits():
     assert control_word(0x0F) is ControlWord.ENABLE_OPERATION
     assert control_word(0x010F) is ControlWord.ENABLE_OPERATION

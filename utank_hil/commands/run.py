@@ -196,7 +196,8 @@ def _refuse_beside_another(port: Port, bus: str) -> None:
             for frame in port.receive():
                 if frame.can_id in sent:
                     common.fail(
-                        f"{bus}: another controller is on this bus: it sent {frame}; end it first",
+                        f"{bus}: another controller is on this bus: it sent 0x{frame.can_id:08X}; "
+                        "end it first",
                         ExitCode.NO_BUS,
                     )
         time.sleep(_LOOK_S)

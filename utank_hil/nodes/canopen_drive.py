@@ -69,12 +69,18 @@ class CanopenDrive:
 
     `deliver` gets each report of a drive that is configured, operational and alive, and None as
     long as its configuration is refused; `takes` has, by identifier, what takes a frame and the
-    time of its receipt. Without `loop` the drive is heard only.
+    time of its receipt. With `hears_only` somebody else configures and commands it.
     """
 
     def __init__(
-        self, plan: DrivePlan, loop: PressureLoop | None = None, area_m2: float = 0.0
+        self,
+        plan: DrivePlan,
+        loop: PressureLoop | None = None,
+        area_m2: float = 0.0,
+        *,
+        hears_only: bool = False,
     ) -> None:
+        self._hears_only = hears_only
         self._plan, self._loop, self._area_m2 = plan, loop, area_m2
         self.deliver: Callable[[DriveReport | None, int], None] = _nobody
         self.setup = CanopenSetup(plan)
@@ -185,7 +191,7 @@ class CanopenDrive:
             self.echo_ns = now_ns
         late_ns = LATE_BEATS * plan.heartbeat_ms * MILLISECOND_NS
         alive = self._operational and now_ns - self._beat_ns <= late_ns
-        if state is None or not alive or not self.setup.done:
+        if state is None or not alive or not (self._hears_only or self.setup.done):
             return
         power_w = self._torque * self._speed_rad_s
         self.deliver(

@@ -164,7 +164,7 @@ class Inbox:
                 pressure if pump_sensor is None else ProfiledDevice(pump_sensor), self._on_pump
             )
         if drive is None and foreign.pump is not None:
-            drive = CanopenDrive(foreign.pump)
+            drive = CanopenDrive(foreign.pump, hears_only=True)
         self.canopen_drive = drive
         if pump and self.canopen_drive is not None:
             self.canopen_drive.deliver = self._on_drive_report
