@@ -16,7 +16,8 @@ from utank_hil.telemetry.frame_log import FrameLog
 
 pytestmark = pytest.mark.slow
 
-HEAVY = ("matplotlib", "numba", "rerun", "control", "pyarrow", "firmware_sim")
+READERS = ("asammdf", "pandas", "sympy")
+HEAVY = ("matplotlib", "numba", "rerun", "control", "pyarrow", "firmware_sim", *READERS)
 
 COMMAND = "import utank_hil.cli, utank_hil.commands.run, utank_hil.commands.panel"
 
@@ -46,6 +47,8 @@ for config in {(type(each.law), each.retuning is None): each for each in configs
         assert ring.count >= 10
 """
 
+CATALOGUE = "from utank_hil.canbus import load_catalogue; load_catalogue()"
+
 CHECK = """
 import sys
 loaded = sorted({{name.partition(".")[0] for name in sys.modules}} & set({heavy!r}))
@@ -66,7 +69,11 @@ def loaded_by(source: str) -> str:
     return done.stdout.strip()
 
 
-@pytest.mark.parametrize("source", [COMMAND, LOOP], ids=["command line", "loop"])
+@pytest.mark.parametrize(
+    "source",
+    [COMMAND, f"import utank_hil.commands.run\n{CATALOGUE}", LOOP],
+    ids=["command line", "run that reads the catalogue first", "loop"],
+)
 def test_controllers_process_loads_nothing_heavy(source: str) -> None:
     assert loaded_by(source) == ""
 
@@ -80,6 +87,11 @@ path = Path("configs/controllers/gpc.yaml")
 assert admit(load_config(path, ControllerConfig), path).linear is not None
 """
     assert loaded_by(source) == ""
+
+
+def test_an_emulated_ship_loads_no_reader_of_measurements() -> None:
+    source = f"import firmware_sim.cli, firmware_sim.run\n{CATALOGUE}"
+    assert not set(READERS) & set(loaded_by(source).split())
 
 
 def test_the_test_can_fail() -> None:

@@ -4,8 +4,6 @@ import math
 from dataclasses import dataclass
 from typing import Any, Final
 
-from cantools.database.can import Database
-
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Address,
@@ -18,7 +16,6 @@ from utank_hil.canbus import (
     SensorTank,
     load_catalogue,
 )
-from utank_hil.canbus.catalogue import DBC_PATH, read_data_ids
 from utank_hil.configuration import ControllerConfig
 from utank_hil.safety.monitors.thresholds import thresholds_of
 
@@ -110,14 +107,11 @@ def guard_parameters(config: ControllerConfig) -> GuardParameters:
         safety.hardwired_age_ms + 150 if vessel.redundancy.hardwired_inputs else 0.0,
     )
     thresholds = thresholds_of(config.plant, safety.roll_limit_rad, config.sensors)
-    database = Database()
-    database.add_dbc_string(DBC_PATH.read_text(encoding="utf-8"))
     catalogue, messages = load_catalogue(), []
     for (kind, source), patience in zip(STREAMS, patience_ms, strict=True):
         codec = catalogue.codec(kind, source)
-        data_ids = read_data_ids(database.get_message_by_name(codec.name))
-        assert data_ids is not None  # the catalogue has checked it
-        messages.append(Message(codec.can_id, math.ceil(patience / TICK_MS), data_ids))
+        assert codec.data_ids is not None  # the catalogue has checked it
+        messages.append(Message(codec.can_id, math.ceil(patience / TICK_MS), codec.data_ids))
     return GuardParameters(
         tuple(messages),
         pressure=math.ceil(limits.pressure_pa / PRESSURE_PA) + 1,

@@ -88,6 +88,9 @@ class Catalogue:
 @cache
 def load_catalogue(path: Path = DBC_PATH) -> Catalogue:
     """Read and compile a DBC; ValueError lists every difference from the message types."""
+    import utank_hil.canbus.python_can  # noqa: F401, before cantools
+
+    # isort: split
     from cantools.database.can import Database  # slow to import, and needed only here
 
     content = path.read_bytes()

@@ -60,11 +60,16 @@ class Codec(Generic[T]):
     name: str  #: Name in the DBC.
     can_id: int  #: Identifier of 29 bits.
     cycle_ns: int  #: Cycle time; 0 for a message without one.
-    protected: bool  #: Whether byte 0 is a CRC and the low nibble of byte 1 a counter.
+    data_ids: bytes | None  #: Sixteen of its protection; None for an unprotected message.
     encode: Callable[[T, int], bytes]  #: ``encode(message, counter)`` gives 8 bytes.
     decode: Callable[[bytes], T | None]  #: Takes 8 bytes; None if the CRC is wrong.
     source: str  #: Text of both functions.
     not_available: Mapping[str, int]  #: Raw value of each signal that says so: all ones.
+
+    @property
+    def protected(self) -> bool:
+        """Whether byte 0 is a CRC and the low nibble of byte 1 a counter."""
+        return self.data_ids is not None
 
 
 def compile_codec(
@@ -93,7 +98,7 @@ def compile_codec(
         exec(compile(source, f"<codec of {name}>", "exec"), scope)
         functions = scope[f"encode_{name}"], scope[f"decode_{name}"]
     largest = {signal.name: signal.not_available for signal in signals}
-    return Codec(name, can_id, cycle_ns, data_ids is not None, *functions, source, largest)
+    return Codec(name, can_id, cycle_ns, data_ids, *functions, source, largest)
 
 
 def field_kind(annotation: Any) -> type:

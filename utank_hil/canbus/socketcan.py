@@ -6,25 +6,11 @@ start of its tick and sends at the end, so a loop that hangs is silent on the bu
 
 import errno
 import socket
-import sys
 from collections.abc import Iterable, Sequence
-from types import ModuleType
-from typing import Final, cast
+from typing import Final
 
 from utank_hil.canbus.frame import LONGEST_ID, STANDARD, Frame, PortError
-
-# python-can imports asammdf where that is installed, and pandas with it. No reader of measurements
-# belongs in the controller's process.
-if "asammdf" in sys.modules:
-    import can
-    from can.interfaces.socketcan import SocketcanBus
-else:
-    sys.modules["asammdf"] = cast(ModuleType, None)  # a module that can't be imported
-    try:
-        import can
-        from can.interfaces.socketcan import SocketcanBus
-    finally:
-        del sys.modules["asammdf"]
+from utank_hil.canbus.python_can import SocketcanBus, can
 
 #: More than the kernel's receive buffer (about 280 frames); bounds the time on a babbling bus.
 MAX_FRAMES_PER_CALL: Final = 320

@@ -186,7 +186,7 @@ class Mf4Log(FrameSource):
         if find_spec("asammdf") is None:  # The reader would not name the package.
             raise ModuleNotFoundError("asammdf is not installed", name="asammdf")
 
-        # It was imported without asammdf (`utank_hil.canbus.socketcan`).
+        # It was imported without asammdf (`utank_hil.canbus.python_can`).
         reader = reload(can.io.mf4).MF4Reader
         try:
             with reader(self._path) as messages:
