@@ -511,7 +511,7 @@ FAULTS: Final = (
     ),
     _row(
         Fault.ROLL_AMPLIFIED,
-        "The ship rolls more than she would with the pump at rest.",
+        "The ship rolls more than it would with the pump at rest.",
         "Retune the law, or use one for this load and sea.",
         _found(
             Reaction.RAMP,
@@ -542,7 +542,7 @@ FAULTS: Final = (
     ),
     _row(
         Fault.STABILITY_LOW,
-        "The ship's metacentric height may be below the limit of her stability booklet, or no "
+        "The ship's metacentric height may be below the limit of its stability booklet, or no "
         "estimates of it come any more: the panel shows no GM then.",
         "Compare with the loading computer; take on ballast or remove weight from above. Without "
         "estimates (the log has the reason) start the controller again when that can be done.",

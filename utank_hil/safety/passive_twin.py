@@ -12,13 +12,13 @@ so the wave moment need not be known: what the pump has done, d = x - x_t, obeys
 
 and the twin's roll is the measured roll minus that of d. A wave moment estimated from the same
 model and fed to the passive ship gives the same answer, by superposition, and adds the estimator's
-lag. f holds the ship's quadratic damping and what her restoring moment has beyond its linear part,
+lag. f holds the ship's quadratic damping and what its restoring moment has beyond its linear part,
 and the tank's quadratic loss.
 
 The twin's model is the configuration's ship. A ship that was loaded otherwise makes d wrong by as
-much as her answer to the pump differs, and nothing where the pump does nothing.
+much as its answer to the pump differs, and nothing where the pump does nothing.
 
-The twin has her valve open. What the valve takes beyond that from the water acts on the ship as the
+The twin has its valve open. What the valve takes beyond that from the water acts on the ship as the
 pump does, with the sign turned. Its loss is known by half, so a ship with a valve is compared with
 more room.
 """
@@ -57,7 +57,7 @@ ANEW_PERIODS: Final = 2.0
 """Roll periods that are remembered before the next judgement: the pump makes its roll from the
 beginning, and in a lull of half a period a sound law came to 2.45 times the twin's."""
 LASTS_PERIODS: Final = 0.25
-"""The memory of the mean squares is the patience: longer, and a bad law only rolls her longer."""
+"""The memory of the mean squares is the patience: longer, and a bad law only rolls it longer."""
 
 
 class PassiveTwin:
@@ -81,7 +81,7 @@ class PassiveTwin:
     roll_rad : float
         The twin's roll.
     amplified : bool
-        The ship rolls more than her twin, and has for over a quarter of a roll period.
+        The ship rolls more than its twin, and has for over a quarter of a roll period.
     """
 
     def __init__(
@@ -162,7 +162,7 @@ class PassiveTwin:
         Parameters
         ----------
         roll_rad, rate_rad_s, level_rate_m_s : float
-            Of the ship and her water.
+            Of the ship and its water.
         pressure_pa : float
             Across the pump, less what the valve takes beyond an open one.
         counts : bool

@@ -133,7 +133,7 @@ def judge_pulses(
                       TANK_PERIOD, "Check the tank's filling and its measures in the ship's file."),
         _period_check("roll_period", "the ship's own roll period", ship_period_s,
                       2 * math.pi / plant.ship.natural_frequency_rad_s, ROLL_PERIOD,
-                      "Slacken the moorings and try again; else give her roll period as loaded in "
+                      "Slacken the moorings and try again; else give its roll period as loaded in "
                       "the ship's file."),
     ]  # fmt: skip
 

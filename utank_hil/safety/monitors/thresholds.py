@@ -22,8 +22,8 @@ UNCONFIRMED_HEEL_DEG: Final = 0.25
 NOISE_LIMIT: Final = 5.0
 """Noise, in the figures of the sensors, from which a signal counts as degraded."""
 DEGRADED_SHARE: Final = 0.5
-"""Of the greatest pressure, or of that which would take the ship to her roll limit if it was held:
-nobody knows whether it presses the right way, and a step heels her up to twice as far at first."""
+"""Of the greatest pressure, or of that which would take the ship to its roll limit if it was held:
+nobody knows whether it presses the right way, and a step heels it up to twice as far at first."""
 LEAST_ROLL_DEG: Final = 0.2
 ROLL_PUSH_AT_W0: Final = 0.6
 """The tank's equation judges from so many degrees RMS on, which push the water by this share of
@@ -180,7 +180,7 @@ def thresholds_of(
 
 
 def _unconfirmed_share(plant: DesignPlant) -> float:
-    """A quarter, or what heels a ship whose pump is strong for her size by so little."""
+    """A quarter, or what heels a ship whose pump is strong for its size by so little."""
     push_n = plant.limits.pressure_pa * plant.tank.reservoir_area_m2
     stiffness = coupled_matrices(plant.ship, plant.tank)[2]
     (k11, k12), (_, k22) = stiffness.tolist()
