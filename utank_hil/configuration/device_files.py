@@ -1,10 +1,11 @@
-"""Profiles that are shipped, and layouts out of a maker's DBC."""
+"""Profiles that are shipped, and layouts out of a maker's DBC or EDS."""
 
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
 from utank_hil.canbus import profiles
+from utank_hil.configuration.eds_files import OF_AN_EDS, with_eds
 from utank_hil.configuration.yaml_text import parse_yaml
 
 FOLDER: Final = Path(profiles.__file__).parent
@@ -28,20 +29,24 @@ def _profile(name: str) -> dict[str, Any]:
 
 
 def with_profile(content: dict[str, Any]) -> dict[str, Any]:
-    """A device's section with what its profile or its DBC says, where it says nothing itself.
+    """A device's section with what its profile, DBC or EDS says, where it says nothing itself.
 
-    ValueError is raised if there is no such profile, or the DBC can't be read, or has no such
+    ValueError is raised if there is no such profile, or the file can't be read, or has no such
     message.
     """
     content = _as_written(content)
     if "dbc" in content:
         return _with_dbc(content)
+    if "eds" in content:
+        return with_eds(content)
     name = content.get("profile", "")
-    if not isinstance(name, str) or name in ("", NATIVE) or name.startswith(OF_A_DBC):
+    if not isinstance(name, str) or name in ("", NATIVE):
+        return content
+    if name.startswith((OF_A_DBC, OF_AN_EDS)):
         return content
     if name not in shipped_profiles():
         known = ", ".join((NATIVE, *shipped_profiles()))
-        raise ValueError(f"no profile {name!r}: there are {known}; or name a file by dbc")
+        raise ValueError(f"no profile {name!r}: there are {known}; or name a file by dbc or eds")
     return _merged(_profile(name), content)
 
 

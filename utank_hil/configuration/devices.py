@@ -70,7 +70,8 @@ class DeviceSection(Section):
     node: NodeNumber | None = None  #: CANopen node.
     source: SourceAddress | None = None  #: Source address, SAE J1939 and NMEA 2000.
     messages: Annotated[dict[str, MessageSection], Field(default_factory=dict)]
-    """Layouts and identifiers by names of your own; with `dbc: FILE` the names in that file."""
+    """Layouts and identifiers by names of your own; with `dbc: FILE` the names in that file, with
+    `eds: FILE` TPDO1 and on."""
     signals: Annotated[dict[str, SignalSection], Field(default_factory=dict)]
     """What each value is made of."""
     valid_when: tuple[ConditionSection, ...] = ()  #: Conditions on status words that must all hold.

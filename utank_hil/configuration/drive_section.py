@@ -11,6 +11,7 @@ from utank_hil.canbus.profiles.canopen import Place
 from utank_hil.canbus.profiles.drive_plan import COMMAND_MS, MODES, DrivePlan
 from utank_hil.configuration.device_files import NATIVE
 from utank_hil.configuration.device_sections import NodeNumber, Whole
+from utank_hil.configuration.eds_files import drive_with_eds
 from utank_hil.configuration.files import Section
 from utank_hil.control.pressure_loop import LoopMargins, loop_margins
 from utank_hil.dynamics.pump import Pump
@@ -42,7 +43,8 @@ class DriveSection(Section):
     heartbeat_ms: Annotated[int, Range(least=20, most=100)] = 50
     """Time without the controller's heartbeat after which the drive stops; and its own cycle."""
     identity: Annotated[tuple[Whole | None, ...], Field(max_length=4)] = ()
-    """Vendor, product, revision and serial number in 1018h; null for any."""
+    """Vendor, product, revision and serial number in 1018h; null for any. With `eds: FILE` that
+    file's, unless given."""
     require: Annotated[dict[str, Whole | None], Field(default_factory=dict)]
     """Objects, as "0x605A" or "0x1400:5", that are written and must read back so, beside 6007h: 3,
     605Ah: 2, 605Eh: 2; null where the drive lacks one."""
@@ -55,6 +57,7 @@ class DriveSection(Section):
     def _complete(cls, content: Any) -> Any:
         if not isinstance(content, dict) or content.get("profile", NATIVE) == NATIVE:
             return content
+        content = drive_with_eds(content) if "eds" in content else content
         given = content.get("require", {})
         return content | {"require": REQUIRE | given if isinstance(given, dict) else given}
 
