@@ -1,15 +1,21 @@
 """A sample that nothing on board can have moved to is discarded."""
 
+import math
+import struct
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 from controller_bench import CATALOGUE, VESSEL
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.canbus import Quality, SensorMotion
+from utank_hil.canbus import Frame, Quality, SensorMotion, SensorTank
+from utank_hil.canbus.frame import STANDARD
+from utank_hil.canbus.profiles.device import ProfiledDevice
+from utank_hil.configuration.devices import DevicesSection
 from utank_hil.control import DesignPlant
-from utank_hil.nodes.plausibility import LevelGates, MotionSensor, SpikeGate
+from utank_hil.nodes.plausibility import LevelGates, MotionSensor, SampleClock, SpikeGate
 from utank_hil.safety.monitors.thresholds import MonitorThresholds, SensorFigures, thresholds_of
 
 MS, S = 1_000_000, 1_000_000_000
@@ -22,7 +28,9 @@ APART = replace(
 
 
 def sensor(thresholds: MonitorThresholds = APART) -> MotionSensor:
-    return MotionSensor(CATALOGUE.receiver(SensorMotion), thresholds)
+    receiver = CATALOGUE.receiver(SensorMotion)
+    receiver.cycle_ns = 0  # time of receipt alone
+    return MotionSensor(receiver, thresholds)
 
 
 def taken(motion: MotionSensor, roll_rad: float, rate_rad_s: float, now_ns: int) -> bool:
@@ -98,3 +106,53 @@ def test_what_moves_no_faster_than_it_can_always_passes(
     gate.passes(start, 0)
     move = share * (0.01 + 0.5 * elapsed_ms * 1e-3) * 0.999
     assert gate.passes(start + move, elapsed_ms * MS)
+
+
+class Slow:
+    """A sensor of 20 Hz on a ship that rolls by 0.3 rad at 10 s; samples come in bursts."""
+
+    def __init__(self, protection: dict[str, object]) -> None:
+        layout = {"start": 0, "bits": 32, "real": True, "unit": "rad"}
+        rate = {"start": 32, "bits": 32, "real": True, "unit": "rad/s"}
+        signals = {"R": layout, "W": rate}
+        more = {"n": {"id": 6, "bytes": 1, "signals": {"N": {"start": 0, "bits": 8}}}}
+        section = {
+            "profile": "", "messages": {"m": {"id": 5, "signals": signals}, **more},
+            "signals": {"roll_rad": {"from": "m.R"}, "roll_rate_rad_s": {"from": "m.W"}},
+            "cycle_ms": 50, "age_ms": 200, "accept_unprotected": True, "protection": protection,
+        }  # fmt: skip
+        plan = DevicesSection(motion=section).foreign().motions[0]
+        assert plan is not None
+        self.device = ProfiledDevice(plan)
+        self.sensor = MotionSensor(
+            self.device, thresholds_of(DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures())
+        )
+        self.device.deliver = self.sensor.take
+
+    def run(self, burst: int, spike: int = -1) -> int:
+        for k in range(400):
+            now_ns = -(-k // burst) * burst * 50 * MS
+            turn = 2 * math.pi / 10 * 0.05 * k
+            roll_rad = 0.3 * math.sin(turn) + 0.1 * (k == spike)
+            words = struct.pack("<ff", roll_rad, 0.3 * 2 * math.pi / 10 * math.cos(turn))
+            for can_id, data in ((6, bytes([k % 256])), (5, words)):
+                frame = Frame(can_id | STANDARD, data)
+                self.device.takes[frame.can_id](frame, now_ns)
+        return self.sensor.discarded
+
+
+@pytest.mark.parametrize("burst", [1, 2, 3])
+def test_a_burst_of_a_slow_sensor_is_no_spike_where_its_stamp_moves_on(burst: int) -> None:
+    stamped = {"stamps": [{"from": "n.N", "us": 50_000}]}
+    assert Slow(stamped).run(burst) == 0
+    assert Slow(stamped).run(burst, spike=200) == 1
+    assert (Slow({"unchanged_ms": 500}).run(burst) > 0) is (burst > 1)  # nothing says it is new
+
+
+def test_the_time_of_a_sample_is_its_receipt_or_what_its_counter_says() -> None:
+    source = CATALOGUE.receiver(SensorTank)  # 20 ms
+    clock = SampleClock(source)
+    times = [clock.time_ns(now_ms * MS) // MS for now_ms in (1000, 1060, 1060, 1060, 1120)]
+    assert [after - before for before, after in pairwise(times)] == [60, 20, 20, 60]
+    source.lost += 2
+    assert clock.time_ns(1120 * MS) // MS - times[-1] == 60

@@ -60,6 +60,7 @@ class Receiver(Generic[T]):
     """
 
     changes: ClassVar[int] = 0
+    counts: ClassVar[bool] = True  #: Whether a counter tells a new frame.
     __slots__ = (
         "_bucket", "_candidate", "_decode", "_expected", "_protected", "_run",
         "can_id", "cycle_ns", "heard", "lost", "rejected", "valid",

@@ -42,6 +42,7 @@ from utank_hil.nodes.plausibility import (
     USABLE,
     LevelGates,
     MotionSensor,
+    SampleClock,
 )
 from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.nodes.stations import ADDRESSES, Stations
@@ -153,6 +154,7 @@ class Inbox:
         self.gates = None if thresholds is None else LevelGates(thresholds)
         levels, pump_sensor = foreign.levels, foreign.pump_sensor
         self._tank = catalogue.receiver(SensorTank) if levels is None else ProfiledDevice(levels)
+        self._tank_clock = SampleClock(self._tank)
         self._hear(self._tank, self._on_tank)
         self._drive: Receiver[DriveStatus1] | None = None
         matched = []
@@ -373,6 +375,7 @@ class Inbox:
 
     def _on_tank(self, tank: SensorTank, now_ns: int) -> None:
         self._count_cycles(now_ns)
+        time_ns = self._tank_clock.time_ns(now_ns)
         # the switches count whatever the gauges say, and a broken switch counts as closed
         self._high_level = not (tank.port_high is _OPEN and tank.starboard_high is _OPEN)
         if tank.quality not in USABLE:
@@ -382,7 +385,7 @@ class Inbox:
         if (
             abs(port_m - starboard_m) <= 2 * self._most_level_m
             and abs(port_m + starboard_m) <= self._most_sum_m
-            and (self.gates is None or self.gates.passes(port_m, starboard_m, now_ns))
+            and (self.gates is None or self.gates.passes(port_m, starboard_m, time_ns))
         ):
             self._port_level_m, self._starboard_level_m = port_m, starboard_m
             self._tank_ns, self._tank_cycles = now_ns, self._cycles

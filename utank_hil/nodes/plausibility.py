@@ -1,7 +1,7 @@
 """Plausibility: a sample that nothing on board can have moved to since the last is discarded."""
 
 import math
-from typing import Final
+from typing import Any, Final
 
 from utank_hil.canbus import Quality, Receiver, SensorMotion
 from utank_hil.canbus.measurements import MotionSample
@@ -18,6 +18,8 @@ STEP_SAMPLES: Final = 5
 
 class SpikeGate:
     """Passes the samples of a signal that are near enough to the last one that passed.
+
+    Times are those of the samples, see `SampleClock`.
 
     Parameters
     ----------
@@ -45,6 +47,29 @@ class SpikeGate:
             return True
         self._in_a_row += 1
         return False
+
+
+class SampleClock:
+    """Time of a source's samples: of their receipt, but for bursts of what the bus held up.
+
+    Where a counter or a stamp shows that a sample is new, it is a cycle after the one before it at
+    least, and later by those that were lost. Only differences of these times mean anything.
+    """
+
+    def __init__(self, source: Receiver[Any] | ProfiledDevice[Any]) -> None:
+        self._source = source
+        self._cycle_ns = source.cycle_ns if source.counts else 0
+        self._came_ns = self._time_ns = NEVER_HEARD_NS
+        self._lost = 0
+
+    def time_ns(self, now_ns: int) -> int:
+        """Time of the sample that came now; once for each that is accepted."""
+        lost = self._source.lost
+        counted_ns = (1 + lost - self._lost) * self._cycle_ns
+        passed_ns = now_ns - self._came_ns
+        self._time_ns += passed_ns if passed_ns > counted_ns else counted_ns
+        self._came_ns, self._lost = now_ns, lost
+        return self._time_ns
 
 
 class MotionSensor:
@@ -76,6 +101,7 @@ class MotionSensor:
         self.heard_ns = NEVER_HEARD_NS
         self.discarded = 0
         self._gated = thresholds is not None
+        self._clock = SampleClock(receiver)
         if thresholds is not None:
             self._roll = SpikeGate(thresholds.roll_spike_rad, thresholds.roll_most_rad_s)
             self._rate = SpikeGate(thresholds.rate_spike_rad_s, thresholds.rate_most_rad_s2)
@@ -83,12 +109,13 @@ class MotionSensor:
     def take(self, motion: SensorMotion, now_ns: int) -> None:
         """Take an accepted message; keep its sample if it is one."""
         roll_rad, rate_rad_s = motion.roll_rad, motion.roll_rate_rad_s
+        time_ns = self._clock.time_ns(now_ns)
         # one test for both: the sum is NaN if either is not available
         if motion.quality not in USABLE or not math.isfinite(roll_rad + rate_rad_s):
             return
         if self._gated:
             # both see every sample
-            passes = self._roll.passes(roll_rad, now_ns) & self._rate.passes(rate_rad_s, now_ns)
+            passes = self._roll.passes(roll_rad, time_ns) & self._rate.passes(rate_rad_s, time_ns)
             if not passes:
                 self.discarded += 1
                 return

@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from moving_ship import THRESHOLDS
 
@@ -84,3 +85,26 @@ def test_what_the_roll_says_against_the_rate_is_found_beside_the_noise() -> None
     watch.update(MotionSample(0.5, 0.0), 0.7, stale=False)
     watch.update(MotionSample(0.5, 0.0), 0.7, stale=False)
     assert not watch.found & Finding.DRIFT
+
+
+@pytest.mark.parametrize("cycle_s", [0.05, 0.0505])
+@pytest.mark.parametrize(("noise", "found"), [(1.0, 0), (12.0, Finding.NOISE)])
+def test_a_sensor_of_20_hz_is_as_noisy_as_its_samples(
+    cycle_s: float, noise: float, found: int
+) -> None:
+    """A roll of 0.3 rad at 10 s; samples come up to 8 ms late, looks are each 50 ms."""
+    watch, draw = MotionWatch(THRESHOLDS, 0.05), np.random.default_rng(2)
+    w, next_s, sample = 2 * math.pi / 10, 0.0, MotionSample()
+    seen = []
+    for tick in range(6000):
+        now_s = tick * TICK_S
+        if now_s >= next_s + draw.uniform(0, 0.008):
+            roll_rad = 0.3 * math.sin(w * next_s) + noise * 2e-4 * draw.standard_normal()
+            rate_rad_s = 0.3 * w * math.cos(w * next_s) + 5e-4 * draw.standard_normal()
+            sample = MotionSample(roll_rad, rate_rad_s, round(1e9 * now_s) + 1)
+            next_s += cycle_s
+        watch.turn(sample, TICK_S)
+        if tick % 5 == 4:
+            watch.update(sample, 0.05, stale=False)
+            seen.append(watch.found & Finding.NOISE)
+    assert set(seen[100:]) == {found}

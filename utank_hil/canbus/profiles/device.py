@@ -115,6 +115,8 @@ class ProfiledDevice(Generic[T]):
         ]
         messages = list(enumerate(plan.messages))
         self._needed = [m for m, each in messages if each.signals or each.stamp is not None]
+        #: Whether a counter or a stamp tells a new measurement.
+        self.counts = any(each.counter or each.stamp for _, each in messages)
         self._status = [m for m, each in messages if each.conditions]
         self._came_ns = [_LONG_AGO] * count
         self._good_ns = [_LONG_AGO] * count

@@ -64,7 +64,9 @@ class RollAgainstRate:
         self.unexplained_rad = 0.0
         self._over_s = self._smooth_rad = 0.0
 
-    def update(self, roll_rad: float, turned_rad: float, elapsed_s: float) -> int:
+    def update(
+        self, roll_rad: float, turned_rad: float, elapsed_s: float, *, even: bool = True
+    ) -> int:
         """Take a sample; return what was found.
 
         Parameters
@@ -75,6 +77,8 @@ class RollAgainstRate:
             Integral of the rate since the last sample.
         elapsed_s : float
             Time since then.
+        even : bool
+            Whether it is the same each time.
         """
         moved_rad = roll_rad - self._roll_rad
         self._roll_rad = roll_rad
@@ -83,7 +87,9 @@ class RollAgainstRate:
         limit_rad = self._limit_rad
         turned_rad += self._bias_rad_s * elapsed_s
         left_rad = moved_rad - turned_rad
-        noisy = self.noise.update(self._bend.update(roll_rad), elapsed_s)
+        bend = self._bend
+        left = bend.update(roll_rad) if even else bend.update_after(roll_rad, elapsed_s)
+        noisy = self.noise.update(left, elapsed_s)
         slow_rad = within(left_rad, limit_rad)  # a jump is no bias
         if abs(self.unexplained_rad) < LEARN * limit_rad:  # a fault is no bias
             self._learned_s = min(self._learned_s + elapsed_s, BIAS_S)

@@ -61,7 +61,7 @@ class MotionWatch:
 
     def update(self, sample: MotionSample, elapsed_s: float, *, stale: bool) -> None:
         """Take a sample, and set `found`; one that is `stale` begins anew."""
-        roll_rad, rate_rad_s = sample.roll_rad, sample.roll_rate_rad_s
+        rate_rad_s = sample.roll_rate_rad_s
         # half a cycle of the ends makes a trapezoid of the sum, where no sample was lost
         turned_rad = self._turned_rad - self._half_s * (rate_rad_s - self._last_rate_rad_s)
         self._turned_rad = 0.0
@@ -71,21 +71,23 @@ class MotionWatch:
             self._rate_bend.restart()
             self.found = 0
             return
-        found = self.motion.update(roll_rad, turned_rad, elapsed_s)
-        if self._bend(sample, elapsed_s):
-            found |= _NOISE
+        found = self._look(sample, turned_rad, elapsed_s)
         # the largest samples of noise are discarded, too
         if self._spikes.update(sample.discarded, elapsed_s) and not found & _NOISE:
             found |= _SPIKES
         self.found = found
 
-    def _bend(self, sample: MotionSample, elapsed_s: float) -> bool:
-        """Whether the rate is noisy; of a slow sensor each sample counts once."""
+    def _look(self, sample: MotionSample, turned_rad: float, elapsed_s: float) -> int:
+        """Roll against rate, and the noise of both; of a slow sensor each sample counts once."""
         if not self._slow:
-            return self.rate_noise.update(self._rate_bend.update(sample.roll_rate_rad_s), elapsed_s)
-        since_s = (sample.heard_ns - self._bent_ns) * 1e-9
-        if since_s <= 0:
-            return self.rate_noise.found
-        self._bent_ns = sample.heard_ns
-        bend = self._rate_bend.update_after(sample.roll_rate_rad_s, since_s)
-        return self.rate_noise.update(bend, since_s)
+            found = self.motion.update(sample.roll_rad, turned_rad, elapsed_s)
+            bend = self._rate_bend.update(sample.roll_rate_rad_s)
+        else:
+            since_s = (sample.heard_ns - self._bent_ns) * 1e-9
+            if since_s <= 0:
+                return self.found & ~_SPIKES
+            self._bent_ns = sample.heard_ns
+            elapsed_s = since_s
+            found = self.motion.update(sample.roll_rad, turned_rad, since_s, even=False)
+            bend = self._rate_bend.update_after(sample.roll_rate_rad_s, since_s)
+        return found | _NOISE if self.rate_noise.update(bend, elapsed_s) else found
