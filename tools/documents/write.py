@@ -8,9 +8,9 @@ import sys
 from types import ModuleType
 from typing import Final
 
-from tools.documents import catalogue, configuration, exit_codes, faults
+from tools.documents import catalogue, configuration, exit_codes, faults, registers
 
-GENERATED: Final[tuple[ModuleType, ...]] = (catalogue, faults, exit_codes, configuration)
+GENERATED: Final[tuple[ModuleType, ...]] = (catalogue, faults, exit_codes, configuration, registers)
 """Each has a `PAGE` and, as `page()`, what it should hold."""
 
 

@@ -1,4 +1,4 @@
-"""The announcer: a process that logs and prints events, for which the loop has no time.
+"""The announcer: a process that logs, prints and shows outward what happens, so the loop need not.
 
 The loop writes an event into shared memory. This process logs it, prints it if it is of retuning,
 and writes the identified ship to files. It reads the remaining events even if the loop was killed.
@@ -9,6 +9,7 @@ import multiprocessing
 import os
 import signal
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from datetime import UTC, datetime
 from multiprocessing.connection import Connection
@@ -22,6 +23,7 @@ from utank_hil.canbus import RetuningState
 from utank_hil.canbus.events import AlarmEvent, RetuningEvent
 from utank_hil.commands.identified import IdentifiedShips
 from utank_hil.commands.lines import Lines
+from utank_hil.commands.outward.outlets import Outlet, Outward
 from utank_hil.console.terminal import shown
 from utank_hil.runners.stopping import SIGNALS, signals_waiting
 from utank_hil.safety.faults import FAULTS
@@ -46,11 +48,9 @@ class EventLog:
 
         OSError is raised if there is no room; then no part of the event is left.
         """
-        monotonic_ns = start_ns + event.time_ns
-        utc_ns = time.time_ns() - time.monotonic_ns() + monotonic_ns
         line = {
-            "utc": datetime.fromtimestamp(utc_ns * 1e-9, UTC).isoformat(timespec="milliseconds"),
-            "monotonic_ns": monotonic_ns,
+            "utc": _utc(event, start_ns).isoformat(timespec="milliseconds"),
+            "monotonic_ns": start_ns + event.time_ns,
             "time_s": event.time_ns * 1e-9,
             **_content(event),
         }
@@ -60,6 +60,11 @@ class EventLog:
     def close(self) -> None:
         """Close the file; idempotent."""
         self._file.close()
+
+
+def _utc(event: Event, start_ns: int) -> datetime:
+    utc_ns = time.time_ns() - time.monotonic_ns() + start_ns + event.time_ns
+    return datetime.fromtimestamp(utc_ns * 1e-9, UTC)
 
 
 def _content(event: Event) -> dict[str, Any]:
@@ -80,7 +85,12 @@ def _content(event: Event) -> dict[str, Any]:
 class Announcer:
     """Event ring of a run, and the process that logs and prints its events, ready at once."""
 
-    def __init__(self, ships: IdentifiedShips | None = None, log: Path | None = None) -> None:
+    def __init__(
+        self,
+        ships: IdentifiedShips | None = None,
+        log: Path | None = None,
+        outlets: Sequence[Outlet] = (),
+    ) -> None:
         #: Name of the ring, for a recorder; None if there was no room for it.
         self.ring: str | None = None
         #: Why events are not printed; the controller runs nevertheless.
@@ -90,7 +100,7 @@ class Announcer:
         try:
             self._writer = EventWriter()
             self.ring = self._writer.name
-            self._process = _started(self.ring, ships, log)
+            self._process = _started(self.ring, ships, log, outlets)
         except OSError as error:
             self.error = str(error)
 
@@ -127,11 +137,13 @@ class Announcer:
             self.error = f"the process that logs events ended with code {process.exitcode}"
 
 
-def _started(ring: str, ships: IdentifiedShips | None, log: Path | None) -> SpawnProcess:
+def _started(
+    ring: str, ships: IdentifiedShips | None, log: Path | None, outlets: Sequence[Outlet]
+) -> SpawnProcess:
     context = multiprocessing.get_context("spawn")
     heard, says = context.Pipe(duplex=False)
     with heard:
-        process = context.Process(target=announce, args=(ring, ships, log, says))
+        process = context.Process(target=announce, args=(ring, ships, log, outlets, says))
         try:
             with signals_waiting():
                 process.start()
@@ -145,8 +157,14 @@ def _started(ring: str, ships: IdentifiedShips | None, log: Path | None) -> Spaw
     raise OSError(f"the process that logs events did not start ({process.exitcode})")
 
 
-def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: Connection) -> None:
-    """Log and print events until their writer ends or dies, as main function of the process."""
+def announce(
+    ring: str,
+    ships: IdentifiedShips | None,
+    log: Path | None,
+    outlets: Sequence[Outlet],
+    ready: Connection,
+) -> None:
+    """Log, print and show events outward until their writer ends or dies; the process's main."""
     with EventReader(ring) as reader, ExitStack() as stack:
         # A terminal may block, and the log must not wait for it.
         lines, events = Lines(), None
@@ -158,6 +176,9 @@ def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: 
                 lines.say(f"no log of events: {error}")
             else:
                 stack.callback(events.close)
+        outward = None
+        if outlets:
+            outward = stack.enter_context(Outward(outlets, reader.writer_pid, lines.say))
         ready.send_bytes(b"ready")
         ready.close()
         # The end of the ring ends it, not Ctrl-C, a closed terminal or a stopped service.
@@ -175,6 +196,10 @@ def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: 
                     lines.say(f"an event was not logged: {error}")
                 if isinstance(event, RetuningEvent):  # The run prints alarms itself, at once.
                     _print(event, ships, lines)
+                elif outward is not None:
+                    outward.take(event, _utc(event, reader.start_ns))
+            if outward is not None:
+                outward.look(reader.lost)
             if last:
                 break
             time.sleep(LOOK_S)

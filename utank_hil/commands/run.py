@@ -34,6 +34,7 @@ from utank_hil.commands.announcer import LOG_NAME, Announcer
 from utank_hil.commands.commissioning_record import why_not_commissioned
 from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.commands.lines import Lines, printed_lines
+from utank_hil.commands.outward.outlets import Outlet, read_outlet
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.commands.service_manager import ServiceManager
 from utank_hil.configuration.controller import ControllerConfig
@@ -92,6 +93,14 @@ def run(
             help="Record of utank-hil commission, if it is not beside the configuration.",
         ),
     ] = None,
+    outward: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="URL",
+            help="Show alarms to the ship's systems: udp:// or iec450://ADDRESS:PORT (IEC 61162), "
+            "modbus://ADDRESS:PORT; may be repeated.",
+        ),
+    ] = None,
     json_: common.Json = False,
     view: common.View = False,
     allow_code: common.AllowCode = False,
@@ -110,6 +119,10 @@ def run(
     **Example:** utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
     """
     loaded = common.load(config, ControllerConfig, allow_code=allow_code)
+    try:
+        outlets = [read_outlet(each) for each in outward or ()]
+    except ValueError as error:
+        common.fail(f"--outward: {error}")
     law = admit(loaded, config)
     if loaded.safety.overruns_in_ten is None:
         notes.say("safety.overruns_in_ten", yellow="repeated late ticks are not judged:")
@@ -131,7 +144,7 @@ def run(
         stop = stack.enter_context(stop_on_signals())
         _refuse_beside_another(port, bus)
         announcer, recording = _outputs(
-            stack, context, loaded, law, config, out, keep, commissioned=not refused
+            stack, context, loaded, law, config, out, keep, outlets, commissioned=not refused
         )
         if view:
             _show(stack)
@@ -260,6 +273,7 @@ def _outputs(
     config: Path,
     out: Path | None,
     keep_mb: float | None,
+    outlets: list[Outlet],
     *,
     commissioned: bool,
 ) -> tuple[Announcer | None, RunRecording]:
@@ -283,8 +297,8 @@ def _outputs(
             commissioned=commissioned,
         )
         about = head["about"]
-    if out is not None or retunes or estimates:
-        announcer = Announcer(ships, log)
+    if out is not None or retunes or estimates or outlets:
+        announcer = Announcer(ships, log, outlets)
         stack.callback(announcer.stop)
         if announcer.error is not None:
             notes.say(announcer.error, red="no log of events:")

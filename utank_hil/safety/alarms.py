@@ -21,7 +21,7 @@ from typing import Final, TypeAlias
 from utank_hil.canbus import Alarm, AlarmState, Fault, Mode
 from utank_hil.canbus.events import AlarmEvent
 from utank_hil.safety import judging
-from utank_hil.safety.faults import FAULTS
+from utank_hil.safety.faults import FAULTS, Reaction
 
 GONE_NS: Final = 10_000_000_000
 """A cause that comes back sooner, as with each roll, was never gone."""
@@ -37,6 +37,14 @@ class Gravity(IntEnum):
     NOTHING = auto()
     HALVES = auto()
     ENDS = auto()
+
+
+def gravest(code: Fault) -> Gravity:
+    """The most that a fault may do to the pressure, the same in every mode."""
+    reactions = {each.reaction for row in FAULTS if row.code is code for each in row.conditions}
+    if reactions & {Reaction.STOP, Reaction.RAMP}:
+        return Gravity.ENDS
+    return Gravity.HALVES if Reaction.HALVE in reactions else Gravity.NOTHING
 
 
 Active: TypeAlias = Mapping[Fault, Gravity]

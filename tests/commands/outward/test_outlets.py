@@ -1,0 +1,180 @@
+"""Outlets on loopback, read by sockets and by the client of pymodbus."""
+
+import os
+import socket
+import time
+from collections.abc import Iterator
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+from pymodbus.client import ModbusTcpClient
+from test_sentences import command, parse_alf, split
+from typer.testing import CliRunner
+
+from utank_hil.canbus import AlarmState, Fault, Mode
+from utank_hil.canbus.events import AlarmEvent
+from utank_hil.cli import app
+from utank_hil.commands.announcer import Announcer
+from utank_hil.commands.outward import outlets as module
+from utank_hil.commands.outward.outlets import Outlet, Outward, read_outlet
+from utank_hil.commands.outward.registers import REGISTERS
+from utank_hil.nodes.signals import SIGNALS
+from utank_hil.telemetry.rows import RowWriter
+
+RAISED = AlarmEvent(0, Fault.LEVEL_LIMIT, AlarmState.ACTIVE_UNACKNOWLEDGED, Mode.FAULT)
+
+
+@pytest.fixture
+def listener() -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as found:
+        found.bind(("127.0.0.1", 0))
+        found.settimeout(5.0)
+        yield found
+
+
+def free_port() -> int:
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        return int(found.getsockname()[1])
+
+
+def row(**shown: float) -> np.ndarray:
+    return np.array([shown.get(name, np.nan) for name in SIGNALS])
+
+
+@pytest.fixture
+def served() -> Iterator[tuple[Outward, ModbusTcpClient, RowWriter]]:
+    port, said = free_port(), list[str]()
+    outlet = read_outlet(f"modbus://127.0.0.1:{port}")
+    with (
+        RowWriter(SIGNALS, 64) as rows,
+        Outward([outlet], os.getpid(), said.append) as outward,
+        ModbusTcpClient("127.0.0.1", port=port, timeout=2, retries=0) as client,
+    ):
+        assert not said
+        yield outward, client, rows
+
+
+def test_registers_show_state_and_alarms(
+    served: tuple[Outward, ModbusTcpClient, RowWriter], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    outward, client, rows = served
+    rows.write(
+        row(mode=3, roll_rad=np.radians(-4.56), pressure_command_pa=-50e3, pressure_actual_pa=1e9)
+    )
+    outward.take(RAISED, datetime.now(UTC))
+    accepted = AlarmState.ACTIVE_ACKNOWLEDGED
+    outward.take(AlarmEvent(0, Fault.DRIFT, accepted, Mode.FAULT), datetime.now(UTC))
+    outward.look(lost=0)
+    for read in (client.read_input_registers, client.read_holding_registers):
+        life, mode, roll, asked, measured, fault, count, waiting, complete = read(
+            0, count=len(REGISTERS)
+        ).registers
+        assert (life, mode, roll, asked) == (1, 3, 65536 - 456, 65536 - 5000)
+        assert (measured, fault) == (32767, 0x8000)  # beyond the range; not available
+        assert (count, waiting, complete) == (2, 1, 1)
+    alarms = client.read_input_registers(100, count=max(Fault) + 1).registers
+    assert {code: state for code, state in enumerate(alarms) if state} == {14: 1, 11: 2}
+    outward.take(AlarmEvent(0, Fault.DRIFT, AlarmState.NORMAL, Mode.FAULT), datetime.now(UTC))
+    monkeypatch.setattr(module, "STALE_S", 0.0)
+    outward.look(lost=1)  # no new row: the controller's loop stands, and its life counter with it
+    assert client.read_input_registers(0, count=9).registers == [
+        1, 0x8000, 0x8000, 0x8000, 0x8000, 0x8000, 1, 1, 0,
+    ]  # fmt: skip
+    assert client.read_input_registers(100 + Fault.DRIFT, count=1).registers == [0]
+
+
+def test_writes_and_other_addresses_are_refused(
+    served: tuple[Outward, ModbusTcpClient, RowWriter],
+) -> None:
+    outward, client, _ = served
+    outward.look(lost=0)
+    before = client.read_holding_registers(0, count=9).registers
+    refused = [
+        client.write_register(1, 3),
+        client.write_registers(0, [1, 2]),
+        client.write_coil(0, True),
+        client.mask_write_register(address=0, and_mask=0, or_mask=1),
+        client.read_coils(0, count=1),
+    ]
+    assert [(each.isError(), each.exception_code) for each in refused] == [(True, 1)] * 5
+    assert client.read_holding_registers(50, count=1).exception_code == 2
+    assert client.read_holding_registers(0, count=9).registers == before
+
+
+def test_a_port_in_use_is_said_and_the_rest_goes_on(listener: socket.socket) -> None:
+    said: list[str] = []
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        taken = other.getsockname()[1]
+        outlets = [
+            Outlet("modbus", ("127.0.0.1", taken)),
+            Outlet("udp", ("127.0.0.1", 9), hear=listener.getsockname()),
+            Outlet("udp", listener.getsockname()),
+        ]
+        with Outward(outlets, os.getpid(), said.append) as outward:
+            outward.take(RAISED, datetime.now(UTC))
+    assert len(said) == 2
+    assert f"modbus://127.0.0.1:{taken}" in said[0]
+    assert "Address already in use" in said[1]
+    assert listener.recv(1500).startswith(b"$U0ALF")
+
+
+def test_commands_are_heard_and_refused_on_loopback(listener: socket.socket) -> None:
+    hear = ("127.0.0.1", free_port())
+    outlet = read_outlet(f"udp://127.0.0.1:{listener.getsockname()[1]}?hear=127.0.0.1:{hear[1]}")
+    with Outward([outlet], os.getpid(), pytest.fail) as outward:
+        outward.take(RAISED, datetime.now(UTC))
+        message = listener.recv(1500).decode().splitlines(keepends=True)
+        assert parse_alf(message).identifier == 10_014
+        listener.sendto(b"\xff noise\r\n", hear)
+        listener.sendto(command("A", "10014").encode(), hear)
+        outward.look(lost=0)
+        assert split(listener.recv(1500).decode())[0] == "U0ARC"
+        assert split(listener.recv(1500).decode())[0] == "U0ALC"
+        outward.look(lost=0)  # the next list is due in 30 s
+        listener.settimeout(0.05)
+        with pytest.raises(TimeoutError):
+            listener.recv(1500)
+
+
+def test_the_announcers_process_shows_alarms(listener: socket.socket) -> None:
+    outlet = Outlet("iec450", listener.getsockname())
+    announcer = Announcer(outlets=[outlet])
+    announcer.write(RAISED, time.monotonic_ns())
+    listener.settimeout(20.0)
+    found = b"".join(listener.recv(1500) for _ in range(2))
+    announcer.stop()
+    assert announcer.error is None
+    assert found.count(b"UdPbC\0") == 2
+    assert b"$U0ALF,2,1,0," in found
+    assert b"LEVEL LIMIT" in found
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("127.0.0.1:5", "write udp://ADDRESS:PORT"),
+        ("udp://ship:5", "Expected 4 octets"),
+        ("udp://127.0.0.1", "such as 127.0.0.1:10110"),
+        ("modbus://127.0.0.1:0", "from 1 to 65535"),
+        ("modbus://127.0.0.1:502?hear=127.0.0.1:5", "of sentences only"),
+        ("udp://127.0.0.1:5/x", r"only \?hear"),
+    ],
+)
+def test_a_wrong_address_is_refused_with_the_form(text: str, says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        read_outlet(text)
+
+
+def test_the_command_line_says_what_is_wrong() -> None:
+    options = ["run", "configs/controllers/gpc.yaml", "--bus", "no-such", "--outward", "tcp://x"]
+    result = CliRunner().invoke(app, options)
+    assert result.exit_code == 2
+    assert "--outward: 'tcp://x': write" in " ".join(result.stderr.split())
+
+
+def test_without_pymodbus_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "find_spec", lambda _: None)
+    with pytest.raises(ValueError, match=r"pip install 'utank-hil\[outward\]'"):
+        read_outlet("modbus://127.0.0.1:502")

@@ -1,0 +1,1 @@
+"""Alarms and state for a ship's own systems, read-only, in the announcer's process."""

@@ -1,0 +1,129 @@
+"""The alarm list as alerts of IEC 61162-1: ALF on each change, ALC cyclically, ARC on commands.
+
+An alert is acknowledged at a station alone: a command from outside is refused by ARC, but for Q,
+which asks for the alert again.
+"""
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Final
+
+from utank_hil.canbus import AlarmState, Fault
+from utank_hil.canbus.events import AlarmEvent
+from utank_hil.commands.outward.sentences import alert_command, room, sentence, text_field
+from utank_hil.safety.alarms import Gravity, gravest
+from utank_hil.safety.faults import FAULTS
+
+FIRST_IDENTIFIER: Final = 10_000  #: Of an equipment's own alerts; the code of the fault is added.
+PRIORITY: Final = {Gravity.ENDS: "A", Gravity.HALVES: "W", Gravity.NOTHING: "C"}
+_CATEGORY: Final = "B"  #: Nothing beyond the alert's text is needed to judge it.
+_INSTANCE: Final = "1"  #: A fault is in the list once.
+_ENTRIES: Final = 5  #: Of a cyclic list that fit into one sentence, whatever their revision.
+_TITLE: Final = 16  #: Characters of an alert's title.
+_SHORT: Final = {
+    Fault.UNKNOWN_IDENTIFIERS: "UNKNOWN FRAMES",
+    Fault.DRIVE_NOT_FOLLOWING: "DRIVE NOT FOLLOW",
+    Fault.VALVE_NOT_FOLLOWING: "VALVE NOT FOLLOW",
+    Fault.PUMP_SENSOR_SILENT: "PUMP SENS SILENT",
+}
+_HAPPENED: Final = {row.code: row.happened for row in FAULTS}
+_STATES: Final = {
+    AlarmState.ACTIVE_UNACKNOWLEDGED: "V",
+    AlarmState.ACTIVE_ACKNOWLEDGED: "A",
+    AlarmState.RECTIFIED_UNACKNOWLEDGED: "U",
+    AlarmState.NORMAL: "N",
+}
+
+
+def title(code: Fault) -> str:
+    """Title of an alert, of 16 characters at most."""
+    return _SHORT.get(code, code.name.replace("_", " "))
+
+
+def alert_state(code: Fault, state: AlarmState) -> str:
+    """State as ALF has it; a caution needs no acknowledgement, so it is active or normal."""
+    if gravest(code) is Gravity.NOTHING:
+        return "A" if state < AlarmState.RECTIFIED_UNACKNOWLEDGED else "N"
+    return _STATES[state]
+
+
+@dataclass(slots=True)
+class _Alert:
+    state: str
+    changed: datetime
+    revision: int
+
+
+class Alerts:
+    """The alerts of a run; each method returns the messages due, each of one or more sentences."""
+
+    def __init__(self) -> None:
+        self._alerts: dict[Fault, _Alert] = {}
+        self._message = self._list = -1
+
+    def take(self, event: AlarmEvent, utc: datetime) -> list[list[str]]:
+        """Return the message of a change, none if the state stays or a reset was refused."""
+        if event.state is None:
+            return []
+        state, alert = alert_state(event.code, event.state), self._alerts.get(event.code)
+        if state != "V" and state == ("N" if alert is None else alert.state):
+            return []
+        revision = 1 if alert is None else alert.revision % 99 + 1
+        self._alerts[event.code] = _Alert(state, utc, revision)
+        return [self._alf(event.code)]
+
+    def cyclic(self) -> list[str]:
+        """Return the list of alerts that are not normal: ALC, whole entries in each sentence."""
+        entries = [
+            ("", str(FIRST_IDENTIFIER + code), _INSTANCE, str(alert.revision))
+            for code, alert in self._alerts.items()
+            if alert.state != "N"
+        ]
+        parts = [entries[at : at + _ENTRIES] for at in range(0, len(entries) or 1, _ENTRIES)]
+        self._list = (self._list + 1) % 100
+        return [
+            sentence(
+                "ALC",
+                (
+                    f"{len(parts):02}",
+                    f"{number:02}",
+                    f"{self._list:02}",
+                    str(len(part)),
+                    *(field for entry in part for field in entry),
+                ),
+            )
+            for number, part in enumerate(parts, 1)
+        ]
+
+    def answer(self, line: str, utc: datetime) -> list[list[str]]:
+        """Return the answer to a command that is for this equipment; none to anything else."""
+        asked = alert_command(line)
+        if asked is None:
+            return []
+        manufacturer, identifier, instance, command = asked
+        code = next((c for c in Fault if identifier == str(FIRST_IDENTIFIER + c)), None)
+        if (
+            manufacturer
+            or code is None
+            or instance not in ("", _INSTANCE)
+            or command not in tuple("AQOS")
+        ):
+            return []
+        if command == "Q" and code in self._alerts:
+            return [self._alf(code)]
+        return [[sentence("ARC", (_time(utc), "", identifier, instance, command))]]
+
+    def _alf(self, code: Fault) -> list[str]:
+        alert = self._alerts[code]
+        self._message = (self._message + 1) % 10
+        said = (str(self._message),)
+        state = (_time(alert.changed), _CATEGORY, PRIORITY[gravest(code)], alert.state)
+        same = ("", str(FIRST_IDENTIFIER + code), _INSTANCE, str(alert.revision), "0")
+        first = ("2", "1", *said, *state, *same, text_field(title(code), _TITLE))
+        second = ("2", "2", *said, *[""] * len(state), *same)
+        text = text_field(_HAPPENED.get(code, ""), room("ALF", second))
+        return [sentence("ALF", first), sentence("ALF", (*second, text))]
+
+
+def _time(utc: datetime) -> str:
+    return f"{utc:%H%M%S}.{utc.microsecond // 10_000:02}"

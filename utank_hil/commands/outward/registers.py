@@ -1,0 +1,140 @@
+"""State and alarms as registers of Modbus TCP, read by function 3 or 4; any other is refused."""
+
+import asyncio
+import logging
+import math
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Final
+
+from utank_hil.canbus import AlarmState, Fault, Mode
+
+NOT_AVAILABLE: Final = 0x8000  #: Least of 16 signed bits, which no value has.
+FIRST_ALARM: Final = 100  #: Register of fault code 0.
+_READS: Final = (3, 4)
+_START_S: Final = 10.0  #: Time in which the server listens, even on a busy machine.
+
+
+@dataclass(slots=True)
+class State:
+    """What the registers show."""
+
+    row: Mapping[str, float]  #: The latest telemetry row; empty without a fresh one.
+    alarms: Mapping[Fault, AlarmState]
+    life: int
+    complete: bool  #: Whether no event of the alarm list was lost.
+
+
+@dataclass(frozen=True, slots=True)
+class Register:
+    """One register: its meaning in words, and its value."""
+
+    meaning: str
+    value: Callable[[State], int]
+
+
+def _signal(name: str, unit: float) -> Callable[[State], int]:
+    def value(state: State) -> int:
+        shown = state.row.get(name, math.nan) / unit
+        return round(max(-32767.0, min(32767.0, shown))) if math.isfinite(shown) else NOT_AVAILABLE
+
+    return value
+
+
+def _waiting(state: State) -> int:
+    return sum(each is not AlarmState.ACTIVE_ACKNOWLEDGED for each in state.alarms.values())
+
+
+_MODES: Final = ", ".join(f"{mode.value} {mode.name}" for mode in Mode)
+REGISTERS: Final = (
+    Register(
+        "life counter: one more for each look (0.5 s) with news of the controller, 65535 then 0",
+        lambda state: state.life,
+    ),
+    Register(f"mode: {_MODES}", _signal("mode", 1.0)),
+    Register("roll, 0.01°, starboard down positive", _signal("roll_rad", math.radians(0.01))),
+    Register("pressure commanded, 10 Pa", _signal("pressure_command_pa", 10.0)),
+    Register("pressure measured, 10 Pa", _signal("pressure_actual_pa", 10.0)),
+    Register("code of the latched fault; in INIT of what is awaited", _signal("fault", 1.0)),
+    Register("alarms in the list", lambda state: len(state.alarms)),
+    Register("of these not acknowledged", _waiting),
+    Register("1: the alarm list is complete; 0: changes were lost", lambda state: state.complete),
+)
+
+
+def values(state: State) -> dict[int, int]:
+    """Return the value of each register by its address, 16 bits each."""
+    found = {at: int(each.value(state)) & 0xFFFF for at, each in enumerate(REGISTERS)}
+    for code in range(max(Fault) + 1):
+        alarm = state.alarms.get(Fault(code)) if code in set(Fault) else None
+        found[FIRST_ALARM + code] = 0 if alarm is None else alarm + 1
+    return found
+
+
+class ModbusServer:
+    """Serves registers from a thread of its own; OSError if the address can't be listened at."""
+
+    def __init__(self, address: tuple[str, int], state: State) -> None:
+        self._values = values(state)
+        self._stop: Callable[[], object] = lambda: None
+        self._failure: OSError | RuntimeError | None = None
+        self._ready = threading.Event()
+        self._thread = threading.Thread(target=self._serve, args=(address,), daemon=True)
+        self._thread.start()
+        if not self._ready.wait(_START_S) or self._failure is not None:
+            raise OSError(
+                f"modbus://{address[0]}:{address[1]}: {self._failure or 'no server in time'}; "
+                "is the port in use, or below 1024?"
+            )
+
+    def show(self, state: State) -> None:
+        """Serve these values from now on."""
+        self._values = values(state)
+
+    def close(self) -> None:
+        """End the server and its connections; idempotent."""
+        with suppress(RuntimeError):  # Its loop has ended.
+            self._stop()
+        self._thread.join(_START_S)
+
+    def _serve(self, address: tuple[str, int]) -> None:
+        try:
+            asyncio.run(self._served(address))
+        except (OSError, RuntimeError) as error:  # The constructor reports it.
+            self._failure = error
+            self._ready.set()
+
+    async def _served(self, address: tuple[str, int]) -> None:
+        from pymodbus.constants import ExcCodes
+        from pymodbus.server import ModbusTcpServer
+        from pymodbus.simulator import DataType, SimData, SimDevice
+
+        async def look(
+            function: int,
+            start: int,
+            at: int,
+            count: int,
+            registers: list[int],
+            _set: list[int] | list[bool] | None,
+        ) -> ExcCodes | None:
+            if function not in _READS:
+                return ExcCodes.ILLEGAL_FUNCTION
+            now = self._values
+            for address in range(at, at + count):
+                registers[address - start] = now[address]
+            return None
+
+        logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)
+        blocks = [
+            SimData(at, values=value, datatype=DataType.REGISTERS)
+            for at, value in self._values.items()
+        ]
+        server = ModbusTcpServer(SimDevice(0, blocks, action=look), address=address)
+        await server.serve_forever(background=True)
+        loop = asyncio.get_running_loop()
+        self._stop = lambda: loop.call_soon_threadsafe(server.serving.set_result, True)
+        self._ready.set()
+        await server.serving
+        server.close()
