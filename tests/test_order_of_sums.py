@@ -11,7 +11,7 @@ TICK = (
     "utank_hil/base/ordered_sums.py", "utank_hil/base/elementary.py",
     "utank_hil/canbus/*.py", "utank_hil/nodes/*.py", "utank_hil/runners/*.py",
     "utank_hil/safety/**/*.py",
-    "utank_hil/control/constrained/plan_programme.py",
+    "utank_hil/control/constrained/plan_programme.py", "utank_hil/control/constrained/preview.py",
     "utank_hil/control/feedback_linearization.py", "utank_hil/control/fuzzy/*direct.py",
     "utank_hil/control/gain.py", "utank_hil/control/level_observer.py",
     "utank_hil/control/limit*.py", "utank_hil/control/semi_active.py",

@@ -60,3 +60,13 @@ def solved(triangle: FloatArray, b: FloatArray) -> FloatArray:
     for n in range(len(b) - 1, -1, -1):
         x[n] = (b[n] - product(triangle[n, n + 1 :], x[n + 1 :])) / triangle[n, n]
     return x
+
+
+def positive_solved(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return x with a x = b for a positive definite `a`, shape (n, n), and `b`, shape (n,)."""
+    a, x = a.copy(), b.copy()
+    for n in range(len(b)):
+        share = a[n + 1 :, n] / a[n, n]
+        a[n + 1 :, n:] -= share[:, None] * a[n, n:]
+        x[n + 1 :] -= share * x[n]
+    return solved(a, x[:, None])[:, 0]

@@ -48,7 +48,8 @@ class RenewedLaw:
 
 _CONDENSED: Final = {"knots", *Predictions._fields}
 _OF_HORIZON: Final = [each.name for each in fields(Horizon) if each.name not in _CONDENSED]
-_OF_LAW: Final = [each.name for each in fields(ConstrainedLaw) if each.name != "horizon"]
+_NOT_SENT: Final = ("horizon", "waves", "foresight")  # A renewed law takes no forecast.
+_OF_LAW: Final = [each.name for each in fields(ConstrainedLaw) if each.name not in _NOT_SENT]
 _PREDICTED: Final = [each.name for each in fields(RenewedLaw) if each.name != "law"]
 
 

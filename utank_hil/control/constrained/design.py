@@ -24,7 +24,7 @@ from utank_hil.base.parameters import (
     refuse,
 )
 from utank_hil.control.constrained.horizon import condense
-from utank_hil.control.constrained.law import ConstrainedLaw
+from utank_hil.control.constrained.law import ConstrainedLaw, Waves
 from utank_hil.control.design_plant import DesignPlant, PumpLimits
 from utank_hil.control.interface import BuiltLaw
 from utank_hil.control.lqg import kalman_predictor
@@ -76,6 +76,27 @@ def sea_plant(
         command), lag and past commands, waves, and last the heel.
     process_covariance : ndarray, shape (n, n)
     """
+    return _sea_plant(
+        sea,
+        plant,
+        sample_time_s,
+        pressure_noise_pa_rt_s,
+        slope_noise_rad_rt_s,
+        heel_std_rad,
+        heel_time_s,
+    )[:2]
+
+
+def _sea_plant(
+    sea: SeaModel,
+    plant: DesignPlant,
+    sample_time_s: float,
+    pressure_noise_pa_rt_s: float,
+    slope_noise_rad_rt_s: float,
+    heel_std_rad: float,
+    heel_time_s: float,
+) -> tuple[LinearModel, FloatArray, FloatArray, FloatArray]:
+    """Return what `sea_plant` does, then `Waves.row` and `Waves.noise`."""
     a, b = state_matrices(plant.ship, plant.tank)
     pressure, slope = b[:, :1], b[:, 1:] * plant.ship.stiffness_nm_rad
     count = len(STATES)
@@ -108,7 +129,9 @@ def sea_plant(
         pump.D,
         sample_time_s,
     )
-    return model, covariance
+    row = np.zeros(n)
+    row[sea_states] = waves.C[0]
+    return model, covariance, row, noise[:, 0]
 
 
 def _straight_line_effect(
@@ -183,20 +206,19 @@ class ConstrainedDesign:
     def law(self, plant: DesignPlant) -> ConstrainedLaw:
         """Design the law for a plant; it plans within the plant's limits."""
         limits = plant.limits
-        whole, covariance = sea_plant(
+        whole, covariance, row, noise = _sea_plant(
             self.sea,
             plant,
-            pressure_noise_pa_rt_s=self.pressure_noise_pa_rt_s,
-            slope_noise_rad_rt_s=self.slope_noise_rad_rt_s,
-            heel_std_rad=self.heel_std_rad,
-            heel_time_s=self.heel_time_s,
-            sample_time_s=self.sample_time_s,
+            self.sample_time_s,
+            self.pressure_noise_pa_rt_s,
+            self.slope_noise_rad_rt_s,
+            self.heel_std_rad,
+            self.heel_time_s,
         )
+        variance = np.square(self.measurement_std)
         rows = [STATES.index(name) for name in self.measured]
         model = whole._replace(C=whole.C[rows], D=whole.D[rows])
-        observer_gain, surprise = kalman_predictor(
-            model, covariance, np.diag(np.square(self.measurement_std))
-        )
+        observer_gain, surprise = kalman_predictor(model, covariance, np.diag(variance))
         level, margin_m = self.measured.index("level_m"), self.level_margin_m
         if margin_m is None:
             margin_m = float(np.sqrt(surprise[level, level]))
@@ -233,6 +255,7 @@ class ConstrainedDesign:
             steady_state=steady_state,
             steady_command=steady_command,
             iteration_limit=self.iteration_limit,
+            waves=Waves(row, noise, covariance, variance),
         )
 
     def build(self, plant: DesignPlant) -> BuiltLaw:

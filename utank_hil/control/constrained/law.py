@@ -16,7 +16,7 @@ zero without a heel correction, so the tank is passive if that persists.
 
 import math
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import Positive, Range, range_problems, refuse
 from utank_hil.control.constrained.horizon import Horizon, condense
 from utank_hil.control.constrained.plan_programme import PlanProgramme
+from utank_hil.control.constrained.preview import Foresight, Preview, WaveForecast
 from utank_hil.control.design_plant import PumpLimits
 from utank_hil.control.lqg import LQGLaw
 from utank_hil.dynamics.sampling import LinearModel
@@ -37,6 +38,15 @@ comparison or the rounding of a message depends on its last digit, which differs
 Rounding to a grid makes it equal on all.
 """
 _FOLLOWED = 0.02  # over the greatest pressure; a mean command this near the plan's counts as it
+
+
+class Waves(NamedTuple):
+    """The waves in a law's own model of n states."""
+
+    row: FloatArray  #: shape (n,): from the state to the wave moment over the roll stiffness.
+    noise: FloatArray  #: shape (n,): what unit white noise adds to the next state.
+    process_covariance: FloatArray  #: shape (n, n)
+    variance: FloatArray  #: shape (m,): of the measurements' noise.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +72,9 @@ class ConstrainedLaw:
     #: shape (n,): from the state to the command that belongs to that part.
     steady_command: FloatArray
     iteration_limit: Annotated[int, Range(least=1)] = 60  #: Limit on the iterations of a programme.
+    waves: Waves | None = None  #: In the first states of `model`; None if it has none.
+    #: How a plan uses forecasts; its horizon then has N more states, the noises to come.
+    foresight: Foresight | None = None
 
     def __post_init__(self) -> None:
         problems = range_problems(self)
@@ -136,11 +149,62 @@ class ConstrainedLaw:
             steady_command=np.append(self.steady_command, np.zeros(f)),
         )
 
+    def previewed(self) -> "ConstrainedLaw":
+        """Return the law that takes forecasts of the waves.
+
+        ValueError is raised if the law has no model of the waves.
+        """
+        from scipy.linalg import block_diag, solve_discrete_are, solve_discrete_lyapunov
+
+        waves, model, horizon = self.waves, self.model, self.horizon
+        if waves is None:
+            raise ValueError("a law without a model of the sea can't weigh a forecast of the waves")
+        own, n, samples = len(waves.row), len(model.A), len(horizon.interpolation)
+        a, c = model.A[:own, :own], model.C[:, :own]
+        error = solve_discrete_are(a.T, c.T, waves.process_covariance, np.diag(waves.variance))
+        noise = np.zeros((n, samples))
+        noise[:own, 0] = waves.noise
+        rest = np.zeros((samples, 1))
+        ahead = LinearModel(
+            np.block([[model.A, noise], [np.zeros((samples, n)), np.eye(samples, k=1)]]),
+            np.vstack([model.B, rest]),
+            np.hstack([model.C, np.zeros((len(c), samples))]),
+            model.D,
+            model.dt,
+        )
+        moment = np.empty((samples, n + samples))
+        moment[0] = np.append(waves.row, np.zeros(n - own + samples))
+        for q in range(1, samples):
+            moment[q] = moment[q - 1] @ ahead.A
+        learnt = block_diag(error, np.zeros((n - own, n - own)), np.eye(samples)) @ moment.T
+        stationary = solve_discrete_lyapunov(a, np.outer(waves.noise, waves.noise))
+        covariance = moment[:, :own] @ stationary @ waves.row
+
+        def padded(matrix: FloatArray) -> FloatArray:
+            return np.hstack([matrix, np.zeros((len(matrix), samples))])
+
+        return replace(
+            self,
+            horizon=condense(
+                ahead,
+                tuple(horizon.knots.tolist()),
+                samples,
+                horizon.output_weight,
+                horizon.input_weight,
+                first_output=horizon.first_output,
+                terminal=padded(horizon.terminal),
+                correction=padded(horizon.correction[None])[0],
+            ),
+            steady_state=block_diag(self.steady_state, np.zeros((samples, samples))),
+            steady_command=padded(self.steady_command[None])[0],
+            foresight=Foresight(moment[:, :n], moment @ learnt, learnt, covariance),
+        )
+
     def unlimited(self) -> LQGLaw:
         """Linear law that the controller follows while no limit is active."""
         rest = np.eye(len(self.steady_state)) - self.steady_state
         gain = -(self.horizon.unlimited_state[:1] @ rest + self.steady_command)
-        return LQGLaw(self.model, gain, self.observer_gain)
+        return LQGLaw(self.model, gain[:, : len(self.model.A)], self.observer_gain)
 
 
 class ConstrainedController:
@@ -159,7 +223,9 @@ class ConstrainedController:
         self.sample_time_s = model.dt
         self._a, self._b, self._c, self._d = model.A, model.B[:, 0], model.C, model.D[:, 0]
         self._observer_gain = law.observer_gain
-        self._plan_gain = product(horizon.unlimited_state, np.eye(len(model.A)) - law.steady_state)
+        self._plan_gain = product(
+            horizon.unlimited_state, np.eye(len(law.steady_state)) - law.steady_state
+        )
         self._target_gains = horizon.unlimited_target
         self._constant_target_gain: FloatArray = horizon.unlimited_target.sum(axis=0)
         self._hessian = horizon.hessian
@@ -187,6 +253,7 @@ class ConstrainedController:
         self._knots = np.minimum(horizon.knots, samples - 2)
         power_pa_m_s = limits.power_w / law.reservoir_area_m2
         self._power_pa_m_s = math.inf if law.level_output is None else power_pa_m_s
+        self._preview = None if law.foresight is None else Preview(law.foresight, model.dt)
         self.reset()
 
     def derive(self) -> None:
@@ -205,6 +272,18 @@ class ConstrainedController:
         self.limited = False
         self.fallbacks = 0
         self._programme.forget()
+        if self._preview is not None:
+            self._preview.reset()
+
+    def preview(self, forecast: WaveForecast | None) -> None:
+        """Take a forecast of the waves for the next step; only a `previewed` law uses it."""
+        if self._preview is not None:
+            self._preview.take(forecast)
+
+    @property
+    def doubts_forecasts(self) -> bool:
+        """Whether forecasts are ignored, as they do not agree with the motion."""
+        return self._preview is not None and self._preview.doubted
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take the newest measurement, shape (m,), and return the command, shape (1,).
@@ -213,7 +292,7 @@ class ConstrainedController:
         or one for each sample of it.
         """
         self.observe(y)
-        state = self._state
+        state = self._state if self._preview is None else self._preview.expected(self._state)
         best = product(self._plan_gain, state)
         if reference is not None:
             if reference.ndim == 1:
@@ -221,7 +300,7 @@ class ConstrainedController:
             else:
                 gains = self._target_gains.swapaxes(0, 1).reshape(len(best), -1)
                 best += product(gains, reference.ravel())
-        self._plan_pa = self._plan(best, float(product(self._steady_command, state)))
+        self._plan_pa = self._plan(best, state, float(product(self._steady_command, state)))
         # The solver keeps its bounds only to a tolerance.
         low, high = self._last_pa - self._step_pa, self._last_pa + self._step_pa
         command = min(max(float(self._plan_pa[0]), low), high)
@@ -274,11 +353,11 @@ class ConstrainedController:
             return math.copysign(self._allowed_pa, command)
         return command
 
-    def _plan(self, best: FloatArray, steady_pa: float) -> FloatArray:
+    def _plan(self, best: FloatArray, state: FloatArray, steady_pa: float) -> FloatArray:
         """Commands at each sample of the horizon; `best` is the analytic plan."""
-        low, high = self._bounds(steady_pa)
+        low, high = self._bounds(state, steady_pa)
         last = self._last_pa - steady_pa
-        levels = product(self._held_state, self._state)
+        levels = product(self._held_state, state)
         plan: FloatArray | None = best
         self.limited = not self._programme.respects(best, low, high, last, levels)
         if self.limited:
@@ -288,13 +367,13 @@ class ConstrainedController:
             return np.append(self._plan_pa[1:], steady_pa)
         return product(self._interpolation, plan) + steady_pa
 
-    def _bounds(self, steady_pa: float) -> tuple[FloatArray, FloatArray]:
+    def _bounds(self, state: FloatArray, steady_pa: float) -> tuple[FloatArray, FloatArray]:
         """Least and greatest pressure at the knots, less the steady command."""
         high = np.full(len(self._knots), self._allowed_pa)
         low = -high
         if self._power_pa_m_s < math.inf:
             plan = self._plan_pa[self._next] - steady_pa
-            levels = product(self._levels_state, self._state) + product(self._levels_plan, plan)
+            levels = product(self._levels_state, state) + product(self._levels_plan, plan)
             speed = np.diff(levels)[self._knots] / self.sample_time_s
             share = self._power_pa_m_s / np.maximum(np.abs(speed), 1e-9)
             high = np.where(speed > 0, np.minimum(high, share), high)
