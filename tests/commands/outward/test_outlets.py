@@ -138,6 +138,21 @@ def test_commands_are_heard_and_refused_on_loopback(listener: socket.socket) -> 
             listener.recv(1500)
 
 
+def test_a_flood_of_commands_holds_up_no_look(
+    listener: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "_MOST_COMMANDS", 2)
+    hear = ("127.0.0.1", free_port())
+    with Outward(
+        [Outlet("udp", listener.getsockname(), hear)], os.getpid(), pytest.fail
+    ) as outward:
+        for _ in range(3):
+            listener.sendto(command("A", "10014").encode(), hear)
+        for expected in (["ARC", "ARC", "ALC"], ["ARC"]):
+            outward.look(lost=0)
+            assert [listener.recv(1500)[3:6].decode() for _ in expected] == expected
+
+
 def test_the_announcers_process_shows_alarms(listener: socket.socket) -> None:
     outlet = Outlet("iec450", listener.getsockname())
     announcer = Announcer(outlets=[outlet])

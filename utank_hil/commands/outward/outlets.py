@@ -24,6 +24,7 @@ KINDS: Final = ("udp", "iec450", "modbus")
 CYCLE_S: Final = 30.0  #: Longest time between two lists of alerts (IEC 62923-1).
 STALE_S: Final = 2.0  #: Age of the last telemetry row, at 20 Hz, after which nothing is known.
 _MOST_BYTES: Final = 1500  #: Of a datagram on Ethernet.
+_MOST_COMMANDS: Final = 64  #: Datagrams of one look: a flood must not hold up the alarms.
 _FORM: Final = "write udp://ADDRESS:PORT, iec450://ADDRESS:PORT or modbus://ADDRESS:PORT"
 
 Address = tuple[str, int]
@@ -93,13 +94,14 @@ class _Udp:
 
     def commands(self) -> list[str]:
         found: list[str] = []
-        while True:
+        for _ in range(_MOST_COMMANDS):
             try:
                 found += self._framing.lines(self._socket.recv(_MOST_BYTES))
             except BlockingIOError:
-                return found
+                break
             except OSError:  # A former message found no listener at its address.
                 continue
+        return found
 
     def close(self) -> None:
         self._socket.close()
