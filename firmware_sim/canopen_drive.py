@@ -76,7 +76,7 @@ class CanopenPumpDrive(CanopenNode):
         super().__init__(plan.node, plan.bus, entries)
         entries[Place(0x1000)].value = 2 << 16 | PROFILE  # servo drive
         self._states = DriveStates()
-        self._speed_rad_s = self._torque_nm = 0.0
+        self._speed_rad_s = self._torque_nm = self._own_pa = 0.0
         self._limited = self._connected = False
         self.refused = 0  #: It has no limits on pressure of its own.
 
@@ -87,8 +87,13 @@ class CanopenPumpDrive(CanopenNode):
 
     @property
     def setpoint_pa(self) -> float:
-        """Pressure that it makes while it is enabled."""
-        return self._plant.pressure_pa if self.enabled else 0.0
+        """Pressure that its rotor makes while it is enabled."""
+        return self._own_pa if self.enabled else 0.0
+
+    @property
+    def _powered(self) -> bool:
+        """Whether no wire cuts its power: without it the motor has no torque."""
+        return not self._plant.power_cut
 
     def fail(self, fault: DriveFault) -> None:
         """Inject a fault: trip the drive, or switch it off for `DriveFault.NONE`."""
@@ -108,6 +113,8 @@ class CanopenPumpDrive(CanopenNode):
         """Watch the controller, drive the pump, and send what is due."""
         entries, states, plant = self.entries, self._states, self._plant
         plant.advance(now_ns)
+        if plant.power_cut:
+            states.command(ControlWord.DISABLE_VOLTAGE)
         entries[MODE_SHOWN].value = entries[MODE].value
         stopped = abs(plant.pressure_pa) < STOPPED_SHARE * self._pump.max_pressure_pa
         states.tick(stopped=stopped)
@@ -115,7 +122,11 @@ class CanopenPumpDrive(CanopenNode):
         if self._connected and not connected and self.enabled:
             self._abort_connection()
         self._connected = connected
-        plant.impose_pressure(self._turn())
+        self._own_pa = pressure_pa = self._turn()
+        broken = None if plant.power_cut else plant.broken_pump
+        if broken is not None and (self.enabled or plant.presses_off):
+            pressure_pa = broken(pressure_pa)
+        plant.impose_pressure(pressure_pa)
         self._show()
         return super().tick(now_ns)
 
@@ -156,7 +167,7 @@ class CanopenPumpDrive(CanopenNode):
             demanded = target
             if aim is not None:
                 demanded = load + stiffness * (aim - speed) * toward
-            most_nm = min(c.max_torque, c.max_power / max(abs(speed), 1e-9))
+            most_nm = min(c.max_torque, c.max_power / max(abs(speed), 1e-9)) * self._powered
             self._torque_nm = min(max(demanded, -most_nm), most_nm)
             self._limited = self._torque_nm != demanded
             speed += (self._torque_nm - load) / stiffness
@@ -169,7 +180,10 @@ class CanopenPumpDrive(CanopenNode):
             for mode in MODES.values():
                 entries[mode.demand].value = 0
         entries[STATUS_WORD].value = (
-            self._states.state | _VOLTAGE | _REMOTE | (_AT_LIMIT if self._limited else 0)
+            self._states.state
+            | _VOLTAGE * self._powered
+            | _REMOTE
+            | (_AT_LIMIT if self._limited else 0)
         )
         for place, value in (
             (SPEED, self._speed_rad_s * self._per_rad_s),

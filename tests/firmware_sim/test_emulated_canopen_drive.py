@@ -8,6 +8,9 @@ import pytest
 import yaml
 
 from firmware_sim.canopen_drive import CanopenPumpDrive, control_word
+from firmware_sim.fault_injection.bench_parts import Bench as Bench_
+from firmware_sim.fault_injection.faulty_node import FaultyNode
+from firmware_sim.fault_injection.nodes import Pump
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from tests.firmware_sim.drive_bench import VESSEL, calm_plant
@@ -155,6 +158,44 @@ def test_without_the_masters_heartbeat_it_does_what_6007h_says(master, code, bra
     assert master.drive.enabled is (code == 0)
     lost = [data[:2] for _, can_id, data in master.heard if can_id == 0x85]
     assert lost == ([b"\x30\x81"] if code else [])
+
+
+def test_without_power_it_has_no_torque_and_no_word_turns_it_on(master):
+    master.enable()
+    master.command(0x0F, 12_000)
+    master.run(100, beat=True)
+    plant, before_pa = master.drive._plant, master.drive._plant.pressure_pa
+    plant.cut_power("hardwired", cut=True)
+    master.run(2, beat=True)
+    assert (master.drive.enabled, master.drive._torque_nm) == (False, 0.0)
+    assert not master.remote.sdo[0x6041].raw & 1 << 4  # voltage
+    states = [master.command(word) for word in (0x06, 0x07, 0x0F)]
+    assert DriveState.OPERATION_ENABLED not in states
+    master.run(300, beat=True)
+    assert abs(plant.pressure_pa) < 0.2 * before_pa  # the water turns the rotor
+    plant.cut_power("hardwired", cut=False)
+    master.run(2, beat=True)
+    assert [master.command(word) for word in (0x06, 0x07, 0x0F)][-1] is DriveState.OPERATION_ENABLED
+
+
+@pytest.mark.parametrize(("off_too", "enabled"), [(False, True), (False, False), (True, False)])
+def test_a_broken_pump_presses_as_the_fault_says(master, off_too, enabled):
+    fault = Pump(kind="pump", times=-1, plus_pa=500, off_too=off_too)
+    master.enable()
+    master.command(0x0F, 12_000)
+    master.run(100, beat=True)
+    if not enabled:
+        master.command(0x06)
+    node = FaultyNode(master.drive)
+    fault.place(Bench_({"drive": node}, master.drive._plant, master.drive, None, 0), 0, 0)
+    for _ in range(5):
+        own_pa = master.drive._own_pa  # the plant is a tick behind
+        list(node.tick(master.now_ns))
+        master.now_ns += TICK_NS
+    pressure_pa = master.drive._plant.pressure_pa
+    assert own_pa > 1e3
+    wrong = enabled or off_too
+    assert pressure_pa == pytest.approx(500 - own_pa if wrong else own_pa, rel=0.02)
 
 
 def test_an_order_of_the_network_that_is_none_changes_nothing(master):
