@@ -129,7 +129,7 @@ class CausalProblem:
         self._plant = plant
         self._pump = pump_with_lag(plant, sample_time_s, plant.delay_s)
         self._std = np.array([noise.roll_rad, noise.roll_rate_rad_s, noise.level_m])
-        model, process = sea_plant(sea, plant, sample_time_s=sample_time_s)
+        model, process, *_ = sea_plant(sea, plant, sample_time_s=sample_time_s)
         n = len(model.A) - 1  # without the heel
         model = model._replace(A=model.A[:n, :n], B=model.B[:n], C=model.C[:, :n])
         self._process = process[:n, :n]

@@ -38,7 +38,7 @@ def problem() -> InnovationFilter:
 
 def covariance(law):
     """Of `STATES` and command, from the Lyapunov equation of ship, drive, waves and law."""
-    whole, process = sea_plant(SEA, PLANT, sample_time_s=law.sample_time_s)
+    whole, process, *_ = sea_plant(SEA, PLANT, sample_time_s=law.sample_time_s)
     rows = [STATES.index(name) for name in DESIGN.measured]
     a, b, c, _, _ = law.matrices()
     by_law = whole.B @ c

@@ -129,7 +129,7 @@ def test_the_margin_that_is_not_given_is_the_error_of_the_forecast_that_draws_ha
     law = DESIGN.law(plant)
     noises = ("pressure_noise_pa_rt_s", "slope_noise_rad_rt_s", "heel_std_rad", "heel_time_s")
     settings = {name: getattr(DESIGN, name) for name in (*noises, "sample_time_s")}
-    _, covariance = sea_plant(DESIGN.sea, plant, **settings)
+    _, covariance, *_ = sea_plant(DESIGN.sea, plant, **settings)
     model, level = law.model, law.level_output
     rng = np.random.default_rng(1)
     process = rng.multivariate_normal(np.zeros(len(covariance)), covariance, 20_000)

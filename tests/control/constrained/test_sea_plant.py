@@ -23,7 +23,7 @@ def plant_of(model: SeaModel, heel_std_rad: float = 0.0):
         heel_std_rad=heel_std_rad,
         heel_time_s=1e4,
         sample_time_s=TS,
-    )
+    )[:2]
 
 
 def test_motion_of_the_passive_ship_in_the_model_is_that_in_the_spectrum():

@@ -326,7 +326,9 @@ class InnovationFilter:
 
     def _in_sea(self, design: ConstrainedDesign) -> ComplexArray:
         """Response of the motion with passive tank to the sea's white noise; shape (N, 4)."""
-        model, spread = sea_plant(design.sea, self._plant, sample_time_s=self._law.sample_time_s)
+        model, spread, *_ = sea_plant(
+            design.sea, self._plant, sample_time_s=self._law.sample_time_s
+        )
         most = int(np.diag(spread).argmax())
         noise = spread[:, most : most + 1] / math.sqrt(spread[most, most])  # its rank is one
         response = state_space_response(model._replace(B=noise, D=0 * model.D), self._z)

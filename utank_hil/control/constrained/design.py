@@ -53,7 +53,7 @@ def sea_plant(
     slope_noise_rad_rt_s: float = 0.0,
     heel_std_rad: float = 0.0,
     heel_time_s: float = 1.0,
-) -> tuple[LinearModel, FloatArray]:
+) -> tuple[LinearModel, FloatArray, FloatArray, FloatArray]:
     """Sampled model of ship, tank, drive, waves and a slowly varying heeling moment.
 
     The waves are white noise through the shaping filter of a `SeaModel`, with a moment that is
@@ -75,28 +75,9 @@ def sea_plant(
         From the pump's command to `STATES`. States: `STATES` (less the direct effect of the
         command), lag and past commands, waves, and last the heel.
     process_covariance : ndarray, shape (n, n)
+    row, noise : ndarray, shape (n,)
+        Those of `Waves`.
     """
-    return _sea_plant(
-        sea,
-        plant,
-        sample_time_s,
-        pressure_noise_pa_rt_s,
-        slope_noise_rad_rt_s,
-        heel_std_rad,
-        heel_time_s,
-    )[:2]
-
-
-def _sea_plant(
-    sea: SeaModel,
-    plant: DesignPlant,
-    sample_time_s: float,
-    pressure_noise_pa_rt_s: float,
-    slope_noise_rad_rt_s: float,
-    heel_std_rad: float,
-    heel_time_s: float,
-) -> tuple[LinearModel, FloatArray, FloatArray, FloatArray]:
-    """Return what `sea_plant` does, then `Waves.row` and `Waves.noise`."""
     a, b = state_matrices(plant.ship, plant.tank)
     pressure, slope = b[:, :1], b[:, 1:] * plant.ship.stiffness_nm_rad
     count = len(STATES)
@@ -206,14 +187,14 @@ class ConstrainedDesign:
     def law(self, plant: DesignPlant) -> ConstrainedLaw:
         """Design the law for a plant; it plans within the plant's limits."""
         limits = plant.limits
-        whole, covariance, row, noise = _sea_plant(
+        whole, covariance, row, noise = sea_plant(
             self.sea,
             plant,
-            self.sample_time_s,
-            self.pressure_noise_pa_rt_s,
-            self.slope_noise_rad_rt_s,
-            self.heel_std_rad,
-            self.heel_time_s,
+            pressure_noise_pa_rt_s=self.pressure_noise_pa_rt_s,
+            slope_noise_rad_rt_s=self.slope_noise_rad_rt_s,
+            heel_std_rad=self.heel_std_rad,
+            heel_time_s=self.heel_time_s,
+            sample_time_s=self.sample_time_s,
         )
         variance = np.square(self.measurement_std)
         rows = [STATES.index(name) for name in self.measured]

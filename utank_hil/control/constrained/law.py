@@ -117,7 +117,7 @@ class ConstrainedLaw:
         """
         from scipy.linalg import block_diag
 
-        horizon, own, other = self.horizon, self.model, law.model
+        own, other = self.model, law.model
         f = len(other.A)
 
         def padded(matrix: FloatArray) -> FloatArray:
@@ -135,16 +135,7 @@ class ConstrainedLaw:
             self,
             model=whole,
             observer_gain=np.vstack([self.observer_gain, law.observer_gain]),
-            horizon=condense(
-                whole,
-                tuple(horizon.knots.tolist()),
-                len(horizon.interpolation),
-                horizon.output_weight,
-                horizon.input_weight,
-                first_output=horizon.first_output,
-                terminal=padded(horizon.terminal),
-                correction=np.append(self.unlimited().gain, -law.gain),
-            ),
+            horizon=self._horizon(whole, np.append(self.unlimited().gain, -law.gain)),
             steady_state=block_diag(self.steady_state, np.zeros((f, f))),
             steady_command=np.append(self.steady_command, np.zeros(f)),
         )
@@ -180,24 +171,30 @@ class ConstrainedLaw:
         stationary = solve_discrete_lyapunov(a, np.outer(waves.noise, waves.noise))
         covariance = moment[:, :own] @ stationary @ waves.row
 
-        def padded(matrix: FloatArray) -> FloatArray:
-            return np.hstack([matrix, np.zeros((len(matrix), samples))])
+        def padded(row: FloatArray) -> FloatArray:
+            return np.append(row, np.zeros(samples))
 
         return replace(
             self,
-            horizon=condense(
-                ahead,
-                tuple(horizon.knots.tolist()),
-                samples,
-                horizon.output_weight,
-                horizon.input_weight,
-                first_output=horizon.first_output,
-                terminal=padded(horizon.terminal),
-                correction=padded(horizon.correction[None])[0],
-            ),
+            horizon=self._horizon(ahead, padded(horizon.correction)),
             steady_state=block_diag(self.steady_state, np.zeros((samples, samples))),
-            steady_command=padded(self.steady_command[None])[0],
+            steady_command=padded(self.steady_command),
             foresight=Foresight(moment[:, :n], moment @ learnt, learnt, covariance),
+        )
+
+    def _horizon(self, model: LinearModel, correction: FloatArray) -> Horizon:
+        """Return the horizon for a model with more states, which the terminal cost leaves out."""
+        horizon = self.horizon
+        more = len(model.A) - horizon.terminal.shape[1]
+        return condense(
+            model,
+            tuple(horizon.knots.tolist()),
+            len(horizon.interpolation),
+            horizon.output_weight,
+            horizon.input_weight,
+            first_output=horizon.first_output,
+            terminal=np.pad(horizon.terminal, ((0, 0), (0, more))),
+            correction=correction,
         )
 
     def unlimited(self) -> LQGLaw:
