@@ -1,5 +1,6 @@
 """EDS and DCF of other makers: the PDOs that a device sends as delivered, and who it is."""
 
+import gzip
 import re
 from pathlib import Path
 
@@ -147,6 +148,7 @@ def test_values_of_every_file_of_others_are_those_of_canopen(path):
         ("0x60200010", "", "1A00h:1 has no value, and is mapped"),
         ("=2\n", "=0\n", "1A00h:0 is 0: TPDO1 carries nothing"),
         ("0x60200010", "0x60200020", "1A00h:1 maps 32 bits of 6020h:0, which has 16"),
+        ("=2\n", "=65\n", "1A00h:0 is 65: a PDO maps 1 to 64"),
         ("0x60200010", "0x60210010", "6021h:0 is mapped, and is not there"),
         ("0x0003", "0x0009", "6020h:0 has the data type 9: no number"),
         ("0x60200010", "0x00070030", "1A00h:2 ends beyond the 8 bytes"),
@@ -166,6 +168,22 @@ def test_errors_name_file_object_and_remedy(tmp_path, old, new, reason):
 def test_messages_must_be_pdos(tmp_path, messages):
     with pytest.raises(ValueError, match="messages names PDOs that are sent"):
         device(eds=written(tmp_path), **(MOTION | {"messages": messages}))
+
+
+def test_a_mapping_of_nothing_repeated_ends(tmp_path):
+    text = f"[1A00]\nDataType=7\nCompactSubObj={10**18}\nDefaultValue=0x00050000\n"
+    path = written(tmp_path, "[1800]\nSubNumber=2\n" + entry(0x1800, 1, 7, "0x181") + text)
+    with pytest.raises(ValueError, match=r"1A00h:0 is 10+: a PDO maps 1 to 64"):
+        Eds(path).sent(1)
+
+
+def test_a_file_is_read_compressed_and_a_huge_one_is_refused(tmp_path):
+    packed = tmp_path / "sensor.eds.gz"
+    packed.write_bytes(gzip.compress(SENSOR.encode()))
+    assert Eds(str(packed)).number(Place(0x1800, 5)) == 20
+    packed.write_bytes(gzip.compress(bytes(1 << 23)))
+    with pytest.raises(ValueError, match=r"sensor\.eds\.gz: holds more than 4194304 bytes"):
+        Eds(str(packed))
 
 
 def test_no_file(tmp_path):

@@ -6,10 +6,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
+from utank_hil.base.text_files import open_content
 from utank_hil.canbus.profiles.canopen import DISABLED, Place
 from utank_hil.canbus.profiles.drive_plan import PROFILE
 
 OF_AN_EDS: Final = "EDS "  #: Begins the name of a device whose layouts were read from an EDS.
+LIMIT_BYTES: Final = 1 << 22  #: Of a file; those of drives have some 100 kB.
 ENCODINGS: Final = ("utf-8-sig", "cp1252", "latin-1")
 """A file has no mark of its encoding. The last decodes anything; numbers are ASCII in all three."""
 _SIGNED: Final = {2: 8, 3: 16, 4: 32, 0x10: 24, 0x12: 40, 0x13: 48, 0x14: 56, 0x15: 64}
@@ -19,6 +21,7 @@ _BITS: Final = {
 }  # fmt: skip
 """Length of the data types of CiA 301 that a PDO can carry."""
 _LONG_ID: Final = 1 << 29  #: In the identifier of a PDO: it has 29 bits.
+_MOST_MAPPED: Final = 64  #: Objects of a PDO, by CiA 301: one a bit.
 _TIMED: Final = (254, 255)  #: Types of a PDO that its event timer sends.
 _NODE: Final = re.compile(r"^\$NODEID\s*\+?\s*|\s*\+\s*\$NODEID$", re.IGNORECASE)
 
@@ -29,7 +32,8 @@ class Eds:
     def __init__(self, file: str) -> None:
         self.file = file
         try:
-            content = Path(file).read_bytes()
+            with open_content(Path(file), LIMIT_BYTES) as opened:
+                content = opened.read()
         except OSError as error:
             raise ValueError(f"eds: {file} can't be read: {error.strerror}") from error
         for encoding in ENCODINGS:
@@ -112,6 +116,8 @@ class Eds:
         if not count:
             reason = f"is 0: TPDO{pdo} carries nothing as delivered. Map it in device and file"
             raise self._error(Place(index, 0), reason)
+        if not 1 <= count <= _MOST_MAPPED:
+            raise self._error(Place(index, 0), f"is {count}: a PDO maps 1 to {_MOST_MAPPED}")
         signals: dict[str, dict[str, Any]] = {}
         start = 0
         for subindex in range(1, count + 1):
