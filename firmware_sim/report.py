@@ -12,6 +12,7 @@ from firmware_sim.bench import BenchResult
 from firmware_sim.figures import NO_TANK as BARE
 from firmware_sim.figures import BenchFigures, RunFigures, rolls_compared
 from firmware_sim.report_page import FIGURES, PICTURE, RECORDING, bench_page
+from firmware_sim.report_tables import roll_interval
 from firmware_sim.retuning_figures import events_on_ships_time
 from firmware_sim.run import COLUMNS
 from firmware_sim.scenario import PASSIVE
@@ -81,6 +82,7 @@ def _draw(result: BenchResult, found: BenchFigures, about: Mapping[str, Any], pa
         about=about,
         bars=[_bare_bar(found), *map(_bar, found.runs, COLORS)],
         wrong=found.wrong,
+        interval=roll_interval(found, result.scenario.vessel.ship.natural_frequency_rad_s),
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from firmware_sim.figures import BenchFigures, read_figures
-from firmware_sim.report_tables import tables
+from firmware_sim.report_tables import few_rolls, tables
 from firmware_sim.run import RECORD_S
 from firmware_sim.scenario import PASSIVE
 from utank_hil.base.arrays import FloatArray
@@ -53,9 +53,11 @@ def bench_page(
     `rolls` has the roll of each compared run, shape (n,), every `RECORD_S` in the window; `scratch`
     is a folder for pictures that are made for the page.
     """
+    vessel = Vessel.model_validate(about["configuration"]["vessel"])
+    few = few_rolls(found, vessel.ship.natural_frequency_rad_s)
     says = "Roll and power of each run, and roll, level and pressure over time"
     sections = [
-        ReportSection("What was run", _what_was_run(found, about["configuration"])),
+        ReportSection("What was run", _what_was_run(found, about["configuration"], vessel)),
         ReportSection(
             "Roll and cost",
             pictures=[] if picture is None else [ReportPicture(picture, says)],
@@ -69,7 +71,7 @@ def bench_page(
         f"{found.mode}, seed {found.seed}, {found.settle_s:g} s to "
         f"{found.end_s:g} s of the same waves for each run. {about['date']}."
     )
-    return Report(f"{found.scenario}: bench", below, _verdict(found), sections)
+    return Report(f"{found.scenario}: bench", below, _verdict(found, few), sections)
 
 
 def read_bench(folder: Path, scratch: Path) -> Report:
@@ -97,7 +99,7 @@ def read_bench(folder: Path, scratch: Path) -> Report:
 BENCH: Final = ReportKind(FIGURES, read_bench)
 
 
-def _verdict(found: BenchFigures) -> Verdict:
+def _verdict(found: BenchFigures, few: str) -> Verdict:
     ranked = [run for run in found.runs if run.ranked and run.name != PASSIVE]
     lines = []
     if ranked:
@@ -111,6 +113,7 @@ def _verdict(found: BenchFigures) -> Verdict:
             line += f" and {_less(best.roll_below_no_tank)} than no tank"
         power = power_words(best.pump.power_mean_w)
         lines.append(f"{line}, for {power} of shaft power on average.")
+    lines += [few] if few else []
     lines += found.wrong or ["No run failed, and no limit of the model was passed."]
     return Verdict(lines, good=not found.wrong)
 
@@ -131,8 +134,7 @@ def sea_words(sea: Mapping[str, Any]) -> str:
     return ", ".join(words)
 
 
-def _what_was_run(found: BenchFigures, scenario: Mapping[str, Any]) -> list[str]:
-    vessel = Vessel.model_validate(scenario["vessel"])
+def _what_was_run(found: BenchFigures, scenario: Mapping[str, Any], vessel: Vessel) -> list[str]:
     names = [run.name for run in found.runs if run.name != PASSIVE]
     return [
         f"Ship: {vessel.name}. {ship_line(vessel)}",

@@ -14,7 +14,32 @@ from utank_hil.console.terminal import new_table
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 _PREFIXES: Final = (("M", 1e6), ("k", 1e3), ("", 1.0))
+_ROLL_DAMPING: Final = 0.1  # Damping ratio of the roll of the shipped ships with their tanks.
+_LEAST_INTERVAL: Final = 0.1
+"""Interval of the roll RMS from which it is said; an hour of the first ship has 0.07."""
 _SHOWN: Final = (1, 3)  # Indices of the exceedance levels in the table: 5 and 10 degrees.
+
+
+def roll_interval(found: BenchFigures, roll_rad_s: float) -> float:
+    """Relative half-width at 95 % of the roll RMS, as of one draw of the sea.
+
+    The variance of a lightly damped motion in T seconds has the relative variance 1 / (zeta w T)
+    (Bendat and Piersol, Random Data, 8.2, with the autocorrelation of an oscillator).
+    """
+    window_s = max(found.end_s - found.settle_s, 1.0)
+    return 1.96 / 2 / math.sqrt(_ROLL_DAMPING * roll_rad_s * window_s)
+
+
+def few_rolls(found: BenchFigures, roll_rad_s: float) -> str:
+    """Return how uncertain the roll of a short window is; empty for a long one."""
+    interval, window_s = roll_interval(found, roll_rad_s), found.end_s - found.settle_s
+    if interval < _LEAST_INTERVAL:
+        return ""
+    rolls = window_s * roll_rad_s / (2 * math.pi)
+    return (
+        f"{window_s:.0f} s hold {rolls:.0f} rolls: each roll RMS is uncertain by ±{interval:.0%} "
+        "(95 %). Laws that differ by less are not ranked by it: use a longer --duration."
+    )
 
 
 def tables(found: BenchFigures) -> list[RichTable]:
@@ -116,7 +141,7 @@ def on_board_table(found: BenchFigures) -> RichTable:
         "lateral\nRMS g",
         "MII\n/min",
         "MSI\n2 h",
-        "work\nallowed",
+        "\nfit for",
     )
     table.caption = (
         "shares of the roll's amplitudes; interruptions of who stands; motion\n"

@@ -1,10 +1,9 @@
 """``utank-hil bench``: a controller quiets a rolling ship."""
 
-import math
 from collections.abc import Mapping
 from errno import ENOSPC
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.progress import TaskProgressColumn
@@ -37,9 +36,6 @@ if TYPE_CHECKING:
     from firmware_sim.scenario import Scenario
 
 STORM = CONFIGS / "scenarios" / "storm.yaml"
-_ROLL_DAMPING: Final = 0.1  # Damping ratio of the roll of the shipped ships with their tanks.
-_LEAST_INTERVAL: Final = 0.1
-"""Interval of the roll RMS from which it is said; an hour of the first ship has 0.07."""
 REAL_TIME_S = 120.0  #: Default length of a run in real time. Chosen; no study.
 
 
@@ -159,12 +155,12 @@ def _print(
     out: Path,
     scenario: Path,
 ) -> None:
-    from firmware_sim.report_tables import tables
+    from firmware_sim.report_tables import few_rolls, tables
 
     console = Terminal()
     for table in tables(found):
         console.table(table)
-    if few := few_rolls(found, result.scenario):
+    if few := few_rolls(found, result.scenario.vessel.ship.natural_frequency_rad_s):
         console.say(yellow=few)
     for ending in found.endings:
         console.say(red=ending)
@@ -183,24 +179,6 @@ def _print(
         )
     console.files(files)
     console.lead_on(("monitor", out), *_run_next(found, scenario))
-
-
-def few_rolls(found: "BenchFigures", scenario: "Scenario") -> str:
-    """Return how uncertain the roll of a short window is; empty for a long one.
-
-    The variance of a lightly damped motion in T seconds has the relative variance 1 / (zeta w T)
-    (Bendat and Piersol, Random Data, 8.2, with the autocorrelation of an oscillator).
-    """
-    roll_rad_s = scenario.vessel.ship.natural_frequency_rad_s
-    window_s = found.end_s - found.settle_s
-    interval = 1.96 / 2 / math.sqrt(_ROLL_DAMPING * roll_rad_s * max(window_s, 1.0))
-    if interval < _LEAST_INTERVAL:
-        return ""
-    rolls = window_s * roll_rad_s / (2 * math.pi)
-    return (
-        f"{window_s:.0f} s hold {rolls:.0f} rolls: each roll RMS is uncertain by ±{interval:.0%} "
-        "(95 %). Laws that differ by less are not ranked by it: use a longer --duration."
-    )
 
 
 def _run_next(found: "BenchFigures", scenario: Path) -> list[tuple[str | Path, ...]]:

@@ -140,7 +140,7 @@ def init(
         if value is not None and not 0 < value < math.inf:
             fail(f"--{option}: must be positive and finite, got {value}")
     try:
-        with notes.busy(f"{name}: sizing tank and pump, designing a law"):
+        with notes.busy(f"{ship_name}: sizing tank and pump, designing a law"):
             project = make_starter(ship, room, gm_loss, hs, tp)
     except (TankImpossibleError, NoLawError) as error:
         if json_:

@@ -78,3 +78,8 @@ def test_a_path_is_said_as_short_as_it_holds(
 ) -> None:
     monkeypatch.setattr(os, "getcwd", lambda: here)
     assert shown(Path("/etc/utank-hil/controller.yaml")) == said
+
+
+def test_a_path_elsewhere_has_no_detours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir("/usr")
+    assert shown(tmp_path / "scenarios" / ".." / "gpc.yaml") == str(tmp_path / "gpc.yaml")

@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -173,3 +174,19 @@ def test_files_that_are_there_stay(tmp_path: Path) -> None:
     assert done.exit_code == ExitCode.USAGE
     assert "ship.yaml: is there already" in done.stderr
     assert (tmp_path / "ship.yaml").read_text() == "mine\n"
+
+
+def test_what_is_being_done_names_the_ship_by_its_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(
+        "utank_hil.console.terminal.Terminal.busy", lambda _, words: _note(said, words)
+    )
+    run(tmp_path / "my_ship", PATROL | {"tank-height": 0.1})
+    assert said == ["my ship: sizing tank and pump, designing a law"]
+
+
+def _note(said: list[str], words: str) -> AbstractContextManager[None]:
+    said.append(words)
+    return nullcontext()

@@ -13,10 +13,12 @@ from hypothesis import strategies as st
 from firmware_sim.bench import BenchResult
 from firmware_sim.figures import figures, mark_of
 from firmware_sim.model_limits import MODEL_LIMITS, passed_limits, steepness
+from firmware_sim.report_page import bench_page
 from firmware_sim.report_tables import in_one_unit, motion_table, pump_table
 from firmware_sim.run import COLUMNS, RECORD_S, Run
 from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_sea import JonswapSea
+from utank_hil.base.provenance import describe
 from utank_hil.canbus import Fault, Mode
 from utank_hil.configuration import load_config
 from utank_hil.console.exit_codes import ExitCode
@@ -255,3 +257,11 @@ def test_small_ships_pumps_are_shown_in_kilowatts() -> None:
     table = pump_table(figures(result_of(PASSIVE_RUN, weak)))
     assert [column.header for column in table.columns][3:5] == ["power\nmean kW", "power\npeak kW"]
     assert list(table.columns[3].cells) == ["0.00", "4.20"]
+
+
+def test_the_page_of_a_short_window_carries_its_interval(tmp_path: Path) -> None:
+    result = result_of(PASSIVE_RUN, run("a", 0.03))
+    about = describe("bench", result.scenario, Path.cwd(), options={}, seed=1)
+    page = bench_page(figures(result), about, None, {}, tmp_path)
+    # 80 s of a ship of 0.5 rad/s: 1.96 / 2 / sqrt(0.1 * 0.5 * 80)
+    assert "uncertain by ±49% (95 %)" in " ".join(page.verdict.lines)

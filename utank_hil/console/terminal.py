@@ -25,7 +25,8 @@ UNLIMITED: Final = 10_000
 def shown(path: Path) -> str:
     """A path as short as it can be said from here; whole in the root, a service's directory."""
     relative = os.path.relpath(path)
-    return str(path) if relative.startswith("..") or os.getcwd() == os.sep else relative
+    outside = relative.startswith("..") or os.getcwd() == os.sep
+    return os.path.normpath(path) if outside else relative
 
 
 def new_table(

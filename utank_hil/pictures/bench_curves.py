@@ -66,6 +66,7 @@ def draw_bench(
     *,
     bars: Sequence[BenchBar] = (),
     wrong: Sequence[str] = (),
+    interval: float | None = None,
 ) -> Path:
     """Draw the roll and cost of all runs as bars, and their roll, level and pressure over time.
 
@@ -73,8 +74,8 @@ def draw_bench(
     full, around the largest roll, or around the first trial of a new law. Lanes below show the
     retuning states. The first curve is the reference, the passive tank: drawn in grey, and searched
     for the largest roll. `bars` are the runs of the summary, those of the curves last, or none; the
-    problems in `wrong` are written above them. Raises `ValueError` without curves, or for more than
-    there are colours.
+    problems in `wrong` are written above them. `interval` is the relative half-width of each roll
+    RMS. Raises `ValueError` without curves, or for more than there are colours.
     """
     if not 1 <= len(curves) <= len(COLORS):
         raise ValueError(f"can draw 1 to {len(COLORS)} runs in one picture, got {len(curves)}")
@@ -95,7 +96,7 @@ def draw_bench(
             top, figure = whole_figure.subfigures(2, 1, squeeze=False, height_ratios=heights)[:, 0]
             if lines:
                 top.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=10, color=WRONG)
-            _draw_bars(top, bars)
+            _draw_bars(top, bars, "" if interval is None else f", each ±{interval:.0%} (95 %)")
         shape, ratios = (3 + retuning, len(spans)), [2.0, 2.0, 2.0, lane][: 3 + retuning]
         axes = figure.subplots(*shape, sharex="col", squeeze=False, height_ratios=ratios)
         for column, span_s in zip(axes.T, spans, strict=True):
@@ -137,12 +138,12 @@ def _around(centre_s: float, whole: tuple[float, float]) -> tuple[float, float]:
     return start_s, start_s + ZOOM_S
 
 
-def _draw_bars(figure: "SubFigure", bars: Sequence[BenchBar]) -> None:
+def _draw_bars(figure: "SubFigure", bars: Sequence[BenchBar], interval: str) -> None:
     rolls, powers = figure.subplots(1, 2, sharey=True, width_ratios=[3, 2])
     places = range(len(bars))
     degrees = [None if bar.roll_rad is None else math.degrees(bar.roll_rad) for bar in bars]
     for axis, label, values, words in (
-        (rolls, "Roll, RMS (°)", degrees, [bar.said for bar in bars]),
+        (rolls, f"Roll, RMS (°){interval}", degrees, [bar.said for bar in bars]),
         (powers, "Shaft power, mean", [bar.power_w for bar in bars], [bar.cost for bar in bars]),
     ):
         most = max((value for value in values if value is not None), default=0.0) or 1.0
