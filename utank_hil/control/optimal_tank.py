@@ -74,12 +74,23 @@ def roll_magnification(
 
 
 def passive_optimum(ratios: ShipTankRatios) -> PassiveOptimum:
-    """Frequency and damping ratio of the water that minimize the greatest roll."""
-    from scipy.optimize import minimize
+    """Frequency and damping ratio of the water that minimize the greatest roll.
+
+    A search on a grid of waves starts Newton's method at its two peaks, which the best tank makes
+    equal and of opposite slopes over frequency and damping. So rounding does not move the result.
+    A response with one peak alone leaves the search's result, which is good to 1e-8 of the peak.
+    """
+    from scipy.optimize import minimize, root
 
     def peak(logs: FloatArray) -> float:
         f, xi = np.exp(logs)
         return float(np.abs(roll_magnification(_WAVES, f, xi, ratios)).max())
+
+    def optimality(x: FloatArray) -> FloatArray:
+        f, xi = np.exp(x[2:])
+        (one, by_f, by_xi), (other, f_too, xi_too) = _slopes(x[:2], f, xi, ratios).T
+        first, second = np.log(np.abs(roll_magnification(x[:2], f, xi, ratios)))
+        return np.array([one, other, first - second, by_f * xi_too - by_xi * f_too])
 
     found = minimize(
         peak,
@@ -87,8 +98,33 @@ def passive_optimum(ratios: ShipTankRatios) -> PassiveOptimum:
         method="Nelder-Mead",
         options={"xatol": 1e-8, "fatol": 1e-10, "maxfev": 2000},
     )
-    f, xi = np.exp(found.x)
-    return PassiveOptimum(float(f), float(xi), float(found.fun))
+    (f, xi), most = np.exp(found.x), float(found.fun)
+    roll = np.abs(roll_magnification(_WAVES, f, xi, ratios))
+    tops = np.flatnonzero((roll[1:-1] >= roll[:-2]) & (roll[1:-1] > roll[2:])) + 1
+    tops = np.sort(tops[np.argsort(-roll[tops])[:2]])
+    if len(tops) == 2:
+        exact = root(optimality, [*_WAVES[tops], *found.x], tol=1e-13)
+        # beside the search's result, whose grid misses a peak by up to its spacing squared
+        if np.abs(exact.fun).max() < 1e-10 and np.abs(exact.x[2:] - found.x).max() < 0.05:
+            f, xi = np.exp(exact.x[2:])
+            most = float(np.abs(roll_magnification(exact.x[:1], f, xi, ratios))[0])
+    return PassiveOptimum(float(f), float(xi), most)
+
+
+def _slopes(q: FloatArray, f: float, xi: float, ratios: ShipTankRatios) -> FloatArray:
+    """Slopes of log |phi / phi_st| over q, log f and log xi; shape (3, N)."""
+    xi_phi, given = ratios.roll_damping_ratio, ratios.static_coupling
+    coupling = (f**2 if given is None else given) - q**2 * ratios.coupling_ratio
+    by_f = 2 * f**2 if given is None else 0.0
+    coupling_slopes = np.array([-2 * q * ratios.coupling_ratio, 0 * q + by_f, 0 * q])
+    tank, ship = f**2 - q**2 + 2j * q * f * xi, 1 - q**2 + 2j * q * xi_phi
+    swing = 2j * q * f * xi
+    tank_slopes = np.array([-2 * q + 2j * f * xi, 2 * f**2 + swing, swing])
+    ship_slopes = np.array([-2 * q + 2j * xi_phi, 0 * q, 0 * q])
+    determinant = tank * ship - ratios.mass_ratio * coupling**2
+    slopes = tank_slopes * ship + tank * ship_slopes
+    slopes -= 2 * ratios.mass_ratio * coupling * coupling_slopes
+    return np.asarray((tank_slopes / tank - slopes / determinant).real)
 
 
 @dataclass(frozen=True, slots=True)
