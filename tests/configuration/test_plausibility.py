@@ -304,18 +304,6 @@ def test_a_roll_limit_at_which_she_no_longer_rights_herself_is_refused(tmp_path:
     assert "set it to 0.19 or less" in refused["safety.roll_limit_rad"]
 
 
-@pytest.mark.parametrize(("kind", "asked"), [("random_pulses", False), ("chirp", True)])
-def test_a_band_beyond_the_sampling_is_refused_where_there_is_one(
-    tmp_path: Path, kind: str, *, asked: bool
-) -> None:
-    """Its default ends at 1.2 rad/s, a law sampled every 3 s at 1.05."""
-    slow = controller("adaptive_gpc")
-    slow["law"]["predictor"]["sample_time_s"] = 3.0
-    slow["retuning"]["excitation"] = {"kind": kind}
-    refused, _ = told(tmp_path, slow, ControllerConfig)
-    assert ("retuning.excitation.band_rad_s" in refused) == asked
-
-
 @pytest.mark.parametrize(("pressure_pa", "warned"), [(20e3, True), (4.5e3, True), (4.2e3, False)])
 def test_a_pump_that_could_capsize_her_is_warned_of(
     tmp_path: Path, pressure_pa: float, warned: bool

@@ -6,7 +6,7 @@ from roll_plant import SAMPLE_TIME_S, noisy, plant, pulses
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ARX
-from utank_hil.identification import IdentificationError, okid, stabilization, validate
+from utank_hil.identification import IdentificationError, okid, validate
 
 
 def _arx_record(seed: int, samples: int = 4000) -> tuple[ARX, FloatArray, FloatArray]:
@@ -143,17 +143,3 @@ def test_units_of_the_record_do_not_matter() -> None:
     np.testing.assert_allclose(
         two.independence_probability, one.independence_probability, rtol=1e-6
     )
-
-
-def test_true_modes_stay_and_spurious_ones_wander_in_the_stabilization_diagram() -> None:
-    truth, u = plant(), pulses(1)
-    result = okid(u, noisy(truth.respond(u, 0 * u), 0.01, 1), 60, sample_time_s=SAMPLE_TIME_S)
-    points = stabilization(result.markov, [4, 6, 8, 10], SAMPLE_TIME_S)
-    right = np.abs(truth.poles_rad_s())
-    assert not any(p.frequency_stable for p in points if p.order == 4)
-    for order in (6, 8, 10):
-        kept = [p for p in points if p.order == order and p.frequency_stable]
-        kept = [p for p in kept if p.damping_stable and p.shape_stable]
-        for frequency in right:
-            assert min(abs(p.frequency_rad_s / frequency - 1) for p in kept) < 0.002
-    assert sum(not p.damping_stable for p in points if p.order > 4) >= 3

@@ -1,17 +1,12 @@
-import re
 from pathlib import Path
-from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
 
-from utank_hil.configuration import ConfigError, ControllerConfig, load_config
 from utank_hil.control import DesignPlant, PumpLimits, pump_model
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.sampling import sample
-from utank_hil.identification import chirp, multisine, prbs, random_pulses
 from utank_hil.retuning import RetuningSettings, make_pulses
-from utank_hil.retuning.settings import Excitation
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -29,17 +24,9 @@ def _largest_response(pulses: np.ndarray) -> tuple[float, float]:
     return float(largest[0]), float(largest[1])
 
 
-KINDS = get_args(get_type_hints(Excitation)["kind"])
-
-
 @pytest.mark.parametrize("added_roll_rad", [0.005, 0.02, 0.5])
-@pytest.mark.parametrize("kind", KINDS)
-def test_pulses_keep_within_pressure_rate_roll_and_level(kind: str, added_roll_rad: float) -> None:
-    settings = RetuningSettings(
-        (6.0, 20.0),
-        added_roll_rad=added_roll_rad,
-        excitation=Excitation(kind),  # type: ignore[arg-type]
-    )
+def test_pulses_keep_within_pressure_rate_roll_and_level(added_roll_rad: float) -> None:
+    settings = RetuningSettings((6.0, 20.0), added_roll_rad=added_roll_rad)
     pulses = make_pulses(settings, DesignPlant(SHIP, TANK, limits=LIMITS), 0.2)
     assert len(pulses) == 2500
     assert np.abs(pulses).max() <= settings.pulse_pa
@@ -51,45 +38,6 @@ def test_pulses_keep_within_pressure_rate_roll_and_level(kind: str, added_roll_r
     assert (
         max(roll_rad / added_roll_rad, level_m / LIMITS.level_m, np.abs(pulses).max() / 30e3) > 0.9
     )
-
-
-def test_each_kind_is_the_signal_of_that_name() -> None:
-    within = PumpLimits(pressure_pa=30e3, rate_pa_s=LIMITS.rate_pa_s)
-    expected = {
-        "random_pulses": random_pulses(500.0, within, 1, (0.6, 3.0), sample_time_s=0.2),
-        "prbs": prbs(500.0, within, 1, 0.6, sample_time_s=0.2),
-        "multisine": multisine(500.0, within, 1, (0.3, 0.9), sample_time_s=0.2),
-        "chirp": chirp(500.0, within, (0.3, 0.9), sample_time_s=0.2),
-    }
-    for kind in KINDS:
-        swept = kind in ("multisine", "chirp")
-        settings = RetuningSettings(
-            (6.0, 20.0),
-            pulse_hold_s=(0.6, 3.0),
-            excitation=Excitation(kind, (0.3, 0.9) if swept else None),
-        )
-        pulses = make_pulses(settings, DesignPlant(SHIP, TANK, limits=LIMITS), 0.2)
-        shape = expected[kind] / np.linalg.norm(expected[kind])
-        assert pulses / np.linalg.norm(pulses) == pytest.approx(shape, abs=1e-12)
-
-
-def test_excitation_is_chosen_in_the_configuration(tmp_path: Path) -> None:
-    content = (CONFIGS / "controllers" / "adaptive_gpc.yaml").read_text()
-    content = content.replace("../ships", str(CONFIGS / "ships"))
-    path = tmp_path / "chosen.yaml"
-    path.write_text(content + "  excitation: {kind: chirp, band_rad_s: [0.3, 0.9]}\n")
-    config = load_config(path, ControllerConfig)
-    assert config.retuning.excitation == Excitation("chirp", (0.3, 0.9))
-    for wrong, said in (
-        ("{kind: noise}", "retuning.excitation.kind"),
-        ("{kind: prbs, band_rad_s: [0.3, 0.9]}", "is for multisine and chirp, not prbs"),
-        ("{kind: chirp, band_rad_s: [0.9, 0.3]}", "must rise"),
-        ("{kind: chirp, band_rad: [0.3, 0.9]}", "did you mean band_rad_s?"),
-        ("{kind: multisine, band_rad_s: [0.3, 0.3001]}", "retuning.identification_s"),
-    ):
-        path.write_text(content + f"  excitation: {wrong}\n")
-        with pytest.raises(ConfigError, match=re.escape(said)):
-            load_config(path, ControllerConfig)
 
 
 def test_pumps_own_limit_counts_too() -> None:

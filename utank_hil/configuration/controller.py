@@ -206,8 +206,6 @@ class ControllerConfig(Section):
         period_s, length_s = law.predictor.sample_time_s, settings.identification_s
         shortest_s, longest_s = settings.pulse_hold_s
         every_s = math.inf if settings.every_s is None else settings.every_s
-        highest_rad_s, excitation = math.pi / period_s, settings.excitation
-        banded = excitation.kind in ("multisine", "chirp")
         most_rad_s = WASHOUT_SHARE * 2 * math.pi / settings.roll_period_range_s[1]
         checks = (
             (
@@ -231,11 +229,6 @@ class ControllerConfig(Section):
                 "every_s",
                 f"must be {LEAST_PAUSE_S:g} or more, got {every_s:g}: during the pulses, and for "
                 "eight roll periods after, no law is compared with the passive ship",
-            ),
-            (
-                banded and excitation.band[1] >= highest_rad_s,
-                "excitation.band_rad_s",
-                f"must stay below {highest_rad_s:.3g}, half of the law's sampling",
             ),
             (
                 length_s > MOST_PULSES_S,

@@ -11,14 +11,13 @@ adjoint gives the gradient in one backward pass (delta method; Pintelon, Guillau
 gives and `validate` checks.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
-from utank_hil.identification.era import Realization, era, realize
+from utank_hil.identification.era import Realization, realize
 from utank_hil.identification.okid import OkidResult, markov_gradient
 from utank_hil.identification.record import IdentificationError
 
@@ -26,11 +25,6 @@ if TYPE_CHECKING:
     from control import StateSpace
 
 _NULL = 1e-12  # Smallest eigenvalue of the Gram matrix, relative to the largest.
-
-
-_FREQUENCY = 0.01  # Stable modes change by less than these from one order to the next,
-_DAMPING = 0.05  # as usual for stabilization diagrams (Peeters and De Roeck 1999).
-_SHAPE = 0.98  # Modal assurance of a stable mode.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,17 +117,6 @@ def _frequency_and_damping_std(s: complex, covariance: FloatArray) -> tuple[floa
     )
 
 
-def modal_assurance(first: ComplexArray, second: ComplexArray) -> FloatArray:
-    """Modal assurance criterion of two sets of shapes, (k, m) and (l, m); shape (k, l), 0 to 1.
-
-    Scale outputs of different units first. With one output the result is always 1.
-    """
-    inner = np.abs(first.conj() @ second.T) ** 2
-    norms = np.sum(np.abs(first) ** 2, axis=1)[:, None] * np.sum(np.abs(second) ** 2, axis=1)
-    assurance: FloatArray = inner / norms
-    return assurance
-
-
 class _Eigen(NamedTuple):
     """Modes, all right eigenvectors, and the indices of the modes' eigenvectors."""
 
@@ -193,48 +176,3 @@ def _inverse_root(result: OkidResult, output: int) -> FloatArray:
     kept = values > _NULL * values[-1]
     root: FloatArray = (vectors[:, kept] / np.sqrt(values[kept])) @ vectors[:, kept].T
     return root
-
-
-@dataclass(frozen=True, slots=True)
-class StabilizationPoint:
-    """A mode at one model order, compared with the nearest mode at the order before."""
-
-    order: int
-    frequency_rad_s: float
-    damping_ratio: float
-    frequency_stable: bool  #: Whether it changes by 1 % or less in frequency,
-    damping_stable: bool  #: by 5 % or less in damping ratio,
-    shape_stable: bool  #: and has a modal assurance of 0.98 or more.
-
-
-def stabilization(
-    markov: FloatArray, orders: Sequence[int], sample_time_s: float
-) -> tuple[StabilizationPoint, ...]:
-    """Return the modes of ERA models of increasing order, by order, then frequency.
-
-    No mode is stable at the first order. The orders are at most the rank of `markov`, shape (K, m,
-    r).
-    """
-    points = []
-    before: ModalParameters | None = None
-    size = np.sqrt(np.sum(np.asarray(markov)[1:] ** 2, axis=(0, 2)))
-    size[size == 0] = 1.0
-    for order in orders:
-        now = modal_parameters(era(markov, order, sample_time_s=sample_time_s))
-        for j, frequency in enumerate(now.frequency_rad_s):
-            stable = (False, False, False)
-            if before is not None:
-                near = int(np.argmin(np.abs(before.frequency_rad_s - frequency)))
-                shift = abs(before.frequency_rad_s[near] / frequency - 1)
-                damping = now.damping_ratio[j]
-                assurance = modal_assurance(now.shapes[[j]] / size, before.shapes[[near]] / size)
-                stable = (
-                    bool(shift <= _FREQUENCY),
-                    bool(abs(before.damping_ratio[near] - damping) <= _DAMPING * abs(damping)),
-                    bool(assurance[0, 0] >= _SHAPE),
-                )
-            points.append(
-                StabilizationPoint(order, float(frequency), float(now.damping_ratio[j]), *stable)
-            )
-        before = now
-    return tuple(points)

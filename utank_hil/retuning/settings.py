@@ -1,8 +1,8 @@
 """Settings of retuning in a controller's configuration."""
 
 import math
-from dataclasses import dataclass, field
-from typing import Annotated, Final, Literal
+from dataclasses import dataclass
+from typing import Annotated, Final
 
 from utank_hil.base.parameters import Positive, Problem, Range, range_problems, refuse
 from utank_hil.dynamics.ship import RollLimit
@@ -10,42 +10,11 @@ from utank_hil.dynamics.ship import RollLimit
 EARLIEST_VERDICT_S: Final = 30.0
 """Shortest time after which a trial is judged: a few roll periods."""
 
-_SWEPT: Final = ("multisine", "chirp")
-_BAND_RAD_S: Final = (0.2, 1.2)  # Band of ship and tank: roll periods of 5 to 31 s.
 VALIDATION_SHARE: Final = 0.2  #: Share of the record, at its end, that validates the model.
 LEAST_PREDICTIONS: Final = 100
 """Smallest number of predictions on validation data. Chosen; no study."""
 LAGS: Final = 25  #: Largest lag of the whiteness test, in samples.
 _OFFSET_AND_WAVE: Final = 3  # These are the disturbance functions that are fitted with the model.
-
-
-@dataclass(frozen=True, slots=True)
-class Excitation:
-    """Excitation signal of an identification: key ``excitation`` of the section.
-
-    Raises `ValueError` if a value is out of its range, or a band is given for another kind.
-    """
-
-    #: A function of `utank_hil.identification.excitation`; the clock of ``prbs`` is the shortest
-    #: pulse of `RetuningSettings.pulse_hold_s`.
-    kind: Literal["random_pulses", "prbs", "multisine", "chirp"] = "random_pulses"
-    #: Frequency band of multisine and chirp; None: 0.2 to 1.2 rad/s.
-    band_rad_s: tuple[Positive, Positive] | None = None
-
-    def __post_init__(self) -> None:
-        problems = range_problems(self)
-        if self.band_rad_s is not None:
-            low, high = self.band_rad_s
-            if self.kind not in _SWEPT:
-                problems.append(("band_rad_s", f"is for {' and '.join(_SWEPT)}, not {self.kind}"))
-            elif not low < high:
-                problems.append(("band_rad_s", f"must rise, got {low} and {high}"))
-        refuse("excitation", problems)
-
-    @property
-    def band(self) -> tuple[float, float]:
-        """The frequency band, with its default."""
-        return self.band_rad_s or _BAND_RAD_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +41,6 @@ class RetuningSettings:
     identification_s: Positive = 500.0  #: Time for which pulses are given and recorded.
     pulse_pa: Positive = 30e3  #: Greatest pressure of the pulses.
     pulse_hold_s: tuple[Positive, Positive] = (1.0, 5.0)  #: Shortest and longest pulse.
-    excitation: Excitation = field(default_factory=Excitation)  #: Signal type of the pulses.
     #: Whether the pulses replace the law's pressure instead of being added to it.
     alone: bool = False
     #: Greatest roll that the pulses alone may cause in still water, on the configured ship.
@@ -101,14 +69,6 @@ class RetuningSettings:
         low, high = self.roll_period_range_s
         if not low < high:
             problems.append(("roll_period_range_s", f"must rise, got {low} and {high}"))
-        if self.excitation.kind == "multisine":
-            least_s = 2 * math.pi / (self.excitation.band[1] - self.excitation.band[0])
-            if self.identification_s < least_s:  # The band holds at least one harmonic.
-                reason = (
-                    f"must be {least_s:.0f} or more for a multisine in the band "
-                    f"{self.excitation.band}, got {self.identification_s:g}"
-                )
-                problems.append(("identification_s", reason))
         refuse("retuning", problems)
 
 
