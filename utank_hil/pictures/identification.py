@@ -7,18 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from utank_hil import identification
 from utank_hil.analysis.motion.decay import RollDecay
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control import DesignPlant
 from utank_hil.dynamics.sampling import state_space_response
+from utank_hil.identification import DisturbanceBasis
 from utank_hil.pictures.style import BELOW, COLORS, DASHES, WIDEST_IN, picture
 from utank_hil.retuning.redesign import Identification, RetuningTask
 from utank_hil.retuning.settings import estimation_samples
 
 SHOWN_S = 120.0  #: Length of the held-out record in the figure. Chosen; no study.
 BAND_RAD_S = np.linspace(0.15, 1.5, 300)
-ORDERS = range(2, 21, 2)
 
 
 def draw_identification(
@@ -29,7 +28,7 @@ def draw_identification(
     title: str,
     about: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Draw held-out roll and its prediction, responses, residuals and the stabilization diagram.
+    """Draw held-out roll and its prediction, responses and residuals.
 
     `record`, shape (N, 1 + m), is the record that `found` was identified from.
     """
@@ -39,9 +38,7 @@ def draw_identification(
     split = estimation_samples(len(record))
     shown = slice(split, min(len(record), split + arx.order + round(SHOWN_S / step_s)))
     here = np.nan_to_num(record[shown])
-    basis = identification.DisturbanceBasis(found.wave_frequencies_rad_s, 0).evaluate(
-        len(here), step_s
-    )
+    basis = DisturbanceBasis(found.wave_frequencies_rad_s, 0).evaluate(len(here), step_s)
     predicted = arx.predict(here[:, :1], here[:, 1:])[arx.order :, roll]
     waves, measured_roll = basis[:, arx.order :].T, here[arx.order :, roll + 1]
     predicted = predicted + waves @ np.linalg.lstsq(waves, measured_roll - predicted, rcond=None)[0]
@@ -55,7 +52,8 @@ def draw_identification(
         "identified ship": _ship_response(task, found.plant(task), z),
     }
     with picture(path, title, (WIDEST_IN, 7.5), about) as figure:
-        (above, bode), (residuals, modes) = figure.subplots(2, 2)
+        places = figure.subplot_mosaic([["above", "above"], ["bode", "residuals"]])
+        above, bode, residuals = (places[name] for name in ("above", "bode", "residuals"))
         above.plot(time_s, np.rad2deg(measured_roll), color=COLORS[0], label="measured")
         above.plot(time_s, np.rad2deg(predicted), color=COLORS[1], lw=1.0, label="predicted")
         above.set(xlabel="Time (s)", ylabel="Roll (°), held out")
@@ -75,26 +73,12 @@ def draw_identification(
         ordinate = "Autocorrelation of held-out errors"
         residuals.set(xlabel="Lag (s)", ylabel=ordinate, ylim=(-0.6, 0.6))
         residuals.legend(frameon=False)
-        for point in _stable_points(found):
-            mark = "o" if point.frequency_stable and point.damping_stable else "x"
-            color = COLORS[1 if point.frequency_stable else 0]
-            modes.plot(point.frequency_rad_s, point.order, mark, color=color)
-        modes.axvline(found.fit.ship.natural_frequency_rad_s, color=COLORS[2], lw=1)
-        ordinate = "Model order (o: stable; line: identified ship)"
-        modes.set(xlabel="Frequency (rad/s)", ylabel=ordinate)
-        modes.set_xlim(BAND_RAD_S[0], BAND_RAD_S[-1])
     return path
 
 
 def _ship_response(task: RetuningTask, plant: DesignPlant, z: ComplexArray) -> ComplexArray:
     predictor = task.design.predictor
     return state_space_response(plant.sampled(predictor.measured, predictor.sample_time_s), z)
-
-
-def _stable_points(found: Identification) -> tuple[identification.StabilizationPoint, ...]:
-    rank = len(identification.hankel_singular_values(found.okid.markov))
-    orders = [order for order in ORDERS if order <= rank]
-    return identification.stabilization(found.okid.markov, orders, found.okid.arx.sample_time_s)
 
 
 def draw_decay(
