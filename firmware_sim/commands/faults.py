@@ -3,23 +3,23 @@
 import json
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 from rich.progress import MofNCompleteColumn
 
 from utank_hil.base.provenance import describe
 from utank_hil.base.shipped import CONFIGS
-from utank_hil.console.common import Json, fail, load, prepare_out, why
+from utank_hil.console.common import Json, fail, load, prepare_out
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.failures import KILLED
-from utank_hil.console.terminal import Terminal, notes, progress_bar, shown
+from utank_hil.console.terminal import Terminal, progress_bar, shown
 
 if TYPE_CHECKING:
-    from firmware_sim.fault_campaign.campaign import Campaign, LiveRow, Row
+    from firmware_sim.fault_campaign.campaign import Campaign, Row
     from firmware_sim.fault_campaign.verdict import Result
 
 CAMPAIGN = CONFIGS / "faults" / "campaign.yaml"
@@ -41,9 +41,6 @@ def faults(
         bool,
         typer.Option(help="Compare the roll over 600 s, as is asked for: ten times the work."),
     ] = False,
-    bus: Annotated[
-        str | None, typer.Option(help="SocketCAN interface for the live rows, such as vcan0.")
-    ] = None,
     json_: Json = False,
 ) -> None:
     """Inject each fault of the fault table and judge what becomes of it.
@@ -51,9 +48,8 @@ def faults(
     **Example:** utank-hil faults --rows motion,F19 --seeds 10
 
     In lockstep on all cores. Without **--full** the roll is compared over 60 s, and over
-    20 s where the controller stays in charge, and rows that take minutes are left out. Rows that
-    need processes and an interface run with **--bus** only. The exit code says whether a row
-    failed (docs/deployment.md).
+    20 s where the controller stays in charge, and rows that take minutes are left out. The exit
+    code says whether a row failed (docs/deployment.md).
     """
     # imported late: `--help` needs none of it
     from firmware_sim.fault_campaign.campaign import Campaign
@@ -65,11 +61,11 @@ def faults(
 
     loaded = load(campaign, Campaign)
     names = [name.strip() for name in rows.split(",") if name.strip()]
-    chosen, live = loaded.chosen(names)
+    chosen = loaded.chosen(names)
     window = Window() if full else Window(60.0, 20.0)
     too_long = [row for row in chosen if row.long and not (full or names)]
     chosen = [row for row in chosen if row not in too_long]
-    _refuse_names(loaded, names, chosen, live, bus)
+    _refuse_names(loaded, names, chosen)
     if out is not None:
         out = prepare_out(out, [f"{row.id}.rrd" for row in chosen])
     began = time.monotonic()
@@ -88,21 +84,21 @@ def faults(
     partly = [row.id for row in chosen if len(outcomes[row.id]) < seeds]
     killed = bool(partly) and not interrupted
     results = [judged(loaded, row, outcomes[row.id]) for row in chosen if row.id not in partly]
-    not_run = _shown_elsewhere(loaded, live, names)
+    not_run = {
+        each.id: f"{each.fault}: shown by {each.elsewhere}"
+        for each in loaded.shown_elsewhere(names)
+    }
     not_run |= {row.id: "takes long: --full or --rows" for row in too_long}
     not_run |= dict.fromkeys(partly, KILLED if killed else INTERRUPTED)
-    on_bus, waiting, bus_error = _on_bus(loaded, live, None if partly else bus)
-    interrupted = interrupted or bus_error == INTERRUPTED
-    not_run |= dict.fromkeys(waiting, bus_error or "needs a live bus: --bus")
     options = {"seeds": seeds, "full": full, "rows": names}
     about = describe("faults", loaded, out or Path(), options=options, seed=1)
     if out is not None:
         files = write_recordings(out, outcomes, about)
         results = [replace(each, recording=shown(files[each.row.id])) for each in results]
     if json_:
-        sys.stdout.write(json.dumps(as_json(results, on_bus, not_run, about)) + "\n")
+        sys.stdout.write(json.dumps(as_json(results, not_run, about)) + "\n")
     else:
-        _print(results, on_bus)
+        _print(results)
         failed = sum(not result.passed for result in results)
         Terminal().say(
             f"{len(results)} rows in {seeds} seas, {failed} failed, {len(not_run)} not run; roll "
@@ -113,63 +109,20 @@ def faults(
         fail(KILLED, ExitCode.SYSTEM)
     if interrupted:
         raise typer.Exit(ExitCode.INTERRUPTED)
-    if bus_error:
-        fail(bus_error, ExitCode.NO_BUS)
-    on_bus_passed = all(told["verdict"] == "pass" for told in on_bus)
-    if not (on_bus_passed and all(result.passed for result in results)):
+    if not all(result.passed for result in results):
         raise typer.Exit(ExitCode.REFUSED)
 
 
-def _refuse_names(
-    campaign: "Campaign",
-    names: Sequence[str],
-    chosen: Sequence["Row"],
-    live: Sequence["LiveRow"],
-    bus: str | None,
-) -> None:
+def _refuse_names(campaign: "Campaign", names: Sequence[str], chosen: Sequence["Row"]) -> None:
     """End with exit code 2 if a name is that of no row, or nothing is left to run."""
     for name in names:
-        if not (any(campaign.chosen([name])) or campaign.shown_elsewhere([name])):
+        if not (campaign.chosen([name]) or campaign.shown_elsewhere([name])):
             fail(f"--rows: no row or requirement begins with {name}")
-    if names and not chosen and (bus is None or not any(row.does for row in live)):
-        lack = "--bus is missing" if any(row.does for row in live) else "tests show all of them"
-        fail(f"--rows: nothing to run: {lack}")
+    if names and not chosen:
+        fail("--rows: nothing to run: tests show all of them")
 
 
-def _shown_elsewhere(
-    campaign: "Campaign", live: Sequence["LiveRow"], names: Sequence[str]
-) -> dict[str, str]:
-    """Rows and requirements that tests show, with where they do."""
-    shown_by = {
-        each.id: f"{each.fault}: shown by {each.elsewhere}"
-        for each in campaign.shown_elsewhere(names)
-    }
-    return shown_by | {row.id: f"shown by {row.elsewhere}" for row in live if row.elsewhere}
-
-
-def _on_bus(
-    campaign: "Campaign", live: Sequence["LiveRow"], bus: str | None
-) -> tuple[list[dict[str, Any]], list[str], str]:
-    """Results of the live rows, names of those not run, and the bus's error if it is the cause."""
-    from firmware_sim.fault_campaign.live import run_live
-
-    waiting = [row for row in live if row.does]
-    results: list[dict[str, Any]] = []
-    error = ""
-    try:
-        while bus is not None and waiting:
-            row = waiting[0]
-            notes.say(f"{row.id} on {bus}")
-            results.append(run_live(row, bus, campaign.asked_by(row)))
-            del waiting[0]
-    except OSError as why_not:
-        error = why(why_not)
-    except KeyboardInterrupt:  # completed rows are kept
-        error = INTERRUPTED
-    return results, [row.id for row in waiting], error
-
-
-def _print(results: Sequence["Result"], on_bus: Sequence[Mapping[str, Any]]) -> None:
+def _print(results: Sequence["Result"]) -> None:
     from firmware_sim.fault_campaign.report import table
 
     console = Terminal()
@@ -177,8 +130,3 @@ def _print(results: Sequence["Result"], on_bus: Sequence[Mapping[str, Any]]) -> 
     for result in results:
         for problem in result.problems:
             console.say(problem, red=f"{result.row.id}:")
-    for told in on_bus:
-        console.say(
-            f"{told['id']}: {told['verdict']}, found {told['found_ms']} ms, drive off "
-            f"{told['zero_ms']} ms, limit {told['limit_ms']} ms {'; '.join(told['problems'])}"
-        )

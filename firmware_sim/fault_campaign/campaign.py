@@ -195,19 +195,6 @@ class Row(Section):
         return self.fault.followed_s > LONG_S
 
 
-class LiveRow(Section):
-    """Fault that needs processes and a CAN interface."""
-
-    id: Annotated[str, Field(pattern=r"^live-[a-z0-9-]+$")]
-    meets: Annotated[tuple[str, ...], Field(min_length=1)]
-    #: Name in `firmware_sim.fault_campaign.live.ACTIONS`; empty where it is verified elsewhere.
-    does: str = ""
-    #: Whether the controller's fault or the drive's stop is judged.
-    judged: Literal["found", "zero"] = "zero"
-    within_ms: Positive | None = None
-    elsewhere: str = ""  #: Test or document that verifies it, where the campaign does not run it.
-
-
 class Campaign(Section):
     """Requirements and rows."""
 
@@ -217,19 +204,15 @@ class Campaign(Section):
     setups: dict[str, Setup]
     requirements: tuple[Requirement, ...]
     rows: tuple[Row, ...]
-    live: tuple[LiveRow, ...] = ()
 
     @model_validator(mode="after")
     def _consistent(self) -> "Campaign":
         known = [requirement.id for requirement in self.requirements]
-        every: list[tuple[str, Sequence[Row | LiveRow]]]
-        every = [("rows", self.rows), ("live", self.live)]
-        ids = [row.id for _, rows in every for row in rows]
+        ids = [row.id for row in self.rows]
         problems = [
-            (f"{key}.{place}.id", "is there twice")
-            for key, rows in every
-            for place, row in enumerate(rows)
-            if ids.count(row.id) > 1
+            (f"rows.{place}.id", "is there twice")
+            for place, name in enumerate(ids)
+            if ids.count(name) > 1
         ]
         problems += [
             (f"requirements.{place}.id", "is there twice")
@@ -237,9 +220,8 @@ class Campaign(Section):
             if known.count(name) > 1
         ]
         problems += [
-            (f"{key}.{place}.meets", f"{name} is no requirement")
-            for key, rows in every
-            for place, row in enumerate(rows)
+            (f"rows.{place}.meets", f"{name} is no requirement")
+            for place, row in enumerate(self.rows)
             for name in row.meets
             if name not in known
         ]
@@ -251,7 +233,7 @@ class Campaign(Section):
                 continue
             key = f"rows.{place}.fault.inject"
             problems += missing_nodes(vessels[row.fault.setup], row.fault.inject, key)
-        met = {name for _, rows in every for row in rows for name in row.meets}
+        met = {name for row in self.rows for name in row.meets}
         problems += [
             (f"requirements.{place}", "is shown by no row: add one, or say `elsewhere`")
             for place, requirement in enumerate(self.requirements)
@@ -268,17 +250,13 @@ class Campaign(Section):
         """
         return self.fault_s + TICK_S * (_PHASE_STRIDE * seed % _PHASES)
 
-    def chosen(self, names: Sequence[str]) -> tuple[list[Row], list[LiveRow]]:
+    def chosen(self, names: Sequence[str]) -> list[Row]:
         """Rows whose name, or requirement, begins with one of the names; all rows without names."""
-
-        def matches(row: Row | LiveRow) -> bool:
-            return any(_begins(own, names) for own in (row.id, *row.meets))
-
-        return [row for row in self.rows if matches(row)], [
-            row for row in self.live if matches(row)
+        return [
+            row for row in self.rows if any(_begins(own, names) for own in (row.id, *row.meets))
         ]
 
-    def asked_by(self, row: Row | LiveRow) -> str:
+    def asked_by(self, row: Row) -> str:
         """Text of the requirement that a row meets."""
         texts = []
         for each in self.requirements:

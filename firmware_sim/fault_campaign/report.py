@@ -13,22 +13,14 @@ from firmware_sim.fault_campaign.verdict import Result
 
 
 def as_json(
-    results: Sequence[Result],
-    on_bus: Sequence[Mapping[str, Any]],
-    not_run: Mapping[str, str],
-    about: Mapping[str, Any],
+    results: Sequence[Result], not_run: Mapping[str, str], about: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return all results for `json.dumps`.
-
-    `on_bus` are live rows in the form of `run_live`, `not_run` the reasons of rows that were not
-    run.
-    """
-    rows = [*(result.as_json() for result in results), *on_bus]
+    """Return all results, and the reasons of rows that were not run, for `json.dumps`."""
     return {
-        "rows": rows,
+        "rows": [result.as_json() for result in results],
         "not_run": [{"id": name, "why": why} for name, why in not_run.items()],
-        "passed": sum(row["verdict"] == "pass" for row in rows),
-        "failed": sum(row["verdict"] == "fail" for row in rows),
+        "passed": sum(result.passed for result in results),
+        "failed": sum(not result.passed for result in results),
         "about": dict(about),
     }
 

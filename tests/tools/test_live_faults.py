@@ -3,14 +3,12 @@
 from types import SimpleNamespace
 
 import pytest
-from judged_rows import CAMPAIGN
 
-from firmware_sim.fault_campaign import live
-from firmware_sim.fault_campaign.campaign import LiveRow
-from firmware_sim.fault_campaign.live_log import LiveLog, LiveTimes, times_of
+from tools.live_faults import rows
+from tools.live_faults.bench import LiveError
+from tools.live_faults.log import LiveLog, LiveTimes, times_of
 from utank_hil.canbus import DriveState, Mode
 
-ROWS = {row.id: row for row in CAMPAIGN.live}
 FAULT_S = 100.0
 OFF = DriveState.FAULT
 
@@ -90,8 +88,8 @@ class Bench:
         pass
 
     def wait_in_charge(self) -> None:
-        if len(self.starts) < live.STARTS:
-            raise live.LiveError("OVERRUN before there was a fault")
+        if len(self.starts) < rows.STARTS:
+            raise LiveError("OVERRUN before there was a fault")
 
 
 @pytest.mark.parametrize(
@@ -113,41 +111,41 @@ def test_only_a_start_that_the_machine_spoilt_is_made_again(
                 kept = [t for t in self.log.motions if not 101 < t < 101 + missing_s]
                 self.log.motions[:] = kept
 
-    monkeypatch.setattr(live, "LiveBench", Spoilt)
-    if starts == live.STARTS:
-        with live._in_charge("vcan0") as bench:
-            assert bench.start == starts
+    monkeypatch.setattr(rows, "LiveBench", Spoilt)
+    if starts == rows.STARTS:
+        with rows.in_charge("vcan0"):
+            assert len(made) == starts
     else:
-        with pytest.raises(live.LiveError, match="OVERRUN"), live._in_charge("vcan0"):
+        with pytest.raises(LiveError, match="OVERRUN"), rows.in_charge("vcan0"):
             raise AssertionError
     assert len(made) == starts
 
 
 @pytest.mark.parametrize(
-    ("attempts", "verdict", "tried"),
+    ("attempts", "passed", "tried"),
     [
-        ([([], 500.0)], "pass", 1),
-        ([(["after 130 ms"], 0.0)], "fail", 1),
-        ([(["after 130 ms"], 40.0), ([], 0.0)], "pass", 2),
-        ([(["after 130 ms"], 40.0), (["after 140 ms"], 0.0)], "fail", 2),
-        ([(["after 130 ms"], 40.0)] * 4, "fail", 3),
+        ([([], 500.0)], True, 1),
+        ([(["after 130 ms"], 0.0)], False, 1),
+        ([(["after 130 ms"], 40.0), ([], 0.0)], True, 2),
+        ([(["after 130 ms"], 40.0), (["after 140 ms"], 0.0)], False, 2),
+        ([(["after 130 ms"], 40.0)] * 4, False, 3),
     ],
 )
 def test_only_what_the_machine_spoilt_is_tried_again(
     monkeypatch: pytest.MonkeyPatch,
     attempts: list[tuple[list[str], float]],
-    verdict: str,
+    passed: bool,
     tried: int,
 ) -> None:
     waiting = list(attempts)
 
-    def attempt(row: LiveRow, bus: str) -> tuple[dict[str, object], float]:
+    def attempt(row: rows.LiveRow, bus: str) -> tuple[list[str], float]:
         problems, held_up_ms = waiting.pop(0)
-        return {"problems": [*problems]}, held_up_ms
+        return [*problems], held_up_ms
 
-    monkeypatch.setattr(live, "_attempt", attempt)
-    row = live.run_live(ROWS["live-controller-killed"], "vcan0", "")
-    assert row["verdict"] == verdict
+    monkeypatch.setattr(rows, "attempted", attempt)
+    problems = rows.run_live(rows.ROWS["controller-killed"], "vcan0")
+    assert (not problems) is passed
     assert len(attempts) - len(waiting) == tried
-    held_up = any("the machine held processes up for 40 ms" in each for each in row["problems"])
+    held_up = any("the machine held processes up for 40 ms" in each for each in problems)
     assert held_up is (tried == 3)

@@ -1,24 +1,19 @@
-"""Live rows: faults of processes and of a CAN interface, with the deployed programs."""
+"""Ship and controller as processes on a CAN interface, with a listener."""
 
 import math
 import signal
-import socket
-import struct
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager, suppress
-from functools import partial
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Final
 
 import can
 from can.interfaces.socketcan import SocketcanBus
 
-from firmware_sim.fault_campaign.campaign import LiveRow
-from firmware_sim.fault_campaign.live_log import HELD_UP_S, LiveLog, LiveTimes, Stream, times_of
+from tools.live_faults.log import LiveLog
 from utank_hil.base.shipped import CONFIGS
 from utank_hil.canbus import (
     ControllerStatus,
@@ -36,22 +31,14 @@ STORM: Final = CONFIGS / "scenarios" / "storm.yaml"
 CONTROLLER: Final = CONFIGS / "controllers" / "gpc.yaml"
 START_S: Final = 180.0
 """Longest time in s until the controller is in charge: imports are slow in an emulated kernel."""
-STARTS: Final = 3
-"""Most starts: a machine that delays processes may end a run before its fault is injected, the only
-cause of a new start."""
-ATTEMPTS: Final = 3  #: Most attempts at a row: such a machine may also spoil what is judged.
 DRIVEN_PA: Final = 5e3
 """Pressure above which the pump works: a tenth of the limit of the storm's ship."""
-RESTED_S: Final = 1.0
-"""Pause of a stopped program in s: longer than every timeout of the other side but the panel's."""
 WATCHED_S: Final = 3.0
 """Time in s for which the bus is watched after the fault: two seconds more than the pause."""
 _RECENT_S: Final = 0.5
 """Largest age in s of the last CTRL_STATUS of a controller in charge: five cycles."""
 _LOOK_S: Final = 0.002  # Polling interval in s: a fifth of the shortest message cycle.
 _EXTENDED_MASK: Final = 0x1FFFFFFF
-_BUS_OFF: Final = struct.pack("=IB3x8s", 0x20000040, 8, bytes(8))
-"""Error frame that reports bus-off, in the form of a kernel driver."""
 
 
 Later = tuple[float, Callable[[], None]] | None
@@ -83,7 +70,6 @@ class LiveBench:
             can_filters=[{"can_id": each, "can_mask": _EXTENDED_MASK, "extended": True}
                          for each in heard],
         )  # fmt: skip
-        self.start = 1  #: Ordinal number of this bench among the starts.
         self.mode: Mode | None = None
         self.fault = ""
         self._status_s = -math.inf
@@ -167,121 +153,3 @@ class LiveBench:
                 later[1]()
                 later = None
         return time.time()
-
-
-Act = Callable[[LiveBench], Later]
-
-
-def _sent(program: Literal["controller", "ship"], number: int, *, rested: bool = False) -> Act:
-    """Return an action that sends a signal; `rested` adds SIGCONT after the timeouts."""
-
-    def act(bench: LiveBench) -> Later:
-        process = bench.controller if program == "controller" else bench.ship
-        process.send_signal(number)
-        return (RESTED_S, partial(process.send_signal, signal.SIGCONT)) if rested else None
-
-    return act
-
-
-def bus_off(bench: LiveBench) -> Later:
-    """Send an error frame that reports bus-off."""
-    with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as raw:
-        raw.bind((bench.bus,))
-        raw.send(_BUS_OFF)
-    return None
-
-
-ACTIONS: Final[dict[str, tuple[Act, Stream | None]]] = {
-    "controller_killed": (_sent("controller", signal.SIGKILL), "commands"),
-    "controller_stopped": (_sent("controller", signal.SIGSTOP), "commands"),
-    "controller_stopped_for_a_second": (
-        _sent("controller", signal.SIGSTOP, rested=True), "commands"
-    ),
-    "controller_hung_up": (_sent("controller", signal.SIGHUP), None),
-    "controller_terminated": (_sent("controller", signal.SIGTERM), None),
-    "ship_killed": (_sent("ship", signal.SIGKILL), "motions"),
-    "ship_stopped_for_a_second": (_sent("ship", signal.SIGSTOP, rested=True), "motions"),
-    "bus_off": (bus_off, None),
-}  # fmt: skip
-"""Actions by name, and the stream that each ends."""
-
-
-@contextmanager
-def _in_charge(bus: str) -> Iterator[LiveBench]:
-    """Yield a bench with its controller in charge, after several starts if needed.
-
-    Raises `LiveError` if no start succeeded.
-    """
-    for start in range(1, STARTS + 1):
-        with (
-            tempfile.TemporaryDirectory() as folder,
-            closing(LiveBench(bus, Path(folder))) as bench,
-        ):
-            try:
-                bench.wait_in_charge()
-            except LiveError:
-                ended = any(each.poll() is not None for each in (bench.controller, bench.ship))
-                if start == STARTS or ended or bench.log.held_up_s <= HELD_UP_S:
-                    raise
-            else:
-                bench.start = start
-                yield bench
-                return
-
-
-def run_live(row: LiveRow, bus: str, requirement: str) -> dict[str, Any]:
-    """Run and judge a live row; return the form of `Result.as_json`.
-
-    Raises `OSError` if the interface cannot be used.
-    """
-    for attempt in range(1, ATTEMPTS + 1):
-        told, held_up_ms = _attempt(row, bus)
-        if not told["problems"] or held_up_ms <= 1e3 * HELD_UP_S:
-            break
-        held_up = f"the machine held processes up for {held_up_ms:.0f} ms, attempt {attempt}"
-        told["problems"].append(held_up)
-    return {
-        "id": row.id,
-        "meets": list(row.meets),
-        "requirement": requirement,
-        "reaction": row.judged,
-        "limit_ms": row.within_ms,
-        "verdict": "fail" if told["problems"] else "pass",
-        "roll_ratio": None,
-        "recording": None,
-        **told,
-    }
-
-
-def _attempt(row: LiveRow, bus: str) -> tuple[dict[str, Any], float]:
-    """Run a live row once; return its result, and the ms for which processes were delayed."""
-    problems = []
-    times = LiveTimes(None, None, 0.0)
-    code = ""
-    mode: Mode | None = None
-    state: DriveState | None = None
-    start = 0
-    act, silences = ACTIONS[row.does]
-    try:
-        with _in_charge(bus) as bench:
-            fault_s = time.time()
-            end_s = bench.watch(act(bench))
-            times = times_of(bench.log, fault_s, end_s, silences=silences, judged=row.judged)
-            code, mode, state, start = bench.fault, bench.mode, bench.state, bench.start
-            if bench.in_charge:
-                problems.append("in charge again in the end")
-    except LiveError as error:
-        problems.append(str(error))
-    judged = times.found_ms if row.judged == "found" else times.zero_ms
-    if not problems and judged is None:
-        problems.append("was not found" if row.judged == "found" else "the drive went on")
-    elif judged is not None and row.within_ms is not None and judged > row.within_ms:
-        problems.append(f"after {judged:.0f} ms, {row.within_ms:.0f} allowed")
-    told = {
-        "found_ms": times.found_ms,
-        "zero_ms": times.zero_ms,
-        "problems": problems,
-        "codes": [code] if code and code != "NONE" else [],
-        "wire": f"start {start}; at the end {mode!r}, drive {state!r}",
-    }
-    return told, times.held_up_ms
