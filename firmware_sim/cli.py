@@ -31,6 +31,7 @@ with quietly_interruptible():
         from utank_hil.canbus.profiles.foreign import ForeignDevices
         from utank_hil.canbus.socketcan import SocketCanPort
         from utank_hil.console.common import (
+            AllowCode,
             Duration,
             Json,
             Version,
@@ -71,6 +72,7 @@ def firmware_sim(
         ),
     ] = "",
     json_: Json = False,
+    allow_code: AllowCode = False,
     version: Version = False,  # noqa: ARG001, ends the command when it is read
 ) -> None:
     """Emulate ship, tank, sensors, pump drive and operator of a scenario until Ctrl-C.
@@ -82,6 +84,8 @@ def firmware_sim(
     **Example:** firmware-sim configs/scenarios/storm.yaml --bus vcan0 --without panel
     """
     loaded = load(scenario, Scenario, allow_code=True)  # laws are not built from it
+    if loaded.fmu is not None and not allow_code:
+        fail(f"{scenario}: fmu.file: runs native code: allow it by --allow-code if you trust it")
     if loaded.faults:
         fail(f"{scenario}: faults: are for the bench in simulated time: leave them out")
     length_s = loaded.duration_s if duration is None else duration

@@ -12,6 +12,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from firmware_sim.drive_limits import DriveLimits
 from firmware_sim.fault_injection.kinds import AnyFault
+from firmware_sim.fmu_file import FmuFile
 from firmware_sim.place import Place
 from firmware_sim.scenario_sea import ScenarioSea
 from firmware_sim.sensor_errors import SensorErrors
@@ -144,9 +145,11 @@ class Scenario(Section):
     seed: Annotated[int, Range(least=0)] = 1
     place: Place | None = None
     """Place where comfort is judged; the deck over the starboard reservoir by default."""
-    plant: Literal["roll", "linear", "sway_roll_yaw"] = "roll"
-    """Equations of the emulated ship: roll, its small-motion limit, or three degrees of `hull`."""
+    plant: Literal["roll", "linear", "sway_roll_yaw", "fmu"] = "roll"
+    """Equations of the emulated ship: roll, its small-motion limit, three degrees of `hull`, or
+    those of another program in `fmu`."""
     hull: HullFile | None = None  #: Hull data of the ship at rest, for plant: sway_roll_yaw.
+    fmu: FmuFile | None = None  #: Ship and tank of another program, for plant: fmu.
     actual_ship: dict[str, Finite] = Field(default_factory=dict)
     """Parameters of the actual ship that differ from the vessel's, on which the controller relies.
 
@@ -207,7 +210,7 @@ class Scenario(Section):
                 reason = f"names one {name!r}: files are named by it, so it can't be a path"
                 problems.append(("controllers", reason))
             problems += self._controller_problems(name, controller)
-        refuse("", [*problems, *self._hull_problems()])
+        refuse("", [*problems, *self._hull_problems(), *self._fmu_problems()])
         problems = [*self._ship_problems(), *self._sea_problems(), *self._voyage_problems()]
         refuse("", [*problems, *self._fault_problems()])
         return self
@@ -233,6 +236,28 @@ class Scenario(Section):
             LateralModel(self.hull.hull, self.sailing_ship, self.vessel.tank)
         except (OSError, ValueError) as error:
             problems.append(("hull", f"does not fit: {error}"))
+        return problems
+
+    def _fmu_problems(self) -> list[Problem]:
+        """Reasons why the plant can't be that of the FMU."""
+        if self.fmu is None or self.plant != "fmu":
+            wrong = [("fmu", "is required with plant: fmu but missing")]
+            wrong = wrong if self.plant == "fmu" else []
+            return wrong or ([("fmu", "needs plant: fmu")] if self.fmu else [])
+        problems = [
+            (key, "does not act on the ship of an FMU: remove it; fmu.parameters change that")
+            for key in ("actual_ship", "voyage")
+            if getattr(self, key)
+        ]
+        variables = self.fmu.variables
+        for key, part, ours in (
+            ("pressure_pa", "pump", self.vessel.pump),
+            ("valve_loss_pa_s2_m2", "valve", self.vessel.valve),
+        ):
+            if (getattr(variables, key) is None) != (ours is None):
+                verb = "is required" if ours is not None else "must be left out"
+                has = "has a" if ours is not None else "has no"
+                problems.append((f"fmu.variables.{key}", f"{verb}: the vessel {has} {part}"))
         return problems
 
     def figures(self) -> dict[str, float]:
@@ -415,6 +440,11 @@ class Scenario(Section):
         ]
         loadings = {f"voyage.{index}.ship": point.ship for index, point in enumerate(self.voyage)}
         loadings = {"actual_ship": self.actual_ship, **loadings}
+        if self.fmu is not None:
+            reason = (
+                "has no ship without its tank: 'no tank' is the vessel by the bench's equations"
+            )
+            found.append(("fmu.file", reason))
         return [*found, *unusual_loadings(self.vessel, loadings)]
 
     def _voyage_problems(self) -> list[Problem]:

@@ -85,6 +85,17 @@ def bare_plant(scenario: Scenario, seed: int) -> Plant:
     return _plant(scenario, seed, negligible(scenario.vessel.tank), None)
 
 
+def plant_of(scenario: Scenario, seed: int) -> Plant:
+    """Ship of the scenario with tank and pump, in the waves of a seed."""
+    vessel = scenario.vessel
+    if scenario.fmu is not None:
+        from firmware_sim.fmu_plant import FmuPlant  # Few scenarios need this import.
+
+        ship = scenario.ship_at(0.0)
+        return FmuPlant(scenario.fmu, ship, vessel.tank, vessel.pump, scenario.waves(seed))
+    return _plant(scenario, seed, vessel.tank, vessel.pump)
+
+
 def _plant(scenario: Scenario, seed: int, tank: Tank, pump: Pump | None) -> Plant:
     return Plant(
         scenario.ship_at,
@@ -108,7 +119,7 @@ def build_ship_side(
     by default the scenario's first.
     """
     vessel, catalogue = scenario.vessel, load_catalogue()
-    plant = _plant(scenario, seed, vessel.tank, vessel.pump)
+    plant = plant_of(scenario, seed)
     version = vessel.version
     foreign = vessel.foreign
     drive: PumpDrive | CanopenPumpDrive | None = None

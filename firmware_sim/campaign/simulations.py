@@ -9,9 +9,9 @@ import numpy as np
 
 from firmware_sim.bench import run_in_turn
 from firmware_sim.figures import LEAST_ROLL_RAD, NO_TANK, bare_figures, run_figures
-from firmware_sim.plant import Plant
 from firmware_sim.run import RECORD_S, roll_without_tank
 from firmware_sim.scenario import PASSIVE, Scenario
+from firmware_sim.ship_side import plant_of
 from utank_hil.analysis.loop import sea_response
 from utank_hil.analysis.loop.loop_simulation import (
     SensorNoise,
@@ -150,6 +150,8 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
         raise ValueError("simulation: linear knows no steady heel: take nonlinear or bus")
     if ship.sway_of_slope or scenario.hull:
         raise ValueError("simulation: linear knows no sway: take nonlinear or bus")
+    if scenario.fmu:
+        raise ValueError("simulation: linear knows no ship of an FMU: take nonlinear or bus")
     moment = scenario.wave_moment(seed)
     count = round(scenario.duration_s / RECORD_S)
     at_rest = np.zeros(count)
@@ -220,16 +222,9 @@ class _PlantInWaves:
     """The bench's plant as `run_law` moves it, sensed without noise."""
 
     def __init__(self, scenario: Scenario, seed: int) -> None:
-        vessel = scenario.vessel
-        self.plant = Plant(
-            scenario.ship_at,
-            vessel.tank,
-            vessel.pump,
-            scenario.waves(seed),
-            hull=scenario.lateral_hull,
-        )
+        self.plant = plant_of(scenario, seed)
         self.power_w: list[float] = []  #: Power of the pump, every `RECORD_S`.
-        self._area_m2, self._tick = vessel.tank.reservoir_area_m2, 0
+        self._area_m2, self._tick = scenario.vessel.tank.reservoir_area_m2, 0
         self.plant.advance(0)
 
     def truth(self) -> FloatArray:

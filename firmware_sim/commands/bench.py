@@ -28,6 +28,7 @@ from utank_hil.console.common import (
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, progress_bar, timing_table
 from utank_hil.control import BuiltLaw
+from utank_hil.runners.node import ModelError
 from utank_hil.telemetry.ring import RingError
 
 if TYPE_CHECKING:
@@ -145,7 +146,8 @@ def _run(
         except OSError as error:
             if isinstance(error, RingError) or (error.errno == ENOSPC and error.filename is None):
                 fail(f"/dev/shm, the memory that processes share: {why(error)}", ExitCode.SYSTEM)
-            fail(error, ExitCode.USAGE if options.channel is None else ExitCode.NO_BUS)
+            of_bus = options.channel is not None and not isinstance(error, ModelError)
+            fail(error, ExitCode.NO_BUS if of_bus else ExitCode.USAGE)
 
 
 def _print(

@@ -58,7 +58,7 @@ Channel = Annotated[
     str | None, typer.Option(metavar="NAME", help="Bus to read of a log with several, as it says.")
 ]
 AllowCode = Annotated[
-    bool, typer.Option("--allow-code", help="Run Python code that the file names as a law.")
+    bool, typer.Option("--allow-code", help="Run code that the file names as a law or ship.")
 ]
 Duration = Annotated[
     float | None,

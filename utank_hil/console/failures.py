@@ -15,6 +15,7 @@ from utank_hil.console.terminal import notes
 
 EXTRA_OF: Final = {
     "asammdf": "files",
+    "fmpy": "models",
     **dict.fromkeys(("clarabel", "control", "dask", "distributed", "jinja2"), "bench"),
     **dict.fromkeys(("matplotlib", "numba"), "bench"),
     **dict.fromkeys(("pyarrow", "rerun", "rerun_cli"), "viewer"),

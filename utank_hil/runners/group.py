@@ -6,7 +6,15 @@ from math import gcd
 from typing import Final
 
 from utank_hil.canbus.frame import Frame
-from utank_hil.runners.node import LinkObserver, LoadObserver, Node, NodeError, Selective, Stoppable
+from utank_hil.runners.node import (
+    LinkObserver,
+    LoadObserver,
+    ModelError,
+    Node,
+    NodeError,
+    Selective,
+    Stoppable,
+)
 
 OUTSIDE: Final = -1  #: Sender index of a frame from outside the group.
 Send = Callable[[int, Frame, int], None]  #: Called as (sender's index, frame, time in ns).
@@ -23,7 +31,8 @@ class NodeGroup:
 
     `names` are by sender index; `next_tick_ns` is the time at which the next node is due.
     ValueError is raised if there is no node, a name comes twice, or a period is not positive. Every
-    method raises NodeError if a node raises, or `send` refuses its frame.
+    method raises NodeError if a node raises, or `send` refuses its frame; a ModelError in a tick
+    passes as it is.
     """
 
     def __init__(self, nodes: Sequence[Node]) -> None:
@@ -87,6 +96,8 @@ class NodeGroup:
                     due_ns[index] += (late_ns // period_ns + 1) * period_ns
                     for frame in tick(now_ns):
                         send(index, frame, now_ns)
+        except ModelError:
+            raise
         except Exception as error:
             raise _failure(self.names[index], "tick", now_ns, error) from error
         self.next_tick_ns = min(due_ns)

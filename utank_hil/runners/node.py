@@ -48,6 +48,10 @@ class NodeError(RuntimeError):
     """A node raised; the original exception is the `__cause__`, and the message names the node."""
 
 
+class ModelError(OSError):
+    """A model of another program failed, which a node runs; it leaves a runner as it is."""
+
+
 @runtime_checkable
 class LinkObserver(Protocol):
     """A node that is notified when the bus can't be reached."""
