@@ -16,7 +16,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # kernels of numpy, OpenBLAS and glibc as on a processor without fused products
 OLDER := NPY_DISABLE_CPU_FEATURES=X86_V3 OPENBLAS_CORETYPE=Nehalem GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA,-AVX2_Usable,-FMA_Usable
 
-.PHONY: help setup compiled bench test test-fast test-all mutants coverage evidence thesis search check format benchmark site sbom wheel docs lock clean
+.PHONY: help setup compiled bench test test-bus test-host test-older test-fast test-all mutants coverage evidence thesis search check format benchmark site sbom wheel docs lock clean
 
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
@@ -66,11 +66,21 @@ check: setup
 	$(VENV)/bin/lint-imports --no-logo
 	$(PYTHON) -m tools.documents.write --check
 
+# the bus needs a core of its own: what runs beside it gives way to its processes
 test: setup
-	$(MAKE) --no-print-directory --jobs=2 --output-sync=target check site
-	$(PARALLEL) -m "not socketcan and not evidence"
+	$(MAKE) --no-print-directory --jobs=2 test-bus check site test-host test-older
+
+# what it says comes in one piece, at its end
+test-bus: setup
+	@mkdir -p .cache
+	@tools/vcan $(VENV)/bin/pytest -m "socketcan and not evidence" tests/socketcan >.cache/bus.txt 2>&1; \
+		code=$$?; echo; cat .cache/bus.txt; exit $$code
+
+test-host: setup
+	nice -n 19 $(PARALLEL) -m "not socketcan and not evidence"
+
+test-older: setup
 	$(OLDER) $(VENV)/bin/pytest -m "not evidence" tests/replay tests/base/test_elementary.py tests/base/test_ordered_sums.py
-	tools/vcan $(VENV)/bin/pytest -m "socketcan and not evidence" tests/socketcan
 
 test-fast: setup
 	$(PARALLEL) -m "not socketcan and not slow and not evidence" --hypothesis-profile=few

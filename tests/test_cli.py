@@ -68,8 +68,18 @@ def test_help_of_every_command_has_an_example_that_parses(application, words, na
     assert "…" not in narrow.stdout  # cut
 
 
+@pytest.mark.evidence(
+    "naval_self_tuning",
+    "patti_b_self_tuning",
+    "self_tuned",
+    "self_tuning",
+    "adaptive_gpc_storm",
+    "adaptive_gpc",
+    "adaptive_dpc_roll",
+    "adaptive_dpc",
+    "dpc",
+)
 @pytest.mark.slow
-@pytest.mark.evidence("naval_self_tuning", "patti_b_self_tuning", "self_tuned", "self_tuning")
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 def test_shipped_controllers_pass_their_check(path: Path) -> None:
     result = invoke(app, "check", path, "--json")
@@ -277,7 +287,7 @@ def test_interrupted_bench_reports_what_it_has_and_leaves_a_readable_recording(
     assert min(each["time_s"][-1] for each in recording.values()) < report["end_s"] + 0.05
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_bench_interrupted_at_once_says_so(tmp_path: Path) -> None:
     with bench_process("--duration", "36000", "--out", str(tmp_path / "out")) as process:
         wait_for_workers(process, 0.0)  # as soon as there is one

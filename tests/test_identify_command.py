@@ -84,6 +84,7 @@ def test_refused_model_leaves_reasons_and_nothing_of_an_earlier_acceptance(
     assert [path.name for path in (tmp_path / "out-2").iterdir()] == ["identification.png"]
 
 
+@pytest.mark.evidence
 def test_configuration_that_is_read_is_not_written_over(accepted) -> None:
     folder, _ = accepted
     given = folder / "out" / "identified_controller.yaml"

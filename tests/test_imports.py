@@ -154,6 +154,7 @@ def dependencies(names: Iterable[str]) -> set[str]:
 PROJECT = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
+@pytest.mark.evidence("check configs/scenarios/voyage.yaml", "check configs/ships/patti_b.yaml")
 @pytest.mark.parametrize(
     "words",
     [
@@ -182,6 +183,7 @@ def test_the_controllers_commands_need_nothing_but_the_dependencies_without_extr
     assert set(foreign) <= {"utank_hil", "firmware_sim", "_distutils_hack", "charset_normalizer"}
 
 
+@pytest.mark.evidence
 def test_a_recording_that_can_not_be_is_said_with_the_extra_and_the_controller_runs(
     tmp_path: Path,
 ) -> None:
@@ -194,6 +196,7 @@ def test_a_recording_that_can_not_be_is_said_with_the_extra_and_the_controller_r
     assert FrameLog(log).head["about"]["command"] == "run"
 
 
+@pytest.mark.evidence("utank_hil-words1-rerun")
 @pytest.mark.parametrize(
     ("module", "words", "package"),
     [

@@ -68,6 +68,7 @@ def test_events_are_told_as_they_happen_and_the_ship_is_kept_when_she_is_retuned
     assert load_config(config, ControllerConfig).vessel.ship.inertia_kg_m2 == 1.8e9
 
 
+@pytest.mark.evidence
 def test_events_that_were_too_many_are_counted(capfd: pytest.CaptureFixture[str]) -> None:
     announcer = Announcer()
     for _ in range(500):
@@ -78,6 +79,7 @@ def test_events_that_were_too_many_are_counted(capfd: pytest.CaptureFixture[str]
     assert f"{500 - said.count('retuning REFUSED')} events were lost" in said
 
 
+@pytest.mark.evidence
 def test_without_a_folder_it_tells_and_writes_nothing(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -89,6 +91,7 @@ def test_without_a_folder_it_tells_and_writes_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.evidence
 def test_ship_that_can_not_be_written_is_told_and_the_next_event_too(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -226,7 +226,7 @@ def test_ship_that_a_scenario_changes_is_checked_too(
     assert reason in why
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_limitless_margins_say_how_far_they_were_searched() -> None:
     path = CONFIGS / "controllers" / "gpc.yaml"
     text = invoke("check", path).stdout
@@ -340,6 +340,7 @@ def test_nonlinear_law_that_is_unstable_at_rest_is_refused_unless_the_file_accep
     assert "accepted by the configuration" in accepted.stdout
 
 
+@pytest.mark.evidence("1230000000000.0-False")
 @pytest.mark.slow
 @pytest.mark.parametrize(("weight", "hardly"), [(1e-6, True), (1.23e12, False)])
 def test_law_that_hardly_acts_is_told_so(tmp_path: Path, weight: float, hardly: bool) -> None:

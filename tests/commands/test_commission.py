@@ -352,6 +352,7 @@ def test_stopped_by_the_operator_it_is_not_passed(
     assert "was not passed" in reason(file)
 
 
+@pytest.mark.evidence
 def test_who_arms_before_the_stage_asks_for_it_is_told_to_wait(
     file: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -105,7 +105,7 @@ def test_run_names_what_the_system_refuses_and_hides_no_defect(
     assert result.exit_code == (ExitCode.SYSTEM if named else 1)
 
 
-@pytest.mark.evidence("full-stdout", "closed-stderr")
+@pytest.mark.evidence("full-stdout", "closed-stderr", "closed-stdout")
 @pytest.mark.slow
 @pytest.mark.parametrize("stream", ["stdout", "stderr"])
 @pytest.mark.parametrize("gone", ["full", "closed"])

@@ -191,7 +191,7 @@ def test_the_same_record_is_read_from_every_kind_of_log(tmp_path: Path) -> None:
         np.testing.assert_array_equal(record[1:], expected[1:], err_msg=name)
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_a_ship_is_identified_from_a_table_in_other_units(tmp_path: Path) -> None:
     (signals,) = read_signals(RETUNED).values()
     theirs = {

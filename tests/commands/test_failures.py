@@ -84,6 +84,7 @@ def test_other_errors_are_those_of_the_program() -> None:
         raise OSError(errno.ECONNRESET, "reset")
 
 
+@pytest.mark.evidence("words1")
 @pytest.mark.parametrize("words", [("check", SHIP), ("check", SHIP, "--json")])
 def test_a_full_disk_behind_standard_output_is_said(words: tuple[str, ...]) -> None:
     with Path("/dev/full").open("w") as full:
@@ -99,6 +100,7 @@ def test_a_pipe_that_nobody_reads_is_no_refusal() -> None:
         assert started(("check", SHIP), stdout=closed).returncode == ExitCode.USAGE
 
 
+@pytest.mark.evidence("2>&-", "<&-")
 @pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
 def test_a_closed_standard_stream_is_nothing_and_its_number_is_not_another_file_s(
     tmp_path: Path, closed: str
@@ -122,6 +124,7 @@ def test_no_output_at_all_ends_with_the_same_code() -> None:
         assert started(("check", SHIP), stdout=full, stderr=full).returncode == ExitCode.USAGE
 
 
+@pytest.mark.evidence
 def test_a_terminal_that_lacks_a_sign_gets_a_question_mark() -> None:
     done = started(("check", GPC), stdout=subprocess.PIPE, encoding="ascii")
     assert done.returncode == ExitCode.OK, done.stderr

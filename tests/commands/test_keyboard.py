@@ -136,6 +136,7 @@ def test_end_of_a_terminal_stops_and_leaves(
         raise AssertionError("it stays")
 
 
+@pytest.mark.evidence("ctrl-d")
 @pytest.mark.slow
 @pytest.mark.parametrize("how", ["ctrl-d", "closed"])
 def test_the_command_sends_its_stop_before_it_ends_with_its_terminal(how: str) -> None:

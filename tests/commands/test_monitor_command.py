@@ -47,6 +47,7 @@ def refused(*words: str) -> str:
     return " ".join(result.stderr.split())
 
 
+@pytest.mark.evidence("bench configs/scenarios/storm_day.yaml --duration 1 --view --json --out")
 @pytest.mark.usefixtures("one_process")
 @pytest.mark.parametrize(
     "command",
@@ -80,6 +81,7 @@ def test_a_stream_whose_port_was_taken_is_refused_instead_of_showing_nothing(
     )
 
 
+@pytest.mark.evidence
 def test_a_run_says_that_its_viewer_found_its_port_taken_and_goes_on(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], taken: socket.socket
 ) -> None:

@@ -23,6 +23,7 @@ def check(folder: Path, shipped: str, ship: str, **law: Any) -> dict[str, Any]:
     return json.loads(CliRunner().invoke(app, ["check", str(file), "--json"]).stdout)
 
 
+@pytest.mark.evidence("change0")
 @pytest.mark.parametrize("change", [{}, {"output_weight": [1e16]}])
 def test_what_is_named_passes_when_it_is_written(tmp_path: Path, change: dict[str, Any]) -> None:
     refused = check(tmp_path, "gpc", "naval_vessel", **change)
@@ -34,6 +35,7 @@ def test_what_is_named_passes_when_it_is_written(tmp_path: Path, change: dict[st
     assert mended["remedy"] is None
 
 
+@pytest.mark.evidence
 def test_where_no_gentler_weight_passes_the_law_that_finds_its_numbers_is_named(
     tmp_path: Path,
 ) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
+from PIL import Image
 from ports import QuietBus
 from typer.testing import CliRunner
 
@@ -21,6 +22,8 @@ from utank_hil.cli import app
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict, write_report_page
+from utank_hil.reports import parts
+from utank_hil.reports import recording as of_recording
 from utank_hil.reports.page import write_page
 from utank_hil.telemetry.recording import write_recording
 
@@ -75,18 +78,42 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
-def test_the_page_of_a_recording_says_what_happened(recording: Path, tmp_path: Path) -> None:
-    page = write_page([recording], tmp_path / "page.html").read_text(encoding="utf-8")
+@pytest.fixture(scope="module")
+def page(recording: Path) -> Path:
+    """The page that the command makes of it."""
+    page = recording.with_name("page.html")
+    done = CliRunner().invoke(app, ["report", str(recording), "--out", str(page), "--json"])
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout) == {"page": str(page), "bytes": page.stat().st_size}
+    return page
+
+
+@pytest.fixture
+def one_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures of reports cost no time where only the words matter."""
+
+    def drawn(*given: object) -> Path:
+        (file,) = (each for each in given if isinstance(each, Path))
+        Image.new("L", (1, 1)).save(file)
+        return file
+
+    monkeypatch.setattr(parts, "draw_roll_statistics", drawn)
+    monkeypatch.setattr(of_recording, "draw_bench", drawn)
+
+
+def test_the_page_of_a_recording_says_what_happened(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
     rms = math.degrees(0.03 / math.sqrt(2))
-    assert f"{rms:.2f}° RMS, 50% less than the {2 * rms:.2f}° of its passive twin" in page
-    assert "In charge for 75% of the time" in page
-    assert 'class="verdict bad"' in page
-    assert "A reservoir is &lt;full&gt;. Look at it." in page
+    assert f"{rms:.2f}° RMS, 50% less than the {2 * rms:.2f}° of its passive twin" in text
+    assert "In charge for 75% of the time" in text
+    assert 'class="verdict bad"' in text
+    assert "A reservoir is &lt;full&gt;. Look at it." in text
     for begin, mode in ((0.0, "STANDBY"), (20.0, "ACTIVE"), (200.0, "FAULT")):
-        assert re.search(rf"{begin:.1f} s</td><td[^>]*>{mode}<", page)
-    assert "kind: gpc" in page  # the whole configuration
+        assert re.search(rf"{begin:.1f} s</td><td[^>]*>{mode}<", text)
+    assert "kind: gpc" in text  # the whole configuration
 
 
+@pytest.mark.usefixtures("one_pixel")
 def test_alarms_of_a_later_part_are_those_of_the_run_and_without_a_log_not_known(
     recording: Path, tmp_path: Path
 ) -> None:
@@ -100,6 +127,7 @@ def test_alarms_of_a_later_part_are_those_of_the_run_and_without_a_log_not_known
     assert "Not known: there is no log-20260101T000000Z.jsonl beside it." in page
 
 
+@pytest.mark.usefixtures("one_pixel")
 def test_the_log_of_a_run_is_found_by_the_name_of_its_recording(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -126,6 +154,7 @@ def of_roll(path: Path, roll_rad: np.ndarray, runs: tuple[str, ...] = ("run",)) 
     return path
 
 
+@pytest.mark.usefixtures("one_pixel")
 def test_gaps_in_the_roll_are_left_out_of_its_figures(tmp_path: Path) -> None:
     roll = 0.03 * np.sin(0.5 * 0.05 * np.arange(5000))
     roll[:10] = roll[1000:1500] = np.nan
@@ -148,14 +177,13 @@ def test_what_no_report_can_be_made_of_is_refused(tmp_path: Path) -> None:
         write_page([bench], tmp_path / "page.html")
 
 
-def test_the_page_needs_nothing_else_and_is_whole(recording: Path, tmp_path: Path) -> None:
-    written = write_page([recording], tmp_path / "page.html")
-    assert written.stat().st_size < 5e6
-    page = written.read_text(encoding="utf-8")
+def test_the_page_needs_nothing_else_and_is_whole(page: Path) -> None:
+    assert page.stat().st_size < 5e6
+    text = page.read_text(encoding="utf-8")
     links = _Links()
-    links.feed(page)
+    links.feed(text)
     assert links.open == []
-    assert "http" not in page.replace("https://", "http://").split("<details>")[0]
+    assert "http" not in text.replace("https://", "http://").split("<details>")[0]
     assert len(links.targets) == 2
     for target in links.targets:
         kind, _, content = target.partition(",")
@@ -175,6 +203,7 @@ def test_cells_are_escaped(tmp_path: Path) -> None:
     assert 'class="verdict"' in page
 
 
+@pytest.mark.usefixtures("one_pixel")
 def test_a_recording_of_another_version_is_named(tmp_path: Path) -> None:
     file = tmp_path / "old.rrd"
     rows = np.zeros((100, len(SIGNALS)))
@@ -184,6 +213,7 @@ def test_a_recording_of_another_version_is_named(tmp_path: Path) -> None:
         write_page([file], tmp_path / "page.html")
 
 
+@pytest.mark.usefixtures("one_pixel")
 def test_a_full_disk_is_said_with_the_page_and_leaves_no_half_of_it(
     recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -215,10 +245,3 @@ def test_what_is_no_run_is_named(tmp_path: Path, name: str, expected: str) -> No
         write_page([tmp_path / name], tmp_path / "page.html")
     assert expected in str(caught.value)
     assert str(tmp_path / name) in str(caught.value)
-
-
-def test_the_command_prints_the_page(recording: Path, tmp_path: Path) -> None:
-    page = tmp_path / "page.html"
-    done = CliRunner().invoke(app, ["report", str(recording), "--out", str(page), "--json"])
-    assert done.exit_code == 0, done.output
-    assert json.loads(done.stdout) == {"page": str(page), "bytes": page.stat().st_size}

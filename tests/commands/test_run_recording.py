@@ -180,6 +180,7 @@ def test_recorder_that_fails_on_the_way_is_told_with_its_file(
     assert summary.rows is None
 
 
+@pytest.mark.evidence("15-the recorder ended before the run")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "words"),
@@ -203,7 +204,7 @@ def test_recorder_that_is_ended_is_told_once_while_the_run_goes_on(
     assert recording.summary.error == words
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_run_says_within_a_second_that_nothing_is_recorded_or_logged_any_longer(
     tmp_path: Path,
 ) -> None:

@@ -167,6 +167,7 @@ def words_seen(file: Path, ships: int, height: int) -> int:
     return int((shown.min(axis=-1) > 150).sum())
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize("ships", [1, pytest.param(MOST_SHADES, marks=pytest.mark.evidence)])
 def test_the_longest_words_of_faults_are_not_cut(
     browser: Browser, tmp_path: Path, ships: int

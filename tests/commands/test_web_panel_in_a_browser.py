@@ -124,6 +124,7 @@ def test_two_pages_see_each_others_orders(
         shows(first, "STANDBY")
 
 
+@pytest.mark.evidence("day", "dusk")
 @pytest.mark.parametrize("palette", ["day", "dusk", "night"])
 def test_nothing_is_cut_and_night_is_red(at: tuple[Bench, Opened], palette: str) -> None:
     made, seen = at

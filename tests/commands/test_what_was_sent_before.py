@@ -50,6 +50,7 @@ def slow_scheduling() -> Iterator[object]:
         yield report
 
 
+@pytest.mark.evidence("commission")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["run", "commission"])
 def test_the_loop_is_handed_no_frame_that_came_before_it_began(

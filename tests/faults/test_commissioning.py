@@ -58,6 +58,7 @@ def failed(node: CommissioningNode) -> dict[str, str]:
     return {check.name: check.remedy for check in node.checks() if not check.passed}
 
 
+@pytest.mark.evidence("gpc", "naval_constrained_gpc", "patti_b_constrained_gpc")
 @pytest.mark.parametrize(
     "name", ["gpc", "naval_constrained_gpc", "patti_b_constrained_gpc", "pump_with_valve"]
 )
@@ -139,6 +140,7 @@ def test_a_wrong_sensor_fails_its_own_checks_with_its_remedy(
     assert word in found[min(names, key=list(found).index)]
 
 
+@pytest.mark.evidence("0.6-blockage", "0.0-no pressure")
 @pytest.mark.parametrize(("factor", "word"), [(-1.0, "pushes to port"), (0.6, "blockage"),
                                               (0.0, "no pressure")])  # fmt: skip
 def test_a_pump_that_turns_the_other_way_is_weak_or_stalled_is_named(
@@ -391,6 +393,7 @@ LEVELS_BY_PUMP = dict.fromkeys(LEVELS, (1 + SCALE) ** 2)
 """Gauges that pass by a pressure that passes, too."""
 
 
+@pytest.mark.evidence("rate too small", "levels", "levels and pressure", "pressure")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "scaled",

@@ -143,6 +143,7 @@ def test_what_is_found_before_it_counts_has_no_more_time_to_zero() -> None:
     assert (found["found"], found["zero"]) == (0.0, 2010.0)
 
 
+@pytest.mark.evidence("motion-silent")
 @pytest.mark.slow
 @pytest.mark.parametrize("row", ["motion-silent", "tank-silent"])
 def test_a_ramp_that_is_a_cut_is_not_passed(row: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,6 +161,7 @@ def test_what_the_operator_does_is_not_taken_for_the_fault() -> None:
     assert outcome_of(row_of("none", operator=(accepts,))).wire != ""
 
 
+@pytest.mark.evidence("3")
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 3])
 def test_a_fault_that_changes_nothing_is_not_on_the_bus(seed: int) -> None:
@@ -202,7 +204,14 @@ def differs(sea: Sea, row: Row, whole: list[Heard], seconds: float) -> bool:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [row.id for row in CAMPAIGN.rows if len(row.fault.inject) > 1])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(row.id, marks=() if row.id == "second-panel-arms" else pytest.mark.evidence)
+        for row in CAMPAIGN.rows
+        if len(row.fault.inject) > 1
+    ],
+)
 def test_of_a_row_with_several_faults_each_is_on_the_bus(name: str) -> None:
     """A row that needs them all could otherwise pass with one of them."""
     row = ROWS[name]
@@ -234,6 +243,10 @@ def _after(seconds: float, mode: Mode) -> Callable[[Supervisor, Measurements, in
     return while_faulted
 
 
+@pytest.mark.evidence(
+    "Supervisor-_while_faulted-while_faulted-levels-stuck-not latched",
+    "Supervisor-_while_faulted-while_faulted-levels-stuck-armed again",
+)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("owner", "name", "broken", "row", "words"),
@@ -338,7 +351,7 @@ def test_a_copy_of_the_process_hands_back_what_it_did_and_changes_nothing() -> N
         in_a_copy(lambda: time.sleep(3600), lambda: True)
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_a_stopped_ship_alone_rolls_as_she_does_on_the_bench() -> None:
     row = ROWS["motion-silent"]
     alone, bench = (
@@ -372,13 +385,13 @@ def outcome_of(row: Row, *, seed: int = 1, patient: bool = False) -> Outcome:
 
 
 def quick_rows() -> list[Row]:
-    """Rows below 100 s that are the first of a requirement, or of a fault's name."""
+    """Rows of a few seconds that are the first of a requirement, or of a fault's name."""
     seen: set[str] = set()
     rows = []
     for row in CAMPAIGN.rows:
         codes = row.expect.codes
         shows = {*row.meets, *codes[:1], *(f"{code} alone" for code in codes if len(codes) == 1)}
-        if row.fault.followed_s < 100.0 and not shows <= seen:
+        if row.fault.setup == "pump" and row.fault.followed_s <= 6.0 and not shows <= seen:
             rows.append(row)
             seen |= shows
     return rows
@@ -394,7 +407,7 @@ def results_of(rows: Sequence[Row]) -> dict[str, Result]:
 
 @pytest.fixture(scope="module")
 def results() -> dict[str, Result]:
-    return results_of(quick_rows())
+    return results_of([row for row in CAMPAIGN.rows if not row.long])
 
 
 def assert_all_passed(results: Mapping[str, Result]) -> None:
@@ -408,16 +421,18 @@ def assert_all_passed(results: Mapping[str, Result]) -> None:
 
 
 @pytest.mark.slow
-def test_a_row_of_each_requirement_is_passed_in_one_sea(results: dict[str, Result]) -> None:
+def test_quick_rows_are_passed_in_one_sea() -> None:
+    assert_all_passed(results_of(quick_rows()))
+
+
+@pytest.mark.evidence
+def test_every_row_is_passed_in_one_sea_and_its_fault_was_on_the_bus(
+    results: dict[str, Result],
+) -> None:
     assert_all_passed(results)
 
 
 @pytest.mark.evidence
-def test_every_row_is_passed_in_one_sea_and_its_fault_was_on_the_bus() -> None:
-    assert_all_passed(results_of([row for row in CAMPAIGN.rows if not row.long]))
-
-
-@pytest.mark.slow
 def test_every_fault_of_the_table_was_the_name_of_one(results: dict[str, Result]) -> None:
     named = {code for each in results.values() for code in each.codes}
     named |= {
@@ -425,11 +440,11 @@ def test_every_fault_of_the_table_was_the_name_of_one(results: dict[str, Result]
         for each in results.values()
         if len(each.row.expect.codes) == 1 and each.outcomes[0].alarm is not None
     }
-    # the first one's row takes long; of the other the valve itself says it first in this sea
-    assert {row.code.name for row in FAULTS} - named == {"STABILITY_LOW", "VALVE_NOT_FOLLOWING"}
+    # the first one's row takes long; of the other the valve itself may say it first
+    assert {row.code.name for row in FAULTS} - named <= {"STABILITY_LOW", "VALVE_NOT_FOLLOWING"}
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 @pytest.mark.usefixtures("one_process")
 def test_the_same_rows_again_give_the_same_to_the_last_digit(results: dict[str, Result]) -> None:
     names = ("noise-10-fold", "flood-80-percent", "gateway-loses-5-percent", "rate-stuck")
@@ -457,7 +472,7 @@ def invoke(*arguments: str):
     return CliRunner().invoke(app, arguments)
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 @pytest.mark.usefixtures("one_process")
 def test_command_prints_one_object_and_writes_recordings(tmp_path: Path) -> None:
     done = invoke("--rows", "roll-spike,F26", "--seeds", "1", "--json", "--out", str(tmp_path))
@@ -472,16 +487,15 @@ def test_command_prints_one_object_and_writes_recordings(tmp_path: Path) -> None
     assert [each["id"] for each in told["not_run"]] == ["F26"]
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("one_process")
-def test_a_row_that_fails_is_told_by_the_exit_code(tmp_path: Path) -> None:
-    before, _, after = TEXT.partition("id: roll-spike,")
-    strict = f"{before}id: roll-spike,{after.replace('found_ms: 30', 'found_ms: 1', 1)}"
-    path = tmp_path / "strict.yaml"
-    path.write_text(strict.replace("../scenarios", str(Path("configs/scenarios").resolve())))
-    done = invoke(str(path), "--rows", "roll-spike", "--seeds", "1")
-    assert done.exit_code == ExitCode.REFUSED
-    assert "1 allowed" in done.output
+@pytest.mark.parametrize(("found_ms", "late"), [(500.0, False), (1e6, True)])
+def test_a_row_that_fails_is_told_by_the_exit_code(
+    found_ms: float, late: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    outcome = replace(GOOD, found=found_ms)
+    monkeypatch.setattr(runner, "run_rows", lambda *_, **__: {GOOD.row: [outcome]})
+    done = invoke("--rows", GOOD.row, "--seeds", "1")
+    assert done.exit_code == (ExitCode.REFUSED if late else ExitCode.OK), done.output
+    assert ("allowed" in done.output) is late
 
 
 @pytest.mark.parametrize(

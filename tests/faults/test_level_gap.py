@@ -13,8 +13,7 @@ NAVAL = load_config(Path("configs/scenarios/naval_vessel.yaml"), Scenario)
 HIGHER = NAVAL.model_copy(update={"sea": NAVAL.sea.model_copy(update={"hs_m": 0.8})})
 
 
-@pytest.mark.evidence("3", "4")
-@pytest.mark.slow
+@pytest.mark.evidence
 @pytest.mark.parametrize("seed", [2, 3, 4])
 def test_a_law_that_plans_keeps_its_level_limit_through_gaps_of_the_gauges(seed: int) -> None:
     """With the last level held it took the water to the high-level switches in all three seas."""

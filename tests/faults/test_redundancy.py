@@ -155,6 +155,9 @@ WRONG = {
 }
 
 
+@pytest.mark.evidence(
+    "noisy-sensors", "in degrees-sensors", "a degree apart-sensors", "a degree apart-sensors_2"
+)
 @pytest.mark.parametrize(
     ("wrong", "name"),
     [  # the noise of one that is not in use is no difference
@@ -291,6 +294,7 @@ def test_a_ship_with_redundancy_is_another_configuration_and_one_without_is_as_b
     assert both.version != without.version
 
 
+@pytest.mark.evidence
 def test_commissioning_checks_the_second_sensor_against_the_first() -> None:
     naval = controller("naval_constrained_gpc")
     vessel = naval.vessel.model_copy(update={"redundancy": BOTH})
@@ -347,6 +351,7 @@ def test_a_sensor_that_falls_silent_in_the_tick_of_active_ends_the_commissioning
     assert (node.stage, node.ended) == (Stage.DONE, said)
 
 
+@pytest.mark.evidence("-1.0")
 @pytest.mark.slow
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_commissioning_ends_where_the_level_goes_too_far_to_either_side(sign: float) -> None:

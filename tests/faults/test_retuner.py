@@ -110,6 +110,7 @@ class Voyage:
 IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED, UNDONE = RetuningState
 
 
+@pytest.mark.evidence
 def test_hung_or_dead_retuner_is_noticed_in_time_and_changes_nothing() -> None:
     hung = Voyage(Broken(None)).run(90)
     refusing = Voyage(Broken(Refusal(("no",)))).run(90)
@@ -122,6 +123,7 @@ def test_hung_or_dead_retuner_is_noticed_in_time_and_changes_nothing() -> None:
     assert (hung.node.mode, hung.node.fault) == (Mode.ACTIVE, Fault.NONE)
 
 
+@pytest.mark.evidence
 def test_after_a_refusal_the_law_is_the_one_it_was() -> None:
     # with pulses of no pressure a refused identification leaves no trace at all
     def silent(retuner: Retuner | None) -> Voyage:
@@ -136,6 +138,7 @@ def test_after_a_refusal_the_law_is_the_one_it_was() -> None:
     assert tried.heard.commands == silent(None).heard.commands
 
 
+@pytest.mark.evidence("nonsense0", "nonsense1", "nonsense3", "nonsense4")
 @pytest.mark.parametrize(
     "nonsense",
     [
@@ -156,6 +159,7 @@ def test_nonsense_that_looks_like_a_law_is_refused(nonsense: Candidate) -> None:
     assert voyage.node.mode is Mode.ACTIVE
 
 
+@pytest.mark.evidence("on trial")
 @pytest.mark.parametrize("failing", ["on trial", "all"])
 def test_law_that_fails_on_trial_is_never_in_charge_again(failing: str) -> None:
     script = (*SCRIPT, TimedAction(75.0, Action.DISARM), TimedAction(77.0, Action.RESET),

@@ -70,8 +70,7 @@ class Shut:
         self._law.reset()
 
 
-@pytest.mark.evidence("True")
-@pytest.mark.slow
+@pytest.mark.evidence
 @pytest.mark.parametrize("pump", [False, True])
 def test_a_valve_that_rolls_the_ship_more_than_an_open_one_is_found_by_her_twin(
     pump: bool,

@@ -66,7 +66,7 @@ def passive() -> np.ndarray:
     return passive
 
 
-@pytest.mark.evidence("dpc-0", "self-tuning-0")
+@pytest.mark.evidence("dpc-0", "self-tuning-0", "gpc-10")
 @pytest.mark.parametrize(
     ("controller", "one_of"), [*((name, 0) for name in sorted(storm().controllers)), ("gpc", 10)]
 )
@@ -80,6 +80,7 @@ def test_twin_rolls_as_the_passive_ship_does_within_three_percent(
     assert np.corrcoef(active[60:, 1], passive[60:, 0])[0, 1] > 0.99
 
 
+@pytest.mark.evidence("100")
 @pytest.mark.parametrize("one_of", [7, 100])
 def test_sensors_look_sound_whatever_share_of_the_ticks_is_lost(one_of: int) -> None:
     bench, _ = recorded(ARMED, one_of=one_of, seconds=70)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from integrated_roll import integrated_roll
+from one_process import in_one_process
 
 from firmware_sim import report
 from firmware_sim.bench import (
@@ -48,14 +49,10 @@ SETTLE_S = 40.0
 
 
 @pytest.fixture(scope="module")
-def storm() -> tuple[BenchResult, list[tuple[str, float]]]:
-    progress: list[tuple[str, float]] = []
-    result = run_bench(
-        STORM.model_copy(update={"settle_s": SETTLE_S}),
-        BenchOptions(duration_s=DURATION_S),
-        lambda name, done_s: progress.append((name, done_s)),
-    )
-    return result, progress
+def storm() -> BenchResult:
+    scenario = STORM.model_copy(update={"settle_s": SETTLE_S})
+    with in_one_process():
+        return run_bench(scenario, BenchOptions(duration_s=DURATION_S), lambda *_: None)
 
 
 def about(result: BenchResult, folder: Path) -> dict[str, Any]:
@@ -63,32 +60,28 @@ def about(result: BenchResult, folder: Path) -> dict[str, Any]:
 
 
 def test_every_run_has_its_rows_on_one_grid_and_the_passive_one_comes_first(storm) -> None:
-    result, progress = storm
-    assert [run.name for run in result.runs] == ["passive", *STORM.controllers]
-    for run in result.runs:
+    assert [run.name for run in storm.runs] == ["passive", *STORM.controllers]
+    for run in storm.runs:
         assert run.rows.shape == (round(DURATION_S / RECORD_S), len(COLUMNS))
         np.testing.assert_allclose(np.diff(run.column("time_s")), RECORD_S, atol=1e-9)
         told = [name not in ESTIMATED for name in COLUMNS]
         assert np.isfinite(run.rows[:, told]).all()
         assert run.refused_commands == 0
-    assert (result.duration_s, result.not_run, result.interrupted) == (DURATION_S, (), False)
-    assert (result.settle_s, result.end_s) == pytest.approx((SETTLE_S, DURATION_S))
-    assert len(result.without_tank_rad) == len(result.runs[0].rows)
-    assert figures(result).endings == ()
-    assert figures(result).exit_code == ExitCode.OK
-    assert {name for name, _ in progress} == {run.name for run in result.runs}
-    assert max(done_s for _, done_s in progress) <= DURATION_S
+    assert (storm.duration_s, storm.not_run, storm.interrupted) == (DURATION_S, (), False)
+    assert (storm.settle_s, storm.end_s) == pytest.approx((SETTLE_S, DURATION_S))
+    assert len(storm.without_tank_rad) == len(storm.runs[0].rows)
+    assert figures(storm).endings == ()
+    assert figures(storm).exit_code == ExitCode.OK
 
 
 def test_people_on_board_are_judged_over_the_window_and_stand_in_the_json(storm) -> None:
-    result, _ = storm
-    told = figures(result).as_json({}, {})["on_board"]
-    assert list(told["runs"]) == ["no tank", *(run.name for run in result.runs)]
+    told = figures(storm).as_json({}, {})["on_board"]
+    assert list(told["runs"]) == ["no tank", *(run.name for run in storm.runs)]
     assert told["place"] == {"height_m": 4.88 + 4.88 - 1.83, "starboard_m": 8.55}
-    roll = result.runs[1].column("true_roll_rad")[round(SETTLE_S / RECORD_S) :]
+    roll = storm.runs[1].column("true_roll_rad")[round(SETTLE_S / RECORD_S) :]
     expected = on_board(roll, RECORD_S, Place(**told["place"]))
-    assert told["runs"][result.runs[1].name] == dataclasses.asdict(expected)
-    table = on_board_table(figures(result))
+    assert told["runs"][storm.runs[1].name] == dataclasses.asdict(expected)
+    table = on_board_table(figures(storm))
     assert table.row_count == len(told["runs"])
     assert "7.9 m above" in str(table.caption)
 
@@ -116,18 +109,16 @@ def test_plans_that_were_not_found_in_time_are_told() -> None:
 
 
 def test_all_runs_are_in_the_same_waves_and_those_are_the_scenarios(storm) -> None:
-    result, _ = storm
-    time_s = result.runs[0].column("time_s")
+    time_s = storm.runs[0].column("time_s")
     moment = STORM.wave_moment(STORM.seed).at(time_s)
-    for run in result.runs:
+    for run in storm.runs:
         np.testing.assert_allclose(
             run.column("wave_moment_nm"), moment, rtol=0, atol=1e-9 * np.abs(moment).max()
         )
 
 
 def test_measurements_stand_beside_the_truth_they_were_taken_of(storm) -> None:
-    result, _ = storm
-    for run in result.runs:
+    for run in storm.runs:
         roll, true = run.column("roll_rad")[10:], run.column("true_roll_rad")[10:]
         # 20 ms of sensor, 10 ms of bus, noise of 2e-4: the error is roll rate times age, and noise
         rate = np.abs(run.column("roll_rate_rad_s")[10:]).max()
@@ -137,31 +128,29 @@ def test_measurements_stand_beside_the_truth_they_were_taken_of(storm) -> None:
 
 
 def test_armed_runs_quiet_the_ship_and_the_passive_one_holds_zero_pressure(storm) -> None:
-    result, _ = storm
-    passive, *controlled = figures(result).compared
+    passive, *controlled = figures(storm).compared
     assert passive.mode == "PASSIVE"
     assert passive.active_share == 0.0
-    assert (result.runs[0].column("pressure_command_pa") == 0.0).all()
+    assert (storm.runs[0].column("pressure_command_pa") == 0.0).all()
     assert passive.pump.pressure_peak_pa < 1e3  # what the loop lets through at zero
     for run in controlled:
         assert (run.mode, run.fault) == ("ACTIVE", "NONE")
         assert run.active_share == 1.0
         assert run.roll_below_passive > 0.25
         assert run.pump.power_mean_w > 0
-    for run in result.runs[1:]:
+    for run in storm.runs[1:]:
         command_pa, limits = run.column("pressure_command_pa"), STORM.controllers[run.name].limits
         assert np.abs(command_pa).max() <= limits.pressure_pa
         assert np.abs(np.diff(command_pa)).max() <= limits.rate_pa_s * RECORD_S * (1 + 1e-9) + 8.0
 
 
 def test_figures_follow_from_the_rows(storm) -> None:
-    result, _ = storm
-    bare, runs = figures(result).no_tank, figures(result).compared
+    bare, runs = figures(storm).no_tank, figures(storm).compared
     skip = round(SETTLE_S / RECORD_S)
-    without = result.without_tank_rad[skip:]
+    without = storm.without_tank_rad[skip:]
     assert bare.rms_rad == pytest.approx(math.sqrt(np.mean(without**2)), rel=1e-12)
-    first = result.runs[0].column("true_roll_rad")[skip:]
-    for run, told in zip(result.runs, runs, strict=True):
+    first = storm.runs[0].column("true_roll_rad")[skip:]
+    for run, told in zip(storm.runs, runs, strict=True):
         roll = run.column("true_roll_rad")[skip:]
         rms = math.sqrt(np.mean(roll**2))
         assert told.roll.rms_rad == pytest.approx(rms, rel=1e-12)
@@ -178,20 +167,19 @@ def test_figures_follow_from_the_rows(storm) -> None:
 
 
 def test_report_leaves_picture_recording_and_figures_behind(storm, tmp_path: Path) -> None:
-    result, _ = storm
-    files, failures = write_report(result, figures(result), tmp_path, about(result, tmp_path))
+    files, failures = write_report(storm, figures(storm), tmp_path, about(storm, tmp_path))
     assert failures == []
     assert files["picture"].read_bytes().startswith(b"\x89PNG")
     recording = read_recording(files["recording"])
-    assert list(recording) == [run.name for run in result.runs]
-    for run in result.runs:
+    assert list(recording) == [run.name for run in storm.runs]
+    for run in storm.runs:
         for name in COLUMNS:
             np.testing.assert_allclose(
                 recording[run.name][name], run.column(name), rtol=1e-6, atol=1e-6, err_msg=name
             )
     told = json.loads(files["figures"].read_text(), parse_constant=pytest.fail)
     known = {name: path for name, path in files.items() if name != "report"}
-    expected = figures(result).as_json(known, about(result, tmp_path))
+    expected = figures(storm).as_json(known, about(storm, tmp_path))
     assert told | {"date": ""} == json.loads(json.dumps(expected, allow_nan=False)) | {"date": ""}
     assert [run["name"] for run in told["runs"]] == list(recording)
     assert told["files"]["picture"] == str(files["picture"])
@@ -210,13 +198,12 @@ def test_report_leaves_picture_recording_and_figures_behind(storm, tmp_path: Pat
 
 
 def test_picture_says_the_same_figures_as_the_table(storm, tmp_path: Path, monkeypatch) -> None:
-    result, _ = storm
     drawn: list[BenchCurve] = []
     monkeypatch.setattr(report, "draw_bench", lambda curves, *_, **__: drawn.extend(curves))
-    report._draw(result, figures(result), about(result, tmp_path), tmp_path / "bench.png")
-    cells = [list(column.cells) for column in motion_table(figures(result)).columns]
+    report._draw(storm, figures(storm), about(storm, tmp_path), tmp_path / "bench.png")
+    cells = [list(column.cells) for column in motion_table(figures(storm)).columns]
     table = {row[0]: row for row in zip(*cells, strict=True)}
-    for run, curve in zip(result.runs, drawn, strict=True):
+    for run, curve in zip(storm.runs, drawn, strict=True):
         name, rms, _, _, _, below, _, _ = table[run.name]
         assert f"{name}: roll {rms}° RMS" in curve.label
         if below:
@@ -226,24 +213,35 @@ def test_picture_says_the_same_figures_as_the_table(storm, tmp_path: Path, monke
             assert sign * int(share[2]) == pytest.approx(float(below.rstrip("%")), abs=0.51)
 
 
+@pytest.mark.evidence
 def test_what_can_not_be_written_is_named_and_the_rest_is_there(storm, tmp_path: Path) -> None:
-    result, _ = storm
     (tmp_path / "bench.rrd").mkdir()
-    files, failures = write_report(result, figures(result), tmp_path, about(result, tmp_path))
+    files, failures = write_report(storm, figures(storm), tmp_path, about(storm, tmp_path))
     assert set(files) == {"picture", "figures", "report"}
     assert [failure.split()[1] for failure in failures] == ["recording"]
     assert set(json.loads(files["figures"].read_text())["files"]) == {"picture", "figures"}
 
 
-def test_same_seed_same_rows_in_any_process_and_another_seed_another_sea(storm) -> None:
-    result, _ = storm
-    for job, run in zip(jobs_of(STORM, STORM.seed, 20.0), result.runs, strict=True):
+def test_same_seed_same_rows_and_another_seed_another_sea(storm) -> None:
+    for job, run in zip(jobs_of(STORM, STORM.seed, 20.0), storm.runs, strict=True):
         again = run_lockstep(job)
         assert again.rows.tobytes() == run.rows[: len(again.rows)].tobytes()
     other = run_lockstep(jobs_of(STORM, 99, 5.0)[0])
     assert not np.array_equal(
-        other.column("wave_moment_nm"), result.runs[0].column("wave_moment_nm")[:100]
+        other.column("wave_moment_nm"), storm.runs[0].column("wave_moment_nm")[:100]
     )
+
+
+@pytest.mark.evidence
+def test_processes_tell_how_far_they_are_and_give_the_same_rows(storm) -> None:
+    progress: list[tuple[str, float]] = []
+    result = run_bench(
+        STORM, BenchOptions(duration_s=20.0), lambda name, done_s: progress.append((name, done_s))
+    )
+    assert {name for name, _ in progress} == {run.name for run in storm.runs}
+    assert max(done_s for _, done_s in progress) <= 20.0
+    for run, alone in zip(result.runs, storm.runs, strict=True):
+        assert run.rows.tobytes() == alone.rows[: len(run.rows)].tobytes()
 
 
 def cut(run: Run, rows: slice) -> Run:
@@ -251,16 +249,15 @@ def cut(run: Run, rows: slice) -> Run:
 
 
 def test_unfinished_runs_are_all_compared_over_the_time_they_share(storm) -> None:
-    result, _ = storm
-    *whole, last = result.runs
+    *whole, last = storm.runs
     runs = (*whole, cut(last, slice(1800)))
     settle_s, end_s = window_s(runs, SETTLE_S)
     assert (settle_s, end_s) == pytest.approx((SETTLE_S, 90.0))
     shortened = dataclasses.replace(
-        result,
+        storm,
         runs=runs,
         end_s=end_s,
-        without_tank_rad=result.without_tank_rad[:1800],
+        without_tank_rad=storm.without_tank_rad[:1800],
         interrupted=True,
         not_run=("lqg",),
     )
@@ -268,7 +265,7 @@ def test_unfinished_runs_are_all_compared_over_the_time_they_share(storm) -> Non
     bare, told = figures(shortened).no_tank, figures(shortened).compared
     rms = [
         math.sqrt(np.mean(roll[skip:1800] ** 2))
-        for roll in (result.without_tank_rad, *(run.column("true_roll_rad") for run in runs))
+        for roll in (storm.without_tank_rad, *(run.column("true_roll_rad") for run in runs))
     ]
     assert bare.rms_rad == pytest.approx(rms[0], rel=1e-12)
     for run, own in zip(told, rms[1:], strict=True):
@@ -283,6 +280,7 @@ def test_unfinished_runs_are_all_compared_over_the_time_they_share(storm) -> Non
     assert (as_told["duration_s"], as_told["end_s"]) == (DURATION_S, pytest.approx(90.0))
 
 
+@pytest.mark.evidence("rows0-ended at 10 s with 0 of the 1600 rows from 40 s to 120 s")
 @pytest.mark.parametrize(
     ("rows", "why"),
     [
@@ -294,11 +292,10 @@ def test_unfinished_runs_are_all_compared_over_the_time_they_share(storm) -> Non
 def test_run_with_too_few_rows_is_told_and_not_compared(
     storm, rows: slice, why: str, tmp_path: Path
 ) -> None:
-    result, _ = storm
-    *whole, last = result.runs
+    *whole, last = storm.runs
     runs = (*whole, cut(last, rows))
     assert window_s(runs, SETTLE_S) == pytest.approx((SETTLE_S, DURATION_S), abs=RECORD_S)
-    some = dataclasses.replace(result, runs=runs)
+    some = dataclasses.replace(storm, runs=runs)
     assert [run.name for run in figures(some).compared] == [run.name for run in whole]
     said = figures(some).endings
     assert len(said) == 1
@@ -312,31 +309,29 @@ def test_run_with_too_few_rows_is_told_and_not_compared(
         _, failures = write_report(some, figures(some), tmp_path, about(some, tmp_path))
         assert failures == []
     # without the passive run, nothing is said to be below it
-    lone = dataclasses.replace(result, runs=(cut(whole[0], rows), *whole[1:], last))
+    lone = dataclasses.replace(storm, runs=(cut(whole[0], rows), *whole[1:], last))
     assert all(run.roll_below_passive is None for run in figures(lone).compared)
     assert all(run.roll_below_no_tank is not None for run in figures(lone).compared)
 
 
 def test_one_run_that_is_ended_early_does_not_leave_too_little_of_the_others(storm) -> None:
-    result, _ = storm
     for reach_s, end_s in ((59.0, DURATION_S), (61.0, 61.0)):
-        runs = (*result.runs[:-1], cut(result.runs[-1], slice(round(reach_s / RECORD_S))))
+        runs = (*storm.runs[:-1], cut(storm.runs[-1], slice(round(reach_s / RECORD_S))))
         assert window_s(runs, 10.0) == pytest.approx((10.0, end_s))
-    assert window_s(result.runs, 500.0) == pytest.approx((DURATION_S / 2, DURATION_S))
+    assert window_s(storm.runs, 500.0) == pytest.approx((DURATION_S / 2, DURATION_S))
 
 
 def test_figure_that_can_not_be_told_is_an_empty_cell_and_null(storm) -> None:
-    result, _ = storm
     count = 40  # two seconds hold no cycle of the roll
     short = dataclasses.replace(
-        result,
-        runs=tuple(cut(run, slice(count)) for run in result.runs),
+        storm,
+        runs=tuple(cut(run, slice(count)) for run in storm.runs),
         settle_s=1.0,
         end_s=2.0,
-        without_tank_rad=result.without_tank_rad[:count],
+        without_tank_rad=storm.without_tank_rad[:count],
     )
     significant = list(motion_table(figures(short)).columns[2].cells)
-    assert significant == [""] * (1 + len(result.runs))
+    assert significant == [""] * (1 + len(storm.runs))
     told = json.loads(json.dumps(figures(short).as_json({}, {}), allow_nan=False))
     assert told["no_tank"]["significant_rad"] is None
 

@@ -54,6 +54,7 @@ def test_json_is_one_object_and_the_same_as_the_file(two_factors, tmp_path: Path
     assert Path(found["files"]["picture"]).stat().st_size > 20_000
 
 
+@pytest.mark.evidence
 def test_table_marks_the_design_and_what_is_refused(two_factors, tmp_path: Path):
     result = run("controller", GPC, "--out", tmp_path)
     assert result.exit_code == 0
@@ -134,7 +135,7 @@ def test_tank_command_takes_a_vessel_without_pump_in_any_named_sea(tmp_path: Pat
     assert run("tank", vessel, "--scenario", sea, "--out", tmp_path).exit_code == 0
 
 
-@pytest.mark.evidence("patti_b-True")
+@pytest.mark.evidence
 @pytest.mark.parametrize(("ship", "said"), [("patti_b", True), ("thesis_first", False)])
 def test_tank_command_says_what_a_linear_prediction_leaves_out(
     ship: str, said: bool, tmp_path: Path

@@ -262,7 +262,7 @@ class Bench:
         return self
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_the_ship_rolls_as_with_the_native_drive():
     seconds = slice(500, None)  # all are in charge by then
     expected = Bench(None).rolls(25)[seconds]
@@ -280,6 +280,7 @@ def test_the_ship_rolls_as_with_the_native_drive():
         assert np.sqrt(np.mean(behind**2)) < 0.06 * np.sqrt(np.mean(found[:, 1] ** 2))
 
 
+@pytest.mark.evidence("<lambda>-19-250_1", "<lambda>-19-250_2")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("lost", "fault", "within_ms"),

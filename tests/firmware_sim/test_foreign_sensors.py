@@ -55,7 +55,7 @@ def roll_and_shares(devices, *, second, seconds=30):
     return np.array(rolls), shares, buses
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_with_two_sensors_the_ship_rolls_as_with_native_nodes():
     native, _, _ = roll_and_shares(None, second=True)
     foreign, shares, buses = roll_and_shares({"motion": SBG, "levels": LEVELS}, second=True)

@@ -40,6 +40,7 @@ def replayed(file: Path) -> ReplayResult:
     return result
 
 
+@pytest.mark.evidence("passive-faults0", "dpc-faults1")
 @pytest.mark.parametrize(
     ("name", "faults"),
     [

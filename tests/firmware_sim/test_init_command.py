@@ -51,7 +51,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
     return lambda ship: made(tuple(ship.items()))
 
 
-@pytest.mark.evidence("0.7", "3.5")
+@pytest.mark.evidence("0.7", "3.5", "1.2")
 @pytest.mark.parametrize("ship", [PATROL, SLOW, STIFF, TRAWLER], ids=lambda ship: str(ship["gm"]))
 def test_project_is_valid_and_its_law_is_let_on_the_bus(
     project: Project, ship: dict[str, float]
@@ -92,6 +92,7 @@ def test_on_the_bench_the_law_is_armed_and_better_than_passive(
     assert active.pump.level_peak_m < scenario.vessel.tank.level_limit_m
 
 
+@pytest.mark.evidence
 def test_period_by_the_weather_criterion_is_said_in_the_file(
     project: Project,
 ) -> None:
@@ -116,6 +117,7 @@ def test_sea_can_be_given(tmp_path: Path) -> None:
     assert scenario.sea.spectrum().hs_m == pytest.approx(2.25, rel=0.01)
 
 
+@pytest.mark.evidence
 def test_a_tank_that_hardly_helps_is_said_to(project: Project) -> None:
     assert project(PATROL)[1]["little_help"] is None
     slow = {"length": 300, "beam": 48, "displacement": 180e3, "gm": 0.6, "roll-period": 45}

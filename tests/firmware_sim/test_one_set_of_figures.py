@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner
 
 from utank_hil.cli import app
@@ -16,6 +17,7 @@ def run(*words: object) -> str:
     return str(result.stdout)
 
 
+@pytest.mark.evidence
 def test_one_pump_is_to_be_ordered(tmp_path: Path) -> None:
     ship = tmp_path / "opv"
     figures = [

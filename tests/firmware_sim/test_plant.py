@@ -303,6 +303,7 @@ def history(plant: Plant, seconds: float) -> np.ndarray:
     return np.array(found)
 
 
+@pytest.mark.evidence("Patti-B, irregular", "the first ship in moderate waves")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("vessel", "sea", "most_rad"),

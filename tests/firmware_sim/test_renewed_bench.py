@@ -68,6 +68,7 @@ def test_a_peak_of_the_waves_is_not_taken_for_a_ship_of_twice_the_stiffness() ->
     assert roll < 0.7 * without
 
 
+@pytest.mark.evidence
 def test_the_first_waves_of_a_swell_condemn_no_law() -> None:
     """Over the first two roll periods it rolls her 1.2 times as much, after that less."""
     swell = JonswapSea(

@@ -65,6 +65,7 @@ class Bench:
             self.run(1.0)
 
 
+@pytest.mark.evidence("on_off")
 @pytest.mark.parametrize("controller", ["on_off", "clipped"])
 def test_valve_law_moves_the_valve_and_the_pump_rests(controller: str) -> None:
     bench = Bench(controller)

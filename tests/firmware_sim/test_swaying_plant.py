@@ -113,6 +113,7 @@ def test_scenario_sways_by_its_share_of_the_slope_and_not_without_it(tmp_path: P
     assert math.isclose(zero.lateral_m_s2, 0.0)
 
 
+@pytest.mark.evidence("1.0")
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.5, 1.0])
 def test_controller_that_knows_no_sway_is_in_charge_of_a_ship_that_sways(share: float) -> None:
@@ -141,6 +142,7 @@ def hull_scenario(**changes: object) -> Scenario:
     return Scenario.model_validate(content)
 
 
+@pytest.mark.evidence
 def test_scenario_with_a_hull_sways_rolls_and_yaws() -> None:
     scenario = hull_scenario(sea={**SEA, "heading_deg": 60.0})
     ship = build_ship_side(scenario, 1, ())

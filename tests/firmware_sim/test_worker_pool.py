@@ -118,7 +118,7 @@ def test_a_process_that_is_killed_is_said_with_a_code_of_its_own(tmp_path: Path,
     assert "Traceback" not in errors
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_processes_end_with_the_command_that_is_killed(tmp_path: Path) -> None:
     with at_work("faults", tmp_path) as process:  # whose processes have copies of their own
         a_worker(process, 0.1)

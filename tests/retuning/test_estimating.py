@@ -78,6 +78,7 @@ def test_lost_samples_are_no_harm_and_many_are_a_short_record():
     assert (many.of_sea, many.of_ship) == (Verdict.RECORD_SHORT, Verdict.RECORD_SHORT)
 
 
+@pytest.mark.evidence("motion3-3")
 @pytest.mark.parametrize(
     ("motion", "verdict"),
     [

@@ -43,6 +43,7 @@ def _waves(
     return RecordedWaves(record, DesignPlant(ship, TANK, DELAY_S, LAG_S, limits), measured, 0.2)
 
 
+@pytest.mark.evidence("0.0")
 @pytest.mark.parametrize("pressure_pa", [0.0, 1e4])
 def test_simulated_roll_is_that_of_the_frequency_response(pressure_pa: float) -> None:
     model = DesignPlant(CONFIGURED, TANK, DELAY_S, LAG_S)
@@ -103,6 +104,7 @@ def _storm_nm(ship: RollShip, seed: int) -> FloatArray:
     return 3.3e-3 * ship.stiffness_nm_rad * waves
 
 
+@pytest.mark.evidence("7.5-2-1.8-False", "12.57-1-1.8-True", "10.0-2-1.4-True")
 @pytest.mark.parametrize(
     ("period_s", "outputs", "size", "limits_matter"),
     [(7.5, 1, 1.0, False), (7.5, 2, 1.8, False), (12.57, 1, 1.8, True), (10.0, 2, 1.4, True)],

@@ -32,7 +32,7 @@ def retuned() -> Answer:
     return retune(record_of(1), task_of(1, 60))
 
 
-@pytest.mark.evidence("7.5-1-200", "10.0-1-200")
+@pytest.mark.evidence("7.5-1-200", "10.0-1-200", "10.0-2-120")
 @pytest.mark.parametrize(("outputs", "order"), [(2, 120), (1, 200)])
 @pytest.mark.parametrize("period_s", [7.5, 10.0])
 def test_law_for_the_ship_of_the_record_is_found_under_a_regular_wave(
@@ -50,7 +50,7 @@ def test_law_for_the_ship_of_the_record_is_found_under_a_regular_wave(
     assert isinstance(read_answer(answer_bytes(answer)), Candidate)
 
 
-@pytest.mark.evidence("1-200")
+@pytest.mark.evidence("1-200", "2-120")
 @pytest.mark.parametrize(("outputs", "order"), [(2, 120), (1, 200)])
 def test_steady_heel_of_two_degrees_changes_neither_ship_nor_verdict(
     outputs: int, order: int
@@ -76,6 +76,7 @@ def test_wave_and_modes_are_found_on_the_way() -> None:
     assert found.validation.one_step_fit.min() > 0.95
 
 
+@pytest.mark.evidence
 def test_same_record_same_answer_bit_for_bit() -> None:
     assert answer_bytes(retune(record_of(1), task_of(1, 60))) == answer_bytes(retuned())
 

@@ -38,6 +38,7 @@ def estimated(ship: ShipFigures = SHIP, factor: float = 1.0) -> MotionEstimate:
     return MotionEstimate(Verdict.GOOD, Verdict.GOOD, ship, waves, 0.05, 4.0, 10.0, 1200.0)
 
 
+@pytest.mark.evidence("1.1455847255369929-0.7352")
 @pytest.mark.parametrize(("period", "begun_with"), [(1.0, 0.5548), (14.4 / 12.57, 0.7352)])
 def test_the_law_is_for_the_estimated_ship_at_the_sample_time_of_the_one_in_charge(
     period: float, begun_with: float

@@ -198,6 +198,7 @@ class Reversed(MovingShip):
         return self._signs[1] * super().rate_rad_s(t)
 
 
+@pytest.mark.evidence("signs0-16")
 @pytest.mark.parametrize(
     ("signs", "found"),
     [((-1, -1), Finding.WATER_SIGN), ((1, -1), Finding.DRIFT_LASTS)],

@@ -22,7 +22,7 @@ from utank_hil.telemetry.recording import read_recording
 from utank_hil.telemetry.replay import replay_log
 from utank_hil.telemetry.replay_head import recorded_config
 
-pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.evidence, pytest.mark.socketcan, pytest.mark.timeout(900)]
 
 DURATION_S = 20.0
 Bench = tuple[Scenario, dict, dict[str, dict[str, np.ndarray]]]

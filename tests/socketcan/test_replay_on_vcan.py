@@ -63,6 +63,7 @@ def wait_for_listener() -> None:
         time.sleep(0.02)
 
 
+@pytest.mark.evidence
 def test_a_run_between_two_processes_is_replayed_bit_for_bit(tmp_path: Path) -> None:
     path = first_that_can_be_judged(driven, tmp_path)
     log = FrameLog(path)

@@ -14,7 +14,7 @@ from two_processes import CHANNEL, Candump, Program, patient_controller, watched
 
 from utank_hil.canbus import Mode
 
-pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.evidence, pytest.mark.socketcan, pytest.mark.timeout(900)]
 
 PAGE = Path("docs/how-to/hardware.md")
 PRESSURE_PA = 2e3

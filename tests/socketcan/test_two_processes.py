@@ -233,7 +233,7 @@ def take_the_link_down(folder: Path) -> tuple[dict[str, object], Path]:
     return report, only_recording(folder / "out")
 
 
-@pytest.mark.evidence  # test_replay_on_vcan.py takes the link down, too
+@pytest.mark.evidence  # test_port.py takes the link down, too
 def test_interface_that_goes_down_under_an_armed_controller_latches_a_fault(
     tmp_path: Path,
 ) -> None:

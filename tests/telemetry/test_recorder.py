@@ -108,6 +108,7 @@ def test_every_row_reaches_the_file_and_the_footer_is_written(tmp_path: Path) ->
     assert list(tmp_path.iterdir()) == [file]
 
 
+@pytest.mark.evidence
 def test_recorder_ends_by_itself_when_the_ring_is_closed(tmp_path: Path) -> None:
     with RowWriter(SIGNALS) as ring:
         recorder = RecorderProcess(RecordingTask(ring.name, str(tmp_path / "run.rrd")))
@@ -116,6 +117,7 @@ def test_recorder_ends_by_itself_when_the_ring_is_closed(tmp_path: Path) -> None
     assert recorder.stop().rows == 10
 
 
+@pytest.mark.evidence
 def test_killed_recorder_leaves_all_but_the_last_second(tmp_path: Path) -> None:
     file = tmp_path / "run.rrd"
     rows = table(200)
@@ -451,6 +453,7 @@ def test_a_full_disk_ends_the_recorder_and_leaves_what_was_written(tmp_path: Pat
     np.testing.assert_allclose(recorded(file)[:100], table(100), rtol=4e-16)
 
 
+@pytest.mark.evidence("3000")
 @pytest.mark.parametrize("rows", [300, 3000])
 def test_file_that_lacks_its_end_or_its_rows_is_a_failure_with_its_reason(
     tmp_path: Path, rows: int
@@ -475,7 +478,7 @@ def test_file_that_lacks_its_end_or_its_rows_is_a_failure_with_its_reason(
         assert len(recorded(file)) == 300
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_where_it_may_go_on_in_another_file_it_does_so_when_there_is_room_again(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

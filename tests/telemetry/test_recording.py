@@ -101,6 +101,7 @@ def test_a_recording_cut_anywhere_gives_back_the_rows_before_the_cut(tmp_path: P
     assert 15_000 < counts[0] < counts[1] < counts[2] <= len(rows)
 
 
+@pytest.mark.evidence("1000")
 @pytest.mark.slow
 @pytest.mark.parametrize("missing", [1000, 100_000])
 def test_a_recording_with_a_hole_gives_back_the_rows_before_it_with_a_warning(
@@ -142,7 +143,7 @@ def test_a_recording_with_zeros_in_it_gives_back_the_rows_around_them_with_a_war
     assert not kept.all()
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_an_hour_of_three_runs_takes_little_more_room_than_its_numbers(tmp_path: Path) -> None:
     runs = {name: random_run(72_000, i) for i, name in enumerate(("passive", "dpc", "gpc"))}
     for rows in runs.values():

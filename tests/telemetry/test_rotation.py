@@ -102,7 +102,7 @@ def texts(file: Path) -> list[str]:
     return [str(text) for each in found for text in each.to_pylist()]
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_a_stop_between_two_files_loses_no_row_of_a_ring_that_is_gone(tmp_path: Path) -> None:
     """When the signal comes, the process is a program that has not set anything up yet."""
     with RowWriter(SIGNALS) as ring:

@@ -35,6 +35,7 @@ def test_it_lets_a_healthy_controller_be() -> None:
     assert abs(found.ship.plant.pressure_pa) > 100
 
 
+@pytest.mark.evidence("fault1", "fault2", "fault3")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "fault",
