@@ -2,7 +2,7 @@
 
 Twenty kills each take half an hour in the emulated kernel, most of it programs that start. So this
 is evidence; `make test` kills one controller (`test_two_processes.py`) and takes the interface down
-once (`test_replay_on_vcan.py`).
+once (`test_port.py`).
 """
 
 import random
