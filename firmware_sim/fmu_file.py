@@ -163,10 +163,8 @@ def read_description(path: Path) -> Any:
     ValueError is raised for a file that is no FMU for co-simulation, is damaged, too large, or
     would leave its folder when it is unpacked.
     """
-    try:
-        from fmpy import read_model_description
-    except ImportError as error:
-        raise ValueError("it needs FMPy: pip install 'utank-hil[models]'") from error
+    from fmpy import read_model_description
+
     try:
         with zipfile.ZipFile(path) as archive:
             _refuse_parts(archive)
