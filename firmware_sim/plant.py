@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,17 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank, water_moments
 from utank_hil.sea import Harmonics
 
 SAILING_TICKS = 100  #: Ticks between updates of the ship's parameters: 1 s.
+
+
+class Equations(NamedTuple):
+    """Numbers of the kernel's equations, see `plant_kernel.advance_tick`."""
+
+    row: FloatArray
+    restoring: FloatArray
+    pump: tuple[float, ...]  #: `PumpCoefficients`.
+    ahead: FloatArray  #: Waves' roll moment and lateral acceleration at `MOMENTS`, (2, 4).
+    phasors: ComplexArray
+    rotations: ComplexArray
 
 
 class Plant:
@@ -129,6 +141,13 @@ class Plant:
             self._ticks += 1
         # plain numbers: reading array elements one by one costs more than converting all
         self._values = self._state.tolist()
+
+    @property
+    def equations(self) -> Equations:
+        """The equations as they are now, in steady waves."""
+        ahead = np.array([self._state[kernel.MOMENTS], self._state[kernel.SWAY]])
+        waves = self._waves.at(self._ticks)
+        return Equations(self._row, self._restoring, self._coefficients, ahead, *waves)
 
     def _tick(self, phasors: ComplexArray, rotations: ComplexArray) -> None:
         if self._lateral is None:

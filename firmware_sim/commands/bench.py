@@ -26,7 +26,7 @@ from utank_hil.console.common import (
     why,
 )
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import Terminal, progress_bar, timing_table
+from utank_hil.console.terminal import Terminal, notes, progress_bar, shown, timing_table
 from utank_hil.control import BuiltLaw
 from utank_hil.runners.node import ModelError
 from utank_hil.telemetry.ring import RingError
@@ -66,6 +66,12 @@ def bench(
         bool,
         typer.Option("--frames", help="Keep each run's frame log there, for replay and export."),
     ] = False,
+    fmu: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Run nothing: write the emulated ship as FMU for other programs."
+        ),
+    ] = None,
     json_: Json = False,
     view: View = False,
     allow_code: AllowCode = False,
@@ -87,6 +93,11 @@ def bench(
     if bus is not None and not real_time:
         fail("--bus is for real time: add --realtime, or leave --bus out")
     loaded = load(scenario, Scenario, allow_code=allow_code)
+    if fmu is not None:
+        _write_fmu(scenario, loaded, fmu, loaded.seed if seed is None else seed)
+        if json_:
+            print_json({"file": str(fmu)})
+        raise typer.Exit
     _refuse_faults(scenario, loaded, real_time=real_time, frames=frames)
     logs = [frames_name(name) for name in ("passive", *loaded.controllers)] if frames else []
     out = prepare_out(out, (*REPORT_FILES, *logs))
@@ -111,6 +122,18 @@ def bench(
     if view:
         watch(files["recording"])
     raise typer.Exit(found.exit_code)
+
+
+def _write_fmu(path: Path, scenario: "Scenario", fmu: Path, seed: int) -> None:
+    from firmware_sim.fmu_export import write_fmu
+
+    try:
+        write_fmu(scenario, fmu, seed)
+    except ValueError as error:
+        fail(f"{path}: {error}")
+    except OSError as error:
+        fail(error)
+    notes.say(f"{shown(fmu)}: FMI 2 for co-simulation, with its source")
 
 
 def _refuse_faults(path: Path, scenario: "Scenario", *, real_time: bool, frames: bool) -> None:
