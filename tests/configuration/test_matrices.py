@@ -4,6 +4,7 @@ import json
 import math
 from pathlib import Path
 
+import control
 import h5py
 import numpy as np
 import pytest
@@ -59,6 +60,27 @@ def test_every_kind_of_file_holds_the_same_law(tmp_path: Path, suffix: str, peri
     np.testing.assert_array_equal(answers(configured(tmp_path, system)), inline)
 
 
+@pytest.mark.parametrize("order", [0, 1, 3])
+def test_a_law_of_python_control_goes_through_json_as_it_is(tmp_path: Path, order: int) -> None:
+    sampled = control.sample_system(control.tf([2e4, 1e4], [0.2, 1.3, 2.0, 1.0]), 0.1)
+    law = control.ss(sampled) if order == 3 else control.ss(order * 0.5, 1.0, 2e4, 3e4, 0.1)
+    law = law if order else control.ss([], [], [], [[3e4]], 0.1)
+    matrices = {name: getattr(law, name).tolist() for name in "ABCD"}
+    content = {**matrices, "dt": law.dt, "name": law.name}
+    found = answers(configured(tmp_path, written(tmp_path, ".json", content)))
+    y = np.random.default_rng(1).standard_normal((5, 1))
+    expected = control.forced_response(law, inputs=y.T).outputs
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("dt", [0, True, None])
+def test_a_law_of_python_control_without_a_time_is_refused(tmp_path: Path, dt: object) -> None:
+    law = control.ss([[0.5]], [[1.0]], [[2.0]], [[3.0]], dt)
+    content = {name: getattr(law, name).tolist() for name in "ABCD"} | {"dt": law.dt}
+    with pytest.raises(ConfigError, match=r"law\.system: law\.json: dt "):
+        configured(tmp_path, written(tmp_path, ".json", content))
+
+
 def test_a_law_without_states_has_d_alone(tmp_path: Path) -> None:
     static = {"A": np.zeros((0, 0)), "B": np.zeros((0, 2)), "C": np.zeros((1, 0)), "dt": 0.1}
     system = written(tmp_path, ".npz", {**static, "D": [[1.0, -2.0]]})
@@ -82,6 +104,9 @@ def test_a_static_law_may_be_json(tmp_path: Path) -> None:
         (".npz", {**LAW, "dt": 0.1, "Ts": 0.1}, "must hold A, B, C, D and one of"),
         (".json", {**LAW, "dt": "fast"}, "dt must be a time in seconds, got 'fast'"),
         (".json", {**LAW, "dt": 0.1, "B": [[1.0]]}, "system.B: must have shape (2, 1)"),
+        (".json", {**LAW, "dt": 0.1, "B": [[1.0, 2.0]] * 2}, "(1, 1): rows as C, columns as B"),
+        (".json", {**LAW, "dt": 0.1, "C": [[1.0]]}, "system.C: must have shape (1, 2), got (1, 1)"),
+        (".json", {**LAW, "dt": 0.1, "A": [[1.0, 2.0]]}, "got (1, 2): square"),
         (".npz", {**LAW, "dt": 0.1, "D": [[1.0], [2.0]]}, "system.D: must be one row"),
         (".npz", {**LAW, "dt": 0.1, "C": [[np.inf, 0.0]]}, "system.C"),
         (".json", {**LAW, "dt": True}, "dt must be a time in seconds, got True"),

@@ -40,10 +40,11 @@ class StateSpaceLaw:
         a, b, c, d, sample_time_s = discrete_matrices(self.model)
         states, outputs, commands = len(a), b.shape[-1], len(c)
         shapes = ((states, states), (states, outputs), (commands, states), (commands, outputs))
+        wanted = ("square", "rows as A", "columns as A", "rows as C, columns as B")
         problems: list[Problem] = []
-        for name, matrix, shape in zip("ABCD", (a, b, c, d), shapes, strict=True):
+        for name, matrix, shape, why in zip("ABCD", (a, b, c, d), shapes, wanted, strict=True):
             if matrix.shape != shape:
-                problems.append((name, f"must have shape {shape}, got {matrix.shape}"))
+                problems.append((name, f"must have shape {shape}, got {matrix.shape}: {why}"))
             elif not np.isfinite(matrix).all():
                 problems.append((name, "must be of finite numbers"))
         refuse("state-space law", problems)
