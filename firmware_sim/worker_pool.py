@@ -35,8 +35,9 @@ class WorkerPool(ProcessPoolExecutor):
             return super().submit(fn, *args, **kwargs)
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> bool | None:
-        """Wait for the processes; if one was killed, kill the others."""
-        if isinstance(error, BrokenProcessPool):  # the base class sends a SIGTERM
+        """Wait for the processes; after Ctrl-C, or if one was killed, kill the others."""
+        # the base class sends a SIGTERM, which the processes ignore
+        if isinstance(error, BrokenProcessPool | KeyboardInterrupt):
             for process in multiprocessing.active_children():
                 process.kill()
         return super().__exit__(kind, error, trace)

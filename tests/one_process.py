@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from firmware_sim import bench
+from firmware_sim.campaign import driver
 from firmware_sim.fault_campaign import runner
 
 
@@ -24,10 +25,10 @@ def _submit(function: Callable[..., object], *arguments: object) -> Future[objec
 def in_one_process() -> Iterator[None]:
     """What is submitted to a pool is done at once."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (bench, runner):
+        for module in (bench, driver, runner):
 
             def pool(_: int, common: object, module=module) -> nullcontext[SimpleNamespace]:
-                patch.setattr(module, "shared", lambda: common)
+                patch.setattr(module, "shared", lambda: common, raising=False)
                 return nullcontext(SimpleNamespace(submit=_submit))
 
             patch.setattr(module, "WorkerPool", pool)

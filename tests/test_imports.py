@@ -222,6 +222,4 @@ def test_every_extra_is_one_of_the_project_and_holds_its_packages() -> None:
     extras = PROJECT["optional-dependencies"]
     held = {extra: " ".join(packages) for extra, packages in extras.items()}
     for package, extra in EXTRA_OF.items():
-        assert {"dask": "distributed", "rerun": "rerun-sdk", "rerun_cli": "rerun-sdk"}.get(
-            package, package
-        ) in held[extra]
+        assert {"rerun": "rerun-sdk", "rerun_cli": "rerun-sdk"}.get(package, package) in held[extra]

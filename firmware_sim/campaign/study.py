@@ -11,10 +11,9 @@ from pydantic import Field, ValidationError, model_validator
 
 from firmware_sim.campaign.axes import MOST_CASES, Axis, Draws
 from firmware_sim.campaign.case_name import as_text, case_name, waves_name
-from firmware_sim.campaign.metrics import METRICS
 from firmware_sim.campaign.overrides import WHOLE, Content, OverrideError, changed
 from firmware_sim.scenario import Scenario
-from utank_hil.base.parameters import ParameterError, Positive, Range, refuse
+from utank_hil.base.parameters import ParameterError, refuse
 from utank_hil.configuration import Section
 from utank_hil.configuration.files import (
     ALLOW_CODE,
@@ -29,31 +28,6 @@ from utank_hil.configuration.yaml_text import Key
 
 Scalar = str | float | int | bool
 SEED: Final = "seed"
-
-
-class Stop(Section):
-    """Stopping rule for a group of cases.
-
-    The interval is computed over the first cases of the group in their order, so it does not depend
-    on which cases return first.
-    """
-
-    metric: str  #: Column of the results whose interval is judged.
-    half_width: Positive | None = None
-    """Largest half width of the 95 % confidence interval, in the metric's unit."""
-    relative: Positive | None = None
-    """Largest half width as a share of the mean, instead of `half_width`."""
-    least: Annotated[int, Range(least=3)] = 10  #: Least number of cases computed.
-
-    @model_validator(mode="after")
-    def _one_measure(self) -> "Stop":
-        problems = []
-        if self.metric not in METRICS:
-            problems.append(("metric", f"must be one of {', '.join(METRICS)}"))
-        if (self.half_width is None) == (self.relative is None):
-            problems.append(("half_width", "or relative: give one of the two"))
-        refuse("stop", problems)
-        return self
 
 
 class Study(Section):
@@ -73,7 +47,6 @@ class Study(Section):
     random: Draws | None = None  #: Random samples, each combined with all of `cases` and `grid`.
     average_over: tuple[str, ...] = (SEED,)
     """Keys that are averaged over and define no group; drawn keys always belong to them."""
-    stop: Stop | None = None  #: Rule by which a group needs no more cases.
 
     @model_validator(mode="after")
     def _consistent(self) -> "Study":

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from firmware_sim.campaign.metrics import METRICS
-from firmware_sim.campaign.stopping import Stopping
 from firmware_sim.campaign.store import Results
-from firmware_sim.campaign.study import Case, Scalar, Stop
+from firmware_sim.campaign.study import Scalar
 from firmware_sim.campaign.work import FAILED, OK
 from firmware_sim.figures import LEAST_ROLL_RAD, NO_TANK
 from utank_hil.analysis.motion.statistics import mean_interval
@@ -24,9 +23,9 @@ class Group:
     """Cases that differ only in the keys averaged over."""
 
     parameters: dict[str, Scalar]  #: Varied keys that the cases have in common.
-    rows: list[list[dict[str, Any]]]  #: Rows of each case that counts and succeeded.
+    rows: list[list[dict[str, Any]]]  #: Rows of each case that succeeded.
     planned: int
-    #: failed, lost: number of counted cases that failed or were lost.
+    #: failed, lost: number of cases that failed or were lost.
     failed: int
     lost: int
 
@@ -41,25 +40,19 @@ class Group:
 
 
 def groups_of(results: Results) -> list[Group]:
-    """Groups of a campaign with the rows that count by `Stopping`."""
-    cases = [
-        Case(each["index"], each["case"], each["waves"], 0,
-             tuple(each[key] for key in results.keys), {}, {})
-        for each in results.cases
-    ]  # fmt: skip
-    written = results.about["configuration"]["stop"]
-    stopping = Stopping(None if written is None else Stop.model_validate(written), cases)
-    stopping.add(row for rows in results.rows.values() for row in rows)
+    """Groups of a campaign with their rows."""
+    by_group: dict[tuple[Scalar, ...], list[str]] = {}
+    for each in results.cases:
+        by_group.setdefault(tuple(each[key] for key in results.keys), []).append(each["case"])
     groups = []
-    for group in dict.fromkeys(case.group for case in cases):
-        names = dict.fromkeys(stopping.used(group))
-        found = [results.rows[name] for name in names if name in results.rows]
+    for group, names in by_group.items():
+        found = [results.rows[name] for name in dict.fromkeys(names) if name in results.rows]
         states = [rows[0]["status"] for rows in found]
         groups.append(
             Group(
                 dict(zip(results.keys, group, strict=True)),
                 [rows for rows in found if rows[0]["status"] == OK],
-                sum(case.group == group for case in cases),
+                len(names),
                 states.count(FAILED),
                 len(states) - states.count(FAILED) - states.count(OK),
             )

@@ -25,7 +25,7 @@ LOST: Final = "lost"  #: Status of a case that was ended from outside; `--resume
 
 
 class OtherCodeError(Exception):
-    """Error for a worker whose code differs from the campaign's."""
+    """Error for code that changed while the campaign ran."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +42,11 @@ class Batch:
 def run_batch(batch: Batch) -> list[Row]:
     """Return the rows of all cases; a failed case gives one row with the reason.
 
-    Raises `OtherCodeError` if the worker's code is not that of the campaign.
+    Raises `OtherCodeError` if the code is not that of the campaign any more.
     """
     if code_digest() != batch.code:
         raise OtherCodeError(
-            "a worker has other code than the campaign: install the same version of utank-hil, "
-            "numpy, scipy and numba there"
+            "the code has changed since the campaign began: begin it anew in another folder"
         )
     return [row for name, seed, values in batch.cases for row in _case(batch, name, seed, values)]
 

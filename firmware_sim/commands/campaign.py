@@ -1,5 +1,6 @@
-"""``utank-hil campaign``: many cases of a scenario, on all cores or on a cluster."""
+"""``utank-hil campaign``: many cases of a scenario, on all cores."""
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,13 +27,8 @@ def campaign(
     resume: Annotated[
         bool, typer.Option("--resume", help="Compute only what the folder does not hold yet.")
     ] = False,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(help="Dask scheduler, as tcp://10.0.0.5:8786, instead of this machine alone."),
-    ] = None,
     workers: Annotated[
-        int | None,
-        typer.Option(min=1, help="Processes on this machine.", show_default="one a core"),
+        int | None, typer.Option(min=1, help="Processes.", show_default="one a core")
     ] = None,
     json_: Json = False,
     allow_code: AllowCode = False,
@@ -50,8 +46,6 @@ def campaign(
     from firmware_sim.campaign.study import load_study
     from firmware_sim.campaign.summary import failures, summary
 
-    if scheduler is not None and workers is not None:
-        fail("--workers is for this machine: leave it out, or --scheduler")
     try:
         loaded = load_study(study, allow_code=allow_code)
     except ConfigError as error:
@@ -63,7 +57,7 @@ def campaign(
         store.begin(loaded, _about(loaded, folder, context.params), resume=resume)
     except StoreError as error:
         fail(error)
-    interrupted = _run(loaded, store, scheduler, workers)
+    interrupted = _run(loaded, store, workers or len(os.sched_getaffinity(0)))
     results = read_results(folder)
     groups = summary(results)
     failed = failures(results)
@@ -98,9 +92,9 @@ def _about(loaded: "LoadedStudy", folder: Path, given: dict[str, Any]) -> dict[s
     }
 
 
-def _run(loaded: "LoadedStudy", store: Any, scheduler: str | None, count: int | None) -> bool:
+def _run(loaded: "LoadedStudy", store: Any, workers: int) -> bool:
     """Compute the missing cases with a progress bar; return whether it was interrupted."""
-    from firmware_sim.campaign.driver import Count, Driver, workers
+    from firmware_sim.campaign.driver import Count, Driver
     from firmware_sim.campaign.work import OtherCodeError
 
     bar = progress_bar(MofNCompleteColumn(), "{task.fields[failed]}")
@@ -114,14 +108,12 @@ def _run(loaded: "LoadedStudy", store: Any, scheduler: str | None, count: int | 
     if not driver.count.needed:
         return False
     try:
-        with workers(scheduler, count) as client, bar:
-            driver.run(client)
+        with bar:
+            driver.run(workers)
     except KeyboardInterrupt:
         return True
     except OtherCodeError as error:
         fail(error)
-    except OSError as error:
-        fail(f"--scheduler {scheduler}: {error}" if scheduler else error)
     return False
 
 

@@ -2,22 +2,22 @@
 
 import importlib
 import json
+import multiprocessing
 import os
 import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 import yaml
-from distributed import Client
+from one_process import in_one_process
 from studies import small, written
 from typer.testing import CliRunner, Result
 
-from firmware_sim.campaign.driver import Count, Driver, batch_of, workers
+from firmware_sim.campaign.driver import Count, Driver, batch_of
+from firmware_sim.campaign.simulations import Row
 from firmware_sim.campaign.store import Store, read_results
 from firmware_sim.campaign.tables import pairs_table
-from firmware_sim.campaign.work import run_batch
+from firmware_sim.campaign.work import LOST, OK, Batch, run_batch
 from firmware_sim.commands.campaign import campaign
 from utank_hil.console.common import new_app
 from utank_hil.console.exit_codes import ExitCode
@@ -31,40 +31,29 @@ def without_times(rows: list[dict[str, object]]) -> list[dict[str, object]]:
 
 
 @pytest.mark.evidence
-def test_workers_that_are_killed_and_an_interruption_change_no_bit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    monkeypatch.setattr("firmware_sim.campaign.driver.LOOK_S", 1.0)
+def test_workers_that_are_killed_and_an_interruption_change_no_bit(tmp_path: Path):
     loaded = small(tmp_path, grid={"seed": {"first": 1, "count": 16}})
     store = Store(tmp_path / "out")
-    store.begin(loaded, {"keys": loaded.keys, "configuration": {"stop": None}}, resume=False)
-    pids: list[int] = []
+    store.begin(loaded, {"keys": loaded.keys}, resume=False)
+    killed: list[int] = []
 
     def kill(count: Count) -> None:
-        if count.done > 3 and pids:
-            os.kill(pids.pop(), signal.SIGKILL)
+        if count.done > 3 and not killed:
+            killed.append(multiprocessing.active_children()[0].pid or 0)
+            os.kill(killed[0], signal.SIGKILL)
         if count.done > 8:
             raise KeyboardInterrupt
 
-    with workers(None, 2) as client:
-        assert all("127.0.0.1" in address for address in client.scheduler_info()["workers"])
-        pids += client.run(os.getpid).values()
-        first = Driver(loaded, store, kill)
-        with pytest.raises(KeyboardInterrupt):
-            first.run(client)
-        done = store.done()
-        assert 8 < len(done) < 16
-        closed: list[int] = []
-
-        def close(count: Count) -> None:
-            """Have every nanny give up."""
-            while len(closed) < 2:
-                client.cluster.sync(list(client.cluster.workers.values())[len(closed)].close)
-                closed.append(count.done)
-
-        second = Driver(loaded, store, close)
-        assert second.count.needed == 16 - len(done)
-        second.run(client)
+    first = Driver(loaded, store, kill)
+    with pytest.raises(KeyboardInterrupt):
+        first.run(2)
+    assert killed
+    assert not multiprocessing.active_children()
+    done = store.done()
+    assert 8 < len(done) < 16
+    second = Driver(loaded, store, lambda count: None)
+    assert second.count.needed == 16 - len(done)
+    second.run(2)
     found = read_results(tmp_path / "out").rows
     assert list(map(len, found.values())) == [3] * 16
     for case in loaded.cases[::5]:
@@ -75,24 +64,33 @@ def test_workers_that_are_killed_and_an_interruption_change_no_bit(
         ]  # as text, which is exact, and in which nan equals nan
 
 
+def _killed_by_the_second(batch: Batch) -> list[Row]:
+    if "2" in [str(seed) for _, seed, _ in batch.cases]:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return run_batch(batch)
+
+
+@pytest.mark.evidence
+def test_a_case_that_kills_each_process_is_lost_alone(tmp_path: Path):
+    loaded = small(tmp_path, grid={"seed": [1, 2, 3, 4]})
+    store = Store(tmp_path / "out")
+    store.begin(loaded, {"keys": loaded.keys}, resume=False)
+    Driver(loaded, store, lambda count: None, _killed_by_the_second).run(2)
+    rows = read_results(tmp_path / "out").rows
+    status = {case.seed: rows[case.name][0]["status"] for case in loaded.cases}
+    assert status == {1: OK, 2: LOST, 3: OK, 4: OK}
+
+
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
-    """Run the command with a worker in a thread of this process."""
-
-    @contextmanager
-    def here(scheduler: str | None, count: int | None) -> Iterator[Client]:
-        with Client(
-            processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None
-        ) as client:
-            yield client
-
-    monkeypatch.setattr("firmware_sim.campaign.driver.workers", here)
+def run(tmp_path: Path):
+    """Run the command in this process."""
     app = new_app()
     app.command()(campaign)
 
     def invoke(*arguments: object) -> Result:
         out = ("--out", str(tmp_path / "out"))
-        return CliRunner().invoke(app, [*map(str, arguments), *out])
+        with in_one_process():
+            return CliRunner().invoke(app, [*map(str, arguments), *out])
 
     return invoke
 
@@ -164,26 +162,13 @@ def test_groups_of_the_same_waves_are_compared_with_the_first(run, tmp_path: Pat
         assert same["roll_rms_difference_rad"] == {"mean": 0.0, "half_width": 0.0, "cases": 3}
 
 
-def test_campaign_stops_where_its_interval_is_narrow(run, tmp_path: Path):
-    stop = {"metric": "roll_below_passive", "half_width": 0.2, "least": 5}
-    path = written(tmp_path, grid={"seed": {"first": 1, "count": 200}}, stop=stop)
-    found = json.loads(run(path, "--json").stdout)
-    (group,) = found["groups"]
-    figure = group["runs"]["gpc"]["roll_below_passive"]
-    assert 5 <= figure["cases"] < 200
-    assert figure["half_width"] <= 0.2
-    # more cases may have been computed; they do not count
-    assert found["cases"] == 200
-    assert group["counted"] == figure["cases"]
-
-
 def test_interrupted_campaign_says_so_keeps_what_there_is_and_goes_on(
     run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     path, whole = written(tmp_path, grid={"seed": [1, 2]}), Driver.run
 
-    def interrupted(driver: Driver, client: Client) -> None:
-        whole(driver, client)
+    def interrupted(driver: Driver, workers: int) -> None:
+        whole(driver, workers)
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
@@ -204,25 +189,6 @@ def test_wrong_study_ends_before_anything_is_computed(run, tmp_path: Path):
     assert done.exit_code == 2
     assert "grid.sea.headin_deg" in done.stderr
     assert not (tmp_path / "out").exists()
-
-
-def test_scheduler_that_does_not_answer_is_named(tmp_path: Path, monkeypatch):
-    monkeypatch.setattr("firmware_sim.campaign.driver.CONNECT_S", 0.2)
-    app = new_app()
-    app.command()(campaign)
-    path = written(tmp_path)
-    arguments = [str(path), "--scheduler", "tcp://127.0.0.1:1", "--out", str(tmp_path / "out")]
-    done = CliRunner().invoke(app, arguments)
-    assert done.exit_code == 2, done.output
-    assert "--scheduler tcp://127.0.0.1:1" in done.stderr
-
-
-def test_without_dask_the_remedy_is_named(monkeypatch, capsys):
-    from utank_hil.console.failures import failures_named
-
-    with pytest.raises(SystemExit), failures_named():
-        raise ModuleNotFoundError("No module named 'distributed'", name="distributed")
-    assert "pip install 'utank-hil[bench]'" in capsys.readouterr().err.replace("\n", "")
 
 
 def test_entry_point_is_the_command():

@@ -120,5 +120,5 @@ def test_worker_of_other_code_ends_the_campaign(tmp_path: Path, monkeypatch):
     found = small(tmp_path)
     batch = batch_of(found, found.cases)
     monkeypatch.setattr("firmware_sim.campaign.work.code_digest", lambda: "older")
-    with pytest.raises(OtherCodeError, match="install the same version"):
+    with pytest.raises(OtherCodeError, match="the code has changed"):
         run_batch(batch)

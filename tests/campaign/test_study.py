@@ -101,8 +101,6 @@ def test_wrong_key_is_told_with_file_place_and_remedy(tmp_path: Path, section, k
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
-        ({"stop": {"metric": "roll", "half_width": 0.1}}, "stop.metric: must be one of"),
-        ({"stop": {"metric": "roll_rms_rad"}}, "give one of the two"),
         ({"grid": {"settle_s": [5.0]}, "set": {"settle_s": 6.0}}, "is in set, too"),
         ({"grid": {"seed": {"begin": 3}}}, "must be a list of values"),
         ({"average_over": ["sea.time"]}, "names sea.time, which is not varied"),

@@ -46,7 +46,7 @@ def ran(folder: Path, name: str, *, pressure_pa: float = 5e4, first: int = 1) ->
     path.write_text(STUDY.format(name=name, configs=CONFIGS, pressure_pa=pressure_pa, first=first))
     loaded, store = load_study(path), Store(folder / name)
     about = {"keys": loaded.keys, "code": "same"}
-    configuration = {"stop": None, "simulation": "linear"}
+    configuration = {"simulation": "linear"}
     store.begin(loaded, {**about, "configuration": configuration}, resume=False)
     store.write(run_batch(batch_of(loaded, loaded.cases)))
     return folder / name

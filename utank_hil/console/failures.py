@@ -16,7 +16,7 @@ from utank_hil.console.terminal import notes
 EXTRA_OF: Final = {
     "asammdf": "files",
     "fmpy": "models",
-    **dict.fromkeys(("clarabel", "control", "dask", "distributed", "jinja2"), "bench"),
+    **dict.fromkeys(("clarabel", "control", "jinja2"), "bench"),
     **dict.fromkeys(("matplotlib", "numba"), "bench"),
     **dict.fromkeys(("pyarrow", "rerun", "rerun_cli"), "viewer"),
 }  #: Packages that are not needed to run the controller, and the extra that installs each.
