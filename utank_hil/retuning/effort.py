@@ -1,7 +1,8 @@
-"""Share of a law's command that pays: predicted from what the pump has made of the roll so far.
+"""Share of the pressure that pays: predicted from what the pump has made of the roll so far.
 
 The ship's roll is that of the passive twin plus the roll d that the pump made. With the share s of
-the command it made d, so with another share it would make about d times that ratio. The mean square
+the pressure it made d, so with another share it would make about d times that ratio: with gains for
+less pressure (`control.gentle_lqg`) its phase is then about the same. The mean square
 of the roll is least at the share ``-s mean(twin d) / mean(d d)``, with means about the mean values
 and an exponential memory. A law that only rolls the ship more thus ends at `LEAST`, next to no
 power, and comes back as soon as it helps. A ship that is not the twin's makes d wrong by as much as

@@ -16,6 +16,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.control import PumpLimits
 from utank_hil.control.constrained.horizon import Horizon, Predictions, predictions
 from utank_hil.control.constrained.law import ConstrainedLaw
+from utank_hil.control.gentle_lqg import SHARES
 from utank_hil.dynamics import STATES, LinearModel
 from utank_hil.retuning.wire import refuse_shapes, refuse_sizes
 
@@ -29,7 +30,7 @@ _MOST_OUTPUTS: Final = len(STATES)
 _MOST_ITERATIONS: Final = 200  # This is three times the budget of the shipped laws.
 
 MOST_NUMBERS: Final = (
-    MOST_STATES * (3 + 3 * MOST_STATES + 2 * _MOST_OUTPUTS + MOST_KNOTS)
+    MOST_STATES * (2 + len(SHARES) + 3 * MOST_STATES + 2 * _MOST_OUTPUTS + MOST_KNOTS)
     + MOST_KNOTS * (1 + MOST_KNOTS + MOST_SAMPLES * _MOST_OUTPUTS)
     + 2 * _MOST_OUTPUTS
 )  #: Most numbers in the arrays of a message.
@@ -77,6 +78,7 @@ class RenewedLawMessage(
     steady_state: FloatArray
     steady_command: FloatArray
     iteration_limit: Annotated[int, msgspec.Meta(ge=1, le=_MOST_ITERATIONS)]
+    gentler: FloatArray | None
     roll_rad: float
     pressure_pa: float
     passive_roll_rad: float
@@ -116,6 +118,8 @@ class RenewedLawMessage(
             ("steady_state", self.steady_state, (n, n)),
             ("steady_command", self.steady_command, (n,)),
         )
+        if self.gentler is not None:
+            refuse_shapes(("gentler", self.gentler, (len(SHARES) - 1, n)))
         predicted = [getattr(self, name) for name in _PREDICTED]
         if not (sample_time_s > 0 and all(map(math.isfinite, (sample_time_s, *predicted)))):
             raise ValueError("the sample time or what is predicted is not finite")

@@ -4,9 +4,9 @@
 (`Estimator`). It is made when waves or ship differ from those that the present law was designed
 for.
 
-A law may be wrong for waves or a ship that are not known yet. So the pump gets that share of its
-command which pays (`Effort`), and a law plans at the limits only for an identified ship: on one
-loaded otherwise the plan swings the water from limit to limit, where the clipped law is stable.
+A law may be wrong for waves or a ship that are not known yet. So it gets that share of the pressure
+which pays (`Effort`), and it plans at the limits only for an identified ship: on one loaded
+otherwise the plan swings the water from limit to limit, where the clipped law is stable.
 """
 
 import dataclasses
@@ -19,6 +19,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState, Verdict
 from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
 from utank_hil.control.design_plant import PumpLimits
+from utank_hil.control.gentle_lqg import GentleController
 from utank_hil.retuning.admission import ANOTHER_QUESTION, WarmUp
 from utank_hil.retuning.answer import Answer
 from utank_hil.retuning.change_monitor import ChangeMonitor, ship_factor
@@ -73,14 +74,14 @@ class RenewingController(LawExchange):
         shared: bool = True,
     ) -> None:
         self._shared = shared
-        first_law = law.unlimited() if shared else law
-        first = MonitoredLaw(first_law.controller(), ChangeMonitor(ship))
+        controller = law.clipped() if shared else law.controller()
+        first = MonitoredLaw(controller, ChangeMonitor(ship))
         super().__init__(first, len(law.model.C), roll, TRIAL, retuner)
         self._law = law
         self._limits = limits
         self._configured = self._ship = ship
         self.effort = Effort(ship.roll_period_s / self.sample_time_s)
-        self._allowed_pa = limits.pressure_pa
+        self._allowed = 1.0
         self._latest: MotionEstimate | None = None
         self._seen: ShipFigures | None = None
         self._due = ""
@@ -89,14 +90,17 @@ class RenewingController(LawExchange):
         self.fallbacks = 0  #: Fallbacks (`Plans`) of all laws together.
 
     def allow(self, share: float) -> None:
-        """Set the share of every law of the bank (`Plans`), as each may become active next."""
-        self._allowed_pa = share * self._limits.pressure_pa
-        for law in self.laws.stepped:
-            if isinstance(law.controller, ConstrainedController):
-                law.controller.allow(share)
+        """Set the share of the pressure limit that every law of the bank may use (`Plans`)."""
+        self._allowed = share
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take the newest measurement and return the command; see `Controller`."""
+        share = self.effort.share if self._shared else 1.0
+        for law in self.laws.stepped:  # as each may become active next
+            if isinstance(law.controller, ConstrainedController):
+                law.controller.allow(self._allowed * share)
+            elif isinstance(law.controller, GentleController):
+                law.controller.use(share)
         controller = self.laws.active.controller
         before = controller.fallbacks if isinstance(controller, ConstrainedController) else 0
         command = float(super().step(y, reference)[0])
@@ -106,9 +110,8 @@ class RenewingController(LawExchange):
             self.effort.clear()
         elif self._fresh and self._shared:
             self.effort.update(self._roll_rad, self._passive_roll_rad)
-        share = self.effort.share if self._shared else 1.0
-        command = share * min(max(command, -self._allowed_pa), self._allowed_pa)
-        return np.array([command])
+        allowed_pa = self._allowed * self._limits.pressure_pa
+        return np.array([min(max(command, -allowed_pa), allowed_pa)])
 
     def reset(self) -> None:
         """Reset all laws; a law on trial is dropped."""
@@ -173,7 +176,8 @@ class RenewingController(LawExchange):
         assert ship is not None
         found = None if ship is self._configured else ship
         try:
-            controller = (law.unlimited() if found is None and self._shared else law).controller()
+            clips = found is None and self._shared
+            controller = law.clipped() if clips else law.controller()
         except (ValueError, ArithmeticError) as error:
             return str(error)
         self.renewed = answer

@@ -145,8 +145,7 @@ class InnovationFilter:
 
     def prediction(self, law: LQGLaw) -> Prediction:
         """Predict the motion under a law in the sea, with the noise of the sensors."""
-        to_command = law.response(self._z)[:, 0] / self._unit_pa
-        loop = np.einsum("wm,wm->w", to_command, self._by_pump[:, self._measured])
+        to_command, loop = self._loop(law)
         to_command = to_command / (1 - loop)[:, None]
         command = np.einsum("wm,wmc->wc", to_command, self._seen)
         together = np.concatenate(
@@ -163,6 +162,15 @@ class InnovationFilter:
             pressure_pa=pressure * self._unit_pa,
             power_w=self._plant.tank.reservoir_area_m2 * self._unit_pa * power,
         )
+
+    def peak_sensitivity(self, law: LQGLaw) -> float:
+        """Peak of the sensitivity of a law on the nominal ship, at the nodes of the means."""
+        return float(np.abs(1 / (1 - self._loop(law)[1])).max())
+
+    def _loop(self, law: LQGLaw) -> tuple[ComplexArray, ComplexArray]:
+        """Transfers to the command, over the pump's maximum, and the loop transfer."""
+        to_command = law.response(self._z)[:, 0] / self._unit_pa
+        return to_command, np.einsum("wm,wm->w", to_command, self._by_pump[:, self._measured])
 
     def value(self, coefficients: FloatArray) -> float:
         """Objective at these coefficients; infinite outside a half plane."""

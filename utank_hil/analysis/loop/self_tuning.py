@@ -19,7 +19,7 @@ Kalman filter without the added noise predicts the waves for the plan at the lim
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Annotated, Final, Literal, Protocol
 
@@ -31,6 +31,7 @@ from utank_hil.analysis.loop.loop_simulation import SensorNoise
 from utank_hil.analysis.loop.robustness import (
     EXTRA_DELAY_S,
     GAINS,
+    PEAK_SENSITIVITY,
     PERIOD_SCALES,
     Robustness,
     of_period,
@@ -41,6 +42,7 @@ from utank_hil.base.parameters import Range, range_problems, refuse
 from utank_hil.base.tick import TICK_S
 from utank_hil.control import BuiltLaw, ConstrainedDesign, DesignPlant, LQGLaw, PumpLimits, SeaModel
 from utank_hil.control.constrained.law import ConstrainedLaw
+from utank_hil.control.gentle_lqg import SHARES
 from utank_hil.dynamics import GRAVITY_M_S2, LinearModel, RollShip
 from utank_hil.dynamics.linear import pump_model, state_matrices
 from utank_hil.dynamics.sampling import sample
@@ -190,7 +192,7 @@ class SelfTunedDesign:
         if not self.clips(plant):
             return self.build(plant)
         law = self.tuned(plant, any_load=True).law
-        return BuiltLaw(law.unlimited().controller, _MEASURED, law)
+        return BuiltLaw(law.clipped, _MEASURED, law)
 
     def clips(self, plant: DesignPlant) -> bool:
         """Whether the first law is clipped, since that passes no level.
@@ -279,6 +281,10 @@ class _Search:
                         planner = self._design(0.0, costlier).law(self._plant)
                         prediction = search.prediction(linear)
                         law = planner.following(linear)
+                        gains = self._gentler(search, design, linear) if self._any_load else None
+                        if gains is not None:
+                            rest = np.zeros((len(gains), len(planner.model.A)))
+                            law = replace(law, gentler=np.hstack([rest, gains]))
                         return SelfTuned(design, law, judged, self._roll_rad, prediction)
             noise *= _MORE_NOISE
         return None
@@ -311,6 +317,22 @@ class _Search:
         model = self._plant.sampled(_MEASURED, law.sample_time_s)
         shared = (LQGLaw(law.model, share * law.gain, law.observer_gain) for share in _SHARES)
         return all(closed_loop_radius(each, model, 1.0) < 1 for each in shared)
+
+    def _gentler(
+        self, search: InnovationFilter, design: ConstrainedDesign, law: LQGLaw
+    ) -> FloatArray | None:
+        """Gains for less pressure (`gentle_lqg`), or None if one misses a margin."""
+        gains = []
+        for share in SHARES[1:]:
+            costly = replace(design, pressure_weight_rad2=design.pressure_weight_rad2 / share**2)
+            gain = costly.law(self._plant).unlimited().gain
+            gain = np.hstack([gain, share * law.gain[:, gain.shape[1] :]])
+            less = LQGLaw(law.model, gain, law.observer_gain)
+            stands = all(closed_loop_radius(less, *case) < 1 for case in self._hard_cases)
+            if not (stands and search.peak_sensitivity(less) <= PEAK_SENSITIVITY):
+                return None
+            gains.append(gain[0])
+        return np.array(gains)
 
     def _design(self, knob: float, costlier: float) -> ConstrainedDesign:
         limits, roll = self._plant.limits, self._roll_rad

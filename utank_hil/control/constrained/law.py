@@ -27,6 +27,7 @@ from utank_hil.control.constrained.horizon import Horizon, condense
 from utank_hil.control.constrained.plan_programme import PlanProgramme
 from utank_hil.control.constrained.preview import Foresight, Preview, WaveForecast
 from utank_hil.control.design_plant import PumpLimits
+from utank_hil.control.gentle_lqg import SHARES, GentleController
 from utank_hil.control.lqg import LQGLaw
 from utank_hil.dynamics.sampling import LinearModel
 
@@ -75,6 +76,9 @@ class ConstrainedLaw:
     waves: Waves | None = None  #: In the first states of `model`; None if it has none.
     #: How a plan uses forecasts; its horizon then has N more states, the noises to come.
     foresight: Foresight | None = None
+    #: shape (len(SHARES) - 1, n): gains of the linear law for less pressure (`gentle_lqg`); without
+    #: them it takes shares of its command.
+    gentler: FloatArray | None = None
 
     def __post_init__(self) -> None:
         problems = range_problems(self)
@@ -202,6 +206,13 @@ class ConstrainedLaw:
         rest = np.eye(len(self.steady_state)) - self.steady_state
         gain = -(self.horizon.unlimited_state[:1] @ rest + self.steady_command)
         return LQGLaw(self.model, gain[:, : len(self.model.A)], self.observer_gain)
+
+    def clipped(self) -> GentleController:
+        """Return a new controller of the linear law; it takes shares of the pressure."""
+        law, gains = self.unlimited(), self.gentler
+        if gains is None:
+            gains = np.multiply.outer(np.array(SHARES[1:]), law.gain[0])
+        return GentleController(law, gains)
 
 
 class ConstrainedController:
