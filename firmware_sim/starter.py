@@ -1,7 +1,7 @@
 """Starter project: vessel, controller and scenario, from a naval architect's data."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, TypeVar
 
 import yaml
@@ -23,6 +23,7 @@ from utank_hil.analysis.tank_sizing import (
     size_pump,
     size_tank,
     usable_level_m,
+    with_duct_loss,
 )
 from utank_hil.base.parameters import ParameterError
 from utank_hil.configuration import ControllerConfig, Vessel
@@ -103,6 +104,7 @@ def make_starter(
     )
     bare = written.ship()
     sized = size_tank(bare, room, stability_share)
+    sized = replace(sized, tank=with_duct_loss(bare, sized.tank))
     demand = pump_demand(bare, sized.tank, pump_level_m(bare, sized.tank))
     pump = size_pump(sized.tank, demand)
     texts = {SHIP: starter_text.ship_file(ship, written, room, sized, demand, pump)}

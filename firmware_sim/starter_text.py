@@ -6,6 +6,7 @@ from typing import Any
 
 from firmware_sim.starter_ship import StarterShip
 from utank_hil.analysis.tank_sizing import (
+    DUCT_LOSS,
     LOADINGS,
     PUMP_SLOPE_RAD,
     PumpDemand,
@@ -44,6 +45,8 @@ def ship_file(
         period = "weather criterion's formula (IS Code 2008, A 2.3.4): measure it"
     length_m, breadth_m = sized.reservoir_length_m, sized.reservoir_breadth_m
     slope_deg = math.degrees(PUMP_SLOPE_RAD)
+    rate_m_s = tank.natural_frequency_rad_s * demand.level_m
+    swinging = tank.linearized(rate_m_s).damping_ratio
     pressure_kpa, flow = demand.pressure_pa / 1e3, demand.flow_m3_s
     return f"""\
 # {_line(ship.name)}, {ship.length_m:g} m by {ship.beam_m:g} m.
@@ -67,7 +70,10 @@ tank:
   # {sized.duct_height_m:.2f} m high; it tunes the water to the ship
   duct_area_m2: {number(tank.duct_area_m2)}
   lz_m: {number(tank.lz_m)}  # duct below the centre of gravity
-  damping_ratio: {number(tank.damping_ratio)}  # best for the passive tank: by throttling
+  damping_ratio: {number(tank.damping_ratio)}  # friction in small motions: a guess
+  # inlet and outlet have {DUCT_LOSS:g}, a throttle the rest: with it the damping ratio
+  # is {swinging:.2g} at {demand.level_m:.2f} m, and less in less motion
+  quadratic_loss: {number(tank.quadratic_loss)}
   headroom_m: {number(tank.headroom_m)}  # roof above the still water
 # Moves the water by {demand.level_m:.2f} m, which holds a wave slope of {slope_deg:.1f} degrees,
 # at {LOADINGS[0]:g} to {LOADINGS[-1]:g} of the roll period:

@@ -117,11 +117,7 @@ def tank(
 
 def _left_out(ship: "RollShip") -> str:
     """Effects that a linear prediction of this ship leaves out."""
-    parts = {
-        "quadratic damping": ship.quadratic_damping_nms2_rad2 > 0,
-        "the restoring moment's curve": bool(ship.restoring_odd_nm or ship.gz_m),
-    }
-    return " and ".join(part for part, there in parts.items() if there)
+    return "the restoring moment's curve" if ship.restoring_odd_nm or ship.gz_m else ""
 
 
 def _sea(path: Path, vessel: Vessel) -> tuple["Scenario", "SeaState"]:

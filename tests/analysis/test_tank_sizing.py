@@ -21,6 +21,7 @@ from utank_hil.analysis.tank_sizing import (
     size_tank,
     stability_taken,
     usable_level_m,
+    with_duct_loss,
 )
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 from utank_hil.dynamics.linear import coupled_matrices
@@ -202,3 +203,14 @@ def test_pump_has_the_power_for_pressure_and_flow_at_once() -> None:
     assert demand.duct_speed_m_s <= 45 / 6.22 * math.sqrt(pump.max_pressure_pa / 50e3) + 1e-9
     assert 0.6 < hydraulic_w / shaft_w < 0.75
     assert shaft_w <= pump.max_power_w
+
+
+def test_duct_s_loss_is_the_wanted_damping_at_the_pump_s_level() -> None:
+    tank = size_tank(PATROL, TankRoom.in_hull(63, 9.5)).tank
+    for wanted in (0.6, 0.05):  # with a throttle, and the least that a duct has
+        found = with_duct_loss(PATROL, dataclasses.replace(tank, damping_ratio=wanted))
+        level_m = pump_level_m(PATROL, tank)
+        area_ratio = tank.reservoir_area_m2 / tank.duct_area_m2
+        per_loss = 2 / (3 * math.pi) * area_ratio**2 * level_m / tank.effective_length_m
+        loss = max(1.5, (wanted - 0.02) / per_loss)
+        assert (found.damping_ratio, found.quadratic_loss) == pytest.approx((0.02, loss))

@@ -18,6 +18,7 @@ from utank_hil.analysis.loop.robustness import PERIOD_SCALES, of_period
 from utank_hil.analysis.loop.sea_response import (
     CalmSeaError,
     MotionInSea,
+    at_its_motion,
     motion_in_sea,
     rms,
     roll_response_without_tank,
@@ -29,6 +30,7 @@ from utank_hil.control import DesignPlant
 from utank_hil.control.optimal_tank import ship_ratios
 from utank_hil.dynamics import GRAVITY_M_S2, STATES, RollShip, Tank
 from utank_hil.dynamics.pump import Pump, pump_load, pump_speed
+from utank_hil.dynamics.tank import negligible
 from utank_hil.sea import Harmonics
 
 STABILITY_SHARES: Final = (0.04, 0.08, 0.12, 0.16, 0.2, MOST_STABILITY_SHARE)
@@ -163,9 +165,9 @@ def roll_curves(plant: DesignPlant, sea: SeaState, law: TunedLaw | None) -> Roll
 
 def predict_roll(plant: DesignPlant, sea: SeaState, *, pump: bool = True) -> RollPrediction:
     """Predict the roll of a ship without, with a passive and, given a pump, an active tank."""
-    ship, waves = plant.ship, sea.wave_moment
-    without = rms(roll_response_without_tank(ship, waves.frequency_rad_s), waves)
-    passive = motion_in_sea(None, plant, (), waves)
+    waves = sea.wave_moment
+    without = _without_tank(plant, waves)
+    passive = motion_in_sea(None, at_its_motion(None, plant, (), waves), (), waves)
     if not pump:
         return RollPrediction(without, passive, None, None, None, "there is no pump")
 
@@ -203,8 +205,8 @@ def loading_sensitivity(
         points.append(
             LoadingPoint(
                 scale,
-                rms(roll_response_without_tank(ship, waves.frequency_rad_s), waves),
-                motion_in_sea(None, loaded, (), waves).roll_rms_rad,
+                _without_tank(loaded, waves),
+                motion_in_sea(None, at_its_motion(None, loaded, (), waves), (), waves).roll_rms_rad,
                 active,
             )
         )
@@ -257,17 +259,25 @@ def _active(
 ) -> MotionInSea:
     """Linear motion with a law, which may have been designed for another plant."""
     law = design.law(design_plant or plant)
-    return motion_in_sea(law, plant, design.predictor.measured, waves)
+    measured = design.predictor.measured
+    return motion_in_sea(law, at_its_motion(law, plant, measured, waves), measured, waves)
+
+
+def _without_tank(plant: DesignPlant, waves: Harmonics) -> float:
+    """Roll RMS of the ship alone."""
+    bare = at_its_motion(None, replace(plant, tank=negligible(plant.tank)), (), waves).ship
+    return rms(roll_response_without_tank(bare, waves.frequency_rad_s), waves)
 
 
 def pump_moments(
     plant: DesignPlant, design: LinearDesign, waves: Harmonics
 ) -> tuple[float, float, float]:
     """RMS of pressure in Pa and flow in m^3/s, and mean power to the water in W; linear loop."""
-    law = design.law(plant)
+    law, measured = design.law(plant), design.predictor.measured
+    plant = at_its_motion(law, plant, measured, waves)
     w = waves.frequency_rad_s
     seen = (w > 0) & (w < math.pi / law.sample_time_s)
-    motions, pressure = closed_loop_response(law, plant, design.predictor.measured, w[seen])
+    motions, pressure = closed_loop_response(law, plant, measured, w[seen])
     rate = motions[:, STATES.index("level_rate_m_s")]
     flow = plant.tank.reservoir_area_m2 * rate
     square = waves.amplitude[seen] ** 2 / 2

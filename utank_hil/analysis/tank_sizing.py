@@ -47,6 +47,11 @@ EFFICIENCY: Final = 2.25 / 3.6
 """Hydraulic power of a pump at its greatest pressure and flow over shaft power (`Pump.for_duct`).
 """
 
+DUCT_LOSS: Final = 1.5
+"""Loss coefficient of a plain duct: 0.5 at its inlet and 1 at its outlet, by Borda and Carnot."""
+LINEAR_SHARE: Final = 0.02
+"""Damping ratio of friction, which is laminar in small motions. Chosen; no study."""
+
 _RESERVOIR_SHARE = 0.2  # greatest breadth of a reservoir over the room's
 _DUCT_SHARE = 0.25  # greatest height of the duct over the room's
 _STILL_SHARE = 0.25  # greatest share of the reservoirs in the water's effective length
@@ -115,7 +120,7 @@ class TankCost:
     stability_taken: float  #: Share of the stability that the free surface takes.
     gm_loss_m: float | None
     water_period_s: float  #: Of the water in the ship held still, as the next.
-    damping_ratio: float
+    damping_ratio: float  #: With the quadratic loss at the level of `pump_level_m`.
     usable_level_m: float  #: As the function `usable_level_m`.
     slope_capacity_rad: float  #: Effective wave slope that the usable level holds.
 
@@ -213,6 +218,17 @@ def _in_room(
     return SizedTank(tank, length_m, breadth_m, tank.duct_area_m2 / length_m, "")
 
 
+def with_duct_loss(ship: RollShip, tank: Tank) -> Tank:
+    """Return a tank whose loss is that of its duct: the same damping, at one level, `pump_level_m`.
+
+    Friction keeps `LINEAR_SHARE`, the rest is quadratic, and at least `DUCT_LOSS`.
+    """
+    rate = tank.natural_frequency_rad_s * pump_level_m(ship, tank)
+    one = replace(tank, damping_ratio=0.0, quadratic_loss=1.0).linearized(rate).damping_ratio
+    loss = max(DUCT_LOSS, (tank.damping_ratio - LINEAR_SHARE) / one)
+    return replace(tank, damping_ratio=LINEAR_SHARE, quadratic_loss=loss)
+
+
 def stability_taken(ship: RollShip, tank: Tank) -> float:
     """Share of the ship's stability that the free surface takes."""
     moment = tank.density_kg_m3 * GRAVITY_M_S2 * tank.reservoir_area_m2 * tank.width_m**2 / 2
@@ -243,10 +259,12 @@ def pump_demand(ship: RollShip, tank: Tank, level_m: float) -> PumpDemand:
     _, roll_rad_s = ship_ratios(ship, tank)
     frequencies = [roll_rad_s / scale for scale in LOADINGS]
     flow_m3_s = tank.reservoir_area_m2 * max(frequencies) * level_m
-    loss_w = tank.reservoir_area_m2 * tank.loss_pa_per_m_s * (roll_rad_s * level_m) ** 2 / 2
+    loss_pa_s_m = tank.linearized(roll_rad_s * level_m).loss_pa_per_m_s
+    loss_w = tank.reservoir_area_m2 * loss_pa_s_m * (roll_rad_s * level_m) ** 2 / 2
     return PumpDemand(
         level_m=level_m,
-        pressure_pa=max(_pressure_pa_per_m(tank, w) for w in frequencies) * level_m,
+        pressure_pa=max(_pressure_pa_per_m(tank.linearized(w * level_m), w) for w in frequencies)
+        * level_m,
         flow_m3_s=flow_m3_s,
         duct_speed_m_s=flow_m3_s / tank.duct_area_m2,
         mean_power_w=loss_w / EFFICIENCY,
@@ -267,13 +285,14 @@ def tank_cost(ship: RollShip, tank: Tank) -> TankCost:
     mass_kg, taken = water_moments(tank, 0.0).mass_kg, stability_taken(ship, tank)
     level_m, weight_n = usable_level_m(ship, tank), ship.displacement_n
     weighed = weight_n > 0
+    moving_m_s = tank.natural_frequency_rad_s * pump_level_m(ship, tank)
     return TankCost(
         water_t=mass_kg / 1e3,
         share_of_displacement=mass_kg * GRAVITY_M_S2 / weight_n if weighed else None,
         stability_taken=taken,
         gm_loss_m=taken * ship.stiffness_nm_rad / weight_n if weighed else None,
         water_period_s=2 * math.pi / tank.natural_frequency_rad_s,
-        damping_ratio=tank.damping_ratio,
+        damping_ratio=tank.linearized(moving_m_s).damping_ratio,
         usable_level_m=level_m,
         slope_capacity_rad=wave_slope_capacity_rad(ship, tank, level_m),
     )

@@ -173,7 +173,8 @@ def best_passive_tank(ship: RollShip, tank: Tank) -> Tank:
             )
         area_m2 = tank.width_m * tank.reservoir_area_m2 / duct_part_m
         change = abs(area_m2 / tank.duct_area_m2 - 1)
-        tank = replace(tank, duct_area_m2=area_m2, damping_ratio=best.damping_ratio)
+        tank = replace(tank, duct_area_m2=area_m2, damping_ratio=best.damping_ratio,
+                       quadratic_loss=0.0)  # fmt: skip
         if change < 1e-6:
             break
     return tank

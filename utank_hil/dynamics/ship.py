@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Final
 
 from utank_hil.base.parameters import Finite, Problem, Range, range_problems, refuse
+from utank_hil.dynamics.tank import IRREGULAR
 
 RollLimit = Annotated[float, Range(above=0, most=0.7)]
 """Limit on roll in rad, at most 0.7 (40 degrees), up to which the IS Code 2008 (part A, 2.2.1)
@@ -74,6 +75,12 @@ class RollShip:
             return self
         damping = self.damping_nms_rad + self.lift_damping_ns2_rad * speed_m_s
         return replace(self, damping_nms_rad=damping, lift_damping_ns2_rad=0.0)
+
+    def linearized(self, rate_rms_rad_s: float) -> "RollShip":
+        """Return the ship with its quadratic damping of an irregular roll in the linear one."""
+        more = IRREGULAR * rate_rms_rad_s * self.quadratic_damping_nms2_rad2
+        damping = self.damping_nms_rad + more
+        return replace(self, damping_nms_rad=damping, quadratic_damping_nms2_rad2=0.0)
 
     def with_figures(
         self, inertia_kg_m2: float, stiffness_nm_rad: float, damping_nms_rad: float

@@ -27,6 +27,10 @@ from utank_hil.base.parameters import (
 )
 
 GRAVITY_M_S2 = 9.80665  # Standard gravity (ISO 80000-3).
+SWING = 8 / (3 * math.pi)
+"""Linear coefficient per amplitude of the rate that takes the work of ``|x'| x'`` in a swing."""
+IRREGULAR = math.sqrt(8 / math.pi)
+"""As `SWING`, per root mean square of a Gaussian rate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +77,16 @@ class Tank:
         """Quadratic pressure loss per ``|dh/dt| dh/dt``, from `quadratic_loss`."""
         area_ratio = self.reservoir_area_m2 / self.duct_area_m2
         return self.quadratic_loss * self.density_kg_m3 / 2 * area_ratio * area_ratio
+
+    def linearized(self, rate_m_s: float, share: float = SWING) -> "Tank":
+        """Return the tank with the quadratic loss of levels of a rate in the damping ratio.
+
+        The rate is an amplitude, or with `share` `IRREGULAR` a root mean square.
+        """
+        loss = share * rate_m_s * self.quadratic_loss_pa_per_m2_s2
+        critical = 2 * self.natural_frequency_rad_s * self.density_kg_m3 * self.effective_length_m
+        ratio = self.damping_ratio + loss / critical
+        return replace(self, damping_ratio=ratio, quadratic_loss=0.0)
 
     @property
     def level_limit_m(self) -> float:

@@ -5,7 +5,7 @@ rate and level are neglected.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -14,11 +14,17 @@ from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control import DesignPlant, LinearLaw
 from utank_hil.dynamics import STATES, RollShip
+from utank_hil.dynamics.tank import IRREGULAR
 from utank_hil.sea import Harmonics
 
 LEAST_ROLL_RAD: Final = 1e-6
 """Roll RMS below which the sea counts as calm, as a ratio to it is meaningless. Chosen; no study.
 """
+
+
+_ROUNDS: Final = 50  # Limit on the iterations: each halves the difference at least.
+_BANDS: Final = 400  # Widths of a hundredth of a roll frequency, far below a resonance's.
+_AGREE: Final = 1e-3  # Relative difference of rates at which the iteration ends.
 
 
 class CalmSeaError(ValueError):
@@ -42,13 +48,54 @@ def motion_in_sea(
     Without a law the tank is passive; for an unstable loop the result is meaningless. `wave_moment`
     is in N m; above the Nyquist frequency pi / Ts the tank is taken as passive.
     """
-    w = wave_moment.frequency_rad_s
+    motions, pressure = _answers(law, plant, measured, wave_moment.frequency_rad_s)
+    roll, level = (motions[:, STATES.index(name)] for name in ("roll_rad", "level_m"))
+    return MotionInSea(*(rms(answer, wave_moment) for answer in (roll, level, pressure)))
+
+
+def at_its_motion(
+    law: LinearLaw | None, plant: DesignPlant, measured: tuple[str, ...], wave_moment: Harmonics
+) -> DesignPlant:
+    """Return the plant whose linear losses take what its quadratic ones take of its own motion.
+
+    That is of equal power in a Gaussian motion: B1 + sqrt(8 / pi) sigma B2, sigma the RMS of the
+    rate. Losses and motion are iterated to agreement.
+    """
+    found, rates = plant, [0.0, 0.0]
+    if not (plant.ship.quadratic_damping_nms2_rad2 or plant.tank.quadratic_loss):
+        return plant
+    waves, names = _bands(wave_moment), ("roll_rate_rad_s", "level_rate_m_s")
+    for _ in range(_ROUNDS):
+        motions, _ = _answers(law, found, measured, waves.frequency_rad_s)
+        before = rates
+        rates = [rms(motions[:, STATES.index(name)], waves) for name in names]
+        ship, tank = plant.ship.linearized(rates[0]), plant.tank.linearized(rates[1], IRREGULAR)
+        found = replace(plant, ship=ship, tank=tank)
+        if np.allclose(rates, before, rtol=_AGREE, atol=0):
+            break
+    return found
+
+
+def _bands(waves: Harmonics) -> Harmonics:
+    """Waves of the same energy in bands, for a motion that is computed many times."""
+    w, energy = waves.frequency_rad_s, np.square(waves.amplitude)
+    if len(w) <= _BANDS:
+        return waves
+    sums, edges = np.histogram(w, _BANDS, weights=energy)
+    there = sums > 0
+    middle = np.histogram(w, edges, weights=energy * w)[0][there] / sums[there]
+    return Harmonics(np.sqrt(sums[there]), middle, np.zeros(len(middle)))
+
+
+def _answers(
+    law: LinearLaw | None, plant: DesignPlant, measured: tuple[str, ...], w: FloatArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """Motions and pressure per wave moment, as `closed_loop_response`, at any frequencies."""
     motions, pressure = closed_loop_response(None, plant, measured, w)
     if law is not None:
         seen = (w > 0) & (w < np.pi / law.sample_time_s)
         motions[seen], pressure[seen] = closed_loop_response(law, plant, measured, w[seen])
-    roll, level = (motions[:, STATES.index(name)] for name in ("roll_rad", "level_m"))
-    return MotionInSea(*(rms(answer, wave_moment) for answer in (roll, level, pressure)))
+    return motions, pressure
 
 
 def require_roll(passive: MotionInSea) -> None:

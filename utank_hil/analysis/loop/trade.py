@@ -7,7 +7,12 @@ from typing import Final, TypeVar
 import numpy as np
 
 from utank_hil.analysis.loop.robustness import Robustness, robustness
-from utank_hil.analysis.loop.sea_response import MotionInSea, motion_in_sea, require_roll
+from utank_hil.analysis.loop.sea_response import (
+    MotionInSea,
+    at_its_motion,
+    motion_in_sea,
+    require_roll,
+)
 from utank_hil.control import ConstrainedDesign, DesignPlant, PredictiveDesign
 from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.sea import Harmonics
@@ -94,7 +99,8 @@ def trade(
     measured = (
         design.measured if isinstance(design, ConstrainedDesign) else design.predictor.measured
     )
-    passive = motion_in_sea(None, plant, measured, wave_moment)
+    settled = at_its_motion(None, plant, measured, wave_moment)
+    passive = motion_in_sea(None, settled, measured, wave_moment)
     require_roll(passive)
     points = []
     for number, factor in enumerate(factors, 1):
@@ -102,7 +108,8 @@ def trade(
         judged = robustness(law, plant, measured)
         motion = less = None
         if judged.nominal.radius < 1:
-            motion = motion_in_sea(law, plant, measured, wave_moment)
+            settled = at_its_motion(law, plant, measured, wave_moment)
+            motion = motion_in_sea(law, settled, measured, wave_moment)
             less = 1 - motion.roll_rms_rad / passive.roll_rms_rad
         points.append(TradePoint(factor, motion, less, judged))
         if progress is not None:
