@@ -24,6 +24,11 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.evidence(
+    "utank_hil/telemetry/ring.py-import utank_hil.pictures-arrows point one way",
+    "firmware_sim/report.py-import utank_hil.commands.run-but the command line imports",
+    "utank_hil/commands/run.py-import firmware_sim.bench-knows nothing of the bench",
+)
 @pytest.mark.parametrize(
     ("file", "line", "contract"),
     [

@@ -162,6 +162,7 @@ def test_slow_ship_may_not_move_her_water_faster_than_the_first_ship_does() -> N
     assert demand.duct_speed_m_s == pytest.approx(MOST_DUCT_SPEED_M_S)
 
 
+@pytest.mark.evidence("0.85", "1.15")
 @pytest.mark.parametrize("scale", [0.85, 1.0, 1.15])
 def test_sized_pump_moves_the_water_as_said(scale: float) -> None:
     """The pump's own equations and the water's, stepped together in a ship held still."""

@@ -140,6 +140,7 @@ def test_commit_is_that_of_the_tree_and_unknown_where_there_is_none(
     commit.cache_clear()
 
 
+@pytest.mark.evidence
 def test_a_wheel_brings_its_commit_configurations_and_pages(tmp_path: Path) -> None:
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--quiet"]
     source = Path(__file__).parents[2]
@@ -171,7 +172,7 @@ def test_both_commands_have_a_version(application) -> None:
     assert re.fullmatch(r"utank-hil \d+\.\d+\.\d+\S*, commit \S+\n.+ libm .+\n", result.stdout)
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 @pytest.mark.usefixtures("one_process")
 def test_figures_picture_and_recording_of_a_bench_hold_the_configuration_that_ran(
     tmp_path: Path,

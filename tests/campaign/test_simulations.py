@@ -49,6 +49,7 @@ def test_linear_and_nonlinear_simulations_agree_where_motions_are_small(tmp_path
     )
 
 
+@pytest.mark.evidence
 def test_nonlinear_simulation_is_near_the_bus_and_has_the_same_bare_ship(tmp_path: Path):
     # on the bus the law has a quarter of its pressure until the water was seen to obey it
     long = {"duration_s": 120.0, "settle_s": 60.0}

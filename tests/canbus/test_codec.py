@@ -5,7 +5,7 @@ from typing import get_type_hints
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from message_strategies import CASE_IDS, CASES, PROTECTED, PROTECTED_IDS, messages
 
@@ -49,6 +49,7 @@ def by_cantools(dbc, message, data):
 
 @pytest.mark.slow
 @EVERY_MESSAGE
+@settings(max_examples=10)  # for each message
 @given(st.data())
 def test_encode_equals_cantools(case, data):
     kind, source, dbc = case
@@ -61,6 +62,7 @@ def test_encode_equals_cantools(case, data):
 
 
 @EVERY_MESSAGE
+@settings(max_examples=10)  # for each message
 @given(st.data())
 def test_decode_equals_cantools_on_random_bytes(case, data):
     kind, source, dbc = case
@@ -91,6 +93,7 @@ def test_decode_equals_cantools_on_random_bytes(case, data):
 
 @pytest.mark.slow
 @EVERY_MESSAGE
+@settings(max_examples=10)  # for each message
 @given(st.data())
 def test_decode_gives_back_what_was_encoded_to_half_a_step(case, data):
     kind, source, dbc = case
@@ -109,6 +112,7 @@ def test_decode_gives_back_what_was_encoded_to_half_a_step(case, data):
 
 @pytest.mark.slow
 @EVERY_MESSAGE
+@settings(max_examples=10)  # for each message
 @given(st.data())
 def test_values_out_of_range_saturate_and_never_raise(case, data):
     kind, source, dbc = case
@@ -142,6 +146,7 @@ def test_all_ones_is_not_available(case):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", PROTECTED, ids=PROTECTED_IDS)
+@settings(max_examples=10)  # for each message
 @given(st.data())
 def test_a_wrong_crc_gives_no_message(case, data):
     kind, source, _ = case

@@ -198,17 +198,23 @@ def test_events_are_logged_and_alarms_are_left_to_the_run_to_print(
     assert "too [short]" in said
 
 
+@pytest.mark.parametrize(
+    "log",
+    [
+        pytest.param(Path("missing/log.jsonl"), id="no folder", marks=pytest.mark.evidence),
+        pytest.param(Path("/dev/full"), id="full"),
+    ],
+)
 def test_a_log_that_can_not_be_written_is_said_and_the_rest_goes_on(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    log: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    for log in (tmp_path / "missing" / "log.jsonl", Path("/dev/full")):
-        announcer = Announcer(log=log)
-        announcer.write(REFUSED, 0)
-        announcer.stop()
-        assert announcer.error is None
-        said = capfd.readouterr().err
-        assert "log" in said
-        assert "too [short]" in said
+    announcer = Announcer(log=log)
+    announcer.write(REFUSED, 0)
+    announcer.stop()
+    assert announcer.error is None
+    said = capfd.readouterr().err
+    assert "log" in said
+    assert "too [short]" in said
 
 
 def test_a_ship_that_no_file_may_hold_is_told_and_leaves_no_file(

@@ -328,7 +328,7 @@ def test_the_record_before_is_void_whatever_hinders_the_new_one(
     def fails(*_: object) -> None:
         raise OSError(28, "No space left on device") if full else ZeroDivisionError("a defect")
 
-    assert commission(monkeypatch, AtTheQuay, file).exit_code == ExitCode.OK
+    passed(file)
     assert reason(file) == ""
     monkeypatch.setattr(module, "write_record" if full else "make_record", fails)
     result = commission(monkeypatch, Stopped, file)

@@ -155,6 +155,7 @@ def test_a_table_of_the_frames_shows_what_the_telemetry_showed(entries: list[Ent
     np.testing.assert_allclose(found["pressure_command_pa"][::2], command[::2], atol=4.0)
 
 
+@pytest.mark.evidence("a.asc", "a.log")
 @pytest.mark.parametrize("name", ["a.log", "a.asc", "a.blf"])
 def test_an_exported_log_of_the_bus_is_replayed_exactly(tmp_path: Path, name: str) -> None:
     config = "configs/controllers/gpc.yaml"

@@ -127,6 +127,7 @@ def test_alarms_of_a_later_part_are_those_of_the_run_and_without_a_log_not_known
     assert "Not known: there is no log-20260101T000000Z.jsonl beside it." in page
 
 
+@pytest.mark.evidence
 @pytest.mark.usefixtures("one_pixel")
 def test_the_log_of_a_run_is_found_by_the_name_of_its_recording(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -33,9 +33,9 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> str:
     scenario = load_config(SCENARIO, Scenario)
     gpc = scenario.controllers["gpc"]  # a fourth curve that costs no design
     controllers = {"dpc": scenario.controllers["dpc"], "gpc": gpc, "gpc again": gpc}
-    scenario = scenario.model_copy(update={"settle_s": 20.0, "controllers": controllers})
+    scenario = scenario.model_copy(update={"settle_s": 10.0, "controllers": controllers})
     with in_one_process():
-        result = run_bench(scenario, BenchOptions(duration_s=60.0), lambda *_: None)
+        result = run_bench(scenario, BenchOptions(duration_s=30.0), lambda *_: None)
     about = describe("bench", result.scenario, folder, options={}, seed=result.seed)
     files, failures = write_report(result, figures(result), folder, about)
     assert failures == []

@@ -129,8 +129,26 @@ def test_no_quantity_of_a_ship_passes_by_a_factor(tmp_path: Path, ship: Path | N
     assert unnamed(tmp_path, stem, content, Vessel) == []
 
 
+@pytest.mark.evidence(
+    "voyage",
+    "adaptive_gpc",
+    "patti_b_constrained_gpc",
+    "self_tuned",
+    "gpc",
+    "valve_clipped",
+    "adaptive_dpc",
+    "dpc",
+    "constrained_gpc",
+    "adaptive_dpc_roll",
+    "valve_on_off",
+    "naval_constrained_gpc",
+    "stimulate",
+    "load_change",
+    "patti_b",
+    "adaptive",
+    "naval_vessel",
+)
 @pytest.mark.slow
-@pytest.mark.evidence("voyage")
 @pytest.mark.parametrize(
     "file",
     [*CONFIGS.glob("controllers/*.yaml"), *CONFIGS.glob("scenarios/*.yaml")],

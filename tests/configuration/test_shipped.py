@@ -55,7 +55,19 @@ def test_drive_and_high_level_switch_follow_from_the_vessel_unless_written() -> 
     assert naval.sensors.high_level_m < naval.vessel.tank.level_limit_m
 
 
-@pytest.mark.evidence("patti_b_self_tuning")
+@pytest.mark.evidence(
+    "patti_b_self_tuning",
+    "adaptive_dpc",
+    "adaptive_dpc_roll",
+    "adaptive_gpc",
+    "dpc",
+    "gpc",
+    "naval_self_tuning",
+    "pd",
+    "self_tuned",
+    "self_tuning",
+    "valve_clipped",
+)
 @pytest.mark.slow
 @pytest.mark.parametrize("path", CONTROLLERS, ids=lambda p: p.stem)
 def test_controller_arms_and_acts_on_the_bus_within_the_drives_limits(path: Path) -> None:
@@ -77,7 +89,7 @@ def test_controller_arms_and_acts_on_the_bus_within_the_drives_limits(path: Path
     assert ship.valve is None or ship.valve.refused == 0
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 @pytest.mark.parametrize(("ship", "seed"), [("patti_b", 53), ("naval_vessel", 51)])
 def test_self_tuning_law_keeps_roll_and_level_after_it_was_armed(ship: str, seed: int) -> None:
     # these seeds ended in HEEL_LIMIT at 17 degrees, and in LEVEL_LIMIT

@@ -127,6 +127,7 @@ def test_taking_over_it_wants_what_it_would_if_in_charge_all_along(name):
     assert_takes_over_as_if_in_charge(name, *PUMP_LAWS[name])
 
 
+@pytest.mark.evidence("small gain fuzzy", "indirect fuzzy")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STARTS_ANEW)
 def test_taking_over_it_begins_as_newly_built(name):
@@ -140,6 +141,7 @@ def test_law_that_does_not_listen_is_found_out(name):
         assert_takes_over_as_if_in_charge(name, lambda: Deaf(build()), names)
 
 
+@pytest.mark.evidence("small gain fuzzy", "indirect fuzzy")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STARTS_ANEW)
 def test_law_that_goes_on_in_waiting_is_found_out(name):

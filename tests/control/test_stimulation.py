@@ -173,7 +173,7 @@ class SharingLimiter(CommandLimiter):
         return super().limit(desired_pa, level_m, level_rate_m_s, share)
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_correction_does_not_wind_up_while_pressure_is_cut():
     limits = PumpLimits(pressure_pa=14e3)
     controller = PLAN.controller()

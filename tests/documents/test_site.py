@@ -32,7 +32,7 @@ def site() -> Path:
     return folder / "docs"
 
 
-@pytest.mark.evidence("can-catalogue", "thesis")
+@pytest.mark.evidence
 @pytest.mark.parametrize("name", PAGES)
 def test_nothing_of_a_page_is_cut_and_it_asks_for_nothing(
     browser: Browser, site: Path, name: str
@@ -54,6 +54,7 @@ def test_nothing_of_a_page_is_cut_and_it_asks_for_nothing(
         assert seen.complaints == []
 
 
+@pytest.mark.evidence
 def test_a_phone_breaks_names_in_tables_at_blanks_alone(browser: Browser, site: Path) -> None:
     with opened(browser, (site / "README.html").as_uri(), PHONE) as seen:
         seen.page.wait_for_load_state("load")
@@ -66,6 +67,7 @@ def test_a_phone_breaks_names_in_tables_at_blanks_alone(browser: Browser, site: 
         assert seen.too_wide <= 0
 
 
+@pytest.mark.evidence
 def test_the_gallery_shows_its_curves(browser: Browser, site: Path) -> None:
     with opened(browser, (site / "thesis.html").as_uri(), DESK) as seen:
         seen.page.wait_for_load_state("load")

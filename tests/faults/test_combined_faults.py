@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, Final, get_args, get_type_hints
 
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
@@ -161,6 +161,7 @@ def pair(*faults: dict[str, Any]) -> list[dict[str, Any]]:
     return [{"message": "SENSOR_MOTION", **fault} for fault in faults]
 
 
+@settings(max_examples=10)  # of 0.1 s each
 @example(pair({"kind": "corrupted"}, {"kind": "counter", "step": 1}))
 @example(pair({"kind": "length", "length": 2}, {"kind": "corrupted"}))
 @example(pair({"kind": "length", "length": 0}, {"kind": "data_id"}))

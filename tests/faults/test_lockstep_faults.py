@@ -211,7 +211,7 @@ def test_same_seed_same_trace_byte_for_byte_and_another_seed_another() -> None:
     assert len(traces[0].splitlines()) > 2000
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 @settings(max_examples=4)
 @given(seed=st.integers(0, 2**31), controller=st.sampled_from(sorted(storm().controllers)))
 def test_drive_never_refuses_a_frame_of_a_fault_free_run(seed: int, controller: str) -> None:
@@ -246,7 +246,7 @@ failures = st.lists(
 
 
 @pytest.mark.slow
-@settings(max_examples=15)
+@settings(max_examples=8)  # of 0.2 s each
 @given(script=scripts, failures=failures, seed=st.integers(0, 100))
 def test_invariants_hold_under_paired_faults_and_any_operator(script, failures, seed: int) -> None:
     timed = tuple(TimedAction(tenths / 10, action) for tenths, action in script)

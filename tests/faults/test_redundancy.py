@@ -315,6 +315,7 @@ def naval_with_both() -> ControllerConfig:
     return naval.model_copy(update={"vessel": vessel})
 
 
+@pytest.mark.evidence("<lambda>-roll_2_zero", "<lambda>-roll_rate_2_zero")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("wrong", "check"),

@@ -66,7 +66,7 @@ def passive() -> np.ndarray:
     return passive
 
 
-@pytest.mark.evidence("dpc-0", "self-tuning-0", "gpc-10")
+@pytest.mark.evidence
 @pytest.mark.parametrize(
     ("controller", "one_of"), [*((name, 0) for name in sorted(storm().controllers)), ("gpc", 10)]
 )

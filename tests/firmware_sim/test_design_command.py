@@ -163,6 +163,7 @@ def test_a_calm_sea_is_refused_with_the_scenario_s_name(tmp_path: Path):
         assert word in result.stderr
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize(
     ("name", "sea"),
     [

@@ -84,6 +84,7 @@ def test_deviations_of_frequency_and_damping_follow_a_pole_that_moves(
     assert found == pytest.approx((abs(of_frequency), abs(of_damping)), abs=1e-6)
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize("limits", [FAST_PUMP, SLOW_PUMP])
 def test_delta_method_is_the_spread_of_redrawn_coefficients(limits: PumpLimits) -> None:
     # draws from the coefficients' own distribution, each through recursion and ERA

@@ -84,6 +84,7 @@ def test_noise_alone_is_not_clear():
     assert fit_motion(noise, PLANT, SAMPLE_TIME_S, KNOWN_SPREAD).clear < 0.5
 
 
+@pytest.mark.evidence
 def test_noise_of_the_level_gauge_is_not_taken_for_waves():
     rng = np.random.default_rng(1)
     noise = rng.standard_normal((6000, 3)) * [2e-8, 5e-8, 3.5e-2]

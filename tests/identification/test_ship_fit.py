@@ -79,8 +79,7 @@ def test_in_a_storm_the_roll_period_is_found_within_a_tenth(
     assert abs(math.log(period_s(fit) / true_s)) < 3 * fit.period_deviation
 
 
-@pytest.mark.evidence("1-120")
-@pytest.mark.slow
+@pytest.mark.evidence
 @pytest.mark.parametrize(("outputs", "order"), [(1, 120), (2, 120)])
 def test_stated_deviations_are_the_errors_over_seas(outputs: int, order: int) -> None:
     errors = []  # of inertia, stiffness, both dampings and period, each over its deviation

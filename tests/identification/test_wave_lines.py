@@ -18,6 +18,7 @@ def _record(*waves: tuple[float, float], noise: float = 0.01) -> tuple[FloatArra
     return u, noisy(y, noise, 3) if noise else y
 
 
+@pytest.mark.evidence("0.6-0.0", "0.6-0.01")
 @pytest.mark.parametrize("noise", [0.0, 0.01, 0.03])
 @pytest.mark.parametrize("omega", [0.6, 0.8377])
 def test_one_wave_is_found_to_a_fraction_of_a_cycle(noise: float, omega: float) -> None:

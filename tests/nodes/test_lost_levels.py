@@ -42,6 +42,7 @@ def always_good(tick: int) -> Quality:
     return Quality.GOOD
 
 
+@pytest.mark.evidence("2", "3", "5")
 @pytest.mark.parametrize("one_of", [1, 2, 3, 4, 5, 10])
 def test_lost_frames(one_of: int) -> None:
     error = worst_rate_error(lambda k, frame: () if k % one_of else (frame,), always_good)

@@ -211,7 +211,7 @@ def test_identifications_that_told_nothing_of_the_ship_do_not_count() -> None:
     rig.run_until(RETUNED, 10000)
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_change_that_went_away_leaves_the_next_one_all_its_tries() -> None:
     def stiffness(k: int) -> float:
         # 12,000 samples are 40 minutes

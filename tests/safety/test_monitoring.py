@@ -228,6 +228,7 @@ class Fading(MovingShip):
         return super()._at(phasor, time_s, noise) * math.exp((self._since_s - time_s) / 40.0)
 
 
+@pytest.mark.evidence
 def test_the_water_has_to_obey_before_it_counts_as_watched() -> None:
     table = Table()
     moved(table, ROLLING, 5.0)
@@ -243,6 +244,14 @@ def test_the_water_has_to_obey_before_it_counts_as_watched() -> None:
     assert still.monitors.confirmed  # water at rest is watched, too
 
 
+@pytest.mark.evidence(
+    "0.15-motion_age_ms",
+    "0.15-tank_age_ms",
+    "0.15-pump_age_ms",
+    "0.45-motion_age_ms",
+    "0.45-tank_age_ms",
+    "0.45-pump_age_ms",
+)
 @pytest.mark.parametrize("age", ["motion_age_ms", "tank_age_ms", "pump_age_ms"])
 @pytest.mark.parametrize("length_s", [0.15, 0.3, 0.45])
 def test_short_gaps_keep_nothing_from_being_judged(age: str, length_s: float) -> None:

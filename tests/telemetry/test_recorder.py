@@ -200,6 +200,7 @@ def open_files() -> int:
     return len(os.listdir("/proc/self/fd"))
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize(
     ("kills", "lost_s"),
     [(3, 5.0), pytest.param(200, 1.0, marks=[pytest.mark.evidence, pytest.mark.timeout(3600)])],

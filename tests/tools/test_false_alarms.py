@@ -76,6 +76,7 @@ def test_hours_that_were_sailed_are_kept_and_retuning_is_ordered_in_every_second
     assert row["maxima"]["drift"] == pytest.approx(0.1 * np.arange(1, 7))
 
 
+@pytest.mark.evidence
 def test_what_ends_control_is_found_though_no_monitor_finds_it() -> None:
     scenario = dict(hours("gpc"))["storm"]
     low = replace(scenario.sensors, high_level_m=0.5)

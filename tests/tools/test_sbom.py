@@ -33,6 +33,7 @@ list(build_controller_node(config).tick(0))
 """
 
 
+@pytest.mark.evidence
 def test_with_the_listed_parts_alone_a_controller_runs() -> None:
     made = sbom()
     assert (made["bomFormat"], made["metadata"]["component"]["name"]) == ("CycloneDX", "utank-hil")

@@ -171,6 +171,7 @@ def test_no_kernel_outlives_a_killed_launcher() -> None:
         time.sleep(0.05)
 
 
+@pytest.mark.evidence("/etc/passwd-126")
 @pytest.mark.parametrize(("command", "code"), [("no-such-command", 127), ("/etc/passwd", 126)])
 def test_command_that_cannot_run_is_told_apart(command: str, code: int) -> None:
     done = run(WAY, command)
@@ -192,6 +193,7 @@ def test_no_time_limit_holds_real_time_processes_up() -> None:
     assert limit.stdout.strip() == b"-1"
 
 
+@pytest.mark.evidence
 def test_two_processes_talk_on_vcan0_and_candump_hears_every_frame() -> None:
     done = run(WAY, sys.executable, "-c", CONVERSATION, sys.executable, SENDER, ANSWERER)
     assert done.returncode == 0, done.stderr.decode()
@@ -203,6 +205,7 @@ def test_two_processes_talk_on_vcan0_and_candump_hears_every_frame() -> None:
     assert frames == expected
 
 
+@pytest.mark.evidence("--map-root-user")
 @pytest.mark.parametrize("identity", ["--map-root-user", "--map-current-user"])
 def test_native_way_makes_a_vcan0_where_there_is_none(identity: str) -> None:
     inside = (VCAN, "--native", sys.executable, "-c", SEND_TO_ONESELF)

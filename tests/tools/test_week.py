@@ -40,7 +40,7 @@ def sailed() -> tuple[list[Sample], Counter[str]]:
     return sail(800, 40, retune, 3, settings=SETTINGS, episode_s=55.0, cargo_s=110.0)
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_faults_and_retunings_leave_nothing_behind() -> None:
     """In a process of its own: what other tests have left free in this one grows at random."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:

@@ -121,8 +121,8 @@ def test_eigenvalues_with_both_direct_paths_are_those_of_python_control(direct):
     np.testing.assert_allclose(found, np.sort_complex(halved.poles()), rtol=1e-9)
 
 
+@pytest.mark.evidence("gain", "lead, in the loop's count")
 @pytest.mark.slow
-@pytest.mark.evidence("gain")
 @pytest.mark.parametrize(
     "law",
     [lead_lag(-2.5e6), static(-3e5), MatrixLaw(lead_lag(-2.5e6).model)],

@@ -81,7 +81,7 @@ def probe(function, **options):
     return impulse_response_law(lambda: Stepped(function), ROLL, **options)
 
 
-@pytest.mark.evidence("dpc", "gpc")
+@pytest.mark.evidence("dpc", "gpc", "constrained")
 @pytest.mark.parametrize("name", LAWS)
 def test_it_is_the_law_that_was_stepped(name):
     own, measured = LAWS[name]
@@ -110,6 +110,7 @@ def test_it_is_the_law_that_was_stepped(name):
     assert mine == pytest.approx(theirs, rel=1e-6)
 
 
+@pytest.mark.evidence
 def test_robustness_takes_it_as_any_law():
     own, measured = LAWS["gpc"]
     found, expected = (

@@ -66,6 +66,7 @@ def test_the_cost_is_that_of_the_sum_over_random_components(short_search):
     assert found.cost == pytest.approx(expected, rel=0.03)
 
 
+@pytest.mark.evidence
 def test_another_ship_in_a_sea_that_is_not_known_gets_a_law():
     naval = load_config(CONTROLLERS / "naval_constrained_gpc.yaml", ControllerConfig).plant
     design = AutoDesign("lqg", "auto")

@@ -69,6 +69,7 @@ def test_passive_roll_is_that_of_the_sum_over_components():
     assert passive_roll_rad(PLANT, SEA) == pytest.approx(motion.roll_rms_rad, rel=0.01)
 
 
+@pytest.mark.evidence
 def test_a_power_budget_is_kept_and_costs_roll():
     free = tuned()
     spared = tuned(0.5 * free.prediction.power_w)
@@ -94,6 +95,7 @@ def patti_b() -> tuple[DesignPlant, SelfTuned]:
     return plant, SelfTunedDesign("self_tuned", BOAT_SEA).tuned(plant)
 
 
+@pytest.mark.evidence
 def test_no_oscillation_goes_on_by_itself_after_the_pump_was_at_its_limit():
     plant, found = patti_b()
     waves = Sea.irregular(BOAT_SPECTRUM, 1).roll_moment(
@@ -109,6 +111,7 @@ def test_no_oscillation_goes_on_by_itself_after_the_pump_was_at_its_limit():
     assert rolls[15_000:].max() < 0.1 * rolls[:15_000].max()
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize("any_load", [False, True])
 def test_a_law_is_stable_with_any_share_of_its_command(any_load):
     # Patti-B's law of least cost has all margins and is not, from 0.05 to 0.3

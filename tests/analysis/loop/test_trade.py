@@ -80,6 +80,7 @@ def test_a_constrained_law_is_traded_by_its_pressure_weight_where_no_limit_is_ac
     assert gentle.roll_below_passive < hard.roll_below_passive
 
 
+@pytest.mark.evidence
 def test_progress_ends_at_one():
     told = []
     trade(GPC_ROLL, DesignPlant(SHIP, TANK), MOMENT, factors=(1.0, 2.0), progress=told.append)

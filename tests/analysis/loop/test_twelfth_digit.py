@@ -85,8 +85,10 @@ def test_pd_stands_on_every_ship(ship: str) -> None:
     assert_stands(config_of("pd").law, config_of(ship), seeds=3)
 
 
+@pytest.mark.evidence(
+    "patti_b_self_tuning", "auto gpc", "auto dpc", "self_tuning", "naval_self_tuning", "auto lqg"
+)
 @pytest.mark.slow
-@pytest.mark.evidence("patti_b_self_tuning", "auto gpc", "auto dpc")
 @pytest.mark.parametrize("name", SEARCHED)
 def test_a_law_that_is_searched_for_stands(name: str) -> None:
     auto = name.startswith("auto ")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.canbus import AlarmState, Fault, Mode
@@ -195,7 +195,6 @@ def test_what_is_not_for_this_equipment_has_no_answer(line: str) -> None:
     assert Alerts().answer(line, UTC_TIME) == []
 
 
-@settings(max_examples=50)
 @given(st.text(max_size=200))
 def test_no_text_breaks_a_sentence_or_its_reader(text: str) -> None:
     assert len(split(sentence("ALF", [text_field(text, 40)]))) == 2

@@ -27,6 +27,7 @@ LAWS = {
 }
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize("seconds", [3e3, pytest.param(1e5, marks=pytest.mark.evidence)])
 @pytest.mark.parametrize("name", LAWS)
 def test_parameters_stay_bounded_over_hours_of_waves(name, seconds):

@@ -38,6 +38,7 @@ def test_first_command_is_the_law_of_the_source_with_what_is_known_before():
     assert law.controller().step(x, np.array([0.05]))[0] == pytest.approx(shifted)
 
 
+@pytest.mark.evidence("1", "2", "3")
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_lyapunov_function_falls_on_a_plant_of_the_class_also_when_projection_acts(seed):

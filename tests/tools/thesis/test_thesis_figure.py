@@ -27,6 +27,7 @@ def canvas(monkeypatch: pytest.MonkeyPatch) -> list[Canvas]:
     return saved
 
 
+@pytest.mark.evidence("1-1", "2-1", "2-2", "3-1", "3-2")
 @pytest.mark.parametrize("columns", [1, 2])
 @pytest.mark.parametrize("panels", [1, 2, 3])
 def test_legends_stand_off_the_data_and_no_text_is_cut(

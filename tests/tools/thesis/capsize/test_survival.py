@@ -123,7 +123,7 @@ def test_contest_at_the_printed_amplitudes(duration_s):
     assert printed.runs[3].max_command > 100e3
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 @pytest.mark.parametrize("duration_s", DURATION_S)
 @pytest.mark.parametrize("law", [law for law in LAWS if law.startswith("fuzzy")])
 def test_fuzzy_laws_survive_what_the_passive_tank_does_up_to_the_second_amplitude(law, duration_s):

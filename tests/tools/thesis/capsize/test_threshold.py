@@ -43,6 +43,7 @@ def test_wind_heels_the_equilibrium_and_shrinks_the_lee_side():
     assert starboard.roll_rad < VANISHING < -port.roll_rad
 
 
+@pytest.mark.evidence
 def test_the_calm_basin_is_bounded_by_the_heteroclinic_cycle():
     """Undamped: survives if and only if its energy lies below the saddle's."""
     ship = replace(PATTI, damping_nms_rad=0.0, quadratic_damping_nms2_rad2=0.0)
@@ -61,6 +62,7 @@ def test_the_calm_basin_is_bounded_by_the_heteroclinic_cycle():
     assert 0.2 < safe.mean() < 0.9
 
 
+@pytest.mark.evidence
 def test_threshold_separates_survival_from_capsize():
     bare = without_tank(MODEL)
     found = capsize_threshold(bare, 0.6, 6e4, duration_s=200.0, cells=300)
@@ -75,6 +77,7 @@ def test_threshold_separates_survival_from_capsize():
 WINDOWS = [(90, 4.06e4, 4.11e4), (150, 4.38e4, 4.41e4)]
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize(("phase_deg", "low_nm", "high_nm"), WINDOWS)
 def test_threshold_is_the_first_window_and_not_one_above_it(phase_deg, low_nm, high_nm):
     phase = math.radians(phase_deg)
@@ -98,7 +101,7 @@ def test_first_windows_are_the_reference_integrator_s(phase_deg, amplitude_nm, c
     assert math.isfinite(run.capsized_s) == capsizes
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_printed_threshold_without_a_tank_is_the_least_at_starts_of_about_140_degrees_only():
     """At 142 degrees she survives it; at 135 she does not, at 150 not even less (above)."""
     bare, printed = without_tank(MODEL), 5.086e4
@@ -109,7 +112,7 @@ def test_printed_threshold_without_a_tank_is_the_least_at_starts_of_about_140_de
     assert at[0].capsizing_nm < printed < at[1].safe_nm
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_printed_threshold_with_the_tank_lies_within_the_range_over_the_phase():
     model = RollModel(PATTI, replace(TANK, lz_m=0.0, damping_ratio=0.1))
     sine, cosine = (
@@ -119,7 +122,7 @@ def test_printed_threshold_with_the_tank_lies_within_the_range_over_the_phase():
     assert sine.capsizing_nm < 8.646e4 < cosine.safe_nm
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_the_tank_raises_the_threshold_by_half():
     """Lz -1 m, damping ratio 0.3: one of the tanks that the source may have meant."""
     bare = capsize_threshold(without_tank(MODEL), 0.6, 2e5, cells=500).capsizing_nm
