@@ -162,6 +162,7 @@ def test_groups_of_the_same_waves_are_compared_with_the_first(run, tmp_path: Pat
         assert same["roll_rms_difference_rad"] == {"mean": 0.0, "half_width": 0.0, "cases": 3}
 
 
+@pytest.mark.evidence
 def test_interrupted_campaign_says_so_keeps_what_there_is_and_goes_on(
     run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -165,6 +165,7 @@ def test_frames_that_came_with_an_error_are_not_lost(buses, wrong):
     assert list(port.receive()) == []
 
 
+@pytest.mark.evidence("with_it1")
 @pytest.mark.parametrize("with_it", [[], [message()]])
 def test_an_error_leaves_nothing_behind_for_the_garbage_collector(buses, with_it):
     """The loop has switched it off."""

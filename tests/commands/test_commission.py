@@ -277,6 +277,7 @@ def test_the_command_leads_through_and_writes_the_record(
     assert reason(file) == ""
 
 
+@pytest.mark.evidence
 def test_json_is_the_record_and_nothing_else(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -318,6 +319,7 @@ def test_ended_while_the_pump_moves_it_leaves_no_older_record(
     assert "there is no record" in reason(file)
 
 
+@pytest.mark.evidence("True")
 @pytest.mark.parametrize("full", [False, True])
 def test_the_record_before_is_void_whatever_hinders_the_new_one(
     file: Path, monkeypatch: pytest.MonkeyPatch, *, full: bool

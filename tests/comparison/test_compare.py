@@ -87,7 +87,7 @@ def test_root_mean_square_is_the_mean_of_its_batches_and_differences_add_up():
         batch_means(np.ones(3), 4)
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_interval_of_an_hour_holds_the_true_difference_about_as_often_as_it_says():
     ratios, count, held = (0.025, 0.05), 300, 0
     # white noise: the mean square goes with the inverse of the damping

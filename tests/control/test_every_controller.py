@@ -141,7 +141,7 @@ def test_law_that_does_not_listen_is_found_out(name):
         assert_takes_over_as_if_in_charge(name, lambda: Deaf(build()), names)
 
 
-@pytest.mark.evidence("small gain fuzzy", "indirect fuzzy")
+@pytest.mark.evidence("small gain fuzzy", "indirect fuzzy", "robust fuzzy")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STARTS_ANEW)
 def test_law_that_goes_on_in_waiting_is_found_out(name):

@@ -194,6 +194,7 @@ def test_law_that_drives_the_roll_up_is_taken_back_within_its_limits() -> None:
     assert voyage.drive.refused == 0
 
 
+@pytest.mark.evidence
 def test_swap_makes_no_step_beyond_the_rate_limit_even_to_the_opposite_law() -> None:
     config = adaptive_config()
     voyage = Voyage(Broken(law_of(-2e5))).run(100)
@@ -202,6 +203,7 @@ def test_swap_makes_no_step_beyond_the_rate_limit_even_to_the_opposite_law() -> 
     assert np.abs(np.diff(voyage.pressures(ORDERED_S))).max() <= step_pa + 8.0
 
 
+@pytest.mark.evidence
 def test_disarmed_while_identifying_it_ends_at_zero_and_stays_there() -> None:
     script = (*SCRIPT, TimedAction(50.0, Action.STOP))
     voyage = Voyage(Broken(law_of(1e5)), script).run(70)

@@ -108,7 +108,7 @@ def test_emulated_pump_gives_the_pressure_that_the_real_drive_reports(
     assert largest > 10e3
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_emulated_ship_rolls_less_with_the_real_drive_than_without_pressure(
     replaced_drive: Bench,
 ) -> None:

@@ -110,6 +110,7 @@ def test_what_to_do_next_can_be_done_under_any_name(tmp_path: Path) -> None:
     assert load_config(tmp_path / "north_star" / "ship.yaml", Vessel).name == "north star"
 
 
+@pytest.mark.evidence
 def test_sea_can_be_given(tmp_path: Path) -> None:
     told = json.loads(run(tmp_path, PATROL, "--hs", "2.25", "--tp", "8", "--json").stdout)
     assert (told["sea"]["hs_m"], told["sea"]["tp_s"]) == (2.25, 8)

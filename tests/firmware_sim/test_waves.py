@@ -32,6 +32,7 @@ def moments(waves, seconds: int) -> np.ndarray:
     return np.array(found)
 
 
+@pytest.mark.evidence
 def test_ship_that_keeps_course_and_speed_meets_the_sum_of_harmonics() -> None:
     waves = PassingWaves(PassingSea.of(SEA), lambda _: 0.0, lambda _: 5.0, moment)
     sailing = Sea(SEA.amplitude_m, SEA.omega_rad_s, SEA.heading_rad, SEA.phase_rad, 5.0)

@@ -127,6 +127,7 @@ def test_data_without_noise_leave_no_doubt() -> None:
     assert np.all(stated.modes.frequency_rad_s <= high)
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize("runs", [25, pytest.param(120, marks=pytest.mark.evidence)])
 def test_bias_variance_and_coverage_against_the_cramer_rao_bound(runs: int) -> None:
     truth, u = plant(), pulses(1)

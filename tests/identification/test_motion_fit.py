@@ -49,6 +49,7 @@ def test_loading_and_waves_are_found_while_the_pump_works(period_s, inertia):
     assert found.clear > 0.9
 
 
+@pytest.mark.evidence
 def test_a_passive_tank_does_not_tell_ship_from_waves_and_says_so():
     moment_nm = wave_moment_nm(SEA, 1300.0, seed=2)
     found, _ = fitted(moment_nm, motion_in(moment_nm, most_pa=0.0))

@@ -141,7 +141,7 @@ def test_an_estimate_is_shown_wherever_people_look() -> None:
     assert voyage.warned
 
 
-@pytest.mark.evidence("9.0")
+@pytest.mark.evidence("9.0", "None")
 @pytest.mark.parametrize("limit_m", [None, 9.0])
 def test_when_estimates_end_that_is_shown_and_an_alarm_where_they_watch_the_stability(
     limit_m: float | None,

@@ -304,6 +304,7 @@ LOADED = replace(
 )
 
 
+@pytest.mark.evidence
 def test_twin_of_a_loaded_ship_takes_over_without_a_bump_and_rolls_as_she_does() -> None:
     def waves(t):
         return 2e7 * (math.sin(0.55 * t) + 0.7 * math.sin(0.8 * t + 1))

@@ -263,6 +263,7 @@ def test_a_stopped_recorder_costs_rows_counts_them_and_holds_up_nobody(tmp_path:
     ]
 
 
+@pytest.mark.evidence
 def test_lost_events_are_noted_in_the_recording(tmp_path: Path) -> None:
     file = tmp_path / "run.rrd"
     with EventWriter() as events, RowWriter(SIGNALS) as ring:
@@ -344,6 +345,7 @@ def test_it_ends_on_a_signal_with_all_rows(tmp_path: Path, stop: signal.Signals)
     assert len(recorded(file)) == 7
 
 
+@pytest.mark.evidence
 def test_recorder_whose_starter_is_gone_ends_without_a_complaint(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -428,6 +430,7 @@ def test_reason_of_a_failure_is_told_where_standard_error_takes_nothing(tmp_path
     assert "is its writer running" in json.loads(ended.stdout)["error"]
 
 
+@pytest.mark.evidence
 def test_a_full_disk_ends_the_recorder_and_leaves_what_was_written(tmp_path: Path) -> None:
     file = tmp_path / "run.rrd"
     limit = 400_000  # the layout takes most of it

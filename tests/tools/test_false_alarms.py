@@ -46,6 +46,7 @@ def test_an_hour_that_another_monitor_ended_is_not_in_the_fit() -> None:
         assert row["maxima"][monitor][-1] == 0.05
 
 
+@pytest.mark.evidence
 def test_every_shipped_law_sails_every_sea() -> None:
     for file in (ROOT / "configs/controllers").glob("*.yaml"):
         seas = dict(hours(file.stem))

@@ -46,6 +46,7 @@ def test_the_law_has_all_margins_and_costs_less_than_the_one_that_is_only_scaled
     assert found.cost < _Search(kind, PLANT, SEA).start.cost
 
 
+@pytest.mark.evidence
 def test_in_mild_weather_it_costs_less_than_the_law_that_was_tuned_in_the_storm():
     found = auto_tuned("lqg", PLANT, SEA)
     assert found.cost < 0.95 * _Search("lqg", PLANT, SEA)._cost(SHIPPED["lqg"].law)

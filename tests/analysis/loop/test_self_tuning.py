@@ -79,6 +79,20 @@ def test_a_power_budget_is_kept_and_costs_roll():
         tuned(1e-3)
 
 
+def test_the_first_law_within_the_power_budget_is_taken(monkeypatch):
+    found = tuned()
+
+    def best(_: object, costlier: float) -> SelfTuned:
+        return replace(found, prediction=replace(found.prediction, power_w=1e4 / costlier))
+
+    monkeypatch.setattr("utank_hil.analysis.loop.self_tuning._Search.best", best)
+    costly, spared = (self_tuned(PLANT, SEA, mean_power_w=most_w) for most_w in (1e5, 4e3))
+    assert costly.prediction.power_w > spared.prediction.power_w > 1e3
+    assert spared.prediction.power_w <= 4e3
+    with pytest.raises(NoLawError, match="the gentlest one puts"):
+        self_tuned(PLANT, SEA, mean_power_w=1e-9)
+
+
 def test_another_ship_gets_a_law_with_all_margins_too():
     naval = load_config(CONTROLLERS / "naval_constrained_gpc.yaml", ControllerConfig).plant
     design = SelfTunedDesign("self_tuned")
@@ -123,6 +137,7 @@ def test_a_law_is_stable_with_any_share_of_its_command(any_load):
         assert closed_loop_radius(clipped, model, 1.0) < 1, share
 
 
+@pytest.mark.evidence
 def test_a_heel_is_looked_for_where_the_water_leaves_the_ship_her_stability():
     assert tuned().design.heel_std_rad > 0
     assert patti_b()[1].design.heel_std_rad == 0

@@ -58,6 +58,7 @@ def test_without_limits_every_record_gives_the_cost_of_the_lqg_law(seed):
     assert cost == pytest.approx(count * each, rel=1e-6)
 
 
+@pytest.mark.evidence
 def test_bound_lies_between_clairvoyant_and_passive_and_costs_no_more_with_more_noise():
     bound = causal_bound(PROBLEM, [PROBLEM.run(seed, 120.0) for seed in range(3)])
     assert bound.clairvoyant_rad < bound.causal_rad < bound.passive_rad
@@ -68,6 +69,7 @@ def test_bound_lies_between_clairvoyant_and_passive_and_costs_no_more_with_more_
     assert worse.causal_rad > 1.3 * bound.causal_rad
 
 
+@pytest.mark.evidence
 def test_passive_roll_is_that_of_the_records():
     runs = [PROBLEM.run(seed, 200.0).passive for seed in range(6)]
     assert np.sqrt(np.mean(runs)) == pytest.approx(PROBLEM.passive_rad, rel=0.25)

@@ -15,6 +15,7 @@ def application() -> typer.Typer:
     return made
 
 
+@pytest.mark.evidence
 def test_chosen_figures_are_drawn_listed_and_put_on_one_page(
     application: typer.Typer, tmp_path: Path
 ) -> None:
@@ -37,6 +38,7 @@ def test_chosen_figures_are_drawn_listed_and_put_on_one_page(
     assert (tmp_path / "2.7.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.evidence
 def test_the_table_has_a_line_for_each_figure(application: typer.Typer, tmp_path: Path) -> None:
     done = CliRunner(env={"COLUMNS": "160"}).invoke(
         application, ["2.7", "2.2", "--out", str(tmp_path)]
