@@ -3,8 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
@@ -34,14 +32,12 @@ from utank_hil.base.parameters import (
     Finite,
     NotNegative,
     ParameterError,
-    Positive,
     Problem,
     Range,
     refuse,
 )
 from utank_hil.configuration import ControllerConfig, Section, Vessel
-from utank_hil.configuration.hull_files.parts import Given
-from utank_hil.configuration.hull_files.reader import read_hull
+from utank_hil.configuration.hull_files.section import HullFile
 from utank_hil.configuration.plausibility import tank_problems
 from utank_hil.dynamics.hull.lateral import LateralHull, LateralModel
 from utank_hil.dynamics.nonlinear import RollModel
@@ -96,31 +92,6 @@ def missing_nodes(vessel: Vessel, faults: Sequence[AnyFault], key: str = "faults
     ]
 
 
-class HullFile(Section):
-    """Hull data as seakeeping codes write them, and what their file lacks."""
-
-    file: Path
-    """Capytaine's netCDF, WAMIT's .1, Nemoh.cal, AQWA's .AH1, ShipX's .re7 or MSS's .mat."""
-    density_kg_m3: Annotated[float, Range(least=900, most=1100)] | None = None
-    """Density of the water."""
-    mass_kg: Positive | None = None  #: Mass of the ship without the tank's water.
-    gravity_centre_m: tuple[Finite, Finite, Finite] | None = None
-    """Centre of gravity forward, to port and up of the origin in the waterline."""
-    gyration_m: tuple[Positive, Positive, Positive] | None = None
-    """Radii of gyration about the centre of gravity in roll, pitch and yaw."""
-
-    @property
-    def hull(self) -> LateralHull:
-        """The hull; ValueError says what it lacks."""
-        given = Given(self.density_kg_m3, self.mass_kg, self.gravity_centre_m, self.gyration_m)
-        return _lateral_hull(self.file, given)
-
-
-@lru_cache(maxsize=4)
-def _lateral_hull(path: Path, given: Given) -> LateralHull:
-    return LateralHull(read_hull(path, given))
-
-
 class Scenario(Section):
     """Ship in a sea, with the controllers to be tested there."""
 
@@ -148,7 +119,8 @@ class Scenario(Section):
     plant: Literal["roll", "linear", "sway_roll_yaw", "fmu"] = "roll"
     """Equations of the emulated ship: roll, its small-motion limit, three degrees of `hull`, or
     those of another program in `fmu`."""
-    hull: HullFile | None = None  #: Hull data of the ship at rest, for plant: sway_roll_yaw.
+    hull: Annotated[HullFile | None, Field(validate_default=True)] = None
+    """Hull data of the ship at rest, for plant: sway_roll_yaw; by default the vessel's."""
     fmu: FmuFile | None = None  #: Ship and tank of another program, for plant: fmu.
     actual_ship: dict[str, Finite] = Field(default_factory=dict)
     """Parameters of the actual ship that differ from the vessel's, on which the controller relies.
@@ -167,6 +139,13 @@ class Scenario(Section):
         if vessel is None or not isinstance(sensors, dict):
             return sensors
         return {"high_level_m": vessel.tank.level_limit_m * _HIGH_LEVEL_SHARE, **sensors}
+
+    @field_validator("hull", mode="before")
+    @classmethod
+    def _of_the_vessel(cls, hull: Any, info: ValidationInfo) -> Any:
+        vessel = info.data.get("vessel")
+        sways = info.data.get("plant") == "sway_roll_yaw"
+        return vessel.hull if hull is None and sways and vessel is not None else hull
 
     @field_validator("drive", mode="before")
     @classmethod

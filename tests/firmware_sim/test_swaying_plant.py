@@ -18,7 +18,11 @@ from firmware_sim.waves import PassingWaves, SteadyWaves
 from utank_hil.assembly import build_controller_node
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Mode
-from utank_hil.configuration import Vessel, load_config
+from utank_hil.configuration import ConfigError, Vessel, load_config
+from utank_hil.configuration.hull_files.parts import Given
+from utank_hil.configuration.hull_files.reader import read_hull
+from utank_hil.dynamics.hull.lateral import LateralHull
+from utank_hil.dynamics.hull.response import free_roll, radiation_at
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.runners import Lockstep, SimulatedBus
 from utank_hil.sea import Harmonics, Sea, jonswap
@@ -171,3 +175,67 @@ def test_hull_that_does_not_fit_the_scenario_is_refused(changes, key: str, reaso
         hull_scenario(**changes)
     assert key in str(refused.value)
     assert reason in str(refused.value)
+
+
+def hull_vessel(**ship: object) -> dict[str, object]:
+    tank = {"width_m": 8.0, "height_m": 2.5, "reservoir_area_m2": 2.0, "duct_area_m2": 0.7}
+    return {"name": "wigley", "ship": ship, "tank": tank, "emulated": True}
+
+
+def test_ship_of_a_hull_file_rolls_as_the_hull_does() -> None:
+    hull = LateralHull(read_hull(Path(HULL["file"]), Given(gyration_m=HULL["gyration_m"])))
+    vessel = Vessel.model_validate(hull_vessel(hull=HULL))
+    found, ship, data = free_roll(hull.data), vessel.ship, hull.about_g
+    omega = 2 * math.pi / found.period_s
+    # sway and yaw eliminated from the equations of the data, at the frequency of free roll
+    lateral = np.ix_([1, 3, 5], [1, 3, 5])
+    added, damping = radiation_at(data, omega)
+    matrix = omega**2 * (data.mass_matrix + added)[lateral]
+    c44 = float(data.hydrostatic[3, 3])
+    own = matrix[1, 1] - matrix[1, [0, 2]] @ np.linalg.solve(
+        matrix[np.ix_([0, 2], [0, 2])], matrix[[0, 2], 1]
+    )
+    assert own == pytest.approx(c44, rel=1e-6)
+    assert ship.stiffness_nm_rad == pytest.approx(c44)
+    assert ship.natural_frequency_rad_s == pytest.approx(omega)
+    mode = found.mode
+    assert ship.damping_nms_rad == pytest.approx(float(mode @ damping[lateral] @ mode))
+    assert ship.displacement_n == pytest.approx(hull.data.mass_kg * 9.80665)
+    assert "roll period" in vessel.assumptions[0]
+    assert any("waves alone" in each for each in vessel.assumptions)
+
+
+def test_figure_that_is_given_goes_before_the_hull_s() -> None:
+    own = Vessel.model_validate(hull_vessel(hull=HULL)).ship
+    vessel = Vessel.model_validate(hull_vessel(hull=HULL, roll_period_s=9.0, damping_ratio=0.04))
+    ship = vessel.ship
+    assert 2 * math.pi / ship.natural_frequency_rad_s == pytest.approx(9.0)
+    assert ship.stiffness_nm_rad == own.stiffness_nm_rad
+    critical = 2 * math.sqrt(ship.inertia_kg_m2 * ship.stiffness_nm_rad)
+    assert ship.damping_nms_rad == pytest.approx(0.04 * critical)
+    assert "given: roll_period_s, damping_ratio" in vessel.assumptions[0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "reason"),
+    [
+        ({"ship": {"hull": HULL["file"]}}, "ship.hull", "gyration_m beside hull.file give"),
+        ({"ship": {"hull": "none.nc"}}, "ship.hull", "can't be"),
+        ({"emulated": False}, "ship.hull", "not emulated: write instead inertia_kg_m2: "),
+    ],
+)
+def test_hull_that_a_ship_can_t_take_is_refused(
+    changes: dict[str, object], key: str, reason: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "ship.yaml"
+    file.write_text(json.dumps(hull_vessel(hull=HULL) | changes))
+    with pytest.raises(ConfigError) as refused:
+        load_config(file, Vessel)
+    assert [each.key for each in refused.value.problems] == [key]
+    assert reason in str(refused.value)
+
+
+def test_plant_that_sways_has_the_vessel_s_hull() -> None:
+    vessel = hull_vessel(hull=HULL, damping_ratio=0.03)
+    assert hull_scenario(vessel=vessel, hull=None).lateral_hull is not None
+    assert hull_scenario(vessel=vessel, hull=None, plant="roll").lateral_hull is None

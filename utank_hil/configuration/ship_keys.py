@@ -6,8 +6,9 @@ ship without the tank's water::
     stiffness = D g GM        inertia = stiffness (T / 2 pi)^2
     linear damping = 2 zeta sqrt(inertia stiffness)
 
-A missing period is that of the weather criterion, IS Code 2008, part A, 2.3.4 (beam B, mean
-draught d, length L at the waterline)::
+What is not given is taken from ``hull``, if there are hull data: mass, C44, and inertia and damping
+of the free roll with sway and yaw free. Else a missing period is that of the weather criterion, IS
+Code 2008, part A, 2.3.4 (beam B, mean draught d, length L at the waterline)::
 
     T = 2 C B / sqrt(GM),     C = 0.373 + 0.023 B / d - 0.043 L / 100
 """
@@ -20,6 +21,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import PlainSerializer, WrapValidator
 
 from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
+from utank_hil.configuration.hull_files.section import HullFile
 from utank_hil.dynamics import GRAVITY_M_S2, RollShip
 
 NOT_GIVEN = math.nan  #: Mark of a missing key; no key of a file can have this value.
@@ -31,6 +33,7 @@ _PAIRS = (
     ("damping_ratio", "damping_nms_rad"),
 )  # Pairs of a naval architect's key and `RollShip`'s for the same quantity.
 
+_HULL_KEYS = "mass_kg, gravity_centre_m and gyration_m beside hull.file give what a file lacks"
 _UNITS = {
     "displacement_t": "it is in tonnes",
     "gm_m": "it is in metres, and roll_period_s in seconds",
@@ -83,6 +86,9 @@ class WrittenShip(RollShip):
     length_m: _Length = NOT_GIVEN
     #: Damping ratio of the ship's roll; instead of `damping_nms_rad`.
     damping_ratio: Annotated[float, Range(least=0, most=1e3)] = NOT_GIVEN
+    #: Hull data of a seakeeping code, by their file or as a section, for what no key here gives:
+    #: displacement, stiffness, inertia and damping. For a bench (`emulated`).
+    hull: HullFile | None = None
 
     def __post_init__(self) -> None:
         twice = [
@@ -99,22 +105,36 @@ class WrittenShip(RollShip):
     @property
     def period_by_formula(self) -> bool:
         """Whether the roll period is the weather criterion's."""
-        return not (self.gives("roll_period_s") or self.gives("inertia_kg_m2"))
+        given = self.gives("roll_period_s") or self.gives("inertia_kg_m2")
+        return self.hull is None and not given
 
     def ship(self) -> RollShip:
         """Return the ship as a `RollShip`, with its errors."""
+        hull = self._of_hull()
         displacement_n = self._displacement_n
         stiffness = displacement_n * self.gm_m if self.gives("gm_m") else self.stiffness_nm_rad
+        if hull is not None:
+            if math.isnan(displacement_n):
+                displacement_n = hull.displacement_n
+            if math.isnan(stiffness):
+                gm = self.gives("gm_m")
+                stiffness = displacement_n * self.gm_m if gm else hull.stiffness_nm_rad
         inertia = self.inertia_kg_m2
+        if hull is not None and math.isnan(inertia) and not self.gives("roll_period_s"):
+            inertia = hull.inertia_kg_m2
         if math.isnan(inertia):
             inertia = stiffness * (self._period_s(stiffness) / (2 * math.pi)) ** 2
-        damping = self.damping_nms_rad if self.gives("damping_nms_rad") else 0.0
+        damping, quadratic = self.damping_nms_rad, self.quadratic_damping_nms2_rad2
         if self.gives("damping_ratio"):
             damping = 2 * self.damping_ratio * math.sqrt(inertia * stiffness)
+        if math.isnan(damping):
+            damping = 0.0 if hull is None else hull.damping_nms_rad
+            quadratic = quadratic or (0.0 if hull is None else hull.quadratic_damping_nms2_rad2)
         found = {
             "inertia_kg_m2": inertia,
             "stiffness_nm_rad": stiffness,
             "damping_nms_rad": damping,
+            "quadratic_damping_nms2_rad2": quadratic,
             "displacement_n": 0.0 if math.isnan(displacement_n) else displacement_n,
         }
         own = {field.name: getattr(self, field.name) for field in fields(RollShip)}
@@ -123,6 +143,14 @@ class WrittenShip(RollShip):
         except ParameterError as error:
             problems = [(self._source(name), reason) for name, reason in error.problems]
             raise ParameterError(error.owner, problems) from error
+
+    def _of_hull(self) -> RollShip | None:
+        if self.hull is None:
+            return None
+        try:
+            return self.hull.hull.ship()
+        except (OSError, ValueError) as error:
+            raise ParameterError("ship", [("hull", f"{error}; {_HULL_KEYS}")]) from error
 
     def _source(self, name: str) -> str:
         """Return the key that a parameter of the ship was computed from."""
@@ -162,7 +190,9 @@ class WrittenShip(RollShip):
         return [(key, reason)]
 
     def _missing(self) -> list[Problem]:
-        problems = []
+        problems: list[Problem] = []
+        if self.hull is not None:
+            return problems
         weighed = self.gives("displacement_t") or self.displacement_n > 0
         if not (self.gives("gm_m") or self.gives("stiffness_nm_rad")):
             name, other = "stiffness_nm_rad", "displacement_t and gm_m"
@@ -186,6 +216,28 @@ class WrittenShip(RollShip):
                     reason = "is required with beam_m but missing, or else roll_period_s"
                     problems.append(("displacement_t", reason))
         return problems
+
+
+def hull_words(hull: HullFile, written: frozenset[str]) -> list[str]:
+    """Return what of a ship comes from its hull data, what was given, and what the data lack."""
+    ship = hull.hull.ship()
+    period_s = 2 * math.pi / ship.natural_frequency_rad_s
+    ratio = ship.damping_nms_rad * ship.natural_frequency_rad_s / (2 * ship.stiffness_nm_rad)
+    figures = (
+        f"displacement {ship.displacement_n / (1e3 * GRAVITY_M_S2):.4g} t",
+        f"GM {ship.stiffness_nm_rad / ship.displacement_n:.3g} m",
+        f"roll period {period_s:.4g} s",
+        f"damping ratio {ratio:.2g}",
+    )
+    taken = [
+        figure
+        for figure, keys in zip(figures, _PAIRS, strict=True)
+        if not written.intersection(keys)
+    ]
+    given = [key for keys in _PAIRS for key in keys if key in written]
+    words = f"ship: of {hull.file}: {', '.join(taken) or 'nothing'}"
+    words += f"; given: {', '.join(given)}" if given else ""
+    return [words, *(f"ship: {hull.file}: {note}" for note in hull.hull.data.notes)]
 
 
 def in_written_keys(problems: list[Problem], written: Collection[str]) -> list[Problem]:

@@ -14,8 +14,9 @@ from utank_hil.base.tick import TICK_S
 from utank_hil.canbus.profiles.foreign import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.configuration.files import Section
+from utank_hil.configuration.hull_files.section import HullFile
 from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
-from utank_hil.configuration.ship_keys import ShipFromFile, in_written_keys
+from utank_hil.configuration.ship_keys import ShipFromFile, hull_words, in_written_keys
 from utank_hil.dynamics import RollModel, Tank
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.steady_heel import RightingRange, greatest_held_pa, righting_range
@@ -51,6 +52,7 @@ class Vessel(Section):
 
     The nodes prove it by their version, which differs from that of the same ship on board."""
     devices: DevicesSection | None = None  #: What is on the bus in the place of the native nodes.
+    _hull: HullFile | None = None
     _written: frozenset[str] = frozenset()  # These are the keys of the ship in its file.
 
     @property
@@ -145,12 +147,19 @@ class Vessel(Section):
         written = content.get("ship") if isinstance(content, dict) else None
         if isinstance(written, dict):
             vessel._written = frozenset(written)
+            if written.get("hull") is not None:
+                vessel._hull = HullFile.model_validate(written["hull"])
         problems = vessel_problems(vessel.ship, vessel.tank, vessel.pump, vessel.valve)
         if vessel.valve is not None:
             wrong = valve_problems(vessel.tank, vessel.valve)
             problems += [(f"valve.{name}", reason) for name, reason in wrong]
         if vessel.least_gm_m is not None and not vessel.ship.displacement_n > 0:
             problems.append(("least_gm_m", "needs ship.displacement_t, to which GM refers: add it"))
+        if vessel.hull is not None and not vessel.emulated:
+            keys = ", ".join(f"{name}: {of:.6g}" for name, of in not_by_default(vessel.ship).items()
+                             if isinstance(of, float))  # fmt: skip
+            reason = f"is for a bench, and the ship is not emulated: write instead {keys}"
+            problems.append(("ship.hull", reason))
         if vessel.devices is not None:
             lacking = vessel.devices.redundancy_problems(vessel.redundancy)
             problems += [(f"devices.{name}", reason) for name, reason in lacking]
@@ -175,8 +184,15 @@ class Vessel(Section):
         return first, second
 
     @property
+    def hull(self) -> HullFile | None:
+        """Hull data that the ship's figures come from, if any."""
+        return self._hull
+
+    @property
     def assumptions(self) -> tuple[str, ...]:
         """Return the assumptions in place of keys that the file does not have."""
+        if self._hull is not None:
+            return tuple(hull_words(self._hull, self._written))
         if not self._written or self._written & {"roll_period_s", "inertia_kg_m2"}:
             return ()
         period_s = 2 * math.pi / self.ship.natural_frequency_rad_s

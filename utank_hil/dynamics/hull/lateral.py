@@ -24,7 +24,7 @@ from utank_hil.dynamics.hull.hull_data import TO_BODY_AXES, HullData
 from utank_hil.dynamics.hull.response import excitation_at, free_roll, wave_number
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank, water_moments
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank, water_moments
 
 _OSCILLATORS = 3  # Number for each motion.
 _START_RATIO = 0.5
@@ -186,6 +186,24 @@ class LateralHull:
         found = free_roll(self.data)
         stiffness = self.stiffness_nm_rad
         return found.radiation_ratio * stiffness * found.period_s / math.pi
+
+    def ship(self) -> RollShip:
+        """Return the ship in roll alone: its free roll, sway and yaw free, with waves' damping.
+
+        To that comes what the data have of viscous damping.
+        """
+        omega, stiffness = 2 * math.pi / free_roll(self.data).period_s, self.stiffness_nm_rad
+        viscous, quadratic = (
+            0.0 if each is None else float(np.interp(omega, self.data.frequency_rad_s, each))
+            for each in (self.data.viscous_roll_nms_rad, self.data.quadratic_roll_nms2_rad2)
+        )
+        return RollShip(
+            stiffness / omega**2,
+            stiffness,
+            self.radiated_nms_rad() + viscous,
+            quadratic,
+            displacement_n=self.data.known("mass_kg") * GRAVITY_M_S2,
+        )
 
     def forces(self, omega_rad_s: FloatArray, heading_rad: FloatArray) -> ComplexArray:
         """Return sway force, roll and yaw moment per m of waves, shape (3, N), leads on the crest.
