@@ -9,7 +9,6 @@ from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMa
 from rerun.encodings import EntityPath
 
 from utank_hil.telemetry import rerun_log
-from utank_hil.telemetry.motion_figures import PHASE_AXES
 from utank_hil.telemetry.scene import SceneSize
 from utank_hil.telemetry.units import UNITS, Field, field_of
 from utank_hil.telemetry.viewer import TIMELINE
@@ -35,9 +34,9 @@ ESTIMATES: Final = (
     "wave_moment_deviation", "sea_age_s", "ship_verdict", "roll_period_s",
     "roll_period_deviation_s", "gm_m", "gm_deviation_m", "ship_age_s",
 )  # fmt: skip
-MOTION, OTHERS = "Motion", "Others"
+OTHERS: Final = "Others"
 SUBJECTS: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
-    MOTION: (
+    "Motion": (
         _ROLL,
         ("Roll, RMS, °", ("roll_rms_rad", "twin_roll_rms_rad")),
         ("Roll rate, °/s", ("roll_rate_rad_s",)),
@@ -183,11 +182,7 @@ def _subjects(
                 views.append(_plot(title, fields, runs, left[fields[0].column], axis))
             for field in fields:
                 del left[field.column]
-        if subject == MOTION and {"roll_rad", "roll_rate_rad_s"} <= set(columns):
-            half = [_phase_plane(paths), _spectra(paths)]
-            tabs.append(rrb.Horizontal(rrb.Vertical(*views), rrb.Vertical(*half),
-                                       column_shares=[2, 1], name=subject))  # fmt: skip
-        elif views:
+        if views:
             tabs.append(rrb.Vertical(*views, name=subject))
     others = _others({field_of(column): those for column, those in left.items()}, runs, axis)
     if others:
@@ -218,29 +213,6 @@ def _others(
         for group in groups
         for first in range(0, len(group), most)
     ]
-
-
-def _phase_plane(paths: Sequence[str]) -> rrb.View:
-    boundary = rr.TimeRangeBoundary
-    trail = rrb.VisibleTimeRange(
-        TIMELINE,
-        start=boundary.cursor_relative(seconds=-HALF_WINDOW_S / 2),
-        end=boundary.cursor_relative(),
-    )
-    return rrb.Spatial2DView(
-        contents=[f"{path}/phase" for path in paths] + [f"{PHASE_AXES}/**"],
-        name="Roll rate, °/s, over roll, °: last 30 s",
-        time_ranges=[trail],
-        visual_bounds=rrb.VisualBounds2D(x_range=[-12, 12], y_range=[-10.5, 10.5]),
-    )
-
-
-def _spectra(paths: Sequence[str]) -> rrb.View:
-    return rrb.BarChartView(
-        contents=[f"{path}/spectrum" for path in paths],
-        name="Spectrum of the roll in the last 5 min, °²/Hz over Hz",
-        plot_legend=rrb.PlotLegend(visible=False),
-    )
 
 
 def _plot(

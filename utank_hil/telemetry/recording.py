@@ -19,7 +19,7 @@ from utank_hil.base.whole_file import write_whole
 from utank_hil.canbus.enumerations import Fault, Mode, RetuningState
 from utank_hil.canbus.events import RetuningEvent
 from utank_hil.telemetry import rerun_log
-from utank_hil.telemetry.blueprint import MOST_SHADES, columns_of, make_blueprint, run_color
+from utank_hil.telemetry.blueprint import columns_of, make_blueprint
 from utank_hil.telemetry.scene import scene_size
 from utank_hil.telemetry.units import column_of, field_of
 from utank_hil.telemetry.viewer import TIMELINE, rerun_binary, rerun_environment
@@ -64,11 +64,9 @@ def write_recording(
     if about is not None:
         rerun_log.write_about(recording, about)
     paths = rerun_log.run_paths(list(runs))
-    for number, (run, rows) in enumerate(runs.items()):
-        color = rerun_log.ONE_COLOR if len(runs) == 1 else run_color(number)
-        beside = number % MOST_SHADES, min(len(runs), MOST_SHADES)
+    for path_of_run, (run, rows) in zip(paths, runs.items(), strict=True):
         log = rerun_log.RunLog(
-            recording, paths[number], columns, about, rerun_log.PICTURES_S, color, beside
+            recording, path_of_run, columns, about, rerun_log.PICTURES_S, alone=len(runs) == 1
         )
         for start in range(0, len(rows), _BLOCK_ROWS):
             log.write(rows[start : start + _BLOCK_ROWS])

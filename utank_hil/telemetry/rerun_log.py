@@ -18,8 +18,7 @@ import rerun as rr
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Fault, Mode, RetuningState
 from utank_hil.telemetry.events import Event, event_text, warns
-from utank_hil.telemetry.motion_figures import NEEDED, MotionFigures
-from utank_hil.telemetry.scene import Figure, Scene, scene_size, send_at
+from utank_hil.telemetry.scene import Scene, scene_size, send_at
 from utank_hil.telemetry.units import field_of
 
 APPLICATION: Final = "utank-hil"
@@ -33,7 +32,6 @@ STATE, RETUNING, LOG = "state", "retuning", "log"
 STATE_COLUMNS: Final = ("mode", "fault")  #: Columns that make up the state lane of a run.
 PICTURES_S: Final = 60.0
 """Length of the drawings that are written to a file at once; a kill loses them, not the rows."""
-ONE_COLOR: Final = (0xE6, 0x9F, 0x00)  #: Colour of a single run.
 _ESCAPE: Final = re.compile(
     r"\\u\{(?P<code>[0-9A-Fa-f]+)\}|\\(?P<mark>.)"
 )  # an escape in entity paths
@@ -68,9 +66,8 @@ class RunLog:
     """Writes the rows of one run.
 
     `path` is one of `run_paths`; `time_s` is among the columns of a row. With the ship in the run's
-    origin, `about`, a scene is drawn. Figures come in batches of `batch_s` (`Figure`). `color` is
-    that of the run among several, `beside` its number and that of runs (`MotionFigures`). Raises
-    `ValueError` if there is no `time_s`, or a column is not in SI units.
+    origin, `about`, a scene is drawn, in batches of `batch_s`. `alone` says whether the recording
+    has no other run. Raises `ValueError` if there is no `time_s`, or a column is not in SI units.
     """
 
     def __init__(
@@ -80,16 +77,14 @@ class RunLog:
         columns: Sequence[str],
         about: Mapping[str, Any] | None = None,
         batch_s: float = 0.0,
-        color: tuple[int, int, int] = ONE_COLOR,
-        beside: tuple[int, int] = (0, 1),
+        *,
+        alone: bool = True,
     ) -> None:
         self._recording, self._path = recording, path
         size = scene_size(columns, about)
-        self._figures: list[Figure] = []
+        self._scene: Scene | None = None
         if size is not None:
-            self._figures.append(Scene(recording, path, columns, size, batch_s, beside[1] == 1))
-        if set(NEEDED) <= set(columns):
-            self._figures.append(MotionFigures(recording, path, columns, color, batch_s, beside))
+            self._scene = Scene(recording, path, columns, size, batch_s, alone)
         self._time = time_index(columns)
         self._fields = [(i, field_of(c)) for i, c in enumerate(columns) if c != TIME_COLUMN]
         self._state = [columns.index(c) for c in STATE_COLUMNS if has_state(columns)]
@@ -115,13 +110,13 @@ class RunLog:
             self._write_text(changed, names, [_level(*each) for each in states])
         if self._retuning:
             self._write_states(RETUNING, rows, self._retuning, _retuning_name)
-        for figure in self._figures:
-            figure.write(rows)
+        if self._scene is not None:
+            self._scene.write(rows)
 
     def close(self) -> None:
         """Send the batched drawings; idempotent."""
-        for figure in self._figures:
-            figure.close()
+        if self._scene is not None:
+            self._scene.close()
 
     def write_events(self, events: Sequence[Event]) -> None:
         """Log events of retuning and alarms; `time_ns` is on the clock of the rows' `time_s`."""

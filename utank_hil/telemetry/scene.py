@@ -4,7 +4,6 @@ It is drawn to scale, from aft, starboard to the right, centred in the ship's ce
 hull is a sketch; tank, water, and roll are as recorded. A light outline is the passive twin.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -120,42 +119,12 @@ class SceneSize:
         return vectors, [0.0, self.lz_m] - vectors / 2
 
 
-class Figure(ABC):
-    """A figure of rows of `columns` that is redrawn every `step_s`.
+class Scene:
+    """Writes the scene of the run of an entity path; one shown `alone` has larger words.
 
     Drawings are sent in batches of `batch_s`, the last by `close`: small chunks cost a file more
     than their content.
     """
-
-    def __init__(self, columns: Sequence[str], step_s: float, batch_s: float) -> None:
-        self._at = {name: columns.index(name) for name in columns}
-        self._step_s, self._due_s = step_s, -np.inf
-        self._held: list[FloatArray] = []
-        self._most_held = batch_s / step_s
-
-    def write(self, rows: FloatArray) -> None:
-        """Take rows with increasing times, and draw what is due within them."""
-        time_s = rows[:, self._at["time_s"]]
-        while (at := int(np.searchsorted(time_s, self._due_s - 1e-9))) < len(time_s):
-            self._held.append(rows[at])
-            self._due_s = time_s[at] + self._step_s
-        if len(self._held) >= self._most_held:
-            self.close()
-
-    def close(self) -> None:
-        """Send the last batch; idempotent."""
-        if self._held:
-            rows = np.stack(self._held)
-            self._held.clear()
-            self._draw(rows)
-
-    @abstractmethod
-    def _draw(self, rows: FloatArray) -> None:
-        """Send the drawings of these rows."""
-
-
-class Scene(Figure):
-    """Writes the scene of the run of an entity path; one shown `alone` has larger words."""
 
     def __init__(
         self,
@@ -166,12 +135,31 @@ class Scene(Figure):
         batch_s: float,
         alone: bool,
     ) -> None:
-        super().__init__(columns, PERIOD_S, batch_s)
+        self._at = {name: columns.index(name) for name in columns}
+        self._due_s = -np.inf
+        self._held: list[FloatArray] = []
+        self._most_held = batch_s / PERIOD_S
         self._recording, self._path, self._size = recording, path, size
         self._large = "#### " if alone else ""
         self._words_due_s = -np.inf
         self._said: tuple[float, float] = (np.nan, np.nan)
         self._stand()
+
+    def write(self, rows: FloatArray) -> None:
+        """Take rows with increasing times, and draw what is due within them."""
+        time_s = rows[:, self._at["time_s"]]
+        while (at := int(np.searchsorted(time_s, self._due_s - 1e-9))) < len(time_s):
+            self._held.append(rows[at])
+            self._due_s = time_s[at] + PERIOD_S
+        if len(self._held) >= self._most_held:
+            self.close()
+
+    def close(self) -> None:
+        """Send the last batch; idempotent."""
+        if self._held:
+            rows = np.stack(self._held)
+            self._held.clear()
+            self._draw(rows)
 
     def _stand(self) -> None:
         """Log the static content: the ship's parts, upright, and the style of moving parts."""
