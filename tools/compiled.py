@@ -60,7 +60,6 @@ PATTERNS: Final = (
     "utank_hil/runners/lockstep.py",
     "utank_hil/safety/monitoring.py",
     "utank_hil/safety/monitors/*.py",
-    "utank_hil/nodes/orders.py",
     "utank_hil/safety/passive_twin.py",
     "utank_hil/base/periodic.py",
     "utank_hil/nodes/stations.py",

@@ -53,10 +53,9 @@ def faults(
     """
     # imported late: `--help` needs none of it
     from firmware_sim.fault_campaign.campaign import Campaign
-    from firmware_sim.fault_campaign.report import as_json, write_recordings
     from firmware_sim.fault_campaign.runner import run_rows
     from firmware_sim.fault_campaign.trial import Window
-    from firmware_sim.fault_campaign.verdict import judged
+    from firmware_sim.fault_campaign.verdict import as_json, judged, write_recordings
     from utank_hil.runners import stop_on_signals
 
     loaded = load(campaign, Campaign)
@@ -123,7 +122,7 @@ def _refuse_names(campaign: "Campaign", names: Sequence[str], chosen: Sequence["
 
 
 def _print(results: Sequence["Result"]) -> None:
-    from firmware_sim.fault_campaign.report import table
+    from firmware_sim.fault_campaign.verdict import table
 
     console = Terminal()
     console.table(table(results))

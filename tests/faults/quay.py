@@ -6,11 +6,10 @@ from pathlib import Path
 from fault_bench import SECOND, Failing, Fault
 
 from firmware_sim.drive import PumpDrive
-from firmware_sim.hardwired import HardwiredNode
 from firmware_sim.plant import Plant
 from firmware_sim.scenario import Scenario
 from firmware_sim.sensors import SensorNode
-from firmware_sim.ship_side import build_ship_side
+from firmware_sim.ship_side import HardwiredNode, build_ship_side
 from utank_hil.assembly import build_commissioning_node
 from utank_hil.canbus import load_catalogue
 from utank_hil.configuration import ControllerConfig, load_config

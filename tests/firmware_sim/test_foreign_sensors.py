@@ -77,7 +77,7 @@ def test_alone_without_counter_or_checksum_it_has_half_the_pressure():
 
 def test_a_cycle_that_is_no_whole_tick_is_refused():
     foreign = DevicesSection(motion=SBG | {"cycle_ms": 5, "age_ms": 20}).foreign()
-    from firmware_sim.foreign_frames import ForeignFrames
+    from firmware_sim.sensors import ForeignFrames
 
     with pytest.raises(ValueError, match="5 ms can't be emulated"):
         ForeignFrames(foreign.motions[0])

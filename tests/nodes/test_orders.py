@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from utank_hil.canbus import Frame, Mode, OperatorCommand, RetuningOrder
 from utank_hil.canbus.endpoints import MAX_LOST
-from utank_hil.nodes.orders import Orders
+from utank_hil.nodes.stations import Orders
 
 QUIET = OperatorCommand(Mode.ACTIVE, True, False, False, False)
 

@@ -6,7 +6,7 @@ import pytest
 from moving_ship import THRESHOLDS
 
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.monitors.volume import Volume
+from utank_hil.safety.monitors.level_stuck import Volume
 
 LIMIT_M = 0.5
 QUIET = replace(THRESHOLDS, volume_m=LIMIT_M, level_noise_m=100.0)

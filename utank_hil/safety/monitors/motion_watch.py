@@ -1,4 +1,4 @@
-"""All that is judged of one motion sensor by itself."""
+"""All that is judged of one motion sensor by itself, and whether two of them agree."""
 
 import math
 from typing import Final
@@ -8,8 +8,69 @@ from utank_hil.canbus.measurements import MotionSample
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.motion import RollAgainstRate
 from utank_hil.safety.monitors.noise import Noise, SecondDifference
-from utank_hil.safety.monitors.spikes import SpikeCount
-from utank_hil.safety.monitors.thresholds import MonitorThresholds
+from utank_hil.safety.monitors.thresholds import NOISE_LIMIT, MonitorThresholds
+
+MOUNTED_RAD: Final = math.radians(0.5)
+"""So far two sensors may be mounted apart."""
+NOISES: Final = 3.0
+SMOOTH_S: Final = 0.25
+APART_S: Final = 0.3
+"""A spike is gone by then; a wrong sign passes through zero for a shorter time with each roll."""
+
+_DISAGREE: Final = int(Finding.SENSORS_DISAGREE)
+
+
+class MotionPair:
+    """Whether two motion sensors agree, by the low-passed differences of roll and rate.
+
+    Two can't tell which of them is wrong, and a ship that rolls by a wrong sensor is worse off than
+    a passive one: where they disagree the pressure falls to zero. While one is silent the other is
+    used, and nothing is compared. `period_s` is the time between two updates.
+    """
+
+    def __init__(self, thresholds: MonitorThresholds, period_s: float) -> None:
+        fastest_rad_s = 2 * 2 * math.pi / thresholds.tank_period_s
+        noises = NOISES / NOISE_LIMIT
+        self._roll_limit_rad = MOUNTED_RAD + noises * thresholds.roll_noise_rad
+        self._rate_limit_rad_s = fastest_rad_s * MOUNTED_RAD + noises * thresholds.rate_noise_rad_s
+        self._period_s = period_s
+        self._share = period_s / SMOOTH_S
+        self._roll_rad = self._rate_rad_s = self._over_s = 0.0
+
+    def update(self, apart_rad: float, rate_apart_rad_s: float) -> int:
+        """Take roll and rate of one less those of the other, NaN where one is silent."""
+        if apart_rad != apart_rad:
+            self._over_s = 0.0
+            return 0
+        self._roll_rad += self._share * (apart_rad - self._roll_rad)
+        self._rate_rad_s += self._share * (rate_apart_rad_s - self._rate_rad_s)
+        over = (
+            abs(self._roll_rad) > self._roll_limit_rad
+            or abs(self._rate_rad_s) > self._rate_limit_rad_s
+        )
+        self._over_s = self._over_s + self._period_s if over else 0.0
+        return _DISAGREE if self._over_s >= APART_S else 0
+
+
+class SpikeCount:
+    """Leaky count of discarded samples: it falls by one each second; five in one are too many."""
+
+    MOST: Final = 4.0
+
+    def __init__(self) -> None:
+        self._level = 0.0
+        self._seen = 0
+        self.found = False
+
+    def update(self, discarded: int, elapsed_s: float) -> bool:
+        """Take the number discarded so far; return whether there were too many."""
+        new = discarded - self._seen
+        self._seen = discarded
+        # forgotten two seconds after the last
+        self._level = min(max(self._level - elapsed_s, 0.0) + new, self.MOST + 2.0)
+        self.found = self._level > self.MOST
+        return self.found
+
 
 SLOW_CYCLE_S: Final = 0.02
 """Of a slower sensor not every look finds a new sample, nor two looks the same number of them."""
