@@ -133,6 +133,7 @@ sbom: setup
 wheel: setup
 	$(PYTHON) -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w dist .
 	$(PYTHON) -m tools.sbom --extra viewer --lock > dist/requirements.txt
+	$(PYTHON) -m tools.sbom --extra bench --lock > dist/requirements-bench.txt
 	@ls dist/*
 
 docs: setup

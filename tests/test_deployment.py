@@ -1,5 +1,6 @@
 """The files of deploy/: fit for systemd, and in step with the program."""
 
+import json
 import os
 import re
 import shlex
@@ -176,3 +177,41 @@ def test_what_the_check_refuses_the_run_refuses_with_the_code_that_is_not_tried_
     path.write_text(f"name: wrong\nvessel: {ship}\n{wrong}\n", encoding="utf-8")
     assert CliRunner().invoke(app, ["check", str(path)]).exit_code != ExitCode.OK
     assert CliRunner().invoke(app, ["run", str(path), "--bus", "nowhere0"]).exit_code == code
+
+
+def instructions() -> list[tuple[str, str]]:
+    """Instruction and arguments of each line of the container file, continuations joined."""
+    text = (DEPLOY / "Containerfile").read_text(encoding="utf-8").replace("\\\n", " ")
+    lines = [line for line in text.splitlines() if line and not line.startswith("#")]
+    return [tuple(line.split(maxsplit=1)) for line in lines]  # type: ignore[misc]
+
+
+def test_the_container_file_installs_what_make_wheel_writes() -> None:
+    written = set(re.findall(r"> (dist/\S+)", Path("Makefile").read_text(encoding="utf-8")))
+    copied = set()
+    for name, arguments in instructions():
+        assert name in {"FROM", "COPY", "RUN", "ENTRYPOINT", "WORKDIR", "CMD"}
+        if name in {"ENTRYPOINT", "CMD"}:
+            assert isinstance(json.loads(arguments), list)
+        if name == "COPY":
+            *sources, place = arguments.split()
+            assert place.endswith("/")
+            copied |= set(sources)
+        if name == "RUN":
+            used = {f"dist/{Path(word).name}" for word in shlex.split(arguments) if "/" in word}
+            assert used <= copied
+    assert copied == written | {"dist/utank_hil-*.whl"}
+
+
+def test_the_images_run_commands_that_there_are_on_the_locked_python() -> None:
+    stages = [a for name, a in instructions() if name == "FROM"]
+    base, first = stages[0].split(" AS ")
+    assert [each.split(" AS ")[1] for each in stages] == ["ship", "bench"]
+    assert stages[1].startswith(f"{first} ")
+    # the lock is resolved for the Python that the tests run on
+    version = f"{sys.version_info.major}.{sys.version_info.minor}"
+    assert base.startswith(f"docker.io/library/python:{version}-")
+    for name, arguments in instructions():
+        if name == "CMD":
+            result = CliRunner().invoke(app, [json.loads(arguments)[0], "--help"])
+            assert result.exit_code == 0
