@@ -56,14 +56,6 @@ class Plant:
     hull : LateralHull, optional
         Hull of a ship that is free to sway and yaw; the waves are then sway force, roll and yaw
         moment.
-
-    Attributes
-    ----------
-    broken_pump : callable or None
-        Injected fault: function that gives the pressure of an enabled pump instead of its
-        set-point.
-    presses_off : bool
-        Whether that fault also acts while the pump is not enabled.
     """
 
     def __init__(
@@ -104,8 +96,10 @@ class Plant:
                 wave[index] = kernel.turned_sum(phasor, rotation)
         self._values: list[float] = self._state.tolist()
         self._now_ns: int | None = None
+        #: Injected fault: function that gives the pressure of an enabled pump instead of its set-
+        #: point.
         self.broken_pump: Callable[[float], float] | None = None
-        self.presses_off = False
+        self.presses_off = False  #: Whether that fault also acts while the pump is not enabled.
         self._cuts: set[str] = set()
 
     def _load(self, ship: RollShip) -> None:

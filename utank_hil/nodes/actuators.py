@@ -38,15 +38,8 @@ class Actuators:
 
     Attributes
     ----------
-    pump : bool
-    valve : ValveCommander or None
-    drive : CanopenDrive or None
-    command_pa : float
-        Pressure commanded.
     limiting : bool
         The limiter holds the law's pressure back.
-    cycle_ns : int
-        Time from one command to the next.
     """
 
     def __init__(
@@ -62,12 +55,12 @@ class Actuators:
         self.pump = pump
         self.valve, self.drive = valve, drive
         self._rate_m_s = 0.0
-        self.command_pa = 0.0
+        self.command_pa = 0.0  #: Pressure commanded.
         self._limiter = limiter
         self._timeout_s = timeout_s
         self._sequence = DriveSequence()
         self._commands = catalogue.transmitter(PumpCommand)
-        self.cycle_ns = self._commands.cycle_ns
+        self.cycle_ns = self._commands.cycle_ns  #: Time from one command to the next.
         self._echo = CommandEcho() if pump else CommandEcho(_ABSENT_NS)
 
     @property

@@ -20,17 +20,12 @@ class CommandEcho:
     ----------
     heard_ns : int
         Before the first echo.
-
-    Attributes
-    ----------
-    heard_ns : int
-        When the last echo came that counts.
     """
 
     __slots__ = ("_counter", "_sent", "_status_ns", "heard_ns")
 
     def __init__(self, heard_ns: int = NEVER_HEARD_NS) -> None:
-        self.heard_ns = heard_ns
+        self.heard_ns = heard_ns  #: When the last echo came that counts.
         self._counter: int | None = None
         self._sent: int | None = None
         self._status_ns = heard_ns

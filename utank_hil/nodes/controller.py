@@ -48,26 +48,14 @@ _CONTROL: Final = Demand.CONTROL
 
 @dataclass(frozen=True, slots=True)
 class ControllerSettings:
-    """Settings of the controller node beside those of its parts.
+    """Settings of the controller node beside those of its parts."""
 
-    Attributes
-    ----------
-    configuration_version : int
-        Hash of the ship's data, to be equal on all nodes before arming.
-    commissioned : bool
-        Whether a commissioning was passed with this configuration; else arming is refused.
-    tank : Tank
-    redundancy : Redundancy
-        What the ship has twice.
-    foreign : ForeignDevices
-        Devices that are not nodes of the catalogue.
-    """
-
-    configuration_version: int
+    configuration_version: int  #: Hash of the ship's data, to be equal on all nodes before arming.
+    #: Whether a commissioning was passed with this configuration; else arming is refused.
     commissioned: bool
     tank: Tank
-    redundancy: Redundancy
-    foreign: ForeignDevices = NO_FOREIGN_DEVICES
+    redundancy: Redundancy  #: What the ship has twice.
+    foreign: ForeignDevices = NO_FOREIGN_DEVICES  #: Devices that are not nodes of the catalogue.
 
 
 class ControllerNode:
@@ -87,26 +75,14 @@ class ControllerNode:
 
     Attributes
     ----------
-    law, safety, actuators, telemetry
-        As given.
     start_ns, last_ns : int
         Time of the first and of the last tick.
-    inbox : Inbox
-        What was received.
-    level : LevelObserver
-    measured : Measurements
-    judgement : Judgement
-        Of the last tick.
-    estimated : EstimateFigures
-        What is known of waves and ship.
-    commissioned : bool
-        Whether arming is allowed for all that commissioning is there for.
     """
 
     name = "controller"
     period_ns = TICK_NS
     measured: Measurements
-    judgement: Judgement
+    judgement: Judgement  #: Judgement of the last tick.
 
     def __init__(
         self,
@@ -120,6 +96,7 @@ class ControllerNode:
     ) -> None:
         self.law, self.safety = law, safety
         self.actuators, self.telemetry = actuators, telemetry
+        #: Whether arming is allowed for all that commissioning is there for.
         self.commissioned = settings.commissioned
         self._estimator = estimator
         self.estimated = EstimateFigures() if estimator is None else estimator.figures

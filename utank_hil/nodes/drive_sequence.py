@@ -29,17 +29,12 @@ _STOPPING = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
 
 
 class DriveSequence:
-    """Chooses the control word of each pump command.
-
-    Attributes
-    ----------
-    ignored : bool
-        Whether the drive has been told to be off in vain, and was not seen off since.
-    """
+    """Chooses the control word of each pump command."""
 
     def __init__(self) -> None:
         self._resets_left = 0
         self._stops = self._rests = self._out = 0
+        #: Whether the drive has been told to be off in vain, and was not seen off since.
         self.ignored = False
 
     def request_reset(self) -> None:

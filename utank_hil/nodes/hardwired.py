@@ -18,10 +18,6 @@ class HardwiredHeard:
 
     Attributes
     ----------
-    receiver : Receiver of HardwiredInputs
-        As given.
-    heard_ns : int
-        When the last accepted frame of good quality came.
     stop : bool
         The stop loop is open or broken.
     high_level : bool
@@ -30,7 +26,7 @@ class HardwiredHeard:
 
     def __init__(self, receiver: Receiver[HardwiredInputs]) -> None:
         self.receiver = receiver
-        self.heard_ns = NEVER_HEARD_NS
+        self.heard_ns = NEVER_HEARD_NS  #: When the last accepted frame of good quality came.
         self.stop = self._stop_heard = self.high_level = False
 
     def accept(self, frame: Frame) -> HardwiredInputs | None:

@@ -105,19 +105,10 @@ class Inbox:
 
     Attributes
     ----------
-    motions : tuple of MotionSensor
-        The one or two motion sensors.
     hardwired : HardwiredHeard
         Hard-wired inputs: what they say counts wherever they are heard.
-    gates : LevelGates or None
-    stations : Stations
-        The operators' orders.
     frames, foreign : int
         Frames heard so far, good and bad, of any kind, and those that are none of the catalogue's.
-    watched : list of Heard
-        Counters of every message that is heard.
-    expected : frozenset of int
-        Identifiers of those whose silence is not judged by their age.
     """
 
     def __init__(
@@ -137,7 +128,7 @@ class Inbox:
         self._most_sum_m = SUM_SHARE * level_limit_m
         self._versions = (catalogue.version, configuration_version)
         self._known = catalogue.can_ids
-        self.watched: list[Heard] = []
+        self.watched: list[Heard] = []  #: Counters of every message that is heard.
         self._subscriptions: dict[int, tuple[_Accept, _Handle]] = {}
         self._foreign = foreign
         self._devices: dict[int, Callable[[Frame, int], None]] = {}
@@ -202,6 +193,7 @@ class Inbox:
                 self._matched_ns[heartbeat.can_id] = _ABSENT_NS
             self._subscribe(heartbeat, partial(self._on_heartbeat, heartbeat.can_id))
         slow = () if self._drive is None else (catalogue.codec(DriveStatus2).can_id,)
+        #: Identifiers of messages whose silence is not judged by their age.
         self.expected = frozenset((*slow, *self._matched_ns))
         for station, address in ADDRESSES.items():
             beats = catalogue.receiver(Heartbeat, address)

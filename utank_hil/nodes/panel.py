@@ -95,14 +95,6 @@ class OperatorPanel:
 
     Attributes
     ----------
-    period_ns : int
-        As given.
-    status : ControllerStatus or None
-        Latest status of the controller.
-    stopping : bool
-        Whether stop is held.
-    heard_ns : int or None
-        When that status came.
     attended : bool
         Whether a person can see the panel. A controller in charge ramps down after a silence of
         five seconds; a shorter one changes nothing.
@@ -137,12 +129,12 @@ class OperatorPanel:
         self._forbidden = False
         self._pressed_until_ns = dict.fromkeys(_EDGES, 0)
         self._stopped_ns = self._arms_ns = self._asks_ns = 0
-        self.stopping = False
+        self.stopping = False  #: Whether stop is held.
         self._pressed: list[Action] = []
         self._sent: OperatorCommand | None = None
         self._ticks = 0
-        self.status: ControllerStatus | None = None
-        self.heard_ns: int | None = None
+        self.status: ControllerStatus | None = None  #: Latest status of the controller.
+        self.heard_ns: int | None = None  #: When that status came.
         self.attended = self._spoke = True
 
     @property

@@ -83,12 +83,8 @@ class MotionSensor:
 
     Attributes
     ----------
-    receiver
-        As given.
     roll_rad, roll_rate_rad_s : float
         Of the last plausible sample, received at `heard_ns`.
-    discarded : int
-        Samples so far that did not pass, by their roll or by their rate.
     """
 
     def __init__(
@@ -99,7 +95,7 @@ class MotionSensor:
         self.receiver = receiver
         self.roll_rad = self.roll_rate_rad_s = 0.0
         self.heard_ns = NEVER_HEARD_NS
-        self.discarded = 0
+        self.discarded = 0  #: Samples so far that did not pass, by their roll or by their rate.
         self._gated = thresholds is not None
         self._clock = SampleClock(receiver)
         if thresholds is not None:
@@ -135,18 +131,12 @@ class MotionSensor:
 
 
 class LevelGates:
-    """The gates of both level gauges.
-
-    Attributes
-    ----------
-    discarded : int
-        Samples so far that did not pass, by either level.
-    """
+    """The gates of both level gauges."""
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
         self._port = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
         self._starboard = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
-        self.discarded = 0
+        self.discarded = 0  #: Samples so far that did not pass, by either level.
 
     def passes(self, port_m: float, starboard_m: float, now_ns: int) -> bool:
         """Whether a sample of the level gauges may be used."""

@@ -5,22 +5,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Redundancy:
-    """Section ``redundancy`` of a vessel's file.
+    """Section ``redundancy`` of a vessel's file."""
 
-    Attributes
-    ----------
-    second_motion_sensor : bool
-        SENSOR_MOTION_2 comes from a node apart from the first sensor's.
-    hardwired_inputs : bool
-        HARDWIRED_INPUTS, high-level switches and a stop loop by wires of their own, comes from a
-        node apart from sensors and drive.
-    second_station : bool
-        A second operator's panel may take the command. Of one that is not declared only stop and
-        disarm count.
-    """
-
+    #: SENSOR_MOTION_2 comes from a node apart from the first sensor's.
     second_motion_sensor: bool = False
+    #: HARDWIRED_INPUTS, high-level switches and a stop loop by wires of their own, comes from a
+    #: node apart from sensors and drive.
     hardwired_inputs: bool = False
+    #: A second operator's panel may take the command. Of one that is not declared only stop and
+    #: disarm count.
     second_station: bool = False
 
 

@@ -67,14 +67,8 @@ class RunningLaw:
 
     Attributes
     ----------
-    law : Controller
     pressure_pa : float
         Last answer.
-    failed : bool
-        The law raised an error, or its last answer is not finite.
-    error : str
-        What first went wrong with the law, an exception or an answer that is not finite; empty if
-        nothing did.
 
     Raises
     ------
@@ -113,8 +107,10 @@ class RunningLaw:
         self._applied = np.zeros(len(commands))
         self._answered = False
         self._raised = False  # until the operator resets
-        self.failed = False
+        self.failed = False  #: Whether it raised an error, or its last answer is not finite.
         self.pressure_pa = self._valve_loss = 0.0
+        #: What first went wrong with the law, an exception or an answer that is not finite; empty
+        #: if nothing did.
         self.error = ""
 
     @property

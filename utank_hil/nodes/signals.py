@@ -90,10 +90,6 @@ class Telemetry:
     event_sink : callable, optional
         Takes each event of retuning and alarms, with the time of the first tick, as it happens;
         must not wait.
-
-    Attributes
-    ----------
-    statistics : LoopStatistics
     """
 
     def __init__(

@@ -189,11 +189,6 @@ class Stations:
         Of the controller's catalogue and configuration.
     second : bool
         Whether the second station may take the command.
-
-    Attributes
-    ----------
-    orders : dict of Orders by Station
-    in_command : Station
     """
 
     def __init__(

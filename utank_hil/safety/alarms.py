@@ -63,20 +63,14 @@ class _Entry:
 
 
 class AlarmList:
-    """The alarms of a controller, the most urgent first.
-
-    Attributes
-    ----------
-    unaccepted : bool
-        Whether one waits to be accepted.
-    """
+    """The alarms of a controller, the most urgent first."""
 
     def __init__(self) -> None:
         self._entries: dict[Fault, _Entry] = {}
         self._order: list[_Entry] = []
         self._place = 0
         self._new: list[AlarmEvent] = []
-        self.unaccepted = False
+        self.unaccepted = False  #: Whether one waits to be accepted.
 
     @property
     def codes(self) -> frozenset[Fault]:

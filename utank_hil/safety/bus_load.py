@@ -15,24 +15,14 @@ frames of this bus in the mean and 29 at most."""
 
 
 class BusLoad:
-    """The load over the last second.
-
-    Parameters
-    ----------
-    bit_rate : int
-
-    Attributes
-    ----------
-    share : float
-        Share of the bus in use; zero in the first second.
-    """
+    """The load over the last second."""
 
     def __init__(self, bit_rate: int) -> None:
         self._bit_rate = bit_rate
         self._schedule = Schedule(LOAD_LOOK_NS)
         # at the first tick only a backlog was received
         self._counted: deque[tuple[int, int]] = deque(maxlen=LOAD_LOOKS + 1)
-        self.share = 0.0
+        self.share = 0.0  #: Share of the bus in use; zero in the first second.
 
     def update(self, now_ns: int, frames: int) -> float:
         """Take the frames heard and sent so far, once a tick; return `share`."""

@@ -44,58 +44,35 @@ class Reaction(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """One way in which a fault shows itself.
-
-    Attributes
-    ----------
-    reaction : Reaction
-    limit : str
-        The condition in words; fields of `SafetyLimits` stand in braces.
-    holds : callable
-        Whether the condition is there.
-    zero_within_ms : int
-        With `Reaction.RAMP`, when the pressure is cut even if the ramp has not come to its end.
-    awaited : int or None
-        Place in the order in which the controller waits, in INIT, for conditions to go; None if
-        it is ready all the same.
-    findings : Finding
-        Those of the monitors any of which is this condition, if it is one of theirs.
-    ends_passive : bool
-        With `Reaction.STOP`: it ends PASSIVE, too, where the drive is enabled.
-    of_drive_that_should_be_on : bool
-        It counts only where the drive is to be in operation enabled.
-    """
+    """One way in which a fault shows itself."""
 
     reaction: Reaction
-    limit: str
-    holds: Holds
+    limit: str  #: The condition in words; fields of `SafetyLimits` stand in braces.
+    holds: Holds  #: Whether the condition is there.
+    #: With `Reaction.RAMP`, when the pressure is cut even if the ramp has not come to its end.
     zero_within_ms: int = 1000
+    #: Place in the order in which the controller waits, in INIT, for conditions to go; None if it
+    #: is ready all the same.
     awaited: int | None = None
+    #: Findings of the monitors, any of which is this condition.
     findings: Finding = _NONE
+    #: With `Reaction.STOP`, whether it ends PASSIVE, too, where the drive is enabled.
     ends_passive: bool = False
+    #: Whether it counts only where the drive is to be in operation enabled.
     of_drive_that_should_be_on: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class FaultRow:
-    """One row of the fault table.
+    """One row of the fault table."""
 
-    Attributes
-    ----------
-    code : Fault
-        As CTRL_STATUS carries it.
-    happened, remedy : str
-        For people: what happened, and what to do.
-    conditions : tuple of Condition
-    law_limit : str
-        A law that ends at a limit of its own for this measurement (`StartsAnew.passed_limit`)
-        shows this code; empty if none does.
-    """
-
-    code: Fault
+    code: Fault  #: Code in CTRL_STATUS.
+    #: happened, remedy: for people: what happened, and what to do.
     happened: str
     remedy: str
     conditions: tuple[Condition, ...]
+    #: A law that ends at a limit of its own for this measurement (`StartsAnew.passed_limit`) shows
+    #: this code; empty if none does.
     law_limit: str = ""
 
 

@@ -45,20 +45,13 @@ _DISAGREE: Final = int(Finding.SENSORS_DISAGREE)
 
 
 class Lateness:
-    """Late ticks.
-
-    Attributes
-    ----------
-    late_ms : float
-        Lateness of this tick.
-    in_ten : int
-        Late ticks among the last ten; one that is late by three counts three times.
-    """
+    """Late ticks."""
 
     def __init__(self) -> None:
         self._last_ns: int | None = None
         self._history = 0
-        self.late_ms = 0.0
+        self.late_ms = 0.0  #: Lateness of this tick.
+        #: Late ticks among the last ten; one that is late by three counts three times.
         self.in_ten = 0
 
     def update(self, now_ns: int) -> None:
@@ -74,12 +67,7 @@ class Lateness:
 
 
 class Heel:
-    """Low-pass of the roll over `HEEL_TIME_CONSTANT_S`.
-
-    Attributes
-    ----------
-    heel_rad : float
-    """
+    """Low-pass of the roll over `HEEL_TIME_CONSTANT_S`."""
 
     def __init__(self) -> None:
         self.heel_rad = 0.0
@@ -109,17 +97,9 @@ class Safety:
     unprotected : bool
         Whether neither counter nor checksum protects a motion sensor's messages: the pressure is
         as of a sensor in doubt unless a second one agrees.
-
-    Attributes
-    ----------
-    supervisor : Supervisor
-    monitors : Monitors or None
-    alarms : AlarmList
-    situation : Situation
-        What was judged last.
     """
 
-    situation: Situation
+    situation: Situation  #: What was judged last.
 
     def __init__(
         self,

@@ -94,24 +94,6 @@ class Monitors:
         Whether there is a second motion sensor.
     motion_cycles_s : tuple of float
         Time between two samples of each motion sensor.
-
-    Attributes
-    ----------
-    thresholds : MonitorThresholds
-    twin : PassiveTwin
-    drive : DriveFollowing
-    volume : Volume
-        The monitors whose statistics are of interest.
-    watches : tuple of MotionWatch
-        What is judged of each motion sensor by itself.
-    equation : TankEquation
-        With the roll of the motion sensor in use.
-    used : int
-        Place of the motion sensor in use.
-    confirmed : bool
-        Whether the water was seen to move as roll and pressure push it, and is watched since.
-    found : int
-        Bits of `Finding`, of now.
     """
 
     def __init__(
@@ -143,11 +125,13 @@ class Monitors:
         self._water_free = plant.valve is None
         self._counts_of_water = ~0 if self._water_free else _WATER_SIGN
         self._compares = compares
+        #: What is judged of each motion sensor by itself.
         self.watches = tuple(
             MotionWatch(thresholds, cycle_s) for cycle_s in motion_cycles_s[: 1 + second_motion]
         )
+        #: The tank's equation with the roll of the motion sensor in use.
         self.equation = TankEquation(ship, tank, thresholds, LONG_S, valve=not self._water_free)
-        self.used = 0
+        self.used = 0  #: Place of the motion sensor in use.
         self._pair = MotionPair(thresholds, SHORT_S)
         self._frames_per_s = bit_rate / MEAN_FRAME_BITS
         self._senders = Senders((), self._frames_per_s)
@@ -161,6 +145,7 @@ class Monitors:
         self._wrong_ns = -(1 << 62)
         # a wrong sign is not seen where the roll passes through zero
         self._doubted_ns = round(thresholds.tank_period_s * 1e9)
+        #: Whether the water was seen to move as roll and pressure push it, and is watched since.
         self.confirmed = False
         self._looks: tuple[Callable[[Measurements, OwnState], int], ...] = (
             self._look_at_motion,
@@ -172,7 +157,7 @@ class Monitors:
         )
         self._found_by = [0] * len(self._looks)
         self._level_found = self._water_found = 0
-        self.found = 0
+        self.found = 0  #: Present findings, bits of `Finding`.
 
     def follow(self, found: ModelSummary | ShipFigures | None) -> None:
         """Compare the law in charge with the twin of the ship that it was designed for.

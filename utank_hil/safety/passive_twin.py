@@ -75,13 +75,6 @@ class PassiveTwin:
         Of the tank's valve, fully open, in Pa per (m/s)^2 of the level's rate.
     room : float
         Factor on the ratios of own roll to the twin's at which a law has lost.
-
-    Attributes
-    ----------
-    roll_rad : float
-        The twin's roll.
-    amplified : bool
-        The ship rolls more than its twin, and has for over a quarter of a roll period.
     """
 
     def __init__(
@@ -112,7 +105,8 @@ class PassiveTwin:
         self._record_share = period_s / (RECORD_PERIODS * roll_period_s)
         self._forget()
         self._losing_s = 0.0
-        self.roll_rad = 0.0
+        self.roll_rad = 0.0  #: The twin's roll.
+        #: Whether the ship has rolled more than its twin for over a quarter of a roll period.
         self.amplified = False
 
     def take(self, ship: RollShip, tank: Tank) -> None:

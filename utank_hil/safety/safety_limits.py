@@ -30,67 +30,41 @@ class SafetyLimits:
     * Late ticks 10 of ten at most. None leaves them to the limit of a single one and to the drive's
       own timeout, for a bench in an emulated kernel; `run` reports it.
 
-    Attributes
-    ----------
-    motion_age_ms, tank_age_ms, pump_age_ms : float
-        Longest age of a sensor's last good sample while armed.
-    motion_spare_age_ms : float
-        Age of the last good sample of the motion sensor that is not in use, where there are two,
-        from which half the pressure is allowed.
-    hardwired_age_ms : float
-        Longest age of the hard-wired inputs, where there are such.
-    tank_degraded_age_ms, pump_degraded_age_ms : float
-        Age of the sensor's last good sample from which half the pressure is allowed.
-    drive_age_ms, echo_age_ms : float
-        Longest age of the drive's status, and of its last new command echo.
-    drive_enabled_within_ms : float
-        Longest time the drive may be out of operation enabled while armed.
-    valve_age_ms, valve_echo_age_ms : float
-        Longest age of the valve's status, and of its last new command echo.
-    valve_follows_within_ms : float
-        Longest time the valve may not follow while armed.
-    valve_off_within_ms : float
-        Longest time it may be elsewhere than where the commands should have brought it.
-    panel_age_to_arm_ms, panel_age_armed_ms : float
-        Longest silence of the operator panel for arming, and while armed.
-    arming_timeout_ms : float
-        Time the drive gets from arming to operation enabled.
-    roll_limit_rad, heel_limit_rad : float
-        Largest roll angle, and largest mean roll angle, while armed.
-    bus_load_limit : float
-        Largest share of the bus in use over a second.
-    long_overrun_ms : float
-        One tick this late cuts the pressure.
-    overruns_in_ten : int or None
-        So many late ticks among the last ten end in a ramp to zero; None: they are not judged.
-
-    Raises
-    ------
-    ValueError
-        If a threshold is out of its range.
+    Raises `ValueError` if a threshold is out of its range.
     """
 
+    #: Longest age of the motion sensor's last good sample while armed.
     motion_age_ms: _Silence = 40.0
+    #: Age of the last good sample of the motion sensor that is not in use, where there are two,
+    #: from which half the pressure is allowed.
     motion_spare_age_ms: _Silence = 100.0
+    #: Longest age of the hard-wired inputs, where there are such.
     hardwired_age_ms: _Silence = 150.0
+    #: Longest age of the tank sensor's last good sample while armed.
     tank_age_ms: _Silence = 1000.0
+    #: Age of that sample from which half the pressure is allowed.
     tank_degraded_age_ms: _Silence = 100.0
+    #: Longest age of the pump sensor's last good sample while armed.
     pump_age_ms: _Silence = 1000.0
+    #: Age of that sample from which half the pressure is allowed.
     pump_degraded_age_ms: _Silence = 200.0
-    drive_age_ms: _Silence = 60.0
-    echo_age_ms: _Silence = 100.0
+    drive_age_ms: _Silence = 60.0  #: Longest age of the drive's status.
+    echo_age_ms: _Silence = 100.0  #: Longest age of the drive's last new command echo.
+    #: Longest time the drive may be out of operation enabled while armed.
     drive_enabled_within_ms: _Silence = 40.0
-    valve_age_ms: _Silence = 60.0
-    valve_echo_age_ms: _Silence = 100.0
-    valve_follows_within_ms: _Silence = 100.0
+    valve_age_ms: _Silence = 60.0  #: Longest age of the valve's status.
+    valve_echo_age_ms: _Silence = 100.0  #: Longest age of the valve's last new command echo.
+    valve_follows_within_ms: _Silence = 100.0  #: Longest time the valve may not follow while armed.
+    #: Longest time it may be elsewhere than where the commands should have brought it.
     valve_off_within_ms: _Silence = 300.0
-    panel_age_to_arm_ms: _Silence = 600.0
-    panel_age_armed_ms: _Patience = 5000.0
-    arming_timeout_ms: _Patience = 2000.0
-    roll_limit_rad: RollLimit = 0.35
-    heel_limit_rad: _HeelLimit = 0.14
-    bus_load_limit: _BusLoad = 0.8
-    long_overrun_ms: _Silence = 50.0
+    panel_age_to_arm_ms: _Silence = 600.0  #: Longest silence of the operator panel for arming.
+    panel_age_armed_ms: _Patience = 5000.0  #: Longest silence of the operator panel while armed.
+    arming_timeout_ms: _Patience = 2000.0  #: Time the drive gets from arming to operation enabled.
+    roll_limit_rad: RollLimit = 0.35  #: Largest roll angle while armed.
+    heel_limit_rad: _HeelLimit = 0.14  #: Largest mean roll angle while armed.
+    bus_load_limit: _BusLoad = 0.8  #: Largest share of the bus in use over a second.
+    long_overrun_ms: _Silence = 50.0  #: One tick this late cuts the pressure.
+    #: So many late ticks among the last ten end in a ramp to zero; None: they are not judged.
     overruns_in_ten: Annotated[int, Range(least=1, most=10)] | None = 3
 
     def __post_init__(self) -> None:

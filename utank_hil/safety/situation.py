@@ -16,24 +16,14 @@ VALVE_OFF: Final = 0.15
 
 @dataclass(slots=True, eq=False)
 class ValveReport:
-    """How the valve follows its commands; zero where there is none.
+    """How the valve follows its commands; zero where there is none."""
 
-    Attributes
-    ----------
-    age_ms, echo_age_ms : float
-        Time since the valve's status, and since its echo of a new command.
-    fault : bool
-        The status reports a fault.
-    out_ms : float
-        Time for which the valve does not follow, while it should.
-    off_ms : float
-        Time for which it is not where the commands should have brought it.
-    """
-
+    #: age_ms, echo_age_ms: time since the valve's status, and since its echo of a new command.
     age_ms: Final[float] = 0.0
     echo_age_ms: Final[float] = 0.0
-    fault: Final[bool] = False
-    out_ms: Final[float] = 0.0
+    fault: Final[bool] = False  #: The status reports a fault.
+    out_ms: Final[float] = 0.0  #: Time for which the valve does not follow, while it should.
+    #: Time for which it is not where the commands should have brought it.
     off_ms: Final[float] = 0.0
 
 
@@ -42,88 +32,40 @@ NO_VALVE: Final = ValveReport()
 
 @dataclass(slots=True, eq=False)
 class OwnState:
-    """What the controller knows of itself before it judges.
+    """What the controller knows of itself before it judges."""
 
-    Attributes
-    ----------
-    command_pa : float
-        Pressure last commanded.
-    level_rate_m_s : float
-        Estimated rate of the tank's level.
-    held_pa : float
-        Pressure that a valve takes from the water.
-    echo_age_ms : float
-        Time since the drive's echo of a new command.
-    drive_stays_on : bool
-        The drive was commanded off in vain.
-    valve : ValveReport
-    law_failed : bool
-        The law raised an error, or its last answer is not finite.
-    excused : bool
-        The roll is caused on purpose, or the pump rests: it says nothing of the law.
-    designed_for : ModelSummary, ShipFigures or None
-        Identified ship that the law in charge was designed for; None for the configuration's.
-    gm_low : bool
-        The metacentric height may be below the limit of the stability booklet.
-    commissioned : bool
-        A commissioning was passed with this configuration.
-    frames_sent : int
-        Frames that the controller has sent since its start.
-    """
-
-    command_pa: Final[float] = 0.0
-    level_rate_m_s: Final[float] = 0.0
-    held_pa: Final[float] = 0.0
-    echo_age_ms: Final[float] = 0.0
-    drive_stays_on: Final[bool] = False
+    command_pa: Final[float] = 0.0  #: Pressure last commanded.
+    level_rate_m_s: Final[float] = 0.0  #: Estimated rate of the tank's level.
+    held_pa: Final[float] = 0.0  #: Pressure that a valve takes from the water.
+    echo_age_ms: Final[float] = 0.0  #: Time since the drive's echo of a new command.
+    drive_stays_on: Final[bool] = False  #: The drive was commanded off in vain.
     valve: Final[ValveReport] = NO_VALVE
-    law_failed: Final[bool] = False
+    law_failed: Final[bool] = False  #: The law raised an error, or its last answer is not finite.
+    #: The roll is caused on purpose, or the pump rests: it says nothing of the law.
     excused: Final[bool] = False
+    #: Identified ship that the law in charge was designed for; None for the configuration's.
     designed_for: "Final[ModelSummary | ShipFigures | None]" = None
+    #: The metacentric height may be below the limit of the stability booklet.
     gm_low: Final[bool] = False
-    commissioned: Final[bool] = False
-    frames_sent: Final[int] = 0
+    commissioned: Final[bool] = False  #: A commissioning was passed with this configuration.
+    frames_sent: Final[int] = 0  #: Frames that the controller has sent since its start.
 
 
 @dataclass(slots=True, eq=False)
 class Situation:
-    """All that a condition of the fault table may look at.
-
-    Attributes
-    ----------
-    measured : Measurements
-    own : OwnState
-    motion : MotionSample
-        The sensor in use.
-    motion_spare_age_ms : float
-        Age of the other sensor's sample; zero without one.
-    found : int
-        What the monitors found, bits of `Finding`.
-    heel_rad : float
-        Low-pass of the roll over a minute.
-    tick_late_ms : float
-        Lateness of this tick.
-    overruns_in_ten : int
-        Late ticks among the last ten; one that is late by three counts three times.
-    bus_load : float
-        Share of the bus in use over the last second.
-    rolled_over_ms : float
-        Time since the roll was beyond its limit.
-    drive_out_ms : float
-        Time for which the drive is not in operation enabled, while it should be.
-    arming_ms : float
-        Time since arming was accepted; zero outside of arming.
-    """
+    """All that a condition of the fault table may look at."""
 
     measured: Final[Measurements]
     own: Final[OwnState]
-    motion: Final[MotionSample]
-    motion_spare_age_ms: Final[float]
-    found: Final[int]
-    heel_rad: Final[float]
-    tick_late_ms: Final[float]
+    motion: Final[MotionSample]  #: The sensor in use.
+    motion_spare_age_ms: Final[float]  #: Age of the other sensor's sample; zero without one.
+    found: Final[int]  #: What the monitors found, bits of `Finding`.
+    heel_rad: Final[float]  #: Low-pass of the roll over a minute.
+    tick_late_ms: Final[float]  #: Lateness of this tick.
+    #: Late ticks among the last ten; one that is late by three counts three times.
     overruns_in_ten: Final[int]
-    bus_load: Final[float]
-    rolled_over_ms: Final[float]
+    bus_load: Final[float]  #: Share of the bus in use over the last second.
+    rolled_over_ms: Final[float]  #: Time since the roll was beyond its limit.
+    #: Time for which the drive is not in operation enabled, while it should be.
     drive_out_ms: Final[float]
-    arming_ms: Final[float]
+    arming_ms: Final[float]  #: Time since arming was accepted; zero outside of arming.

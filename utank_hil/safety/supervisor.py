@@ -48,38 +48,28 @@ class Supervisor:
 
     Attributes
     ----------
-    limits : SafetyLimits
-        As given.
-    mode : Mode
-    fault : Fault
-        Why the mode is FAULT (latched until reset); in INIT, what is still missing; else NONE, or
-        why the last arming was refused.
-    demand : Demand
-    drive_wanted : bool
-        Whether the drive should be in operation enabled.
-    degraded : bool
-        Whether only `MonitorThresholds.degraded_share` of the pressure is allowed.
     raised : Fault
         What was latched in this tick, or refused arming in it; else NONE.
     reset_refused_by : Fault
         What lasts, in FAULT after a reset was refused; else NONE.
-    rolled_over_ms, drive_out_ms, arming_ms : float
-        Its timers, as `Situation` has them.
-    standing : int
-        Conditions that hold, bits of `judging.standing`; without those of a drive that is to be
-        off.
     """
 
     def __init__(self, limits: SafetyLimits) -> None:
         self.limits = limits
         self.mode = Mode.INIT
+        #: Why the mode is FAULT (latched until reset); in INIT, what is still missing; else NONE,
+        #: or why the last arming was refused.
         self.fault = Fault.NONE
         self.demand = Demand.ZERO
-        self.drive_wanted = False
+        self.drive_wanted = False  #: Whether the drive should be in operation enabled.
+        #: Whether only `MonitorThresholds.degraded_share` of the pressure is allowed.
         self.degraded = False
         self.raised = self.reset_refused_by = Fault.NONE
+        #: rolled_over_ms, drive_out_ms, arming_ms: timers, as in `Situation`.
         self.rolled_over_ms = math.inf
         self.drive_out_ms = self.arming_ms = 0.0
+        #: Conditions that hold, bits of `judging.standing`; without those of a drive that is to be
+        #: off.
         self.standing = 0
         self._arming_since_ns: int | None = None
         self._reset_until_ns: int | None = None

@@ -29,28 +29,16 @@ Record = Mapping[str, FloatArray]
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing that was checked.
+    """One thing that was checked."""
 
-    Attributes
-    ----------
-    name : str
-        For programs, as in the record.
-    what : str
-        For people.
-    measured, expected, tolerance : float
-        In `unit`; NaN could not be measured, and fails.
-    unit : str
-    remedy : str
-        What to do if it failed.
-    """
-
-    name: str
-    what: str
+    name: str  #: For programs, as in the record.
+    what: str  #: For people.
+    #: measured, expected, tolerance: in `unit`; NaN could not be measured, and fails.
     measured: float
     expected: float
     tolerance: float
     unit: str
-    remedy: str
+    remedy: str  #: What to do if it failed.
 
     @property
     def passed(self) -> bool:

@@ -81,15 +81,6 @@ class CommissioningNode:
         If it has a valve.
     volume_m : float
         Sum of both levels at which the volume's monitor speaks.
-
-    Attributes
-    ----------
-    node : ControllerNode
-    stage : Stage
-    rest, moved : Record
-        What was recorded at rest, and from ACTIVE on; empty before.
-    ended : str
-        Why it ended before its time, in words; else empty.
     """
 
     name = "controller"
@@ -123,8 +114,9 @@ class CommissioningNode:
         self._names = tuple(sources)
         self._getters = tuple(sources.values())
         self.stage = Stage.WAITING
-        self.ended = ""
+        self.ended = ""  #: Why it ended before its time, in words; else empty.
         self._since_ns = 0
+        #: rest, moved: what was recorded at rest, and from ACTIVE on; empty before.
         self.rest: Record = {}
         self.moved: Record = {}
         self._rows: list[FloatArray] = []

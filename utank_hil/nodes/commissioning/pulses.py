@@ -29,20 +29,11 @@ SHAPE: Final = ((1.0, 1.0), (-1.0, 0.5), (1.0, 0.5), (-1.0, 0.5), (0.0, 2.0))
 
 @dataclass(frozen=True, slots=True)
 class PulsePlan:
-    """What the pump is to do, and what the files say that comes of it.
+    """What the pump is to do, and what the files say that comes of it."""
 
-    Attributes
-    ----------
-    pressure_pa : float
-        Of each pulse.
-    period_s : float
-        Of the tank.
-    level_m, roll_rad : float
-        Greatest level and roll that the linear model predicts.
-    """
-
-    pressure_pa: float
-    period_s: float
+    pressure_pa: float  #: Pressure of each pulse.
+    period_s: float  #: Period of the tank.
+    #: level_m, roll_rad: greatest level and roll that the linear model predicts.
     level_m: float
     roll_rad: float
 
@@ -89,21 +80,11 @@ def plan_pulses(plant: DesignPlant) -> PulsePlan:
 
 @dataclass(frozen=True, slots=True)
 class ValveStroke:
-    """A valve's way to a narrow opening, and back.
+    """A valve's way to a narrow opening, and back."""
 
-    Attributes
-    ----------
-    opening : float
-        The narrow one.
-    loss : float
-        Of it, in Pa per (m/s)^2.
-    hold_s : float
-        Time for either way.
-    """
-
-    opening: float
-    loss: float
-    hold_s: float
+    opening: float  #: The narrow opening.
+    loss: float  #: Loss of that opening in Pa per (m/s)^2.
+    hold_s: float  #: Time for either way.
 
     @property
     def duration_s(self) -> float:

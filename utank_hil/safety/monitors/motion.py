@@ -44,12 +44,11 @@ class RollAgainstRate:
     ----------
     unexplained_rad : float
         Leaky sum of the roll's moves that the rate does not account for.
-    noise : Noise
-        Of the roll, by its second difference.
     """
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
         self._limit_rad = thresholds.drift_rad
+        #: Of the roll, by its second difference.
         self.noise = Noise(math.sqrt(6) * thresholds.roll_noise_rad)
         self._bend = SecondDifference()
         self._bias_rad_s = 0.0

@@ -86,13 +86,6 @@ class MotionWatch:
     thresholds : MonitorThresholds
     cycle_s : float
         Time between two samples.
-
-    Attributes
-    ----------
-    motion : RollAgainstRate
-    rate_noise : Noise
-    found : int
-        Bits of `Finding`.
     """
 
     def __init__(self, thresholds: MonitorThresholds, cycle_s: float = TICK_S) -> None:
@@ -106,7 +99,7 @@ class MotionWatch:
         self._last_rate_rad_s = 0.0
         self._heard_ns = 0
         self._waited_s = self._turned_rad = 0.0
-        self.found = 0
+        self.found = 0  #: Bits of `Finding`.
 
     def turn(self, sample: MotionSample, elapsed_s: float) -> None:
         """Integrate the rate up to the newest sample, once a tick.

@@ -20,18 +20,12 @@ class Noise:
     ----------
     limit : float
         Standard deviation of the residual that counts as too much.
-
-    Attributes
-    ----------
-    found : bool
-    power : float
-        Averaged square of the residual.
     """
 
     def __init__(self, limit: float) -> None:
         self._limit_power = limit * limit
         self._most = MOST * limit
-        self.power = 0.0
+        self.power = 0.0  #: Averaged square of the residual.
         self.found = False
 
     @property

@@ -79,11 +79,6 @@ class Stream:
         With a cycle.
     silent_s : float
         A silence of so long is found; infinite where others judge it.
-
-    Attributes
-    ----------
-    damaged : int
-        Frames with a wrong CRC or data ID in the last update.
     """
 
     def __init__(self, receiver: Heard, silent_s: float = float("inf")) -> None:
@@ -91,7 +86,7 @@ class Stream:
         self._cycles_per_s = 1e9 / receiver.cycle_ns
         self._silent_limit_s = silent_s
         self.begin()
-        self.damaged = 0
+        self.damaged = 0  #: Frames with a wrong CRC or data ID in the last update.
         self.excess = self._missing = 0.0
         self._silent_s = self._slow_s = self._gap = 0.0
         self._heard_before = False

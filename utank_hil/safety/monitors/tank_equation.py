@@ -111,8 +111,6 @@ class TankEquation:
         and the sway that speak most for sound sensors.
     late_s : float
         Delay of the motion sensor, the same; NaN as long as the roll is too small to tell.
-    sign_gain : float
-        Gain below which a sign is wrong.
     obeyed : bool
         Whether reversed motion or swapped gauges now leave far more than sound sensors do.
     settled : bool
@@ -130,6 +128,7 @@ class TankEquation:
     ) -> None:
         share = VALVE_SHARE if valve else LEAST_SHARE
         self._pump_share = share * share
+        #: Gain below which a sign is wrong.
         self.sign_gain = VALVE_SIGN_GAIN if valve else SIGN_GAIN
         ratio = (1 - self.sign_gain) / (1 + self.sign_gain)
         self._clearly, self._far = ratio * ratio, 2 * math.sqrt(-self.sign_gain)

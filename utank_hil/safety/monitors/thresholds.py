@@ -38,22 +38,12 @@ class SensorFigures:
 
     Ten to twenty times the default at most, at which wrong signs are still found within seconds.
 
-    Attributes
-    ----------
-    roll_noise_rad, roll_rate_noise_rad_s : float
-        Of the motion sensor.
-    level_noise_m : float
-        Of each level gauge.
-
-    Raises
-    ------
-    ValueError
-        If a figure is out of its range.
+    Raises `ValueError` if a figure is out of its range.
     """
 
-    roll_noise_rad: Annotated[float, Range(above=0, most=2e-3)] = 2e-4
-    roll_rate_noise_rad_s: Annotated[float, Range(above=0, most=1e-2)] = 5e-4
-    level_noise_m: Annotated[float, Range(above=0, most=0.05)] = 0.005
+    roll_noise_rad: Annotated[float, Range(above=0, most=2e-3)] = 2e-4  #: Noise of the roll.
+    roll_rate_noise_rad_s: Annotated[float, Range(above=0, most=1e-2)] = 5e-4  #: Noise of its rate.
+    level_noise_m: Annotated[float, Range(above=0, most=0.05)] = 0.005  #: Noise of a level gauge.
 
     def __post_init__(self) -> None:
         refuse("sensors", range_problems(self))
@@ -61,71 +51,41 @@ class SensorFigures:
 
 @dataclass(frozen=True, slots=True)
 class MonitorThresholds:
-    """Thresholds of the monitors.
+    """Thresholds of the monitors."""
 
-    Attributes
-    ----------
-    tank_period_s : float
-        T, in which the tank's equation is judged.
-    roll_spike_rad, roll_most_rad_s, rate_spike_rad_s, rate_most_rad_s2 : float
-        A sample further than the first from the last one, and than the second a second more, is
-        discarded; of roll and of its rate.
-    level_spike_m, level_most_m_s : float
-        The same of the levels.
-    roll_noise_rad, rate_noise_rad_s, level_noise_m : float
-        Noise at which the signals count as degraded.
-    drift_rad : float
-        Roll that the integrated rate does not account for.
-    roll_still_rad : float
-        A roll that stays within this of a value does not move.
-    level_still_m : float
-        The same of the level.
-    volume_m : float
-        Sum of both levels.
-    least_roll_push_m2_s2, least_pump_push_m2_s2 : float
-        Root mean square of the push on the water, as pressure over density, below which the tank's
-        equation says nothing.
-    zero_push_m2_s2 : float
-        Constant push that the sensors' zeros may feign, all together.
-    motion_late_s : float
-        Delay of the motion sensor.
-    pressure_error_pa : float
-        Error of the pump's pressure against the model of the drive.
-    free_rotor_pa_m : float
-        Pressure of a pump that is off, per level, that is excused besides.
-    pressure_limit_pa : float
-        Greatest command.
-    unconfirmed_share : float
-        Of the pressure, until the water was seen to move as roll and pressure push it.
-    degraded_share : float
-        Of the pressure, while a sensor or the drive is in doubt.
-    amplified_roll_rad : float
-        Root mean square of the roll below which it is not compared with the twin's.
-    """
-
-    tank_period_s: float
+    tank_period_s: float  #: T, in which the tank's equation is judged.
+    #: roll_spike_rad, roll_most_rad_s, rate_spike_rad_s, rate_most_rad_s2: of roll and of its rate;
+    #: a sample further than the first from the last one, and than the second a second more, is
+    #: discarded.
     roll_spike_rad: float
     roll_most_rad_s: float
     rate_spike_rad_s: float
     rate_most_rad_s2: float
+    #: level_spike_m, level_most_m_s: the same of the levels.
     level_spike_m: float
     level_most_m_s: float
+    #: roll_noise_rad, rate_noise_rad_s, level_noise_m: noise at which the signals count as
+    #: degraded.
     roll_noise_rad: float
     rate_noise_rad_s: float
     level_noise_m: float
-    drift_rad: float
-    roll_still_rad: float
-    level_still_m: float
-    volume_m: float
+    drift_rad: float  #: Roll that the integrated rate does not account for.
+    roll_still_rad: float  #: A roll that stays within this of a value does not move.
+    level_still_m: float  #: The same of the level.
+    volume_m: float  #: Sum of both levels.
+    #: least_roll_push_m2_s2, least_pump_push_m2_s2: root mean square of the push on the water, as
+    #: pressure over density, below which the tank's equation says nothing.
     least_roll_push_m2_s2: float
     least_pump_push_m2_s2: float
-    zero_push_m2_s2: float
-    motion_late_s: float
-    pressure_error_pa: float
-    free_rotor_pa_m: float
-    pressure_limit_pa: float
+    zero_push_m2_s2: float  #: Constant push that the sensors' zeros may feign, all together.
+    motion_late_s: float  #: Delay of the motion sensor.
+    pressure_error_pa: float  #: Error of the pump's pressure against the model of the drive.
+    free_rotor_pa_m: float  #: Pressure of a pump that is off, per level, that is excused besides.
+    pressure_limit_pa: float  #: Greatest command.
+    #: Share of the pressure until the water was seen to move as roll and pressure push it.
     unconfirmed_share: float
-    degraded_share: float
+    degraded_share: float  #: Share while a sensor or the drive is in doubt.
+    #: Root mean square of the roll below which it is not compared with the twin's.
     amplified_roll_rad: float
 
 
