@@ -181,6 +181,8 @@ class _Reader:
                 text = content_of.read()
         except (OSError, RuntimeError, ValueError) as error:
             reason = f"can't be read: {_why(error).removeprefix(f'{file}: ')}"
+            if isinstance(error, IsADirectoryError):
+                reason = "is a folder; name a file in it"
             if namer is None:
                 return self._give_up(key, ConfigProblem(file, "", reason))
             where, within = self._within(namer)
@@ -212,7 +214,10 @@ class _Reader:
             strange = [name for name in own if name not in known and not nearest(name, known)]
             above = any(key[: len(upper)] == upper for upper in self.unread)
             open_ended = not key and model.model_config.get("extra") != "forbid"
-            if above or open_ended or not known or len(strange) <= len(own) - len(strange):
+            noun, wanted = "" if key else _kind(part, dict(_nouns())), getattr(model, "noun", "")
+            another = noun and wanted and noun != wanted
+            few = len(strange) <= len(own) - len(strange)
+            if above or open_ended or not known or (few and not another):
                 continue
             why = f"has the keys {', '.join(own)}; a file for this has {', '.join(known)}"
             if key:
@@ -220,8 +225,7 @@ class _Reader:
                 at_name = _dotted((*within, key[-1]))
                 self.problems.append(ConfigProblem(where, at_name, f"names {file}, which {why}"))
             else:
-                noun, wanted = _kind(content, dict(_nouns())), getattr(model, "noun", "")
-                if noun and wanted and noun != wanted:
+                if another:
                     why = f"is a {noun}, and a {wanted} is wanted"
                 self.problems.append(ConfigProblem(file, "", why))
             self.unread.add(key)

@@ -50,7 +50,17 @@ Version = Annotated[
     ),
 ]
 Config = Annotated[Path, typer.Argument(help="Controller configuration.")]
-Bus = Annotated[str, typer.Option("--bus", help="SocketCAN interface, for example can0.")]
+
+
+def _named(bus: str) -> str:
+    if not bus.strip():
+        raise typer.BadParameter("is empty; name a CAN interface, for example can0")
+    return bus
+
+
+Bus = Annotated[
+    str, typer.Option("--bus", help="SocketCAN interface, for example can0.", callback=_named)
+]
 Run = Annotated[str | None, typer.Option(help="Run of a recording; without it the last one.")]
 From = Annotated[float | None, typer.Option("--from", metavar="SECONDS")]
 To = Annotated[float | None, typer.Option("--to", metavar="SECONDS")]

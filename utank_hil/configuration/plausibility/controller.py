@@ -30,9 +30,13 @@ def controller_warnings(
     rolls = f"the ship rolls in {roll_s:.3g} s, at {roll_rad_s:.3g} rad/s"
     height_m = tank.level_limit_m
     full = f"a reservoir is full or empty at {height_m:.3g} m"
+    gives = f"the pump gives {most_pa or 0:g} Pa"
     share = "it is a share of critical damping, 10 % is 0.10"
     rows: list[tuple[str, Any, float | None, float, float, str]] = [
         ("limits.level_m", limits.level_m, height_m, 0.05, 1, full),
+        ("limits.pressure_pa", limits.pressure_pa, most_pa, 0.05, math.inf, gives),
+        ("limits.rate_pa_s", limits.rate_pa_s, limits.pressure_pa / roll_s, 1, math.inf,
+         f"{rolls}, and the pressure needs longer to its limit"),
         ("law.frequency_rad_s", _of(law, "frequency_rad_s"), roll_rad_s, *_PERIODS, rolls),
         ("law.damping_ratio", _of(law, "damping_ratio"), 1, *_RATIOS, share),
         ("law.level_damping_ratio", _of(law, "level_damping_ratio"), 1, *_RATIOS, share),
@@ -67,8 +71,7 @@ def controller_warnings(
         rows += [
             ("retuning.roll_period_range_s", roll_s / low_s, 1, 1, math.inf, rolls),
             ("retuning.roll_period_range_s", roll_s / high_s, 1, 0, 1, rolls),
-            ("retuning.pulse_pa", retuning.pulse_pa, most_pa, 0.02, 1,
-             f"the pump gives {most_pa or 0:g} Pa"),
+            ("retuning.pulse_pa", retuning.pulse_pa, most_pa, 0.02, 1, gives),
             ("retuning.pulse_hold_s", retuning.pulse_hold_s[1], roll_s, 0.05, 1, rolls),
             ("retuning.identification_s", retuning.identification_s, roll_s, 5, 500, rolls),
         ]  # fmt: skip

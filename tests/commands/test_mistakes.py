@@ -1,0 +1,147 @@
+"""Mistakes of a user at the command line: each is told by its place and with a remedy."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from utank_hil.cli import app
+
+CONFIGS = Path("configs").resolve()
+GPC, FIRST, STORM = "controllers/gpc.yaml", "ships/thesis_first.yaml", "scenarios/storm.yaml"
+SHIP = ("--length", "90", "--beam", "14", "--displacement", "2800", "--gm", "1.1")
+
+#: Words of the command with {configs} and {here}, then what the message must name.
+MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
+    # a file of another kind, or none
+    ("a ship to run", f"run {{configs}}/{FIRST} --bus can0", ("thesis_first.yaml", "controller")),
+    ("a scenario to run", f"run {{configs}}/{STORM} --bus can0", ("storm.yaml", "controller")),
+    ("a controller to the bench", f"bench {{configs}}/{GPC}", ("gpc.yaml", "scenario")),
+    ("a ship to the bench", f"bench {{configs}}/{FIRST}", ("thesis_first.yaml", "scenario")),
+    ("a scenario to a campaign", f"campaign {{configs}}/{STORM}", ("storm.yaml", "study")),
+    ("a controller to the panel", f"panel {{configs}}/{GPC} --bus can0", ("gpc.yaml", "ship")),
+    ("a folder to check", "check {here}", ("{here}", "file")),
+    ("a table to check", "check {here}/table.csv", ("table.csv",)),
+    ("an empty file", "check {here}/empty.yaml", ("empty.yaml", "empty")),
+    ("tabs", "check {here}/tabs.yaml", ("tabs.yaml", "line 2", "tab")),
+    ("letters of Windows", "check {here}/latin.yaml", ("latin.yaml", "UTF-8")),
+    ("a file that is not there", "bench {here}/strom.yaml", ("strom.yaml", "no such file")),
+    ("no recording", "report {here}/table.csv", ("table.csv",)),
+    ("nothing to report", "report {here}", ("{here}",)),
+    ("a replay of a table", "replay {here}/table.csv", ("table.csv",)),
+    ("an export of a text", "export {here}/tabs.yaml --to {here}/out.csv", ("tabs.yaml",)),
+    ("an export to nothing", "export {here}/table.csv", ("--to",)),
+    # options
+    ("a misspelt command", "bnech", ("No such command", "bnech")),
+    ("a misspelt option", "bench --sede 3", ("--seed",)),
+    ("no bus", f"run {{configs}}/{GPC}", ("--bus",)),
+    ("an empty bus", f"run {{configs}}/{GPC} --bus ''", ("bus",)),
+    ("a bus by its device", f"run {{configs}}/{GPC} --bus /dev/ttyUSB0", ("/dev/ttyUSB0",)),
+    ("a seed with a point", "bench --seed 1.5", ("--seed", "integer")),
+    ("an outlet without a port", f"run {{configs}}/{GPC} --bus can0 --outward udp://127.0.0.1",
+     ("--outward", "127.0.0.1:10110")),
+    # a ship from its papers
+    ("a GM in centimetres", "init {here}/a --length 90 --beam 14 --displacement 2800 --gm 110 "
+     "--roll-period 10", ("gm", "metres")),
+    ("a displacement in kilograms", "init {here}/a --length 90 --beam 14 "
+     "--displacement 2800000 --gm 1.1 --roll-period 10", ("displacement", "tonnes")),
+    ("a beam over the length", "init {here}/a --length 14 --beam 90 --displacement 2800 --gm 1.1 "
+     "--roll-period 10", ("beam",)),
+    ("no stability", "init {here}/a --length 90 --beam 14 --displacement 2800 --gm -1", ("gm",)),
+    ("neither draught nor period", f"init {{here}}/a {' '.join(SHIP)}",
+     ("roll-period", "draught")),
+    ("a folder in use", f"init {{here}}/used {' '.join(SHIP)} --roll-period 10",
+     ("ship.yaml", "another folder")),
+    ("a sea of no height", f"init {{here}}/a {' '.join(SHIP)} --roll-period 10 --hs 0",
+     ("--hs", "positive")),
+]  # fmt: skip
+
+#: Changes of a shipped file, and what the message must name.
+IN_A_FILE: list[tuple[str, str, str, object, tuple[str, ...]]] = [
+    ("a name that is no file", GPC, "vessel", "my_ship.yaml", ("vessel", "my_ship.yaml")),
+    ("a law without a kind", GPC, "law", {"gain": 1}, ("law", "kind")),
+    ("a law of another name", GPC, "law", {"kind": "pid"}, ("law", "pid", "gpc")),
+    ("a comma for a point", GPC, "limits", {"level_m": "3,5"}, ("limits.level_m", "3,5")),
+    ("a unit behind the number", GPC, "limits", {"pressure_pa": "50 kPa"},
+     ("limits.pressure_pa", "50 kPa")),
+    ("a list for a number", GPC, "bit_rate", [250_000], ("bit_rate",)),
+    ("yes for a number", GPC, "bit_rate", True, ("bit_rate",)),
+    ("no sea", STORM, "sea", None, ("sea",)),
+    ("a sea of another kind", STORM, "sea", {"kind": "johnswap"}, ("sea", "jonswap")),
+    ("a duration in words", STORM, "duration_s", "one hour", ("duration_s", "one hour")),
+    ("no controllers", STORM, "controllers", {}, ("controllers",)),
+    ("an order that is none", STORM, "operator", [{"time_s": 5.0, "action": "armed"}],
+     ("operator", "arm")),
+    ("an order before the beginning", STORM, "operator", [{"time_s": -5.0, "action": "arm"}],
+     ("operator", "time_s")),
+    ("a negative duration", STORM, "duration_s", -60.0, ("duration_s", "-60")),
+    ("no number", STORM, "duration_s", float("nan"), ("duration_s", "nan")),
+    ("a seed in words", STORM, "seed", "first", ("seed", "first")),
+    ("a misspelt key", GPC, "limtis", {"level_m": 3.5}, ("limtis", "limits")),
+    ("a misspelt key inside", GPC, "limits", {"level": 3.5}, ("limits.level", "level_m")),
+    ("a limit of nothing", GPC, "limits", {"pressure_pa": 0}, ("limits.pressure_pa", "0")),
+    ("a delay in milliseconds", GPC, "delay_s", 50, ("delay_s", "50")),
+    ("a sea without its height", STORM, "sea", {"kind": "jonswap", "tp_s": 10.0}, ("hs_m",)),
+    ("a wave height in centimetres", STORM, "sea",
+     {"kind": "jonswap", "hs_m": 450.0, "tp_s": 10.0}, ("hs_m", "450")),
+    ("a settling beyond the end", STORM, "settle_s", 1e6, ("settle_s",)),
+]  # fmt: skip
+
+
+@pytest.fixture
+def here(tmp_path: Path) -> Path:
+    (tmp_path / "table.csv").write_text("time_s,roll_deg\n0,1\n")
+    (tmp_path / "empty.yaml").write_text("")
+    (tmp_path / "tabs.yaml").write_text("name: ship\n\tship: 1\n")
+    (tmp_path / "latin.yaml").write_bytes("name: Größe\n".encode("latin-1"))
+    (tmp_path / "used").mkdir()
+    (tmp_path / "used" / "ship.yaml").write_text("name: mine\n")
+    return tmp_path
+
+
+def told(*words: str) -> str:
+    """What the command says of a mistake, in one line."""
+    result = CliRunner(env={"COLUMNS": "200", "TERM": "dumb"}).invoke(app, list(words))
+    assert isinstance(result.exception, SystemExit), result.exception
+    assert result.exit_code in (1, 2, 3), result.output
+    assert "Traceback" not in result.output
+    assert result.stderr
+    return re.sub(r"[\s│]+", " ", result.stderr)
+
+
+@pytest.mark.parametrize(
+    ("words", "named"), [m[1:] for m in MISTAKES], ids=[m[0] for m in MISTAKES]
+)
+def test_a_mistake_is_told_by_its_place(here: Path, words: str, named: tuple[str, ...]) -> None:
+    said = told(*(each.format(configs=CONFIGS, here=here) for each in shlex.split(words)))
+    for each in named:
+        assert each.format(here=here).lower() in said.lower(), said
+
+
+@pytest.mark.parametrize(
+    ("file", "key", "value", "named"), [m[1:] for m in IN_A_FILE], ids=[m[0] for m in IN_A_FILE]
+)
+def test_a_mistake_in_a_file_is_told_at_its_key(
+    tmp_path: Path, file: str, key: str, value: object, named: tuple[str, ...]
+) -> None:
+    text = (CONFIGS / file).read_text(encoding="utf-8")
+    content = yaml.safe_load(text.replace(" ../", f" {CONFIGS}/"))
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump(content | {key: value}, allow_unicode=True), encoding="utf-8")
+    said = told("check", str(path))
+    for each in ("mine.yaml", *named):
+        assert each in said, said
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("pressure_pa", 50.0), ("rate_pa_s", 100.0), ("level_m", 0.004)]
+)
+def test_a_limit_in_another_unit_is_warned_of(tmp_path: Path, key: str, value: float) -> None:
+    path = tmp_path / "mine.yaml"
+    text = (CONFIGS / GPC).read_text(encoding="utf-8").replace(" ../", f" {CONFIGS}/")
+    path.write_text(f"{text}limits: {{{key}: {value}}}\n", encoding="utf-8")
+    result = CliRunner(env={"COLUMNS": "200", "TERM": "dumb"}).invoke(app, ["check", str(path)])
+    assert f"limits.{key}: is {value:.4g} against" in re.sub(r"\s+", " ", result.stderr)
