@@ -122,7 +122,6 @@ def advance_tick(
 
     Parameters
     ----------
-    state : ndarray, shape (STATES,)
     row : ndarray, shape (18,)
         `RollCoefficients`, and the pieces of the restoring moment per radian.
     restoring : ndarray, shape (pieces, powers)

@@ -89,14 +89,9 @@ def standard_normal(seed: int) -> Iterator[float]:
 class SensorNode:
     """Node that measures the plant and sends the measurements in the cycles of the catalogue.
 
-    Parameters
-    ----------
-    configuration_version : int
-        Version sent in the heartbeat, which the controller compares with its own.
-    second : bool
-        Whether it is the second motion sensor, which measures nothing else and has no bias.
-    foreign : ForeignDevices
-        Devices of other makers, in whose frames the node sends what they measure.
+    A `second` motion sensor measures nothing else and has no bias. `foreign` are devices of other
+    makers, in whose frames the node sends what they measure. The heartbeat has
+    `configuration_version`.
     """
 
     period_ns = TICK_NS

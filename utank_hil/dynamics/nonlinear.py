@@ -114,7 +114,6 @@ class RollModel:
 
         Parameters
         ----------
-        state : array_like, shape (..., 4)
         pressure_pa, wave_moment_nm, valve_loss_pa_per_m2_s2, sway_m_s2 : array_like, shape (...)
             Inputs; the valve loss is the output of `valves`, the sway the lateral acceleration.
         stopped : bool

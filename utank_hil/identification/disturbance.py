@@ -89,7 +89,6 @@ def find_disturbance_frequencies(
 
     Parameters
     ----------
-    u : array_like, shape (N, r) or (N,)
     y : array_like, shape (N, m) or (N,)
         NaN rows are gaps, as in `okid`.
     most : int

@@ -58,7 +58,6 @@ def validate(
 
     Parameters
     ----------
-    u : array_like, shape (N, r) or (N,)
     y : array_like, shape (N, m) or (N,)
         NaN rows are gaps, as in `okid`.
     disturbance_frequencies_rad_s : sequence of float

@@ -25,8 +25,6 @@ class Actuators:
 
     Parameters
     ----------
-    limiter : CommandLimiter
-    catalogue : Catalogue
     timeout_s : float
         Sent with every command: the drive stops on its own after so long a silence.
     pump : bool
@@ -71,13 +69,8 @@ class Actuators:
     def observe(self, measured: Measurements) -> tuple[float, bool, ValveReport]:
         """Look at what came back, once a tick.
 
-        Returns
-        -------
-        echo_age_ms : float
-            Time since the drive's echo of a new command.
-        stays_on : bool
-            The drive was commanded off in vain.
-        valve : ValveReport
+        Return the time in ms since the drive's echo of a new command, whether the drive was
+        commanded off in vain, and the valve's report.
         """
         if self.drive is None:
             self._echo.heard(measured.drive_echo, measured.drive_echo_ns)
@@ -115,14 +108,7 @@ class Actuators:
     ) -> None:
         """Turn the law's pressure, or zero, into a permitted `command_pa`.
 
-        Parameters
-        ----------
-        judgement : Judgement
-        wanted_pa : float
-            The law's pressure.
-        level : LevelObserver
-        share : float
-            Share of the greatest pressure that is allowed.
+        `share` is the share of the greatest pressure that is allowed.
         """
         if not self.pump:
             return

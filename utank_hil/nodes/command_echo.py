@@ -14,12 +14,8 @@ class CommandEcho:
     """The newest command of which its receiver has sent the counter back.
 
     A receiver that gets every command, each a second late, sends new counters all the time. So an
-    echo counts if it is new and not more than `MOST_BEHIND` commands behind.
-
-    Parameters
-    ----------
-    heard_ns : int
-        Before the first echo.
+    echo counts if it is new and not more than `MOST_BEHIND` commands behind. Before the first echo
+    `heard_ns` is as given.
     """
 
     __slots__ = ("_counter", "_sent", "_status_ns", "heard_ns")

@@ -65,11 +65,6 @@ class ControllerNode:
     ----------
     law : RunningLaw
         The law in charge while active.
-    safety : Safety
-    actuators : Actuators
-    telemetry : Telemetry
-    settings : ControllerSettings
-    catalogue : Catalogue
     estimator : Estimator, optional
         Estimates waves and ship from the motion.
 

@@ -44,12 +44,8 @@ class DriveSequence:
     def next_word(self, state: DriveState | None, *, wanted: bool) -> ControlWord:
         """Return the control word that leads from `state` towards operation enabled, or off.
 
-        Parameters
-        ----------
-        state : DriveState or None
-            State the drive last reported, None if unknown.
-        wanted : bool
-            Whether the supervisor wants the drive in operation enabled.
+        `state` is what the drive last reported, None if unknown; `wanted` says whether the
+        supervisor wants the drive in operation enabled.
         """
         if self._resets_left and state is DriveState.FAULT:
             self._resets_left -= 1

@@ -18,13 +18,8 @@ NANOSECONDS = 1e-9
 class Housekeeping:
     """Address claim and heartbeat of one node.
 
-    Parameters
-    ----------
-    address : Address
-        The node's address.
-    catalogue : Catalogue
-    configuration_version : int
-        Hash of the configuration, to be equal on all nodes before arming.
+    `configuration_version` is the hash of the configuration, to be equal on all nodes before
+    arming.
     """
 
     def __init__(self, address: Address, catalogue: Catalogue, configuration_version: int) -> None:

@@ -88,7 +88,6 @@ class Inbox:
 
     Parameters
     ----------
-    catalogue : Catalogue
     configuration_version : int
         Hash of the controller's configuration, to compare with the others'.
     level_limit_m : float
@@ -97,7 +96,6 @@ class Inbox:
         Whether the ship has a pump, and a valve, to be heard.
     thresholds : MonitorThresholds, optional
         What no motion of ship and water exceeds; without them no sample is a spike.
-    redundancy : Redundancy
     foreign : ForeignDevices
         Devices of other makers.
     drive : CanopenDrive, optional
@@ -228,13 +226,7 @@ class Inbox:
         self._received: dict[Fault, str] = {}
 
     def snapshot(self, now_ns: int) -> Measurements:
-        """What is known at a tick; takes the operators' edges, which come once.
-
-        Parameters
-        ----------
-        now_ns : int
-            Time of the tick.
-        """
+        """What is known at a tick; takes the operators' edges, which come once."""
         stations, gates, hardwired, drive = self.stations, self.gates, self.hardwired, self._drive
         wishes = stations.take(now_ns)  # first of all: who is in command may change
         motions = tuple([sensor.sample(now_ns) for sensor in self.motions])

@@ -59,12 +59,7 @@ class TimedAction:
     """A button press at a time after the panel first receives the status of a ready controller.
 
     The panel's own start is no reference: a controller that starts later would miss the rising edge
-    of an earlier press.
-
-    Raises
-    ------
-    ValueError
-        If the time is negative or not finite.
+    of an earlier press. Raises `ValueError` if the time is negative or not finite.
     """
 
     time_s: NotNegative
@@ -83,7 +78,6 @@ class OperatorPanel:
 
     Parameters
     ----------
-    catalogue : Catalogue
     configuration_version : int
         Sent in the heartbeat.
     script : iterable of TimedAction

@@ -19,14 +19,8 @@ STEP_SAMPLES: Final = 5
 class SpikeGate:
     """Passes the samples of a signal that are near enough to the last one that passed.
 
-    Times are those of the samples, see `SampleClock`.
-
-    Parameters
-    ----------
-    spike : float
-        Distance from the last sample, noise included, that is always near enough.
-    most_per_s : float
-        So much more for each second since then.
+    `spike` is the distance, noise included, that is always near enough; `most_per_s` is added for
+    each second since then. Times are those of the samples, see `SampleClock`.
     """
 
     def __init__(self, spike: float, most_per_s: float) -> None:
@@ -77,7 +71,6 @@ class MotionSensor:
 
     Parameters
     ----------
-    receiver : Receiver of SensorMotion, or ProfiledDevice
     thresholds : MonitorThresholds, optional
         Of what no ship can do; without them every finite sample is taken.
 

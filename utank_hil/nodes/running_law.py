@@ -57,7 +57,6 @@ class RunningLaw:
     ----------
     law : Controller
         Its sample time must be a whole number of ticks.
-    measure : callable
     commands : tuple of str
         What it commands, see `BuiltLaw`.
     limits : SafetyLimits
@@ -174,14 +173,7 @@ class RunningLaw:
     ) -> None:
         """Do one tick: answer when a sample is due, in charge or not.
 
-        Parameters
-        ----------
-        measured : Measurements
-        judgement : Judgement
-        level : LevelObserver
-        actuators : Actuators
-            Say what was applied, and are asked for the valve's loss.
-        take_order : callable
+        The `actuators` say what was applied, and are asked for the valve's loss.
         """
         self._note(judgement)
         due = self._samples.due(measured.now_ns)

@@ -79,17 +79,10 @@ EventSink = Callable[[RetuningEvent | AlarmEvent, int], None]
 class Telemetry:
     """Takes what the controller shows: rows of numbers, and events.
 
-    Parameters
-    ----------
-    statistics : LoopStatistics, optional
-        Of the loop that drives the node; without any, in lockstep, all zero.
-    sink : callable, optional
-        Takes one telemetry row (columns `SIGNALS`); must copy it and not wait.
-    sink_every : int
-        Ticks from one row to the next; the first tick has one.
-    event_sink : callable, optional
-        Takes each event of retuning and alarms, with the time of the first tick, as it happens;
-        must not wait.
+    `statistics` are those of the loop that drives the node; without any, in lockstep, all are zero.
+    `sink` takes a row (columns `SIGNALS`) every `sink_every` ticks from the first on; it must copy
+    it and not wait. `event_sink` takes each event of retuning and alarms, with the time of the
+    first tick, as it happens, and must not wait either.
     """
 
     def __init__(

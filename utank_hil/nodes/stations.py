@@ -182,13 +182,8 @@ LIVE_NS: Final = 600_000_000
 class Stations:
     """The orders of all stations.
 
-    Parameters
-    ----------
-    catalogue : Catalogue
-    versions : tuple of int
-        Of the controller's catalogue and configuration.
-    second : bool
-        Whether the second station may take the command.
+    `versions` are those of the controller's catalogue and configuration; `second` says whether the
+    second station may take the command.
     """
 
     def __init__(

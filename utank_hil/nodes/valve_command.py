@@ -19,15 +19,8 @@ STALE_MS: Final = 100.0
 class ValveCommander:
     """Turns the loss that a law asks for into VALVE_CMD, and watches the valve.
 
-    The valve follows only while the law is in charge; else it goes to its fail position.
-
-    Parameters
-    ----------
-    valve : Valve
-    tank : Tank
-    catalogue : Catalogue
-    timeout_s : float
-        Sent with every command: the valve goes to its fail position after so long a silence.
+    The valve follows only while the law is in charge; else it goes to its fail position, as it does
+    after a silence of `timeout_s`, which is sent with every command.
     """
 
     def __init__(self, valve: Valve, tank: Tank, catalogue: Catalogue, timeout_s: float) -> None:

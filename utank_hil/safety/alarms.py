@@ -166,14 +166,8 @@ def active_faults(
     what cuts it at once counts everywhere, but in INIT of what is awaited the reason alone. Why
     arming was refused counts as long as it would be.
 
-    Parameters
-    ----------
-    mode, fault : Mode, Fault
-        Of the supervisor.
-    standing : int
-        Conditions that hold, see `judging.standing`.
-    law_fault : Fault
-        Limit on which the law ended, or NONE.
+    Mode and fault are those of the supervisor, `standing` the conditions that hold
+    (`judging.standing`), `law_fault` the limit on which the law ended, or NONE.
     """
     found = dict.fromkeys({law_fault, *judging.faults(standing & judging.WARNING)}, Gravity.NOTHING)
     # in STANDBY it says why arming was refused, which may be some time ago

@@ -83,20 +83,10 @@ class Heel:
 class Safety:
     """Judges each tick what was measured; keeps its own timers and writes to nobody else.
 
-    Parameters
-    ----------
-    limits : SafetyLimits
-    bit_rate : int
-        Of the bus.
-    monitors : Monitors, optional
-        Of sensors, pump and bus; without them the fault table has ages, states and limits only.
-    pump : bool
-        Whether the tank has a pump to be watched.
-    motion_cycles_s : tuple of float
-        Time between two samples of each motion sensor.
-    unprotected : bool
-        Whether neither counter nor checksum protects a motion sensor's messages: the pressure is
-        as of a sensor in doubt unless a second one agrees.
+    Without `monitors` the fault table has ages, states and limits only. `pump` says whether the
+    tank has a pump to be watched. `motion_cycles_s` are the times between two samples of each
+    motion sensor. `unprotected` says that neither counter nor checksum protects a motion sensor's
+    messages: the pressure is as of a sensor in doubt unless a second one agrees.
     """
 
     situation: Situation  #: What was judged last.
@@ -144,14 +134,7 @@ class Safety:
         return math.nan if self.monitors is None else self.monitors.twin.ship_rms_rad
 
     def judge(self, measured: Measurements, own: OwnState) -> Judgement:
-        """Judge one tick.
-
-        Parameters
-        ----------
-        measured : Measurements
-        own : OwnState
-            What the controller knows of itself.
-        """
+        """Judge one tick; `own` is what the controller knows of itself."""
         now_ns, supervisor, monitors = measured.now_ns, self.supervisor, self.monitors
         self._lateness.update(now_ns)
         load = self._load.update(now_ns, measured.frames + own.frames_sent)
@@ -236,12 +219,8 @@ class Safety:
     ) -> list[AlarmEvent]:
         """Raise, accept and rectify alarms; return what became of them.
 
-        Parameters
-        ----------
-        accepted : list of int or None
-            Codes that an operator has accepted; None stands for all.
-        law_fault : Fault
-            Limit on which the law ended, or NONE.
+        `accepted` are the codes that an operator has accepted, where None stands for all;
+        `law_fault` is the limit on which the law ended, or NONE.
         """
         supervisor, alarms = self.supervisor, self.alarms
         mode = supervisor.mode

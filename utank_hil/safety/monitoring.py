@@ -79,21 +79,9 @@ _ROUND: Final = (
 class Monitors:
     """The monitors of one ship.
 
-    Parameters
-    ----------
-    plant : DesignPlant
-    roll_limit_rad : float
-        Largest roll under control.
-    sensors : SensorFigures
-    bit_rate : int
-        Of the bus.
-    compares : bool
-        Whether the law is meant to roll the ship less than its passive twin; one that stimulates
-        the ship is not.
-    second_motion : bool
-        Whether there is a second motion sensor.
-    motion_cycles_s : tuple of float
-        Time between two samples of each motion sensor.
+    `roll_limit_rad` is the largest roll under control, `bit_rate` that of the bus. `compares` says
+    whether the law is meant to roll the ship less than its passive twin; one that stimulates the
+    ship is not. `motion_cycles_s` are the times between two samples of each motion sensor.
     """
 
     def __init__(
@@ -162,11 +150,8 @@ class Monitors:
     def follow(self, found: ModelSummary | ShipFigures | None) -> None:
         """Compare the law in charge with the twin of the ship that it was designed for.
 
-        Parameters
-        ----------
-        found : ModelSummary, ShipFigures or None
-            As identified; None for the ship of the configuration, which is taken too in the place
-            of one that can't be this one.
+        None stands for the ship of the configuration, which is taken too in the place of an
+        identified one that can't be this one.
         """
         if found is self._followed:
             return
@@ -206,20 +191,7 @@ class Monitors:
         return PassiveTwinMessage(quality, twin.roll_rad, twin.rms_rad, twin.ship_rms_rad)
 
     def update(self, measured: Measurements, own: OwnState, used: int = 0) -> int:
-        """Look at one tick.
-
-        Parameters
-        ----------
-        measured : Measurements
-        own : OwnState
-        used : int
-            Place of the motion sensor in use.
-
-        Returns
-        -------
-        int
-            `found`.
-        """
+        """Look at one tick and return `found`; `used` is the place of the motion sensor in use."""
         now_ns = measured.now_ns
         if not self._begun:
             self._begin(measured)

@@ -61,20 +61,11 @@ LASTS_PERIODS: Final = 0.25
 
 
 class PassiveTwin:
-    """The twin and the comparison with it.
+    """The twin and the comparison with it, updated every `period_s`.
 
-    Parameters
-    ----------
-    ship : RollShip
-    tank : Tank
-    period_s : float
-        Time between two updates.
-    least_roll_rad : float
-        Own root mean square below which nothing is judged.
-    open_loss : float
-        Of the tank's valve, fully open, in Pa per (m/s)^2 of the level's rate.
-    room : float
-        Factor on the ratios of own roll to the twin's at which a law has lost.
+    Below the own root mean square `least_roll_rad` nothing is judged. `open_loss` is that of the
+    tank's valve, fully open, in Pa per (m/s)^2 of the level's rate. `room` is the factor on the
+    ratios of own roll to the twin's at which a law has lost.
     """
 
     def __init__(
@@ -153,14 +144,9 @@ class PassiveTwin:
     ) -> None:
         """Take what is measured, once a period.
 
-        Parameters
-        ----------
-        roll_rad, rate_rad_s, level_rate_m_s : float
-            Of the ship and its water.
-        pressure_pa : float
-            Across the pump, less what the valve takes beyond an open one.
-        counts : bool
-            Whether the roll is to be trusted; else nothing of it is remembered, or judged.
+        `pressure_pa` is that across the pump, less what the valve takes beyond an open one.
+        `counts` says whether the roll is to be trusted; else nothing of it is remembered, or
+        judged.
         """
         made, effort = self._made, self._effort
         effort[0] = 0.5 * (pressure_pa + self._pressure_pa)

@@ -87,13 +87,7 @@ class Supervisor:
     def count(self, measured: Measurements, roll_rad: float, command_pa: float) -> None:
         """Advance the timers, before the tick's conditions are judged.
 
-        Parameters
-        ----------
-        measured : Measurements
-        roll_rad : float
-            Of the motion sensor in use.
-        command_pa : float
-            Pressure last commanded.
+        `roll_rad` is that of the motion sensor in use, `command_pa` the pressure last commanded.
         """
         now_ns = measured.now_ns
         if abs(roll_rad) > self.limits.roll_limit_rad:
@@ -118,11 +112,7 @@ class Supervisor:
     def update(self, seen: Situation, standing: int) -> None:
         """Take one tick's situation and set `mode`, `fault`, `demand` and `drive_wanted`.
 
-        Parameters
-        ----------
-        seen : Situation
-        standing : int
-            Conditions that hold in it, see `judging.standing`.
+        `standing` are the conditions that hold in it, see `judging.standing`.
         """
         now_ns, measured = seen.measured.now_ns, seen.measured
         self.raised = _NO_FAULT

@@ -51,16 +51,9 @@ def judge_rest(
 ) -> list[Check]:
     """Zeros of the sensors, and whether ship and water are still enough for pulses.
 
-    Parameters
-    ----------
-    rest : Record
-        Of some seconds in which ship and water are at rest and the pump is off.
-    plant : DesignPlant
-        As the files describe it.
-    plan : PulsePlan, optional
-        If the tank has a pump.
-    volume_m : float
-        Sum of both levels at which the volume's monitor speaks.
+    `rest` is the record of some seconds in which ship and water are at rest and the pump is off.
+    `plan` is None for a tank without a pump. `volume_m` is the sum of both levels at which the
+    volume's monitor speaks.
     """
     mean = {name: float(column.mean()) for name, column in rest.items()}
     roll_deg = math.degrees(mean["roll_rad"])

@@ -68,19 +68,8 @@ class Stage(Enum):
 class CommissioningNode:
     """Leads through a commissioning; on the bus it is the controller.
 
-    Parameters
-    ----------
-    node : ControllerNode
-        With `law` in it.
-    law : PulseLaw
-    plant : DesignPlant
-        As the files describe it.
-    plan : PulsePlan, optional
-        If the tank has a pump.
-    stroke : ValveStroke, optional
-        If it has a valve.
-    volume_m : float
-        Sum of both levels at which the volume's monitor speaks.
+    `node` has the law of the pulses in it. `plan` is None without a pump, `stroke` without a valve.
+    `volume_m` is the sum of both levels at which the volume's monitor speaks.
     """
 
     name = "controller"

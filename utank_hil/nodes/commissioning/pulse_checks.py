@@ -61,18 +61,10 @@ class Each(NamedTuple, Generic[_T]):
 def judge_pulses(
     rest: Record, pulses: Record, plant: DesignPlant, plan: PulsePlan, sample_time_s: float
 ) -> list[Check]:
-    """Judge the record of the pulses.
+    """Judge the records at rest, and from the moment at which the first pulse began.
 
-    Parameters
-    ----------
-    rest, pulses : Record
-        At rest, and from the moment at which the first pulse began.
-    plant : DesignPlant
-        As the files describe it.
-    plan : PulsePlan
-        What was to be done.
-    sample_time_s : float
-        Time between two rows.
+    `plant` is as the files describe it, `plan` what was to be done, `sample_time_s` the time
+    between two rows.
     """
 
     def filtered(name: str) -> FloatArray:
@@ -160,10 +152,7 @@ def _scale_checks(scales: Each[float]) -> list[Check]:
 def remedies_of(scales: Each[float]) -> Each[str]:
     """What to do about each scale if it is wrong; all of them together say what is reversed.
 
-    Parameters
-    ----------
-    scales : Each of float
-        With their signs: 1 is right, 0 did not move.
+    Of the signed `scales` 1 is right, and 0 did not move.
     """
     pressure, port, starboard, roll, rate = scales
     if abs(pressure) < NO_PRESSURE:

@@ -52,13 +52,7 @@ class PulsePlan:
 
 
 def plan_pulses(plant: DesignPlant) -> PulsePlan:
-    """Pulses as strong as the shares of this module allow.
-
-    Parameters
-    ----------
-    plant : DesignPlant
-        As the files describe it, with its limits.
-    """
+    """Pulses for a plant, as strong as the shares of this module allow."""
     period_s = 2 * math.pi / plant.tank.natural_frequency_rad_s
     unit = PulsePlan(1.0, period_s, 0.0, 0.0)
     step_s = round(period_s / 200 / TICK_S + 0.5) * TICK_S
@@ -103,13 +97,7 @@ def plan_stroke(valve: Valve, tank: Tank) -> ValveStroke:
 
 
 class PulseLaw:
-    """A law that answers what it was set to.
-
-    Parameters
-    ----------
-    commands : tuple of str
-        As in `BuiltLaw`.
-    """
+    """A law that answers what it was set to; `commands` are as in `BuiltLaw`."""
 
     sample_time_s = TICK_S
 

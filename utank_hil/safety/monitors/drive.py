@@ -43,7 +43,6 @@ class DriveFollowing:
     ----------
     lag_s : float
         Time constant of the pump's pressure.
-    thresholds : MonitorThresholds
     period_s : float
         Time between two updates.
 

@@ -59,16 +59,7 @@ _LEVEL_STUCK: Final = int(Finding.LEVEL_STUCK)
 
 
 class LevelStuck:
-    """The measured level against water that is free to move.
-
-    Parameters
-    ----------
-    ship : RollShip
-    tank : Tank
-    thresholds : MonitorThresholds
-    period_s : float
-        Time between two updates.
-    """
+    """The measured level, looked at every `period_s`, against water that is free to move."""
 
     def __init__(
         self, ship: RollShip, tank: Tank, thresholds: MonitorThresholds, period_s: float

@@ -68,16 +68,8 @@ class RollAgainstRate:
     ) -> int:
         """Take a sample; return what was found.
 
-        Parameters
-        ----------
-        roll_rad : float
-            Measured now.
-        turned_rad : float
-            Integral of the rate since the last sample.
-        elapsed_s : float
-            Time since then.
-        even : bool
-            Whether it is the same each time.
+        `turned_rad` is the integral of the rate since the last sample, `elapsed_s` ago; `even` says
+        whether that time is the same each time.
         """
         moved_rad = roll_rad - self._roll_rad
         self._roll_rad = roll_rad

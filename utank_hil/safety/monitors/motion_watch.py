@@ -79,14 +79,7 @@ _SPIKES: Final = int(Finding.SPIKES)
 
 
 class MotionWatch:
-    """The monitors of one motion sensor.
-
-    Parameters
-    ----------
-    thresholds : MonitorThresholds
-    cycle_s : float
-        Time between two samples.
-    """
+    """The monitors of one motion sensor, of which a sample comes every `cycle_s`."""
 
     def __init__(self, thresholds: MonitorThresholds, cycle_s: float = TICK_S) -> None:
         self._half_s = 0.5 * cycle_s

@@ -14,13 +14,7 @@ def within(value: float, most: float) -> float:
 
 
 class Noise:
-    """Power of a residual, averaged over 0.7 s, against a limit.
-
-    Parameters
-    ----------
-    limit : float
-        Standard deviation of the residual that counts as too much.
-    """
+    """Power of a residual, averaged over 0.7 s, against a limit on its standard deviation."""
 
     def __init__(self, limit: float) -> None:
         self._limit_power = limit * limit

@@ -71,14 +71,9 @@ class Heard(Protocol):
 
 
 class Stream:
-    """Pace of one message.
+    """Pace of one cyclic message.
 
-    Parameters
-    ----------
-    receiver : Heard
-        With a cycle.
-    silent_s : float
-        A silence of so long is found; infinite where others judge it.
+    A silence of `silent_s` is found; it is infinite where others judge it.
     """
 
     def __init__(self, receiver: Heard, silent_s: float = float("inf")) -> None:
@@ -145,13 +140,8 @@ class Stream:
 class Senders:
     """All messages that the controller hears, and the frames that are none of them.
 
-    Every second message is looked at in one call, the others in the next.
-
-    Parameters
-    ----------
-    streams : sequence of Stream
-    frames_per_s : float
-        Frames that fill the bus.
+    Every second message is looked at in one call, the others in the next. `frames_per_s` fill the
+    bus.
     """
 
     def __init__(self, streams: Sequence[Stream], frames_per_s: float) -> None:

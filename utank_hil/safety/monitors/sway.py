@@ -34,15 +34,7 @@ def most_sway(ship: RollShip) -> float:
 
 
 class SlopePush:
-    """Push on the water by a ship that sways with the waves, from the moment that rolls it.
-
-    Parameters
-    ----------
-    ship : RollShip
-    tank : Tank
-    period_s : float
-        Time between two updates.
-    """
+    """Push on the water by a ship that sways with the waves, from the moment that rolls it."""
 
     def __init__(self, ship: RollShip, tank: Tank, period_s: float) -> None:
         scale = GRAVITY_M_S2 * tank.width_m / ship.stiffness_nm_rad

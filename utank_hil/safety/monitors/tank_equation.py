@@ -94,9 +94,6 @@ class TankEquation:
 
     Parameters
     ----------
-    ship : RollShip
-    tank : Tank
-    thresholds : MonitorThresholds
     period_s : float
         Time between two updates.
     valve : bool

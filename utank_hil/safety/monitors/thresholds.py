@@ -94,12 +94,8 @@ def thresholds_of(
 ) -> MonitorThresholds:
     """The thresholds for a ship.
 
-    Parameters
-    ----------
-    plant : DesignPlant
-    roll_limit_rad : float
-        Largest roll under control: nothing moves faster than a roll of this amplitude at 2 w0.
-    sensors : SensorFigures
+    `roll_limit_rad` is the largest roll under control: nothing moves faster than a roll of this
+    amplitude at 2 w0.
     """
     tank, limits = plant.tank, plant.limits
     frequency_rad_s = tank.natural_frequency_rad_s
