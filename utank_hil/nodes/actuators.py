@@ -23,21 +23,9 @@ _ABSENT_NS = 1 << 62
 class Actuators:
     """What is on board of pump and valve.
 
-    Parameters
-    ----------
-    timeout_s : float
-        Sent with every command: the drive stops on its own after so long a silence.
-    pump : bool
-        Whether the tank has a pump.
-    valve : ValveCommander, optional
-        If the tank has a valve.
-    drive : CanopenDrive, optional
-        Drive of another maker.
-
-    Attributes
-    ----------
-    limiting : bool
-        The limiter holds the law's pressure back.
+    `timeout_s` is sent with every command: the drive stops on its own after so long a silence.
+    `pump` says whether the tank has a pump; `valve` is None without a valve, `drive` without a
+    drive of another maker. `limiting` says whether the limiter holds the law's pressure back.
     """
 
     def __init__(

@@ -61,17 +61,8 @@ class ControllerSettings:
 class ControllerNode:
     """The controller node.
 
-    Parameters
-    ----------
-    law : RunningLaw
-        The law in charge while active.
-    estimator : Estimator, optional
-        Estimates waves and ship from the motion.
-
-    Attributes
-    ----------
-    start_ns, last_ns : int
-        Time of the first and of the last tick.
+    `law` is in charge while active; `estimator` estimates waves and ship from the motion.
+    `start_ns` and `last_ns` are the times of the first and of the last tick.
     """
 
     name = "controller"

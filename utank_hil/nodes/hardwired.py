@@ -16,12 +16,8 @@ _OFF: Final = Switch.OFF
 class HardwiredHeard:
     """What HARDWIRED_INPUTS says.
 
-    Attributes
-    ----------
-    stop : bool
-        The stop loop is open or broken.
-    high_level : bool
-        A switch is closed or broken.
+    `stop` says whether the stop loop is open or broken, `high_level` whether a switch is closed or
+    broken.
     """
 
     def __init__(self, receiver: Receiver[HardwiredInputs]) -> None:

@@ -69,15 +69,8 @@ class SampleClock:
 class MotionSensor:
     """What is heard of one motion sensor.
 
-    Parameters
-    ----------
-    thresholds : MonitorThresholds, optional
-        Of what no ship can do; without them every finite sample is taken.
-
-    Attributes
-    ----------
-    roll_rad, roll_rate_rad_s : float
-        Of the last plausible sample, received at `heard_ns`.
+    Without `thresholds`, of what no ship can do, every finite sample is taken. `roll_rad` and
+    `roll_rate_rad_s` are those of the last plausible sample, received at `heard_ns`.
     """
 
     def __init__(

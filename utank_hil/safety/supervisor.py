@@ -46,12 +46,8 @@ class Demand(Enum):
 class Supervisor:
     """The controller's modes: INIT, STANDBY, PASSIVE, ACTIVE and FAULT.
 
-    Attributes
-    ----------
-    raised : Fault
-        What was latched in this tick, or refused arming in it; else NONE.
-    reset_refused_by : Fault
-        What lasts, in FAULT after a reset was refused; else NONE.
+    `raised` is what was latched in this tick, or refused arming in it; `reset_refused_by` is what
+    lasts, in FAULT after a reset was refused. Else either is NONE.
     """
 
     def __init__(self, limits: SafetyLimits) -> None:

@@ -8,19 +8,8 @@ from utank_hil.dynamics.sampling import transition_and_step
 class DerivativeFilter:
     """1 / (s / w + 1)^2 with its first and second derivative, for inputs that run straight.
 
-    Parameters
-    ----------
-    frequency_rad_s : float
-        w.
-    period_s : float
-        Time between two inputs.
-
-    Attributes
-    ----------
-    value, rate : float
-        Output and its first derivative.
-    last : float
-        The last input.
+    `frequency_rad_s` is w, `period_s` the time between two inputs. `value` and `rate` are the
+    output and its first derivative, `last` is the last input.
     """
 
     __slots__ = (

@@ -81,17 +81,11 @@ class DriveFollowing:
     ) -> int:
         """Take the command that leaves now and the newest pressure; return what was found.
 
-        Parameters
-        ----------
-        command_pa, pressure_pa : float
-            A pressure that is NaN, of a sensor that is late, changes nothing of what is found: one
-            that is late again and again is judged by what it sends in between.
-        level_m, level_rate_m_s : float
-            Of the starboard side: how far the water is off, and the way it flows.
-        enabled : bool
-            Whether the drive is in operation enabled.
-        limited : bool
-            Whether it says that its power or its speed is at the limit.
+        A pressure that is NaN, of a sensor that is late, changes nothing of what is found: one that
+        is late again and again is judged by what it sends in between. `level_m` and its rate are
+        those of the starboard side: how far the water is off, and the way it flows. `enabled` says
+        whether the drive is in operation enabled, `limited` whether it says that its power or its
+        speed is at the limit.
         """
         if enabled is not self._enabled:
             self._enabled = enabled

@@ -40,10 +40,7 @@ _NOISE: Final = int(Finding.NOISE)
 class RollAgainstRate:
     """Compares the roll with its integrated rate.
 
-    Attributes
-    ----------
-    unexplained_rad : float
-        Leaky sum of the roll's moves that the rate does not account for.
+    `unexplained_rad` is the leaky sum of the roll's moves that the rate does not account for.
     """
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
