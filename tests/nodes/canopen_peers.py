@@ -113,7 +113,7 @@ class Line:
         for _ in range(ticks):
             frames = self.drive.frames(self.now_ns)
             if self.now_ns // TICK_NS % 2 == 0:
-                frames = frames + self.drive._command(target, word)
+                frames = frames + self.drive.follow(target, word)
             for frame in frames:
                 self._to_the_drive(frame)
             if self.now_ns // TICK_NS % 5 == 0 and self.beats:

@@ -142,7 +142,7 @@ def both(first, second):
 
 def test_the_controller_beats_with_each_command_and_stops_the_node():
     line = Line().run(400)
-    frames = line.drive._command(0.0, ControlWord.SHUTDOWN)
+    frames = line.drive.follow(0.0, ControlWord.SHUTDOWN)
     assert [each.can_id & 0x7FF for each in frames] == [0x77F, 0x80, 0x205]
     *_, last = line.drive.stop()
     assert last.data == bytes((2, 5))

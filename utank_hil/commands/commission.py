@@ -161,18 +161,7 @@ class Guide:
 
 def _print(record: dict[str, Any], path: Path, config: Path) -> None:
     console = Terminal()
-    table = Table(title=f"Commissioning of {record['vessel']}")
-    for heading in ("check", "measured", "expected", "unit", "verdict"):
-        table.add_column(heading, justify="right" if "ed" in heading else "left", no_wrap=True)
-    for check in record["checks"]:
-        measured = "none" if check["measured"] is None else f"{check['measured']:.3g}"
-        expected = f"{check['expected']:.3g} ± {check['tolerance']:.2g}"
-        verdict = "pass" if check["verdict"] == "pass" else Text("FAIL", "red")
-        table.add_row(check["what"], measured, expected, check["unit"], verdict)
-    console.table(table)
-    for check in record["checks"]:
-        if check["verdict"] != "pass":
-            console.say(check["remedy"], red=f"{check['what']}:")
+    print_checks(console, f"Commissioning of {record['vessel']}", record["checks"])
     if record["ended"]:
         console.say(record["ended"], red="ended early:")
     where = f"record: {shown(path)}"
@@ -181,3 +170,19 @@ def _print(record: dict[str, Any], path: Path, config: Path) -> None:
     else:
         console.say(where, green="passed;")
         console.lead_on(("run", config, "--bus", record["bus"], "--out", "log"))
+
+
+def print_checks(console: Terminal, title: str, checks: list[dict[str, Any]]) -> None:
+    """Print the checks of a record as a table, and the remedies of those that failed."""
+    table = Table(title=title)
+    for heading in ("check", "measured", "expected", "unit", "verdict"):
+        table.add_column(heading, justify="right" if "ed" in heading else "left", no_wrap=True)
+    for check in checks:
+        measured = "none" if check["measured"] is None else f"{check['measured']:.3g}"
+        expected = f"{check['expected']:.3g} ± {check['tolerance']:.2g}"
+        verdict = "pass" if check["verdict"] == "pass" else Text("FAIL", "red")
+        table.add_row(check["what"], measured, expected, check["unit"], verdict)
+    console.table(table)
+    for check in checks:
+        if check["verdict"] != "pass":
+            console.say(check["remedy"], red=f"{check['what']}:")

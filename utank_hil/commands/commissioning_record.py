@@ -58,16 +58,21 @@ def make_record(
         "commissioned_for": commissioned_for(config),
         "passed": not ended and bool(checks) and all(check.passed for check in checks),
         "ended": ended,
-        "checks": [
-            {
-                **asdict(check),
-                "measured": check.measured if math.isfinite(check.measured) else None,
-                "verdict": "pass" if check.passed else "fail",
-                "remedy": "" if check.passed else check.remedy,
-            }
-            for check in checks
-        ],
+        "checks": listed(checks),
     }
+
+
+def listed(checks: list[Check]) -> list[dict[str, Any]]:
+    """Return checks as a record has them."""
+    return [
+        {
+            **asdict(check),
+            "measured": check.measured if math.isfinite(check.measured) else None,
+            "verdict": "pass" if check.passed else "fail",
+            "remedy": "" if check.passed else check.remedy,
+        }
+        for check in checks
+    ]
 
 
 def why_not_replaceable(path: Path) -> str:

@@ -305,7 +305,7 @@ class OthersSection(Section):
     pgns: tuple[Pgn, ...] = ()  #: Groups by SAE J1939-21, of any source and priority.
 
 
-_KINDS: Final[dict[str, type[tuple[Any, ...]]]] = {
+KINDS: Final[dict[str, type[tuple[Any, ...]]]] = {
     "motion": SensorMotion,
     "motion_2": SensorMotion,
     "levels": SensorTank,
@@ -329,7 +329,7 @@ class DevicesSection(Section):
         problems = [
             (f"{role}.{name}", reason)
             for role, device in self.sensors().items()
-            for name, reason in device.problems(_KINDS[role])
+            for name, reason in device.problems(KINDS[role])
         ]
         for role in ("motion", "motion_2"):
             cycle_ms = self.sensors()[role].cycle_ms
@@ -375,7 +375,7 @@ class DevicesSection(Section):
 
     def sensors(self) -> dict[str, DeviceSection]:
         """The sensors by their roles."""
-        return {role: getattr(self, role) for role in _KINDS}
+        return {role: getattr(self, role) for role in KINDS}
 
     def redundancy_problems(self, redundancy: Redundancy) -> Iterator[Problem]:
         """What a second motion sensor must be there for, or is there without need."""
@@ -425,11 +425,11 @@ class DevicesSection(Section):
         """The devices as the controller node hears them, with the drive of the pump."""
         buses, others = self.buses(), self.others
         bus_of_pump = buses.index(self.pump.bus)
-        plans: dict[str, DevicePlan[Any] | None] = dict.fromkeys(_KINDS)
+        plans: dict[str, DevicePlan[Any] | None] = dict.fromkeys(KINDS)
         for role, device in self.sensors().items():
             if not device.native:
                 bus, silent = buses.index(device.bus), device.bus in self.receive_only
-                plans[role] = device.plan(_KINDS[role], role, bus, silent=silent)
+                plans[role] = device.plan(KINDS[role], role, bus, silent=silent)
         return ForeignDevices(
             (plans["motion"], plans["motion_2"]),
             plans["levels"],

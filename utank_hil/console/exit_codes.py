@@ -24,11 +24,11 @@ class ExitCode(IntEnum):
     )
     REFUSED = (
         1,
-        "`bus`, `check`, `commission`, `identify`, `init`, `faults`, `replay`",
+        "`bus`, `check`, `commission`, `conform`, `identify`, `init`, `faults`, `replay`",
         "Something on a bus is missing, wrong or double, a law misses its margins, a commissioning "
-        "is not passed, a model or its law is refused, no tank can be for a ship, a row of the "
-        "fault campaign failed, or a replay differs. Of any command, with a traceback: an error in "
-        "the program.",
+        "is not passed, a device does not conform to its profile, a model or its law is refused, "
+        "no tank can be for a ship, a row of the fault campaign failed, or a replay differs. Of "
+        "any command, with a traceback: an error in the program.",
     )
     USAGE = (
         2,
@@ -38,7 +38,7 @@ class ExitCode(IntEnum):
     )
     NO_BUS = (
         3,
-        "`run`, `commission`, `panel`, `bench`, `bus`, `faults`, `firmware-sim`",
+        "`run`, `commission`, `conform`, `panel`, `bench`, `bus`, `faults`, `firmware-sim`",
         "The CAN interface can't be opened; of `run`, another controller is on it.",
     )
     BUS_LOST = (4, "`run`", "Ended while the CAN bus could not be used, or with its loss latched.")

@@ -154,16 +154,27 @@ class CanopenDrive:
             self._loop.reset()
         stays = word is not _ENABLE and state_of(self._status) is _ENABLED
         self._ignored = self._ignored + 1 if stays else 0
-        frames = self._command(target, word)
+        frames = self.follow(target, word)
         if self._ignored > IGNORED:
             frames.append(self.setup.order(NodeCommand.STOP))
         return frames
 
     def stop(self) -> list[Frame]:
         """Leave the drive braking, and its node stopped."""
-        return [*self._command(0.0, ControlWord.QUICK_STOP), self.setup.order(NodeCommand.STOP)]
+        return [*self.follow(0.0, ControlWord.QUICK_STOP), self.setup.order(NodeCommand.STOP)]
 
-    def _command(self, target: float, word: ControlWord) -> list[Frame]:
+    @property
+    def speed_rad_s(self) -> float:
+        """Speed of the rotor by the last PDO; NaN before the first."""
+        return self._speed_rad_s
+
+    @property
+    def state(self) -> DriveState | None:
+        """State by the last status word."""
+        return state_of(self._status)
+
+    def follow(self, target: float, word: ControlWord) -> list[Frame]:
+        """Heartbeat, SYNC and command with a target in N m or rad/s, by the mode."""
         plan, tag = self._plan, self._tag
         beat = Frame(tag | HEARTBEAT + plan.controller_node, bytes((_OPERATIONAL,)))
         if not self.setup.done:

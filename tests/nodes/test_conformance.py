@@ -1,0 +1,180 @@
+"""Devices put through their profiles: emulated sensors, a drive that canopen plays, the bench's."""
+
+import math
+
+import pytest
+
+from firmware_sim.canopen_drive import CanopenPumpDrive
+from firmware_sim.sensors import ForeignFrames
+from tests.firmware_sim.drive_bench import VESSEL, calm_plant
+from tests.nodes.canopen_peers import PROFILE, PUMP, Line
+from utank_hil.base.tick import TICK_NS
+from utank_hil.canbus import Frame, Quality, SensorMotion
+from utank_hil.canbus.frame import STANDARD
+from utank_hil.canbus.profiles.canopen import NetworkState, Place
+from utank_hil.configuration.devices import DevicesSection
+from utank_hil.configuration.drive_section import DriveSection
+from utank_hil.nodes.commissioning.conformance import SensorTrial
+from utank_hil.nodes.commissioning.drive_conformance import DriveTrial
+
+SBG = {"profile": "sbg_ellipse", "accept_unprotected": True}
+
+
+def failed(trial):
+    assert trial.done
+    return {each.name for each in trial.checks if not each.passed}
+
+
+def heel_rad(asked, since_s):
+    """Heel to starboard by 0.1 rad within two seconds of the first request."""
+    return 0.05 * (1 - math.cos(math.pi * min(since_s / 2, 1))) if asked else 0.0
+
+
+def sensor_trial(sign=1, rate_sign=1, every=1, repeats=False, silent=False):
+    """A trial of an emulated inertial sensor whose person takes three seconds a step."""
+    plan = DevicesSection(motion=SBG).foreign().motions[0]
+    device, asked = ForeignFrames(plan), []
+
+    def ask(what):
+        asked.append(now_ns)
+        return lambda: now_ns - asked[-1] > 3_000_000_000
+
+    trial, now_ns, tick = SensorTrial(plan, ask, 2.0), 0, 0
+    while not trial.done:
+        assert tick < 6000
+        since_s = (now_ns - asked[0]) * 1e-9 if asked else 0.0
+        off = len(asked) == 2 and not repeats
+        if not (silent or off or tick % every):
+            before, after = (heel_rad(asked, max(since_s + d, 0)) for d in (-5e-3, 5e-3))
+            roll, rate = heel_rad(asked, since_s), (after - before) * 100
+            values = SensorMotion(sign * roll, rate_sign * rate, Quality.GOOD)
+            for frame in device.frames(values, now_ns, tick):
+                trial.receive(frame, now_ns + 1_000_000)
+        now_ns += TICK_NS
+        tick += 1
+        trial.tick(now_ns)
+    return trial
+
+
+@pytest.mark.parametrize(
+    ("changes", "wrong"),
+    [
+        ({}, set()),
+        ({"sign": -1, "rate_sign": -1}, {"roll_rad_sign"}),
+        ({"rate_sign": -1}, {"roll_rate"}),
+        ({"repeats": True}, {"silence"}),
+        ({"every": 2}, {"rate", "jitter"}),
+        ({"silent": True}, {"rate", "jitter", "gap", "usable"}),
+    ],
+)
+def test_a_sensor_conforms_or_what_is_wrong_is_named(changes, wrong):
+    assert failed(sensor_trial(**changes)) == wrong
+
+
+class TrialLine(Line):
+    """canopen's node, whose rotor turns as its target says and stops in 40 ms."""
+
+    def __init__(self, changes=(), tweak=lambda _: None):
+        super().__init__(changes, tweak)
+        self.drive = self.trial = DriveTrial(self.plan, PUMP, lambda what: lambda: True)
+        self.drive.takes = self.trial._drive.takes
+        self.controller_ns, self.watches, self.stops = 0, True, True
+        self.speed = 0.0
+
+    def run(self):
+        trial = self.trial
+        while not trial.done:
+            assert self.now_ns < 60_000_000_000
+            for frame in trial.tick(self.now_ns):
+                if frame.can_id & 0x7FF == 0x77F:
+                    self.controller_ns = self.now_ns
+                self._to_the_drive(frame)
+            self._turn()
+            if self.now_ns // TICK_NS % 5 == 0:
+                state = {"OPERATIONAL": 5, "PRE-OPERATIONAL": 127, "STOPPED": 4}
+                self.wire.said.append((0x705, bytes([state.get(self.node.nmt.state, 127)])))
+            for can_id, data in self.wire.said:
+                trial.receive(Frame(can_id | STANDARD, data), self.now_ns + TICK_NS // 2)
+            self.wire.said.clear()
+            self.now_ns += TICK_NS
+        for frame in trial.stop(self.now_ns):
+            self._to_the_drive(frame)
+        return trial
+
+    def _turn(self):
+        node = self.node
+        enabled = node.sdo[0x6041].raw == 0x237
+        if self.watches and enabled and self.now_ns - self.controller_ns > 50_000_000:
+            node.sdo[0x6041].raw, enabled = 0x0250, False
+            node.nmt.state = "PRE-OPERATIONAL"  # 1029h as delivered: no PDO from now on
+        target = node.sdo[0x6071].raw if enabled else 0
+        if enabled or self.stops:
+            self.speed += (target * 10 - self.speed) * 0.5
+        node.set_data(0x606C, 0, (round(self.speed) & 0xFFFFFFFF).to_bytes(4, "little"))
+
+
+def test_a_drive_of_another_stack_conforms_and_is_left_stopped():
+    line = TrialLine()
+    assert failed(line.run()) == set()
+    assert line.node.nmt.state == "STOPPED"
+    times_ms = {each.name: each.measured for each in line.trial.checks if each.unit == "ms"}
+    assert 20 <= times_ms["quick_stop_ms"] <= 60
+    assert 70 <= times_ms["lost_controller_ms"] <= 130
+
+
+def test_a_drive_that_runs_on_is_found():
+    line = TrialLine()
+    line.watches = line.stops = False
+    assert failed(line.run()) == {"quick_stop_ms", "lost_controller_ms", "lost_controller_off"}
+
+
+def test_a_drive_whose_identity_can_be_written_is_found():
+    line = TrialLine(tweak=lambda od: setattr(od[0x1018][1], "access_type", "rw"))
+    assert "read_only" in failed(line.run())
+
+
+def test_a_drive_without_heartbeat_consumer_ends_the_trial():
+    trial = TrialLine(tweak=lambda od: od.indices.pop(0x1016)).run()
+    assert failed(trial) == {"set_up"}
+    assert "another drive" in trial.checks[0].remedy
+
+
+def emulated(mode, look=lambda pushes, pressure_pa: None, **entries):
+    """The trial of the bench's drive; `entries` do not keep what is written."""
+    plan = DriveSection(**(PROFILE | {"mode": mode})).plan(0, VESSEL.pump)
+    drive = CanopenPumpDrive(calm_plant(), VESSEL.pump, plan)
+    trial, now_ns = DriveTrial(plan, VESSEL.pump, lambda what: lambda: True), 0
+    while not trial.done:
+        assert now_ns < 60_000_000_000
+        for frame in trial.tick(now_ns):
+            drive.receive(frame, now_ns)
+        for key, value in entries.items():
+            if drive.state is NetworkState.OPERATIONAL:
+                drive.entries[Place(int(key[1:], 16))].value = value
+        for frame in drive.tick(now_ns):
+            trial.receive(frame, now_ns)
+        look(trial._pushes, drive._plant.pressure_pa)
+        now_ns += TICK_NS
+    return trial
+
+
+@pytest.mark.parametrize("mode", ["torque", "velocity"])
+def test_the_drive_of_the_bench_conforms(mode):
+    assert failed(emulated(mode)) == set()
+
+
+def test_one_that_does_nothing_when_the_controller_dies_is_found():
+    assert failed(emulated("torque", x6007=0)) == {"lost_controller_ms", "lost_controller_off"}
+
+
+@pytest.mark.parametrize("mode", ["torque", "velocity"])
+def test_its_times_are_those_of_the_pumps_pressure(mode):
+    pressures_pa = []
+    checks = emulated(mode, look=lambda *each: pressures_pa.append(each)).checks
+    measured_ms = [each.measured for each in checks if each.unit == "ms"]
+    ends = [k for k in range(1, len(pressures_pa)) if pressures_pa[k - 1][0] > pressures_pa[k][0]]
+    assert len(measured_ms) == len(ends) == 2
+    for time_ms, end in zip(measured_ms, ends, strict=True):
+        before_pa = pressures_pa[end - 1][1]
+        stopped = next(k for k in range(end, end + 50) if pressures_pa[k][1] < 0.1 * before_pa)
+        assert abs(time_ms - 10 * (stopped - end)) <= 30  # a PDO, and a speed of it, late

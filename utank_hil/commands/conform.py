@@ -1,0 +1,132 @@
+"""``utank-hil conform``: puts one device of a ship's file through its profile."""
+
+import math
+import select
+import sys
+from collections.abc import Callable
+from contextlib import ExitStack
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from utank_hil.base.provenance import PROGRAM, version
+from utank_hil.base.tick import TICK_S
+from utank_hil.canbus import PortError
+from utank_hil.commands.commission import print_checks
+from utank_hil.commands.commissioning_record import listed, write_record
+from utank_hil.configuration.devices import KINDS
+from utank_hil.configuration.vessel import Vessel
+from utank_hil.console.common import Bus, Json, fail, load, print_json, why_not_writable
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.terminal import Terminal, notes, shown
+from utank_hil.nodes.commissioning.conformance import Ask, SensorTrial, Trial
+from utank_hil.nodes.commissioning.drive_conformance import DriveTrial
+from utank_hil.runners import RealTimeLoop, stop_on_signals
+
+
+def conform(
+    device: Annotated[str, typer.Argument(help="motion, motion_2, levels, pump_sensor or pump.")],
+    channel: Bus,
+    ship: Annotated[Path, typer.Option(help="Ship whose section devices has the device.")],
+    record: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Where the record goes.")
+    ] = None,
+    seconds: Annotated[
+        float, typer.Option(min=1.0, max=3600, help="How long to measure a sensor's pace.")
+    ] = 10.0,
+    hand_s: Annotated[
+        float | None,
+        typer.Option(min=0.5, max=600, help="Wait so long for each step by hand, not for Enter."),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Put a device of another maker through its profile, and write the record of it.
+
+    A sensor: rate and jitter, validity, signs by hand, silence. A drive: its configuration read
+    back, what it must refuse, its time to stop; the pump turns. Nothing else may command it. Exit
+    code 1 if it does not conform.
+
+    **Example:** utank-hil conform motion --bus can0 --ship ship.yaml
+    """
+    from utank_hil.canbus.socketcan import SocketCanPort
+
+    vessel = load(ship, Vessel)
+    path = record or Path(f"{device}.conformance.json")
+    if reason := why_not_writable(path.parent, (path.name,)):
+        fail(f"{reason}; choose another place with --record")
+    trial, silent = trial_of(vessel, device, ship, asks(hand_s), seconds)
+    with ExitStack() as stack:
+        try:
+            port = SocketCanPort(channel, standard=True, receive_only=silent)
+        except PortError as error:
+            fail(error, ExitCode.NO_BUS)
+        stack.callback(port.close)
+        stop = stack.enter_context(stop_on_signals())
+        RealTimeLoop([trial], port).run(lambda: trial.done or stop())
+    if not trial.done:
+        fail("ended before all was checked; there is no record", ExitCode.INTERRUPTED)
+    passed, checks = all(each.passed for each in trial.checks), listed(trial.checks)
+    made = {
+        "program": PROGRAM,
+        "version": version(),
+        "date": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
+        "device": device,
+        "profile": getattr(vessel.devices, device).profile,
+        "vessel": vessel.name,
+        "file": ship.name,
+        "bus": channel,
+        "configuration_version": vessel.version,
+        "passed": passed,
+        "checks": checks,
+    }
+    write_record(path, made)
+    if json_:
+        print_json({**made, "record": str(path)})
+    else:
+        console = Terminal()
+        print_checks(console, f"{device} of {vessel.name}", checks)
+        said = {"green": "conforms;"} if passed else {"red": "does not conform;"}
+        console.say(f"record: {shown(path)}", **said)
+    raise typer.Exit(ExitCode.OK if passed else ExitCode.REFUSED)
+
+
+def trial_of(
+    vessel: Vessel, device: str, file: Path, ask: Ask, seconds: float
+) -> tuple[Trial, bool]:
+    """The trial of a device on the first interface, and whether nothing may be sent there."""
+    devices = vessel.devices
+    names = (*KINDS, "pump")
+    if device not in names:
+        fail(f"no device {device!r}: there are {', '.join(names)}")
+    if devices is None or getattr(devices, device).native:
+        fail(f"{file}: devices.{device} is native: utank-hil commission checks it")
+    if device == "pump":
+        assert vessel.pump is not None  # else the file would have been refused
+        return DriveTrial(devices.pump.plan(0, vessel.pump), vessel.pump, ask), False
+    section = devices.sensors()[device]
+    silent = section.bus in devices.receive_only
+    return SensorTrial(section.plan(KINDS[device], device, 0, silent=silent), ask, seconds), silent
+
+
+def asks(hand_s: float | None) -> Ask:
+    """Ask on the terminal; a step is done at Enter, or after so many seconds."""
+
+    def ask(what: str) -> Callable[[], bool]:
+        if hand_s is not None:
+            notes.say(f"{what}: within {hand_s:g} s.")
+            ticks = iter(range(math.ceil(hand_s / TICK_S)))
+            return lambda: next(ticks, None) is None
+        notes.say(f"{what}, then press Enter.")
+
+        def entered() -> bool:
+            if not select.select([sys.stdin], [], [], 0)[0]:
+                return False
+            if not sys.stdin.readline():
+                fail("the input has ended: use --hand-s where nobody is there")
+            return True
+
+        return entered
+
+    return ask
