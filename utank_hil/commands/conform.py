@@ -48,7 +48,7 @@ def conform(
     back, what it must refuse, its time to stop; the pump turns. Nothing else may command it. Exit
     code 1 if it does not conform.
 
-    **Example:** utank-hil conform motion --bus can0 --ship ship.yaml
+    **Example:** utank-hil conform pump --bus can2 --ship configs/ships/thesis_first_devices.yaml
     """
     from utank_hil.canbus.socketcan import SocketCanPort
 
