@@ -13,6 +13,7 @@ from utank_hil.base.parameters import Finite, Positive, refuse
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import Fault
 from utank_hil.configuration import ControllerConfig, Section
+from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.panel import TimedAction
 from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.retuning import EstimateSettings
@@ -65,6 +66,7 @@ class Setup(Section):
     displacement_n: Positive | None = None
     least_gm_m: Positive | None = None
     sea_estimate: EstimateSettings | None = None  #: Settings that replace the controller's.
+    devices: DevicesSection | None = None  #: Devices that replace the vessel's.
     commissioned: bool = True  #: Whether the controller may be armed.
 
     @property
@@ -77,6 +79,7 @@ class Setup(Section):
                 "redundancy": self.redundancy,
                 "ship": replace(own.ship, displacement_n=weight_n),
                 "least_gm_m": self.least_gm_m or own.least_gm_m,
+                "devices": self.devices or own.devices,
             }
         )
         controllers = {

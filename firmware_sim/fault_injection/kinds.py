@@ -32,6 +32,7 @@ AnyFault = Annotated[
     | nodes.Killed
     | nodes.Mute
     | nodes.Deaf
+    | nodes.LostIdentifier
     | nodes.Link
     | nodes.Pump
     | nodes.Drive

@@ -1,16 +1,18 @@
 """Faults of nodes, pump, drive, valve and law."""
 
 import math
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import field_validator
 
 from firmware_sim.fault_injection.bench_parts import Bench
 from firmware_sim.fault_injection.fault import Fault, NodeName
 from firmware_sim.fault_injection.faulty_node import Span, Spoiled
-from utank_hil.base.parameters import Finite, NotNegative
+from utank_hil.base.parameters import Finite, NotNegative, Range
 from utank_hil.base.tick import TICK_S
-from utank_hil.canbus import DriveFault
+from utank_hil.canbus import DriveFault, Frame
+from utank_hil.canbus.frame import OTHER_BUS, STANDARD
+from utank_hil.configuration.device_sections import Id11
 
 
 class NodeFault(Fault):
@@ -67,6 +69,27 @@ class Deaf(NodeFault):
 
     def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         bench.nodes[self.node].deaf.append(span)
+
+
+class LostIdentifier(NodeFault):
+    """Frames of one 11-bit identifier do not leave the node, as PDOs and heartbeats of CANopen."""
+
+    kind: Literal["lost_identifier"]
+    id_11bit: Id11  #: Identifier of the frames.
+    #: The last of so many frames leaves; none without it.
+    keeps_one_of: Annotated[int, Range(least=2, most=1000)] | None = None
+
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
+        count = [0]
+
+        def lose(frame: Frame, _: float) -> tuple[Frame, ...]:
+            if frame.can_id & (OTHER_BUS - 1) != STANDARD | self.id_11bit:
+                return (frame,)
+            count[0] += 1
+            kept = self.keeps_one_of is not None and count[0] % self.keeps_one_of == 0
+            return (frame,) if kept else ()
+
+        bench.nodes[self.node].spoiled.append(Spoiled(span, lose))
 
 
 class Link(NodeFault):

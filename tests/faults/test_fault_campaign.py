@@ -551,3 +551,14 @@ def test_wrong_arguments_are_refused(arguments: list[str], words: str) -> None:
     done = invoke(*arguments)
     assert done.exit_code == ExitCode.USAGE
     assert words in done.output
+
+
+@pytest.mark.parametrize(
+    ("row", "found_ms"),
+    [("canopen-four-of-five-commands-lost", 100), ("canopen-heartbeat-lost", 180)],
+)
+def test_a_drive_of_another_maker_that_misses_frames_is_stopped(row: str, found_ms: float) -> None:
+    assert ROWS[row].limit.found_ms == found_ms
+    outcome = outcome_of(ROWS[row], patient=True)
+    assert outcome.code == "DRIVE_SILENT"
+    assert verdict(row, outcome).passed, outcome
