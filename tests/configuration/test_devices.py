@@ -1,5 +1,6 @@
 """Section `devices` of a ship's file: what it refuses, and what it changes."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,17 @@ def test_a_change_of_a_device_voids_the_commissioning(tmp_path):
 )
 def test_what_is_refused(tmp_path, devices, reason):
     assert reason in problems(tmp_path, devices)
+
+
+@pytest.mark.parametrize(
+    "content", [b"\x01", b'VERSION "', b"BO_ 99999999999999999999 A: 8 B\n", b"SG_ : 1", bytes(9)]
+)
+def test_a_damaged_dbc_is_refused_by_its_name(tmp_path, content):
+    (tmp_path / "theirs.dbc").write_bytes(content)
+    motion = SBG | {"dbc": "./theirs.dbc", "messages": {"a": "B"}}
+    assert re.search(
+        r"theirs\.dbc (is no DBC|has no message)", problems(tmp_path, {"motion": motion})
+    )
 
 
 def test_a_motion_signal_without_unit_is_refused(tmp_path):

@@ -1,6 +1,8 @@
 """A frame log that is cut or damaged anywhere is whole up to a second before."""
 
 import random
+import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +51,47 @@ def read(path: Path) -> tuple[Records, FrameLog]:
     log = FrameLog(path)
     blocks = list(log.blocks())
     return np.concatenate(blocks) if blocks else np.empty(0, dtype=RECORD), log
+
+
+def sealed(*blocks: tuple[bytes, bytes]) -> bytes:
+    """A log of these blocks, each with the right checksum."""
+    parts = [b"UTANKHIL frames 1\n"]
+    for kind, payload in blocks:
+        checksum = zlib.crc32(payload, zlib.crc32(kind))
+        parts += [struct.pack("<4sII", kind, len(payload), checksum), payload]
+    return b"".join(parts)
+
+
+@pytest.mark.parametrize(
+    "head",
+    [b"", b"no zlib", zlib.compress(b"{"), zlib.compress(b"\xff"), zlib.compress(b"[1]"),
+     zlib.compress(b"[" * 99_999), zlib.compress(b'{"a": 1}')[:-3],
+     zlib.compress(bytes(1 << 29), 9)],
+)  # fmt: skip
+def test_a_sealed_head_that_says_nothing_is_refused_by_its_file(
+    tmp_path: Path, head: bytes
+) -> None:
+    path = tmp_path / "theirs.frames"
+    path.write_bytes(sealed((b"HEAD", head)))
+    with pytest.raises(FrameLogError, match=r"theirs\.frames"):
+        FrameLog(path)
+
+
+@pytest.mark.parametrize(
+    ("kind", "payload"),
+    [(b"BUSZ", b"no zlib"), (b"BUSZ", zlib.compress(b"\xff")), (b"BUSX", b"no xz"),
+     (b"BUSZ", zlib.compress(b"\x02\0\0\0" + bytes(23))), (b"BUSZ", zlib.compress(b"")),
+     (b"BUSZ", zlib.compress(bytes(1 << 29), 9)), (b"ELSE", b"of nobody")],
+)  # fmt: skip
+def test_a_sealed_block_that_holds_no_records_ends_the_log_and_is_said(
+    tmp_path: Path, kind: bytes, payload: bytes
+) -> None:
+    write_log(tmp_path / "a.frames", 60)
+    whole = (tmp_path / "a.frames").read_bytes()
+    (tmp_path / "a.frames").write_bytes(whole + sealed((kind, payload))[18:])
+    records, log = read(tmp_path / "a.frames")
+    assert len(records) == 60 * 5
+    assert log.cut.startswith("a.frames ")
 
 
 @pytest.mark.parametrize("small", [False, True])

@@ -85,7 +85,6 @@ def _with_dbc(content: dict[str, Any]) -> dict[str, Any]:
 def _dbc_layouts(file: str) -> dict[str, dict[str, Any]]:
     """Layouts of all messages of a DBC, as `MessageSection` has them, by their names."""
     from cantools.database.can import Database
-    from cantools.database.errors import Error
 
     try:
         content = Path(file).read_bytes()
@@ -98,8 +97,9 @@ def _dbc_layouts(file: str) -> dict[str, dict[str, Any]]:
             break
         except UnicodeDecodeError:
             continue
-        except (Error, ValueError) as error:
-            raise ValueError(f"dbc: {file} is no DBC: {error}") from error
+        except Exception as error:  # a damaged file makes the library raise errors of any kind
+            why = f"{error}" or type(error).__name__
+            raise ValueError(f"dbc: {file} is no DBC: {why}") from error
     else:
         raise ValueError(f"dbc: {file} is text in none of {', '.join(ENCODINGS)}")
     return {message.name: _layout(message) for message in database.messages}

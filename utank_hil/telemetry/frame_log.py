@@ -27,10 +27,7 @@ _BLOCK: Final = struct.Struct("<4sII")
 _HEAD: Final = b"HEAD"
 _QUICK: Final = b"BUSZ"  # Blocks of this kind are compressed with zlib.
 _SMALL: Final = b"BUSX"  # Blocks of this kind are compressed with xz.
-_DECOMPRESS: Final[dict[bytes, Callable[[bytes], bytes]]] = {
-    _QUICK: zlib.decompress,
-    _SMALL: lzma.decompress,
-}
+_MOST_BYTES: Final = 1 << 28  # Of a block, decompressed: 40 minutes of a full bus.
 
 
 class FrameLogError(ValueError):
@@ -113,15 +110,26 @@ class FrameLog:
         kind, payload = next(self._read(path), (b"", b""))
         if kind != _HEAD:
             raise FrameLogError(f"{path}: {self.cut or 'its head is missing'}")
-        self.head: dict[str, Any] = json.loads(zlib.decompress(payload))
+        try:
+            self.head: dict[str, Any] = json.loads(payload)
+        except (ValueError, RecursionError) as error:
+            raise FrameLogError(f"{path}: its head is no JSON: {error}") from error
+        if not isinstance(self.head, dict):
+            raise FrameLogError(f"{path}: its head is no JSON object")
 
     def blocks(self, note: Callable[[str], None] | None = None) -> Iterator[Records]:
         """Yield the records block by block; `note` is called with `cut`, if it is not empty."""
         self.cut = ""
         for path in self._paths:
             for kind, payload in self._read(path):
-                if kind in _DECOMPRESS:
-                    yield unpack(_DECOMPRESS[kind](payload))
+                if kind == _HEAD:
+                    continue
+                try:
+                    records = unpack(payload)
+                except ValueError as error:
+                    self.cut = f"{path.name} has a block that holds no records: {error}"
+                    break
+                yield records
             if self.cut:  # Records after a gap do not continue the same run.
                 break
         if self.cut and note is not None:
@@ -142,7 +150,27 @@ class FrameLog:
                 if zlib.crc32(payload, zlib.crc32(kind)) != checksum:
                     self.cut = f"{path.name} is damaged at byte {place}"
                     return
-                yield kind, payload
+                try:
+                    whole_block = _whole(kind, payload)
+                except (ValueError, EOFError, zlib.error, lzma.LZMAError) as error:
+                    self.cut = f"{path.name} is damaged at byte {place}: {error}"
+                    return
+                yield kind, whole_block
+
+
+def _whole(kind: bytes, payload: bytes) -> bytes:
+    """Return what a block holds; ValueError for one of another kind, or one that is too long."""
+    decompressor: Any
+    if kind == _SMALL:
+        decompressor = lzma.LZMADecompressor(memlimit=_MOST_BYTES)
+    elif kind in (_HEAD, _QUICK):
+        decompressor = zlib.decompressobj()
+    else:
+        raise ValueError(f"a block of the kind {kind!r} is not known")
+    content: bytes = decompressor.decompress(payload, _MOST_BYTES)
+    if not decompressor.eof:
+        raise ValueError(f"a block is cut, or holds more than {_MOST_BYTES >> 20} MB")
+    return content
 
 
 class FrameRecording(Closing):

@@ -66,18 +66,30 @@ def floats(line: str) -> list[float]:
 def table(path: Path, least_columns: int) -> list[list[float]]:
     """Return the rows of a file of numbers; a first line of text is left out.
 
-    ValueError names file and line if another row has fewer numbers.
+    ValueError names file and line if another row has fewer numbers, or one that is not finite.
     """
     rows = []
     for number, line in enumerate(text(path).splitlines(), 1):
         row = floats(line)
         if len(row) >= least_columns:
+            if not np.isfinite(row).all():
+                raise ValueError(f"{path}: line {number} has a number that is not finite: {line!r}")
             rows.append(row)
         elif line.strip() and number > 1:
             raise ValueError(f"{path}: line {number} has not {least_columns} numbers: {line!r}")
     if not rows:
         raise ValueError(f"{path} holds no numbers")
     return rows
+
+
+def mode(path: Path, number: float) -> int:
+    """Return the place of a rigid-body mode, 1 to 6 in a file; ValueError for any other."""
+    if number not in range(1, 7):
+        raise ValueError(
+            f"{path}: mode {number:g}: one body has 1 to 6; several bodies, or more degrees, "
+            "are not read"
+        )
+    return int(number) - 1
 
 
 def text(path: Path) -> str:

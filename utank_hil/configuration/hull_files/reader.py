@@ -41,8 +41,12 @@ def read_hull(path: Path, given: Given | None = None) -> HullData:
         raise ValueError(f"{path} is of no known kind; known are {kinds}")
     try:
         hull = reader(path, known)
-    except (IndexError, StopIteration, RuntimeError, TypeError) as error:
+    except (LookupError, ArithmeticError, StopIteration, RuntimeError, TypeError) as error:
         raise ValueError(f"{path} is incomplete, or not what its name says: {error!r}") from error
+    except ValueError as error:
+        if str(path.parent) in str(error):
+            raise
+        raise ValueError(f"{path}: {error}") from error
     return completed(hull, known)
 
 

@@ -20,6 +20,7 @@ from utank_hil.configuration.hull_files.parts import (
     Given,
     floats,
     hull_of,
+    mode,
     rigid_body,
     sibling,
     table,
@@ -55,9 +56,7 @@ def read_wamit(path: Path, given: Given) -> HullData:
 
     first = {at(row[0]): np.zeros((2, 6, 6)) for row in rows}
     for row in rows:
-        i, j = int(row[1]) - 1, int(row[2]) - 1
-        if max(i, j) > 5:
-            raise ValueError(f"{path}: has more than one body or more than six degrees")
+        i, j = mode(path, row[1]), mode(path, row[2])
         first[at(row[0])][:, i, j] = [*row[3:5], 0.0][:2]
     scale = density * unit_m ** (3 + _PAIR)
     omega = np.array(sorted(w for w in first if 0 < w < np.inf))
@@ -75,14 +74,14 @@ def read_wamit(path: Path, given: Given) -> HullData:
     where = (
         np.searchsorted(headings, force_rows[:, 1]),
         np.searchsorted(waves, force_rows[:, 0]),
-        force_rows[:, 2].astype(int) - 1,
+        np.array([mode(forces, number) for number in force_rows[:, 2]]),
     )
     excitation[where] = force_rows[:, 5] + 1j * force_rows[:, 6]
     hydrostatic = None
     if stiff := sibling(path, ".hst"):
         hydrostatic = np.zeros((6, 6))
         for row in table(stiff, 3):
-            hydrostatic[int(row[0]) - 1, int(row[1]) - 1] = row[2]
+            hydrostatic[mode(stiff, row[0]), mode(stiff, row[1])] = row[2]
         hydrostatic = hydrostatic * density * gravity * unit_m ** (2.0 + _PAIR)
     return hull_of(
         path,
