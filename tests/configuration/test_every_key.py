@@ -55,6 +55,10 @@ NOT_TOLD: Final = {
     "naval_vessel.ship.restoring_odd_nm": {10},
     # 0.05 for a tank without throttle; 0.5 is one throttled much
     "thesis_first_valve.tank.damping_ratio": {10},
+    # another node of the bus
+    "thesis_first_devices.devices.pump.node": {10},
+    # drives count speeds from a thousandth of a rev/min to one
+    "thesis_first_devices.devices.pump.speed_rad_s_per_unit": {0.001, 10},
     # small ships in a small sea: three to eight times its height is a usual sea
     "naval_constrained_gpc.law.sea.density_m2_hz": {10, 60},
     "patti_b_constrained_gpc.law.sea.density_m2_hz": {10},

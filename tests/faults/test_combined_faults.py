@@ -118,7 +118,10 @@ def faults_of(message: str, node: str) -> dict[str, dict[str, Strategy]]:
         "deaf": {},
         "link": {"reason": st.just("gone"), "warns": st.booleans()},
         "bit_errors": {"share": SHARE},
-    }
+        "lost_identifier": {
+            "id_11bit": st.sampled_from([0, 0x185, 0x7FF]), "keeps_one_of": st.none() | SEVERAL
+        },
+    }  # fmt: skip
     elsewhere = {
         "killed": {},
         "pump": {"times": NUMBER, "plus_pa": NUMBER, "lag_s": LAG, "off_too": st.booleans()},

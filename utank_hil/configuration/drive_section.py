@@ -23,6 +23,11 @@ REQUIRE: Final = {"0x6007": 3, "0x605A": 2, "0x605E": 2}
 """Quick stop where the controller's heartbeat ends or the node is stopped; it brakes on its ramp,
 then the drive switches off; so it does at a fault. CiA 402-2; 35 EDS of seven makers."""
 
+_TORQUES: Final = (100, 3000)
+"""Counts of the target torque at the pump's greatest pressure: ten times the torque that is needed,
+in steps of 1 %, to a drive that gives three times its rated one for a while."""
+_SPEEDS: Final = (1000, 2**31)
+
 
 class DriveSection(Section):
     """Drive of the pump."""
@@ -94,6 +99,18 @@ class DriveSection(Section):
         elif not MODES[self.mode or ""].torque and pump.lag_s * pump.speed_bandwidth_rad_s <= 1:
             own_s = 1 / pump.speed_bandwidth_rad_s
             yield "pump.lag_s", f"must exceed the lag of the drive's speed loop, {own_s:.3g} s"
+
+    def unusual(self, pump: Pump) -> Iterator[Problem]:
+        """What suits no drive of this pump, by its counts at the greatest pressure and speed."""
+        for name, of, most, (least_counts, most_counts), words in (
+            ("pressure_pa_per_unit", self.pressure_pa_per_unit, pump.max_pressure_pa, _TORQUES,
+             "6071h counts thousandths of the rated torque"),
+            ("speed_rad_s_per_unit", self.speed_rad_s_per_unit, pump.max_speed_rad_s, _SPEEDS,
+             "606Ch counts the rotor's speed in 32 bits"),
+        ):  # fmt: skip
+            if of and not least_counts <= most / abs(of) <= most_counts:
+                at_most = f"{most:.4g} are {most / abs(of):.3g} counts"
+                yield f"devices.pump.{name}", f"is {of:.4g}, so the pump's {at_most}: {words}"
 
     def margins(self, sensor_late_s: float) -> LoopMargins:
         """Margins of the pressure loop with a pressure that is late by cycle and latency."""

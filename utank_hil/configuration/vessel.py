@@ -204,6 +204,8 @@ class Vessel(Section):
     def warnings(self) -> list[Problem]:
         """Return what is unusual in the vessel."""
         found = vessel_warnings(self.ship, self.tank, self.pump, self.valve)
+        if self.devices is not None and self.pump is not None:
+            found += self.devices.pump.unusual(self.pump)
         if self.least_gm_m is not None:
             gm_m = self.ship.stiffness_nm_rad / self.ship.displacement_n
             if not 0.05 * gm_m <= self.least_gm_m <= gm_m:  # 0.15 m of 3 m to all of it
