@@ -1,6 +1,7 @@
 """Puts one device of another maker through its profile, as a node beside nothing else."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any, Final
@@ -38,7 +39,7 @@ def flag(name: str, what: str, remedy: str, *, right: bool) -> Check:
     return Check(name, what, float(right), 1.0, 0.0, "1", remedy)
 
 
-class Trial:
+class Trial(ABC):
     """A node that follows a script; `checks` fill on the way, `done` ends it."""
 
     name = "conform"
@@ -51,13 +52,13 @@ class Trial:
         self.now_ns = 0
         self._script = self.script()
 
+    @abstractmethod
     def script(self) -> Script:
         """The frames of each tick, as long as the trial lasts."""
-        raise NotImplementedError
 
+    @abstractmethod
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take what is the device's."""
-        raise NotImplementedError
 
     def tick(self, now_ns: int) -> list[Frame]:
         """Go on with the script."""
@@ -66,8 +67,9 @@ class Trial:
         self.done = frames is None
         return frames or []
 
+    @abstractmethod
     def _frames(self) -> list[Frame]:
-        raise NotImplementedError
+        """The frames of a tick in which nothing is asked of the device."""
 
     def _wait(self, seconds: float, until: Callable[[], bool] = lambda: False) -> Script:
         end_ns = self.now_ns + round(seconds * SECOND_NS)
