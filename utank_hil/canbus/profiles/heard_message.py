@@ -1,6 +1,7 @@
 """What protects the frames of one message of another maker's device."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 from utank_hil.canbus.endpoints import BUCKET_LIMIT, MAX_LOST, RESYNC_FRAMES, Rejection
@@ -21,14 +22,23 @@ class Crc8:
 
     def of(self, data: bytes) -> int:
         """The checksum that belongs into the frame."""
-        register = self.start
+        register, table = self.start, _table(self.polynomial)
         for place, byte in enumerate(data):
             if place != self.byte:
-                register ^= byte
-                for _ in range(8):
-                    register = (register << 1) ^ (self.polynomial if register & 0x80 else 0)
-                    register &= 0xFF
+                register = table[register ^ byte]
         return register ^ self.final
+
+
+@cache
+def _table(polynomial: int) -> bytes:
+    """The register after each byte, from a register of zero."""
+    after = []
+    for register in range(256):
+        for _ in range(8):
+            register = (register << 1) ^ (polynomial if register & 0x80 else 0)
+            register &= 0xFF
+        after.append(register)
+    return bytes(after)
 
 
 class HeardMessage:
