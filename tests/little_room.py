@@ -1,6 +1,7 @@
 """A disk that fills up while a file is written."""
 
 import resource
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
@@ -11,9 +12,11 @@ ROOM: Final = 1024
 @contextmanager
 def little_room() -> Iterator[None]:
     """No file can grow beyond `ROOM` bytes in here."""
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    limits, none = resource.getrlimit(resource.RLIMIT_FSIZE), sys.dont_write_bytecode
+    sys.dont_write_bytecode = True  # Python keeps what it wrote of it, and can't read it again
     resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, limits[1]))
     try:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        sys.dont_write_bytecode = none
