@@ -77,7 +77,7 @@ class ConstrainedLaw:
     #: How a plan uses forecasts; its horizon then has N more states, the noises to come.
     foresight: Foresight | None = None
     #: shape (len(SHARES) - 1, n): gains of the linear law for less pressure (`gentle_lqg`); without
-    #: them it takes shares of its command.
+    #: them it takes shares of its gain.
     gentler: FloatArray | None = None
 
     def __post_init__(self) -> None:
