@@ -67,18 +67,19 @@ def test_a_recording_has_pictures_in_time_and_words_on_a_change(tmp_path: Path) 
     write_recording(file, SIGNALS, {"run": rows}, about=ABOUT)
     drawn = {
         chunk.entity_path.removeprefix("/1/run/scene/"): chunk.to_record_batch()
-        for component in ("Transform3D:rotation_axis_angle", "LineStrips2D:strips")
+        for component in ("Transform3D:quaternion", "LineStrips2D:strips")
         for chunk in _read_chunks(file, component)
         if not chunk.is_static
     }
     assert set(drawn) == {"ship", "twin", "ship/water"}
     assert {batch.num_rows for batch in drawn.values()} == {round(20.0 / PERIOD_S)}
     for name, signal in (("ship", "roll_rad"), ("twin", "twin_roll_rad")):
-        turns = drawn[name].column("Transform3D:rotation_axis_angle").flatten()
+        turns = np.stack(drawn[name].column("Transform3D:quaternion").flatten().to_numpy(False))
         # about the axis into the picture: to the right and downwards, as positive roll is
-        assert turns.field("axis").to_pylist() == [[0.0, 0.0, 1.0]] * len(turns)
+        np.testing.assert_array_equal(turns[:, :2], 0.0)
         expected = rows[:: round(PERIOD_S / 0.05), SIGNALS.index(signal)]
-        np.testing.assert_allclose(turns.field("angle").to_numpy(), expected, atol=1e-7)
+        angles = 2 * np.arctan2(turns[:, 2], turns[:, 3])
+        np.testing.assert_allclose(angles, expected, atol=1e-7)
     words = [
         (time, text)
         for chunk in _read_chunks(file, "TextDocument:text")

@@ -187,7 +187,7 @@ class Scene:
         self._turn("ship", rows, roll)
         self._turn("twin", rows, np.where(np.isfinite(twin), twin, roll))
         water = size.water(np.nan_to_num(port), np.nan_to_num(starboard))
-        strips = rr.LineStrips2D.columns(strips=list(water.reshape(-1, 2, 2)))
+        strips = rr.LineStrips2D.columns(strips=water.reshape(-1, 2, 2).astype(np.float32))
         self._send("scene/ship/water", rows, strips.partition([water.shape[1]] * len(rows)))
         if size.pressure_pa:
             vectors, origins = size.arrow(np.nan_to_num(pressure))
@@ -201,8 +201,9 @@ class Scene:
 
     def _turn(self, name: str, rows: FloatArray, roll_rad: FloatArray) -> None:
         """Rotate a part of the scene, and its children, to starboard."""
-        turns = [rr.RotationAxisAngle([0.0, 0.0, 1.0], radians=angle) for angle in roll_rad]
-        self._send(f"scene/{name}", rows, rr.Transform3D.columns(rotation_axis_angle=turns))
+        zero, half_rad = np.zeros(len(rows)), roll_rad / 2
+        turns = np.column_stack([zero, zero, np.sin(half_rad), np.cos(half_rad)])
+        self._send(f"scene/{name}", rows, rr.Transform3D.columns(quaternion=turns))
 
     def _send(self, name: str, rows: FloatArray, columns: rr.ComponentColumnList) -> None:
         send_at(self._recording, f"{self._path}/{name}", rows[:, self._at["time_s"]], columns)
