@@ -37,6 +37,9 @@ PATTERNS: Final = (
     "firmware_sim/truth.py",
     "firmware_sim/waves.py",
     "utank_hil/canbus/endpoints.py",
+    "utank_hil/canbus/profiles/device.py",
+    "utank_hil/canbus/profiles/field.py",
+    "utank_hil/canbus/profiles/heard_message.py",
     "utank_hil/control/level_observer.py",
     "utank_hil/control/limiter.py",
     "utank_hil/control/pressure_loop.py",
@@ -222,7 +225,7 @@ def main() -> None:
         build()
     except (OSError, subprocess.CalledProcessError) as error:
         lines = (getattr(error, "stderr", None) or str(error)).splitlines()
-        print(f"{PLAIN}: {lines[0] if lines else error}")
+        print(f"{PLAIN}: {next((line for line in lines if 'error' in line), error)}")
 
 
 if __name__ == "__main__":

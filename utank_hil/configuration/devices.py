@@ -10,16 +10,16 @@ from utank_hil.base.parameters import Problem, Range, refuse
 from utank_hil.canbus.enumerations import Address
 from utank_hil.canbus.frame import BUS_SHIFT, MOST_BUSES, STANDARD, Frame
 from utank_hil.canbus.messages import SensorMotion, SensorPump, SensorTank
-from utank_hil.canbus.profiles.device import (
+from utank_hil.canbus.profiles.device_plan import (
     FIELDS,
     SWITCHES,
     ConditionPlan,
+    Crc8,
     DevicePlan,
     MessagePlan,
     SignalPlan,
 )
 from utank_hil.canbus.profiles.foreign import ForeignDevices
-from utank_hil.canbus.profiles.heard_message import Crc8
 from utank_hil.configuration.device_files import NATIVE, with_profile
 from utank_hil.configuration.device_sections import (
     UNITS,

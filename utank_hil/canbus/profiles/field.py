@@ -18,7 +18,7 @@ class Field:
     """
 
     __slots__ = (
-        "_half", "_least", "_mask", "_most", "_order", "_real", "_shift", "bits", "offset", "scale",
+        "_half", "_ieee", "_least", "_mask", "_most", "_order", "_shift", "bits", "offset", "scale",
     )  # fmt: skip
 
     def __init__(
@@ -46,7 +46,7 @@ class Field:
         self._shift = shift
         self._mask = (1 << bits) - 1
         self._half = 1 << (bits - 1) if signed and not real else 1 << bits
-        self._real = _REAL[bits] if real else ""
+        self._ieee = _REAL[bits] if real else ""
         self._least = -(1 << bits) if least_raw is None else least_raw
         self._most = 1 << bits if most_raw is None else most_raw
         self.bits, self.scale, self.offset = bits, scale, offset
@@ -62,9 +62,9 @@ class Field:
         raw = self.raw(data)
         if not self._least <= raw <= self._most:
             return math.nan
-        if self._real:
+        if self._ieee:
             packed = raw.to_bytes(self.bits // 8, "little")
-            return float(struct.unpack(self._real, packed)[0]) * self.scale + self.offset
+            return float(struct.unpack(self._ieee, packed)[0]) * self.scale + self.offset
         return raw * self.scale + self.offset
 
     def put(self, word: int, value: float, length: int) -> int:
@@ -73,8 +73,8 @@ class Field:
         The value is cut to what the bits, and the counts that are values, can hold.
         """
         raw = (value - self.offset) / self.scale
-        if self._real:
-            counts = int.from_bytes(struct.pack(self._real, raw), "little")
+        if self._ieee:
+            counts = int.from_bytes(struct.pack(self._ieee, raw), "little")
         else:
             low = -self._half if self._half <= self._mask else 0
             high = self._half - 1 if self._half <= self._mask else self._mask

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from utank_hil.canbus.messages import SensorMotion, SensorPump, SensorTank
-from utank_hil.canbus.profiles.device import DevicePlan
+from utank_hil.canbus.profiles.device_plan import DevicePlan
 from utank_hil.canbus.profiles.drive_plan import DrivePlan
 
 

@@ -1,44 +1,10 @@
 """What protects the frames of one message of another maker's device."""
 
-from dataclasses import dataclass
-from functools import cache
 from typing import Final
 
 from utank_hil.canbus.endpoints import BUCKET_LIMIT, MAX_LOST, RESYNC_FRAMES, Rejection
+from utank_hil.canbus.profiles.device_plan import Crc8
 from utank_hil.canbus.profiles.field import Field
-
-
-@dataclass(frozen=True, slots=True)
-class Crc8:
-    """A checksum of eight bits over all other bytes of a frame, in their order.
-
-    The numbers are those of the Rocksoft model, without reflection; SAE J1850 is the default.
-    """
-
-    byte: int  #: Place of the checksum in the frame.
-    polynomial: int = 0x1D
-    start: int = 0xFF
-    final: int = 0xFF
-
-    def of(self, data: bytes) -> int:
-        """The checksum that belongs into the frame."""
-        register, table = self.start, _table(self.polynomial)
-        for place, byte in enumerate(data):
-            if place != self.byte:
-                register = table[register ^ byte]
-        return register ^ self.final
-
-
-@cache
-def _table(polynomial: int) -> bytes:
-    """The register after each byte, from a register of zero."""
-    after = []
-    for register in range(256):
-        for _ in range(8):
-            register = (register << 1) ^ (polynomial if register & 0x80 else 0)
-            register &= 0xFF
-        after.append(register)
-    return bytes(after)
 
 
 class HeardMessage:

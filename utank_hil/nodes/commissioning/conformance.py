@@ -8,7 +8,8 @@ from typing import Any, Final
 
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Frame, Quality, SensorMotion, SensorPump, SensorTank
-from utank_hil.canbus.profiles.device import FIELDS, DevicePlan, ProfiledDevice
+from utank_hil.canbus.profiles.device import ProfiledDevice
+from utank_hil.canbus.profiles.device_plan import FIELDS, DevicePlan
 from utank_hil.nodes.commissioning.checks import Check
 
 SECOND_NS: Final = 1_000_000_000

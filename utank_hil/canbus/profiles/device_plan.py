@@ -1,0 +1,114 @@
+"""What a device of another maker sends, worked out beforehand from its profile."""
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Final, Generic, TypeVar
+
+from utank_hil.canbus.frame import Frame
+from utank_hil.canbus.messages import SensorMotion, SensorPump, SensorTank
+from utank_hil.canbus.profiles.field import Field
+
+T = TypeVar("T", bound=tuple[Any, ...])
+
+FIELDS: Final[dict[type[tuple[Any, ...]], tuple[str, ...]]] = {
+    SensorMotion: ("roll_rad", "roll_rate_rad_s"),
+    SensorTank: ("port_level_m", "starboard_level_m", "port_high", "starboard_high"),
+    SensorPump: ("pressure_pa", "flow_m3_s"),
+}
+"""What a device may measure, in the order of the message's fields before the quality."""
+SWITCHES: Final = ("port_high", "starboard_high")
+
+
+@dataclass(frozen=True, slots=True)
+class Crc8:
+    """A checksum of eight bits over all other bytes of a frame, in their order.
+
+    The numbers are those of the Rocksoft model, without reflection; SAE J1850 is the default.
+    """
+
+    byte: int  #: Place of the checksum in the frame.
+    polynomial: int = 0x1D
+    start: int = 0xFF
+    final: int = 0xFF
+
+    def of(self, data: bytes) -> int:
+        """The checksum that belongs into the frame."""
+        register, table = self.start, _table(self.polynomial)
+        for place, byte in enumerate(data):
+            if place != self.byte:
+                register = table[register ^ byte]
+        return register ^ self.final
+
+
+@cache
+def _table(polynomial: int) -> bytes:
+    """The register after each byte, from a register of zero."""
+    after = []
+    for register in range(256):
+        for _ in range(8):
+            register = (register << 1) ^ (polynomial if register & 0x80 else 0)
+            register &= 0xFF
+        after.append(register)
+    return bytes(after)
+
+
+@dataclass(frozen=True, slots=True)
+class SignalPlan:
+    """One measured value: value = sign * (physical * factor + offset)."""
+
+    place: int  #: Place of the value in the measurement.
+    field: Field
+    factor: float
+    offset: float
+    sign: int
+    #: least, most: range of the physical value, in the maker's unit; outside it there is none.
+    least: float
+    most: float
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionPlan:
+    """What a status must say: its counts under a mask are among those allowed."""
+
+    field: Field
+    mask: int
+    allowed: frozenset[int]
+
+
+@dataclass(frozen=True, slots=True)
+class MessagePlan:
+    """One message: the identifiers that it may have, what it says, and its protection."""
+
+    name: str
+    can_ids: tuple[int, ...]
+    length: int
+    cycle_ns: int
+    signals: tuple[SignalPlan, ...] = ()
+    conditions: tuple[ConditionPlan, ...] = ()
+    counter: Field | None = None
+    crc: Crc8 | None = None
+    stamp: Field | None = None
+    stamp_us: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class DevicePlan(Generic[T]):
+    """All that is needed to hear a device."""
+
+    name: str
+    kind: type[T]  #: Message that it stands for.
+    messages: tuple[MessagePlan, ...]
+    cycle_ns: int  #: Cycle of the measurement.
+    same_instant_ns: int  #: Frames that belong to one measurement come within this time.
+    age_ms: float  #: A stamp that is later than others by more is too late.
+    #: Content that has been the same for longer is none; 0 where stamp or counter say more.
+    unchanged_ns: int = 0
+    #: Level above which a reservoir counts as high where there are no switches.
+    high_level_m: float = math.inf
+    derived: bool = False  #: Whether the rate is the difference of two rolls.
+    #: Identifier (priority 6) of the device's address claim, and the NAME it must carry.
+    name_id: tuple[int, int] | None = None
+    #: Sent each second to a device that is silent, or has not said its name: start of a CANopen
+    #: node, request of an address claim.
+    wake: Frame | None = None
