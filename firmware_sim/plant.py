@@ -17,7 +17,7 @@ from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank, water_moments
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.sea import Harmonics
 
 SAILING_TICKS = 100  #: Ticks between updates of the ship's parameters: 1 s.
@@ -109,7 +109,7 @@ class Plant:
             a, b = state_matrices(ship, tank)
             heel = b[:, 1:] * ship.heeling_moment_nm
             push_pa = tank.density_kg_m3 * GRAVITY_M_S2 * tank.width_m  # per acceleration over g
-            lever_nm = GRAVITY_M_S2 * float(water_moments(tank, 0.0).first_kgm[2])
+            lever_nm = GRAVITY_M_S2 * tank.water_lever_kgm
             self._linear_model = np.hstack([a, b, heel, b[:, 1:] * lever_nm - b[:, :1] * push_pa])
             ship = replace(ship, quadratic_damping_nms2_rad2=0.0)
             tank = replace(tank, quadratic_loss=0.0)

@@ -16,7 +16,6 @@ from utank_hil.analysis.tank_sizing import (
 )
 from utank_hil.configuration.ship_keys import WrittenShip
 from utank_hil.dynamics.pump import Pump
-from utank_hil.dynamics.tank import water_moments
 
 
 def number(value: float) -> str:
@@ -37,7 +36,7 @@ def ship_file(
 ) -> str:
     """File of the vessel: ship, tank and pump."""
     tank, bare = sized.tank, written.ship()
-    water_t = water_moments(tank, 0.0).mass_kg / 1e3
+    water_t = tank.water_kg / 1e3
     share, taken = water_t / ship.displacement_t, stability_taken(bare, tank)
     damping_ratio, where_from = ship.damping
     period = "as given"

@@ -12,7 +12,6 @@ from utank_hil.analysis.tank_sizing import TankCost
 from utank_hil.base.finite import finite
 from utank_hil.console.terminal import new_table
 from utank_hil.control.optimal_tank import TankFigures
-from utank_hil.dynamics.tank import water_moments
 
 Rows = list[tuple[str, str]]
 
@@ -103,7 +102,7 @@ def sweep_tables(points: Sequence[SweepPoint]) -> list[Table]:
         )
         for share in sorted({point.stability_share for point in points}):
             row = {p.frequency_ratio: p for p in points if p.stability_share == share}
-            water_t = [water_moments(point.tank, 0.0).mass_kg / 1e3 for point in row.values()]
+            water_t = [point.tank.water_kg / 1e3 for point in row.values()]
             cells = (_sweep_cell(row.get(ratio), name) for ratio in ratios)
             heading = f"{share:.0%}, {_tonnes(min(water_t))} to {_tonnes(max(water_t))}"
             table.add_row(heading, *cells)

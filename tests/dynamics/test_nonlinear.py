@@ -14,8 +14,8 @@ from roll_energy import (
 from scipy.integrate import simpson
 
 from tools.thesis.reference import after_impact, simulate_reference
-from utank_hil.dynamics import RollModel, RollShip, Tank, coupled_model, tank_wrench
-from utank_hil.dynamics.tank import water_moments
+from tools.thesis.wrench import tank_wrench, water_moments
+from utank_hil.dynamics import RollModel, RollShip, Tank, coupled_model
 from utank_hil.dynamics.valves import air_valve_loss, duct_valve_loss
 
 PAIRS = {

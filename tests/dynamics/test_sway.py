@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from roll_energy import PATTI, PATTI_TANK, THESIS_SHIP, THESIS_TANK
 
-from utank_hil.dynamics import tank_wrench
+from tools.thesis.wrench import tank_wrench
 from utank_hil.dynamics.nonlinear import RollModel
 
 UNIT = st.floats(-1, 1)

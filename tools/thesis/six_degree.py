@@ -21,11 +21,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tools.thesis.wrench import gravity_body, tank_wrench, water_moments
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.restoring import Restoring, restoring
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank, water_moments
-from utank_hil.dynamics.wrench import gravity_body, tank_wrench
+from utank_hil.dynamics.tank import Tank
 
 Matrix6 = tuple[tuple[float, ...], ...]
 ZERO6: Matrix6 = ((0.0,) * 6,) * 6

@@ -25,7 +25,6 @@ from utank_hil.base.parameters import Finite, Positive, Range, range_problems, r
 from utank_hil.control.optimal_tank import best_passive_tank, ship_ratios
 from utank_hil.dynamics import GRAVITY_M_S2, RollShip, Tank
 from utank_hil.dynamics.pump import Pump
-from utank_hil.dynamics.tank import water_moments
 
 STABILITY_SHARE: Final = 0.15  #: Default share of the ship's stability that the free surface takes.
 LEAST_STABILITY_SHARE: Final = 0.03
@@ -158,7 +157,7 @@ def size_tank(
     found, duct_m, tuned = None, math.inf, False
     for _ in range(_ROUNDS):
         found = _in_room(ship, room, wanted, duct_m, tuned=tuned)
-        mass_kg = water_moments(found.tank, 0.0).mass_kg
+        mass_kg = found.tank.water_kg
         heavy = mass_kg * GRAVITY_M_S2 / (MOST_MASS_SHARE * ship.displacement_n)
         long = found.reservoir_length_m / room.length_m
         excess = max(heavy, long)
@@ -282,7 +281,7 @@ def _pressure_pa_per_m(tank: Tank, frequency_rad_s: float) -> float:
 
 def tank_cost(ship: RollShip, tank: Tank) -> TankCost:
     """Cost of a tank to the ship, and its capacity."""
-    mass_kg, taken = water_moments(tank, 0.0).mass_kg, stability_taken(ship, tank)
+    mass_kg, taken = tank.water_kg, stability_taken(ship, tank)
     level_m, weight_n = usable_level_m(ship, tank), ship.displacement_n
     weighed = weight_n > 0
     moving_m_s = tank.natural_frequency_rad_s * pump_level_m(ship, tank)

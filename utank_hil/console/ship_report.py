@@ -15,7 +15,7 @@ from utank_hil.control.optimal_tank import tank_figures
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.steady_heel import steady_heel, upright
-from utank_hil.dynamics.tank import GRAVITY_M_S2, water_moments
+from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.dynamics.valves import added_damping_ratio
 
 _OF_PUMP: Final = (
@@ -50,7 +50,7 @@ def ship_figures(vessel: Vessel) -> dict[str, Any]:
     figures = tank_figures(ship, tank)
     free = np.linalg.eigvals(state_matrices(ship, tank)[0])
     frequency = ship.natural_frequency_rad_s
-    water_kg = float(water_moments(tank, 0.0).mass_kg)
+    water_kg = tank.water_kg
     weight_n = ship.displacement_n or None
     return {
         "roll_period_s": 2 * math.pi / frequency,

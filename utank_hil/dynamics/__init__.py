@@ -1,4 +1,4 @@
-"""Ship and tank: parameters, linear and nonlinear coupled models, six-degree forces."""
+"""Ship and tank: parameters, linear and nonlinear coupled models."""
 
 from utank_hil.dynamics.linear import STATES as STATES
 from utank_hil.dynamics.linear import coupled_matrices as coupled_matrices
@@ -12,4 +12,3 @@ from utank_hil.dynamics.simulate import WaveMoment as WaveMoment
 from utank_hil.dynamics.simulate import simulate as simulate
 from utank_hil.dynamics.tank import GRAVITY_M_S2 as GRAVITY_M_S2
 from utank_hil.dynamics.tank import Tank as Tank
-from utank_hil.dynamics.wrench import tank_wrench as tank_wrench

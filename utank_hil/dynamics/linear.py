@@ -20,7 +20,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.ordered_sums import product
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank, water_moments
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 if TYPE_CHECKING:
     from control import StateSpace
@@ -32,19 +32,18 @@ INPUTS = ("pressure_pa", "wave_moment_nm")
 def coupled_matrices(ship: RollShip, tank: Tank) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mass, damping, stiffness for q = (roll_rad, level_m); SI units, symmetric, (2, 2)."""
     g, at = GRAVITY_M_S2, tank.reservoir_area_m2
-    water = water_moments(tank, 0.0)
-    coupling_inertia = water.swirl_kgm[0]
-    coupling_stiffness = -g * water.first_slope_kg[1]
+    coupling_inertia = tank.swirl_kgm
+    coupling_stiffness = -g * tank.across_kg
     mass = np.array(
         [
-            [ship.inertia_kg_m2 + water.inertia_kgm2[0, 0], coupling_inertia],
+            [ship.inertia_kg_m2 + sum(tank.water_squares_kg_m2), coupling_inertia],
             [coupling_inertia, tank.density_kg_m3 * at * tank.effective_length_m],
         ]
     )
     damping = np.diag([ship.damping_nms_rad, at * tank.loss_pa_per_m_s])
     stiffness = np.array(
         [
-            [ship.stiffness_nm_rad + g * water.first_kgm[2], coupling_stiffness],
+            [ship.stiffness_nm_rad + g * tank.water_lever_kgm, coupling_stiffness],
             [coupling_stiffness, 2 * tank.density_kg_m3 * g * at],
         ]
     )

@@ -41,7 +41,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.elementary import sines_cosines
 from utank_hil.dynamics.restoring import Restoring, restoring
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank, water_moments
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 REST_M_S = 1e-4  # A slower rebound ends at rest, which bounds the number of bounces.
 INSIDE_M = 1e-12  # Distance from the limit after an impact, so that the next is a sign change.
@@ -155,14 +155,13 @@ class RollModel:
 
 def _coefficients(ship: RollShip, tank: Tank) -> RollCoefficients:
     flow, at = tank.density_kg_m3 * tank.reservoir_area_m2, tank.reservoir_area_m2
-    water = water_moments(tank, 0.0)
     return RollCoefficients(
-        inertia=ship.inertia_kg_m2 + float(water.inertia_kgm2[0, 0]),
+        inertia=ship.inertia_kg_m2 + sum(tank.water_squares_kg_m2),
         inertia_h2=2 * flow * (tank.height_m - tank.lz_m),
-        coupling=float(water.swirl_kgm[0]),
+        coupling=tank.swirl_kgm,
         level_inertia=flow * tank.effective_length_m,
-        weight_lever=GRAVITY_M_S2 * float(water.first_kgm[2]),
-        weight_h=GRAVITY_M_S2 * float(water.first_slope_kg[1]),
+        weight_lever=GRAVITY_M_S2 * tank.water_lever_kgm,
+        weight_h=GRAVITY_M_S2 * tank.across_kg,
         weight_h2=GRAVITY_M_S2 * flow,
         damping=ship.damping_nms_rad,
         quadratic_damping=ship.quadratic_damping_nms2_rad2,

@@ -10,12 +10,8 @@ raises the starboard level.
 
 import math
 from dataclasses import dataclass, replace
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
-import numpy as np
-import numpy.typing as npt
-
-from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import (
     Finite,
     NotNegative,
@@ -93,6 +89,40 @@ class Tank:
         """Level at which one reservoir is full or the other one is empty, whichever is less."""
         return min(self.headroom_m, self.height_m)
 
+    @property
+    def water_kg(self) -> float:
+        """Mass of the water."""
+        area, duct = self.reservoir_area_m2, self.duct_area_m2
+        return self.density_kg_m3 * (2 * area * self.height_m + duct * self.width_m)
+
+    @property
+    def water_lever_kgm(self) -> float:
+        """First moment of the water at rest, positive below the ship's centre of gravity."""
+        height, lz = self.height_m, self.lz_m
+        in_duct = self.duct_area_m2 * self.width_m * lz
+        in_reservoirs = self.reservoir_area_m2 * (2 * lz * height - height * height)
+        return self.density_kg_m3 * (in_reservoirs + in_duct)
+
+    @property
+    def water_squares_kg_m2(self) -> tuple[float, float]:
+        """Integrals of y^2 and z^2 over the water at rest; their sum is its roll inertia."""
+        at, ap, length = self.reservoir_area_m2, self.duct_area_m2, self.width_m
+        height, lz, rho = self.height_m, self.lz_m, self.density_kg_m3
+        across = at * length * length * height / 2 + ap * length * length * length / 12
+        down = 2 * height * height * height / 3 - 2 * lz * height * height + 2 * lz * lz * height
+        return rho * across, rho * (at * down + ap * length * lz * lz)
+
+    @property
+    def swirl_kgm(self) -> float:
+        """Angular momentum of the flow about the roll axis per rate of the level."""
+        flow = self.density_kg_m3 * self.reservoir_area_m2
+        return -flow * (self.width_m * (self.height_m + self.lz_m))
+
+    @property
+    def across_kg(self) -> float:
+        """First moment of the water to starboard per level."""
+        return self.density_kg_m3 * self.reservoir_area_m2 * self.width_m
+
 
 def negligible(tank: Tank) -> Tank:
     """Return a tank with 1e-9 of the water, strongly damped: the ship moves as without a tank."""
@@ -101,78 +131,4 @@ def negligible(tank: Tank) -> Tank:
         reservoir_area_m2=1e-9 * tank.reservoir_area_m2,
         duct_area_m2=1e-9 * tank.duct_area_m2,
         damping_ratio=1.0,
-    )
-
-
-class WaterMoments(NamedTuple):
-    """Integrals over the mass of the water, and their derivatives with respect to the level."""
-
-    mass_kg: float
-    first_kgm: FloatArray  #: shape (..., 3): Integral of r dm about the ship's centre of gravity.
-    #: shape (..., 3): d first / dh; times dh/dt it is the momentum of the flow relative to the
-    #: ship.
-    first_slope_kg: FloatArray
-    first_curvature_kg_m: FloatArray  #: shape (3,): d2 first / dh2.
-    #: shape (..., 3, 3): Inertia tensor about the ship's centre of gravity.
-    inertia_kgm2: FloatArray
-    inertia_slope_kgm: FloatArray  #: shape (..., 3, 3): d inertia / dh.
-    #: shape (..., 3): Angular momentum of the flow relative to the ship per dh/dt.
-    swirl_kgm: FloatArray
-    swirl_slope_kg: FloatArray  #: shape (3,): d swirl / dh.
-
-
-def water_moments(tank: Tank, level_m: npt.ArrayLike) -> WaterMoments:
-    """Moments of the tank water at the given levels, any shape.
-
-    They are exact: the water fills three straight tubes (port reservoir, duct, starboard
-    reservoir), so every integral over its mass is a polynomial in the level h.
-    """
-    h = np.asarray(level_m, dtype=np.float64)
-    rho, at, ap = tank.density_kg_m3, tank.reservoir_area_m2, tank.duct_area_m2
-    length, height, lx, lz = tank.width_m, tank.height_m, tank.lx_m, tank.lz_m
-    zero = np.zeros_like(h)
-    mass = rho * (2 * at * height + ap * length)
-
-    # These are integrals of y, z, y^2, z^2, y z over the mass; those of x follow from x = lx.
-    first_y = rho * at * length * h
-    first_z = rho * (at * (2 * lz * height - height * height - h * h) + ap * length * lz)
-    square_y = rho * (at * length * length * height / 2 + ap * length * length * length / 12)
-    square_z = rho * (
-        at
-        * (
-            2 * height * height * height / 3
-            - 2 * lz * height * height
-            + 2 * lz * lz * height
-            + 2 * (height - lz) * h * h
-        )
-        + ap * length * lz * lz
-    )
-    product_yz = rho * at * length * (lz - height) * h
-    slope_y, slope_z = rho * at * length, -2 * rho * at * h
-    slope_zz, slope_yz = 4 * rho * at * (height - lz) * h, rho * at * length * (lz - height)
-
-    inertia = np.empty((*h.shape, 3, 3))
-    inertia[..., 0, 0] = square_y + square_z
-    inertia[..., 1, 1] = mass * lx * lx + square_z
-    inertia[..., 2, 2] = mass * lx * lx + square_y
-    inertia[..., 0, 1] = inertia[..., 1, 0] = -lx * first_y
-    inertia[..., 0, 2] = inertia[..., 2, 0] = -lx * first_z
-    inertia[..., 1, 2] = inertia[..., 2, 1] = -product_yz
-    inertia_slope = np.zeros((*h.shape, 3, 3))
-    inertia_slope[..., 0, 0] = inertia_slope[..., 1, 1] = slope_zz
-    inertia_slope[..., 0, 1] = inertia_slope[..., 1, 0] = -lx * slope_y
-    inertia_slope[..., 0, 2] = inertia_slope[..., 2, 0] = -lx * slope_z
-    inertia_slope[..., 1, 2] = inertia_slope[..., 2, 1] = -slope_yz
-
-    flow = rho * at  # The mass flow per dh/dt is the same along the whole streamline.
-    return WaterMoments(
-        mass_kg=mass,
-        first_kgm=np.stack([zero + mass * lx, first_y, zero + first_z], axis=-1),
-        first_slope_kg=np.stack([zero, zero + slope_y, zero + slope_z], axis=-1),
-        first_curvature_kg_m=np.array([0.0, 0.0, -2 * flow]),
-        inertia_kgm2=inertia,
-        inertia_slope_kgm=inertia_slope,
-        swirl_kgm=flow
-        * np.stack([zero - length * (height + lz), 2 * lx * h, zero + length * lx], axis=-1),
-        swirl_slope_kg=np.array([0.0, 2 * flow * lx, 0.0]),
     )

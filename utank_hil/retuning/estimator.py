@@ -14,7 +14,6 @@ import numpy as np
 from utank_hil.base.parameters import Range, range_problems, refuse
 from utank_hil.canbus import SeaEstimate, ShipEstimate, Verdict
 from utank_hil.dynamics import GRAVITY_M_S2, RollShip, Tank, coupled_matrices
-from utank_hil.dynamics.tank import water_moments
 from utank_hil.retuning.answer import Refusal
 from utank_hil.retuning.estimate import EstimateRequest, MotionEstimate, ShipFigures
 from utank_hil.retuning.history import SampleHistory
@@ -141,7 +140,7 @@ def metacentric_height_m(ship: RollShip, tank: Tank, stiffness_nm_rad: float) ->
         return nan
     stiffness = coupled_matrices(ship, tank)[2]
     free = stiffness[0, 0] - stiffness[0, 1] * stiffness[0, 1] / stiffness[1, 1]
-    weight_n = ship.displacement_n + GRAVITY_M_S2 * float(water_moments(tank, 0.0).mass_kg)
+    weight_n = ship.displacement_n + GRAVITY_M_S2 * tank.water_kg
     return float(free + stiffness_nm_rad - ship.stiffness_nm_rad) / weight_n
 
 

@@ -24,7 +24,7 @@ from utank_hil.dynamics.hull.hull_data import TO_BODY_AXES, HullData
 from utank_hil.dynamics.hull.response import excitation_at, free_roll, wave_number
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank, water_moments
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 _OSCILLATORS = 3  # Number for each motion.
 _START_RATIO = 0.5
@@ -262,17 +262,16 @@ class LateralModel:
 
     def packed(self, ship: RollShip) -> FloatArray:
         """Return the parameters of `lateral_kernel` for the ship as it is now."""
-        tank, water = self.tank, water_moments(self.tank, 0.0)
+        tank = self.tank
         c = RollModel(ship, tank).coefficients
         hull = self.hull.rigid_mass + self.hull.radiation.infinite_added_mass
         flow = tank.density_kg_m3 * tank.reservoir_area_m2
         viscous = self.viscous_nms_rad + ship.damping_nms_rad - self.ship.damping_nms_rad
         return np.array([
             *hull[np.triu_indices(3)], c.inertia - c.ship_inertia, c.inertia_h2, c.coupling,
-            c.level_inertia, water.mass_kg, tank.lx_m, flow, tank.width_m, water.first_kgm[2],
+            c.level_inertia, tank.water_kg, tank.lx_m, flow, tank.width_m, tank.water_lever_kgm,
             tank.height_m - tank.lz_m,
-            float(water.inertia_kgm2[1, 1]) - water.mass_kg * tank.lx_m**2,
-            float(water.inertia_kgm2[2, 2]) - water.mass_kg * tank.lx_m**2,
+            *reversed(tank.water_squares_kg_m2),
             viscous, c.quadratic_damping, c.offset_moment, c.wind_moment,
             c.area, c.loss, c.quadratic_loss, c.level_limit, c.restitution,
         ])  # fmt: skip
