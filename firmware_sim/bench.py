@@ -11,8 +11,17 @@ from multiprocessing.context import SpawnContext
 from pathlib import Path
 from typing import Any, Final
 
-from firmware_sim.real_time_run import run_controller, run_in_one_process, run_ship
-from firmware_sim.run import RECORD_S, Job, Run, join, roll_without_tank, run_lockstep
+from firmware_sim.run import (
+    RECORD_S,
+    Job,
+    Run,
+    join,
+    roll_without_tank,
+    run_controller,
+    run_in_one_process,
+    run_lockstep,
+    run_ship,
+)
 from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.ship_side import PASSIVE_SCRIPT
 from firmware_sim.worker_pool import WorkerPool, shared, whole_first

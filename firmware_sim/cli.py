@@ -14,10 +14,9 @@ with quietly_interruptible():
     from utank_hil.console.failures import failures_named
 
     with failures_named():
-        from firmware_sim.external_nodes import ExternalDrive
         from firmware_sim.run import RECORD_NS, RECORD_S, SECOND_NS
         from firmware_sim.scenario import Scenario
-        from firmware_sim.ship_side import NODE_NAMES, build_ship_side
+        from firmware_sim.ship_side import NODE_NAMES, ExternalDrive, build_ship_side
         from firmware_sim.truth import TRUTH, TruthRecorder
         from utank_hil.analysis.motion.statistics import (
             PumpStatistics,

@@ -1,5 +1,9 @@
-"""Figures of a bench, computed once for tables, JSON, picture and page."""
+"""Figures of a bench, computed once for tables, JSON, picture and page.
 
+The effect on people knows roll alone; sway, heave and pitch add to it on a real ship.
+"""
+
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,17 +15,18 @@ from pydantic import TypeAdapter
 
 from firmware_sim.bench import BenchResult
 from firmware_sim.model_limits import passed_limits
-from firmware_sim.on_board import LEVELS_RAD, OnBoard, on_board
-from firmware_sim.place import Place
 from firmware_sim.retuning_figures import RetuningFigures, retuning_figures
 from firmware_sim.run import RECORD_S, Run
 from firmware_sim.scenario import PASSIVE
+from firmware_sim.scenario_sections import Place
 from firmware_sim.ship_side import PASSIVE_SCRIPT
-from utank_hil.analysis.motion.comfort import EXPOSURE_S
+from utank_hil.analysis.motion.comfort import EXPOSURE_S, Comfort, comfort
 from utank_hil.analysis.motion.statistics import (
     PumpStatistics,
     RollStatistics,
+    exceedance,
     pump_statistics,
+    rayleigh_exceedance,
     roll_statistics,
 )
 from utank_hil.base.arrays import FloatArray
@@ -31,6 +36,38 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.failures import KILLED
 from utank_hil.nodes.panel import Action
 from utank_hil.safety.faults import fault_text
+
+LEVELS_RAD: Final = tuple(math.radians(degrees) for degrees in (2.5, 5.0, 7.5, 10.0, 15.0, 20.0))
+"""Single amplitudes of roll whose exceedance is stated."""
+
+
+@dataclass(frozen=True, slots=True)
+class OnBoard:
+    """Effect of a run's roll on people."""
+
+    #: Shares of the single amplitudes of roll above each of `LEVELS_RAD`; None for a record without
+    #: a half-cycle.
+    exceedance: tuple[float, ...] | None
+    #: The shares for a narrow-banded Gaussian roll of the same standard deviation.
+    rayleigh: tuple[float, ...]
+    comfort: Comfort  #: Comfort at the place.
+
+
+def on_board(roll_rad: FloatArray, step_s: float, place: Place) -> OnBoard:
+    """Judge a roll record of shape (n,), n at least 3."""
+    levels = np.array(LEVELS_RAD)
+    try:
+        above: tuple[float, ...] | None = tuple(exceedance(roll_rad, levels).tolist())
+    except ValueError:
+        above = None
+    deviation = float(roll_rad.std())
+    rayleigh = rayleigh_exceedance(deviation, levels) if deviation > 0 else 0 * levels
+    return OnBoard(
+        above,
+        tuple(rayleigh.tolist()),
+        comfort(roll_rad, np.gradient(roll_rad, step_s), step_s, place.height_m, place.starboard_m),
+    )
+
 
 NO_TANK: Final = "no tank"
 LEAST_ROLL_RAD: Final = 1e-6  #: Roll below which a ratio of rolls is meaningless.

@@ -8,23 +8,19 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from firmware_sim.drive_limits import DriveLimits
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.fmu_file import FmuFile
-from firmware_sim.place import Place
 from firmware_sim.scenario_sea import ScenarioSea
-from firmware_sim.sensor_errors import SensorErrors
-from firmware_sim.unusual_encounter import (
-    moment_problems,
-    unusual_loadings,
-    unusual_sea,
-    unusual_waypoints,
-)
+from firmware_sim.scenario_sections import DriveLimits, Place, SensorErrors
 from firmware_sim.voyage import (
     Waypoint,
+    moment_problems,
     ship_on_the_way,
     spectra_on_the_way,
     track,
+    unusual_loadings,
+    unusual_sea,
+    unusual_waypoints,
     waypoint_problems,
 )
 from firmware_sim.waves import PassingWaves, Response, SteadyWaves, Waves

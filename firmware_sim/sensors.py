@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 
-from firmware_sim.sensor_errors import SensorErrors
+from firmware_sim.scenario_sections import SensorErrors
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Address,

@@ -1,13 +1,20 @@
-"""Ship's side of the bus, built from a scenario."""
+"""Ship's side of the bus, built from a scenario.
 
+Where real hardware takes the place of drive or valve, an external node makes the plant follow the
+hardware's reports, and sends nothing. A report acts from the tick after its receipt until the next
+one, for `STALE_NS` at most. A frame with a wrong CRC or counter, or whose value is not available,
+is ignored.
+"""
+
+import math
+from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import Any, Final
 
 from firmware_sim.canopen_drive import CanopenPumpDrive
 from firmware_sim.drive import PumpDrive
-from firmware_sim.external_nodes import ExternalDrive, ExternalValve
 from firmware_sim.guard.parameters import guard_parameters
 from firmware_sim.guard.reference import GuardNode
 from firmware_sim.plant import Plant
@@ -18,21 +25,94 @@ from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Address,
     Catalogue,
+    DriveStatus1,
     Frame,
     HardwiredInputs,
     Quality,
+    Receiver,
     Switch,
+    ValveStatus,
     load_catalogue,
 )
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.tank import Tank, negligible
+from utank_hil.dynamics.valves import Valve
 from utank_hil.nodes.housekeeping import Housekeeping
 from utank_hil.nodes.panel import Action, OperatorPanel, TimedAction
 from utank_hil.runners import Node
 
-if TYPE_CHECKING:
-    from firmware_sim.plant import Plant  # compiled: a scenario is read without it
+STALE_NS: Final = 60_000_000
+"""Three cycles of the reports: the controller's own limit for a silent drive or valve."""
+
+
+class _ExternalNode(ABC):
+    period_ns = TICK_NS
+
+    def __init__(self, plant: Plant, receiver: Receiver[Any], signal: str) -> None:
+        self._plant, self._receiver, self._signal = plant, receiver, signal
+        self.hears = frozenset([receiver.can_id])  # see `Selective`
+        self._value = math.nan
+        self._reported_ns = -STALE_NS - 1
+        self._ticks = self._fresh_ticks = 0
+
+    @property
+    def reported_share(self) -> float:
+        """Share of the ticks so far with a report no older than `STALE_NS`."""
+        return self._fresh_ticks / max(self._ticks, 1)
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Store the report."""
+        if frame.can_id != self._receiver.can_id:
+            return
+        status = self._receiver.accept(frame)
+        if status is not None and math.isfinite(value := getattr(status, self._signal)):
+            self._value, self._reported_ns = value, now_ns
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Advance the plant, and apply the report from now on."""
+        self._plant.advance(now_ns)
+        fresh = now_ns - self._reported_ns <= STALE_NS
+        self._ticks += 1
+        self._fresh_ticks += fresh
+        self._act(self._value if fresh else None)
+        return ()
+
+    @abstractmethod
+    def _act(self, value: float | None) -> None:
+        """Apply a reported value to the plant; None without a fresh report."""
+
+
+class ExternalDrive(_ExternalNode):
+    """Node that imposes the pressure of DRIVE_STATUS_1, in every state of the drive.
+
+    Without a report the rotor turns freely.
+    """
+
+    name = "external drive"
+
+    def __init__(self, plant: Plant, catalogue: Catalogue) -> None:
+        super().__init__(plant, catalogue.receiver(DriveStatus1), "pressure_pa")
+
+    def _act(self, value: float | None) -> None:
+        if value is None:
+            self._plant.drive_pump(0.0, enabled=False)
+        else:
+            self._plant.impose_pressure(value)
+
+
+class ExternalValve(_ExternalNode):
+    """Node that sets the loss of VALVE_STATUS's opening; without a report the fail position's."""
+
+    name = "external valve"
+
+    def __init__(self, plant: Plant, tank: Tank, valve: Valve, catalogue: Catalogue) -> None:
+        super().__init__(plant, catalogue.receiver(ValveStatus), "opening")
+        self._tank, self._valve = tank, valve
+
+    def _act(self, value: float | None) -> None:
+        opening = self._valve.fail_opening if value is None else value
+        self._plant.set_valve_loss(self._valve.loss(self._tank, opening))
 
 
 class HardwiredNode:
@@ -47,7 +127,7 @@ class HardwiredNode:
 
     def __init__(
         self,
-        plant: "Plant",
+        plant: Plant,
         high_level_m: float,
         catalogue: Catalogue,
         *,

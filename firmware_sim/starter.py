@@ -1,19 +1,21 @@
 """Starter project: vessel, controller and scenario, from a naval architect's data."""
 
+import json
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Final, TypeVar
+from typing import Annotated, Any, Final, TypeVar
 
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from firmware_sim import starter_text
 from firmware_sim.pooled_waves import pooled_wave_moment
 from firmware_sim.scenario import Scenario
-from firmware_sim.starter_ship import StarterShip
 from utank_hil.analysis.loop.self_tuning import SelfTuned, SelfTunedDesign
 from utank_hil.analysis.tank_prediction import RollPrediction, SeaState, predict_roll
 from utank_hil.analysis.tank_sizing import (
+    DUCT_LOSS,
+    LOADINGS,
+    PUMP_SLOPE_RAD,
     STABILITY_SHARE,
     PumpDemand,
     SizedTank,
@@ -22,14 +24,115 @@ from utank_hil.analysis.tank_sizing import (
     pump_level_m,
     size_pump,
     size_tank,
+    stability_taken,
     usable_level_m,
     with_duct_loss,
 )
-from utank_hil.base.parameters import ParameterError
+from utank_hil.base.parameters import (
+    ParameterError,
+    Positive,
+    Problem,
+    Range,
+    range_problems,
+    refuse,
+)
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.configuration.files import problems_in_words
-from utank_hil.configuration.ship_keys import WrittenShip
+from utank_hil.configuration.ship_keys import WrittenShip, weather_criterion_period_s
+from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.roll_damping import HullForm, estimated_roll_damping
 from utank_hil.dynamics.tank import GRAVITY_M_S2
+
+USUAL_DAMPING_RATIO: Final = 0.05
+"""Damping ratio of a ship that nothing is known of. Chosen; no study."""
+ESTIMATED_AT_RAD: Final = math.radians(5)
+"""Amplitude of the estimate: a tank leaves a few degrees."""
+_LEAST_DAMPING, _MOST_DAMPING = 0.004, 0.3
+"""Range of an estimate; a bare tanker's measured damping below 5 degrees is the least."""
+_GYRATION_PER_BEAM: Final = (0.1, 1.2)
+"""Plausible radius of gyration per beam; usual ships have about 0.4."""
+_DEPTH_PER_BEAM: Final = (0.01, 1.0)
+"""Plausible ratio of displaced volume to length times squared beam."""
+
+
+@dataclass(frozen=True, slots=True)
+class StarterShip:
+    """Ship as a naval architect knows it, without the tank's water.
+
+    Raises `ValueError` if a value is out of its range, neither period nor draught is given, or
+    displacement and length, or GM and period, are inconsistent.
+    """
+
+    name: str
+    length_m: Positive
+    beam_m: Positive
+    displacement_t: Positive
+    gm_m: Positive
+    #: Roll period; by default from the weather criterion's formula, which needs the draught.
+    roll_period_s: Positive | None = None
+    draught_m: Positive | None = None
+    #: Of the roll; by default estimated from the draught, without it `USUAL_DAMPING_RATIO`.
+    roll_damping_ratio: Annotated[float, Range(above=0, most=0.3)] | None = None
+
+    def __post_init__(self) -> None:
+        problems = range_problems(self)
+        if self.roll_period_s is None and self.draught_m is None:
+            reason = "is needed, or else the draught for the weather criterion's period"
+            problems.append(("roll_period_s", reason))
+        refuse("ship", problems or self._shape_problems())
+
+    def _shape_problems(self) -> list[Problem]:
+        """Implausible combinations for the beam: displacement and length, period and GM."""
+        depth_m = self.displacement_t / (self.length_m * self.beam_m)  # in fresh water
+        least, most = _DEPTH_PER_BEAM
+        if not least <= depth_m / self.beam_m <= most:
+            reason = (
+                f"is {depth_m:.3g} m of water on {self.length_m:g} m by {self.beam_m:g} m: the "
+                "displacement is in tonnes, length and beam in metres"
+            )
+            return [("displacement_t", reason)]
+        gyration_m = self.period_s / (2 * math.pi) * math.sqrt(GRAVITY_M_S2 * self.gm_m)
+        least, most = _GYRATION_PER_BEAM
+        if least <= gyration_m / self.beam_m <= most:
+            return []
+        reason = (
+            f"gives a radius of gyration of {gyration_m:.3g} m at a roll period of "
+            f"{self.period_s:.3g} s; it is about 0.4 of the beam, {0.4 * self.beam_m:.3g} m: GM is "
+            "in metres, the period in seconds"
+        )
+        return [("gm_m", reason)]
+
+    @property
+    def damping(self) -> tuple[float, str]:
+        """Damping ratio of the roll, and where it comes from."""
+        if self.roll_damping_ratio is not None:
+            return self.roll_damping_ratio, "as given"
+        if self.draught_m is None:
+            return USUAL_DAMPING_RATIO, "assumed, --draught estimates it"
+        hull = HullForm.usual(
+            self.length_m, self.beam_m, self.draught_m, self.displacement_t, self.gm_m
+        )
+        frequency = 2 * math.pi / self.period_s
+        stiffness = 1e3 * self.displacement_t * GRAVITY_M_S2 * self.gm_m
+        found = estimated_roll_damping(hull, ESTIMATED_AT_RAD, frequency).total
+        ratio = found * hull.unit_nms_rad * frequency / (2 * stiffness)
+        outside = hull.outside(frequency)
+        words = (
+            f"estimated at {math.degrees(ESTIMATED_AT_RAD):g} degrees, Ikeda's method by "
+            f"regression, usual bilge keels: a factor of {2 if outside else 1.5:g} either way"
+        )
+        if outside:
+            words += f" ({'; '.join(outside)})"
+        return min(max(ratio, _LEAST_DAMPING), _MOST_DAMPING), words
+
+    @property
+    def period_s(self) -> float:
+        """Roll period, given or by formula."""
+        if self.roll_period_s is not None:
+            return self.roll_period_s
+        assert self.draught_m is not None
+        return weather_criterion_period_s(self.beam_m, self.draught_m, self.length_m, self.gm_m)
+
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
@@ -107,7 +210,7 @@ def make_starter(
     sized = replace(sized, tank=with_duct_loss(bare, sized.tank))
     demand = pump_demand(bare, sized.tank, pump_level_m(bare, sized.tank))
     pump = size_pump(sized.tank, demand)
-    texts = {SHIP: starter_text.ship_file(ship, written, room, sized, demand, pump)}
+    texts = {SHIP: ship_file(ship, written, room, sized, demand, pump)}
     # from here on with the rounded numbers of the files
     vessel = _valid(Vessel, yaml.safe_load(texts[SHIP]))
     usable_m = float(f"{usable_level_m(vessel.ship, vessel.tank):.3g}")
@@ -115,16 +218,16 @@ def make_starter(
     if usable_m < (1 - _LEAST_LEVEL_CHANGE) * vessel.default_limits["level_m"]:
         limits["level_m"] = usable_m
     sea = starter_sea(ship.length_m, ship.period_s, hs_m, tp_s)
-    texts[CONTROLLER] = starter_text.controller_file(ship.name, sea, limits)
+    texts[CONTROLLER] = controller_file(ship.name, sea, limits)
     written_law = yaml.safe_load(texts[CONTROLLER])
     config = _valid(ControllerConfig, written_law | {"vessel": vessel})
-    texts[SCENARIO] = starter_text.scenario_file(ship.name, sea)
+    texts[SCENARIO] = scenario_file(ship.name, sea)
     parts = {"vessel": vessel, "controllers": {"self_tuned": config}}
     scenario = _valid(Scenario, yaml.safe_load(texts[SCENARIO]) | parts)
     state = SeaState.on(vessel.ship, pooled_wave_moment(scenario, vessel.ship))
     assert isinstance(config.law, SelfTunedDesign)
     law = config.law.tuned(config.plant)
-    texts[README] = starter_text.readme(ship.name)
+    texts[README] = readme(ship.name)
     prediction = predict_roll(config.plant, state)
     return StarterProject(vessel, sized, demand, law, prediction, sea, texts)
 
@@ -137,3 +240,134 @@ def _valid(model: type[ModelT], content: dict[str, Any]) -> ModelT:
         found = problems_in_words(error, content, model)
         problems = [(".".join(map(str, key)), reason) for key, reason in found]
         raise ParameterError("starter", problems) from error
+
+
+def number(value: float) -> str:
+    """Number with four digits in YAML notation."""
+    short = float(f"{value:.4g}")
+    if short == 0 or 1e-3 <= abs(short) < 1e6:
+        return repr(short)
+    return f"{short:.3e}"
+
+
+def ship_file(
+    ship: StarterShip,
+    written: WrittenShip,
+    room: TankRoom,
+    sized: SizedTank,
+    demand: PumpDemand,
+    pump: Pump,
+) -> str:
+    """File of the vessel: ship, tank and pump."""
+    tank, bare = sized.tank, written.ship()
+    water_t = tank.water_kg / 1e3
+    share, taken = water_t / ship.displacement_t, stability_taken(bare, tank)
+    damping_ratio, where_from = ship.damping
+    period = "as given"
+    if ship.roll_period_s is None:
+        period = "weather criterion's formula (IS Code 2008, A 2.3.4): measure it"
+    length_m, breadth_m = sized.reservoir_length_m, sized.reservoir_breadth_m
+    slope_deg = math.degrees(PUMP_SLOPE_RAD)
+    rate_m_s = tank.natural_frequency_rad_s * demand.level_m
+    swinging = tank.linearized(rate_m_s).damping_ratio
+    pressure_kpa, flow = demand.pressure_pa / 1e3, demand.flow_m3_s
+    return f"""\
+# {_line(ship.name)}, {ship.length_m:g} m by {ship.beam_m:g} m.
+# Written by `utank-hil init`: change what you know better.
+name: {json.dumps(ship.name)}
+ship:  # without the tank's water
+  displacement_t: {number(ship.displacement_t)}
+  gm_m: {number(ship.gm_m)}
+  roll_period_s: {number(written.roll_period_s)}  # {period}
+  damping_ratio: {number(damping_ratio)}  # of the roll: a decay test tells
+  # {where_from}
+# Room: {room.breadth_m:.2f} m across, {room.height_m:.2f} m high, {length_m:.2f} m along the ship.
+# Size by {sized.bound_by}.
+# Water {water_t:.1f} t, {share:.1%} of the displacement.
+# Its free surface takes {taken * ship.gm_m:.2f} m of the GM, {taken:.0%}.
+tank:
+  width_m: {number(tank.width_m)}  # between the reservoirs' centre lines
+  height_m: {number(tank.height_m)}  # still water above the duct
+  # one reservoir, {length_m:.2f} m along and {breadth_m:.2f} m across the ship
+  reservoir_area_m2: {number(tank.reservoir_area_m2)}
+  # {sized.duct_height_m:.2f} m high; it tunes the water to the ship
+  duct_area_m2: {number(tank.duct_area_m2)}
+  lz_m: {number(tank.lz_m)}  # duct below the centre of gravity
+  damping_ratio: {number(tank.damping_ratio)}  # friction in small motions: a guess
+  # inlet and outlet have {DUCT_LOSS:g}, a throttle the rest: with it the damping ratio
+  # is {swinging:.2g} at {demand.level_m:.2f} m, and less in less motion
+  quadratic_loss: {number(tank.quadratic_loss)}
+  headroom_m: {number(tank.headroom_m)}  # roof above the still water
+# Moves the water by {demand.level_m:.2f} m, which holds a wave slope of {slope_deg:.1f} degrees,
+# at {LOADINGS[0]:g} to {LOADINGS[-1]:g} of the roll period:
+# {pressure_kpa:.1f} kPa, {flow:.2f} m3/s, {demand.duct_speed_m_s:.1f} m/s in the duct.
+pump:
+  max_pressure_pa: {number(pump.max_pressure_pa)}
+  max_power_w: {number(pump.max_power_w)}
+# A bench: no commissioning is asked for. On board take this line out, then commission.
+emulated: true
+"""
+
+
+def controller_file(name: str, sea: dict[str, Any], limits: dict[str, float]) -> str:
+    """File of the controller: a law that is designed for the scenario's sea."""
+    level = f"level_m: {number(limits['level_m'])}, " if limits else ""
+    remark = "# level_m: beyond it the water in the duct would be too fast\n" if limits else ""
+    return f"""\
+# A law that finds its numbers for ship, pump and sea, with all margins. Without the section sea it
+# expects no sea in particular. mean_power_w in W, beside it, bounds what the pump spends.
+name: {json.dumps(f"{name}, self-tuned")}
+vessel: ship.yaml
+law:
+  kind: self_tuned
+  sea: {{kind: jonswap, hs_m: {number(sea["hs_m"])}, tp_s: {number(sea["tp_s"])}, \
+effective_slope: {number(sea["effective_slope"]["coefficient"])}}}
+# the plan keeps the limits itself: the level barrier behind it acts late and hard
+{remark}limits: {{{level}brake_share: 1.0, sharpness: 4.0}}
+"""
+
+
+def scenario_file(name: str, sea: dict[str, Any]) -> str:
+    """File of the scenario: a beam sea near the ship's roll period."""
+    return f"""\
+# A beam sea near the roll period, where a ship rolls most.
+name: {json.dumps(f"{name} in a beam sea")}
+vessel: ship.yaml
+sea:
+  kind: jonswap
+  hs_m: {number(sea["hs_m"])}
+  tp_s: {number(sea["tp_s"])}
+  effective_slope: {{coefficient: {number(sea["effective_slope"]["coefficient"])}}}
+controllers:
+  self_tuned: controller.yaml
+operator:
+  - {{time_s: 5.0, action: arm}}
+duration_s: 900
+settle_s: 60
+seed: 1
+"""
+
+
+def readme(name: str) -> str:
+    """Instructions for the use of the files."""
+    return f"""\
+# {_line(name)}
+
+| file | holds |
+|---|---|
+| `ship.yaml` | ship, tank and pump |
+| `controller.yaml` | the law |
+| `scenario.yaml` | the sea, and who arms when |
+
+```sh
+utank-hil check controller.yaml      # is the law robust enough for this ship
+utank-hil bench scenario.yaml        # without tank, passive, active: table, picture, recording
+utank-hil design tank ship.yaml --scenario scenario.yaml    # would another tank be better
+```
+
+After a change in `ship.yaml` run `check` again: a law that misses its margins is refused.
+"""
+
+
+def _line(name: str) -> str:
+    return " ".join(name.split())

@@ -31,7 +31,6 @@ from utank_hil.canbus import enumerations, load_catalogue
 
 PATTERNS: Final = (
     "firmware_sim/drive.py",
-    "firmware_sim/drive_states.py",
     "firmware_sim/plant.py",
     "firmware_sim/sensors.py",
     "firmware_sim/truth.py",
@@ -71,7 +70,7 @@ PATTERNS: Final = (
     "utank_hil/telemetry/memory_log.py",
 )
 NOT: Final = frozenset(["utank_hil/safety/monitors/thresholds.py"])
-"""No file with a dataclass that a configuration holds, as `sensor_errors.py` is one:
+"""No file with a dataclass that a configuration holds, as `scenario_sections.py` is one:
 pydantic needs its `__dict__`, and pickle can't fill a frozen one that is compiled.
 """
 

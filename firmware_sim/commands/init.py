@@ -107,8 +107,7 @@ def init(
     **Example:** utank-hil init patrol --length 63 --beam 9.5 --displacement 1900
     --gm 0.9 --roll-period 9.5
     """
-    from firmware_sim.starter import FILES, make_starter
-    from firmware_sim.starter_ship import StarterShip
+    from firmware_sim.starter import FILES, StarterShip, make_starter
     from utank_hil.analysis.loop.sea_response import CalmSeaError
     from utank_hil.analysis.loop.self_tuning import NoLawError
     from utank_hil.analysis.tank_sizing import TankImpossibleError, TankRoom

@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from firmware_sim.drive_limits import DriveLimits
 from firmware_sim.scenario import Scenario
-from firmware_sim.sensor_errors import SensorErrors
+from firmware_sim.scenario_sections import DriveLimits, SensorErrors
 from firmware_sim.ship_side import PASSIVE_SCRIPT, build_ship_side
 from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.base.arrays import FloatArray

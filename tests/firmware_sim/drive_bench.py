@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from firmware_sim.drive import PumpDrive
-from firmware_sim.drive_limits import DriveLimits
 from firmware_sim.plant import Plant
+from firmware_sim.scenario_sections import DriveLimits
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     ControlWord,

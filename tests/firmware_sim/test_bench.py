@@ -19,13 +19,12 @@ from firmware_sim.bench import (
     run_in_turn,
     window_s,
 )
-from firmware_sim.figures import figures
-from firmware_sim.on_board import on_board
-from firmware_sim.place import Place
+from firmware_sim.figures import figures, on_board
 from firmware_sim.report import write_report
 from firmware_sim.report_tables import motion_table, on_board_table
 from firmware_sim.run import COLUMNS, RECORD_S, Run, run_lockstep
 from firmware_sim.scenario import Scenario
+from firmware_sim.scenario_sections import Place
 from utank_hil.base.provenance import describe
 from utank_hil.canbus import Mode
 from utank_hil.configuration import load_config

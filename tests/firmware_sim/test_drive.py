@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware_sim.drive import MISCODED_COMMANDS_TO_TRIP
-from firmware_sim.drive_limits import DriveLimits
 from firmware_sim.plant import Plant
+from firmware_sim.scenario_sections import DriveLimits
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Address,

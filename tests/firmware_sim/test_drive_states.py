@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware_sim.drive_states import DriveStates
+from firmware_sim.drive import DriveStates
 from utank_hil.canbus import ControlWord, DriveFault, DriveState
 
 S, C = DriveState, ControlWord

@@ -15,9 +15,8 @@ from foreign_nodes import (
     ForeignSensors,
 )
 
-from firmware_sim.external_nodes import STALE_NS, ExternalDrive
 from firmware_sim.scenario import Scenario
-from firmware_sim.ship_side import build_ship_side
+from firmware_sim.ship_side import STALE_NS, ExternalDrive, build_ship_side
 from firmware_sim.truth import TRUTH, TruthRecorder
 from utank_hil.assembly import build_controller_node
 from utank_hil.base.tick import TICK_NS

@@ -11,8 +11,7 @@ from typer.testing import CliRunner
 
 from firmware_sim.bench import jobs_of
 from firmware_sim.fault_injection.kinds import AnyFault
-from firmware_sim.real_time_run import run_in_one_process
-from firmware_sim.run import Job, run_lockstep
+from firmware_sim.run import Job, run_in_one_process, run_lockstep
 from firmware_sim.scenario import Scenario
 from utank_hil.cli import app
 from utank_hil.configuration import load_config

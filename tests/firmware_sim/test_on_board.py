@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import yaml
 
-from firmware_sim.on_board import LEVELS_RAD, on_board
-from firmware_sim.place import Place
+from firmware_sim.figures import LEVELS_RAD, on_board
 from firmware_sim.scenario import Scenario
+from firmware_sim.scenario_sections import Place
 from utank_hil.analysis.motion.comfort import comfort
 from utank_hil.configuration import ConfigError, load_config
 from utank_hil.dynamics import Tank

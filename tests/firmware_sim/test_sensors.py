@@ -7,7 +7,7 @@ import pytest
 from drive_bench import CATALOGUE, VESSEL
 
 from firmware_sim.plant import Plant
-from firmware_sim.sensor_errors import SensorErrors
+from firmware_sim.scenario_sections import SensorErrors
 from firmware_sim.sensors import SensorNode
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (

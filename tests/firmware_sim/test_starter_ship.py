@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from firmware_sim.starter_ship import StarterShip
+from firmware_sim.starter import StarterShip
 
 SHIP = StarterShip("patrol", 63, 9.5, 1000, 0.9, 9.5, 3.2)
 

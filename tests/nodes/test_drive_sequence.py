@@ -1,6 +1,6 @@
 import pytest
 
-from firmware_sim.drive_states import DriveStates
+from firmware_sim.drive import DriveStates
 from utank_hil.canbus import ControlWord, DriveFault, DriveState
 from utank_hil.nodes.drive_sequence import AT_REST, DISABLES, QUICK_STOPS, RESETS, DriveSequence
 

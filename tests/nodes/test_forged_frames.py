@@ -10,8 +10,8 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from firmware_sim.drive import PumpDrive
-from firmware_sim.drive_limits import DriveLimits
 from firmware_sim.plant import Plant
+from firmware_sim.scenario_sections import DriveLimits
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Frame, Mode
 from utank_hil.canbus.catalogue import DBC_PATH, read_data_ids

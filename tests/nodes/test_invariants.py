@@ -20,7 +20,7 @@ import pytest
 from controller_bench import CATALOGUE, LIMITS, MS, VERSION, ControllerBench
 
 from firmware_sim.drive import PumpDrive
-from firmware_sim.drive_limits import DriveLimits
+from firmware_sim.scenario_sections import DriveLimits
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import (
     Address,

@@ -16,8 +16,7 @@ import pytest
 from busy_machine import first_that_can_be_judged, judged_by, lost
 from two_processes import CHANNEL, patient_controller
 
-from firmware_sim.real_time_run import run_controller
-from firmware_sim.run import Job
+from firmware_sim.run import Job, run_controller
 from firmware_sim.ship_side import build_ship_side
 from tools.reference_recordings.cases import Case, config_of, scenario_of, ship_nodes
 from utank_hil.assembly import build_law
