@@ -15,11 +15,9 @@ from utank_hil.control.predictive.design import MOST_ORDER, MOST_SAMPLES
 from utank_hil.control.washout import WashoutLaw
 from utank_hil.dynamics.linear import STATES
 from utank_hil.retuning import Candidate, MotionEstimate, Refusal, ShipFigures
-from utank_hil.retuning.admission import Admission, WarmUp
-from utank_hil.retuning.admission import _candidate_gains as admission_gains
-from utank_hil.retuning.admission import _gains as gains_of
+from utank_hil.retuning.adaptive import gains
 from utank_hil.retuning.answer import LONGEST_BYTES, answer_bytes, read_answer
-from utank_hil.retuning.history import SampleHistory
+from utank_hil.retuning.history import WarmUp
 from utank_hil.sea import SlopeSpectrum
 
 
@@ -120,15 +118,11 @@ def test_a_long_refusal_is_cut(character: str) -> None:
 def test_admission_of_the_largest_law_allocates_no_square_of_its_order(
     washout_rad_s: float,
 ) -> None:
-    outputs = 2
-    candidate = replace(
-        law_of_size(MOST_ORDER, MOST_SAMPLES, outputs, 1e-3), washout_rad_s=washout_rad_s
-    )
-    configured, history = law_of(1e5, outputs=outputs), SampleHistory(1000, outputs)
-    admission = Admission(configured, history)
+    candidate = replace(law_of_size(MOST_ORDER, MOST_SAMPLES, 1, 1e-3), washout_rad_s=washout_rad_s)
+    controller = Rig(ToyRetuner()).controller
     tracemalloc.start()
     try:
-        warm_up = admission.admit(candidate)
+        warm_up = controller._admit(candidate)
         peak_bytes = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -140,10 +134,10 @@ def test_admission_of_the_largest_law_allocates_no_square_of_its_order(
 def test_gains_on_a_reference_are_bounded(gain: float, admitted: bool) -> None:
     good = candidate_of(1e5)
     law = good.law
-    gains = np.zeros_like(law.reference_gains)
-    gains.flat[0] = gain
-    other = PredictiveLaw(law.input_gains, law.output_gains, gains, law.sample_time_s)
-    answer = Admission(law_of(1e5), SampleHistory(1000, 1)).admit(replace(good, law=other))
+    on_reference = np.zeros_like(law.reference_gains)
+    on_reference.flat[0] = gain
+    other = PredictiveLaw(law.input_gains, law.output_gains, on_reference, law.sample_time_s)
+    answer = Rig(ToyRetuner()).controller._admit(replace(good, law=other))
     assert isinstance(answer, WarmUp) is admitted
     assert admitted or answer == "the law's gains on a reference are out of bounds"
 
@@ -155,7 +149,9 @@ def test_gains_are_those_of_the_whole_laws_matrices(data: st.DataObject) -> None
     washout_rad_s = data.draw(st.sampled_from([0.0, 0.02, 3.0]))
     candidate = candidate_of(gain, washout_rad_s, order=7, outputs=outputs)
     whole = candidate.whole_law()
-    assert admission_gains(candidate.law, whole) == pytest.approx(gains_of(whole), rel=1e-12)
+    model = whole.matrices()  # in observer form: the command is the first state
+    of_matrices = np.abs(model.A[:, 0]).sum(), np.abs(model.B).sum()
+    assert gains(whole) == pytest.approx(of_matrices, rel=1e-12)
 
 
 EXTREME = [0.0, -1.0, 1e-308, -5e-324, 1e9, -1e200, 1.7e308, -1.7e308, math.nan, math.inf]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from utank_hil.retuning.effort import FIRST, LEAST, Effort
+from utank_hil.retuning.renewing import FIRST_EFFORT, LEAST_EFFORT, Effort
 
 SAMPLES = 60
 
@@ -26,8 +26,8 @@ def ended(made_with_all: complex, periods: int = 60) -> float:
         (-0.8 + 0.0j, 1.0),  # the best share is 1.25
         (-2.0 + 0.0j, 0.5),  # with all of it the roll would be turned round
         (-0.5 + 1.0j, 0.4),  # Re(-made) / |made|^2
-        (0.3 + 0.0j, LEAST),  # it only adds roll
-        (0.0 + 1.0j, LEAST),
+        (0.3 + 0.0j, LEAST_EFFORT),  # it only adds roll
+        (0.0 + 1.0j, LEAST_EFFORT),
     ],
 )
 def test_it_ends_at_the_share_of_the_least_roll(made: complex, best: float) -> None:
@@ -49,4 +49,4 @@ def test_an_unknown_passive_roll_gives_the_whole_command_and_clearing_forgets() 
         effort.update(0.1, math.nan)
     assert effort.share == pytest.approx(1.0, abs=0.01)
     effort.clear()
-    assert effort.share == FIRST
+    assert effort.share == FIRST_EFFORT

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.retuning.desk import Mailbox
+from utank_hil.retuning.retuner import Mailbox
 
 
 @given(st.lists(st.binary(max_size=64), min_size=1, max_size=5))

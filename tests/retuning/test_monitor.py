@@ -7,7 +7,7 @@ import pytest
 
 from utank_hil.canbus import Verdict
 from utank_hil.retuning import MotionEstimate, ShipFigures
-from utank_hil.retuning.change_monitor import ChangeMonitor
+from utank_hil.retuning.estimate import ChangeMonitor
 
 DESIGNED = ShipFigures(4.8e8, 1.9e9, 4.8e7)
 FOUND = replace(DESIGNED, stiffness_deviation=0.02, period_deviation=0.01)

@@ -10,7 +10,7 @@ from utank_hil.control.interface import LinearLaw
 from utank_hil.dynamics.linear import STATES, state_matrices
 from utank_hil.dynamics.sampling import sample
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.retuning.recorded_waves import RecordedWaves, tank_motion
+from utank_hil.retuning.redesign import RecordedWaves, tank_motion
 
 pytestmark = pytest.mark.slow
 

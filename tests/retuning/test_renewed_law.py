@@ -16,8 +16,14 @@ from utank_hil.control.constrained.horizon import condense
 from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.retuning import RenewedLaw
-from utank_hil.retuning.answer import LONGEST_BYTES, answer_bytes, read_answer
-from utank_hil.retuning.renewed_law import MOST_KNOTS, MOST_SAMPLES, MOST_STATES
+from utank_hil.retuning.answer import (
+    LONGEST_BYTES,
+    MOST_KNOTS,
+    MOST_PLANNED,
+    MOST_STATES,
+    answer_bytes,
+    read_answer,
+)
 
 SIZES = st.tuples(
     st.integers(1, 12), st.integers(1, 4), st.integers(1, 6), st.integers(7, 20), st.integers(0, 3)
@@ -130,14 +136,14 @@ def test_whatever_numbers_a_broken_worker_sends_none_but_a_sound_law_is_read(
 
 
 def test_the_largest_law_fits_its_mailbox_and_a_larger_one_is_refused() -> None:
-    largest = law_of(MOST_STATES, 4, MOST_KNOTS, MOST_SAMPLES, 3)
+    largest = law_of(MOST_STATES, 4, MOST_KNOTS, MOST_PLANNED, 3)
     horizon = dataclasses.replace(largest.law.horizon, terminal=np.eye(MOST_STATES))
     whole = dataclasses.replace(largest, law=dataclasses.replace(largest.law, horizon=horizon))
     assert len(answer_bytes(whole)) <= LONGEST_BYTES
     for sizes in (
         (MOST_STATES + 1, 1, 1, 9, 0),
-        (3, 1, MOST_KNOTS + 1, MOST_SAMPLES, 0),
-        (3, 1, 1, MOST_SAMPLES + 1, 0),
+        (3, 1, MOST_KNOTS + 1, MOST_PLANNED, 0),
+        (3, 1, 1, MOST_PLANNED + 1, 0),
     ):
         with pytest.raises(ValueError, match=r"states must be 1 to|of length <=|<= 150"):
             read_answer(answer_bytes(law_of(*sizes)))

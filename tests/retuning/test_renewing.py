@@ -23,10 +23,15 @@ from utank_hil.retuning import (
     RenewingController,
     ShipFigures,
 )
-from utank_hil.retuning.effort import FIRST, LEAST
 from utank_hil.retuning.law_bank import FADE_SAMPLES
 from utank_hil.retuning.law_exchange import RETRY_NS
-from utank_hil.retuning.renewing import SEA_DIFFERENCE, TRIAL, sea_difference
+from utank_hil.retuning.renewing import (
+    FIRST_EFFORT,
+    LEAST_EFFORT,
+    SEA_DIFFERENCE,
+    TRIAL,
+    sea_difference,
+)
 from utank_hil.retuning.trial import WindowStatistics
 from utank_hil.sea import SlopeSpectrum, jonswap
 
@@ -344,13 +349,13 @@ def test_a_law_that_only_rolls_the_ship_more_loses_its_pressure_and_gets_it_back
     rig = Rig(None)
     rig.passive = lambda k: 0.2 if k < 1000 else 1.5
     rig.run(1000)
-    assert LEAST <= rig.controller.effort.share < 0.2
+    assert LEAST_EFFORT <= rig.controller.effort.share < 0.2
     rig.run(2500)
     assert rig.controller.effort.share > 0.9
     assert rig.states == []
     rig.engaged = False
     rig.run(1)
-    assert rig.controller.effort.share == FIRST
+    assert rig.controller.effort.share == FIRST_EFFORT
 
 
 def test_no_command_exceeds_what_is_allowed() -> None:

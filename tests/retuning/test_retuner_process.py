@@ -23,8 +23,8 @@ from utank_hil.retuning import (
     RetuneFunction,
     RetunerProcess,
     Work,
-    retuner_process,
 )
+from utank_hil.retuning import retuner as retuner_module
 
 pytestmark = pytest.mark.slow
 
@@ -117,7 +117,7 @@ def _answer_at(desk: Desk, number: int) -> Answer | None:
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A heart that has not beaten for 1.5 s, not 5 s, is no sign of life."""
-    monkeypatch.setattr("utank_hil.retuning.desk._ALIVE_NS", 1_500_000_000)
+    monkeypatch.setattr("utank_hil.retuning.retuner._ALIVE_NS", 1_500_000_000)
 
 
 def test_each_record_gets_its_own_answer() -> None:
@@ -179,9 +179,11 @@ def test_the_loop_begins_without_a_retuner_that_does_not_start(
                 child.join()
         assert now_s < 100.0
 
-    clock = SimpleNamespace(monotonic=lambda: now_s, sleep=sleep)
-    monkeypatch.setattr(retuner_process, "time", clock)
-    monkeypatch.setattr(retuner_process, "run_watchdog", process)
+    clock = SimpleNamespace(
+        monotonic=lambda: now_s, monotonic_ns=lambda: round(now_s * 1e9) + 10**12, sleep=sleep
+    )
+    monkeypatch.setattr(retuner_module, "time", clock)
+    monkeypatch.setattr(retuner_module, "run_watchdog", process)
     with RetunerProcess(work_of(answers_with_the_sum)) as retuner:
         assert now_s == pytest.approx(waited_s)
         assert not retuner.alive
@@ -345,4 +347,4 @@ def test_a_worker_whose_heart_beats_is_left_alone_however_long_it_has_run(
     if child == 0:
         time.sleep(1.5)
         os._exit(3)
-    assert retuner_process._watch(child, Desk(), os.getppid(), 0.5) == told  # type: ignore[arg-type]
+    assert retuner_module._watch(child, Desk(), os.getppid(), 0.5) == told  # type: ignore[arg-type]

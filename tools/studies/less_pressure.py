@@ -29,8 +29,8 @@ from utank_hil.base.tick import TICK_S
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import DesignPlant
 from utank_hil.control.constrained.law import ConstrainedLaw
-from utank_hil.retuning.effort import Effort
 from utank_hil.retuning.estimate import ShipFigures
+from utank_hil.retuning.renewing import Effort
 from utank_hil.sea import EffectiveSlope, Sea, ittc
 
 CONTROLLER: Final = Path("configs/controllers/self_tuning.yaml")

@@ -18,13 +18,20 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.elementary import log
 from utank_hil.canbus import RetuningState, Verdict
 from utank_hil.canbus.events import ModelSummary
-from utank_hil.control import ARX, Controller, DesignPlant, LinearLaw, PumpLimits
-from utank_hil.retuning.admission import Admission, WarmUp
+from utank_hil.control import (
+    ARX,
+    Controller,
+    DesignPlant,
+    LinearLaw,
+    PredictiveLaw,
+    PumpLimits,
+    WashoutLaw,
+)
 from utank_hil.retuning.answer import Answer, Candidate
-from utank_hil.retuning.change_monitor import SIGNIFICANT, ChangeMonitor
-from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
+from utank_hil.retuning.estimate import SIGNIFICANT, ChangeMonitor, MotionEstimate, ShipFigures
+from utank_hil.retuning.history import WarmUp
 from utank_hil.retuning.law_bank import MonitoredLaw
-from utank_hil.retuning.law_exchange import RETRY_NS, LawExchange
+from utank_hil.retuning.law_exchange import ANOTHER_QUESTION, RETRY_NS, LawExchange
 from utank_hil.retuning.retuner import Retuner
 from utank_hil.retuning.settings import RetuningSettings
 
@@ -33,6 +40,9 @@ MOST_TRIES: Final = 3
 AGREES: Final = 1.05
 """Factor between roll periods found by pulses and from the motion up to which they agree: the
 accuracy that a law's check asks of the period."""
+GAIN_FACTOR: Final = 30.0  #: Largest gains of a candidate, relative to the configured law's.
+MOST_COEFFICIENTS: Final = 1e9
+"""Largest sum of the gains on a reference; it prevents an overflow. Chosen; no study."""
 
 _NEW: Final = (RetuningState.TRIAL, RetuningState.RETUNED)
 # in Python 3.11 a member costs eight times as much to read from its class as from the module
@@ -68,7 +78,7 @@ class AdaptiveController(LawExchange):
         self.candidate: Candidate | None = None  #: Latest admitted candidate.
         self._settings = settings
         self._pulses_pa = pulses_pa
-        self._admission = Admission(law, self._history)
+        self._law = law
         self._seen: ShipFigures | None = None
         self._pulses_given = 0
         self._tries = 0
@@ -133,19 +143,34 @@ class AdaptiveController(LawExchange):
             self._submit(self._history.record(self._pulses_given))
 
     def _admit(self, answer: Answer) -> WarmUp | str:
-        warm_up = self._admission.admit(answer)
-        if isinstance(warm_up, WarmUp):
-            assert isinstance(answer, Candidate)
-            found, seen = ShipFigures.identified(answer.summary), self._seen
-            if seen is not None and abs(log(found.roll_period_s / seen.roll_period_s)) > max(
-                log(AGREES), SIGNIFICANT * seen.period_deviation
-            ):
-                return (
-                    f"the roll period found, {found.roll_period_s:.2f} s, is not that of the motion"
-                    f" without pulses, {seen.roll_period_s:.2f} s"
-                )
-            self.candidate = answer
-        return warm_up
+        if not isinstance(answer, Candidate):
+            return ANOTHER_QUESTION
+        if answer.law.output_gains.shape[1:] != (1, self._history.outputs):
+            return "the law is for other signals"
+        try:
+            law, found = answer.whole_law(), ShipFigures.identified(answer.summary)
+        except ValueError as error:
+            return str(error)
+        if law.sample_time_s != self._law.sample_time_s:
+            return f"the law's sample time is {law.sample_time_s} s"
+        # Bounded gains mean bounded commands, as the applied commands and the outputs are bounded.
+        (on_commands, on_outputs), (commands, outputs) = gains(law), gains(self._law)
+        most = GAIN_FACTOR * max(1.0, commands)
+        if not (on_commands <= most and on_outputs <= GAIN_FACTOR * outputs):
+            return "the law's gains are out of bounds"
+        if not _sum(answer.law.reference_gains) <= MOST_COEFFICIENTS:
+            return "the law's gains on a reference are out of bounds"
+        seen = self._seen
+        if seen is not None and abs(log(found.roll_period_s / seen.roll_period_s)) > max(
+            log(AGREES), SIGNIFICANT * seen.period_deviation
+        ):
+            return (
+                f"the roll period found, {found.roll_period_s:.2f} s, is not that of the motion"
+                f" without pulses, {seen.roll_period_s:.2f} s"
+            )
+        self.candidate = answer
+        service = MonitoredLaw(law.controller(), ChangeMonitor(found), answer.summary)
+        return WarmUp(service, self._history)
 
     def _on_trial(self) -> str:
         assert self.candidate is not None
@@ -184,6 +209,23 @@ class AdaptiveController(LawExchange):
     @property
     def _found(self) -> ModelSummary | None:
         return self.candidate.summary if self.candidate and self.state in _NEW else None
+
+
+def gains(law: LinearLaw) -> tuple[float, float]:
+    """Sums of a law's absolute gains on past commands and on outputs.
+
+    They are those of the law's matrices in observer form, which take many ticks to compute.
+    """
+    share, inner = (law.share, law.law) if isinstance(law, WashoutLaw) else (0.0, law)
+    assert isinstance(inner, PredictiveLaw)
+    outputs = (1 - share) * _sum(inner.output_gains) + share * inner.output_gains.shape[2]
+    return _sum(inner.input_gains), outputs
+
+
+def _sum(values: FloatArray) -> float:
+    """Sum of the absolute values; infinite if it overflows."""
+    with np.errstate(over="ignore"):
+        return float(np.abs(values).sum())
 
 
 def make_pulses(settings: RetuningSettings, plant: DesignPlant, sample_time_s: float) -> FloatArray:

@@ -1,23 +1,25 @@
-"""History of commands and outputs, as the law received them."""
+"""History of commands and outputs, as the law received them, and warm-up of a new law with it."""
+
+from typing import Final
 
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.retuning.law_bank import MonitoredLaw
+
+WARM_UP_SAMPLES: Final = 1000
+"""Past samples that a new law is stepped through: more than the memory of any law or washout."""
+WARM_UP_CHUNK: Final = 50  #: Number of warm-up samples processed in one sample time.
 
 
 class SampleHistory:
-    """The latest `capacity` rows (command, outputs...), oldest first.
-
-    The buffer has twice the capacity and is compacted every `capacity` samples, so that the latest
-    rows are always contiguous.
-    """
+    """The latest `capacity` rows (command, outputs...), oldest first."""
 
     def __init__(self, capacity: int, outputs: int) -> None:
         self.capacity = capacity
         self.outputs = outputs
-        self._rows = np.zeros((2 * capacity, 1 + outputs))
-        self._fresh = np.zeros(2 * capacity, dtype=np.bool_)
-        self._end = 0
+        self._rows = np.zeros((capacity, 1 + outputs))
+        self._fresh = np.zeros(capacity, dtype=np.bool_)
         self.count = 0  #: Number of samples taken so far.
 
     def add(self, command_pa: float, y: FloatArray, *, fresh: bool) -> None:
@@ -27,24 +29,49 @@ class SampleHistory:
         outputs, held values if nothing was measured; `fresh` says whether they are a new
         measurement.
         """
-        if self._end == len(self._rows):
-            kept = self.capacity - 1
-            self._rows[:kept] = self._rows[self._end - kept :]
-            self._fresh[:kept] = self._fresh[self._end - kept :]
-            self._end = kept
-        row = self._rows[self._end]
+        at = self.count % self.capacity
+        row = self._rows[at]
         row[0] = command_pa
         row[1:] = y
-        self._fresh[self._end] = fresh
-        self._end += 1
+        self._fresh[at] = fresh
         self.count += 1
 
     def latest(self, samples: int) -> FloatArray:
-        """Return at most `samples` latest rows as a view, valid until the next `add`."""
-        return self._rows[max(0, self._end - min(samples, self.capacity)) : self._end]
+        """Return at most `samples` latest rows."""
+        rows: FloatArray = self._rows[self._places(samples)]
+        return rows
 
     def record(self, samples: int) -> FloatArray:
-        """Return a copy of at most `samples` latest rows, with gaps as NaN."""
-        rows = self.latest(samples).copy()
-        rows[~self._fresh[self._end - len(rows) : self._end], 1:] = np.nan
+        """Return at most `samples` latest rows, with gaps as NaN."""
+        places = self._places(samples)
+        rows: FloatArray = self._rows[places]
+        rows[~self._fresh[places], 1:] = np.nan
         return rows
+
+    def _places(self, samples: int) -> np.ndarray:
+        """Indices of the latest rows; taking them makes a copy."""
+        first = self.count - min(samples, self.capacity, self.count)
+        return np.arange(first, self.count) % self.capacity
+
+
+class WarmUp:
+    """Steps a new law through past samples, one chunk per sample time."""
+
+    def __init__(self, law: MonitoredLaw, history: SampleHistory) -> None:
+        self.law = law
+        self._history = history
+        self._stepped = max(0, history.count - WARM_UP_SAMPLES)
+
+    @property
+    def done(self) -> bool:
+        """Whether the law has been stepped through all samples."""
+        return self._stepped == self._history.count
+
+    def advance(self) -> None:
+        """Step the law through the next chunk."""
+        controller, missing = self.law.controller, self._history.count - self._stepped
+        rows = self._history.latest(missing)[:WARM_UP_CHUNK]
+        for row in rows:
+            controller.applied(row[:1])
+            controller.step(row[1:])
+        self._stepped += len(rows)

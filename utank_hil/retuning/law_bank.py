@@ -18,8 +18,7 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.events import ModelSummary
 from utank_hil.control import Controller
-from utank_hil.retuning.change_monitor import ChangeMonitor
-from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
+from utank_hil.retuning.estimate import ChangeMonitor, MotionEstimate, ShipFigures
 
 FADE_SAMPLES: Final = 15
 """Length of a fade: 3 s at 0.2 s, a quarter of the first ship's roll period."""

@@ -34,10 +34,9 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningOrder, RetuningState
 from utank_hil.canbus.events import ModelSummary, RetuningEvent
-from utank_hil.retuning.admission import WARM_UP_CHUNK, WARM_UP_SAMPLES, WarmUp
 from utank_hil.retuning.answer import Answer, Refusal
 from utank_hil.retuning.estimate import MotionEstimate
-from utank_hil.retuning.history import SampleHistory
+from utank_hil.retuning.history import WARM_UP_CHUNK, WARM_UP_SAMPLES, SampleHistory, WarmUp
 from utank_hil.retuning.law_bank import LawBank, MonitoredLaw
 from utank_hil.retuning.retuner import Request, Retuner
 from utank_hil.retuning.settings import EARLIEST_VERDICT_S, RetuningSettings, TrialSettings
@@ -52,6 +51,7 @@ RETRY_NS: Final = 600_000_000_000
 """Shortest time from a failed or undone exchange to the next one without an order."""
 BUSY_NS: Final = 30_000_000_000
 """Time without a heartbeat for which a retuner may be busy with an estimate."""
+ANOTHER_QUESTION: Final = "the retuner answered another question"
 
 _REQUESTED: Final = "ordered by the operator"
 _COMPARABLE: Final = (
@@ -250,8 +250,6 @@ class LawExchange(ABC):
         answer = self._retuner.answer(self._request_number, self._now_ns)
         if isinstance(answer, Refusal):
             self._refuse(answer.reasons)
-        elif isinstance(answer, MotionEstimate):
-            self._abort("the retuner answered another question")
         elif answer is not None:
             warm_up = self._admit(answer)
             if isinstance(warm_up, str):

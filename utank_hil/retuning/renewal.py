@@ -10,9 +10,8 @@ import numpy as np
 from utank_hil.analysis.loop.self_tuning import self_tuned
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import DesignPlant
-from utank_hil.retuning.answer import Refusal
+from utank_hil.retuning.answer import Refusal, RenewedLaw
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
-from utank_hil.retuning.renewed_law import RenewedLaw
 from utank_hil.sea import SlopeSpectrum
 
 TAIL_SHARE: Final = 0.15

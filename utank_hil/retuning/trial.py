@@ -1,9 +1,8 @@
 """Comparison of a law on trial with the law before: roll and pressure over equal windows."""
 
 import math
+from collections import deque
 from typing import Final, NamedTuple
-
-import numpy as np
 
 
 class WindowStatistics(NamedTuple):
@@ -30,58 +29,46 @@ class MovingWindow:
     """
 
     def __init__(self, samples: int) -> None:
-        self._rows = np.zeros((samples, 3))
-        self.length = samples
+        self._length = samples
         self.clear()
 
     def clear(self) -> None:
         """Discard all samples."""
         self.samples = 0
-        self._roll = self._roll_square = 0.0
-        self._pressure = self._pressure_square = 0.0
-        self._passive = self._passive_square = 0.0
+        self._rows: deque[tuple[float, ...]] = deque(maxlen=self._length)
+        self._sums = [0.0] * 6
 
     def add(self, roll_rad: float, pressure_pa: float, passive_roll_rad: float = 0.0) -> None:
         """Append a sample; the oldest leaves a full window."""
-        if not math.isfinite(passive_roll_rad):
-            passive_roll_rad = 0.0
-        row = self._rows[self.samples % len(self._rows)]
-        if self.full:
-            self._add_to_sums(float(row[0]), float(row[1]), float(row[2]), -1.0)
-        row[0], row[1], row[2] = roll_rad, pressure_pa, passive_roll_rad
-        self._add_to_sums(roll_rad, pressure_pa, passive_roll_rad, 1.0)
+        values = roll_rad, pressure_pa, passive_roll_rad if math.isfinite(passive_roll_rad) else 0.0
+        row = (*values, *(value * value for value in values))
+        left = self._rows[0] if self.full else [0.0] * len(row)
+        self._rows.append(row)
+        self._sums = [
+            total - old + new for total, old, new in zip(self._sums, left, row, strict=True)
+        ]
         self.samples += 1
 
     @property
     def heel_rad(self) -> float:
         """Mean roll of the samples in the window; zero if there are none."""
-        return self._roll / max(1, min(self.samples, len(self._rows)))
+        return self._sums[0] / max(1, len(self._rows))
 
     @property
     def full(self) -> bool:
         """Whether the window is full."""
-        return self.samples >= len(self._rows)
+        return len(self._rows) == self._length
 
     @property
     def statistics(self) -> WindowStatistics:
         """Statistics of the samples in the window; zero if there are none."""
-        count = max(1, min(self.samples, len(self._rows)))
-        return WindowStatistics(
-            _deviation(self._roll, self._roll_square, count),
-            _deviation(self._pressure, self._pressure_square, count),
-            math.sqrt(max(0.0, self._pressure_square / count)),
-            _deviation(self._passive, self._passive_square, count),
+        means = [total / max(1, len(self._rows)) for total in self._sums]
+        # rounding may leave a variance just below zero
+        roll, pressure, passive = (
+            math.sqrt(max(0.0, square - mean * mean))
+            for mean, square in zip(means[:3], means[3:], strict=True)
         )
-
-    def _add_to_sums(
-        self, roll_rad: float, pressure_pa: float, passive_rad: float, sign: float
-    ) -> None:
-        self._roll += sign * roll_rad
-        self._roll_square += sign * roll_rad * roll_rad
-        self._pressure += sign * pressure_pa
-        self._pressure_square += sign * pressure_pa * pressure_pa
-        self._passive += sign * passive_rad
-        self._passive_square += sign * passive_rad * passive_rad
+        return WindowStatistics(roll, pressure, math.sqrt(max(0.0, means[4])), passive)
 
 
 def worsening(
@@ -105,9 +92,3 @@ def worsening(
             )
             break
     return tuple(found)
-
-
-def _deviation(total: float, squares: float, count: int) -> float:
-    """Return the standard deviation from sums; rounding may leave a variance just below zero."""
-    mean = total / count
-    return math.sqrt(max(0.0, squares / count - mean * mean))
