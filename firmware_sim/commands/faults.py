@@ -34,6 +34,10 @@ def faults(
     rows: Annotated[
         str, typer.Option(metavar="NAMES", help="Rows or requirements, or the beginnings of names.")
     ] = "",
+    scenario: Annotated[
+        Path | None,
+        typer.Option(help="Your ship in the place of the first, with its first controller."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder for a recording of each row, of the first seed.")
     ] = None,
@@ -58,13 +62,15 @@ def faults(
     from firmware_sim.fault_campaign.verdict import as_json, judged, write_recordings
     from utank_hil.runners import stop_on_signals
 
-    loaded = load(campaign, Campaign)
+    loaded = whole = load(campaign, Campaign)
+    if scenario is not None:
+        loaded = _on(whole, scenario)
     names = [name.strip() for name in rows.split(",") if name.strip()]
     chosen = loaded.chosen(names)
     window = Window() if full else Window(60.0, 20.0)
     too_long = [row for row in chosen if row.long and not (full or names)]
     chosen = [row for row in chosen if row not in too_long]
-    _refuse_names(loaded, names, chosen)
+    _refuse_names(whole, names, chosen)
     if out is not None:
         out = prepare_out(out, [f"{row.id}.rrd" for row in chosen])
     began = time.monotonic()
@@ -87,9 +93,15 @@ def faults(
         each.id: f"{each.fault}: shown by {each.elsewhere}"
         for each in loaded.shown_elsewhere(names)
     }
+    kept = {row.id for row in loaded.rows}
+    not_run |= {
+        row.id: f"needs the ship of setup {row.fault.setup}"
+        for row in whole.chosen(names)
+        if row.id not in kept
+    }
     not_run |= {row.id: "takes long: --full or --rows" for row in too_long}
     not_run |= dict.fromkeys(partly, KILLED if killed else INTERRUPTED)
-    options = {"seeds": seeds, "full": full, "rows": names}
+    options = {"seeds": seeds, "full": full, "rows": names, "scenario": str(scenario or "")}
     about = describe("faults", loaded, out or Path(), options=options, seed=1)
     if out is not None:
         files = write_recordings(out, outcomes, about)
@@ -112,13 +124,26 @@ def faults(
         raise typer.Exit(ExitCode.REFUSED)
 
 
+def _on(campaign: "Campaign", path: Path) -> "Campaign":
+    """The campaign on the ship of a scenario."""
+    from firmware_sim.fault_campaign.campaign import COMMON
+    from firmware_sim.scenario import Scenario
+
+    ship = load(path, Scenario)
+    if COMMON not in campaign.setups:
+        fail(f"--scenario: the campaign has no setup {COMMON} whose ship it could replace")
+    if not ship.controllers:
+        fail(f"{path}: controllers: one is needed that is to find the faults")
+    return campaign.on(ship, next(iter(ship.controllers)))
+
+
 def _refuse_names(campaign: "Campaign", names: Sequence[str], chosen: Sequence["Row"]) -> None:
     """End with exit code 2 if a name is that of no row, or nothing is left to run."""
     for name in names:
         if not (campaign.chosen([name]) or campaign.shown_elsewhere([name])):
             fail(f"--rows: no row or requirement begins with {name}")
     if names and not chosen:
-        fail("--rows: nothing to run: tests show all of them")
+        fail("--rows: nothing to run: tests show all of them, or the ship has none of these nodes")
 
 
 def _print(results: Sequence["Result"]) -> None:

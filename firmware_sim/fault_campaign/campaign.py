@@ -18,6 +18,7 @@ from utank_hil.nodes.panel import TimedAction
 from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.retuning import EstimateSettings
 
+COMMON: Final = "pump"  #: Setup of rows that name none.
 LONG_S: Final = 300.0
 """Follow-up time in s above which a row takes more than a minute of CPU time per sea."""
 _PHASES: Final = 100  # Number of ticks in a second, the slowest message cycle.
@@ -115,7 +116,7 @@ class Setup(Section):
 class Trial(Section):
     """Stimulus for a ship under way."""
 
-    setup: str = "pump"  #: Name of a setup in `Campaign.setups`.
+    setup: str = COMMON  #: Name of a setup in `Campaign.setups`.
     inject: tuple[AnyFault, ...] = ()  #: Faults; their times count from `Campaign.fault_at_s`.
     #: Additional actions of the operator; their times count from the fault.
     operator: tuple[TimedAction, ...] = ()
@@ -258,6 +259,28 @@ class Campaign(Section):
         return [
             row for row in self.rows if any(_begins(own, names) for own in (row.id, *row.meets))
         ]
+
+    def on(self, scenario: Scenario, controller: str) -> "Campaign":
+        """Campaign with another ship in the place of that of the setup `COMMON`.
+
+        Left are the rows of setups that change neither its parameters nor its devices, with faults
+        of nodes that the ship has.
+        """
+        common = self.setups[COMMON]
+        bare = {"redundancy": common.redundancy, "commissioned": common.commissioned}
+        setups = {
+            name: setup.model_copy(update={"scenario": scenario, "controller": controller})
+            for name, setup in self.setups.items()
+            if setup.model_copy(update=bare) == common
+        }
+        vessels = {name: setup.equipped.vessel for name, setup in setups.items()}
+        rows = tuple(
+            row
+            for row in self.rows
+            if (vessel := vessels.get(row.fault.setup)) is not None
+            and not missing_nodes(vessel, row.fault.inject)
+        )
+        return self.model_copy(update={"setups": setups, "rows": rows})
 
     def asked_by(self, row: Row) -> str:
         """Text of the requirement that a row meets."""

@@ -27,6 +27,7 @@ from firmware_sim.fault_campaign.trial import Outcome, Sea, Window, in_a_copy, t
 from firmware_sim.fault_campaign.verdict import Result, judged
 from firmware_sim.fault_campaign.watch import BusLog, Heard, Watch, first_difference
 from firmware_sim.faulty_bench import FaultyBench
+from firmware_sim.scenario import Scenario
 from utank_hil.assembly import build_law
 from utank_hil.canbus import Fault, Mode
 from utank_hil.canbus.measurements import Measurements
@@ -562,3 +563,17 @@ def test_a_drive_of_another_maker_that_misses_frames_is_stopped(row: str, found_
     outcome = outcome_of(ROWS[row], patient=True)
     assert outcome.code == "DRIVE_SILENT"
     assert verdict(row, outcome).passed, outcome
+
+
+@pytest.mark.slow
+def test_rows_run_on_another_ship() -> None:
+    patti = "configs/scenarios/patti_b.yaml"
+    done = invoke("--scenario", patti, "--seeds", "1", "--json", "--rows", "drive-fa,F35,F31")
+    found = json.loads(done.stdout)
+    assert done.exit_code == 0
+    assert [row["id"] for row in found["rows"]] == ["drive-faulted", "not-commissioned"]
+    assert {row["why"] for row in found["not_run"]} == {"needs the ship of setup valve"}
+    ship = load_config(Path(patti), Scenario)
+    moved = CAMPAIGN.on(ship, "constrained")
+    assert set(moved.setups) == {"pump", "redundant", "uncommissioned"}
+    assert all(setup.config.vessel.ship == ship.vessel.ship for setup in moved.setups.values())
