@@ -3,9 +3,13 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from firmware_sim.fault_injection.bench_parts import Bench, BreakableLaw, LawFailures
-from firmware_sim.fault_injection.faulty_bus import FaultyBus
-from firmware_sim.fault_injection.faulty_node import FaultyNode
+from firmware_sim.fault_injection.bench_parts import (
+    Bench,
+    BreakableLaw,
+    FaultyBus,
+    FaultyNode,
+    LawFailures,
+)
 from firmware_sim.fault_injection.kinds import AnyFault, place_all
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import ShipSide, build_ship_side

@@ -11,7 +11,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-import firmware_sim.report
+import firmware_sim.report_page
 from firmware_sim.cli import app as ship_app
 from utank_hil.cli import app
 from utank_hil.cli import commands as entry_points
@@ -325,7 +325,7 @@ def test_bench_whose_results_can_not_be_written_prints_them_all_the_same(
         raise OSError(28, "No space left on device")
 
     for name in ("_draw", "_record"):
-        monkeypatch.setattr(firmware_sim.report, name, full)
+        monkeypatch.setattr(firmware_sim.report_page, name, full)
     result = invoke(
         app, "bench", CONFIGS / "scenarios" / "storm_day.yaml", "--duration", "4", "--out", tmp_path
     )

@@ -26,7 +26,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.evidence(
     "utank_hil/telemetry/ring.py-import utank_hil.pictures-arrows point one way",
-    "firmware_sim/report.py-import utank_hil.commands.run-but the command line imports",
+    "firmware_sim/report_page.py-import utank_hil.commands.run-but the command line imports",
     "utank_hil/commands/run.py-import firmware_sim.bench-knows nothing of the bench",
 )
 @pytest.mark.parametrize(
@@ -37,7 +37,11 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("utank_hil/commands/run.py", "import firmware_sim.bench", "knows nothing of the bench"),
         ("utank_hil/control/optimal_tank.py", "import utank_hil.control.pd", "no circle of files"),
         ("utank_hil/dynamics/tank.py", "import time", "know nothing of CAN, time or files"),
-        ("firmware_sim/report.py", "import utank_hil.commands.run", "but the command line imports"),
+        (
+            "firmware_sim/report_page.py",
+            "import utank_hil.commands.run",
+            "but the command line imports",
+        ),
         ("firmware_sim/bench.py", "import firmware_sim.commands", "but the command line imports"),
         ("utank_hil/attic.py", "", "every room has its layer"),
     ],

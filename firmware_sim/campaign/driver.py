@@ -9,11 +9,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Final
 
-from firmware_sim.campaign.case_name import as_text, code_digest
-from firmware_sim.campaign.simulations import Row
+from firmware_sim.campaign.simulations import FAILED, LOST, Batch, Row, failed_row, run_batch
 from firmware_sim.campaign.store import Store
-from firmware_sim.campaign.study import Case, LoadedStudy
-from firmware_sim.campaign.work import FAILED, LOST, Batch, failed_row, run_batch
+from firmware_sim.campaign.study import Case, LoadedStudy, as_text, code_digest
 from firmware_sim.worker_pool import WorkerPool
 from utank_hil.base.background import one_thread_each
 

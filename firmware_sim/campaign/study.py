@@ -1,17 +1,20 @@
 """Studies (``configs/studies``): the cases of a scenario that a campaign computes."""
 
+import hashlib
+import importlib.metadata
 import itertools
+import json
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import date
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
 from firmware_sim.campaign.axes import MOST_CASES, Axis, Draws
-from firmware_sim.campaign.case_name import as_text, case_name, waves_name
-from firmware_sim.campaign.overrides import WHOLE, Content, OverrideError, changed
 from firmware_sim.scenario import Scenario
 from utank_hil.base.parameters import ParameterError, refuse
 from utank_hil.configuration import Section
@@ -24,7 +27,147 @@ from utank_hil.configuration.files import (
     located,
     problems_in_words,
 )
+from utank_hil.configuration.known_keys import known_keys, nearest
 from utank_hil.configuration.yaml_text import Key
+
+_PACKAGES: Final = ("utank_hil", "firmware_sim")
+_SUFFIXES: Final = (".py", ".dbc")
+_NUMERICAL: Final = ("numpy", "scipy", "numba")
+_ROOT: Final = Path(__file__).resolve().parents[2]
+_DIGITS: Final = 24
+"""Hexadecimal digits of a hash: 96 bits, without collisions among a million cases."""
+_PATH: Final = re.compile(r'"([^"\\]*/[^"\\]*)"')
+_WAVES: Final = ("sea", "voyage", "duration_s", "settle_s")
+
+
+@cache
+def code_digest() -> str:
+    """Hash of the program's files and of the versions of the numerical packages."""
+    whole = hashlib.sha256()
+    for package in _PACKAGES:
+        files = (file for file in (_ROOT / package).rglob("*") if file.suffix in _SUFFIXES)
+        for file in sorted(files):
+            content = file.read_bytes()
+            name = file.relative_to(_ROOT).as_posix()
+            whole.update(f"{name}\n{len(content)}\n".encode() + content)
+    for name in _NUMERICAL:
+        whole.update(f"{name} {importlib.metadata.version(name)}\n".encode())
+    return whole.hexdigest()[:_DIGITS]
+
+
+def case_name(simulation: str, content: dict[str, Any]) -> str:
+    """Name of a case: a hash of the scenario's content, its seed and its data files."""
+    return _digest([simulation, content, code_digest()])
+
+
+def waves_name(content: dict[str, Any]) -> str:
+    """Hash of a scenario's waves and of the span that is judged.
+
+    Runs with the same name met the same waves and are compared pair by pair.
+    """
+    return _digest([{key: content.get(key) for key in _WAVES}, content.get("seed", 1)])
+
+
+def as_text(content: Any) -> str:
+    """Content as JSON in canonical form."""
+    return json.dumps(content, sort_keys=True, default=_plain)
+
+
+def _digest(content: Any) -> str:
+    text = _PATH.sub(lambda found: _file_digest(found[1]) or found[0], as_text(content))
+    return hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]
+
+
+@cache
+def _file_digest(name: str) -> str:
+    file = Path(name)
+    return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, date):
+        return value.isoformat()
+    raise TypeError(f"{type(value).__name__} is no content of a configuration")
+
+
+Content = dict[str, Any]
+WHOLE: Final = "scenario"  #: Key whose value replaces the whole scenario.
+_VESSEL: Final = "vessel"
+_EVERY: Final = "*"
+
+
+class OverrideError(ValueError):
+    """Error for a key that the scenario does not have; the message begins with a verb."""
+
+
+def changed(content: Content, values: Mapping[str, Any]) -> Content:
+    """Return a copy of a scenario's content with other values at some dotted keys.
+
+    ``*`` stands for every name, as in ``controllers.*.limits.pressure_pa``. A key of ``vessel``
+    also applies to the controllers of the same ship; ``actual_ship`` changes the ship alone and not
+    the controllers' model of it. Values are applied in order; `WHOLE` replaces the content. Raises
+    `OverrideError` if a key leads into a value, or to a name that does not exist.
+    """
+    new: Content = values.get(WHOLE, content)
+    for key, value in values.items():
+        if key != WHOLE:
+            for path in list(_paths(new, key.split("."))):
+                new = _with(new, path, value)
+    return new
+
+
+def _paths(content: Content, path: list[str]) -> Iterator[list[str]]:
+    """Yield the paths that a key with ``*`` matches."""
+    if _EVERY in path:
+        at = path.index(_EVERY)
+        names = _inside(content, path[:at])
+        if not isinstance(names, dict) or not names:
+            raise OverrideError(f"stands for nothing: {'.'.join(path[:at])} has no names")
+        for name in names:
+            yield from _paths(content, [*path[:at], name, *path[at + 1 :]])
+        return
+    if path[0] == _VESSEL:
+        vessel = content.get(_VESSEL)
+        for name, controller in content.get("controllers", {}).items():
+            if isinstance(controller, dict) and controller.get(_VESSEL) == vessel:
+                yield ["controllers", name, *path]
+    yield path
+
+
+def _inside(content: Any, path: list[str]) -> Any:
+    for part in path:
+        content = content[int(part)] if isinstance(content, list) else content.get(part, {})
+    return content
+
+
+def _with(place: Any, path: list[str], value: Any, depth: int = 0) -> Any:
+    """Return a copy of a section, down to the end of the path, with the new value there."""
+    if depth == len(path):
+        return value
+    part, above = path[depth], ".".join(path[:depth])
+    if isinstance(place, list):
+        if not (part.isdecimal() and int(part) < len(place)):
+            raise OverrideError(f"names item {part} of {above}, which has {len(place)}")
+        inner = _with(place[int(part)], path, value, depth + 1)
+        return [*place[: int(part)], inner, *place[int(part) + 1 :]]
+    if not isinstance(place, dict):
+        raise OverrideError(f"leads into {above}, which is a value and has no keys")
+    if part not in place and depth < len(path) - 1:
+        _refuse_stranger(place, path[: depth + 1])
+    return {**place, part: _with(place.get(part, {}), path, value, depth + 1)}
+
+
+def _refuse_stranger(place: Content, path: list[str]) -> None:
+    """Refuse a key that the schema does not allow; a missing allowed section may be created."""
+    *above, name = path
+    known = known_keys(Scenario, above)
+    if name in known:
+        return
+    there = sorted(known) or sorted(place)
+    near = nearest(name, there)
+    advice = f"did you mean {near}?" if near else f"there are {', '.join(there) or 'none'}"
+    raise OverrideError(f"names {'.'.join(path)}, which is not there; {advice}")
+
 
 Scalar = str | float | int | bool
 SEED: Final = "seed"

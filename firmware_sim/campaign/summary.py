@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from firmware_sim.campaign.metrics import METRICS
-from firmware_sim.campaign.store import Results
+from firmware_sim.campaign.simulations import FAILED, OK
+from firmware_sim.campaign.store import METRICS, Results
 from firmware_sim.campaign.study import Scalar
-from firmware_sim.campaign.work import FAILED, OK
 from firmware_sim.figures import LEAST_ROLL_RAD, NO_TANK
 from utank_hil.analysis.motion.statistics import mean_interval
 

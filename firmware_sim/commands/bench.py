@@ -87,7 +87,7 @@ def bench(
     # imported late: `--help` needs none of it
     from firmware_sim.bench import BenchOptions, frames_name
     from firmware_sim.figures import figures
-    from firmware_sim.report import REPORT_FILES, write_report
+    from firmware_sim.report_page import REPORT_FILES, write_report
     from firmware_sim.scenario import Scenario
 
     if bus is not None and not real_time:

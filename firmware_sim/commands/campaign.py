@@ -78,8 +78,8 @@ def campaign(
 
 
 def _about(loaded: "LoadedStudy", folder: Path, given: dict[str, Any]) -> dict[str, Any]:
-    from firmware_sim.campaign.case_name import code_digest
-    from firmware_sim.campaign.metrics import LEAVES_OUT, METRICS
+    from firmware_sim.campaign.store import LEAVES_OUT, METRICS
+    from firmware_sim.campaign.study import code_digest
 
     first = loaded.scenario_of(loaded.cases[0])
     return {
@@ -95,7 +95,7 @@ def _about(loaded: "LoadedStudy", folder: Path, given: dict[str, Any]) -> dict[s
 def _run(loaded: "LoadedStudy", store: Any, workers: int) -> bool:
     """Compute the missing cases with a progress bar; return whether it was interrupted."""
     from firmware_sim.campaign.driver import Count, Driver
-    from firmware_sim.campaign.work import OtherCodeError
+    from firmware_sim.campaign.simulations import OtherCodeError
 
     bar = progress_bar(MofNCompleteColumn(), "{task.fields[failed]}")
     task = bar.add_task("cases", total=None, failed="")
@@ -118,8 +118,8 @@ def _run(loaded: "LoadedStudy", store: Any, workers: int) -> bool:
 
 
 def _print(loaded: "LoadedStudy", groups: list[dict[str, Any]], failed: dict[str, int]) -> None:
-    from firmware_sim.campaign.metrics import LEAVES_OUT
-    from firmware_sim.campaign.tables import pairs_table, runs_table
+    from firmware_sim.campaign.report_page import pairs_table, runs_table
+    from firmware_sim.campaign.store import LEAVES_OUT
 
     console, study = Terminal(), loaded.study
     console.table(runs_table(groups, f"{study.name}, simulation: {study.simulation}"))

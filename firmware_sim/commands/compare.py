@@ -12,7 +12,7 @@ from utank_hil.console.common import Json, fail, print_json
 from utank_hil.console.terminal import Terminal, new_table, shown
 
 if TYPE_CHECKING:
-    from firmware_sim.comparison.difference import Comparison, Difference
+    from firmware_sim.comparison import Comparison, Difference
 
 _SCALES: Final = {
     "rad": (180 / math.pi, "°"),
@@ -38,9 +38,7 @@ def compare(
     of recordings of the same seed and sea.
     """
     from firmware_sim.campaign.store import is_campaign
-    from firmware_sim.comparison.campaigns import compare_campaigns
-    from firmware_sim.comparison.difference import CompareError
-    from firmware_sim.comparison.records import compare_records
+    from firmware_sim.comparison import CompareError, compare_campaigns, compare_records
 
     places = [reference, *others]
     kinds = {is_campaign(place) for place in places}

@@ -6,8 +6,7 @@ from typing import Annotated, Any, ClassVar, Final
 
 from pydantic import AfterValidator
 
-from firmware_sim.fault_injection.bench_parts import Bench
-from firmware_sim.fault_injection.faulty_node import NEVER_NS, Span, Spoil, Spoiled
+from firmware_sim.fault_injection.bench_parts import NEVER_NS, Bench, Span, Spoil, Spoiled
 from utank_hil.base.parameters import Problem, Range
 from utank_hil.canbus import Address, Frame, load_catalogue
 from utank_hil.canbus.catalogue import NamedMessage

@@ -8,8 +8,8 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
+from firmware_sim.fault_injection.bench_parts import Spoil
 from firmware_sim.fault_injection.fault import MessageFault, intact
-from firmware_sim.fault_injection.faulty_node import Spoil
 from utank_hil.base.parameters import Range
 from utank_hil.canbus import Frame
 from utank_hil.canbus.codec import FRAME_BYTES

@@ -5,9 +5,8 @@ from typing import Annotated, Literal
 
 from pydantic import field_validator
 
-from firmware_sim.fault_injection.bench_parts import Bench
+from firmware_sim.fault_injection.bench_parts import Bench, Span, Spoiled
 from firmware_sim.fault_injection.fault import Fault, NodeName
-from firmware_sim.fault_injection.faulty_node import Span, Spoiled
 from utank_hil.base.parameters import Finite, NotNegative, Range
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import DriveFault, Frame

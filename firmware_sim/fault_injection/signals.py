@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, get_type_hints
 
 from pydantic import Field, model_validator
 
+from firmware_sim.fault_injection.bench_parts import Spoil
 from firmware_sim.fault_injection.fault import (
     FaultSpan,
     MessageFault,
@@ -16,7 +17,6 @@ from firmware_sim.fault_injection.fault import (
     signal_problems,
     whole_cycles,
 )
-from firmware_sim.fault_injection.faulty_node import Spoil
 from utank_hil.base.parameters import Finite, Positive, refuse
 from utank_hil.canbus import Frame
 from utank_hil.canbus.catalogue import NamedMessage

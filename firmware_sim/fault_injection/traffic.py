@@ -5,7 +5,15 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from firmware_sim.fault_injection.bench_parts import Bench
+from firmware_sim.fault_injection.bench_parts import (
+    NEVER_NS,
+    Bench,
+    Disturbance,
+    FaultyNode,
+    OtherFrame,
+    Span,
+    Spoiled,
+)
 from firmware_sim.fault_injection.fault import (
     NODE_OF,
     SECOND_NS,
@@ -15,8 +23,6 @@ from firmware_sim.fault_injection.fault import (
     MessageName,
     NodeName,
 )
-from firmware_sim.fault_injection.faulty_bus import Disturbance, OtherFrame
-from firmware_sim.fault_injection.faulty_node import NEVER_NS, FaultyNode, Span, Spoiled
 from firmware_sim.fault_injection.signals import value_of, value_problems
 from utank_hil.base.parameters import refuse
 from utank_hil.canbus import Frame, Station, load_catalogue

@@ -14,10 +14,9 @@ from studies import small, written
 from typer.testing import CliRunner, Result
 
 from firmware_sim.campaign.driver import Count, Driver, batch_of
-from firmware_sim.campaign.simulations import Row
+from firmware_sim.campaign.report_page import pairs_table
+from firmware_sim.campaign.simulations import LOST, OK, Batch, Row, run_batch
 from firmware_sim.campaign.store import Store, read_results
-from firmware_sim.campaign.tables import pairs_table
-from firmware_sim.campaign.work import LOST, OK, Batch, run_batch
 from firmware_sim.commands.campaign import campaign
 from utank_hil.console.common import new_app
 from utank_hil.console.exit_codes import ExitCode

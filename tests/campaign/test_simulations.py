@@ -9,9 +9,8 @@ import pytest
 from studies import CONFIGS, small
 
 from firmware_sim.campaign.driver import batch_of
-from firmware_sim.campaign.overrides import changed
-from firmware_sim.campaign.simulations import rows_of
-from firmware_sim.campaign.work import OtherCodeError, run_batch
+from firmware_sim.campaign.simulations import OtherCodeError, rows_of, run_batch
+from firmware_sim.campaign.study import changed
 from firmware_sim.scenario import Scenario
 from utank_hil.assembly import build_law
 
@@ -120,6 +119,6 @@ def test_vessel_with_a_valve_needs_the_bus(tmp_path: Path):
 def test_worker_of_other_code_ends_the_campaign(tmp_path: Path, monkeypatch):
     found = small(tmp_path)
     batch = batch_of(found, found.cases)
-    monkeypatch.setattr("firmware_sim.campaign.work.code_digest", lambda: "older")
+    monkeypatch.setattr("firmware_sim.campaign.simulations.code_digest", lambda: "older")
     with pytest.raises(OtherCodeError, match="the code has changed"):
         run_batch(batch)

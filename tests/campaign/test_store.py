@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from little_room import little_room
 from studies import small
 
+from firmware_sim.campaign.simulations import FAILED, LOST, OK, failed_row
 from firmware_sim.campaign.store import Store, StoreError, read_results
-from firmware_sim.campaign.work import FAILED, LOST, OK, failed_row
 
 
 def rows(case: str, roll: float = 1.0) -> list[dict[str, object]]:

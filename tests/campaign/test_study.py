@@ -5,10 +5,9 @@ from pathlib import Path
 import pytest
 from studies import CONFIGS, small, written
 
-from firmware_sim.campaign import case_name
+from firmware_sim.campaign import study as case_name
 from firmware_sim.campaign.axes import Draws
-from firmware_sim.campaign.overrides import changed
-from firmware_sim.campaign.study import load_study
+from firmware_sim.campaign.study import changed, load_study
 from firmware_sim.scenario import Scenario
 from utank_hil.configuration import ConfigError
 from utank_hil.sea import load_ndbc

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser
 
 from firmware_sim.bench import BenchOptions, run_bench
 from firmware_sim.figures import figures
-from firmware_sim.report import write_report
+from firmware_sim.report_page import write_report
 from firmware_sim.scenario import Scenario
 from utank_hil.base.provenance import describe
 from utank_hil.configuration import load_config

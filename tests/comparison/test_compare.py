@@ -11,12 +11,11 @@ from scipy.stats import ttest_ind
 from typer.testing import CliRunner
 
 from firmware_sim.campaign.driver import batch_of
+from firmware_sim.campaign.simulations import run_batch
 from firmware_sim.campaign.store import Store
 from firmware_sim.campaign.study import load_study
-from firmware_sim.campaign.work import run_batch
 from firmware_sim.commands.compare import compare
-from firmware_sim.comparison.difference import independent, paired
-from firmware_sim.comparison.records import batch_count
+from firmware_sim.comparison import batch_count, independent, paired
 from utank_hil.analysis.motion.statistics import batch_means, rms_batches
 from utank_hil.canbus.enumerations import Mode
 from utank_hil.console.common import new_app

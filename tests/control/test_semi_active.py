@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shipped_designs import GPC_ROLL, LQG_ROLL_RATE_LEVEL
 
-from tools.thesis.capsize.survival import controlled_run
+from tools.thesis.capsize import controlled_run
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.gain import GainLaw
 from utank_hil.control.pd import PDDesign

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rolling_ship import SHIP, TANK
 
-from tools.thesis.capsize.survival import controlled_run
+from tools.thesis.capsize import controlled_run
 from tools.thesis.harmonic import harmonic_response
 from utank_hil.control import CommandLimiter, PumpLimits
 from utank_hil.control.stimulation import Stimulation

@@ -10,7 +10,7 @@ import pytest
 from integrated_roll import integrated_roll
 from one_process import in_one_process
 
-from firmware_sim import report
+from firmware_sim import report_page as report
 from firmware_sim.bench import (
     BenchOptions,
     BenchResult,
@@ -20,7 +20,7 @@ from firmware_sim.bench import (
     window_s,
 )
 from firmware_sim.figures import figures, on_board
-from firmware_sim.report import write_report
+from firmware_sim.report_page import write_report
 from firmware_sim.report_tables import motion_table, on_board_table
 from firmware_sim.run import COLUMNS, RECORD_S, Run, run_lockstep
 from firmware_sim.scenario import Scenario

@@ -9,7 +9,7 @@ import yaml
 
 from firmware_sim.canopen_drive import CanopenPumpDrive, control_word
 from firmware_sim.fault_injection.bench_parts import Bench as Bench_
-from firmware_sim.fault_injection.faulty_node import FaultyNode
+from firmware_sim.fault_injection.bench_parts import FaultyNode
 from firmware_sim.fault_injection.nodes import Pump
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side

@@ -7,7 +7,7 @@ import yaml
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.waves import PassingWaves
-from tools.thesis.capsize.threshold import equilibria
+from tools.thesis.capsize import equilibria
 from utank_hil.configuration import ConfigError, Vessel, load_config
 from utank_hil.dynamics import RollModel
 

@@ -11,8 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tools.reference_recordings.cases import CASES, FAULTS, Case, record
-from tools.reference_recordings.comparison import DESIGN_BOUND, LOGS, compare
+from tools.reference_recordings.cases import (
+    CASES,
+    DESIGN_BOUND,
+    FAULTS,
+    LOGS,
+    Case,
+    compare,
+    record,
+)
 from utank_hil.assembly import build_law
 from utank_hil.canbus import (
     ControllerStatus,

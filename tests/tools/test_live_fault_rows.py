@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from tools.live_faults import rows
-from tools.live_faults.bench import LiveError
-from tools.live_faults.log import LiveLog, LiveTimes, times_of
+from tools.live_faults.bench import LiveError, LiveLog, LiveTimes, times_of
 from utank_hil.canbus import DriveState, Mode
 
 FAULT_S = 100.0

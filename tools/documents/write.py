@@ -5,13 +5,19 @@ python -m tools.documents.write [--check]
 
 import argparse
 import sys
-from types import ModuleType
+from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Final
 
-from tools.documents import catalogue, configuration, exit_codes, faults, registers
+from tools.documents import catalogue, configuration, tables
+from tools.documents.tables import DOCS, written_anew
 
-GENERATED: Final[tuple[ModuleType, ...]] = (catalogue, faults, exit_codes, configuration, registers)
-"""Each has a `PAGE` and, as `page()`, what it should hold."""
+TABLES: Final[dict[Path, Callable[[], Iterable[str]]]] = {
+    DOCS / "safety.md": tables.faults,
+    DOCS / "deployment.md": tables.exit_codes,
+    DOCS / "how-to" / "outward.md": tables.registers,
+}
+WHOLE: Final = {catalogue.PAGE: catalogue.page, configuration.PAGE: configuration.page}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -20,8 +26,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--check", action="store_true", help="write nothing; fail if one is stale")
     check = parser.parse_args(arguments).check
     stale = False
-    for each in GENERATED:
-        place, text = each.PAGE, each.page()
+    pages = {place: page() for place, page in WHOLE.items()}
+    pages |= {place: written_anew(place, lines()) for place, lines in TABLES.items()}
+    for place, text in pages.items():
         if place.exists() and place.read_text(encoding="utf-8") == text:
             continue
         if check:

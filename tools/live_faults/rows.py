@@ -16,8 +16,15 @@ from functools import partial
 from pathlib import Path
 from typing import Final, Literal
 
-from tools.live_faults.bench import Later, LiveBench, LiveError
-from tools.live_faults.log import HELD_UP_S, LiveTimes, Stream, times_of
+from tools.live_faults.bench import (
+    HELD_UP_S,
+    Later,
+    LiveBench,
+    LiveError,
+    LiveTimes,
+    Stream,
+    times_of,
+)
 
 STARTS: Final = 3
 """Most starts: a machine that delays processes may end a run before its fault is injected, the only

@@ -10,8 +10,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tools.reference_recordings.cases import CASES, Case, record
-from tools.reference_recordings.comparison import LOGS, compare
+from tools.reference_recordings.cases import CASES, LOGS, Case, compare, record
 
 
 def main() -> int:

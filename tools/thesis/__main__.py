@@ -66,7 +66,7 @@ def reproduce(
 
 def _make(entries: list[Entry], out: Path) -> tuple[dict[str, Figure], dict[str, float]]:
     """Make and draw each figure; how long each took."""
-    from tools.thesis.drawing import draw_figure
+    from tools.thesis.gallery import draw_figure
 
     made: dict[str, Figure] = {}
     seconds: dict[str, float] = {}

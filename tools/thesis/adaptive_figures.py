@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
-from tools.thesis.linear_contest import Entrant, radius, responses
+from tools.thesis.linear_contest import SAMPLE_TIME_S, Entrant, held_model, radius, responses
 from tools.thesis.loading_change import (
     NEW_LAW_S,
     NEW_PERIOD_S,
@@ -20,7 +20,6 @@ from tools.thesis.loading_change import (
     voyage,
     with_noise,
 )
-from tools.thesis.printed_laws import SAMPLE_TIME_S, held_model
 from tools.thesis.ships import AS_PRINTED, GREATER
 from utank_hil.analysis.loop.margins import margins
 from utank_hil.base.arrays import FloatArray

@@ -5,8 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from tools.thesis.capsize.contest import PATTI_B, WAVE_RAD_S
-from tools.thesis.capsize.threshold import capsize_threshold, without_tank
+from tools.thesis.capsize import PATTI_B, WAVE_RAD_S, capsize_threshold, without_tank
 from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
 from tools.thesis.patti_b import MIDDLE_NM, PASSIVE_NM, STRONG_NM, WEAK_NM
 from utank_hil.base.arrays import FloatArray

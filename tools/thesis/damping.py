@@ -6,8 +6,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from tools.thesis.batch import simulate_batch
-from tools.thesis.capsize.contest import PATTI_B, law_factory
-from tools.thesis.capsize.threshold import without_tank
+from tools.thesis.capsize import PATTI_B, law_factory, without_tank
 from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
 from tools.thesis.linear_contest import PASSIVE as PASSIVE_TANK
 from tools.thesis.linear_contest import PD, entrants, responses

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from tools.thesis.capsize.contest import PATTI_B, WAVE_RAD_S, law_factory
+from tools.thesis.capsize import PATTI_B, WAVE_RAD_S, law_factory
 from tools.thesis.figure import Check, Curve, Figure, Panel, Verdict
 from tools.thesis.patti_b import METHOD, MIDDLE_NM, ROBUST, SMALL_GAIN, Run, run_controller, told
 from utank_hil.base.arrays import FloatArray
@@ -16,7 +16,7 @@ from utank_hil.dynamics import WaveMoment
 DURATION_S: Final = 120.0
 _OPEN: Final = (
     "Gains of adaptation, leakage and starting values are not given. Varied: as in "
-    "`tools.thesis.capsize.contest`, from zero, twice as fast."
+    "`tools.thesis.capsize`, from zero, twice as fast."
 )
 
 

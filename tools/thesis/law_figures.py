@@ -9,28 +9,26 @@ import numpy as np
 
 from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
 from tools.thesis.linear_contest import (
+    DPC_BOTH,
+    DPC_ROLL,
+    GPC_BOTH,
+    GPC_ROLL,
     LQR,
     PASSIVE,
     PD,
+    PRINTED,
     ROLL_ONLY,
+    SAMPLE_TIME_S,
     WHOLE,
     Entrant,
     History,
     Response,
     entrants,
+    held_model,
     lqr_as_printed,
     radius,
     regular_wave_run,
     responses,
-)
-from tools.thesis.printed_laws import (
-    DPC_BOTH,
-    DPC_ROLL,
-    GPC_BOTH,
-    GPC_ROLL,
-    PRINTED,
-    SAMPLE_TIME_S,
-    held_model,
 )
 from tools.thesis.ships import AS_PRINTED, GREATER, ROLL_RAD_S
 from utank_hil.base.arrays import FloatArray

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tools.thesis.linear_contest import Entrant, radius
-from tools.thesis.printed_laws import SAMPLE_TIME_S, held_model
+from tools.thesis.linear_contest import SAMPLE_TIME_S, Entrant, held_model, radius
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
 from utank_hil.control.design_plant import PumpLimits

@@ -6,8 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from tools.thesis.capsize.contest import PATTI_B
-from tools.thesis.capsize.threshold import equilibria, safe_basin, without_tank
+from tools.thesis.capsize import PATTI_B, equilibria, safe_basin, without_tank
 from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics import RollModel, simulate

@@ -17,8 +17,7 @@ from typing import Final
 import numpy as np
 
 from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
-from tools.thesis.ships import ROLL_RAD_S, first_ship
-from tools.thesis.stimulation import tuned_tank
+from tools.thesis.ships import ROLL_RAD_S, first_ship, tuned_tank
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip

@@ -12,16 +12,21 @@ from tools.thesis.adaptive_figures import (
     figure_3_15,
 )
 from tools.thesis.capsize_amplitudes import figure_capsize
-from tools.thesis.contest_table import figure_contest
 from tools.thesis.damping import figure_damping
 from tools.thesis.figure import Figure
-from tools.thesis.friction_families import figure_2_3, figure_2_4, figure_2_5, figure_2_6
+from tools.thesis.friction_families import (
+    figure_2_3,
+    figure_2_4,
+    figure_2_5,
+    figure_2_6,
+    figure_3_1,
+)
 from tools.thesis.fuzzy_parameters import figure_4_12, figure_4_13, figure_4_16
-from tools.thesis.gains import figure_first_ship, figure_gains
+from tools.thesis.gains import figure_first_ship, figure_gains, figure_magnification
 from tools.thesis.law_figures import figure_3_6, figure_3_7, figure_3_8, figure_3_9, figure_3_10
-from tools.thesis.magnification import figure_magnification
 from tools.thesis.membership import figure_4_5
-from tools.thesis.optimum import figure_3_2, figure_3_3, figure_3_4
+from tools.thesis.optimum import figure_3_2, figure_3_3, figure_3_4, figure_tank_place
+from tools.thesis.patti_b import figure_contest
 from tools.thesis.phase_plane import figure_4_1, table_4_1
 from tools.thesis.pump_power import figure_2_7
 from tools.thesis.still_water import figure_2_8
@@ -35,8 +40,6 @@ from tools.thesis.survival_figures import (
     figure_4_14,
     figure_4_15,
 )
-from tools.thesis.tank_place import figure_tank_place
-from tools.thesis.wave_phases import figure_3_1
 
 
 @dataclass(frozen=True, slots=True)

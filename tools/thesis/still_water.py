@@ -6,10 +6,15 @@ from typing import Final
 
 import numpy as np
 
-from tools.thesis.capsize.threshold import without_tank
+from tools.thesis.capsize import without_tank
 from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
-from tools.thesis.ships import ROLL_RAD_S, first_ship
-from tools.thesis.stimulation import StimulatedRoll, stimulate_on_still_water, tuned_tank
+from tools.thesis.ships import (
+    ROLL_RAD_S,
+    StimulatedRoll,
+    first_ship,
+    stimulate_on_still_water,
+    tuned_tank,
+)
 from utank_hil.analysis.motion.decay import roll_decay
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.optimal_tank import ship_ratios

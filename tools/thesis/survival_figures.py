@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from tools.thesis.batch import simulate_batch
-from tools.thesis.capsize.contest import PATTI_B, WAVE_RAD_S, contest
+from tools.thesis.capsize import PATTI_B, WAVE_RAD_S, contest
 from tools.thesis.figure import Check, Curve, Figure, Panel, Verdict
 from tools.thesis.patti_b import (
     LINEARIZED,

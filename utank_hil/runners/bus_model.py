@@ -4,7 +4,7 @@ Modelled: bit rate, arbitration by identifier, non-preemptive transmission, bit 
 intermission. Every queued frame of every node takes part in every arbitration, as in a CAN
 controller with one mailbox per message; frames of equal identifier in queueing order. Not modelled:
 limits of queues, collisions of two nodes that send the same identifier. Errors and retransmission
-are those of `firmware_sim.fault_injection.faulty_bus`.
+are those of `firmware_sim.fault_injection.bench_parts`.
 """
 
 from heapq import heappop, heappush

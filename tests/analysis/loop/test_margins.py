@@ -6,7 +6,7 @@ import control
 import numpy as np
 import pytest
 
-from tools.thesis.printed_laws import PRINTED_ARX
+from tools.thesis.linear_contest import PRINTED_ARX
 from utank_hil.analysis.loop.closed_loop import closed_loop_radius
 from utank_hil.analysis.loop.margins import loop_response, margins, radius_and_peak, stability_grid
 from utank_hil.control import ARX, PredictiveLaw, design_dpc, design_gpc, pump_model

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from others import others_file
 
-from tools.thesis.capsize.threshold import without_tank
+from tools.thesis.capsize import without_tank
 from utank_hil.analysis.motion.decay import roll_decay
 from utank_hil.dynamics import RollModel, RollShip, Tank, simulate
 

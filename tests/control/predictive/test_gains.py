@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tools.thesis.printed_laws import DPC_ROLL, GPC_ROLL, PRINTED, PRINTED_ARX
+from tools.thesis.linear_contest import DPC_ROLL, GPC_ROLL, PRINTED, PRINTED_ARX
 from utank_hil.control import ARX, design_dpc, design_gpc
 from utank_hil.control.predictive.gains import predict
 

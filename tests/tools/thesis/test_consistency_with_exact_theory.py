@@ -8,7 +8,7 @@ import pytest
 
 from tools.thesis import pump_power
 from tools.thesis.adaptive_figures import OWN_WAVE, _pair, dpc_both
-from tools.thesis.capsize.contest import PATTI_B, WAVE_RAD_S
+from tools.thesis.capsize import PATTI_B, WAVE_RAD_S
 from tools.thesis.damping import START_RAD, _damping
 from tools.thesis.fuzzy_parameters import _settled_s
 from tools.thesis.linear_contest import PASSIVE, entrants, regular_wave_run, responses

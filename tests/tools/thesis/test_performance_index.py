@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tools.thesis.printed_laws import (
+from tools.thesis.linear_contest import (
     DPC_BOTH,
     FREQUENCY_RATIOS,
     PRINTED,

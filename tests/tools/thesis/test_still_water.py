@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tools.thesis.stimulation import stimulate_on_still_water, tuned_tank
+from tools.thesis.ships import stimulate_on_still_water, tuned_tank
 from utank_hil.dynamics import RollModel, RollShip, Tank
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as Canvas
 
-from tools.thesis.drawing import draw_figure
 from tools.thesis.figure import Curve, Figure, Panel
+from tools.thesis.gallery import draw_figure
 
 X = np.linspace(0, 100, 2001)
 LONG = tuple(Curve(f"a law with a name of {n} words", X, np.sin(X / (n + 1))) for n in range(4))

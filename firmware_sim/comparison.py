@@ -1,6 +1,8 @@
-"""Comparison of recorded runs by batch means."""
+"""Differences of means, paired or independent: of campaigns by case, of recordings by batch."""
 
 import json
+import math
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,21 +10,154 @@ from typing import Any, Final
 
 import numpy as np
 
-from firmware_sim.comparison.difference import (
-    CompareError,
-    Comparison,
-    Difference,
-    differing,
-    independent,
-    paired,
-    same_runs,
-)
+from firmware_sim.campaign.store import METRICS, Results, read_results
+from firmware_sim.campaign.summary import Group, groups_of
 from firmware_sim.plant_kernel import CAPSIZE_RAD
-from utank_hil.analysis.motion.statistics import batch_means, rms_batches
+from utank_hil.analysis.motion.statistics import batch_means, mean_interval, rms_batches
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Mode
 from utank_hil.telemetry.recording import read_about
 from utank_hil.telemetry.signal_files import read_signals, require
+
+
+class CompareError(ValueError):
+    """Error for inputs that cannot be compared; the message contains reason and remedy."""
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """Figure of one run beside that of another."""
+
+    reference: float
+    value: float
+    difference: float  #: `value` minus `reference`.
+    #: Half width of the difference's 95 % confidence interval; None with too few values.
+    half_width: float | None
+    count: int  #: Number of pairs, or of values on the smaller side.
+    paired: bool  #: Whether both sides met the same waves.
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Run beside the reference run of the same name."""
+
+    source: str  #: Origin of the run.
+    run: str
+    parameters: dict[str, Any]
+    figures: dict[str, Difference]
+    remarks: tuple[str, ...] = ()  #: Remarks on the validity of the comparison.
+
+
+def paired(reference: FloatArray, values: FloatArray) -> Difference:
+    """Difference of values paired by index, shape (n,)."""
+    width = mean_interval(values - reference).half_width if len(values) > 1 else None
+    return _difference(reference, values, width, paired=True)
+
+
+def independent(reference: FloatArray, values: FloatArray) -> Difference:
+    """Difference of the means of independent values, shapes (n,) and (m,): Welch's interval."""
+    count = min(len(reference), len(values))
+    if count < 2:
+        return _difference(reference, values, None, paired=False)
+    from scipy.stats import ttest_ind
+
+    if np.ptp(reference) == 0 == np.ptp(values):
+        return _difference(reference, values, 0.0, paired=False)
+    interval = ttest_ind(values, reference, equal_var=False).confidence_interval(0.95)
+    width = float(interval.high - interval.low) / 2
+    return _difference(reference, values, width, paired=False)
+
+
+def _difference(
+    reference: FloatArray, values: FloatArray, half_width: float | None, *, paired: bool
+) -> Difference:
+    first, second = float(np.mean(reference)), float(np.mean(values))
+    count = min(len(reference), len(values))
+    return Difference(first, second, second - first, half_width, count, paired)
+
+
+def same_runs(reference: Sequence[str], other: Sequence[str], source: str) -> list[str]:
+    """Names that both have; raise `CompareError` if there are none."""
+    common = [name for name in reference if name in other]
+    if not common:
+        raise CompareError(
+            f"{source}: has the runs {', '.join(other)}; the reference has {', '.join(reference)}: "
+            "none of one name"
+        )
+    return common
+
+
+def differing(reference: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[str, ...]:
+    """Differences in code and simulation, which are not the subject of the comparison."""
+    remarks = []
+    for key, words in (("simulation", "kinds of simulation"), ("code", "versions of the program")):
+        if reference.get(key) != other.get(key):
+            remarks.append(f"different {words}: {reference.get(key)} and {other.get(key)}")
+    return tuple(remarks)
+
+
+_Figures = dict[str, dict[str, float]]  # Metrics by the waves of a case.
+
+
+def compare_campaigns(reference: Path, others: list[Path]) -> list[Comparison]:
+    """Compare campaigns with the first one, group by group and run by run.
+
+    Raises `CompareError` if the campaigns vary different keys, or share no group or no run.
+    """
+    first = read_results(reference)
+    return [each for other in others for each in _campaigns_compared(first, other)]
+
+
+def _campaigns_compared(first: Results, path: Path) -> list[Comparison]:
+    second = read_results(path)
+    if set(first.keys) != set(second.keys):
+        here, there = (", ".join(each.keys) or "nothing" for each in (second, first))
+        raise CompareError(
+            f"{path}: varies {here}, the reference {there}: only like can be compared"
+        )
+    remarks = differing(
+        *({**each.about, **each.about["configuration"]} for each in (first, second))
+    )
+    groups = {_key(group): group for group in groups_of(second)}
+    shared = [group for group in groups_of(first) if _key(group) in groups]
+    if not shared:
+        raise CompareError(f"{path}: has no value of {', '.join(first.keys)} in common")
+    waves = [{case["case"]: case["waves"] for case in each.cases} for each in (first, second)]
+    found = []
+    for group in shared:
+        other = groups[_key(group)]
+        for run in same_runs(group.runs, other.runs, str(path)):
+            one, two = _of_run(group, run, waves[0]), _of_run(other, run, waves[1])
+            figures = {
+                metric: difference
+                for metric in METRICS
+                if (difference := _of_metric(one, two, metric)) is not None
+            }
+            found.append(Comparison(str(path), run, group.parameters, figures, remarks))
+    return found
+
+
+def _key(group: Group) -> tuple[tuple[str, Any], ...]:
+    return tuple(sorted(group.parameters.items()))
+
+
+def _of_run(group: Group, run: str, waves: dict[str, str]) -> _Figures:
+    return {waves[row["case"]]: row for row in group.of_run(run) if not row["mark"]}
+
+
+def _of_metric(one: _Figures, two: _Figures, metric: str) -> Difference | None:
+    """Difference of a metric; None where one side lacks it."""
+    values = [
+        {waves: row[metric] for waves, row in each.items() if not math.isnan(row[metric])}
+        for each in (one, two)
+    ]
+    if not all(values):
+        return None
+    common = [waves for waves in values[0] if waves in values[1]]
+    if common:
+        return paired(*(np.array([each[waves] for waves in common]) for each in values))
+    return independent(*(np.array(list(each.values())) for each in values))
+
 
 BATCH_PERIODS: Final = 40
 """Batch length in mean roll periods: after it a lightly damped ship has no memory.
@@ -105,10 +240,10 @@ def compare_records(reference: Path, others: list[Path]) -> list[Comparison]:
     `ValueError` if a file is not a recording.
     """
     first = read_record(reference)
-    return [each for other in others for each in _compared(first, read_record(other))]
+    return [each for other in others for each in _records_compared(first, read_record(other))]
 
 
-def _compared(first: Record, second: Record) -> list[Comparison]:
+def _records_compared(first: Record, second: Record) -> list[Comparison]:
     found = []
     together = first.waves is not None and first.waves == second.waves
     if len(first.runs) == len(second.runs) == 1:  # a log has no names of runs

@@ -5,9 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from tools.thesis.capsize.contest import LAWS, PATTI_B, WAVE_RAD_S, contest
-from tools.thesis.capsize.survival import controlled_run, largest_survivable_wave
-from tools.thesis.capsize.threshold import capsize_threshold
+from tools.thesis.capsize import (
+    LAWS,
+    PATTI_B,
+    WAVE_RAD_S,
+    capsize_threshold,
+    contest,
+    controlled_run,
+    largest_survivable_wave,
+)
 from utank_hil.control import CommandLimiter, PassiveController, PumpLimits
 from utank_hil.dynamics import WaveMoment, simulate
 

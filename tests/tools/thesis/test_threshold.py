@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tools.thesis.capsize.threshold import (
+from tools.thesis.capsize import (
     capsize_threshold,
     equilibria,
     safe_basin,

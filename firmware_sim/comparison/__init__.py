@@ -1,1 +1,0 @@
-"""Comparison of campaigns or recorded runs, with confidence intervals."""
