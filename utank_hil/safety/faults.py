@@ -96,517 +96,251 @@ def _found(
     )
 
 
+_STOP, _RAMP, _HALVE, _REFUSE, _GIVE_UP, _WARN = Reaction
 # Of the conditions with the same reaction, the first that holds names the fault.
 FAULTS: Final = (
-    _row(
-        Fault.HARDWIRED_STOP,
-        "The hard-wired stop was pressed, or its loop is broken.",
-        "Release the stop; if none is pressed, look for the break in the loop.",
-        Condition(
-            Reaction.STOP,
-            "the stop loop is open, broken or not available, in any intact frame",
-            lambda seen, _: seen.measured.hardwired_stop,
-            ends_passive=True,
-        ),
-    ),
-    _row(
-        Fault.HARDWIRED_SILENT,
-        "The node of the hard-wired stop and high-level switches is not heard.",
-        "Check the node's supply and bus connection, and the quality in HARDWIRED_INPUTS.",
-        Condition(
-            Reaction.STOP,
-            "last good frame older than {hardwired_age_ms:g} ms",
-            lambda seen, limits: seen.measured.hardwired_age_ms > limits.hardwired_age_ms,
-            awaited=9,
-        ),
-    ),
-    _row(
-        Fault.BUS_LOST,
-        "The CAN bus could not be read or written.",
-        "Check the interface (ip -details link show), the cable and the termination.",
-        Condition(
-            Reaction.STOP,
-            "error on sending or receiving within the last command cycle",
-            lambda seen, _: seen.measured.link_lost,
-            awaited=1,
-        ),
-    ),
-    _row(
-        Fault.ADDRESS_CONFLICT,
-        "Another node sends with the controller's address.",
-        f"Stop the second sender of identifiers that end in {Address.CONTROLLER:X}, which may also "
-        "be a test tool; then wait for ten seconds.",
-        Condition(
-            Reaction.STOP,
-            "an identifier of the controller was received within 10 s, whatever came with it",
-            lambda seen, _: seen.measured.address_conflict,
-            awaited=2,
-        ),
-    ),
-    _row(
-        Fault.VERSION_MISMATCH,
-        "A node runs another message catalogue or another ship configuration.",
-        "Compare the versions in the heartbeats; give all nodes the same catalogue and ship file.",
-        Condition(
-            Reaction.STOP,
-            "a version in the heartbeats of drive, sensors, valve or hard-wired inputs differs, or "
-            "none was received for 5 s",
-            lambda seen, _: not seen.measured.versions_match,
-            awaited=8,
-        ),
-        Condition(
-            Reaction.RAMP,
-            "a version in the panel's heartbeat differs, or none was received",
-            lambda seen, _: not seen.measured.panel_matches,
-        ),
-    ),
-    _row(
-        Fault.DRIVE_FAULT,
-        "The pump drive reports a fault, is not in operation enabled, or can't be switched off.",
-        "Read the drive's fault in DRIVE_STATUS_2 and remove its cause. If it can't be switched "
-        "off, cut its power (hard-wired stop, main switch).",
-        Condition(
-            Reaction.STOP,
-            "drive reports a fault",
-            lambda seen, _: seen.measured.drive_fault,
-        ),
-        Condition(
-            Reaction.STOP,
-            "drive out of operation enabled for over {drive_enabled_within_ms:g} ms, or from its "
-            "third departure on (the count falls by one each second)",
-            lambda seen, limits: seen.drive_out_ms > limits.drive_enabled_within_ms,
-            of_drive_that_should_be_on=True,
-        ),
-        Condition(
-            Reaction.STOP,
-            "still in operation, or braking, 0.2 s after *disable voltage*",
-            lambda seen, _: seen.own.drive_stays_on,
-        ),
-        Condition(
-            Reaction.GIVE_UP,
-            "not in operation enabled within {arming_timeout_ms:g} ms of arming",
-            lambda seen, limits: seen.arming_ms > limits.arming_timeout_ms,
-        ),
-    ),
-    _row(
-        Fault.DRIVE_SILENT,
-        "The pump drive sends no status, or does not receive the commands in time.",
-        "Check the drive's supply and bus connection. If DRIVE_STATUS_1 arrives but its command "
-        "echo stands still, the drive does not accept PUMP_CMD; if it is behind, look for what "
-        "holds frames up, a gateway for example.",
-        Condition(
-            Reaction.STOP,
-            "status older than {drive_age_ms:g} ms, or DRIVE_STATUS_2 never heard; no new command "
-            "echo, at most three commands behind, for over {echo_age_ms:g} ms",
-            lambda seen, limits: (
-                seen.measured.drive_age_ms > limits.drive_age_ms
-                or seen.own.echo_age_ms > limits.echo_age_ms
-            ),
-            awaited=6,
-        ),
-    ),
-    _row(
-        Fault.NODE_SILENT,
-        "A device on the bus sends no heartbeat, or the drive no DRIVE_STATUS_2.",
-        "Find the identifier that is missing on the bus (candump), and in docs/can-catalogue.md "
-        "whose it is; check that device's supply, bus connection and firmware.",
-        _found(
-            Reaction.HALVE,
-            "DRIVE_STATUS_2, or a heartbeat of drive, sensors, valve or hard-wired inputs, silent "
-            "for 1 s",
-            Finding.NODE_SILENT,
-        ),
-    ),
-    _row(
-        Fault.VALVE_SILENT,
-        "The tank's valve sends no status, or does not receive the commands in time.",
-        "Check the valve's supply and bus connection. If VALVE_STATUS arrives but its command echo "
-        "stands still, the valve does not accept VALVE_CMD; if it is behind, look for what holds "
-        "frames up, a gateway for example.",
-        Condition(
-            Reaction.STOP,
-            "status older than {valve_age_ms:g} ms, or no new command echo, at most three commands "
-            "behind, for over {valve_echo_age_ms:g} ms",
-            lambda seen, limits: (
-                seen.own.valve.age_ms > limits.valve_age_ms
-                or seen.own.valve.echo_age_ms > limits.valve_echo_age_ms
-            ),
-            awaited=7,
-        ),
-    ),
-    _row(
-        Fault.VALVE_FAULT,
-        "The tank's valve reports a fault, or does not follow.",
-        "Read the valve's fault in VALVE_STATUS and remove its cause.",
-        Condition(
-            Reaction.STOP,
-            "valve reports a fault, or is not following for over {valve_follows_within_ms:g} ms",
-            lambda seen, limits: (
-                seen.own.valve.fault or seen.own.valve.out_ms > limits.valve_follows_within_ms
-            ),
-        ),
-    ),
-    _row(
-        Fault.VALVE_NOT_FOLLOWING,
-        "The tank's valve is not where it was commanded to be.",
-        "Look for what blocks the valve; compare its time from shut to open with the ship file.",
-        Condition(
-            Reaction.STOP,
-            f"more than {VALVE_OFF:.0%} of its way off for over {{valve_off_within_ms:g}} ms",
-            lambda seen, limits: seen.own.valve.off_ms > limits.valve_off_within_ms,
-        ),
-    ),
-    _row(
-        Fault.INTERNAL,
-        "The control law raised an error, or gave no finite pressure.",
-        "Report it with the recording and the configuration; use another law until it is mended.",
-        Condition(
-            Reaction.STOP,
-            "the law raises, or its answer is not finite",
-            lambda seen, _: seen.own.law_failed,
-        ),
-    ),
-    _row(
-        Fault.LEVEL_LIMIT,
-        "The water in a reservoir is too high, or a high-level switch is broken.",
-        "If the water was low, check the switches and their wiring; if it was high, lower "
-        "limits.level_m or limits.pressure_pa.",
-        Condition(
-            Reaction.STOP,
-            "a high-level switch is closed, broken or not available",
-            lambda seen, _: seen.measured.high_level,
-        ),
-        law_limit="level_m",
-    ),
-    _row(
-        Fault.BUS_OVERLOAD,
-        "The CAN bus is nearly full.",
-        "Find the node that sends too much (candump) and stop it.",
-        Condition(
-            Reaction.STOP,
-            "over {bus_load_limit:.0%} of the bus in use over a second",
-            lambda seen, limits: seen.bus_load > limits.bus_load_limit,
-        ),
-    ),
-    _row(
-        Fault.SIGN_FLIP,
-        "The pump presses against its command, or its pressure is measured with the wrong sign.",
-        "Check the pump's direction of rotation and the sign of the pressure sensor.",
-        _found(
-            Reaction.STOP,
-            "measured pressure against the command for 200 ms, or against the water's motion",
-            Finding.PUMP_SIGN,
-            ends_passive=True,
-        ),
-    ),
-    _row(
-        Fault.MOTION_SIGN_FLIP,
-        "Roll and its rate, or the levels, are measured with the wrong sign, or are swapped.",
-        "Check how motion sensor and level gauges are mounted and connected: roll is positive "
-        "starboard down.",
-        _found(
-            Reaction.STOP,
-            "the water against roll and pressure",
-            Finding.WATER_SIGN,
-        ),
-    ),
-    _row(
-        Fault.FOREIGN_SENDER,
-        "A message comes faster than its cycle: two nodes send it, or its counter skips.",
-        "Find the second sender of the identifier (candump) and stop it.",
-        _found(
-            Reaction.STOP,
-            "frames heard and lost by the counter over 1.25 a cycle, eight too many",
-            Finding.SECOND_SENDER,
-        ),
-        Condition(
-            Reaction.STOP,
-            "the address of another node was claimed under another name in the last 10 s",
-            lambda seen, _: seen.measured.claimed_twice,
-        ),
-    ),
-    _row(
-        Fault.UNKNOWN_IDENTIFIERS,
-        "Frames that are not in the catalogue take up the CAN bus.",
-        "Find the node that sends them (candump) and stop it.",
-        _found(
-            Reaction.STOP,
-            "over 10% of the bus in use by identifiers that are not in the catalogue",
-            Finding.FLOOD,
-        ),
-    ),
-    _row(
-        Fault.MOTION_SILENT,
-        "No usable measurement comes from the motion sensor.",
-        "Check the sensor's supply and bus connection, and what SENSOR_MOTION carries: its "
-        "quality, and values that jump, which are discarded.",
-        Condition(
-            Reaction.RAMP,
-            "last good sample older than {motion_age_ms:g} ms",
-            lambda seen, limits: seen.motion.age_ms > limits.motion_age_ms,
-            zero_within_ms=200,  # 250 after the sample, whose first 40 ms of age are allowed
-            awaited=3,
-        ),
-        Condition(
-            Reaction.HALVE,
-            "one of two motion sensors: last good sample older than {motion_spare_age_ms:g} ms",
-            lambda seen, limits: seen.motion_spare_age_ms > limits.motion_spare_age_ms,
-        ),
-    ),
-    _row(
-        Fault.SENSORS_DISAGREE,
-        "The two motion sensors disagree.",
-        "Compare both with the horizon and a plumb line; mend or replace the one that is wrong.",
-        _found(
-            Reaction.RAMP,
-            "roll apart by half a degree for 0.3 s, or their rates by as much at 2 w0",
-            Finding.SENSORS_DISAGREE,
-        ),
-    ),
-    _row(
-        Fault.TANK_SILENT,
-        "No usable measurement comes from the tank's level gauges.",
-        "Check the gauges' supply and bus connection, and the quality that SENSOR_TANK carries.",
-        Condition(
-            Reaction.HALVE,
-            "last good sample older than {tank_degraded_age_ms:g} ms",
-            lambda seen, limits: seen.measured.tank_age_ms > limits.tank_degraded_age_ms,
-            awaited=4,
-        ),
-        Condition(
-            Reaction.RAMP,
-            "last good sample older than {tank_age_ms:g} ms",
-            lambda seen, limits: seen.measured.tank_age_ms > limits.tank_age_ms,
-        ),
-    ),
-    _row(
-        Fault.PUMP_SENSOR_SILENT,
-        "No usable measurement comes from the pump's pressure sensor.",
-        "Check the sensor's supply and bus connection, and the quality that SENSOR_PUMP carries.",
-        Condition(
-            Reaction.HALVE,
-            "last good sample older than {pump_degraded_age_ms:g} ms",
-            lambda seen, limits: seen.measured.pump_age_ms > limits.pump_degraded_age_ms,
-        ),
-        Condition(
-            Reaction.RAMP,
-            "last good sample older than {pump_age_ms:g} ms",
-            lambda seen, limits: seen.measured.pump_age_ms > limits.pump_age_ms,
-            awaited=5,
-        ),
-    ),
-    _row(
-        Fault.PROTECTION,
-        "Messages of a sensor, drive, valve or panel keep arriving damaged or out of order.",
-        "Look for a second sender of their identifiers, a node that protects them wrongly, and "
-        "disturbance on the cable.",
-        Condition(
-            Reaction.RAMP,
-            f"leaky bucket of rejected frames at {BUCKET_LIMIT}",
-            lambda seen, _: not (seen.motion.valid and seen.measured.protection_valid),
-        ),
-        _found(Reaction.RAMP, "three frames a second with a wrong CRC or data ID", Finding.DAMAGED),
-    ),
-    _row(
-        Fault.STUCK_SIGNAL,
-        "The roll or the level stands still although the water is pushed.",
-        "Check the motion sensor, the level gauges and whatever passes their messages on.",
-        _found(
-            Reaction.RAMP,
-            "roll still while the water moves, or level still while it is pushed",
-            Finding.ROLL_STUCK | Finding.LEVEL_STUCK,
-        ),
-    ),
-    _row(
-        Fault.DRIFT,
-        "Roll and integrated roll rate do not agree.",
-        "Check the motion sensor: sign of each, a signal that stands still, alignment, bias of the "
-        "gyroscope, filter of the roll.",
-        _found(
-            Reaction.HALVE, "roll off the integrated rate by six times its noise", Finding.DRIFT
-        ),
-        _found(Reaction.RAMP, "the same for 30 s, or four times as far", Finding.DRIFT_LASTS),
-    ),
-    _row(
-        Fault.VOLUME,
-        "The port and starboard levels do not add up to the water in the tank.",
-        "Check the level gauges, then the tank for a leak or a wrong filling.",
-        _found(
-            Reaction.HALVE,
-            "mean of both levels off zero by 1.5% of the still-water height",
-            Finding.VOLUME,
-        ),
-        _found(Reaction.RAMP, "the same for 30 s, or three times as far", Finding.VOLUME_LASTS),
-    ),
-    _row(
-        Fault.SPIKES,
-        "Samples of motion sensor or level gauges had to be discarded again and again.",
-        "Check the sensors' cables and supply.",
-        _found(Reaction.RAMP, "five spikes (the count falls by one each second)", Finding.SPIKES),
-    ),
-    _row(
-        Fault.NOISE,
-        "The motion sensor or a level gauge is noisier than its figures.",
-        "Check the sensor's fastening, cable and supply, and the section `sensors` of the "
-        "configuration.",
-        _found(
-            Reaction.HALVE,
-            "five times the noise of the section `sensors`, 3.75 times in the sum of the levels, "
-            "over 0.7 s",
-            Finding.NOISE,
-        ),
-    ),
-    _row(
-        Fault.SIGNAL_DELAYED,
-        "The water moves before the measured roll does: the motion sensor is late.",
-        "Check the motion sensor's filter and whatever passes its messages on.",
-        _found(Reaction.RAMP, "roll late by a thirtieth of the roll period", Finding.MOTION_LATE),
-    ),
-    _row(
-        Fault.DRIVE_NOT_FOLLOWING,
-        "The pump's pressure does not follow the command, or the pump presses though it is off.",
-        "If the pump presses though it is off, cut its power (hard-wired stop, main switch). Check "
-        "the pump for blockage, the drive for limits and local operation, and the pressure sensor.",
-        _found(
-            Reaction.STOP,
-            "15% of the pressure limit off for 500 ms; drive off: and 2 kPa per m of level",
-            Finding.DRIVE_LOST,
-            ends_passive=True,
-        ),
-        _found(Reaction.RAMP, "the same for 300 ms", Finding.DRIVE_LAGS),
-    ),
-    _row(
-        Fault.SATURATION,
-        "The pump has been held at its limit on one side.",
-        "Correct a steady heel by ballast; lower the law's gains if the sea asks for more than the "
-        "pump has.",
-        _found(
-            Reaction.HALVE,
-            "command at its limit to one side, or drive at one of its own, for 10 s",
-            Finding.SATURATED,
-        ),
-    ),
-    _row(
-        Fault.ROLL_AMPLIFIED,
-        "The ship rolls more than it would with the pump at rest.",
-        "Retune the law, or use one for this load and sea.",
-        _found(
-            Reaction.RAMP,
-            "roll over 1.25 times the passive twin's for a quarter of a roll period, over 1.1 "
-            "times in twelve roll periods, with a valve a tenth more, and over 0.5 degrees RMS",
-            Finding.ROLL_AMPLIFIED,
-        ),
-    ),
-    _row(
-        Fault.HEEL_LIMIT,
-        "The ship rolls or heels beyond the limit for active control.",
-        "Wait until the roll is small; correct the heel by ballast; check the motion sensor.",
-        Condition(
-            Reaction.RAMP,
-            "roll over {roll_limit_rad:g} rad, or its mean over a minute over "
-            "{heel_limit_rad:g} rad",
-            lambda seen, limits: (
-                abs(seen.motion.roll_rad) > limits.roll_limit_rad
-                or abs(seen.heel_rad) > limits.heel_limit_rad
-            ),
-        ),
-        Condition(  # a ship that rolls through upright is upright twice in a period
-            Reaction.REFUSE,
-            f"roll over {{roll_limit_rad:g}} rad within the last {ROLL_CALM_S} s",
-            lambda seen, _: seen.rolled_over_ms < 1e3 * ROLL_CALM_S,
-        ),
-        law_limit="roll_rad",
-    ),
-    _row(
-        Fault.STABILITY_LOW,
-        "The ship's metacentric height may be below the limit of its stability booklet, or no "
-        "estimates of it come any more: the panel shows no GM then.",
-        "Compare with the loading computer; take on ballast or remove weight from above. Without "
-        "estimates (the log has the reason) start the controller again when that can be done.",
-        Condition(
-            Reaction.WARN,
-            "interval of the estimated GM, two standard deviations, reaches below the vessel's "
-            "least_gm_m, or no estimate for three intervals",
-            lambda seen, _: seen.own.gm_low,
-        ),
-    ),
-    _row(
-        Fault.DRIVE_WARNING,
-        "The pump drive warns: it may soon trip or not hold the pressure.",
-        "Read the warning bits in DRIVE_STATUS_2. Temperature: cooling, load. Voltage: supply. "
-        "Command: bus, its cable and load. Sensor: the drive's pressure feedback.",
-        Condition(
-            Reaction.WARN,
-            "a warning bit in the last DRIVE_STATUS_2",
-            lambda seen, _: seen.measured.drive_warns,
-        ),
-    ),
-    _row(
-        Fault.BUS_DEGRADED,
-        "Frames are lost on the CAN bus, a node sends too seldom, or a measurement has gaps.",
-        "Check the cable, its plugs and termination, gateways between the nodes, the load, and "
-        "the nodes' cycle times.",
-        _found(
-            Reaction.WARN,
-            "over 0.1% of a message's frames missing by its counter, or in bursts of a message of "
-            "25 ms or less, five too many; or under 0.75 a cycle for 2 s",
-            Finding.FRAMES_LOST,
-        ),
-        _found(
-            Reaction.HALVE,
-            "gaps of motion, levels or pressure, or a level over 0.9 of the tank, have kept the "
-            "tank's equation from judging for a roll period",
-            Finding.UNWATCHED,
-        ),
-        _found(Reaction.RAMP, "the same for three roll periods", Finding.UNWATCHED_LONG),
-    ),
-    _row(
-        Fault.OVERRUN,
-        "The controller's loop ran too late.",
-        "Stop other work on the computer and give the controller real-time scheduling.",
-        Condition(
-            Reaction.STOP,
-            "a tick {long_overrun_ms:g} ms late or more",
-            # counted in whole ticks: what is 50 here was up to 60
-            lambda seen, limits: seen.tick_late_ms >= limits.long_overrun_ms,
-        ),
-        Condition(
-            Reaction.RAMP,
-            "{overruns_in_ten} of the last ten ticks late; one that comes after the time of the "
-            "next counts for that, too",
-            lambda seen, limits: (
-                limits.overruns_in_ten is not None
-                and seen.overruns_in_ten >= limits.overruns_in_ten
-            ),
-        ),
-        Condition(Reaction.WARN, "one of them", lambda seen, _: seen.overruns_in_ten > 0),
-    ),
-    _row(
-        Fault.NOT_COMMISSIONED,
-        "No commissioning was passed with this configuration: signs and scales are not known.",
-        "Run utank-hil commission with this controller's file at the quay.",
-        Condition(
-            Reaction.REFUSE,
-            "no record of a passed commissioning with this vessel and these sensors",
-            lambda seen, _: not seen.own.commissioned,
-        ),
-    ),
-    _row(
-        Fault.OPERATOR_SILENT,
-        "The operator's panel is not heard.",
-        "Check that the panel runs and is connected to the bus.",
-        Condition(
-            Reaction.REFUSE,
-            "order or heartbeat silent for over {panel_age_to_arm_ms:g} ms",
-            lambda seen, limits: seen.measured.panel_age_ms > limits.panel_age_to_arm_ms,
-        ),
-        Condition(
-            Reaction.RAMP,
-            "order or heartbeat silent for over {panel_age_armed_ms:g} ms",
-            lambda seen, limits: seen.measured.panel_age_ms > limits.panel_age_armed_ms,
-        ),
-    ),
-)
+    _row(Fault.HARDWIRED_STOP, "The hard-wired stop was pressed, or its loop is broken.",
+         "Release the stop; if none is pressed, look for the break in the loop.",
+         Condition(_STOP, "the stop loop is open, broken or not available, in any intact frame",
+             lambda seen, _: seen.measured.hardwired_stop, ends_passive=True)),
+    _row(Fault.HARDWIRED_SILENT, "The node of the hard-wired stop and high-level switches is not "
+         "heard.",
+         "Check the node's supply and bus connection, and the quality in HARDWIRED_INPUTS.",
+         Condition(_STOP, "last good frame older than {hardwired_age_ms:g} ms",
+             lambda seen, limits: seen.measured.hardwired_age_ms > limits.hardwired_age_ms,
+             awaited=9)),
+    _row(Fault.BUS_LOST, "The CAN bus could not be read or written.",
+         "Check the interface (ip -details link show), the cable and the termination.",
+         Condition(_STOP, "error on sending or receiving within the last command cycle",
+             lambda seen, _: seen.measured.link_lost, awaited=1)),
+    _row(Fault.ADDRESS_CONFLICT, "Another node sends with the controller's address.",
+         f"Stop the second sender of identifiers that end in {Address.CONTROLLER:X}, which may "
+         "also be a test tool; then wait for ten seconds.",
+         Condition(_STOP, "an identifier of the controller was received within 10 s, whatever came "
+             "with it", lambda seen, _: seen.measured.address_conflict, awaited=2)),
+    _row(Fault.VERSION_MISMATCH, "A node runs another message catalogue or another ship "
+         "configuration.",
+         "Compare the versions in the heartbeats; give all nodes the same catalogue and ship file.",
+         Condition(_STOP, "a version in the heartbeats of drive, sensors, valve or hard-wired "
+             "inputs differs, or none was received for 5 s",
+             lambda seen, _: not seen.measured.versions_match, awaited=8),
+         Condition(_RAMP, "a version in the panel's heartbeat differs, or none was received",
+             lambda seen, _: not seen.measured.panel_matches)),
+    _row(Fault.DRIVE_FAULT, "The pump drive reports a fault, is not in operation enabled, or can't "
+         "be switched off.",
+         "Read the drive's fault in DRIVE_STATUS_2 and remove its cause. If it can't be switched "
+         "off, cut its power (hard-wired stop, main switch).",
+         Condition(_STOP, "drive reports a fault", lambda seen, _: seen.measured.drive_fault),
+         Condition(_STOP, "drive out of operation enabled for over {drive_enabled_within_ms:g} ms, "
+             "or from its third departure on (the count falls by one each second)",
+             lambda seen, limits: seen.drive_out_ms > limits.drive_enabled_within_ms,
+             of_drive_that_should_be_on=True),
+         Condition(_STOP, "still in operation, or braking, 0.2 s after *disable voltage*",
+             lambda seen, _: seen.own.drive_stays_on),
+         Condition(_GIVE_UP, "not in operation enabled within {arming_timeout_ms:g} ms of arming",
+             lambda seen, limits: seen.arming_ms > limits.arming_timeout_ms)),
+    _row(Fault.DRIVE_SILENT, "The pump drive sends no status, or does not receive the commands in "
+         "time.",
+         "Check the drive's supply and bus connection. If DRIVE_STATUS_1 arrives but its command "
+         "echo stands still, the drive does not accept PUMP_CMD; if it is behind, look for what "
+         "holds frames up, a gateway for example.",
+         Condition(_STOP, "status older than {drive_age_ms:g} ms, or DRIVE_STATUS_2 never heard; "
+             "no new command echo, at most three commands behind, for over {echo_age_ms:g} ms",
+             lambda seen, limits: (seen.measured.drive_age_ms > limits.drive_age_ms
+             or seen.own.echo_age_ms > limits.echo_age_ms), awaited=6)),
+    _row(Fault.NODE_SILENT, "A device on the bus sends no heartbeat, or the drive no "
+         "DRIVE_STATUS_2.",
+         "Find the identifier that is missing on the bus (candump), and in docs/can-catalogue.md "
+         "whose it is; check that device's supply, bus connection and firmware.",
+         _found(_HALVE, "DRIVE_STATUS_2, or a heartbeat of drive, sensors, valve or hard-wired "
+             "inputs, silent for 1 s", Finding.NODE_SILENT)),
+    _row(Fault.VALVE_SILENT, "The tank's valve sends no status, or does not receive the commands "
+         "in time.",
+         "Check the valve's supply and bus connection. If VALVE_STATUS arrives but its command "
+         "echo stands still, the valve does not accept VALVE_CMD; if it is behind, look for what "
+         "holds frames up, a gateway for example.",
+         Condition(_STOP, "status older than {valve_age_ms:g} ms, or no new command echo, at most "
+             "three commands behind, for over {valve_echo_age_ms:g} ms", lambda seen, limits: (
+             seen.own.valve.age_ms > limits.valve_age_ms
+             or seen.own.valve.echo_age_ms > limits.valve_echo_age_ms), awaited=7)),
+    _row(Fault.VALVE_FAULT, "The tank's valve reports a fault, or does not follow.",
+         "Read the valve's fault in VALVE_STATUS and remove its cause.",
+         Condition(_STOP, "valve reports a fault, or is not following for over "
+             "{valve_follows_within_ms:g} ms", lambda seen, limits: (seen.own.valve.fault
+             or seen.own.valve.out_ms > limits.valve_follows_within_ms))),
+    _row(Fault.VALVE_NOT_FOLLOWING, "The tank's valve is not where it was commanded to be.",
+         "Look for what blocks the valve; compare its time from shut to open with the ship file.",
+         Condition(_STOP, f"more than {VALVE_OFF:.0%} of its way off for over "
+             "{valve_off_within_ms:g} ms",
+             lambda seen, limits: seen.own.valve.off_ms > limits.valve_off_within_ms)),
+    _row(Fault.INTERNAL, "The control law raised an error, or gave no finite pressure.",
+         "Report it with the recording and the configuration; use another law until it is mended.",
+         Condition(_STOP, "the law raises, or its answer is not finite",
+             lambda seen, _: seen.own.law_failed)),
+    _row(Fault.LEVEL_LIMIT, "The water in a reservoir is too high, or a high-level switch is "
+         "broken.",
+         "If the water was low, check the switches and their wiring; if it was high, lower "
+         "limits.level_m or limits.pressure_pa.",
+         Condition(_STOP, "a high-level switch is closed, broken or not available",
+             lambda seen, _: seen.measured.high_level),
+         law_limit="level_m"),
+    _row(Fault.BUS_OVERLOAD, "The CAN bus is nearly full.",
+         "Find the node that sends too much (candump) and stop it.",
+         Condition(_STOP, "over {bus_load_limit:.0%} of the bus in use over a second",
+             lambda seen, limits: seen.bus_load > limits.bus_load_limit)),
+    _row(Fault.SIGN_FLIP, "The pump presses against its command, or its pressure is measured with "
+         "the wrong sign.",
+         "Check the pump's direction of rotation and the sign of the pressure sensor.",
+         _found(_STOP, "measured pressure against the command for 200 ms, or against the water's "
+             "motion", Finding.PUMP_SIGN, ends_passive=True)),
+    _row(Fault.MOTION_SIGN_FLIP, "Roll and its rate, or the levels, are measured with the wrong "
+         "sign, or are swapped.",
+         "Check how motion sensor and level gauges are mounted and connected: roll is positive "
+         "starboard down.",
+         _found(_STOP, "the water against roll and pressure", Finding.WATER_SIGN)),
+    _row(Fault.FOREIGN_SENDER, "A message comes faster than its cycle: two nodes send it, or its "
+         "counter skips.",
+         "Find the second sender of the identifier (candump) and stop it.",
+         _found(_STOP, "frames heard and lost by the counter over 1.25 a cycle, eight too many",
+             Finding.SECOND_SENDER),
+         Condition(_STOP, "the address of another node was claimed under another name in the last "
+             "10 s", lambda seen, _: seen.measured.claimed_twice)),
+    _row(Fault.UNKNOWN_IDENTIFIERS, "Frames that are not in the catalogue take up the CAN bus.",
+         "Find the node that sends them (candump) and stop it.",
+         _found(_STOP, "over 10% of the bus in use by identifiers that are not in the catalogue",
+             Finding.FLOOD)),
+    _row(Fault.MOTION_SILENT, "No usable measurement comes from the motion sensor.",
+         "Check the sensor's supply and bus connection, and what SENSOR_MOTION carries: its "
+         "quality, and values that jump, which are discarded.",
+         Condition(_RAMP, "last good sample older than {motion_age_ms:g} ms",
+             lambda seen, limits: seen.motion.age_ms > limits.motion_age_ms,
+             zero_within_ms=200, awaited=3),  # 250 after the sample, of which 40 ms are allowed
+         Condition(_HALVE, "one of two motion sensors: last good sample older than "
+             "{motion_spare_age_ms:g} ms",
+             lambda seen, limits: seen.motion_spare_age_ms > limits.motion_spare_age_ms)),
+    _row(Fault.SENSORS_DISAGREE, "The two motion sensors disagree.",
+         "Compare both with the horizon and a plumb line; mend or replace the one that is wrong.",
+         _found(_RAMP, "roll apart by half a degree for 0.3 s, or their rates by as much at 2 w0",
+             Finding.SENSORS_DISAGREE)),
+    _row(Fault.TANK_SILENT, "No usable measurement comes from the tank's level gauges.",
+         "Check the gauges' supply and bus connection, and the quality that SENSOR_TANK carries.",
+         Condition(_HALVE, "last good sample older than {tank_degraded_age_ms:g} ms",
+             lambda seen, limits: seen.measured.tank_age_ms > limits.tank_degraded_age_ms,
+             awaited=4),
+         Condition(_RAMP, "last good sample older than {tank_age_ms:g} ms",
+             lambda seen, limits: seen.measured.tank_age_ms > limits.tank_age_ms)),
+    _row(Fault.PUMP_SENSOR_SILENT, "No usable measurement comes from the pump's pressure sensor.",
+         "Check the sensor's supply and bus connection, and the quality that SENSOR_PUMP carries.",
+         Condition(_HALVE, "last good sample older than {pump_degraded_age_ms:g} ms",
+             lambda seen, limits: seen.measured.pump_age_ms > limits.pump_degraded_age_ms),
+         Condition(_RAMP, "last good sample older than {pump_age_ms:g} ms",
+             lambda seen, limits: seen.measured.pump_age_ms > limits.pump_age_ms, awaited=5)),
+    _row(Fault.PROTECTION, "Messages of a sensor, drive, valve or panel keep arriving damaged or "
+         "out of order.",
+         "Look for a second sender of their identifiers, a node that protects them wrongly, and "
+         "disturbance on the cable.",
+         Condition(_RAMP, f"leaky bucket of rejected frames at {BUCKET_LIMIT}",
+             lambda seen, _: not (seen.motion.valid and seen.measured.protection_valid)),
+         _found(_RAMP, "three frames a second with a wrong CRC or data ID", Finding.DAMAGED)),
+    _row(Fault.STUCK_SIGNAL, "The roll or the level stands still although the water is pushed.",
+         "Check the motion sensor, the level gauges and whatever passes their messages on.",
+         _found(_RAMP, "roll still while the water moves, or level still while it is pushed",
+             Finding.ROLL_STUCK | Finding.LEVEL_STUCK)),
+    _row(Fault.DRIFT, "Roll and integrated roll rate do not agree.",
+         "Check the motion sensor: sign of each, a signal that stands still, alignment, bias of "
+         "the gyroscope, filter of the roll.",
+         _found(_HALVE, "roll off the integrated rate by six times its noise", Finding.DRIFT),
+         _found(_RAMP, "the same for 30 s, or four times as far", Finding.DRIFT_LASTS)),
+    _row(Fault.VOLUME, "The port and starboard levels do not add up to the water in the tank.",
+         "Check the level gauges, then the tank for a leak or a wrong filling.",
+         _found(_HALVE, "mean of both levels off zero by 1.5% of the still-water height",
+             Finding.VOLUME),
+         _found(_RAMP, "the same for 30 s, or three times as far", Finding.VOLUME_LASTS)),
+    _row(Fault.SPIKES, "Samples of motion sensor or level gauges had to be discarded again and "
+         "again.",
+         "Check the sensors' cables and supply.",
+         _found(_RAMP, "five spikes (the count falls by one each second)", Finding.SPIKES)),
+    _row(Fault.NOISE, "The motion sensor or a level gauge is noisier than its figures.",
+         "Check the sensor's fastening, cable and supply, and the section `sensors` of the "
+         "configuration.",
+         _found(_HALVE, "five times the noise of the section `sensors`, 3.75 times in the sum of "
+             "the levels, over 0.7 s", Finding.NOISE)),
+    _row(Fault.SIGNAL_DELAYED, "The water moves before the measured roll does: the motion sensor "
+         "is late.",
+         "Check the motion sensor's filter and whatever passes its messages on.",
+         _found(_RAMP, "roll late by a thirtieth of the roll period", Finding.MOTION_LATE)),
+    _row(Fault.DRIVE_NOT_FOLLOWING, "The pump's pressure does not follow the command, or the pump "
+         "presses though it is off.",
+         "If the pump presses though it is off, cut its power (hard-wired stop, main switch). "
+         "Check the pump for blockage, the drive for limits and local operation, and the pressure "
+         "sensor.",
+         _found(_STOP, "15% of the pressure limit off for 500 ms; drive off: and 2 kPa per m of "
+             "level", Finding.DRIVE_LOST, ends_passive=True),
+         _found(_RAMP, "the same for 300 ms", Finding.DRIVE_LAGS)),
+    _row(Fault.SATURATION, "The pump has been held at its limit on one side.",
+         "Correct a steady heel by ballast; lower the law's gains if the sea asks for more than "
+         "the pump has.",
+         _found(_HALVE, "command at its limit to one side, or drive at one of its own, for 10 s",
+             Finding.SATURATED)),
+    _row(Fault.ROLL_AMPLIFIED, "The ship rolls more than it would with the pump at rest.",
+         "Retune the law, or use one for this load and sea.",
+         _found(_RAMP, "roll over 1.25 times the passive twin's for a quarter of a roll period, "
+             "over 1.1 times in twelve roll periods, with a valve a tenth more, and over 0.5 "
+             "degrees RMS", Finding.ROLL_AMPLIFIED)),
+    _row(Fault.HEEL_LIMIT, "The ship rolls or heels beyond the limit for active control.",
+         "Wait until the roll is small; correct the heel by ballast; check the motion sensor.",
+         Condition(_RAMP, "roll over {roll_limit_rad:g} rad, or its mean over a minute over "
+             "{heel_limit_rad:g} rad", lambda seen, limits: (
+             abs(seen.motion.roll_rad) > limits.roll_limit_rad
+             or abs(seen.heel_rad) > limits.heel_limit_rad)),
+         # a ship that rolls through upright is upright twice in a period
+         Condition(_REFUSE, f"roll over {{roll_limit_rad:g}} rad within the last {ROLL_CALM_S} s",
+             lambda seen, _: seen.rolled_over_ms < 1e3 * ROLL_CALM_S),
+         law_limit="roll_rad"),
+    _row(Fault.STABILITY_LOW, "The ship's metacentric height may be below the limit of its "
+         "stability booklet, or no estimates of it come any more: the panel shows no GM then.",
+         "Compare with the loading computer; take on ballast or remove weight from above. Without "
+         "estimates (the log has the reason) start the controller again when that can be done.",
+         Condition(_WARN, "interval of the estimated GM, two standard deviations, reaches below "
+             "the vessel's least_gm_m, or no estimate for three intervals",
+             lambda seen, _: seen.own.gm_low)),
+    _row(Fault.DRIVE_WARNING, "The pump drive warns: it may soon trip or not hold the pressure.",
+         "Read the warning bits in DRIVE_STATUS_2. Temperature: cooling, load. Voltage: supply. "
+         "Command: bus, its cable and load. Sensor: the drive's pressure feedback.",
+         Condition(_WARN, "a warning bit in the last DRIVE_STATUS_2",
+             lambda seen, _: seen.measured.drive_warns)),
+    _row(Fault.BUS_DEGRADED, "Frames are lost on the CAN bus, a node sends too seldom, or a "
+         "measurement has gaps.",
+         "Check the cable, its plugs and termination, gateways between the nodes, the load, and "
+         "the nodes' cycle times.",
+         _found(_WARN, "over 0.1% of a message's frames missing by its counter, or in bursts of a "
+             "message of 25 ms or less, five too many; or under 0.75 a cycle for 2 s",
+             Finding.FRAMES_LOST),
+         _found(_HALVE, "gaps of motion, levels or pressure, or a level over 0.9 of the tank, have "
+             "kept the tank's equation from judging for a roll period", Finding.UNWATCHED),
+         _found(_RAMP, "the same for three roll periods", Finding.UNWATCHED_LONG)),
+    _row(Fault.OVERRUN, "The controller's loop ran too late.",
+         "Stop other work on the computer and give the controller real-time scheduling.",
+         Condition(_STOP, "a tick {long_overrun_ms:g} ms late or more",
+             # counted in whole ticks: what is 50 here was up to 60
+             lambda seen, limits: seen.tick_late_ms >= limits.long_overrun_ms),
+         Condition(_RAMP, "{overruns_in_ten} of the last ten ticks late; one that comes after the "
+             "time of the next counts for that, too", lambda seen, limits: (
+             limits.overruns_in_ten is not None
+             and seen.overruns_in_ten >= limits.overruns_in_ten)),
+         Condition(_WARN, "one of them", lambda seen, _: seen.overruns_in_ten > 0)),
+    _row(Fault.NOT_COMMISSIONED, "No commissioning was passed with this configuration: signs and "
+         "scales are not known.",
+         "Run utank-hil commission with this controller's file at the quay.",
+         Condition(_REFUSE, "no record of a passed commissioning with this vessel and these "
+             "sensors", lambda seen, _: not seen.own.commissioned)),
+    _row(Fault.OPERATOR_SILENT, "The operator's panel is not heard.",
+         "Check that the panel runs and is connected to the bus.",
+         Condition(_REFUSE, "order or heartbeat silent for over {panel_age_to_arm_ms:g} ms",
+             lambda seen, limits: seen.measured.panel_age_ms > limits.panel_age_to_arm_ms),
+         Condition(_RAMP, "order or heartbeat silent for over {panel_age_armed_ms:g} ms",
+             lambda seen, limits: seen.measured.panel_age_ms > limits.panel_age_armed_ms)),
+)  # fmt: skip
 
 
 def fault_words(fault: Fault) -> tuple[str, str]:
