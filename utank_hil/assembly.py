@@ -29,7 +29,7 @@ from utank_hil.nodes.canopen_drive import CanopenDrive
 from utank_hil.nodes.commissioning.node import CommissioningNode
 from utank_hil.nodes.commissioning.pulses import PulseLaw, plan_pulses, plan_stroke
 from utank_hil.nodes.controller import ControllerNode, ControllerSettings
-from utank_hil.nodes.running_law import ExchangedLaw, Measure, RunningLaw
+from utank_hil.nodes.running_law import Measure, RunningLaw
 from utank_hil.nodes.signals import EventSink, Telemetry
 from utank_hil.nodes.valve_command import ValveCommander
 from utank_hil.retuning import (
@@ -194,14 +194,13 @@ def build_controller_node(
             second_motion=vessel.redundancy.second_motion_sensor,
             motion_cycles_s=vessel.motion_cycles_s,
         )
-    thresholds = None if monitors is None else monitors.thresholds
-    measure = measure_of(law.measured)
-    running = (
-        RunningLaw(
-            law.controller(), measure, law.commands, limits=config.safety, thresholds=thresholds
-        )
-        if exchange is None
-        else ExchangedLaw(exchange, measure, limits=config.safety, thresholds=thresholds)
+    controller = law.controller() if exchange is None else exchange
+    running = RunningLaw(
+        controller,
+        measure_of(law.measured),
+        law.commands,
+        limits=config.safety,
+        thresholds=None if monitors is None else monitors.thresholds,
     )
     limiter = CommandLimiter(config.limits, tank, TICK_S)
     foreign, drive = vessel.foreign, None

@@ -38,7 +38,7 @@ from utank_hil.control.interface import PRESSURE
 from utank_hil.nodes.actuators import Actuators
 from utank_hil.nodes.controller import ControllerNode, ControllerSettings
 from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
-from utank_hil.nodes.running_law import ExchangedLaw, Measure, RunningLaw
+from utank_hil.nodes.running_law import Measure, RunningLaw
 from utank_hil.nodes.signals import SIGNALS, Telemetry
 from utank_hil.nodes.valve_command import ValveCommander
 from utank_hil.retuning import Estimator
@@ -119,9 +119,7 @@ class ControllerBench:
         measure = measure or measure_of(("roll_rad", "level_m"))
         limiter = CommandLimiter(LIMITS, VESSEL.tank, TICK_S)
         self.node = ControllerNode(
-            ExchangedLaw(self.law, measure, limits=limits, thresholds=thresholds)
-            if hasattr(self.law, "laws")  # that it is exchanged for
-            else RunningLaw(self.law, measure, commands, limits=limits, thresholds=thresholds),
+            RunningLaw(self.law, measure, commands, limits=limits, thresholds=thresholds),
             Safety(limits, 250_000, monitors, pump=pump),
             Actuators(limiter, CATALOGUE, 0.05, pump=pump, valve=valve),
             Telemetry(sink=lambda row: self.rows.append(row.copy()), **telemetry),

@@ -44,6 +44,7 @@ from utank_hil.canbus import (
 from utank_hil.control import DesignPlant
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import EstimateFigures, RetuningEvent
+from utank_hil.retuning.law_exchange import LawExchange
 from utank_hil.runners import RealTimeLoop
 from utank_hil.runners.statistics import LoopStatistics
 from utank_hil.safety.monitoring import Monitors
@@ -346,6 +347,7 @@ def test_heartbeat_tells_the_fault() -> None:
     assert VESSEL.version == VERSION == heard[-1].configuration_version
 
 
+@LawExchange.register
 class NotedUpdates(ToyLaw):
     """A law that is retuned, with a retuning that does nothing."""
 

@@ -173,8 +173,9 @@ class ControllerNode:
         self._estimate_waves(measured, judgement)
         take_order = self.inbox.stations.take_retuning
         self.law.update(measured, judgement, self.level, self.actuators, take_order)
-        for event in self.law.take_events():
-            self.telemetry.tell(event, self.start_ns)
+        if self.law.exchange is not None:
+            for event in self.law.exchange.take_events():
+                self.telemetry.tell(event, self.start_ns)
         self.actuators.limit(judgement, self.law.pressure_pa, self.level, self._share(judgement))
         frames = self._encode(measured, judgement)
         self.last_ns = now_ns
@@ -240,8 +241,8 @@ class ControllerNode:
             (motion.roll_rad, motion.roll_rate_rad_s, measured.level_m),
             fresh=is_fresh(measured, motion),
         )
-        if estimate is not None:
-            self.law.note(estimate)
+        if estimate is not None and self.law.exchange is not None:
+            self.law.exchange.note(estimate)
         news = estimator.take_news()
         if news:
             event = RetuningEvent(measured.now_ns, self.retuning_state, news)

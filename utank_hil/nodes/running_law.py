@@ -16,7 +16,7 @@ from utank_hil.canbus.measurements import Measurements, MotionSample
 from utank_hil.control.interface import PRESSURE, VALVE, Controller, Plans, StartsAnew
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.nodes.actuators import Actuators
-from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
+from utank_hil.retuning.estimate import ShipFigures
 from utank_hil.retuning.law_exchange import LawExchange
 from utank_hil.safety.faults import FAULTS
 from utank_hil.safety.judgement import Judgement
@@ -90,6 +90,9 @@ class RunningLaw:
                 f"{TICK_S} s; design the controller for a multiple of it"
             )
         self.law = law
+        #: The law itself, where it is one that is exchanged for better ones while it runs.
+        self.exchange = law if isinstance(law, LawExchange) else None
+        self._engaged = self._interrupted = False
         self._measure = measure
         self._commands = commands
         self._limits = limits
@@ -128,29 +131,22 @@ class RunningLaw:
     @property
     def state(self) -> RetuningState | None:
         """Where retuning stands; None without it."""
-        return None
+        return None if self.exchange is None else self.exchange.state
 
     @property
     def excused(self) -> bool:
         """Whether the roll says nothing of the law, see `LawExchange.excused`."""
-        return False
+        return self.exchange is not None and self.exchange.excused
 
     @property
     def designed_for(self) -> ModelSummary | ShipFigures | None:
         """Identified ship that the law in charge was designed for; None for the configuration's."""
-        return None
+        return None if self.exchange is None else self.exchange.laws.active.found
 
     @property
     def events(self) -> tuple[RetuningEvent, ...]:
         """What was done last to retune the law."""
-        return ()
-
-    def take_events(self) -> list[RetuningEvent]:
-        """Events of retuning since the last call."""
-        return []
-
-    def note(self, estimate: MotionEstimate) -> None:
-        """Take what the motion tells of waves and ship."""
+        return () if self.exchange is None else tuple(self.exchange.events)
 
     def share(self, judgement: Judgement) -> float:
         """Share of the greatest pressure that the next plan may count on.
@@ -175,7 +171,7 @@ class RunningLaw:
 
         The `actuators` say what was applied, and are asked for the valve's loss.
         """
-        self._note(judgement)
+        self._interrupted |= judgement.demand is not _CONTROL
         due = self._samples.due(measured.now_ns)
         if due:
             actuators.note_applied(self._applied, self._commands, measured)
@@ -197,18 +193,6 @@ class RunningLaw:
         elif actuators.valve is not None:
             actuators.valve.ask(self._valve_loss)
 
-    def _note(self, judgement: Judgement) -> None:
-        """Keep what the next answer has to know of the ticks before it."""
-
-    def _before_answer(
-        self,
-        measured: Measurements,
-        motion: MotionSample,
-        judgement: Judgement,
-        take_order: TakeOrder,
-    ) -> None:
-        """Do what comes between `applied` and `step`."""
-
     def _answer(
         self,
         measured: Measurements,
@@ -221,7 +205,18 @@ class RunningLaw:
         # the command that left since the last answer: anti-windup and bumpless take-over
         if self._answered:
             self.law.applied(self._applied.copy())  # a law may keep it
-        self._before_answer(measured, motion, judgement, take_order)
+        if self.exchange is not None:
+            # in charge at the last answer and not since is for one answer out of charge
+            in_charge = judgement.demand is _CONTROL
+            self._engaged = in_charge and not (self._engaged and self._interrupted)
+            self._interrupted = False
+            self.exchange.update(
+                measured.now_ns,
+                take_order(measured.now_ns),
+                engaged=self._engaged,
+                fresh=is_fresh(measured, motion),
+                passive_roll_rad=judgement.passive_roll_rad,
+            )
         self._answered = True
         answer = self.law.step(self._measure(measured, motion, level))
         answered = dict(zip(self._commands, answer, strict=True))
@@ -258,69 +253,3 @@ class RunningLaw:
         """Have the law begin anew."""
         self.law.reset()
         self._watched_share = 0.0
-
-
-class ExchangedLaw(RunningLaw):
-    """A law that is exchanged for a better one while it runs."""
-
-    law: LawExchange
-
-    def __init__(
-        self,
-        law: LawExchange,
-        measure: Measure,
-        *,
-        limits: SafetyLimits,
-        thresholds: MonitorThresholds | None = None,
-    ) -> None:
-        super().__init__(law, measure, limits=limits, thresholds=thresholds)
-        self._engaged = self._interrupted = False
-
-    @property
-    def state(self) -> RetuningState:
-        """Where retuning stands."""
-        return self.law.state
-
-    @property
-    def excused(self) -> bool:
-        """Whether the roll says nothing of the law, see `LawExchange.excused`."""
-        return self.law.excused
-
-    @property
-    def designed_for(self) -> ModelSummary | ShipFigures | None:
-        """Identified ship that the law in charge was designed for; None for the configuration's."""
-        return self.law.laws.active.found
-
-    @property
-    def events(self) -> tuple[RetuningEvent, ...]:
-        """What was done last to retune the law."""
-        return tuple(self.law.events)
-
-    def take_events(self) -> list[RetuningEvent]:
-        """Events of retuning since the last call."""
-        return self.law.take_events()
-
-    def note(self, estimate: MotionEstimate) -> None:
-        """Take what the motion tells of waves and ship."""
-        self.law.note(estimate)
-
-    def _note(self, judgement: Judgement) -> None:
-        self._interrupted |= judgement.demand is not _CONTROL
-
-    def _before_answer(
-        self,
-        measured: Measurements,
-        motion: MotionSample,
-        judgement: Judgement,
-        take_order: TakeOrder,
-    ) -> None:
-        # what was in charge at the last answer and not since is for one answer out of charge
-        self._engaged = judgement.demand is _CONTROL and not (self._engaged and self._interrupted)
-        self._interrupted = False
-        self.law.update(
-            measured.now_ns,
-            take_order(measured.now_ns),
-            engaged=self._engaged,
-            fresh=is_fresh(measured, motion),
-            passive_roll_rad=judgement.passive_roll_rad,
-        )
