@@ -125,7 +125,7 @@ def advance_tick(
     row : ndarray, shape (18,)
         `RollCoefficients`, and the pieces of the restoring moment per radian.
     restoring : ndarray, shape (pieces, powers)
-        Coefficients of `utank_hil.dynamics.restoring.Restoring`.
+        Coefficients of `utank_hil.dynamics.ship.Restoring`.
     linear : ndarray, shape (4, 8) or (0, 8)
         Linear model that replaces `row` and `restoring`. Columns: state matrix, effect of pressure,
         effect of wave moment, accelerations by steady heeling moments, effect of sway.

@@ -33,16 +33,14 @@ from utank_hil.base.parameters import (
     refuse,
 )
 from utank_hil.configuration import ControllerConfig, Section, Vessel
-from utank_hil.configuration.hull_files.section import HullFile
+from utank_hil.configuration.hull_files.reader import HullFile
 from utank_hil.configuration.plausibility import tank_problems
 from utank_hil.dynamics.hull.lateral import LateralHull, LateralModel
-from utank_hil.dynamics.nonlinear import RollModel
+from utank_hil.dynamics.nonlinear import RollModel, steady_heel
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.steady_heel import steady_heel
 from utank_hil.nodes.panel import TimedAction
 from utank_hil.sea import Harmonics
-from utank_hil.sea.encounter import wavenumber_rad_m
-from utank_hil.sea.sea import slope_per_m
+from utank_hil.sea.sea import slope_per_m, wavenumber_rad_m
 
 MOST_CONTROLLERS = 7
 """Most controllers: more runs with the passive one cannot be distinguished in a picture."""

@@ -36,7 +36,7 @@ from utank_hil.configuration.spectra import (
 )
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea, Spectrum
-from utank_hil.sea.directional import SUFFIXES
+from utank_hil.sea.measured import SUFFIXES
 from utank_hil.sea.moment_table import MomentTable
 from utank_hil.sea.passing import PassingSea
 

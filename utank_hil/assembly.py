@@ -24,14 +24,13 @@ from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.interface import PRESSURE, VALVE
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.pressure_loop import PressureLoop
-from utank_hil.nodes.actuators import Actuators
+from utank_hil.nodes.actuators import Actuators, ValveCommander
 from utank_hil.nodes.canopen_drive import CanopenDrive
 from utank_hil.nodes.commissioning.node import CommissioningNode
 from utank_hil.nodes.commissioning.pulses import PulseLaw, plan_pulses, plan_stroke
 from utank_hil.nodes.controller import ControllerNode, ControllerSettings
 from utank_hil.nodes.running_law import Measure, RunningLaw
 from utank_hil.nodes.signals import EventSink, Telemetry
-from utank_hil.nodes.valve_command import ValveCommander
 from utank_hil.retuning import (
     AdaptiveController,
     Desk,

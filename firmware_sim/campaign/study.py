@@ -18,6 +18,7 @@ from firmware_sim.campaign.axes import MOST_CASES, Axis, Draws
 from firmware_sim.scenario import Scenario
 from utank_hil.base.parameters import ParameterError, refuse
 from utank_hil.configuration import Section
+from utank_hil.configuration.error_words import known_keys, nearest
 from utank_hil.configuration.files import (
     ALLOW_CODE,
     ConfigError,
@@ -27,7 +28,6 @@ from utank_hil.configuration.files import (
     located,
     problems_in_words,
 )
-from utank_hil.configuration.known_keys import known_keys, nearest
 from utank_hil.configuration.yaml_text import Key
 
 _PACKAGES: Final = ("utank_hil", "firmware_sim")

@@ -12,7 +12,7 @@ from utank_hil.canbus import Address, Frame, load_catalogue
 from utank_hil.canbus.catalogue import NamedMessage
 from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.configuration import Section
-from utank_hil.configuration.known_keys import nearest
+from utank_hil.configuration.error_words import nearest
 
 SECOND_NS: Final = 1_000_000_000
 LONGEST_FAULT_S: Final = 86_400.0  #: Latest time of a fault: a day, the longest run of a scenario.

@@ -14,7 +14,7 @@ from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import socketcan
 from utank_hil.canbus.profiles.canopen import Place
 from utank_hil.commands import conform as command
-from utank_hil.configuration.drive_section import DriveSection
+from utank_hil.configuration.device_sections import DriveSection
 from utank_hil.console.common import new_app
 
 SHIP = "configs/ships/thesis_first.yaml"

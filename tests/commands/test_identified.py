@@ -14,7 +14,7 @@ from utank_hil.base.parameters import ParameterError
 from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
 from utank_hil.control import PredictiveDesign
-from utank_hil.dynamics.restoring import restoring
+from utank_hil.dynamics.ship import restoring
 from utank_hil.retuning import ModelSummary
 
 CONFIG = Path("configs/controllers/adaptive_dpc.yaml")

@@ -14,8 +14,8 @@ from utank_hil.base.parameters import ParameterError
 from utank_hil.canbus import Frame, Quality
 from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.canopen import Place
+from utank_hil.configuration.device_files import Eds, with_eds
 from utank_hil.configuration.devices import DevicesSection
-from utank_hil.configuration.eds_files import Eds, with_eds
 
 
 def entry(index, part, kind, value=""):

@@ -16,8 +16,8 @@ from utank_hil.configuration.hull_files.parts import Given
 from utank_hil.configuration.hull_files.reader import read_hull
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.hull import lateral_kernel as kernel
+from utank_hil.dynamics.hull.hull_data import radiation_at
 from utank_hil.dynamics.hull.lateral import LateralHull, LateralModel, fit_radiation
-from utank_hil.dynamics.hull.response import radiation_at
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea import Harmonics

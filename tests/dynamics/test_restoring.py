@@ -6,7 +6,7 @@ import pytest
 from roll_energy import LEVERS, PATTI, THESIS_SHIP, ship_potential
 
 from utank_hil.dynamics import RollShip
-from utank_hil.dynamics.restoring import restoring
+from utank_hil.dynamics.ship import restoring
 
 
 def test_odd_polynomial_is_evaluated_as_written():

@@ -7,7 +7,7 @@ import pytest
 
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.dynamics import RollModel
-from utank_hil.dynamics.restoring import restoring
+from utank_hil.dynamics.ship import restoring
 
 SHIPS = Path(__file__).parents[2] / "configs" / "ships"
 

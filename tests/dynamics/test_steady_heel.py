@@ -9,7 +9,7 @@ import pytest
 
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.dynamics import RollModel, simulate
-from utank_hil.dynamics.steady_heel import _at_rest, greatest_held_pa, righting_range, steady_heel
+from utank_hil.dynamics.nonlinear import _at_rest, greatest_held_pa, righting_range, steady_heel
 
 SHIPS = Path("configs/ships")
 RISE_S, HOLD_S = 1000.0, 200.0

@@ -29,8 +29,8 @@ from utank_hil.canbus import (
     Switch,
 )
 from utank_hil.canbus.events import AlarmEvent, RetuningEvent
+from utank_hil.nodes.commissioning.checks import RATE_SCALE, SCALE, Each, remedies_of
 from utank_hil.nodes.commissioning.node import REST_S, ROW_S, CommissioningNode, Stage
-from utank_hil.nodes.commissioning.pulse_checks import RATE_SCALE, SCALE, Each, remedies_of
 from utank_hil.nodes.commissioning.pulses import plan_pulses
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.nodes.redundancy import Redundancy

@@ -21,8 +21,8 @@ from utank_hil.canbus import ControlWord, DriveState, Fault, Frame, Mode
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.profiles.canopen import Place
 from utank_hil.configuration import load_config
+from utank_hil.configuration.device_sections import DriveSection
 from utank_hil.configuration.devices import DevicesSection
-from utank_hil.configuration.drive_section import DriveSection
 from utank_hil.nodes.canopen_drive import state_of
 from utank_hil.runners import Lockstep, SimulatedBus
 from utank_hil.runners.several_buses import with_more

@@ -21,8 +21,8 @@ from utank_hil.canbus import Mode
 from utank_hil.configuration import ConfigError, Vessel, load_config
 from utank_hil.configuration.hull_files.parts import Given
 from utank_hil.configuration.hull_files.reader import read_hull
+from utank_hil.dynamics.hull.hull_data import free_roll, radiation_at
 from utank_hil.dynamics.hull.lateral import LateralHull
-from utank_hil.dynamics.hull.response import free_roll, radiation_at
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.runners import Lockstep, SimulatedBus
 from utank_hil.sea import Harmonics, Sea, jonswap

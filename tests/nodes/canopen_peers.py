@@ -6,7 +6,7 @@ from canopen import objectdictionary as od
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import ControlWord, Frame
 from utank_hil.canbus.frame import STANDARD
-from utank_hil.configuration.drive_section import DriveSection
+from utank_hil.configuration.device_sections import DriveSection
 from utank_hil.dynamics.pump import Pump
 from utank_hil.nodes.canopen_drive import CanopenDrive
 

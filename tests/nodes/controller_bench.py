@@ -35,12 +35,11 @@ from utank_hil.canbus import (
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.control import CommandLimiter, PumpLimits
 from utank_hil.control.interface import PRESSURE
-from utank_hil.nodes.actuators import Actuators
+from utank_hil.nodes.actuators import Actuators, ValveCommander
 from utank_hil.nodes.controller import ControllerNode, ControllerSettings
 from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.nodes.running_law import Measure, RunningLaw
 from utank_hil.nodes.signals import SIGNALS, Telemetry
-from utank_hil.nodes.valve_command import ValveCommander
 from utank_hil.retuning import Estimator
 from utank_hil.safety.judge import Safety
 from utank_hil.safety.monitoring import Monitors

@@ -2,7 +2,7 @@
 
 import pytest
 
-from utank_hil.nodes.command_echo import CommandEcho
+from utank_hil.nodes.actuators import CommandEcho
 from utank_hil.nodes.plausibility import NEVER_HEARD_NS
 
 

@@ -12,10 +12,9 @@ from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Frame, Quality, SensorMotion
 from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.canopen import NetworkState, Place
+from utank_hil.configuration.device_sections import DriveSection
 from utank_hil.configuration.devices import DevicesSection
-from utank_hil.configuration.drive_section import DriveSection
-from utank_hil.nodes.commissioning.conformance import SensorTrial
-from utank_hil.nodes.commissioning.drive_conformance import DriveTrial
+from utank_hil.nodes.commissioning.conformance import DriveTrial, SensorTrial
 
 SBG = {"profile": "sbg_ellipse", "accept_unprotected": True}
 

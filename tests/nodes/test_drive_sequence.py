@@ -2,7 +2,7 @@ import pytest
 
 from firmware_sim.drive import DriveStates
 from utank_hil.canbus import ControlWord, DriveFault, DriveState
-from utank_hil.nodes.drive_sequence import AT_REST, DISABLES, QUICK_STOPS, RESETS, DriveSequence
+from utank_hil.nodes.actuators import AT_REST, DISABLES, QUICK_STOPS, RESETS, DriveSequence
 
 S, C = DriveState, ControlWord
 

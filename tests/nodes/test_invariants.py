@@ -40,10 +40,9 @@ from utank_hil.canbus import (
 from utank_hil.canbus.measurements import Measurements
 from utank_hil.safety import judging
 from utank_hil.safety.faults import FAULTS, Condition, Reaction
-from utank_hil.safety.judgement import Judgement
 from utank_hil.safety.safety_limits import SafetyLimits
 from utank_hil.safety.situation import OwnState, Situation, ValveReport
-from utank_hil.safety.supervisor import DISARMED_ZERO_WITHIN_MS, Demand
+from utank_hil.safety.supervisor import DISARMED_ZERO_WITHIN_MS, Demand, Judgement
 
 SEED = 1
 SAFETY = SafetyLimits()

@@ -33,7 +33,7 @@ from utank_hil.configuration import Vessel, load_config
 from utank_hil.control import DesignPlant
 from utank_hil.control.interface import PRESSURE, VALVE
 from utank_hil.dynamics.valves import Valve
-from utank_hil.nodes.valve_command import ValveCommander
+from utank_hil.nodes.actuators import ValveCommander
 from utank_hil.safety.monitoring import Monitors
 from utank_hil.safety.monitors.thresholds import SensorFigures
 

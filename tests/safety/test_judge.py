@@ -8,8 +8,8 @@ from situations import MEASURED, OWN
 
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus.measurements import MotionSample
-from utank_hil.safety.bus_load import BusLoad
 from utank_hil.safety.judge import HEEL_TIME_CONSTANT_S, Lateness, Safety
+from utank_hil.safety.monitors.senders import BusLoad
 from utank_hil.safety.safety_limits import SafetyLimits
 
 MS = 1_000_000

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.dynamics.linear import coupled_matrices
-from utank_hil.dynamics.restoring import restoring
+from utank_hil.dynamics.ship import restoring
 from utank_hil.safety.passive_twin import PassiveTwin
 
 FIRST = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)

@@ -10,7 +10,7 @@ from others import others_file
 from firmware_sim.scenario_sea import ScenarioSea
 from utank_hil.configuration import ConfigError, Section, load_config
 from utank_hil.sea import Sea
-from utank_hil.sea.directional import load_directional
+from utank_hil.sea.measured import load_directional
 
 FREQUENCY_HZ = np.arange(0.05, 0.3, 0.01)
 DIRECTION_DEG = np.arange(5.0, 360.0, 10.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from utank_hil.sea import EffectiveSlope, SlopeSpectrum
-from utank_hil.sea.models import jonswap_density
+from utank_hil.sea.spectrum import jonswap_density
 
 OMEGA = np.arange(0.1, 2.5, 0.01)
 

@@ -23,8 +23,7 @@ import numpy as np
 
 from tools.thesis.wrench import gravity_body, tank_wrench, water_moments
 from utank_hil.base.arrays import FloatArray
-from utank_hil.dynamics.restoring import Restoring, restoring
-from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.ship import Restoring, RollShip, restoring
 from utank_hil.dynamics.tank import Tank
 
 Matrix6 = tuple[tuple[float, ...], ...]

@@ -21,8 +21,7 @@ from utank_hil.configuration.vessel import Vessel
 from utank_hil.console.common import Bus, Json, fail, load, print_json, why_not_writable
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, notes, shown
-from utank_hil.nodes.commissioning.conformance import Ask, SensorTrial, Trial
-from utank_hil.nodes.commissioning.drive_conformance import DriveTrial
+from utank_hil.nodes.commissioning.conformance import Ask, DriveTrial, SensorTrial, Trial
 from utank_hil.runners import RealTimeLoop, stop_on_signals
 
 

@@ -1,17 +1,225 @@
 """Profiles that are shipped, and layouts out of a maker's DBC or EDS."""
 
+import re
+from configparser import ConfigParser, Error
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
+from utank_hil.base.text_files import open_content
 from utank_hil.canbus import profiles
-from utank_hil.configuration.eds_files import OF_AN_EDS, with_eds
+from utank_hil.canbus.profiles.canopen import DISABLED, Place
+from utank_hil.canbus.profiles.drive_plan import PROFILE
 from utank_hil.configuration.yaml_text import parse_yaml
+
+OF_AN_EDS: Final = "EDS "  #: Begins the name of a device whose layouts were read from an EDS.
+LIMIT_BYTES: Final = 1 << 22  #: Of a file; those of drives have some 100 kB.
+ENCODINGS: Final = ("utf-8-sig", "cp1252", "latin-1")
+"""A file has no mark of its encoding. The last decodes anything; numbers are ASCII in all three."""
+_SIGNED: Final = {2: 8, 3: 16, 4: 32, 0x10: 24, 0x12: 40, 0x13: 48, 0x14: 56, 0x15: 64}
+_REAL: Final = {8: 32, 0x11: 64}
+_BITS: Final = {
+    1: 1, 5: 8, 6: 16, 7: 32, 0x16: 24, 0x18: 40, 0x19: 48, 0x1A: 56, 0x1B: 64, **_SIGNED, **_REAL,
+}  # fmt: skip
+"""Length of the data types of CiA 301 that a PDO can carry."""
+_LONG_ID: Final = 1 << 29  #: In the identifier of a PDO: it has 29 bits.
+_MOST_MAPPED: Final = 64  #: Objects of a PDO, by CiA 301: one a bit.
+_TIMED: Final = (254, 255)  #: Types of a PDO that its event timer sends.
+_NODE: Final = re.compile(r"^\$NODEID\s*\+?\s*|\s*\+\s*\$NODEID$", re.IGNORECASE)
+
+
+class Eds:
+    """The objects of a file; ValueError names file, object and remedy."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        try:
+            with open_content(Path(file), LIMIT_BYTES) as opened:
+                content = opened.read()
+        except OSError as error:
+            raise ValueError(f"eds: {file} can't be read: {error.strerror}") from error
+        for encoding in ENCODINGS:
+            try:
+                text = content.decode(encoding)
+                break
+            except UnicodeDecodeError:
+                continue
+        parser = ConfigParser(
+            interpolation=None, delimiters=("=",), inline_comment_prefixes=(";", "#")
+        )
+        try:
+            parser.read_string(text, Path(file).name)
+        except Error as error:
+            raise ValueError(f"eds: {file} is no EDS: {error.message}") from error
+        self._sections = {name.upper(): dict(parser[name]) for name in parser.sections()}
+
+    def entry(self, place: Place) -> dict[str, str] | None:
+        """Keys of an entry, with small letters; None where the device lacks it."""
+        whole = self._sections.get(f"{place.number:04X}")
+        part = self._sections.get(f"{place.number:04X}SUB{place.subindex:X}")
+        if part is not None or whole is None:
+            return part
+        short = self._number(whole.get("compactsubobj", ""), place) or 0
+        if not short:
+            parts = self._number(whole.get("subnumber", ""), place)
+            return None if place.subindex or parts else whole
+        if not place.subindex:
+            return {"datatype": "5", "defaultvalue": str(short)}
+        if place.subindex > short:
+            return None
+        values = self._sections.get(f"{place.number:04X}VALUE", {})
+        value = values.get(str(place.subindex), whole.get("defaultvalue", ""))
+        return whole | {"defaultvalue": value}
+
+    def value(self, place: Place) -> tuple[int, bool] | None:
+        """An entry's value, and whether the node's number is to be added; None without a value.
+
+        What the DCF of a node says comes before what its type is delivered with.
+        """
+        entry = self.entry(place) or {}
+        own = entry.get("parametervalue") if self.node is not None else ""
+        written = own or entry.get("defaultvalue") or ""
+        number = self._number(_NODE.sub("", written) or ("0" if written else ""), place)
+        return None if number is None else (number, _NODE.search(written) is not None)
+
+    def number(self, place: Place) -> int:
+        """An entry's value; 0 without one."""
+        return (self.value(place) or (0, False))[0]
+
+    @property
+    def node(self) -> int | None:
+        """Node that a DCF is of."""
+        found = self._sections.get("DEVICECOMISSIONING", {})  # so the standard spells it
+        return self._number(found.get("nodeid", ""), Place(0))
+
+    def sent(self, pdo: int) -> dict[str, Any]:
+        """The layout of a sent PDO, 1 to 512, as `MessageSection` has it."""
+        settings, mapping = 0x1800 + pdo - 1, 0x1A00 + pdo - 1
+        found = self.value(Place(settings, 1))
+        if found is None:
+            raise self._error(Place(settings, 1), f"has no value: TPDO{pdo} is not in this device")
+        cob, relative = found
+        if cob & DISABLED:
+            reason = f"has bit 31: TPDO{pdo} is off as delivered. Turn it on in device and file"
+            raise self._error(Place(settings, 1), reason)
+        timed = self.number(Place(settings, 2)) in _TIMED
+        signals, bits = self._mapped(mapping, pdo)
+        can_id = cob & (_LONG_ID - 1)
+        place: dict[str, Any] = {"id": can_id, "format": "29bit" if cob & _LONG_ID else "11bit"}
+        return {
+            **({"cob": can_id} if relative else place),
+            "bytes": -(-bits // 8),
+            "cycle_ms": (self.number(Place(settings, 5)) if timed else 0) or None,
+            "signals": signals,
+        }
+
+    def _mapped(self, index: int, pdo: int) -> tuple[dict[str, dict[str, Any]], int]:
+        count = self.number(Place(index, 0))
+        if not count:
+            reason = f"is 0: TPDO{pdo} carries nothing as delivered. Map it in device and file"
+            raise self._error(Place(index, 0), reason)
+        if not 1 <= count <= _MOST_MAPPED:
+            raise self._error(Place(index, 0), f"is {count}: a PDO maps 1 to {_MOST_MAPPED}")
+        signals: dict[str, dict[str, Any]] = {}
+        start = 0
+        for subindex in range(1, count + 1):
+            value = self.number(Place(index, subindex))
+            place, bits = Place(value >> 16, value >> 8 & 0xFF), value & 0xFF
+            if not value:
+                raise self._error(Place(index, subindex), "has no value, and is mapped")
+            if start + bits > 64:
+                raise self._error(Place(index, subindex), "ends beyond the 8 bytes of a frame")
+            if place.number >= 0x1000:  # below it is a type, and fills a gap
+                kind = self._type(place)
+                if _BITS[kind] != bits:
+                    reason = f"maps {bits} bits of {place}, which has {_BITS[kind]}"
+                    raise self._error(Place(index, subindex), reason)
+                signals[str(place)] = {
+                    "start": start, "bits": bits, "signed": kind in _SIGNED, "real": kind in _REAL,
+                }  # fmt: skip
+            start += bits
+        return signals, start
+
+    def _type(self, place: Place) -> int:
+        entry = self.entry(place)
+        kind = self._number((entry or {}).get("datatype", ""), place)
+        if kind not in _BITS:
+            said = "is mapped, and is not there" if entry is None else f"has the data type {kind}"
+            raise self._error(place, f"{said}: no number that a PDO carries")
+        return kind
+
+    def _number(self, written: str, place: Place) -> int | None:
+        """A number, decimal or hexadecimal; None of an empty one."""
+        text = written.strip()
+        if not text:
+            return None
+        if re.fullmatch(r"0[0-9]*[1-9][0-9]+|0+[89]", text):
+            reason = f"is {text}: octal or decimal? Write it without the leading zero"
+            raise self._error(place, reason)
+        try:
+            return int(text, 16 if text[:2] in ("0x", "0X") else 10)
+        except ValueError:
+            raise self._error(place, f"is {text!r}, and must be a whole number") from None
+
+    def _error(self, place: Place, reason: str) -> ValueError:
+        return ValueError(f"eds: {self.file}: {place} {reason}")
+
+
+@cache
+def eds_file(file: str) -> Eds:
+    """The file of this name, read once."""
+    return Eds(file)
+
+
+def with_eds(content: dict[str, Any]) -> dict[str, Any]:
+    """A sensor's section with the layouts of its PDOs in the place of their names."""
+    rest = {key: value for key, value in content.items() if key not in ("eds", "messages")}
+    named = content.get("messages")
+    pdos = named.values() if isinstance(named, dict) else [""]
+    if not all(re.fullmatch(r"TPDO[1-9][0-9]*", str(each), re.IGNORECASE) for each in pdos):
+        raise ValueError("with eds, messages names PDOs that are sent: {name: TPDO1}")
+    assert isinstance(named, dict)
+    eds = eds_file(str(content["eds"]))
+    _same_node(eds, content)
+    messages = {name: eds.sent(int(str(each)[4:])) for name, each in named.items()}
+    if "cycle_ms" not in rest:
+        cycles = [each["cycle_ms"] for each in messages.values()]
+        if None in cycles:
+            pdo = list(pdos)[cycles.index(None)]
+            raise ValueError(
+                f"cycle_ms is required but missing: as {eds.file} has it, {pdo} is sent on a "
+                "change or at SYNC. Set its type (1800h:2) to 255 and its event timer (1800h:5)"
+            )
+        rest["cycle_ms"] = max(cycles)
+    return {"profile": f"{OF_AN_EDS}{Path(eds.file).name}", **rest, "messages": messages}
+
+
+def drive_with_eds(content: dict[str, Any]) -> dict[str, Any]:
+    """A drive's section with the identity of its file, if that is a drive which can be watched."""
+    eds = eds_file(str(content["eds"]))
+    _same_node(eds, content)
+    rest = {key: value for key, value in content.items() if key != "eds"}
+    kind = eds.number(Place(0x1000)) & 0xFFFF
+    if kind != PROFILE:
+        raise ValueError(f"eds: {eds.file}: 1000h:0 says profile {kind}; a drive has {PROFILE}")
+    if eds.entry(Place(0x1016, 1)) is None:
+        reason = "the drive would run on after the controller's end. Take one that watches it"
+        raise ValueError(f"eds: {eds.file}: there is no 1016h (heartbeat consumer): {reason}")
+    if "identity" not in rest:
+        rest["identity"] = [eds.number(Place(0x1018, part)) or None for part in range(1, 5)]
+    return rest
+
+
+def _same_node(eds: Eds, content: dict[str, Any]) -> None:
+    if eds.node not in (None, content.get("node")):
+        said = content.get("node")
+        raise ValueError(f"eds: {eds.file} is the DCF of node {eds.node}, not of node {said}")
+
 
 FOLDER: Final = Path(profiles.__file__).parent
 NATIVE: Final = "native"
 OF_A_DBC: Final = "DBC "  #: Begins the name of a device whose layouts were read from a DBC.
-ENCODINGS: Final = ("utf-8", "cp1252")
+DBC_ENCODINGS: Final = ("utf-8", "cp1252")
 """A DBC has no mark of its encoding: UTF-8 fails on anything else, and then it is a Windows one."""
 
 
@@ -91,7 +299,7 @@ def _dbc_layouts(file: str) -> dict[str, dict[str, Any]]:
     except OSError as error:
         raise ValueError(f"dbc: {file} can't be read: {error.strerror}") from error
     database = Database(strict=False)  # one message that does not fit spoils no other
-    for encoding in ENCODINGS:
+    for encoding in DBC_ENCODINGS:
         try:
             database.add_dbc_string(content.decode(encoding))
             break
@@ -101,7 +309,7 @@ def _dbc_layouts(file: str) -> dict[str, dict[str, Any]]:
             why = f"{error}" or type(error).__name__
             raise ValueError(f"dbc: {file} is no DBC: {why}") from error
     else:
-        raise ValueError(f"dbc: {file} is text in none of {', '.join(ENCODINGS)}")
+        raise ValueError(f"dbc: {file} is text in none of {', '.join(DBC_ENCODINGS)}")
     return {message.name: _layout(message) for message in database.messages}
 
 

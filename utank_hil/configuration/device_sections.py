@@ -1,14 +1,21 @@
-"""Parts of the section ``devices`` of a ship's file: messages, signals, validity, protection."""
+"""Parts of a ship's section ``devices``: messages, signals, validity, protection, drive."""
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
-from utank_hil.base.parameters import Finite, Range
+from utank_hil.base.parameters import Finite, Problem, Range
+from utank_hil.base.tick import TICK_S
 from utank_hil.canbus.frame import LONGEST_ID, LONGEST_STANDARD_ID
+from utank_hil.canbus.profiles.canopen import Place
+from utank_hil.canbus.profiles.drive_plan import COMMAND_MS, MODES, DrivePlan
 from utank_hil.canbus.profiles.field import Field as BusField
+from utank_hil.configuration.device_files import NATIVE, drive_with_eds
 from utank_hil.configuration.files import Section
+from utank_hil.control.pressure_loop import LoopMargins, loop_margins
+from utank_hil.dynamics.pump import Pump
 
 
 def _whole(value: Any) -> Any:
@@ -141,3 +148,141 @@ def unit_of(value: str) -> str:
         if value.endswith(f"_{unit}"):
             return unit
     return ""
+
+
+LEAST_PHASE_DEG: Final = 45.0
+LEAST_GAIN: Final = 2.0
+"""Least margins of the pressure loop: the pump's map may be off by a factor of two."""
+REQUIRE: Final = {"0x6007": 3, "0x605A": 2, "0x605E": 2}
+"""Quick stop where the controller's heartbeat ends or the node is stopped; it brakes on its ramp,
+then the drive switches off; so it does at a fault. CiA 402-2; 35 EDS of seven makers."""
+
+_TORQUES: Final = (100, 3000)
+"""Counts of the target torque at the pump's greatest pressure: ten times the torque that is needed,
+in steps of 1 %, to a drive that gives three times its rated one for a while."""
+_SPEEDS: Final = (1000, 2**31)
+
+
+class DriveSection(Section):
+    """Drive of the pump."""
+
+    profile: Literal["native", "cia402"] = NATIVE
+    """`cia402`, or `native` for the drive of this project's own catalogue."""
+    bus: str = ""  #: Interface that it is on; empty for the controller's own.
+    node: NodeNumber | None = None  #: CANopen node of the drive.
+    controller_node: NodeNumber = 127  #: CANopen node that the controller's heartbeat is from.
+    mode: Literal["torque", "cyclic_torque", "velocity", "cyclic_velocity"] | None = None
+    """Mode of operation, in 6060h 4, 10, 3, 9."""
+    pressure_pa_per_unit: Annotated[float, Range(least=-1e9, most=1e9)] | None = None
+    """Measured: pressure, in still water, of one count of the target torque 6071h."""
+    speed_rad_s_per_unit: Annotated[float, Range(least=-1e6, most=1e6)] | None = None
+    """Speed of the pump's rotor of one count of 60FFh and 606Ch."""
+    delay_ms: Annotated[float, Range(least=20, most=500)] = 50.0
+    """From a change of the pressure to the torque that answers it, as the loop is designed for."""
+    heartbeat_ms: Annotated[int, Range(least=20, most=100)] = 50
+    """Time without the controller's heartbeat after which the drive stops; and its own cycle."""
+    identity: Annotated[tuple[Whole | None, ...], Field(max_length=4)] = ()
+    """Vendor, product, revision and serial number in 1018h; null for any. With `eds: FILE` that
+    file's, unless given."""
+    require: Annotated[dict[str, Whole | None], Field(default_factory=dict)]
+    """Objects, as "0x605A" or "0x1400:5", that are written and must read back so, beside 6007h: 3,
+    605Ah: 2, 605Eh: 2; null where the drive lacks one."""
+    echo: Literal["command", "demand"] = "command"
+    """What the drive sends back: control word and target, or its demand (6074h, 606Bh)."""
+    synchronous: bool = True  #: The drive sends at SYNC, else by its event timer.
+
+    @model_validator(mode="before")
+    @classmethod
+    def _complete(cls, content: Any) -> Any:
+        if not isinstance(content, dict) or content.get("profile", NATIVE) == NATIVE:
+            return content
+        content = drive_with_eds(content) if "eds" in content else content
+        given = content.get("require", {})
+        return content | {"require": REQUIRE | given if isinstance(given, dict) else given}
+
+    @property
+    def native(self) -> bool:
+        """Whether it is the drive of this project's own catalogue."""
+        return self.profile == NATIVE
+
+    def problems(self) -> Iterator[Problem]:
+        """What is wrong or missing."""
+        if self.native:
+            if self.bus:
+                yield "bus", "is for a drive with a profile: the native one is on the own bus"
+            return
+        needed = ["node", "mode", "speed_rad_s_per_unit"]
+        torque = self.mode is not None and MODES[self.mode].torque
+        for name in [*needed, "pressure_pa_per_unit"][: 4 if torque else 3]:
+            if not getattr(self, name):
+                yield name, "is required but missing, or zero"
+        if self.node == self.controller_node:
+            yield "controller_node", "is the drive's own node: choose another"
+        for written in self.require:
+            try:
+                _place(written)
+            except ValueError:
+                yield "require", f"{written!r} is no object: write 0x605A, or 0x1400:5"
+
+    def pump_problems(self, pump: Pump | None) -> Iterator[Problem]:
+        """What does not fit to the pump."""
+        if self.native:
+            return
+        if pump is None:
+            yield "devices.pump", "is a drive, but the ship has no pump: add it, or leave this out"
+        elif not MODES[self.mode or ""].torque and pump.lag_s * pump.speed_bandwidth_rad_s <= 1:
+            own_s = 1 / pump.speed_bandwidth_rad_s
+            yield "pump.lag_s", f"must exceed the lag of the drive's speed loop, {own_s:.3g} s"
+
+    def unusual(self, pump: Pump) -> Iterator[Problem]:
+        """What suits no drive of this pump, by its counts at the greatest pressure and speed."""
+        for name, of, most, (least_counts, most_counts), words in (
+            ("pressure_pa_per_unit", self.pressure_pa_per_unit, pump.max_pressure_pa, _TORQUES,
+             "6071h counts thousandths of the rated torque"),
+            ("speed_rad_s_per_unit", self.speed_rad_s_per_unit, pump.max_speed_rad_s, _SPEEDS,
+             "606Ch counts the rotor's speed in 32 bits"),
+        ):  # fmt: skip
+            if of and not least_counts <= most / abs(of) <= most_counts:
+                at_most = f"{most:.4g} are {most / abs(of):.3g} counts"
+                yield f"devices.pump.{name}", f"is {of:.4g}, so the pump's {at_most}: {words}"
+
+    def margins(self, sensor_late_s: float) -> LoopMargins:
+        """Margins of the pressure loop with a pressure that is late by cycle and latency."""
+        late_s = sensor_late_s + TICK_S + COMMAND_MS * 1e-3
+        return loop_margins(self.delay_ms * 1e-3, late_s)
+
+    def plan(self, bus: int, pump: Pump) -> DrivePlan:
+        """The drive as the controller commands and hears it, on the interface of this number."""
+        assert self.node is not None
+        assert self.mode is not None
+        assert self.speed_rad_s_per_unit is not None
+        mode = MODES[self.mode]
+        per_si = 1 / self.speed_rad_s_per_unit
+        if mode.torque:  # T = p A dP, see `utank_hil.dynamics.pump`
+            assert self.pressure_pa_per_unit is not None
+            per_si = 1 / (self.pressure_pa_per_unit * pump.pitch_m * pump.duct_area_m2)
+        return DrivePlan(
+            bus,
+            self.node,
+            self.controller_node,
+            mode,
+            per_si,
+            self.speed_rad_s_per_unit,
+            self.delay_ms * 1e-3,
+            self.heartbeat_ms,
+            self.identity,
+            tuple((_place(key), value) for key, value in self.require.items() if value is not None),
+            self.echo == "command",
+            self.synchronous,
+        )
+
+
+NATIVE_DRIVE: Final = DriveSection.model_validate({})
+
+
+def _place(written: str) -> Place:
+    index, _, subindex = written.partition(":")
+    place = Place(int(index, 16), int(subindex or "0", 0))
+    if not (0x1000 <= place.number <= 0xFFFF and 0 <= place.subindex <= 0xFF):
+        raise ValueError(written)
+    return place

@@ -22,9 +22,13 @@ from utank_hil.canbus.profiles.device_plan import (
 from utank_hil.canbus.profiles.foreign import ForeignDevices
 from utank_hil.configuration.device_files import NATIVE, with_profile
 from utank_hil.configuration.device_sections import (
+    LEAST_GAIN,
+    LEAST_PHASE_DEG,
+    NATIVE_DRIVE,
     UNITS,
     ConditionSection,
     Cycle,
+    DriveSection,
     FieldSection,
     Id11,
     Id29,
@@ -35,12 +39,6 @@ from utank_hil.configuration.device_sections import (
     SignalSection,
     SourceAddress,
     unit_of,
-)
-from utank_hil.configuration.drive_section import (
-    LEAST_GAIN,
-    LEAST_PHASE_DEG,
-    NATIVE_DRIVE,
-    DriveSection,
 )
 from utank_hil.configuration.files import Section
 from utank_hil.control.pressure_loop import LoopMargins

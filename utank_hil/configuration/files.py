@@ -15,8 +15,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from utank_hil.base.parameters import ParameterError, Problem
 from utank_hil.base.text_files import open_text
-from utank_hil.configuration.error_words import words_for
-from utank_hil.configuration.known_keys import known_keys, nearest
+from utank_hil.configuration.error_words import known_keys, nearest, words_for
 from utank_hil.configuration.yaml_text import Key, YamlError, parse_yaml
 
 ModelT = TypeVar("ModelT", bound=BaseModel)

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import PlainSerializer, WrapValidator
 
 from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
-from utank_hil.configuration.hull_files.section import HullFile
+from utank_hil.configuration.hull_files.reader import HullFile
 from utank_hil.dynamics import GRAVITY_M_S2, RollShip
 
 NOT_GIVEN = math.nan  #: Mark of a missing key; no key of a file can have this value.

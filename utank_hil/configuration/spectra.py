@@ -26,7 +26,7 @@ from utank_hil.configuration.files import Section
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea import MeasuredSpectra, Spectrum, ittc, jonswap, load_ndbc, pierson_moskowitz
-from utank_hil.sea.directional import SUFFIXES, load_directional
+from utank_hil.sea.measured import SUFFIXES, load_directional
 from utank_hil.sea.ndbc import HIGHEST_M
 
 WaveHeight = Annotated[float, Range(above=0, most=HIGHEST_M)]

@@ -14,12 +14,12 @@ from utank_hil.base.tick import TICK_S
 from utank_hil.canbus.profiles.foreign import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.configuration.files import Section
-from utank_hil.configuration.hull_files.section import HullFile
+from utank_hil.configuration.hull_files.reader import HullFile
 from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
 from utank_hil.configuration.ship_keys import ShipFromFile, hull_words, in_written_keys
 from utank_hil.dynamics import RollModel, Tank
+from utank_hil.dynamics.nonlinear import RightingRange, greatest_held_pa, righting_range
 from utank_hil.dynamics.pump import Pump
-from utank_hil.dynamics.steady_heel import RightingRange, greatest_held_pa, righting_range
 from utank_hil.dynamics.valves import Valve, valve_problems
 from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.safety.safety_limits import SafetyLimits

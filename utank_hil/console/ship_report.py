@@ -13,8 +13,7 @@ from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
 from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.control.optimal_tank import tank_figures
 from utank_hil.dynamics.linear import state_matrices
-from utank_hil.dynamics.nonlinear import RollModel
-from utank_hil.dynamics.steady_heel import steady_heel, upright
+from utank_hil.dynamics.nonlinear import RollModel, steady_heel, upright
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.dynamics.valves import added_damping_ratio
 

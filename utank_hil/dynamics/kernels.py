@@ -43,7 +43,7 @@ def unpacked(row: FloatArray) -> RollCoefficients:
 
 @njit(error_model="numpy", inline="always")
 def righting_moment(per_piece: float, restoring: FloatArray, phi: float) -> float:
-    """Restoring moment, from the pieces of `utank_hil.dynamics.restoring.Restoring`."""
+    """Restoring moment, from the pieces of `utank_hil.dynamics.ship.Restoring`."""
     heel = abs(phi)
     piece = min(int(heel * per_piece), restoring.shape[0] - 1)
     if piece > 0:

@@ -36,7 +36,7 @@ from scipy.optimize import minimize
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control import DesignPlant
 from utank_hil.dynamics import RollShip, coupled_matrices
-from utank_hil.dynamics.restoring import restoring
+from utank_hil.dynamics.ship import restoring
 from utank_hil.identification.smooth_spectrum import (
     LogSpectrum,
     SmoothSpectrum,

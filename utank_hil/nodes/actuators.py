@@ -1,19 +1,222 @@
-"""Pump and valve as the controller commands them."""
+"""Pump and valve as the controller commands them, and whether they follow."""
+
+from typing import Final
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.canbus import Catalogue, ControlWord, Frame, PumpCommand
+from utank_hil.base.tick import TICK_S
+from utank_hil.canbus import (
+    Catalogue,
+    ControlWord,
+    DriveState,
+    Frame,
+    PumpCommand,
+    SensorTank,
+    ValveCommand,
+    ValveControl,
+)
 from utank_hil.canbus.measurements import Measurements
 from utank_hil.control.interface import VALVE
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limiter import CommandLimiter
+from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics.valves import Valve
 from utank_hil.nodes.canopen_drive import CanopenDrive
-from utank_hil.nodes.command_echo import CommandEcho
-from utank_hil.nodes.drive_sequence import DriveSequence
-from utank_hil.nodes.plausibility import MILLISECOND_NS
-from utank_hil.nodes.valve_command import ValveCommander
-from utank_hil.safety.judgement import Judgement
-from utank_hil.safety.situation import NO_VALVE, ValveReport
-from utank_hil.safety.supervisor import Demand
+from utank_hil.nodes.plausibility import MILLISECOND_NS, NEVER_HEARD_NS
+from utank_hil.safety.situation import NO_VALVE, VALVE_OFF, ValveReport
+from utank_hil.safety.supervisor import Demand, Judgement
+
+QUICK_STOPS: Final = 26
+"""Commands, the first and half a second of them: a drive that brakes for longer, waits for a word
+or stays in operation is told to be off."""
+DISABLES: Final = 10
+"""Commands that tell it so, after which it does not obey."""
+AT_REST: Final = 10
+"""Commands to a drive that neither drives nor brakes, after which it has stopped: one status in
+between proves nothing of a drive whose enable chatters."""
+RESETS: Final = 5
+"""Commands that reset a fault of drive or valve: the first is the edge, some may be lost. Where its
+cause lasts another edge is needed later, so the bit is taken back."""
+
+
+_TOWARDS_ENABLED = {
+    DriveState.SWITCH_ON_DISABLED: ControlWord.SHUTDOWN,
+    DriveState.READY_TO_SWITCH_ON: ControlWord.SWITCH_ON,
+    DriveState.SWITCHED_ON: ControlWord.ENABLE_OPERATION,
+    DriveState.OPERATION_ENABLED: ControlWord.ENABLE_OPERATION,
+    DriveState.QUICK_STOP_ACTIVE: ControlWord.QUICK_STOP,
+}
+_STOPPING = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
+"""Here the motor brakes; to disable the voltage would leave the rotor running down."""
+
+
+class DriveSequence:
+    """Chooses the control word of each pump command."""
+
+    def __init__(self) -> None:
+        self._resets_left = 0
+        self._stops = self._rests = self._out = 0
+        #: Whether the drive has been told to be off in vain, and was not seen off since.
+        self.ignored = False
+
+    def request_reset(self) -> None:
+        """Reset the drive's fault with the next commands; only ever on an operator's order."""
+        self._resets_left = RESETS
+
+    def next_word(self, state: DriveState | None, *, wanted: bool) -> ControlWord:
+        """Return the control word that leads from `state` towards operation enabled, or off.
+
+        `state` is what the drive last reported, None if unknown; `wanted` says whether the
+        supervisor wants the drive in operation enabled.
+        """
+        if self._resets_left and state is DriveState.FAULT:
+            self._resets_left -= 1
+            return ControlWord.FAULT_RESET
+        self._resets_left = 0
+        word = ControlWord.DISABLE_VOLTAGE
+        if wanted and state is not None:
+            word = _TOWARDS_ENABLED.get(state, word)
+        elif state in _STOPPING:
+            word = ControlWord.QUICK_STOP
+        if word is ControlWord.QUICK_STOP:
+            self._stops += 1
+            self._rests = 0
+        else:
+            self._rests += 1
+            if wanted or self._rests >= AT_REST:
+                self._stops = 0
+        self._out = 0 if state in _STOPPING else self._out + 1
+        if self._stops > QUICK_STOPS + DISABLES:
+            self.ignored = True
+        elif self._out >= AT_REST:  # not because it is to be on again
+            self.ignored = False
+        return ControlWord.DISABLE_VOLTAGE if self._stops > QUICK_STOPS else word
+
+
+MOST_BEHIND: Final = 3
+"""Commands that may have left since the one that is echoed; one or two have, if all is well."""
+_COUNTER_MASK: Final = 15
+"""Of a counter of four bits: 16 commands behind looks like none."""
+
+
+class CommandEcho:
+    """The newest command of which its receiver has sent the counter back.
+
+    A receiver that gets every command, each a second late, sends new counters all the time. So an
+    echo counts if it is new and not more than `MOST_BEHIND` commands behind. Before the first echo
+    `heard_ns` is as given.
+    """
+
+    __slots__ = ("_counter", "_sent", "_status_ns", "heard_ns")
+
+    def __init__(self, heard_ns: int = NEVER_HEARD_NS) -> None:
+        self.heard_ns = heard_ns  #: When the last echo came that counts.
+        self._counter: int | None = None
+        self._sent: int | None = None
+        self._status_ns = heard_ns
+
+    def sent(self, counter: int) -> None:
+        """Note the counter of the command that leaves."""
+        self._sent = counter
+
+    def heard(self, counter: int | None, now_ns: int) -> None:
+        """Take the counter in a status that came at `now_ns`; None where there is none yet."""
+        if now_ns == self._status_ns:  # the same status
+            return
+        self._status_ns = now_ns
+        if counter is None or counter == self._counter or self._sent is None:
+            return
+        self._counter = counter
+        if (self._sent - counter) & _COUNTER_MASK <= MOST_BEHIND:
+            self.heard_ns = now_ns
+
+
+STALE_MS: Final = 100.0
+"""Where the valve stands is not known from an older report: VALVE_SILENT, and no more."""
+
+
+class ValveCommander:
+    """Turns the loss that a law asks for into VALVE_CMD, and watches the valve.
+
+    The valve follows only while the law is in charge; else it goes to its fail position, as it does
+    after a silence of `timeout_s`, which is sent with every command.
+    """
+
+    def __init__(self, valve: Valve, tank: Tank, catalogue: Catalogue, timeout_s: float) -> None:
+        self._valve = valve
+        self._tank = tank
+        self._sender = catalogue.transmitter(ValveCommand)
+        self._timeout_s = timeout_s
+        self._most_step = TICK_S / valve.opening_time_s
+        self._level_period_s = catalogue.codec(SensorTank).cycle_ns * 1e-9
+        self._inertia_pa_s2_m = tank.density_kg_m3 * tank.effective_length_m
+        self._asked = valve.fail_opening
+        self._told = valve.fail_opening
+        self._expected = valve.fail_opening
+        self._following = False
+        self._resets_left = 0
+        self._followed_ns = self._at_place_ns = 0
+        self._heard = False
+        self._echo = CommandEcho()
+
+    def ask(self, loss: float) -> None:
+        """Take the loss that the law wants, in Pa per (m/s)^2 of dh/dt."""
+        self._asked = self._valve.opening(self._tank, max(loss, 0.0))
+
+    def applied_loss(self, measured: Measurements) -> float:
+        """The loss of the valve as it stands."""
+        return self._valve.loss(self._tank, measured.valve_opening)
+
+    def held_pa(self, measured: Measurements, rate_m_s: float) -> float:
+        """Pressure that the valve takes from water at a level rate, for the level's observer.
+
+        It is that of the rate at the end of a gauge's cycle: a step with the rate at its beginning
+        is unstable where a valve slows the water faster than that.
+        """
+        damping_pa_s_m = self.applied_loss(measured) * abs(rate_m_s)
+        slowed = 1.0 + damping_pa_s_m * self._level_period_s / self._inertia_pa_s2_m
+        return damping_pa_s_m * rate_m_s / slowed
+
+    def request_reset(self) -> None:
+        """Reset the valve's fault with the next commands; only ever on an operator's order."""
+        self._resets_left = RESETS
+
+    def observe(self, measured: Measurements) -> ValveReport:
+        """Look at the valve, once a tick."""
+        now_ns, opening = measured.now_ns, measured.valve_opening
+        self._echo.heard(measured.valve_echo, measured.valve_echo_ns)
+        if not self._following or measured.valve_following:
+            self._followed_ns = now_ns
+        if not self._heard:  # it may stand anywhere at first, and runs from there
+            self._heard = measured.valve_heard_ns > NEVER_HEARD_NS
+            self._expected = opening
+        step = self._told - self._expected
+        self._expected += min(max(step, -self._most_step), self._most_step)
+        age_ms = (now_ns - measured.valve_heard_ns) / MILLISECOND_NS
+        unknown = age_ms > STALE_MS  # others judge that
+        if unknown or abs(opening - self._expected) <= VALVE_OFF:
+            self._at_place_ns = now_ns
+        return ValveReport(
+            age_ms,
+            (now_ns - self._echo.heard_ns) / MILLISECOND_NS,
+            measured.valve_fault,
+            (now_ns - self._followed_ns) / MILLISECOND_NS,
+            (now_ns - self._at_place_ns) / MILLISECOND_NS,
+        )
+
+    def frame(self, *, faulted: bool, follow: bool) -> Frame:
+        """Return the next command; `faulted` says whether the valve reports a fault."""
+        control = ValveControl.FOLLOW if follow else ValveControl.FAIL_POSITION
+        if self._resets_left and faulted:
+            control = ValveControl.RESET
+            self._resets_left -= 1
+        else:
+            self._resets_left = 0
+        self._following = control is ValveControl.FOLLOW
+        self._told = self._asked if self._following else self._valve.fail_opening
+        frame = self._sender.frame(ValveCommand(self._told, control, self._timeout_s))
+        self._echo.sent(self._sender.counter)
+        return frame
+
 
 _CONTROL = Demand.CONTROL
 _RAMP = Demand.RAMP

@@ -33,10 +33,9 @@ from utank_hil.nodes.running_law import RunningLaw, is_fresh
 from utank_hil.nodes.signals import Telemetry
 from utank_hil.retuning.estimator import SAMPLE_TIME_S, EstimateFigures, Estimator
 from utank_hil.safety.judge import Safety
-from utank_hil.safety.judgement import Judgement
 from utank_hil.safety.monitoring import STALE_MS
 from utank_hil.safety.situation import OwnState
-from utank_hil.safety.supervisor import Demand
+from utank_hil.safety.supervisor import Demand, Judgement
 
 NANOSECONDS: Final = 1e-9
 

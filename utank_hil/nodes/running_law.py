@@ -19,10 +19,9 @@ from utank_hil.nodes.actuators import Actuators
 from utank_hil.retuning.estimate import ShipFigures
 from utank_hil.retuning.law_exchange import LawExchange
 from utank_hil.safety.faults import FAULTS
-from utank_hil.safety.judgement import Judgement
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 from utank_hil.safety.safety_limits import SafetyLimits
-from utank_hil.safety.supervisor import Demand
+from utank_hil.safety.supervisor import Demand, Judgement
 
 FRESH_MS: Final = 50.0
 """An older measurement is a gap in the record that the ship is identified from."""

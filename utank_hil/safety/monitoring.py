@@ -19,14 +19,12 @@ from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.retuning.estimate import ShipFigures
-from utank_hil.safety.bus_load import MEAN_FRAME_BITS
 from utank_hil.safety.monitors.drive import DriveFollowing, Saturation
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.level_stuck import LevelStuck, Volume
-from utank_hil.safety.monitors.motion import RollAgainstRate
-from utank_hil.safety.monitors.motion_watch import MotionPair, MotionWatch, SpikeCount
+from utank_hil.safety.monitors.motion import MotionPair, MotionWatch, RollAgainstRate, SpikeCount
 from utank_hil.safety.monitors.noise import Noise
-from utank_hil.safety.monitors.senders import Heard, Senders, Stream
+from utank_hil.safety.monitors.senders import MEAN_FRAME_BITS, Heard, Senders, Stream
 from utank_hil.safety.monitors.tank_equation import TankEquation
 from utank_hil.safety.monitors.thresholds import MonitorThresholds, SensorFigures, thresholds_of
 from utank_hil.safety.passive_twin import PassiveTwin

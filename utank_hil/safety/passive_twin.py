@@ -30,9 +30,8 @@ import numpy as np
 
 from utank_hil.base.ordered_sums import product
 from utank_hil.dynamics.linear import state_matrices
-from utank_hil.dynamics.restoring import restoring
 from utank_hil.dynamics.sampling import transition_and_step
-from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.ship import RollShip, restoring
 from utank_hil.dynamics.tank import Tank
 
 MEMORY_PERIODS: Final = 6.0

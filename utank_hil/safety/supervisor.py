@@ -9,6 +9,7 @@ What counts as a fault, and what it does, is the table in `utank_hil.safety.faul
 """
 
 import math
+from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
@@ -276,3 +277,22 @@ class Supervisor:
         if enabled and departures <= DEPARTURES:
             self._drive_enabled_ns = now_ns
         self.drive_out_ms = (now_ns - self._drive_enabled_ns) / MILLISECOND_NS
+
+
+@dataclass(slots=True, eq=False)
+class Judgement:
+    """What the controller obeys in one tick."""
+
+    #: mode, fault: as `Supervisor` has them.
+    mode: Final[Mode]
+    fault: Final[Fault]
+    demand: Final[Demand]
+    drive_wanted: Final[bool]  #: Whether the drive should be in operation enabled.
+    motion: Final[int]  #: Place of the motion sensor that is to be used.
+    share: Final[float]  #: Share of the greatest pressure that is allowed by what is degraded.
+    #: Share that is allowed in its place until the water was seen to move as roll and pressure push
+    #: it; None from then on.
+    unconfirmed_share: Final[float | None]
+    standing: Final[int]  #: Conditions of the fault table that hold, bits of `judging.standing`.
+    #: What the ship would roll without the pump; NaN if that is not known.
+    passive_roll_rad: Final[float]

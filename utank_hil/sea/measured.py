@@ -1,8 +1,16 @@
-"""A time series of wave spectra measured at one place."""
+"""A time series of wave spectra measured at one place.
+
+Directional spectra of wave models and buoys are read by the package wavespectra.
+
+Formats: WAVEWATCH III (netCDF, text), SWAN (netCDF, text), ERA5, NDBC's netCDF, Sofar Spotter
+(JSON) and Datawell (``.spt``). Spectra of one frequency and no direction are read by `load_ndbc`.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime
+from pathlib import Path
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -99,3 +107,128 @@ class MeasuredSpectra:
         present = np.isfinite(density)
         begun, ahead = np.logical_or.accumulate(present), np.logical_or.accumulate(present[::-1])
         return frequency_hz, np.where(begun & ahead[::-1], density, 0.0)
+
+
+SUFFIXES: Final = (".nc", ".spec", ".json", ".spt")
+"""Suffixes of files that hold directional spectra."""
+_NETCDF: Final = {
+    "d2fd": "read_era5",
+    "spectral_wave_density": "read_ndbc",
+    "density": "read_ncswan",
+    "efth": "read_ww3",
+}  # Readers of netCDF files, by a variable that the file of the program has.
+_TEXT: Final = {"SWAN": "read_swan", "'WAVEWATCH": "read_ww3_station"}
+"""Readers of ``.spec`` files, by their first word."""
+_NEAR_DEG: Final = 0.5
+"""Largest distance in latitude or longitude: the spacing of global wave models."""
+
+
+def load_directional(path: Path, place: tuple[float, float] | None = None) -> MeasuredSpectra:
+    """Load the directional spectra of one place.
+
+    `place` is latitude and longitude in degrees, and may be omitted for a file of one place. Each
+    band has its mean direction and spread; heights are those of the bands, without a tail beyond
+    the last one. Spectra without values are left out and named in the notes. ValueError is raised
+    if the file can't be read, holds no spectra, or the place is none of its places. OSError is
+    raised if it can't be opened.
+    """
+    path.open("rb").close()  # Readers give a less precise reason.
+    try:
+        import wavespectra
+    except ImportError as error:
+        reason = "directional spectra need wavespectra: pip install 'utank-hil[files]'"
+        raise ValueError(f"{path}: {reason}") from error
+    name = _reader(path)
+    try:
+        content = getattr(wavespectra, name)(str(path)).load()
+    except Exception as error:  # Readers raise any exception at a damaged file.
+        program = name.removeprefix("read_")
+        raise ValueError(f"{path}: can't be read as a file of {program}: {error}") from error
+    content = _at_place(path, content, place).efth
+    time = content.time.values.astype("datetime64[s]")
+    density = content.transpose("time", "freq", "dir").values.astype(float)  # m2/Hz/degree
+    order = np.argsort(time, kind="stable")
+    empty = ~np.isfinite(density).any(axis=(1, 2))
+    twice = np.r_[False, np.diff(time[order]) == np.timedelta64(0, "s")]
+    notes = [f"{path}: the spectrum of {each} has no values" for each in time[order][empty[order]]]
+    notes += [f"{path}: {each} has a second spectrum" for each in time[order][twice]]
+    kept = order[~empty[order] & ~twice]
+    if not len(kept):
+        raise ValueError(f"{path}: no spectrum at this place has values")
+    return _spectra(path, time[kept], content.freq.values, content.dir.values, density[kept], notes)
+
+
+def _reader(path: Path) -> str:
+    """Return the name of the reader of a file, by what the file holds."""
+    suffix = path.suffix.lower()
+    if suffix == ".nc":
+        import xarray
+
+        try:
+            with xarray.open_dataset(path) as content:
+                known = [reader for name, reader in _NETCDF.items() if name in content.variables]
+                found = ", ".join(map(str, content.variables))
+        except Exception as error:  # Its engines raise any exception at a damaged file.
+            raise ValueError(f"{path}: is no netCDF file that can be read: {error}") from error
+        if known:
+            return known[0]
+        raise ValueError(f"{path}: holds none of {', '.join(_NETCDF)}; it has {found}")
+    if suffix == ".spec":
+        with path.open(encoding="utf-8", errors="replace") as text:
+            first = text.readline(80).split()[:1]
+        reader = _TEXT.get(first[0]) if first else None
+        if reader is None:
+            raise ValueError(f"{path}: does not begin as a file of SWAN or WAVEWATCH III does")
+        return reader
+    if suffix in (".json", ".spt"):
+        return {".json": "read_spotter", ".spt": "read_datawell"}[suffix]
+    raise ValueError(f"{path}: must be a file of {', '.join(SUFFIXES)}")
+
+
+def _at_place(path: Path, content: Any, place: tuple[float, float] | None) -> Any:
+    """Return the spectra of one place of a file's sites or grid."""
+    axes = [axis for axis in ("site", "lat", "lon") if axis in content.efth.dims]
+    if all(content.sizes[axis] == 1 for axis in axes):
+        return content.isel(dict.fromkeys(axes, 0))
+    if "site" in axes:
+        still = content.isel(time=0)  # A station does not drift.
+        latitude, longitude = still.lat.values, still.lon.values
+        sites = [{"site": index} for index in range(content.sizes["site"])]
+    else:
+        latitude, longitude = (
+            part.ravel() for part in np.meshgrid(content.lat.values, content.lon.values)
+        )
+        grid = np.ndindex(content.sizes["lon"], content.sizes["lat"])
+        sites = [{"lat": row, "lon": column} for column, row in grid]
+    if place is None:
+        shown = [f"[{a:g}, {b:g}]" for a, b in zip(latitude, longitude, strict=True)]
+        several = f"{path}: holds {len(shown)} places: choose one by its latitude and longitude"
+        raise ValueError(f"{several}, place: {', '.join(shown[:5])}")
+    apart = np.abs(np.stack([latitude - place[0], (longitude - place[1] + 180) % 360 - 180]))
+    nearest = int(np.argmin(np.hypot(*apart)))
+    if apart[:, nearest].max() > _NEAR_DEG:
+        where = f"[{latitude[nearest]:g}, {longitude[nearest]:g}]"
+        raise ValueError(f"{path}: no place within {_NEAR_DEG} degrees; the nearest is {where}")
+    return content.isel(sites[nearest])
+
+
+def _spectra(
+    path: Path,
+    time: Any,
+    frequency_hz: FloatArray,
+    direction_deg: FloatArray,
+    density: FloatArray,
+    notes: list[str],
+) -> MeasuredSpectra:
+    """Return spectra with mean direction and spread, of densities in m2/Hz/degree."""
+    order = np.argsort(direction_deg)
+    direction_deg = direction_deg[order].astype(float)
+    width_deg = (np.roll(direction_deg, -1) - np.roll(direction_deg, 1)) % 360 / 2
+    energy = np.nan_to_num(density[:, :, order]) * width_deg
+    total = np.maximum(energy.sum(axis=2), 0.0)
+    # A spread made of four Fourier coefficients is below 0 in places.
+    energy = np.maximum(energy, 0.0)
+    mean_deg = np.degrees(np.angle(energy @ np.exp(1j * np.radians(direction_deg)))) % 360
+    spread = Spread(direction_deg, energy)
+    bands = np.broadcast_to(frequency_hz.astype(float), total.shape)
+    return MeasuredSpectra(str(path), time, bands, total, mean_deg, spread, tuple(notes))

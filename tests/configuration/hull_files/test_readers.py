@@ -10,8 +10,7 @@ from others import others_file
 
 from utank_hil.configuration.hull_files.parts import Given
 from utank_hil.configuration.hull_files.reader import read_hull
-from utank_hil.dynamics.hull.hull_data import HullData
-from utank_hil.dynamics.hull.response import excitation_at, radiation_at
+from utank_hil.dynamics.hull.hull_data import HullData, excitation_at, radiation_at
 
 # centre of buoyancy and volume by WAMIT's own `.out`; the density is that of MSS
 FPSO = Given(1025.0, 1025 * 97960.9, (0.788631, 0.0, -1.0))

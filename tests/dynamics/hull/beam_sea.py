@@ -6,8 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray
-from utank_hil.dynamics.hull.hull_data import HullData
-from utank_hil.dynamics.hull.response import excitation_at, free_roll, radiation_at, wave_number
+from utank_hil.dynamics.hull.hull_data import (
+    HullData,
+    excitation_at,
+    free_roll,
+    radiation_at,
+    wave_number,
+)
 
 
 @dataclass(frozen=True)

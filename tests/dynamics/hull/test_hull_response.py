@@ -5,7 +5,7 @@ from hulls import made_up_hull
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.dynamics.hull.response import excitation_at, free_roll, radiation_at, wave_number
+from utank_hil.dynamics.hull.hull_data import excitation_at, free_roll, radiation_at, wave_number
 
 MIRROR = np.array([1, -1, 1, -1, 1, -1])
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.safety.monitors.misfit import Misfit
+from utank_hil.safety.monitors.sway import Misfit
 
 
 @given(

@@ -7,7 +7,7 @@ import pytest
 from moving_ship import THRESHOLDS
 
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.monitors.motion_watch import MotionPair
+from utank_hil.safety.monitors.motion import MotionPair
 
 PERIOD_S = 10.0
 MOUNTED_RAD = math.radians(0.5)

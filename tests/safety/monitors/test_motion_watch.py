@@ -10,7 +10,7 @@ from moving_ship import THRESHOLDS
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus.measurements import MotionSample
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.monitors.motion_watch import MotionWatch
+from utank_hil.safety.monitors.motion import MotionWatch
 
 STEP_S = 0.05
 LOOSE = replace(THRESHOLDS, drift_rad=100.0, roll_noise_rad=100.0, rate_noise_rad_s=100.0)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from utank_hil.safety.monitors.motion_watch import SpikeCount
+from utank_hil.safety.monitors.motion import SpikeCount
 
 
 @pytest.mark.parametrize(("new", "found"), [(4, [False]), (5, [True, False]),

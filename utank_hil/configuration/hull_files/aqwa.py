@@ -17,8 +17,7 @@ from utank_hil.configuration.hull_files.parts import (
     rigid_body,
     text,
 )
-from utank_hil.dynamics.hull.hull_data import HullData
-from utank_hil.dynamics.hull.response import wave_number
+from utank_hil.dynamics.hull.hull_data import HullData, wave_number
 
 
 def read_aqwa(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same for all readers

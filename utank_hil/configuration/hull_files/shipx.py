@@ -21,8 +21,7 @@ from utank_hil.configuration.hull_files.parts import (
     sibling,
     text,
 )
-from utank_hil.dynamics.hull.hull_data import TO_BODY_AXES, HullData, inverse_shift
-from utank_hil.dynamics.hull.response import wave_number
+from utank_hil.dynamics.hull.hull_data import TO_BODY_AXES, HullData, inverse_shift, wave_number
 
 _FROM_SHIPX = np.array([-1.0, -1, 1, -1, -1, 1])
 _LEAST_OF_NEXT = 0.7

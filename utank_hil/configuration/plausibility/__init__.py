@@ -13,27 +13,24 @@ from typing import Final
 import numpy as np
 
 from utank_hil.base.parameters import Problem
-from utank_hil.configuration.plausibility.drive import (
+from utank_hil.configuration.plausibility.vessel import (
+    Figure,
+    free_surface_nm_rad,
     holding,
+    of_heights,
     of_motor,
     of_pump,
     of_quickness,
-    of_valve,
-)
-from utank_hil.configuration.plausibility.figure import Figure
-from utank_hil.configuration.plausibility.hull import (
-    free_surface_nm_rad,
-    of_heights,
     of_ship,
     of_sizes,
     of_tank,
+    of_valve,
     of_weight,
 )
 from utank_hil.dynamics.linear import coupled_matrices
-from utank_hil.dynamics.nonlinear import RollModel
+from utank_hil.dynamics.nonlinear import RollModel, righting_range
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.steady_heel import righting_range
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve
 

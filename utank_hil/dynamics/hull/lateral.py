@@ -20,8 +20,13 @@ import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.parameters import refuse
-from utank_hil.dynamics.hull.hull_data import TO_BODY_AXES, HullData
-from utank_hil.dynamics.hull.response import excitation_at, free_roll, wave_number
+from utank_hil.dynamics.hull.hull_data import (
+    TO_BODY_AXES,
+    HullData,
+    excitation_at,
+    free_roll,
+    wave_number,
+)
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank

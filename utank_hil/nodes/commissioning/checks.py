@@ -1,14 +1,33 @@
-"""One check of a commissioning, and the zeros of the sensors while ship and water are at rest."""
+"""One check of a commissioning, and the zeros of the sensors while ship and water are at rest.
+
+What the pump's pulses show: signs, scales and order of sensors and pump, and natural periods.
+
+Three equations, low-pass filtered on both sides (`DerivativeFilter`), are solved by least squares.
+With the level h, the roll phi, the pressure P and the notation of `utank_hil.dynamics.linear`::
+
+    pump   P = a P_promised                                   by command, delay and lag
+    tank   P / rho = Le h'' + c h' + k h - r (g L phi + L (H + Lz) phi'')     of either gauge
+    ship   -(M01 h'' + K01 h) = M00 phi'' + B00 phi' + K00 phi
+
+By hydrostatics k is 2 g and r is 1, whatever friction and load are. So 2 g / k is a gauge's scale
+with its sign, r that of the roll, and sqrt(k / Le) the tank's frequency. M00 and K00 less the
+water's share are the ship's inertia and stiffness. The ship's equation is solved with the scales
+taken out, so that a wrong one shows in its own check alone.
+"""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Generic, NamedTuple, TypeVar
+
+import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.design_plant import DesignPlant
+from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.nodes.commissioning.pulses import PulsePlan, ValveStroke
+from utank_hil.safety.monitors.noise import DerivativeFilter
 from utank_hil.safety.monitors.thresholds import ZERO_HEEL_DEG
 from utank_hil.safety.situation import VALVE_OFF
 
@@ -122,3 +141,247 @@ def _gauge_zero(side: str, measured_m: float, expected_m: float, tolerance_m: fl
         f"{side}_level_zero", f"{side} gauge at rest", measured_m, expected_m, tolerance_m, "m",
         f"Set the {side} gauge's zero at the still-water level; check the tank's filling.",
     )  # fmt: skip
+
+
+SCALE: Final = 0.06
+"""Of pressure, and of levels by it: at sea the monitors bear 10 % of either, not 15 (the storm)."""
+RATE_SCALE: Final = 0.03
+"""At sea the monitors bear it, and not 4 % (Patti-B); at the quay it is found to 1 %."""
+ROLL_SCALE: Final = 0.3
+ROLL_2_SCALE: Final = 0.05
+"""Two sensors that are farther apart disagree at sea: half a degree at a roll of ten."""
+TANK_PERIOD: Final = 0.1
+ROLL_PERIOD: Final = 0.15
+"""Tolerances, as shares."""
+CORNER: Final = 0.5
+"""Of the filters, as a share of the tank's frequency: a gauge's noise biases what is found with
+one that lets more of it through."""
+NO_PRESSURE: Final = 0.15
+"""Of what was commanded: less is none."""
+STILL_SHARE: Final = 0.03
+"""Of the plan's peak, after the filter, which lets a fifth through: less is no motion."""
+
+_T = TypeVar("_T")
+_BEND, _RATE, _VALUE = range(3)  # rows of a filtered signal
+
+
+class Each(NamedTuple, Generic[_T]):
+    """Something for each signal."""
+
+    pressure: _T
+    port: _T
+    starboard: _T
+    roll: _T
+    rate: _T
+
+
+def judge_pulses(
+    rest: Record, pulses: Record, plant: DesignPlant, plan: PulsePlan, sample_time_s: float
+) -> list[Check]:
+    """Judge the records at rest, and from the moment at which the first pulse began.
+
+    `plant` is as the files describe it, `plan` what was to be done, `sample_time_s` the time
+    between two rows.
+    """
+
+    def filtered(name: str) -> FloatArray:
+        return _filtered(pulses[name] - rest[name].mean(), plant, sample_time_s)
+
+    roll, rate, pressure = map(filtered, ("roll_rad", "roll_rate_rad_s", "pressure_pa"))
+    port, starboard = -filtered("port_level_m"), filtered("starboard_level_m")
+    promised = _filtered(
+        _promised(pulses["command_pa"], plant, sample_time_s), plant, sample_time_s
+    )
+    mass, _, stiffness = coupled_matrices(plant.ship, plant.tank)
+    water_kg_m = plant.tank.density_kg_m3 * plant.tank.reservoir_area_m2
+    push = -(mass[1, 0] * roll[_BEND] + stiffness[1, 0] * roll[_VALUE]) / water_kg_m
+    pushed = pressure[_VALUE] / plant.tank.density_kg_m3
+    # a pressure of nothing but zero fits any water: there is then no equation
+    fits = [
+        _least_squares([*gauge, -push], pushed)
+        if _moves(gauge, plan.level_m) and pushed.any()
+        else None
+        for gauge in (port, starboard)
+    ]
+    gauges = [0.0 if fit is None else 2 * GRAVITY_M_S2 / float(fit[_VALUE]) for fit in fits]
+    good = [fit for fit in fits if fit is not None]
+    rolls = _moves(roll, plan.roll_rad)
+    scales = Each(
+        _slope(pressure[_VALUE], promised[_VALUE]),
+        gauges[0],
+        gauges[1],
+        _mean([float(fit[3]) for fit in good]) if rolls else 0.0,
+        _slope(rate[_VALUE], roll[_RATE]) if rolls else 0.0,
+    )
+    checks = _scale_checks(scales)
+    if "roll_2_rad" in pulses:
+        roll_2, rate_2 = filtered("roll_2_rad"), filtered("roll_rate_2_rad_s")
+        remedy = "Mount both motion sensors alike: roll is positive starboard down."
+        checks += [
+            _scale_check("roll_2", "second sensor's roll, by the first's",
+                         _slope(roll_2[_VALUE], roll[_VALUE]), ROLL_2_SCALE, remedy),
+            _scale_check("roll_rate_2", "second sensor's rate, by its roll",
+                         _slope(rate_2[_VALUE], roll_2[_RATE]), RATE_SCALE, remedy),
+        ]  # fmt: skip
+    tank_period_s = _period_s(_mean([float(fit[_VALUE] / fit[_BEND]) for fit in good]))
+    ship_period_s = math.nan
+    if good and rolls:
+        true = [
+            each / scale for each, scale in zip((port, starboard), gauges, strict=True) if scale
+        ]
+        level = np.mean(true, axis=0)
+        righting = -(mass[0, 1] * level[_BEND] + stiffness[0, 1] * level[_VALUE])
+        inertia, _, righted = _least_squares(list(roll / scales.roll), righting).tolist()
+        # less the water's share
+        inertia -= mass[0, 0] - plant.ship.inertia_kg_m2
+        righted -= stiffness[0, 0] - plant.ship.stiffness_nm_rad
+        ship_period_s = _period_s(righted / inertia)
+    return [
+        *checks,
+        _period_check("tank_period", "natural period of the tank", tank_period_s, plan.period_s,
+                      TANK_PERIOD, "Check the tank's filling and its measures in the ship's file."),
+        _period_check("roll_period", "the ship's own roll period", ship_period_s,
+                      2 * math.pi / plant.ship.natural_frequency_rad_s, ROLL_PERIOD,
+                      "Slacken the moorings and try again; else give its roll period as loaded in "
+                      "the ship's file."),
+    ]  # fmt: skip
+
+
+def _scale_checks(scales: Each[float]) -> list[Check]:
+    remedies = remedies_of(scales)
+    return [
+        _scale_check(name, what, scale, tolerance, remedy)
+        for (name, what, tolerance), scale, remedy in zip(
+            (
+                ("pressure", "pump pressure, by the command", SCALE),
+                ("port_level", "port level, by the pump pressure", SCALE),
+                ("starboard_level", "starboard level, by the pump pressure", SCALE),
+                ("roll", "roll, by what it does to the water", ROLL_SCALE),
+                ("roll_rate", "roll rate, by the roll", RATE_SCALE),
+            ),
+            scales,
+            remedies,
+            strict=True,
+        )
+    ]
+
+
+def remedies_of(scales: Each[float]) -> Each[str]:
+    """What to do about each scale if it is wrong; all of them together say what is reversed.
+
+    Of the signed `scales` 1 is right, and 0 did not move.
+    """
+    pressure, port, starboard, roll, rate = scales
+    if abs(pressure) < NO_PRESSURE:
+        nothing = "Without pressure nothing moves."
+        return Each(
+            "The pump gives no pressure, or its sensor shows none. Check both.",
+            nothing,
+            nothing,
+            nothing,
+            nothing,
+        )
+    # whoever is compared with a wrong pressure shows the inverse of its scale
+    sensor = abs(pressure - 1) > SCALE and all(
+        abs(pressure * gauge - 1) <= 2 * SCALE for gauge in (port, starboard)
+    )
+    if sensor:
+        of_pressure = (
+            "The pressure sensor is connected the wrong way round: exchange its sides."
+            if pressure < 0
+            else "The water moves by what was commanded: correct the pressure sensor's scaling."
+        )
+    elif pressure < 0:
+        of_pressure = (
+            "The pump pushes to port when it is to push to starboard: exchange two of the motor's "
+            "phases, or correct the drive's direction."
+        )
+    else:
+        of_pressure = "Check the pump for blockage, and the drive's limits and scaling."
+    agrees = "It agrees once the pressure sensor is right."
+    swapped = "The gauge falls when the pump pushes to its side: port and starboard are swapped."
+    of_gauges = [
+        agrees
+        if sensor
+        else swapped
+        if port < 0 and starboard < 0
+        else f"Only the {side} gauge counts downwards: correct its sign."
+        if scale < 0
+        else f"The {side} gauge does not move: check it, its pipe and its cable."
+        if scale == 0
+        else "The motion sensor shows no roll, and its push on the water is missing here."
+        if roll == 0
+        else f"Correct the {side} gauge's scaling."
+        for side, scale in (("port", port), ("starboard", starboard))
+    ]
+    if roll == 0:
+        of_roll = of_rate = "The motion sensor shows no roll: check it and its cable."
+    elif sensor and abs(roll / pressure - 1) <= 2 * ROLL_SCALE:
+        of_roll, of_rate = agrees, "Correct the sign or scaling of the roll rate."
+    elif roll < 0:
+        of_roll = "The roll has the wrong sign: it is positive starboard down. " + (
+            "Turn the motion sensor round." if rate > 0 else "The roll rate's is right."
+        )
+        of_rate = "It agrees once the roll has the right sign."
+    else:
+        of_roll = "Correct the roll's scaling; check the tank's measures in the ship's file."
+        of_rate = (
+            "The roll rate has the wrong sign: it is positive while starboard goes down."
+            if rate < 0
+            else "Correct the scaling of the roll rate."
+        )
+    return Each(of_pressure, of_gauges[0], of_gauges[1], of_roll, of_rate)
+
+
+def _scale_check(name: str, what: str, scale: float, tolerance: float, remedy: str) -> Check:
+    return Check(name, what, scale, 1.0, tolerance, "1", remedy)
+
+
+def _period_check(
+    name: str, what: str, period_s: float, expected_s: float, share: float, remedy: str
+) -> Check:
+    return Check(name, what, period_s, expected_s, share * expected_s, "s", remedy)
+
+
+def _mean(values: list[float]) -> float:
+    return sum(values) / len(values) if values else math.nan
+
+
+def _period_s(square_rad2_s2: float) -> float:
+    """Period of a squared frequency; NaN where that is none."""
+    return 2 * math.pi / math.sqrt(square_rad2_s2) if square_rad2_s2 > 0 else math.nan
+
+
+def _filtered(column: FloatArray, plant: DesignPlant, sample_time_s: float) -> FloatArray:
+    """A signal's second derivative, first derivative and value, low-pass filtered, shape (3, n)."""
+    signal = DerivativeFilter(CORNER * plant.tank.natural_frequency_rad_s, sample_time_s)
+    return np.array([(signal.update(x), signal.rate, signal.value) for x in column.tolist()]).T
+
+
+def _promised(command_pa: FloatArray, plant: DesignPlant, sample_time_s: float) -> FloatArray:
+    """The pressure that the files promise for a command."""
+    late = np.roll(command_pa, round(plant.delay_s / sample_time_s))  # the record ends at zero
+    share = 1 - math.exp(-sample_time_s / plant.lag_s) if plant.lag_s > 0 else 1.0
+    pressure_pa = np.empty(len(late))
+    value = 0.0
+    for index, asked in enumerate(late.tolist()):
+        value += share * (asked - value)
+        pressure_pa[index] = value
+    return pressure_pa
+
+
+def _moves(signal: FloatArray, expected: float) -> bool:
+    return bool(np.abs(signal[_VALUE]).max() > STILL_SHARE * expected)
+
+
+def _slope(y: FloatArray, x: FloatArray) -> float:
+    """Least-squares slope of y against x, through zero."""
+    power = float(x @ x)
+    return float(x @ y) / power if power > 0 else math.nan
+
+
+def _least_squares(columns: list[FloatArray], y: FloatArray) -> FloatArray:
+    matrix = np.column_stack(columns)
+    size = np.linalg.norm(matrix, axis=0)
+    size[size == 0] = 1.0
+    return np.asarray(np.linalg.lstsq(matrix / size, y, rcond=None)[0] / size)

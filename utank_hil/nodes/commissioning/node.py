@@ -14,10 +14,10 @@ from utank_hil.control.interface import PRESSURE, VALVE
 from utank_hil.nodes.commissioning.checks import (
     Check,
     Record,
+    judge_pulses,
     judge_rest,
     judge_valve,
 )
-from utank_hil.nodes.commissioning.pulse_checks import judge_pulses
 from utank_hil.nodes.commissioning.pulses import PulseLaw, PulsePlan, ValveStroke
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.safety.faults import fault_text

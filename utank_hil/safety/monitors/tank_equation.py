@@ -40,10 +40,9 @@ from utank_hil.base.elementary import exp
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
-from utank_hil.safety.monitors.derivative_filter import DerivativeFilter
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.monitors.misfit import Misfit
-from utank_hil.safety.monitors.sway import SPREAD, SlopePush, most_sway
+from utank_hil.safety.monitors.noise import DerivativeFilter
+from utank_hil.safety.monitors.sway import SPREAD, Misfit, SlopePush, most_sway
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
 SIGN_GAIN: Final = -0.25
