@@ -67,6 +67,20 @@ def test_with_a_passive_tank_and_another_ship_than_the_known_one_the_sea_is_unce
     assert (found.of_sea, found.of_ship) == (Verdict.UNCERTAIN, Verdict.UNCERTAIN)
 
 
+def test_righting_levers_are_those_of_the_known_ship():
+    """Straight levers say no more than the stiffness does."""
+    ship = loaded(10.0)
+    heel_rad = 0.1 * np.arange(8)
+    weight_n = 1e8
+    levers_m = tuple((SHIP.stiffness_nm_rad / weight_n * heel_rad).tolist())
+    levered = replace(SHIP, displacement_n=weight_n, gz_step_rad=0.1, gz_m=levers_m)
+    task = replace(TASK, plant=replace(PLANT, ship=levered))
+    asked = request(motion_in(MOMENT_NM, ship, 0.0)[500:], ship)
+    without, found = estimate(asked, TASK), estimate(asked, task)
+    assert found.of_ship is Verdict.UNCERTAIN
+    np.testing.assert_allclose(found.waves.density, without.waves.density, rtol=1e-3)
+
+
 def test_lost_samples_are_no_harm_and_many_are_a_short_record():
     motion = motion_in(MOMENT_NM)[500:]
     whole = estimate(request(motion), TASK)

@@ -24,7 +24,6 @@ hardly be distinguished: the stated deviations are then large. They are the curv
 likelihood, with priors as in `ship_fit`.
 """
 
-import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -189,11 +188,10 @@ class _Record:
         """Return the fit of the most likely ship."""
         stiffness, inertia, damping = np.exp(theta).tolist()
         ship = self._ship
-        fitted = dataclasses.replace(
-            ship,
-            stiffness_nm_rad=ship.stiffness_nm_rad * stiffness,
-            inertia_kg_m2=ship.inertia_kg_m2 * inertia,
-            damping_nms_rad=ship.damping_nms_rad * damping,
+        fitted = ship.with_figures(
+            ship.inertia_kg_m2 * inertia,
+            ship.stiffness_nm_rad * stiffness,
+            ship.damping_nms_rad * damping,
         )
         found = self.likelihood(theta)
         # A ship in error changes the spectrum, and the stiffness that it is relative to.

@@ -75,13 +75,7 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
     contradicted = False
     if of_ship is not Verdict.GOOD:
         likeliest = fit.log_likelihood
-        ship = dataclasses.replace(
-            task.plant.ship,
-            stiffness_nm_rad=known.stiffness_nm_rad,
-            inertia_kg_m2=known.inertia_kg_m2,
-            damping_nms_rad=known.damping_nms_rad,
-        )
-        plant = dataclasses.replace(task.plant, ship=ship)
+        plant = dataclasses.replace(task.plant, ship=known.ship(task.plant.ship))
         fit = fit_motion(motion, plant, task.sample_time_s, KNOWN_SPREAD)
         contradicted = likeliest - fit.log_likelihood > CONTRADICTED
     if fit.clear < LEAST_CLEAR:
