@@ -22,7 +22,7 @@ from utank_hil.commands.export import export
 from utank_hil.commands.identify import identify_log
 from utank_hil.commands.replay import replay
 from utank_hil.console.common import new_app
-from utank_hil.identification.logged_samples import logged_samples
+from utank_hil.identification.record import logged_samples
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.bus_records import Kind
 from utank_hil.telemetry.frame_log import FrameLog

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.identification.logged_samples import logged_samples
+from utank_hil.identification.record import logged_samples
 
 STEP_S = 0.05
 COUNT = 400

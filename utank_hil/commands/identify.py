@@ -20,7 +20,7 @@ from utank_hil.console import common
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, say_note
 from utank_hil.identification import IdentificationError
-from utank_hil.identification.logged_samples import logged_samples
+from utank_hil.identification.record import logged_samples
 from utank_hil.retuning import Candidate
 from utank_hil.retuning.redesign import RetuningTask, identify, judge
 

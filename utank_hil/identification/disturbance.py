@@ -133,28 +133,24 @@ class _Search:
     """Evidence for one more line in addition to known ones."""
 
     def __init__(self, z: FloatArray, m: int, lines: list[float], sample_time_s: float) -> None:
-        time_s = np.arange(len(z), dtype=np.float64) * sample_time_s
         known = DisturbanceBasis(lines).evaluate(len(z), sample_time_s)
-        self._regression = LagRegression(z, m, _ORDER, known)
-        gram, right = self._regression.gram()
-        ridge = np.full(len(gram), _RIDGE * self._regression.rows)
-        self._factor = cho_factor(gram + np.diag(ridge))
-        self._errors = self._regression.residuals(cho_solve(self._factor, right))
-        squares = sum(np.sum(e**2, axis=1) for e in self._errors)
-        self._variance = squares / self._regression.rows + _RIDGE
-        # These are the times of the regression's rows, for the sines and cosines.
-        marks = LagRegression(z, m, _ORDER, time_s[None])
-        self._times = [segment.basis[0] for segment in marks.segments]
+        regression = LagRegression(z, m, _ORDER, known)
+        self._matrix = regression.matrix
+        ridge = _RIDGE * regression.rows * np.eye(regression.columns)
+        self._factor = cho_factor(self._matrix.T @ self._matrix + ridge)
+        self._errors = regression.residuals(
+            cho_solve(self._factor, self._matrix.T @ regression.targets)
+        )
+        self._variance = np.mean(self._errors**2, axis=0) + _RIDGE
+        self._time_s = regression.at * sample_time_s
 
     def reduction(self, frequency_rad_s: float) -> float:
         """Return the reduction of the squared error over its variance, summed over outputs."""
-        waves = [
-            np.array([np.sin(frequency_rad_s * t), np.cos(frequency_rad_s * t)])
-            for t in self._times
-        ]
-        shared = self._regression.transposed(waves)
-        inner = sum(w @ w.T for w in waves) - shared.T @ cho_solve(self._factor, shared)
-        seen = sum(w @ e.T for w, e in zip(waves, self._errors, strict=True))
+        turn = frequency_rad_s * self._time_s
+        waves = np.column_stack([np.sin(turn), np.cos(turn)])
+        shared = self._matrix.T @ waves
+        inner = waves.T @ waves - shared.T @ cho_solve(self._factor, shared)
+        seen = waves.T @ self._errors
         gain = np.sum(seen * np.linalg.solve(inner, seen), axis=0)
         return float(np.sum(gain / self._variance))
 

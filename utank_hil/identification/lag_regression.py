@@ -1,44 +1,40 @@
-"""The least-squares problem of an ARX model, without its regression matrix.
+"""The least-squares problem of an ARX model, and its solution.
 
 ::
 
     y(k) = sum_{i=1..p} alpha_i y(k-i) + sum_{i=0..p} beta_i u(k-i) + c psi(k) + e(k)
 
-With z = (y, u) of q = m + r channels, the N - p rows of the regression matrix are a sliding window
-over z. So its Gram matrix is block Toeplitz up to corrections from the windows' ends (displacement
-structure, the covariance method of linear prediction)::
-
-    G[i+1, j+1] = G[i, j] + z(p-1-i) z(p-1-j)^T - z(N-1-i) z(N-1-j)^T
-
-One block row of correlations and this recursion give the Gram matrix in O(N p q^2 + p^2 q^2)
-operations, and products with the regression matrix are convolutions. Rows with a NaN divide a
-record into segments. The sums run over the segments, so a window never spans a gap.
+Rows with a NaN divide a record into segments, and a window of lags never spans a gap. Data that fit
+a model of lower order exactly do not determine all coefficients: the solution of minimum norm is
+taken, whose surplus poles lie inside the unit circle. Noisy data with weak excitation in some
+directions use `shrinkage_estimate`.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lapack
+from scipy.linalg import cholesky, lapack, lstsq, qr, solve_triangular
+from scipy.optimize import minimize_scalar
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.identification.record import IdentificationError
 
 _EXCITED = 1e-10  # Smallest pivot of the lagged inputs' Gram matrix: singular values of 1e-5.
-
-
-@dataclass(frozen=True, slots=True)
-class Segment:
-    """A part of the record without gaps."""
-
-    channels: FloatArray  #: shape (q, N): outputs, then inputs; each channel contiguous.
-    basis: FloatArray  #: shape (d, N - p): disturbance basis at the rows of the regression.
+_NULL = 1e-12  # Smallest eigenvalue, relative to the largest.
+_LOG_KAPPA = (-15.0, 30.0)  # The range is from zero input coefficients to plain least squares.
+_RANK = 1e-10  # Inverse of the largest condition number that determines all coefficients.
+_EXACT = 1e-10  # Relative residual of data without noise.
+_INFLATION = 100.0  # Above this, noise in weak directions of the input exceeds shrinkage's bias.
 
 
 class LagRegression:
     """Regression of the outputs on their past, the inputs and a disturbance basis.
 
+    `matrix`, shape (rows, n), times the coefficients gives `targets`, shape (rows, m).
     Coefficients have shape (n, m), n = r + p q + d: beta_0 transposed, then alpha_i and beta_i
-    transposed for each lag i = 1..p, then the rows of the basis.
+    transposed for each lag i = 1..p, then the rows of the basis. `at`, shape (rows,), are the
+    samples of the rows, and `ends` the rows after which a new segment begins.
 
     `z`, shape (N, q), holds outputs and inputs, the outputs first; a row with a value that is not
     finite is a gap. `basis`, shape (d, N), is the disturbance basis at every sample.
@@ -49,19 +45,23 @@ class LagRegression:
         self.outputs = outputs
         self.order = order
         self.channels = z.shape[1]
-        self.segments = [
-            Segment(np.ascontiguousarray(z[start:stop].T), basis[:, start + order : stop])
-            for start, stop in segment_bounds(z)
-            if stop - start > order
-        ]
-        if not self.segments:
+        self.basis_size = len(basis)
+        bounds = [(start, stop) for start, stop in segment_bounds(z) if stop - start > order]
+        if not bounds:
             raise IdentificationError(
                 f"no stretch of the record without gaps is longer than the order {order}; "
                 "record longer, mend the gaps or lower the order"
             )
-        self.basis_size = len(basis)
-        self.rows = sum(s.channels.shape[1] - order for s in self.segments)
-        self.columns = (order + 1) * self.channels - outputs + self.basis_size
+        lagged = [
+            np.lib.stride_tricks.sliding_window_view(z[start:stop], order + 1, axis=0)
+            for start, stop in bounds
+        ]
+        self.ends = np.cumsum([len(each) for each in lagged])[:-1]
+        self.at = np.concatenate([np.arange(start + order, stop) for start, stop in bounds])
+        newest_first = np.vstack(lagged)[:, :, ::-1].transpose(0, 2, 1)
+        whole = np.hstack([newest_first.reshape(len(self.at), -1), basis[:, self.at].T])
+        self.targets, self.matrix = whole[:, :outputs], whole[:, outputs:]
+        self.rows, self.columns = self.matrix.shape
 
     @property
     def input_rows(self) -> np.ndarray:
@@ -70,77 +70,10 @@ class LagRegression:
         index: np.ndarray = np.arange(self.order + 1)[:, None] * q + np.arange(q - m)
         return index.ravel()
 
-    def target_squares(self) -> FloatArray:
-        """Sum of squares of each output over the rows, shape (m,)."""
-        squares: FloatArray = np.sum(
-            [np.sum(s.channels[: self.outputs, self.order :] ** 2, axis=1) for s in self.segments],
-            axis=0,
-        )
-        return squares
-
-    def gram(self) -> tuple[FloatArray, FloatArray]:
-        """Normal equations: the upper triangle of G (n, n), and the right side (n, m)."""
-        p, q, m = self.order, self.channels, self.outputs
-        lags = (p + 1) * q
-        size = lags + self.basis_size
-        gram = np.zeros((size, size))
-        # The window ends of all segments are side by side: the displacement is one matrix product.
-        head = np.hstack([s.channels[:, :p][:, ::-1].T.reshape(-1, 1) for s in self.segments])
-        tail = np.hstack([s.channels[:, -p:][:, ::-1].T.reshape(-1, 1) for s in self.segments])
-        np.matmul(np.hstack([head, tail]), np.hstack([head, -tail]).T, out=gram[q:lags, q:lags])
-        gram[:q, :lags] = self._correlate([s.channels[:, p:] for s in self.segments]).T
-        for start in range(0, lags - q, q):
-            here, below = slice(start, start + q), slice(start + q, start + 2 * q)
-            gram[below, start + q : lags] += gram[here, start : lags - q]
-        if self.basis_size:
-            gram[:lags, lags:] = self._correlate([s.basis for s in self.segments])
-            gram[lags:, lags:] = sum(s.basis @ s.basis.T for s in self.segments)
-        right = gram[:m, m:].T.copy()
-        return gram[m:, m:], right
-
-    def residuals(self, coefficients: FloatArray) -> list[FloatArray]:
-        """One-step prediction errors by segment, each of shape (m, N - p)."""
-        p, q, m = self.order, self.channels, self.outputs
-        split = (p + 1) * q - m
-        filters = np.zeros(((p + 1) * q, m))
-        filters[m:] = coefficients[:split]
-        filters = np.ascontiguousarray(filters.reshape(p + 1, q, m).transpose(1, 2, 0))
-        left = []
-        for segment in self.segments:
-            error = segment.channels[:m, p:] - coefficients[split:].T @ segment.basis
-            for channel, taps in zip(segment.channels, filters, strict=True):
-                for row, tap in zip(error, taps, strict=True):
-                    row -= np.convolve(channel, tap, "valid")
-            left.append(error)
-        return left
-
-    def transposed(self, errors: list[FloatArray]) -> FloatArray:
-        """Product of the transposed regression matrix with errors by segment; shape (n, j)."""
-        split = self.channels * (self.order + 1)
-        product = np.empty((split + self.basis_size, len(errors[0])))
-        product[:split] = self._correlate(errors)
-        product[split:] = sum(s.basis @ e.T for s, e in zip(self.segments, errors, strict=True))
-        return product[self.outputs :]
-
-    def matrix(self) -> tuple[FloatArray, FloatArray]:
-        """Explicit regression matrix (rows, n) and targets (rows, m), for small problems."""
-        p, m = self.order, self.outputs
-        blocks, targets = [], []
-        for segment in self.segments:
-            windows = np.lib.stride_tricks.sliding_window_view(segment.channels, p + 1, axis=1)
-            lagged = windows[:, :, ::-1].transpose(1, 2, 0).reshape(windows.shape[1], -1)
-            blocks.append(np.hstack([lagged[:, m:], segment.basis.T]))
-            targets.append(lagged[:, :m])
-        return np.vstack(blocks), np.vstack(targets)
-
-    def _correlate(self, errors: list[FloatArray]) -> FloatArray:
-        """sum_k z_c(k-i) e_j(k) for all lags and channels; shape ((p + 1) q, j)."""
-        out = np.zeros((self.order + 1, self.channels, len(errors[0])))
-        for segment, error in zip(self.segments, errors, strict=True):
-            for c, channel in enumerate(segment.channels):
-                for j, row in enumerate(error):
-                    out[:, c, j] += np.correlate(channel, row, "valid")[::-1]
-        return out.reshape(-1, out.shape[2])
+    def residuals(self, coefficients: FloatArray) -> FloatArray:
+        """One-step prediction errors, shape (rows, m)."""
+        errors: FloatArray = self.targets - self.matrix @ coefficients
+        return errors
 
 
 def segment_bounds(z: FloatArray) -> list[tuple[int, int]]:
@@ -173,7 +106,7 @@ def excitation_order(u: FloatArray, most: int) -> int:
         return 0
     signal = signal / np.where(peak > 0, peak, 1.0)
     regression = LagRegression(signal, 0, most - 1, np.empty((0, len(signal))))
-    return input_excitation(regression, regression.gram()[0])[0]
+    return input_excitation(regression, regression.matrix.T @ regression.matrix)[0]
 
 
 def input_excitation(regression: LagRegression, gram: FloatArray) -> tuple[int, float]:
@@ -185,7 +118,7 @@ def input_excitation(regression: LagRegression, gram: FloatArray) -> tuple[int, 
     index = regression.input_rows
     lagged = gram[np.ix_(index, index)]
     power = lagged.diagonal()
-    factor, _, rank, _ = lapack.dpstrf(lagged.T, lower=1, tol=_EXCITED * power.max())
+    factor, _, rank, _ = lapack.dpstrf(lagged, lower=1, tol=_EXCITED * power.max())
     inputs = regression.channels - regression.outputs
     if rank < len(index):
         return int(rank) // inputs, np.inf
@@ -193,3 +126,108 @@ def input_excitation(regression: LagRegression, gram: FloatArray) -> tuple[int, 
     # The routine dpstrf leaves the other triangle unchanged.
     inflation = np.sum(np.tril(inverse) ** 2) * power.mean() / len(index)
     return int(rank) // inputs, float(inflation)
+
+
+def shrinkage_estimate(
+    regression: LagRegression, gram: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return shrunk coefficients (n, m), and 1 / kappa for each output (m,).
+
+    With a slow pump or a narrow-band input, the record does not determine the fast part of the
+    pulse responses. Least squares then amplifies noise to hundreds of times the signal, and ERA
+    realizes it. Here the input coefficients of each output have a Gaussian prior of zero mean and
+    variance tau^2 (ridge regression), and kappa = tau^2 / sigma^2 maximizes the likelihood of the
+    data (empirical Bayes, restricted likelihood; Pillonetto et al., Automatica 2014). With the
+    Schur complement S = V diag(l) V^T of the inputs in the normal equations and its right-hand side
+    c::
+
+        beta = V kappa / (1 + kappa l) V^T c
+
+    `gram` is the Gram matrix (n, n). numpy.linalg.LinAlgError is raised if the other columns of the
+    regression are dependent.
+    """
+    right = regression.matrix.T @ regression.targets
+    inputs = regression.input_rows
+    others = np.setdiff1d(np.arange(len(gram)), inputs)
+    factor = cholesky(gram[np.ix_(others, others)], lower=True)
+    shared = solve_triangular(factor, gram[np.ix_(others, inputs)], lower=True)
+    known = solve_triangular(factor, right[others], lower=True)
+    values, vectors = np.linalg.eigh(gram[np.ix_(inputs, inputs)] - shared.T @ shared)
+    kept = values > _NULL * values[-1]
+    values, vectors = values[kept], vectors[:, kept]
+    seen = vectors.T @ (right[inputs] - shared.T @ known)
+    all_squares = np.sum(regression.targets**2, axis=0)
+    squares = all_squares - np.sum(known**2, axis=0)
+    freedom = regression.rows - len(others)
+    coefficients = np.empty_like(right)
+    penalty = np.empty(right.shape[1])
+    for j, part in enumerate(seen.T):
+        rounding = float(np.finfo(np.float64).eps * all_squares[j])
+        kappa = _maximum_likelihood(values, part**2, float(squares[j]), freedom, rounding)
+        beta = vectors @ (kappa * part / (1 + kappa * values))
+        coefficients[inputs, j] = beta
+        coefficients[others, j] = solve_triangular(
+            factor, known[:, j] - shared @ beta, lower=True, trans=1
+        )
+        penalty[j] = 1 / kappa
+    return coefficients, penalty
+
+
+def _maximum_likelihood(
+    values: FloatArray, squares: FloatArray, total: float, freedom: int, rounding: float
+) -> float:
+    """Return the kappa of maximum restricted likelihood, with residuals of at least rounding."""
+
+    def cost(log_kappa: float) -> float:
+        kappa = np.exp(log_kappa)
+        left = max(total - np.sum(squares * kappa / (1 + kappa * values)), rounding)
+        return float(freedom * np.log(left) + np.sum(np.log1p(kappa * values)))
+
+    return float(np.exp(minimize_scalar(cost, bounds=_LOG_KAPPA, method="bounded").x))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """Solution of a regression."""
+
+    coefficients: FloatArray  #: shape (n, m)
+    #: shape (m, m): covariance of the equation errors, with rows minus rank as degrees of freedom.
+    residual_covariance: FloatArray
+    gram: FloatArray  #: shape (n, n): Gram matrix.
+    #: shape (m,): term of the shrinkage on the diagonal of the inputs' part; zero without
+    #: shrinkage.
+    penalty: FloatArray
+    rank: int
+    excitation_order: int  #: See `excitation_order`, for p + 1 lags.
+
+
+def fit(regression: LagRegression) -> Fit:
+    """Return the least-squares solution, of minimum norm if it is not unique.
+
+    IdentificationError is raised if there are no more rows than columns.
+    """
+    if regression.rows <= regression.columns:
+        raise IdentificationError(
+            f"{regression.rows} usable rows cannot determine {regression.columns} coefficients "
+            "an output; record longer or lower the order"
+        )
+    matrix, targets = regression.matrix, regression.targets
+    gram = matrix.T @ matrix
+    excitation_order, inflation = input_excitation(regression, gram)
+    penalty = np.zeros(regression.outputs)
+    # The triangle of both, as the normal equations lose half the digits.
+    triangle = qr(np.hstack([matrix, targets]), overwrite_a=True, mode="r", check_finite=False)[0]
+    rank = len(gram)
+    factor, shared = triangle[:rank, :rank], triangle[:rank, rank:]
+    if lapack.dtrcon(factor)[0] > _RANK:
+        coefficients = solve_triangular(factor, shared)
+    else:
+        coefficients, _, rank, _ = lstsq(matrix, targets, cond=_RANK, lapack_driver="gelsy")
+    exact = np.sum(regression.residuals(coefficients) ** 2) <= _EXACT**2 * np.sum(targets**2)
+    if not exact and (inflation > _INFLATION or rank < regression.columns):
+        with suppress(np.linalg.LinAlgError):  # The outputs are dependent, or hardly any noise.
+            coefficients, penalty = shrinkage_estimate(regression, gram)
+            rank = regression.columns
+    errors = regression.residuals(coefficients)
+    covariance = errors.T @ errors / (regression.rows - rank)
+    return Fit(coefficients, covariance, gram, penalty, int(rank), excitation_order)

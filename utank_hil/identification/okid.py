@@ -15,8 +15,7 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
 from utank_hil.identification.disturbance import DisturbanceBasis
-from utank_hil.identification.lag_regression import LagRegression
-from utank_hil.identification.least_squares import Fit, fit
+from utank_hil.identification.lag_regression import Fit, LagRegression, fit
 from utank_hil.identification.record import IdentificationError, channel_scale, stacked_record
 
 _MARKOV_COUNT = 401  # At 0.2 s this is a Hankel matrix over 40 s, longer than any roll period.
@@ -89,7 +88,7 @@ class OkidResult:
     #: shape (d, m): coefficients of the disturbance basis in the ARX equation.
     disturbance: FloatArray
     residual_covariance: FloatArray  #: shape (m, m): covariance of the one-step prediction errors.
-    #: shape (n, n): upper triangle of the regression's Gram matrix, with columns divided by
+    #: shape (n, n): the regression's Gram matrix, with columns divided by
     #: `column_scale`, in the order of `LagRegression`.
     gram: FloatArray
     column_scale: FloatArray  #: shape (n,)
@@ -138,11 +137,13 @@ def okid(
     """
     if not (np.isfinite(sample_time_s) and sample_time_s > 0):
         raise ValueError(f"sample_time_s must be positive, got {sample_time_s}")
+    if int(order) != order or order < 1:
+        raise ValueError(f"order must be a positive integer, got {order}")
     basis = DisturbanceBasis(tuple(disturbance_frequencies_rad_s), disturbance_polynomial_degree)
     z, m = stacked_record(u, y)
     scale = channel_scale(z, m)
     functions = basis.evaluate(len(z), sample_time_s)
-    regression = LagRegression(z / scale, m, checked_order(order), functions)
+    regression = LagRegression(z / scale, m, int(order), functions)
     solution = fit(regression)
     if solution.excitation_order < min(_LEAST_EXCITATION, order + 1):
         raise IdentificationError(
@@ -193,10 +194,3 @@ def _in_units(
         excitation_order=solution.excitation_order,
         rows=regression.rows,
     )
-
-
-def checked_order(order: int) -> int:
-    """`order` as int; ValueError if it is not a positive integer."""
-    if int(order) != order or order < 1:
-        raise ValueError(f"order must be a positive integer, got {order}")
-    return int(order)

@@ -7,6 +7,7 @@ with past inputs mean a wrong transfer function. Ljung, System Identification, 1
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.special import chdtrc
@@ -84,12 +85,11 @@ def validate(
     coefficients = _coefficients(arx, scale, regression)
     errors = _errors(regression, coefficients)
     if basis.size:
-        known = np.hstack([s.basis for s in regression.segments])
-        coefficients[-basis.size :] = np.linalg.lstsq(known.T, np.hstack(errors).T, rcond=None)[0]
+        known = regression.matrix[:, -basis.size :]
+        coefficients[-basis.size :] = np.linalg.lstsq(known, errors, rcond=None)[0]
         errors = _errors(regression, coefficients)
-    targets = np.hstack([s.channels[:m, regression.order :] for s in regression.segments])
-    spread = np.std(targets, axis=1)
-    whiteness, correlation = _whiteness(errors, lags)
+    spread = np.std(regression.targets, axis=0)
+    whiteness, correlation = _whiteness(np.split(errors, regression.ends), lags)
     independence, crossed = _independence(errors, regression, lags)
     return Validation(
         1 - _rms(errors) / spread,
@@ -104,31 +104,35 @@ def validate(
 
 def _refuse_unusable(regression: LagRegression, lags: int) -> None:
     """Raise IdentificationError for too few predictions, or channels that do not move."""
-    p, m = regression.order, regression.outputs
     if regression.rows <= lags:
         raise IdentificationError(
             f"{regression.rows} predictions are too few to correlate over {lags} lags; validate "
             "on a longer record, mend its gaps or ask for fewer lags"
         )
-    for c in range(regression.channels):
-        # Outputs are compared at the predictions, inputs also at every lag before them.
-        for lag in range(1 if c < m else lags + 1):
-            parts = [
-                s.channels[c, p - lag : s.channels.shape[1] - lag] for s in regression.segments
-            ]
-            if max(part.max() for part in parts) - min(part.min() for part in parts) < _STILL:
-                name = f"output {c}" if c < m else f"input {c - m}"
+    # Outputs are compared at the predictions, inputs also at every lag before them.
+    inputs = regression.channels - regression.outputs
+    lagged = np.stack([_lagged(regression, j, lags) for j in range(inputs)])
+    for name, parts in (("output", regression.targets.T), ("input", lagged.transpose(0, 2, 1))):
+        for number, part in enumerate(parts):
+            if np.ptp(part, axis=-1).min() < _STILL:
                 raise IdentificationError(
-                    f"{name} does not move in the samples that predictions are judged by; "
+                    f"{name} {number} does not move in the samples that predictions are judged by; "
                     "validate on a stretch in which it moves throughout"
                 )
 
 
-def _errors(regression: LagRegression, coefficients: FloatArray) -> list[FloatArray]:
-    """Return one-step prediction errors by segment; an overflow is refused."""
+def _lagged(regression: LagRegression, number: int, lags: int) -> FloatArray:
+    """Return an input at lags 0, 1, ... before the predictions, shape (rows, lags + 1)."""
+    inputs = regression.channels - regression.outputs
+    columns = regression.input_rows[number::inputs][: lags + 1]
+    return regression.matrix[:, columns]
+
+
+def _errors(regression: LagRegression, coefficients: FloatArray) -> FloatArray:
+    """Return one-step prediction errors, shape (rows, m); an overflow is refused."""
     with np.errstate(over="ignore", invalid="ignore"):
         errors = regression.residuals(coefficients)
-        if not all(np.isfinite(e @ e.T).all() for e in errors):
+        if not np.isfinite(errors.T @ errors).all():
             raise IdentificationError(
                 "the model's predictions of this record overflow; the model is not of these "
                 "signals, or of other units"
@@ -141,13 +145,7 @@ def _simulation_fit(
 ) -> FloatArray:
     """Return the fit of the simulated response; minus infinity if it overflows."""
     with np.errstate(over="ignore", invalid="ignore"):
-        simulated = [
-            s.channels[: regression.outputs, regression.order :] - free
-            for s, free in zip(
-                regression.segments, _simulated(regression, coefficients), strict=True
-            )
-        ]
-        fit = 1 - _rms(simulated) / spread
+        fit = 1 - _rms(regression.targets - _simulated(regression, coefficients)) / spread
     return np.where(np.isnan(fit), -np.inf, fit)
 
 
@@ -163,67 +161,58 @@ def _coefficients(arx: ARX, scale: FloatArray, regression: LagRegression) -> Flo
     return np.vstack([lagged, np.zeros((regression.basis_size, m))])
 
 
-def _simulated(regression: LagRegression, coefficients: FloatArray) -> list[FloatArray]:
-    """Return the response of each segment, (m, N - p), with its first p samples as state."""
-    p, q, m = regression.order, regression.channels, regression.outputs
-    split = (p + 1) * q - m
-    past = coefficients[q - m : split].reshape(p, q, m)[:, :m]
-    newest_first = past.transpose(2, 0, 1).reshape(m, p * m)
-    inputs_only = coefficients.copy()
-    inputs_only[q - m : split].reshape(p, q, m)[:, :m] = 0
+def _simulated(regression: LagRegression, coefficients: FloatArray) -> FloatArray:
+    """Return the response, shape (rows, m), from each segment's first outputs on."""
+    p, m = regression.order, regression.outputs
+    split = len(coefficients) - regression.basis_size
+    by_lag = np.vstack([np.zeros((m, m)), coefficients[:split]]).reshape(p + 1, -1, m)
+    newest_first = by_lag[1:, :m].reshape(p * m, m).T
+    own = np.zeros(len(coefficients), dtype=np.bool_)
+    own[:split] = np.arange(m, split + m) % regression.channels < m
+    forced = regression.matrix[:, ~own] @ coefficients[~own]
+    begins = np.concatenate([[0], regression.ends, [regression.rows]])
     responses = []
-    for segment, left in zip(regression.segments, regression.residuals(inputs_only), strict=True):
-        forced = segment.channels[:m, p:] - left
-        samples = segment.channels.shape[1]
-        history = np.zeros((samples, m))  # The time is reversed: newest first.
-        history[samples - p :] = segment.channels[:m, :p].T[::-1]
-        for k in range(samples - p):
-            now = samples - p - 1 - k
-            history[now] = newest_first @ history[now + 1 : now + 1 + p].ravel() + forced[:, k]
-        responses.append(history[: samples - p][::-1].T)
-    return responses
+    for first, last in pairwise(begins.tolist()):
+        count = last - first
+        history = np.zeros((count + p, m))  # The time is reversed: newest first.
+        history[count:] = regression.matrix[first, own].reshape(p, m)
+        for k in range(count):
+            now = count - 1 - k
+            past = history[now + 1 : now + 1 + p].ravel()
+            history[now] = newest_first @ past + forced[first + k]
+        responses.append(history[:count][::-1])
+    return np.vstack(responses)
 
 
-def _rms(errors: list[FloatArray]) -> FloatArray:
-    rms: FloatArray = np.sqrt(np.mean(np.hstack(errors) ** 2, axis=1))
+def _rms(errors: FloatArray) -> FloatArray:
+    rms: FloatArray = np.sqrt(np.mean(errors**2, axis=0))
     return rms
 
 
 def _whiteness(errors: list[FloatArray], lags: int) -> tuple[FloatArray, FloatArray]:
     """Return the Ljung-Box p-value and the autocorrelation of each output's errors."""
-    total = sum(np.sum(e**2, axis=1) for e in errors)
+    total = sum(np.sum(e**2, axis=0) for e in errors)
     correlation = np.array(
-        [
-            sum(np.sum(e[:, lag:] * e[:, :-lag], axis=1) for e in errors)
-            for lag in range(1, lags + 1)
-        ]
+        [sum(np.sum(e[lag:] * e[:-lag], axis=0) for e in errors) for lag in range(1, lags + 1)]
     ) / np.maximum(total, 1e-300)
-    rows = sum(e.shape[1] for e in errors)
+    rows = sum(len(e) for e in errors)
     weights = rows * (rows + 2) / (rows - np.arange(1, lags + 1))
     return chdtrc(lags, weights @ correlation**2), correlation
 
 
 def _independence(
-    errors: list[FloatArray], regression: LagRegression, lags: int
+    errors: FloatArray, regression: LagRegression, lags: int
 ) -> tuple[FloatArray, FloatArray]:
     """Return the p-value of the independence of errors and past inputs, and their correlation."""
-    p, m = regression.order, regression.outputs
-    inputs = regression.channels - m
-    probability = np.empty((m, inputs))
-    correlation = np.empty((lags + 1, m, inputs))
-    size = np.sqrt(np.maximum(sum(np.sum(e**2, axis=1) for e in errors), 1e-300))
-    rows = regression.rows
+    inputs = regression.channels - regression.outputs
+    rows, probability = regression.rows, np.empty((regression.outputs, inputs))
+    correlation = np.empty((lags + 1, regression.outputs, inputs))
+    size = np.sqrt(np.maximum(np.sum(errors**2, axis=0), 1e-300))
     for j in range(inputs):
-        lagged = [
-            np.array(
-                [s.channels[m + j, p - lag : s.channels.shape[1] - lag] for lag in range(lags + 1)]
-            )
-            for s in regression.segments
-        ]
-        power = sum(window @ window.T for window in lagged)
+        lagged = _lagged(regression, j, lags)
+        power = lagged.T @ lagged
         scale = np.sqrt(power.diagonal())
-        crossed = sum(w @ e.T for w, e in zip(lagged, errors, strict=True))
-        correlation[:, :, j] = crossed / scale[:, None] / size
+        correlation[:, :, j] = lagged.T @ errors / scale[:, None] / size
         # Lagged inputs are correlated, those of a slow input almost completely.
         values, vectors = np.linalg.eigh(power / np.outer(scale, scale))
         kept = values > 1e-6 * values[-1]
