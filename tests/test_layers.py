@@ -32,10 +32,14 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ("file", "line", "contract"),
     [
-        ("utank_hil/control/pd.py", "import utank_hil.runners.node", "arrows point one way"),
+        ("utank_hil/control/gain.py", "import utank_hil.runners.node", "arrows point one way"),
         ("utank_hil/telemetry/ring.py", "import utank_hil.pictures", "arrows point one way"),
         ("utank_hil/commands/run.py", "import firmware_sim.bench", "knows nothing of the bench"),
-        ("utank_hil/control/optimal_tank.py", "import utank_hil.control.pd", "no circle of files"),
+        (
+            "utank_hil/control/optimal_tank.py",
+            "import utank_hil.control.gain",
+            "no circle of files",
+        ),
         ("utank_hil/dynamics/tank.py", "import time", "know nothing of CAN, time or files"),
         (
             "firmware_sim/report_page.py",

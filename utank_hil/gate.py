@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.analysis.loop.robustness import Robustness, robustness
+from utank_hil.analysis.loop.margins import Robustness, robustness
 from utank_hil.assembly import build_law
 from utank_hil.base.parameters import ParameterError, refuse
 from utank_hil.base.tick import TICK_S

@@ -37,8 +37,8 @@ from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.configuration import ControllerConfig
 from utank_hil.configuration.files import ALLOW_CODE, problems_in_words
 from utank_hil.control import BuiltLaw, DesignPlant
+from utank_hil.control.gain import PassiveDesign
 from utank_hil.control.interface import PRESSURE
-from utank_hil.control.passive import PassiveDesign
 from utank_hil.dynamics.linear import STATES
 from utank_hil.nodes.signals import ROW_TICKS
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_radius
+from utank_hil.analysis.loop.margins import closed_loop_radius
 from utank_hil.control.feedback_linearization import FeedbackLinearization
 from utank_hil.control.gain import GainLaw
 from utank_hil.dynamics import RollShip, Tank

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.analysis.loop.robustness import of_period, robustness
+from utank_hil.analysis.loop.margins import of_period, robustness
 from utank_hil.analysis.loop.sea_response import motion_in_sea
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import LQGLaw, SeaModel
 from utank_hil.control.constrained.law import ConstrainedLaw
-from utank_hil.control.gentle_lqg import SHARES, GentleController
+from utank_hil.control.lqg import SHARES, GentleController
 from utank_hil.sea import Harmonics, ittc
 
 CONFIG = load_config(Path("configs/controllers/self_tuning.yaml"), ControllerConfig)

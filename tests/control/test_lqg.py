@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rolling_ship import SHIP, TANK
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_radius
+from utank_hil.analysis.loop.margins import closed_loop_radius
 from utank_hil.control.lqg import LQGLaw, design_lqg, design_lqr, kalman_predictor
 from utank_hil.dynamics import coupled_model
 from utank_hil.dynamics.sampling import LinearModel, sampled_model

@@ -7,8 +7,7 @@ import pytest
 from rolling_ship import SHIP, TANK
 from shipped_designs import LQG_ROLL_RATE_LEVEL
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_response
-from utank_hil.analysis.loop.margins import margins
+from utank_hil.analysis.loop.margins import closed_loop_response, margins
 from utank_hil.control import DesignPlant, WashoutLaw, pump_model
 from utank_hil.control.lqg_design import LQGDesign, wave_plant
 from utank_hil.control.predictive.design import Predictor

@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from rolling_ship import SHIP, TANK
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_response
-from utank_hil.analysis.loop.margins import margins
+from utank_hil.analysis.loop.margins import closed_loop_response, margins
 from utank_hil.control import DesignPlant
-from utank_hil.control.gain import GainLaw
+from utank_hil.control.gain import PD_MEASURED, GainLaw, design_pd
 from utank_hil.control.optimal_tank import passive_optimum, ship_ratios
-from utank_hil.control.pd import PD_MEASURED, design_pd
 from utank_hil.dynamics.linear import coupled_matrices, pump_model
 
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from shipped_designs import GPC_ROLL, LQG_ROLL_RATE_LEVEL
 from test_semi_active import PLANT, VALVE
 
-from utank_hil.analysis.loop.robustness import robustness
-from utank_hil.control.passive import PassiveDesign
+from utank_hil.analysis.loop.margins import robustness
+from utank_hil.control.gain import PassiveDesign
 from utank_hil.control.semi_active import OnOffValveDesign, PumpWithValve, PumpWithValveDesign
 
 

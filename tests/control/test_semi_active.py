@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from shipped_designs import GPC_ROLL, LQG_ROLL_RATE_LEVEL
 
 from tools.thesis.capsize import controlled_run
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.gain import GainLaw
-from utank_hil.control.pd import PDDesign
+from utank_hil.control.gain import GainLaw, PDDesign
+from utank_hil.control.interface import DesignPlant
 from utank_hil.control.semi_active import (
     ClippedValve,
     ClippedValveDesign,

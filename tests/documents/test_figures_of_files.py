@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tools.studies.share_of_possible import STORM_HOUR, expecting, measured_hour, shipped
-from utank_hil.analysis.loop.robustness import robustness
+from utank_hil.analysis.loop.margins import robustness
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.control import ConstrainedDesign
 from utank_hil.sea import jonswap

@@ -90,7 +90,7 @@ def test_the_steps_of_a_page_work(
         ("```sh\nutank-hil check nothing.yaml\n```\n", "nothing.yaml"),
         ("`x.yaml`:\n\n```yaml\na: 1\n```\n\n```sh\nutank-hil check x.yaml\n```\n", "x.yaml: has"),
         ("```python\nimport nothing_like_it\n```\n", "nothing_like_it"),
-        ("```python utank_hil/control/design_plant.py\nnot there\n```\n", "page.md:1"),
+        ("```python utank_hil/control/interface.py\nnot there\n```\n", "page.md:1"),
     ],
     ids=["missing file", "wrong file", "wrong snippet", "wrong quotation"],
 )

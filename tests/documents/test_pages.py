@@ -137,7 +137,7 @@ def test_the_glossary_s_places_are_right() -> None:
 def test_a_wrong_place_is_found() -> None:
     limiter = "control/limiter.py"
     assert missing(["CommandLimiter._barrier_pa"], limiter) == []
-    assert missing(["PumpLimits.level_m"], "control/design_plant.py") == []
+    assert missing(["PumpLimits.level_m"], "control/interface.py") == []
     assert missing(["CommandLimiter.command_pa"], limiter) == []
     assert missing(["barrier_pa", "CommandLimiter.barrier"], limiter) != []
     assert missing(["x"], "control/nothing.py") == ["control/nothing.py"]

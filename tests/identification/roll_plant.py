@@ -6,7 +6,7 @@ import control
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
-from utank_hil.control.design_plant import PumpLimits
+from utank_hil.control.interface import PumpLimits
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 from utank_hil.identification import random_pulses
 

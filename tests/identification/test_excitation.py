@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from roll_plant import SAMPLE_TIME_S, plant
 
 from utank_hil.control import ARX
-from utank_hil.control.design_plant import PumpLimits
+from utank_hil.control.interface import PumpLimits
 from utank_hil.identification import excitation_order, random_pulses, response_scale
 
 LIMITS = PumpLimits(pressure_pa=5e4, rate_pa_s=1e5)

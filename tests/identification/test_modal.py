@@ -12,7 +12,7 @@ from roll_plant import FAST_PUMP, SLOW_PUMP, Plant, noisy, plant, pulses
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ARX
-from utank_hil.control.design_plant import PumpLimits
+from utank_hil.control.interface import PumpLimits
 from utank_hil.identification import (
     IdentificationError,
     era,
@@ -21,7 +21,7 @@ from utank_hil.identification import (
     modal_parameters,
     okid,
 )
-from utank_hil.identification.modal import _frequency_and_damping_std
+from utank_hil.identification.era import _frequency_and_damping_std
 
 pytestmark = pytest.mark.slow
 

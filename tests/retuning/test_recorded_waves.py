@@ -3,7 +3,7 @@ import pytest
 from recorded_ship import CONFIGURED, DELAY_S, LAG_S, TANK, ship_of
 from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_response
+from utank_hil.analysis.loop.margins import closed_loop_response
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import CommandLimiter, DesignPlant, PumpLimits, pump_model
 from utank_hil.control.interface import LinearLaw

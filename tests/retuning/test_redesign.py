@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from recorded_ship import DELAY_S, LAG_S, TANK, record_of, ship_of, task_of
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_radius
-from utank_hil.analysis.loop.margins import margins
+from utank_hil.analysis.loop.margins import closed_loop_radius, margins
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import pump_model
 from utank_hil.dynamics.sampling import sample

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from utank_hil.analysis.loop.robustness import robustness
+from utank_hil.analysis.loop.margins import robustness
 from utank_hil.analysis.loop.self_tuning import passive_roll_rad, sample_time_of
 from utank_hil.assembly import works_of
 from utank_hil.canbus import Verdict

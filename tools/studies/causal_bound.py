@@ -39,7 +39,7 @@ from utank_hil.analysis.loop.loop_simulation import SensorNoise
 from utank_hil.analysis.motion.statistics import Interval, mean_interval
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.constrained.design import sea_plant
-from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import DesignPlant
 from utank_hil.control.lqg import kalman_predictor
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import STATES

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import DesignPlant
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import LinearModel, sample
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from tools.printing import command_line, show
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
-from utank_hil.analysis.loop.robustness import of_period
+from utank_hil.analysis.loop.margins import of_period
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.background import one_thread_each

@@ -29,7 +29,7 @@ from tools.printing import command_line, show
 from tools.studies.causal_bound import CausalBound, CausalProblem, causal_bound
 from tools.studies.clairvoyant import clairvoyant_bound
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
-from utank_hil.analysis.loop.robustness import robustness
+from utank_hil.analysis.loop.margins import robustness
 from utank_hil.analysis.loop.sea_response import roll_without_tank
 from utank_hil.analysis.motion.statistics import mean_interval
 from utank_hil.assembly import build_law
@@ -39,8 +39,7 @@ from utank_hil.base.tick import TICK_S
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import BuiltLaw, ConstrainedDesign, PumpLimits
 from utank_hil.control.constrained.law import ConstrainedLaw
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import LinearLaw
+from utank_hil.control.interface import DesignPlant, LinearLaw
 from utank_hil.dynamics.linear import STATES
 from utank_hil.sea import EffectiveSlope, Sea, Spectrum, jonswap, load_ndbc
 

@@ -24,7 +24,7 @@ from tools.thesis.ships import AS_PRINTED, GREATER
 from utank_hil.analysis.loop.margins import margins
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.optimal_tank import ship_ratios
-from utank_hil.control.predictive.gains import design_dpc, design_gpc
+from utank_hil.control.predictive.law import design_dpc, design_gpc
 from utank_hil.dynamics.linear import pump_model
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank

@@ -15,14 +15,13 @@ import numpy.typing as npt
 
 from tools.thesis.batch import simulate_batch
 from utank_hil.base.arrays import FloatArray
-from utank_hil.control.design_plant import PumpLimits
 from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
 from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.indirect import IndirectFuzzy
 from utank_hil.control.fuzzy.law import ErrorDynamics
-from utank_hil.control.interface import Controller
+from utank_hil.control.gain import PassiveController
+from utank_hil.control.interface import Controller, PumpLimits
 from utank_hil.control.limiter import CommandLimiter
-from utank_hil.control.passive import PassiveController
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.simulate import WaveComponents, WaveMoment, whole_steps

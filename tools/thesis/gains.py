@@ -17,8 +17,7 @@ from tools.thesis.linear_contest import (
 )
 from tools.thesis.ships import AS_PRINTED, FITTED, GREATER, INERTIA_KG_M2, ROLL_RAD_S
 from utank_hil.control.optimal_tank import ship_ratios
-from utank_hil.control.predictive.gains import design_dpc, design_gpc
-from utank_hil.control.predictive.law import PredictiveLaw
+from utank_hil.control.predictive.law import PredictiveLaw, design_dpc, design_gpc
 from utank_hil.dynamics.ship import RollShip
 
 ROLL_DAMPING: Final = 4.87e8  #: As printed; a tenth of it fits.

@@ -33,8 +33,7 @@ from tools.thesis.linear_contest import (
 from tools.thesis.ships import AS_PRINTED, GREATER, ROLL_RAD_S
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
-from utank_hil.control.predictive.gains import design_dpc
-from utank_hil.control.predictive.law import PredictiveLaw
+from utank_hil.control.predictive.law import PredictiveLaw, design_dpc
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 

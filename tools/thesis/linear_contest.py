@@ -15,17 +15,14 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_radius, closed_loop_response
+from utank_hil.analysis.loop.margins import closed_loop_radius, closed_loop_response
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.gain import GainLaw
-from utank_hil.control.interface import Controller, LinearLaw
+from utank_hil.control.gain import PD_MEASURED, GainLaw, design_pd
+from utank_hil.control.interface import Controller, DesignPlant, LinearLaw
 from utank_hil.control.lqg import design_lqr
 from utank_hil.control.optimal_tank import ship_ratios
-from utank_hil.control.pd import PD_MEASURED, design_pd
-from utank_hil.control.predictive.gains import design_dpc, design_gpc
-from utank_hil.control.predictive.law import PredictiveLaw
+from utank_hil.control.predictive.law import PredictiveLaw, design_dpc, design_gpc
 from utank_hil.dynamics.linear import STATES, pump_model, state_matrices
 from utank_hil.dynamics.sampling import LinearModel, sample, transition_and_step
 from utank_hil.dynamics.ship import RollShip

@@ -15,7 +15,7 @@ import numpy as np
 from tools.thesis.linear_contest import SAMPLE_TIME_S, Entrant, held_model, radius
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
-from utank_hil.control.design_plant import PumpLimits
+from utank_hil.control.interface import PumpLimits
 from utank_hil.control.predictive.law import PredictiveLaw
 from utank_hil.dynamics.linear import STATES, state_matrices
 from utank_hil.dynamics.sampling import LinearModel, transition_and_step

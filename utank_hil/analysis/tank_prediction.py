@@ -12,9 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.analysis.loop.linear_tuning import LinearDesign, TunedLaw, first_law
-from utank_hil.analysis.loop.robustness import PERIOD_SCALES, of_period
+from utank_hil.analysis.loop.margins import PERIOD_SCALES, closed_loop_response, of_period
 from utank_hil.analysis.loop.sea_response import (
     CalmSeaError,
     MotionInSea,

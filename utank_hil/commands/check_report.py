@@ -8,8 +8,7 @@ import numpy as np
 from rich.text import Text
 
 from utank_hil.analysis.loop.linear_tuning import AutoDesign
-from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins
-from utank_hil.analysis.loop.robustness import Robustness, robustness
+from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins, Robustness, robustness
 from utank_hil.analysis.loop.self_tuning import NoLawError, SelfTunedDesign
 from utank_hil.analysis.loop.trade import Design, scaled, varied
 from utank_hil.base.finite import finite
@@ -18,7 +17,7 @@ from utank_hil.console.ship_report import devices_json, print_devices, ship_figu
 from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.control import BuiltLaw
 from utank_hil.control.constrained.design import ConstrainedDesign
-from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import DesignPlant
 from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.gate import MOST_STEP_S, JudgedLaw

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Final
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from utank_hil.analysis.loop.robustness import EXTRA_DELAY_S
+from utank_hil.analysis.loop.margins import EXTRA_DELAY_S
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
 from utank_hil.base.tick import TICK_S, is_whole_ticks

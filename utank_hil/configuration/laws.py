@@ -33,10 +33,9 @@ from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.feedback_linearization import FeedbackLinearizationDesign
 from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.indirect import IndirectFuzzy
+from utank_hil.control.gain import PassiveDesign, PDDesign
 from utank_hil.control.interface import LawDesign
 from utank_hil.control.lqg_design import LQGDesign
-from utank_hil.control.passive import PassiveDesign
-from utank_hil.control.pd import PDDesign
 from utank_hil.control.predictive.design import PredictiveDesign
 from utank_hil.control.python_law import PythonDesign
 from utank_hil.control.sea_model import SeaModel

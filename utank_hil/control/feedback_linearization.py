@@ -42,9 +42,8 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.elementary import sine_cosine
 from utank_hil.base.parameters import NotNegative, Positive, SampleTime, range_problems, refuse
 from utank_hil.base.tick import TICK_S
-from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.gain import slope_at_rest
-from utank_hil.control.interface import BuiltLaw, Memoryless
+from utank_hil.control.interface import BuiltLaw, DesignPlant, Memoryless
 from utank_hil.dynamics import GRAVITY_M_S2, STATES, RollModel, RollShip, Tank
 
 

@@ -1,15 +1,23 @@
-"""A constant gain on the newest measurement, u = -K (y - reference)."""
+"""Laws without memory: a constant gain on the newest measurement, u = -K (y - reference), or none.
+
+PD control of the level, thesis (3.5), makes the tank the best passive one by its pump:
+P = -k h - c h', with k and c such that the water in a ship held still has the frequency and damping
+ratio of `passive_optimum`. The pump changes the water's stiffness and loss, but not the coupling of
+ship and water.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.ordered_sums import product
-from utank_hil.base.parameters import SampleTime, range_problems, refuse
-from utank_hil.control.interface import Controller, Memoryless
+from utank_hil.base.parameters import Range, SampleTime, range_problems, refuse
+from utank_hil.control.interface import BuiltLaw, Controller, DesignPlant, Memoryless
+from utank_hil.control.optimal_tank import passive_optimum, ship_ratios
+from utank_hil.dynamics import RollShip, Tank, coupled_matrices
 from utank_hil.dynamics.sampling import LinearModel
 
 STEP: Final = 1e-6
@@ -81,3 +89,58 @@ def slope_at_rest(controller: Callable[[], Controller], inputs: int) -> GainLaw:
     if not np.isfinite(slope).all():
         raise ValueError("its answer at rest overflows")
     return GainLaw(-slope, controller().sample_time_s)
+
+
+@dataclass(slots=True, eq=False)
+class PassiveController(Memoryless):
+    """Zero pressure for each of `inputs` pumps, for any measurement."""
+
+    inputs: Annotated[int, Range(least=1)] = 1
+    sample_time_s: SampleTime = 0.2
+
+    def __post_init__(self) -> None:
+        refuse("passive", range_problems(self))
+
+    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:  # noqa: ARG002
+        """Return zero pressure, shape (r,)."""
+        return np.zeros(self.inputs)
+
+
+@dataclass(frozen=True, slots=True)
+class PassiveDesign:
+    """The passive tank as a law of a configuration."""
+
+    kind: Literal["passive"] = "passive"
+
+    def build(self, plant: DesignPlant) -> BuiltLaw:  # noqa: ARG002, the same for all
+        """Return zero pressure; there is no loop."""
+        return BuiltLaw(PassiveController, ("roll_rad",), closes_loop=False)
+
+
+PD_MEASURED: Final = ("level_m", "level_rate_m_s")
+
+
+def design_pd(ship: RollShip, tank: Tank, sample_time_s: float = 0.02) -> GainLaw:
+    """PD law on `PD_MEASURED` that gives the tank its best frequency and damping.
+
+    The gains assume no delay, so the sample time must be short against the roll period.
+    """
+    ratios, ship_frequency = ship_ratios(ship, tank)
+    best = passive_optimum(ratios)
+    mass, damping, stiffness = (matrix[1, 1] for matrix in coupled_matrices(ship, tank))
+    frequency = best.frequency_ratio * ship_frequency
+    spring = mass * frequency * frequency - stiffness
+    loss = 2 * best.damping_ratio * frequency * mass - damping
+    return GainLaw(np.array([[spring, loss]]) / tank.reservoir_area_m2, sample_time_s)
+
+
+@dataclass(frozen=True, slots=True)
+class PDDesign:
+    """PD on the level as a law of a configuration."""
+
+    kind: Literal["pd"] = "pd"
+
+    def build(self, plant: DesignPlant) -> BuiltLaw:
+        """Design the law for a plant."""
+        law = design_pd(plant.ship, plant.tank)
+        return BuiltLaw(law.controller, PD_MEASURED, law)

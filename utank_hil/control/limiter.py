@@ -18,7 +18,7 @@ wave's moment, which is unknown.
 
 import math
 
-from utank_hil.control.design_plant import PumpLimits
+from utank_hil.control.interface import PumpLimits
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 

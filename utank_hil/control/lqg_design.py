@@ -12,8 +12,7 @@ from typing import Literal
 import numpy as np
 
 from utank_hil.base.parameters import NotNegative, Positive, range_problems, refuse
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import BuiltLaw, LinearLaw
+from utank_hil.control.interface import BuiltLaw, DesignPlant, LinearLaw
 from utank_hil.control.lqg import LQGLaw, design_lqg, design_lqr
 from utank_hil.control.predictive.design import Predictor, washed, wave_plant, weight_problems
 from utank_hil.dynamics.linear import STATES

@@ -24,8 +24,7 @@ from typing import Any, Literal
 import numpy as np
 
 from utank_hil.base.parameters import ParameterError, refuse
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import BuiltLaw, Controller, LinearLaw
+from utank_hil.control.interface import BuiltLaw, Controller, DesignPlant, LinearLaw
 from utank_hil.control.predictive.design import measured_problems
 from utank_hil.control.state_space import StateSpaceLaw
 

@@ -30,8 +30,14 @@ from utank_hil.base.parameters import (
     range_problems,
     refuse,
 )
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import PRESSURE, VALVE, BuiltLaw, Controller, LawDesign
+from utank_hil.control.interface import (
+    PRESSURE,
+    VALVE,
+    BuiltLaw,
+    Controller,
+    DesignPlant,
+    LawDesign,
+)
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.valves import ValveRange
 

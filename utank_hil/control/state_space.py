@@ -18,8 +18,7 @@ from utank_hil.base.arrays import ComplexArray, FloatArray, plausible
 from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import Finite, Problem, SampleTime, range_problems, refuse
 from utank_hil.control.arx import discrete_matrices
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import BuiltLaw
+from utank_hil.control.interface import BuiltLaw, DesignPlant
 from utank_hil.control.predictive.design import measured_problems
 from utank_hil.dynamics.sampling import LinearModel, state_space_response
 

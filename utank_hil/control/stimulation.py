@@ -23,8 +23,7 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray, plausible
 from utank_hil.base.elementary import sine_cosine
 from utank_hil.base.parameters import Positive, Problem, Range, SampleTime, range_problems, refuse
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import BuiltLaw
+from utank_hil.control.interface import BuiltLaw, DesignPlant
 from utank_hil.dynamics import STATES, RollShip, Tank, coupled_matrices
 
 FACTOR = (0.25, 3.0)  # range of the correction m; beyond it the model is invalid

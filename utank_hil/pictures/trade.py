@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from utank_hil.analysis.loop.robustness import PEAK_SENSITIVITY
+from utank_hil.analysis.loop.margins import PEAK_SENSITIVITY
 from utank_hil.analysis.loop.trade import Trade, TradePoint
 from utank_hil.pictures.style import BELOW, COLORS, HIGHLIGHT, WIDEST_IN, picture
 

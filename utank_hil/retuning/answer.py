@@ -22,7 +22,7 @@ from utank_hil.canbus.events import ModelSummary
 from utank_hil.control import LinearLaw, PredictiveLaw, PumpLimits, WashoutLaw
 from utank_hil.control.constrained.horizon import Horizon, Predictions, predictions
 from utank_hil.control.constrained.law import ConstrainedLaw
-from utank_hil.control.gentle_lqg import SHARES
+from utank_hil.control.lqg import SHARES
 from utank_hil.control.predictive.design import MOST_ORDER, MOST_SAMPLES
 from utank_hil.dynamics import STATES, LinearModel
 from utank_hil.retuning.estimate import MOST_BANDS, MotionEstimate

@@ -17,7 +17,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from utank_hil.analysis.loop.robustness import Robustness, robustness
+from utank_hil.analysis.loop.margins import Robustness, robustness
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import (
     CommandLimiter,

@@ -18,8 +18,8 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState, Verdict
 from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
-from utank_hil.control.design_plant import PumpLimits
-from utank_hil.control.gentle_lqg import GentleController
+from utank_hil.control.interface import PumpLimits
+from utank_hil.control.lqg import GentleController
 from utank_hil.retuning.answer import Answer, RenewedLaw
 from utank_hil.retuning.estimate import ChangeMonitor, MotionEstimate, ShipFigures, ship_factor
 from utank_hil.retuning.history import WarmUp
@@ -66,7 +66,7 @@ class Effort:
 
     The ship's roll is that of the passive twin plus the roll d that the pump made. With the share s
     of the pressure it made d, so with another share it would make about d times that ratio: with
-    gains for less pressure (`control.gentle_lqg`) its phase is then about the same. The mean square
+    gains for less pressure (`GentleController`) its phase is then about the same. The mean square
     of the roll is least at the share ``-s mean(twin d) / mean(d d)``, with means about the mean
     values and an exponential memory. A law that only rolls the ship more thus ends at
     `LEAST_EFFORT`, next to no power, and comes back as soon as it helps. A ship that is not the

@@ -15,7 +15,7 @@ from utank_hil.canbus import Quality
 from utank_hil.canbus.enumerations import DriveState
 from utank_hil.canbus.events import ModelSummary
 from utank_hil.canbus.measurements import Measurements
-from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import DesignPlant
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.retuning.estimate import ShipFigures

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_radius, closed_loop_response
+from utank_hil.analysis.loop.margins import closed_loop_radius, closed_loop_response
 from utank_hil.control import ARX, DesignPlant, PredictiveLaw, design_gpc, pump_model
 from utank_hil.dynamics import RollShip, Tank, coupled_model, sampled_model
 from utank_hil.dynamics.sampling import sample

@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL, LQG_ROLL_RATE_LEVEL
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_eigenvalues, closed_loop_radius
-from utank_hil.analysis.loop.margins import margins
-from utank_hil.analysis.loop.robustness import robustness
+from utank_hil.analysis.loop.margins import (
+    closed_loop_eigenvalues,
+    closed_loop_radius,
+    margins,
+    robustness,
+)
 from utank_hil.control import DesignPlant, WashoutLaw, design_pd
 from utank_hil.control.gain import GainLaw
 from utank_hil.control.state_space import StateSpaceLaw

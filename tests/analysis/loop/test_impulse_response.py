@@ -7,15 +7,18 @@ import pytest
 from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL, LQG_ROLL_RATE_LEVEL
 
 from utank_hil.analysis.loop import impulse_response
-from utank_hil.analysis.loop.closed_loop import closed_loop_eigenvalues, closed_loop_radius
 from utank_hil.analysis.loop.impulse_response import (
     NoImpulseResponse,
     NotDecaying,
     impulse_response_law,
     realize,
 )
-from utank_hil.analysis.loop.margins import margins
-from utank_hil.analysis.loop.robustness import robustness
+from utank_hil.analysis.loop.margins import (
+    closed_loop_eigenvalues,
+    closed_loop_radius,
+    margins,
+    robustness,
+)
 from utank_hil.control import (
     PD_MEASURED,
     ConstrainedDesign,

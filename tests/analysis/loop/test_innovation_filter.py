@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_lyapunov
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_radius
 from utank_hil.analysis.loop.innovation_filter import (
     InnovationFilter,
     laguerre,
     mean_positive_product,
 )
-from utank_hil.analysis.loop.robustness import GAINS, ship_variants
+from utank_hil.analysis.loop.margins import GAINS, closed_loop_radius, ship_variants
 from utank_hil.analysis.loop.self_tuning import SelfTuned, self_tuned
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control.constrained.design import ConstrainedDesign, sea_plant

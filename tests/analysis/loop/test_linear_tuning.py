@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from utank_hil.analysis.loop.linear_tuning import LINEAR_KINDS, AutoDesign, _Search, auto_tuned
-from utank_hil.analysis.loop.robustness import robustness
+from utank_hil.analysis.loop.margins import robustness
 from utank_hil.analysis.loop.sea_response import motion_in_sea
 from utank_hil.analysis.loop.self_tuning import (
     NoLawError,

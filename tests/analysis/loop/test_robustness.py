@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_radius
-from utank_hil.analysis.loop.robustness import (
+from utank_hil.analysis.loop.margins import (
     EXTRA_DELAY_S,
     GAINS,
     INERTIA_SCALES,
     PERIOD_SCALES,
+    closed_loop_radius,
     robustness,
 )
 from utank_hil.control import DesignPlant

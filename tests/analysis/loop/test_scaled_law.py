@@ -10,7 +10,7 @@ from utank_hil.analysis.loop.linear_tuning import (
     first_law,
     scaled_law,
 )
-from utank_hil.analysis.loop.robustness import robustness
+from utank_hil.analysis.loop.margins import robustness
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.control.lqg_design import LQGDesign

@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_radius
 from utank_hil.analysis.loop.innovation_filter import InnovationFilter
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
-from utank_hil.analysis.loop.robustness import of_period, robustness
+from utank_hil.analysis.loop.margins import closed_loop_radius, of_period, robustness
 from utank_hil.analysis.loop.sea_response import motion_in_sea
 from utank_hil.analysis.loop.self_tuning import (
     NoLawError,
@@ -24,7 +23,7 @@ from utank_hil.analysis.loop.self_tuning import (
 from utank_hil.assembly import build_law
 from utank_hil.base.tick import TICK_S
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import DesignPlant
 from utank_hil.control.lqg import LQGLaw
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import pump_model

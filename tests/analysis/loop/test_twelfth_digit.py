@@ -14,7 +14,7 @@ from utank_hil.analysis.loop.linear_tuning import AutoDesign
 from utank_hil.analysis.loop.sea_response import motion_in_sea
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign, unknown_sea
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import DesignPlant
 from utank_hil.sea import Harmonics
 
 QUICK = (

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rolling_ship import SHIP, TANK
 
 from utank_hil.analysis.loop.loop_simulation import SensorNoise, passive_motion, simulate_loop
-from utank_hil.analysis.loop.robustness import robustness
+from utank_hil.analysis.loop.margins import robustness
 from utank_hil.base.ordered_sums import positive_solved
 from utank_hil.control import ConstrainedDesign, DesignPlant, PumpLimits, SeaModel
 from utank_hil.control.constrained.preview import WaveForecast

@@ -6,7 +6,7 @@ from rolling_ship import SHIP, TANK
 from scipy.linalg import solve_discrete_lyapunov
 
 from utank_hil.control.constrained.design import sea_plant
-from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import DesignPlant
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import STATES, coupled_model, pump_model
 from utank_hil.dynamics.sampling import sample, state_space_response

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tools.thesis.linear_contest import DPC_ROLL, GPC_ROLL, PRINTED, PRINTED_ARX
 from utank_hil.control import ARX, design_dpc, design_gpc
-from utank_hil.control.predictive.gains import predict
+from utank_hil.control.predictive.law import predict
 
 shapes = {
     "seed": st.integers(0, 2**32 - 1),

@@ -11,7 +11,7 @@ from tools.thesis.linear_contest import (
     designed_laws,
     performance_index,
 )
-from utank_hil.analysis.loop.closed_loop import closed_loop_response
+from utank_hil.analysis.loop.margins import closed_loop_response
 from utank_hil.control import DesignPlant, PredictiveLaw
 from utank_hil.dynamics import RollShip, Tank
 

@@ -31,7 +31,7 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.analysis.loop.robustness import (
+from utank_hil.analysis.loop.margins import (
     EXTRA_DELAY_S,
     GAINS,
     PEAK_SENSITIVITY,

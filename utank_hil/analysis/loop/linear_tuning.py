@@ -26,9 +26,8 @@ from typing import Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.analysis.loop.loop_simulation import SensorNoise
-from utank_hil.analysis.loop.robustness import Robustness, robustness
+from utank_hil.analysis.loop.margins import Robustness, closed_loop_response, robustness
 from utank_hil.analysis.loop.sea_response import motion_in_sea
 from utank_hil.analysis.loop.self_tuning import (
     NoLawError,

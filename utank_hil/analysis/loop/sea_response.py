@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_response
+from utank_hil.analysis.loop.margins import closed_loop_response
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control import DesignPlant, LinearLaw
 from utank_hil.dynamics import STATES, RollShip

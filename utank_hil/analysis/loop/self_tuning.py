@@ -25,15 +25,15 @@ from typing import Annotated, Final, Literal, Protocol
 
 import numpy as np
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_radius
 from utank_hil.analysis.loop.innovation_filter import InnovationFilter, Prediction
 from utank_hil.analysis.loop.loop_simulation import SensorNoise
-from utank_hil.analysis.loop.robustness import (
+from utank_hil.analysis.loop.margins import (
     EXTRA_DELAY_S,
     GAINS,
     PEAK_SENSITIVITY,
     PERIOD_SCALES,
     Robustness,
+    closed_loop_radius,
     of_period,
     robustness,
 )
@@ -42,7 +42,7 @@ from utank_hil.base.parameters import Range, range_problems, refuse
 from utank_hil.base.tick import TICK_S
 from utank_hil.control import BuiltLaw, ConstrainedDesign, DesignPlant, LQGLaw, PumpLimits, SeaModel
 from utank_hil.control.constrained.law import ConstrainedLaw
-from utank_hil.control.gentle_lqg import SHARES
+from utank_hil.control.lqg import SHARES
 from utank_hil.dynamics import GRAVITY_M_S2, LinearModel, RollShip
 from utank_hil.dynamics.linear import pump_model, state_matrices
 from utank_hil.dynamics.sampling import sample
@@ -321,7 +321,7 @@ class _Search:
     def _gentler(
         self, search: InnovationFilter, design: ConstrainedDesign, law: LQGLaw
     ) -> FloatArray | None:
-        """Gains for less pressure (`gentle_lqg`), or None if one misses a margin."""
+        """Gains for less pressure (`GentleController`), or None if one misses a margin."""
         gains = []
         for share in SHARES[1:]:
             costly = replace(design, pressure_weight_rad2=design.pressure_weight_rad2 / share**2)

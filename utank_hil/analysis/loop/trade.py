@@ -6,7 +6,7 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from utank_hil.analysis.loop.robustness import Robustness, robustness
+from utank_hil.analysis.loop.margins import Robustness, robustness
 from utank_hil.analysis.loop.sea_response import (
     MotionInSea,
     at_its_motion,

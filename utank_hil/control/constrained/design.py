@@ -25,8 +25,7 @@ from utank_hil.base.parameters import (
 )
 from utank_hil.control.constrained.horizon import condense
 from utank_hil.control.constrained.law import ConstrainedLaw, Waves
-from utank_hil.control.design_plant import DesignPlant, PumpLimits
-from utank_hil.control.interface import BuiltLaw
+from utank_hil.control.interface import BuiltLaw, DesignPlant, PumpLimits
 from utank_hil.control.lqg import kalman_predictor
 from utank_hil.control.predictive.design import measured_problems, per_output
 from utank_hil.control.sea_model import SeaModel

@@ -26,9 +26,8 @@ from utank_hil.base.parameters import Positive, Range, range_problems, refuse
 from utank_hil.control.constrained.horizon import Horizon, condense
 from utank_hil.control.constrained.plan_programme import PlanProgramme
 from utank_hil.control.constrained.preview import Foresight, Preview, WaveForecast
-from utank_hil.control.design_plant import PumpLimits
-from utank_hil.control.gentle_lqg import SHARES, GentleController
-from utank_hil.control.lqg import LQGLaw
+from utank_hil.control.interface import PumpLimits
+from utank_hil.control.lqg import SHARES, GentleController, LQGLaw
 from utank_hil.dynamics.sampling import LinearModel
 
 _GRID_BITS = 20
@@ -76,8 +75,8 @@ class ConstrainedLaw:
     waves: Waves | None = None  #: In the first states of `model`; None if it has none.
     #: How a plan uses forecasts; its horizon then has N more states, the noises to come.
     foresight: Foresight | None = None
-    #: shape (len(SHARES) - 1, n): gains of the linear law for less pressure (`gentle_lqg`); without
-    #: them it takes shares of its gain.
+    #: shape (len(SHARES) - 1, n): gains of the linear law for less pressure (`GentleController`);
+    #: without them it takes shares of its gain.
     gentler: FloatArray | None = None
 
     def __post_init__(self) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.ordered_sums import product
 from utank_hil.control.constrained.horizon import Horizon
-from utank_hil.control.design_plant import PumpLimits
+from utank_hil.control.interface import PumpLimits
 
 _OPTIMAL = 1
 

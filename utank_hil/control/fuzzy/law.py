@@ -24,9 +24,8 @@ from utank_hil.base.parameters import (
     refuse,
 )
 from utank_hil.base.tick import TICK_S
-from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.gain import slope_at_rest
-from utank_hil.control.interface import BuiltLaw, Controller
+from utank_hil.control.interface import BuiltLaw, Controller, DesignPlant
 from utank_hil.dynamics.linear import STATES
 
 SETS = 3

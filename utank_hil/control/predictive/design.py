@@ -26,10 +26,8 @@ from utank_hil.base.parameters import (
     refuse,
 )
 from utank_hil.control.arx import ARX, discrete_matrices
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import BuiltLaw, LinearLaw
-from utank_hil.control.predictive.gains import design_dpc, design_gpc
-from utank_hil.control.predictive.law import PredictiveLaw
+from utank_hil.control.interface import BuiltLaw, DesignPlant, LinearLaw
+from utank_hil.control.predictive.law import PredictiveLaw, design_dpc, design_gpc
 from utank_hil.control.washout import WashableLaw, WashoutLaw
 from utank_hil.dynamics.linear import STATES, state_matrices
 from utank_hil.dynamics.sampling import LinearModel, noise_covariance, sample

@@ -23,7 +23,7 @@ from typing import Final, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import DesignPlant
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.nodes.commissioning.pulses import PulsePlan, ValveStroke

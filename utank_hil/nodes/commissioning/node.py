@@ -9,8 +9,7 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import Frame, Mode
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import PRESSURE, VALVE
+from utank_hil.control.interface import PRESSURE, VALVE, DesignPlant
 from utank_hil.nodes.commissioning.checks import (
     Check,
     Record,

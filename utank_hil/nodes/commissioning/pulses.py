@@ -9,7 +9,7 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.tick import TICK_S
-from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import DesignPlant
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Annotated, Final
 
 from utank_hil.base.parameters import Range, range_problems, refuse
-from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import DesignPlant
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.nonlinear import RollModel, greatest_held_pa
 from utank_hil.dynamics.tank import GRAVITY_M_S2
