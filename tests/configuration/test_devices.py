@@ -151,6 +151,20 @@ def test_a_ship_that_was_written_out_is_read_again(tmp_path):
             assert DevicesSection.model_validate(found.model_dump(mode=mode)) == found
 
 
+def test_the_noisier_gauge_counts_and_noise_of_no_value_is_refused(tmp_path):
+    levels = {"profile": "cia404_levels", "accept_unprotected": True, "node": 9,
+              "high_level_m": 4.6, "noise": {"starboard_level_m": 0.03},
+              "signals": {name: {"scale": 0.25, "offset": -3}
+                          for name in ("port_level_m", "starboard_level_m")}}  # fmt: skip
+    ship_file(tmp_path, {"levels": levels})
+    content = yaml.safe_load(Path("configs/controllers/pd.yaml").read_text())
+    path = tmp_path / "c.yaml"
+    path.write_text(yaml.safe_dump(content | {"vessel": "ship.yaml"}))
+    assert load_config(path, ControllerConfig).sensor_figures.level_noise_m == 0.03
+    said = problems(tmp_path, {"levels": levels | {"noise": {"level_m": 0.03}}})
+    assert "devices.levels.noise.level_m: is no value of it; there are port_level_m" in said
+
+
 def test_coarse_steps_are_noise():
     section = {"signals": {"roll_rate_rad_s": {"scale": 0.01}}}
     devices = DevicesSection(motion=SBG | section)

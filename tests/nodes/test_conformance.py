@@ -70,6 +70,13 @@ def test_a_sensor_conforms_or_what_is_wrong_is_named(changes, wrong):
     assert failed(sensor_trial(**changes)) == wrong
 
 
+def test_a_sensor_whose_measurements_come_all_at_once_has_no_rate():
+    trial = sensor_trial()
+    trial._heard, trial.checks = [trial._heard[0]] * 3, []
+    trial._judge_pace()
+    assert [each.measured for each in trial.checks if each.name == "rate"] == [0.0]
+
+
 class TrialLine(Line):
     """canopen's node, whose rotor turns as its target says and stops in 40 ms."""
 

@@ -138,7 +138,9 @@ class ControllerConfig(Section):
         values = {
             "roll_noise_rad": [devices.noise(role, "roll_rad") for role in roles],
             "roll_rate_noise_rad_s": [devices.noise(role, "roll_rate_rad_s") for role in roles],
-            "level_noise_m": [devices.noise("levels", "port_level_m")],
+            "level_noise_m": [
+                devices.noise("levels", f"{side}_level_m") for side in ("port", "starboard")
+            ],
         }
         most = {name: max(getattr(self.sensors, name), *found) for name, found in values.items()}
         return SensorFigures(**most)

@@ -177,6 +177,8 @@ class DeviceSection(Section):
                 unit = f"has the unit {layout.unit!r}" if layout.unit else "has no unit"
                 reason = f"{signal.from_} {unit}: give scale, from it to {unit_of(name)}"
                 yield f"signals.{name}.scale", reason
+        for name in self.noise.keys() - set(known):
+            yield f"noise.{name}", f"is no value of it; there are {', '.join(known)}"
         needed = [name for name in known if name not in SWITCHES and name != "flow_m3_s"]
         if kind is SensorTank and self.high_level_m is None:
             needed += SWITCHES

@@ -13,7 +13,7 @@ from utank_hil.configuration.hull_files.reader import read_hull
 from utank_hil.dynamics.hull.hull_data import HullData, excitation_at, radiation_at
 
 # centre of buoyancy and volume by WAMIT's own `.out`; the density is that of MSS
-FPSO = Given(1025.0, 1025 * 97960.9, (0.788631, 0.0, -1.0))
+FPSO = Given(density_kg_m3=1025.0, mass_kg=1025 * 97960.9, gravity_centre_m=(0.788631, 0.0, -1.0))
 SHIPX = np.array([-1.0, -1, 1, -1, -1, 1])
 
 
@@ -119,7 +119,7 @@ def test_resonance_in_beam_sea_is_that_computed_elsewhere(name, given, ratio, pe
 
 
 CYLINDERS = {
-    "wamit": ("wamit-cylinder/cyl.1", Given(1000.0)),
+    "wamit": ("wamit-cylinder/cyl.1", Given(density_kg_m3=1000.0)),
     "nemoh": ("nemoh3-cylinder/Nemoh.cal", None),
     "aqwa": ("aqwa-cylinder/cylinder.AH1", None),
     "capytaine": ("capytaine-cylinder/cylinder_hydrodynamics.nc", None),
@@ -222,7 +222,18 @@ def test_what_is_wrong_in_a_file_is_refused_in_words(tmp_path, name, file, old, 
         assert old in text
         path.write_text(text.replace(old, new, 1), encoding="latin-1")
     with pytest.raises(ValueError, match=words):
-        read_hull(folder / Path(name).name, Given(1000.0) if "cyl.1" in name else None)
+        read_hull(
+            folder / Path(name).name, Given(density_kg_m3=1000.0) if "cyl.1" in name else None
+        )
+
+
+def test_what_is_wrong_names_the_file_where_its_folder_is_the_present_one(tmp_path, monkeypatch):
+    text = hulls("aqwa-cylinder/cylinder.AH1").read_text(encoding="latin-1")
+    rows = text.split("MASS\n", 1)[1].splitlines()
+    (tmp_path / "a.ah1").write_text(text.replace(rows[1], rows[1].rsplit(maxsplit=1)[0], 1))
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError, match=r"^a\.ah1: setting an array"):
+        read_hull(Path("a.ah1"))
 
 
 def test_wamit_needs_a_density():

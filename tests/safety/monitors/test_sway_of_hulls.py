@@ -14,7 +14,10 @@ from utank_hil.safety.monitors.sway import LEAST_SLOPE, SPREAD
 
 HULLS = {
     "wigley": ("tests/dynamics/data/wigley.nc", Given(gyration_m=(4.56, 15.0, 15.0))),
-    "fpso": ("hulls/wamit-fpso/fpso.1", Given(1025.0, 1025 * 97960.9, (0.788631, 0.0, -1.0))),
+    "fpso": (
+        "hulls/wamit-fpso/fpso.1",
+        Given(density_kg_m3=1025.0, mass_kg=1025 * 97960.9, gravity_centre_m=(0.788631, 0.0, -1.0)),
+    ),
     "supply": ("hulls/shipx-supply/input.re7", None),
 }
 AROUND = np.linspace(0.75, 1.25, 21)

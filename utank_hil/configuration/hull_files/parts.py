@@ -1,7 +1,6 @@
 """What readers of hull data have in common."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,25 +8,23 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.parameters import Finite, Positive, Range, range_problems, refuse
+from utank_hil.base.parameters import Finite, Positive, Range
+from utank_hil.configuration.files import Section
 from utank_hil.dynamics.hull.hull_data import HullData
 
 GRAVITY_M_S2 = 9.81  #: For codes that write none into their numeric files.
 
 
-@dataclass(frozen=True, slots=True)
-class Given:
+class Given(Section):
     """What a user knows of the hull besides its file, for what the file lacks."""
 
-    density_kg_m3: Annotated[float, Range(least=900, most=1100)] | None = None  #: Of the water.
-    mass_kg: Positive | None = None  #: Displaced mass.
-    #: Centre of gravity forward, to port and up of the place in the waterline that phases refer to.
+    density_kg_m3: Annotated[float, Range(least=900, most=1100)] | None = None
+    """Density of the water."""
+    mass_kg: Positive | None = None  #: Mass of the ship without the tank's water.
     gravity_centre_m: tuple[Finite, Finite, Finite] | None = None
-    #: Radii of gyration about the centre of gravity in roll, pitch and yaw.
+    """Centre of gravity forward, to port and up of the origin in the waterline."""
     gyration_m: tuple[Positive, Positive, Positive] | None = None
-
-    def __post_init__(self) -> None:
-        refuse("hull", range_problems(self))
+    """Radii of gyration about the centre of gravity in roll, pitch and yaw."""
 
 
 def rigid_body(matrix: npt.ArrayLike, reference_m: npt.ArrayLike = (0, 0, 0)) -> dict[str, Any]:

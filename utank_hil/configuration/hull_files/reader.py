@@ -4,13 +4,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from pydantic import model_validator
 
-from utank_hil.base.parameters import Finite, Positive, Range
-from utank_hil.configuration.files import Section
 from utank_hil.configuration.hull_files.aqwa import read_aqwa
 from utank_hil.configuration.hull_files.capytaine import read_capytaine
 from utank_hil.configuration.hull_files.nemoh import read_nemoh
@@ -49,7 +47,8 @@ def read_hull(path: Path, given: Given | None = None) -> HullData:
     except (LookupError, ArithmeticError, StopIteration, RuntimeError, TypeError) as error:
         raise ValueError(f"{path} is incomplete, or not what its name says: {error!r}") from error
     except ValueError as error:
-        if str(path.parent) in str(error):
+        folder = "" if path.parent == Path() else str(path.parent)
+        if str(path) in str(error) or (folder and folder in str(error)):
             raise
         raise ValueError(f"{path}: {error}") from error
     return completed(hull, known)
@@ -85,18 +84,11 @@ def completed(hull: HullData, given: Given) -> HullData:
     return replace(hull, **new)
 
 
-class HullFile(Section):
+class HullFile(Given):
     """Hull data as seakeeping codes write them, and what their file lacks."""
 
     file: Path
     """Capytaine's netCDF, WAMIT's .1, Nemoh.cal, AQWA's .AH1, ShipX's .re7 or MSS's .mat."""
-    density_kg_m3: Annotated[float, Range(least=900, most=1100)] | None = None
-    """Density of the water."""
-    mass_kg: Positive | None = None  #: Mass of the ship without the tank's water.
-    gravity_centre_m: tuple[Finite, Finite, Finite] | None = None
-    """Centre of gravity forward, to port and up of the origin in the waterline."""
-    gyration_m: tuple[Positive, Positive, Positive] | None = None
-    """Radii of gyration about the centre of gravity in roll, pitch and yaw."""
 
     @model_validator(mode="before")
     @classmethod
@@ -106,10 +98,9 @@ class HullFile(Section):
     @property
     def hull(self) -> LateralHull:
         """The hull; ValueError says what it lacks."""
-        given = Given(self.density_kg_m3, self.mass_kg, self.gravity_centre_m, self.gyration_m)
-        return _lateral_hull(self.file, given)
+        return _lateral_hull(self)
 
 
 @lru_cache(maxsize=4)
-def _lateral_hull(path: Path, given: Given) -> LateralHull:
-    return LateralHull(read_hull(path, given))
+def _lateral_hull(section: HullFile) -> LateralHull:
+    return LateralHull(read_hull(section.file, section))

@@ -173,11 +173,11 @@ class SensorTrial(Trial):
     def _judge_pace(self) -> None:
         cycle_ms, heard = self._plan.cycle_ns * 1e-6, self._heard
         gaps_ms = [(after - before) * 1e-6 for (before, _), (after, _) in pairwise(heard)]
-        count, rate_hz = len(gaps_ms), 1e3 / cycle_ms
+        count, rate_hz, heard_ms = len(gaps_ms), 1e3 / cycle_ms, sum(gaps_ms)
         jitter_ms = math.sqrt(sum((gap - cycle_ms) ** 2 for gap in gaps_ms) / max(count, 1))
         good = sum(self._usable(message) for _, message in heard) / max(len(heard), 1)
         self.checks += [
-            Check("rate", "measurements a second", count * 1e3 / sum(gaps_ms) if count else 0.0,
+            Check("rate", "measurements a second", count * 1e3 / heard_ms if heard_ms else 0.0,
                   rate_hz, RATE_SHARE * rate_hz, "Hz", "Set the device's rate, or cycle_ms."),
             Check("jitter", "gaps about the cycle, RMS", jitter_ms if count else math.nan, 0.0,
                   cycle_ms / 2, "ms", "Lower the bus load; let the device send by its clock."),
