@@ -16,7 +16,7 @@ with quietly_interruptible():
     with failures_named():
         from firmware_sim.run import RECORD_NS, RECORD_S, SECOND_NS
         from firmware_sim.scenario import Scenario
-        from firmware_sim.ship_side import NODE_NAMES, ExternalDrive, build_ship_side
+        from firmware_sim.ship_side import EXTERNAL_DRIVE, NODE_NAMES, ExternalNode, build_ship_side
         from firmware_sim.truth import TRUTH, TruthRecorder
         from utank_hil.analysis.motion.statistics import (
             PumpStatistics,
@@ -106,7 +106,9 @@ def firmware_sim(
     if len(log.rows) == 0:
         fail("ended before the first sample", ExitCode.INTERRUPTED)
     roll, pump = _figures(log.rows)
-    external = next((node for node in nodes if isinstance(node, ExternalDrive)), None)
+    external = next(
+        (n for n in nodes if isinstance(n, ExternalNode) and n.name == EXTERNAL_DRIVE), None
+    )
     if json_:
         summary = {
             "duration_s": len(log.rows) * RECORD_S,

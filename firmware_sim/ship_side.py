@@ -7,8 +7,7 @@ is ignored.
 """
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
@@ -44,13 +43,24 @@ from utank_hil.runners import Node
 
 STALE_NS: Final = 60_000_000
 """Three cycles of the reports: the controller's own limit for a silent drive or valve."""
+EXTERNAL_DRIVE: Final = "external drive"
 
 
-class _ExternalNode(ABC):
+class ExternalNode:
+    """Node that hands a signal of the hardware's reports on to the plant; None without a report."""
+
     period_ns = TICK_NS
 
-    def __init__(self, plant: Plant, receiver: Receiver[Any], signal: str) -> None:
-        self._plant, self._receiver, self._signal = plant, receiver, signal
+    def __init__(
+        self,
+        name: str,
+        plant: Plant,
+        receiver: Receiver[Any],
+        signal: str,
+        act: Callable[[float | None], None],
+    ) -> None:
+        self.name = name
+        self._plant, self._receiver, self._signal, self._act = plant, receiver, signal, act
         self.hears = frozenset([receiver.can_id])  # see `Selective`
         self._value = math.nan
         self._reported_ns = -STALE_NS - 1
@@ -78,41 +88,31 @@ class _ExternalNode(ABC):
         self._act(self._value if fresh else None)
         return ()
 
-    @abstractmethod
-    def _act(self, value: float | None) -> None:
-        """Apply a reported value to the plant; None without a fresh report."""
 
-
-class ExternalDrive(_ExternalNode):
+def external_drive(plant: Plant) -> ExternalNode:
     """Node that imposes the pressure of DRIVE_STATUS_1, in every state of the drive.
 
     Without a report the rotor turns freely.
     """
 
-    name = "external drive"
-
-    def __init__(self, plant: Plant, catalogue: Catalogue) -> None:
-        super().__init__(plant, catalogue.receiver(DriveStatus1), "pressure_pa")
-
-    def _act(self, value: float | None) -> None:
-        if value is None:
-            self._plant.drive_pump(0.0, enabled=False)
+    def act(pressure_pa: float | None) -> None:
+        if pressure_pa is None:
+            plant.drive_pump(0.0, enabled=False)
         else:
-            self._plant.impose_pressure(value)
+            plant.impose_pressure(pressure_pa)
+
+    receiver = load_catalogue().receiver(DriveStatus1)
+    return ExternalNode(EXTERNAL_DRIVE, plant, receiver, "pressure_pa", act)
 
 
-class ExternalValve(_ExternalNode):
+def external_valve(plant: Plant, tank: Tank, valve: Valve) -> ExternalNode:
     """Node that sets the loss of VALVE_STATUS's opening; without a report the fail position's."""
 
-    name = "external valve"
+    def act(opening: float | None) -> None:
+        plant.set_valve_loss(valve.loss(tank, valve.fail_opening if opening is None else opening))
 
-    def __init__(self, plant: Plant, tank: Tank, valve: Valve, catalogue: Catalogue) -> None:
-        super().__init__(plant, catalogue.receiver(ValveStatus), "opening")
-        self._tank, self._valve = tank, valve
-
-    def _act(self, value: float | None) -> None:
-        opening = self._valve.fail_opening if value is None else value
-        self._plant.set_valve_loss(self._valve.loss(self._tank, opening))
+    receiver = load_catalogue().receiver(ValveStatus)
+    return ExternalNode("external valve", plant, receiver, "opening", act)
 
 
 class HardwiredNode:
@@ -211,8 +211,8 @@ class ShipSide:
     def without(self, names: Collection[str]) -> list[Node]:
         """Return the nodes that remain when hardware replaces some of `NODE_NAMES`.
 
-        Without the emulated drive an `ExternalDrive` moves the plant's pump, without the emulated
-        valve an `ExternalValve` its valve. Raises `ValueError` if the ship does not have a node of
+        Without the emulated drive an `external_drive` moves the plant's pump, without the emulated
+        valve an `external_valve` its valve. Raises `ValueError` if the ship does not have a node of
         this name.
         """
         known = [node.name for node in self.nodes]
@@ -221,10 +221,9 @@ class ShipSide:
                 raise ValueError(f"no node {name!r} to leave out; there are {', '.join(known)}")
         nodes: list[Node] = [node for node in self.nodes if node.name not in names]
         if "drive" in names:
-            nodes.append(ExternalDrive(self.plant, load_catalogue()))
+            nodes.append(external_drive(self.plant))
         if "valve" in names and self.vessel.valve is not None:
-            valve = ExternalValve(self.plant, self.vessel.tank, self.vessel.valve, load_catalogue())
-            nodes.append(valve)
+            nodes.append(external_valve(self.plant, self.vessel.tank, self.vessel.valve))
         return nodes
 
 

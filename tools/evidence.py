@@ -73,7 +73,6 @@ PARTS: Final = {
         f"cost_{name}": Part(f"python -m tools.benchmarks.{name} {options}--json", minutes)
         for name, options, minutes in (
             ("realtime", "--seconds 200 ", 20),
-            ("retuning", "", 4),
             ("slice", "", 1),
         )
     },

@@ -398,17 +398,17 @@ def quick_rows() -> list[Row]:
     return rows
 
 
-def results_of(rows: Sequence[Row]) -> dict[str, Result]:
+def results_of(rows: Sequence[Row], window: Window) -> dict[str, Result]:
     # each task begins with a passive ship's ten minutes
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(runner, "ROWS_A_TASK", 100)
-        outcomes = run_rows(CAMPAIGN, rows, [1], Window(60.0, 20.0), lambda _: None, lambda: False)
+        outcomes = run_rows(CAMPAIGN, rows, [1], window, lambda _: None, lambda: False)
     return {row.id: verdict(row.id, *outcomes[row.id]) for row in rows}
 
 
 @pytest.fixture(scope="module")
 def results() -> dict[str, Result]:
-    return results_of([row for row in CAMPAIGN.rows if not row.long])
+    return results_of([row for row in CAMPAIGN.rows if not row.long], Window(60.0, 20.0))
 
 
 def assert_all_passed(results: Mapping[str, Result]) -> None:
@@ -423,7 +423,7 @@ def assert_all_passed(results: Mapping[str, Result]) -> None:
 
 @pytest.mark.slow
 def test_quick_rows_are_passed_in_one_sea() -> None:
-    assert_all_passed(results_of(quick_rows()))
+    assert_all_passed(results_of(quick_rows(), Window(20.0, 8.0)))
 
 
 @pytest.mark.evidence

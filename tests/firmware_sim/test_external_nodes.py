@@ -16,7 +16,7 @@ from foreign_nodes import (
 )
 
 from firmware_sim.scenario import Scenario
-from firmware_sim.ship_side import STALE_NS, ExternalDrive, build_ship_side
+from firmware_sim.ship_side import EXTERNAL_DRIVE, STALE_NS, build_ship_side, external_drive
 from firmware_sim.truth import TRUTH, TruthRecorder
 from utank_hil.assembly import build_controller_node
 from utank_hil.base.tick import TICK_NS
@@ -134,7 +134,7 @@ def test_a_drive_that_reports_nothing_lets_the_emulated_rotor_turn_freely(why: s
         if abs(drive.pressure_pa) > 20e3:
             break
     assert abs(drive.pressure_pa) > 20e3
-    (external,) = (node for node in bench.kept if isinstance(node, ExternalDrive))
+    (external,) = (node for node in bench.kept if node.name == EXTERNAL_DRIVE)
     assert external.reported_share > 0.99
     before = len(bench.table.rows)
     setattr(drive, why, True)
@@ -152,7 +152,7 @@ def test_a_drive_that_reports_nothing_lets_the_emulated_rotor_turn_freely(why: s
 
 def test_damaged_and_foreign_frames_do_not_move_the_pump() -> None:
     ship = build_ship_side(STORM, 1, ())
-    external, drive = ExternalDrive(ship.plant, load_catalogue()), ForeignDrive("drive")
+    external, drive = external_drive(ship.plant), ForeignDrive("drive")
     external.receive(drive.report(5e3, 0), 0)
     frame = drive.report(40e3, 0)
     for bit in range(64):

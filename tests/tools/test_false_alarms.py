@@ -66,6 +66,7 @@ def test_hours_that_were_sailed_are_kept_and_retuning_is_ordered_in_every_second
         return {"largest": {"drift": 0.1 * seed}, "found_s": {"DRIFT": 3.0} if seed == 2 else {}}
 
     monkeypatch.setattr(false_alarms, "CACHE", tmp_path)
+    monkeypatch.setattr(false_alarms, "commit", lambda: "abc")
     monkeypatch.setattr(false_alarms, "margins", margins)
     sea, scenario = next(iter(hours("adaptive_gpc")))
     assert len(sail("adaptive_gpc", sea, scenario, 2)) == 2
@@ -75,6 +76,11 @@ def test_hours_that_were_sailed_are_kept_and_retuning_is_ordered_in_every_second
     row = judged("adaptive_gpc", sea, runs)
     assert (row["hours"], row["worst"], row["found_in_hours"]) == (6, "drift", {"DRIFT": [2]})
     assert row["maxima"]["drift"] == pytest.approx(0.1 * np.arange(1, 7))
+    monkeypatch.setattr(false_alarms, "commit", lambda: "abc+")  # another change each time
+    ordered.clear()
+    for _ in range(2):
+        assert len(sail("adaptive_gpc", sea, scenario, 1)) == 1
+    assert len(ordered) == 2
 
 
 @pytest.mark.evidence

@@ -6,10 +6,11 @@ Each law of configs/controllers sails for so many hours in each sea and, where i
 half as many on the voyage; a law that can be retuned is so every second hour, pulses included. The
 unit is an hour of its own seed. Of each hour the largest statistic of each monitor over its
 threshold is kept (`monitor_margins`), in .cache/false_alarms: after Ctrl-C, or with more hours, the
-same command at the same commit goes on. A Gumbel distribution is fitted to the hourly maxima of
-each law in each sea; its tail beyond 1 is the rate of false alarms there. Over all laws and seas it
-is the mean. The aim is one in 1000 hours. An hour ends a minute after control has; where another
-monitor ended it, its maxima are not those of an hour, and are left out of the fit.
+same command at the same commit goes on; of a changed checkout nothing is kept. A Gumbel
+distribution is fitted to the hourly maxima of each law in each sea; its tail beyond 1 is the rate
+of false alarms there. Over all laws and seas it is the mean. The aim is one in 1000 hours. An hour
+ends a minute after control has; where another monitor ended it, its maxima are not those of an
+hour, and are left out of the fit.
 """
 
 import json
@@ -89,9 +90,12 @@ def ordered(scenario: Scenario, name: str, seed: int) -> Scenario:
 
 def sail(name: str, sea: str, scenario: Scenario, count: int) -> list[dict[str, Any]]:
     """The hours of one law in one sea: those that are kept, and what is missing to `count`."""
-    file = CACHE / commit() / f"{name}-{sea}.jsonl"
+    at = commit()
+    file = CACHE / at / f"{name}-{sea}.jsonl"
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.touch()
+    file.open(
+        "w" if at.endswith("+") else "a"
+    ).close()  # which changes a plus stands for is unknown
     kept = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
     for seed in range(len(kept) + 1, count + 1):
         run = margins(ordered(scenario, name, seed), name, seed, HOUR_S)
