@@ -33,16 +33,7 @@ def steepness(spectrum: Spectrum) -> tuple[float, float]:
     return found, float(np.interp(period_s, [6.0, 12.0], [1 / 10, 1 / 15]))
 
 
-def _roll(result: BenchResult) -> Iterator[str]:
-    return _rolled_beyond(result, MOST_ROLL_RAD)
-
-
-def _linear_roll(result: BenchResult) -> Iterator[str]:
-    if result.scenario.plant == "linear":
-        yield from _rolled_beyond(result, MOST_LINEAR_ROLL_RAD)
-
-
-def _rolled_beyond(result: BenchResult, limit_rad: float) -> Iterator[str]:
+def _roll(result: BenchResult, limit_rad: float = MOST_ROLL_RAD) -> Iterator[str]:
     rolls = {"no tank": result.without_tank_rad}
     rolls |= {run.name: run.column("true_roll_rad") for run in result.runs}
     for name, roll_rad in rolls.items():
@@ -93,7 +84,9 @@ MODEL_LIMITS: Final[tuple[tuple[str, Callable[[BenchResult], Iterator[str]]], ..
     (
         f"roll beyond {math.degrees(MOST_LINEAR_ROLL_RAD):.0f}° by linear equations: neither the "
         "restoring curve nor quadratic damping (plant: roll has both)",
-        _linear_roll,
+        lambda result: _roll(
+            result, MOST_LINEAR_ROLL_RAD if result.scenario.plant == "linear" else math.inf
+        ),
     ),
     (
         "level at the tank's end: a strike is one impulse, without sloshing or trapped air",

@@ -193,12 +193,16 @@ class Scenario(Section):
         """Hull of a plant that sways and yaws."""
         return None if self.hull is None else self.hull.hull
 
+    def _of_plant(self, key: str, plant: str) -> list[Problem]:
+        """Reasons why a section and the only plant that has it do not go together."""
+        if self.plant == plant:
+            return [(key, f"is required with plant: {plant} but missing")]
+        return [(key, f"needs plant: {plant}")] if getattr(self, key) else []
+
     def _hull_problems(self) -> list[Problem]:
         """Reasons why the plant can't be that of the hull."""
-        sways = self.plant == "sway_roll_yaw"
-        if self.hull is None or not sways:
-            wrong = [("hull", "is required with plant: sway_roll_yaw but missing")] if sways else []
-            return wrong or ([("hull", "needs plant: sway_roll_yaw")] if self.hull else [])
+        if self.hull is None or self.plant != "sway_roll_yaw":
+            return self._of_plant("hull", "sway_roll_yaw")
         problems = []
         if self.voyage or len(self.sea.spectra) > 1:
             reason = "keeps course, speed and sea: remove voyage and sea.until, or take plant: roll"
@@ -214,9 +218,7 @@ class Scenario(Section):
     def _fmu_problems(self) -> list[Problem]:
         """Reasons why the plant can't be that of the FMU."""
         if self.fmu is None or self.plant != "fmu":
-            wrong = [("fmu", "is required with plant: fmu but missing")]
-            wrong = wrong if self.plant == "fmu" else []
-            return wrong or ([("fmu", "needs plant: fmu")] if self.fmu else [])
+            return self._of_plant("fmu", "fmu")
         problems = [
             (key, "does not act on the ship of an FMU: remove it; fmu.parameters change that")
             for key in ("actual_ship", "voyage")

@@ -68,6 +68,19 @@ class Panel:
             )
 
 
+def panel_of(
+    title: str,
+    x_label: str,
+    y_label: str,
+    x: npt.ArrayLike,
+    family: Mapping[str, Any],
+    **options: Any,
+) -> Panel:
+    """Panel with a curve for each member of a family, over the same abscissae."""
+    curves = tuple(Curve(name, x, y) for name, y in family.items())
+    return Panel(title, x_label, y_label, curves, **options)
+
+
 @dataclass(frozen=True, slots=True)
 class Row:
     """A printed number beside ours."""
@@ -140,15 +153,14 @@ def _finite(printed: float | tuple[float, float]) -> Any:
     return [each if math.isfinite(each) else None for each in printed]
 
 
-def printed_text(row: Mapping[str, Any] | Row) -> str:
-    """The printed number of a row, or of its JSON, as text."""
-    printed = row.printed if isinstance(row, Row) else row["printed"]
-    if isinstance(printed, (tuple, list)):
-        low, high = printed
-        if high is None or math.isinf(high):
-            return f"{low:.5g} or more"
-        return f"{low:.5g} to {high:.5g}" if low else f"less than {high:.5g}"
-    return f"{printed:.5g}"
+def printed_text(row: Row) -> str:
+    """The printed number of a row as text."""
+    if not isinstance(row.printed, tuple):
+        return f"{row.printed:.5g}"
+    low, high = row.printed
+    if math.isinf(high):
+        return f"{low:.5g} or more"
+    return f"{low:.5g} to {high:.5g}" if low else f"less than {high:.5g}"
 
 
 def greatest(rows: Iterable[Row]) -> str:

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict, peaks
+from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict, panel_of, peaks
 from tools.thesis.harmonic import HarmonicResponse, harmonic_response
 from tools.thesis.ships import ROLL_RAD_S, first_ship, tuned_ship
 from utank_hil.base.arrays import FloatArray
@@ -246,14 +246,10 @@ def figure_2_6() -> Figure:
     )
 
 
-def _family_panel(
-    title: str, y_label: str, family: list[FloatArray], *, log_y: bool = False
-) -> Panel:
+def _family_panel(title: str, y_label: str, family: list[FloatArray], **options: bool) -> Panel:
     """A curve for each friction."""
-    curves = (
-        Curve(f"friction {each:g}", _RATIO, y) for each, y in zip(FRICTIONS, family, strict=True)
-    )
-    return Panel(title, _X, y_label, tuple(curves), log_y=log_y)
+    named = {f"friction {each:g}": y for each, y in zip(FRICTIONS, family, strict=True)}
+    return panel_of(title, _X, y_label, _RATIO, named, **options)
 
 
 WAVE_FRICTIONS: Final = (0.05, 0.1, 0.2, 0.4)
@@ -269,7 +265,7 @@ def _by_wave(ship: RollShip, tank: Tank, ratio: float | None = None) -> Harmonic
 
 def figure_3_1() -> Figure:
     """Phases over frequency, and the parts of the tank's moment."""
-    family = [_by_wave(*tuned_ship(friction)) for friction in WAVE_FRICTIONS]
+    family = {f"friction {each:g}": _by_wave(*tuned_ship(each)) for each in WAVE_FRICTIONS}
     ship, tank = tuned_ship(CHOSEN)
     at_own = _by_wave(ship, tank, 1.0)
     roll_deg = -float(np.degrees(at_own.roll_phase_rad[0]))
@@ -277,25 +273,19 @@ def figure_3_1() -> Figure:
     built = first_ship(4.87e7, CHOSEN)
     printed = _by_wave(*built, 1.0)
     slow, own = _parts(ship, tank, 0.05), _parts(ship, tank, 1.0)
-    labels = [f"friction {friction:g}" for friction in WAVE_FRICTIONS]
     return Figure(
         "closed form (2.24), corrected",
         "Ship, friction and tuning are not given: the first ship with a duct of its own roll "
         "frequency, friction varied from 0.05 to 0.4 (numbers at 0.1), and with the printed duct.",
         tuple(
-            Panel(
+            panel_of(
                 title,
                 "Wave frequency per roll frequency",
                 "Phase (°)",
-                tuple(
-                    Curve(label, _BAND, np.degrees(np.unwrap(phase)))
-                    for label, phase in zip(labels, phases, strict=True)
-                ),
+                _BAND,
+                {name: np.degrees(np.unwrap(getattr(y, part))) for name, y in family.items()},
             )
-            for title, phases in (
-                ("Roll", [each.roll_phase_rad for each in family]),
-                ("Water", [each.tank_phase_rad for each in family]),
-            )
+            for title, part in (("Roll", "roll_phase_rad"), ("Water", "tank_phase_rad"))
         ),
         rows=(
             Row(

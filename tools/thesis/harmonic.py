@@ -23,13 +23,12 @@ from utank_hil.dynamics.tank import Tank
 class HarmonicResponse(NamedTuple):
     """Steady oscillation ``amplitude cos(omega t + phase)`` of roll and tank."""
 
-    roll_rad: FloatArray  #: shape (n,): Roll amplitude and phase, the phase in (-pi, pi].
-    roll_phase_rad: FloatArray  #: shape (n,): Roll amplitude and phase, the phase in (-pi, pi].
-    #: shape (n,): Amplitudes of the tank angle and of the starboard level, and their common phase.
+    #: All of shape (n,): roll amplitude and phase, the phase in (-pi, pi].
+    roll_rad: FloatArray
+    roll_phase_rad: FloatArray
+    #: Amplitudes of the tank angle and of the starboard level, and their common phase.
     tank_angle_rad: FloatArray
-    #: shape (n,): Amplitudes of the tank angle and of the starboard level, and their common phase.
     level_m: FloatArray
-    #: shape (n,): Amplitudes of the tank angle and of the starboard level, and their common phase.
     tank_phase_rad: FloatArray
 
 

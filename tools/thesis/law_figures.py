@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
+from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict, panel_of
 from tools.thesis.linear_contest import (
     DPC_BOTH,
     DPC_ROLL,
@@ -37,13 +37,15 @@ from utank_hil.control.predictive.law import PredictiveLaw, design_dpc
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 
-RATIOS: Final = np.linspace(0.01, 2.0, 2000)
+RATIOS: Final = np.linspace(0.01, 2.0, 2000)  #: The source does not say how far it went.
 HORIZONS: Final = (8, 15, 25, 50)
 DURATION_S: Final = 120.0
 SLOPE_RAD: Final = 0.02
 WAVES_RAD_S: Final = (0.4, 0.5, 0.6)
 PRINTED_INDEX: Final = {**{name: law.index for name, law in PRINTED.items()}, LQR: 504.0}
 _Q: Final = "Wave frequency per roll frequency"
+_AXES: Final = (_Q, "Roll per static roll")
+_METHOD: Final = "sampled loop on the continuous ship, exact linear theory"
 _OPEN: Final = (
     "The tank's friction and the ship's right damping are not given, and the printed gains belong "
     "to a ship with larger reservoirs than the printed ones (25.2 m², group `gains`): this ship is "
@@ -66,30 +68,25 @@ def figure_3_6() -> Figure:
         for name, ship in _SHIPS.items()
     }
     drawn = found["25.2 m²"]
-    weights = (
-        Curve(PASSIVE, RATIOS, drawn[PASSIVE].roll),
-        Curve("weight on roll", RATIOS, drawn[LQR].roll),
-        Curve("weight on all, as printed", RATIOS, as_printed["25.2 m²"].roll),
-    )
+    weights = {
+        PASSIVE: drawn[PASSIVE].roll,
+        "weight on roll": drawn[LQR].roll,
+        "weight on all, as printed": as_printed["25.2 m²"].roll,
+    }
     shown = (
         ("25.2 m²: roll or level fed back", ROLL_ONLY, drawn),
         ("25.2 m²: both fed back", WHOLE, drawn),
         ("Printed ship: both fed back", WHOLE, found["printed ship"]),
     )
     return Figure(
-        "sampled loop on the continuous ship, exact linear theory",
+        _METHOD,
         _OPEN,
         (
             *(
-                Panel(
-                    title,
-                    _Q,
-                    "Roll per static roll",
-                    tuple(Curve(name, RATIOS, answers[name].roll) for name in names),
-                )
+                panel_of(title, *_AXES, RATIOS, {name: answers[name].roll for name in names})
                 for title, names, answers in shown
             ),
-            Panel("25.2 m²: which weight of LQR", _Q, "Roll per static roll", weights),
+            panel_of("25.2 m²: which weight of LQR", *_AXES, RATIOS, weights),
         ),
         checks=(
             *(
@@ -260,16 +257,9 @@ def figure_3_9() -> Figure:
             + ", ".join(f"{share:.0%}" for share in below)
             + " of the band"
         )
-        panels.append(
-            Panel(
-                name,
-                _Q,
-                "Roll per static roll",
-                tuple(Curve(label, ratio, answers[label].roll) for label in laws),
-            )
-        )
+        panels.append(panel_of(name, *_AXES, ratio, {label: answers[label].roll for label in laws}))
     return Figure(
-        "sampled loop on the continuous ship, exact linear theory; p = 2, hp = hc + 2",
+        f"{_METHOD}; p = 2, hp = hc + 2",
         "The horizons of the family are not known: 8 to 50 samples of 0.2 s. Ships as in 3.6.",
         tuple(panels),
         checks=(
@@ -287,7 +277,12 @@ def _dpc(ship: RollShip, tank: Tank, horizon: int) -> PredictiveLaw:
     return design_dpc(arx, horizon, horizon + 2)
 
 
-def _index(answers: Mapping[str, Response], name: str) -> float:
+def index_of(answers: Mapping[str, Response], name: str) -> float:
+    """Yardstick of Fig. 3.10 in rad/Pa: roll taken from the passive tank, per pressure.
+
+    It is the integral over the frequency ratio of the difference of amplitudes, per pressure. That
+    of the complex answers is the same for every law: it is what the pressure does to the ship.
+    """
     gain = _gain(answers, name)
     return float(np.trapezoid(np.abs(gain), RATIOS))
 
@@ -302,7 +297,7 @@ def figure_3_10() -> Figure:
     """Roll taken off the passive tank per pressure, over frequency, and its integral."""
     found = {name: responses(*ship, entrants(*ship), RATIOS) for name, ship in _SHIPS.items()}
     laws = (GPC_ROLL, LQR, DPC_BOTH, DPC_ROLL, GPC_BOTH)
-    index = {name: {law: _index(answers, law) for law in laws} for name, answers in found.items()}
+    index = {name: {law: index_of(answers, law) for law in laws} for name, answers in found.items()}
     drawn = {law: _gain(found["25.2 m²"], law) for law in laws}
     low = RATIOS < 0.9
     middle = (RATIOS > 0.95) & (RATIOS < 1.8)
@@ -314,26 +309,23 @@ def figure_3_10() -> Figure:
     without = [law for law in printed_order if law != LQR]
     same = [[law for law in each if law != LQR] == without for each in order.values()]
     return Figure(
-        "sampled loop on the continuous ship, exact linear theory",
+        _METHOD,
         _OPEN + " Range and unit of the integral are not given: q from 0.01 to 2, and indices "
         "relative to DPC (roll).",
-        (
-            Panel(
-                "Roll fed back",
+        tuple(
+            panel_of(
+                title,
                 _Q,
                 "1e-6 rad per Pa",
-                tuple(Curve(law, RATIOS, 1e6 * drawn[law]) for law in (GPC_ROLL, DPC_ROLL, LQR)),
+                RATIOS,
+                {law: 1e6 * drawn[law] for law in shown},
                 span=(0.95, 1.8),
                 span_label="0.95 to 1.8",
-            ),
-            Panel(
-                "Roll and level fed back",
-                _Q,
-                "1e-6 rad per Pa",
-                tuple(Curve(law, RATIOS, 1e6 * drawn[law]) for law in (GPC_BOTH, DPC_BOTH, LQR)),
-                span=(0.95, 1.8),
-                span_label="0.95 to 1.8",
-            ),
+            )
+            for title, shown in (
+                ("Roll fed back", (GPC_ROLL, DPC_ROLL, LQR)),
+                ("Roll and level fed back", (GPC_BOTH, DPC_BOTH, LQR)),
+            )
         ),
         rows=(
             *(
@@ -386,7 +378,7 @@ def _index_reason(name: str, law: str) -> str:
         ship, tank = _SHIPS[name]
         laws = {LQR: lqr_as_printed(ship, tank), DPC_ROLL: entrants(ship, tank)[DPC_ROLL]}
         answers = responses(ship, tank, laws, RATIOS)
-        printed = _index(answers, LQR) / _index(answers, DPC_ROLL)
+        printed = index_of(answers, LQR) / index_of(answers, DPC_ROLL)
         return f"weight on roll alone; with the printed weight on all states {printed:.2f}"
     if name == "printed ship":
         return "the printed laws were not made for the printed ship"

@@ -29,7 +29,6 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 
 SAMPLE_TIME_S: Final = 0.2
-FREQUENCY_RATIOS: Final = np.linspace(0.01, 2.0, 2000)  #: The source does not say how far it went.
 GPC_ROLL, DPC_ROLL = "GPC (roll)", "DPC (roll)"
 GPC_BOTH, DPC_BOTH = "GPC (roll, level)", "DPC (roll, level)"
 PRINTED_ARX: Final = ARX(
@@ -150,39 +149,6 @@ def printed_plant() -> LinearModel:
     held = np.block([[a, b], [np.zeros((inputs, n)), np.eye(inputs)]])
     whole = logm(held).real / SAMPLE_TIME_S
     return LinearModel(whole[:n, :n], whole[:n, n:], c, np.zeros((1, 1)), 0.0)
-
-
-def performance_index(law: LinearLaw, plant: DesignPlant, measured: tuple[str, ...]) -> float:
-    """Yardstick of Fig. 3.10 in rad/Pa: roll taken from the passive tank per pressure.
-
-    ::
-
-        J = int | |phi_OL(q)| - |phi_CL(q)| | / |u_CL(q)| dq,    q = wave / roll frequency
-
-    phi_OL with the passive tank and phi_CL, u_CL with the law, all per wave moment. The difference
-    is one of amplitudes: that of the complex answers is the same for every law, since
-    phi_CL - phi_OL is what the pressure u_CL does to the ship.
-
-    Parameters
-    ----------
-    plant : DesignPlant
-        The thesis has a lag of 0 and, since its u(k) is made of y(k-1), a delay of one sample.
-    measured : tuple of str
-        Names of the outputs that the law sees, in its order.
-    """
-    w = FREQUENCY_RATIOS * ship_ratios(plant.ship, plant.tank)[1]
-    row = STATES.index("roll_rad")
-    passive, _ = closed_loop_response(None, plant, measured, w)
-    active, pressure = closed_loop_response(law, plant, measured, w)
-    gain = np.abs(np.abs(passive[:, row]) - np.abs(active[:, row])) / np.abs(pressure)
-    return float(np.sum((gain[1:] + gain[:-1]) / 2 * np.diff(FREQUENCY_RATIOS)))
-
-
-def source_index(
-    law: PredictiveLaw, ship: RollShip, tank: Tank, measured: tuple[str, ...]
-) -> float:
-    """Performance index in the source's timing: a sample of delay and no lag; rad/Pa."""
-    return performance_index(law, DesignPlant(ship, tank, SAMPLE_TIME_S, 0.0), measured)
 
 
 def _relative(mine: FloatArray, printed: tuple[float, ...]) -> list[float]:

@@ -5,12 +5,13 @@ from typing import Final
 
 import numpy as np
 
-from tools.thesis.figure import Check, Curve, Figure, Panel, Verdict
+from tools.thesis.figure import Check, Figure, Verdict, panel_of
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.fuzzy.law import WIDTH, FuzzyBasis
 
 RANGE: Final = math.pi / 6
 _NAMES: Final = ("negative", "zero", "positive")
+_AXES: Final = ("Input per c", "Membership")
 _X: Final = np.linspace(-1.5, 1.5, 601)
 
 
@@ -32,43 +33,28 @@ def _printed(number: int, x: FloatArray) -> FloatArray:
 
 def figure_4_5() -> Figure:
     """Both sets of curves, and whether they are memberships."""
-    built = [_built(center, _X) for center in (-1, 0, 1)]
-    printed = [_printed(number, _X) for number in (1, 2, 3)]
+    built = {name: _built(center, _X) for center, name in enumerate(_NAMES, -1)}
+    printed = {f"j = {n} ({word})": _printed(n, _X) for n, word in enumerate("PZN", 1)}
     basis = FuzzyBasis((RANGE,) * 4)
     here = np.array([0.3 / RANGE])
     degrees = np.array([_built(center, here)[0] for center in (-1, 0, 1)])
     of_law = basis.memberships(np.array([0.3, 0.0, 0.0, 0.0]))[0]
     same = np.allclose(degrees / degrees.sum(), of_law, rtol=1e-12)
-    greatest = max(float(each.max()) for each in printed)
+    greatest = max(float(each.max()) for each in printed.values())
     return Figure(
         "formula",
         "The width sigma is not given: here neighbouring sets cross at one half. As printed, the "
         "exponent has no square and the centres are -c, -c/2 and 0; built are -c, 0 and c.",
         (
-            Panel(
-                "As built",
-                "Input per c",
-                "Membership",
-                tuple(Curve(name, _X, y) for name, y in zip(_NAMES, built, strict=True)),
-                y_limits=(0.0, 1.05),
-            ),
-            Panel(
-                "(4.26) to the letter",
-                "Input per c",
-                "Membership",
-                tuple(
-                    Curve(f"j = {number} ({word})", _X, y)
-                    for number, word, y in zip((1, 2, 3), ("P", "Z", "N"), printed, strict=True)
-                ),
-                y_limits=(0.0, 5.0),
-            ),
+            panel_of("As built", *_AXES, _X, built, y_limits=(0.0, 1.05)),
+            panel_of("(4.26) to the letter", *_AXES, _X, printed, y_limits=(0.0, 5.0)),
         ),
         checks=(
             Check(
                 "membership functions have values between zero and one",
                 Verdict.of(greatest <= 1),
                 f"(4.26) as printed reaches {greatest:.3g} within 1.5 c; with the square "
-                f"{max(float(each.max()) for each in built):.0f}",
+                f"{max(float(each.max()) for each in built.values()):.0f}",
             ),
             Check(
                 "positive, zero and negative correspond with j = 1, 2, 3",

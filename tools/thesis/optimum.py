@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
+from tools.thesis.figure import Check, Figure, Row, Verdict, panel_of
 from tools.thesis.ships import tuned_ship
 from utank_hil.control.optimal_tank import (
     PassiveOptimum,
@@ -58,18 +58,15 @@ def figure_3_2() -> Figure:
         f"0.12, 0 to 0.1 and {COUPLINGS[0]:g} to {COUPLINGS[-1]:g} (drawn: "
         f"{_first().coupling_ratio:.3f}).",
         tuple(
-            Panel(
+            panel_of(
                 title,
                 "Mass ratio",
                 title,
-                tuple(
-                    Curve(
-                        f"ship damping {each:g}",
-                        MASS_RATIOS,
-                        [getattr(best, name) for best in column],
-                    )
+                MASS_RATIOS,
+                {
+                    f"ship damping {each:g}": [getattr(best, name) for best in column]
                     for each, column in family.items()
-                ),
+                },
             )
             for title, name in (
                 ("Frequency ratio", "frequency_ratio"),
@@ -118,14 +115,12 @@ def figure_3_3() -> Figure:
         "Ship and dampings are not given: the first ship with a duct of its roll frequency "
         f"(mass ratio {ratios.mass_ratio:.3f}), 0.3, 1 and 3 times the optimum.",
         (
-            Panel(
+            panel_of(
                 "",
                 _X,
                 "Roll per static roll",
-                tuple(
-                    Curve(f"damping ratio {share * best.damping_ratio:.3f}", _WAVES, y)
-                    for share, y in family.items()
-                ),
+                _WAVES,
+                {f"damping ratio {k * best.damping_ratio:.3f}": y for k, y in family.items()},
             ),
         ),
         checks=(
@@ -160,11 +155,12 @@ def figure_3_4() -> Figure:
         "closed form of 3.2",
         "Ship and frequency ratios are not given: as in 3.3, 0.85, the optimum and 1.15.",
         (
-            Panel(
+            panel_of(
                 "",
                 _X,
                 "Roll per static roll",
-                tuple(Curve(f"frequency ratio {f:.3g}", _WAVES, y) for f, y in family.items()),
+                _WAVES,
+                {f"frequency ratio {f:.3g}": y for f, y in family.items()},
             ),
         ),
         checks=(
@@ -202,20 +198,19 @@ def figure_tank_place() -> Figure:
         f"damping ratio of {_DAMPING:g}; Lz from -10 m (above the centre of gravity) to 5 m, also "
         "with frequency and damping at their optimum for each Lz.",
         (
-            Panel(
+            panel_of(
                 "Roll by waves",
                 "Wave frequency per 0.5 rad/s",
                 "Roll per static roll without tank",
-                tuple(Curve(f"Lz {z:g} m", _PLACE_WAVES, y) for z, y in roll.items()),
+                _PLACE_WAVES,
+                {f"Lz {z:g} m": y for z, y in roll.items()},
             ),
-            Panel(
+            panel_of(
                 "Greatest roll",
                 "Lz (m); above the centre of gravity is negative",
                 "Roll per static roll without tank",
-                (
-                    Curve("one tank, moved", _ALONG_M, top),
-                    Curve("water at its optimum at each Lz", _ALONG_M, best),
-                ),
+                _ALONG_M,
+                {"one tank, moved": top, "water at its optimum at each Lz": best},
                 y_limits=(0.0, 1.1 * max(top)),
             ),
         ),

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tools.thesis.law_figures import RATIOS, index_of
 from tools.thesis.linear_contest import (
     DPC_BOTH,
     DPC_ROLL,
@@ -11,14 +12,16 @@ from tools.thesis.linear_contest import (
     PRINTED,
     PRINTED_ARX,
     SAMPLE_TIME_S,
+    Entrant,
     designed_laws,
     deviations,
     held_model,
     printed_plant,
-    source_index,
+    responses,
 )
+from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.analysis.loop.margins import margins
-from utank_hil.control import design_dpc, design_gpc
+from utank_hil.control import DesignPlant, PredictiveLaw, design_dpc, design_gpc
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 from utank_hil.dynamics.sampling import sample, sampled_model
 
@@ -67,13 +70,49 @@ def test_a_printed_law_feeds_back_the_level_in_metres():
     )
 
 
-def outputs(name):
-    return PRINTED[name].measured
+def index(ship, tank, laws):
+    """The index of Fig. 3.10 of each law in the source's timing."""
+    entrants = {
+        name: Entrant(law, PRINTED[name].measured, SAMPLE_TIME_S) for name, law in laws.items()
+    }
+    answers = responses(ship, tank, entrants, RATIOS)
+    return {name: index_of(answers, name) for name in laws}
+
+
+def test_index_is_the_integral_of_amplitude_taken_away_per_pressure():
+    (ship, tank), measured = PRINTED_SHIP, PRINTED[DPC_BOTH].measured
+    law = designed_laws(ship, tank)[DPC_BOTH]
+    plant, total = DesignPlant(ship, tank, SAMPLE_TIME_S, 0.0), 0.0
+    for q in RATIOS[::20]:
+        w = np.array([q * 0.496])
+        passive = closed_loop_response(None, plant, measured, w)[0][0, 0]
+        active, pressure = closed_loop_response(law, plant, measured, w)
+        share = abs(abs(passive) - abs(active[0, 0])) / abs(pressure[0])
+        total += 20 * (RATIOS[1] - RATIOS[0]) * share
+    assert index(ship, tank, {DPC_BOTH: law})[DPC_BOTH] == pytest.approx(total, rel=0.02)
+
+
+def test_gain_of_a_law_counts_for_nothing_where_it_is_small():
+    # amplitude taken away and pressure both grow with a small gain
+    quiet, quieter = (
+        index(
+            *PRINTED_SHIP,
+            {
+                GPC_ROLL: PredictiveLaw(
+                    np.zeros((1, 1, 1)),
+                    np.full((1, 1, 1), gain),
+                    np.zeros((1, 1, 1)),
+                    SAMPLE_TIME_S,
+                )
+            },
+        )[GPC_ROLL]
+        for gain in (1e-3, 1e-4)
+    )
+    assert quiet == pytest.approx(quieter, rel=1e-3)
 
 
 def test_ranking_of_the_designed_laws_on_the_printed_ship():
-    laws = designed_laws(*PRINTED_SHIP)
-    found = {name: source_index(law, *PRINTED_SHIP, outputs(name)) for name, law in laws.items()}
+    found = index(*PRINTED_SHIP, designed_laws(*PRINTED_SHIP))
     assert found[GPC_ROLL] == max(found.values())
     assert found[GPC_BOTH] == min(found.values())
     assert found[GPC_ROLL] / found[DPC_ROLL] == pytest.approx(578 / 499, rel=0.03)
@@ -82,10 +121,7 @@ def test_ranking_of_the_designed_laws_on_the_printed_ship():
 
 def test_the_printed_laws_have_the_printed_ratios_on_the_ship_they_fit():
     tank = GREATER_RESERVOIRS[1]
-    found = {
-        name: source_index(printed.law(tank), *GREATER_RESERVOIRS, printed.measured)
-        for name, printed in PRINTED.items()
-    }
+    found = index(*GREATER_RESERVOIRS, {name: each.law(tank) for name, each in PRINTED.items()})
     assert sorted(found, key=found.get) == sorted(PRINTED, key=lambda name: PRINTED[name].index)
     for name, printed in PRINTED.items():
         ratio = found[name] / found[DPC_ROLL]
