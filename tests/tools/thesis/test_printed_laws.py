@@ -19,8 +19,7 @@ from tools.thesis.linear_contest import (
     printed_plant,
     responses,
 )
-from utank_hil.analysis.loop.closed_loop import closed_loop_response
-from utank_hil.analysis.loop.margins import margins
+from utank_hil.analysis.loop.margins import closed_loop_response, margins
 from utank_hil.control import DesignPlant, PredictiveLaw, design_dpc, design_gpc
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 from utank_hil.dynamics.sampling import sample, sampled_model
