@@ -269,3 +269,23 @@ def test_no_zero_makes_a_wrong_sensor_look_obeyed(
         assert not any(seen)
     elif roll_deg >= 1.0:
         assert any(seen)
+
+
+@pytest.mark.parametrize("frequency", [0.85, 1.0, 1.15])
+def test_a_duct_that_loses_quadratically_is_no_late_motion_sensor(frequency: float) -> None:
+    """Water of 1.5 m with a damping ratio of 0.3 there, pushed by the roll as its equation asks."""
+    tank = replace(TANK, damping_ratio=0.02)
+    w = frequency * tank.natural_frequency_rad_s
+    one = replace(tank, quadratic_loss=1.0).linearized(1.5 * w).damping_ratio - 0.02
+    tank = replace(tank, quadratic_loss=0.28 / one)
+    equation = TankEquation(SHIP, tank, replace(THRESHOLDS, zero_push_m2_s2=0.0), STEP_S)
+    push = 9.80665 * tank.width_m - tank.width_m * (tank.height_m + tank.lz_m) * w**2
+    loss, length_m = tank.linearized(1.5 * w).loss_pa_per_m_s / 1000, tank.effective_length_m
+    for k in range(1200):
+        h, rate = 1.5 * math.sin(w * k * STEP_S), 1.5 * w * math.cos(w * k * STEP_S)
+        spring = (2 * 9.80665 - length_m * w**2) * h
+        lost = loss * 0.02 / 0.3 * rate + tank.quadratic_loss_pa_per_m2_s2 / 1000 * abs(rate) * rate
+        x = spring + loss * rate
+        equation.update(x / push, h, 1000 * (spring + lost - x))
+    assert equation.late_s == pytest.approx(0, abs=0.05)
+    assert equation.level_gain == pytest.approx(1, abs=0.04)

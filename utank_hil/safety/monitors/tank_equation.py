@@ -48,6 +48,8 @@ from utank_hil.safety.monitors.thresholds import MonitorThresholds
 SIGN_GAIN: Final = -0.25
 VALVE_SIGN_GAIN: Final = -0.5
 """The same behind a valve: one that holds back half as much again as configured makes it -0.23."""
+RATE_LEFT: Final = 1.25
+"""What the filters leave of |h'| h' over what they leave of h', squared, near w0."""
 SETTLED: Final = 6.0
 """Time constants of the filters after which their start is forgotten."""
 STUCK_GAIN: Final = 0.3
@@ -137,7 +139,7 @@ class TankEquation:
         self._most_sway = most_sway(ship)
         self._spread = SPREAD * self._most_sway
         self._loss = tank.loss_pa_per_m_s / density
-        self._quadratic_loss = tank.quadratic_loss_pa_per_m2_s2 / density
+        self._quadratic_loss = RATE_LEFT * tank.quadratic_loss_pa_per_m2_s2 / density
         self._stiffness = float(stiffness[1, 1] / water_kg_m)
         self._push = float(-stiffness[1, 0] / water_kg_m)
         self._push_inertia = float(-mass[1, 0] / water_kg_m)
