@@ -226,7 +226,7 @@ def make_starter(
     scenario = _valid(Scenario, yaml.safe_load(texts[SCENARIO]) | parts)
     state = SeaState.on(vessel.ship, pooled_wave_moment(scenario, vessel.ship))
     assert isinstance(config.law, SelfTunedDesign)
-    law = config.law.tuned(config.plant)
+    law = config.law.tuned(config.design_plant)
     texts[README] = readme(ship.name)
     prediction = predict_roll(config.plant, state)
     return StarterProject(vessel, sized, demand, law, prediction, sea, texts)

@@ -105,9 +105,9 @@ def build_law(config: ControllerConfig) -> BuiltLaw:
             # an equation that was solved for another matrix than the one given
             warnings.simplefilter("error", RuntimeWarning)
             law = (
-                config.law.first(config.plant)
+                config.law.first(config.design_plant)
                 if config.renews and isinstance(config.law, SelfTunedDesign)
-                else config.law.build(config.plant)
+                else config.law.build(config.design_plant)
             )
             if law.linear is None and law.closes_loop and not law.dissipates:
                 law = _by_impulse_response(law)
@@ -275,7 +275,7 @@ def retuning_task(
 
     design = config.law
     if isinstance(design, AutoDesign):
-        design = design.tuned(config.plant)
+        design = design.tuned(config.design_plant)
     if not isinstance(design, PredictiveDesign) or "roll_rad" not in design.predictor.measured:
         raise ValueError(
             f"law.kind: {design.kind} can't be designed anew for a ship that is found: it must be "

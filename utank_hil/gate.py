@@ -60,7 +60,10 @@ def judge(config: ControllerConfig, *, with_delay_margin: bool = True) -> Judged
         return JudgedLaw(config, law, None, step_s)
     try:
         found = robustness(
-            law.linear, config.plant, law.linear_measured, with_delay_margin=with_delay_margin
+            law.linear,
+            config.design_plant,
+            law.linear_measured,
+            with_delay_margin=with_delay_margin,
         )
     except (ValueError, ArithmeticError) as error:
         raise ParameterError("", [("law", f"its margins can't be computed: {error}")]) from error

@@ -61,7 +61,7 @@ def controller(
     loaded = load(config, ControllerConfig, allow_code=True)  # foreign code is refused, not run
     law = loaded.law
     if isinstance(law, AutoDesign):
-        law = law.tuned(loaded.plant)
+        law = law.tuned(loaded.design_plant)
     if not isinstance(law, Design):
         fail(
             f"{config}: law.kind: a {law.kind} law has no weight to trade: take "

@@ -18,6 +18,7 @@ from utank_hil.analysis.loop.sea_response import (
     CalmSeaError,
     MotionInSea,
     at_its_motion,
+    at_work,
     motion_in_sea,
     rms,
     roll_response_without_tank,
@@ -133,8 +134,11 @@ class RollCurves:
 
 
 def roll_curves(plant: DesignPlant, sea: SeaState, law: TunedLaw | None) -> RollCurves:
-    """Roll over static roll in regular waves of half to twice the roll period."""
-    ship = plant.ship
+    """Roll over static roll in regular waves of half to twice the roll period.
+
+    The tank has the loss of its passive motion in the sea.
+    """
+    ship, plant = plant.ship, at_work(plant, sea.wave_moment)
     own = ship.natural_frequency_rad_s
     w = own * np.geomspace(0.5, 2.0, 300)
     roll = STATES.index("roll_rad")
@@ -178,7 +182,7 @@ def predict_roll(plant: DesignPlant, sea: SeaState, *, pump: bool = True) -> Rol
         )
 
     try:
-        law = first_law(plant, sea.slope_rad, sea.peak_rad_s, within_limits)
+        law = first_law(at_work(plant, waves), sea.slope_rad, sea.peak_rad_s, within_limits)
     except NoLawError as error:
         return RollPrediction(without, passive, None, None, None, str(error))
     active, power_w = _active(plant, law.design, waves), _mean_power_w(plant, law.design, waves)
@@ -200,7 +204,9 @@ def loading_sensitivity(
         active = None
         if prediction.law is not None:
             design = prediction.law.design
-            active = _active(loaded, design, waves, design_plant=plant).roll_rms_rad
+            active = _active(
+                loaded, design, waves, design_plant=at_work(plant, sea.wave_moment)
+            ).roll_rms_rad
         points.append(
             LoadingPoint(
                 scale,
@@ -257,7 +263,7 @@ def _active(
     design_plant: DesignPlant | None = None,
 ) -> MotionInSea:
     """Linear motion with a law, which may have been designed for another plant."""
-    law = design.law(design_plant or plant)
+    law = design.law(at_work(design_plant or plant, waves))
     measured = design.predictor.measured
     return motion_in_sea(law, at_its_motion(law, plant, measured, waves), measured, waves)
 
@@ -272,7 +278,7 @@ def pump_moments(
     plant: DesignPlant, design: LinearDesign, waves: Harmonics
 ) -> tuple[float, float, float]:
     """RMS of pressure in Pa and flow in m^3/s, and mean power to the water in W; linear loop."""
-    law, measured = design.law(plant), design.predictor.measured
+    law, measured = design.law(at_work(plant, waves)), design.predictor.measured
     plant = at_its_motion(law, plant, measured, waves)
     w = waves.frequency_rad_s
     seen = (w > 0) & (w < math.pi / law.sample_time_s)

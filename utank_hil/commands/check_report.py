@@ -214,7 +214,7 @@ def remedy(judged: JudgedLaw) -> str | None:
 
     None is returned if the law is not refused for its margins or has nothing to scale.
     """
-    design, plant, report = judged.config.law, judged.config.plant, judged.robustness
+    design, plant, report = judged.config.law, judged.config.design_plant, judged.robustness
     refused = report is not None and report.failures() and judged.step_s <= MOST_STEP_S
     if not refused or report is None or not isinstance(design, Design):
         return None

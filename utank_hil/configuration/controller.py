@@ -10,7 +10,8 @@ from typing import Annotated, Any, ClassVar, Final
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from utank_hil.analysis.loop.margins import EXTRA_DELAY_S
-from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
+from utank_hil.analysis.loop.sea_response import at_work, moment_of
+from utank_hil.analysis.loop.self_tuning import SelfTunedDesign, unknown_sea
 from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
 from utank_hil.base.tick import TICK_S, is_whole_ticks
 from utank_hil.configuration.files import Section
@@ -270,8 +271,15 @@ class ControllerConfig(Section):
 
     @property
     def plant(self) -> DesignPlant:
-        """The plant that the law is designed for."""
+        """Ship, tank, pump and limits."""
         vessel = self.vessel
         lag_s = 0.0 if vessel.pump is None else vessel.pump.lag_s
         valve = None if vessel.valve is None else vessel.valve.range(vessel.tank)
         return DesignPlant(vessel.ship, vessel.tank, self.delay_s, lag_s, self.limits, valve)
+
+    @property
+    def design_plant(self) -> DesignPlant:
+        """The plant with the tank's loss in the sea that the law expects (`at_work`)."""
+        plant = self.plant
+        sea = getattr(self.law, "sea", None) or unknown_sea(plant.ship)
+        return at_work(plant, moment_of(sea, plant.ship))

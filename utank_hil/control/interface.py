@@ -48,9 +48,16 @@ class DesignPlant:
     lag_s: NotNegative = 0.1  #: Time constant of the pump's pressure.
     limits: PumpLimits = _LIMITS  #: On the command, for the laws that plan within them.
     valve: ValveRange | None = None  #: Range of the tank's valve, if any.
+    #: The tank in small motions, where `tank` has the linear loss of its working level, else None.
+    calm: Tank | None = None
 
     def __post_init__(self) -> None:
         refuse("design plant", range_problems(self))
+
+    @property
+    def tanks(self) -> tuple[Tank, ...]:
+        """The tanks, of greater and of least loss, on which a law must have its margins."""
+        return (self.tank,) if self.calm is None else (self.tank, self.calm)
 
     def model(self, measured: tuple[str, ...]) -> LinearModel:
         """Continuous model from pump pressure to the outputs `measured`, names of `STATES`."""

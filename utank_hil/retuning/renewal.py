@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from utank_hil.analysis.loop.sea_response import at_work, moment_of
 from utank_hil.analysis.loop.self_tuning import self_tuned
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import DesignPlant
@@ -52,10 +53,11 @@ def renew(estimate: MotionEstimate, task: RenewalTask) -> RenewedLaw | Refusal:
     if estimate.waves is None or estimate.ship is None:
         return Refusal(("there is no estimate of the waves to design a law for",))
     plant = dataclasses.replace(task.plant, ship=estimate.ship.ship(task.plant.ship))
+    sea = TailedSpectrum(estimate.waves)
     try:
         tuned = self_tuned(
-            plant,
-            TailedSpectrum(estimate.waves),
+            at_work(plant, moment_of(sea, plant.ship)),
+            sea,
             mean_power_w=task.mean_power_w,
             sample_time_s=task.sample_time_s,
             any_load=estimate.ship == ShipFigures.of(task.plant.ship),

@@ -32,6 +32,17 @@ def judge(design):
     )
 
 
+def test_the_worst_of_both_tanks_counts():
+    law, measured = GPC_ROLL.law(DesignPlant(SHIP, TANK)), GPC_ROLL.predictor.measured
+    calm = dataclasses.replace(TANK, damping_ratio=0.02)
+    ends = [robustness(law, DesignPlant(SHIP, tank), measured) for tank in (TANK, calm)]
+    found = robustness(law, DesignPlant(SHIP, TANK, calm=calm), measured)
+    assert found.worst_radius == max(end.worst_radius for end in ends)
+    assert found.late_radius == max(end.late_radius for end in ends)
+    assert found.nominal.peak_sensitivity == max(end.nominal.peak_sensitivity for end in ends)
+    assert ends[0] != ends[1]
+
+
 @pytest.mark.parametrize("design", [GPC_ROLL, DPC_ROLL_LEVEL], ids=["gpc", "dpc"])
 def test_default_designs_hold_what_is_promised(design):
     found = judge(design)

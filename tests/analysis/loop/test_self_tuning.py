@@ -11,7 +11,12 @@ import pytest
 from utank_hil.analysis.loop.innovation_filter import InnovationFilter
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.analysis.loop.margins import closed_loop_radius, of_period, robustness
-from utank_hil.analysis.loop.sea_response import motion_in_sea
+from utank_hil.analysis.loop.sea_response import (
+    at_its_motion,
+    at_work,
+    moment_of,
+    motion_in_sea,
+)
 from utank_hil.analysis.loop.self_tuning import (
     NoLawError,
     SelfTuned,
@@ -49,6 +54,24 @@ def moment():
     return Sea.irregular(STORM, 1, components=4096).roll_moment(
         PLANT.ship.stiffness_nm_rad, EffectiveSlope(SEA.effective_slope)
     )
+
+
+def test_a_law_for_a_quadratic_loss_has_its_margins_at_both_ends_and_rolls_less():
+    tank = replace(PLANT.tank, damping_ratio=0.02, quadratic_loss=4.0)
+    plant, waves = replace(PLANT, tank=tank), moment_of(SEA, PLANT.ship)
+    working = at_work(plant, waves)
+    assert working.tanks == (working.tank, tank)
+    assert working.tank.damping_ratio > 5 * tank.damping_ratio
+    found = self_tuned(working, SEA).law
+    for each in working.tanks:
+        end = replace(PLANT, tank=each)
+        assert not robustness(found, end, MEASURED, with_delay_margin=False).failures()
+    rolls = [
+        motion_in_sea(law, at_its_motion(law, plant, MEASURED, waves), MEASURED, waves).roll_rms_rad
+        for law in (found, self_tuned(plant, SEA).law)
+    ]
+    assert rolls[0] < 0.95 * rolls[1]
+    assert at_work(PLANT, waves) is PLANT  # shipped tanks lose linearly
 
 
 def test_the_law_has_all_margins_and_its_roll_is_that_of_another_computation():

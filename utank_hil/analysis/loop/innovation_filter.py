@@ -45,11 +45,9 @@ from utank_hil.dynamics import STATES, LinearModel
 from utank_hil.dynamics.sampling import state_space_response
 
 _ORDER: Final = 14
-"""Number of filter states. From 8 to 14 the predicted roll of the shipped laws falls by 1.5 %, to
-16 by 0.2 % more."""
+"""Filter states. From 8 to 14 the roll of the shipped laws falls by 1.5 %, to 16 by 0.2 % more."""
 _POLE: Final = 0.7
-"""Decay rate of the Laguerre basis over the roll frequency; from 0.5 to 1 the roll changes by 0.5
-%."""
+"""Decay rate of the Laguerre basis over w; from 0.5 to 1 the roll changes by 0.5 %."""
 _BOUND: Final = 0.85 * PEAK_SENSITIVITY
 """Peak sensitivity that the penalty aims at: the required one less 15 %. The 15 % is chosen; no
 study."""
@@ -73,7 +71,6 @@ _LOADS_PEAK: Final = 3.0
 """Sensitivity from which these are penalized. With 40 the clipped law rolled a ship loaded to 1.3
 times its period 1.4 to 3.3 times the passive roll, with 6 up to 1.15 times, with 3 at most 0.98
 times; the storm's roll rises by 0, 0 and 4 %."""
-"""Shares of its command that a pump at its limit gives there."""
 _EXACT: Final = 1e-14
 """Newton decrement of the last step. Newton's method squares the remaining error."""
 _MOST_STEPS: Final = 200  # Limit on the Newton steps. Chosen; no study.
@@ -383,8 +380,12 @@ def _others(
 ) -> Iterator[tuple[DesignPlant, float, float, float]]:
     """Yield the other ships, the pump's gain, its share of the command, and the peak to penalize.
 
-    The ships of the grid are taken with and without extra delay.
+    The ships of the grid have extra delay or none, and the tank at work and in small motions.
     """
+    if plant.calm is not None:
+        calm = replace(plant, tank=plant.calm, calm=None)
+        yield calm, 1.0, 1.0, PEAK_SENSITIVITY
+        yield from _others(calm, any_load=any_load)
     late = replace(plant, delay_s=plant.delay_s + EXTRA_DELAY_S)
     yield late, 1.0, 1.0, _OTHERS_PEAK
     for period_scale, inertia_scale, ship in ship_variants(plant.ship):

@@ -28,10 +28,9 @@ import numpy as np
 
 from utank_hil.analysis.loop.loop_simulation import SensorNoise
 from utank_hil.analysis.loop.margins import Robustness, closed_loop_response, robustness
-from utank_hil.analysis.loop.sea_response import motion_in_sea
+from utank_hil.analysis.loop.sea_response import SlopeDensity, moment_of, motion_in_sea
 from utank_hil.analysis.loop.self_tuning import (
     NoLawError,
-    SlopeDensity,
     cost_weights,
     sample_time_of,
     short,
@@ -41,7 +40,6 @@ from utank_hil.analysis.loop.trade import scaled
 from utank_hil.control import BuiltLaw, DesignPlant, PredictiveDesign, Predictor, SeaModel
 from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.dynamics import STATES
-from utank_hil.sea import Harmonics
 
 LinearKind = Literal["gpc", "dpc", "lqg"]
 LINEAR_KINDS: Final[tuple[LinearKind, ...]] = get_args(LinearKind)
@@ -81,7 +79,6 @@ _SWEEPS: Final = 3  # Limit on passes over the factors with one step size. Chose
 _MOST_DAMPING: Final = 1.0  # Limit on the damping of the predictor's waves: critical damping.
 _SLOPE: Final = 1.46
 """Significant slope of the sea assumed for the scaled law, over the passive roll's RMS."""
-_OMEGA: Final = np.geomspace(0.1, 10.0, 600)  # Wave frequencies over the roll frequency.
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,9 +204,8 @@ class _Search:
     def __init__(self, kind: LinearKind, plant: DesignPlant, sea: SlopeDensity) -> None:
         self._least_std = asdict(SensorNoise())
         self._plant = plant
-        w = plant.ship.natural_frequency_rad_s * _OMEGA
-        slope = np.sqrt(2 * sea.slope_density(w) * np.gradient(w))
-        self._moment = Harmonics(plant.ship.stiffness_nm_rad * slope, w, np.zeros(len(w)))
+        self._moment = moment_of(sea, plant.ship)
+        w = self._moment.frequency_rad_s
         answers, _ = closed_loop_response(None, plant, (), w)
         roll = np.abs(answers[:, STATES.index("roll_rad")])
         energy = np.square(roll * self._moment.amplitude) / 2

@@ -301,15 +301,21 @@ def robustness(
 ) -> Robustness:
     """Judge a law on its ship, with extra delay, and on a grid of ships, pump gains and delays.
 
-    The delay margin (`with_delay_margin`) is informative only; no requirement uses it.
+    The worst of the plant's `tanks` counts. The delay margin (`with_delay_margin`) is informative
+    only; no requirement uses it.
     """
     delay_s, lag_s = plant.delay_s, plant.lag_s
-    model = plant.model(measured)
-    late_radius, late_peak = radius_and_peak(
-        law, sample(model, law.sample_time_s, delay_s + EXTRA_DELAY_S, lag_s)
-    )
-    variants = list(ship_variants(plant.ship))
-    systems = [pump_model(variant, plant.tank, measured) for _, _, variant in variants]
+    models = [pump_model(plant.ship, tank, measured) for tank in plant.tanks]
+    late = [
+        radius_and_peak(law, sample(model, law.sample_time_s, delay_s + EXTRA_DELAY_S, lag_s))
+        for model in models
+    ]
+    own = [
+        margins(law, each, delay_s, lag_s, with_delay_margin=with_delay_margin) for each in models
+    ]
+    ships = list(ship_variants(plant.ship))
+    variants = [(tank, *each) for tank in plant.tanks for each in ships]
+    systems = [pump_model(ship, tank, measured) for tank, _, _, ship in variants]
     extra_s = (0.0, EXTRA_DELAY_S)
     radii = np.array(
         [
@@ -321,11 +327,11 @@ def robustness(
         ]
     )
     when, which, gain = np.unravel_index(int(radii.argmax()), radii.shape)
-    period_scale, inertia_scale, _ = variants[which]
+    _, period_scale, inertia_scale, _ = variants[which]
     return Robustness(
-        nominal=margins(law, model, delay_s, lag_s, with_delay_margin=with_delay_margin),
-        late_radius=late_radius,
-        late_peak_sensitivity=late_peak,
+        nominal=max(own, key=lambda each: (each.radius >= 1, each.peak_sensitivity)),
+        late_radius=max(radius for radius, _ in late),
+        late_peak_sensitivity=max(peak for _, peak in late),
         worst_radius=float(radii[when, which, gain]),
         worst_period_scale=period_scale,
         worst_inertia_scale=inertia_scale,

@@ -6,7 +6,7 @@ rate and level are neglected.
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -25,6 +25,16 @@ LEAST_ROLL_RAD: Final = 1e-6
 _ROUNDS: Final = 50  # Limit on the iterations: each halves the difference at least.
 _BANDS: Final = 400  # Widths of a hundredth of a roll frequency, far below a resonance's.
 _AGREE: Final = 1e-3  # Relative difference of rates at which the iteration ends.
+
+
+_OMEGA: Final = np.geomspace(0.1, 10.0, 600)  # Wave frequencies over the roll frequency.
+
+
+class SlopeDensity(Protocol):
+    """A sea as a law's design needs it."""
+
+    def slope_density(self, omega_rad_s: FloatArray) -> FloatArray:
+        """One-sided density of the effective wave slope over encounter frequency."""
 
 
 class CalmSeaError(ValueError):
@@ -74,6 +84,24 @@ def at_its_motion(
         if np.allclose(rates, before, rtol=_AGREE, atol=0):
             break
     return found
+
+
+def moment_of(sea: SlopeDensity, ship: RollShip) -> Harmonics:
+    """Roll moment in N m of a sea, as far as it can roll a ship."""
+    w = ship.natural_frequency_rad_s * _OMEGA
+    slope = np.sqrt(2 * sea.slope_density(w) * np.gradient(w))
+    return Harmonics(ship.stiffness_nm_rad * slope, w, np.zeros(len(w)))
+
+
+def at_work(plant: DesignPlant, wave_moment: Harmonics) -> DesignPlant:
+    """Return the plant that laws are designed for: the tank's loss is that of its passive motion.
+
+    As it is in small motions, the tank is kept as `calm`.
+    """
+    if not plant.tank.quadratic_loss:
+        return plant
+    moving = at_its_motion(None, plant, (), wave_moment)
+    return replace(plant, tank=moving.tank, calm=plant.tank)
 
 
 def _bands(waves: Harmonics) -> Harmonics:

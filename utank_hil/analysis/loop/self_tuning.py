@@ -21,7 +21,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Annotated, Final, Literal, Protocol
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from utank_hil.analysis.loop.margins import (
     of_period,
     robustness,
 )
+from utank_hil.analysis.loop.sea_response import SlopeDensity
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import Range, range_problems, refuse
 from utank_hil.base.tick import TICK_S
@@ -92,13 +93,6 @@ _MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 
 class NoLawError(ValueError):
     """No law of the kind is robust or within the limits, even with the smallest weights tried."""
-
-
-class SlopeDensity(Protocol):
-    """A sea as a law's design needs it."""
-
-    def slope_density(self, omega_rad_s: FloatArray) -> FloatArray:
-        """One-sided density of the effective wave slope over encounter frequency."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,9 +308,12 @@ class _Search:
 
     def _bears_shares(self, law: LQGLaw) -> bool:
         """Whether the loop is stable with any share of the command, which the estimate knows."""
-        model = self._plant.sampled(_MEASURED, law.sample_time_s)
-        shared = (LQGLaw(law.model, share * law.gain, law.observer_gain) for share in _SHARES)
-        return all(closed_loop_radius(each, model, 1.0) < 1 for each in shared)
+        plant = self._plant
+        models = [
+            replace(plant, tank=tank).sampled(_MEASURED, law.sample_time_s) for tank in plant.tanks
+        ]
+        shared = [LQGLaw(law.model, share * law.gain, law.observer_gain) for share in _SHARES]
+        return all(closed_loop_radius(law, model, 1.0) < 1 for law in shared for model in models)
 
     def _gentler(
         self, search: InnovationFilter, design: ConstrainedDesign, law: LQGLaw
@@ -373,10 +370,11 @@ class _Search:
         """Yield the cases that usually fail first: the longest and the shortest roll period."""
         ship, plant = self._plant.ship, self._plant
         for scale in (PERIOD_SCALES[-1], PERIOD_SCALES[0]):
-            model = pump_model(of_period(ship, scale), plant.tank, _MEASURED)
             late_s = plant.delay_s + (EXTRA_DELAY_S if scale < 1 else 0.0)
-            sampled = sample(model, self._step_s, late_s, plant.lag_s)
-            yield from ((sampled, gain) for gain in (GAINS[0], GAINS[-1]))
+            for tank in plant.tanks:
+                model = pump_model(of_period(ship, scale), tank, _MEASURED)
+                sampled = sample(model, self._step_s, late_s, plant.lag_s)
+                yield from ((sampled, gain) for gain in (GAINS[0], GAINS[-1]))
 
 
 def _steady_stiffness(ship: RollShip, plant: DesignPlant) -> float:

@@ -10,6 +10,7 @@ from utank_hil.analysis.loop.margins import Robustness, robustness
 from utank_hil.analysis.loop.sea_response import (
     MotionInSea,
     at_its_motion,
+    at_work,
     motion_in_sea,
     require_roll,
 )
@@ -102,10 +103,11 @@ def trade(
     settled = at_its_motion(None, plant, measured, wave_moment)
     passive = motion_in_sea(None, settled, measured, wave_moment)
     require_roll(passive)
+    working = at_work(plant, wave_moment)
     points = []
     for number, factor in enumerate(factors, 1):
-        law = scaled(design, factor).law(plant)
-        judged = robustness(law, plant, measured)
+        law = scaled(design, factor).law(working)
+        judged = robustness(law, working, measured)
         motion = less = None
         if judged.nominal.radius < 1:
             settled = at_its_motion(law, plant, measured, wave_moment)

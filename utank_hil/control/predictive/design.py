@@ -248,7 +248,8 @@ def wave_plant(predictor: Predictor, plant: DesignPlant) -> tuple[LinearModel, F
     The model is from the pump's command to `STATES`, with states of ship and tank, wave moment, lag
     and past commands; the covariance has shape (n, n).
     """
-    a_ship, b_ship = state_matrices(plant.ship, plant.tank)
+    # of greater loss, laws of greater weights would miss their margins in small motions
+    a_ship, b_ship = state_matrices(plant.ship, plant.tanks[-1])
     pressure, wave = b_ship[:, :1], b_ship[:, 1:]
     wp, zeta = predictor.wave_peak_rad_s, predictor.wave_damping_ratio
     n = len(STATES)
