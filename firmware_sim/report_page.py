@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from firmware_sim.bench import BenchResult
 from firmware_sim.figures import NO_TANK as BARE
 from firmware_sim.figures import BenchFigures, RunFigures, read_figures, rolls_compared
-from firmware_sim.report_tables import few_rolls, roll_interval, tables
+from firmware_sim.report_tables import few_rolls, in_one_unit, roll_interval, tables
 from firmware_sim.retuning_figures import events_on_ships_time
 from firmware_sim.run import COLUMNS, RECORD_S
 from firmware_sim.scenario import PASSIVE
@@ -223,7 +223,7 @@ def _draw(result: BenchResult, found: BenchFigures, about: Mapping[str, Any], pa
         path,
         title=f"{found.scenario}, seed {found.seed}, {found.mode}",
         about=about,
-        bars=[_bare_bar(found), *map(_bar, found.runs, COLORS)],
+        bars=[_bare_bar(found), *map(bar_of, found.runs, COLORS)],
         wrong=found.wrong,
         interval=roll_interval(found, result.scenario.vessel.ship.natural_frequency_rad_s),
     )
@@ -236,7 +236,8 @@ def _bare_bar(found: BenchFigures) -> BenchBar:
     return BenchBar(BARE, NO_TANK, bare.rms_rad, _degrees(bare.rms_rad), None, "")
 
 
-def _bar(run: RunFigures, color: str) -> BenchBar:
+def bar_of(run: RunFigures, color: str) -> BenchBar:
+    """Bars and words of a run in the picture's summary."""
     if run.mark is not None or run.roll is None or run.pump is None:
         return BenchBar(run.name, color, None, "" if run.mark is None else run.mark.word, None, "")
     said, pump = _degrees(run.roll.rms_rad), run.pump
@@ -244,10 +245,10 @@ def _bar(run: RunFigures, color: str) -> BenchBar:
         return BenchBar(run.name, color, run.roll.rms_rad, said, None, "")
     if run.roll_below_passive is not None:
         below = run.roll_below_passive
-        said += f"   {abs(below):.0%} {'below' if below >= 0 else 'above'} passive"
-    scale, unit = (1e6, "MW") if pump.power_peak_w >= 1e6 else (1e3, "kW")
-    mean, most = pump.power_mean_w / scale, pump.power_peak_w / scale
-    cost = f"{mean:.2f} {unit}, at most {most:.2f}"
+        share, side = f"{abs(below):.0%}", "below" if below >= 0 else "above"
+        said += "   as passive" if share == "0%" else f"   {share} {side} passive"
+    unit, (mean, most) = in_one_unit([pump.power_mean_w, pump.power_peak_w], "W")
+    cost = f"{mean} {unit}, at most {most}"
     return BenchBar(run.name, color, run.roll.rms_rad, said, pump.power_mean_w, cost)
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from firmware_sim.bench import BenchResult
 from firmware_sim.figures import figures, mark_of
 from firmware_sim.model_limits import MODEL_LIMITS, passed_limits, steepness
-from firmware_sim.report_page import bench_page
+from firmware_sim.report_page import bar_of, bench_page
 from firmware_sim.report_tables import in_one_unit, motion_table, pump_table
 from firmware_sim.run import COLUMNS, RECORD_S, Run
 from firmware_sim.scenario import Scenario
@@ -257,6 +257,15 @@ def test_small_ships_pumps_are_shown_in_kilowatts() -> None:
     table = pump_table(figures(result_of(PASSIVE_RUN, weak)))
     assert [column.header for column in table.columns][3:5] == ["power\nmean kW", "power\npeak kW"]
     assert list(table.columns[3].cells) == ["0.00", "4.20"]
+
+
+def test_the_picture_says_power_by_three_digits_and_no_difference_of_nothing() -> None:
+    weak = with_column(run("a", 0.03), "true_shaft_power_w", 102_700.0, slice(None))
+    found = figures(result_of(PASSIVE_RUN, weak)).runs[1]
+    for below, words in ((-0.001, "as passive"), (-0.02, "2% above passive")):
+        bar = bar_of(dataclasses.replace(found, roll_below_passive=below), "C0")
+        assert bar.cost == "103 kW, at most 103"
+        assert bar.said == f"1.73°   {words}"
 
 
 def test_the_page_of_a_short_window_carries_its_interval(tmp_path: Path) -> None:
