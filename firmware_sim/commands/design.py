@@ -207,12 +207,15 @@ def tank(
         roll_curves,
         sweep_tank,
     )
+    from utank_hil.analysis.tank_sizing import with_duct_loss
     from utank_hil.control.optimal_tank import best_passive_tank
     from utank_hil.pictures.tank import draw_sweep, draw_tank
 
     loaded = load(vessel, Vessel)
     try:
         best = best_passive_tank(loaded.ship, loaded.tank)
+        if loaded.tank.quadratic_loss:
+            best = with_duct_loss(loaded.ship, best)
     except ValueError as error:
         fail(error)
     tanks = {"present": loaded.tank, "best": best}
@@ -294,11 +297,11 @@ def _plant(vessel: Vessel, tank: Tank) -> "DesignPlant":
 
 def _figures(vessel: Vessel, tank: Tank, found: "RollPrediction | None") -> dict[str, Any]:
     from firmware_sim.tank_report import prediction_json
-    from utank_hil.analysis.tank_sizing import tank_cost
+    from utank_hil.analysis.tank_sizing import moving, tank_cost
     from utank_hil.control.optimal_tank import tank_figures
 
     return {
-        **asdict(tank_figures(vessel.ship, tank)),
+        **asdict(tank_figures(vessel.ship, moving(vessel.ship, tank))),
         **asdict(tank_cost(vessel.ship, tank)),
         "prediction": None if found is None else prediction_json(found),
     }
@@ -309,14 +312,14 @@ def _table(
 ) -> Table:
     """Table of the present tank beside the best passive one."""
     from firmware_sim.tank_report import cost_rows, figure_rows, roll_rows
-    from utank_hil.analysis.tank_sizing import tank_cost
+    from utank_hil.analysis.tank_sizing import moving, tank_cost
     from utank_hil.control.optimal_tank import tank_figures
 
     table = new_table(f"Tank of {vessel.name}", *tanks, caption=caption)
     columns = []
     for name, tank in tanks.items():
         rows = [
-            *figure_rows(tank_figures(vessel.ship, tank)),
+            *figure_rows(tank_figures(vessel.ship, moving(vessel.ship, tank))),
             *cost_rows(tank_cost(vessel.ship, tank)),
         ]
         columns.append(rows + (roll_rows(found[name]) if found else []))

@@ -228,6 +228,11 @@ def with_duct_loss(ship: RollShip, tank: Tank) -> Tank:
     return replace(tank, damping_ratio=LINEAR_SHARE, quadratic_loss=loss)
 
 
+def moving(ship: RollShip, tank: Tank) -> Tank:
+    """Return the tank with the linear loss that it has at the pump's level."""
+    return tank.linearized(tank.natural_frequency_rad_s * pump_level_m(ship, tank))
+
+
 def stability_taken(ship: RollShip, tank: Tank) -> float:
     """Share of the ship's stability that the free surface takes."""
     moment = tank.density_kg_m3 * GRAVITY_M_S2 * tank.reservoir_area_m2 * tank.width_m**2 / 2
@@ -284,14 +289,13 @@ def tank_cost(ship: RollShip, tank: Tank) -> TankCost:
     mass_kg, taken = tank.water_kg, stability_taken(ship, tank)
     level_m, weight_n = usable_level_m(ship, tank), ship.displacement_n
     weighed = weight_n > 0
-    moving_m_s = tank.natural_frequency_rad_s * pump_level_m(ship, tank)
     return TankCost(
         water_t=mass_kg / 1e3,
         share_of_displacement=mass_kg * GRAVITY_M_S2 / weight_n if weighed else None,
         stability_taken=taken,
         gm_loss_m=taken * ship.stiffness_nm_rad / weight_n if weighed else None,
         water_period_s=2 * math.pi / tank.natural_frequency_rad_s,
-        damping_ratio=tank.linearized(moving_m_s).damping_ratio,
+        damping_ratio=moving(ship, tank).damping_ratio,
         usable_level_m=level_m,
         slope_capacity_rad=wave_slope_capacity_rad(ship, tank, level_m),
     )
