@@ -223,3 +223,10 @@ def test_file_of_another_kind_is_refused_in_one_line() -> None:
     (problem,) = caught.value.problems
     assert problem.key == ""
     assert problem.reason == "is a ship, and a controller is wanted"
+
+
+def test_a_file_that_its_reader_names_is_not_named_twice(tmp_path: Path) -> None:
+    waves = tmp_path / "waves.txt"
+    waves.write_text("none\n")
+    reason = refused(tmp_path, f"sea: {{kind: measured, file: {waves}}}\n", Scenario)["sea.file"]
+    assert reason == f"{waves}, line 1: no header line with frequencies stands before the data"

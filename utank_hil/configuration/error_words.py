@@ -142,6 +142,8 @@ def words_for(error: Any, model: type[BaseModel]) -> str:
     words = str(error["msg"]).removeprefix("Value error, ")
     if isinstance(value, dict | list | tuple | BaseModel):
         return words
+    if isinstance(value, str) and value and words.startswith(value):
+        return words  # a file is named by its reader
     return f"{words} (got {_short(repr(value))})"
 
 

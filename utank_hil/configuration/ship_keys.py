@@ -33,7 +33,9 @@ _PAIRS = (
     ("damping_ratio", "damping_nms_rad"),
 )  # Pairs of a naval architect's key and `RollShip`'s for the same quantity.
 
-_HULL_KEYS = "mass_kg, gravity_centre_m and gyration_m beside hull.file give what a file lacks"
+_HULL_KEYS = (
+    "density_kg_m3, mass_kg, gravity_centre_m, gyration_m beside hull.file give what a file lacks"
+)
 _UNITS = {
     "displacement_t": "it is in tonnes",
     "gm_m": "it is in metres, and roll_period_s in seconds",

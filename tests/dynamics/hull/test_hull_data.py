@@ -84,7 +84,7 @@ def test_what_is_missing_is_named():
     hull = made_up_hull(inertia_kg_m2=None)
     assert hull.inertia_kg_m2 is None
     assert hull.mass_kg is not None
-    with pytest.raises(ParameterError, match="fpso inertia_kg_m2 is missing"):
+    with pytest.raises(ParameterError, match="fpso: inertia_kg_m2 is missing"):
         made_up_hull(inertia_kg_m2=None, source="fpso").mass_matrix  # noqa: B018
 
 

@@ -151,7 +151,7 @@ class HullData:
     def known(self, name: str) -> Any:
         """Return a field, or raise `ParameterError` naming it if the source does not have it."""
         if (value := getattr(self, name)) is None:
-            raise ParameterError(self.source, [(name, "is missing")])
+            raise ParameterError(f"{self.source}:", [(name, "is missing")])
         return value
 
     @property
