@@ -24,7 +24,7 @@ from utank_hil.control.interface import Controller, PumpLimits
 from utank_hil.control.limiter import CommandLimiter
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.simulate import WaveComponents, WaveMoment, whole_steps
+from utank_hil.dynamics.simulate import WaveMoment, whole_steps
 from utank_hil.dynamics.tank import Tank, negligible
 
 LIMIT_RAD = math.radians(89)  # of the search for equilibria
@@ -133,21 +133,16 @@ def safe_basin(
     roll_rad: FloatArray,
     roll_rate_rad_s: FloatArray,
     duration_s: float,
-    *,
-    wave: WaveComponents | None = None,
 ) -> npt.NDArray[np.bool_]:
-    """Safe basin: the starts that survive, with the water flat and at rest relative to the ship.
+    """Starts that survive in calm water, with the tank's flat and at rest relative to the ship.
 
-    The result has shape (b, a) for rolls of shape (a,) and rates of shape (b,); the sea is calm
-    unless a wave is given.
+    The result has shape (b, a) for rolls of shape (a,) and rates of shape (b,).
     """
     limit = model.coefficients.level_limit
     roll, rate = np.meshgrid(roll_rad, roll_rate_rad_s)
     level = np.clip(np.tan(roll) * model.tank.width_m / 2, -limit, limit)
     initial = np.stack([roll, rate, level, np.zeros_like(roll)], axis=-1).reshape(-1, 4)
-    result = simulate_batch(
-        model, duration_s, initial, wave=WaveMoment([], [], []) if wave is None else wave
-    )
+    result = simulate_batch(model, duration_s, initial)
     return np.asarray(np.isinf(result.capsized_s).reshape(roll.shape))
 
 

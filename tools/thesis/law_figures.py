@@ -56,10 +56,6 @@ _OPEN: Final = (
 _SHIPS: Final = {"25.2 m²": GREATER, "printed ship": AS_PRINTED}
 
 
-def _stable(ship: RollShip, tank: Tank) -> dict[str, float]:
-    return {name: radius(ship, tank, law) for name, law in entrants(ship, tank).items()}
-
-
 def figure_3_6() -> Figure:
     """Roll over frequency with each law."""
     found = {name: responses(*ship, entrants(*ship), RATIOS) for name, ship in _SHIPS.items()}
@@ -130,7 +126,8 @@ def _effective(answers: Mapping[str, Response]) -> Verdict:
 
 
 def _stability(name: str) -> str:
-    unstable = [law for law, value in _stable(*_SHIPS[name]).items() if value >= 1]
+    ship = _SHIPS[name]
+    unstable = [law for law, each in entrants(*ship).items() if radius(*ship, each) >= 1]
     return f"unstable: {', '.join(unstable)}" if unstable else "all loops stable"
 
 

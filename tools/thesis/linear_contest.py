@@ -181,11 +181,6 @@ class Response:
     pressure_pa: FloatArray  #: shape (n,): per rad of static roll.
 
 
-def lqr_on_roll(ship: RollShip, tank: Tank) -> Entrant:
-    """LQR with the printed weight on roll alone, as GPC has it: this gives the printed index."""
-    return _lqr(ship, tank, np.diag([LQR_WEIGHT, 0.0, 0.0, 0.0]))
-
-
 def lqr_as_printed(ship: RollShip, tank: Tank) -> Entrant:
     """LQR with the printed weight on all four states: roll, tank angle, and their rates."""
     per_metre = (2 / tank.width_m) ** 2
@@ -197,10 +192,13 @@ def _lqr(ship: RollShip, tank: Tank, weight: FloatArray) -> Entrant:
 
 
 def entrants(ship: RollShip, tank: Tank) -> dict[str, Entrant]:
-    """PD and LQR designed for the ship, and the four predictive laws as printed."""
+    """PD and LQR designed for the ship, and the four predictive laws as printed.
+
+    LQR has the printed weight on roll alone, as GPC has it: this gives the printed index.
+    """
     found = {
         PD: Entrant(design_pd(ship, tank, PD_SAMPLE_S), PD_MEASURED, 0.0),
-        LQR: lqr_on_roll(ship, tank),
+        LQR: _lqr(ship, tank, np.diag([LQR_WEIGHT, 0.0, 0.0, 0.0])),
     }
     for name, printed in PRINTED.items():
         found[name] = Entrant(printed.law(tank), printed.measured, SAMPLE_TIME_S)

@@ -55,7 +55,7 @@ def _history(title: str, runs: dict[str, Run]) -> Panel:
             Curve(name, each.time_s[each.time_s <= SHOWN_S], each.roll_deg[each.time_s <= SHOWN_S])
             for name, each in runs.items()
         ),
-        y_limits=(-SHOWN_DEG, SHOWN_DEG) if _any_capsizes(runs) else None,
+        y_limits=(-SHOWN_DEG, SHOWN_DEG) if not all(map(_survives, runs.values())) else None,
     )
 
 
@@ -70,10 +70,6 @@ def _plane(title: str, runs: dict[str, Run]) -> Panel:
             for shown in [(each.time_s <= SHOWN_S) & (np.abs(each.roll_deg) < SHOWN_DEG)]
         ),
     )
-
-
-def _any_capsizes(runs: dict[str, Run]) -> bool:
-    return any(math.isfinite(each.result.capsized_s) for each in runs.values())
 
 
 def _told(runs: dict[str, Run]) -> str:
