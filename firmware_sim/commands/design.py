@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from utank_hil.analysis.loop.trade import Trade, TradePoint
     from utank_hil.analysis.tank_prediction import RollPrediction, SeaState, SweepPoint
     from utank_hil.control import DesignPlant
-    from utank_hil.dynamics.ship import RollShip
 
 
 PICTURE, FIGURES = "design.png", "design.json"
@@ -262,17 +261,12 @@ def tank(
     console.table(_table(loaded, tanks, found, f"roll: linear prediction for {name}"))
     if loaded.pump is not None:
         console.say(f"pump: net head, flow, shaft, duty: {order_words(loaded)}")
-    if left_out := _left_out(loaded.ship):
-        console.say(f"left out of the roll: {left_out}; utank-hil bench has it")
+    if loaded.ship.restoring_odd_nm or loaded.ship.gz_m:
+        console.say("left out of the roll: the restoring moment's curve; utank-hil bench has it")
     console.table(loading_table(loadings))
     for each in sweep_tables(points) if points else ():
         console.table(each)
     console.files(files)
-
-
-def _left_out(ship: "RollShip") -> str:
-    """Effects that a linear prediction of this ship leaves out."""
-    return "the restoring moment's curve" if ship.restoring_odd_nm or ship.gz_m else ""
 
 
 def _sea(path: Path, vessel: Vessel) -> tuple[Scenario, "SeaState"]:

@@ -1,7 +1,9 @@
 """Common base of all faults."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from functools import partial
+from itertools import cycle
 from typing import Annotated, Any, ClassVar, Final
 
 from pydantic import AfterValidator
@@ -123,6 +125,11 @@ class MessageFault(Fault):
 def whole_cycles(by_s: float, cycle_ns: int) -> int:
     """Delay in whole cycles, rounded up, at least one."""
     return max(1, -(-round(by_s * SECOND_NS) // cycle_ns))
+
+
+def one_in(every: int) -> Callable[[], bool]:
+    """Return a function that is true at its first call, and at one in `every` from then on."""
+    return cycle([True, *[False] * (every - 1)]).__next__
 
 
 def intact(named: NamedMessage, frame: Frame) -> Any:

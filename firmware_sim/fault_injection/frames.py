@@ -4,12 +4,13 @@ import random
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Iterable
+from itertools import cycle
 from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
 from firmware_sim.fault_injection.bench_parts import Spoil
-from firmware_sim.fault_injection.fault import MessageFault, intact
+from firmware_sim.fault_injection.fault import MessageFault, intact, one_in
 from utank_hil.base.parameters import Range
 from utank_hil.canbus import Frame
 from utank_hil.canbus.codec import FRAME_BYTES
@@ -52,14 +53,13 @@ class Replayed(MessageFault):
 
     def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         kept: list[Frame] = []
-        count = [0]
+        again = cycle(kept)  # begins when all are kept
 
         def replay(frame: Frame, _: float) -> Iterable[Frame]:
-            if len(kept) < self.frames:
-                kept.append(frame)
-                return (frame,)
-            count[0] += 1
-            return (kept[(count[0] - 1) % self.frames],)
+            if len(kept) == self.frames:
+                return (next(again),)
+            kept.append(frame)
+            return (frame,)
 
         return replay
 
@@ -102,11 +102,10 @@ class Counter(MessageFault):
     def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         codec = self.named.codec
         counter: list[int] = []
-        left_out = [self.one_of - 1]
+        sends = one_in(self.one_of)
 
         def count(frame: Frame, _: float) -> Iterable[Frame]:
-            left_out[0] = (left_out[0] + 1) % self.one_of
-            if left_out[0]:
+            if not sends():
                 return ()
             message = intact(self.named, frame)
             if message is None:
@@ -127,15 +126,10 @@ class Damaged(MessageFault):
         """Return the damaged bytes of a frame, which another fault may have shortened."""
 
     def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        count = [-1]
-
-        def harm(frame: Frame, _: float) -> Iterable[Frame]:
-            count[0] += 1
-            if count[0] % self.every:
-                return (frame,)
-            return (Frame(frame.can_id, self._damage(frame.data)),)
-
-        return harm
+        harms = one_in(self.every)
+        return lambda frame, _: (
+            Frame(frame.can_id, self._damage(frame.data)) if harms() else frame,
+        )
 
 
 class Corrupted(Damaged):

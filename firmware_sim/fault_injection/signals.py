@@ -14,6 +14,7 @@ from firmware_sim.fault_injection.fault import (
     FaultSpan,
     MessageFault,
     intact,
+    one_in,
     signal_problems,
     whole_cycles,
 )
@@ -149,13 +150,8 @@ class Spikes(SignalFault):
     every: Annotated[int, Field(ge=2)]
 
     def _change(self, seed: int) -> Change:  # noqa: ARG002
-        count = [-1]
-
-        def strike(values: Sequence[Any], _: float) -> Sequence[Any]:
-            count[0] += 1
-            return values if count[0] % self.every else [value + self.by for value in values]
-
-        return strike
+        strikes = one_in(self.every)
+        return lambda values, _: [value + self.by for value in values] if strikes() else values
 
 
 class Sign(SignalFault):
@@ -231,13 +227,10 @@ class Value(MessageFault):
     def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         hints = get_type_hints(self.named.kind)
         values = {name: value_of(hints[name], written) for name, written in self.values.items()}
-        count = [-1]
-
-        def say(message: Any, _: float) -> Any:
-            count[0] += 1
-            return message if count[0] % self.every else message._replace(**values)
-
-        return _altered(self.named, say)
+        speaks = one_in(self.every)
+        return _altered(
+            self.named, lambda message, _: message._replace(**values) if speaks() else message
+        )
 
 
 def value_problems(named: Any, values: dict[str, Any]) -> list[tuple[str, str]]:
