@@ -266,7 +266,8 @@ def test_rows_follow_the_motion_in_every_tick_and_the_estimates_within_100_ms() 
     bench = ControllerBench()
     changed_s = []
     for number in range(40):
-        bench.node.estimated.hs_m = float(number)
+        figures = bench.node.estimated
+        figures.sea = figures.sea._replace(significant_height_m=float(number))
         bench.tick()
         row = dict(zip(SIGNALS, bench.rows[-1], strict=True))
         assert row["time_s"] == bench.node.time_s == pytest.approx(number * 0.01)

@@ -55,9 +55,9 @@ def test_it_asks_once_an_interval_for_the_latest_record_and_shows_what_came():
     assert first.ship == ShipFigures(1e9, 2e9, 5e7)
     assert first.record[-1].tolist() == pytest.approx([1e3, 6.0, 0.2, 0.3])
     figures = motion.estimator.figures
-    assert (figures.of_sea, figures.of_ship) == (Verdict.GOOD, Verdict.GOOD)
-    assert figures.sea_message()[1:5] == (3.2, 9.1, WAVES.rms_rad, 0.05)
-    assert figures.ship_message()[1] == pytest.approx(SHIP.roll_period_s)
+    assert (figures.sea.verdict, figures.ship.verdict) == (Verdict.GOOD, Verdict.GOOD)
+    assert figures.sea[1:5] == (3.2, 9.1, WAVES.rms_rad, 0.05)
+    assert figures.ship[1] == pytest.approx(SHIP.roll_period_s)
     assert "roll period 8.89" in figures.words()[1]
 
 
@@ -69,10 +69,10 @@ def test_the_ship_that_was_told_is_the_known_one_of_the_next_request():
     motion.desk.reply = replace(GOOD, of_ship=Verdict.UNCERTAIN)
     motion.run(120.0)
     assert motion.desk.records[3].ship == heavier
-    assert motion.estimator.figures.of_ship is Verdict.UNCERTAIN
+    assert motion.estimator.figures.ship.verdict is Verdict.UNCERTAIN
     # what is shown of the ship is what was told last, with its age
-    assert motion.estimator.figures.roll_period_s == pytest.approx(heavier.roll_period_s)
-    assert motion.estimator.figures.ship_age_s > 100
+    assert motion.estimator.figures.ship.roll_period_s == pytest.approx(heavier.roll_period_s)
+    assert motion.estimator.figures.ship.age_s > 100
 
 
 def test_what_is_not_new_is_a_gap():
@@ -88,15 +88,15 @@ def test_without_another_estimate_nothing_is_known_after_three_intervals_but_its
     motion = Motion(ToyRetuner(GOOD), least_gm_m=9.0)
     motion.run(61.0)
     figures = motion.estimator.figures
-    assert figures.sea_age_s == pytest.approx(0.8, abs=0.3)
+    assert figures.sea.age_s == pytest.approx(0.8, abs=0.3)
     motion.estimator.take_news()
     motion.desk.alive = False
     motion.run(60.0 * OUTDATED - 5)
-    assert (figures.of_sea, figures.gm_low) == (Verdict.GOOD, False)
+    assert (figures.sea.verdict, figures.gm_low) == (Verdict.GOOD, False)
     motion.run(10.0)
-    assert (figures.of_sea, figures.of_ship) == (Verdict.OUTDATED, Verdict.OUTDATED)
-    assert np.isnan([*figures.sea_message()[1:5], *figures.ship_message()[1:5]]).all()
-    assert figures.sea_age_s == figures.ship_age_s == pytest.approx(185.8, abs=0.3)
+    assert (figures.sea.verdict, figures.ship.verdict) == (Verdict.OUTDATED, Verdict.OUTDATED)
+    assert np.isnan([*figures.sea[1:5], *figures.ship[1:5]]).all()
+    assert figures.sea.age_s == figures.ship.age_s == pytest.approx(185.8, abs=0.3)
     assert figures.gm_low  # nobody watches it any more
     assert "the last estimate is 180 s old" in motion.estimator.take_news()[-1]
     # whoever works with estimates hears of it once
@@ -105,25 +105,28 @@ def test_without_another_estimate_nothing_is_known_after_three_intervals_but_its
     ]
     motion.desk.alive = True
     motion.run(62.0)
-    assert (figures.of_ship, figures.gm_low) == (Verdict.GOOD, False)
-    assert figures.gm_m == pytest.approx(metacentric_height_m(CONFIGURED, TANK, 1e9))
+    assert (figures.ship.verdict, figures.gm_low) == (Verdict.GOOD, False)
+    assert figures.ship.gm_m == pytest.approx(metacentric_height_m(CONFIGURED, TANK, 1e9))
 
 
 @pytest.mark.parametrize("reply", [None, Refusal(("the retuner failed",))])
 def test_estimates_that_never_come_are_outdated_too(reply: Refusal | None):
     motion = Motion(ToyRetuner(reply), least_gm_m=9.0)
     motion.run(60.0 * OUTDATED - 1)
-    assert motion.estimator.figures.of_ship is Verdict.RECORD_SHORT
+    assert motion.estimator.figures.ship.verdict is Verdict.RECORD_SHORT
     motion.run(2.0)
     figures = motion.estimator.figures
-    assert (figures.of_sea, figures.of_ship, figures.gm_low) == (*2 * (Verdict.OUTDATED,), True)
+    assert (figures.sea.verdict, figures.ship.verdict, figures.gm_low) == (
+        *2 * (Verdict.OUTDATED,),
+        True,
+    )
     assert "there was none" in motion.estimator.take_news()[-1]
 
 
 def test_without_a_limit_on_gm_nobody_is_warned_that_it_is_not_known():
     motion = Motion(ToyRetuner(None))
     motion.run(60.0 * OUTDATED + 1)
-    assert motion.estimator.figures.of_ship is Verdict.OUTDATED
+    assert motion.estimator.figures.ship.verdict is Verdict.OUTDATED
     assert not motion.estimator.figures.gm_low
 
 
@@ -142,11 +145,11 @@ def test_a_ship_that_was_not_identified_for_an_hour_is_not_shown_but_a_warning_s
     figures = motion.estimator.figures
     motion.desk.reply = replace(GOOD, of_ship=Verdict.UNCERTAIN)
     motion.run(3590.0)
-    assert figures.gm_m > 9
+    assert figures.ship.gm_m > 9
     motion.run(20.0)
-    assert (figures.of_sea, figures.of_ship) == (Verdict.GOOD, Verdict.UNCERTAIN)
-    assert np.isnan(figures.ship_message()[1:5]).all()
-    assert figures.ship_age_s == pytest.approx(3610.8, abs=0.5)
+    assert (figures.sea.verdict, figures.ship.verdict) == (Verdict.GOOD, Verdict.UNCERTAIN)
+    assert np.isnan(figures.ship[1:5]).all()
+    assert figures.ship.age_s == pytest.approx(3610.8, abs=0.5)
     assert figures.gm_low  # no ship was identified that has more
     assert any("roll period and GM" in each for each in motion.estimator.take_news())
 
@@ -156,7 +159,7 @@ def test_a_failure_changes_nothing_and_is_asked_again():
     motion.run(125.0)
     assert motion.came == []
     assert len(motion.desk.records) == 2
-    assert motion.estimator.figures.of_sea is Verdict.RECORD_SHORT
+    assert motion.estimator.figures.sea.verdict is Verdict.RECORD_SHORT
 
 
 def test_why_no_estimates_come_is_known_from_the_first_failure_until_one_comes():
@@ -218,6 +221,6 @@ def test_stability_is_low_when_the_interval_reaches_below_the_limit(
     motion = Motion(ToyRetuner(GOOD), least_m)
     motion.run(61.0)
     figures = motion.estimator.figures
-    assert figures.gm_m == pytest.approx(metacentric_height_m(CONFIGURED, TANK, 1e9))
-    assert figures.gm_deviation_m == pytest.approx(0.02 * 1e9 / WEIGHT_N, rel=0.1)
+    assert figures.ship.gm_m == pytest.approx(metacentric_height_m(CONFIGURED, TANK, 1e9))
+    assert figures.ship.gm_deviation_m == pytest.approx(0.02 * 1e9 / WEIGHT_N, rel=0.1)
     assert figures.gm_low is low

@@ -269,8 +269,8 @@ class ControllerNode:
             if safety.monitors is not None:
                 frames.append(self._twin.frame(safety.monitors.twin_message()))
         if self._estimator is not None and self._figures_schedule.due(now_ns):
-            frames.append(self._sea.frame(self.estimated.sea_message()))
-            frames.append(self._ship.frame(self.estimated.ship_message()))
+            frames.append(self._sea.frame(self.estimated.sea))
+            frames.append(self._ship.frame(self.estimated.ship))
         return frames
 
     def _status_message(self, measured: Measurements, judgement: Judgement) -> ControllerStatus:

@@ -58,77 +58,45 @@ class EstimateSettings:
         return round(self.record_s / SAMPLE_TIME_S)
 
 
+_NO_SEA: Final = SeaEstimate(Verdict.RECORD_SHORT, *(nan,) * 5)
+_NO_SHIP: Final = ShipEstimate(*_NO_SEA)
+
+
 @dataclass(slots=True)
 class EstimateFigures:
-    """Estimates for panels and telemetry; NaN while unknown."""
+    """Estimates for panels and telemetry, as they go onto the bus; NaN while unknown."""
 
-    #: of_sea, of_ship: whether the estimate of waves and ship is good now.
-    of_sea: Verdict = Verdict.RECORD_SHORT
-    of_ship: Verdict = Verdict.RECORD_SHORT
-    hs_m: float = nan  #: hs_m, tp_s: significant height and peak period of beam waves.
-    tp_s: float = nan
-    #: moment_rms_rad, moment_deviation: root mean square of the wave moment per roll stiffness; its
-    #: relative standard deviation.
-    moment_rms_rad: float = nan
-    moment_deviation: float = nan
-    #: sea_age_s, ship_age_s: time since the end of the record of the waves, and of the one that
-    #: identified the ship.
-    sea_age_s: float = nan
-    #: roll_period_s, roll_period_deviation_s: roll period of the last identified ship without tank
-    #: water; NaN if that is too old.
-    roll_period_s: float = nan
-    roll_period_deviation_s: float = nan
-    #: gm_m, gm_deviation_m: metacentric height with free tank water; NaN also if the displacement
-    #: is unknown.
-    gm_m: float = nan
-    gm_deviation_m: float = nan
-    ship_age_s: float = nan
-    #: Whether the interval of the last `gm_m` reaches below the limit of the stability booklet, or
-    #: estimates have ceased; False without a limit.
+    #: Height and peak period of beam waves; root mean square of the wave moment per roll stiffness
+    #: and its relative standard deviation; time since the end of the record.
+    sea: SeaEstimate = _NO_SEA
+    #: Ship that was identified last, without tank water, NaN if that is too old; metacentric height
+    #: with free tank water, NaN also if the displacement is unknown.
+    ship: ShipEstimate = _NO_SHIP
+    #: Whether the interval of the last metacentric height reaches below the limit of the stability
+    #: booklet, or estimates have ceased; False without a limit.
     gm_low: bool = False
 
     def words(self) -> tuple[str, ...]:
         """The estimate in words."""
-        sea = f"sea {self.of_sea.name}"
-        if not math.isnan(self.hs_m):
+        of_sea, hs_m, tp_s, moment_rms_rad, moment_deviation, _ = self.sea
+        of_ship, period_s, period_deviation_s, gm_m, gm_deviation_m, _ = self.ship
+        assert of_sea is not None
+        assert of_ship is not None
+        sea, ship = f"sea {of_sea.name}", f"ship {of_ship.name}"
+        if not math.isnan(hs_m):
             sea += (
-                f": {self.hs_m:.2f} m, {self.tp_s:.1f} s as beam waves, wave moment "
-                f"{math.degrees(self.moment_rms_rad):.2f} degrees +- {self.moment_deviation:.0%}"
+                f": {hs_m:.2f} m, {tp_s:.1f} s as beam waves, wave moment "
+                f"{math.degrees(moment_rms_rad):.2f} degrees +- {moment_deviation:.0%}"
             )
-        ship = f"ship {self.of_ship.name}"
-        if self.of_ship is Verdict.GOOD:
-            ship += (
-                f": roll period {self.roll_period_s:.2f} +- {self.roll_period_deviation_s:.2f} s"
-            )
-            if not math.isnan(self.gm_m):
-                ship += f", GM {self.gm_m:.2f} +- {self.gm_deviation_m:.2f} m"
+        if of_ship is Verdict.GOOD:
+            ship += f": roll period {period_s:.2f} +- {period_deviation_s:.2f} s"
+            if not math.isnan(gm_m):
+                ship += f", GM {gm_m:.2f} +- {gm_deviation_m:.2f} m"
         return sea, ship
 
     def forget_ship(self) -> None:
-        """Clear the ship's figures."""
-        self.roll_period_s = self.roll_period_deviation_s = self.gm_m = self.gm_deviation_m = nan
-
-    def sea_message(self) -> SeaEstimate:
-        """Return the message of the sea estimate for the bus."""
-        return SeaEstimate(
-            self.of_sea,
-            self.hs_m,
-            self.tp_s,
-            self.moment_rms_rad,
-            self.moment_deviation,
-            self.sea_age_s,
-        )
-
-    def ship_message(self) -> ShipEstimate:
-        """Return the message of the ship estimate for the bus."""
-        return ShipEstimate(
-            self.of_ship,
-            self.roll_period_s,
-            self.roll_period_deviation_s,
-            self.gm_m,
-            self.gm_deviation_m,
-            self.ship_age_s,
-        )
+        """Clear the ship's figures; its verdict and age go on."""
+        self.ship = _NO_SHIP._replace(verdict=self.ship.verdict, age_s=self.ship.age_s)
 
 
 def metacentric_height_m(ship: RollShip, tank: Tank, stiffness_nm_rad: float) -> float:
@@ -208,7 +176,7 @@ class Estimator:
             record = self._history.record(self._history.capacity)
             self._desk.submit(self._number, EstimateRequest(self._known, record), now_ns)
         self._grow_old(now_ns)
-        outdated = self.figures.of_sea is Verdict.OUTDATED
+        outdated = self.figures.sea.verdict is Verdict.OUTDATED
         if now_ns - self._since_ns > self._outdated_ns and not outdated:
             came = self._give_up(now_ns)
         return came
@@ -234,13 +202,12 @@ class Estimator:
             self.trouble = ""
             self._news.append("there are estimates of sea and ship again")
         self._since_ns = asked_ns
-        self.figures.sea_age_s = 0.0
         ship = answer.ship
         if answer.of_ship is Verdict.GOOD and ship is not None:
             self._ship_ns = asked_ns
             self._known = ship
             self._show_ship(ship)
-        self._show(answer)
+        self._show(answer, 0.0)
         self.figures.gm_low = self._low
         self._news += self.figures.words()
         return answer
@@ -255,20 +222,21 @@ class Estimator:
                 "it is dead, hangs or is too busy"
             )
         last = f"the last estimate is {silent_s:.0f} s old"
-        if math.isnan(figures.sea_age_s):
+        if math.isnan(figures.sea.age_s):
             last = "there was none"
         self._news.append(f"sea and ship are not known now: {last}")
-        self._show(outdated)
+        self._show(outdated, figures.sea.age_s)
         figures.forget_ship()
         figures.gm_low = self._least_gm_m is not None
         return outdated
 
-    def _show(self, estimate: MotionEstimate) -> None:
-        figures, waves = self.figures, estimate.waves
-        figures.of_sea, figures.of_ship = estimate.of_sea, estimate.of_ship
-        figures.hs_m, figures.tp_s = estimate.hs_m, estimate.tp_s
-        figures.moment_rms_rad = nan if waves is None else waves.rms_rad
-        figures.moment_deviation = estimate.rms_deviation
+    def _show(self, found: MotionEstimate, age_s: float) -> None:
+        rms_rad = nan if found.waves is None else found.waves.rms_rad
+        figures = self.figures
+        figures.sea = SeaEstimate(
+            found.of_sea, found.hs_m, found.tp_s, rms_rad, found.rms_deviation, age_s
+        )
+        figures.ship = figures.ship._replace(verdict=found.of_ship)
 
     def _fail(self, reason: str) -> None:
         if not self.trouble:  # The trouble is reported once.
@@ -276,27 +244,28 @@ class Estimator:
             self._news.append(f"no estimates of sea and ship: {reason}")
 
     def _show_ship(self, ship: ShipFigures) -> None:
-        figures = self.figures
-        figures.roll_period_s = ship.roll_period_s
-        figures.roll_period_deviation_s = ship.period_deviation * ship.roll_period_s
+        period_s, deviation_s = ship.roll_period_s, ship.period_deviation * ship.roll_period_s
         gm_m, less_m = (
             metacentric_height_m(self._ship, self._tank, ship.stiffness_nm_rad * factor)
             for factor in (1.0, 1.0 - ship.stiffness_deviation)
         )
-        figures.gm_m, figures.gm_deviation_m = gm_m, gm_m - less_m
-        least_m = gm_m - GM_DEVIATIONS * figures.gm_deviation_m
+        self.figures.ship = ShipEstimate(
+            Verdict.GOOD, period_s, deviation_s, gm_m, gm_m - less_m, self.figures.ship.age_s
+        )
+        least_m = gm_m - GM_DEVIATIONS * (gm_m - less_m)
         self._low = self._least_gm_m is not None and least_m < self._least_gm_m
 
     def _grow_old(self, now_ns: int) -> None:
         figures = self.figures
-        if not math.isnan(figures.sea_age_s):
-            figures.sea_age_s = (now_ns - self._since_ns) * 1e-9
+        if not math.isnan(figures.sea.age_s):
+            figures.sea = figures.sea._replace(age_s=(now_ns - self._since_ns) * 1e-9)
         if self._ship_ns is None:
             return
-        figures.ship_age_s = (now_ns - self._ship_ns) * 1e-9
-        if figures.ship_age_s > self._ship_outdated_s and not math.isnan(figures.roll_period_s):
+        age_s = (now_ns - self._ship_ns) * 1e-9
+        figures.ship = figures.ship._replace(age_s=age_s)
+        if age_s > self._ship_outdated_s and not math.isnan(figures.ship.roll_period_s):
             figures.forget_ship()
             self._news.append(
                 "roll period and GM are not known any more: "
-                f"the ship was last identified {figures.ship_age_s / 60:.0f} minutes ago"
+                f"the ship was last identified {age_s / 60:.0f} minutes ago"
             )
