@@ -319,7 +319,7 @@ def estimator_work(config: ControllerConfig) -> Work | None:
     settings = config.sea_estimate
     if settings is None:
         return None
-    from utank_hil.retuning.estimating import EstimateTask, estimate  # here: scipy.optimize
+    from utank_hil.retuning.renewal import EstimateTask, estimate  # here: scipy.optimize
 
     task = EstimateTask(config.plant, ESTIMATE_SAMPLE_TIME_S, settings.effective_slope)
     numbers = settings.samples * len(COLUMNS)

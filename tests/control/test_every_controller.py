@@ -21,8 +21,7 @@ from utank_hil.control import (
     pump_model,
 )
 from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
-from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
-from utank_hil.control.fuzzy.indirect import IndirectFuzzy
+from utank_hil.control.fuzzy.adaptive import IndirectFuzzy, RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.law import ErrorDynamics
 from utank_hil.control.interface import StartsAnew
 from utank_hil.control.lqg import design_lqr

@@ -5,8 +5,7 @@ import pytest
 from rolling_ship import SHIP, TANK
 
 from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
-from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
-from utank_hil.control.fuzzy.indirect import IndirectFuzzy
+from utank_hil.control.fuzzy.adaptive import IndirectFuzzy, RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.law import ErrorDynamics, FuzzyBasis
 from utank_hil.control.gain import slope_at_rest
 from utank_hil.dynamics import RollModel

@@ -10,7 +10,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Verdict
 from utank_hil.dynamics import RollShip
 from utank_hil.retuning.estimate import EstimateRequest, ShipFigures
-from utank_hil.retuning.estimating import EstimateTask, estimate
+from utank_hil.retuning.renewal import EstimateTask, estimate
 from utank_hil.sea import jonswap
 
 TASK = EstimateTask(PLANT, SAMPLE_TIME_S, 0.5)

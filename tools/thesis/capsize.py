@@ -16,8 +16,7 @@ import numpy.typing as npt
 from tools.thesis.batch import simulate_batch
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
-from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
-from utank_hil.control.fuzzy.indirect import IndirectFuzzy
+from utank_hil.control.fuzzy.adaptive import IndirectFuzzy, RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.law import ErrorDynamics
 from utank_hil.control.gain import PassiveController
 from utank_hil.control.interface import Controller, PumpLimits

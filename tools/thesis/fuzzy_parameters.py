@@ -10,7 +10,7 @@ from tools.thesis.capsize import PATTI_B, WAVE_RAD_S, law_factory
 from tools.thesis.figure import Check, Curve, Figure, Panel, Verdict
 from tools.thesis.patti_b import METHOD, MIDDLE_NM, ROBUST, SMALL_GAIN, Run, run_controller, told
 from utank_hil.base.arrays import FloatArray
-from utank_hil.control.fuzzy.direct import DirectFuzzyController, RobustFuzzy, SmallGainFuzzy
+from utank_hil.control.fuzzy.adaptive import DirectFuzzyController, RobustFuzzy, SmallGainFuzzy
 from utank_hil.dynamics import WaveMoment
 
 DURATION_S: Final = 120.0

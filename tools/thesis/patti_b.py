@@ -20,7 +20,7 @@ from tools.thesis.capsize import (
 )
 from tools.thesis.figure import Check, Figure, Table, Verdict
 from utank_hil.base.arrays import FloatArray
-from utank_hil.control.fuzzy.direct import DirectFuzzyController
+from utank_hil.control.fuzzy.adaptive import DirectFuzzyController
 from utank_hil.control.interface import Controller
 from utank_hil.dynamics import RollModel, WaveMoment
 

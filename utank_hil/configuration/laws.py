@@ -31,8 +31,7 @@ from utank_hil.configuration.matrices import SystemFile
 from utank_hil.configuration.spectra import LawSea
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.feedback_linearization import FeedbackLinearizationDesign
-from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
-from utank_hil.control.fuzzy.indirect import IndirectFuzzy
+from utank_hil.control.fuzzy.adaptive import IndirectFuzzy, RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.gain import PassiveDesign, PDDesign
 from utank_hil.control.interface import LawDesign
 from utank_hil.control.lqg_design import LQGDesign

@@ -1,4 +1,4 @@
-"""Design of a constrained law from an estimate of waves and ship, in the retuner's process."""
+"""Estimate of waves and ship from a record of the motion, and a constrained law for them."""
 
 import dataclasses
 import math
@@ -10,9 +10,12 @@ import numpy as np
 from utank_hil.analysis.loop.sea_response import at_work, moment_of
 from utank_hil.analysis.loop.self_tuning import self_tuned
 from utank_hil.base.arrays import FloatArray
+from utank_hil.canbus import Verdict
 from utank_hil.control import DesignPlant
+from utank_hil.identification.motion_fit import KNOWN_SPREAD, MotionFit, fit_motion
 from utank_hil.retuning.answer import Refusal, RenewedLaw
-from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
+from utank_hil.retuning.estimate import EstimateRequest, MotionEstimate, ShipFigures
+from utank_hil.retuning.estimator import COLUMNS
 from utank_hil.sea import SlopeSpectrum
 
 TAIL_SHARE: Final = 0.15
@@ -73,3 +76,125 @@ def renew(estimate: MotionEstimate, task: RenewalTask) -> RenewedLaw | Refusal:
             )
         )
     return RenewedLaw(tuned.law, predicted.roll_rad, predicted.pressure_pa, tuned.passive_roll_rad)
+
+
+LEAST_PERIODS: Final = 45.0  #: Shortest record in natural roll periods.
+MOST_MISSING: Final = 0.05  #: Largest share of missing samples; gaps are interpolated.
+LEAST_CLEAR: Final = 0.8
+"""Smallest share of the wave moment's energy in bands above the sensors' noise."""
+STIFFNESS_DEVIATION: Final = 0.03
+PERIOD_DEVIATION: Final = 0.05
+"""Largest relative deviations of an identified ship. With less information, waves are taken for
+the ship, at deviations of 0.036 and more (docs/retuning.md).
+"""
+FARTHEST: Final = 1.45
+"""Largest ratio of the roll period found to the configured ship's, or its inverse. Loading changes
+it by some 30 %; with little pump work, a peak of the waves looks like a ship further away.
+"""
+SEA_DEVIATION: Final = 0.2
+"""Largest relative deviation of the moment's root mean square for a sea that counts as known."""
+CONTRADICTED: Final = 20.0
+"""Log-likelihood ratio from which another ship contradicts the known one."""
+LONGEST_S: Final = 25.0
+"""Longest period of ocean swell (WMO-No. 702). A moment of longer encounter is that of waves which
+a ship under way overtakes or runs with: their height does not follow from it."""
+MOST_LONGER: Final = 0.1
+"""Share of longer waves in the energy of the beam waves up to which there are a height and a peak.
+Chosen; no study."""
+SAME: Final = 3.0
+"""Standard deviations within which the ships of the last half and the whole record agree."""
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateTask:
+    """Constant inputs of the estimator."""
+
+    plant: DesignPlant  #: The configured ship and tank.
+    sample_time_s: float
+    effective_slope: float  #: Ratio of effective to true wave slope, for the wave height.
+
+
+def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
+    """Estimate waves and ship from a record.
+
+    The ship is fitted to the whole record and to its last half. If they contradict each other, the
+    loading changed meanwhile and the half counts. If the motion does not identify the ship, the
+    waves are based on the known one, and uncertain if another ship explains the motion far better.
+    """
+    known, record = request.ship, request.record
+    period_s = 2 * np.pi / task.plant.ship.natural_frequency_rad_s
+    least = round(LEAST_PERIODS * period_s / task.sample_time_s)
+    motion = _without_gaps(record[:, [COLUMNS.index(name) for name in _MOTION]])
+    if motion is None or len(motion) < least:
+        return MotionEstimate(Verdict.RECORD_SHORT, Verdict.RECORD_SHORT)
+    if not np.ptp(motion, axis=0).all():
+        return MotionEstimate(Verdict.MOTION_SMALL, Verdict.MOTION_SMALL)
+    fit = fit_motion(motion, task.plant, task.sample_time_s)
+    half = motion[len(motion) // 2 :]
+    if len(half) >= least:
+        late = fit_motion(half, task.plant, task.sample_time_s)
+        if _identified(late, task) and (_apart(late, fit) or not _identified(fit, task)):
+            fit, motion = late, half
+    of_ship = Verdict.GOOD if _identified(fit, task) else Verdict.UNCERTAIN
+    contradicted = False
+    if of_ship is not Verdict.GOOD:
+        likeliest = fit.log_likelihood
+        plant = dataclasses.replace(task.plant, ship=known.ship(task.plant.ship))
+        fit = fit_motion(motion, plant, task.sample_time_s, KNOWN_SPREAD)
+        contradicted = likeliest - fit.log_likelihood > CONTRADICTED
+    if fit.clear < LEAST_CLEAR:
+        return MotionEstimate(Verdict.MOTION_SMALL, Verdict.MOTION_SMALL)
+    ship, waves = fit.ship, fit.waves
+    elevation = waves.elevation_density(task.effective_slope)
+    longer = float(elevation[waves.omega_rad_s < 2 * np.pi / LONGEST_S].sum())
+    beam = longer <= MOST_LONGER * float(elevation.sum())
+    sea_known = fit.rms_deviation <= SEA_DEVIATION and not contradicted
+    return MotionEstimate(
+        Verdict.GOOD if sea_known else Verdict.UNCERTAIN,
+        of_ship,
+        ShipFigures(
+            ship.stiffness_nm_rad,
+            ship.inertia_kg_m2,
+            ship.damping_nms_rad,
+            float(fit.deviation[0]),
+            fit.period_deviation,
+        ),
+        waves,
+        fit.rms_deviation,
+        waves.hs_m(task.effective_slope) if beam else math.nan,
+        2 * np.pi / float(waves.omega_rad_s[np.argmax(elevation)]) if beam else math.nan,
+        len(motion) * task.sample_time_s,
+    )
+
+
+_MOTION: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
+
+
+def _identified(fit: MotionFit, task: EstimateTask) -> bool:
+    factor = fit.ship.natural_frequency_rad_s / task.plant.ship.natural_frequency_rad_s
+    return bool(
+        fit.deviation[0] <= STIFFNESS_DEVIATION
+        and fit.period_deviation <= PERIOD_DEVIATION
+        and abs(np.log(factor)) <= np.log(FARTHEST)
+    )
+
+
+def _apart(late: MotionFit, whole: MotionFit) -> bool:
+    """Whether two fits are of different ships, by stiffness or by period."""
+    ratio = late.ship.stiffness_nm_rad / whole.ship.stiffness_nm_rad
+    by_stiffness = abs(np.log(ratio)) / np.hypot(late.deviation[0], whole.deviation[0])
+    ratio = late.ship.natural_frequency_rad_s / whole.ship.natural_frequency_rad_s
+    by_period = abs(np.log(ratio)) / np.hypot(late.period_deviation, whole.period_deviation)
+    return bool(max(by_stiffness, by_period) > SAME)
+
+
+def _without_gaps(motion: FloatArray) -> FloatArray | None:
+    """Return the record from its first sample on, interpolated; None with too many gaps."""
+    here = np.asarray(np.isfinite(motion).all(axis=1))
+    if not here.any():
+        return None
+    motion, here = motion[np.argmax(here) :], here[np.argmax(here) :]
+    if np.mean(~here) > MOST_MISSING:
+        return None
+    index = np.arange(len(motion))
+    return np.column_stack([np.interp(index, index[here], each[here]) for each in motion.T])

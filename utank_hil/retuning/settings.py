@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from itertools import count
 from typing import Annotated, Final
 
 from utank_hil.base.parameters import Positive, Problem, Range, range_problems, refuse
@@ -106,19 +107,14 @@ def least_samples(order: int, outputs: int) -> int:
     """Return the smallest record, in samples, for estimation and validation of a model."""
     skipped = max(order, LAGS)  # These samples at the start of each part have no prediction.
     columns = (order + 1) * (outputs + 1) - outputs + _OFFSET_AND_WAVE
-    judged = (LEAST_PREDICTIONS + skipped) / VALIDATION_SHARE
-    fitted = (order + columns + 1) / (1 - VALIDATION_SHARE)
-    least = math.floor(max(judged, fitted)) - 2
-    while not _enough(least, order, skipped, columns):  # The parts are whole samples.
-        least += 1
-    return least
+
+    def enough(samples: int) -> bool:
+        first = estimation_samples(samples)
+        return first - order > columns and samples - first - skipped >= LEAST_PREDICTIONS
+
+    return next(filter(enough, count()))
 
 
 def estimation_samples(samples: int) -> int:
     """Return the number of samples that estimate the model; the rest validates it."""
     return round((1 - VALIDATION_SHARE) * samples)
-
-
-def _enough(samples: int, order: int, skipped: int, columns: int) -> bool:
-    first = estimation_samples(samples)
-    return first - order > columns and samples - first - skipped >= LEAST_PREDICTIONS

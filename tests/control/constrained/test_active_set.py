@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from utank_hil.control.constrained.plan_programme import ActiveSetSolver
+from utank_hil.control.constrained.horizon import ActiveSetSolver
 
 
 def interior_point(hessian, gradient, rows, lower, upper):

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy import sparse
 
 from utank_hil.control import ARX, PumpLimits, design_gpc
+from utank_hil.control.constrained.horizon import LEVEL_SPACING
 from utank_hil.control.constrained.law import ConstrainedController
-from utank_hil.control.constrained.plan_programme import LEVEL_SPACING
 
 WIDE = PumpLimits(pressure_pa=1e12, rate_pa_s=1e12, level_m=1e12)
 

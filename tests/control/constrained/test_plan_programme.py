@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from utank_hil.control import PumpLimits
-from utank_hil.control.constrained.horizon import condense
-from utank_hil.control.constrained.plan_programme import PlanProgramme
+from utank_hil.control.constrained.horizon import PlanProgramme, condense
 from utank_hil.dynamics.sampling import LinearModel
 
 # level(k+1) = 0.9 level(k) + u(k): what is wanted of it is a level of 2

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
-from utank_hil.control.fuzzy.indirect import IndirectFuzzy
+from utank_hil.control.fuzzy.adaptive import IndirectFuzzy, RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.law import ErrorDynamics
 
 pytestmark = pytest.mark.slow

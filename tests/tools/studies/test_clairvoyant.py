@@ -11,7 +11,7 @@ from tools.studies.clairvoyant import NoHistoryError, clairvoyant_bound
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.base.tick import TICK_S
 from utank_hil.control import DesignPlant, PumpLimits
-from utank_hil.control.constrained.plan_programme import ActiveSetSolver
+from utank_hil.control.constrained.horizon import ActiveSetSolver
 from utank_hil.dynamics.linear import STATES, pump_model
 from utank_hil.dynamics.sampling import LinearModel, transition_and_step
 from utank_hil.sea import EffectiveSlope, Sea, jonswap

@@ -9,7 +9,7 @@ Each sample it finds the plan of least cost (`utank_hil.control.constrained.hori
 
 The pressure can always be brought to zero at its rate limit and s is unbounded, so a plan exists
 for any level and waves. As long as the analytic optimum, linear in the state, keeps all limits, it
-is the plan; else a quadratic programme is solved (`utank_hil.control.constrained.plan_programme`).
+is the plan; else a quadratic programme is solved (`utank_hil.control.constrained.horizon`).
 If this reaches its iteration limit, the last plan continues; a plan ends in the steady command,
 zero without a heel correction, so the tank is passive if that persists.
 """
@@ -23,8 +23,7 @@ import numpy as np
 from utank_hil.base.arrays import MOST_MEASURED, ComplexArray, FloatArray
 from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import Positive, Range, range_problems, refuse
-from utank_hil.control.constrained.horizon import Horizon, condense
-from utank_hil.control.constrained.plan_programme import PlanProgramme
+from utank_hil.control.constrained.horizon import Horizon, PlanProgramme, condense
 from utank_hil.control.constrained.preview import Foresight, Preview, WaveForecast
 from utank_hil.control.interface import PumpLimits
 from utank_hil.control.lqg import SHARES, GentleController, LQGLaw
