@@ -21,7 +21,7 @@ TICK = (
     "utank_hil/dynamics/ship.py", "utank_hil/dynamics/tank.py", "utank_hil/dynamics/valves.py",
     "utank_hil/retuning/adaptive.py", "utank_hil/retuning/answer.py",
     "utank_hil/retuning/estimate.py", "utank_hil/retuning/estimator.py",
-    "utank_hil/retuning/history.py", "utank_hil/retuning/law_*.py",
+    "utank_hil/retuning/law_*.py",
     "utank_hil/retuning/renewing.py", "utank_hil/retuning/trial.py",
     "utank_hil/sea/sea.py", "utank_hil/sea/spectrum.py", "utank_hil/sea/moment_table.py",
     "utank_hil/sea/passing.py",

@@ -22,8 +22,7 @@ from utank_hil.retuning import (
     Refusal,
     law_exchange,
 )
-from utank_hil.retuning.history import WARM_UP_CHUNK, WARM_UP_SAMPLES
-from utank_hil.retuning.law_bank import FADE_SAMPLES
+from utank_hil.retuning.law_bank import FADE_SAMPLES, WARM_UP_CHUNK, WARM_UP_SAMPLES
 from utank_hil.retuning.law_exchange import TRIAL_PATIENCE
 
 IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED, UNDONE = RetuningState

@@ -17,7 +17,7 @@ from utank_hil.dynamics.linear import STATES
 from utank_hil.retuning import Candidate, MotionEstimate, Refusal, ShipFigures
 from utank_hil.retuning.adaptive import gains
 from utank_hil.retuning.answer import LONGEST_BYTES, answer_bytes, read_answer
-from utank_hil.retuning.history import WarmUp
+from utank_hil.retuning.law_bank import WarmUp
 from utank_hil.sea import SlopeSpectrum
 
 

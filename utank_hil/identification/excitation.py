@@ -41,7 +41,17 @@ def random_pulses(
     rng = np.random.default_rng(seed)
     lengths = rng.integers(shortest, longest + 1, samples // shortest + 1)
     amplitudes = rng.uniform(-limits.pressure_pa, limits.pressure_pa, len(lengths))
-    return _rate_limited(np.repeat(amplitudes, lengths)[:samples], limits, sample_time_s)
+    target = np.repeat(amplitudes, lengths)[:samples]
+    step, now = limits.rate_pa_s * sample_time_s, 0.0
+    pressure = np.empty_like(target)
+    for k, wanted in enumerate(target):
+        now += min(max(wanted - now, -step), step)
+        pressure[k] = now
+    # An envelope starts and ends at zero with the limited rate.
+    left = np.arange(samples)
+    envelope = step * np.minimum(left, left[::-1])
+    ended: FloatArray = np.clip(pressure, -envelope, envelope)
+    return ended
 
 
 def response_scale(pressure_pa: FloatArray, model: ARX, response_limits: FloatArray) -> float:
@@ -74,22 +84,3 @@ def _samples(duration_s: float, sample_time_s: float) -> int:
     if not (math.isfinite(duration_s) and round(duration_s / sample_time_s) >= 1):
         raise ValueError(f"{duration_s} s do not last one sample of {sample_time_s} s")
     return round(duration_s / sample_time_s)
-
-
-def _rate_limited(target: FloatArray, limits: PumpLimits, sample_time_s: float) -> FloatArray:
-    """Rate-limit a piecewise constant target."""
-    step = limits.rate_pa_s * sample_time_s
-    pressure = np.empty_like(target)
-    now = 0.0
-    for k, wanted in enumerate(target):
-        now += min(max(wanted - now, -step), step)
-        pressure[k] = now
-    return _with_zero_ends(pressure, step)
-
-
-def _with_zero_ends(pressure: FloatArray, step: float) -> FloatArray:
-    """Clip to an envelope that starts and ends at zero with the limited rate."""
-    left = np.arange(len(pressure))
-    envelope = step * np.minimum(left, left[::-1])
-    ended: FloatArray = np.clip(pressure, -envelope, envelope)
-    return ended

@@ -29,8 +29,7 @@ from utank_hil.control import (
 )
 from utank_hil.retuning.answer import Answer, Candidate
 from utank_hil.retuning.estimate import SIGNIFICANT, ChangeMonitor, MotionEstimate, ShipFigures
-from utank_hil.retuning.history import WarmUp
-from utank_hil.retuning.law_bank import MonitoredLaw
+from utank_hil.retuning.law_bank import MonitoredLaw, WarmUp
 from utank_hil.retuning.law_exchange import ANOTHER_QUESTION, RETRY_NS, LawExchange
 from utank_hil.retuning.retuner import Retuner
 from utank_hil.retuning.settings import RetuningSettings

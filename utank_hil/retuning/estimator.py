@@ -16,7 +16,7 @@ from utank_hil.canbus import SeaEstimate, ShipEstimate, Verdict
 from utank_hil.dynamics import GRAVITY_M_S2, RollShip, Tank, coupled_matrices
 from utank_hil.retuning.answer import Refusal
 from utank_hil.retuning.estimate import EstimateRequest, MotionEstimate, ShipFigures
-from utank_hil.retuning.history import SampleHistory
+from utank_hil.retuning.law_bank import SampleHistory
 from utank_hil.retuning.retuner import Retuner
 
 COLUMNS: Final = ("pressure_pa", "roll_rad", "roll_rate_rad_s", "level_m")

@@ -36,8 +36,14 @@ from utank_hil.canbus import RetuningOrder, RetuningState
 from utank_hil.canbus.events import ModelSummary, RetuningEvent
 from utank_hil.retuning.answer import Answer, Refusal
 from utank_hil.retuning.estimate import MotionEstimate
-from utank_hil.retuning.history import WARM_UP_CHUNK, WARM_UP_SAMPLES, SampleHistory, WarmUp
-from utank_hil.retuning.law_bank import LawBank, MonitoredLaw
+from utank_hil.retuning.law_bank import (
+    WARM_UP_CHUNK,
+    WARM_UP_SAMPLES,
+    LawBank,
+    MonitoredLaw,
+    SampleHistory,
+    WarmUp,
+)
 from utank_hil.retuning.retuner import Request, Retuner
 from utank_hil.retuning.settings import EARLIEST_VERDICT_S, RetuningSettings, TrialSettings
 from utank_hil.retuning.trial import MovingWindow, WindowStatistics, worsening

@@ -22,8 +22,7 @@ from utank_hil.control.interface import PumpLimits
 from utank_hil.control.lqg import GentleController
 from utank_hil.retuning.answer import Answer, RenewedLaw
 from utank_hil.retuning.estimate import ChangeMonitor, MotionEstimate, ShipFigures, ship_factor
-from utank_hil.retuning.history import WarmUp
-from utank_hil.retuning.law_bank import MonitoredLaw
+from utank_hil.retuning.law_bank import MonitoredLaw, WarmUp
 from utank_hil.retuning.law_exchange import ANOTHER_QUESTION, RETRY_NS, LawExchange
 from utank_hil.retuning.retuner import Retuner
 from utank_hil.retuning.settings import TrialSettings

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.retuning.history import SampleHistory
+from utank_hil.retuning.law_bank import SampleHistory
 
 
 @given(
