@@ -81,7 +81,7 @@ def _step_time_s(law: BuiltLaw) -> float:
         begin_s = time.perf_counter()
         try:
             controller.step(y)
-        except Exception:  # judged by its impulse response, which names the step
+        except (Exception, SystemExit):  # judged by its impulse response, which names the step
             break
         times.append(time.perf_counter() - begin_s)
     return min(times, default=0.0)

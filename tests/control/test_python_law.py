@@ -82,6 +82,16 @@ def that_fails():
     raise OSError("no licence")
 
 
+def that_leaves():
+    raise SystemExit(0)
+
+
+def that_leaves_at_rest():
+    law = Gain()
+    law.step = lambda y: that_leaves()
+    return law
+
+
 not_callable = 3
 """
 
@@ -125,6 +135,8 @@ def test_a_law_s_own_state_space_is_judged_in_the_loops_count() -> None:
         ("Gain", {"gian": 1.0}, "parameters", "unexpected keyword argument 'gian'"),
         ("for_plant", {}, "parameters", "missing a required argument: 'share'"),
         ("that_fails", {}, "factory", "failed: OSError: no licence"),
+        ("that_leaves", {}, "factory", "failed: SystemExit: 0"),
+        ("that_leaves_at_rest", {}, "factory", "fails at rest: SystemExit: 0"),
         ("without_reset", {}, "factory", "without reset"),
         ("of_scalar", {}, "factory", "gives 1.0, not a pressure of shape"),
         ("that_raises_at_rest", {}, "factory", "fails at rest: ZeroDivisionError"),
@@ -147,6 +159,12 @@ def test_a_module_that_is_not_there_is_said_with_where_it_was_looked_for(tmp_pat
         PythonDesign("own_lows:Gain", ("roll_rad",)).build(PLANT)
     with pytest.raises(ParameterError, match=rf"can't import {tmp_path}/own_lows.py: FileNotFound"):
         PythonDesign(f"{tmp_path}/own_lows.py:Gain", ("roll_rad",)).build(PLANT)
+
+
+def test_a_file_that_leaves_is_refused_and_does_not_end_the_command(tmp_path: Path) -> None:
+    (tmp_path / "leaves.py").write_text("raise SystemExit(0)", encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"can't import .*leaves.py: SystemExit: 0"):
+        PythonDesign(f"{tmp_path}/leaves.py:Gain", ("roll_rad",)).build(PLANT)
 
 
 def test_a_file_is_a_module_of_its_own_and_its_law_goes_to_another_process(tmp_path: Path) -> None:

@@ -89,7 +89,7 @@ def _call(factory: str, parameters: dict[str, Any], plant: DesignPlant) -> Contr
         raise _refused("parameters", f"do not fit {factory}: {error}") from error
     try:
         controller: Controller = function(**parameters)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         reason = f"{factory} failed: {type(error).__name__}: {error}"
         raise _refused("factory", reason) from error
     return controller
@@ -102,7 +102,7 @@ def _imported(factory: str) -> Callable[..., Any]:
             module = _of_file(Path(module_name).resolve())
         else:
             module = importlib.import_module(module_name)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         reason = f"can't import {module_name}: {type(error).__name__}: {error}"
         if isinstance(error, ModuleNotFoundError) and not _is_file(module_name):
             reason += f"; install it, or name its file, ./{module_name}.py:{name}"
@@ -143,7 +143,7 @@ def _try_out(controller: Controller, outputs: int) -> None:
         answer = controller.step(np.zeros(outputs))
         controller.applied(np.zeros(1))
         controller.reset()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         reason = f"returned a controller that fails at rest: {type(error).__name__}: {error}"
         raise _refused("factory", reason) from error
     if not (isinstance(answer, np.ndarray) and answer.shape == (1,) and np.isfinite(answer).all()):

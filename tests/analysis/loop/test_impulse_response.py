@@ -189,9 +189,14 @@ def fails_in_its_tenth_step(y, step):
     return 1 / (9 - step), step + 1
 
 
+def leaves(y, step):
+    raise SystemExit(0)
+
+
 @pytest.mark.parametrize(
     ("function", "message"),
     [
+        (leaves, "step 1 after an impulse of 0.0005 in roll_rad: SystemExit: 0"),
         (
             fails_in_its_tenth_step,
             "step 10 after an impulse of 0.0005 in roll_rad: ZeroDivisionError: float division",
@@ -200,7 +205,7 @@ def fails_in_its_tenth_step(y, step):
         (lambda y, s: (np.zeros((1, 1)), s), "step 1 .* must be finite, shape"),
         (lambda y, s: (np.zeros(1 + int(s > 3)), s + 1), "step 5 .* must be finite, shape"),
     ],
-    ids=["raises", "nan", "matrix", "other shape"],
+    ids=["leaves", "raises", "nan", "matrix", "other shape"],
 )
 def test_a_step_that_fails_is_told_with_its_number(function, message):
     with pytest.raises(NoImpulseResponse, match=message):

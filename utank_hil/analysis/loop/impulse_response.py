@@ -177,7 +177,7 @@ def _answers(
         try:
             answer = np.array(controller.step(y), dtype=np.float64)
             controller.applied(answer.copy())
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             reason = f"{type(error).__name__}: {error}"
             raise NoImpulseResponse(f"{_where(step, size, measured[index])}: {reason}") from error
         commands = commands or answer.shape
