@@ -27,7 +27,7 @@ with quietly_interruptible():
         from utank_hil.base.arrays import FloatArray
         from utank_hil.canbus.frame import Port
         from utank_hil.canbus.ports import open_buses
-        from utank_hil.canbus.profiles.foreign import ForeignDevices
+        from utank_hil.canbus.profiles.device_plan import ForeignDevices
         from utank_hil.canbus.socketcan import SocketCanPort
         from utank_hil.console.common import (
             AllowCode,

@@ -22,8 +22,7 @@ from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.panel import TimedAction
 from utank_hil.retuning import Retuner
 from utank_hil.runners import Lockstep, Node
-from utank_hil.runners.lockstep import Trace
-from utank_hil.runners.several_buses import with_more
+from utank_hil.runners.lockstep import Trace, with_more
 
 Tap = Callable[[ControllerNode], Node]
 """Function that wraps a controller in the node put on the bus."""

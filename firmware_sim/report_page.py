@@ -26,7 +26,7 @@ from utank_hil.pictures import BenchBar, BenchCurve, draw_bench
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
 from utank_hil.pictures.style import COLORS, NO_TANK
 from utank_hil.reports.page import PAGE, write_reports
-from utank_hil.reports.parts import Report, ReportKind, about_section, printed, roll_figure
+from utank_hil.reports.recording import Report, ReportKind, about_section, printed, roll_figure
 from utank_hil.telemetry.recording import read_recording, write_recording
 
 PICTURE, RECORDING, FIGURES = "bench.png", "bench.rrd", "bench.json"

@@ -40,12 +40,12 @@ from utank_hil.runners import (
     heard_by,
     real_time_scheduling,
 )
-from utank_hil.runners.several_buses import with_more
+from utank_hil.runners.lockstep import with_more
 from utank_hil.telemetry.frame_log import BlockSink, FrameLogWriter
 from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head
-from utank_hil.telemetry.rows import RowWriter
+from utank_hil.telemetry.ring import RowWriter
 
 SECOND_NS: Final = 1_000_000_000
 RECORD_NS: Final = ROW_TICKS * TICK_NS

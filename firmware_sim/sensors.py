@@ -19,8 +19,7 @@ from utank_hil.canbus import (
     Switch,
     Transmitter,
 )
-from utank_hil.canbus.profiles.device_plan import DevicePlan
-from utank_hil.canbus.profiles.foreign import NO_FOREIGN_DEVICES, ForeignDevices
+from utank_hil.canbus.profiles.device_plan import NO_FOREIGN_DEVICES, DevicePlan, ForeignDevices
 from utank_hil.nodes.housekeeping import Housekeeping
 
 if TYPE_CHECKING:

@@ -32,7 +32,7 @@ from utank_hil.runners import RealTimeLoop, real_time_scheduling, stop_on_signal
 from utank_hil.assembly import build_controller_node
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import SimulatedRetuner
-from utank_hil.telemetry.rows import RowWriter
+from utank_hil.telemetry.ring import RowWriter
 
 assert SocketCanPort
 files = sorted(Path("configs/controllers").glob("*.yaml"))

@@ -38,7 +38,6 @@ PATTERNS: Final = (
     "utank_hil/canbus/endpoints.py",
     "utank_hil/canbus/profiles/device.py",
     "utank_hil/canbus/profiles/field.py",
-    "utank_hil/canbus/profiles/heard_message.py",
     "utank_hil/control/level_observer.py",
     "utank_hil/control/limiter.py",
     "utank_hil/control/pressure_loop.py",

@@ -14,7 +14,7 @@ from firmware_sim.scenario import PASSIVE
 from utank_hil.console.terminal import new_table
 from utank_hil.pictures.campaign import CampaignRun, draw_campaign
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
-from utank_hil.reports.parts import Report, ReportKind, about_section, printed
+from utank_hil.reports.recording import Report, ReportKind, about_section, printed
 
 Figure = dict[str, Any]
 

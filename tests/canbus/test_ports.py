@@ -5,7 +5,7 @@ import pytest
 from utank_hil.canbus import Frame, PortError
 from utank_hil.canbus.frame import BUS_SHIFT
 from utank_hil.canbus.ports import BusPorts, open_buses
-from utank_hil.canbus.profiles.foreign import ForeignDevices
+from utank_hil.canbus.profiles.device_plan import ForeignDevices
 
 
 class Interface:

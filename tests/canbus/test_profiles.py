@@ -12,10 +12,9 @@ from others import others_file
 
 from utank_hil.canbus import Frame, Quality, Rejection, SensorMotion, SensorTank, Switch
 from utank_hil.canbus.frame import STANDARD
-from utank_hil.canbus.profiles.device import ProfiledDevice
+from utank_hil.canbus.profiles.device import HeardMessage, ProfiledDevice, Stamp
 from utank_hil.canbus.profiles.device_plan import Crc8
 from utank_hil.canbus.profiles.field import Field
-from utank_hil.canbus.profiles.heard_message import HeardMessage, Stamp
 from utank_hil.configuration.devices import DevicesSection
 
 MS = 1_000_000

@@ -37,8 +37,7 @@ from utank_hil.canbus import (
     Verdict,
     load_catalogue,
 )
-from utank_hil.commands.web_panel.desk import Desk
-from utank_hil.commands.web_panel.instruments import Instruments
+from utank_hil.commands.web_panel.desk import Desk, Instruments
 from utank_hil.commands.web_panel.server import ServerProcess
 from utank_hil.configuration import load_config
 from utank_hil.configuration.vessel import Vessel

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
-from utank_hil.canbus.bit_rate import why_other_bit_rate
+from utank_hil.canbus.ports import why_other_bit_rate
 from utank_hil.cli import app
 from utank_hil.commands import commission as module
 from utank_hil.commands.commissioning_record import (

@@ -29,8 +29,13 @@ from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.recording import write_recording
 from utank_hil.telemetry.replay import Entry, entries_of
 from utank_hil.telemetry.replay_head import recorded_config
-from utank_hil.telemetry.signal_files import TABLE_SUFFIXES, even_rows, read_signals, write_signals
-from utank_hil.telemetry.signal_table import signal_table
+from utank_hil.telemetry.signal_files import (
+    TABLE_SUFFIXES,
+    even_rows,
+    read_signals,
+    signal_table,
+    write_signals,
+)
 
 LOG = Path("tests/replay/every-mode.frames")
 RETUNED = Path("tests/replay/retuned-and-undone.frames")

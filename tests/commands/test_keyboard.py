@@ -21,7 +21,7 @@ from utank_hil.canbus import (
     Station,
     load_catalogue,
 )
-from utank_hil.commands.keyboard import LEAVE_NS, Keyboard
+from utank_hil.commands.panel import LEAVE_NS, Keyboard
 from utank_hil.nodes.panel import SILENT_NS, Action, OperatorPanel
 from utank_hil.safety.faults import fault_text
 

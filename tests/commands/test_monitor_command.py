@@ -20,7 +20,7 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry import live, viewer
 from utank_hil.telemetry.recording import write_recording
-from utank_hil.telemetry.rows import RowWriter
+from utank_hil.telemetry.ring import RowWriter
 
 pytestmark = pytest.mark.slow
 

@@ -22,7 +22,6 @@ from utank_hil.cli import app
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict, write_report_page
-from utank_hil.reports import parts
 from utank_hil.reports import recording as of_recording
 from utank_hil.reports.page import write_page
 from utank_hil.telemetry.recording import write_recording
@@ -97,7 +96,7 @@ def one_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
         Image.new("L", (1, 1)).save(file)
         return file
 
-    monkeypatch.setattr(parts, "draw_roll_statistics", drawn)
+    monkeypatch.setattr(of_recording, "draw_roll_statistics", drawn)
     monkeypatch.setattr(of_recording, "draw_bench", drawn)
 
 

@@ -22,7 +22,7 @@ from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.recorder_process import RecorderError, RecorderReport, RecordingTask
 from utank_hil.telemetry.recording import read_recording
-from utank_hil.telemetry.rows import RowReader
+from utank_hil.telemetry.ring import RowReader
 
 SHM = Path("/dev/shm")
 

@@ -15,7 +15,7 @@ import pytest
 from ship_of_a_page import Bench, bench
 
 from utank_hil.canbus import AlarmState, Fault, Mode, Station
-from utank_hil.commands.keyboard import Keyboard
+from utank_hil.commands.panel import Keyboard
 from utank_hil.commands.web_panel.server import MOST_PAGES
 
 pytestmark = pytest.mark.slow

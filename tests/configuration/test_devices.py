@@ -7,7 +7,7 @@ import pytest
 import yaml
 from others import others_file
 
-from utank_hil.canbus.profiles.foreign import ForeignDevices
+from utank_hil.canbus.profiles.device_plan import ForeignDevices
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.configuration.device_files import shipped_profiles
 from utank_hil.configuration.devices import DevicesSection

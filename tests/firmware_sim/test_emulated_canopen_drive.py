@@ -25,7 +25,7 @@ from utank_hil.configuration.device_sections import DriveSection
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.canopen_drive import state_of
 from utank_hil.runners import Lockstep, SimulatedBus
-from utank_hil.runners.several_buses import with_more
+from utank_hil.runners.lockstep import with_more
 
 SECOND_NS = 1_000_000_000
 MS = 1_000_000

@@ -15,7 +15,7 @@ from utank_hil.configuration import load_config
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.runners import Lockstep, SimulatedBus
-from utank_hil.runners.several_buses import with_more
+from utank_hil.runners.lockstep import with_more
 
 SECOND_NS = 1_000_000_000
 SBG = {"profile": "sbg_ellipse", "bus": "can1", "accept_unprotected": True}

@@ -17,9 +17,8 @@ from typer.testing import CliRunner, Result
 from utank_hil.commands.export import export
 from utank_hil.commands.replay import replay
 from utank_hil.console.common import new_app
-from utank_hil.telemetry.bus_files.clock import OneClock
 from utank_hil.telemetry.bus_files.frame import BusFrame, FrameKind
-from utank_hil.telemetry.bus_files.log import BusLog
+from utank_hil.telemetry.bus_files.log import BusLog, OneClock
 from utank_hil.telemetry.signal_files import read_signals
 
 WIDE = {"TERM": "dumb", "COLUMNS": "400", "NO_COLOR": "1"}

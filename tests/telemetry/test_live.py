@@ -22,8 +22,7 @@ from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.events import EventWriter
 from utank_hil.telemetry.live import LiveRun, LiveStream, live_runs
 from utank_hil.telemetry.recording import _read_chunks, read_about, read_recording
-from utank_hil.telemetry.ring import ring_names
-from utank_hil.telemetry.rows import RowWriter
+from utank_hil.telemetry.ring import RowWriter, ring_names
 from utank_hil.telemetry.viewer import rerun_binary, rerun_environment
 
 ABOUT = {
@@ -85,7 +84,7 @@ def test_a_run_is_found_by_its_ring_and_says_what_it_is() -> None:
 
 def test_a_killed_run_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     code = (
-        "import time; from utank_hil.telemetry.rows import RowWriter;"
+        "import time; from utank_hil.telemetry.ring import RowWriter;"
         "from utank_hil.nodes.signals import SIGNALS;"
         "ring = RowWriter(SIGNALS); print(ring.name, flush=True); time.sleep(60)"
     )

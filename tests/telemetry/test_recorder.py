@@ -34,7 +34,7 @@ from utank_hil.telemetry.recorder_process import (
     RecordingTask,
 )
 from utank_hil.telemetry.recording import read_recording
-from utank_hil.telemetry.rows import RowWriter
+from utank_hil.telemetry.ring import RowWriter
 
 pytestmark = pytest.mark.slow
 
@@ -305,7 +305,7 @@ import numpy as np
 from utank_hil.canbus import RetuningState
 from utank_hil.canbus.events import RetuningEvent
 from utank_hil.telemetry.events import EventWriter
-from utank_hil.telemetry.rows import RowWriter
+from utank_hil.telemetry.ring import RowWriter
 ring, events = RowWriter({SIGNALS!r}), EventWriter()
 print(ring.name, events.name, flush=True)
 sys.stdin.readline()

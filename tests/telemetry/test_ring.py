@@ -16,8 +16,14 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from utank_hil.telemetry.ring import RingError, RingKind, RingReader, RingWriter
-from utank_hil.telemetry.rows import RowReader, RowWriter
+from utank_hil.telemetry.ring import (
+    RingError,
+    RingKind,
+    RingReader,
+    RingWriter,
+    RowReader,
+    RowWriter,
+)
 
 SHM = Path("/dev/shm")
 
@@ -288,7 +294,7 @@ def test_a_pipe_of_somebody_else_holds_nobody_up() -> None:
 
 WRITE_FOR_EVER = """
 import sys, numpy as np
-from utank_hil.telemetry.rows import RowWriter
+from utank_hil.telemetry.ring import RowWriter
 writer = RowWriter([str(i) for i in range(14)], slots=64)
 print(writer.name, flush=True)
 sys.stdin.readline()
@@ -405,7 +411,7 @@ def test_a_ring_whose_segment_was_removed_meanwhile_closes_quietly() -> None:
     """systemd-logind removes those of a user who logs out, whatever still runs (RemoveIPC)."""
     code = """
 import os
-from utank_hil.telemetry.rows import RowWriter
+from utank_hil.telemetry.ring import RowWriter
 with RowWriter(["a"]) as writer:
     os.unlink(f"/dev/shm/{writer.name}")
     writer.write(bytes(8))
@@ -418,7 +424,7 @@ with RowWriter(["a"]) as writer:
 def test_a_reader_process_that_exits_does_not_take_the_ring_with_it() -> None:
     code = """
 import sys
-from utank_hil.telemetry.rows import RowReader
+from utank_hil.telemetry.ring import RowReader
 reader = RowReader(sys.argv[1])
 assert reader.read_rows().shape == (1, 1)
 """

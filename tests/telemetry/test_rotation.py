@@ -20,8 +20,8 @@ from utank_hil.telemetry.events import EventWriter
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.recorder_process import RecorderProcess, RecorderReport, RecordingTask
 from utank_hil.telemetry.recording import read_about, read_recording
+from utank_hil.telemetry.ring import RowWriter
 from utank_hil.telemetry.rotation import make_room, part_of, remove_oldest
-from utank_hil.telemetry.rows import RowWriter
 
 TIME = SIGNALS.index("time_s")
 EVENT_EVERY = 4  # rows: the ring's 64 last while a busy machine starts the recorder

@@ -1,9 +1,30 @@
-"""Several CAN interfaces as one port; no frame is ever handed from one to another."""
+"""CAN interfaces: their bit rate, and several as one port; no frame goes from one to another."""
 
+import json
+import subprocess
 from collections.abc import Sequence
 
 from utank_hil.canbus.frame import BUS_SHIFT, OTHER_BUS, Frame, Port, PortError
-from utank_hil.canbus.profiles.foreign import ForeignDevices
+from utank_hil.canbus.profiles.device_plan import ForeignDevices
+
+
+def why_other_bit_rate(channel: str, bit_rate: int) -> str:
+    """Return why an interface does not run at a bit rate; empty if it does.
+
+    Also empty where `ip` (iproute2) tells none: it is missing, or the interface is virtual.
+    """
+    words = ["ip", "-details", "-json", "link", "show", channel]
+    try:
+        said = subprocess.run(words, capture_output=True, check=True, timeout=5).stdout
+        found = int(json.loads(said)[0]["linkinfo"]["info_data"]["bittiming"]["bitrate"])
+    except (OSError, subprocess.SubprocessError, ValueError, LookupError, TypeError):
+        return ""
+    if found == bit_rate:
+        return ""
+    return (
+        f"is {bit_rate}, but {channel} runs at {found}: load and delay would be judged by the "
+        f"wrong one; give both the same (ip link set {channel} type can bitrate {bit_rate})"
+    )
 
 
 class BusPorts:

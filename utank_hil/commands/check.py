@@ -1,19 +1,289 @@
 """``utank-hil check``: is a configuration fit to be used, and how robust are its laws."""
 
+import math
+from dataclasses import asdict, replace
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Final
 
+import numpy as np
 import typer
 from pydantic import BaseModel
+from rich.text import Text
 
+from utank_hil.analysis.loop.linear_tuning import AutoDesign
+from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins, Robustness, robustness
+from utank_hil.analysis.loop.self_tuning import NoLawError, SelfTunedDesign
+from utank_hil.analysis.loop.trade import Design, scaled, varied
+from utank_hil.base.finite import finite
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.configuration.files import ConfigError, kind_of
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.console.admission import judge_law
 from utank_hil.console.common import AllowCode, Json, fail, load, print_json, warnings_of
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import Terminal
+from utank_hil.console.ship_report import (
+    devices_json,
+    print_devices,
+    print_ship,
+    ship_figures,
+    ship_json,
+    ship_line,
+)
+from utank_hil.console.terminal import Terminal, new_table
+from utank_hil.control import BuiltLaw
+from utank_hil.control.constrained.design import ConstrainedDesign
+from utank_hil.control.interface import DesignPlant
+from utank_hil.control.lqg_design import LQGDesign
+from utank_hil.dynamics.linear import state_matrices
+from utank_hil.gate import MOST_STEP_S, JudgedLaw
+
+MARGINS = "Margins, delay and pump lag included"
+NO_LOOP = "The law closes no loop that quiets the roll: it has no margins."
+DISSIPATES = (
+    "The law throttles a valve, which can only take energy out of the water, whatever it measures: "
+    "no loop can become unstable, and there are no margins. It may still roll the ship more than "
+    "the valve at rest; see what a bench says."
+)
+LEAST_LOOP_GAIN = 0.05
+"""Loop gain below which a law with all margins hardly acts; the shipped laws have 1.3 and more."""
+GENTLER: Final = (0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4)  #: Factors on a weight on outputs or states.
+LONGER: Final = (1.3, 1.6, 2.0, 3.0)  #: Factors on the control horizon of an exact deadbeat.
+Judged = dict[str, JudgedLaw]
+
+
+def controller_json(judged: JudgedLaw) -> dict[str, Any]:
+    """Return a controller as one JSON object."""
+    config, report = judged.config, judged.robustness
+    return {
+        "name": config.name,
+        "vessel": config.vessel.name,
+        "ship": ship_figures(config.vessel),
+        "devices": devices_json(config.vessel.devices),
+        "configuration_version": config.vessel.version,
+        "law": config.law.kind,
+        "at_rest": _at_rest(judged.law),
+        "dissipates": judged.law.dissipates,
+        "limits": finite(asdict(config.limits)),
+        "robustness": None if report is None else finite(asdict(report)),
+        "delay_margin_searched_s": None if report is None else _searched_s(judged.law),
+        "failures": list(judged.failures),
+        "remedy": remedy(judged),
+        "accepted": judged.accepted,
+    }
+
+
+def collection_json(collection: Any, judged: Judged) -> dict[str, Any]:
+    """Return a file of several controllers, such as a scenario, as one JSON object."""
+    vessel: Vessel = collection.vessel
+    controllers = {name: controller_json(each) for name, each in judged.items()}
+    return {
+        "name": collection.name,
+        "vessel": vessel.name,
+        "ship": ship_figures(vessel),
+        "figures": collection.figures(),
+        "configuration_version": vessel.version,
+        "controllers": controllers,
+        "accepted": all(each["accepted"] for each in controllers.values()),
+    }
+
+
+def print_controller(judged: JudgedLaw) -> None:
+    """Print a controller's margins."""
+    config, report = judged.config, judged.robustness
+    console = Terminal()
+    names = f"{config.name} for {config.vessel.name}"
+    console.say(f"{names}: the configuration is valid.")
+    console.say(ship_line(config.vessel))
+    print_devices(console, config.vessel.devices)
+    if report is None:
+        if judged.law.unjudged:
+            _print_verdict(console, judged)
+        else:
+            console.say(DISSIPATES if judged.law.dissipates else NO_LOOP)
+        return
+    margin = report.nominal
+    table = new_table(MARGINS, "value", "required")
+    table.add_row("peak sensitivity", f"{margin.peak_sensitivity:.2f}", "2 or less")
+    table.add_row("  at", f"{margin.peak_frequency_rad_s:.2f} rad/s", "")
+    table.add_row("pump gain factor", _gain(margin), "")
+    table.add_row("phase margin", _phase(margin), "")
+    table.add_row("delay margin", _delay(judged.law, margin), "over 20 ms")
+    table.add_row("disk margin", f"{margin.disk_margin:.2f}", "")
+    table.add_row("greatest loop gain", f"{margin.peak_loop_gain:.3g}", "")
+    table.add_row("largest eigenvalue of the grid", _radius(report.worst_radius), "less than 1")
+    table.caption = (
+        "grid: roll period 0.7 to 1.3, or inertia 0.8 to 1.25;\n"
+        "pump gain 0.8 to 1.2, 0 or 20 ms more delay"
+    )
+    console.table(table)
+    for remark in _remarks(judged.law, report):
+        console.say(remark)
+    _print_verdict(console, judged)
+
+
+def _print_verdict(console: Terminal, judged: JudgedLaw) -> None:
+    for failure in judged.failures:
+        console.say(failure, red="missed:")
+    if judged.failures:
+        verdict = "accepted by the configuration" if judged.accepted else "refused"
+        console.say(f"This law is {verdict}.")
+        _print_remedy(console, judged)
+    elif judged.law.adapts:
+        console.say("met by what the law starts from", yellow="What it learns is not judged:")
+    else:
+        console.say(green="All requirements are met.")
+
+
+def _print_remedy(console: Terminal, judged: JudgedLaw, whose: str = "") -> None:
+    found = remedy(judged)
+    if found is not None:
+        console.say(found, yellow=f"remedy{whose}:")
+
+
+def print_collection(kind: str, collection: Any, judged: Judged) -> None:
+    """Print the margins of all controllers of a file."""
+    console = Terminal()
+    names = f"{collection.name}, {collection.vessel.name}"
+    console.say(f"{names}: the {kind} is valid.")
+    console.say(ship_line(collection.vessel))
+    for line in collection.meaning():
+        console.say(line)
+    if not judged:  # A passive tank has no law.
+        return
+    table = new_table(
+        MARGINS, "peak\nsensitivity", "pump gain\nfactor", "phase\nmargin", "delay\nmargin",
+        "largest\neigenvalue",
+    )  # fmt: skip
+    table.add_column("", no_wrap=True)
+    for each, one in judged.items():
+        verdict = _verdict(one)
+        if one.robustness is None:
+            table.add_row(each, *5 * ("",), verdict)
+            continue
+        margin = one.robustness.nominal
+        peak, radius = f"{margin.peak_sensitivity:.2f}", f"{one.robustness.worst_radius:.4f}"
+        figures = peak, _gain(margin), _phase(margin), _delay(one.law, margin), radius
+        table.add_row(each, *figures, verdict)
+    console.table(table)
+    for each, one in judged.items():
+        for remark in () if one.robustness is None else _remarks(one.law, one.robustness):
+            console.say(f"{each}: {remark}")
+    for each, one in judged.items():
+        for failure in one.failures:
+            console.say(failure, red=f"missed by {each}:")
+        _print_remedy(console, one, f" of {each}")
+
+
+def _verdict(judged: JudgedLaw) -> str | Text:
+    if judged.failures:
+        return Text("accepted", "yellow") if judged.accepted else Text("refused", "red")
+    if judged.robustness is None:
+        return "dissipates" if judged.law.dissipates else "no loop"
+    return "at rest" if judged.law.adapts else Text("ok", "green")
+
+
+def _radius(radius: float) -> str:
+    near = abs(radius - 1) < 5e-5  # would print as 1.0000
+    return f"1 {'-' if radius < 1 else '+'} {abs(1 - radius):.0e}" if near else f"{radius:.4f}"
+
+
+def _gain(margin: Margins) -> str:
+    high = f"{margin.gain_high:.2f}" if math.isfinite(margin.gain_high) else "any"
+    return f"{margin.gain_low:.2f} to {high}"
+
+
+def _phase(margin: Margins) -> str:
+    if not math.isfinite(margin.phase_margin_rad):
+        return "any"
+    return f"{math.degrees(margin.phase_margin_rad):.0f}°"
+
+
+def _delay(law: BuiltLaw, margin: Margins) -> str:
+    if not math.isfinite(margin.delay_margin_s):
+        return f"over {1e3 * _searched_s(law):.0f} ms"
+    return f"{1e3 * margin.delay_margin_s:.0f} ms"
+
+
+def _searched_s(law: BuiltLaw) -> float:
+    """Return the extra delay up to which the loop was found stable, if no margin was found."""
+    return 0.0 if law.linear is None else DELAY_SAMPLES * law.linear.sample_time_s
+
+
+def _remarks(law: BuiltLaw, report: Robustness) -> list[str]:
+    notes = [note for note in (_at_rest(law),) if note is not None]
+    gain = report.nominal.peak_loop_gain
+    if gain < LEAST_LOOP_GAIN and not law.adapts:
+        notes.append(f"It hardly acts: its loop gain is {gain:.2g} at most.")
+    return notes
+
+
+def _at_rest(law: BuiltLaw) -> str | None:
+    if not law.at_rest:
+        return None
+    learning = " with the parameters it starts from" if law.adapts else ""
+    return f"The law is nonlinear: these are the margins of its slope at rest{learning}."
+
+
+def remedy(judged: JudgedLaw) -> str | None:
+    """Return the first gentler design that meets all requirements, as keys of the file.
+
+    None is returned if the law is not refused for its margins or has nothing to scale.
+    """
+    design, plant, report = judged.config.law, judged.config.design_plant, judged.robustness
+    refused = report is not None and report.failures() and judged.step_s <= MOST_STEP_S
+    if not refused or report is None or not isinstance(design, Design):
+        return None
+    stiffness = plant.ship.stiffness_nm_rad / report.worst_period_scale**2
+    softer = replace(plant.ship, stiffness_nm_rad=stiffness)
+    if np.linalg.eigvals(state_matrices(softer, plant.tank)[0]).real.max() > 0:
+        return (
+            f"at {report.worst_period_scale:g} of the roll period the ship is unstable with the "
+            "tank's water alone, whatever the law asks for: make the tank's reservoirs smaller"
+        )
+    for factor in LONGER if varied(design) == "control horizon" else GENTLER:
+        gentler = scaled(design, factor)
+        try:
+            found = robustness(
+                gentler.law(plant), plant, judged.law.measured, with_delay_margin=False
+            )
+        except (ValueError, ArithmeticError):
+            continue  # It can't be designed or judged either.
+        if not found.failures():
+            return f"{_keys(gentler)} passes; a value between may, too"
+    return _automatic(design, plant) or (
+        f"no gentler {varied(design)} passes: choose another law, or another tank"
+    )
+
+
+def _automatic(design: Design, plant: DesignPlant) -> str | None:
+    try:
+        if isinstance(design, ConstrainedDesign):
+            SelfTunedDesign("self_tuned", design.sea).tuned(plant)
+            return "law.kind: self_tuned with the same sea in place of the other numbers passes"
+        AutoDesign(design.kind, "auto").tuned(plant)
+    except NoLawError:
+        return None
+    return f"law: {{kind: {design.kind}, tuning: auto}} passes"
+
+
+def _keys(design: Design) -> str:
+    """Return the keys of the numbers that `scaled` scales, as written in a file."""
+    if isinstance(design, ConstrainedDesign):
+        return f"law.pressure_weight_rad2: {design.pressure_weight_rad2:.3g}"
+    if isinstance(design, LQGDesign):
+        return f"law.state_weight: {_list(design.state_weight)}"
+    if design.output_weight is not None:
+        return f"law.output_weight: {_list(design.output_weight)}"
+    return (
+        f"law.control_horizon: {design.control_horizon} with law.prediction_horizon: "
+        f"{design.prediction_horizon}"
+    )
+
+
+def _list(values: tuple[float, ...]) -> str:
+    return f"[{', '.join(f'{value:.3g}' for value in values)}]"
+
 
 GROUP = "utank_hil.collections"
 """Entry points of further kinds of file: models with a name, a vessel, a mapping `controllers`, and
@@ -33,9 +303,6 @@ def check(
 
     **Example:** utank-hil check configs/controllers/gpc.yaml
     """
-    from utank_hil.commands import check_report as report
-    from utank_hil.console.ship_report import print_ship, ship_json
-
     loaded: BaseModel
     pumped: dict[str, Vessel | ControllerConfig]
     collections = {point.name: point.load() for point in entry_points(group=GROUP)}
@@ -55,15 +322,15 @@ def check(
             for name, each in collection.controllers.items()
         }
         pumped = {f"controllers.{name}.": each for name, each in collection.controllers.items()}
-        loaded, content = collection, report.collection_json(collection, judged)
+        loaded, content = collection, collection_json(collection, judged)
         if not json_:
-            report.print_collection(kind, collection, judged)
+            print_collection(kind, collection, judged)
     else:
         loaded = only = load(config, ControllerConfig, allow_code=allow_code)
         controller, pumped = judge_law(only, config), {"": only}
-        content = report.controller_json(controller)
+        content = controller_json(controller)
         if not json_:
-            report.print_controller(controller)
+            print_controller(controller)
     held = [
         f"{config}: {where}{key} {reason}"
         for where, each in pumped.items()

@@ -11,9 +11,8 @@ from rich.text import Text
 from utank_hil.assembly import build_commissioning_node
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import AlarmState, Fault, PortError
-from utank_hil.canbus.bit_rate import why_other_bit_rate
 from utank_hil.canbus.events import AlarmEvent, RetuningEvent
-from utank_hil.canbus.ports import open_port
+from utank_hil.canbus.ports import open_port, why_other_bit_rate
 from utank_hil.commands.commissioning_record import (
     make_record,
     record_path,

@@ -18,8 +18,7 @@ from utank_hil.telemetry.recorder_process import (
     RecorderProcess,
     RecordingTask,
 )
-from utank_hil.telemetry.ring import RingWriter
-from utank_hil.telemetry.rows import RowWriter
+from utank_hil.telemetry.ring import RingWriter, RowWriter
 
 NAME: Final = "run-{}.rrd"
 FRAMES: Final = f"run-{{}}{SUFFIX}"

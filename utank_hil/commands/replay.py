@@ -20,9 +20,8 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, say_note
 from utank_hil.telemetry.bus_files.log import BusLog
 from utank_hil.telemetry.bus_logs import LoggedController
-from utank_hil.telemetry.explained_tick import ExplainedTick, Number
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
-from utank_hil.telemetry.replay import LawVerdict, ReplayResult, replay_log
+from utank_hil.telemetry.replay import ExplainedTick, LawVerdict, Number, ReplayResult, replay_log
 from utank_hil.telemetry.replay import replay as run_replay
 from utank_hil.telemetry.replay_head import ReplayHeadError, few, recorded_config
 

@@ -27,9 +27,8 @@ from utank_hil.canbus import (
     PumpCommand,
     load_catalogue,
 )
-from utank_hil.canbus.bit_rate import why_other_bit_rate
 from utank_hil.canbus.events import AlarmEvent
-from utank_hil.canbus.ports import BusPorts, open_port
+from utank_hil.canbus.ports import BusPorts, open_port, why_other_bit_rate
 from utank_hil.commands.announcer import LOG_NAME, Announcer
 from utank_hil.commands.commissioning_record import why_not_commissioned
 from utank_hil.commands.identified import IdentifiedShips, read_controller

@@ -16,10 +16,10 @@ from utank_hil.canbus.profiles.device_plan import (
     ConditionPlan,
     Crc8,
     DevicePlan,
+    ForeignDevices,
     MessagePlan,
     SignalPlan,
 )
-from utank_hil.canbus.profiles.foreign import ForeignDevices
 from utank_hil.configuration.device_files import NATIVE, with_profile
 from utank_hil.configuration.device_sections import (
     LEAST_GAIN,

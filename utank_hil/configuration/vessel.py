@@ -11,7 +11,7 @@ from pydantic import ValidationInfo, field_validator, model_validator
 
 from utank_hil.base.parameters import Problem, Range, refuse
 from utank_hil.base.tick import TICK_S
-from utank_hil.canbus.profiles.foreign import NO_FOREIGN_DEVICES, ForeignDevices
+from utank_hil.canbus.profiles.device_plan import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.hull_files.reader import HullFile

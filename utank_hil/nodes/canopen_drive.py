@@ -19,8 +19,8 @@ from utank_hil.canbus.profiles.canopen import (
     NetworkState,
     NodeCommand,
 )
+from utank_hil.canbus.profiles.device import HeardMessage
 from utank_hil.canbus.profiles.drive_plan import COMMAND_MS, DrivePlan
-from utank_hil.canbus.profiles.heard_message import HeardMessage
 from utank_hil.control.pressure_loop import PressureLoop
 from utank_hil.nodes.canopen_setup import CanopenSetup
 from utank_hil.nodes.plausibility import MILLISECOND_NS, NEVER_HEARD_NS

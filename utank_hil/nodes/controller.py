@@ -22,7 +22,7 @@ from utank_hil.canbus import (
 from utank_hil.canbus.events import RetuningEvent
 from utank_hil.canbus.measurements import Measurements, MotionSample
 from utank_hil.canbus.profiles.device import SILENT_NS
-from utank_hil.canbus.profiles.foreign import NO_FOREIGN_DEVICES, ForeignDevices
+from utank_hil.canbus.profiles.device_plan import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.dynamics.tank import Tank
 from utank_hil.nodes.actuators import Actuators

@@ -33,7 +33,7 @@ from utank_hil.canbus import (
 from utank_hil.canbus.frame import OTHER_BUS, STANDARD
 from utank_hil.canbus.measurements import Measurements
 from utank_hil.canbus.profiles.device import ProfiledDevice
-from utank_hil.canbus.profiles.foreign import NO_FOREIGN_DEVICES, ForeignDevices
+from utank_hil.canbus.profiles.device_plan import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.nodes.canopen_drive import CanopenDrive, DriveReport
 from utank_hil.nodes.hardwired import HardwiredHeard
 from utank_hil.nodes.plausibility import (

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from utank_hil.pictures.report_page import write_report_page
-from utank_hil.reports.parts import Report, ReportKind
-from utank_hil.reports.recording import recording_report
+from utank_hil.reports.recording import Report, ReportKind, recording_report
 
 GROUP: Final = "utank_hil.reports"  #: Entry points of runs that leave a folder (`ReportKind`).
 PAGE: Final = "report.html"

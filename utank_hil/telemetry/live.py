@@ -11,8 +11,7 @@ from utank_hil.base.closing import Closing
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.events import EventReader
 from utank_hil.telemetry.part import live_log, open_stream
-from utank_hil.telemetry.ring import RingKind, RingReader, ring_names
-from utank_hil.telemetry.rows import RowReader
+from utank_hil.telemetry.ring import RingKind, RingReader, RowReader, ring_names
 from utank_hil.telemetry.viewer import LOOPBACK, hold_port, live_url, port_of
 
 MEMORY: Final = "64MiB"  #: History for late viewers, which bounds the memory of the stream.

@@ -25,9 +25,8 @@ from utank_hil.base.background import give_way
 from utank_hil.telemetry.events import EventReader
 from utank_hil.telemetry.frame_log import FrameRecording
 from utank_hil.telemetry.recorder_process import RecorderState
-from utank_hil.telemetry.ring import RingKind, RingReader
+from utank_hil.telemetry.ring import RingKind, RingReader, RowReader
 from utank_hil.telemetry.rotation import SUFFIXES, make_room, part_of
-from utank_hil.telemetry.rows import RowReader
 from utank_hil.telemetry.viewer import rerun_environment
 
 BATCH_S: Final = 0.5  #: Time between two writes: one costs 1 kB, a kill loses two at most.

@@ -20,7 +20,7 @@ from utank_hil.commands.outward import outlets as module
 from utank_hil.commands.outward.outlets import Outlet, Outward, read_outlet
 from utank_hil.commands.outward.registers import REGISTERS
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.rows import RowWriter
+from utank_hil.telemetry.ring import RowWriter
 
 RAISED = AlarmEvent(0, Fault.LEVEL_LIMIT, AlarmState.ACTIVE_UNACKNOWLEDGED, Mode.FAULT)
 

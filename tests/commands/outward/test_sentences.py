@@ -10,13 +10,14 @@ from hypothesis import strategies as st
 
 from utank_hil.canbus import AlarmState, Fault, Mode
 from utank_hil.canbus.events import AlarmEvent
-from utank_hil.commands.outward.alerts import Alerts, title
-from utank_hil.commands.outward.sentences import (
+from utank_hil.commands.outward.alerts import (
+    Alerts,
     Framing,
     alert_command,
     checksum,
     sentence,
     text_field,
+    title,
 )
 from utank_hil.safety.alarms import Gravity, gravest
 from utank_hil.safety.faults import FAULTS, FaultRow

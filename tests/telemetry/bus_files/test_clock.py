@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.telemetry.bus_files.clock import OneClock
 from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError, FrameKind
+from utank_hil.telemetry.bus_files.log import OneClock
 
 DAY_S = 86_400
 

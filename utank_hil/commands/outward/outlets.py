@@ -14,11 +14,9 @@ from urllib.parse import parse_qs, urlsplit
 from utank_hil.base.closing import Closing
 from utank_hil.canbus import AlarmState, Fault
 from utank_hil.canbus.events import AlarmEvent
-from utank_hil.commands.outward.alerts import Alerts
+from utank_hil.commands.outward.alerts import Alerts, Framing
 from utank_hil.commands.outward.registers import ModbusServer, State
-from utank_hil.commands.outward.sentences import Framing
-from utank_hil.telemetry.ring import RingKind, RingReader, ring_names
-from utank_hil.telemetry.rows import RowReader
+from utank_hil.telemetry.ring import RingKind, RingReader, RowReader, ring_names
 
 KINDS: Final = ("udp", "iec450", "modbus")
 CYCLE_S: Final = 30.0  #: Longest time between two lists of alerts (IEC 62923-1).
