@@ -12,19 +12,29 @@ from utank_hil.base.elementary import exp
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import ControlWord, DriveFault, DriveState, Frame
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
-from utank_hil.canbus.profiles.canopen import (
+from utank_hil.canbus.profiles.drive_plan import (
     ASYNCHRONOUS,
+    CONTROL_WORD,
     DISABLED,
     EMERGENCY,
     HEARTBEAT,
+    MODE,
+    MODE_SHOWN,
+    MODES,
+    MODES_SUPPORTED,
     NMT,
+    PROFILE,
     RECEIVED_1,
     SDO_ANSWER,
     SDO_REQUEST,
     SENT_1,
     SENT_2,
+    SPEED,
+    STATUS_WORD,
     SYNC,
+    TORQUE,
     Abort,
+    DrivePlan,
     NetworkState,
     NodeCommand,
     Place,
@@ -32,18 +42,6 @@ from utank_hil.canbus.profiles.canopen import (
     refusal,
     value_answer,
     written_answer,
-)
-from utank_hil.canbus.profiles.drive_plan import (
-    CONTROL_WORD,
-    MODE,
-    MODE_SHOWN,
-    MODES,
-    MODES_SUPPORTED,
-    PROFILE,
-    SPEED,
-    STATUS_WORD,
-    TORQUE,
-    DrivePlan,
 )
 from utank_hil.dynamics.pump import Pump, pump_load, pump_pressure, pump_speed
 

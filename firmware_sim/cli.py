@@ -11,13 +11,13 @@ with quietly_interruptible():
     import typer
 
     import utank_hil.console.single_thread  # noqa: F401, first: it must run before numpy loads
-    from utank_hil.console.failures import failures_named
+    from utank_hil.console.common import failures_named
 
     with failures_named():
         from firmware_sim.run import RECORD_NS, RECORD_S, SECOND_NS
         from firmware_sim.scenario import Scenario
         from firmware_sim.ship_side import EXTERNAL_DRIVE, NODE_NAMES, ExternalNode, build_ship_side
-        from firmware_sim.truth import TRUTH, TruthRecorder
+        from firmware_sim.truth import TRUTH, MemoryLog, TruthRecorder
         from utank_hil.analysis.motion.statistics import (
             PumpStatistics,
             RollStatistics,
@@ -49,7 +49,6 @@ with quietly_interruptible():
             real_time_scheduling,
             stop_on_signals,
         )
-        from utank_hil.telemetry.memory_log import MemoryLog
 
 app = new_app("Ship emulator, sensors, pump drive and operator panel on a CAN bus.")
 

@@ -32,8 +32,8 @@ from utank_hil.analysis.motion.statistics import (
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.finite import finite
 from utank_hil.canbus import Fault, Mode
+from utank_hil.console.common import KILLED
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.failures import KILLED
 from utank_hil.nodes.panel import Action
 from utank_hil.safety.faults import fault_text
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from firmware_sim.faulty_bench import FaultyBench, Tap
 from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.ship_side import ShipSide, bare_plant, build_ship_side
-from firmware_sim.truth import TRUTH, TruthRecorder
+from firmware_sim.truth import TRUTH, MemoryLog, TruthRecorder
 from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.provenance import describe
@@ -42,7 +42,6 @@ from utank_hil.runners import (
 )
 from utank_hil.runners.lockstep import with_more
 from utank_hil.telemetry.frame_log import BlockSink, FrameLogWriter
-from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head
 from utank_hil.telemetry.ring import RowWriter

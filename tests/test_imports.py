@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from utank_hil.console.common import EXTRA_OF
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.failures import EXTRA_OF
 from utank_hil.telemetry.frame_log import FrameLog
 
 pytestmark = pytest.mark.slow

@@ -59,11 +59,9 @@ PATTERNS: Final = (
     "utank_hil/safety/monitoring.py",
     "utank_hil/safety/monitors/*.py",
     "utank_hil/safety/passive_twin.py",
-    "utank_hil/base/periodic.py",
+    "utank_hil/base/tick.py",
     "utank_hil/nodes/stations.py",
     "utank_hil/safety/supervisor.py",
-    "utank_hil/runners/wire_time.py",
-    "utank_hil/telemetry/memory_log.py",
 )
 NOT: Final = frozenset(["utank_hil/safety/monitors/thresholds.py"])
 """No file with a dataclass that a configuration holds, as `scenario_sections.py` is one:

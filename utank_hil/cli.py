@@ -18,8 +18,7 @@ with quietly_interruptible():
     from typer.core import TyperCommand, TyperGroup
 
     import utank_hil.console.single_thread  # noqa: F401, first: it must run before numpy loads
-    from utank_hil.console.common import Version, new_app
-    from utank_hil.console.failures import failures_named
+    from utank_hil.console.common import Version, failures_named, new_app
 
 GROUP = "utank_hil.commands"
 

@@ -13,9 +13,8 @@ from rich.progress import MofNCompleteColumn
 
 from utank_hil.base.provenance import describe
 from utank_hil.base.shipped import CONFIGS
-from utank_hil.console.common import Json, fail, load, prepare_out
+from utank_hil.console.common import KILLED, Json, fail, load, prepare_out
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.failures import KILLED
 from utank_hil.console.terminal import Terminal, progress_bar, shown
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ import typer
 
 from firmware_sim.guard.parameters import guard_parameters
 from utank_hil.configuration import ControllerConfig
-from utank_hil.console.common import fail, load
-from utank_hil.console.failures import failures_named
+from utank_hil.console.common import fail, failures_named, load
 
 
 def main(config: Annotated[Path, typer.Argument(help="Controller.")]) -> None:

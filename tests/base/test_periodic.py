@@ -3,7 +3,7 @@ from itertools import accumulate
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.base.periodic import Schedule
+from utank_hil.base.tick import Schedule
 
 gaps = st.lists(st.integers(1, 700), min_size=1, max_size=60)
 

@@ -23,7 +23,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.catalogue import DBC_PATH, read_data_ids
 from utank_hil.canbus.e2e import data_ids
-from utank_hil.runners.wire_time import LONGEST_FRAME_BITS
+from utank_hil.runners.bus_model import LONGEST_FRAME_BITS
 
 TABLE = {
     "PUMP_CMD": (0x08FF1080, 20),

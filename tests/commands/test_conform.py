@@ -12,7 +12,7 @@ from tests.firmware_sim.drive_bench import VESSEL, calm_plant
 from tests.nodes.canopen_peers import PROFILE
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import socketcan
-from utank_hil.canbus.profiles.canopen import Place
+from utank_hil.canbus.profiles.drive_plan import Place
 from utank_hil.commands import conform as command
 from utank_hil.configuration.device_sections import DriveSection
 from utank_hil.console.common import new_app

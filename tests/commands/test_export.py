@@ -24,8 +24,7 @@ from utank_hil.commands.replay import replay
 from utank_hil.console.common import new_app
 from utank_hil.identification.record import logged_samples
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.bus_records import Kind
-from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.frame_log import FrameLog, Kind
 from utank_hil.telemetry.recording import write_recording
 from utank_hil.telemetry.replay import Entry, entries_of
 from utank_hil.telemetry.replay_head import recorded_config

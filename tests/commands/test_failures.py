@@ -12,8 +12,8 @@ from little_room import little_room
 from typer.testing import CliRunner
 
 from utank_hil.cli import app
+from utank_hil.console.common import failures_named
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.failures import failures_named
 
 GPC = "configs/controllers/gpc.yaml"
 SHIP = "configs/ships/thesis_first.yaml"
@@ -108,7 +108,7 @@ def test_a_closed_standard_stream_is_nothing_and_its_number_is_not_another_file_
     opened = tmp_path / "opened"
     program = (
         "import os, sys\n"
-        "from utank_hil.console.failures import failures_named\n"
+        "from utank_hil.console.common import failures_named\n"
         "with failures_named():\n"
         f"    print('text'); print('text', file=sys.stderr)\n"
         f"    number = os.open({str(opened)!r}, os.O_CREAT | os.O_RDWR)\n"

@@ -16,8 +16,7 @@ from utank_hil.commands.run import run
 from utank_hil.console.common import new_app
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.telemetry import law_values
-from utank_hil.telemetry.bus_records import Kind
-from utank_hil.telemetry.frame_log import FrameLog, FrameLogWriter
+from utank_hil.telemetry.frame_log import FrameLog, FrameLogWriter, Kind
 from utank_hil.telemetry.replay import entries_of
 
 pytestmark = pytest.mark.slow

@@ -4,7 +4,7 @@ import pytest
 
 from tests.nodes.canopen_peers import PROFILE, PUMP
 from utank_hil.base.parameters import ParameterError
-from utank_hil.canbus.profiles.canopen import Place
+from utank_hil.canbus.profiles.drive_plan import Place
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.console.ship_report import devices_json, print_devices
 from utank_hil.console.terminal import Terminal

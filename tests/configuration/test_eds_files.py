@@ -13,7 +13,7 @@ from tests.nodes.canopen_peers import PROFILE, Wire
 from utank_hil.base.parameters import ParameterError
 from utank_hil.canbus import Frame, Quality
 from utank_hil.canbus.frame import STANDARD
-from utank_hil.canbus.profiles.canopen import Place
+from utank_hil.canbus.profiles.drive_plan import Place
 from utank_hil.configuration.device_files import Eds, with_eds
 from utank_hil.configuration.devices import DevicesSection
 

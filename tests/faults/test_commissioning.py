@@ -35,8 +35,8 @@ from utank_hil.nodes.commissioning.pulses import plan_pulses
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.runners import Lockstep
-from utank_hil.telemetry.bus_records import RECORD
 from utank_hil.telemetry.events import event_text
+from utank_hil.telemetry.frame_log import RECORD
 from utank_hil.telemetry.node_tap import NodeTap
 from utank_hil.telemetry.replay import entries_of, replay
 

@@ -33,8 +33,8 @@ from utank_hil.canbus import Fault, Mode
 from utank_hil.canbus.measurements import Measurements
 from utank_hil.configuration import ConfigError, load_config
 from utank_hil.configuration.files import problems_in_words
+from utank_hil.console.common import KILLED
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.failures import KILLED
 from utank_hil.control import BuiltLaw
 from utank_hil.control.limiter import CommandLimiter
 from utank_hil.nodes.running_law import RunningLaw

@@ -19,7 +19,7 @@ from utank_hil.assembly import build_controller_node
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import ControlWord, DriveState, Fault, Frame, Mode
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
-from utank_hil.canbus.profiles.canopen import Place
+from utank_hil.canbus.profiles.drive_plan import Place
 from utank_hil.configuration import load_config
 from utank_hil.configuration.device_sections import DriveSection
 from utank_hil.configuration.devices import DevicesSection

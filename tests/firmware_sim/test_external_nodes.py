@@ -17,14 +17,13 @@ from foreign_nodes import (
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import EXTERNAL_DRIVE, STALE_NS, build_ship_side, external_drive
-from firmware_sim.truth import TRUTH, TruthRecorder
+from firmware_sim.truth import TRUTH, MemoryLog, TruthRecorder
 from utank_hil.assembly import build_controller_node
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Fault, Frame, Mode, load_catalogue
 from utank_hil.configuration import load_config
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.runners import Lockstep
-from utank_hil.telemetry.memory_log import MemoryLog
 
 STORM = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
 RESOLUTION_PA = 8.0

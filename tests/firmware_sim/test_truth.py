@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 from drive_bench import calm_plant
 
-from firmware_sim.truth import TRUTH, TruthRecorder
+from firmware_sim.truth import TRUTH, MemoryLog, TruthRecorder
 from utank_hil.canbus import Frame
-from utank_hil.telemetry.memory_log import MemoryLog
 
 PERIOD_NS = 50_000_000
 

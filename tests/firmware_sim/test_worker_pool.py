@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from firmware_sim.worker_pool import WorkerPool, shared, whole_first
+from utank_hil.console.common import KILLED
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.failures import KILLED
 from utank_hil.runners.stopping import SIGNALS
 
 COMMANDS = {

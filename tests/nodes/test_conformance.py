@@ -11,7 +11,7 @@ from tests.nodes.canopen_peers import PROFILE, PUMP, Line
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Frame, Quality, SensorMotion
 from utank_hil.canbus.frame import STANDARD
-from utank_hil.canbus.profiles.canopen import NetworkState, Place
+from utank_hil.canbus.profiles.drive_plan import NetworkState, Place
 from utank_hil.configuration.device_sections import DriveSection
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.commissioning.conformance import DriveTrial, SensorTrial

@@ -30,8 +30,7 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.control.constrained.design import ConstrainedDesign
-from utank_hil.telemetry.bus_records import Kind
-from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.frame_log import FrameLog, Kind
 from utank_hil.telemetry.law_values import decoded, encoded, law_values
 from utank_hil.telemetry.replay import entries_of, replay, replay_log
 from utank_hil.telemetry.replay_head import law_differences, recorded_config, recorded_law

@@ -23,8 +23,7 @@ from two_processes import (
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.telemetry.bus_files.writing import write_frames
 from utank_hil.telemetry.bus_logs import frames_of
-from utank_hil.telemetry.bus_records import Kind
-from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.frame_log import FrameLog, Kind
 from utank_hil.telemetry.replay import entries_of, replay_log
 from utank_hil.telemetry.replay_head import recorded_config
 

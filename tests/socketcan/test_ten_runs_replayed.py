@@ -26,8 +26,7 @@ from utank_hil.canbus.socketcan import SocketCanPort
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.nodes.panel import Action
 from utank_hil.runners import RealTimeLoop, heard_by
-from utank_hil.telemetry.bus_records import Kind
-from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.frame_log import FrameLog, Kind
 from utank_hil.telemetry.replay import Entry, entries_of, replay_log
 from utank_hil.telemetry.replay_head import recorded_config
 

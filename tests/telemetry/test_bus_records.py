@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.telemetry.bus_records import (
+from utank_hil.telemetry.frame_log import (
     LAYOUT,
     PAYLOAD_BYTES,
     RECORD,

@@ -8,8 +8,7 @@ from typer.testing import CliRunner
 from utank_hil.assembly import build_law
 from utank_hil.canbus import SensorMotion, load_catalogue
 from utank_hil.cli import app
-from utank_hil.telemetry.bus_records import Kind
-from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.frame_log import FrameLog, Kind
 from utank_hil.telemetry.replay import ExplainedTick, entries_of, replay
 from utank_hil.telemetry.replay_head import recorded_config
 

@@ -11,8 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from little_room import little_room
 
-from utank_hil.telemetry.bus_records import LAYOUT, RECORD, Kind, Records
-from utank_hil.telemetry.frame_log import BlockSink, FrameLog, FrameLogError, FrameLogWriter
+from utank_hil.telemetry.frame_log import (
+    LAYOUT,
+    RECORD,
+    BlockSink,
+    FrameLog,
+    FrameLogError,
+    FrameLogWriter,
+    Kind,
+    Records,
+)
 
 TICK_NS = 10_000_000
 SECOND_NS = 1_000_000_000

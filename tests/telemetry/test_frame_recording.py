@@ -11,8 +11,15 @@ import numpy as np
 import pytest
 
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.bus_records import IN_A_SLOT, LAYOUT, Kind, Records, frame_ring
-from utank_hil.telemetry.frame_log import FrameLog, FrameRecording
+from utank_hil.telemetry.frame_log import (
+    IN_A_SLOT,
+    LAYOUT,
+    FrameLog,
+    FrameRecording,
+    Kind,
+    Records,
+    frame_ring,
+)
 from utank_hil.telemetry.recorder_process import RecorderProcess, RecorderState, RecordingTask
 from utank_hil.telemetry.ring import RingWriter, RowWriter
 from utank_hil.telemetry.rotation import part_of

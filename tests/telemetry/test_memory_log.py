@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.telemetry.memory_log import MemoryLog
+from firmware_sim.truth import MemoryLog
 
 
 @given(promised=st.integers(0, 60), offered=st.integers(0, 90))

@@ -15,7 +15,7 @@ from utank_hil.control import PredictiveLaw
 from utank_hil.retuning import Answer, Candidate, ModelSummary, Refusal
 from utank_hil.retuning.answer import answer_bytes
 from utank_hil.runners import LoopStatistics
-from utank_hil.telemetry.bus_records import LAYOUT, Kind
+from utank_hil.telemetry.frame_log import LAYOUT, Kind
 from utank_hil.telemetry.node_tap import NodeTap, RetunerTap
 from utank_hil.telemetry.replay import RecordedRetuner
 

@@ -21,10 +21,9 @@ from rerun.chunk import RrdReader
 from utank_hil.canbus import Mode, RetuningState
 from utank_hil.canbus.events import RetuningEvent
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.bus_records import LAYOUT, Kind, frame_ring
 from utank_hil.telemetry.events import EventWriter
-from utank_hil.telemetry.frame_log import FrameLog
-from utank_hil.telemetry.part import RecordingPart
+from utank_hil.telemetry.frame_log import LAYOUT, FrameLog, Kind, frame_ring
+from utank_hil.telemetry.live import RecordingPart
 from utank_hil.telemetry.recorder import record_part
 from utank_hil.telemetry.recorder_process import (
     RecorderError,

@@ -15,9 +15,8 @@ from rerun.chunk import RrdReader
 from utank_hil.canbus import RetuningState
 from utank_hil.canbus.events import RetuningEvent
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.bus_records import LAYOUT, Kind, frame_ring
 from utank_hil.telemetry.events import EventWriter
-from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.frame_log import LAYOUT, FrameLog, Kind, frame_ring
 from utank_hil.telemetry.recorder_process import RecorderProcess, RecorderReport, RecordingTask
 from utank_hil.telemetry.recording import read_about, read_recording
 from utank_hil.telemetry.ring import RowWriter

@@ -8,7 +8,7 @@ from cantools.database.can import Database, Message, Signal
 from utank_hil.canbus import load_catalogue
 from utank_hil.canbus.catalogue import DBC_PATH, read_data_ids
 from utank_hil.canbus.endpoints import BUCKET_LIMIT, MAX_LOST, RESYNC_FRAMES
-from utank_hil.runners.wire_time import LONGEST_FRAME_BITS
+from utank_hil.runners.bus_model import LONGEST_FRAME_BITS
 
 BIT_RATE = 250_000
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "can-catalogue.md"

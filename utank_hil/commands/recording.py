@@ -10,8 +10,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.whole_file import claimed_files
 from utank_hil.console.common import why_not_writable
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.bus_records import frame_ring
-from utank_hil.telemetry.frame_log import SUFFIX
+from utank_hil.telemetry.frame_log import SUFFIX, frame_ring
 from utank_hil.telemetry.recorder_process import (
     NEEDS_RERUN,
     RecorderError,
@@ -110,7 +109,7 @@ class RunRecording:
         return self._records is not None
 
     def write_records(self, records: bytes, time_ns: int) -> None:  # noqa: ARG002
-        """Take `bus_records` of ticks; never waits."""
+        """Take records of ticks (`frame_log`); never waits."""
         if self._records is not None:
             self._records.write(records)
 

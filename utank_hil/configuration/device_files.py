@@ -8,8 +8,7 @@ from typing import Any, Final
 
 from utank_hil.base.text_files import open_content
 from utank_hil.canbus import profiles
-from utank_hil.canbus.profiles.canopen import DISABLED, Place
-from utank_hil.canbus.profiles.drive_plan import PROFILE
+from utank_hil.canbus.profiles.drive_plan import DISABLED, PROFILE, Place
 from utank_hil.configuration.yaml_text import parse_yaml
 
 OF_AN_EDS: Final = "EDS "  #: Begins the name of a device whose layouts were read from an EDS.

@@ -9,8 +9,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 from utank_hil.base.parameters import Finite, Problem, Range
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus.frame import LONGEST_ID, LONGEST_STANDARD_ID
-from utank_hil.canbus.profiles.canopen import Place
-from utank_hil.canbus.profiles.drive_plan import COMMAND_MS, MODES, DrivePlan
+from utank_hil.canbus.profiles.drive_plan import COMMAND_MS, MODES, DrivePlan, Place
 from utank_hil.canbus.profiles.field import Field as BusField
 from utank_hil.configuration.device_files import NATIVE, drive_with_eds
 from utank_hil.configuration.files import Section

@@ -20,8 +20,8 @@ from pydantic import (
     model_validator,
 )
 
-from utank_hil.base.number_table import read_number_table
 from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
+from utank_hil.base.text_files import read_number_table
 from utank_hil.configuration.files import Section
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.tank import GRAVITY_M_S2

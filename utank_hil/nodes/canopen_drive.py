@@ -8,7 +8,9 @@ from typing import Final, NamedTuple
 from utank_hil.canbus import ControlWord, DriveState, Frame
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.measurements import Measurements
-from utank_hil.canbus.profiles.canopen import (
+from utank_hil.canbus.profiles.device import HeardMessage
+from utank_hil.canbus.profiles.drive_plan import (
+    COMMAND_MS,
     EMERGENCY,
     HEARTBEAT,
     RECEIVED_1,
@@ -16,11 +18,10 @@ from utank_hil.canbus.profiles.canopen import (
     SENT_1,
     SENT_2,
     SYNC,
+    DrivePlan,
     NetworkState,
     NodeCommand,
 )
-from utank_hil.canbus.profiles.device import HeardMessage
-from utank_hil.canbus.profiles.drive_plan import COMMAND_MS, DrivePlan
 from utank_hil.control.pressure_loop import PressureLoop
 from utank_hil.nodes.canopen_setup import CanopenSetup
 from utank_hil.nodes.plausibility import MILLISECOND_NS, NEVER_HEARD_NS

@@ -9,19 +9,20 @@ from typing import Final
 
 from utank_hil.canbus import Frame
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
-from utank_hil.canbus.profiles.canopen import (
+from utank_hil.canbus.profiles.drive_plan import (
     NMT,
     SDO_REQUEST,
     Abort,
     Answer,
+    DrivePlan,
     NodeCommand,
     Place,
+    Step,
     abort_words,
     answer,
     read_request,
     write_request,
 )
-from utank_hil.canbus.profiles.drive_plan import DrivePlan, Step
 
 ANSWER_NS: Final = 300_000_000  #: CiA 301 names no time; servers of drives answer within 50 ms.
 PATIENCE_NS: Final = 300_000_000  #: For a mode to be entered, likewise.

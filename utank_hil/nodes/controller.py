@@ -4,8 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from utank_hil.base.periodic import Schedule
-from utank_hil.base.tick import TICK_NS, TICK_S
+from utank_hil.base.tick import TICK_NS, TICK_S, Schedule
 from utank_hil.canbus import (
     Address,
     Alarm,

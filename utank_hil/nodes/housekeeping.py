@@ -2,7 +2,7 @@
 
 import math
 
-from utank_hil.base.periodic import Schedule
+from utank_hil.base.tick import Schedule
 from utank_hil.canbus import (
     Address,
     AddressClaim,

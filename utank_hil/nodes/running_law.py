@@ -7,8 +7,7 @@ from typing import Final
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.periodic import Schedule
-from utank_hil.base.tick import TICK_NS, TICK_S, is_whole_ticks
+from utank_hil.base.tick import TICK_NS, TICK_S, Schedule, is_whole_ticks
 from utank_hil.canbus import RetuningOrder, RetuningState
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.canbus.events import ModelSummary, RetuningEvent

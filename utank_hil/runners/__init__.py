@@ -1,6 +1,7 @@
 """Nodes and the two runners that drive them: lockstep in simulated time, and real time."""
 
 from utank_hil.runners.bus_model import SimulatedBus as SimulatedBus
+from utank_hil.runners.bus_model import frame_bits as frame_bits
 from utank_hil.runners.lockstep import Lockstep as Lockstep
 from utank_hil.runners.node import Node as Node
 from utank_hil.runners.node import NodeError as NodeError
@@ -11,4 +12,3 @@ from utank_hil.runners.realtime import RealTimeLoop as RealTimeLoop
 from utank_hil.runners.statistics import Histogram as Histogram
 from utank_hil.runners.statistics import LoopStatistics as LoopStatistics
 from utank_hil.runners.stopping import stop_on_signals as stop_on_signals
-from utank_hil.runners.wire_time import frame_bits as frame_bits

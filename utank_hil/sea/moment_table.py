@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.elementary import phasors
-from utank_hil.base.number_table import read_number_table
+from utank_hil.base.text_files import read_number_table
 
 COLUMNS: Final = ("omega_rad_s", "heading_deg", "moment_nm_per_m", "phase_deg")
 

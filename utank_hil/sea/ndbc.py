@@ -25,8 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.number_table import NUMBER
-from utank_hil.base.text_files import lines_of, open_text
+from utank_hil.base.text_files import NUMBER, lines_of, open_text
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea.measured import MeasuredSpectra
 from utank_hil.sea.spectrum import Spectrum

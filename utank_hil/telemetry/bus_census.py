@@ -8,7 +8,7 @@ from utank_hil.canbus import Address, Frame, HardwiredInputs, Heartbeat, Rejecti
 from utank_hil.canbus.frame import BUS_SHIFT, OTHER_BUS, STANDARD
 from utank_hil.configuration import Vessel
 from utank_hil.nodes.inbox import Inbox
-from utank_hil.runners.wire_time import frame_bits
+from utank_hil.runners.bus_model import frame_bits
 from utank_hil.safety.monitors.senders import LEAST_PER_CYCLE, MOST_PER_CYCLE
 from utank_hil.telemetry.bus_files.frame import BusFrame, FrameKind
 

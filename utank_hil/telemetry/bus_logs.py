@@ -14,7 +14,7 @@ from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.canbus.frame import BUS_SHIFT, LONGEST_ID, STANDARD
 from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError, FrameKind
 from utank_hil.telemetry.bus_files.log import BusLog
-from utank_hil.telemetry.bus_records import Kind
+from utank_hil.telemetry.frame_log import Kind
 from utank_hil.telemetry.replay import Entry
 
 _EARLY_NS: Final = TICK_NS // 5

@@ -12,7 +12,7 @@ from utank_hil.nodes.controller import ControllerNode
 from utank_hil.retuning import Retuner
 from utank_hil.retuning.answer import Answer, answer_bytes
 from utank_hil.retuning.retuner import Request
-from utank_hil.telemetry.bus_records import IN_A_SLOT, LAYOUT, PAYLOAD_BYTES, Kind
+from utank_hil.telemetry.frame_log import IN_A_SLOT, LAYOUT, PAYLOAD_BYTES, Kind
 
 Sink = Callable[[bytes, int], None]
 """Function that takes the packed records of ticks and the time of the last; it must not wait."""

@@ -56,7 +56,7 @@ def record_part(state: RecorderState) -> bool:
             events = EventReader(task.events, places.get(RingKind.EVENTS))
             stack.enter_context(events)
         if find_spec("rerun") is not None:
-            from utank_hil.telemetry.part import RecordingPart
+            from utank_hil.telemetry.live import RecordingPart
 
             part = RecordingPart(file, reader.columns, reader.about)
         if task.frames is not None:

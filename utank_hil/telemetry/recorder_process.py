@@ -23,7 +23,7 @@ class RecordingTask:
 
     rows: str  #: Name of the ring of rows.
     file: str  #: The first `.rrd` file; the frame log stands beside it.
-    #: events, frames: names of the rings of events and of `bus_records`.
+    #: events, frames: names of the rings of events and of records (`frame_log`).
     events: str | None = None
     frames: str | None = None
     head: Mapping[str, Any] = field(default_factory=dict)  #: Head of the frame log (`replay_head`).

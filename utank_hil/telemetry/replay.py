@@ -22,8 +22,7 @@ from utank_hil.nodes.signals import SIGNALS, shown_by
 from utank_hil.retuning.answer import Answer, read_answer
 from utank_hil.retuning.retuner import Request
 from utank_hil.runners import LoopStatistics
-from utank_hil.telemetry.bus_records import LAYOUT, PAYLOAD_BYTES, Kind, Records
-from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.frame_log import LAYOUT, PAYLOAD_BYTES, FrameLog, Kind, Records
 from utank_hil.telemetry.law_values import ValueDifference, Values, differences, law_values
 from utank_hil.telemetry.replay_head import causes, law_differences, recorded_law
 

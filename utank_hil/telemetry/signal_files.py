@@ -14,15 +14,19 @@ from typing import Any, Final
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.number_table import is_time, read_number_table, since_first
-from utank_hil.base.text_files import TextFileError, kind_of
+from utank_hil.base.text_files import (
+    TextFileError,
+    is_time,
+    kind_of,
+    read_number_table,
+    since_first,
+)
 from utank_hil.base.whole_file import left_whole
 from utank_hil.canbus import AddressClaim, DriveStatus2, load_catalogue
 from utank_hil.canbus.codec import FRAME_BYTES, Codec
 from utank_hil.telemetry.bus_files.log import BusLog, format_of
 from utank_hil.telemetry.bus_logs import LoggedController
-from utank_hil.telemetry.bus_records import Kind
-from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
+from utank_hil.telemetry.frame_log import SUFFIX, FrameLog, Kind
 from utank_hil.telemetry.replay import Entry, entries_of
 from utank_hil.telemetry.units import column_of
 

@@ -17,20 +17,23 @@ from utank_hil.canbus import (
     SensorTank,
 )
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
-from utank_hil.canbus.profiles.canopen import (
+from utank_hil.canbus.profiles.device import ProfiledDevice
+from utank_hil.canbus.profiles.device_plan import FIELDS, DevicePlan
+from utank_hil.canbus.profiles.drive_plan import (
+    COMMAND_MS,
     SDO_ANSWER,
     SDO_REQUEST,
     SENT_1,
     SENT_2,
+    SPEED,
+    STATUS_WORD,
     Answer,
+    DrivePlan,
     Place,
     answer,
     read_request,
     write_request,
 )
-from utank_hil.canbus.profiles.device import ProfiledDevice
-from utank_hil.canbus.profiles.device_plan import FIELDS, DevicePlan
-from utank_hil.canbus.profiles.drive_plan import COMMAND_MS, SPEED, STATUS_WORD, DrivePlan
 from utank_hil.dynamics.pump import Pump
 from utank_hil.nodes.actuators import DriveSequence
 from utank_hil.nodes.canopen_drive import CanopenDrive, state_of

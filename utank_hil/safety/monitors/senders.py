@@ -23,8 +23,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Final, Protocol
 
-from utank_hil.base.periodic import Schedule
-from utank_hil.base.tick import TICK_NS
+from utank_hil.base.tick import TICK_NS, Schedule
 from utank_hil.canbus.endpoints import Rejection
 from utank_hil.safety.monitors.finding import Finding
 
