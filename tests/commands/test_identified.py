@@ -49,6 +49,18 @@ def test_the_valve_of_a_ship_that_was_found_is_kept(tmp_path: Path) -> None:
     assert load_config(files["vessel"], Vessel).valve == vessel.valve
 
 
+def test_the_devices_of_a_ship_that_was_found_are_kept_and_that_she_is_emulated(
+    tmp_path: Path,
+) -> None:
+    vessel = load_config(Path("configs/ships/thesis_first_devices.yaml"), Vessel)
+    files = IdentifiedShips(tmp_path, vessel, read_controller(CONFIG)).write(FOUND)
+    found = load_config(files["vessel"], Vessel)
+    assert (found.devices, found.emulated) == (vessel.devices, True)
+    assert found.model_copy(update={"ship": vessel.ship, "tank": vessel.tank}).version == (
+        vessel.version
+    )
+
+
 def test_the_least_gm_of_a_ship_that_was_found_is_still_watched(tmp_path: Path) -> None:
     vessel = load_config(CONFIG, ControllerConfig).vessel
     ship = dataclasses.replace(vessel.ship, displacement_n=1.42e8)

@@ -72,8 +72,9 @@ class IdentifiedShips:
 def _vessel_content(vessel: Vessel) -> dict[str, Any]:
     """Return the content of a vessel's file, without values at their defaults."""
     content: dict[str, Any] = {"name": f"{vessel.name.removesuffix(', identified')}, identified"}
-    if vessel.least_gm_m is not None:
-        content["least_gm_m"] = vessel.least_gm_m
+    content |= vessel.model_dump(
+        mode="json", include={"least_gm_m", "emulated", "devices"}, exclude_defaults=True
+    )
     for key in ("ship", "tank", "pump", "valve", "redundancy"):
         part = getattr(vessel, key)
         if part is None or part == NO_REDUNDANCY:
