@@ -60,6 +60,12 @@ def test_an_error_of_a_sensors_interface_is_told_once_and_ends_nothing():
     second.error = "not found"
     ports.receive()
     assert [str(each) for each in ports.take_errors()] == ["not found"]
+    second.error = None
+    ports.receive()
+    assert ports.take_errors() == []  # it works again
+    second.error = "not found"
+    ports.receive()
+    assert [str(each) for each in ports.take_errors()] == ["not found"]
 
 
 def test_the_own_interface_is_not_opened_twice():

@@ -30,7 +30,8 @@ def why_other_bit_rate(channel: str, bit_rate: int) -> str:
 class BusPorts:
     """The controller's own interface, the first, and others, whose frames carry their numbers.
 
-    An error of another one is kept in `errors`, by its number; the devices on it fall silent.
+    An error of another one is kept in `errors`, by its number, until it is taken; the devices on it
+    fall silent.
     """
 
     def __init__(self, ports: Sequence[Port]) -> None:
@@ -78,9 +79,10 @@ class BusPorts:
         return frames
 
     def take_errors(self) -> list[PortError]:
-        """Errors of interfaces but the controller's own, each once until it is another one."""
+        """New errors of interfaces but the controller's own; one that lasts is told once."""
         new = [each for number, each in self.errors.items() if str(each) != self._told.get(number)]
         self._told = {number: str(each) for number, each in self.errors.items()}
+        self.errors.clear()
         return new
 
     def close(self) -> None:
