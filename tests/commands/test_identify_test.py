@@ -41,11 +41,16 @@ def test_a_decay_becomes_the_ships_keys_and_a_picture(tmp_path: Path, record: Pa
     assert found["ship"]["damping_ratio"] == pytest.approx(0.02, rel=0.02)
     assert found["ship"]["quadratic_damping_nms2_rad2"] == pytest.approx(0, abs=2e4)
     assert found["command"] == "identify decay"
+    assert found["warnings"] == []
     assert (tmp_path / "decay.png").stat().st_size > 10_000
     code, out = run("identify", "decay", record, "--from", 10.5, "--out", tmp_path)
     assert code == 0
     assert "roll_period_s: 5.6" in out
     assert "--ship SHIP.yaml adds" in out
+    words = ("identify", "decay", record, "--from", 10.5, "--ship", "configs/ships/patti_b.yaml")
+    code, out = run(*words, "--out", tmp_path)
+    assert "rolls in" in out
+    assert "of a model, or of another ship" in " ".join(out.split())
 
 
 def test_rest_in_the_record_is_refused_with_the_remedy(tmp_path: Path, record: Path) -> None:

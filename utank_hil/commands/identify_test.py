@@ -1,6 +1,7 @@
 """``utank-hil identify decay`` and ``inclining``: what tests of the ship say."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -8,6 +9,7 @@ from typing import Annotated, Any, NoReturn
 import numpy as np
 import typer
 
+from utank_hil.analysis.loop.margins import PERIOD_SCALES
 from utank_hil.analysis.motion.decay import RollDecay, roll_decay
 from utank_hil.analysis.motion.inclining import inclining
 from utank_hil.base.arrays import FloatArray
@@ -57,17 +59,21 @@ def decay(
     if vessel is not None:
         about = describe("identify decay", vessel, out, options=context.params)
     path = draw_decay(found, out / PICTURE, record.name, about)
-    keys = ship_keys(found, vessel)
+    keys, warnings = ship_keys(found, vessel), list(found.warnings)
+    if vessel is not None:
+        own_s = 2 * math.pi / vessel.ship.natural_frequency_rad_s
+        if not PERIOD_SCALES[0] <= found.period_s / own_s <= PERIOD_SCALES[-1]:
+            reason = "is this the record of a model, or of another ship or loading?"
+            warnings.append(f"{vessel.name} rolls in {own_s:.3g} s: {reason}")
     if json_:
         plain = {
             name: value.tolist() if isinstance(value, np.ndarray) else value
             for name, value in asdict(found).items()
             if name not in ("time_s", "roll_rad", "fit_rad")
         }
-        warnings = list(found.warnings)
         print_json(about | plain | {"ship": keys, "warnings": warnings, "picture": str(path)})
         return
-    _print_decay(Terminal(), found, keys, vessel, path)
+    _print_decay(Terminal(), found, keys, warnings, vessel, path)
 
 
 def ship_keys(found: RollDecay, vessel: Vessel | None) -> dict[str, float]:
@@ -132,7 +138,12 @@ def refuse(reason: str, json_: bool) -> NoReturn:
 
 
 def _print_decay(
-    terminal: Terminal, found: RollDecay, keys: dict[str, Any], vessel: Vessel | None, path: Path
+    terminal: Terminal,
+    found: RollDecay,
+    keys: dict[str, Any],
+    warnings: Sequence[str],
+    vessel: Vessel | None,
+    path: Path,
 ) -> None:
     table = new_table("Free decay", "value", "95 %")
     for name, value, (low, high), digits in (
@@ -156,7 +167,7 @@ def _print_decay(
     terminal.table(table)
     least, _, most = amplitudes_deg
     terminal.say(f"It holds from {least:.1f} to {most:.1f}°, and nowhere else.")
-    for warning in found.warnings:
+    for warning in warnings:
         terminal.say(warning, yellow="warning:")
     terminal.say("Keys of the ship:")
     for name, value in keys.items():
