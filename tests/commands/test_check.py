@@ -378,3 +378,15 @@ def test_a_period_by_formula_is_said(tmp_path: Path) -> None:
     told = json.loads(CliRunner().invoke(app, ["check", str(path), "--json"]).stdout)
     assert told["pump_heel_rad"] is None
     assert told["assumptions"][0].startswith("ship: roll period 8.8 s")
+
+
+def test_two_losses_of_a_tank_that_loses_quadratically_are_named(tmp_path: Path):
+    content = yaml.safe_load((CONFIGS / "ships" / "thesis_first.yaml").read_text())
+    content["tank"] |= {"damping_ratio": 0.02, "quadratic_loss": 4.0}
+    (tmp_path / "ship.yaml").write_text(yaml.safe_dump(content))
+    path = controller(tmp_path, "pd", vessel="./ship.yaml")
+    found = invoke("check", path)
+    said = re.search(r"damping ratio is (0\.\d+) in the sea .* expects, 0.02 in", found.stdout)
+    assert said
+    assert float(said[1]) > 0.03
+    assert "two tanks" not in invoke("check", controller(tmp_path, "pd")).stdout

@@ -117,7 +117,7 @@ def print_controller(judged: JudgedLaw) -> None:
         "pump gain 0.8 to 1.2, 0 or 20 ms more delay"
     )
     console.table(table)
-    for remark in _remarks(judged.law, report):
+    for remark in _remarks(judged, report):
         console.say(remark)
     _print_verdict(console, judged)
 
@@ -167,7 +167,7 @@ def print_collection(kind: str, collection: Any, judged: Judged) -> None:
         table.add_row(each, *figures, verdict)
     console.table(table)
     for each, one in judged.items():
-        for remark in () if one.robustness is None else _remarks(one.law, one.robustness):
+        for remark in () if one.robustness is None else _remarks(one, one.robustness):
             console.say(f"{each}: {remark}")
     for each, one in judged.items():
         for failure in one.failures:
@@ -210,8 +210,15 @@ def _searched_s(law: BuiltLaw) -> float:
     return 0.0 if law.linear is None else DELAY_SAMPLES * law.linear.sample_time_s
 
 
-def _remarks(law: BuiltLaw, report: Robustness) -> list[str]:
+def _remarks(judged: JudgedLaw, report: Robustness) -> list[str]:
+    law, tanks = judged.law, judged.config.design_plant.tanks
     notes = [note for note in (_at_rest(law),) if note is not None]
+    if len(tanks) > 1:
+        working, calm = (f"{tank.damping_ratio:.2g}" for tank in tanks)
+        notes.append(
+            f"The worse of two tanks counts: the water's damping ratio is {working} in the sea "
+            f"that the law expects, {calm} in small motions."
+        )
     gain = report.nominal.peak_loop_gain
     if gain < LEAST_LOOP_GAIN and not law.adapts:
         notes.append(f"It hardly acts: its loop gain is {gain:.2g} at most.")
