@@ -38,7 +38,7 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea, Spectrum
 from utank_hil.sea.measured import SUFFIXES
 from utank_hil.sea.moment_table import MomentTable
-from utank_hil.sea.passing import PassingSea
+from utank_hil.sea.sea import PassingSea
 
 Bearing = Annotated[float, Range(least=-360, most=360)]
 Speed = Annotated[float, Range(least=0, most=40)]

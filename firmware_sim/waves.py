@@ -9,8 +9,7 @@ from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.elementary import angles_of, each, exp, log, phasors, sizes
 from utank_hil.base.tick import TICK_S
 from utank_hil.sea import Harmonics
-from utank_hil.sea.passing import PassingSea
-from utank_hil.sea.sea import encounter_frequency
+from utank_hil.sea.sea import PassingSea, encounter_frequency
 
 AHEAD_TICKS: Final = 2
 """Ticks by which the last of the plant's four interpolation points is ahead."""

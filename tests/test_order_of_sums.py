@@ -24,7 +24,6 @@ TICK = (
     "utank_hil/retuning/law_*.py",
     "utank_hil/retuning/renewing.py", "utank_hil/retuning/trial.py",
     "utank_hil/sea/sea.py", "utank_hil/sea/spectrum.py", "utank_hil/sea/moment_table.py",
-    "utank_hil/sea/passing.py",
     "firmware_sim/drive*.py", "firmware_sim/plant*.py", "firmware_sim/sensors.py",
     "firmware_sim/truth.py", "firmware_sim/valve.py", "firmware_sim/voyage.py",
     "firmware_sim/waves.py",

@@ -26,8 +26,7 @@ from utank_hil.dynamics.hull.lateral import LateralHull
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.runners import Lockstep, SimulatedBus
 from utank_hil.sea import Harmonics, Sea, jonswap
-from utank_hil.sea.passing import PassingSea
-from utank_hil.sea.sea import slope_per_m
+from utank_hil.sea.sea import PassingSea, slope_per_m
 
 VESSEL = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)
 STORM = Path("configs/scenarios/storm.yaml")

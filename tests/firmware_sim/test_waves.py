@@ -9,8 +9,7 @@ from firmware_sim.plant import Plant
 from firmware_sim.waves import PassingWaves
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
-from utank_hil.sea.passing import PassingSea
-from utank_hil.sea.sea import encounter_frequency
+from utank_hil.sea.sea import PassingSea, encounter_frequency
 
 VESSEL = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)
 SLOPE = EffectiveSlope(0.5)

@@ -290,6 +290,6 @@ def test_accepted_frames_that_say_something_new_are_counted() -> None:
     line = Line()
     for said, changes in (({}, 0), ({}, 0), ({"reset": True}, 1), ({"reset": True}, 1), ({}, 2)):
         line.say(**said)  # type: ignore[arg-type]
-        assert line.orders.changes == changes
+        assert line.orders.receiver.changes == changes
     line.say(stop=True, corrupt=True)
-    assert line.orders.changes == 2
+    assert line.orders.receiver.changes == 2

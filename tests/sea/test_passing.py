@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from utank_hil.sea import Sea, jonswap
-from utank_hil.sea.passing import PassingSea
+from utank_hil.sea.sea import PassingSea
 
 YOUNG, OLD = jonswap(1.5, 6.0), jonswap(4.0, 11.0)
 

@@ -56,21 +56,21 @@ class Receiver(Generic[T]):
     `heard` counts frames, accepted or not, `rejected` those that were not, by `Rejection`. `valid`
     is the state of the stream by a leaky bucket, +1 for a rejected and -1 for an accepted frame:
     False before the first accepted frame, and from `BUCKET_LIMIT` until the bucket is empty again.
-    `changes` is 0: only who knows of a message that is also sent on a change counts those.
+    `changes` are frames with a new content, which who hears a message that is also sent on a change
+    counts; else 0.
     """
 
-    changes: ClassVar[int] = 0
     counts: ClassVar[bool] = True  #: Whether a counter tells a new frame.
     __slots__ = (
         "_bucket", "_candidate", "_decode", "_expected", "_protected", "_run",
-        "can_id", "cycle_ns", "heard", "lost", "rejected", "valid",
+        "can_id", "changes", "cycle_ns", "heard", "lost", "rejected", "valid",
     )  # fmt: skip
 
     def __init__(self, codec: Codec[T]) -> None:
         self.can_id = codec.can_id
         self.cycle_ns = codec.cycle_ns
         self.valid = False
-        self.heard = self.lost = 0
+        self.heard = self.lost = self.changes = 0
         self.rejected = dict.fromkeys(Rejection, 0)
         self._decode = codec.decode
         self._protected = codec.protected

@@ -211,40 +211,22 @@ class ControllerConfig(Section):
         every_s = math.inf if settings.every_s is None else settings.every_s
         most_rad_s = WASHOUT_SHARE * 2 * math.pi / settings.roll_period_range_s[1]
         checks = (
-            (
-                settings.change_factor is not None and self.sea_estimate is None,
-                "change_factor",
-                "needs the section sea_estimate, which tells the ship: add `sea_estimate: {}`",
-            ),
-            (
-                settings.order > MOST_ORDER,
-                "order",
-                f"must be {MOST_ORDER} at most, got {settings.order}",
-            ),
-            (
-                not period_s / 2 < shortest_s <= longest_s <= length_s,
-                "pulse_hold_s",
-                f"must rise from the law's sample time, {period_s:g} s, to identification_s at "
-                f"most, got {shortest_s:g} and {longest_s:g}",
-            ),
-            (
-                every_s < LEAST_PAUSE_S,
-                "every_s",
-                f"must be {LEAST_PAUSE_S:g} or more, got {every_s:g}: during the pulses, and for "
-                "eight roll periods after, no law is compared with the passive ship",
-            ),
-            (
-                length_s > MOST_PULSES_S,
-                "identification_s",
-                f"must be {MOST_PULSES_S:g} at most, got {length_s:g}",
-            ),
-            (
-                law.washout_rad_s > most_rad_s,
-                "roll_period_range_s",
-                f"must leave {most_rad_s:.4g} or more for the law's washout_rad_s, "
-                f"{law.washout_rad_s:g}: lower one of the two",
-            ),
-        )
+            (settings.change_factor is not None and self.sea_estimate is None, "change_factor",
+             "needs the section sea_estimate, which tells the ship: add `sea_estimate: {}`"),
+            (settings.order > MOST_ORDER, "order",
+             f"must be {MOST_ORDER} at most, got {settings.order}"),
+            (not period_s / 2 < shortest_s <= longest_s <= length_s, "pulse_hold_s",
+             f"must rise from the law's sample time, {period_s:g} s, to identification_s at most, "
+             f"got {shortest_s:g} and {longest_s:g}"),
+            (every_s < LEAST_PAUSE_S, "every_s",
+             f"must be {LEAST_PAUSE_S:g} or more, got {every_s:g}: during the pulses, and for "
+             "eight roll periods after, no law is compared with the passive ship"),
+            (length_s > MOST_PULSES_S, "identification_s",
+             f"must be {MOST_PULSES_S:g} at most, got {length_s:g}"),
+            (law.washout_rad_s > most_rad_s, "roll_period_range_s",
+             f"must leave {most_rad_s:.4g} or more for the law's washout_rad_s, "
+             f"{law.washout_rad_s:g}: lower one of the two"),
+        )  # fmt: skip
         problems = [(name, reason) for wrong, name, reason in checks if wrong]
         problems += record_problems(
             settings.order,

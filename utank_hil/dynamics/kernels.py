@@ -15,6 +15,7 @@ import numpy as np
 
 from utank_hil.base import elementary
 from utank_hil.base.arrays import FloatArray
+from utank_hil.dynamics import nonlinear
 from utank_hil.dynamics.jit import njit
 from utank_hil.dynamics.nonlinear import INSIDE_M, REST_M_S, RollCoefficients
 
@@ -30,6 +31,7 @@ InStep = tuple[float, float, float]  #: Values of a quantity at start, middle an
 NO_SWAY = (0.0, 0.0, 0.0)
 # No kernel reorders or fuses sums (`fastmath`): processors would differ in their last digits.
 sine_cosine = njit(error_model="numpy")(elementary.sine_cosine)
+forces = njit(error_model="numpy", inline="always")(nonlinear.forces)
 
 
 @njit(error_model="numpy")
@@ -69,31 +71,11 @@ def accelerations(
     pump: float,
     valve: float,
 ) -> tuple[float, float]:
-    """Roll and level acceleration; `pump` is area times pressure, `valve` area times valve loss.
-
-    `sway` is the centre of gravity's lateral acceleration over g, positive to starboard. To the
-    water it turns gravity (`utank_hil.dynamics.nonlinear`).
-    """
+    """Roll and level acceleration by `utank_hil.dynamics.nonlinear.forces`."""
     sin, cos = sine_cosine(phi)
     righting = righting_moment(per_piece, restoring, phi)
-    roll_inertia = c.inertia + c.inertia_h2 * h * h
-    roll_moment = (
-        moment
-        + c.wind_moment
-        + (c.offset_moment + c.weight_h * h) * cos
-        - (c.damping + c.quadratic_damping * abs(phi_dot)) * phi_dot
-        - righting
-        - 2 * c.inertia_h2 * h * h_dot * phi_dot
-        - (c.weight_lever - c.weight_h2 * h * h) * sin
-        + sway * (c.weight_h * h * sin + (c.weight_lever - c.weight_h2 * h * h) * cos)
-    )
-    level_force = (
-        pump
-        - (c.loss + (c.quadratic_loss + valve) * abs(h_dot)) * h_dot
-        + c.inertia_h2 * h * phi_dot * phi_dot
-        + c.weight_h * sin
-        - 2 * c.weight_h2 * h * cos
-        - sway * (c.weight_h * cos + 2 * c.weight_h2 * h * sin)
+    roll_inertia, roll_moment, level_force = forces(
+        c, righting, sin, cos, phi_dot, h, h_dot, moment, sway, pump, valve
     )
     scale = 1 / (roll_inertia * c.level_inertia - c.coupling * c.coupling)
     h_ddot = (roll_inertia * level_force - c.coupling * roll_moment) * scale

@@ -34,7 +34,7 @@ d phi' = -m_c / (m0 + m2 h^2) d h'. While the water is pressed against the stop,
 import math
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -82,6 +82,37 @@ class Impact(NamedTuple):
     stop_impulse_ns: float
 
 
+def forces(
+    c: RollCoefficients, righting: Any, sin: Any, cos: Any, phi_dot: Any, h: Any, h_dot: Any,
+    moment: Any, sway: Any, pump: Any, valve: Any,
+) -> tuple[Any, Any, Any]:  # fmt: skip
+    """Roll inertia, roll moment and force on the level, of numbers or arrays; kernels compile it.
+
+    `sway` is the centre of gravity's lateral acceleration over g, positive to starboard: to the
+    water it turns gravity. `pump` is area times pressure, `valve` area times valve loss.
+    """
+    roll_inertia = c.inertia + c.inertia_h2 * h * h
+    roll_moment = (
+        moment
+        + c.wind_moment
+        + (c.offset_moment + c.weight_h * h) * cos
+        - (c.damping + c.quadratic_damping * abs(phi_dot)) * phi_dot
+        - righting
+        - 2 * c.inertia_h2 * h * h_dot * phi_dot
+        - (c.weight_lever - c.weight_h2 * h * h) * sin
+        + sway * (c.weight_h * h * sin + (c.weight_lever - c.weight_h2 * h * h) * cos)
+    )
+    level_force = (
+        pump
+        - (c.loss + (c.quadratic_loss + valve) * abs(h_dot)) * h_dot
+        + c.inertia_h2 * h * phi_dot * phi_dot
+        + c.weight_h * sin
+        - 2 * c.weight_h2 * h * cos
+        - sway * (c.weight_h * cos + 2 * c.weight_h2 * h * sin)
+    )
+    return roll_inertia, roll_moment, level_force
+
+
 @dataclass(frozen=True, slots=True)
 class RollModel:
     """Ship and tank in roll; states (roll_rad, roll_rate_rad_s, level_m, level_rate_m_s)."""
@@ -124,26 +155,11 @@ class RollModel:
         phi, phi_dot, h, h_dot = np.moveaxis(np.asarray(state, dtype=np.float64), -1, 0)
         sin, cos = sines_cosines(phi)
         sway = np.asarray(sway_m_s2) / GRAVITY_M_S2
-        roll_inertia = c.inertia + c.inertia_h2 * h * h
-        roll_moment = (
-            np.asarray(wave_moment_nm)
-            + c.wind_moment
-            + c.offset_moment * cos
-            - (c.damping + c.quadratic_damping * np.abs(phi_dot)) * phi_dot
-            - self.restoring.moment_nm(phi)
-            - 2 * c.inertia_h2 * h * h_dot * phi_dot
-            + c.weight_h * h * cos
-            - (c.weight_lever - c.weight_h2 * h * h) * sin
-            + sway * (c.weight_h * h * sin + (c.weight_lever - c.weight_h2 * h * h) * cos)
-        )
-        loss = c.quadratic_loss + c.area * np.asarray(valve_loss_pa_per_m2_s2)
-        level_force = (
-            c.area * np.asarray(pressure_pa)
-            - (c.loss + loss * np.abs(h_dot)) * h_dot
-            + c.inertia_h2 * h * phi_dot * phi_dot
-            + c.weight_h * sin
-            - 2 * c.weight_h2 * h * cos
-            - sway * (c.weight_h * cos + 2 * c.weight_h2 * h * sin)
+        pump = c.area * np.asarray(pressure_pa)
+        valve = c.area * np.asarray(valve_loss_pa_per_m2_s2)
+        moment, righting = np.asarray(wave_moment_nm), self.restoring.moment_nm(phi)
+        roll_inertia, roll_moment, level_force = forces(
+            c, righting, sin, cos, phi_dot, h, h_dot, moment, sway, pump, valve
         )
         if stopped:
             phi_ddot, h_ddot = roll_moment / roll_inertia, np.zeros_like(h)

@@ -176,8 +176,8 @@ class Inbox:
         self.watched.append(hardwired.receiver)
         self.stations = Stations(catalogue, self._versions, second=redundancy.second_station)
         for orders in self.stations.orders.values():
-            self._subscriptions[orders.can_id] = orders.accept, orders.obey
-            self.watched.append(orders)
+            self._subscriptions[orders.receiver.can_id] = orders.accept, orders.obey
+            self.watched.append(orders.receiver)
         if len(senders) == 2 and foreign.motions[1] is None:
             matched.append(Address.SENSORS_2)
         self._matched_ns: dict[int, int] = {}

@@ -46,12 +46,7 @@ class Orders:
     """
 
     def __init__(self, receiver: Receiver[OperatorCommand]) -> None:
-        self.can_id = receiver.can_id
         self.receiver = receiver
-        self.cycle_ns = receiver.cycle_ns
-        self.rejected = receiver.rejected
-        #: Number of accepted frames whose content was new: they come on top of the cycle's.
-        self.changes = 0
         self._gap_ns = (MAX_LOST + 1) * receiver.cycle_ns
         self.requested_mode = Mode.STANDBY
         self.last: OperatorCommand | None = None  #: Latest accepted frame,
@@ -66,16 +61,6 @@ class Orders:
         #: frame disarmed what an accepted one had armed.
         self.news = self.takes_command = self.lets_go = False
         self._lasting = Wishes()  # without edges
-
-    @property
-    def heard(self) -> int:
-        """Accepted frames so far."""
-        return self.receiver.heard
-
-    @property
-    def lost(self) -> int:
-        """Frames so far that are missing by the counter."""
-        return self.receiver.lost
 
     def accept(self, frame: Frame) -> OperatorCommand | None:
         """Return the message of a frame, None if it is rejected; hear its stop or disarm."""
@@ -118,7 +103,7 @@ class Orders:
             undo or (order.undo and not before.undo),
             forbidden or order.forbid_retuning,
         )
-        self.changes += order != before
+        self.receiver.changes += order != before
         self.last, self.heard_ns = order, now_ns
         self.requested_mode = Mode.STANDBY if asked is None else asked
 
