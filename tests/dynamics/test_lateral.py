@@ -121,8 +121,7 @@ def test_memory_is_the_radiation_of_the_data_to_one_percent(limit: bool) -> None
     assert np.all(least > -1e-9 * np.abs(memory.real).max())
 
 
-@pytest.mark.parametrize("heading_deg", [90.0, 135.0])
-@pytest.mark.parametrize("omega", [0.5, 0.8, 1.1])
+@pytest.mark.parametrize(("heading_deg", "omega"), [(90.0, 0.8), (135.0, 0.5), (135.0, 1.1)])
 def test_plant_in_a_regular_wave_is_the_frequency_domain_of_the_data_to_one_percent(
     heading_deg: float, omega: float
 ) -> None:

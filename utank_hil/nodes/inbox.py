@@ -86,27 +86,13 @@ class Inbox:
 
     Only the inbox writes its attributes; the others get the values of `snapshot`.
 
-    Parameters
-    ----------
-    configuration_version : int
-        Hash of the controller's configuration, to compare with the others'.
-    level_limit_m : float
-        Level at which a reservoir is full or empty; infinite if it is not known.
-    pump, valve : bool
-        Whether the ship has a pump, and a valve, to be heard.
-    thresholds : MonitorThresholds, optional
-        What no motion of ship and water exceeds; without them no sample is a spike.
-    foreign : ForeignDevices
-        Devices of other makers.
-    drive : CanopenDrive, optional
-        The drive of `foreign` as it is commanded.
+    `configuration_version` is compared with the other nodes'. `level_limit_m` is the level at which
+    a reservoir is full or empty. `pump` and `valve` say whether there is one to be heard. Without
+    `thresholds`, what no motion of ship and water exceeds, no sample is a spike. `drive` is that of
+    `foreign`, the devices of other makers, as it is commanded.
 
-    Attributes
-    ----------
-    hardwired : HardwiredHeard
-        Hard-wired inputs: what they say counts wherever they are heard.
-    frames, foreign : int
-        Frames heard so far, good and bad, of any kind, and those that are none of the catalogue's.
+    What `hardwired` says counts wherever it is heard. `frames` were heard so far, good and bad, of
+    any kind; `foreign` are those of them that are none of the catalogue's.
     """
 
     def __init__(

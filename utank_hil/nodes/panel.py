@@ -74,24 +74,11 @@ class OperatorPanel:
 
     Stop is held until the controller answers with a mode without power, and for `EDGE_NS` at least,
     `RAMP_NS` in FAULT. Until then arming is refused. While nobody attends it the panel is silent,
-    but for a stop.
+    but for a stop. `attended` says whether a person can see it: a controller in charge ramps down
+    after a silence of five seconds; a shorter one changes nothing.
 
-    Parameters
-    ----------
-    configuration_version : int
-        Sent in the heartbeat.
-    script : iterable of TimedAction
-        Scheduled button presses, for benches.
-    station : Station
-        Which of the two stations it is.
-    period_ns : int
-        Time between two looks at the buttons; the cycle of OPERATOR_CMD is a multiple of it.
-
-    Attributes
-    ----------
-    attended : bool
-        Whether a person can see the panel. A controller in charge ramps down after a silence of
-        five seconds; a shorter one changes nothing.
+    `script` are scheduled button presses, for benches. `period_ns` is the time between two looks at
+    the buttons, of which the cycle of OPERATOR_CMD is a multiple.
     """
 
     name = "panel"

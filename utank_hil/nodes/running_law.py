@@ -49,28 +49,11 @@ def is_fresh(measured: Measurements, motion: MotionSample) -> bool:
 class RunningLaw:
     """A law on the bus; it is stepped every sample time, in charge or not.
 
-    A law may be anybody's: whatever it raises cuts the pressure.
+    A law may be anybody's: whatever it raises cuts the pressure. `pressure_pa` is its last answer.
 
-    Parameters
-    ----------
-    law : Controller
-        Its sample time must be a whole number of ticks.
-    commands : tuple of str
-        What it commands, see `BuiltLaw`.
-    limits : SafetyLimits
-        Of the ages from which a law that plans has watched nothing.
-    thresholds : MonitorThresholds, optional
-        Of the share of the pressure that a plan begins with, and of the tank's period.
-
-    Attributes
-    ----------
-    pressure_pa : float
-        Last answer.
-
-    Raises
-    ------
-    ValueError
-        If the law's sample time is not a whole number of ticks.
+    `commands` is what it commands, see `BuiltLaw`. `limits` have the ages from which a law that
+    plans has watched nothing, `thresholds` the share of the pressure that a plan begins with, and
+    the tank's period. ValueError is raised if the law's sample time is not a whole number of ticks.
     """
 
     def __init__(

@@ -85,6 +85,8 @@ class CommissioningNode:
         volume_m: float,
     ) -> None:
         self.node = node
+        self.receive, self.other_frames = node.receive, node.other_frames
+        self.link_error, self.stop = node.link_error, node.stop
         self._law = law
         self._plant = plant
         self._plan = plan
@@ -137,22 +139,6 @@ class CommissioningNode:
     def length_s(self) -> float:
         """Length of the stage that it is in, where it has one."""
         return REST_S if self.stage is Stage.REST else SETTLE_S + self._moving_s
-
-    def receive(self, frame: Frame, now_ns: int) -> None:
-        """Take one frame from the bus."""
-        self.node.receive(frame, now_ns)
-
-    def other_frames(self, count: int) -> None:
-        """Take note of frames of other kinds on the bus."""
-        self.node.other_frames(count)
-
-    def link_error(self, now_ns: int, reason: str) -> None:
-        """Take note that the bus could not be read or written."""
-        self.node.link_error(now_ns, reason)
-
-    def stop(self, now_ns: int) -> Iterable[Frame]:
-        """Leave the pump at zero."""
-        return self.node.stop(now_ns)
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Let the controller do its tick, and look at what came of it."""

@@ -39,19 +39,8 @@ class DriveFollowing:
     only while the water flows the way of the command: a rotor at its greatest speed brakes water
     that outruns it.
 
-    Parameters
-    ----------
-    lag_s : float
-        Time constant of the pump's pressure.
-    period_s : float
-        Time between two updates.
-
-    Attributes
-    ----------
-    expected_pa : float
-        Pressure by the model.
-    late_pa : float
-        Distance of the measured pressure from it, where it is judged.
+    `lag_s` is the pressure's time constant, `period_s` the time between two updates; `expected_pa`
+    is the model's pressure, `late_pa` how far the measured one is off, where that is judged.
     """
 
     def __init__(self, lag_s: float, thresholds: MonitorThresholds, period_s: float) -> None:

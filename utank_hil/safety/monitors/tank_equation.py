@@ -91,28 +91,14 @@ def roll_push_at_natural_frequency(ship: RollShip, tank: Tank) -> float:
 
 
 class TankEquation:
-    """Gains of roll, pump and level in the tank's equation.
+    """Gains of roll, pump and level in the tank's equation, updated every `period_s`.
 
-    Parameters
-    ----------
-    period_s : float
-        Time between two updates.
-    valve : bool
-        Whether the pressure holds what a valve takes, as it is estimated.
-
-    Attributes
-    ----------
-    doubt : float
-        Power over that at which a sign is found wrong; NaN as long as no push is large enough.
-    level_gain : float
-        See the module; NaN as long as the push is too small to tell. With the constant within +-z
-        and the sway that speak most for sound sensors.
-    late_s : float
-        Delay of the motion sensor, the same; NaN as long as the roll is too small to tell.
-    obeyed : bool
-        Whether reversed motion or swapped gauges now leave far more than sound sensors do.
-    settled : bool
-        Whether the filters have forgotten their start, the first one or that after a gap.
+    With `valve` the pressure holds what a valve takes, as it is estimated. `doubt` is the power
+    over that at which a sign is found wrong. `level_gain`, see the module, and `late_s`, the motion
+    sensor's delay, are with the constant within +-z and the sway that speak most for sound sensors.
+    All three are NaN as long as the push, or the roll, is too small to tell. `obeyed` says whether
+    reversed motion or swapped gauges now leave far more than sound sensors do, `settled` whether
+    the filters have forgotten their start, the first one or that after a gap.
     """
 
     def __init__(
