@@ -1,5 +1,9 @@
 """Compiling where nothing can be kept."""
 
+import importlib
+import sys
+from pathlib import Path
+
 import pytest
 from numba.core.caching import CacheImpl
 
@@ -19,3 +23,26 @@ def test_what_can_not_be_kept_is_compiled_all_the_same(
     compiled = njit()(twice)
     assert compiled(21.0) == 42.0
     assert (compiled.stats.cache_path is not None) is kept
+
+
+def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    head = "from utank_hil.dynamics.jit import njit\n"
+    (tmp_path / "calling.py").write_text(
+        f"{head}from called_kernel import one\n@njit()\ndef two(): return 2 * one()\n"
+    )
+    found = []
+    for value in (1, 1, 10):
+        called = f"{head}@njit()\ndef one(): return {value}\n"
+        if not found or value != 1:
+            (tmp_path / "called_kernel.py").write_text(called)
+        importlib.invalidate_caches()
+        for name in ("calling", "called_kernel"):
+            sys.modules.pop(name, None)
+        two = importlib.import_module("calling").two
+        found.append((two(), sum(two.stats.cache_hits.values())))
+    for name in ("calling", "called_kernel"):
+        del sys.modules[name]
+    assert found == [(2, 0), (2, 1), (20, 0)]

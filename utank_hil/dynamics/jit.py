@@ -1,11 +1,16 @@
 """Numba's compiler with its cache, if a folder is available."""
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import Any, Final, TypeVar
 
 import numba
 
+from utank_hil.base import elementary
+
 F = TypeVar("F", bound=Callable[..., Any])
+SOURCES: Final = [Path(elementary.__file__), *sorted(Path(__file__).parent.rglob("*.py"))]
+"""Files of what a kernel may call, beside the kernels in its own folder."""
 
 
 def njit(**options: Any) -> Callable[[F], F]:
@@ -20,6 +25,11 @@ def njit(**options: Any) -> Callable[[F], F]:
             compiled: F = numba.njit(cache=True, **options)(function)
         except RuntimeError:  # There is no folder for the cache.
             compiled = numba.njit(**options)(function)
+        index = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+        if index is not None:  # numba itself looks at the kernel's own file alone
+            beside = Path(function.__code__.co_filename).parent.glob("*kernel*.py")
+            stats = [each.stat() for each in (*SOURCES, *sorted(beside))]
+            index._source_stamp = index._source_stamp, [(s.st_mtime_ns, s.st_size) for s in stats]
         return compiled
 
     return decorate
