@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
-from itertools import cycle
+from itertools import count
 from typing import Annotated, Any, ClassVar, Final
 
 from pydantic import AfterValidator
@@ -129,7 +129,8 @@ def whole_cycles(by_s: float, cycle_ns: int) -> int:
 
 def one_in(every: int) -> Callable[[], bool]:
     """Return a function that is true at its first call, and at one in `every` from then on."""
-    return cycle([True, *[False] * (every - 1)]).__next__
+    calls = count()
+    return lambda: next(calls) % every == 0
 
 
 def intact(named: NamedMessage, frame: Frame) -> Any:
