@@ -7,16 +7,20 @@ Formats: WAVEWATCH III (netCDF, text), SWAN (netCDF, text), ERA5, NDBC's netCDF,
 """
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.sea.spectrum import Spectrum, Spread, band_edges
+
+if TYPE_CHECKING:
+    from xarray import Dataset
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,14 +162,27 @@ def load_directional(path: Path, place: tuple[float, float] | None = None) -> Me
     return _spectra(path, time[kept], content.freq.values, content.dir.values, density[kept], notes)
 
 
+@contextmanager
+def open_netcdf(path: Path) -> "Iterator[Dataset]":
+    """Open a netCDF file of any version; any exception may be raised at a damaged one."""
+    import h5netcdf  # type: ignore[import-untyped]
+    import xarray
+
+    # Where opening fails its end needs this, and else writes to standard error.
+    h5netcdf.File._writable = False
+    with path.open("rb") as file:  # The libraries leave open what they can't read.
+        engine: Literal["scipy", "h5netcdf"] = "scipy" if file.read(3) == b"CDF" else "h5netcdf"
+        file.seek(0)
+        with xarray.open_dataset(file, engine=engine) as content:
+            yield content
+
+
 def _reader(path: Path) -> str:
     """Return the name of the reader of a file, by what the file holds."""
     suffix = path.suffix.lower()
     if suffix == ".nc":
-        import xarray
-
         try:
-            with xarray.open_dataset(path) as content:
+            with open_netcdf(path) as content:
                 known = [reader for name, reader in _NETCDF.items() if name in content.variables]
                 found = ", ".join(map(str, content.variables))
         except Exception as error:  # Its engines raise any exception at a damaged file.

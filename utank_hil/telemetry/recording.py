@@ -132,7 +132,7 @@ def _chunks(path: Path, component: str) -> list[Chunk]:
     try:
         return _read_chunks(path, component)
     except RuntimeError as error:
-        damage = error
+        damage = str(error)  # The error itself would keep the file open.
     with tempfile.TemporaryDirectory() as folder:
         intact = Path(folder) / path.name
         command = [rerun_binary(), "rrd", "optimize", "--continue-on-error"]
@@ -143,8 +143,8 @@ def _chunks(path: Path, component: str) -> list[Chunk]:
         except RuntimeError:
             chunks = []
     if not chunks:
-        raise ValueError(f"{path}: {damage}") from damage
-    if done.stderr or "exceeds file size" not in str(damage):
+        raise ValueError(f"{path}: {damage}")
+    if done.stderr or "exceeds file size" not in damage:
         warnings.warn(f"{path} is damaged: rows may be missing", stacklevel=3)
     return chunks
 

@@ -295,7 +295,8 @@ def _read_parquet(path: Path, note: Callable[[str], None] | None) -> Iterator[_C
     from pyarrow import parquet
 
     try:
-        table = parquet.read_table(path)
+        with path.open("rb") as content:  # The library leaves open what it can't read.
+            table = parquet.read_table(content)
     except (pyarrow.ArrowException, OSError) as error:
         raise TextFileError(f"{path}: is no Parquet file that can be read: {error}") from error
     other = []

@@ -12,18 +12,16 @@ import numpy as np
 from utank_hil.base.arrays import ComplexArray
 from utank_hil.configuration.hull_files.parts import Given, hull_of
 from utank_hil.dynamics.hull.hull_data import DEGREES, HullData
+from utank_hil.sea.measured import open_netcdf
 
 
 def read_capytaine(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same for all readers
     """Read a netCDF file."""
     try:
-        import xarray
+        with open_netcdf(path) as content:
+            data = content.load()
     except ImportError as error:
         raise ValueError(f"{path} needs xarray: pip install 'utank-hil[files]'") from error
-    try:
-        with path.open("rb") as start:
-            engine = "scipy" if start.read(3) == b"CDF" else "h5netcdf"
-        data = xarray.load_dataset(path, engine=engine)
     except (OSError, ValueError) as error:
         raise ValueError(f"{path} can't be read as netCDF: {error}") from error
     needed = ("omega", "added_mass", "radiation_damping", "wave_direction")

@@ -2,11 +2,12 @@
 
 import zlib
 from collections.abc import Iterator
+from contextlib import suppress
 from datetime import UTC, datetime
 from importlib import reload
 from importlib.util import find_spec
 from struct import Struct
-from typing import BinaryIO, Final
+from typing import Any, BinaryIO, Final
 
 from utank_hil.base.text_files import open_content
 from utank_hil.telemetry.bus_files.frame import (
@@ -186,6 +187,10 @@ class Mf4Log(FrameSource):
         if find_spec("asammdf") is None:  # The reader would not name the package.
             raise ModuleNotFoundError("asammdf is not installed", name="asammdf")
 
+        from asammdf.blocks.mdf_v4 import MDF4
+
+        # Its own writes to standard error.
+        MDF4.__del__ = _close_what_is_open  # type: ignore[method-assign]
         # It was imported without asammdf (`utank_hil.canbus.python_can`).
         reader = reload(can.io.mf4).MF4Reader
         try:
@@ -201,3 +206,9 @@ class Mf4Log(FrameSource):
             ) from error
         if not self._count:
             raise BusLogError(f"{self._path}: no frames of a bus in it")
+
+
+def _close_what_is_open(file: Any) -> None:
+    """Close a file of asammdf, which lacks attributes where it was refused early."""
+    with suppress(AttributeError):
+        file.close()

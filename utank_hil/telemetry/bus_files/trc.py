@@ -9,7 +9,7 @@ LOOKS: Final = re.compile(r";\$FILEVERSION=|;#{20}|\s*\d+\)\s+\d")
 """Look of a line of such a log."""
 _VERSION_1: Final = re.compile(
     r"\s*\d+\)\s+(?P<O>\d+(?:\.\d+)?)\s+(?:(?P<B>\d{1,2})\s+)?(?:(?P<d>Rx|Tx|Warng|Error)\s+)?"
-    r"(?P<I>[0-9A-F]{8}|[0-9A-F]{4})\s+(?:-\s+)?(?P<L>\d)(?:\s+(?P<D>.*))?",
+    r"(?P<I>[0-9A-F]{7,8}|[0-9A-F]{4})\s+(?:-\s+)?(?P<L>\d)(?:\s+(?P<D>.*))?",
     re.I | re.A,
 )
 _COLUMNS: Final = re.compile(r";\$COLUMNS=([A-Za-z,]+)")
@@ -68,7 +68,8 @@ def _frame(cells: dict[str, str]) -> BusFrame:
     data = b"" if kind is FrameKind.REMOTE else bytes.fromhex(" ".join(text.split()[:size]))
     if kind is not FrameKind.REMOTE and len(data) != size:
         raise ValueError(f"{len(data)} of {size} bytes")
-    if len(number) not in (4, 8) or int(number, 16) > (0x7FF if len(number) == 4 else 0x1FFFFFFF):
+    extended = len(number) in (7, 8)  # python-can writes seven digits where they do.
+    if not (extended or len(number) == 4) or int(number, 16) > (0x1FFFFFFF if extended else 0x7FF):
         raise ValueError(f"{number} is no identifier of 11 or 29 bits")
     milliseconds, _, rest = cells["O"].partition(".")
     if not (cells["O"].isascii() and milliseconds.isdecimal() and (rest or "0").isdecimal()):
@@ -76,4 +77,4 @@ def _frame(cells: dict[str, str]) -> BusFrame:
     now_ns, bus = int(milliseconds + rest.ljust(6, "0")[:6]), cells.get("B") or "1"
     mark, speed = cells.get("d"), _SPEEDS.get(cells.get("T") or "", 0)
     sent = None if mark is None else mark.lower() == "tx"
-    return BusFrame(now_ns, bus, int(number, 16), len(number) == 8, kind, data, code, sent, speed)
+    return BusFrame(now_ns, bus, int(number, 16), extended, kind, data, code, sent, speed)
