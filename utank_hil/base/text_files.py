@@ -38,6 +38,12 @@ def kind_of(path: Path) -> str:
     return Path(path.stem if path.suffix.lower() == ".gz" else path.name).suffix.lower()
 
 
+def refuse_device(path: Path) -> None:
+    """Raise TextFileError for a pipe, socket or device, which may never begin or end."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise TextFileError(f"{path}: is no regular file but a pipe, socket or device")
+
+
 @contextmanager
 def open_content(
     path: Path, limit_bytes: int = LIMIT_BYTES, on_cut: Callable[[str], None] | None = None
@@ -47,6 +53,7 @@ def open_content(
     `on_cut` is called with the place where compressed content is cut or damaged, at which reading
     ends; without it that is a TextFileError, as is larger content.
     """
+    refuse_device(path)
     with path.open("rb") as file:
         compressed = file.peek(2)[:2] == _GZIP
         yield io.BufferedReader(_Content(file, path, limit_bytes, on_cut, compressed))
@@ -145,8 +152,9 @@ def read_number_table(path: Path) -> dict[str, FloatArray]:
     ``time_s``, in seconds from its first row. TextFileError has the line, the cause and the remedy.
     """
     with open_text(path) as text:
-        first = text.readline()
-        lines = csv.reader(chain([first], text), delimiter=max(",;\t", key=first.count))
+        content = (line for _, line in lines_of(path, text))
+        first = next(content, "")
+        lines = csv.reader(chain([first], content), delimiter=max(",;\t", key=first.count))
         try:
             names = [name.strip() for name in next(lines, [])]
             _check_names(path, names)
@@ -195,7 +203,7 @@ def _check_names(path: Path, names: list[str]) -> None:
             raise TextFileError(f"{path}: line 1 names {name!r} twice: rename one")
         if NUMBER.fullmatch(name):
             raise TextFileError(
-                f"{path}: line 1 holds the number {name}: it must name the columns, such as "
+                f"{path}: line 1 holds the number {name[:60]}: it must name the columns, such as "
                 "time_s,roll_deg"
             )
 
@@ -210,12 +218,14 @@ def _append_row(path: Path, names: list[str], row: list[str], line: int, values:
         if NUMBER.fullmatch(word):
             number = float(word)
             if math.isinf(number):
-                raise TextFileError(f"{path}: line {line}, {name}: {word} is too large")
+                raise TextFileError(f"{path}: line {line}, {name}: {word[:60]} is too large")
         elif word.lower() not in _MISSING:
             date = _date_s(word) if is_time(name) else None
             if date is None:
                 comma = "; write decimals with a point" if "," in word else ""
-                raise TextFileError(f"{path}: line {line}, {name}: {field!r} is no number{comma}")
+                raise TextFileError(
+                    f"{path}: line {line}, {name}: {field[:60]!r} is no number{comma}"
+                )
             number = date
             dated.add(index)
         if not name and word:

@@ -13,6 +13,7 @@ from pydantic import BaseModel
 
 from utank_hil.base.finite import finite
 from utank_hil.base.provenance import PROGRAM, commit, version
+from utank_hil.base.text_files import refuse_device
 from utank_hil.canbus import load_catalogue
 from utank_hil.configuration import ControllerConfig
 from utank_hil.nodes.commissioning.checks import Check
@@ -140,6 +141,7 @@ def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: P
     path = path or record_path(file)
     remedy = f"run utank-hil commission {file} --bus {bus} at the quay"
     try:
+        refuse_device(path)
         record = _Record.model_validate_json(path.read_bytes(), strict=True)
     except FileNotFoundError:
         return f"{path}: there is no record of a commissioning; {remedy}"

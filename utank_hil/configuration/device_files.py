@@ -294,7 +294,8 @@ def _dbc_layouts(file: str) -> dict[str, dict[str, Any]]:
     from cantools.database.can import Database
 
     try:
-        content = Path(file).read_bytes()
+        with open_content(Path(file), LIMIT_BYTES) as opened:
+            content = opened.read()
     except OSError as error:
         raise ValueError(f"dbc: {file} can't be read: {error.strerror}") from error
     database = Database(strict=False)  # one message that does not fit spoils no other

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Final, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from utank_hil.base.parameters import ParameterError, Problem
-from utank_hil.base.text_files import open_text
+from utank_hil.base.text_files import open_text, refuse_device
 from utank_hil.configuration.error_words import known_keys, nearest, words_for
 from utank_hil.configuration.yaml_text import Key, YamlError, parse_yaml
 
@@ -263,6 +263,11 @@ class _Reader:
         if isinstance(value, str) and value.lower().endswith(_SUFFIXES) and not named:
             return self.read(file.parent / value, key, stack, key)
         if isinstance(value, str) and value.startswith(("./", "../")):
+            try:
+                refuse_device(file.parent / value)
+            except (OSError, ValueError) as error:
+                self.problems.append(self.problem(key, str(error)))
+                self.unread.add(())  # A reader would wait for it.
             return str(file.parent / value)
         return value
 

@@ -4,14 +4,17 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final
+from zipfile import ZipFile
 
 import numpy as np
 from pydantic import BeforeValidator
 
+from utank_hil.base.text_files import open_text
 from utank_hil.control.state_space import SystemMatrices
 
 _NAMES: Final = ("A", "B", "C", "D")
 _SAMPLE_TIMES: Final = ("sample_time_s", "dt", "Ts")
+_LIMIT_BYTES: Final = 1 << 26  #: Of a law's file; one of a hundred states has some 200 kB.
 _HDF5: Final = b"\x89HDF\r\n\x1a\n"
 _MATLAB_73: Final = b"MATLAB 7.3"
 _AS_STRUCT: Final = (
@@ -114,9 +117,8 @@ def _unwrapped(content: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _json(path: Path) -> Mapping[str, Any]:
-    content = json.loads(
-        path.read_text(encoding="utf-8-sig"), object_pairs_hook=_once, parse_constant=_no_number
-    )
+    with open_text(path, _LIMIT_BYTES) as text:
+        content = json.loads(text.read(), object_pairs_hook=_once, parse_constant=_no_number)
     if not isinstance(content, dict):
         raise ValueError("it is no object")
     for name in _NAMES:
@@ -147,6 +149,9 @@ def _refuse_truth(name: str, value: Any) -> None:
 
 
 def _npz(path: Path) -> Mapping[str, Any]:
+    with ZipFile(path) as parts:
+        if sum(part.file_size for part in parts.infolist()) > _LIMIT_BYTES:
+            raise ValueError(f"it unpacks to more than {_LIMIT_BYTES} bytes, the most that is read")
     with np.load(path, allow_pickle=False) as archive:
         return {name: archive[name] for name in archive.files}
 

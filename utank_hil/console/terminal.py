@@ -1,14 +1,16 @@
 """What the commands print for people: text as it is, and tables at any width."""
 
 import os
+import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.measure import Measurement
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 
     from utank_hil.runners import LoopStatistics
 
+_STEERS: Final = re.compile("[\0-\b\v-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 UNLIMITED: Final = 10_000
 
 
@@ -46,6 +49,16 @@ class Terminal(Console):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(markup=False, emoji=False, highlight=False, **options)
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
+        """Yield what is shown; texts of files can't steer the terminal."""
+        for segment in super().render(renderable, options):
+            if segment.control:
+                yield segment
+            else:
+                yield Segment(_STEERS.sub("\N{REPLACEMENT CHARACTER}", segment.text), segment.style)
 
     def on_broken_pipe(self) -> None:
         """End as where results can't be written; Rich's own exit code is that of a refusal."""

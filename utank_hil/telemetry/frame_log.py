@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.closing import Closing
+from utank_hil.base.text_files import refuse_device
 from utank_hil.base.whole_file import append_whole, errors_name
 from utank_hil.telemetry.ring import RingKind, RingReader, RingWriter
 from utank_hil.telemetry.rotation import part_of, whole_of
@@ -209,6 +210,7 @@ class FrameLog:
             note(f"{self.cut}; what follows in it is left out")
 
     def _read(self, path: Path) -> Iterator[tuple[bytes, bytes]]:
+        refuse_device(path)
         with path.open("rb") as content:
             if content.read(len(_MARK)) != _MARK:
                 raise FrameLogError(f"{path}: is no frame log of this version")

@@ -70,10 +70,15 @@ def recorded_config(head: Mapping[str, Any]) -> Iterator[ControllerConfig]:
     """
     with tempfile.TemporaryDirectory(prefix="utank-replay-") as folder:
         places = {}
-        for number, (name, data) in enumerate(head["files"].items()):
-            places[name] = str(Path(folder, f"{number}-{Path(name).name}"))
-            Path(places[name]).write_bytes(unpacked(data))
-        content = _put(_in_full(head["about"]["configuration"]), places)
+        try:
+            for number, (name, data) in enumerate(head["files"].items()):
+                places[name] = str(Path(folder, f"{number}-{Path(name).name}"))
+                Path(places[name]).write_bytes(unpacked(data))
+            content = _put(_in_full(head["about"]["configuration"]), places)
+        except (LookupError, TypeError, AttributeError) as error:
+            raise ReplayHeadError(
+                f"its head is not one that this program writes: {error!r}"
+            ) from error
         if code := next(_code(content.get("law")), None):
             raise ReplayHeadError(
                 f"its law is Python code, {code}, which a log must not choose: name the "

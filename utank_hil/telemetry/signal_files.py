@@ -19,6 +19,7 @@ from utank_hil.base.text_files import (
     is_time,
     kind_of,
     read_number_table,
+    refuse_device,
     since_first,
 )
 from utank_hil.base.whole_file import left_whole
@@ -139,6 +140,7 @@ def read_signals(
     from its first record. ValueError has the file's name, the line if any, and the remedy.
     """
     suffix = kind_of(path)
+    refuse_device(path)
     path.open("rb").close()  # Readers may give a less precise reason.
     if suffix == ".rrd":
         from utank_hil.telemetry.recording import read_recording  # This imports Rerun.
@@ -190,7 +192,10 @@ def write_signals(path: Path, columns: Mapping[str, FloatArray]) -> None:
         return
     with left_whole(path), path.open("w", newline="", encoding="utf-8") as content:
         writer = csv.writer(content)
-        writer.writerow(columns)
+        # A spreadsheet runs what begins so; an apostrophe makes it text.
+        writer.writerow(
+            f"'{name}" if name[:1] in ("=", "+", "-", "@") else name for name in columns
+        )
         for row in zip(*(values.tolist() for values in columns.values()), strict=True):
             writer.writerow("" if value != value else repr(value) for value in row)
 

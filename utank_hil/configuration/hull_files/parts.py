@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import Finite, Positive, Range
+from utank_hil.base.text_files import open_content
 from utank_hil.configuration.files import Section
 from utank_hil.dynamics.hull.hull_data import HullData
 
@@ -89,10 +90,14 @@ def mode(path: Path, number: float) -> int:
     return int(number) - 1
 
 
+_LIMIT_BYTES: Final = 1 << 28  #: Of a text; ShipX's of many speeds have some 50 MB.
+
+
 def text(path: Path) -> str:
     """Return a file's text; ValueError if it can't be read."""
     try:
-        return path.read_text(encoding="latin-1")
+        with open_content(path, _LIMIT_BYTES) as content:
+            return content.read().decode("latin-1")
     except OSError as error:
         raise ValueError(f"{path} can't be read: {error.strerror}") from error
 

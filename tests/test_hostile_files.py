@@ -1,0 +1,543 @@
+"""Files that somebody made to do harm: none runs, hangs or fills the memory; each is refused.
+
+A row of `ROWS` makes a file in an empty folder, names what is to read it (the words of a command,
+or a reader), and what must be said. Code in a file would touch the canary ``ran``. What is said
+has no signs that steer a terminal.
+"""
+
+import gzip
+import io
+import os
+import pickle
+import socket
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+import yaml
+from test_mutated_files import LAW, made_fmu, ring, status_mb, within
+
+from utank_hil.cli import app
+from utank_hil.console.common import failures_named
+from utank_hil.console.terminal import Terminal
+from utank_hil.telemetry.frame_log import FrameLogWriter
+from utank_hil.telemetry.ring import RingReader
+
+ROOT = Path(__file__).resolve().parents[1]
+SHIP = f"vessel: {ROOT}/configs/ships/thesis_first.yaml\n"
+ESCAPE = "\x1b]0;owned\x07\x1b[2J"
+MOST_S, MOST_MB, GIB = 20, 700, 1 << 30
+
+
+class Canary:
+    """What leaves a mark when it is unpickled."""
+
+    def __init__(self, folder: Path) -> None:
+        self.mark = str(folder / "ran")
+
+    def __reduce__(self) -> Any:
+        return os.mkdir, (self.mark,)
+
+
+class Row(NamedTuple):
+    """A hostile file: its name, content, what reads it, and what is said."""
+
+    name: str
+    content: "str | bytes | Callable[[Path], object]"
+    words: "tuple[str, ...] | Callable[[Path], Any]"
+    says: str
+    code: int = 2
+
+
+CHECK = ("check", "{}")
+EXPORT = ("export", "{}", "--to", "{folder}/to.csv")
+FRAMES = ("export", "{}", "--to", "{folder}/to.log")
+REPLAY = ("replay", "{}")
+
+
+def controller(law: str) -> str:
+    return f"name: A\n{SHIP}law:\n  {law}\n"
+
+
+def law_of(make: Callable[[Path], object], suffix: str) -> Callable[[Path], object]:
+    """Return what makes a controller's file whose law is a data file."""
+
+    def made(path: Path) -> None:
+        file = path.with_name(f"law{suffix}")
+        make(file)
+        law = f"kind: state_space\n  system: ./{file.name}\n  measured: [roll_rad]"
+        path.write_text(controller(law))
+
+    return made
+
+
+def law(content: "str | bytes", suffix: str = ".json") -> Callable[[Path], object]:
+    content = content.encode() if isinstance(content, str) else content
+    return law_of(lambda path: path.write_bytes(content), suffix)
+
+
+def linked(to: str) -> Callable[[Path], object]:
+    return lambda path: path.symlink_to(to)
+
+
+def listening(path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as own:
+        here = os.getcwd()
+        os.chdir(path.parent)  # A path may be longer than a socket's name.
+        try:
+            own.bind(path.name)
+        finally:
+            os.chdir(here)
+
+
+def zipped(**parts: "str | bytes") -> Callable[[Path], object]:
+    def make(path: Path) -> None:
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, content in parts.items():
+                archive.writestr(name, content)
+
+    return make
+
+
+def bomb(path: Path) -> None:
+    """Write gzip of a GB and more, without a line feed in it, in a MB."""
+    member = gzip.compress(b"0" * (1 << 26))
+    path.write_bytes(member * 17)
+
+
+def npz_bomb(path: Path) -> None:
+    head = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        head, {"descr": "<f8", "fortran_order": False, "shape": (GIB // 8,)}
+    )
+    with (
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
+        archive.open("A.npy", "w") as part,
+    ):
+        part.write(head.getvalue())
+        for _ in range(GIB >> 24):
+            part.write(bytes(1 << 24))
+
+
+def object_npz(path: Path) -> None:
+    np.savez(path, A=np.array([Canary(path.parent)], dtype=object), B=[1.0], C=[1.0], D=[1.0])
+
+
+def pickled(path: Path) -> None:
+    path.write_bytes(pickle.dumps({"A": Canary(path.parent)}))
+
+
+def mat(**variables: Any) -> Callable[[Path], object]:
+    def make(path: Path) -> None:
+        from scipy.io import savemat
+
+        savemat(path, variables)
+
+    return make
+
+
+def mat_class(number: int) -> Callable[[Path], object]:
+    """Write a MAT file whose variable A is of another class, as 16 of a function's handle."""
+
+    def make(path: Path) -> None:
+        mat(**LAW)(path)
+        content = bytearray(path.read_bytes())
+        content[144] = number
+        path.write_bytes(content)
+
+    return make
+
+
+def sparse(path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(1 << 40)
+
+
+def fmu(**parts: "str | bytes") -> Callable[[Path], object]:
+    """Return what makes a scenario whose ship is an FMU with further, or other, parts."""
+
+    def make(path: Path) -> None:
+        unit = path.with_name("ship.fmu")
+        made_fmu(unit)
+        with zipfile.ZipFile(unit) as archive:
+            whole = {name: archive.read(name) for name in archive.namelist()}
+        zipped(**{**whole, **parts})(unit)
+        storm = yaml.safe_load((ROOT / "configs/scenarios/patti_b.yaml").read_text())
+        names = ("roll_rad", "roll_rate_rad_s", "level_m", "flow_m3_s")
+        storm |= {
+            "vessel": str(ROOT / "configs/ships/patti_b.yaml"),
+            "controllers": {"a": str(ROOT / "configs/controllers/patti_b_constrained_gpc.yaml")},
+            "plant": "fmu",
+            "fmu": {"file": "./ship.fmu", "variables": dict.fromkeys(names, "p")},
+        }
+        path.write_text(yaml.safe_dump(storm))
+
+    return make
+
+
+ALLOWED = (*CHECK, "--allow-code")
+XML = "modelDescription.xml"
+
+
+def frame_log(**head: Any) -> Callable[[Path], object]:
+    def make(path: Path) -> None:
+        about = {"configuration": {"name": "A"}, "data": {}}
+        content = {"about": about, "files": {}, "law": {}, "packages": {}, "catalogue": 1} | head
+        FrameLogWriter(path, content).close()
+
+    return make
+
+
+def block(kind: bytes, payload: bytes, length: int | None = None) -> bytes:
+    size = len(payload) if length is None else length
+    return struct.pack("<4sII", kind, size, zlib.crc32(payload, zlib.crc32(kind))) + payload
+
+
+MARK = b"UTANKHIL frames 1\n"
+HEAD_BOMB = MARK + block(b"HEAD", zlib.compress(bytes(GIB)))
+
+
+def device(content: Callable[[Path], object] | bytes, key: str) -> Callable[[Path], object]:
+    """Return what makes a ship's file whose motion sensor is described by a DBC or EDS."""
+
+    def make(path: Path) -> None:
+        file = path.with_name(f"a.{key}")
+        if isinstance(content, bytes):
+            file.write_bytes(content)
+        else:
+            content(file)
+        ship = yaml.safe_load((ROOT / "configs/ships/thesis_first.yaml").read_text())
+        ship["devices"] = {"motion": {key: f"./{file.name}", "messages": {"a": "TPDO1"}}}
+        path.write_text(yaml.safe_dump(ship))
+
+    return make
+
+
+def ring_of(*words: int) -> bytes:
+    return struct.pack("<16q", *words, *[0] * (16 - len(words))) + bytes(4096)
+
+
+RING = int.from_bytes(b"UTNKRING", "little")
+
+
+def csv_of(name: str) -> str:
+    return f"time_s,{name}\n0,1\n0.1,2\n0.2,3\n"
+
+
+ROWS = [
+    # configurations
+    Row(
+        "python-object.yaml",
+        "name: !!python/object/apply:os.mkdir [ran]\n",
+        CHECK,
+        "not valid YAML in line 1",
+    ),
+    Row("python-name.yaml", "name: !!python/name:os.system\n", CHECK, "not valid YAML in line 1"),
+    Row(
+        "python-module.yaml",
+        "name: !!python/module:antigravity\n",
+        CHECK,
+        "not valid YAML in line 1",
+    ),
+    Row("own-tag.yaml", "name: !Canary x\n", CHECK, "not valid YAML in line 1"),
+    Row(
+        "aliases.yaml",
+        "a0: &a0 [1, 2]\n"
+        + "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]\n" for i in range(1, 12)),
+        CHECK,
+        "aliases",
+    ),
+    Row("alias-of-itself.yaml", "a: &a [*a]\n", CHECK, "names what it stands in"),
+    Row("merge-of-itself.yaml", "a: &a\n  <<: *a\n", CHECK, "names what it stands in"),
+    Row("deep.yaml", "a: " + "[" * 50_000, CHECK, "nested too deeply"),
+    Row(
+        "deep-lines.yaml",
+        "".join(" " * i + "a:\n" for i in range(1500)),
+        CHECK,
+        "nested too deeply",
+    ),
+    Row("twice.yaml", f"name: A\nname: B\n{SHIP}law: {{kind: passive}}\n", CHECK, "written twice"),
+    Row("huge.yaml", controller("kind: pd\n  gains: [1e999, 1]"), CHECK, "law"),
+    Row("digits.yaml", f"name: A\n{SHIP}a: {'9' * 5000}\n", CHECK, "not valid YAML"),
+    Row("large.yaml", "name: A\n" + "#" * (1 << 23), CHECK, "more than"),
+    Row("sparse.yaml", sparse, CHECK, "can't be read"),
+    Row("zeros.yaml", linked("/dev/zero"), CHECK, "regular file"),
+    Row("pipe.yaml", lambda path: os.mkfifo(path), CHECK, "regular file"),
+    Row("socket.yaml", listening, CHECK, "can't be read"),
+    Row("folder.yaml", lambda path: path.mkdir(), CHECK, "is a folder"),
+    Row("loop.yaml", linked("loop.yaml"), CHECK, "can't be read"),
+    Row(
+        "circle.yaml",
+        "name: A\nvessel: circle.yaml\nlaw: {kind: passive}\n",
+        CHECK,
+        "includes itself",
+    ),
+    Row(
+        "secret.yaml",
+        f"name: A\nvessel: {'../' * 20}etc/passwd.yaml\nlaw: {{kind: passive}}\n",
+        CHECK,
+        "No such file",
+    ),
+    Row("null.yaml", b"name: A\0B\n", CHECK, "not valid YAML"),
+    Row("binary.yaml", bytes(range(256)) * 9, CHECK, "can't be read"),
+    Row(
+        "inner-code.yaml",
+        controller(
+            "kind: pump_with_valve\n  pump: {kind: python, factory: './x.py:Law', measured: [roll_rad]}"  # noqa: E501
+        ),
+        CHECK,
+        "law",
+    ),
+    Row(
+        "code.yaml",
+        controller("kind: python\n  factory: ./x.py:Law\n  measured: [roll_rad]"),
+        CHECK,
+        "--allow-code",
+    ),
+    Row(
+        "module.yaml",
+        controller("kind: python\n  factory: os:system\n  measured: [roll_rad]"),
+        CHECK,
+        "--allow-code",
+    ),
+    Row("escape.yaml", 'name: A\n"\\e]0;owned\\a": 1\n', CHECK, "error:"),
+    Row(f"{ESCAPE}.yaml", "a: [", CHECK, "not valid YAML"),
+    # laws
+    Row("pickle-npz.yaml", law_of(object_npz, ".npz"), CHECK, "holds no matrices"),
+    Row("pickle.yaml", law_of(pickled, ".npz"), CHECK, "holds no matrices"),
+    Row("npz-bomb.yaml", law_of(npz_bomb, ".npz"), CHECK, "holds no matrices"),
+    Row(
+        "reduce.yaml",
+        law('{"A": {"py/reduce": ["os.mkdir", ["ran"]]}, "B": 1, "C": 1, "D": 1, "dt": 1}'),
+        CHECK,
+        "A",
+    ),
+    Row("deep-json.yaml", law('{"A": ' + "[" * 200_000), CHECK, "holds no matrices"),
+    Row("nan-json.yaml", law('{"A": NaN}'), CHECK, "NaN is no finite number"),
+    Row("twice-json.yaml", law('{"A": 1, "A": 2}'), CHECK, "twice"),
+    Row("digits-json.yaml", law('{"A": ' + "9" * 5000 + "}"), CHECK, "holds no matrices"),
+    Row("zeros-json.yaml", law_of(linked("/dev/zero"), ".json"), CHECK, "regular file"),
+    Row("pipe-json.yaml", law_of(lambda path: os.mkfifo(path), ".json"), CHECK, "regular file"),
+    Row("pipe-mat.yaml", law_of(lambda path: os.mkfifo(path), ".mat"), CHECK, "regular file"),
+    Row("sparse-json.yaml", law_of(sparse, ".json"), CHECK, "more than"),
+    Row("handle-mat.yaml", law_of(mat_class(16), ".mat"), CHECK, "law.mat"),
+    Row("object-mat.yaml", law_of(mat_class(17), ".mat"), CHECK, "law.mat"),
+    Row(
+        "cell-mat.yaml",
+        law_of(mat(**(LAW | {"A": np.array([1, "a"], dtype=object)})), ".mat"),
+        CHECK,
+        "must hold numbers",
+    ),
+    Row(
+        "text-mat.yaml",
+        law_of(mat(**(LAW | {"A": "os.system"})), ".mat"),
+        CHECK,
+        "must hold numbers",
+    ),
+    # models of others
+    Row("fmu-code.yaml", fmu(), CHECK, "--allow-code"),
+    Row("fmu-up.yaml", fmu(**{"../../ran": "x"}), ALLOWED, "would leave the folder"),
+    Row("fmu-root.yaml", fmu(**{"/tmp/ran": "x"}), ALLOWED, "would leave the folder"),
+    Row("fmu-drive.yaml", fmu(**{"..\\ran": "x"}), ALLOWED, "would leave the folder"),
+    Row(
+        "fmu-entity.yaml",
+        fmu(**{XML: '<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/passwd">]><a>&b;</a>'}),
+        ALLOWED,
+        "document type",
+    ),
+    Row(
+        "fmu-laughs.yaml",
+        fmu(**{XML: "<!DOCTYPE a [<!ENTITY b 'c'><!ENTITY d '&b;&b;'>]><a>&d;</a>"}),
+        ALLOWED,
+        "document type",
+    ),
+    Row("fmu-bomb.yaml", fmu(**{f"{i}": bytes(1 << 26) for i in range(9)}), ALLOWED, "more than"),
+    Row("fmu-large.yaml", fmu(**{XML: bytes(1 << 25)}), ALLOWED, "larger than"),
+    Row(
+        "fmu-name.yaml",
+        fmu(
+            **{
+                XML: '<fmiModelDescription fmiVersion="2.0" modelName="a" guid="b">'
+                '<CoSimulation modelIdentifier="../x"/></fmiModelDescription>'
+            }
+        ),
+        ALLOWED,
+        "can't be used",
+    ),
+    # devices
+    Row("dbc-zeros.yaml", device(linked("/dev/zero"), "dbc"), CHECK, "regular file"),
+    Row("dbc-pipe.yaml", device(lambda path: os.mkfifo(path), "dbc"), CHECK, "regular file"),
+    Row(
+        "dbc-escape.yaml",
+        device(f'VERSION ""\nBO_ 1 {ESCAPE}: 8 A\n'.encode(), "dbc"),
+        CHECK,
+        "error:",
+    ),
+    Row("dbc-sparse.yaml", device(sparse, "dbc"), CHECK, "more than"),
+    Row("eds-pipe.yaml", device(lambda path: os.mkfifo(path), "eds"), CHECK, "regular file"),
+    Row(
+        "eds-escape.yaml",
+        device(f"[1800sub1]\nDefaultValue={ESCAPE}\n".encode(), "eds"),
+        CHECK,
+        "error:",
+    ),
+    Row(
+        "eds-inner.yaml",
+        device(b"[1800sub1]\nDefaultValue=%(DefaultValue)s\n", "eds"),
+        CHECK,
+        "error:",
+    ),
+    # logs and tables
+    Row("bomb.log.gz", bomb, EXPORT, "bomb.log.gz"),
+    Row("bomb.csv.gz", bomb, EXPORT, "bomb.csv.gz"),
+    Row("pipe.log", lambda path: os.mkfifo(path), EXPORT, "regular file"),
+    Row("pipe.csv", lambda path: os.mkfifo(path), EXPORT, "regular file"),
+    Row("pipe.frames", lambda path: os.mkfifo(path), REPLAY, "regular file"),
+    Row("pipe.rrd", lambda path: os.mkfifo(path), EXPORT, "regular file"),
+    Row("zeros.log", linked("/dev/zero"), FRAMES, "regular file"),
+    Row("zeros.parquet", linked("/dev/zero"), EXPORT, "regular file"),
+    Row("line.log", b"(1.5) can0 123#01" + b"0" * (1 << 20), FRAMES, "more than"),
+    Row("escape.log", f"(1.5) {ESCAPE} 123#01\n(1.6) can1 123#01\n", EXPORT, "error:"),
+    Row(
+        "claims.blf",
+        b"LOGG"
+        + struct.pack("<L", 144)
+        + bytes(136)
+        + b"LOBJ"
+        + struct.pack("<HHLL", 16, 1, 0xFFFFFFFF, 10),
+        FRAMES,
+        "claims.blf",
+    ),
+    Row(
+        "blf-bomb.blf",
+        b"LOGG"
+        + struct.pack("<L", 144)
+        + bytes(136)
+        + b"LOBJ"
+        + struct.pack("<HHLLH14x", 16, 1, 32 + len(zlib.compress(bytes(GIB // 4))), 10, 2)
+        + zlib.compress(bytes(GIB // 4)),
+        FRAMES,
+        "more than",
+    ),
+    Row("not.mf4", b"MDF " + bytes(4096), FRAMES, "not.mf4"),
+    Row("page.rrd", "<script>alert(1)</script>", EXPORT, "page.rrd"),
+    Row("pickle.rrd", pickled, EXPORT, "pickle.rrd"),
+    Row("pickle.parquet", pickled, EXPORT, "no Parquet file"),
+    Row("names.csv", "time_s," + "a" * (1 << 18) + "\n1,2\n", EXPORT, "names.csv"),
+    Row("quotes.csv", 'time_s,"' + "a\n" * (1 << 17), EXPORT, "quotes.csv"),
+    Row("escape.csv", csv_of("roll_rad") + f"0.3,{ESCAPE}\n", EXPORT, "is no number"),
+    # recordings
+    Row("head-bomb.frames", HEAD_BOMB, REPLAY, "more than"),
+    Row(
+        "head-deep.frames", MARK + block(b"HEAD", zlib.compress(b"[" * 200_000)), REPLAY, "no JSON"
+    ),
+    Row("head-list.frames", MARK + block(b"HEAD", zlib.compress(b"[]")), REPLAY, "no JSON object"),
+    Row(
+        "head-empty.frames",
+        MARK + block(b"HEAD", zlib.compress(b"{}")),
+        REPLAY,
+        "head-empty.frames",
+    ),
+    Row("head-text.frames", frame_log(about={"configuration": "a"}), REPLAY, "head-text.frames"),
+    Row("head-files.frames", frame_log(files=["a"]), REPLAY, "head-files.frames"),
+    Row("head-data.frames", frame_log(files={"../../ran": 1}), REPLAY, "head-data.frames"),
+    Row(
+        "code.frames",
+        frame_log(
+            about={
+                "configuration": {"name": "A", "law": {"kind": "python", "factory": "./x.py:Law"}},
+                "data": {},
+            }
+        ),
+        REPLAY,
+        "must not choose",
+    ),
+    Row("length.frames", MARK + block(b"HEAD", b"", 0xFFFFFFFF), REPLAY, "is cut"),
+    # what others hold in shared memory
+    Row("short.ring", b"UTNKRING", ring, "too short"),
+    Row("magic.ring", ring_of(1, 4, 8, 2, 8), ring, "not a telemetry ring"),
+    Row("slots.ring", ring_of(RING, 4, 8, 1 << 62, 8), ring, "not a telemetry ring"),
+    Row("text.ring", ring_of(RING, 4, 8, 2, -8), ring, "not a telemetry ring"),
+    Row("no-slots.ring", ring_of(RING, 4, 8, 0, 8), ring, "not a telemetry ring"),
+    Row("long-text.ring", ring_of(RING, 4, 8, 2, 1 << 40), ring, "not a telemetry ring"),
+    Row("kind.ring", ring_of(RING, 4, 8, 2, 8), ring, "damaged telemetry ring"),
+]
+
+
+# A library may leave a file to the garbage collector; the commands' processes end.
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: ascii(row.name))
+def test_a_hostile_file_is_refused_in_words(
+    row: Row, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / row.name
+    if callable(row.content):
+        row.content(path)
+    else:
+        path.write_bytes(row.content.encode() if isinstance(row.content, str) else row.content)
+    Path("x.py").write_text("from pathlib import Path\nPath('ran').mkdir()\n")
+    Path("/proc/self/clear_refs").write_text("5")
+    before_mb = status_mb("VmRSS")
+    with within(MOST_S, row.name):
+        if callable(row.words):
+            with pytest.raises((ValueError, OSError)) as refused:
+                row.words(path)
+            said, code = str(refused.value), 2
+        else:
+            code = told([word.format(path, folder=tmp_path) for word in row.words])
+            said = "".join(capfd.readouterr())
+    assert row.says in said
+    assert code == row.code, said
+    assert "Traceback" not in said
+    assert not set(said) & {chr(each) for each in (*range(10), *range(11, 32), *range(127, 160))}
+    assert len(said) < 3000, "a line that nobody reads"
+    assert not list(tmp_path.rglob("ran"))
+    assert status_mb("VmHWM") - before_mb < MOST_MB
+
+
+def told(words: list[str]) -> int:
+    """Run a command as `main` does and return its exit code."""
+    with pytest.raises(SystemExit) as ended, failures_named():
+        app(words)
+    return int(ended.value.code or 0)
+
+
+def test_a_column_that_a_spreadsheet_would_run_is_text_in_a_copy(tmp_path: Path) -> None:
+    for name in ("=cmd|' /C calc'!A0", "+1", "-1+1", "@SUM(A1)"):
+        (tmp_path / "a.csv").write_text(csv_of(name))
+        if told(["export", str(tmp_path / "a.csv"), "--to", str(tmp_path / "to.csv")]) == 0:
+            assert (tmp_path / "to.csv").read_text().splitlines()[0] == f"time_s,'{name}"
+
+
+def test_a_terminal_gets_no_signs_that_steer_it(capsys: pytest.CaptureFixture[str]) -> None:
+    Terminal(width=200).say(f"a{ESCAPE}b\x9b31m\u202e", red="error:")
+    said = capsys.readouterr().out
+    assert said.strip().isprintable()
+    assert "]0;owned" in said
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, linked("/dev/zero"), listening, linked("/etc/passwd")])
+def test_a_name_in_shared_memory_that_is_no_file_is_no_ring(make: Callable[[Path], object]) -> None:
+    path = Path("/dev/shm") / f"utank-hostile-{os.getpid()}"
+    make(path)
+    try:
+        with within(MOST_S, path.name), pytest.raises(OSError, match=r"ring|symbolic|address"):
+            RingReader(path.name)
+    finally:
+        path.unlink()
+
+
+def test_a_page_shows_names_and_texts_and_runs_none_of_them(tmp_path: Path) -> None:
+    from utank_hil.pictures.report_page import write_report_page
+
+    evil = "<script>alert(1)</script><img src=x onerror=alert(1)>"
+    page = write_report_page(tmp_path / "a.html", evil, evil, [], [])
+    assert "<script>alert" not in page.read_text()
+    assert "<img src=x" not in page.read_text()
