@@ -18,7 +18,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.nodes.controller import ControllerNode
-from utank_hil.safety.supervisor import Demand
+from utank_hil.safety.situation import Demand
 
 Heard = tuple[int, int, bytes]  #: Time in ns, identifier and data of a frame on the bus.
 

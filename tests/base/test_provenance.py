@@ -255,7 +255,8 @@ def test_a_git_at_work_in_the_source_tree_is_not_disturbed(
 
 
 def test_kernels_of_an_older_processor_are_said() -> None:
-    older = {"NPY_DISABLE_CPU_FEATURES": "X86_V3", "OPENBLAS_CORETYPE": "Nehalem"}
+    vectors = "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"
+    older = {"NPY_DISABLE_CPU_FEATURES": vectors, "OPENBLAS_CORETYPE": "Nehalem"}
     code = (
         "import json; from utank_hil.base.provenance import machine; print(json.dumps(machine()))"
     )

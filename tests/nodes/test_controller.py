@@ -49,7 +49,7 @@ from utank_hil.runners import RealTimeLoop
 from utank_hil.runners.statistics import LoopStatistics
 from utank_hil.safety.monitoring import Monitors
 from utank_hil.safety.monitors.thresholds import SensorFigures
-from utank_hil.safety.supervisor import Demand
+from utank_hil.safety.situation import Demand
 
 START_NS = 7_000_000_123
 LEVEL = 20e3  # a pressure away from every limit

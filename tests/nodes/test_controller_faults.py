@@ -32,7 +32,7 @@ from utank_hil.canbus import (
     SensorTank,
     Switch,
 )
-from utank_hil.safety.supervisor import Demand
+from utank_hil.safety.situation import Demand
 
 START_NS = 7_000_000_123
 LEVEL = 20e3  # a pressure away from every limit

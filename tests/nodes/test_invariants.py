@@ -41,8 +41,8 @@ from utank_hil.canbus.measurements import Measurements
 from utank_hil.safety import judging
 from utank_hil.safety.faults import FAULTS, Condition, Reaction
 from utank_hil.safety.safety_limits import SafetyLimits
-from utank_hil.safety.situation import OwnState, Situation, ValveReport
-from utank_hil.safety.supervisor import DISARMED_ZERO_WITHIN_MS, Demand, Judgement
+from utank_hil.safety.situation import Demand, Judgement, OwnState, Situation, ValveReport
+from utank_hil.safety.supervisor import DISARMED_ZERO_WITHIN_MS
 
 SEED = 1
 SAFETY = SafetyLimits()

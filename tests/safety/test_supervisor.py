@@ -13,8 +13,8 @@ from utank_hil.safety import judging
 from utank_hil.safety.faults import FAULTS, Condition, Reaction
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.safety_limits import SafetyLimits
-from utank_hil.safety.situation import MILLISECOND_NS, OwnState, Situation
-from utank_hil.safety.supervisor import Demand, Supervisor
+from utank_hil.safety.situation import MILLISECOND_NS, Demand, OwnState, Situation
+from utank_hil.safety.supervisor import Supervisor
 
 
 class Bench:

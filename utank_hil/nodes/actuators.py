@@ -22,8 +22,7 @@ from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve
 from utank_hil.nodes.canopen_drive import CanopenDrive
 from utank_hil.nodes.plausibility import MILLISECOND_NS, NEVER_HEARD_NS
-from utank_hil.safety.situation import NO_VALVE, VALVE_OFF, ValveReport
-from utank_hil.safety.supervisor import Demand, Judgement
+from utank_hil.safety.situation import NO_VALVE, VALVE_OFF, Demand, Judgement, ValveReport
 
 QUICK_STOPS: Final = 26
 """Commands, the first and half a second of them: a drive that brakes for longer, waits for a word

@@ -33,8 +33,7 @@ from utank_hil.nodes.signals import Telemetry
 from utank_hil.retuning.estimator import SAMPLE_TIME_S, EstimateFigures, Estimator
 from utank_hil.safety.judge import Safety
 from utank_hil.safety.monitoring import STALE_MS
-from utank_hil.safety.situation import OwnState
-from utank_hil.safety.supervisor import Demand, Judgement
+from utank_hil.safety.situation import Demand, Judgement, OwnState
 
 NANOSECONDS: Final = 1e-9
 

@@ -20,7 +20,7 @@ from utank_hil.retuning.law_exchange import LawExchange
 from utank_hil.safety.faults import FAULTS
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 from utank_hil.safety.safety_limits import SafetyLimits
-from utank_hil.safety.supervisor import Demand, Judgement
+from utank_hil.safety.situation import Demand, Judgement
 
 FRESH_MS: Final = 50.0
 """An older measurement is a gap in the record that the ship is identified from."""

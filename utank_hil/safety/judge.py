@@ -19,8 +19,8 @@ from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.senders import BusLoad
 from utank_hil.safety.monitors.thresholds import DEGRADED_SHARE
 from utank_hil.safety.safety_limits import SafetyLimits
-from utank_hil.safety.situation import MILLISECOND_NS, OwnState, Situation
-from utank_hil.safety.supervisor import Judgement, Supervisor
+from utank_hil.safety.situation import MILLISECOND_NS, Judgement, OwnState, Situation
+from utank_hil.safety.supervisor import Supervisor
 
 HEEL_TIME_CONSTANT_S: Final = 60.0
 """Three roll periods of a ship that rolls slowly: waves are gone from the mean, a list is not."""

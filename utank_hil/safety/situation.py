@@ -1,8 +1,10 @@
-"""What the fault table is judged by in one tick: values that nobody can change."""
+"""What the fault table is judged by in one tick, and the judgement: values that nobody changes."""
 
 from dataclasses import dataclass
+from enum import Enum
 from typing import TYPE_CHECKING, Final
 
+from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.canbus.measurements import Measurements, MotionSample
 
 if TYPE_CHECKING:  # who prints the words of a fault needs no ship
@@ -69,3 +71,30 @@ class Situation:
     #: Time for which the drive is not in operation enabled, while it should be.
     drive_out_ms: Final[float]
     arming_ms: Final[float]  #: Time since arming was accepted; zero outside of arming.
+
+
+class Demand(Enum):
+    """What the rest of the tick has to do with the pump pressure."""
+
+    CONTROL = "the controller's pressure, limited"
+    RAMP = "to zero at the rate limit"
+    ZERO = "zero at once"
+
+
+@dataclass(slots=True, eq=False)
+class Judgement:
+    """What the controller obeys in one tick."""
+
+    #: mode, fault: as `Supervisor` has them.
+    mode: Final[Mode]
+    fault: Final[Fault]
+    demand: Final[Demand]
+    drive_wanted: Final[bool]  #: Whether the drive should be in operation enabled.
+    motion: Final[int]  #: Place of the motion sensor that is to be used.
+    share: Final[float]  #: Share of the greatest pressure that is allowed by what is degraded.
+    #: Share that is allowed in its place until the water was seen to move as roll and pressure push
+    #: it; None from then on.
+    unconfirmed_share: Final[float | None]
+    standing: Final[int]  #: Conditions of the fault table that hold, bits of `judging.standing`.
+    #: What the ship would roll without the pump; NaN if that is not known.
+    passive_roll_rad: Final[float]

@@ -9,8 +9,6 @@ What counts as a fault, and what it does, is the table in `utank_hil.safety.faul
 """
 
 import math
-from dataclasses import dataclass
-from enum import Enum
 from typing import Final
 
 from utank_hil.canbus.enumerations import DriveState, Fault, Mode
@@ -18,7 +16,7 @@ from utank_hil.canbus.measurements import Measurements
 from utank_hil.safety import judging
 from utank_hil.safety.faults import Condition, Reaction
 from utank_hil.safety.safety_limits import SafetyLimits
-from utank_hil.safety.situation import MILLISECOND_NS, Situation
+from utank_hil.safety.situation import MILLISECOND_NS, Demand, Situation
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ACTIVE: Final = Mode.ACTIVE
@@ -34,14 +32,6 @@ RESET_WITHIN_MS: Final = 500
 DEPARTURES: Final = 2.0
 """More often out of operation enabled, a drive counts as out of it. It falls by one each second."""
 _NEVER_NS: Final = 1 << 62
-
-
-class Demand(Enum):
-    """What the rest of the tick has to do with the pump pressure."""
-
-    CONTROL = "the controller's pressure, limited"
-    RAMP = "to zero at the rate limit"
-    ZERO = "zero at once"
 
 
 class Supervisor:
@@ -277,22 +267,3 @@ class Supervisor:
         if enabled and departures <= DEPARTURES:
             self._drive_enabled_ns = now_ns
         self.drive_out_ms = (now_ns - self._drive_enabled_ns) / MILLISECOND_NS
-
-
-@dataclass(slots=True, eq=False)
-class Judgement:
-    """What the controller obeys in one tick."""
-
-    #: mode, fault: as `Supervisor` has them.
-    mode: Final[Mode]
-    fault: Final[Fault]
-    demand: Final[Demand]
-    drive_wanted: Final[bool]  #: Whether the drive should be in operation enabled.
-    motion: Final[int]  #: Place of the motion sensor that is to be used.
-    share: Final[float]  #: Share of the greatest pressure that is allowed by what is degraded.
-    #: Share that is allowed in its place until the water was seen to move as roll and pressure push
-    #: it; None from then on.
-    unconfirmed_share: Final[float | None]
-    standing: Final[int]  #: Conditions of the fault table that hold, bits of `judging.standing`.
-    #: What the ship would roll without the pump; NaN if that is not known.
-    passive_roll_rad: Final[float]
