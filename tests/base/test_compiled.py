@@ -1,5 +1,6 @@
 """Compiled copies of modules: used while they are of this source, and only then."""
 
+import ast
 import json
 import os
 import subprocess
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tools.compiled import PATTERNS
 from utank_hil.base import compiled
 
 RUN = """
@@ -103,6 +105,26 @@ def test_without_a_compiler_that_works_one_line_is_said(compiler: str) -> None:
     assert len(done.stdout.splitlines()) == 1
     assert "plain Python runs" in done.stdout
     assert not done.stderr
+
+
+def test_no_module_that_is_compiled_has_a_dataclass_that_its_own_init_could_not_fill() -> None:
+    files = {file for each in PATTERNS for file in compiled.ROOT.glob(each)}
+    classes = [
+        (file.name, node)
+        for file in files
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.ClassDef)
+    ]
+    assert len(classes) > 50
+    unfit = [
+        f"{name}: {node.name}"
+        for name, node in classes
+        if any("dataclass" in ast.unparse(each) for each in node.decorator_list)
+        and any(
+            "Final" in ast.unparse(part) for part in node.body if isinstance(part, ast.AnnAssign)
+        )
+    ]
+    assert not unfit
 
 
 @pytest.mark.evidence
