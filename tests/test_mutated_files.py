@@ -297,7 +297,7 @@ READERS = [
     ),
 ]
 OTHERS = {
-    "hulls/wamit-fpso/fpso.1": lambda path: read_hull(path, Given(1025.0, 1e8, (0.8, 0.0, -1.0))),
+    "hulls/wamit-fpso/fpso.1": lambda path: read_hull(path, Given(density_kg_m3=1025.0)),
     "hulls/aqwa-cylinder/cylinder.AH1": read_hull,
     "hulls/nemoh3-cylinder/Nemoh.cal": read_hull,
     "hulls/nemoh3-cylinder/results/ExcitationForce.tec": lambda path: read_hull(
