@@ -107,7 +107,8 @@ def test_every_frame_decodes_with_the_dbc_to_values_within_its_ranges(story: Sto
         assert frame.signals["control_word"] in set(ControlWord)
     # the roll of one ship, not of many: it moves by its own rate
     rolls = np.array([[f.time_s, f.signals["roll_rad"]] for f in story.of("SENSOR_MOTION")])
-    assert np.abs(np.diff(rolls[:, 1])).max() < 0.03
+    steps_s, steps_rad = np.diff(rolls, axis=0).T  # a busy machine leaves gaps
+    assert (np.abs(steps_rad) < 0.03 + 0.2 * (steps_s - 0.01).clip(0.0)).all()
 
 
 def test_pressure_flows_once_the_controller_is_in_charge(story: Story) -> None:
