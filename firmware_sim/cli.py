@@ -16,7 +16,13 @@ with quietly_interruptible():
     with failures_named():
         from firmware_sim.run import RECORD_NS, RECORD_S, SECOND_NS
         from firmware_sim.scenario import Scenario
-        from firmware_sim.ship_side import EXTERNAL_DRIVE, NODE_NAMES, ExternalNode, build_ship_side
+        from firmware_sim.ship_side import (
+            EXTERNAL_DRIVE,
+            NODE_NAMES,
+            ExternalNode,
+            build_ship_side,
+            load_compiled_code,
+        )
         from firmware_sim.truth import TRUTH, MemoryLog, TruthRecorder
         from utank_hil.analysis.motion.statistics import (
             PumpStatistics,
@@ -87,7 +93,9 @@ def firmware_sim(
     if loaded.faults:
         fail(f"{scenario}: faults: are for the bench in simulated time: leave them out")
     length_s = loaded.duration_s if duration is None else duration
-    ship = build_ship_side(loaded, loaded.seed if seed is None else seed, loaded.operator)
+    seed = loaded.seed if seed is None else seed
+    load_compiled_code(loaded, seed)
+    ship = build_ship_side(loaded, seed, loaded.operator)
     log = MemoryLog(len(TRUTH), -(-round(length_s * SECOND_NS) // RECORD_NS))
     try:
         nodes = ship.without([name.strip() for name in without.split(",") if name.strip()])

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from firmware_sim.faulty_bench import FaultyBench, Tap
 from firmware_sim.scenario import PASSIVE, Scenario
-from firmware_sim.ship_side import ShipSide, bare_plant, build_ship_side
+from firmware_sim.ship_side import ShipSide, bare_plant, build_ship_side, load_compiled_code
 from firmware_sim.truth import TRUTH, MemoryLog, TruthRecorder
 from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.base.arrays import FloatArray
@@ -299,9 +299,7 @@ def run_controller(job: Job, channel: str, meeting: Meeting) -> ControllerRun:
 
 def _ship_of(job: Job) -> tuple[ShipSide, TruthRecorder, MemoryLog]:
     """Ship's side of a run, the recorder of its truth, and the rows of that."""
-    first = build_ship_side(job.scenario, job.seed, ()).plant
-    for now_ns in (0, TICK_NS):  # its compiled code loads here, and not in the first ticks of a run
-        first.advance(now_ns)
+    load_compiled_code(job.scenario, job.seed)
     ship = build_ship_side(job.scenario, job.seed, job.script, job.controller)
     log = job.log_of(TRUTH)
     return ship, TruthRecorder(ship.plant, log, RECORD_NS), log

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from numba.core.caching import CacheImpl
 
+from utank_hil.dynamics import jit
 from utank_hil.dynamics.jit import njit
 
 
@@ -39,6 +40,7 @@ def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(
         if not found or value != 1:
             (tmp_path / "called_kernel.py").write_text(called)
         importlib.invalidate_caches()
+        jit._digest.cache_clear()  # as in a new process
         for name in ("calling", "called_kernel"):
             sys.modules.pop(name, None)
         two = importlib.import_module("calling").two

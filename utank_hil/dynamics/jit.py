@@ -1,6 +1,8 @@
 """Numba's compiler with its cache, if a folder is available."""
 
 from collections.abc import Callable
+from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -27,9 +29,14 @@ def njit(**options: Any) -> Callable[[F], F]:
             compiled = numba.njit(**options)(function)
         index = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
         if index is not None:  # numba itself looks at the kernel's own file alone
-            beside = Path(function.__code__.co_filename).parent.glob("*kernel*.py")
-            stats = [each.stat() for each in (*SOURCES, *sorted(beside))]
-            index._source_stamp = index._source_stamp, [(s.st_mtime_ns, s.st_size) for s in stats]
+            index._source_stamp = _digest(Path(function.__code__.co_filename))
         return compiled
 
     return decorate
+
+
+@cache
+def _digest(file: Path) -> str:
+    """Digest of what a file's kernels may call. Its own time would differ from mount to mount."""
+    beside = [file, *sorted(file.parent.glob("*kernel*.py"))]
+    return sha256(b"\0".join(each.read_bytes() for each in (*SOURCES, *beside))).hexdigest()
