@@ -93,10 +93,10 @@ def unpack(data: bytes) -> tuple[int, int, int, int, int]:
 MYPY: Final = """[mypy]
 explicit_package_bases = true
 follow_imports_for_stubs = true
-[mypy-numpy.*,scipy.*,pydantic.*,pydantic_core.*,annotated_types.*,rich.*,typer.*,click.*,can.*,\
-cantools.*,control.*,yaml.*,daqp.*,numba.*]
-follow_imports = skip
 ignore_missing_imports = true
+[mypy-numpy.*,scipy.*,pydantic.*,pydantic_core.*,annotated_types.*,rich.*,typer.*,click.*,can.*,\
+cantools.*,control.*,yaml.*,daqp.*,numba.*,wavespectra.*,xarray.*,pandas.*,h5py.*]
+follow_imports = skip
 """
 """`make check` has checked the types; reading those of other packages takes a minute."""
 

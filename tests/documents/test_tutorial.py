@@ -73,7 +73,7 @@ def test_its_commands_give_its_figures(tmp_path: Path, monkeypatch: pytest.Monke
     watched, faulty = shown
     assert watched[0] == "patrol/out/bench.rrd"
     assert faulty == ("patrol/faulty/bench.rrd", pytest.approx(100.4, abs=0.06))
-    assert "sensor: alignment" in (tmp_path / "patrol/faulty/report.html").read_text()
+    assert "a signal that stands still" in (tmp_path / "patrol/faulty/report.html").read_text()
 
 
 def test_no_command_of_it_is_left_out() -> None:
