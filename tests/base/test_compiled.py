@@ -146,7 +146,7 @@ def test_a_compiled_run_equals_the_plain_one_and_codecs_pass_their_tests() -> No
     subprocess.run(run_compiled, env={**os.environ, "UTANK_HIL_COMPILED": "1"}, check=True)
 
 
-@pytest.mark.evidence
+@pytest.mark.slow
 def test_the_tick_translates_to_c_without_a_cache_from_before(tmp_path: Path) -> None:
     translate = (
         "from pathlib import Path; from tools.compiled import c_sources; c_sources(Path('{}'))"
