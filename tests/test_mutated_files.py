@@ -30,7 +30,7 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from others import DATA
+from others import others_file
 
 from firmware_sim.campaign.study import load_study
 from firmware_sim.fmu_file import FmuFile
@@ -443,15 +443,12 @@ def test_a_damaged_file_is_read_or_refused_in_words(
 def test_a_damaged_file_of_others_is_read_or_refused_in_words(
     name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    if not DATA.is_dir():
-        pytest.skip("files of others are not here")
-    folder = (
-        shutil.copytree((DATA / name).parent, tmp_path / "copy") if "hulls" in name else tmp_path
-    )
+    theirs = others_file(name)
+    folder = shutil.copytree(theirs.parent, tmp_path / "copy") if "hulls" in name else tmp_path
     path = folder / Path(name).name
     if name.count("/") == 3:  # Results stand below the file that is read.
-        shutil.copytree((DATA / name).parents[1], tmp_path / "whole")
+        shutil.copytree(theirs.parents[1], tmp_path / "whole")
         path = tmp_path / "whole" / Path(*Path(name).parts[2:])
     else:
-        shutil.copyfile(DATA / name, path)
+        shutil.copyfile(theirs, path)
     tried(path, OTHERS[name], capfd, 12, streamed=False)

@@ -1,7 +1,8 @@
 """Copies of a log of the bus: candump, ASC and BLF, with every frame's time, kind and length."""
 
+from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from datetime import UTC, datetime
 from itertools import chain, islice
 from pathlib import Path
@@ -23,7 +24,7 @@ def write_frames(path: Path, frames: Iterable[BusFrame], notes: list[str] | None
     where they are times of the day; BLF notes that in its head.
     """
     suffix = path.suffix.lower()
-    writer = {".log": _Candump, ".asc": _Asc, ".blf": _Blf}[suffix]
+    writers: dict[str, Callable[..., _Writer]] = {".log": _Candump, ".asc": _Asc, ".blf": _Blf}
     lost: Counter[str] = Counter()
     waiting = iter(frames)
     first = list(islice(waiting, 1))  # Before a file is overwritten, the log has been begun.
@@ -32,7 +33,7 @@ def write_frames(path: Path, frames: Iterable[BusFrame], notes: list[str] | None
     with (
         left_whole(path),
         path.open(mode, encoding=encoding) as content,
-        writer(content, lost) as copy,
+        writers[suffix](content, lost) as copy,
     ):
         for frame in chain(first, waiting):
             if frame.extended or frame.number < 1 << 11 or frame.kind is FrameKind.ERROR:
@@ -45,7 +46,7 @@ def write_frames(path: Path, frames: Iterable[BusFrame], notes: list[str] | None
     return count
 
 
-class _Writer:
+class _Writer(ABC):
     """Writes one format; `lost` counts what it can't hold."""
 
     def __init__(self, content: Any, lost: Counter[str]) -> None:
@@ -56,12 +57,12 @@ class _Writer:
     def __enter__(self) -> "_Writer":
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *_: object) -> None:  # noqa: B027, most formats have no end
         """End the file."""
 
+    @abstractmethod
     def write(self, frame: BusFrame) -> None:
         """Write one frame."""
-        raise NotImplementedError
 
     def _microseconds(self, time_ns: int) -> int:
         time_us = (time_ns - (self._origin_ns or 0) + 500) // 1000
