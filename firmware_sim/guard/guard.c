@@ -18,7 +18,11 @@
 #define HEEL_SCALE 4096
 
 /* CiA 402 states in which a drive gives no torque. */
-enum { NOT_READY = 0x00, DISABLED = 0x40, READY = 0x21, SWITCHED_ON = 0x23, FAULT = 0x08 };
+#define NOT_READY 0x00U
+#define DISABLED 0x40U
+#define READY 0x21U
+#define SWITCHED_ON 0x23U
+#define FAULT 0x08U
 
 static uint8_t crc8(const uint8_t *data, uint8_t data_id)
 {
@@ -28,7 +32,7 @@ static uint8_t crc8(const uint8_t *data, uint8_t data_id)
     for (place = 1U; place < 9U; place++) {
         crc ^= (place < 8U) ? data[place] : data_id;
         for (bit = 0U; bit < 8U; bit++) {
-            crc = ((crc & 0x80U) != 0U) ? ((crc << 1) ^ 0x2FU) & 0xFFU : crc << 1;
+            crc = ((crc & 0x80U) != 0U) ? (((crc << 1) ^ 0x2FU) & 0xFFU) : (crc << 1);
         }
     }
     return (uint8_t)(crc ^ 0xFFU);
@@ -44,10 +48,10 @@ static int32_t magnitude(int32_t value)
     return (value < 0) ? -value : value;
 }
 
-static uint16_t longer(uint16_t lasted, uint8_t holds)
+static uint16_t longer(uint16_t lasted, bool holds)
 {
     uint16_t next = 0U;
-    if (holds != 0U) {
+    if (holds) {
         next = (lasted < OLDEST) ? (uint16_t)(lasted + 1U) : lasted;
     }
     return next;
@@ -82,7 +86,7 @@ void guard_start(struct guard *guard, const struct guard_parameters *parameters)
         byte[index] = 0U;
     }
     guard->parameters = parameters;
-    for (index = 0U; index < (uint32_t)GUARD_STREAMS; index++) {
+    for (index = 0U; index < GUARD_STREAMS; index++) {
         guard->streams[index].age = OLDEST;
         guard->streams[index].expected = NONE;
         guard->streams[index].candidate = NONE;
@@ -99,11 +103,11 @@ static void take_command(struct guard *guard, const uint8_t *data, uint8_t cycle
     const struct guard_parameters *limits = guard->parameters;
     const int32_t asked = word(data, 2U) - ZERO;
     const int32_t last = guard->command;
-    const uint8_t nearer = (uint8_t)((magnitude(asked) <= magnitude(last))
-                                     && ((asked == 0) || ((asked < 0) == (last < 0))));
+    const bool nearer = (magnitude(asked) <= magnitude(last))
+                        && ((asked == 0) || ((asked < 0) == (last < 0)));
     if ((magnitude(asked) > limits->pressure)
-        || ((nearer == 0U) && (magnitude(asked - last) > limits->step * (int32_t)cycles))) {
-        guard->bad_command = 1U;
+        || ((!nearer) && (magnitude(asked - last) > (limits->step * (int32_t)cycles)))) {
+        guard->bad_command = true;
     }
     guard->command = asked;
     guard->streams[GUARD_COMMAND].age = 0U;
@@ -113,7 +117,7 @@ static void take_motion(struct guard *guard, const uint8_t *data, uint32_t strea
 {
     const int32_t roll = word(data, 2U);
     const int32_t rate = word(data, 4U);
-    if (((data[1] >> 4) <= 1U) && (roll <= 2 * MIDDLE) && (rate <= 2 * MIDDLE)) {
+    if (((data[1] >> 4) <= 1U) && (roll <= (2 * MIDDLE)) && (rate <= (2 * MIDDLE))) {
         guard->roll = roll - MIDDLE;
         guard->roll_rate = rate - MIDDLE;
         guard->streams[stream].age = 0U;
@@ -124,7 +128,7 @@ static void take_tank(struct guard *guard, const uint8_t *data)
 {
     const int32_t port = word(data, 2U);
     const int32_t starboard = word(data, 4U);
-    guard->tank_high = (uint8_t)((data[1] & 0xF0U) != 0U);
+    guard->tank_high = (data[1] & 0xF0U) != 0U;
     if (((data[6] & 15U) <= 1U) && (port >= 2000) && (port <= 62000) && (starboard >= 2000)
         && (starboard <= 62000)) {
         guard->level = starboard - port;
@@ -136,40 +140,40 @@ static void take_tank(struct guard *guard, const uint8_t *data)
 static void take_order(struct guard *guard, const uint8_t *data, uint32_t station, uint8_t counts)
 {
     const uint8_t arm = (uint8_t)(data[2] & 1U);
-    const uint8_t stop = (uint8_t)((data[2] >> 1) & 1U);
+    const bool stop = (data[2] & 2U) != 0U;
     const uint8_t reset = (uint8_t)((data[2] >> 2) & 1U);
-    if (stop != 0U) {
-        guard->stop_heard = 1U;
+    if (stop) {
+        guard->stop_heard = true;
     }
-    if ((stop != 0U) || ((arm == 0U) && (guard->arm_bit[station] == 1U))) {
-        guard->armed = 0U;
+    if (stop || ((arm == 0U) && (guard->arm_bit[station] == 1U))) {
+        guard->armed = false;
     }
     if (counts != 0U) {
-        const uint8_t may = (uint8_t)((station == 0U) || (guard->parameters->second_station != 0U));
-        if (may != 0U) {
-            if ((arm == 1U) && (guard->arm_bit[station] == 0U) && (stop == 0U)) {
-                guard->armed = 1U;
+        const bool may = (station == 0U) || guard->parameters->second_station;
+        if (may) {
+            if ((arm == 1U) && (guard->arm_bit[station] == 0U) && (!stop)) {
+                guard->armed = true;
             }
             if ((reset == 1U) && (guard->reset_bit[station] == 0U)) {
-                guard->reset = 1U;
+                guard->reset = true;
             }
         }
         guard->arm_bit[station] = arm;
         guard->reset_bit[station] = reset;
         guard->stop_bit[station] = stop;
-        guard->streams[(uint32_t)GUARD_ORDER + station].age = 0U;
+        guard->streams[GUARD_ORDER + station].age = 0U;
     }
 }
 
 static void take_hardwired(struct guard *guard, const uint8_t *data, uint8_t counts)
 {
-    const uint8_t open = (uint8_t)((data[2] & 3U) != 0U);
-    if (open != 0U) {
-        guard->loop_open = 1U;
-        guard->stop_heard = 1U;
+    const bool open = (data[2] & 3U) != 0U;
+    if (open) {
+        guard->loop_open = true;
+        guard->stop_heard = true;
     }
     if (counts != 0U) {
-        guard->hardwired_high = (uint8_t)((data[1] & 0xF0U) != 0U);
+        guard->hardwired_high = (data[1] & 0xF0U) != 0U;
         if ((data[2] >> 4) <= 1U) {
             guard->loop_open = open;
             guard->streams[GUARD_HARDWIRED].age = 0U;
@@ -180,14 +184,14 @@ static void take_hardwired(struct guard *guard, const uint8_t *data, uint8_t cou
 static void take(struct guard *guard, uint32_t stream, const uint8_t *data, uint8_t cycles)
 {
     const int32_t pressure = word(data, 2U) - ZERO;
-    const uint8_t known = (uint8_t)(magnitude(pressure) <= 31250);
+    const bool known = magnitude(pressure) <= 31250;
     switch (stream) {
     case GUARD_COMMAND:
         take_command(guard, data, cycles);
         break;
     case GUARD_DRIVE:
         guard->drive_state = data[6];
-        if (known != 0U) {
+        if (known) {
             guard->drive_pressure = pressure;
             guard->streams[stream].age = 0U;
         }
@@ -196,7 +200,7 @@ static void take(struct guard *guard, uint32_t stream, const uint8_t *data, uint
         take_tank(guard, data);
         break;
     case GUARD_PUMP:
-        if ((known != 0U) && ((data[1] >> 4) <= 1U)) {
+        if (known && ((data[1] >> 4) <= 1U)) {
             guard->pump_pressure = pressure;
             guard->streams[stream].age = 0U;
         }
@@ -210,17 +214,17 @@ static void take(struct guard *guard, uint32_t stream, const uint8_t *data, uint
 void guard_receive(struct guard *guard, uint32_t can_id, const uint8_t *data, uint8_t length)
 {
     uint32_t stream = 0U;
-    while ((stream < (uint32_t)GUARD_STREAMS)
+    while ((stream < GUARD_STREAMS)
            && (guard->parameters->messages[stream].can_id != can_id)) {
         stream++;
     }
-    if ((stream < (uint32_t)GUARD_STREAMS) && (length == 8U)) {
+    if ((stream < GUARD_STREAMS) && (length == 8U)) {
         const uint8_t counter = (uint8_t)(data[1] & 15U);
         if (data[0] == crc8(data, guard->parameters->messages[stream].data_ids[counter])) {
             const uint8_t cycles = accepted(&guard->streams[stream], counter);
-            if ((stream == (uint32_t)GUARD_ORDER) || (stream == (uint32_t)GUARD_ORDER_2)) {
-                take_order(guard, data, stream - (uint32_t)GUARD_ORDER, cycles);
-            } else if (stream == (uint32_t)GUARD_HARDWIRED) {
+            if ((stream == GUARD_ORDER) || (stream == GUARD_ORDER_2)) {
+                take_order(guard, data, stream - GUARD_ORDER, cycles);
+            } else if (stream == GUARD_HARDWIRED) {
                 take_hardwired(guard, data, cycles);
             } else if (cycles != 0U) {
                 take(guard, stream, data, cycles);
@@ -239,22 +243,22 @@ static uint16_t younger(const struct guard *guard, uint32_t first, uint32_t seco
 }
 
 /* Whether a message that is awaited is older than its patience. */
-static uint8_t silent(const struct guard *guard)
+static bool silent(const struct guard *guard)
 {
-    uint8_t found = 0U;
+    bool found = false;
     uint32_t index;
-    for (index = 0U; index < (uint32_t)GUARD_STREAMS; index++) {
+    for (index = 0U; index < GUARD_STREAMS; index++) {
         const uint16_t patience = guard->parameters->messages[index].patience;
         uint16_t age = guard->streams[index].age;
-        if (index == (uint32_t)GUARD_MOTION) {
+        if (index == GUARD_MOTION) {
             age = younger(guard, GUARD_MOTION, GUARD_MOTION_2);
-        } else if ((index == (uint32_t)GUARD_ORDER) && (guard->parameters->second_station != 0U)) {
+        } else if ((index == GUARD_ORDER) && guard->parameters->second_station) {
             age = younger(guard, GUARD_ORDER, GUARD_ORDER_2);
         } else {
             /* its own age */
         }
         if ((patience != 0U) && (age > patience)) {
-            found = 1U;
+            found = true;
         }
     }
     return found;
@@ -275,11 +279,11 @@ static void note_command(struct guard *guard, int32_t command)
     guard->most[0] = (command > guard->most[0]) ? command : guard->most[0];
 }
 
-static uint8_t is_off(const struct guard *guard, int32_t pressure, int32_t error)
+static bool is_off(const struct guard *guard, int32_t pressure, int32_t error)
 {
     const int32_t least = (guard->least[0] < guard->least[1]) ? guard->least[0] : guard->least[1];
     const int32_t most = (guard->most[0] > guard->most[1]) ? guard->most[0] : guard->most[1];
-    return (uint8_t)((pressure < least - error) || (pressure > most + error));
+    return (pressure < (least - error)) || (pressure > (most + error));
 }
 
 uint8_t guard_tick(struct guard *guard)
@@ -289,73 +293,65 @@ uint8_t guard_tick(struct guard *guard)
     uint32_t reasons = 0U;
     int32_t command;
     int32_t error = limits->error;
-    uint8_t off = 0U;
-    uint8_t drive_heard;
-    uint8_t live;
-    for (index = 0U; index < (uint32_t)GUARD_STREAMS; index++) {
-        guard->streams[index].age = longer(guard->streams[index].age, 1U);
+    bool off = false;
+    bool drive_heard;
+    bool live;
+    for (index = 0U; index < GUARD_STREAMS; index++) {
+        guard->streams[index].age = longer(guard->streams[index].age, true);
     }
     command = (guard->streams[GUARD_COMMAND].age <= COMMAND_AGE) ? guard->command : 0;
     note_command(guard, command);
     if (younger(guard, GUARD_MOTION, GUARD_MOTION_2) <= FRESH) {
-        guard->heel += (guard->roll * HEEL_SCALE - guard->heel) / HEEL_TICKS;
+        guard->heel += ((guard->roll * HEEL_SCALE) - guard->heel) / HEEL_TICKS;
     }
-    drive_heard = (uint8_t)(guard->streams[GUARD_DRIVE].age
-                            <= limits->messages[GUARD_DRIVE].patience);
-    live = (uint8_t)((drive_heard == 0U)
-                     || ((guard->drive_state != (uint8_t)NOT_READY)
-                         && (guard->drive_state != (uint8_t)DISABLED)
-                         && (guard->drive_state != (uint8_t)READY)
-                         && (guard->drive_state != (uint8_t)SWITCHED_ON)
-                         && (guard->drive_state != (uint8_t)FAULT)));
+    drive_heard = guard->streams[GUARD_DRIVE].age <= limits->messages[GUARD_DRIVE].patience;
+    live = (!drive_heard)
+           || ((guard->drive_state != NOT_READY) && (guard->drive_state != DISABLED)
+               && (guard->drive_state != READY) && (guard->drive_state != SWITCHED_ON)
+               && (guard->drive_state != FAULT));
     /* A drive may say that it is off and press: what it does counts. Off, its rotor turns freely. */
-    if ((drive_heard == 0U) || (live == 0U)) {
+    if ((!drive_heard) || (!live)) {
         error += (magnitude(guard->level) * limits->free_rotor) / 2000;
     }
-    if ((drive_heard != 0U) && (is_off(guard, guard->drive_pressure, error) != 0U)) {
-        off = 1U;
+    if (drive_heard && is_off(guard, guard->drive_pressure, error)) {
+        off = true;
     }
-    if ((guard->streams[GUARD_PUMP].age <= FRESH)
-        && (is_off(guard, guard->pump_pressure, error) != 0U)) {
-        off = 1U;
+    if ((guard->streams[GUARD_PUMP].age <= FRESH) && is_off(guard, guard->pump_pressure, error)) {
+        off = true;
     }
     guard->off_command = longer(guard->off_command, off);
-    guard->unarmed = longer(guard->unarmed, (uint8_t)((live != 0U) && (guard->command != 0)
-                                                      && (guard->armed == 0U)));
-    guard->high = longer(guard->high,
-                         (uint8_t)((guard->tank_high != 0U) || (guard->hardwired_high != 0U)
-                                   || (magnitude(guard->level) > limits->level)));
-    guard->rolled = longer(guard->rolled,
-                           (uint8_t)((magnitude(guard->roll) > limits->roll)
-                                     || (magnitude(guard->roll_rate) > limits->roll_rate)));
-    if ((guard->stop_heard != 0U) || (guard->loop_open != 0U) || (guard->stop_bit[0] != 0U)
-        || (guard->stop_bit[1] != 0U)) {
+    guard->unarmed = longer(guard->unarmed, live && (guard->command != 0) && (!guard->armed));
+    guard->high = longer(guard->high, guard->tank_high || guard->hardwired_high
+                                          || (magnitude(guard->level) > limits->level));
+    guard->rolled = longer(guard->rolled, (magnitude(guard->roll) > limits->roll)
+                                              || (magnitude(guard->roll_rate) > limits->roll_rate));
+    if (guard->stop_heard || guard->loop_open || guard->stop_bit[0] || guard->stop_bit[1]) {
         reasons |= GUARD_STOP;
     }
     reasons |= (guard->unarmed > RELEASE) ? GUARD_DISARMED : 0U;
-    reasons |= ((live != 0U) && (guard->command != 0) && (silent(guard) != 0U)) ? GUARD_SILENT : 0U;
-    reasons |= ((live != 0U) && (guard->bad_command != 0U)) ? GUARD_COMMANDED : 0U;
+    reasons |= (live && (guard->command != 0) && silent(guard)) ? GUARD_SILENT : 0U;
+    reasons |= (live && guard->bad_command) ? GUARD_COMMANDED : 0U;
     reasons |= (guard->off_command > FOLLOW) ? GUARD_PRESSURE : 0U;
     reasons |= (guard->high > PERSIST) ? GUARD_LEVEL : 0U;
     reasons |= ((guard->rolled > PERSIST)
-                || (magnitude(guard->heel) > limits->heel * HEEL_SCALE))
+                || (magnitude(guard->heel) > (limits->heel * HEEL_SCALE)))
                    ? GUARD_ROLL
                    : 0U;
-    if ((guard->reasons == GUARD_WAITING) && (silent(guard) == 0U)) {
+    if ((guard->reasons == GUARD_WAITING) && (!silent(guard))) {
         guard->reasons = 0U;
     }
-    if (drive_heard == 0U) { /* nobody knows what it does; it is waited for again */
+    if (!drive_heard) { /* nobody knows what it does; it is waited for again */
         guard->reasons |= GUARD_WAITING;
     }
-    if ((guard->reset != 0U) && (reasons == 0U)) {
+    if (guard->reset && (reasons == 0U)) {
         guard->reasons &= GUARD_WAITING;
     }
     guard->reasons |= (uint8_t)reasons;
     if (guard->reasons != 0U) {
-        guard->armed = 0U;
+        guard->armed = false;
     }
-    guard->reset = 0U;
-    guard->stop_heard = 0U;
-    guard->bad_command = 0U;
+    guard->reset = false;
+    guard->stop_heard = false;
+    guard->bad_command = false;
     return guard->reasons;
 }

@@ -9,20 +9,20 @@
 #ifndef GUARD_H
 #define GUARD_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
-enum {
-    GUARD_COMMAND,
-    GUARD_DRIVE,
-    GUARD_MOTION,
-    GUARD_MOTION_2,
-    GUARD_TANK,
-    GUARD_PUMP,
-    GUARD_ORDER,
-    GUARD_ORDER_2,
-    GUARD_HARDWIRED,
-    GUARD_STREAMS
-};
+/* Streams: the messages that are heard, and their number. */
+#define GUARD_COMMAND 0U
+#define GUARD_DRIVE 1U
+#define GUARD_MOTION 2U
+#define GUARD_MOTION_2 3U
+#define GUARD_TANK 4U
+#define GUARD_PUMP 5U
+#define GUARD_ORDER 6U
+#define GUARD_ORDER_2 7U
+#define GUARD_HARDWIRED 8U
+#define GUARD_STREAMS 9U
 
 /* Reasons to cut, as bits; none allows. */
 #define GUARD_WAITING 1U   /* not every message was heard since power-up */
@@ -50,7 +50,7 @@ struct guard_parameters {
     int32_t roll;
     int32_t roll_rate;
     int32_t heel;
-    uint8_t second_station; /* whether a second station may arm */
+    bool second_station; /* whether a second station may arm */
 };
 
 struct guard_stream {
@@ -78,16 +78,16 @@ struct guard {
     uint16_t high;
     uint16_t rolled;
     uint8_t drive_state;
-    uint8_t tank_high;
-    uint8_t hardwired_high;
-    uint8_t loop_open;
+    bool tank_high;
+    bool hardwired_high;
+    bool loop_open;
     uint8_t arm_bit[2];   /* as accepted last; 2: none was */
     uint8_t reset_bit[2]; /* the same */
-    uint8_t stop_bit[2];
-    uint8_t armed;
-    uint8_t reset;
-    uint8_t stop_heard;
-    uint8_t bad_command;
+    bool stop_bit[2];
+    bool armed;
+    bool reset;
+    bool stop_heard;
+    bool bad_command;
     uint8_t reasons; /* latched */
 };
 
