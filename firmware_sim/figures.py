@@ -1,9 +1,5 @@
-"""Figures of a bench, computed once for tables, JSON, picture and page.
+"""Figures of a bench, computed once for tables, JSON, picture and page."""
 
-The effect on people knows roll alone; sway, heave and pitch add to it on a real ship.
-"""
-
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,22 +7,17 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import TypeAdapter
 
 from firmware_sim.bench import BenchResult
 from firmware_sim.model_limits import passed_limits
 from firmware_sim.retuning_figures import RetuningFigures, retuning_figures
 from firmware_sim.run import RECORD_S, Run
 from firmware_sim.scenario import PASSIVE
-from firmware_sim.scenario_sections import Place
 from firmware_sim.ship_side import PASSIVE_SCRIPT
-from utank_hil.analysis.motion.comfort import EXPOSURE_S, Comfort, comfort
 from utank_hil.analysis.motion.statistics import (
     PumpStatistics,
     RollStatistics,
-    exceedance,
     pump_statistics,
-    rayleigh_exceedance,
     roll_statistics,
 )
 from utank_hil.base.arrays import FloatArray
@@ -36,38 +27,6 @@ from utank_hil.console.common import KILLED
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.nodes.panel import Action
 from utank_hil.safety.faults import fault_text
-
-LEVELS_RAD: Final = tuple(math.radians(degrees) for degrees in (2.5, 5.0, 7.5, 10.0, 15.0, 20.0))
-"""Single amplitudes of roll whose exceedance is stated."""
-
-
-@dataclass(frozen=True, slots=True)
-class OnBoard:
-    """Effect of a run's roll on people."""
-
-    #: Shares of the single amplitudes of roll above each of `LEVELS_RAD`; None for a record without
-    #: a half-cycle.
-    exceedance: tuple[float, ...] | None
-    #: The shares for a narrow-banded Gaussian roll of the same standard deviation.
-    rayleigh: tuple[float, ...]
-    comfort: Comfort  #: Comfort at the place.
-
-
-def on_board(roll_rad: FloatArray, step_s: float, place: Place) -> OnBoard:
-    """Judge a roll record of shape (n,), n at least 3."""
-    levels = np.array(LEVELS_RAD)
-    try:
-        above: tuple[float, ...] | None = tuple(exceedance(roll_rad, levels).tolist())
-    except ValueError:
-        above = None
-    deviation = float(roll_rad.std())
-    rayleigh = rayleigh_exceedance(deviation, levels) if deviation > 0 else 0 * levels
-    return OnBoard(
-        above,
-        tuple(rayleigh.tolist()),
-        comfort(roll_rad, np.gradient(roll_rad, step_s), step_s, place.height_m, place.starboard_m),
-    )
-
 
 NO_TANK: Final = "no tank"
 LEAST_ROLL_RAD: Final = 1e-6  #: Roll below which a ratio of rolls is meaningless.
@@ -146,16 +105,6 @@ class RunFigures:
 
 
 @dataclass(frozen=True, slots=True)
-class OnBoardFigures:
-    """Effect of the roll on people at a place, by run."""
-
-    place: Place
-    exposure_s: float
-    levels_rad: tuple[float, ...]
-    runs: dict[str, OnBoard]  #: Bare ship, and the compared runs that did not capsize.
-
-
-@dataclass(frozen=True, slots=True)
 class BenchFigures:
     """Figures of a bench over its window, in SI units."""
 
@@ -172,7 +121,6 @@ class BenchFigures:
     endings: tuple[str, ...]  #: Remarks on the ends of runs; empty where all went as ordered.
     limits_passed: tuple[str, ...]  #: Limits of the model that were passed.
     no_tank: BareShip
-    on_board: OnBoardFigures
     runs: tuple[RunFigures, ...]  #: All runs with at least one row; the passive tank first.
 
     @property
@@ -190,14 +138,6 @@ class BenchFigures:
         return {**about, **asdict(self), "files": {name: str(each) for name, each in files.items()}}
 
 
-def read_figures(content: Mapping[str, Any]) -> BenchFigures:
-    """Read the figures from the JSON of a bench.
-
-    Raises `pydantic.ValidationError` if there are none, or those of another version.
-    """
-    return TypeAdapter(BenchFigures).validate_python(content)
-
-
 def figures(result: BenchResult) -> BenchFigures:
     """Compute the figures of a bench."""
     marks = {run.name: mark_of(result, run) for run in result.runs}
@@ -208,7 +148,6 @@ def figures(result: BenchResult) -> BenchFigures:
         endings=tuple(_endings(result, marks)),
         limits_passed=tuple(passed_limits(result)),
         no_tank=bare_figures(result),
-        on_board=_on_board(result),
         runs=run_figures(result),
     )
 
@@ -294,11 +233,6 @@ def mark_of(result: BenchResult, run: Run) -> Mark | None:
     return None
 
 
-def rolls_compared(result: BenchResult) -> dict[str, FloatArray]:
-    """Roll of each compared run over the window."""
-    return {run.name: _roll(result, run) for run in result.runs if result.compares(run)}
-
-
 def _orders(result: BenchResult, run: Run) -> npt.NDArray[np.int64]:
     """Mode ordered by the operator at each row, from when the controller is ready.
 
@@ -340,18 +274,6 @@ def _exit_code(result: BenchResult, marks: Mapping[str, Mark | None]) -> ExitCod
     if result.killed:
         return ExitCode.SYSTEM
     return ExitCode.NOT_RANKED if any(marks.values()) or result.not_run else ExitCode.OK
-
-
-def _on_board(result: BenchResult) -> OnBoardFigures:
-    """Judge the rolls for people on board; a capsized ship is left out."""
-    place = result.scenario.place_on_board
-    rolls = {}
-    if result.without_tank_capsized_s >= result.end_s:
-        rolls[NO_TANK] = _bare_roll(result)
-    afloat = {run.name for run in result.runs if run.capsized_s >= result.end_s}
-    rolls |= {name: roll for name, roll in rolls_compared(result).items() if name in afloat}
-    runs = {name: on_board(roll, RECORD_S, place) for name, roll in rolls.items() if len(roll) >= 3}
-    return OnBoardFigures(place, EXPOSURE_S, LEVELS_RAD, runs)
 
 
 def _bare_roll(result: BenchResult) -> FloatArray:

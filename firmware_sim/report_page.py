@@ -1,23 +1,19 @@
-"""Files of a bench: figures, picture, recording, and its page, also from the files."""
+"""Files of a bench: figures, picture, recording, and its page."""
 
 import json
 import math
-import tempfile
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import ValidationError
-
 from firmware_sim.bench import BenchResult
 from firmware_sim.figures import NO_TANK as BARE
-from firmware_sim.figures import BenchFigures, RunFigures, read_figures, rolls_compared
+from firmware_sim.figures import BenchFigures, RunFigures
 from firmware_sim.report_tables import few_rolls, in_one_unit, roll_interval, tables
 from firmware_sim.retuning_figures import events_on_ships_time
-from firmware_sim.run import COLUMNS, RECORD_S
+from firmware_sim.run import COLUMNS
 from firmware_sim.scenario import PASSIVE
-from utank_hil.base.arrays import FloatArray
 from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import Vessel
 from utank_hil.console.common import why
@@ -25,11 +21,10 @@ from utank_hil.console.ship_report import power_words, ship_line
 from utank_hil.pictures import BenchBar, BenchCurve, draw_bench
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
 from utank_hil.pictures.style import COLORS, NO_TANK
-from utank_hil.reports.page import PAGE, write_reports
-from utank_hil.reports.recording import Report, ReportKind, about_section, printed, roll_figure
-from utank_hil.telemetry.recording import read_recording, write_recording
+from utank_hil.reports.page import Report, about_section, printed, write_report
+from utank_hil.telemetry.recording import write_recording
 
-PICTURE, RECORDING, FIGURES = "bench.png", "bench.rrd", "bench.json"
+PICTURE, RECORDING, FIGURES, PAGE = "bench.png", "bench.rrd", "bench.json", "report.html"
 
 _SEAS: Final = {
     "measured": "measured",
@@ -51,18 +46,8 @@ _SEA_KEYS: Final = {
 }
 
 
-def bench_page(
-    found: BenchFigures,
-    about: Mapping[str, Any],
-    picture: bytes | None,
-    rolls: Mapping[str, FloatArray],
-    scratch: Path,
-) -> Report:
-    """Return the page of a bench.
-
-    `rolls` has the roll of each compared run, shape (n,), every `RECORD_S` in the window; `scratch`
-    is a folder for pictures that are made for the page.
-    """
+def bench_page(found: BenchFigures, about: Mapping[str, Any], picture: bytes | None) -> Report:
+    """Return the page of a bench."""
     vessel = Vessel.model_validate(about["configuration"]["vessel"])
     few = few_rolls(found, vessel.ship.natural_frequency_rad_s)
     says = "Roll and power of each run, and roll, level and pressure over time"
@@ -73,7 +58,6 @@ def bench_page(
             pictures=[] if picture is None else [ReportPicture(picture, says)],
             tables=[printed(table) for table in tables(found)],
         ),
-        *([roll_figure(rolls, RECORD_S, scratch)] if rolls else []),
         _deadlines(found),
         about_section(about, about["configuration"]),
     ]
@@ -82,31 +66,6 @@ def bench_page(
         f"{found.end_s:g} s of the same waves for each run. {about['date']}."
     )
     return Report(f"{found.scenario}: bench", below, _verdict(found, few), sections)
-
-
-def read_bench(folder: Path, scratch: Path) -> Report:
-    """Return the page of a bench from its files.
-
-    Raises `OSError, ValueError` if a file is missing or invalid.
-    """
-    content = json.loads((folder / FIGURES).read_text(encoding="utf-8"))
-    try:
-        found = read_figures(content)
-    except ValidationError as error:
-        key = ".".join(map(str, error.errors()[0]["loc"]))
-        reason = f"has no {key} that can be used: it is of another version, make it again"
-        raise ValueError(f"{folder / FIGURES}: {reason}") from error
-    recorded = read_recording(folder / RECORDING)
-    rolls = {}
-    for run in found.compared:
-        time_s = recorded[run.name]["time_s"]
-        half_s = RECORD_S / 2
-        between = (time_s > found.settle_s - half_s) & (time_s < found.end_s - half_s)
-        rolls[run.name] = recorded[run.name]["true_roll_rad"][between]
-    return bench_page(found, content, (folder / PICTURE).read_bytes(), rolls, scratch)
-
-
-BENCH: Final = ReportKind(FIGURES, read_bench)
 
 
 def _verdict(found: BenchFigures, few: str) -> Verdict:
@@ -169,7 +128,7 @@ def _deadlines(found: BenchFigures) -> ReportSection:
 REPORT_FILES: Final = (PICTURE, RECORDING, FIGURES, PAGE)
 
 
-def write_report(
+def write_files(
     result: BenchResult, found: BenchFigures, folder: Path, about: Mapping[str, Any]
 ) -> tuple[dict[str, Path], list[str]]:
     """Write picture, recording, figures and page of a bench, with their provenance `about`.
@@ -186,9 +145,7 @@ def write_report(
 
     def write_page(path: Path) -> None:
         picture = files["picture"].read_bytes() if "picture" in files else None
-        with tempfile.TemporaryDirectory() as scratch:
-            page = bench_page(found, about, picture, rolls_compared(result), Path(scratch))
-            write_reports([page], path)
+        write_report(bench_page(found, about, picture), path)
 
     writers: tuple[tuple[str, str, Callable[[Path], None]], ...] = (
         ("picture", PICTURE, partial(_draw, result, found, about)),

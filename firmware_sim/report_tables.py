@@ -11,13 +11,11 @@ from firmware_sim.retuning_figures import SETTLING_S, RetuningFigures
 from firmware_sim.scenario import PASSIVE
 from utank_hil.analysis.motion.statistics import RollStatistics
 from utank_hil.console.terminal import new_table
-from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 _PREFIXES: Final = (("M", 1e6), ("k", 1e3), ("", 1.0))
 _ROLL_DAMPING: Final = 0.1  # Damping ratio of the roll of the shipped ships with their tanks.
 _LEAST_INTERVAL: Final = 0.1
 """Interval of the roll RMS from which it is said; an hour of the first ship has 0.07."""
-_SHOWN: Final = (1, 3)  # Indices of the exceedance levels in the table: 5 and 10 degrees.
 
 
 def roll_interval(found: BenchFigures, roll_rad_s: float) -> float:
@@ -44,7 +42,7 @@ def few_rolls(found: BenchFigures, roll_rad_s: float) -> str:
 
 def tables(found: BenchFigures) -> list[RichTable]:
     """All tables of a bench that have rows."""
-    made = [motion_table(found), pump_table(found), on_board_table(found), retuning_table(found)]
+    made = [motion_table(found), pump_table(found), retuning_table(found)]
     return [table for table in made if table.rows]
 
 
@@ -129,37 +127,6 @@ def in_one_unit(values: Sequence[float], unit: str) -> tuple[str, list[str]]:
     prefix, scale = next((each for each in _PREFIXES if largest >= each[1]), _PREFIXES[-1])
     digits = 2 if largest < scale else max(0, 2 - math.floor(math.log10(largest / scale)))
     return prefix + unit, [f"{value / scale:.{digits}f}" for value in values]
-
-
-def on_board_table(found: BenchFigures) -> RichTable:
-    """Table of the roll's effect on people at the scenario's place."""
-    judged = found.on_board
-    levels, place = judged.levels_rad, judged.place
-    table = new_table(
-        "On board",
-        *(f"above\n{math.degrees(levels[index]):g}°" for index in _SHOWN),
-        "lateral\nRMS g",
-        "MII\n/min",
-        "MSI\n2 h",
-        "\nfit for",
-    )
-    table.caption = (
-        "shares of the roll's amplitudes; interruptions of who stands; motion\n"
-        "sickness incidence by McCauley et al. 1976 (ISO 2631-1 gives more,\n"
-        f"from the dose in the JSON); NORDFORSK 1987; at {place.height_m:.1f} m above and\n"
-        f"{place.starboard_m:.1f} m to starboard of the centre of gravity, by roll alone"
-    )
-    for name, each in judged.runs.items():
-        felt, above = each.comfort, each.exceedance
-        table.add_row(
-            name,
-            *("" if above is None else f"{above[index]:.1%}" for index in _SHOWN),
-            f"{felt.lateral_rms_m_s2 / GRAVITY_M_S2:.3f}",
-            f"{felt.interruptions_per_min:.2f}",
-            f"{felt.sickness_percent:.1f}%",
-            felt.allowed_work[-1] if felt.allowed_work else "none",
-        )
-    return table
 
 
 def retuning_table(found: BenchFigures) -> RichTable:

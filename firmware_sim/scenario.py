@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.fmu_file import FmuFile
 from firmware_sim.scenario_sea import ScenarioSea
-from firmware_sim.scenario_sections import DriveLimits, Place, SensorErrors
+from firmware_sim.scenario_sections import DriveLimits, SensorErrors
 from firmware_sim.voyage import (
     Waypoint,
     moment_problems,
@@ -108,8 +108,6 @@ class Scenario(Section):
     duration_s: Annotated[float, Range(above=0, most=LONGEST_S)]
     settle_s: NotNegative  #: Time at the start that is left out of the statistics.
     seed: Annotated[int, Range(least=0)] = 1
-    place: Place | None = None
-    """Place where comfort is judged; the deck over the starboard reservoir by default."""
     plant: Literal["roll", "linear", "sway_roll_yaw", "fmu"] = "roll"
     """Equations of the emulated ship: roll, its small-motion limit, three degrees of `hull`, or
     those of another program in `fmu`."""
@@ -258,11 +256,6 @@ class Scenario(Section):
             f"{figures['encounter_rad_s']:.3g} rad/s and {figures['speed_kn']:.3g} knots; standing "
             f"still they would heel it {math.degrees(figures['static_roll_rms_rad']):.2g}° RMS."
         ]
-
-    @property
-    def place_on_board(self) -> Place:
-        """Place where comfort is judged."""
-        return self.place or Place.over_reservoir(self.vessel.tank)
 
     @property
     def sailing_ship(self) -> RollShip:

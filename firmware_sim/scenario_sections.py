@@ -1,11 +1,10 @@
-"""Sections of a scenario: errors of the sensors, limits of the drive, the place judged."""
+"""Sections of a scenario: errors of the sensors, limits of the drive."""
 
 from dataclasses import dataclass
 from typing import Annotated
 
-from utank_hil.base.parameters import Finite, NotNegative, Positive, Range, range_problems, refuse
+from utank_hil.base.parameters import NotNegative, Positive, Range, range_problems, refuse
 from utank_hil.base.tick import TICK_NS
-from utank_hil.dynamics.tank import Tank
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,19 +49,3 @@ class DriveLimits:
 
     def __post_init__(self) -> None:
         refuse("drive", range_problems(self))
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Place on board, relative to the ship's centre of gravity."""
-
-    height_m: Finite  #: Height above the centre of gravity.
-    starboard_m: Finite = 0.0  #: Distance to starboard of the centre of gravity.
-
-    def __post_init__(self) -> None:
-        refuse("place", range_problems(self))
-
-    @classmethod
-    def over_reservoir(cls, tank: Tank) -> "Place":
-        """Place on the deck over the starboard reservoir, the default of a scenario."""
-        return cls(tank.height_m + tank.level_limit_m - tank.lz_m, tank.width_m / 2)

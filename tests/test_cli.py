@@ -21,8 +21,8 @@ from utank_hil.telemetry.recording import read_recording
 CONFIGS = Path("configs").resolve()
 SHIPPED = sorted((CONFIGS / "controllers").glob("*.yaml"))
 BIN = Path(sys.executable).parent
-RESULTS = ("out/bench.rrd", "out/gpc.frames")
-"""Of `utank-hil bench --frames`, for the examples."""
+RESULTS = ("out/bench.rrd", "out/gpc.frames", "out/run.rrd")
+"""Of `utank-hil bench --frames` and `run --out`, for the examples."""
 PLAIN = {"TERM": "dumb", "COLUMNS": "200", "NO_COLOR": "1"}
 
 

@@ -87,7 +87,7 @@ def bench(
     # imported late: `--help` needs none of it
     from firmware_sim.bench import BenchOptions, frames_name
     from firmware_sim.figures import figures
-    from firmware_sim.report_page import REPORT_FILES, write_report
+    from firmware_sim.report_page import REPORT_FILES, write_files
     from firmware_sim.scenario import Scenario
 
     if bus is not None and not real_time:
@@ -111,7 +111,7 @@ def bench(
     about = _about(loaded, options, out, context.params)
     result = _run(loaded, options, laws)
     found = figures(result)
-    files, failures = write_report(result, found, out, about)
+    files, failures = write_files(result, found, out, about)
     files |= {f"frames of {Path(name).stem}": out / name for name in logs}
     if json_:
         print_json(found.as_json(files, about))

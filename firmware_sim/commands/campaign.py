@@ -41,10 +41,10 @@ def campaign(
     was. A case that fails is recorded with its reason and ends nothing.
     """
     # imported late: `--help` needs none of it
-    from firmware_sim.campaign.report_page import draw
     from firmware_sim.campaign.store import FILES, PICTURE, SUMMARY, Store, StoreError, read_results
     from firmware_sim.campaign.study import load_study
     from firmware_sim.campaign.summary import failures, summary
+    from firmware_sim.campaign.tables import draw
 
     try:
         loaded = load_study(study, allow_code=allow_code)
@@ -71,7 +71,7 @@ def campaign(
         console = Terminal()
         console.say(f"results: {shown(folder)}")
         again = ("campaign", study, "--resume", *(() if out is None else ("--out", out)))
-        console.lead_on(again, ("report", folder))
+        console.lead_on(again)
     if interrupted:
         notes.say("interrupted: the same command with --resume goes on from here")
         raise typer.Exit(ExitCode.INTERRUPTED)
@@ -118,8 +118,8 @@ def _run(loaded: "LoadedStudy", store: Any, workers: int) -> bool:
 
 
 def _print(loaded: "LoadedStudy", groups: list[dict[str, Any]], failed: dict[str, int]) -> None:
-    from firmware_sim.campaign.report_page import pairs_table, runs_table
     from firmware_sim.campaign.store import LEAVES_OUT
+    from firmware_sim.campaign.tables import pairs_table, runs_table
 
     console, study = Terminal(), loaded.study
     console.table(runs_table(groups, f"{study.name}, simulation: {study.simulation}"))

@@ -23,10 +23,16 @@ from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict, write_report_page
 from utank_hil.reports import recording as of_recording
-from utank_hil.reports.page import write_page
+from utank_hil.reports.page import write_report
 from utank_hil.telemetry.recording import write_recording
 
 pytestmark = pytest.mark.slow
+
+
+def write_page(recording: Path, page: Path) -> Path:
+    """What the command does."""
+    return write_report(of_recording.recording_report(recording), page)
+
 
 ACTIVE_FROM_S, FAULT_FROM_S, END_S = 20.0, 200.0, 240.0
 
@@ -96,7 +102,6 @@ def one_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
         Image.new("L", (1, 1)).save(file)
         return file
 
-    monkeypatch.setattr(of_recording, "draw_roll_statistics", drawn)
     monkeypatch.setattr(of_recording, "draw_bench", drawn)
 
 
@@ -119,10 +124,10 @@ def test_alarms_of_a_later_part_are_those_of_the_run_and_without_a_log_not_known
     for name in (recording.name, "log-20260101T000000Z.jsonl"):
         shutil.copy(recording.with_name(name), tmp_path)
     part = (tmp_path / recording.name).rename(tmp_path / "run-20260101T000000Z-part002.rrd")
-    page = write_page([part], tmp_path / "page.html").read_text(encoding="utf-8")
+    page = write_page(part, tmp_path / "page.html").read_text(encoding="utf-8")
     assert "A reservoir is &lt;full&gt;. Look at it." in page
     (tmp_path / "log-20260101T000000Z.jsonl").unlink()
-    page = write_page([part], tmp_path / "page.html").read_text(encoding="utf-8")
+    page = write_page(part, tmp_path / "page.html").read_text(encoding="utf-8")
     assert "Not known: there is no log-20260101T000000Z.jsonl beside it." in page
 
 
@@ -136,8 +141,14 @@ def test_the_log_of_a_run_is_found_by_the_name_of_its_recording(
     assert CliRunner().invoke(app, [*words, "--out", str(tmp_path)]).exit_code == 0
     (log,), (file,) = tmp_path.glob("log-*.jsonl"), tmp_path.glob("run-*.rrd")
     log.write_text(json.dumps(EVENT) + "\n", encoding="utf-8")
-    page = write_page([file], tmp_path / "page.html").read_text(encoding="utf-8")
+    page = write_page(file, tmp_path / "page.html").read_text(encoding="utf-8")
     assert "A reservoir is &lt;full&gt;. Look at it." in page
+
+
+def test_a_folder_is_refused_and_says_what_to_name(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["report", str(tmp_path)])
+    assert done.exit_code == 2
+    assert "name a recording" in " ".join(done.output.split())
 
 
 def of_roll(path: Path, roll_rad: np.ndarray, runs: tuple[str, ...] = ("run",)) -> Path:
@@ -158,23 +169,21 @@ def of_roll(path: Path, roll_rad: np.ndarray, runs: tuple[str, ...] = ("run",)) 
 def test_gaps_in_the_roll_are_left_out_of_its_figures(tmp_path: Path) -> None:
     roll = 0.03 * np.sin(0.5 * 0.05 * np.arange(5000))
     roll[:10] = roll[1000:1500] = np.nan
-    page = write_page([of_roll(tmp_path / "a.rrd", roll)], tmp_path / "a.html").read_text()
+    page = write_page(of_roll(tmp_path / "a.rrd", roll), tmp_path / "a.html").read_text()
     rms = math.degrees(math.sqrt(np.nanmean(roll**2)))
     assert f"{rms:.2f}° RMS, 50% less than the {2 * rms:.2f}° of its passive twin" in page
     assert "the roll is known for 89.8% of it" in page
-    assert "Spectra and exceedance" in page
-    page = write_page([of_roll(tmp_path / "b.rrd", np.nan * roll)], tmp_path / "b.html").read_text()
+    page = write_page(of_roll(tmp_path / "b.rrd", np.nan * roll), tmp_path / "b.html").read_text()
     assert "In charge for 100% of the time: the roll is not known." in page
-    assert "Spectra and exceedance" not in page
 
 
 def test_what_no_report_can_be_made_of_is_refused(tmp_path: Path) -> None:
     one = of_roll(tmp_path / "one.rrd", np.array([0.1]))
     with pytest.raises(ValueError, match=r"one\.rrd: 1 rows are too few for a report"):
-        write_page([one], tmp_path / "page.html")
+        write_page(one, tmp_path / "page.html")
     bench = of_roll(tmp_path / "bench.rrd", np.zeros(100), ("passive", "gpc"))
-    with pytest.raises(ValueError, match="holds the runs passive, gpc of a bench: give its folder"):
-        write_page([bench], tmp_path / "page.html")
+    with pytest.raises(ValueError, match="holds the runs passive, gpc of a bench"):
+        write_page(bench, tmp_path / "page.html")
 
 
 def test_the_page_needs_nothing_else_and_is_whole(page: Path) -> None:
@@ -184,7 +193,7 @@ def test_the_page_needs_nothing_else_and_is_whole(page: Path) -> None:
     links.feed(text)
     assert links.open == []
     assert "http" not in text.replace("https://", "http://").split("<details>")[0]
-    assert len(links.targets) == 2
+    assert len(links.targets) == 1
     for target in links.targets:
         kind, _, content = target.partition(",")
         assert kind == "data:image/png;base64"
@@ -210,7 +219,7 @@ def test_a_recording_of_another_version_is_named(tmp_path: Path) -> None:
     rows[:, SIGNALS.index("time_s")] = np.arange(100)
     write_recording(file, SIGNALS, {"run": rows}, about={"configuration": {"name": "a law"}})
     with pytest.raises(ValueError, match=r"old\.rrd: has no 'machine': it is of another version"):
-        write_page([file], tmp_path / "page.html")
+        write_page(file, tmp_path / "page.html")
 
 
 @pytest.mark.usefixtures("one_pixel")
@@ -230,18 +239,17 @@ def test_a_full_disk_is_said_with_the_page_and_leaves_no_half_of_it(
     page = tmp_path / "page.html"
     monkeypatch.setattr(Path, "write_bytes", half)
     with pytest.raises(OSError, match="No space left"):
-        write_page([recording], page)
+        write_page(recording, page)
     assert not page.exists()
 
 
 @pytest.mark.parametrize(
     ("name", "expected"),
-    [("nothing", "is not there"), ("empty", "holds no bench.json"), ("text.rrd", "text.rrd")],
+    [("nothing.rrd", "nothing.rrd"), ("text.rrd", "text.rrd")],
 )
 def test_what_is_no_run_is_named(tmp_path: Path, name: str, expected: str) -> None:
-    (tmp_path / "empty").mkdir()
     (tmp_path / "text.rrd").write_text("no recording")
     with pytest.raises((ValueError, OSError)) as caught:
-        write_page([tmp_path / name], tmp_path / "page.html")
+        write_page(tmp_path / name, tmp_path / "page.html")
     assert expected in str(caught.value)
     assert str(tmp_path / name) in str(caught.value)

@@ -1,6 +1,6 @@
 """Analysis of ship, tank and law without a bus.
 
-`loop` holds margins, robustness and trade-offs; `motion` statistics, decay, comfort, exceedance.
+`loop` holds margins, robustness and trade-offs; `motion` statistics, decay, inclining test.
 """
 
 from utank_hil.analysis.loop.loop_simulation import LinearShip as LinearShip

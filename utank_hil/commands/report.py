@@ -1,4 +1,4 @@
-"""``utank-hil report``: a run as one page that can be sent."""
+"""``utank-hil report``: a run on board as one page that can be sent."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,25 +10,27 @@ from utank_hil.console.terminal import notes, shown
 
 
 def report(
-    runs: Annotated[
-        list[Path], typer.Argument(help="Folders of benches and campaigns, recordings (.rrd).")
-    ],
+    recording: Annotated[Path, typer.Argument(help="Recording of `utank-hil run` (.rrd).")],
     out: Annotated[
-        Path | None, typer.Option(help="The page; beside the first run if not given.")
+        Path | None, typer.Option(help="The page; beside the recording if not given.")
     ] = None,
     json_: Json = False,
 ) -> None:
-    """Write one HTML page of one or several runs: it needs no network and prints well.
+    """Write one HTML page of a recording: it needs no network and prints well.
 
-    Verdict, tables, pictures, alarms, deadlines, and where the results come from.
+    Verdict, picture, modes, alarms, deadlines, and where the results come from. The page of a bench
+    is written by the bench.
 
-    **Example:** utank-hil report out
+    **Example:** utank-hil report out/run.rrd
     """
-    from utank_hil.reports.page import PAGE, write_page
+    from utank_hil.reports.page import write_report
+    from utank_hil.reports.recording import recording_report
 
-    page = out or (runs[0] / PAGE if runs[0].is_dir() else runs[0].with_suffix(".html"))
+    if recording.is_dir():
+        fail(f"{recording}: is a folder; name a recording of `utank-hil run` (.rrd) in it")
     try:
-        written = write_page(runs, page)
+        page = out or recording.with_suffix(".html")
+        written = write_report(recording_report(recording), page)
     except (OSError, ValueError) as error:
         fail(error)
     if json_:

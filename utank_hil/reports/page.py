@@ -1,52 +1,54 @@
-"""Writes the page of one or several runs, of whatever kind."""
+"""What reports of runs share: their parts, and the page that they are written to."""
 
-import tempfile
-from collections.abc import Callable, Sequence
-from importlib.metadata import entry_points
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, NamedTuple
 
-from utank_hil.pictures.report_page import write_report_page
-from utank_hil.reports.recording import Report, ReportKind, recording_report
+import yaml
+from rich.table import Table
 
-GROUP: Final = "utank_hil.reports"  #: Entry points of runs that leave a folder (`ReportKind`).
-PAGE: Final = "report.html"
-
-
-def write_page(runs: list[Path], page: Path) -> Path:
-    """Write the page of these runs; OSError or ValueError says which can't be read, or written."""
-    return write_reports([_report(run) for run in runs], page)
+from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict, write_report_page
 
 
-def write_reports(reports: Sequence[Report], page: Path) -> Path:
-    """Write the page of these reports, one after the other."""
-    title, below = reports[0].title, reports[0].below
-    if len(reports) > 1:
-        title = ", ".join(each.title for each in reports)
-        below = " ".join(f"{each.title}: {each.below}" for each in reports)
-    verdicts = [each.verdict for each in reports]
-    sections = [section for each in reports for section in each.sections]
-    return write_report_page(page, title, below, verdicts, sections)
+class Report(NamedTuple):
+    """The report of a run: heading, the line below it, what is said first of all, and the rest."""
+
+    title: str
+    below: str
+    verdict: Verdict
+    sections: Sequence[ReportSection]
 
 
-def _report(run: Path) -> Report:
-    if not run.exists():
-        raise ValueError(f"{run}: is not there")
-    file = run
-    make: Callable[[Path, Path], Report] = recording_report
-    if not run.is_file():
-        kinds: list[ReportKind] = [point.load() for point in entry_points(group=GROUP)]
-        kind = next((kind for kind in kinds if (run / kind.file).exists()), None)
-        if kind is None:
-            files = " and no ".join(kind.file for kind in kinds)
-            raise ValueError(
-                f"{run}: holds no {files}: give the folder of a bench or of a campaign, or the "
-                ".rrd file of a run"
-            )
-        file, make = run / kind.file, kind.report
-    try:
-        with tempfile.TemporaryDirectory() as scratch:
-            return make(run, Path(scratch))
-    except KeyError as error:
-        reason = f"has no {error}: it is of another version, make it again"
-        raise ValueError(f"{file}: {reason}") from error
+def printed(table: Table) -> ReportTable:
+    """A table of the terminal."""
+
+    def line(text: object) -> str:
+        return " ".join(str(text or "").split())
+
+    rows = zip(*([line(cell) for cell in column.cells] for column in table.columns), strict=True)
+    caption = ": ".join(filter(None, (line(table.title), line(table.caption))))
+    return ReportTable([line(column.header) for column in table.columns], list(rows), caption)
+
+
+def about_section(about: Mapping[str, Any], configuration: Any) -> ReportSection:
+    """Program, machine and command of a result, its data files and its whole configuration."""
+    machine = about["machine"]
+    options = {name: value for name, value in about["options"].items() if value is not None}
+    rows = [
+        ["program", f"{about['program']} {about['version']}, commit {about['commit']}"],
+        ["date", about["date"]],
+        ["machine", f"{machine['platform']}, Python {machine['python']}, {machine['cpus']} cores"],
+        ["command", f"{about['command']}: " + ", ".join(f"{k} {v}" for k, v in options.items())],
+        *([f"data file {name}", f"SHA-256 {digest}"] for name, digest in about["data"].items()),
+    ]
+    listing = yaml.safe_dump(configuration, sort_keys=False, allow_unicode=True)
+    return ReportSection(
+        "Where it comes from",
+        tables=[ReportTable(["", ""], rows, text=True)],
+        listings={"The whole configuration": listing},
+    )
+
+
+def write_report(report: Report, page: Path) -> Path:
+    """Write a report over a page; raises `OSError` if it can't be written."""
+    return write_report_page(page, report.title, report.below, [report.verdict], report.sections)

@@ -2,100 +2,39 @@
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import tempfile
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-import yaml
-from rich.table import Table
 
 from utank_hil.analysis.motion.statistics import roll_statistics
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.pictures import BenchCurve, draw_bench
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
-from utank_hil.pictures.roll_statistics import draw_roll_statistics
+from utank_hil.reports.page import Report, about_section
 from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.rotation import whole_of
-
-
-class Report(NamedTuple):
-    """The report of a run: heading, the line below it, what is said first of all, and the rest."""
-
-    title: str
-    below: str
-    verdict: Verdict
-    sections: Sequence[ReportSection]
-
-
-@dataclass(frozen=True, slots=True)
-class ReportKind:
-    """A kind of run that can be reported."""
-
-    file: str  #: By which the run's folder is known.
-    #: Of the folder, with another one for pictures that are made for the report. Raises OSError or
-    #: ValueError for what it can't read, KeyError for what another version wrote.
-    report: Callable[[Path, Path], Report]
-
-
-def printed(table: Table) -> ReportTable:
-    """A table of the terminal."""
-
-    def line(text: object) -> str:
-        return " ".join(str(text or "").split())
-
-    rows = zip(*([line(cell) for cell in column.cells] for column in table.columns), strict=True)
-    caption = ": ".join(filter(None, (line(table.title), line(table.caption))))
-    return ReportTable([line(column.header) for column in table.columns], list(rows), caption)
-
-
-def roll_figure(rolls: Mapping[str, FloatArray], step_s: float, scratch: Path) -> ReportSection:
-    """Spectra of the roll and exceedance of its amplitudes, as a picture in `scratch`."""
-    title = "Roll at which periods, how often"
-    file = draw_roll_statistics(rolls, step_s, scratch / "roll.png", title)
-    says = "Left: spectra of the roll over its period. Right: share of amplitudes above each angle."
-    picture = ReportPicture(file.read_bytes(), says)
-    return ReportSection("Spectra and exceedance", pictures=[picture])
-
-
-def about_section(about: Mapping[str, Any], configuration: Any) -> ReportSection:
-    """Program, machine and command of a result, its data files and its whole configuration."""
-    machine = about["machine"]
-    options = {name: value for name, value in about["options"].items() if value is not None}
-    rows = [
-        ["program", f"{about['program']} {about['version']}, commit {about['commit']}"],
-        ["date", about["date"]],
-        ["machine", f"{machine['platform']}, Python {machine['python']}, {machine['cpus']} cores"],
-        ["command", f"{about['command']}: " + ", ".join(f"{k} {v}" for k, v in options.items())],
-        *([f"data file {name}", f"SHA-256 {digest}"] for name, digest in about["data"].items()),
-    ]
-    listing = yaml.safe_dump(configuration, sort_keys=False, allow_unicode=True)
-    return ReportSection(
-        "Where it comes from",
-        tables=[ReportTable(["", ""], rows, text=True)],
-        listings={"The whole configuration": listing},
-    )
-
 
 STEP_S: Final = 0.05  #: Step between the samples that are drawn: ample for a ship.
 LEAST_ROWS: Final = 3  #: Rows that statistics and a spectrum need.
 RUN, LOG = "run-", "log-"  #: Beginnings of the names of a run's recording and of its log of alarms.
 
 
-def recording_report(file: Path, scratch: Path) -> Report:
+def recording_report(file: Path) -> Report:
     """The report of a recording of ``utank-hil run --out``, with its log of alarms beside it.
 
-    `scratch` is a folder for pictures. Raises `OSError, ValueError` if the file is no recording,
-    one of several runs, or one of hardly any rows.
+    Raises `OSError, ValueError` if the file is no recording, one of several runs, one of hardly
+    any rows, or of another version.
     """
     from utank_hil.telemetry.recording import read_about, read_recording
 
     runs = read_recording(file)
     if len(runs) > 1:
-        raise ValueError(f"{file}: holds the runs {', '.join(runs)} of a bench: give its folder")
+        names = ", ".join(runs)
+        raise ValueError(f"{file}: holds the runs {names} of a bench, whose page is beside it")
     ((name, rows),) = runs.items()
     if len(rows["time_s"]) < LEAST_ROWS:
         raise ValueError(f"{file}: {len(rows['time_s'])} rows are too few for a report")
@@ -106,19 +45,16 @@ def recording_report(file: Path, scratch: Path) -> Report:
     duration_s = float(rows["time_s"][-1] - rows["time_s"][0])
     alarms = _alarms(file)
     sections = [
-        ReportSection("Roll, level and pressure", pictures=[_histories(rows, scratch, file.stem)]),
+        ReportSection("Roll, level and pressure", pictures=[_histories(rows, file.stem)]),
         ReportSection("Modes", tables=[_modes(rows)]),
         _alarm_section(alarms, file),
     ]
-    rolls = {"passive twin": rows["twin_roll_rad"], "ship": rows["roll_rad"]}
-    stretches = {each: _longest_known(roll) for each, roll in rolls.items()}
-    known = {each: roll for each, roll in stretches.items() if len(roll) >= LEAST_ROWS}
-    if known:
-        step_s = float(np.median(np.diff(rows["time_s"])))
-        sections.append(roll_figure(known, step_s, scratch))
     sections.append(_deadlines(rows))
     if about is not None:
-        sections.append(about_section(about, about["configuration"]))
+        try:
+            sections.append(about_section(about, about["configuration"]))
+        except KeyError as error:
+            raise ValueError(f"{file}: has no {error}: it is of another version") from error
     title = (about or {}).get("configuration", {}).get("name", name)
     below = f"Recording {file.name}, {duration_s:.0f} s" + (f", {about['date']}." if about else ".")
     return Report(f"{title}: run", below, _verdict(rows, alarms), sections)
@@ -160,18 +96,11 @@ def _rolled(rows: dict[str, FloatArray], active: npt.NDArray[np.bool_]) -> str:
     return words if share_known == 1 else f"{words}; the roll is known for {share_known:.1%} of it"
 
 
-def _longest_known(roll_rad: FloatArray) -> FloatArray:
-    """The longest stretch without a gap, which a spectrum needs."""
-    ends = np.flatnonzero(~np.isfinite(np.concatenate([[np.nan], roll_rad, [np.nan]])))
-    longest = int(np.diff(ends).argmax())
-    return roll_rad[ends[longest] : ends[longest + 1] - 1]
-
-
 def _degrees(angle_rad: float) -> str:
     return f"{math.degrees(angle_rad):.2f}°"
 
 
-def _histories(rows: dict[str, FloatArray], scratch: Path, title: str) -> ReportPicture:
+def _histories(rows: dict[str, FloatArray], title: str) -> ReportPicture:
     every = max(1, round(STEP_S / float(np.median(np.diff(rows["time_s"])))))
     thin = {name: values[::every] for name, values in rows.items()}
     level_m = (thin["starboard_level_m"] - thin["port_level_m"]) / 2
@@ -179,9 +108,10 @@ def _histories(rows: dict[str, FloatArray], scratch: Path, title: str) -> Report
     time_s, pressure_pa = thin["time_s"], thin["pressure_actual_pa"]
     twin = BenchCurve("passive twin", time_s, thin["twin_roll_rad"], nothing, nothing)
     ship = BenchCurve("ship", time_s, thin["roll_rad"], level_m, pressure_pa)
-    file = draw_bench([twin, ship], scratch / "histories.png", title)
     says = "Roll of the ship and of its passive twin, level and pressure"
-    return ReportPicture(file.read_bytes(), says)
+    with tempfile.TemporaryDirectory() as scratch:
+        file = draw_bench([twin, ship], Path(scratch) / "histories.png", title)
+        return ReportPicture(file.read_bytes(), says)
 
 
 def _modes(rows: dict[str, FloatArray]) -> ReportTable:

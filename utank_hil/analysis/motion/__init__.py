@@ -1,1 +1,1 @@
-"""Analysis of motion records: statistics, decay, exceedance, comfort and motion sickness."""
+"""Analysis of motion records: statistics, decay, inclining test."""

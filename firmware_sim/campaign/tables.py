@@ -1,20 +1,16 @@
-"""Picture of a campaign, and its report, made from the files in its folder."""
+"""Tables and picture of a campaign."""
 
-import json
 import math
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from rich.table import Table
 
-from firmware_sim.campaign.store import PICTURE, SUMMARY, Results
+from firmware_sim.campaign.store import Results
 from firmware_sim.campaign.summary import groups_of
 from firmware_sim.figures import NO_TANK
-from firmware_sim.scenario import PASSIVE
 from utank_hil.console.terminal import new_table
 from utank_hil.pictures.campaign import CampaignRun, draw_campaign
-from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
-from utank_hil.reports.recording import Report, ReportKind, about_section, printed
 
 Figure = dict[str, Any]
 
@@ -109,54 +105,6 @@ def _short_keys(groups: list[dict[str, Any]]) -> list[str]:
 
 def _short(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-MOST_LINES: Final = 8  #: Most lines of the verdict. Chosen; no study.
-
-
-def campaign_report(folder: Path, scratch: Path) -> Report:  # noqa: ARG001
-    """Return the report of a campaign's folder; `scratch` is unused, as it makes no pictures.
-
-    Raises `OSError, ValueError` if a file of the campaign is missing or invalid.
-    """
-    content = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
-    groups, failed, study = content["groups"], content["failures"], content["configuration"]
-    picture = ReportPicture((folder / PICTURE).read_bytes(), "Rolls of each run, with intervals")
-    tables = [printed(runs_table(groups, "Runs")), printed(pairs_table(groups))]
-    sections = [
-        ReportSection("Results", pictures=[picture], tables=tables),
-        ReportSection("What it leaves out", [f"{each}." for each in content["leaves_out"]]),
-    ]
-    if failed:
-        rows = [[reason, str(count)] for reason, count in failed.items()]
-        table = ReportTable(["reason", "cases"], rows, text=True)
-        sections.append(ReportSection("Cases without a result", tables=[table]))
-    sections.append(about_section(content, study))
-    below = f"{content['cases']} cases, simulation {study['simulation']}. {content['date']}."
-    title = f"{study.get('name') or folder.name}: campaign"
-    return Report(title, below, _verdict(content), sections)
-
-
-CAMPAIGN: Final = ReportKind(SUMMARY, campaign_report)
-
-
-def _verdict(content: dict[str, Any]) -> Verdict:
-    lines = []
-    for group in content["groups"]:
-        where = ", ".join(f"{key} {value}" for key, value in group["parameters"].items())
-        lines += [
-            f"{pair['run']}{f' ({where})' if where else ''}: "
-            f"{interval(pair['share_below'], 100, 1)} % below the passive tank, mean of "
-            f"{pair['share_below']['cases']} pairs."
-            for pair in group["paired"]
-            if pair["against"] == PASSIVE and pair["share_below"]["cases"]
-        ]
-    wrong = []
-    if content["interrupted"]:
-        wrong.append("The campaign was interrupted: --resume goes on from there.")
-    if content["failures"]:
-        wrong.append(f"{sum(content['failures'].values())} cases have no result.")
-    return Verdict([*lines[:MOST_LINES], *wrong], good=not wrong)
 
 
 def draw(results: Results, groups: list[dict[str, Any]], path: Path) -> Path:
