@@ -2,6 +2,7 @@
 
 import math
 import re
+import struct
 
 import cantools
 import pytest
@@ -246,7 +247,7 @@ def test_an_mti_has_its_most_byte_first():
 def ssi2(roll_counts, rate_counts):
     slope = (0).to_bytes(3, "little") + roll_counts.to_bytes(3, "little") + b"\xff\xff"
     rates = b"\xff\xff" + rate_counts.to_bytes(2, "little") + bytes(4)
-    return {0x0CF02980: slope, 0x0CF02A80: rates}
+    return {0x0CF02990: slope, 0x0CF02A90: rates}
 
 
 @pytest.mark.parametrize(
@@ -260,7 +261,7 @@ def ssi2(roll_counts, rate_counts):
     ],
 )
 def test_j1939_counts_beyond_the_range_are_no_angle(roll, rate, good):
-    found, heard = device(profile="j1939_ssi2", source=0x80)
+    found, heard = device(profile="j1939_ssi2", source=0x90)
     for can_id, data in ssi2(roll, rate).items():
         give(found, can_id, data, 0)
     sample = heard[-1][1]
@@ -409,3 +410,30 @@ def test_a_stamp_that_stands_is_seen_at_once():
     times = [0, 10, 20, 20, 30]
     passed = [stamp.passes(t.to_bytes(2, "little"), 10 * k * MS) for k, t in enumerate(times)]
     assert passed == [False, True, True, False, True]
+
+
+def test_counter_and_stamp_may_have_a_sign():
+    message = HeardMessage(1, 10 * MS, 1, counter=Field(0, 4, 1, signed=True))
+    accepted = [message.passes(bytes((each % 16,))) for each in (6, 7, 8, 9, 9, 14, 15, 0, 1)]
+    assert accepted == [True, True, True, True, False, False, False, True, True]
+    stamp = Stamp(Field(0, 16, 2, signed=True), 1000.0, 40)
+    times = range(32_700, 32_860, 10)  # through the change of its sign
+    passed = [stamp.passes((ms & 0xFFFF).to_bytes(2, "little"), ms * MS) for ms in times]
+    assert passed == [False] + [True] * 15
+
+
+@pytest.mark.parametrize("flow", [0, 0xFFFF])
+def test_a_frozen_pressure_is_found_beside_a_flow_that_is_not_available(flow):
+    signals = {
+        "P": {"start": 0, "bits": 16, "unit": "Pa"},
+        "Q": {"start": 16, "bits": 16, "unit": "l/s", "most_raw": 0xFAFF},
+    }
+    found, heard = device(
+        "pump_sensor", profile="", cycle_ms=20, age_ms=100,
+        messages={"m": {"id": 5, "bytes": 4, "signals": signals}},
+        signals={"pressure_pa": {"from": "m.P"}, "flow_m3_s": {"from": "m.Q"}},
+        protection={"unchanged_ms": 200},
+    )  # fmt: skip
+    for k in range(30):
+        give(found, STANDARD | 5, struct.pack("<HH", 700, flow), 20 * k * MS)
+    assert [each.quality for _, each in heard] == [Quality.GOOD] * 11 + [Quality.BAD] * 19

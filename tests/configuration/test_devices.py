@@ -7,14 +7,28 @@ import pytest
 import yaml
 from others import others_file
 
+from utank_hil.canbus import Address, Frame, Quality, SensorMotion, load_catalogue
+from utank_hil.canbus.frame import STANDARD
+from utank_hil.canbus.profiles.device import ProfiledDevice
 from utank_hil.canbus.profiles.device_plan import ForeignDevices
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.configuration.device_files import shipped_profiles
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.configuration.files import ConfigError, load_config
 
+MOTION = load_catalogue().codec(SensorMotion, Address.SENSORS).can_id
 SHIP = Path("configs/ships/thesis_first.yaml").resolve()
 SBG = {"profile": "sbg_ellipse", "accept_unprotected": True}
+SSI2 = {"profile": "j1939_ssi2", "source": 0x20, "accept_unprotected": True}
+LEVELS = {
+    "profile": "cia404_levels", "node": 9, "high_level_m": 4.6, "accept_unprotected": True,
+    "signals": {name: {"scale": 0.25, "offset": -3} for name in
+                ("port_level_m", "starboard_level_m")},
+}  # fmt: skip
+DRIVE = {
+    "profile": "cia402", "node": 5, "mode": "torque", "pressure_pa_per_unit": 80.0,
+    "speed_rad_s_per_unit": 0.001,
+}  # fmt: skip
 
 
 def ship_file(folder, devices, **more):
@@ -73,8 +87,21 @@ def test_a_change_of_a_device_voids_the_commissioning(tmp_path):
         ({"motion": SBG, "receive_only": ["can3"]}, "no device is on can3"),
         ({"motion": SBG | {"dbc": "./none.dbc", "messages": {"a": "B"}}}, "can't be read"),
         ({"motion": {"sources": 5}}, "did you mean source"),
+        ({"motion": SBG | {"messages": {"status": {"cycle_ms": 100}, "gyro": {"cycle_ms": 20}}}},
+         "messages.gyro.cycle_ms: is 20, and cycle_ms 10"),
+        ({"motion": SBG | {"messages": {"attitude": {"id": 0x18F02920}}}}, "must be 29bit: 0x18f0"),
+        ({"motion": SBG | {"protection": {"crcs": [{"message": "attitude", "byte": 6}]}}},
+         "byte 6 is not in attitude, which has 6"),
+        ({"motion": SBG | {"messages": {"attitude": {"only": {"from": "YAW", "in": [1]}}}}},
+         "'YAW' is no signal of attitude"),
+        ({"motion": SSI2 | {"source": 0x80}}, "motion.source: is the address of controller"),
+        ({"motion": SBG | {"messages": {"attitude": {"id": MOTION, "format": "29bit"}}}},
+         f"{MOTION:#x} is a native node's on this bus"),
+        ({"motion": SSI2, "motion_2": SSI2}, "is no second source for itself"),
+        ({"levels": LEVELS | {"node": 5}, "pump": DRIVE}, "levels.node: is the drive's"),
+        ({"levels": LEVELS | {"node": 127}, "pump": DRIVE}, "levels.node: is the drive's"),
     ],
-)
+)  # fmt: skip
 def test_what_is_refused(tmp_path, devices, reason):
     assert reason in problems(tmp_path, devices)
 
@@ -187,3 +214,69 @@ def test_declared_devices_are_known(can_id, known):
         other_ids=frozenset([1 << 29 | 0x321]), other_pgns=frozenset([0x1F113, 0xEA00])
     )
     assert others.knows(can_id) is known
+
+
+SLOPE_ID = 0x18FF3020
+INERTIAL = f"""VERSION ""
+BO_ {SLOPE_ID | 1 << 31} SLOPE: 8 S
+ SG_ ROLL : 0|16@1- (0.001,0) [0|0] "deg" X
+BO_ 256 IMU: 8 S
+ SG_ PAGE M : 0|8@1+ (1,0) [0|0] "" X
+ SG_ ANGLE m0 : 8|16@1- (0.001,0) [0|0] "rad" X
+ SG_ TURN m1 : 8|16@1- (0.001,0) [0|0] "rad/s" X
+ SG_ YAW m2 : 8|16@1- (0.001,0) [0|0] "rad/s" X
+BO_ 257 LONG: 20 S
+ SG_ FAR : 100|16@1- (0.001,0) [0|0] "rad" X
+BA_DEF_ BO_ "GenMsgCycleTime" INT 0 10000;
+BA_DEF_DEF_ "GenMsgCycleTime" 0;
+BA_ "GenMsgCycleTime" BO_ 256 20;
+"""
+
+
+def inertial(folder, **changes):
+    (folder / "theirs.dbc").write_text(INERTIAL)
+    return {
+        "dbc": "./theirs.dbc", "messages": {"a": "IMU", "b": "IMU"}, "cycle_ms": 10, "age_ms": 40,
+        "signals": {"roll_rad": {"from": "a.ANGLE"}, "roll_rate_rad_s": {"from": "b.TURN"}},
+        "protection": {"unchanged_ms": 100}, "accept_unprotected": True, **changes,
+    }  # fmt: skip
+
+
+def test_contents_that_share_an_identifier_are_told_apart(tmp_path):
+    found = ProfiledDevice(ship(tmp_path, {"motion": inertial(tmp_path)}).foreign.motions[0])
+    heard = []
+    found.deliver = lambda message, _: heard.append(message)
+    for page, counts in ((0, 250), (2, 999), (1, -40)):
+        data = bytes((page,)) + counts.to_bytes(2, "little", signed=True) + bytes(5)
+        found.takes[STANDARD | 256](Frame(STANDARD | 256, data), 0)
+    assert heard == [(pytest.approx(0.25), pytest.approx(-0.04), Quality.GOOD)]
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"messages": {"a": "IMU", "b": "LONG"}}, "LONG has 20 bytes .*fast packet"),
+        ({"messages": {"a": "IMU"}, "signals": {"roll_rad": {"from": "a.ANGLE"},
+          "roll_rate_rad_s": {"from": "a.TURN"}}}, "of IMU do not come together: name IMU for eac"),
+        ({"messages": {"a": {"id": 5}, "b": "IMU"}}, "messages names messages of the file"),
+    ],
+)  # fmt: skip
+def test_what_a_dbc_does_not_give_is_refused(tmp_path, changes, reason):
+    assert re.search(reason, problems(tmp_path, {"motion": inertial(tmp_path, **changes)}))
+
+
+def test_identifiers_of_a_dbc_may_be_others_and_its_cycle_counts_where_none_is_given(tmp_path):
+    content = inertial(tmp_path, messages={"a": {"of": "IMU", "id": 0x333}, "b": "IMU"})
+    del content["cycle_ms"]
+    plan = ship(tmp_path, {"motion": content}).foreign.motions[0]
+    assert [each.can_ids for each in plan.messages] == [(STANDARD | 0x333,), (STANDARD | 256,)]
+    assert plan.cycle_ns == 20_000_000
+
+
+def test_a_source_finds_a_message_of_a_dbc_by_its_group(tmp_path):
+    signals = {"roll_rad": {"from": "s.ROLL"}, "roll_rate_rad_s": {"from": "a.TURN"}}
+    content = inertial(tmp_path, source=0x21, messages={"s": "SLOPE", "a": "IMU"}, signals=signals)
+    plan = ship(tmp_path, {"motion": content}).foreign.motions[0]
+    group = SLOPE_ID >> 8 & 0x3FFFF
+    assert {each & 0x3FFFFFF for each in plan.messages[1].can_ids} == {group << 8 | 0x21}
+    assert len(plan.messages[1].can_ids) == 8

@@ -1,5 +1,6 @@
 """Devices of other makers in the inbox, and what an unprotected one costs."""
 
+import struct
 import time
 from types import SimpleNamespace
 
@@ -202,7 +203,7 @@ def test_a_name_is_asked_for_until_it_is_told():
     name = 0xC0FFEE0102030405
     found = inbox({"motion": SSI2 | {"protection": {"n2k_name": name}}})
     (request,) = found.wakes(0)
-    assert request == Frame(0x18EA2080, bytes([0x00, 0xEE, 0x00]))
+    assert request == Frame(0x18EA20FE, bytes([0x00, 0xEE, 0x00]))
     found.receive(Frame(0x18F02920, slope(0)), 5 * SILENT_NS)
     found.receive(Frame(0x0CF02A20, RATES), 5 * SILENT_NS)
     assert found.wakes(5 * SILENT_NS) == [request]
@@ -215,3 +216,43 @@ def test_nothing_is_sent_where_the_interface_is_receive_only():
     redundancy = {"redundancy": Redundancy(second_motion_sensor=True)}
     assert len(inbox({"motion": levels}, **redundancy).wakes(0)) == 1
     assert inbox({"motion": levels, "receive_only": ["can1"]}, **redundancy).wakes(0) == []
+
+
+def test_two_roles_hear_one_frame():
+    """Levels and pressure are inputs of one device, in one PDO."""
+    signals = {
+        name: {"start": 16 * k, "bits": 16, "signed": True, "scale": 1e-3, "unit": "m"}
+        for k, name in enumerate(("PORT", "STARBOARD", "PRESSURE"))
+    }
+    inputs = {
+        "profile": "", "node": 7, "cycle_ms": 20, "age_ms": 100, "accept_unprotected": True,
+        "messages": {"in": {"cob": 0x180, "bytes": 6, "signals": signals}},
+        "protection": {"unchanged_ms": 2000},
+    }  # fmt: skip
+    levels = inputs | {
+        "high_level_m": 4.0,
+        "signals": {
+            "port_level_m": {"from": "in.PORT"},
+            "starboard_level_m": {"from": "in.STARBOARD"},
+        },
+    }
+    pressure = inputs | {"signals": {"pressure_pa": {"from": "in.PRESSURE", "scale": 1000}}}
+    found = inbox({"levels": levels, "pump_sensor": pressure})
+    frame = Frame(STANDARD | 0x187, struct.pack("<hhh", -1000, 1500, 250))
+    found.receive(frame, 0)
+    seen = found.snapshot(0)
+    assert (seen.port_level_m, seen.starboard_level_m) == pytest.approx((-1.0, 1.5))
+    assert seen.pressure_pa == pytest.approx(250.0)
+
+
+def test_what_a_declared_device_says_besides_is_no_stranger():
+    levels = {"profile": "cia410", "node": 5, "accept_unprotected": True}
+    redundancy = {"redundancy": Redundancy(second_motion_sensor=True)}
+    found = inbox({"motion": SSI2, "motion_2": levels}, **redundancy)
+    for can_id in (0x705, 0x085, 0x285, 0x585):
+        found.receive(Frame(STANDARD | can_id, bytes(8)), 0)
+    found.receive(Frame(0x18FECA20, bytes(8)), 0)
+    assert found.foreign == 0
+    for can_id in (STANDARD | 0x706, STANDARD | 0x605, 0x18FECA21):
+        found.receive(Frame(can_id, bytes(8)), 0)
+    assert found.foreign == 3

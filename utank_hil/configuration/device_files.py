@@ -1,6 +1,7 @@
 """Profiles that are shipped, and layouts out of a maker's DBC or EDS."""
 
 import re
+from collections.abc import Iterator
 from configparser import ConfigParser, Error
 from functools import cache
 from pathlib import Path
@@ -12,6 +13,7 @@ from utank_hil.canbus.profiles.drive_plan import DISABLED, PROFILE, Place
 from utank_hil.configuration.yaml_text import parse_yaml
 
 OF_AN_EDS: Final = "EDS "  #: Begins the name of a device whose layouts were read from an EDS.
+FRAME_BYTES: Final = 8
 LIMIT_BYTES: Final = 1 << 22  #: Of a file; those of drives have some 100 kB.
 ENCODINGS: Final = ("utf-8-sig", "cp1252", "latin-1")
 """A file has no mark of its encoding. The last decodes anything; numbers are ASCII in all three."""
@@ -173,18 +175,15 @@ def eds_file(file: str) -> Eds:
 def with_eds(content: dict[str, Any]) -> dict[str, Any]:
     """A sensor's section with the layouts of its PDOs in the place of their names."""
     rest = {key: value for key, value in content.items() if key not in ("eds", "messages")}
-    named = content.get("messages")
-    pdos = named.values() if isinstance(named, dict) else [""]
-    if not all(re.fullmatch(r"TPDO[1-9][0-9]*", str(each), re.IGNORECASE) for each in pdos):
-        raise ValueError("with eds, messages names PDOs that are sent: {name: TPDO1}")
-    assert isinstance(named, dict)
+    named = _named(content, "eds", r"TPDO[1-9][0-9]*")
+    pdos = [of for of, _ in named.values()]
     eds = eds_file(str(content["eds"]))
     _same_node(eds, content)
-    messages = {name: eds.sent(int(str(each)[4:])) for name, each in named.items()}
+    messages = {name: eds.sent(int(of[4:])) | changes for name, (of, changes) in named.items()}
     if "cycle_ms" not in rest:
         cycles = [each["cycle_ms"] for each in messages.values()]
         if None in cycles:
-            pdo = list(pdos)[cycles.index(None)]
+            pdo = pdos[cycles.index(None)]
             raise ValueError(
                 f"cycle_ms is required but missing: as {eds.file} has it, {pdo} is sent on a "
                 "change or at SYNC. Set its type (1800h:2) to 255 and its event timer (1800h:5)"
@@ -274,18 +273,73 @@ def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
     return both
 
 
+_NAMED: Final = {
+    "dbc": ("messages of the file", "MESSAGE"), "eds": ("PDOs that are sent", "TPDO1"),
+}  # fmt: skip
+
+
+def _named(content: dict[str, Any], key: str, names: str) -> dict[str, tuple[str, dict[str, Any]]]:
+    """What `messages` names in a file, and what it has otherwise there, by names of the ship's."""
+    what, example = _NAMED[key]
+    given = content.get("messages")
+    found: dict[str, tuple[str, dict[str, Any]]] = {}
+    for name, each in given.items() if isinstance(given, dict) else ():
+        rest = dict(each) if isinstance(each, dict) else {"of": each}
+        found[name] = str(rest.pop("of", "")), rest
+    if not found or not all(re.fullmatch(names, of, re.IGNORECASE) for of, _ in found.values()):
+        raise ValueError(
+            f"with {key}, messages names {what}: {{name: {example}}}, or, with another "
+            f"identifier, {{name: {{of: {example}, id: 0x123}}}}"
+        )
+    return found
+
+
 def _with_dbc(content: dict[str, Any]) -> dict[str, Any]:
     """Replace the names of messages by their layouts; the file is not needed any longer."""
     rest = {key: value for key, value in content.items() if key not in ("dbc", "messages")}
-    named = content.get("messages")
-    if not isinstance(named, dict) or not all(isinstance(each, str) for each in named.values()):
-        raise ValueError("with dbc, messages names messages of the file: {name: MESSAGE}")
-    layouts = _dbc_layouts(str(content["dbc"]))
-    for each in named.values():
-        if each not in layouts:
-            raise ValueError(f"messages: {content['dbc']} has no message {each}")
-    messages = {key: layouts[each] for key, each in named.items()}
-    return {"profile": f"{OF_A_DBC}{Path(str(content['dbc'])).name}", **rest, "messages": messages}
+    layouts, file = _dbc_layouts(str(content["dbc"])), content["dbc"]
+    meant = set(_words([content.get(key) for key in ("signals", "valid_when", "protection")]))
+    messages: dict[str, dict[str, Any]] = {}
+    for name, (of, changes) in _named(content, "dbc", ".+").items():
+        if of not in layouts:
+            raise ValueError(f"messages: {file} has no message {of}")
+        layout = dict(layouts[of])
+        if layout["bytes"] > FRAME_BYTES:
+            raise ValueError(
+                f"messages: {of} has {layout['bytes']} bytes in {file}, and comes in several "
+                "frames (fast packet, transport protocol), which are not put together"
+            )
+        comes_with = layout.pop("comes_with")
+        used = {each: comes_with[each] for each in comes_with if f"{name}.{each}" in meant}
+        if used:
+            layout["only"] = _one_content(of, used)
+        if "cycle_ms" in content:  # a file's is a placeholder
+            del layout["cycle_ms"]
+        if "source" in content and layout["format"] == "29bit":  # so are source and priority
+            layout["pgn"] = layout.pop("id") >> 8 & 0x3FFFF
+        messages[name] = layout | changes
+    cycles_ms = [each["cycle_ms"] for each in messages.values() if each.get("cycle_ms")]
+    if len(cycles_ms) == len(messages):
+        rest["cycle_ms"] = max(cycles_ms)
+    return {"profile": f"{OF_A_DBC}{Path(str(file)).name}", **rest, "messages": messages}
+
+
+def _words(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict | list | tuple):
+        for each in value.values() if isinstance(value, dict) else value:
+            yield from _words(each)
+
+
+def _one_content(of: str, comes_with: dict[str, tuple[str, list[int]]]) -> dict[str, Any]:
+    """What tells the frames of a multiplexed message that have all of these signals."""
+    (selector, counts), *others = comes_with.values()
+    both = set(counts).intersection(*(each for _, each in others))
+    if not both or any(name != selector for name, _ in others):
+        said = ", ".join(comes_with)
+        raise ValueError(f"messages: {said} of {of} do not come together: name {of} for each")
+    return {"from": selector, "in": sorted(both)}
 
 
 @cache
@@ -333,4 +387,9 @@ def _layout(message: Any) -> dict[str, Any]:
         "bytes": max(message.length, 1),
         "cycle_ms": message.cycle_time or None,
         "signals": signals,
+        "comes_with": {
+            signal.name: (signal.multiplexer_signal, signal.multiplexer_ids)
+            for signal in message.signals
+            if signal.multiplexer_ids
+        },
     }

@@ -81,6 +81,8 @@ class MessageSection(_Part):
     bytes: Annotated[int, Range(least=1, most=8), _WHOLE] = 8
     """Length; a frame of another one is refused."""
     cycle_ms: Cycle | None = None  #: Of a message that has another cycle than the device's.
+    only: "ConditionSection | None" = None
+    """Of an identifier with several contents: which of them, by a signal of this message."""
     signals: Annotated[dict[str, FieldSection], Field(default_factory=dict)]
     """Layouts of its signals."""
 

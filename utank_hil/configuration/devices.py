@@ -7,19 +7,19 @@ from typing import Annotated, Any, Final
 from pydantic import Field, model_validator
 
 from utank_hil.base.parameters import Problem, Range, refuse
+from utank_hil.canbus.catalogue import load_catalogue
 from utank_hil.canbus.enumerations import Address
-from utank_hil.canbus.frame import BUS_SHIFT, MOST_BUSES, STANDARD, Frame
+from utank_hil.canbus.frame import BUS_SHIFT, LONGEST_STANDARD_ID, MOST_BUSES, STANDARD, Frame
 from utank_hil.canbus.messages import SensorMotion, SensorPump, SensorTank
 from utank_hil.canbus.profiles.device_plan import (
     FIELDS,
     SWITCHES,
-    ConditionPlan,
     Crc8,
     DevicePlan,
     ForeignDevices,
     MessagePlan,
-    SignalPlan,
 )
+from utank_hil.canbus.profiles.field import ConditionPlan, SignalPlan
 from utank_hil.configuration.device_files import NATIVE, with_profile
 from utank_hil.configuration.device_sections import (
     LEAST_GAIN,
@@ -54,6 +54,8 @@ PRIORITIES: Final = range(8)
 NATIVE_PUMP_MS: Final = 20.0  #: Cycle of SENSOR_PUMP.
 _NAME_PGN: Final = 0xEEFF  #: Address claimed, to all.
 _REQUEST_PGN: Final = 0xEA00
+_NO_ADDRESS: Final = 0xFE
+"""Of one who has claimed none, SAE J1939-81: on another bus the controller's may be somebody's."""
 Noise = Annotated[float, Range(above=0, most=1.0)]
 
 
@@ -129,13 +131,18 @@ class DeviceSection(Section):
             if self.age_ms < least_ms:
                 yield "age_ms", f"must be {least_ms:g} or more, two cycles, got {self.age_ms:g}"
         yield from self._message_problems()
+        yield from self._cycle_problems()
         yield from self._signal_problems(kind)
         for place, (key, path) in enumerate(self._paths()):
             if path.partition(".")[0] not in self.messages or self._field(path) is None:
                 yield key, f"{path!r} is no signal of messages: write MESSAGE.SIGNAL (no. {place})"
         for crc in self.protection.crcs:
-            if crc.message not in self.messages:
+            said = self.messages.get(crc.message)
+            if said is None:
                 yield "protection.crcs", f"there is no message {crc.message!r}"
+            elif crc.byte >= said.bytes:
+                reason = f"byte {crc.byte} is not in {crc.message}, which has {said.bytes}"
+                yield "protection.crcs", f"{reason}: the first is byte 0"
         guards = self.protection
         if not self.protected and not self.accept_unprotected:
             reason = (
@@ -156,6 +163,11 @@ class DeviceSection(Section):
                 yield "source", f"is required but missing: it sends PGN {message.pgn}"
             elif message.cob is not None and self.node is None:
                 yield "node", "is required but missing: its identifiers follow from it"
+            elif message.format == "11bit" and (message.id or 0) > LONGEST_STANDARD_ID:
+                reason = f"must be 29bit: {message.id:#x} has more than 11 bits"
+                yield f"messages.{name}.format", reason
+            if message.only is not None and message.only.from_ not in message.signals:
+                yield f"messages.{name}.only", f"{message.only.from_!r} is no signal of {name}"
             for signal, layout in message.signals.items():
                 try:
                     layout.field(message.bytes)
@@ -195,6 +207,17 @@ class DeviceSection(Section):
         yield from (("protection.counters", each) for each in self.protection.counters)
         yield from (("protection.stamps", each.from_) for each in self.protection.stamps)
 
+    def _cycle_problems(self) -> Iterator[Problem]:
+        """Messages with a value or a stamp that come at another pace than the measurement."""
+        paths = [path for key, path in self._paths() if key.startswith(("signals", "protection.s"))]
+        for name in {path.partition(".")[0] for path in paths} & set(self.messages):
+            own_ms = self.messages[name].cycle_ms
+            if own_ms is not None and own_ms != self.cycle_ms:
+                reason = (
+                    f"is {own_ms:g}, and cycle_ms {self.cycle_ms:g}: what has a value or a stamp"
+                )
+                yield f"messages.{name}.cycle_ms", f"{reason} comes once in each measurement"
+
     def _field(self, path: str) -> FieldSection | None:
         message, _, signal = path.partition(".")
         section = self.messages.get(message)
@@ -218,7 +241,7 @@ class DeviceSection(Section):
             return Frame(bus << BUS_SHIFT | STANDARD, bytes((1, self.node)))
         if self.protection.n2k_name is not None:
             assert self.source is not None
-            can_id = 6 << 26 | _REQUEST_PGN << 8 | self.source << 8 | int(Address.CONTROLLER)
+            can_id = 6 << 26 | _REQUEST_PGN << 8 | self.source << 8 | _NO_ADDRESS
             return Frame(bus << BUS_SHIFT | can_id, (_NAME_PGN & 0xFF00).to_bytes(3, "little"))
         return None
 
@@ -250,6 +273,7 @@ class DeviceSection(Section):
 
     def _message_plan(self, name: str, kind: type[tuple[Any, ...]], bus: int) -> MessagePlan:
         section, guards = self.messages[name], self.protection
+        only = section.only
         layouts = {f"{name}.{key}": layout for key, layout in section.signals.items()}
         fields = {key: layout.field(section.bytes) for key, layout in layouts.items()}
         signals = tuple(
@@ -281,16 +305,24 @@ class DeviceSection(Section):
             None if crc is None else Crc8(**crc.model_dump(exclude={"message"})),
             None if stamp is None else fields[stamp.from_],
             1.0 if stamp is None else stamp.us,
+            None if only is None else ConditionPlan(
+                fields[f"{name}.{only.from_}"], only.mask, frozenset(only.in_)
+            ),
+        )  # fmt: skip
+
+    def can_ids(self) -> frozenset[int]:
+        """Identifiers of all its messages."""
+        return frozenset(
+            can_id for message in self.messages.values() for can_id in self._can_ids(message)
         )
 
     def _can_ids(self, section: MessageSection) -> tuple[int, ...]:
-        if section.pgn is not None:  # the priority is the sender's choice
-            assert self.source is not None
+        if section.pgn is not None and self.source is not None:  # of any priority
             return tuple(each << 26 | section.pgn << 8 | self.source for each in PRIORITIES)
-        if section.cob is not None:
-            assert self.node is not None
+        if section.cob is not None and self.node is not None:
             return (STANDARD | section.cob + self.node,)
-        assert section.id is not None
+        if section.id is None:
+            return ()
         return (section.id if section.format == "29bit" else STANDARD | section.id,)
 
 
@@ -351,10 +383,32 @@ class DevicesSection(Section):
             if device.protection.n2k_name is not None and device.bus in self.receive_only:
                 reason = f"has to be asked for, but {device.bus} is receive-only: leave one out"
                 problems.append((f"{role}.protection.n2k_name", reason))
+        problems += self._clashes()
         strange = [name for name in self.receive_only if name not in buses]
         problems += [("receive_only", f"no device is on {name}") for name in strange]
         refuse("devices", problems)
         return self
+
+    def _clashes(self) -> Iterator[Problem]:
+        """What two devices, or a device and a native node, both are by their identifiers."""
+        ids = {role: each.can_ids() for role, each in self.sensors().items() if not each.native}
+        native = load_catalogue().can_ids
+        for role, own in ids.items():
+            device = self.sensors()[role]
+            if not device.bus and (taken := own & native):
+                reason = f"{min(taken):#x} is a native node's on this bus: change it in the device"
+                yield f"{role}.messages", reason
+            if not device.bus and device.source in set(Address):
+                reason = f"is the address of {Address(device.source).name.lower()}: change it there"
+                yield f"{role}.source", reason
+            if self.pump.native or device.node is None or device.bus != self.pump.bus:
+                continue
+            if device.node in (self.pump.node, self.pump.controller_node):
+                yield f"{role}.node", "is the drive's or the controller's: give it another number"
+        both = [ids.get(role, frozenset()) for role in ("motion", "motion_2")]
+        if self.motion.bus == self.motion_2.bus and (same := both[0] & both[1]):
+            reason = f"has {min(same):#x} of motion: a sensor is no second source for itself"
+            yield "motion_2.messages", reason
 
     def pressure_margins(self) -> LoopMargins:
         """Margins of the pressure loop around the drive, with the pump sensor's own delay."""
@@ -425,6 +479,8 @@ class DevicesSection(Section):
         """The devices as the controller node hears them, with the drive of the pump."""
         buses, others = self.buses(), self.others
         bus_of_pump = buses.index(self.pump.bus)
+        own = [each for each in self.sensors().values() if not each.bus]
+        nodes = {self.pump.node if not self.pump.bus else None, *(each.node for each in own)}
         plans: dict[str, DevicePlan[Any] | None] = dict.fromkeys(KINDS)
         for role, device in self.sensors().items():
             if not device.native:
@@ -439,4 +495,7 @@ class DevicesSection(Section):
             frozenset((*others.ids_29bit, *(STANDARD | each for each in others.ids_11bit))),
             frozenset(others.pgns),
             None if self.pump.native or pump is None else self.pump.plan(bus_of_pump, pump),
-        )
+            frozenset(node for node in nodes if node is not None),
+            frozenset(each.source for each in self.sensors().values()
+                      if not each.bus and each.source is not None),
+        )  # fmt: skip

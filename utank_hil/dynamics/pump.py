@@ -176,41 +176,42 @@ class Pump:
         )
 
 
-def _length(x: float, y: float) -> float:
-    return math.sqrt(x * x + y * y)  # `hypot` is the C library's
-
-
 def pump_pressure(speed: float, flow: float, c: PumpCoefficients) -> float:
     """Pressure rise in Pa at a speed (rad/s) and a flow to starboard (m^3/s)."""
-    u = flow / c.area
-    return c.half_rho_lift * _length(c.radius * speed, u) * (c.pitch * speed - u)
+    u, rn = flow / c.area, c.radius * speed
+    # `hypot` is the C library's, and not the same everywhere
+    return c.half_rho_lift * math.sqrt(rn * rn + u * u) * (c.pitch * speed - u)
 
 
 def pump_load(speed: float, flow: float, c: PumpCoefficients) -> tuple[float, float]:
     """Load torque of the water in N m, and its derivative by speed in N m s, zero or more."""
-    u = flow / c.area
-    rn = c.radius * speed
-    w = _length(rn, u) + 1e-9  # The offset avoids division by zero.
-    slip = c.pitch * speed - u
-    drag = c.pitch * c.half_rho_lift * slip + c.half_rho_friction * c.radius * rn
-    drag_slope = c.half_rho_lift * c.pitch * c.pitch + c.half_rho_friction * c.radius * c.radius
-    slope = c.area * (c.radius * rn / w * drag + w * drag_slope)
-    return c.area * w * drag, max(slope, 0.0)
+    area, radius, pitch = c.area, c.radius, c.pitch
+    lift, friction = c.half_rho_lift, c.half_rho_friction
+    u = flow / area
+    rn = radius * speed
+    w = math.sqrt(rn * rn + u * u) + 1e-9  # The offset avoids division by zero.
+    slip = pitch * speed - u
+    drag = pitch * lift * slip + friction * radius * rn
+    drag_slope = lift * pitch * pitch + friction * radius * radius
+    slope = area * (radius * rn / w * drag + w * drag_slope)
+    return area * w * drag, max(slope, 0.0)
 
 
 def pump_speed(pressure: float, flow: float, c: PumpCoefficients) -> float:
     """Speed in rad/s that gives a pressure rise at a flow: the inverse of `pump_pressure`."""
+    radius, pitch = c.radius, c.pitch  # read once: Python takes most of its time for that
     u = flow / c.area
     wanted = pressure / c.half_rho_lift
     # The start is from the slip s of (a |s| + b |u|) = wanted, exact without flow or slip.
-    a = c.radius / c.pitch
+    a = radius / pitch
     b = math.sqrt(1.0 + a * a) * abs(u)
     slip = 2.0 * wanted / (b + math.sqrt(b * b + 4.0 * a * abs(wanted)) + 1e-12)
-    speed = (u + slip) / c.pitch
+    speed = (u + slip) / pitch
     for _ in range(8):  # Newton's method: the head curve is smooth and monotone.
-        w = _length(c.radius * speed, u)
-        slip = c.pitch * speed - u
-        slope = w * c.pitch + c.radius * c.radius * speed * slip / (w + 1e-12)
+        rn = radius * speed
+        w = math.sqrt(rn * rn + u * u)
+        slip = pitch * speed - u
+        slope = w * pitch + radius * radius * speed * slip / (w + 1e-12)
         if slope < 1e-9:
             break
         change = (w * slip - wanted) / slope
@@ -279,7 +280,7 @@ def compile_pump(compiler: Callable[[Any], Any]) -> tuple[Callable[..., Any], Ca
     """
     scope = dict(globals())
     scope["exp"] = compiler(exp)
-    for function in (_length, pump_pressure, pump_load, pump_speed, pump_step, pump_coast):
+    for function in (pump_pressure, pump_load, pump_speed, pump_step, pump_coast):
         name = function.__name__
         scope[name] = compiler(FunctionType(function.__code__, scope, name))
     return scope["pump_step"], scope["pump_coast"]

@@ -22,6 +22,7 @@ from utank_hil.canbus.profiles.drive_plan import (
     NetworkState,
     NodeCommand,
 )
+from utank_hil.canbus.profiles.field import Field
 from utank_hil.control.pressure_loop import PressureLoop
 from utank_hil.nodes.canopen_setup import CanopenSetup
 from utank_hil.nodes.plausibility import MILLISECOND_NS, NEVER_HEARD_NS
@@ -43,6 +44,7 @@ _OPERATIONAL: Final = int(NetworkState.OPERATIONAL)
 _STATES: Final = {int(state): state for state in DriveState}
 _WARNING: Final = 1 << 7
 _AT_LIMIT: Final = 1 << 11
+_new: Final = tuple.__new__
 
 
 def state_of(status_word: int) -> DriveState | None:
@@ -85,7 +87,23 @@ class CanopenDrive:
         self._plan, self._loop, self._area_m2 = plan, loop, area_m2
         self.deliver: Callable[[DriveReport | None, int], None] = _nobody
         self.setup = CanopenSetup(plan)
-        self._tag = plan.bus << BUS_SHIFT | STANDARD
+        self._tag = tag = plan.bus << BUS_SHIFT | STANDARD
+        self._in_nm: bool = plan.mode.torque
+        self._late_ns: int = LATE_BEATS * plan.heartbeat_ms * MILLISECOND_NS
+        self._bits, self._per_si, self._marked = (
+            plan.mode.bits,
+            plan.units_per_si,
+            plan.echoes_command,
+        )
+        # with each command: heartbeat and SYNC of the controller
+        self._beat = [Frame(tag | HEARTBEAT + plan.controller_node, bytes((_OPERATIONAL,)))]
+        self._with = self._beat + [Frame(tag | SYNC, b"")] * plan.synchronous
+        self._received = tag | RECEIVED_1 + plan.node
+        measured = sum(bits for _, bits in plan.measured) // 8
+        scale = plan.speed_rad_s_per_unit
+        self._speed = Field(0, 32, measured, signed=True, scale=scale)
+        self._torque_field = Field(32, 16, measured, signed=True, scale=1 / plan.units_per_si)
+        self._mode_field = Field(48, 8, measured, signed=True)
         cycle_ns = COMMAND_MS * MILLISECOND_NS
         self.watched = tuple(
             HeardMessage(self._tag | cob + plan.node, cycle_ns, sum(b for _, b in entries) // 8)
@@ -108,7 +126,8 @@ class CanopenDrive:
         self._operational = False
         self._started_ns = NEVER_HEARD_NS
         self._speed_rad_s = self._torque = math.nan
-        self._mode_shown = plan.mode.number
+        self._mode: int = plan.mode.number
+        self._mode_shown = self._mode
         self._status = self._ignored = 0
         self._emergency = self._told = ""
 
@@ -176,46 +195,40 @@ class CanopenDrive:
 
     def follow(self, target: float, word: ControlWord) -> list[Frame]:
         """Heartbeat, SYNC and command with a target in N m or rad/s, by the mode."""
-        plan, tag = self._plan, self._tag
-        beat = Frame(tag | HEARTBEAT + plan.controller_node, bytes((_OPERATIONAL,)))
         if not self.setup.done:
-            return [beat]
-        bits = plan.mode.bits
+            return list(self._beat)
+        bits = self._bits
         most = (1 << bits - 1) - MARKS
-        counts = round(min(max(target * plan.units_per_si, -most), most))
+        counts = round(min(max(target * self._per_si, -most), most))
         counts += ((self._count - counts + MARKS // 2) % MARKS) - MARKS // 2
         self._count += 1
         content = word | (counts & (1 << bits) - 1) << 16
-        self._sent.append((content if plan.echoes_command else content >> 16, self._now_ns))
-        command = Frame(tag | RECEIVED_1 + plan.node, content.to_bytes(2 + bits // 8, "little"))
+        self._sent.append((content if self._marked else content >> 16, self._now_ns))
+        command = _new(Frame, (self._received, content.to_bytes(2 + bits // 8, "little")))
         # SYNC first: what it asks for is sampled before the command, whoever is in front on the bus
-        return [beat, *([Frame(tag | SYNC, b"")] if plan.synchronous else []), command]
+        return [*self._with, command]
 
     def _on_status(self, frame: Frame, now_ns: int) -> None:
-        data, plan = frame.data, self._plan
+        data = frame.data
         if not self.watched[0].passes(data):
             return
-        self._status = int.from_bytes(data[:2], "little")
+        self._status = data[0] | data[1] << 8
         state = state_of(self._status)
-        if plan.echoes_command or state is _ENABLED:
+        if self._marked or state is _ENABLED:
             self._heard(int.from_bytes(data[2:], "little"))
         else:  # there is no demand
             self.echo_ns = now_ns
-        late_ns = LATE_BEATS * plan.heartbeat_ms * MILLISECOND_NS
-        alive = self._operational and now_ns - self._beat_ns <= late_ns
+        alive = self._operational and now_ns - self._beat_ns <= self._late_ns
         if state is None or not alive or not (self._hears_only or self.setup.done):
             return
-        power_w = self._torque * self._speed_rad_s
-        self.deliver(
-            DriveReport(
-                state,
-                self._mode_shown != plan.mode.number,
-                self._status & _AT_LIMIT != 0,
-                self._status & _WARNING != 0,
-                power_w,
-            ),
-            now_ns,
+        report = (
+            state,
+            self._mode_shown != self._mode,
+            self._status & _AT_LIMIT != 0,
+            self._status & _WARNING != 0,
+            self._torque * self._speed_rad_s,
         )
+        self.deliver(_new(DriveReport, report), now_ns)
 
     def _heard(self, echo: int) -> None:
         """Take an echo: it tells when the newest command left that has arrived."""
@@ -223,22 +236,20 @@ class CanopenDrive:
             return
         self._echo = echo
         # after SYNC it is a cycle old; else the middle of what its phase can be
-        phase_ns = 0 if self._plan.synchronous else COMMAND_MS * MILLISECOND_NS // 2
+        phase_ns = 0 if len(self._with) > 1 else COMMAND_MS * MILLISECOND_NS // 2
         for content, sent_ns in reversed(self._sent):
             if content == echo:
                 self.echo_ns = sent_ns - phase_ns
                 return
 
     def _on_measured(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
-        data, plan = frame.data, self._plan
+        data = frame.data
         if not self.watched[1].passes(data):
             return
-        speed = int.from_bytes(data[:4], "little", signed=True)
-        self._speed_rad_s = speed * plan.speed_rad_s_per_unit
-        if plan.mode.torque:
-            torque = int.from_bytes(data[4:6], "little", signed=True)
-            self._torque = torque / plan.units_per_si
-        self._mode_shown = int.from_bytes(data[6:7], "little", signed=True)
+        self._speed_rad_s = self._speed.value(data)
+        if self._in_nm:
+            self._torque = self._torque_field.value(data)
+        self._mode_shown = self._mode_field.raw(data)
 
     def _on_answer(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
         self.setup.take(frame.data)

@@ -32,7 +32,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.frame import OTHER_BUS, STANDARD
 from utank_hil.canbus.measurements import Measurements
-from utank_hil.canbus.profiles.device import ProfiledDevice
+from utank_hil.canbus.profiles.device import ProfiledDevice, hear
 from utank_hil.canbus.profiles.device_plan import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.nodes.canopen_drive import CanopenDrive, DriveReport
 from utank_hil.nodes.hardwired import HardwiredHeard
@@ -288,7 +288,8 @@ class Inbox:
             return
         source.deliver = handle
         self._foreigners.append(source)
-        self._devices |= source.takes
+        for can_id, take in source.takes.items():
+            hear(self._devices, can_id, take)
         self.watched += source.watched
 
     def wakes(self, now_ns: int) -> list[Frame]:

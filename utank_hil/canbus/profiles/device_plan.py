@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final, Generic, TypeVar
 
-from utank_hil.canbus.frame import Frame
+from utank_hil.canbus.frame import STANDARD, Frame
 from utank_hil.canbus.messages import SensorMotion, SensorPump, SensorTank
 from utank_hil.canbus.profiles.drive_plan import DrivePlan
-from utank_hil.canbus.profiles.field import Field
+from utank_hil.canbus.profiles.field import ConditionPlan, Field, SignalPlan
 
 T = TypeVar("T", bound=tuple[Any, ...])
 
@@ -55,29 +55,6 @@ def _table(polynomial: int) -> bytes:
 
 
 @dataclass(frozen=True, slots=True)
-class SignalPlan:
-    """One measured value: value = sign * (physical * factor + offset)."""
-
-    place: int  #: Place of the value in the measurement.
-    field: Field
-    factor: float
-    offset: float
-    sign: int
-    #: least, most: range of the physical value, in the maker's unit; outside it there is none.
-    least: float
-    most: float
-
-
-@dataclass(frozen=True, slots=True)
-class ConditionPlan:
-    """What a status must say: its counts under a mask are among those allowed."""
-
-    field: Field
-    mask: int
-    allowed: frozenset[int]
-
-
-@dataclass(frozen=True, slots=True)
 class MessagePlan:
     """One message: the identifiers that it may have, what it says, and its protection."""
 
@@ -91,6 +68,7 @@ class MessagePlan:
     crc: Crc8 | None = None
     stamp: Field | None = None
     stamp_us: float = 1.0
+    only: ConditionPlan | None = None  #: Other frames of the identifier are none of this message.
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +107,9 @@ class ForeignDevices:
     other_ids: frozenset[int] = frozenset()  #: Identifiers that are nobody's fault.
     other_pgns: frozenset[int] = frozenset()
     pump: DrivePlan | None = None  #: Drive of the pump.
+    #: nodes, sources: CANopen nodes and source addresses of devices on the controller's own bus.
+    nodes: frozenset[int] = frozenset()
+    sources: frozenset[int] = frozenset()
 
     @property
     def any(self) -> bool:
@@ -136,11 +117,21 @@ class ForeignDevices:
         return self != NO_FOREIGN_DEVICES
 
     def knows(self, can_id: int) -> bool:
-        """Whether a frame on the controller's own bus is of a declared device."""
+        """Whether a frame on the controller's own bus is of a declared device.
+
+        What a device of the ship's file says besides, as its heartbeat, is no stranger's.
+        """
+        if can_id & STANDARD:
+            said = can_id & 0x780 in SAID and can_id & 0x7F in self.nodes
+        else:
+            said = can_id & 0xFF in self.sources
         group = can_id >> 8 & 0x3FFFF
         if group & 0xFF00 < 0xF000:  # the low byte is its destination
             group &= 0x3FF00
-        return can_id in self.other_ids or group in self.other_pgns
+        return said or can_id in self.other_ids or group in self.other_pgns
 
+
+SAID: Final = frozenset((0x080, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700))
+"""What a CANopen node sends by the predefined connections of CiA 301, less its number."""
 
 NO_FOREIGN_DEVICES: Final = ForeignDevices()

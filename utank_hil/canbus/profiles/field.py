@@ -1,4 +1,4 @@
-"""One signal in a frame of any maker, with its bits worked out beforehand."""
+"""One signal in a frame of any maker, with its bits worked out beforehand, and what it is for."""
 
 import math
 import struct
@@ -18,7 +18,8 @@ class Field:
     """
 
     __slots__ = (
-        "_half", "_ieee", "_least", "_mask", "_most", "_order", "_shift", "bits", "offset", "scale",
+        "_big", "_count", "_first", "_half", "_ieee", "_least", "_mask", "_most", "_shift",
+        "_spare", "bits", "offset", "scale",
     )  # fmt: skip
 
     def __init__(
@@ -42,8 +43,13 @@ class Field:
             raise ValueError(f"bits {start} and on, {bits} of them, are not in {length} bytes")
         if real and bits not in _REAL:
             raise ValueError(f"a real number has 16, 32 or 64 bits, not {bits}")
-        self._order: str = "big" if big_endian else "little"
+        self._big = big_endian
         self._shift = shift
+        # its bytes, from the most of them to the least, and the bits that the least one has besides
+        self._count = (shift + bits - 1) // 8 - shift // 8 + 1
+        least = shift // 8
+        self._first = length - least - self._count if big_endian else least + self._count - 1
+        self._spare = shift % 8
         self._mask = (1 << bits) - 1
         self._half = 1 << (bits - 1) if signed and not real else 1 << bits
         self._ieee = _REAL[bits] if real else ""
@@ -53,8 +59,12 @@ class Field:
 
     def raw(self, data: bytes) -> int:
         """Counts of the signal, with their sign."""
-        word = int.from_bytes(data, "big" if self._order == "big" else "little")
-        raw = word >> self._shift & self._mask
+        word, place = 0, self._first
+        step = 1 if self._big else -1
+        for _ in range(self._count):
+            word = word << 8 | data[place]
+            place += step
+        raw = word >> self._spare & self._mask
         return raw - self._mask - 1 if raw >= self._half else raw
 
     def value(self, data: bytes) -> float:
@@ -79,8 +89,51 @@ class Field:
             low = -self._half if self._half <= self._mask else 0
             high = self._half - 1 if self._half <= self._mask else self._mask
             counts = round(min(max(raw, low, self._least), high, self._most)) & self._mask
-        if self._order == "big":
+        if self._big:
             turned = int.from_bytes(word.to_bytes(length, "little"), "big")
             turned = turned & ~(self._mask << self._shift) | counts << self._shift
             return int.from_bytes(turned.to_bytes(length, "big"), "little")
         return word & ~(self._mask << self._shift) | counts << self._shift
+
+
+class SignalPlan:
+    """One measured value: value = sign * (physical * factor + offset).
+
+    `place` is that of the value in the measurement. Outside of `least` to `most`, in the maker's
+    unit, there is no value.
+    """
+
+    __slots__ = ("factor", "field", "least", "most", "offset", "place", "sign")
+
+    def __init__(
+        self,
+        place: int,
+        field: Field,
+        factor: float,
+        offset: float,
+        sign: float,
+        least: float,
+        most: float,
+    ) -> None:
+        self.place, self.field, self.factor, self.offset = place, field, factor, offset
+        self.sign, self.least, self.most = sign, least, most
+
+    def value(self, data: bytes) -> float:
+        """The value in its own unit; NaN where there is none."""
+        physical = self.field.value(data)
+        if self.least <= physical <= self.most:
+            return self.sign * (physical * self.factor + self.offset)
+        return math.nan
+
+
+class ConditionPlan:
+    """What a status must say: its counts under a mask are among those allowed."""
+
+    __slots__ = ("allowed", "field", "mask")
+
+    def __init__(self, field: Field, mask: int, allowed: frozenset[int]) -> None:
+        self.field, self.mask, self.allowed = field, mask, allowed
+
+    def holds(self, data: bytes) -> bool:
+        """Whether a frame says so."""
+        return self.field.raw(data) & self.mask in self.allowed
