@@ -7,9 +7,8 @@ from typing import Any
 
 from rich.table import Table
 
-from utank_hil.analysis.tank_prediction import LoadingPoint, RollPrediction, SweepPoint
+from utank_hil.analysis.tank_prediction import LoadingPoint, RollPrediction
 from utank_hil.analysis.tank_sizing import TankCost
-from utank_hil.base.finite import finite
 from utank_hil.console.terminal import new_table
 from utank_hil.control.optimal_tank import TankFigures
 
@@ -88,45 +87,6 @@ def loading_table(points: Sequence[LoadingPoint]) -> Table:
         cells = ("" if roll is None else f"{math.degrees(roll):.2f}" for roll in rolls)
         table.add_row(f"×{point.period_scale:g}", *cells)
     return table
-
-
-def sweep_tables(points: Sequence[SweepPoint]) -> list[Table]:
-    """Tables of other tanks' roll, passive and active: by share of stability and by frequency."""
-    tables = []
-    ratios = sorted({point.frequency_ratio for point in points})
-    for name in ("passive", "active"):
-        table = new_table(
-            f"Other tanks, {name}: roll RMS in °",
-            *(f"{ratio:g}" for ratio in ratios),
-            caption="by stability taken, and by the water's frequency per roll frequency",
-        )
-        for share in sorted({point.stability_share for point in points}):
-            row = {p.frequency_ratio: p for p in points if p.stability_share == share}
-            water_t = [point.tank.water_kg / 1e3 for point in row.values()]
-            cells = (_sweep_cell(row.get(ratio), name) for ratio in ratios)
-            heading = f"{share:.0%}, {_tonnes(min(water_t))} to {_tonnes(max(water_t))}"
-            table.add_row(heading, *cells)
-        tables.append(table)
-    return tables
-
-
-def _sweep_cell(point: SweepPoint | None, name: str) -> str:
-    motion = None if point is None else getattr(point.prediction, name)
-    return "" if motion is None else f"{math.degrees(motion.roll_rms_rad):.2f}"
-
-
-def sweep_json(points: Sequence[SweepPoint]) -> list[dict[str, Any]]:
-    """Other tanks in SI units."""
-    return [
-        {
-            "stability_share": point.stability_share,
-            "frequency_ratio": point.frequency_ratio,
-            "mass_ratio": point.mass_ratio,
-            "tank": finite(asdict(point.tank)),
-            "prediction": prediction_json(point.prediction),
-        }
-        for point in points
-    ]
 
 
 def prediction_json(found: RollPrediction) -> dict[str, Any]:

@@ -340,7 +340,11 @@ def test_bench_whose_results_can_not_be_written_prints_them_all_the_same(
 def test_other_commands_try_their_folder_first_too(tmp_path: Path, command: str) -> None:
     (tmp_path / "out").write_text("mine")
     gpc = CONFIGS / "controllers" / "gpc.yaml"
-    words = ("design", "controller", gpc) if command == "design" else ("identify", "no.rrd", gpc)
+    words = (
+        ("design", "tank", CONFIGS / "ships" / "naval_vessel.yaml")
+        if command == "design"
+        else ("identify", "no.rrd", gpc)
+    )
     result = invoke(app, *words, "--out", tmp_path / "out")
     assert result.exit_code == 2
     assert "is not a folder" in said(result)

@@ -11,12 +11,10 @@ from utank_hil.analysis.tank_prediction import (
     loading_sensitivity,
     predict_roll,
     pump_moments,
-    sweep_tank,
 )
-from utank_hil.analysis.tank_sizing import TankRoom, size_tank, stability_taken
+from utank_hil.analysis.tank_sizing import TankRoom, size_tank
 from utank_hil.configuration.ship_keys import WrittenShip
 from utank_hil.control import DesignPlant, PumpLimits
-from utank_hil.control.optimal_tank import ship_ratios
 from utank_hil.dynamics import RollModel, simulate
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.pump import AT_REST, Pump, pump_step
@@ -132,26 +130,3 @@ def test_loading_changes_the_roll_and_the_nominal_one_is_the_prediction() -> Non
     law, measured = FOUND.law.design.law(PLANT), FOUND.law.design.predictor.measured
     active = motion_in_sea(law, dataclasses.replace(PLANT, ship=stiff), measured, moment)
     assert points[0.7].active_rad == pytest.approx(active.roll_rms_rad)
-
-
-def test_sweep_has_the_tanks_it_says_and_the_best_is_near_the_sized_one() -> None:
-    points = sweep_tank(PLANT, SEA, pump=False, ratios=(0.6, 0.8, 1.0, 1.25, 1.6))
-    for point in points:
-        assert stability_taken(SHIP, point.tank) == pytest.approx(point.stability_share)
-        ratio = point.tank.natural_frequency_rad_s / SHIP.natural_frequency_rad_s
-        assert ratio == pytest.approx(point.frequency_ratio)
-        assert point.mass_ratio == pytest.approx(ship_ratios(SHIP, point.tank)[0].mass_ratio)
-    share = min(
-        (each.stability_share for each in points),
-        key=lambda share: abs(share - stability_taken(SHIP, TANK)),
-    )
-    row = [point for point in points if point.stability_share == share]
-    best = min(row, key=lambda point: point.prediction.passive.roll_rms_rad)
-    assert best.frequency_ratio == 1.0
-
-
-def test_sweep_leaves_out_what_no_duct_can_make_fast_enough() -> None:
-    tall = dataclasses.replace(TANK, height_m=15.0)
-    plant = dataclasses.replace(PLANT, tank=tall)
-    points = sweep_tank(plant, SEA, pump=False, shares=(0.1,), ratios=(0.8, 1.6))
-    assert [point.frequency_ratio for point in points] == [0.8]

@@ -6,7 +6,6 @@ linear prediction does not hold.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -24,19 +23,12 @@ from utank_hil.analysis.loop.sea_response import (
     roll_response_without_tank,
 )
 from utank_hil.analysis.loop.self_tuning import NoLawError
-from utank_hil.analysis.tank_sizing import MOST_STABILITY_SHARE, stability_taken
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control import DesignPlant
-from utank_hil.control.optimal_tank import ship_ratios
-from utank_hil.dynamics import GRAVITY_M_S2, STATES, RollShip, Tank
+from utank_hil.dynamics import STATES, RollShip
 from utank_hil.dynamics.pump import Pump, pump_load, pump_speed
 from utank_hil.dynamics.tank import negligible
 from utank_hil.sea import Harmonics
-
-STABILITY_SHARES: Final = (0.04, 0.08, 0.12, 0.16, 0.2, MOST_STABILITY_SHARE)
-"""Shares of stability of a sweep. Chosen; no study."""
-FREQUENCY_RATIOS: Final = (0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4)
-"""Frequency ratios of a sweep. Chosen; no study."""
 
 _BANDS = 40  # Number of bands of the sea's energy in the curves. Chosen; no study.
 
@@ -105,17 +97,6 @@ class LoadingPoint:
     without_tank_rad: float
     passive_rad: float
     active_rad: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class SweepPoint:
-    """One tank of a sweep, given by its share of stability and its frequency ratio."""
-
-    stability_share: float
-    frequency_ratio: float
-    mass_ratio: float
-    tank: Tank
-    prediction: RollPrediction
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -216,43 +197,6 @@ def loading_sensitivity(
             )
         )
     return tuple(points)
-
-
-def sweep_tank(
-    plant: DesignPlant,
-    sea: SeaState,
-    *,
-    pump: bool = True,
-    shares: Sequence[float] | None = None,
-    ratios: Sequence[float] | None = None,
-) -> tuple[SweepPoint, ...]:
-    """Predict the roll for tanks of other mass and frequency in the same place.
-
-    Losses and pump limits are unchanged. The reservoirs' area gives the share of stability, the
-    duct's the frequency; tanks that no duct makes fast enough are left out. The default shares are
-    `STABILITY_SHARES`, the default ratios `FREQUENCY_RATIOS`.
-    """
-    points = []
-    for share in shares or STABILITY_SHARES:
-        for ratio in ratios or FREQUENCY_RATIOS:
-            tank = _varied(plant.ship, plant.tank, share, ratio)
-            if tank is None:
-                continue
-            changed = replace(plant, tank=tank)
-            ratios_of, _ = ship_ratios(plant.ship, tank)
-            found = predict_roll(changed, sea, pump=pump)
-            points.append(SweepPoint(share, ratio, ratios_of.mass_ratio, tank, found))
-    return tuple(points)
-
-
-def _varied(ship: RollShip, tank: Tank, share: float, ratio: float) -> Tank | None:
-    area_m2 = tank.reservoir_area_m2 * share / stability_taken(ship, tank)
-    frequency = ratio * ship.natural_frequency_rad_s
-    duct_part_m = 2 * GRAVITY_M_S2 / frequency**2 - 2 * tank.height_m
-    if duct_part_m <= 0:
-        return None
-    duct_m2 = tank.width_m * area_m2 / duct_part_m
-    return replace(tank, reservoir_area_m2=area_m2, duct_area_m2=duct_m2)
 
 
 def _active(

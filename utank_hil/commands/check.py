@@ -11,10 +11,9 @@ import typer
 from pydantic import BaseModel
 from rich.text import Text
 
-from utank_hil.analysis.loop.linear_tuning import AutoDesign
+from utank_hil.analysis.loop.linear_tuning import AutoDesign, Design, scaled, varied
 from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins, Robustness, robustness
 from utank_hil.analysis.loop.self_tuning import NoLawError, SelfTunedDesign
-from utank_hil.analysis.loop.trade import Design, scaled, varied
 from utank_hil.base.finite import finite
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.configuration.files import ConfigError, kind_of

@@ -1,4 +1,4 @@
-"""Pictures of a tank for a ship: roll in waves, other loadings, other tanks."""
+"""Picture of a tank for a ship: roll in waves, other loadings."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from utank_hil.analysis.tank_prediction import LoadingPoint, RollCurves, SweepPoint
+from utank_hil.analysis.tank_prediction import LoadingPoint, RollCurves
 from utank_hil.pictures.style import BELOW, COLORS, DASHES, WIDEST_IN, picture
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    pass
 
 _NAMES = ("without tank", "passive tank", "active tank")
 
@@ -48,38 +48,3 @@ def draw_tank(
         loading.set_ylabel("Roll RMS in the sea (°)")
         figure.legend(*waves.get_legend_handles_labels(), **BELOW)
     return path
-
-
-def draw_sweep(
-    points: Sequence[SweepPoint], path: Path, title: str, about: Mapping[str, Any] | None = None
-) -> Path:
-    """Draw roll in the sea over the water's frequency, a line for each share of stability."""
-    with picture(path, title, (WIDEST_IN, 4.6), about) as figure:
-        passive = figure.add_subplot(1, 2, 1)
-        active = figure.add_subplot(1, 2, 2, sharey=passive)
-        _draw_shares(passive, points, [p.prediction.passive.roll_rms_rad for p in points])
-        found = [p.prediction.active for p in points]
-        _draw_shares(active, points, [np.nan if p is None else p.roll_rms_rad for p in found])
-        none = np.degrees(points[0].prediction.without_tank_rad)
-        passive.axhline(none, color=COLORS[0], linestyle="--")
-        passive.set_title("Passive tank; dashed: none", loc="left", fontsize=10)
-        within = "Active tank, within the limits of pump and level"
-        active.set_title(within, loc="left", fontsize=10)
-        passive.set_ylabel("Roll RMS in the sea (°)")
-        passive.set_ylim(bottom=0)
-        figure.legend(*passive.get_legend_handles_labels(), title="Stability taken", **BELOW)
-    return path
-
-
-def _draw_shares(axes: "Axes", points: Sequence[SweepPoint], roll_rad: Sequence[float]) -> None:
-    for number, share in enumerate(sorted({point.stability_share for point in points})):
-        of = [index for index, point in enumerate(points) if point.stability_share == share]
-        axes.plot(
-            [points[index].frequency_ratio for index in of],
-            np.degrees([roll_rad[index] for index in of]),
-            marker="o",
-            color=COLORS[(number + 1) % len(COLORS)],
-            linestyle=DASHES[(number + 1) % len(COLORS)],
-            label=f"{share:.0%}",
-        )
-    axes.set_xlabel("Frequency of the water per roll frequency")
