@@ -169,6 +169,7 @@ def _balanced(impulse: FloatArray, order: int, sample_time_s: float) -> LinearMo
 
     hankel = LinearOperator((count, count), matvec=hankel_times, dtype=np.float64)
     values, vectors = eigsh(hankel, k=order, which="LM", v0=np.ones(count))
+    vectors *= np.where(vectors[0] < 0, -1.0, 1.0)  # the solver's choice differs with scipy
     root = np.sqrt(np.abs(values))
     observability = vectors * root
     shifted = np.vstack([observability[1:], np.zeros((1, order))])
