@@ -14,14 +14,12 @@ from pydantic import ValidationError
 from firmware_sim.bench import run_in_turn
 from firmware_sim.campaign.study import Content, as_text, changed, code_digest
 from firmware_sim.figures import LEAST_ROLL_RAD, NO_TANK, bare_figures, run_figures
-from firmware_sim.run import RECORD_S, roll_without_tank
+from firmware_sim.run import RECORD_S
 from firmware_sim.scenario import PASSIVE, Scenario
-from firmware_sim.ship_side import plant_of
 from utank_hil.analysis.loop import sea_response
 from utank_hil.analysis.loop.loop_simulation import (
     SensorNoise,
     passive_motion,
-    run_law,
     simulate_loop,
 )
 from utank_hil.analysis.motion.statistics import (
@@ -33,11 +31,10 @@ from utank_hil.analysis.motion.statistics import (
 from utank_hil.assembly import build_law
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import ParameterError
-from utank_hil.base.tick import TICK_NS, TICK_S
+from utank_hil.base.tick import TICK_S
 from utank_hil.configuration import ControllerConfig
 from utank_hil.configuration.files import ALLOW_CODE, problems_in_words
 from utank_hil.control import BuiltLaw, DesignPlant
-from utank_hil.control.gain import PassiveDesign
 from utank_hil.control.interface import PRESSURE
 from utank_hil.dynamics.linear import STATES
 from utank_hil.nodes.signals import ROW_TICKS
@@ -65,7 +62,7 @@ class _Record:
 def rows_of(simulation: str, scenario: Scenario, seed: int, laws: Laws) -> list[Row]:
     """Compute a case.
 
-    `simulation` is "bus", "linear" or "nonlinear"; `seed` replaces the scenario's. There is one row
+    `simulation` is "bus" or "linear"; `seed` replaces the scenario's. There is one row
     for the bare ship and for each run: ``run``, ``mark`` (why it does not count, or empty) and the
     figures of `METRICS`. Raises `ValueError` if this kind of simulation cannot compute the
     scenario.
@@ -74,8 +71,7 @@ def rows_of(simulation: str, scenario: Scenario, seed: int, laws: Laws) -> list[
         return _on_the_bus(scenario, seed, laws)
     if scenario.faults:
         raise ValueError("faults befall bus and nodes, which simulation: bus alone has: take that")
-    records = {"linear": _linear, "nonlinear": _nonlinear}[simulation](scenario, seed, laws)
-    return _judged(scenario, list(records))
+    return _judged(scenario, list(_linear(scenario, seed, laws)))
 
 
 def _on_the_bus(scenario: Scenario, seed: int, laws: Laws) -> list[Row]:
@@ -154,13 +150,13 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
     ship, tank = scenario.ship_at(0.0), scenario.vessel.tank
     changes = scenario.voyage or len(scenario.sea.spectra) > 1
     if changes or (scenario.actual_ship and scenario.actual_from_s > 0):
-        raise ValueError("simulation: linear keeps ship, course and sea: take nonlinear or bus")
+        raise ValueError("simulation: linear keeps ship, course and sea: take bus")
     if ship.heeling_moment_nm:
-        raise ValueError("simulation: linear knows no steady heel: take nonlinear or bus")
+        raise ValueError("simulation: linear knows no steady heel: take bus")
     if ship.sway_of_slope or scenario.hull:
-        raise ValueError("simulation: linear knows no sway: take nonlinear or bus")
+        raise ValueError("simulation: linear knows no sway: take bus")
     if scenario.fmu:
-        raise ValueError("simulation: linear knows no ship of an FMU: take nonlinear or bus")
+        raise ValueError("simulation: linear knows no ship of an FMU: take bus")
     moment = scenario.wave_moment(seed)
     count = round(scenario.duration_s / RECORD_S)
     at_rest = np.zeros(count)
@@ -195,64 +191,6 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
         motion, pressure_pa = run.motion[shown], run.pressure_pa[shown]
         power_w = pressure_pa * tank.reservoir_area_m2 * motion[:, _LEVEL_RATE]
         yield _Record(name, motion[:, 0], motion[:, _LEVEL], pressure_pa, power_w)
-
-
-def _nonlinear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
-    """Simulate the nonlinear plant and pump with law and limiter, fed with the true motion."""
-    _refuse_valve(scenario)
-    if scenario.plant == "linear":
-        raise ValueError("plant: linear is not simulation: nonlinear; remove one")
-    count = round(scenario.duration_s / RECORD_S)
-    roll_rad, capsized_s = roll_without_tank(scenario, seed, count)
-    at_rest = np.zeros(count)
-    yield _Record(NO_TANK, roll_rad, at_rest, at_rest, at_rest, capsized_s=capsized_s)
-    plant = next(iter(scenario.controllers.values())).plant
-    runs = [(PASSIVE, PassiveDesign().build(plant), plant)]
-    runs += [
-        (name, _pump_law(name, laws[name]), controller.plant)
-        for name, controller in scenario.controllers.items()
-    ]
-    for name, law, plant in runs:
-        ship = _PlantInWaves(scenario, seed)
-        run = run_law(ship, law.controller(), law.measured, plant, count * ROW_TICKS)
-        motion, moved = run.motion[::ROW_TICKS], ship.plant
-        yield _Record(
-            name,
-            motion[:, 0],
-            motion[:, _LEVEL],
-            run.pressure_pa[::ROW_TICKS],
-            np.array(ship.power_w),
-            moved.strikes,
-            moved.capsized_s,
-        )
-
-
-class _PlantInWaves:
-    """The bench's plant as `run_law` moves it, sensed without noise."""
-
-    def __init__(self, scenario: Scenario, seed: int) -> None:
-        self.plant = plant_of(scenario, seed)
-        self.power_w: list[float] = []  #: Power of the pump, every `RECORD_S`.
-        self._area_m2, self._tick = scenario.vessel.tank.reservoir_area_m2, 0
-        self.plant.advance(0)
-
-    def truth(self) -> FloatArray:
-        """`STATES` and the pressure."""
-        plant = self.plant
-        rate_m_s = plant.flow_m3_s / self._area_m2
-        return np.array(
-            [plant.roll_rad, plant.roll_rate_rad_s, plant.level_m, rate_m_s, plant.pressure_pa]
-        )
-
-    sensed = truth
-
-    def advance(self, command_pa: float) -> None:
-        """Move by one tick with a set-point of the pump."""
-        if self._tick % ROW_TICKS == 0:
-            self.power_w.append(self.plant.pump_power_w)
-        self.plant.drive_pump(command_pa, enabled=True)
-        self._tick += 1
-        self.plant.advance(self._tick * TICK_NS)
 
 
 def _refuse_valve(scenario: Scenario) -> None:

@@ -47,13 +47,6 @@ LEAVES_OUT: Final = {
         "was designed for, and its power is that into the water",
         "errors of the sensors but white noise",
     ),
-    "nonlinear": (
-        "bus, nodes, modes and monitors: the law is in charge from the start",
-        "retuning",
-        "errors of the sensors: the law sees the true motion and the level's estimated rate, its "
-        "command comes later by the delay that it was designed for",
-        "the drive's own limits",
-    ),
 }
 """Effects that each kind of simulation leaves out."""
 

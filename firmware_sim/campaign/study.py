@@ -180,7 +180,7 @@ class Study(Section):
 
     name: str
     scenario: Content  #: Scenario file that is varied.
-    simulation: Literal["bus", "linear", "nonlinear"]
+    simulation: Literal["bus", "linear"]
     """Kind of simulation, which determines the effects that are left out."""
     set: Content = Field(default_factory=dict)  #: Values by dotted key that apply to every case.
     cases: Annotated[tuple[Content, ...], Field(min_length=1)] = ({},)

@@ -74,5 +74,5 @@ def test_bench_prints_names_as_they_are(tmp_path: Path) -> None:
     out = tmp_path / "out [b]"
     output = told("bench", scenario, "--duration", 30, "--out", out)
     assert SEA in output
-    assert output.count(RUN) >= 3
+    assert output.count(RUN) >= 2
     assert f"recording: {out}" in output

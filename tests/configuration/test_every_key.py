@@ -146,7 +146,6 @@ def test_no_quantity_of_a_ship_passes_by_a_factor(tmp_path: Path, ship: Path | N
     "adaptive_dpc_roll",
     "valve_on_off",
     "naval_constrained_gpc",
-    "stimulate",
     "load_change",
     "patti_b",
     "adaptive",

@@ -4,7 +4,6 @@ from cantools.database.can import Database
 
 from utank_hil.canbus import Fault
 from utank_hil.canbus.catalogue import DBC_PATH
-from utank_hil.dynamics.linear import STATES
 from utank_hil.safety.faults import FAULTS, fault_text
 
 NOT_AVAILABLE = 255
@@ -25,10 +24,6 @@ def test_each_code_of_the_dbc_has_one_row_or_is_reserved_and_each_row_has_a_code
     rows = [row.code for row in FAULTS]
     assert codes == {code.value: code.name for code in (*rows, *RESERVED)}
     assert len(rows) + len(RESERVED) == len(codes)
-
-
-def test_a_law_ends_only_at_limits_of_what_it_measures() -> None:
-    assert {row.law_limit for row in FAULTS} <= {"", *STATES}
 
 
 def test_people_read_what_happened_and_what_to_do() -> None:

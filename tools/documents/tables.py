@@ -67,6 +67,3 @@ def _conditions(row: FaultRow) -> Iterator[str]:
         init = "" if each.awaited is None else "yes"
         yield f"| {name} | {limit} | {reaction} | {init} |\n"
         name = ""
-    if row.law_limit:
-        found = f"the law ended at its own limit of `{row.law_limit}`"
-        yield f"| {name} | {found} | the law answers zero, alarm | |\n"

@@ -8,9 +8,10 @@ import numpy as np
 
 from tools.thesis.capsize import PATTI_B, WAVE_RAD_S, law_factory
 from tools.thesis.figure import Check, Curve, Figure, Panel, Verdict
+from tools.thesis.fuzzy_laws import SmallGainFuzzy
 from tools.thesis.patti_b import METHOD, MIDDLE_NM, ROBUST, SMALL_GAIN, Run, run_controller, told
 from utank_hil.base.arrays import FloatArray
-from utank_hil.control.fuzzy.adaptive import DirectFuzzyController, RobustFuzzy, SmallGainFuzzy
+from utank_hil.control.fuzzy.adaptive import DirectFuzzyController, DirectFuzzyLaw, RobustFuzzy
 from utank_hil.dynamics import WaveMoment
 
 DURATION_S: Final = 120.0
@@ -20,7 +21,7 @@ _OPEN: Final = (
 )
 
 
-def _law(name: str) -> RobustFuzzy | SmallGainFuzzy:
+def _law(name: str) -> DirectFuzzyLaw:
     controller = law_factory(name, unlimited=True)()
     assert isinstance(controller, DirectFuzzyController)
     return controller.law

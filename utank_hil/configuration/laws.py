@@ -31,7 +31,7 @@ from utank_hil.configuration.matrices import SystemFile
 from utank_hil.configuration.spectra import LawSea
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.feedback_linearization import FeedbackLinearizationDesign
-from utank_hil.control.fuzzy.adaptive import IndirectFuzzy, RobustFuzzy, SmallGainFuzzy
+from utank_hil.control.fuzzy.adaptive import RobustFuzzy
 from utank_hil.control.gain import PassiveDesign, PDDesign
 from utank_hil.control.interface import LawDesign
 from utank_hil.control.lqg_design import LQGDesign
@@ -40,7 +40,6 @@ from utank_hil.control.python_law import PythonDesign
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign, PumpWithValveDesign
 from utank_hil.control.state_space import StateSpaceDesign, SystemMatrices
-from utank_hil.control.stimulation import StimulationDesign
 
 LAWS: Final[tuple[type[LawDesign], ...]] = (
     PassiveDesign,
@@ -49,10 +48,7 @@ LAWS: Final[tuple[type[LawDesign], ...]] = (
     PredictiveDesign,
     ConstrainedDesign,
     FeedbackLinearizationDesign,
-    SmallGainFuzzy,
     RobustFuzzy,
-    IndirectFuzzy,
-    StimulationDesign,
     StateSpaceDesign,
     PythonDesign,
     OnOffValveDesign,

@@ -4,9 +4,7 @@ from utank_hil.control.arx import ARX as ARX
 from utank_hil.control.constrained.design import ConstrainedDesign as ConstrainedDesign
 from utank_hil.control.feedback_linearization import FeedbackLinearization as FeedbackLinearization
 from utank_hil.control.feedback_linearization import level_brake as level_brake
-from utank_hil.control.fuzzy.adaptive import IndirectFuzzy as IndirectFuzzy
 from utank_hil.control.fuzzy.adaptive import RobustFuzzy as RobustFuzzy
-from utank_hil.control.fuzzy.adaptive import SmallGainFuzzy as SmallGainFuzzy
 from utank_hil.control.fuzzy.law import ErrorDynamics as ErrorDynamics
 from utank_hil.control.gain import PD_MEASURED as PD_MEASURED
 from utank_hil.control.gain import GainLaw as GainLaw
@@ -33,6 +31,5 @@ from utank_hil.control.sea_model import SeaModel as SeaModel
 from utank_hil.control.semi_active import ClippedValve as ClippedValve
 from utank_hil.control.semi_active import OnOffValve as OnOffValve
 from utank_hil.control.state_space import StateSpaceLaw as StateSpaceLaw
-from utank_hil.control.stimulation import Stimulation as Stimulation
 from utank_hil.control.washout import WashoutLaw as WashoutLaw
 from utank_hil.dynamics.linear import pump_model as pump_model

@@ -123,13 +123,11 @@ class Plans(Protocol):
 class StartsAnew(Protocol):
     """A controller that is reset when an operator arms it, or resets a fault.
 
-    Its memory depends on its own action: the progress of a ramp, its end, or adaptation while
-    active. The memory of other controllers is an estimate of the ship, which a reset would lose.
+    Its memory depends on its own action, as adaptation while active does. That of other controllers
+    is an estimate of the ship, which a reset would lose.
     """
 
-    #: The measurement, a name of `STATES`, that passed a limit of the law; the pressure is then
-    #: zero until a reset. Empty if none did.
-    passed_limit: str
+    starts_anew: bool  #: Marks such a controller, whatever its value.
 
     def reset(self) -> None:
         """Return to the initial state."""

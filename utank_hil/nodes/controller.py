@@ -128,7 +128,7 @@ class ControllerNode:
     @property
     def fault(self) -> Fault:
         """Fault of the supervisor, or else that of the limit on which the law ended."""
-        return self.safety.supervisor.fault or self.law.fault
+        return self.safety.supervisor.fault
 
     @property
     def command_pa(self) -> float:
@@ -259,7 +259,7 @@ class ControllerNode:
         if self._status_schedule.due(now_ns):
             self.telemetry.renew_slow()
             accepted = self.inbox.stations.take_accepted()
-            for event in safety.update_alarms(accepted, self.law.fault, now_ns):
+            for event in safety.update_alarms(accepted, now_ns):
                 received = self.inbox.received(event.code)
                 self.telemetry.tell(replace(event, received=received), self.start_ns)
             frames.append(self._alarm_frames.frame(safety.alarms.next_message(now_ns)))
@@ -276,7 +276,7 @@ class ControllerNode:
         catalogue_version, configuration_version = self._versions
         return ControllerStatus(
             mode=judgement.mode,
-            fault=judgement.fault or self.law.fault,
+            fault=judgement.fault,
             armed=judgement.mode is _ACTIVE,
             alarm=self.safety.alarms.unaccepted,
             degraded=in_control and self._share(judgement) < 1.0,

@@ -9,7 +9,7 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.tick import TICK_NS, TICK_S, Schedule, is_whole_ticks
 from utank_hil.canbus import RetuningOrder, RetuningState
-from utank_hil.canbus.enumerations import Fault, Mode
+from utank_hil.canbus.enumerations import Mode
 from utank_hil.canbus.events import ModelSummary, RetuningEvent
 from utank_hil.canbus.measurements import Measurements, MotionSample
 from utank_hil.control.interface import PRESSURE, VALVE, Controller, Plans, StartsAnew
@@ -17,7 +17,6 @@ from utank_hil.control.level_observer import LevelObserver
 from utank_hil.nodes.actuators import Actuators
 from utank_hil.retuning.estimate import ShipFigures
 from utank_hil.retuning.law_exchange import LawExchange
-from utank_hil.safety.faults import FAULTS
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 from utank_hil.safety.safety_limits import SafetyLimits
 from utank_hil.safety.situation import Demand, Judgement
@@ -32,8 +31,6 @@ new start, and in waves that are as high as ever."""
 
 _ACTIVE: Final = Mode.ACTIVE
 _CONTROL: Final = Demand.CONTROL
-_NO_FAULT: Final = Fault.NONE
-_FAULT_OF_LIMIT: Final = {row.law_limit: row.code for row in FAULTS if row.law_limit}
 
 Measure = Callable[[Measurements, MotionSample, LevelObserver], FloatArray]
 """Picks a law's measurement vector, shape (m,)."""
@@ -95,14 +92,6 @@ class RunningLaw:
         #: What first went wrong with the law, an exception or an answer that is not finite; empty
         #: if nothing did.
         self.error = ""
-
-    @property
-    def fault(self) -> Fault:
-        """Fault of the limit of its own on which the law ended, or NONE."""
-        law = self.law
-        if self._starts_anew and isinstance(law, StartsAnew):
-            return _FAULT_OF_LIMIT.get(law.passed_limit, _NO_FAULT)
-        return _NO_FAULT
 
     @property
     def fallbacks(self) -> int | None:
@@ -215,7 +204,7 @@ class RunningLaw:
 
     def _start_anew(self, measured: Measurements, judgement: Judgement) -> None:
         """Reset a law that asks for it when an operator arms or resets, and one that raised."""
-        # in charge nothing but disarming and arming again brings back a law that has ended
+        # in charge a reset of a fault would take away what the law has learned meanwhile
         if self._starts_anew and judgement.mode is not _ACTIVE:
             self.law.reset()
         if self.failed and measured.reset_edge:

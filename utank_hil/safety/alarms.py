@@ -157,9 +157,7 @@ class AlarmList:
         self.unaccepted = any(each.state in _UNACCEPTED for each in self._order)
 
 
-def active_faults(
-    mode: Mode, fault: Fault, standing: int, law_fault: Fault
-) -> dict[Fault, Gravity]:
+def active_faults(mode: Mode, fault: Fault, standing: int) -> dict[Fault, Gravity]:
     """Faults whose cause is there, or which are latched.
 
     What ends or halves the pressure counts in ACTIVE, and in FAULT, where it is a second fault;
@@ -167,9 +165,9 @@ def active_faults(
     arming was refused counts as long as it would be.
 
     Mode and fault are those of the supervisor, `standing` the conditions that hold
-    (`judging.standing`), `law_fault` the limit on which the law ended, or NONE.
+    (`judging.standing`).
     """
-    found = dict.fromkeys({law_fault, *judging.faults(standing & judging.WARNING)}, Gravity.NOTHING)
+    found = dict.fromkeys(judging.faults(standing & judging.WARNING), Gravity.NOTHING)
     # in STANDBY it says why arming was refused, which may be some time ago
     refusing = standing & (judging.ENDING | judging.REFUSING)
     if mode is Mode.INIT or fault in judging.faults(refusing):

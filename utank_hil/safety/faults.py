@@ -71,15 +71,10 @@ class FaultRow:
     happened: str
     remedy: str
     conditions: tuple[Condition, ...]
-    #: A law that ends at a limit of its own for this measurement (`StartsAnew.passed_limit`) shows
-    #: this code; empty if none does.
-    law_limit: str = ""
 
 
-def _row(
-    code: Fault, happened: str, remedy: str, *conditions: Condition, law_limit: str = ""
-) -> FaultRow:
-    return FaultRow(code, happened, remedy, conditions, law_limit)
+def _row(code: Fault, happened: str, remedy: str, *conditions: Condition) -> FaultRow:
+    return FaultRow(code, happened, remedy, conditions)
 
 
 def _found(
@@ -182,8 +177,7 @@ FAULTS: Final = (
          "If the water was low, check the switches and their wiring; if it was high, lower "
          "limits.level_m or limits.pressure_pa.",
          Condition(_STOP, "a high-level switch is closed, broken or not available",
-             lambda seen, _: seen.measured.high_level),
-         law_limit="level_m"),
+             lambda seen, _: seen.measured.high_level)),
     _row(Fault.BUS_OVERLOAD, "The CAN bus is nearly full.",
          "Find the node that sends too much (candump) and stop it.",
          Condition(_STOP, "over {bus_load_limit:.0%} of the bus in use over a second",
@@ -295,8 +289,7 @@ FAULTS: Final = (
              or abs(seen.heel_rad) > limits.heel_limit_rad)),
          # a ship that rolls through upright is upright twice in a period
          Condition(_REFUSE, f"roll over {{roll_limit_rad:g}} rad within the last {ROLL_CALM_S} s",
-             lambda seen, _: seen.rolled_over_ms < 1e3 * ROLL_CALM_S),
-         law_limit="roll_rad"),
+             lambda seen, _: seen.rolled_over_ms < 1e3 * ROLL_CALM_S)),
     _row(Fault.STABILITY_LOW, "The ship's metacentric height may be below the limit of its "
          "stability booklet, or no estimates of it come any more: the panel shows no GM then.",
          "Compare with the loading computer; take on ballast or remove weight from above. Without "

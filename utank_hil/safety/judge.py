@@ -213,13 +213,10 @@ class Safety:
         if self._start_ns is None:
             self._start_ns = now_ns
 
-    def update_alarms(
-        self, accepted: list[int | None], law_fault: Fault, now_ns: int
-    ) -> list[AlarmEvent]:
+    def update_alarms(self, accepted: list[int | None], now_ns: int) -> list[AlarmEvent]:
         """Raise, accept and rectify alarms; return what became of them.
 
-        `accepted` are the codes that an operator has accepted, where None stands for all;
-        `law_fault` is the limit on which the law ended, or NONE.
+        `accepted` are the codes that an operator has accepted, where None stands for all.
         """
         supervisor, alarms = self.supervisor, self.alarms
         mode = supervisor.mode
@@ -229,7 +226,7 @@ class Safety:
             alarms.accept(code, mode, now_ns)
         active = self._passing
         if self._alarming:
-            now = active_faults(mode, supervisor.fault, supervisor.standing, law_fault)
+            now = active_faults(mode, supervisor.fault, supervisor.standing)
             active |= {code: max(each, active.get(code, each)) for code, each in now.items()}
         alarms.update(active, mode, now_ns)
         self._passing.clear()

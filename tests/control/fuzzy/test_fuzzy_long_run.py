@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from utank_hil.control.fuzzy.adaptive import IndirectFuzzy, RobustFuzzy, SmallGainFuzzy
+from tools.thesis.fuzzy_laws import IndirectFuzzy, SmallGainFuzzy
+from utank_hil.control.fuzzy.adaptive import RobustFuzzy
 from utank_hil.control.fuzzy.law import ErrorDynamics
 
 pytestmark = pytest.mark.slow

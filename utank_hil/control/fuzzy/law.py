@@ -180,11 +180,9 @@ class FuzzyController(ABC):
 
     Parameters adapted before a fault or a disarming may have caused it, so an armed law restarts
     from its initial parameters (`StartsAnew`).
-
-    `passed_limit` is empty, as the law has no limit that ends it.
     """
 
-    passed_limit = ""
+    starts_anew = True
 
     def __init__(self, law: FuzzyLaw) -> None:
         self.sample_time_s = law.sample_time_s
