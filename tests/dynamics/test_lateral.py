@@ -50,7 +50,7 @@ def linear_response(model: LateralModel, omega: float, force: np.ndarray) -> np.
 
 @cache
 def hull() -> LateralHull:
-    """The Wigley hull of `tools.small_hull`."""
+    """A Wigley hull of 60 x 12 x 4 m, whole, by Capytaine."""
     file = Path(__file__).parent / "data" / "wigley.nc"
     return LateralHull(read_hull(file, Given(gyration_m=(4.56, 15.0, 15.0))))
 

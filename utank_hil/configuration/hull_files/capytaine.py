@@ -10,9 +10,12 @@ from typing import Any
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray
-from utank_hil.configuration.hull_files.parts import Given, hull_of
+from utank_hil.configuration.hull_files.parts import Given, hull_of, rigid_body
 from utank_hil.dynamics.hull.hull_data import DEGREES, HullData
 from utank_hil.sea.measured import open_netcdf
+
+GIVEN = "mass_distribution_given"
+"""Attribute of an inertia matrix that is the ship's, about the origin; others may be a solid's."""
 
 
 def read_capytaine(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same for all readers
@@ -24,6 +27,11 @@ def read_capytaine(path: Path, given: Given) -> HullData:  # noqa: ARG001, the s
         raise ValueError(f"{path} needs xarray: pip install 'utank-hil[files]'") from error
     except (OSError, ValueError) as error:
         raise ValueError(f"{path} can't be read as netCDF: {error}") from error
+    return hull_of_dataset(path, data)
+
+
+def hull_of_dataset(path: Path, data: Any) -> HullData:
+    """Return the hull of a dataset, by the name of its file."""
     needed = ("omega", "added_mass", "radiation_damping", "wave_direction")
     lacking = [name for name in needed if name not in data]
     if lacking:
@@ -103,7 +111,9 @@ def _body(data: Any, matrix: Any) -> tuple[dict[str, Any], list[str]]:
     """Return mass and points, as far as the file has them, and what it has not."""
     body: dict[str, Any] = {}
     notes = []
-    if "inertia_matrix" in data:
+    if "inertia_matrix" in data and data["inertia_matrix"].attrs.get(GIVEN):
+        body |= rigid_body(matrix("inertia_matrix"))
+    elif "inertia_matrix" in data:
         body["mass_kg"] = float(matrix("inertia_matrix")[0, 0])
         notes.append("inertia_matrix may be that of a homogeneous body: only its mass is taken")
     if "center_of_mass" in data:

@@ -293,6 +293,26 @@ def free_roll(hull: HullData) -> FreeRoll:
     return FreeRoll(2 * math.pi / omega, omega * radiated / (2 * stiffness), mode)
 
 
+def with_roll_period(hull: HullData, period_s: float) -> HullData:
+    """Return the hull with the roll inertia of a free roll of this period, sway and yaw free.
+
+    ValueError is raised as by `free_roll`, and if the added mass alone makes the period longer.
+    """
+    stiffness = float(hull.about_gravity_centre().known("hydrostatic")[3, 3])
+    omega = 2 * math.pi / period_s
+    added, _ = radiation_at(hull.about_gravity_centre(), omega)
+    others = hull.about_gravity_centre().mass_matrix + added
+    others[3, 3] -= hull.known("inertia_kg_m2")[0, 0]
+    lateral = others[np.ix_(_LATERAL, _LATERAL)]
+    mode = _mode(lateral)
+    needed = stiffness / omega**2 - float(mode @ lateral @ mode)
+    if needed <= 0:
+        raise ValueError(f"{hull.source}: added mass alone rolls slower than {period_s:g} s")
+    inertia = np.array(hull.known("inertia_kg_m2"))
+    inertia[0, 0] = needed
+    return replace(hull, inertia_kg_m2=inertia)
+
+
 def _mode(inertia: FloatArray) -> FloatArray:
     """Return sway, 1, yaw of free roll: sway and yaw have inertia alone."""
     others = np.ix_([0, 2], [0, 2])

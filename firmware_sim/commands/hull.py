@@ -1,0 +1,126 @@
+"""``utank-hil hull``: hydrodynamic data of a hull from its mesh."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from utank_hil.base.parameters import ParameterError
+from utank_hil.console.common import Json, fail, print_json
+from utank_hil.console.terminal import Terminal, new_table, notes, say_note, shown
+
+if TYPE_CHECKING:
+    from utank_hil.dynamics.hull.hull_data import HullData
+
+_POSITIVE = {"min": 1e-6, "max": 1e9}
+
+
+def hull(
+    mesh: Annotated[
+        Path,
+        typer.Argument(
+            help="Panels of the hull, x forward, z up: WAMIT .gdf, HAMS .pnl, NEMOH .mar, "
+            "HydroStar .hst; with meshio .stl, .obj, .ply. Whole, or one side of y = 0."
+        ),
+    ],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The netCDF file to write.")] = Path(
+        "hull.nc"
+    ),
+    gm: Annotated[
+        float | None, typer.Option(**_POSITIVE, help="Metacentric height, m; or --gravity.")
+    ] = None,
+    gravity: Annotated[
+        float | None, typer.Option(help="Centre of gravity above the waterline, m.")
+    ] = None,
+    roll_period: Annotated[
+        float | None, typer.Option(**_POSITIVE, help="Of the free roll, s; or --gyration.")
+    ] = None,
+    gyration: Annotated[
+        float | None, typer.Option(**_POSITIVE, help="Radius of gyration in roll, m.")
+    ] = None,
+    draught: Annotated[
+        float | None,
+        typer.Option(
+            **_POSITIVE,
+            help="Depth of the lowest point, m.",
+            show_default="the waterline is z = 0 of the file",
+        ),
+    ] = None,
+    trim: Annotated[
+        float, typer.Option(min=-20, max=20, help="Bow down, about midship, degrees.")
+    ] = 0.0,
+    scale: Annotated[
+        float, typer.Option(**_POSITIVE, help="Unit of the file in m, 0.001 for mm.")
+    ] = 1.0,
+    displacement: Annotated[
+        float | None,
+        typer.Option(**_POSITIVE, help="In t, to check that of the mesh."),
+    ] = None,
+    density: Annotated[
+        float, typer.Option(min=900, max=1100, help="Of the water, kg/m3.")
+    ] = 1025.0,
+    json_: Json = False,
+) -> None:
+    """Compute what waves do to a hull, for `ship: {hull: FILE}`.
+
+    Added mass, damping and wave forces of the ship at rest in deep water, by Capytaine (a package
+    of the extra `hulls`). The ship's speed enters a scenario by the frequency of encounter.
+
+    **Example:** utank-hil hull supply.gdf --draught 6 --gm 1.2 --roll-period 10 --out supply.nc
+    """
+    import capytaine  # noqa: F401, its absence is said before the work
+
+    from firmware_sim.hull.compute import Loading, compute_hull, write_hull
+    from firmware_sim.hull.mesh import MeshError, read_mesh
+
+    for one, other, names in (
+        (gm, gravity, "--gm or --gravity"),
+        (roll_period, gyration, "--roll-period or --gyration"),
+    ):
+        if (one is None) == (other is None):
+            fail(f"{names} is needed, and not both")
+    if out.suffix.lower() != ".nc":
+        fail(f"--out {out}: its suffix must be .nc")
+    loading = Loading(gm, gravity, roll_period, gyration, displacement, density)
+    try:
+        side, said = read_mesh(mesh, draught, trim, scale)
+        with notes.busy(f"{shown(mesh)}: {2 * side.nb_faces} panels, computing"):
+            data, found, wrong = compute_hull(side, loading, str(out))
+    except (MeshError, ParameterError) as error:
+        fail(f"{mesh}: {error}")
+    for text in (*said, *wrong):
+        say_note(f"{mesh}: {text}")
+    write_hull(out, data)
+    figures = hull_figures(found)
+    if json_:
+        print_json({"file": str(out), "panels": 2 * side.nb_faces, **figures})
+        return
+    table = new_table(shown(mesh), "")
+    table.show_header = False
+    for name, value in figures.items():
+        words, _, unit = name.rpartition("_")
+        table.add_row(words.replace("_", " "), f"{value:.4g} {unit.replace('ratio', '')}")
+    console = Terminal()
+    console.table(table)
+    console.say(f"written: {shown(out)}")
+    console.say(f"In the ship's file: ship: {{hull: ./{out.name}}}")
+
+
+def hull_figures(hull: "HullData") -> dict[str, float]:
+    """Figures by which a naval architect knows the ship again."""
+    from utank_hil.dynamics.hull.hull_data import free_roll
+
+    free = free_roll(hull)
+    about_g: Any = hull.about_gravity_centre()
+    mass_kg, weight_n = about_g.mass_kg, about_g.mass_kg * hull.gravity_m_s2
+    return {
+        "displacement_t": mass_kg / 1e3,
+        "metacentric_height_m": about_g.hydrostatic[3, 3] / weight_n,
+        "centre_of_gravity_above_water_m": hull.known("gravity_centre_m")[2],
+        "roll_period_s": free.period_s,
+        "roll_gyration_m": math.sqrt(about_g.inertia_kg_m2[0, 0] / mass_kg),
+        "damping_by_radiated_waves_ratio": free.radiation_ratio,
+        "shortest_wave_s": 2 * math.pi / hull.wave_frequency_rad_s[-1],
+        "longest_wave_s": 2 * math.pi / hull.wave_frequency_rad_s[0],
+    }
