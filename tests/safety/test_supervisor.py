@@ -39,11 +39,12 @@ def armed_bench() -> Bench:
     return bench
 
 
+STALE_MS = SafetyLimits().motion_age_ms + 10
 ACTIVE = {"requested_mode": Mode.ACTIVE, "armed": True, "drive_enabled": True}
 ARMING = {**ACTIVE, "arm_edge": True, "drive_enabled": False}
 # what each fault looks like, all else being well
 SIGNS: list[tuple[Fault, Reaction, dict[str, object]]] = [
-    (Fault.MOTION_SILENT, Reaction.RAMP, {"motion_age_ms": 50}),
+    (Fault.MOTION_SILENT, Reaction.RAMP, {"motion_age_ms": STALE_MS}),
     (Fault.TANK_SILENT, Reaction.RAMP, {"tank_age_ms": 1100}),
     (Fault.PUMP_SENSOR_SILENT, Reaction.RAMP, {"pump_age_ms": 1100}),
     (Fault.PROTECTION, Reaction.RAMP, {"protection_valid": False}),
@@ -143,7 +144,7 @@ def test_faults_that_cut_the_pressure_are_named_before_those_that_ramp() -> None
 INIT_SIGNS = [
     (Fault.BUS_LOST, {"link_lost": True}),
     (Fault.ADDRESS_CONFLICT, {"address_conflict": True}),
-    (Fault.MOTION_SILENT, {"motion_age_ms": 50}),
+    (Fault.MOTION_SILENT, {"motion_age_ms": STALE_MS}),
     (Fault.TANK_SILENT, {"tank_age_ms": 110}),
     (Fault.PUMP_SENSOR_SILENT, {"pump_age_ms": 1100}),
     (Fault.DRIVE_SILENT, {"drive_age_ms": 70}),
@@ -289,7 +290,7 @@ def test_a_drive_that_was_out_is_no_reason_to_refuse_the_reset() -> None:
 @pytest.mark.parametrize(("age_ms", "mode"), [(600, Mode.PASSIVE), (601, Mode.STANDBY)])
 def test_passive_is_not_entered_on_an_old_order(age_ms: float, mode: Mode) -> None:
     bench = Bench()
-    bench.tick(motion_age_ms=50)  # INIT
+    bench.tick(motion_age_ms=STALE_MS)  # INIT
     bench.tick(requested_mode=Mode.PASSIVE, passive_edge=True, panel_age_ms=age_ms)
     bench.tick(requested_mode=Mode.PASSIVE, panel_age_ms=age_ms)
     assert bench.supervisor.mode is mode
@@ -335,16 +336,16 @@ def test_passive_that_could_not_be_entered_for_long_is_to_be_asked_for_anew(
 
 def test_passive_that_was_asked_for_meanwhile_is_entered_when_it_can_be() -> None:
     bench = Bench()
-    bench.tick(motion_age_ms=50, requested_mode=Mode.PASSIVE, passive_edge=True)
+    bench.tick(motion_age_ms=STALE_MS, requested_mode=Mode.PASSIVE, passive_edge=True)
     assert bench.supervisor.mode is Mode.INIT
     for _ in range(2):
         bench.tick(requested_mode=Mode.PASSIVE)
     assert bench.supervisor.mode is Mode.PASSIVE
     # one that was taken back is not, nor one that a stop came after
     for last in ({"requested_mode": Mode.STANDBY}, {"requested_mode": Mode.PASSIVE, "stop": True}):
-        bench.tick(motion_age_ms=50)
-        bench.tick(motion_age_ms=50, requested_mode=Mode.PASSIVE, passive_edge=True)
-        bench.tick(motion_age_ms=50, **last)
+        bench.tick(motion_age_ms=STALE_MS)
+        bench.tick(motion_age_ms=STALE_MS, requested_mode=Mode.PASSIVE, passive_edge=True)
+        bench.tick(motion_age_ms=STALE_MS, **last)
         for _ in range(3):
             bench.tick(requested_mode=Mode.PASSIVE)
         assert bench.supervisor.mode is Mode.STANDBY
@@ -529,7 +530,7 @@ def test_a_stop_in_the_tick_of_a_fault_that_ramps_is_not_lost(disarmed: bool) ->
     bench = disarmed_bench() if disarmed else armed_bench()
     before = RAMPING if disarmed else ACTIVE
     bench.tick(**before)
-    supervisor = bench.tick(**{**before, "motion_age_ms": 50, "stop": True})
+    supervisor = bench.tick(**{**before, "motion_age_ms": STALE_MS, "stop": True})
     assert (supervisor.mode, supervisor.fault) == (Mode.FAULT, Fault.MOTION_SILENT)
     assert supervisor.demand is Demand.ZERO
     assert not supervisor.drive_wanted
@@ -811,7 +812,7 @@ def test_elsewhere_it_is_off_as_it_should_be() -> None:
 
 
 READY = {
-    "motion_age_ms": 40, "tank_age_ms": 100, "pump_age_ms": 1000, "drive_age_ms": 60,
+    "motion_age_ms": STALE_MS - 10, "tank_age_ms": 100, "pump_age_ms": 1000, "drive_age_ms": 60,
     "echo_age_ms": 100,
 }  # fmt: skip
 
