@@ -237,7 +237,7 @@ class Scenario(Section):
         """Effect of the sea on the ship, in figures."""
         elevation, moment = self.sea.sea(self.seed).elevation, self.wave_moment(self.seed)
         moment_nm = math.sqrt(moment.variance)
-        energy = elevation.amplitude**2 + _TINY  # still water has a frequency, too
+        energy = elevation.amplitude * elevation.amplitude + _TINY  # still water has one, too
         return {
             "hs_m": 4 * math.sqrt(elevation.variance),
             "encounter_rad_s": float(np.average(elevation.frequency_rad_s, weights=energy)),
@@ -377,7 +377,7 @@ class Scenario(Section):
         if problems := moment_problems(self.sea, self.vessel.ship):
             return problems
         waves = self.sea.sea(self.seed)
-        steep = wavenumber_rad_m(waves.omega_rad_s) @ waves.amplitude_m
+        steep = (wavenumber_rad_m(waves.omega_rad_s) * waves.amplitude_m).sum()
         if np.abs(amplitudes).max() > _NO_MOMENT * self.vessel.ship.stiffness_nm_rad * steep:
             return []
         # still water is a valid sea, and a ship that turns meets these waves from the side

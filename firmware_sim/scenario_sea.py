@@ -294,7 +294,7 @@ class RegularSea(_AnySea):
 
     @model_validator(mode="after")
     def _not_broken(self) -> Self:
-        length_m = GRAVITY_M_S2 * self.period_s**2 / (2 * math.pi)
+        length_m = GRAVITY_M_S2 * self.period_s * self.period_s / (2 * math.pi)
         if 2 * self.amplitude_m > _STEEPEST * length_m:
             reason = (
                 f"of {self.amplitude_m:g} m in a wave {length_m:.3g} m long: it breaks above "

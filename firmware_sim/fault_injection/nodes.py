@@ -1,12 +1,12 @@
 """Faults of nodes, pump, drive, valve and law."""
 
-import math
 from typing import Annotated, Literal
 
 from pydantic import field_validator
 
 from firmware_sim.fault_injection.bench_parts import Bench, Span, Spoiled
 from firmware_sim.fault_injection.fault import Fault, NodeName
+from utank_hil.base.elementary import exp
 from utank_hil.base.parameters import Finite, NotNegative, Range
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import DriveFault, Frame
@@ -125,7 +125,7 @@ class Pump(Fault):
         return self.off_too
 
     def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        share = 1.0 - math.exp(-TICK_S / self.lag_s) if self.lag_s else 1.0
+        share = 1.0 - exp(-TICK_S / self.lag_s) if self.lag_s else 1.0
         pressure_pa = [0.0]
 
         def broken(setpoint_pa: float) -> float:

@@ -125,7 +125,8 @@ class WrittenShip(RollShip):
         if hull is not None and math.isnan(inertia) and not self.gives("roll_period_s"):
             inertia = hull.inertia_kg_m2
         if math.isnan(inertia):
-            inertia = stiffness * (self._period_s(stiffness) / (2 * math.pi)) ** 2
+            per_rad_s = self._period_s(stiffness) / (2 * math.pi)
+            inertia = stiffness * (per_rad_s * per_rad_s)  # `**` is the C library's pow
         damping, quadratic = self.damping_nms_rad, self.quadratic_damping_nms2_rad2
         if self.gives("damping_ratio"):
             damping = 2 * self.damping_ratio * math.sqrt(inertia * stiffness)

@@ -12,6 +12,7 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
+from utank_hil.base.elementary import exp
 from utank_hil.dynamics.pump import Pump, pump_load, pump_speed
 
 
@@ -45,8 +46,8 @@ class PressureLoop:
         self._pump, self._c = pump, pump.coefficients
         self._cycle_s, self._torque = cycle_s, torque
         self._lag_s = 0.0 if torque else 1 / pump.speed_bandwidth_rad_s
-        self._toward = 1 - math.exp(-cycle_s / (pump.lag_s - self._lag_s))
-        self._follow = 1 - math.exp(-cycle_s / self._lag_s) if self._lag_s else 1.0
+        self._toward = 1 - exp(-cycle_s / (pump.lag_s - self._lag_s))
+        self._follow = 1 - exp(-cycle_s / self._lag_s) if self._lag_s else 1.0
         self._per_s = 0.5 / delay_s
         self._late = max(1, round(delay_s / cycle_s))
         self.reset()
