@@ -28,11 +28,11 @@ DESIGNS = {
 }  # fmt: skip
 """Modules that no tick runs through: designs, readers of files, judgements and tables."""
 PARTS = {
-    "utank_hil/control/constrained/law.py": ("ConstrainedController",),
+    "utank_hil/control/constrained/law.py": ("ConstrainedController", "ConstrainedLaw.controller",
+                                              "ConstrainedLaw.unlimited", "ConstrainedLaw.clipped"),
     "utank_hil/control/fuzzy/law.py": ("FuzzyBasis.memberships", "_degrees", "_gauss",
                                        "ErrorDynamics", "FuzzyController"),
-    "utank_hil/control/lqg.py": ("LQGController.step", "LQGController.applied",
-                                 "LQGController.innovation"),
+    "utank_hil/control/lqg.py": ("LQGController", "GentleController"),
     "utank_hil/control/predictive/law.py": ("PredictiveController",),
     "utank_hil/control/constrained/horizon.py": ("predictions", "_interpolation", "ActiveSetSolver",
                                                     "PlanProgramme"),

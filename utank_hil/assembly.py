@@ -365,8 +365,11 @@ def _adaptive(config: ControllerConfig, law: BuiltLaw, retuner: Retuner) -> Adap
 def _renewing(config: ControllerConfig, law: BuiltLaw, retuner: Retuner) -> RenewingController:
     """A controller that begins with `law` and has it renewed."""
     assert isinstance(law.linear, ConstrainedLaw)
-    ship = ShipFigures.of(config.vessel.ship)
-    roll = law.measured.index("roll_rad")
-    assert isinstance(config.law, SelfTunedDesign)
-    shared = config.law.clips(config.plant)
-    return RenewingController(law.linear, ship, roll, config.limits, retuner, shared=shared)
+    return RenewingController(
+        law.linear,
+        law.controller(),
+        ShipFigures.of(config.vessel.ship),
+        law.measured.index("roll_rad"),
+        config.limits,
+        retuner,
+    )

@@ -13,6 +13,7 @@ import pytest
 
 from tools.reference_recordings.cases import (
     CASES,
+    CONTROLLERS,
     DESIGN_BOUND,
     FAULTS,
     LOGS,
@@ -20,7 +21,7 @@ from tools.reference_recordings.cases import (
     compare,
     record,
 )
-from utank_hil.assembly import build_law
+from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.canbus import (
     ControllerStatus,
     Fault,
@@ -29,10 +30,11 @@ from utank_hil.canbus import (
     SensorMotion,
     load_catalogue,
 )
+from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.telemetry.frame_log import FrameLog, Kind
 from utank_hil.telemetry.law_values import decoded, encoded, law_values
-from utank_hil.telemetry.replay import entries_of, replay, replay_log
+from utank_hil.telemetry.replay import RecordedRetuner, entries_of, replay, replay_log
 from utank_hil.telemetry.replay_head import law_differences, recorded_config, recorded_law
 
 STATUS = load_catalogue().codec(ControllerStatus)
@@ -103,6 +105,22 @@ def test_a_recorded_law_answers_for_itself_and_today_s_design_is_judged_beside()
     (gains,) = (each for each in law.differences if each.name.startswith("gains"))
     assert gains.deviation == law.deviation == pytest.approx(1e-3, rel=2e-3)
     assert law.deviation > DESIGN_BOUND
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["adaptive_dpc", "self_tuning"])
+def test_a_law_that_may_be_exchanged_begins_as_recorded(name: str) -> None:
+    config = load_config(CONTROLLERS / f"{name}.yaml", ControllerConfig)
+    designed = build_law(config)
+    values = law_values(designed.controller())
+    recorded = {key: x * (1 + 1e-9) if x.dtype.kind == "f" else x for key, x in values.items()}
+    law, why = recorded_law({"law": encoded(recorded)}, config, designed)
+    node = build_controller_node(config, law, retuner=RecordedRetuner(), commissioned=True)
+    runs = law_values(node.law.law.laws.active.controller)
+    assert not why
+    assert {key: x.tobytes() for key, x in runs.items()} == {
+        key: np.asarray(x).tobytes() for key, x in recorded.items()
+    }
 
 
 def test_a_design_that_another_weight_changes_is_beyond_the_bound() -> None:

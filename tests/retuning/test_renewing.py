@@ -69,7 +69,9 @@ class Rig:
     def __init__(self, answer: Answer | None, first: ConstrainedLaw | None = None) -> None:
         self.retuner = ToyRetuner(answer)
         law = first or law_for(2.0, 8.0)
-        self.controller = RenewingController(law, SHIP, 0, CONFIG.limits, self.retuner)
+        self.controller = RenewingController(
+            law, law.clipped(), SHIP, 0, CONFIG.limits, self.retuner
+        )
         self._model = PLANT.sampled(("roll_rad", "roll_rate_rad_s", "level_m"), 0.2)
         self._state = np.zeros(len(self._model.A))
         self.command_pa, self.samples = 0.0, 0

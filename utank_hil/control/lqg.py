@@ -160,17 +160,18 @@ class LQGLaw:
         """Transfer matrix from y to u at the points `z`, shape (N,); shape (N, r, m)."""
         return state_space_response(self.matrices(), z)
 
-    def reference_gain(self) -> FloatArray:
+    def reference_gain(self) -> FloatArray | None:
         """Feedforward gain on a constant target of the outputs; shape (r, m).
 
         It is the steady input that brings the outputs nearest to the target (least squares), plus
-        the gain times the resulting state.
-
-        numpy.linalg.LinAlgError is raised if the model has a pole at 1, and so no steady state of
-        an input.
+        the gain times the resulting state. None if the model has a pole at 1, and so no steady
+        state of an input.
         """
         a, b, c, d, _ = self.model
-        steady = np.linalg.solve(np.eye(len(a)) - a, b)
+        try:
+            steady = np.linalg.solve(np.eye(len(a)) - a, b)
+        except np.linalg.LinAlgError:
+            return None
         feedforward: FloatArray = (np.eye(b.shape[1]) + self.gain @ steady) @ np.linalg.pinv(
             c @ steady + d
         )
@@ -196,16 +197,14 @@ class LQGController:
         state, mean, command, measured = np.split(
             np.eye(self._own + outputs), [states, states + outputs, self._own]
         )
-        self._surprise = (1 - washout_share) * (measured - mean) - c @ state - d @ command
-        next_state = a @ state + b @ command + law.observer_gain @ self._surprise
+        expected = product(c, state) + product(d, command)
+        self._surprise = (1 - washout_share) * (measured - mean) - expected
+        next_state = product(a, state) + product(b, command)
+        next_state += product(law.observer_gain, self._surprise)
         next_mean = mean + washout_share * (measured - mean)
-        self._advance = np.vstack([next_state, next_mean, -law.gain @ next_state])
+        self._advance = np.vstack([next_state, next_mean, -product(law.gain, next_state)])
         # computed here, as a step has no time for it; without one, steps without target still work
-        self._reference_gain: FloatArray | None
-        try:
-            self._reference_gain = law.reference_gain()
-        except np.linalg.LinAlgError:
-            self._reference_gain = None
+        self._reference_gain = law.reference_gain()
         self.reset()
 
     def reset(self) -> None:

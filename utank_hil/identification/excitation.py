@@ -57,6 +57,9 @@ def random_pulses(
 def response_scale(pressure_pa: FloatArray, model: ARX, response_limits: FloatArray) -> float:
     """Factor, at most 1, that keeps the response to an excitation within limits.
 
+    It is a multiple of 2^-20: the last digits of a prediction, which follow the processor, do not
+    move a command.
+
     ValueError is raised if the limits do not match the model's outputs or are not positive, or the
     model has more than one input.
 
@@ -75,7 +78,8 @@ def response_scale(pressure_pa: FloatArray, model: ARX, response_limits: FloatAr
     if model.inputs != 1:
         raise ValueError(f"the model must have the pressure as its one input, has {model.inputs}")
     peak = np.abs(model.simulate(np.asarray(pressure_pa)[:, None])).max(axis=0)
-    return float(min(1.0, 1.0 / np.max(peak / limits, initial=1e-300)))
+    most = float(min(1.0, 1.0 / np.max(peak / limits, initial=1e-300)))
+    return math.ldexp(math.floor(math.ldexp(most, 20)), -20)
 
 
 def _samples(duration_s: float, sample_time_s: float) -> int:

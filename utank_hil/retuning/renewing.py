@@ -18,7 +18,7 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState, Verdict
 from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
-from utank_hil.control.interface import PumpLimits
+from utank_hil.control.interface import Controller, PumpLimits
 from utank_hil.control.lqg import GentleController
 from utank_hil.retuning.answer import Answer, RenewedLaw
 from utank_hil.retuning.estimate import ChangeMonitor, MotionEstimate, ShipFigures, ship_factor
@@ -102,23 +102,21 @@ class Effort:
 class RenewingController(LawExchange):
     """A constrained law that is renewed as waves and ship change.
 
-    `law` is the first one, for an unknown sea, `ship` the configured one, `roll` the index of the
-    roll among the outputs. No law may exceed `limits`. A law that is not `shared` plans from the
-    start and gets its whole command, as only its plan keeps the level.
+    `law` is the first one, for an unknown sea, and `controller` steps it; `ship` is the configured
+    one, `roll` the index of the roll among the outputs. No law may exceed `limits`. A controller
+    that plans from the start gets its whole command, as only its plan keeps the level.
     """
 
     def __init__(
         self,
         law: ConstrainedLaw,
+        controller: Controller,
         ship: ShipFigures,
         roll: int,
         limits: PumpLimits,
         retuner: Retuner,
-        *,
-        shared: bool = True,
     ) -> None:
-        self._shared = shared
-        controller = law.clipped() if shared else law.controller()
+        self._shared = isinstance(controller, GentleController)
         first = MonitoredLaw(controller, ChangeMonitor(ship))
         super().__init__(first, len(law.model.C), roll, TRIAL, retuner)
         self._law = law

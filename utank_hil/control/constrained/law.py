@@ -202,7 +202,7 @@ class ConstrainedLaw:
     def unlimited(self) -> LQGLaw:
         """Linear law that the controller follows while no limit is active."""
         rest = np.eye(len(self.steady_state)) - self.steady_state
-        gain = -(self.horizon.unlimited_state[:1] @ rest + self.steady_command)
+        gain = -(product(self.horizon.unlimited_state[:1], rest) + self.steady_command)
         return LQGLaw(self.model, gain[:, : len(self.model.A)], self.observer_gain)
 
     def clipped(self) -> GentleController:
