@@ -50,7 +50,7 @@ CAPSIZED, STRUCK, DAMPED_STRIKING = 23 + CAPSIZED_S, 23 + STRIKE_LOSS, 23 + DAMP
 # there is no pump
 FREE, DRIVEN, IMPOSED, ABSENT = 0, 1, 2, 3
 
-CAPSIZE_RAD = np.pi / 2
+CAPSIZE_RAD = np.pi / 2  #: Beyond it the model of the hull does not hold.
 
 pump_step, pump_coast = compile_pump(njit())
 

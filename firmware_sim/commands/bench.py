@@ -10,7 +10,6 @@ from rich.progress import TaskProgressColumn
 
 from utank_hil.base.provenance import describe
 from utank_hil.base.shipped import CONFIGS
-from utank_hil.commands.monitor import watch
 from utank_hil.configuration.files import files_named
 from utank_hil.console.admission import admit
 from utank_hil.console.common import (
@@ -18,7 +17,6 @@ from utank_hil.console.common import (
     AllowCode,
     Duration,
     Json,
-    View,
     fail,
     load,
     prepare_out,
@@ -73,7 +71,6 @@ def bench(
         ),
     ] = None,
     json_: Json = False,
-    view: View = False,
     allow_code: AllowCode = False,
 ) -> None:
     """Run a scenario: the tank passive, then with each controller, in the same waves.
@@ -119,8 +116,6 @@ def bench(
         _print(result, found, files, out, scenario)
     if failures:
         fail("; ".join(failures))
-    if view:
-        watch(files["recording"])
     raise typer.Exit(found.exit_code)
 
 

@@ -41,10 +41,9 @@ def campaign(
     was. A case that fails is recorded with its reason and ends nothing.
     """
     # imported late: `--help` needs none of it
-    from firmware_sim.campaign.store import FILES, PICTURE, SUMMARY, Store, StoreError, read_results
+    from firmware_sim.campaign.store import FILES, SUMMARY, Store, StoreError, read_results
     from firmware_sim.campaign.study import load_study
     from firmware_sim.campaign.summary import failures, summary
-    from firmware_sim.campaign.tables import draw
 
     try:
         loaded = load_study(study, allow_code=allow_code)
@@ -63,7 +62,6 @@ def campaign(
     failed = failures(results)
     content = {**results.about, "interrupted": interrupted, "groups": groups, "failures": failed}
     store.write_json(SUMMARY, content)
-    draw(results, groups, folder / PICTURE)
     if json_:
         print_json(content)
     else:

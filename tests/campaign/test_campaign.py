@@ -116,7 +116,6 @@ def test_command_resumes_counts_failures_and_compares_in_the_same_waves(run, tmp
     # headings are another sea: nothing is beside the first
     assert [group["beside_first"] for group in found["groups"]] == [[], [], []]
     out = tmp_path / "out"
-    assert (out / "campaign.png").stat().st_size > 10_000
     about = json.loads((out / "study.json").read_text())
     assert about["configuration"]["grid"] == {**grid, "seed": [1, 2, 3]}
     assert about["data"]

@@ -1,4 +1,4 @@
-"""What `monitor` and `--view` say where they can't show: a port in use, no display, no driver."""
+"""What `monitor` says where it can't show: a port in use, no display, no driver."""
 
 import os
 import signal
@@ -6,16 +6,13 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from utank_hil.cli import app
-from utank_hil.commands import run
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry import live, viewer
@@ -47,25 +44,17 @@ def refused(*words: str) -> str:
     return " ".join(result.stderr.split())
 
 
-@pytest.mark.evidence("bench configs/scenarios/storm_day.yaml --duration 1 --view --json --out")
-@pytest.mark.usefixtures("one_process")
-@pytest.mark.parametrize(
-    "command",
-    ["monitor", "bench configs/scenarios/storm_day.yaml --duration 1 --view --json --out"],
-)
 def test_a_port_that_was_taken_since_ends_the_viewer_with_the_remedy(
-    monkeypatch: pytest.MonkeyPatch, recording: Path, taken: socket.socket, command: str
+    monkeypatch: pytest.MonkeyPatch, recording: Path, taken: socket.socket
 ) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     ports = [taken.dup(), viewer.hold_port()]
     monkeypatch.setattr(viewer, "hold_port", lambda: ports.pop(0))
-    bench = command != "monitor"
-    said = refused(*command.split(), str(recording.parent if bench else recording))
+    said = refused("monitor", str(recording))
     assert "the viewer failed" in said
-    shown = recording.parent / "bench.rrd" if bench else recording
-    assert f"if a port was in use, utank-hil monitor {shown} takes another" in said
-    assert shown.exists()  # not for the viewer to lose
+    assert f"if a port was in use, utank-hil monitor {recording} takes another" in said
+    assert recording.exists()  # not for the viewer to lose
 
 
 def test_a_stream_whose_port_was_taken_is_refused_instead_of_showing_nothing(
@@ -79,26 +68,6 @@ def test_a_stream_whose_port_was_taken_is_refused_instead_of_showing_nothing(
         f"port {viewer.port_of(taken)} of this machine was taken; start it again: it takes another"
         in said
     )
-
-
-@pytest.mark.evidence
-def test_a_run_says_that_its_viewer_found_its_port_taken_and_goes_on(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], taken: socket.socket
-) -> None:
-    port = viewer.port_of(taken)
-    live_taken = f"from utank_hil.telemetry import live; live.port_of = lambda held: {port}; "
-    monkeypatch.setattr(run, "_COMMAND_LINE", live_taken + run._COMMAND_LINE)
-    started, popen = [], subprocess.Popen
-
-    def start(*words: Any, **options: Any) -> "subprocess.Popen[bytes]":
-        started.append(popen(*words, **options))
-        return started[-1]
-
-    monkeypatch.setattr(subprocess, "Popen", start)
-    with RowWriter(SIGNALS), ExitStack() as stack:
-        run._show(stack)  # and does not wait for it
-        assert started[0].wait() == ExitCode.USAGE
-    assert f"port {port} of this machine was taken" in " ".join(capfd.readouterr().err.split())
 
 
 def test_where_no_window_can_be_the_page_and_the_remedy_are_named(recording: Path) -> None:

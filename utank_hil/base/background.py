@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 _SCORE: Final = Path("/proc/self/oom_score_adj")
-_FIRST_TO_GO: Final = 500
+_FIRST_TO_GO: Final = 500  #: Score of 1000 of the kernel: well before the controller, which has 0.
 _THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 

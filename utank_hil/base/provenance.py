@@ -21,7 +21,7 @@ from pydantic import BaseModel
 PROGRAM: Final = "utank-hil"
 UNKNOWN: Final = "unknown"
 _ROOT: Final = Path(__file__).resolve().parents[2]
-_GIT_S: Final = 5.0
+_GIT_S: Final = 5.0  #: Limit on a call of git. Chosen; no study.
 _CORE_NAMES: Final = tuple(
     f"{prefix}openblas_get_corename{suffix}" for prefix in ("scipy_", "") for suffix in ("64_", "")
 )

@@ -18,7 +18,7 @@ from utank_hil.base.compiled import compiled_codecs
 from utank_hil.canbus.e2e import WORD_TABLES, first_byte_table
 
 T = TypeVar("T", bound=tuple[Any, ...])
-FRAME_BYTES: Final = 8
+FRAME_BYTES: Final = 8  #: Of a classic frame.
 #: Parts of a frame: name, first bit, number of bits.
 _PARTS: Final = (("crc", 0, 8), ("b1", 8, 8), ("w1", 16, 16), ("w2", 32, 16), ("w3", 48, 16))
 _STRUCT: Final = struct.Struct("<BBHHH")

@@ -5,7 +5,7 @@ from typing import Final, NamedTuple, Protocol
 
 STANDARD: Final = 1 << 29  #: Mark of an identifier of 11 bits.
 BUS_SHIFT: Final = 30  #: Above it stands the number of the interface; the controller's own is 0.
-MOST_BUSES: Final = 4
+MOST_BUSES: Final = 4  #: Two motion sensors, drive and its own.
 OTHER_BUS: Final = 1 << BUS_SHIFT  #: Identifiers from here on are of other interfaces.
 LONGEST_ID: Final = (1 << 29) - 1
 LONGEST_STANDARD_ID: Final = (1 << 11) - 1

@@ -12,7 +12,7 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.telemetry.events import event_text
 
 _END_S: Final = 10.0  #: Time for the last line on a slow terminal.
-_STANDARD_ERROR: Final = 2
+_STANDARD_ERROR: Final = 2  #: By POSIX.
 
 
 class Lines:

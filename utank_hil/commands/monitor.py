@@ -19,7 +19,7 @@ LIVE: Final = "rerun+http://"  #: Beginning of the address of a live stream.
 LOOKS: Final = "&theme=dark&hide_welcome_screen&notebook=0&persist=0"
 """Options of the viewer in a browser: a dark ground that suits the colours, and no menus."""
 _LOOK_S: Final = 0.25  #: Time between two reads of the ring, short enough to appear smooth.
-_NICENESS: Final = 5
+_NICENESS: Final = 5  #: Below what controls, above idle.
 
 
 def monitor(

@@ -38,9 +38,9 @@ HELP: Final = """\
   forbid, permit       no retuning; retuning again, where no other station forbids it
   help, quit           Words may be cut short: d for disarm."""
 
-_READ_BYTES: Final = 4096
+_READ_BYTES: Final = 4096  #: Of a terminal's line.
 _STOP: Final = Action.STOP.value
-_LONGEST_LINE: Final = 256
+_LONGEST_LINE: Final = 256  #: Longer than any word.
 _WORDS: Final = (*(action.value for action in Action), "help", "quit")
 _LASTING: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.ACTIVE_ACKNOWLEDGED)
 _UNACCEPTED: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.RECTIFIED_UNACKNOWLEDGED)

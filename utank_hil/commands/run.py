@@ -1,9 +1,6 @@
 """``utank-hil run``: the deployed controller alone."""
 
 import errno
-import os
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -59,9 +56,8 @@ from utank_hil.telemetry.replay_head import replay_head
 
 _REFUSALS: Final = (errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE, errno.ENOSPC)
 LISTEN_S: Final = 0.35  #: Three cycles of a controller's status.
-_LOOK_S: Final = 0.01
+_LOOK_S: Final = 0.01  #: Time between two reads of the bus: a tick.
 LOOK_TICKS: Final = 100  #: Ticks between two checks of the recorder.
-_COMMAND_LINE: Final = "from utank_hil.cli import main; main()"
 
 
 def run(
@@ -101,7 +97,6 @@ def run(
         ),
     ] = None,
     json_: common.Json = False,
-    view: common.View = False,
     allow_code: common.AllowCode = False,
 ) -> None:
     """Run the controller on a CAN bus until Ctrl-C; the pump is left at zero.
@@ -145,8 +140,6 @@ def run(
         announcer, recording = _outputs(
             stack, context, loaded, law, config, out, keep, outlets, commissioned=not refused
         )
-        if view:
-            _show(stack)
         retuner, estimating = _desks(stack, loaded)
         alarms = stack.enter_context(printed_lines())
 
@@ -375,17 +368,6 @@ def _print_summary(
         _tell(console, recording)
         if recording.file is not None and recording.error is None:
             console.lead_on(("report", Path(recording.file)))
-
-
-def _show(stack: ExitStack) -> None:
-    """Show this run in a separate process until it ends; the run continues without it."""
-    command = [sys.executable, "-c", _COMMAND_LINE, "monitor", str(os.getpid())]
-    try:
-        process = stack.enter_context(subprocess.Popen(command, stdin=subprocess.DEVNULL))
-    except OSError as error:
-        notes.say(str(error), red="no viewer:")
-        return
-    stack.callback(process.terminate)
 
 
 def _tell(console: Terminal, recording: RecordingSummary) -> None:

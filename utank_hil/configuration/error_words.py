@@ -114,7 +114,7 @@ WANTED: Final = {
 }
 """Description of a valid value, by the type of the validation error."""
 
-_LONGEST = 60
+_LONGEST = 60  #: Characters of a value that fit on a line.
 
 
 def words_for(error: Any, model: type[BaseModel]) -> str:

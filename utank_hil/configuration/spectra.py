@@ -34,7 +34,7 @@ WaveHeight = Annotated[float, Range(above=0, most=HIGHEST_M)]
 WavePeriod = Annotated[float, Range(above=0, most=40)]
 Latitude = Annotated[float, Range(least=-90, most=90)]
 Longitude = Annotated[float, Range(least=-360, most=360)]
-_STEEPEST: Final = 0.1
+_STEEPEST: Final = 0.1  #: Of a sea that does not break: Hs over wave length.
 _BANDS: Final = ("frequency_hz", "density_m2_hz")
 
 

@@ -45,7 +45,6 @@ def _print_version(wanted: bool) -> None:
 Json = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on standard output and nothing else.")
 ]
-View = Annotated[bool, typer.Option("--view", help="Open the Rerun viewer, or serve it locally.")]
 Version = Annotated[
     bool,
     typer.Option(

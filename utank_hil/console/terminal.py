@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from utank_hil.runners import LoopStatistics
 
 _STEERS: Final = re.compile("[\0-\b\v-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
-UNLIMITED: Final = 10_000
+UNLIMITED: Final = 10_000  #: Columns, wider than any table.
 
 
 def shown(path: Path) -> str:

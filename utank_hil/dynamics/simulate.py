@@ -13,7 +13,7 @@ import numpy.typing as npt
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.nonlinear import Impact, RollModel
 
-IMPACTS_KEPT = 10_000
+IMPACTS_KEPT = 10_000  #: Strikes of a run that are kept. Chosen; no study.
 
 
 class WaveComponents(Protocol):

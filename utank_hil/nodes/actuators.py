@@ -219,7 +219,7 @@ class ValveCommander:
 
 _CONTROL = Demand.CONTROL
 _RAMP = Demand.RAMP
-_ABSENT_NS = 1 << 62
+_ABSENT_NS = 1 << 62  #: As never.
 
 
 class Actuators:

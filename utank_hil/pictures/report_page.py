@@ -9,7 +9,7 @@ from typing import Any, Final
 from utank_hil.base.whole_file import write_whole
 from utank_hil.pictures.style import DPI, TEXT_PT
 
-LEAST_TEXT_PX: Final = 9.0
+LEAST_TEXT_PX: Final = 9.0  #: Readable on a screen.
 TEXT_PX: Final = TEXT_PT / 72 * DPI  #: Size of a picture's text as drawn.
 _TEMPLATE: Final = Path(__file__).with_name("report.html.jinja")
 

@@ -34,7 +34,7 @@ SILENT_CYCLES: Final = 2.5
 as silent."""
 QUIET_START_NS: Final = 10_000_000_000
 """What is awaited at the start is an alarm only when it has not come by then."""
-_ALL_LATE: Final = 0x3FF
+_ALL_LATE: Final = 0x3FF  #: The last ten ticks.
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _INIT: Final = Mode.INIT

@@ -15,7 +15,7 @@ from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.ring import RingKind, RingReader, RingWriter
 
 _SLOTS: Final = 64  #: A retuning has four events in four minutes; readers poll every 0.5 s.
-_LONGEST_BYTES: Final = 8192
+_LONGEST_BYTES: Final = 8192  #: Of an event; a longer text is cut.
 _MOST_BYTES_A_CHARACTER: Final = 6  #: Length of an escaped character in JSON.
 _CUT: Final = _LONGEST_BYTES // (2 * _MOST_BYTES_A_CHARACTER)
 Event: TypeAlias = RetuningEvent | AlarmEvent

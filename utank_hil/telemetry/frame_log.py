@@ -95,7 +95,7 @@ def _by_sender(head: npt.NDArray[np.uint8]) -> npt.NDArray[np.intp]:
 
 
 SUFFIX: Final = ".frames"
-BLOCK_NS: Final = 500_000_000
+BLOCK_NS: Final = 500_000_000  #: What a crash may lose.
 _MARK: Final = b"UTANKHIL frames 1\n"
 _BLOCK: Final = struct.Struct("<4sII")
 _HEAD: Final = b"HEAD"

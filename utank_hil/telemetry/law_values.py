@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 Part = TypeVar("Part")
 Values = dict[str, npt.NDArray[Any]]  #: Arrays by the path of attributes that leads to them.
-_DEEPEST: Final = 12
+_DEEPEST: Final = 12  #: Depth at which a circle of objects ends. Chosen; no study.
 
 
 class LawValuesError(ValueError):

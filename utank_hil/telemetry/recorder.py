@@ -31,7 +31,7 @@ from utank_hil.telemetry.viewer import rerun_environment
 
 BATCH_S: Final = 0.5  #: Time between two writes: one costs 1 kB, a kill loses two at most.
 RETRY_S: Final = 10.0  #: Time between two attempts to begin a file.
-_NICENESS: Final = 5
+_NICENESS: Final = 5  #: Below what controls, above idle.
 _FULL_BYTES: Final = 1 << 20  #: Free space below which a disk counts as full.
 _ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 

@@ -23,7 +23,7 @@ from utank_hil.telemetry.law_values import packed, unpacked
 
 _PACKAGES: Final = ("numpy", "scipy", "daqp")
 _CODE: Final = "python"  #: Kind of a law that is the user's own code.
-_SHOWN: Final = 10
+_SHOWN: Final = 10  #: Differences that fit on a screen.
 
 
 class ReplayHeadError(ValueError):

@@ -34,7 +34,7 @@ _UNUSUAL_RESIDUAL: Final = 0.02
 _UNUSUAL_HEEL: Final = 0.25
 """Heel per greatest amplitude from which the restoring of the two sides differs."""
 _NO_DECAY: Final = "the roll of this record does not decay: is it a free decay alone?"
-_EQUAL_WORK: Final = 4 / (3 * math.pi)
+_EQUAL_WORK: Final = 4 / (3 * math.pi)  #: Of quadratic damping in the linear one of equal work.
 
 
 @dataclass(frozen=True, slots=True, eq=False)

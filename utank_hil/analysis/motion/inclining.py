@@ -13,7 +13,7 @@ from scipy.stats import t as student
 
 from utank_hil.base.arrays import FloatArray
 
-_LEAST_SHIFTS = 5
+_LEAST_SHIFTS = 5  #: Rows that a residual can be judged by; chosen.
 _MOST_HEEL_RAD = math.radians(6)  # Tests heel 1 to 4 degrees: beyond, GZ is no straight line.
 
 

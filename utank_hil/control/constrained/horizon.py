@@ -190,11 +190,11 @@ def _interpolation(knots: tuple[int, ...], samples: int) -> FloatArray:
     return hats.T
 
 
-_OPTIMAL = 1
+_OPTIMAL = 1  #: Exit flag of DAQP.
 
 
 LEVEL_SPACING = 3  # the level is constrained at every third sample
-_FREE = 1e30
+_FREE = 1e30  #: Bound that DAQP takes for none.
 
 
 class ActiveSetSolver:

@@ -28,7 +28,7 @@ from utank_hil.control.gain import slope_at_rest
 from utank_hil.control.interface import BuiltLaw, Controller, DesignPlant
 from utank_hil.dynamics.linear import STATES
 
-SETS = 3
+SETS = 3  #: Negative, zero, positive.
 # Neighbouring sets cross at a membership of one half; the thesis gives no width.
 WIDTH = 1 / math.sqrt(8 * log(2))
 _OBEYED = 0.9  # share of a command that must be sent for adaptation to continue

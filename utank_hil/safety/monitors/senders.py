@@ -39,7 +39,7 @@ LOST_SHARE: Final = 0.001
 MOST_LOST: Final = 5.0
 FOREIGN_SHARE: Final = 0.1
 """Of the bus: so much of it may be used by frames that are not in the catalogue."""
-FOREIGN_FRAMES: Final = 40.0
+FOREIGN_FRAMES: Final = 40.0  #: Excess of such frames that is reported. Chosen; no study.
 DAMAGED_FRAMES: Final = 3
 """With a wrong CRC or data ID within `DAMAGED_S`."""
 DAMAGED_S: Final = 1.0
