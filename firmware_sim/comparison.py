@@ -1,7 +1,6 @@
-"""Differences of means, paired or independent: of campaigns by case, of recordings by batch."""
+"""Differences of means of recordings, by batch: paired or independent."""
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -10,8 +9,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from firmware_sim.campaign.store import METRICS, Results, read_results
-from firmware_sim.campaign.summary import Group, groups_of
 from firmware_sim.plant_kernel import CAPSIZE_RAD
 from utank_hil.analysis.motion.statistics import batch_means, mean_interval, rms_batches
 from utank_hil.base.arrays import FloatArray
@@ -43,7 +40,6 @@ class Comparison:
 
     source: str  #: Origin of the run.
     run: str
-    parameters: dict[str, Any]
     figures: dict[str, Difference]
     remarks: tuple[str, ...] = ()  #: Remarks on the validity of the comparison.
 
@@ -88,75 +84,9 @@ def same_runs(reference: Sequence[str], other: Sequence[str], source: str) -> li
 
 
 def differing(reference: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[str, ...]:
-    """Differences in code and simulation, which are not the subject of the comparison."""
-    remarks = []
-    for key, words in (("simulation", "kinds of simulation"), ("code", "versions of the program")):
-        if reference.get(key) != other.get(key):
-            remarks.append(f"different {words}: {reference.get(key)} and {other.get(key)}")
-    return tuple(remarks)
-
-
-_Figures = dict[str, dict[str, float]]  # Metrics by the waves of a case.
-
-
-def compare_campaigns(reference: Path, others: list[Path]) -> list[Comparison]:
-    """Compare campaigns with the first one, group by group and run by run.
-
-    Raises `CompareError` if the campaigns vary different keys, or share no group or no run.
-    """
-    first = read_results(reference)
-    return [each for other in others for each in _campaigns_compared(first, other)]
-
-
-def _campaigns_compared(first: Results, path: Path) -> list[Comparison]:
-    second = read_results(path)
-    if set(first.keys) != set(second.keys):
-        here, there = (", ".join(each.keys) or "nothing" for each in (second, first))
-        raise CompareError(
-            f"{path}: varies {here}, the reference {there}: only like can be compared"
-        )
-    remarks = differing(
-        *({**each.about, **each.about["configuration"]} for each in (first, second))
-    )
-    groups = {_key(group): group for group in groups_of(second)}
-    shared = [group for group in groups_of(first) if _key(group) in groups]
-    if not shared:
-        raise CompareError(f"{path}: has no value of {', '.join(first.keys)} in common")
-    waves = [{case["case"]: case["waves"] for case in each.cases} for each in (first, second)]
-    found = []
-    for group in shared:
-        other = groups[_key(group)]
-        for run in same_runs(group.runs, other.runs, str(path)):
-            one, two = _of_run(group, run, waves[0]), _of_run(other, run, waves[1])
-            figures = {
-                metric: difference
-                for metric in METRICS
-                if (difference := _of_metric(one, two, metric)) is not None
-            }
-            found.append(Comparison(str(path), run, group.parameters, figures, remarks))
-    return found
-
-
-def _key(group: Group) -> tuple[tuple[str, Any], ...]:
-    return tuple(sorted(group.parameters.items()))
-
-
-def _of_run(group: Group, run: str, waves: dict[str, str]) -> _Figures:
-    return {waves[row["case"]]: row for row in group.of_run(run) if not row["mark"]}
-
-
-def _of_metric(one: _Figures, two: _Figures, metric: str) -> Difference | None:
-    """Difference of a metric; None where one side lacks it."""
-    values = [
-        {waves: row[metric] for waves, row in each.items() if not math.isnan(row[metric])}
-        for each in (one, two)
-    ]
-    if not all(values):
-        return None
-    common = [waves for waves in values[0] if waves in values[1]]
-    if common:
-        return paired(*(np.array([each[waves] for waves in common]) for each in values))
-    return independent(*(np.array(list(each.values())) for each in values))
+    """Difference in code, which is not the subject of the comparison."""
+    here, there = reference.get("code"), other.get("code")
+    return () if here == there else (f"different versions of the program: {here} and {there}",)
 
 
 BATCH_PERIODS: Final = 40
@@ -257,7 +187,7 @@ def _records_compared(first: Record, second: Record) -> list[Comparison]:
         capsized = _capsized((first.path, run, one), (second.path, other, two))
         if capsized:
             remarks.append(f"not compared: the ship capsized in {' and '.join(capsized)}")
-            found.append(Comparison(str(second.path), run, {}, {}, tuple(remarks)))
+            found.append(Comparison(str(second.path), run, {}, tuple(remarks)))
             continue
         remarks += _in_charge(run, one, two)
         same = together and _at_same_times(one, two)
@@ -278,7 +208,7 @@ def _records_compared(first: Record, second: Record) -> list[Comparison]:
             )
         if min(counts) < LEAST_BATCHES:
             remarks.append(f"no interval: shorter than {LEAST_BATCHES * LEAST_PERIODS} rolls")
-        found.append(Comparison(str(second.path), run, {}, figures, tuple(remarks)))
+        found.append(Comparison(str(second.path), run, figures, tuple(remarks)))
     return found
 
 

@@ -149,11 +149,6 @@ class Results:
     rows: dict[str, list[dict[str, Any]]]
 
 
-def is_campaign(folder: Path) -> bool:
-    """Whether a folder contains a campaign."""
-    return (folder / CASES).is_file() and (folder / ABOUT).is_file()
-
-
 def read_results(folder: Path) -> Results:
     """Read a campaign, complete or not."""
     about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))

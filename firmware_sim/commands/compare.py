@@ -1,4 +1,4 @@
-"""``utank-hil compare``: differences between runs, recordings or campaigns."""
+"""``utank-hil compare``: differences between runs or recordings."""
 
 import math
 from dataclasses import asdict
@@ -20,36 +20,25 @@ _SCALES: Final = {
     "w": (1e-3, "kW"),
     "m": (1, "m"),
 }
-_SHARES: Final = ("roll_below_no_tank", "roll_below_passive", "active_share")
 
 
 def compare(
-    reference: Annotated[
-        Path, typer.Argument(help="Campaign or bench folder; or a recording, log or table.")
-    ],
+    reference: Annotated[Path, typer.Argument(help="Bench folder; or a recording, log or table.")],
     others: Annotated[list[Path], typer.Argument(help="One or more of the same kind.")],
     json_: Json = False,
 ) -> None:
-    """Compare runs, recordings or campaigns with the first: differences with 95 % intervals.
+    """Compare runs or recordings with the first: differences with 95 % intervals.
 
     **Example:** utank-hil compare out out/seed7
 
-    Where the waves are the same, values are compared pair by pair: cases of campaigns, and pieces
-    of recordings of the same seed and sea.
+    Pieces of recordings of the same seed and sea are compared pair by pair. A study with several
+    cases compares what it varies itself (utank-hil campaign).
     """
-    from firmware_sim.campaign.store import is_campaign
-    from firmware_sim.comparison import CompareError, compare_campaigns, compare_records
+    from firmware_sim.comparison import CompareError, compare_records
 
-    places = [reference, *others]
-    kinds = {is_campaign(place) for place in places}
-    if len(kinds) > 1:
-        fail("a campaign and a recording can't be compared: name things of one kind")
+    first, *rest = (_recording(place) for place in (reference, *others))
     try:
-        if kinds == {True}:
-            found = compare_campaigns(reference, others)
-        else:
-            first, *rest = (_recording(place) for place in places)
-            found = compare_records(first, rest)
+        found = compare_records(first, rest)
     except (CompareError, ValueError) as error:
         fail(error)
     if json_:
@@ -70,8 +59,8 @@ def _recording(place: Path) -> Path:
 
     file = place / RECORDING if place.is_dir() else place
     if not file.is_file():
-        wanted = f"{RECORDING} or a campaign" if place.is_dir() else "such file"
-        fail(f"{place}: there is no {wanted}; name a folder of `bench` or `campaign`, or a file")
+        wanted = RECORDING if place.is_dir() else "such file"
+        fail(f"{place}: there is no {wanted}; name a folder of `bench`, or a file")
     return file
 
 
@@ -82,13 +71,12 @@ def _table(reference: Path, found: list["Comparison"]) -> Table:
     table = new_table(
         f"{shown(Path(found[0].source))} against {shown(reference)}",
         *("first", "this", "difference", "%", "pairs"),
-        names=("run", *found[0].parameters, "figure"),
+        names=("run", "figure"),
         caption="difference ± half width of its 95 % interval" if intervals else None,
     )
     for each in found:
         for name, figure in each.figures.items():
-            values = [str(value) for value in each.parameters.values()]
-            table.add_row(each.run, *values, *_cells(name, figure))
+            table.add_row(each.run, *_cells(name, figure))
     return table
 
 
@@ -97,16 +85,14 @@ def _cells(name: str, figure: "Difference") -> list[str]:
     width = "" if figure.half_width is None else f" ± {scale * figure.half_width:.3g}"
     share = f"{figure.difference / figure.reference:+.1%}" if figure.reference else ""
     return [
-        f"{name.rsplit('_', 1)[0] if unit not in ('', '%') else name} {unit}".strip(),
+        f"{name.rsplit('_', 1)[0] if unit else name} {unit}".strip(),
         f"{scale * figure.reference:.4g}",
         f"{scale * figure.value:.4g}",
         f"{scale * figure.difference:+.3g}{width}",
-        "" if name in _SHARES else share,
+        share,
         str(figure.count) if figure.paired else "none",
     ]
 
 
 def _unit(name: str) -> tuple[float, str]:
-    if name in _SHARES:
-        return 100.0, "%"
     return _SCALES.get(name.rsplit("_", 1)[-1], (1.0, ""))

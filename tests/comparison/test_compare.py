@@ -10,10 +10,6 @@ import pytest
 from scipy.stats import ttest_ind
 from typer.testing import CliRunner
 
-from firmware_sim.campaign.driver import batch_of
-from firmware_sim.campaign.simulations import run_batch
-from firmware_sim.campaign.store import Store
-from firmware_sim.campaign.study import load_study
 from firmware_sim.commands.compare import compare
 from firmware_sim.comparison import batch_count, independent, paired
 from utank_hil.analysis.motion.statistics import batch_means, rms_batches
@@ -23,32 +19,8 @@ from utank_hil.telemetry.recording import write_recording
 
 APP = new_app()
 APP.command()(compare)
-CONFIGS = Path("configs").resolve()
 COLUMNS = ("time_s", "roll_rad", "starboard_level_m", "port_level_m", "pressure_actual_pa",
            "pump_power_w")  # fmt: skip
-STUDY = """
-name: {name}
-scenario: {configs}/scenarios/storm.yaml
-simulation: linear
-set:
-  controllers: {{gpc: {configs}/controllers/gpc.yaml}}
-  controllers.gpc.limits.pressure_pa: {pressure_pa}
-  duration_s: 30
-  settle_s: 10
-grid: {{seed: {{first: {first}, count: 4}}}}
-"""
-
-
-def ran(folder: Path, name: str, *, pressure_pa: float = 5e4, first: int = 1) -> Path:
-    """A campaign's folder."""
-    path = folder / f"{name}.yaml"
-    path.write_text(STUDY.format(name=name, configs=CONFIGS, pressure_pa=pressure_pa, first=first))
-    loaded, store = load_study(path), Store(folder / name)
-    about = {"keys": loaded.keys, "code": "same"}
-    configuration = {"simulation": "linear"}
-    store.begin(loaded, {**about, "configuration": configuration}, resume=False)
-    store.write(run_batch(batch_of(loaded, loaded.cases)))
-    return folder / name
 
 
 def found(*arguments: object) -> dict[str, object]:
@@ -114,24 +86,6 @@ def test_independent_means_have_welch_s_interval():
     assert difference.difference == pytest.approx((expected.low + expected.high) / 2)
     assert difference.half_width == pytest.approx((expected.high - expected.low) / 2)
     assert not difference.paired
-
-
-@pytest.mark.slow
-def test_campaigns_in_the_same_waves_are_paired_and_their_passive_tank_is_the_same(tmp_path: Path):
-    strong, weak = ran(tmp_path, "strong"), ran(tmp_path, "weak", pressure_pa=1.5e4)
-    by_run = {each["run"]: each for each in found(strong, weak)["comparisons"]}
-    roll = by_run["gpc"]["figures"]["roll_rms_rad"]
-    assert (roll["paired"], roll["count"]) == (True, 4)
-    assert roll["difference"] == pytest.approx(roll["value"] - roll["reference"])
-    peak = by_run["gpc"]["figures"]["pressure_peak_pa"]
-    assert (peak["reference"], peak["value"]) == pytest.approx((5e4, 1.5e4), rel=0.02)
-    passive = by_run["passive"]["figures"]["roll_rms_rad"]
-    assert (passive["difference"], passive["half_width"]) == (0, 0)
-    other = ran(tmp_path, "other", first=50)
-    unpaired = found(strong, other)["comparisons"][0]["figures"]["roll_rms_rad"]
-    assert not unpaired["paired"]
-    done = CliRunner().invoke(APP, [str(strong), str(weak)])
-    assert "pressure_peak kPa" in done.stdout
 
 
 def test_recordings_of_the_same_waves_are_paired_piece_by_piece(tmp_path: Path):

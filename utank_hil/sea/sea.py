@@ -66,7 +66,7 @@ def encounter_frequency(
 
 
 BEAM_RAD = math.pi / 2  # These waves travel from port to starboard.
-COMPONENTS = 512  #: Of a sea; an hour of them does not repeat. Chosen; no study.
+COMPONENTS = 512  #: Of a sea. Chosen; no study.
 
 
 MOST_SLOPE_SHARE: Final = 2.0

@@ -54,7 +54,7 @@ class Volume:
         return found | _VOLUME
 
 
-BANDS: Final = 16.0  #: Limit on the sum, in bands of the noise. Chosen; no study.
+BANDS: Final = 16.0  #: Movement of the water that counts, in bands. Chosen; no study.
 _LEVEL_STUCK: Final = int(Finding.LEVEL_STUCK)
 
 
