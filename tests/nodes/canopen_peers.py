@@ -116,7 +116,8 @@ class Line:
                 frames = frames + self.drive.follow(target, word)
             for frame in frames:
                 self._to_the_drive(frame)
-            if self.now_ns // TICK_NS % 5 == 0 and self.beats:
+            beats = self.beats and self.node.sdo[0x1017].raw  # as often as it was told
+            if beats and self.now_ns // TICK_NS % 5 == 0:
                 state = {"OPERATIONAL": 5, "PRE-OPERATIONAL": 127, "STOPPED": 4}
                 self.wire.said.append((0x705, bytes([state.get(self.node.nmt.state, 127)])))
             for can_id, data in self.wire.said:

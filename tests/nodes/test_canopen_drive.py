@@ -162,3 +162,38 @@ def test_states_are_those_of_the_status_word():
     assert state_of(0x0028) is DriveState.FAULT
     assert state_of(0x0061) is None
     assert TICK_NS == 10 * MS
+
+
+def powered_anew(line):
+    """Forget all that was written, as a drive whose power was off."""
+    fresh = Line().node
+    line.node.object_dictionary = fresh.object_dictionary
+    line.node.data_store.clear()
+    line.node.nmt.state = "PRE-OPERATIONAL"
+    line.node.sdo[0x6041].raw = 0x250
+
+
+@pytest.mark.parametrize("said", [True, False])
+def test_a_drive_that_was_off_is_configured_anew_whether_its_start_was_heard_or_not(said):
+    line = Line().run(400)
+    powered_anew(line)
+    if said:
+        line.wire.said.append((0x705, b"\0"))
+    before = len(line.reports)
+    line.run(900)
+    assert line.node.sdo[0x1017].raw == 50, line.drive.words
+    assert line.drive.setup.done
+    assert line.reports[before:]
+    assert line.reports[-1][0] > line.now_ns - 60 * MS
+
+
+def test_a_drive_that_falls_out_of_operation_counts_no_longer_and_is_started_again():
+    line = Line().run(400)
+    line.node.nmt.state = "PRE-OPERATIONAL"
+    line.run(8)
+    last_ns = line.reports[-1][0]
+    line.run(20)
+    assert line.reports[-1][0] == last_ns
+    line.run(400)
+    assert line.node.nmt.state == "OPERATIONAL"
+    assert line.reports[-1][0] > line.now_ns - 60 * MS

@@ -146,7 +146,9 @@ class CanopenDrive:
         self._now_ns = now_ns
         setup = self.setup
         if setup.done:
-            if not self._operational and now_ns - self._started_ns > START_NS:
+            # without a heartbeat, its start was not heard: it has forgotten all
+            lives = self._operational and now_ns - self._beat_ns <= START_NS
+            if not lives and now_ns - self._started_ns > START_NS:
                 setup.restart(now_ns)
             return []
         frames = setup.frames(now_ns)
