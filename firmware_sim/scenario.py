@@ -33,6 +33,7 @@ from utank_hil.base.parameters import (
     refuse,
 )
 from utank_hil.configuration import ControllerConfig, Section, Vessel
+from utank_hil.configuration.devices import UNGUARDED
 from utank_hil.configuration.hull_files.reader import HullFile
 from utank_hil.configuration.plausibility import tank_problems
 from utank_hil.dynamics.hull.lateral import LateralHull, LateralModel
@@ -162,9 +163,10 @@ class Scenario(Section):
                 )
             if "operator" not in self.model_fields_set:
                 problems.append(("operator", "is required but missing: who arms the controllers"))
-        if self.guard and (self.vessel.pump is None or self.vessel.foreign.any):
-            reason = "is for a ship with a pump, and with native messages only: leave it out"
-            problems.append(("guard", reason))
+        if self.guard and self.vessel.foreign.any:
+            problems.append(("guard", f"can't be with devices: leave it out. {UNGUARDED}"))
+        elif self.guard and self.vessel.pump is None:
+            problems.append(("guard", "is for a ship with a pump: leave it out"))
         if self.plant == "linear" and self.vessel.valve is not None:
             reason = (
                 "is linear, but the loss of the vessel's valve is quadratic and would change "

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 
+from firmware_sim.canopen_node import CanopenSensor
 from firmware_sim.scenario_sections import SensorErrors
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
@@ -117,7 +118,9 @@ class SensorNode:
         self._messages: list[tuple[int, Callable[[Any], Frame], Callable[[], Any]]] = []
         # the noise is drawn in this order: append a new message at the end
         motion = catalogue.transmitter(SensorMotion, address)
-        self._foreign: list[tuple[ForeignFrames, Callable[[], tuple[Any, ...]]]] = []
+        self._foreign: list[
+            tuple[ForeignFrames, Callable[[], tuple[Any, ...]], CanopenSensor | None]
+        ] = []
         self._send(motion, self._measure_motion, foreign.motions[second])
         if not second:
             self._send(catalogue.transmitter(SensorTank), self._measure_tank, foreign.levels)
@@ -132,8 +135,11 @@ class SensorNode:
         """Send what is measured as the node of the catalogue, or as the device of a plan."""
         if plan is None:
             self._publish(transmitter, measure)
-        else:
-            self._foreign.append((ForeignFrames(plan), measure))
+            return
+        server = CanopenSensor(plan) if plan.steps else None
+        if server is not None:
+            self.hears |= server.hears
+        self._foreign.append((ForeignFrames(plan), measure, server))
 
     def _publish(self, transmitter: Transmitter[_M], measure: Callable[[], _M]) -> None:
         """Send the result of `measure` once in the message's cycle."""
@@ -141,7 +147,10 @@ class SensorNode:
         self._messages.append((ticks, transmitter.frame, measure))
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Ignore the frame."""
+        """Take what is asked of a CANopen sensor."""
+        for _, _, server in self._foreign:
+            if server is not None:
+                server.receive(frame, now_ns)
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Measure, and send the messages that are due."""
@@ -152,8 +161,11 @@ class SensorNode:
         for ticks, frame, measure in self._messages:
             if self._ticks % ticks == 0:
                 frames.append(frame(measure()))
-        for device, measured in self._foreign:
-            frames += device.frames(measured(), now_ns, self._ticks)
+        for device, measured, server in self._foreign:
+            if server is not None:
+                frames += server.tick(now_ns)
+            if server is None or server.measures:
+                frames += device.frames(measured(), now_ns, self._ticks)
         if self._messages:  # else no node of the catalogue is on board
             frames.extend(self._housekeeping.frames(now_ns))
         self._ticks += 1

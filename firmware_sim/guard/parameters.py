@@ -17,6 +17,7 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.configuration import ControllerConfig
+from utank_hil.configuration.devices import UNGUARDED
 from utank_hil.safety.monitors.thresholds import thresholds_of
 
 TICK_MS: Final = TICK_NS / 1e6
@@ -94,7 +95,7 @@ def guard_parameters(config: ControllerConfig) -> GuardParameters:
     if vessel.pump is None:
         raise ValueError("the ship has no pump: there is nothing to guard")
     if vessel.foreign.any:
-        raise ValueError("the guard reads native messages only: leave out devices")
+        raise ValueError(UNGUARDED)
     patience_ms = (
         150.0,
         safety.drive_age_ms + 140,

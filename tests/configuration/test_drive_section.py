@@ -18,7 +18,7 @@ from utank_hil.console.terminal import Terminal
         ({"pressure_pa_per_unit": None}, "pump.pressure_pa_per_unit is required"),
         ({"speed_rad_s_per_unit": 0}, "pump.speed_rad_s_per_unit is required"),
         ({"node": 127}, "pump.controller_node is the drive's own"),
-        ({"require": {"60FFh": 1}}, "'60FFh' is no object: write 0x605A"),
+        ({"require": {"60FGh": 1}}, "'60FGh' is no object: write 0x605A"),
         ({"delay_ms": 30}, "pump.delay_ms is 30, and the pressure loop's margins are 42 degrees"),
         ({"profile": "native", "bus": "can1"}, "pump.bus is for a drive with a profile"),
     ],

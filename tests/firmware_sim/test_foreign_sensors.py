@@ -57,16 +57,20 @@ def roll_and_shares(devices, *, second, seconds=30):
 
 @pytest.mark.evidence
 def test_with_two_sensors_the_ship_rolls_as_with_native_nodes():
-    native, _, _ = roll_and_shares(None, second=True)
-    foreign, shares, buses = roll_and_shares({"motion": SBG, "levels": LEVELS}, second=True)
+    native, _, _ = roll_and_shares(None, second=True, seconds=60)
+    devices = {"motion": SBG, "levels": LEVELS}
+    foreign, shares, buses = roll_and_shares(devices, second=True, seconds=60)
+    # it is armed later by 0.8 s, in which the gauges are configured
+    native, foreign = native[300:], foreign[300:]
     assert set(shares) == {1.0}
     rms = np.sqrt(np.mean(native**2))
     assert np.sqrt(np.mean((foreign - native) ** 2)) < 0.03 * rms
     assert ("sensors", 1) in buses
     assert ("sensors", 2) in buses
-    # the gauges are started once, as a CANopen device has to be; else it speaks on its own bus
+    # the gauges are configured and started, as a CANopen device has to be; nothing goes elsewhere
     said = {number: count for (sender, number), count in buses.items() if sender == "controller"}
-    assert said == {0: said[0], 2: 1}
+    assert said == {0: said[0], 2: said[2]}
+    assert 30 < said[2] < 100
 
 
 @pytest.mark.slow

@@ -1,13 +1,15 @@
 """Devices of other makers in the inbox, and what an unprotected one costs."""
 
+import re
 import struct
-import time
 from types import SimpleNamespace
 
+import canopen
 import pytest
 from others import others_file
 
-from utank_hil.canbus import Address, Frame, Heartbeat, NodeState, load_catalogue
+from tests.nodes.canopen_peers import Wire
+from utank_hil.canbus import Address, Fault, Frame, Heartbeat, NodeState, load_catalogue
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.measurements import MotionSample
 from utank_hil.canbus.profiles.device import SILENT_NS
@@ -97,7 +99,7 @@ def test_a_node_that_is_not_on_board_is_not_waited_for():
 
 
 def test_levels_without_switches_say_by_themselves_that_they_are_high():
-    levels = {
+    levels = AS_IT_IS | {
         "profile": "cia404_levels", "node": 7, "high_level_m": 1.5, "accept_unprotected": True,
         "signals": {each: {"scale": 0.25, "offset": -3} for each in
                     ("port_level_m", "starboard_level_m")},
@@ -155,48 +157,114 @@ def test_redundancy_has_its_second_device():
     assert [each.age_ms for each in found.snapshot(0).motions] == [0, 0]
 
 
-def test_a_silent_canopen_node_is_started_and_its_pdo_is_a_level():
-    """The node is canopen's, with the description of its maker."""
-    import can
-    import canopen
+SYSTEC = {
+    "profile": "cia404_levels", "node": 7, "high_level_m": 1.5, "accept_unprotected": True,
+    "signals": {each: {"scale": 0.25, "offset": -3.0} for each in
+                ("port_level_m", "starboard_level_m")},
+    "identity": [0x3F, None, None, 4711],
+}  # fmt: skip
 
-    levels = {
-        "profile": "cia404_levels", "node": 7, "high_level_m": 1.5, "accept_unprotected": True,
-        "signals": {each: {"scale": 0.25, "offset": -3.0} for each in
-                    ("port_level_m", "starboard_level_m")},
-    }  # fmt: skip
-    found = inbox({"levels": levels})
-    (start,) = found.wakes(0)
-    network = canopen.Network(can.Bus("levels", interface="virtual"))
-    with can.Bus("levels", interface="virtual") as ours:
-        network.connect()
-        node = network.create_node(7, str(others_file("devices/eds/systec-IoX4_8AI.eds")))
-        node.nmt.state = "PRE-OPERATIONAL"
-        ours.send(
-            can.Message(
-                arbitration_id=start.can_id & ~STANDARD, is_extended_id=False, data=start.data
-            )
-        )
-        end_s = time.monotonic() + 5
-        while node.nmt.state != "OPERATIONAL" and time.monotonic() < end_s:
-            time.sleep(0.01)
-        assert node.nmt.state == "OPERATIONAL"
-        node.tpdo.read()
-        pdo = node.tpdo[1]
-        for variable in pdo:
-            variable.raw = {0x7130: 12_000 if variable.subindex == 1 else 16_000}.get(
-                variable.index, 0
-            )
-        while ours.recv(0.01) is not None:
-            pass
-        pdo.transmit()
-        heard = ours.recv(5)
-        network.disconnect()
-    found.receive(Frame(STANDARD | heard.arbitration_id, bytes(heard.data)), 2 * SILENT_NS)
-    seen = found.snapshot(2 * SILENT_NS)
-    assert (seen.port_level_m, seen.starboard_level_m) == pytest.approx((0.0, 1.0))
-    assert found.wakes(2 * SILENT_NS) == []
-    assert len(found.wakes(4 * SILENT_NS)) == 1
+
+AS_IT_IS = {
+    "canopen_profile": None, "require": {"0x6132:1": None, "0x6132:2": None}, "identity": [],
+}  # fmt: skip
+
+
+class Gauges:
+    """The inbox, and canopen's node by its maker's file, tick by tick."""
+
+    def __init__(self, changes=None, tweak=lambda _: None):
+        self.wire = Wire()
+        self.node = canopen.LocalNode(7, str(others_file("devices/eds/systec-IoX4_8AI.eds")))
+        dictionary = self.node.object_dictionary
+        dictionary[0x1018][1].default, dictionary[0x1018][4].default = 0x3F, 4711
+        tweak(dictionary)
+        self.wire.add_node(self.node)
+        self.node.nmt.state = "PRE-OPERATIONAL"
+        self.inbox = inbox({"levels": SYSTEC | (changes or {})})
+        self.now_ns, self.sent = 0, 0
+
+    def run(self, ticks):
+        for _ in range(ticks):
+            for frame in self.inbox.setups(self.now_ns):
+                self.sent += 1
+                self.wire.notify(frame.can_id & 0x7FF, bytearray(frame.data), 0.0)
+            if self.node.nmt.state == "OPERATIONAL" and self.now_ns // MS % 20 == 0:
+                self.node.tpdo.read()
+                for variable in self.node.tpdo[1]:
+                    moves = self.now_ns // MS // 20 % 2
+                    raw = {0x7130: 12_000 + moves if variable.subindex == 1 else 16_000}
+                    variable.raw = raw.get(variable.index, 0)
+                self.node.tpdo[1].transmit()
+            for can_id, data in self.wire.said:
+                self.inbox.receive(Frame(can_id | STANDARD, data), self.now_ns)
+            self.wire.said.clear()
+            self.now_ns += 10 * MS
+        return self.inbox.snapshot(self.now_ns)
+
+
+def test_a_canopen_sensor_is_configured_and_read_back_before_its_levels_count():
+    gauges = Gauges()
+    seen = gauges.run(200)
+    sdo = gauges.node.sdo
+    assert [sdo[0x6132][n].raw for n in (1, 2)] == [3, 3]
+    assert [sdo[0x1800][n].raw for n in (2, 3, 5)] == [255, 0, 20]
+    assert (seen.port_level_m, seen.starboard_level_m) == pytest.approx((0.0, 1.0), abs=1e-3)
+    assert (now_age(seen) < 30, gauges.inbox.received(Fault.TANK_SILENT)) == (True, "")
+    sent = gauges.sent
+    gauges.run(300)
+    assert gauges.sent == sent  # it is left alone
+    gauges.wire.said.append((0x707, b"\0"))  # it starts anew
+    gauges.node.nmt.state = "PRE-OPERATIONAL"
+    assert now_age(gauges.run(10)) > 30
+    assert now_age(gauges.run(300)) < 30
+    gauges.node.nmt.state = "PRE-OPERATIONAL"  # and without a word
+    assert now_age(gauges.run(50)) > 30
+    assert now_age(gauges.run(300)) < 30
+
+
+def now_age(seen):
+    return seen.tank_age_ms
+
+
+@pytest.mark.parametrize(
+    ("tweak", "words"),
+    [
+        (lambda od: setattr(od[0x1018][4], "default", 4712),
+         "1018h:4 is 0x1268, not 0x1267: another serial number"),
+        (lambda od: setattr(od[0x1000], "default", 0x191),
+         "1000h:0 is 0x191, not 0x194: this is no device by CiA 404"),
+        (lambda od: setattr(od[0x6132][2], "access_type", "ro"),
+         "6132h:2 is 0x2, not 0x3, and writing it gave .*read only.*set require"),
+        (lambda od: setattr(od[0x1A00][3], "default", 0x71300310),
+         "1A00h:3 .*mapping is fixed"),
+        (lambda od: setattr(od[0x1800][5], "access_type", "ro"),
+         "1800h:5 is 0x0, not 0x14.*on a change only"),
+        (lambda od: od.indices.pop(0x6132), "6132h:1 .*no object.*set require"),
+    ],
+)  # fmt: skip
+def test_a_sensor_that_is_not_as_its_profile_says_is_refused_by_name(tweak, words):
+    def ro(od):
+        tweak(od)
+        if "fixed" in words:
+            for subindex in range(5):
+                od[0x1A00][subindex].access_type = "ro"
+
+    gauges = Gauges(tweak=ro)
+    seen = gauges.run(250)
+    assert now_age(seen) > 1000
+    said = gauges.inbox.received(Fault.TANK_SILENT)
+    assert re.search(f"node 7: {words}", said), said
+
+
+def test_another_device_at_the_node_is_found_after_it_was_swapped():
+    gauges = Gauges()
+    gauges.run(200)
+    gauges.node.object_dictionary[0x1018][4].default = 4712
+    gauges.node.nmt.state = "PRE-OPERATIONAL"
+    gauges.wire.said.append((0x707, b"\0"))
+    assert now_age(gauges.run(300)) > 1000
+    assert "another serial number" in gauges.inbox.received(Fault.TANK_SILENT)
 
 
 def test_a_name_is_asked_for_until_it_is_told():
@@ -212,10 +280,18 @@ def test_a_name_is_asked_for_until_it_is_told():
 
 
 def test_nothing_is_sent_where_the_interface_is_receive_only():
-    levels = {"profile": "cia410", "node": 5, "accept_unprotected": True, "bus": "can1"}
+    slopes = {"profile": "cia410", "node": 5, "accept_unprotected": True, "bus": "can1"}
     redundancy = {"redundancy": Redundancy(second_motion_sensor=True)}
-    assert len(inbox({"motion": levels}, **redundancy).wakes(0)) == 1
-    assert inbox({"motion": levels, "receive_only": ["can1"]}, **redundancy).wakes(0) == []
+    found = inbox({"motion": slopes}, **redundancy)
+    assert len(found.setups(0)) == 1
+    found = inbox({"motion": slopes, "receive_only": ["can1"]}, **redundancy)
+    assert found.wakes(0) + found.setups(0) == []
+
+
+def test_a_silent_node_that_is_not_configured_is_started_each_second():
+    found = inbox({"levels": SYSTEC | AS_IT_IS})
+    assert found.wakes(0) == [Frame(STANDARD, bytes((1, 7)))]
+    assert found.setups(0) == []
 
 
 def test_two_roles_hear_one_frame():

@@ -103,7 +103,8 @@ class Eds:
         if cob & DISABLED:
             reason = f"has bit 31: TPDO{pdo} is off as delivered. Turn it on in device and file"
             raise self._error(Place(settings, 1), reason)
-        timed = self.number(Place(settings, 2)) in _TIMED
+        kind = self.number(Place(settings, 2))
+        timed = kind in _TIMED
         signals, bits = self._mapped(mapping, pdo)
         can_id = cob & (_LONG_ID - 1)
         place: dict[str, Any] = {"id": can_id, "format": "29bit" if cob & _LONG_ID else "11bit"}
@@ -111,6 +112,8 @@ class Eds:
             **({"cob": can_id} if relative else place),
             "bytes": -(-bits // 8),
             "cycle_ms": (self.number(Place(settings, 5)) if timed else 0) or None,
+            "pdo": pdo,
+            "pdo_type": kind if timed else 255,
             "signals": signals,
         }
 
@@ -137,6 +140,7 @@ class Eds:
                     raise self._error(Place(index, subindex), reason)
                 signals[str(place)] = {
                     "start": start, "bits": bits, "signed": kind in _SIGNED, "real": kind in _REAL,
+                    "object": str(place),
                 }  # fmt: skip
             start += bits
         return signals, start
@@ -179,7 +183,11 @@ def with_eds(content: dict[str, Any]) -> dict[str, Any]:
     pdos = [of for of, _ in named.values()]
     eds = eds_file(str(content["eds"]))
     _same_node(eds, content)
-    messages = {name: eds.sent(int(of[4:])) | changes for name, (of, changes) in named.items()}
+    if profile := eds.number(Place(0x1000)) & 0xFFFF:
+        rest = {"canopen_profile": profile, "identity": _identity(eds)} | rest
+    messages = {
+        name: _otherwise(eds.sent(int(of[4:])), changes) for name, (of, changes) in named.items()
+    }
     if "cycle_ms" not in rest:
         cycles = [each["cycle_ms"] for each in messages.values()]
         if None in cycles:
@@ -189,6 +197,9 @@ def with_eds(content: dict[str, Any]) -> dict[str, Any]:
                 "change or at SYNC. Set its type (1800h:2) to 255 and its event timer (1800h:5)"
             )
         rest["cycle_ms"] = max(cycles)
+    else:  # it is written into the device
+        for each in messages.values():
+            each["cycle_ms"] = None
     return {"profile": f"{OF_AN_EDS}{Path(eds.file).name}", **rest, "messages": messages}
 
 
@@ -203,9 +214,13 @@ def drive_with_eds(content: dict[str, Any]) -> dict[str, Any]:
     if eds.entry(Place(0x1016, 1)) is None:
         reason = "the drive would run on after the controller's end. Take one that watches it"
         raise ValueError(f"eds: {eds.file}: there is no 1016h (heartbeat consumer): {reason}")
-    if "identity" not in rest:
-        rest["identity"] = [eds.number(Place(0x1018, part)) or None for part in range(1, 5)]
-    return rest
+    return {"identity": _identity(eds)} | rest
+
+
+def _identity(eds: Eds) -> list[int | None]:
+    """What a file says of 1018h; zeros stand for nothing."""
+    known = [eds.number(Place(0x1018, part)) or None for part in range(1, 5)]
+    return known if any(known) else []
 
 
 def _same_node(eds: Eds, content: dict[str, Any]) -> None:
@@ -294,6 +309,14 @@ def _named(content: dict[str, Any], key: str, names: str) -> dict[str, tuple[str
     return found
 
 
+def _otherwise(layout: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """A layout with what the ship's file changes; another identifier takes the place of its own."""
+    ways = ("id", "pgn", "cob")
+    if any(way in changes for way in ways):
+        layout = {key: value for key, value in layout.items() if key not in ways}
+    return layout | changes
+
+
 def _with_dbc(content: dict[str, Any]) -> dict[str, Any]:
     """Replace the names of messages by their layouts; the file is not needed any longer."""
     rest = {key: value for key, value in content.items() if key not in ("dbc", "messages")}
@@ -317,7 +340,7 @@ def _with_dbc(content: dict[str, Any]) -> dict[str, Any]:
             del layout["cycle_ms"]
         if "source" in content and layout["format"] == "29bit":  # so are source and priority
             layout["pgn"] = layout.pop("id") >> 8 & 0x3FFFF
-        messages[name] = layout | changes
+        messages[name] = _otherwise(layout, changes)
     cycles_ms = [each["cycle_ms"] for each in messages.values() if each.get("cycle_ms")]
     if len(cycles_ms) == len(messages):
         rest["cycle_ms"] = max(cycles_ms)

@@ -63,12 +63,48 @@ class FieldSection(_Part):
     scale: Finite = 1.0  #: Physical value of one count.
     offset: Finite = 0.0  #: Physical value of no counts.
     unit: str = ""  #: Unit of the physical value.
+    object: str = ""  #: CANopen object that is mapped there, as 7130h:1.
     least_raw: Whole | None = None  #: Least count that is a value.
     most_raw: Whole | None = None  #: Counts outside of these two are not available, or an error.
 
     def field(self, length: int) -> BusField:
         """The signal in a frame of so many bytes."""
-        return BusField(length=length, **self.model_dump(exclude={"unit"}))
+        return BusField(length=length, **self.model_dump(exclude={"unit", "object"}))
+
+
+class CanopenSection(Section):
+    """What is asked of a CANopen node before it counts."""
+
+    node: NodeNumber | None = None  #: CANopen node.
+    identity: Annotated[tuple[Whole | None, ...], Field(max_length=4)] = ()
+    """Vendor, product, revision and serial number in 1018h; null for any. With `eds: FILE` those of
+    the file, unless given."""
+    require: Annotated[dict[str, Whole | None], Field(default_factory=dict)]
+    """Objects, as "0x605A" or "0x1400:5", that are written and must read back so; null where the
+    device lacks one. A drive's are 6007h: 3, 605Ah: 2, 605Eh: 2 and these."""
+
+    def require_problems(self) -> Iterator[Problem]:
+        """What is no object."""
+        for written in self.require:
+            try:
+                place_of(written)
+            except ValueError:
+                yield "require", f"{written!r} is no object: write 0x605A, or 0x1400:5"
+
+    def required(self) -> tuple[tuple[Place, int], ...]:
+        """Objects and what they must be."""
+        return tuple(
+            (place_of(key), value) for key, value in self.require.items() if value is not None
+        )
+
+
+def place_of(written: str) -> Place:
+    """An object as a file writes it; ValueError if it is none."""
+    index, _, subindex = written.partition(":")
+    place = Place(int(index.removesuffix("h"), 16), int(subindex or "0", 0))
+    if not (0x1000 <= place.number <= 0xFFFF and 0 <= place.subindex <= 0xFF):
+        raise ValueError(written)
+    return place
 
 
 class MessageSection(_Part):
@@ -81,6 +117,9 @@ class MessageSection(_Part):
     bytes: Annotated[int, Range(least=1, most=8), _WHOLE] = 8
     """Length; a frame of another one is refused."""
     cycle_ms: Cycle | None = None  #: Of a message that has another cycle than the device's.
+    pdo: Annotated[int, Range(least=1, most=512), _WHOLE] | None = None
+    """Number of the sent PDO (TPDO) that it is: by it the device is configured and read back."""
+    pdo_type: Literal[254, 255] = 255  #: Its type of transmission, by event timer.
     only: "ConditionSection | None" = None
     """Of an identifier with several contents: which of them, by a signal of this message."""
     signals: Annotated[dict[str, FieldSection], Field(default_factory=dict)]
@@ -164,13 +203,12 @@ in steps of 1 %, to a drive that gives three times its rated one for a while."""
 _SPEEDS: Final = (1000, 2**31)
 
 
-class DriveSection(Section):
+class DriveSection(CanopenSection):
     """Drive of the pump."""
 
     profile: Literal["native", "cia402"] = NATIVE
     """`cia402`, or `native` for the drive of this project's own catalogue."""
     bus: str = ""  #: Interface that it is on; empty for the controller's own.
-    node: NodeNumber | None = None  #: CANopen node of the drive.
     controller_node: NodeNumber = 127  #: CANopen node that the controller's heartbeat is from.
     mode: Literal["torque", "cyclic_torque", "velocity", "cyclic_velocity"] | None = None
     """Mode of operation, in 6060h 4, 10, 3, 9."""
@@ -182,12 +220,6 @@ class DriveSection(Section):
     """From a change of the pressure to the torque that answers it, as the loop is designed for."""
     heartbeat_ms: Annotated[int, Range(least=20, most=100)] = 50
     """Time without the controller's heartbeat after which the drive stops; and its own cycle."""
-    identity: Annotated[tuple[Whole | None, ...], Field(max_length=4)] = ()
-    """Vendor, product, revision and serial number in 1018h; null for any. With `eds: FILE` that
-    file's, unless given."""
-    require: Annotated[dict[str, Whole | None], Field(default_factory=dict)]
-    """Objects, as "0x605A" or "0x1400:5", that are written and must read back so, beside 6007h: 3,
-    605Ah: 2, 605Eh: 2; null where the drive lacks one."""
     echo: Literal["command", "demand"] = "command"
     """What the drive sends back: control word and target, or its demand (6074h, 606Bh)."""
     synchronous: bool = True  #: The drive sends at SYNC, else by its event timer.
@@ -219,11 +251,7 @@ class DriveSection(Section):
                 yield name, "is required but missing, or zero"
         if self.node == self.controller_node:
             yield "controller_node", "is the drive's own node: choose another"
-        for written in self.require:
-            try:
-                _place(written)
-            except ValueError:
-                yield "require", f"{written!r} is no object: write 0x605A, or 0x1400:5"
+        yield from self.require_problems()
 
     def pump_problems(self, pump: Pump | None) -> Iterator[Problem]:
         """What does not fit to the pump."""
@@ -272,18 +300,10 @@ class DriveSection(Section):
             self.delay_ms * 1e-3,
             self.heartbeat_ms,
             self.identity,
-            tuple((_place(key), value) for key, value in self.require.items() if value is not None),
+            self.required(),
             self.echo == "command",
             self.synchronous,
         )
 
 
 NATIVE_DRIVE: Final = DriveSection.model_validate({})
-
-
-def _place(written: str) -> Place:
-    index, _, subindex = written.partition(":")
-    place = Place(int(index, 16), int(subindex or "0", 0))
-    if not (0x1000 <= place.number <= 0xFFFF and 0 <= place.subindex <= 0xFF):
-        raise ValueError(written)
-    return place

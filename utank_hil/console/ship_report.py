@@ -7,8 +7,9 @@ import numpy as np
 
 from utank_hil.analysis.tank_sizing import pump_demand, pump_level_m
 from utank_hil.configuration import Vessel
+from utank_hil.configuration.device_section import DeviceSection
 from utank_hil.configuration.device_sections import unit_of
-from utank_hil.configuration.devices import DeviceSection, DevicesSection
+from utank_hil.configuration.devices import UNGUARDED, DevicesSection
 from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
 from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.control.optimal_tank import tank_figures
@@ -222,7 +223,11 @@ def power_words(power_w: float) -> str:
 def devices_json(devices: DevicesSection | None) -> dict[str, Any]:
     """Devices by their roles; those that are native nodes are left out."""
     sensors = {} if devices is None else devices.sensors()
-    found = {role: _figures(each) for role, each in sensors.items() if not each.native}
+    found = {
+        role: _figures(each, silent=devices is not None and each.bus in devices.receive_only)
+        for role, each in sensors.items()
+        if not each.native
+    }
     if devices is not None and not devices.pump.native:
         margins = devices.pressure_margins()
         found["pump"] = devices.pump.model_dump(mode="json") | {
@@ -233,8 +238,9 @@ def devices_json(devices: DevicesSection | None) -> dict[str, Any]:
     return found
 
 
-def _figures(device: DeviceSection) -> dict[str, Any]:
-    has, lacks = _protection(device)
+def _figures(device: DeviceSection, *, silent: bool) -> dict[str, Any]:
+    read_back = device.canopen_profile is not None and not silent
+    has, lacks = _protection(device, read_back=read_back)
     return {
         "profile": device.profile,
         "device": device.device or device.profile,
@@ -245,12 +251,13 @@ def _figures(device: DeviceSection) -> dict[str, Any]:
         "age_ms": device.age_ms,
         "steps": {name: device.step(name) for name in device.signals},
         "derived": [name for name, each in device.signals.items() if each.source == "derived"],
+        "read_back": device.read_back() if read_back else [],
         "protected_by": has,
         "not_protected_by": lacks,
     }
 
 
-def _protection(device: DeviceSection) -> tuple[list[str], list[str]]:
+def _protection(device: DeviceSection, *, read_back: bool) -> tuple[list[str], list[str]]:
     guards = device.protection
     there = {
         "counter": bool(guards.counters),
@@ -263,7 +270,7 @@ def _protection(device: DeviceSection) -> tuple[list[str], list[str]]:
             for layout in message.signals.values()
         ),
         f"limit on unchanged content ({guards.unchanged_ms or 0:g} ms)": bool(guards.unchanged_ms),
-        "identity": guards.n2k_name is not None,
+        "identity": guards.n2k_name is not None or (read_back and bool(device.identity)),
     }
     has = [name for name, given in there.items() if given]
     lacks = ("counter", "checksum", "time stamp", "status", "identity")
@@ -283,11 +290,17 @@ def print_devices(console: Terminal, devices: DevicesSection | None) -> None:
             what = f"in steps of {step:.2g} {_UNITS.get(unit_of(name), '')}".rstrip()
             what = "derived, not measured" if name in each["derived"] else what
             console.say(f"  {name}: {what}")
+        if each["read_back"]:
+            console.say("  read back by SDO before it counts: " + ", ".join(each["read_back"]))
+        else:
+            console.say("its settings", yellow="  not read back:")
         console.say("  protected by " + ", ".join(each["protected_by"]))
         if each["not_protected_by"]:
             console.say(", ".join(each["not_protected_by"]), yellow="  not protected by")
     if devices is not None and devices.unprotected:
         console.say("Half the pressure is allowed until a second motion sensor agrees.")
+    if devices_json(devices):
+        console.say(f"{UNGUARDED}.")
 
 
 def _print_drive(console: Terminal, drive: dict[str, Any], where: str) -> None:

@@ -86,7 +86,7 @@ class CanopenDrive:
         self._hears_only = hears_only
         self._plan, self._loop, self._area_m2 = plan, loop, area_m2
         self.deliver: Callable[[DriveReport | None, int], None] = _nobody
-        self.setup = CanopenSetup(plan)
+        self.setup = CanopenSetup(plan.bus, plan.node, plan.steps())
         self._tag = tag = plan.bus << BUS_SHIFT | STANDARD
         self._in_nm: bool = plan.mode.torque
         self._late_ns: int = LATE_BEATS * plan.heartbeat_ms * MILLISECOND_NS

@@ -1,20 +1,23 @@
-"""Configures a drive by SDO: each entry is read, written where it differs, and read back.
+"""Configures a node by SDO: each entry is read, written where it differs, and read back.
 
-One request is in flight; nothing waits. What the drive lacks or does not keep is said with object,
+One request is in flight; nothing waits. What the node lacks or does not keep is said with object,
 index, value and remedy, and tried again after a while: somebody may have mended it.
 """
 
-from collections.abc import Generator
-from typing import Final
+from collections.abc import Generator, Iterable
+from typing import Any, Final
 
 from utank_hil.canbus import Frame
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
+from utank_hil.canbus.profiles.device import SILENT_NS, ProfiledDevice, hear
 from utank_hil.canbus.profiles.drive_plan import (
+    HEARTBEAT,
     NMT,
+    SDO_ANSWER,
     SDO_REQUEST,
     Abort,
     Answer,
-    DrivePlan,
+    NetworkState,
     NodeCommand,
     Place,
     Step,
@@ -36,16 +39,16 @@ class _Refused(Exception):
 
 
 class CanopenSetup:
-    """The start of one drive: `done`, or the `problem` that it was refused for."""
+    """The start of one node by its steps: `done`, or the `problem` that it was refused for."""
 
-    def __init__(self, plan: DrivePlan) -> None:
-        self._plan = plan
-        self._tag = plan.bus << BUS_SHIFT | STANDARD
+    def __init__(self, bus: int, node: int, steps: Iterable[Step]) -> None:
+        self._node, self._steps = node, tuple(steps)
+        self._tag = bus << BUS_SHIFT | STANDARD
         self.problem = ""
         self.restart(0)
 
     def restart(self, begin_ns: int) -> None:
-        """Begin anew, not before this time: the drive has started, or was refused."""
+        """Begin anew, not before this time: the node has started, or was refused."""
         self.done = False
         self._begin_ns = begin_ns
         self._talk: _Talk | None = None
@@ -55,7 +58,7 @@ class CanopenSetup:
 
     def order(self, command: NodeCommand) -> Frame:
         """Network management for this node."""
-        return Frame(self._tag | NMT, bytes((command, self._plan.node)))
+        return Frame(self._tag | NMT, bytes((command, self._node)))
 
     def frames(self, now_ns: int) -> list[Frame]:
         """What is to be sent now: the next request, if the last one is answered or out of time."""
@@ -77,10 +80,10 @@ class CanopenSetup:
             self.done, self.problem = True, ""
             return [self.order(NodeCommand.START)]
         self._asked_ns = now_ns
-        return [Frame(self._tag | SDO_REQUEST + self._plan.node, self._request[1])]
+        return [Frame(self._tag | SDO_REQUEST + self._node, self._request[1])]
 
     def take(self, data: bytes) -> None:
-        """Take what the drive's server says; what was not asked for is nothing."""
+        """Take what the node's server says; what was not asked for is nothing."""
         got = answer(data)
         asked = self._request if self._asked_ns is not None else None
         if got is not None and asked is not None and got.place == asked[0]:
@@ -98,10 +101,10 @@ class CanopenSetup:
             self.restart(self._now_ns + AGAIN_NS)
 
     def _conversation(self) -> _Talk:
-        for number, step in enumerate(self._plan.steps()):
+        for number, step in enumerate(self._steps):
             got = yield step.place, read_request(step.place)
             if not number and got.abort == Abort.NO_ANSWER_IN_TIME:
-                raise _Refused  # nobody is there: DRIVE_SILENT says so
+                raise _Refused  # nobody is there: its silence says so
             said = ""
             first_ns = self._now_ns
             while not step.writes and not self._kept(step, got):
@@ -114,7 +117,9 @@ class CanopenSetup:
                 written = yield step.place, write_request(step.place, value, size)
                 said = f", and writing it gave {abort_words(written.abort)}" * bool(written.abort)
                 got = yield step.place, read_request(step.place)
-            if step.needed and not self._kept(step, got):
+            # only its length counts, and a process value need not be readable
+            unread = not step.equal_bits and got.value is None
+            if step.needed and not unread and not self._kept(step, got):
                 raise _Refused(self._words(step, got) + said + f": {step.remedy}")
 
     @staticmethod
@@ -132,4 +137,45 @@ class CanopenSetup:
         else:
             bits = (1 << 8 * got.size) - 1
             what = f"is {got.value:#x}, not {step.value & step.equal_bits & bits:#x}"
-        return f"node {self._plan.node}: {step.place} {what}"
+        return f"node {self._node}: {step.place} {what}"
+
+
+class SensorSetup:
+    """A CANopen sensor: it is configured, and read back, before what it measures counts.
+
+    It takes the sensor's answers and its start from among the device's frames.
+    """
+
+    def __init__(self, device: ProfiledDevice[Any]) -> None:
+        plan = self._plan = device.plan
+        assert plan.node is not None
+        self._device = device
+        self.setup = CanopenSetup(plan.bus, plan.node, plan.steps)
+        tag = (plan.bus << BUS_SHIFT | STANDARD) + plan.node
+        hear(device.takes, tag + SDO_ANSWER, self._take_answer)
+        hear(device.takes, tag + HEARTBEAT, self._take_heartbeat)
+        device.named = False
+        self._done_ns = 0
+
+    @property
+    def kind(self) -> type[tuple[Any, ...]]:
+        """Message that it stands for."""
+        return self._plan.kind
+
+    def frames(self, now_ns: int) -> list[Frame]:
+        """What the configuration needs in this tick, usually nothing."""
+        setup = self.setup
+        if setup.done and self._device.silent(now_ns) and now_ns - self._done_ns > SILENT_NS:
+            setup.restart(now_ns)
+        frames = setup.frames(now_ns)
+        if setup.done and not self._device.named:
+            self._done_ns = now_ns
+        self._device.named = setup.done
+        return frames
+
+    def _take_answer(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
+        self.setup.take(frame.data)
+
+    def _take_heartbeat(self, frame: Frame, now_ns: int) -> None:
+        if frame.data[:1] == bytes((NetworkState.BOOT_UP,)):
+            self.setup.restart(now_ns)

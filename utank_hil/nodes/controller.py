@@ -252,6 +252,7 @@ class ControllerNode:
         frames = self._housekeeping.frames(now_ns, faulted=judgement.mode is _FAULT)
         if self._wake_schedule.due(now_ns):
             frames += self.inbox.wakes(now_ns)
+        frames += self.inbox.setups(now_ns)
         if self.actuators.drive is not None:
             frames += self.actuators.drive.frames(now_ns)
         if self._command_schedule.due(now_ns):

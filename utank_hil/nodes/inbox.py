@@ -35,6 +35,7 @@ from utank_hil.canbus.measurements import Measurements
 from utank_hil.canbus.profiles.device import ProfiledDevice, hear
 from utank_hil.canbus.profiles.device_plan import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.nodes.canopen_drive import CanopenDrive, DriveReport
+from utank_hil.nodes.canopen_setup import SensorSetup
 from utank_hil.nodes.hardwired import HardwiredHeard
 from utank_hil.nodes.plausibility import (
     MILLISECOND_NS,
@@ -73,6 +74,10 @@ VERSION_NS: Final = 5_000_000_000
 STRANGE_NS: Final = 1_000_000_000
 """Silence after which a second motion sensor of another version counts as gone."""
 
+_OF_SENSORS: Final = {
+    Fault.MOTION_SILENT: SensorMotion, Fault.TANK_SILENT: SensorTank,
+    Fault.PUMP_SENSOR_SILENT: SensorPump,
+}  # fmt: skip
 _ABSENT_NS: Final = 1 << 62
 """Time of receipt of what is not on board: it is never late."""
 
@@ -117,6 +122,7 @@ class Inbox:
         self._foreign = foreign
         self._devices: dict[int, Callable[[Frame, int], None]] = {}
         self._foreigners: list[ProfiledDevice[Any]] = []
+        self._setups: list[SensorSetup] = []
         # a second sensor that is silent is missed but not waited for
         senders = [Address.SENSORS, Address.SENSORS_2][: 1 + redundancy.second_motion_sensor]
         sources = [
@@ -288,9 +294,18 @@ class Inbox:
             return
         source.deliver = handle
         self._foreigners.append(source)
+        if source.plan.steps:
+            self._setups.append(SensorSetup(source))
         for can_id, take in source.takes.items():
             hear(self._devices, can_id, take)
         self.watched += source.watched
+
+    def setups(self, now_ns: int) -> list[Frame]:
+        """What CANopen sensors are configured with in this tick."""
+        frames: list[Frame] = []
+        for each in self._setups:
+            frames += each.frames(now_ns)
+        return frames
 
     def wakes(self, now_ns: int) -> list[Frame]:
         """What is to be sent to devices of other makers that are silent."""
@@ -309,6 +324,9 @@ class Inbox:
 
     def received(self, code: Fault) -> str:
         """Node, message and value that a fault was last judged by, in words."""
+        if code in _OF_SENSORS:
+            kind, each = _OF_SENSORS[code], self._setups
+            return "; ".join([one.setup.problem for one in each if one.kind is kind])
         if code in (Fault.DRIVE_FAULT, Fault.DRIVE_SILENT):
             if self.canopen_drive is not None:
                 return self.canopen_drive.words

@@ -166,7 +166,7 @@ class ProfiledDevice(Generic[T]):
     """
 
     def __init__(self, plan: DevicePlan[T]) -> None:
-        self._plan = plan
+        self.plan = plan
         self.deliver: Callable[[T, int], None] = _nobody
         self.cycle_ns: int = plan.cycle_ns
         messages = [
@@ -206,8 +206,11 @@ class ProfiledDevice(Generic[T]):
 
     def wake(self, now_ns: int) -> Frame | None:
         """What is to be sent to a device that says nothing, or not who it is."""
-        silent = now_ns - self._delivered_ns > SILENT_NS
-        return self._plan.wake if silent or not self.named else None
+        return self.plan.wake if self.silent(now_ns) or not self.named else None
+
+    def silent(self, now_ns: int) -> bool:
+        """Whether it has brought nothing for `SILENT_NS`."""
+        return now_ns - self._delivered_ns > SILENT_NS
 
     @property
     def lost(self) -> int:
@@ -218,8 +221,8 @@ class ProfiledDevice(Generic[T]):
         return lost
 
     def _take_claim(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
-        assert self._plan.name_id is not None
-        self.named = int.from_bytes(frame.data, "little") == self._plan.name_id[1]
+        assert self.plan.name_id is not None
+        self.named = int.from_bytes(frame.data, "little") == self.plan.name_id[1]
 
     def _take(self, message: _Message, frame: Frame, now_ns: int) -> None:
         data = frame.data
@@ -287,6 +290,6 @@ class ProfiledDevice(Generic[T]):
 
     def _switch(self, raw: float, level_m: float) -> Switch:
         """A switch's state; without switches the level decides, and one that is unknown is high."""
-        if math.isfinite(self._plan.high_level_m):
-            return Switch.OFF if level_m <= self._plan.high_level_m else Switch.ON
+        if math.isfinite(self.plan.high_level_m):
+            return Switch.OFF if level_m <= self.plan.high_level_m else Switch.ON
         return Switch.OFF if raw == 0.0 else Switch.ON

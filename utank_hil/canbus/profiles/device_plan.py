@@ -7,7 +7,7 @@ from typing import Any, Final, Generic, TypeVar
 
 from utank_hil.canbus.frame import STANDARD, Frame
 from utank_hil.canbus.messages import SensorMotion, SensorPump, SensorTank
-from utank_hil.canbus.profiles.drive_plan import DrivePlan
+from utank_hil.canbus.profiles.drive_plan import DrivePlan, Step
 from utank_hil.canbus.profiles.field import ConditionPlan, Field, SignalPlan
 
 T = TypeVar("T", bound=tuple[Any, ...])
@@ -91,6 +91,10 @@ class DevicePlan(Generic[T]):
     #: Sent each second to a device that is silent, or has not said its name: start of a CANopen
     #: node, request of an address claim.
     wake: Frame | None = None
+    #: bus, node: of a CANopen node that is configured by `steps` before it counts.
+    bus: int = 0
+    node: int | None = None
+    steps: tuple[Step, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,9 +1,11 @@
 """A pump drive by CiA 402: its objects, its PDOs, what is written and read back at the start."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final, NamedTuple
+
+from utank_hil.canbus.frame import LONGEST_ID
 
 NMT: Final = 0x000  #: Identifier of network management.
 SYNC: Final = 0x080
@@ -180,6 +182,44 @@ class Step(NamedTuple):
     size: int = 0  #: Bytes that the entry has; 0 for any.
 
 
+def identity_steps(profile: int, identity: Sequence[int | None]) -> Iterator[Step]:
+    """Steps that compare the profile in 1000h, and what is known of 1018h."""
+    yield Step(
+        Place(0x1000), profile, f"this is no device by CiA {profile}: look at node and wiring",
+        equal_bits=0xFFFF, writes=False,
+    )  # fmt: skip
+    for subindex, (name, value) in enumerate(zip(IDENTITY_NAMES, identity, strict=False), start=1):
+        if value is not None:
+            remedy = f"another {name}: if the device was replaced, change identity"
+            yield Step(Place(0x1018, subindex), value, remedy, writes=False)
+
+
+def pdo_steps(
+    index: int, cob: int, entries: Sequence[tuple[Place, int]], kind: int, timer_ms: int = 0
+) -> Iterator[Step]:
+    """Steps that map a PDO and set its pace; a mapping that is fixed passes if it is the same.
+
+    Without `entries` it is left as it is.
+    """
+    free = "the device's mapping is fixed, or it can't map this: choose another echo or signal"
+    for place, bits in entries:
+        remedy = f"{bits} bits of it are to be mapped: choose another mode, echo or signal"
+        yield Step(place, 0, remedy, equal_bits=0, writes=False, size=bits // 8)
+    mapping, which = index + 0x200, DISABLED | LONGEST_ID
+    yield Step(Place(index, 1), cob | DISABLED, "", which, needed=False)
+    if entries:
+        yield Step(Place(mapping), 0, "", needed=False)
+        for subindex, (place, bits) in enumerate(entries, start=1):
+            yield Step(Place(mapping, subindex), mapped(place, bits), free)
+        yield Step(Place(mapping), len(entries), free)
+    yield Step(Place(index, 2), kind, "this type of transmission is needed, see synchronous")
+    if index >= 0x1800:
+        held = "the device may hold its PDO back, or sends it on a change only"
+        yield Step(Place(index, 3), 0, held, needed=False)
+        yield Step(Place(index, 5), timer_ms, held, needed=timer_ms != 0)
+    yield Step(Place(index, 1), cob, free, which)
+
+
 @dataclass(frozen=True, slots=True)
 class DrivePlan:
     """All that is needed to configure, command and hear a drive."""
@@ -216,16 +256,7 @@ class DrivePlan:
 
     def steps(self) -> Iterator[Step]:
         """What is compared, written and read back, in this order."""
-        yield Step(
-            Place(0x1000), PROFILE, "this is no drive by CiA 402: look at node and wiring",
-            equal_bits=0xFFFF, writes=False,
-        )  # fmt: skip
-        for subindex, (name, value) in enumerate(
-            zip(IDENTITY_NAMES, self.identity, strict=False), start=1
-        ):
-            if value is not None:
-                remedy = f"another {name}: if the drive was replaced, change identity"
-                yield Step(Place(0x1018, subindex), value, remedy, writes=False)
+        yield from identity_steps(PROFILE, self.identity)
         bit = 1 << self.mode.number - 1
         yield Step(
             MODES_SUPPORTED, bit, f"mode {self.mode.number} is not supported: choose another mode",
@@ -233,10 +264,11 @@ class DrivePlan:
         )  # fmt: skip
         for number in (1, 2, 3):
             yield Step(Place(0x1801 + number, 1), DISABLED, "", DISABLED, needed=False)
-        yield from self._pdo(0x1400, RECEIVED_1, self.received, ASYNCHRONOUS)
+        yield from pdo_steps(0x1400, RECEIVED_1 + self.node, self.received, ASYNCHRONOUS)
         cyclic = 1 if self.synchronous else ASYNCHRONOUS
-        yield from self._pdo(0x1800, SENT_1, self.sent, cyclic)
-        yield from self._pdo(0x1801, SENT_2, self.measured, cyclic)
+        timer_ms = 0 if self.synchronous else COMMAND_MS
+        yield from pdo_steps(0x1800, SENT_1 + self.node, self.sent, cyclic, timer_ms)
+        yield from pdo_steps(0x1801, SENT_2 + self.node, self.measured, cyclic, timer_ms)
         consumed = self.controller_node << 16 | self.heartbeat_ms
         yield Step(
             HEARTBEAT_CONSUMER, consumed,
@@ -245,33 +277,10 @@ class DrivePlan:
         )  # fmt: skip
         yield Step(HEARTBEAT_PRODUCER, self.heartbeat_ms, "the drive must send a heartbeat")
         for place, value in self.require:
-            yield Step(
-                place, value, "set require as the drive's manual says, or null where the measured "
-                "stop decides",
-            )  # fmt: skip
+            remedy = (
+                "set require as the drive's manual says, or null where the measured stop decides"
+            )
+            yield Step(place, value, remedy)
         # it may be write-only
         yield Step(MODE, self.mode.number, "", needed=False, size=1)
         yield Step(MODE_SHOWN, self.mode.number, "the drive does not enter the mode", writes=False)
-
-    def _pdo(
-        self, index: int, cob: int, entries: tuple[tuple[Place, int], ...], kind: int
-    ) -> Iterator[Step]:
-        """Steps that map a PDO; one whose mapping is fixed passes if it is the same."""
-        free = "the drive's mapping is fixed, or it can't map this: choose another echo or mode"
-        for place, bits in entries:
-            remedy = f"{bits} bits of it are to be mapped: choose another mode or echo"
-            yield Step(place, 0, remedy, equal_bits=0, writes=False, size=bits // 8)
-        own, mapping = cob + self.node, index + 0x200
-        which = DISABLED | 0x7FF
-        yield Step(Place(index, 1), own | DISABLED, "", which, needed=False)
-        yield Step(Place(mapping), 0, "", needed=False)
-        for subindex, (place, bits) in enumerate(entries, start=1):
-            yield Step(Place(mapping, subindex), mapped(place, bits), free)
-        yield Step(Place(mapping), len(entries), free)
-        yield Step(Place(index, 2), kind, "this type of transmission is needed: see synchronous")
-        if index >= 0x1800:
-            held = "the drive may hold its PDO back"
-            yield Step(Place(index, 3), 0, held, needed=False)
-            timer_ms = 0 if self.synchronous else COMMAND_MS
-            yield Step(Place(index, 5), timer_ms, held, needed=not self.synchronous)
-        yield Step(Place(index, 1), own, free, which)

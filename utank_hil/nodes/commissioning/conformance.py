@@ -37,6 +37,7 @@ from utank_hil.canbus.profiles.drive_plan import (
 from utank_hil.dynamics.pump import Pump
 from utank_hil.nodes.actuators import DriveSequence
 from utank_hil.nodes.canopen_drive import CanopenDrive, state_of
+from utank_hil.nodes.canopen_setup import CanopenSetup, SensorSetup
 from utank_hil.nodes.commissioning.checks import Check
 
 SECOND_NS: Final = 1_000_000_000
@@ -65,6 +66,11 @@ Ask = Callable[[str], Callable[[], bool]]
 def flag(name: str, what: str, remedy: str, *, right: bool) -> Check:
     """A check that is right or not."""
     return Check(name, what, float(right), 1.0, 0.0, "1", remedy)
+
+
+def _set_up(setup: CanopenSetup) -> Check:
+    why = setup.problem or "It does not answer: look at bus and node."
+    return flag("set_up", "configured by SDO, read back, started", why, right=setup.done)
 
 
 class Trial(ABC):
@@ -115,6 +121,7 @@ class SensorTrial(Trial):
         self._plan, self._device, self._listen_s = plan, ProfiledDevice(plan), listen_s
         self._device.deliver = lambda message, now_ns: self._heard.append((now_ns, message))
         self._heard: list[tuple[int, tuple[Any, ...]]] = []
+        self._setup = SensorSetup(self._device) if plan.steps else None
         self._woken_ns = 0
         super().__init__(ask)
 
@@ -125,6 +132,8 @@ class SensorTrial(Trial):
             take(frame, now_ns)
 
     def _frames(self) -> list[Frame]:
+        if self._setup is not None:
+            return self._setup.frames(self.now_ns)
         wake = self._device.wake(self.now_ns)
         if wake is None or self.now_ns - self._woken_ns < SECOND_NS:
             return []
@@ -133,6 +142,10 @@ class SensorTrial(Trial):
 
     def script(self) -> Script:
         """Listen, move by hand, take the plug off, and put it back."""
+        if self._setup is not None:
+            setup = self._setup.setup
+            yield from self._wait(CONFIGURED_S, lambda: setup.done or bool(setup.problem))
+            self.checks.append(_set_up(setup))
         yield from self._wait(BACK_S, lambda: bool(self._heard))
         rejected, lost, self._heard = self._rejected(), self._device.lost, []
         yield from self._wait(self._listen_s)
@@ -144,7 +157,7 @@ class SensorTrial(Trial):
             Check("lost", "measurements lost by the counter",
                   (self._device.lost - lost) / max(len(self._heard), 1), 0.0, LOST_SHARE, "1",
                   "Look at cables, termination and load: utank-hil bus."),
-            flag("name", "the device claims its NAME", "Compare n2k_name.",
+            flag("name", "the device is who it is to be", "Compare n2k_name, or identity.",
                  right=self._device.named),
         ]  # fmt: skip
         if not self._heard:
@@ -291,9 +304,7 @@ class DriveTrial(Trial):
         setup = self._drive.setup
         yield from self._by_hand("The pump will turn: water and ship still, nobody at the shaft")
         yield from self._wait(CONFIGURED_S, lambda: setup.done or bool(setup.problem))
-        why = setup.problem or f"node {self._plan.node} does not answer: look at bus and node"
-        said = "configured by SDO, read back, started"
-        self.checks.append(flag("set_up", said, why, right=setup.done))
+        self.checks.append(_set_up(setup))
         if not setup.done:
             return
         yield from self._wait(STATE_S, lambda: self._state is DriveState.SWITCH_ON_DISABLED)
