@@ -35,6 +35,7 @@ PATTERNS: Final = (
     "firmware_sim/sensors.py",
     "firmware_sim/truth.py",
     "firmware_sim/waves.py",
+    "utank_hil/analysis/loop/loop_ticks.py",
     "utank_hil/canbus/endpoints.py",
     "utank_hil/canbus/profiles/device.py",
     "utank_hil/canbus/profiles/field.py",

@@ -19,6 +19,7 @@ from firmware_sim.scenario import PASSIVE, Scenario
 from utank_hil.analysis.loop import sea_response
 from utank_hil.analysis.loop.loop_simulation import (
     SensorNoise,
+    between,
     passive_motion,
     simulate_loop,
 )
@@ -31,7 +32,6 @@ from utank_hil.analysis.motion.statistics import (
 from utank_hil.assembly import build_law
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import ParameterError
-from utank_hil.base.tick import TICK_S
 from utank_hil.configuration import ControllerConfig
 from utank_hil.configuration.files import ALLOW_CODE, problems_in_words
 from utank_hil.control import BuiltLaw, DesignPlant
@@ -167,9 +167,9 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
         at_rest,
         at_rest,
     )
-    passive = passive_motion(ship, tank, moment, TICK_S, count * ROW_TICKS)
-    shown = slice(None, None, ROW_TICKS)
-    yield _Record(PASSIVE, passive[shown, 0], passive[shown, _LEVEL], at_rest, at_rest)
+    passive = passive_motion(ship, tank, moment, RECORD_S, count + 1)
+    in_ticks = between(passive, RECORD_S, ROW_TICKS)
+    yield _Record(PASSIVE, passive[:-1, 0], passive[:-1, _LEVEL], at_rest, at_rest)
     errors = scenario.sensors
     noise = SensorNoise(
         errors.roll_noise_rad,
@@ -182,13 +182,14 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
         plant = controller.plant
         run = simulate_loop(
             DesignPlant(ship, tank, plant.delay_s, plant.lag_s, plant.limits),
-            passive,
+            in_ticks,
             law.controller(),
             law.measured,
             noise=noise,
             seed=seed,
+            every=ROW_TICKS,
         )
-        motion, pressure_pa = run.motion[shown], run.pressure_pa[shown]
+        motion, pressure_pa = run.motion, run.pressure_pa
         power_w = pressure_pa * tank.reservoir_area_m2 * motion[:, _LEVEL_RATE]
         yield _Record(name, motion[:, 0], motion[:, _LEVEL], pressure_pa, power_w)
 

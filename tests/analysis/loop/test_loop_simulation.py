@@ -6,7 +6,7 @@ from rolling_ship import SHIP, TANK
 from scipy.integrate import solve_ivp
 
 from utank_hil.analysis import SensorNoise
-from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
+from utank_hil.analysis.loop.loop_simulation import between, passive_motion, simulate_loop
 from utank_hil.control import DesignPlant, PassiveController, PumpLimits
 from utank_hil.dynamics.linear import STATES, coupled_model, pump_model
 from utank_hil.dynamics.sampling import sample
@@ -83,3 +83,28 @@ def test_a_delay_between_the_ticks_is_refused():
             PassiveController(),
             ("roll_rad",),
         )
+
+
+def test_motion_between_its_samples_is_that_of_the_finer_grid():
+    coarse = passive_motion(SHIP, TANK, WAVES, 0.05, 1001)
+    fine = passive_motion(SHIP, TANK, WAVES, 0.01, 5000)
+    # (w step)^4 / 384 of the faster wave, and of its rate four times the (w step)^3 of it
+    found = between(coarse, 0.05, 5)
+    np.testing.assert_allclose(found[::5], fine[::5], rtol=1e-12, atol=1e-12)
+    size = np.abs(fine).max(axis=0)
+    assert (np.abs(found - fine).max(axis=0) < size * [1e-7, 1e-5, 1e-7, 1e-5]).all()
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.05])
+def test_what_is_kept_is_each_fifth_tick_of_all(delay_s):
+    commands = 1e4 * np.random.default_rng(3).normal(size=30)
+    waves = passive_motion(SHIP, TANK, WAVES, 0.01, 600)
+    plant = DesignPlant(SHIP, TANK, delay_s=delay_s)
+    every, fifth = (
+        simulate_loop(plant, waves, Script(commands), STATES, seed=2, every=step) for step in (1, 5)
+    )
+    for name in ("motion", "pressure_pa", "command_pa", "wish_pa"):
+        np.testing.assert_array_equal(getattr(fifth, name), getattr(every, name)[::5])
+    # a command reaches the drive after the delay, and its lag
+    reached = np.flatnonzero(every.pressure_pa)[0]
+    assert reached == np.flatnonzero(every.command_pa)[0] + round(delay_s / 0.01) + 1
