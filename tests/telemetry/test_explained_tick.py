@@ -31,6 +31,10 @@ def test_each_stage_is_explained_with_exact_numbers() -> None:
     # the command is the law's answer on the message's grid, a step of which is under 10 Pa
     answer_pa = float(by_name["pressure_command_pa"]["replayed"])
     assert abs(float(command["recorded"]) - answer_pa) < 10
+    # of a memory of hundreds of samples only those that the tick wrote
+    memory = [each for each in numbers if each["name"].startswith("flat")]
+    assert 1 <= len(memory) < 10
+    assert all("[" in each["name"] and "," not in each["replayed"] for each in memory)
 
 
 def test_a_tick_that_is_not_there_is_refused() -> None:

@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from utank_hil.assembly import build_controller_node, build_law
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Frame, load_catalogue
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
@@ -70,10 +71,8 @@ class ExplainedTick:
         self.numbers += [Number("controller", name, "", said(x)) for name, x in values.items()]
         now = law_values(node.law.law)
         changed = {each.name.partition("[")[0] for each in differences(self._before, now)}
-        self.numbers += [
-            Number("law", name, "", said(now[name].tolist()))
-            for name in sorted(changed & now.keys())
-        ]
+        for name in sorted(changed & now.keys()):
+            self.numbers += _of_array(name, self._before.get(name), now[name])
         before, again = self._all_signals(recorded), self._all_signals(sent)
         for name in dict.fromkeys((*before, *again)):
             both = before.get(name, NONE), again.get(name, NONE)
@@ -91,6 +90,19 @@ class ExplainedTick:
         return {f"{name}.{field}": said(getattr(message, field)) for field in message._fields}
 
 
+def _of_array(name: str, before: FloatArray | None, now: FloatArray) -> list[Number]:
+    """A changed array; of a long one, as a memory of samples, only the elements that changed."""
+    if before is not None and before.shape == now.shape:
+        places = np.argwhere(before != now)
+        if len(places) < _FEW < now.size:
+            return [
+                Number("law", f"{name}{place.tolist()}", "", said(now[tuple(place)].item()))
+                for place in places
+            ]
+    return [Number("law", name, "", said(now.tolist()))]
+
+
+_FEW: Final = 20
 _NOTHING: Final = "nothing"
 
 
