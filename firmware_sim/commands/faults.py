@@ -4,7 +4,6 @@ import json
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -13,9 +12,9 @@ from rich.progress import MofNCompleteColumn
 
 from utank_hil.base.provenance import describe
 from utank_hil.base.shipped import CONFIGS
-from utank_hil.console.common import KILLED, Json, fail, load, prepare_out
+from utank_hil.console.common import KILLED, Json, fail, load
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import Terminal, progress_bar, shown
+from utank_hil.console.terminal import Terminal, progress_bar
 
 if TYPE_CHECKING:
     from firmware_sim.fault_campaign.campaign import Campaign, Row
@@ -37,9 +36,6 @@ def faults(
         Path | None,
         typer.Option(help="Your ship in the place of the first, with its first controller."),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for a recording of each row, of the first seed.")
-    ] = None,
     full: Annotated[
         bool,
         typer.Option(help="Compare the roll over 600 s, as is asked for: ten times the work."),
@@ -58,7 +54,7 @@ def faults(
     from firmware_sim.fault_campaign.campaign import Campaign
     from firmware_sim.fault_campaign.runner import run_rows
     from firmware_sim.fault_campaign.trial import Window
-    from firmware_sim.fault_campaign.verdict import as_json, judged, write_recordings
+    from firmware_sim.fault_campaign.verdict import as_json, judged
     from utank_hil.runners import stop_on_signals
 
     loaded = whole = load(campaign, Campaign)
@@ -70,8 +66,6 @@ def faults(
     too_long = [row for row in chosen if row.long and not (full or names)]
     chosen = [row for row in chosen if row not in too_long]
     _refuse_names(whole, names, chosen)
-    if out is not None:
-        out = prepare_out(out, [f"{row.id}.rrd" for row in chosen])
     began = time.monotonic()
     with progress_bar(MofNCompleteColumn()) as bar, stop_on_signals() as stopped:
         task = bar.add_task("faults", total=len(chosen) * seeds)
@@ -82,7 +76,6 @@ def faults(
             window,
             lambda done: bar.update(task, completed=done),
             stopped,
-            recorded=out is not None,
         )
         interrupted = stopped()
     partly = [row.id for row in chosen if len(outcomes[row.id]) < seeds]
@@ -101,10 +94,7 @@ def faults(
     not_run |= {row.id: "takes long: --full or --rows" for row in too_long}
     not_run |= dict.fromkeys(partly, KILLED if killed else INTERRUPTED)
     options = {"seeds": seeds, "full": full, "rows": names, "scenario": str(scenario or "")}
-    about = describe("faults", loaded, out or Path(), options=options, seed=1)
-    if out is not None:
-        files = write_recordings(out, outcomes, about)
-        results = [replace(each, recording=shown(files[each.row.id])) for each in results]
+    about = describe("faults", loaded, Path(), options=options, seed=1)
     if json_:
         sys.stdout.write(json.dumps(as_json(results, not_run, about)) + "\n")
     else:

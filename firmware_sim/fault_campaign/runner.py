@@ -29,7 +29,6 @@ Progress = Callable[[int], None]  #: Callback that takes the number of completed
 class _Shared:
     campaign: Campaign
     window: Window
-    recorded: bool
     done: "Synchronized[int]"
     stop: Any  # plain value without a lock
 
@@ -45,7 +44,7 @@ def _do(setup_name: str, seed: int, rows: list[Row], first: bool) -> list[Outcom
         _laws[setup_name] = build_law(setup.config)
     sea = Sea(
         ours.campaign, setup, _laws[setup_name], seed, ours.window,
-        recorded=ours.recorded and first, patient=first,
+        patient=first,
         stopped=lambda: bool(ours.stop.value),
     )  # fmt: skip
     outcomes = []
@@ -68,14 +67,11 @@ def run_rows(
     window: Window,
     progress: Progress,
     stopped: Callable[[], bool],
-    *,
-    recorded: bool = False,
 ) -> dict[str, list[Outcome]]:
     """Run rows in the seas of some seeds.
 
-    `stopped` says whether to end early; `recorded`, whether the outcomes of the first seed contain
-    recordings. There is a process for each core. The outcomes of a row are in the order of the
-    seeds, and incomplete after an early end or a killed process.
+    `stopped` says whether to end early. There is a process for each core. The outcomes of a row are
+    in the order of the seeds, and incomplete after an early end or a killed process.
     """
     context = multiprocessing.get_context("spawn")
     done, stop = context.Value("i", 0), context.Value("b", 0, lock=False)
@@ -84,7 +80,7 @@ def run_rows(
         by_setup[row.fault.setup].append(row)
     futures: list[Future[list[Outcome]]] = []
     outcomes: list[Outcome] = []
-    common = _Shared(campaign, window, recorded, done, stop)
+    common = _Shared(campaign, window, done, stop)
     with suppress(BrokenProcessPool), WorkerPool(len(os.sched_getaffinity(0)), common) as pool:
         for seed in seeds:
             for setup, its in by_setup.items():

@@ -20,7 +20,6 @@ from firmware_sim.fault_campaign.campaign import Campaign, Row, Setup, StatusFla
 from firmware_sim.fault_campaign.watch import BusLog, Heard, Watch, first_difference
 from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.ship_side import build_ship_side
-from firmware_sim.truth import TRUTH, true_values
 from firmware_sim.worker_pool import end_with
 from utank_hil.assembly import estimator_work
 from utank_hil.base.arrays import FloatArray
@@ -28,23 +27,19 @@ from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Mode
 from utank_hil.control import BuiltLaw
 from utank_hil.nodes.panel import Action, TimedAction
-from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import SimulatedRetuner
 
 T = TypeVar("T")
 
 SECOND_NS: Final = 1_000_000_000
 SAMPLE_TICKS: Final = 5
-"""Ticks between samples of a passive ship's roll and of a recording: 50 ms."""
+"""Ticks between samples of a passive ship's roll: 50 ms."""
 SAMPLE_NS: Final = SAMPLE_TICKS * TICK_NS
-COLUMNS: Final = (*SIGNALS, *TRUTH[1:])
 _LOOK_S: Final = 0.1  # Interval in s at which Ctrl-C is checked while a copy works.
 REARMED_S: Final = 20.0
 """Time in s after the fault for which the campaign's first sea checks that nothing arms again."""
 COMMANDS_NS: Final = 40_000_000  #: Two cycles of PUMP_CMD.
 FLAGS: Final = get_args(StatusFlag)
-RECORDED_S: Final = 10.0
-"""Time in s before the fault at which a recording begins. Chosen; no study."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +82,6 @@ class Outcome:
     window_s: float = math.nan
     wire: str = ""  #: First frame that the fault changed; empty if none differs.
     error: str = ""
-    rows: FloatArray | None = None  #: Recording with columns `COLUMNS`, if requested.
 
 
 @dataclass(slots=True)
@@ -96,7 +90,6 @@ class Underway:
 
     bench: FaultyBench
     log: BusLog
-    recorded: list[FloatArray] = field(default_factory=list)
     reference: list[Heard] = field(default_factory=list)
 
 
@@ -115,13 +108,12 @@ class Sea:
         seed: int,
         window: Window,
         *,
-        recorded: bool = False,
         patient: bool = False,
         stopped: Callable[[], bool] = lambda: False,
     ) -> None:
         self._stopped = stopped
         self._campaign, self._setup, self._law = campaign, setup, law
-        self._seed, self._window, self._recorded = seed, window, recorded
+        self._seed, self._window = seed, window
         self._patient = patient
         self._fault_s = campaign.fault_at_s(seed)
         self._fault_ns = round(self._fault_s * SECOND_NS)
@@ -130,12 +122,8 @@ class Sea:
         self._passive: dict[bool, FloatArray] = {}
 
     def _start(self) -> Underway:
-        log, rows, config = BusLog(), list[FloatArray](), self._setup.config
+        log, config = BusLog(), self._setup.config
         work = estimator_work(config)
-
-        def record(row: FloatArray) -> None:
-            rows.append(np.array([*row, *true_values(bench.ship.plant)]))
-
         bench = FaultyBench(
             self._setup.scenario_of(self._fault_s),
             config,
@@ -143,13 +131,11 @@ class Sea:
             seed=self._seed,
             script=(TimedAction(self._campaign.arm_s, Action.ARM),),
             trace=log,
-            sink=record if self._recorded else None,
-            sink_every=SAMPLE_TICKS,
             estimating=work and SimulatedRetuner(work[0]),
             commissioned=self._setup.commissioned,
         )
         log.node = bench.node
-        return Underway(bench, log, rows)
+        return Underway(bench, log)
 
     def prepare(self, rows: list[Row]) -> None:
         """Simulate the references of the rows: the bus without a fault, and the passive ship."""
@@ -260,15 +246,7 @@ class Sea:
             passive_variance=float(passive.var()),
             window_s=window_s,
             wire=wire,
-            rows=self._recorded_rows(underway, start_ns),
         )
-
-    def _recorded_rows(self, underway: Underway, start_ns: int) -> FloatArray | None:
-        """Rows from `RECORDED_S` before the fault on, if requested."""
-        if not self._recorded:
-            return None
-        first_s = start_ns / SECOND_NS - RECORDED_S
-        return np.array([each for each in underway.recorded if each[0] >= first_s])
 
     def _passive_beside(self, bench: FaultyBench, seconds: float, stopped: bool) -> FloatArray:
         """Roll of the passive ship with pump and valve in the final state of a bench."""

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Final
 
 from rich.table import Table
@@ -11,7 +10,7 @@ from rich.text import Text
 
 from firmware_sim.fault_campaign.campaign import Campaign, Row, Setup
 from firmware_sim.fault_campaign.campaign import Reaction as Asked
-from firmware_sim.fault_campaign.trial import COLUMNS, FLAGS, Outcome
+from firmware_sim.fault_campaign.trial import FLAGS, Outcome
 from utank_hil.canbus import PumpCommand, load_catalogue
 from utank_hil.safety.faults import FAULTS, Reaction
 
@@ -64,7 +63,6 @@ class Result:
     window_s: float  #: Time over which `roll_ratio` was computed.
     problems: tuple[str, ...]  #: Reasons for failure; empty if passed.
     outcomes: tuple[Outcome, ...] = field(repr=False)
-    recording: str = ""
 
     @property
     def passed(self) -> bool:
@@ -92,7 +90,6 @@ class Result:
             "roll_limit": limit.roll,
             "roll_window_s": None if math.isnan(self.window_s) else self.window_s,
             "seeds": len(self.outcomes),
-            "recording": self.recording or None,
         }
 
 
@@ -289,18 +286,3 @@ def table(results: Sequence[Result]) -> Table:
             Text("pass", "green") if result.passed else Text("fail", "red"),
         )
     return drawn
-
-
-def write_recordings(
-    folder: Path, outcomes: Mapping[str, Sequence[Outcome]], about: Mapping[str, Any]
-) -> dict[str, Path]:
-    """Write the recordings of the rows that have one; return the files by row."""
-    from utank_hil.telemetry.recording import write_recording
-
-    files = {}
-    for name, each in outcomes.items():
-        kept = {f"seed {one.seed}": one.rows for one in each if one.rows is not None}
-        if kept:
-            files[name] = folder / f"{name}.rrd"
-            write_recording(files[name], COLUMNS, kept, about=about)
-    return files
