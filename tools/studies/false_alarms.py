@@ -46,10 +46,10 @@ SEAS = {"calm": 0.2, "ordinary": 0.5, "storm": 1.0}
 SCENARIOS = ("storm", "patti_b", "naval_vessel", "semi_active")
 VOYAGE = "voyage"
 RIGHTLY_FOUND = {
-    *product(("feedback_linearization", "pd", "stimulate"), (*SEAS, VOYAGE)),
+    *product(("feedback_linearization", "pd"), (*SEAS, VOYAGE)),
     ("self_tuned", VOYAGE),
 }
-"""Laws that roll the ship more than the passive tank in a sea, or on purpose: none of `by_monitor`.
+"""Laws that roll the ship more than the passive tank in a sea: none of `by_monitor`.
 
 `self_tuned` is made for the storm's sea; in the short waves at the beginning of the voyage it rolls
 it 1.3 to 1.9 times as much for the first minutes.

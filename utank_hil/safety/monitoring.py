@@ -78,8 +78,8 @@ class Monitors:
     """The monitors of one ship.
 
     `roll_limit_rad` is the largest roll under control, `bit_rate` that of the bus. `compares` says
-    whether the law is meant to roll the ship less than its passive twin; one that stimulates the
-    ship is not. `motion_cycles_s` are the times between two samples of each motion sensor.
+    whether the law is meant to roll the ship less than its passive twin; one without a loop is
+    not. `motion_cycles_s` are the times between two samples of each motion sensor.
     """
 
     def __init__(
