@@ -176,7 +176,7 @@ def _retuning_cells(retuning: RetuningFigures) -> tuple[str, ...]:
 
 
 def _percent(share: float | None) -> str:
-    return "" if share is None else f"{share:.1%}"
+    return "" if share is None else f"{round(share, 3) + 0.0:.1%}"  # no -0.0%
 
 
 def _roll_cells(roll: RollStatistics) -> tuple[str, ...]:

@@ -403,10 +403,12 @@ class Scenario(Section):
         hs_m, roll_rad = figures["hs_m"], figures["static_roll_rms_rad"]
         found += unusual_sea(self.sea, self.vessel.ship, hs_m, roll_rad)
         found += unusual_waypoints(self.voyage, hs_m)
+        late = {f"operator.{i}.time_s": each.time_s for i, each in enumerate(self.operator)}
+        late |= {f"faults.{i}.at_s": each.at_s for i, each in enumerate(self.faults)}
         found += [
-            (f"operator.{index}.time_s", f"is {action.time_s:g}, after duration_s")
-            for index, action in enumerate(self.operator)
-            if action.time_s > self.duration_s
+            (key, f"is {time_s:g}, after duration_s")
+            for key, time_s in late.items()
+            if time_s > self.duration_s
         ]
         loadings = {f"voyage.{index}.ship": point.ship for index, point in enumerate(self.voyage)}
         loadings = {"actual_ship": self.actual_ship, **loadings}

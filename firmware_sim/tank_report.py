@@ -9,6 +9,7 @@ from rich.table import Table
 
 from utank_hil.analysis.tank_prediction import LoadingPoint, RollPrediction
 from utank_hil.analysis.tank_sizing import TankCost
+from utank_hil.console.ship_report import power_words, tonnes
 from utank_hil.console.terminal import new_table
 from utank_hil.control.optimal_tank import TankFigures
 
@@ -26,7 +27,7 @@ def cost_rows(cost: TankCost) -> Rows:
     """Rows of a tank's cost to the ship, and of its capacity."""
     share, loss_m = cost.share_of_displacement, cost.gm_loss_m
     return [
-        ("water", _tonnes(cost.water_t) + ("" if share is None else f", {share:.1%}")),
+        ("water", tonnes(1e3 * cost.water_t) + ("" if share is None else f", {share:.1%}")),
         (
             "free surface takes",
             f"{cost.stability_taken:.1%}"
@@ -70,7 +71,7 @@ def roll_rows(found: RollPrediction) -> Rows:
             (
                 f"{2 * active.level_rms_m:.2f} m",
                 f"{2e-3 * active.pressure_rms_pa:.1f} kPa",
-                power(found.mean_power_w),
+                power_words(found.mean_power_w),
             ),
             strict=True,
         ),
@@ -108,15 +109,6 @@ def less(share: float | None) -> str:
     if share is None:
         return ""
     return f"{abs(share):.0%} {'more' if share < 0 else 'less'}"
-
-
-def power(value_w: float) -> str:
-    """Power with a suitable unit."""
-    return f"{value_w / 1e6:.2f} MW" if abs(value_w) >= 1e6 else f"{value_w / 1e3:.3g} kW"
-
-
-def _tonnes(mass_t: float) -> str:
-    return f"{mass_t:.0f} t" if mass_t >= 100 else f"{mass_t:.3g} t"
 
 
 def _degrees(angle_rad: float) -> str:

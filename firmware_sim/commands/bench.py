@@ -24,7 +24,15 @@ from utank_hil.console.common import (
     why,
 )
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import Terminal, notes, progress_bar, shown, timing_table
+from utank_hil.console.terminal import (
+    Command,
+    Terminal,
+    notes,
+    progress_bar,
+    run_command,
+    shown,
+    timing_table,
+)
 from utank_hil.control import BuiltLaw
 from utank_hil.runners.node import ModelError
 from utank_hil.telemetry.ring import RingError
@@ -201,14 +209,14 @@ def _print(
     console.lead_on(("monitor", out), *_run_next(found, scenario))
 
 
-def _run_next(found: "BenchFigures", scenario: Path) -> list[tuple[str | Path, ...]]:
+def _run_next(found: "BenchFigures", scenario: Path) -> list[Command]:
     """Return the command that runs the best law of a sound bench, if a file of its own holds it."""
     if found.endings:
         return []
     files = files_named(scenario)
     ranked = sorted((run.rank, run.name) for run in found.runs if run.rank is not None)
     named = [files[key] for _, name in ranked if (key := ("controllers", name)) in files]
-    return [("run", file, "--bus", "can0") for file in named[:1]]
+    return run_command(named[0]) if named else []
 
 
 def _about(

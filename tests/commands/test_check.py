@@ -21,6 +21,7 @@ from utank_hil.assembly import build_controller_node, build_law, retuner_work
 from utank_hil.base.parameters import ParameterError
 from utank_hil.cli import app
 from utank_hil.configuration import ConfigError, ControllerConfig, Vessel, load_config
+from utank_hil.console import terminal
 from utank_hil.retuning import SimulatedRetuner
 
 CONFIGS = Path("configs").resolve()
@@ -337,6 +338,7 @@ def test_nonlinear_law_that_is_unstable_at_rest_is_refused_unless_the_file_accep
     assert refused.exit_code == 1
     assert missed in refused.stdout
     assert "margins of its slope at rest" in refused.stdout
+    assert "remedy: law: {kind: self_tuned} passes" in refused.stdout
     started = invoke("run", controller(tmp_path, shipped, **changes), "--bus", "nowhere0")
     assert started.exit_code == 2
     assert "the law misses its margins" in started.stderr
@@ -390,3 +392,24 @@ def test_two_losses_of_a_tank_that_loses_quadratically_are_named(tmp_path: Path)
     assert said
     assert float(said[1]) > 0.03
     assert "two tanks" not in invoke("check", controller(tmp_path, "pd")).stdout
+
+
+def test_what_comes_next_is_what_this_machine_can_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def following(path: Path) -> list[str]:
+        return invoke("check", path).stdout.partition("Next:\n  ")[2].splitlines()
+
+    pd = controller(tmp_path, "pd")
+    net = tmp_path / "net"
+    monkeypatch.setattr(terminal, "INTERFACES", net)
+    assert following(pd) == []
+    (tmp_path / "scenario.yaml").write_text("controllers: {other: gpc.yaml}\n")
+    assert following(pd) == []
+    (tmp_path / "scenario.yaml").write_text(f"controllers: {{mine: {pd.name}}}\n")
+    for name, kind in (("can3", 280), ("eth0", 1), ("vcan1", 280)):
+        (net / name).mkdir(parents=True)
+        (net / name / "type").write_text(f"{kind}\n")
+    bench, run = following(pd)
+    assert bench == f"utank-hil bench {tmp_path / 'scenario.yaml'}"
+    assert run == f"  utank-hil run {pd} --bus can3"

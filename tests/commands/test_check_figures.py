@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from utank_hil.cli import app
 from utank_hil.configuration.yaml_text import parse_yaml
+from utank_hil.console.ship_report import power_words, tonnes
 
 CONFIGS = Path("configs").resolve()
 G = 9.80665
@@ -63,11 +64,23 @@ def test_heel_that_the_pump_holds_is_one_that_she_can_have(tmp_path: Path) -> No
     patti_b = CONFIGS / "ships" / "patti_b.yaml"
     for made, said in (
         (lambda: ship(tmp_path), "0.92°"),
-        (lambda: ship(tmp_path, tank__headroom_m=1.0), "0.34°, a reservoir full or empty"),
+        (
+            lambda: ship(tmp_path, tank__headroom_m=1.0),
+            "0.34° │ │ a reservoir is then │ full or empty",
+        ),
         (lambda: patti_b, "capsizes the ship"),
     ):
         path = made()
-        assert f"holds │ {said} │" in " ".join(invoke("check", path).stdout.split())
+        assert f"holds │ {said} " in " ".join(invoke("check", path).stdout.split())
+
+
+def test_figures_of_a_great_ship_have_no_exponent() -> None:
+    assert [tonnes(mass) for mass in (1.4149e6, 273.4e3, 47.5e3)] == ["1415 t", "273 t", "47.5 t"]
+    assert [power_words(power) for power in (4.16e6, 999.6e3, 800.0)] == [
+        "4.16 MW",
+        "1000 kW",
+        "0.8 kW",
+    ]
 
 
 def test_figures_are_printed_for_ship_controller_and_scenario(tmp_path: Path) -> None:

@@ -46,7 +46,8 @@ def test_a_decay_becomes_the_ships_keys_and_a_picture(tmp_path: Path, record: Pa
     code, out = run("identify", "decay", record, "--from", 10.5, "--out", tmp_path)
     assert code == 0
     assert "roll_period_s: 5.6" in out
-    assert "--ship SHIP.yaml adds" in out
+    assert "The ratio is that at" in out
+    assert "--ship SHIP.yaml gives both parts" in out
     words = ("identify", "decay", record, "--from", 10.5, "--ship", "configs/ships/patti_b.yaml")
     code, out = run(*words, "--out", tmp_path)
     assert "rolls in" in out

@@ -1,5 +1,6 @@
 """Mistakes of a user at the command line: each is told by its place and with a remedy."""
 
+import math
 import re
 import shlex
 from pathlib import Path
@@ -55,6 +56,36 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
      ("roll-period", "draught")),
     ("a folder in use", f"init {{here}}/used {' '.join(SHIP)} --roll-period 10",
      ("ship.yaml", "another folder")),
+    ("a tank broader than the ship", f"init {{here}}/a {' '.join(SHIP)} --roll-period 10 "
+     "--tank-breadth 20", ("--tank-breadth", "20 m", "beam 14 m")),
+    ("a share of GM in per cent", f"init {{here}}/a {' '.join(SHIP)} --roll-period 10 --gm-loss 15",
+     ("gm-loss",)),
+    # a record of the ship
+    ("a record's degrees as radians", "identify decay {here}/radians.csv", ("roll_deg",)),
+    ("a record's milliseconds as seconds", "identify decay {here}/milliseconds.csv",
+     ("rolls in", "in seconds")),
+    ("a record that runs backward", "identify decay {here}/backward.csv", ("rising times",)),
+    ("decimals with a comma", "identify decay {here}/comma.csv", ("line 2, time_s", "a point")),
+    ("a record of other columns", "identify decay {here}/shifts.csv", ("in SI units it has",
+     "heel_rad")),
+    ("an end before the beginning", "identify decay {here}/radians.csv --from 90 --to 20",
+     ("--from 90", "--to 20")),
+    ("kilograms for tonnes", "identify inclining {here}/shifts.csv --displacement 2000000",
+     ("GM would be", "N m", "2e+06 t")),
+    # commands that take another's files
+    ("a ship to the fault table", "faults --scenario {here}/used/ship.yaml",
+     ("ship.yaml",)),
+    ("a scenario to the law's trade", f"design controller {{configs}}/{STORM}",
+     ("is a scenario", "controller")),
+    ("a controller to the tank's", f"design tank {{configs}}/{GPC}", ("is a controller", "ship")),
+    ("results that are not there", "compare {here}/out1 {here}/out2", ("out1", "bench")),
+    ("results into a file", f"bench {{configs}}/{STORM} --out {{here}}/table.csv",
+     ("table.csv", "--out")),
+    ("a bus in simulated time", "bench --bus can0", ("--bus", "--realtime")),
+    ("a format by another name", "export {here}/table.csv --to {here}/out.mat",
+     ("out.mat", ".parquet")),
+    ("a port that is none", f"panel {{configs}}/{FIRST} --bus can0 --web "
+     "--listen 127.0.0.1:99999", ("--listen", "port")),
     ("a sea of no height", f"init {{here}}/a {' '.join(SHIP)} --roll-period 10 --hs 0",
      ("--hs", "positive")),
 ]  # fmt: skip
@@ -88,6 +119,14 @@ IN_A_FILE: list[tuple[str, str, str, object, tuple[str, ...]]] = [
     ("a wave height in centimetres", STORM, "sea",
      {"kind": "jonswap", "hs_m": 450.0, "tp_s": 10.0}, ("hs_m", "450")),
     ("a settling beyond the end", STORM, "settle_s", 1e6, ("settle_s",)),
+    ("a law of no file", GPC, "law", {"kind": "python", "factory": "mine:make"},
+     ("law.kind", "--allow-code")),
+    ("a controller called passive", STORM, "controllers",
+     {"passive": str(CONFIGS / GPC)}, ("controllers", "passive", "rename")),
+    ("a fault of a signal that is none", STORM, "faults",
+     [{"kind": "stuck", "message": "SENSOR_MOTION", "signals": ["roll_deg"], "at_s": 50}],
+     ("faults.0.signals.0", "roll_rad")),
+    ("a scenario for a ship", GPC, "vessel", str(CONFIGS / STORM), ("vessel", "storm.yaml")),
 ]  # fmt: skip
 
 
@@ -97,6 +136,16 @@ def here(tmp_path: Path) -> Path:
     (tmp_path / "empty.yaml").write_text("")
     (tmp_path / "tabs.yaml").write_text("name: ship\n\tship: 1\n")
     (tmp_path / "latin.yaml").write_bytes("name: Größe\n".encode("latin-1"))
+    swings = [(0.1 * n, 8 * 0.995**n * math.cos(0.06 * n)) for n in range(1000)]
+    for name, head, rows in (
+        ("radians", "time_s,roll_rad", swings),
+        ("milliseconds", "time_s,roll_deg", [(1e3 * t, roll) for t, roll in swings]),
+        ("backward", "time_s,roll_deg", swings[::-1]),
+        ("shifts", "moment_nm,heel_deg", [(1e3 * n, 0.1 * n) for n in range(-3, 4)]),
+    ):
+        lines = [head, *(f"{one:.6g},{other:.6g}" for one, other in rows)]
+        (tmp_path / f"{name}.csv").write_text("\n".join(lines))
+    (tmp_path / "comma.csv").write_text("time_s;roll_deg\n0,0;5,1\n0,1;4,9\n")
     (tmp_path / "used").mkdir()
     (tmp_path / "used" / "ship.yaml").write_text("name: mine\n")
     return tmp_path
@@ -134,6 +183,17 @@ def test_a_mistake_in_a_file_is_told_at_its_key(
     said = told("check", str(path))
     for each in ("mine.yaml", *named):
         assert each in said, said
+
+
+def test_what_would_come_after_the_end_is_warned_of(tmp_path: Path) -> None:
+    path = tmp_path / "late.yaml"
+    content = yaml.safe_load((CONFIGS / STORM).read_text().replace(" ../", f" {CONFIGS}/"))
+    fault = {"kind": "stuck", "message": "SENSOR_MOTION", "signals": ["roll_rad"], "at_s": 5000}
+    content |= {"controllers": {"gpc": str(CONFIGS / GPC)}, "faults": [fault]}
+    path.write_text(yaml.safe_dump(content | {"operator": [{"time_s": 4000, "action": "arm"}]}))
+    result = CliRunner(env={"COLUMNS": "200", "TERM": "dumb"}).invoke(app, ["check", str(path)])
+    for key, value in (("operator.0.time_s", 4000), ("faults.0.at_s", 5000)):
+        assert f"{key}: is {value}, after duration_s" in result.stderr
 
 
 @pytest.mark.parametrize(

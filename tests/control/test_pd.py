@@ -1,12 +1,14 @@
 """PD on the level: a virtual tank, at the optimum."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rolling_ship import SHIP, TANK
 
 from utank_hil.analysis.loop.margins import closed_loop_response, margins
 from utank_hil.control import DesignPlant
-from utank_hil.control.gain import PD_MEASURED, GainLaw, design_pd
+from utank_hil.control.gain import PD_MEASURED, GainLaw, PDDesign, design_pd
 from utank_hil.control.optimal_tank import passive_optimum, ship_ratios
 from utank_hil.dynamics.linear import coupled_matrices, pump_model
 
@@ -34,6 +36,34 @@ def test_roll_over_frequency_peaks_at_the_optimum_when_the_loop_is_fast():
     passive, _ = closed_loop_response(None, model, PD_MEASURED, w)
     assert np.abs(motions[:, 0]).max() < 0.5 * np.abs(passive[:, 0]).max()
     assert ship_frequency == pytest.approx(0.4985, abs=1e-4)
+
+
+def test_of_a_quadratic_loss_the_pump_adds_what_is_missing_and_none_in_fast_water():
+    rough = replace(TANK, quadratic_loss=8.0)
+    plant = DesignPlant(SHIP, rough.linearized(0.5), calm=rough)
+    built, whole = PDDesign().build(plant), design_pd(SHIP, rough)
+    assert built.at_rest
+    np.testing.assert_array_equal(built.linear.gain, whole.gain)
+    controller, per_rate = built.controller(), rough.quadratic_loss_pa_per_m2_s2
+    spring, loss = whole.gain[0]
+    full_m_s = loss / per_rate
+    for rate in (0.2 * full_m_s, -0.9 * full_m_s):
+        (pressure,) = controller.step(np.array([0.1, rate]))
+        own = per_rate * abs(rate) * rate
+        assert pressure == pytest.approx(-(spring * 0.1 + loss * rate - own))
+    for rate in (1.1 * full_m_s, -5 * full_m_s):
+        assert controller.step(np.array([0.0, rate])) == [0.0]
+    bare = PDDesign().build(DesignPlant(SHIP, TANK))
+    np.testing.assert_array_equal(bare.controller().step(np.array([0.1, 3.0])),
+                                  -design_pd(SHIP, TANK).gain @ [0.1, 3.0])  # fmt: skip
+
+
+def test_a_pump_that_brakes_less_than_the_tank_keeps_driving():
+    still = replace(TANK, damping_ratio=0.9, quadratic_loss=8.0)
+    controller = PDDesign().build(DesignPlant(SHIP, still)).controller()
+    loss = design_pd(SHIP, still).gain[0, 1]
+    assert loss < 0
+    assert controller.step(np.array([0.0, 3.0])) == pytest.approx([-3.0 * loss])
 
 
 def test_delay_and_lag_of_the_pump_are_harmless():

@@ -215,7 +215,7 @@ def test_damaged_rows_are_named_and_the_others_used(write):
     assert spectra.tp_s.tolist() == [1 / 0.15, 1 / 0.05, 1 / 0.1]
     lines = [re.search("line ([0-9]+)", note)[1] for note in spectra.notes]
     assert lines == ["3", "11", "5", "7", "8"]
-    with pytest.raises(ValueError, match=r"(?s)no spectrum within.*5 rows are left out.*line 3"):
+    with pytest.raises(ValueError, match=r"(?s)no spectrum of.*5 rows are left out.*line 3"):
         spectra.at("2020-01-01T02:00")
 
 

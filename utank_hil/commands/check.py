@@ -11,12 +11,12 @@ import typer
 from pydantic import BaseModel
 from rich.text import Text
 
-from utank_hil.analysis.loop.linear_tuning import AutoDesign, Design, scaled, varied
+from utank_hil.analysis.loop.linear_tuning import LINEAR_KINDS, AutoDesign, Design, scaled, varied
 from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins, Robustness, robustness
 from utank_hil.analysis.loop.self_tuning import NoLawError, SelfTunedDesign
 from utank_hil.base.finite import finite
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.configuration.files import ConfigError, kind_of
+from utank_hil.configuration.files import ConfigError, files_named, kind_of
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.console.admission import judge_law
 from utank_hil.console.common import AllowCode, Json, fail, load, print_json, warnings_of
@@ -29,10 +29,10 @@ from utank_hil.console.ship_report import (
     ship_json,
     ship_line,
 )
-from utank_hil.console.terminal import Terminal, new_table
+from utank_hil.console.terminal import Command, Terminal, new_table, run_command
 from utank_hil.control import BuiltLaw
 from utank_hil.control.constrained.design import ConstrainedDesign
-from utank_hil.control.interface import DesignPlant
+from utank_hil.control.interface import DesignPlant, LawDesign
 from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.gate import MOST_STEP_S, JudgedLaw
@@ -234,12 +234,15 @@ def _at_rest(law: BuiltLaw) -> str | None:
 def remedy(judged: JudgedLaw) -> str | None:
     """Return the first gentler design that meets all requirements, as keys of the file.
 
-    None is returned if the law is not refused for its margins or has nothing to scale.
+    Of a law that has nothing to scale it is the self-tuned one. None is returned if the law is not
+    refused for its margins.
     """
     design, plant, report = judged.config.law, judged.config.design_plant, judged.robustness
     refused = report is not None and report.failures() and judged.step_s <= MOST_STEP_S
-    if not refused or report is None or not isinstance(design, Design):
+    if not refused or report is None:
         return None
+    if not isinstance(design, Design):
+        return _automatic(design, plant)
     stiffness = plant.ship.stiffness_nm_rad / report.worst_period_scale**2
     softer = replace(plant.ship, stiffness_nm_rad=stiffness)
     if np.linalg.eigvals(state_matrices(softer, plant.tank)[0]).real.max() > 0:
@@ -262,15 +265,18 @@ def remedy(judged: JudgedLaw) -> str | None:
     )
 
 
-def _automatic(design: Design, plant: DesignPlant) -> str | None:
+def _automatic(design: LawDesign, plant: DesignPlant) -> str | None:
     try:
         if isinstance(design, ConstrainedDesign):
             SelfTunedDesign("self_tuned", design.sea).tuned(plant)
             return "law.kind: self_tuned with the same sea in place of the other numbers passes"
-        AutoDesign(design.kind, "auto").tuned(plant)
+        if design.kind in LINEAR_KINDS:
+            AutoDesign(design.kind, "auto").tuned(plant)
+            return f"law: {{kind: {design.kind}, tuning: auto}} passes"
+        SelfTunedDesign("self_tuned").tuned(plant)
     except NoLawError:
         return None
-    return f"law: {{kind: {design.kind}, tuning: auto}} passes"
+    return "law: {kind: self_tuned} passes; it finds its numbers itself"
 
 
 def _keys(design: Design) -> str:
@@ -352,8 +358,20 @@ def check(
     if not content["accepted"]:
         raise typer.Exit(ExitCode.REFUSED)
     if not json_:
-        following: dict[str, tuple[str | Path, ...]] = {
-            "ship": ("design", "tank", config),
-            "controller": ("run", config, "--bus", "can0"),
+        following: dict[str, list[Command]] = {
+            "ship": [("design", "tank", config)],
+            "controller": [*_bench_of(config), *run_command(config)],
         }
-        Terminal().lead_on(following.get(kind, ("bench", config)))
+        Terminal().lead_on(*following.get(kind, [("bench", config)]))
+
+
+def _bench_of(controller: Path) -> list[Command]:
+    """The bench of the scenario beside a controller, as `init` writes it, if it names it."""
+    scenario = controller.parent / "scenario.yaml"
+    try:
+        named = files_named(scenario).values()
+    except ConfigError:
+        return []
+    return (
+        [("bench", scenario)] if controller.resolve() in (each.resolve() for each in named) else []
+    )

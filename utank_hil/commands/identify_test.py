@@ -45,8 +45,9 @@ def decay(
     """
     from utank_hil.pictures.identification import draw_decay
 
+    if from_s is not None and to_s is not None and from_s >= to_s:
+        fail(f"--from {from_s:g} is not before --to {to_s:g}")
     vessel = None if ship is None else load(ship, Vessel)
-    out = prepare_out(out, (PICTURE,))
     time_s, roll_rad = _columns(record, "time_s", "roll_rad")
     part = np.ones(len(time_s), dtype=bool)
     part &= True if from_s is None else time_s >= from_s
@@ -55,6 +56,7 @@ def decay(
         found = roll_decay(time_s[part], roll_rad[part])
     except ValueError as error:
         refuse(f"{record}: {error}; --from and --to choose a part", json_)
+    out = prepare_out(out, (PICTURE,))
     about: dict[str, Any] = {}
     if vessel is not None:
         about = describe("identify decay", vessel, out, options=context.params)
@@ -79,14 +81,13 @@ def decay(
 def ship_keys(found: RollDecay, vessel: Vessel | None) -> dict[str, float]:
     """Return the keys of a ship's file that a decay test gives.
 
-    A negative linear part, which no file can have, is replaced by the equivalent ratio in the
-    middle.
+    The ratio is the linear part beside the quadratic one, which needs a vessel's GM. Alone, or
+    where the linear part is negative, which no file can have, it is the equivalent in the middle.
     """
-    keys = {"roll_period_s": found.period_s, "damping_ratio": found.damping_ratio}
-    if found.damping_ratio < 0:
-        keys["damping_ratio"] = float(found.equivalent_ratio[1])
-    elif vessel is not None:
+    keys = {"roll_period_s": found.period_s, "damping_ratio": float(found.equivalent_ratio[1])}
+    if found.damping_ratio >= 0 and vessel is not None:
         inertia = vessel.ship.stiffness_nm_rad * (found.period_s / (2 * math.pi)) ** 2
+        keys["damping_ratio"] = found.damping_ratio
         keys["quadratic_damping_nms2_rad2"] = max(0.0, inertia * found.quadratic_per_rad)
     return {name: float(f"{value:.4g}") for name, value in keys.items()}
 
@@ -172,6 +173,8 @@ def _print_decay(
     terminal.say("Keys of the ship:")
     for name, value in keys.items():
         terminal.say(f"  {name}: {value:g}")
+    if "quadratic_damping_nms2_rad2" not in keys:
+        terminal.say(f"The ratio is that at {amplitudes_deg[1]:.1f}°.")
     if vessel is None and found.damping_ratio >= 0:
-        terminal.say("--ship SHIP.yaml adds quadratic_damping_nms2_rad2, which needs its GM.")
+        terminal.say("--ship SHIP.yaml gives both parts: the quadratic one needs its GM.")
     terminal.say(f"Picture: {path}")

@@ -113,18 +113,18 @@ def _pump_rows(vessel: Vessel, figures: dict[str, Any]) -> list[tuple[str, str]]
     return [
         ("pump's greatest pressure", f"{vessel.pump.max_pressure_pa / 1e3:.1f} kPa"),
         ("  in metres of water", f"{figures['pump_head_m']:.2f} m"),
-        ("heel that it holds", _held(figures["pump_heel_rad"], figures["pump_heel_at_the_end"])),
-        ("flow that `init` sizes a pump for", f"{figures['pump_flow_m3_s']:.3g} m³/s"),
+        *_held(figures["pump_heel_rad"], figures["pump_heel_at_the_end"]),
+        ("flow that `init` sizes a pump for", f"{three_digits(figures['pump_flow_m3_s'])} m³/s"),
         ("power of pressure and flow, without losses", power_words(figures["pump_power_asked_w"])),
         ("power to hold the pressure in still water", power_words(figures["pump_power_held_w"])),
         ("power of the motor", power_words(figures["pump_power_w"])),
     ]
 
 
-def _held(heel_rad: float | None, at_the_end: bool | None) -> str:
-    if heel_rad is None:
-        return "capsizes the ship"
-    return f"{math.degrees(heel_rad):.2f}°" + (", a reservoir full or empty" if at_the_end else "")
+def _held(heel_rad: float | None, at_the_end: bool | None) -> list[tuple[str, str]]:
+    held = "capsizes the ship" if heel_rad is None else f"{math.degrees(heel_rad):.2f}°"
+    end = [("  a reservoir is then", "full or empty")] if at_the_end else []
+    return [("heel that it holds", held), *end]
 
 
 def _valve_rows(vessel: Vessel, figures: dict[str, Any]) -> list[tuple[str, str]]:
@@ -164,7 +164,7 @@ def print_ship(vessel: Vessel) -> None:
     share, gm_m, taken = (figures[name] for name in ("water_share", "gm_m", "stability_taken"))
     for text, value in (
         ("metacentric height GM", "no displacement" if gm_m is None else f"{gm_m:.2f} m"),
-        ("water in the tank", _tonnes(figures["water_kg"])),
+        ("water in the tank", tonnes(figures["water_kg"])),
         ("  of the displacement", "" if share is None else f"{share:.2%}"),
         ("water's frequency per roll frequency", f"{figures['frequency_ratio']:.3f}"),
         ("mass ratio", f"{figures['mass_ratio']:.4f}"),
@@ -190,34 +190,42 @@ def ship_line(vessel: Vessel) -> str:
     if vessel.pump is not None:
         pump = (
             f"the pump presses {figures['pump_head_m']:.2g} m of water, moves up to "
-            f"{figures['pump_flow_m3_s']:.3g} m³/s and has {power_words(figures['pump_power_w'])}"
+            f"{three_digits(figures['pump_flow_m3_s'])} m³/s and has "
+            f"{power_words(figures['pump_power_w'])}"
         )
     if vessel.valve is not None:
         pump += f"; a valve in the {vessel.valve.kind} opens in {vessel.valve.opening_time_s:g} s"
     periods = " and ".join(f"{mode['period_s']:.3g}" for mode in figures["modes"])
     return (
         f"The ship rolls in {figures['roll_period_s']:.3g} s, with the water in {periods} s; "
-        f"{_tonnes(figures['water_kg'])} of water take {figures['stability_taken']:.1%} of its "
+        f"{tonnes(figures['water_kg'])} of water take {figures['stability_taken']:.1%} of its "
         f"stability; {pump}."
     )
 
 
-def _tonnes(mass_kg: float) -> str:
-    return f"{mass_kg / 1e3:.3g} t"
+def three_digits(value: float) -> str:
+    """A figure of three digits at least, without an exponent."""
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+def tonnes(mass_kg: float) -> str:
+    """A mass in tonnes."""
+    return f"{three_digits(mass_kg / 1e3)} t"
 
 
 def order_words(vessel: Vessel) -> str:
     """Return net head, flow, shaft power and duty of a vessel's pump, to order it by."""
     figures = _pump_figures(vessel)
     return (
-        f"{figures['pump_head_m']:.2f} m, {figures['pump_flow_m3_s']:.3g} m³/s, "
+        f"{figures['pump_head_m']:.2f} m, {three_digits(figures['pump_flow_m3_s'])} m³/s, "
         f"{power_words(figures['pump_power_w'])}, reversing"
     )
 
 
 def power_words(power_w: float) -> str:
     """A power with the unit that suits it."""
-    return f"{power_w / 1e6:.2f} MW" if power_w >= 1e6 else f"{power_w / 1e3:.3g} kW"
+    mega = abs(power_w) >= 1e6
+    return f"{power_w / 1e6:.2f} MW" if mega else f"{three_digits(power_w / 1e3)} kW"
 
 
 def devices_json(devices: DevicesSection | None) -> dict[str, Any]:

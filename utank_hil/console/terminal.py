@@ -3,7 +3,7 @@
 import os
 import re
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -23,6 +23,18 @@ if TYPE_CHECKING:
 
 _STEERS: Final = re.compile("[\0-\b\v-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 UNLIMITED: Final = 10_000  #: Columns, wider than any table.
+
+
+INTERFACES: Final = Path("/sys/class/net")  #: Where Linux lists the network's interfaces.
+_CAN: Final = "280"  # ARPHRD_CAN of <linux/if_arp.h>
+Command = tuple[str | Path, ...]
+
+
+def run_command(controller: Path) -> list[Command]:
+    """Return the command that runs a controller on this machine's CAN interface, if it has one."""
+    kinds = {path.parent.name: path.read_text().strip() for path in INTERFACES.glob("*/type")}
+    buses = sorted(name for name, kind in kinds.items() if kind == _CAN)
+    return [("run", controller, "--bus", bus) for bus in buses[:1]]
 
 
 def shown(path: Path) -> str:
@@ -82,9 +94,10 @@ class Terminal(Console):
         for name, path in files.items():
             self.say(f"{name:>10}: {shown(path)}")
 
-    def lead_on(self, *commands: Sequence[str | Path]) -> None:
+    def lead_on(self, *commands: Command) -> None:
         """Print which commands come next, by their words, as they can be pasted into a shell."""
-        self.say("Next:")
+        if commands:
+            self.say("Next:")
         for command in commands:
             words = [shown(word) if isinstance(word, Path) else word for word in command]
             self.say(f"  utank-hil {shlex.join(words)}")

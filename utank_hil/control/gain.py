@@ -3,11 +3,12 @@
 PD control of the level, thesis (3.5), makes the tank the best passive one by its pump:
 P = -k h - c h', with k and c such that the water in a ship held still has the frequency and damping
 ratio of `passive_optimum`. The pump changes the water's stiffness and loss, but not the coupling of
-ship and water.
+ship and water. Of a tank with quadratic loss, c is what that leaves to be done (`MissingLoss`).
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Final, Literal
 
 import numpy as np
@@ -142,5 +143,27 @@ class PDDesign:
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Design the law for a plant."""
-        law = design_pd(plant.ship, plant.tank)
-        return BuiltLaw(law.controller, PD_MEASURED, law)
+        tank = plant.calm or plant.tank
+        law, quadratic = design_pd(plant.ship, tank), tank.quadratic_loss_pa_per_m2_s2
+        if not quadratic:
+            return BuiltLaw(law.controller, PD_MEASURED, law)
+        return BuiltLaw(partial(MissingLoss, law, quadratic), PD_MEASURED, law, at_rest=True)
+
+
+class MissingLoss(Memoryless):
+    """PD on the level of a tank of quadratic loss: the pump adds the loss that the tank lacks.
+
+    `quadratic` is in Pa per (m/s)^2 of the level's rate. In fast water the tank has the loss of the
+    best one by itself and the pump adds none; it never drives the water for having more.
+    """
+
+    def __init__(self, law: GainLaw, quadratic: float) -> None:
+        self.sample_time_s = law.sample_time_s
+        self._spring, self._loss = law.gain[0].tolist()
+        self._quadratic = quadratic
+
+    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+        """Return the pressure, shape (1,), for level and rate about the reference."""
+        level, rate = (y if reference is None else y - reference).tolist()
+        lacking = max(self._loss - self._quadratic * abs(rate), min(self._loss, 0.0))
+        return np.array([-(self._spring * level + lacking * rate)])

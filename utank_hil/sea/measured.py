@@ -77,8 +77,9 @@ class MeasuredSpectra:
             left_out = ""
             if self.notes:
                 left_out = f"; {len(self.notes)} rows are left out, the first: {self.notes[0]}"
+            near = f"within {within_s:g} s of" if within_s else "of"
             raise ValueError(
-                f"{self.source}: no spectrum within {within_s:g} s of {wanted}; the nearest is of "
+                f"{self.source}: no spectrum {near} {wanted}; the nearest is of "
                 f"{self.time[index]}, all are from {self.time[0]} to {self.time[-1]}{left_out}"
             )
         return self[index]

@@ -283,8 +283,8 @@ def _lacks(path: Path, name: str, columns: Mapping[str, FloatArray]) -> TextFile
     if unclear:
         other = f": name {unclear[0]!r} {name} if it is in seconds"
     return TextFileError(
-        f"{path}: has no column {name}{other}; it has {', '.join(columns)}. Name columns by what "
-        "they hold and their unit (docs/how-to/logs.md)"
+        f"{path}: has no column {name}{other}; in SI units it has {', '.join(columns)}. Name "
+        "columns by what they hold and their unit (docs/how-to/logs.md)"
     )
 
 

@@ -132,7 +132,7 @@ SWING = np.arange(0, 120, 0.1)
         (lambda: (SWING, 0.1 * np.cos(0.5 * SWING) + 0.08 * np.cos(0.61 * SWING)), "leaves"),
         (lambda: (SWING, 0.3 + 0.1 * np.exp(-SWING / 80) * np.cos(0.5 * SWING)), "heel of 17"),
         (whole_file, "leave them out|does not decay"),
-        (lambda: (np.repeat(SWING, 2), np.repeat(SWING, 2)), "rising times"),
+        (lambda: (np.repeat(SWING, 2), 0.1 * np.cos(np.repeat(SWING, 2))), "rising times"),
     ],
 )  # fmt: skip
 def test_what_is_no_free_decay_is_refused(record, words):

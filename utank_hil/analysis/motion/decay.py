@@ -33,6 +33,8 @@ waves."""
 _UNUSUAL_RESIDUAL: Final = 0.02
 _UNUSUAL_HEEL: Final = 0.25
 """Heel per greatest amplitude from which the restoring of the two sides differs."""
+SHORTEST_S: Final = 0.2  #: Natural period of the smallest models.
+LONGEST_S: Final = 60.0  #: Natural period beyond any ship's.
 _NO_DECAY: Final = "the roll of this record does not decay: is it a free decay alone?"
 _EQUAL_WORK: Final = 4 / (3 * math.pi)  #: Of quadratic damping in the linear one of equal work.
 
@@ -88,10 +90,17 @@ def roll_decay(time_s: FloatArray, roll_rad: FloatArray) -> RollDecay:
     """
     known = np.isfinite(time_s) & np.isfinite(roll_rad)
     time, roll = time_s[known], roll_rad[known]
+    if len(roll) and np.ptp(roll) > math.pi:
+        raise ValueError(f"the roll swings by {np.ptp(roll):.3g} rad: name degrees roll_deg")
     if len(time) < 3 * _LEAST_SAMPLES or np.any(np.diff(time) <= 0):
         raise ValueError("a decay test needs some swings of at least 20 samples, and rising times")
     start = _start(time, roll)
     found = _fit(time, roll, start)
+    if not SHORTEST_S < found.period_s < LONGEST_S:
+        raise ValueError(
+            f"the ship rolls in {found.period_s:.3g} s: the times must be in seconds, and a swing "
+            "needs 20 samples"
+        )
     swings = (time[-1] - time[0]) / found.period_s
     if swings >= 4 * _LEAST_SWINGS:
         middle = time[0] + found.period_s * round(swings / 2)

@@ -14,6 +14,8 @@ from scipy.stats import t as student
 from utank_hil.base.arrays import FloatArray
 
 _LEAST_SHIFTS = 5  #: Rows that a residual can be judged by; chosen.
+LEAST_GM_M = 0.01  #: Of the smallest models; chosen.
+MOST_GM_M = 100.0  #: Beyond that of the widest barges; chosen.
 _MOST_HEEL_RAD = math.radians(6)  # Tests heel 1 to 4 degrees: beyond, GZ is no straight line.
 
 
@@ -46,5 +48,11 @@ def inclining(moment_nm: FloatArray, heel_rad: FloatArray, displacement_n: float
     half = float(student.ppf(0.975, degrees)) * math.sqrt(float(rest @ rest) / degrees / size)
     if rise - half <= 0:
         raise ValueError("the heel does not follow the moment: check the signs of both")
+    gm_m = 1 / (displacement_n * rise)
+    if not LEAST_GM_M < gm_m < MOST_GM_M:
+        raise ValueError(
+            f"its GM would be {gm_m:.2g} m: moments are in N m, heel in the column's unit, and the "
+            f"displacement is {displacement_n / 9.80665e3:.4g} t"
+        )
     low, high = (1 / (displacement_n * (rise + sign * half)) for sign in (1, -1))
-    return Inclining(1 / (displacement_n * rise), (low, high), math.atan(level))
+    return Inclining(gm_m, (low, high), math.atan(level))
