@@ -17,7 +17,7 @@ from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import Vessel
 from utank_hil.console.common import OUT, Json, fail, load, new_app, prepare_out, print_json
 from utank_hil.console.ship_report import order_words
-from utank_hil.console.terminal import Terminal, new_table
+from utank_hil.console.terminal import Terminal, new_table, notes
 from utank_hil.dynamics.tank import Tank
 
 if TYPE_CHECKING:
@@ -33,7 +33,10 @@ def tank(
     vessel: Annotated[Path, typer.Argument(help="Ship, tank and pump: a file of configs/ships.")],
     scenario: Annotated[
         Path | None,
-        typer.Option(help="Scenario whose sea counts.", show_default="the vessel's, if shipped"),
+        typer.Option(
+            help="Scenario whose sea counts.",
+            show_default="scenario.yaml beside, or a shipped one",
+        ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for pictures and figures.")] = OUT,
     json_: Json = False,
@@ -64,7 +67,7 @@ def tank(
     except ValueError as error:
         fail(error)
     tanks = {"present": loaded.tank, "best": best}
-    path = scenario or shipped_scenario(loaded)
+    path = scenario or usual_scenario(loaded, vessel)
     console = Terminal()
     figures: dict[str, Any] = {"vessel": loaded.name, "scenario": None}
     if path is None:
@@ -79,11 +82,13 @@ def tank(
     name = chosen.name
     plants = {key: _plant(loaded, each) for key, each in tanks.items()}
     pump = loaded.pump is not None
-    found = {key: predict_roll(plant, sea, pump=pump) for key, plant in plants.items()}
     out = prepare_out(out, (PICTURE, FIGURES))
-    plant, own = plants["present"], found["present"]
-    loadings = loading_sensitivity(plant, sea, own)
-    title = f"{loaded.name}: {name}"
+    with notes.busy(f"{loaded.name}: a law for each tank and loading"):
+        found = {key: predict_roll(plant, sea, pump=pump) for key, plant in plants.items()}
+        plant, own = plants["present"], found["present"]
+        loadings = loading_sensitivity(plant, sea, own)
+    # a scenario of `init` begins with the ship's name
+    title = name if name.startswith(loaded.name) else f"{loaded.name}: {name}"
     about = describe("design tank", loaded, out, options=context.params, scenario=chosen)
     files = {"picture": out / PICTURE, "figures": out / FIGURES}
     draw_tank(roll_curves(plant, sea, own.law), loadings, files["picture"], title, about)
@@ -165,10 +170,12 @@ class _VesselOfScenario(BaseModel):
     vessel: Vessel
 
 
-def shipped_scenario(vessel: Vessel) -> Path | None:
-    """Shipped scenario of a vessel: the storm for its ship, else the first one with the ship."""
+def usual_scenario(vessel: Vessel, file: Path) -> Path | None:
+    """Scenario of a vessel: the one beside its file, the storm, or the first one shipped."""
+    beside = file.with_name("scenario.yaml")
     shipped = [STORM, *sorted(STORM.parent.glob("*.yaml"))]
-    own = (p for p in shipped if load(p, _VesselOfScenario).vessel.version == vessel.version)
+    usual = [beside, *shipped] if beside.exists() else shipped
+    own = (p for p in usual if load(p, _VesselOfScenario).vessel.version == vessel.version)
     return next(own, None)
 
 

@@ -20,6 +20,7 @@ from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node, build_law, retuner_work
 from utank_hil.base.parameters import ParameterError
 from utank_hil.cli import app
+from utank_hil.commands.check import radius_words
 from utank_hil.configuration import ConfigError, ControllerConfig, Vessel, load_config
 from utank_hil.console import terminal
 from utank_hil.retuning import SimulatedRetuner
@@ -341,7 +342,7 @@ def test_nonlinear_law_that_is_unstable_at_rest_is_refused_unless_the_file_accep
     assert "remedy: law: {kind: self_tuned} passes" in refused.stdout
     started = invoke("run", controller(tmp_path, shipped, **changes), "--bus", "nowhere0")
     assert started.exit_code == 2
-    assert "the law misses its margins" in started.stderr
+    assert re.search(r"error: \S+\.yaml: .*: the law misses its margins", started.stderr)
     accepted = invoke("check", controller(tmp_path, shipped, **changes, accept_low_margins=True))
     assert accepted.exit_code == 0
     assert "accepted by the configuration" in accepted.stdout
@@ -392,6 +393,11 @@ def test_two_losses_of_a_tank_that_loses_quadratically_are_named(tmp_path: Path)
     assert said
     assert float(said[1]) > 0.03
     assert "two tanks" not in invoke("check", controller(tmp_path, "pd")).stdout
+
+
+def test_an_eigenvalue_below_one_is_not_shown_as_one() -> None:
+    words = [radius_words(each) for each in (0.99812, 0.99998, 1.00003, 1.0045)]
+    assert words == ["0.9981", "1 - 2e-05", "1 + 3e-05", "1.0045"]
 
 
 def test_what_comes_next_is_what_this_machine_can_do(

@@ -75,8 +75,7 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
     # commands that take another's files
     ("a ship to the fault table", "faults --scenario {here}/used/ship.yaml",
      ("ship.yaml",)),
-    ("a scenario to the law's trade", f"design controller {{configs}}/{STORM}",
-     ("is a scenario", "controller")),
+    ("a report of a table", "report {here}/table.csv", ("table.csv",)),
     ("a controller to the tank's", f"design tank {{configs}}/{GPC}", ("is a controller", "ship")),
     ("results that are not there", "compare {here}/out1 {here}/out2", ("out1", "bench")),
     ("results into a file", f"bench {{configs}}/{STORM} --out {{here}}/table.csv",

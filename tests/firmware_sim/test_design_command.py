@@ -86,6 +86,17 @@ def test_tank_command_refuses_a_calm_sea(tmp_path: Path):
         assert word in result.stderr
 
 
+def test_the_sea_beside_a_ship_counts(tmp_path: Path):
+    content = (CONFIGS / "ships" / "thesis_first.yaml").read_text()
+    (tmp_path / "s.yaml").write_text(content.replace("1.9275e+9", "1.93e+9"))
+    assert "Name a sea with --scenario" in run("tank", tmp_path / "s.yaml").stdout
+    sea = "{kind: jonswap, hs_m: 3, tp_s: 10, effective_slope: {coefficient: 0.5}}"
+    mine = f"name: a sea\nvessel: s.yaml\nsea: {sea}\ncontrollers: {{}}\nduration_s: 100\n"
+    (tmp_path / "scenario.yaml").write_text(f"{mine}operator: []\nsettle_s: 30\n")
+    done = run("tank", tmp_path / "s.yaml", "--out", tmp_path, "--json")
+    assert json.loads(done.stdout)["scenario"] == "a sea"
+
+
 def test_a_tank_of_quadratic_loss_is_compared_at_the_level_of_its_pump(tmp_path: Path):
     """The optimum of `init`, which has 0.02 for friction and 0.23 at 0.85 m, is near its best."""
     path = tmp_path / "ship.yaml"

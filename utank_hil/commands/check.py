@@ -110,7 +110,9 @@ def print_controller(judged: JudgedLaw) -> None:
     table.add_row("delay margin", _delay(judged.law, margin), "over 20 ms")
     table.add_row("disk margin", f"{margin.disk_margin:.2f}", "")
     table.add_row("greatest loop gain", f"{margin.peak_loop_gain:.3g}", "")
-    table.add_row("largest eigenvalue of the grid", _radius(report.worst_radius), "less than 1")
+    table.add_row(
+        "largest eigenvalue of the grid", radius_words(report.worst_radius), "less than 1"
+    )
     table.caption = (
         "grid: roll period 0.7 to 1.3, or inertia 0.8 to 1.25;\n"
         "pump gain 0.8 to 1.2, 0 or 20 ms more delay"
@@ -161,7 +163,7 @@ def print_collection(kind: str, collection: Any, judged: Judged) -> None:
             table.add_row(each, *5 * ("",), verdict)
             continue
         margin = one.robustness.nominal
-        peak, radius = f"{margin.peak_sensitivity:.2f}", f"{one.robustness.worst_radius:.4f}"
+        peak, radius = f"{margin.peak_sensitivity:.2f}", radius_words(one.robustness.worst_radius)
         figures = peak, _gain(margin), _phase(margin), _delay(one.law, margin), radius
         table.add_row(each, *figures, verdict)
     console.table(table)
@@ -182,7 +184,8 @@ def _verdict(judged: JudgedLaw) -> str | Text:
     return "at rest" if judged.law.adapts else Text("ok", "green")
 
 
-def _radius(radius: float) -> str:
+def radius_words(radius: float) -> str:
+    """An eigenvalue's modulus; one near 1 by what is missing."""
     near = abs(radius - 1) < 5e-5  # would print as 1.0000
     return f"1 {'-' if radius < 1 else '+'} {abs(1 - radius):.0e}" if near else f"{radius:.4f}"
 

@@ -31,10 +31,11 @@ def admit(config: ControllerConfig, path: Path, key: str = "") -> BuiltLaw:
     for failure in found.failures:
         notes.say(failure, yellow=f"{config.name}, margins:")
     if not found.accepted:
+        place = ": ".join(filter(None, (str(path), key, config.name)))
         if found.step_s > MOST_STEP_S:
-            fail(f"{config.name}: the law's step is too slow for the loop: make it faster")
+            fail(f"{place}: the law's step is too slow for the loop: make it faster")
         fail(
-            f"{config.name}: the law misses its margins; redesign it (utank-hil check may name a "
-            "weight that passes), or set accept_low_margins: true"
+            f"{place}: the law misses its margins; redesign it (utank-hil check may name one that "
+            "passes), or set accept_low_margins: true"
         )
     return found.law
