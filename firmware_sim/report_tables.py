@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import Final
 
 from rich.table import Table as RichTable
@@ -131,26 +132,35 @@ def in_one_unit(values: Sequence[float], unit: str) -> tuple[str, list[str]]:
 
 def retuning_table(found: BenchFigures) -> RichTable:
     """Table of retuning and its gain; empty where nothing retuned."""
-    table = new_table(
-        "Retuning",
-        "retuned\nat s",
-        "roll RMS\nbefore °",
-        "roll RMS\nafter °",
-        "\nless",
-        "roll period s\nfound ± / true",
-        "ship damping MN m s\nfound / true",
-        "tank damping ratio\nfound / true",
-    )
+    rows = {run.name: _retuning_cells(run.retuning) for run in found.runs if run.retuning}
+    shown = [any(cells) for cells in zip(*rows.values(), strict=True)] or [True]
+    headings = [heading for heading, kept in zip(_RETUNING, shown, strict=False) if kept]
+    figures = [heading for heading in headings if heading not in _RETUNING[-2:]]
+    table = new_table("Retuning", *figures)
     table.add_column("\nended in", no_wrap=True)
-    table.add_column("\nbecause")
+    if "\nbecause" in headings:
+        table.add_column("\nbecause")
     table.caption = (
         f"± one standard deviation; before the first retuning, and from {SETTLING_S:g} s "
         "after the new law took charge"
     )
-    for run in found.runs:
-        if run.retuning is not None:
-            table.add_row(run.name, *_retuning_cells(run.retuning))
+    for name, cells in rows.items():
+        table.add_row(name, *(cell for cell, kept in zip(cells, shown, strict=True) if kept))
     return table
+
+
+_RETUNING: Final = (
+    "retuned\nat s",
+    "roll RMS\nbefore °",
+    "roll RMS\nafter °",
+    "\nless",
+    "roll period s\nfound ± / true",
+    "ship damping MN m s\nfound / true",
+    "tank damping ratio\nfound / true",
+    "\nended in",
+    "\nbecause",
+)
+"""Headings; those of figures that no run has are left out."""
 
 
 def _retuning_cells(retuning: RetuningFigures) -> tuple[str, ...]:
@@ -171,7 +181,7 @@ def _retuning_cells(retuning: RetuningFigures) -> tuple[str, ...]:
         ship,
         tank,
         state if attempts <= 1 else f"{state}, attempt {attempts}",
-        "; ".join(retuning.reasons),
+        "\n".join(wrap("; ".join(retuning.reasons), 24)),
     )
 
 

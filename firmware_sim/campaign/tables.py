@@ -25,10 +25,10 @@ def runs_table(groups: list[dict[str, Any]], title: str) -> Table:
     power = _power(groups)
     marked = any(run["marked"] for group in groups for run in group["runs"].values())
     figures = (
-        "cases", "roll", "below\npassive %", "greatest\nroll °", "level\npeak m",
+        "cases", "roll\nRMS °", "below\npassive %", "max.\nroll °", "level\npeak m",
         f"power\n{power[1]}", *(["not\ncounted"] if marked else []),
     )  # fmt: skip
-    caption = "mean ± 95 % of the mean; rolls in degrees, RMS"
+    caption = "mean ± 95 % of the mean"
     table = new_table(title, *figures, names=("run", *_short_keys(groups)), caption=caption)
     for group in groups:
         for run, found in group["runs"].items():
@@ -39,7 +39,7 @@ def runs_table(groups: list[dict[str, Any]], title: str) -> Table:
                 run,
                 *(_short(value) for value in group["parameters"].values()),
                 str(found["roll_rms_rad"]["cases"]),
-                interval(found["roll_rms_rad"], 180 / math.pi, 3),
+                interval(found["roll_rms_rad"], 180 / math.pi, 2),
                 passive,
                 f"{math.degrees(worst):.1f}",
                 _mean(found["level_peak_m"], 1, 2),

@@ -66,12 +66,11 @@ def campaign(
         print_json(content)
     else:
         _print(loaded, groups, failed)
-        console = Terminal()
-        console.say(f"results: {shown(folder)}")
-        again = ("campaign", study, "--resume", *(() if out is None else ("--out", out)))
-        console.lead_on(again)
+        Terminal().say(f"results: {shown(folder)}")
     if interrupted:
-        notes.say("interrupted: the same command with --resume goes on from here")
+        again = ("campaign", study, "--resume", *(() if out is None else ("--out", out)))
+        notes.say("interrupted: --resume goes on from here")
+        notes.lead_on(again)
         raise typer.Exit(ExitCode.INTERRUPTED)
 
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from textwrap import wrap
 from typing import Any, Final
 
 from rich.table import Table
@@ -262,27 +263,31 @@ def as_json(
 
 
 def table(results: Sequence[Result]) -> Table:
-    """Table with one line per row."""
+    """Table with two lines a row, what was found above what is asked for."""
     drawn = Table(title="Faults")
-    for heading in ("row", "reaction"):
-        drawn.add_column(heading, no_wrap=True)
-    for heading in ("found\nms", "limit\nms", "zero\nms", "limit\nms", "roll\nvariance"):
+    drawn.add_column("row\n  reaction, alarms", no_wrap=True)
+    for heading in ("found\nms", "zero\nms", "roll\nvar.", ""):
         drawn.add_column(heading, justify="right", no_wrap=True)
-    drawn.add_column("called")
-    drawn.add_column("", no_wrap=True)
     drawn.caption = (
-        "worst of the seeds; times after the fault; zero: of the drive's set-point, or the end of "
-        "the valve's following; variance of the roll over that of the passive ship, at most 1.05"
+        "worst of the seeds; times after the fault, ≤ their limits; zero: of the drive's "
+        "set-point,\nor the end of the valve's following; variance of the roll over that of the "
+        "passive ship, ≤ 1.05"
     )
     for result in results:
-        limit_ms = result.row.limit.found_ms
-        times_ms = (result.found_ms, limit_ms, result.zero_ms, result.zero_limit_ms)
+        said = " ".join((result.row.expect.reaction, *result.codes))
+        found = _over(result.found_ms, result.row.limit.found_ms)
+        zero = _over(result.zero_ms, result.zero_limit_ms)
         drawn.add_row(
-            result.row.id,
-            result.row.expect.reaction,
-            *("" if time_ms is None else f"{time_ms:.0f}" for time_ms in times_ms),
+            "\n  ".join([result.row.id, *wrap(said, 40)]),
+            found,
+            zero,
             "" if math.isnan(result.roll_ratio) else f"{result.roll_ratio:.2f}",
-            " ".join(result.codes),
             Text("pass", "green") if result.passed else Text("fail", "red"),
         )
     return drawn
+
+
+def _over(time_ms: float | None, limit_ms: float | None) -> str:
+    """A time above its limit."""
+    found = "" if time_ms is None else f"{time_ms:.0f}"
+    return found if limit_ms is None else f"{found}\n≤{limit_ms:.0f}"

@@ -91,8 +91,10 @@ def test_the_sea_beside_a_ship_counts(tmp_path: Path):
     (tmp_path / "s.yaml").write_text(content.replace("1.9275e+9", "1.93e+9"))
     assert "Name a sea with --scenario" in run("tank", tmp_path / "s.yaml").stdout
     sea = "{kind: jonswap, hs_m: 3, tp_s: 10, effective_slope: {coefficient: 0.5}}"
-    mine = f"name: a sea\nvessel: s.yaml\nsea: {sea}\ncontrollers: {{}}\nduration_s: 100\n"
-    (tmp_path / "scenario.yaml").write_text(f"{mine}operator: []\nsettle_s: 30\n")
+    mine = f"name: a sea\nvessel: s.yaml\nsea: {sea}\nduration_s: 100\nsettle_s: 30\n"
+    mine += "controllers: {mine: c.yaml}\noperator: [{time_s: 5.0, action: arm}]\n"
+    (tmp_path / "c.yaml").write_text("name: c\nvessel: s.yaml\nlaw: {kind: pd}\n")
+    (tmp_path / "scenario.yaml").write_text(mine)
     done = run("tank", tmp_path / "s.yaml", "--out", tmp_path, "--json")
     assert json.loads(done.stdout)["scenario"] == "a sea"
 
