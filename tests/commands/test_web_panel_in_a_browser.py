@@ -76,6 +76,32 @@ def test_arm_by_touch_is_held_and_stop_is_not(at: tuple[Bench, Opened]) -> None:
     shows(seen, "STANDBY")
 
 
+def test_a_finger_arms_and_a_tap_stops(browser: Browser, running: tuple[Bench, str]) -> None:
+    made, url = running
+    made.ship.mode, made.ship.alarms = Mode.STANDBY, {}
+    context = browser.new_context(viewport={"width": 1024, "height": 768}, has_touch=True)
+    page = context.new_page()
+    page.goto(url, wait_until="commit")
+    seen = Opened(page)
+    shows(seen, "STANDBY")
+    middle = {
+        name: (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        for name in ("arm", "stop")
+        if (box := page.locator(f"#{name}").bounding_box()) is not None
+    }
+    page.touchscreen.tap(*middle["arm"])
+    time.sleep(1.2)
+    assert made.ship.mode is Mode.STANDBY  # a tap in passing
+    finger, (x, y) = context.new_cdp_session(page), middle["arm"]
+    touch = {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]}
+    finger.send("Input.dispatchTouchEvent", touch)
+    shows(seen, "ACTIVE")
+    finger.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    page.touchscreen.tap(*middle["stop"])
+    shows(seen, "STANDBY")
+    context.close()
+
+
 def test_keys_alone_do_for_everything(at: tuple[Bench, Opened]) -> None:
     made, seen = at
     keyboard = seen.page.keyboard

@@ -92,6 +92,6 @@ def draw_decay(
             top.plot(found.time_s, np.degrees(roll), label=name, **style)
         top.set_ylabel("Roll (°)")
         low.plot(found.time_s, np.degrees(found.roll_rad - found.fit_rad), color=COLORS[0], lw=0.8)
-        low.set(xlabel="Time (s)", ylabel="Left (°)")
+        low.set(xlabel="Time (s)", ylabel="Less fit (°)")
         figure.legend(**BELOW)
     return path

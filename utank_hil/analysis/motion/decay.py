@@ -33,8 +33,8 @@ waves."""
 _UNUSUAL_RESIDUAL: Final = 0.02
 _UNUSUAL_HEEL: Final = 0.25
 """Heel per greatest amplitude from which the restoring of the two sides differs."""
-SHORTEST_S: Final = 0.2  #: Natural period of the smallest models.
-LONGEST_S: Final = 60.0  #: Natural period beyond any ship's.
+SHORTEST_S: Final = 0.2  #: Natural period of the smallest models; chosen.
+LONGEST_S: Final = 60.0  #: Natural period beyond any ship's; chosen.
 _NO_DECAY: Final = "the roll of this record does not decay: is it a free decay alone?"
 _EQUAL_WORK: Final = 4 / (3 * math.pi)  #: Of quadratic damping in the linear one of equal work.
 
