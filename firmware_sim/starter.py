@@ -73,12 +73,18 @@ class StarterShip:
     draught_m: Positive | None = None
     #: Of the roll; by default estimated from the draught, without it `USUAL_DAMPING_RATIO`.
     roll_damping_ratio: Annotated[float, Range(above=0, most=0.3)] | None = None
+    #: Of radiated waves, of hull data; in place of the estimate's part by waves.
+    radiated_ratio: float | None = None
 
     def __post_init__(self) -> None:
         problems = range_problems(self)
         if self.roll_period_s is None and self.draught_m is None:
             reason = "is needed, or else the draught for the weather criterion's period"
             problems.append(("roll_period_s", reason))
+        least, given = self.radiated_ratio or 0.0, self.roll_damping_ratio
+        if given is not None and given < least:
+            reason = f"is {given:g}, and waves alone take {least:.3g} from this hull: raise it"
+            problems.append(("roll_damping_ratio", reason))
         refuse("ship", problems or self._shape_problems())
 
     def _shape_problems(self) -> list[Problem]:
@@ -109,13 +115,13 @@ class StarterShip:
             return self.roll_damping_ratio, "as given"
         if self.draught_m is None:
             return USUAL_DAMPING_RATIO, "assumed, --draught estimates it"
-        hull = HullForm.usual(
-            self.length_m, self.beam_m, self.draught_m, self.displacement_t, self.gm_m
-        )
-        frequency = 2 * math.pi / self.period_s
+        hull, frequency = self.form, 2 * math.pi / self.period_s
         stiffness = 1e3 * self.displacement_t * GRAVITY_M_S2 * self.gm_m
-        found = estimated_roll_damping(hull, ESTIMATED_AT_RAD, frequency).total
-        ratio = found * hull.unit_nms_rad * frequency / (2 * stiffness)
+        found = estimated_roll_damping(hull, ESTIMATED_AT_RAD, frequency)
+        computed = self.radiated_ratio is not None
+        viscous = found.total - (found.wave if computed else 0.0)
+        ratio = viscous * hull.unit_nms_rad * frequency / (2 * stiffness)
+        ratio += self.radiated_ratio or 0.0
         outside = hull.outside(frequency)
         words = (
             f"estimated at {math.degrees(ESTIMATED_AT_RAD):g} degrees, Ikeda's method by "
@@ -124,6 +130,14 @@ class StarterShip:
         if outside:
             words += f" ({'; '.join(outside)})"
         return min(max(ratio, _LEAST_DAMPING), _MOST_DAMPING), words
+
+    @property
+    def form(self) -> HullForm:
+        """The usual form of these main particulars, which need the draught."""
+        assert self.draught_m is not None
+        return HullForm.usual(
+            self.length_m, self.beam_m, self.draught_m, self.displacement_t, self.gm_m
+        )
 
     @property
     def period_s(self) -> float:
@@ -136,6 +150,7 @@ class StarterShip:
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
+HULL = "hull.nc"
 SHIP, CONTROLLER, SCENARIO, README = "ship.yaml", "controller.yaml", "scenario.yaml", "README.md"
 FILES: Final = (SHIP, CONTROLLER, SCENARIO, README)
 
@@ -169,7 +184,11 @@ class StarterProject:
 
 
 def starter_sea(
-    length_m: float, roll_period_s: float, hs_m: float | None = None, tp_s: float | None = None
+    length_m: float,
+    roll_period_s: float,
+    hs_m: float | None = None,
+    tp_s: float | None = None,
+    effective_slope: float = EFFECTIVE_SLOPE,
 ) -> dict[str, Any]:
     """Sea as given, else at the roll period and as high as ship's length and pump permit."""
     shortest_s, longest_s = PERIODS_S
@@ -177,12 +196,12 @@ def starter_sea(
     wavenumber = (2 * math.pi / period_s) ** 2 / GRAVITY_M_S2
     least_m, most_m = _HEIGHTS_M
     height_m = min(max(_HEIGHT_PER_LENGTH * length_m, least_m), most_m)
-    height_m = min(height_m, 2 * MOST_SLOPE_RAD / (EFFECTIVE_SLOPE * wavenumber))
+    height_m = min(height_m, 2 * MOST_SLOPE_RAD / (effective_slope * wavenumber))
     return {
         "kind": "jonswap",
         "hs_m": hs_m or float(f"{height_m:.2g}"),
         "tp_s": period_s,
-        "effective_slope": {"coefficient": EFFECTIVE_SLOPE},
+        "effective_slope": {"coefficient": effective_slope},
     }
 
 
@@ -192,12 +211,14 @@ def make_starter(
     stability_share: float = STABILITY_SHARE,
     hs_m: float | None = None,
     tp_s: float | None = None,
+    effective_slope: float | None = None,
 ) -> StarterProject:
     """Size tank and pump, find a law, and write the files.
 
     The free surface may take `stability_share` of the stability, see `size_tank`. Raises
     `TankImpossibleError, NoLawError` if there is no tank or no law for this ship. Raises
-    `ValueError` if a value is invalid.
+    `ValueError` if a value is invalid. With an effective slope of hull data the files take these
+    from `HULL`.
     """
     written = WrittenShip(
         displacement_t=ship.displacement_t,
@@ -217,7 +238,8 @@ def make_starter(
     limits = {}
     if usable_m < (1 - _LEAST_LEVEL_CHANGE) * vessel.default_limits["level_m"]:
         limits["level_m"] = usable_m
-    sea = starter_sea(ship.length_m, ship.period_s, hs_m, tp_s)
+    slope = EFFECTIVE_SLOPE if effective_slope is None else float(f"{effective_slope:.2g}")
+    sea = starter_sea(ship.length_m, ship.period_s, hs_m, tp_s, slope)
     texts[CONTROLLER] = controller_file(ship.name, sea, limits)
     written_law = yaml.safe_load(texts[CONTROLLER])
     config = _valid(ControllerConfig, written_law | {"vessel": vessel})
@@ -229,6 +251,8 @@ def make_starter(
     law = config.law.tuned(config.design_plant)
     texts[README] = readme(ship.name)
     prediction = predict_roll(config.plant, state)
+    if effective_slope is not None:
+        texts |= {SHIP: _with_hull(texts[SHIP]), SCENARIO: _swaying(texts[SCENARIO])}
     return StarterProject(vessel, sized, demand, law, prediction, sea, texts)
 
 
@@ -346,6 +370,18 @@ duration_s: 900
 settle_s: 60
 seed: 1
 """
+
+
+def _with_hull(ship: str) -> str:
+    """File of the vessel with the hull's data."""
+    remark = "a usual form, see docs/dynamics.md; better: utank-hil hull MESH"
+    return ship.replace("\n# Room:", f"\n  hull: ./{HULL}  # {remark}\n# Room:", 1)
+
+
+def _swaying(scenario: str) -> str:
+    """File of the scenario with a ship that sways, rolls and yaws by its hull."""
+    lines = [line for line in scenario.splitlines() if "effective_slope" not in line]
+    return "\n".join([*lines, "plant: sway_roll_yaw  # waves act by the hull's data", ""])
 
 
 def readme(name: str) -> str:

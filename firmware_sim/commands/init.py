@@ -97,6 +97,14 @@ def init(
     name: Annotated[
         str | None, typer.Option(help="Of the ship.", show_default="the folder's")
     ] = None,
+    hull: Annotated[
+        bool,
+        typer.Option(
+            "--hull",
+            help="Compute what waves do to a usual hull of these dimensions, so that the ship "
+            "sways, too; needs --draught and the extra hulls.",
+        ),
+    ] = False,
     json_: Json = False,
 ) -> None:
     """Write a starter project for your ship: tank, pump, law, sea.
@@ -107,12 +115,14 @@ def init(
     **Example:** utank-hil init patrol --length 63 --beam 9.5 --displacement 1900
     --gm 0.9 --roll-period 9.5
     """
-    from firmware_sim.starter import FILES, StarterShip, make_starter
+    from firmware_sim.hull.compute import Loading, usual_hull, write_hull
+    from firmware_sim.hull.mesh import MeshError
+    from firmware_sim.starter import FILES, HULL, StarterShip, make_starter
     from utank_hil.analysis.loop.sea_response import CalmSeaError
     from utank_hil.analysis.loop.self_tuning import NoLawError
     from utank_hil.analysis.tank_sizing import TankImpossibleError, TankRoom
 
-    for path in (folder / file for file in FILES):
+    for path in (folder / file for file in (*FILES, *([HULL] * hull))):
         if path.exists():
             fail(f"{path}: is there already; name another folder, or remove it")
     given = {
@@ -138,9 +148,23 @@ def init(
     for option, value in (("hs", hs), ("tp", tp)):
         if value is not None and not 0 < value < math.inf:
             fail(f"--{option}: must be positive and finite, got {value}")
+    data, slope = None, None
+    if hull:
+        if draught is None:
+            fail("--hull: needs --draught")
+        loading = Loading(gm, roll_period_s=ship.period_s, displacement_t=displacement)
+        try:
+            with notes.busy(f"{ship_name}: computing the hull"):
+                data, found = usual_hull(ship.form, loading)
+            slope = found.effective_slope
+            ship = replace(ship, radiated_ratio=found.radiation_ratio)
+        except ParameterError as error:
+            _fail_at(error)
+        except (MeshError, ValueError) as error:
+            fail(f"--hull: the usual hull of these dimensions {error}")
     try:
         with notes.busy(f"{ship_name}: sizing tank and pump, designing a law"):
-            project = make_starter(ship, room, gm_loss, hs, tp)
+            project = make_starter(ship, room, gm_loss, hs, tp, slope)
     except (TankImpossibleError, NoLawError) as error:
         if json_:
             print_json({"possible": False, "reason": str(error)})
@@ -154,6 +178,9 @@ def init(
     files = {file: folder / file for file in FILES}
     for file, path in files.items():
         write_whole(path, project.texts[file])
+    if data is not None:
+        files[HULL] = folder / HULL
+        write_hull(files[HULL], data)
     little = _little_help(project)
     if json_:
         figures = {"possible": True, "little_help": little, **_as_json(project)}

@@ -16,11 +16,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from firmware_sim.hull.mesh import MeshError
+from firmware_sim.hull.mesh import MeshError, form_mesh
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.whole_file import left_whole
 from utank_hil.configuration.hull_files.capytaine import GIVEN, hull_of_dataset
 from utank_hil.dynamics.hull.hull_data import HullData, with_roll_period
+from utank_hil.dynamics.hull.lateral import LateralHull
+from utank_hil.dynamics.roll_damping import HullForm
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 _OMEGA: Final = np.linspace(0.2, 2.5, 30)
@@ -107,6 +109,12 @@ def compute_hull(
     said = [f"energy does not add up, irregular frequency or too coarse: {at:.3g} rad/s left out"
             for at in wrong]  # fmt: skip
     return data, found, said
+
+
+def usual_hull(form: HullForm, loading: Loading) -> tuple[Any, LateralHull]:
+    """Return the dataset of the usual form of main particulars, and the hull."""
+    data, found, _ = compute_hull(form_mesh(form), loading, "hull of main particulars")
+    return data, LateralHull(found)
 
 
 def write_hull(path: Path, data: Any) -> None:

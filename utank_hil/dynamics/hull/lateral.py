@@ -186,11 +186,24 @@ class LateralHull:
             None if limit is None else _lateral(limit),
         )
 
+    @property
+    def radiation_ratio(self) -> float:
+        """Damping ratio of free roll by radiation."""
+        return free_roll(self.data).radiation_ratio
+
     def radiated_nms_rad(self) -> float:
         """Linear damping of free roll that radiation accounts for."""
         found = free_roll(self.data)
         stiffness = self.stiffness_nm_rad
         return found.radiation_ratio * stiffness * found.period_s / math.pi
+
+    @property
+    def effective_slope(self) -> float:
+        """Roll moment of beam waves at the roll frequency, sway and yaw free, per C44 and slope."""
+        free = free_roll(self.data)
+        omega = 2 * math.pi / free.period_s
+        force = free.mode @ excitation_at(self.about_g, omega, 90.0)[LATERAL]
+        return float(abs(force)) * GRAVITY_M_S2 / (omega**2 * self.stiffness_nm_rad)
 
     def ship(self) -> RollShip:
         """Return the ship in roll alone: its free roll, sway and yaw free, with waves' damping.
