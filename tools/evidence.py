@@ -45,6 +45,7 @@ PARTS: Final = {
     # what the laws are worth
     "share_of_possible": Part("python -m tools.studies.share_of_possible --seeds 8 --json", 6),
     "renewed_seas": Part("python -m tools.studies.renewed_seas --seeds 3 --json", 30),
+    "ten_hulls": Part("python -m tools.studies.ten_hulls --json", 15),
     "less_pressure": Part("python -m tools.studies.less_pressure --json", 12),
     "february_hours": Part(_study("february_hours"), 80),
     "storm_seeds": Part(_study("storm_seeds"), 30),
