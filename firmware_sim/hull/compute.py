@@ -61,6 +61,7 @@ def compute_hull(
     import xarray as xr
     from capytaine.io.xarray import separate_complex_values
 
+    cpt.set_logging("ERROR")  # else what it skips at infinite frequency goes to standard output
     mesh = cpt.ReflectionSymmetricMesh(side, plane="xOz")
     lid, degrees = _lid(side), cpt.rigid_body_dofs(rotation_center=(0, 0, 0))
     hull = cpt.FloatingBody(mesh=mesh, lid_mesh=lid, dofs=degrees, name="hull")

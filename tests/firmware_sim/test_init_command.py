@@ -15,6 +15,7 @@ from firmware_sim.bench import BenchOptions, run_bench
 from firmware_sim.commands.init import init
 from firmware_sim.figures import figures
 from firmware_sim.scenario import Scenario
+from firmware_sim.starter import StarterShip
 from utank_hil.analysis.tank_sizing import usable_level_m
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
 from utank_hil.console.common import new_app
@@ -108,6 +109,29 @@ def test_what_to_do_next_can_be_done_under_any_name(tmp_path: Path) -> None:
     assert load_config(tmp_path / "ship.yaml", Vessel).name == name
     assert run(tmp_path / "north_star", PATROL).exit_code == 0
     assert load_config(tmp_path / "north_star" / "ship.yaml", Vessel).name == "north star"
+
+
+@pytest.mark.evidence
+def test_with_a_hull_the_ship_sways_by_it(tmp_path: Path) -> None:
+    ship = PATROL | {"displacement": 1350, "draught": 3.9, "roll-period": 8}
+    done = run(tmp_path, ship, "--hull", "--json")
+    assert done.exit_code == 0, done.output
+    assert "hull" in json.loads(done.stdout)["files"]
+    scenario = load_config(tmp_path / "scenario.yaml", Scenario)
+    assert scenario.plant == "sway_roll_yaw"
+    vessel = scenario.vessel
+    assert 2 * math.pi / vessel.ship.natural_frequency_rad_s == pytest.approx(8.0)
+    hull = scenario.lateral_hull
+    assert hull is not None
+    assert hull.stiffness_nm_rad == pytest.approx(vessel.ship.stiffness_nm_rad, rel=0.01)
+    law = (tmp_path / "controller.yaml").read_text()
+    assert f"effective_slope: {hull.effective_slope:.2g}" in law
+
+
+def test_a_hull_needs_a_draught_and_more_damping_than_its_waves(tmp_path: Path) -> None:
+    assert "--hull: needs --draught" in run(tmp_path, PATROL, "--hull").stderr
+    with pytest.raises(ValueError, match=r"waves alone take 0\.03 from this hull: raise it"):
+        StarterShip("", 63, 9.5, 1350, 0.9, 8.0, 3.9, roll_damping_ratio=0.02, radiated_ratio=0.03)
 
 
 @pytest.mark.evidence

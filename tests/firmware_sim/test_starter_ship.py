@@ -20,6 +20,13 @@ def test_damping_is_as_given_or_estimated_or_assumed() -> None:
     assert unknown.damping == (0.05, "assumed, --draught estimates it")
 
 
+def test_radiation_of_a_hull_takes_the_place_of_the_estimate_s_waves() -> None:
+    estimate, _ = SHIP.damping
+    still, _ = dataclasses.replace(SHIP, radiated_ratio=0.0).damping
+    assert still < estimate
+    assert dataclasses.replace(SHIP, radiated_ratio=0.01).damping[0] == pytest.approx(still + 0.01)
+
+
 @pytest.mark.parametrize(("draught_m", "named"), [(2.0, "beam per draught"), (9.0, "block")])
 def test_a_form_beyond_the_regression_is_named_with_a_wider_factor(draught_m, named) -> None:
     words = dataclasses.replace(SHIP, draught_m=draught_m).damping[1]

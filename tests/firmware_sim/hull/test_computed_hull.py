@@ -7,15 +7,18 @@ from pathlib import Path
 import capytaine as cpt
 import numpy as np
 import pytest
-from beam_sea import motions
+from beam_sea import motions, roll_resonance
 from bodies import Side, box, hemisphere, wigley
+from others import others_file
 
 from firmware_sim.hull import compute
 from firmware_sim.hull.compute import Loading, compute_hull, energy_errors, write_hull
-from firmware_sim.hull.mesh import MeshError
+from firmware_sim.hull.mesh import MeshError, form_mesh
 from utank_hil.configuration.hull_files.parts import Given
 from utank_hil.configuration.hull_files.reader import read_hull
 from utank_hil.dynamics.hull.hull_data import HullData, excitation_at, free_roll, radiation_at
+from utank_hil.dynamics.hull.lateral import LateralHull
+from utank_hil.dynamics.roll_damping import HullForm
 
 RHO, G = 1025.0, 9.80665
 
@@ -151,3 +154,36 @@ def test_what_does_not_belong_together_is_refused(panels, loading, reason: str) 
 def test_period_that_added_mass_alone_exceeds_is_refused() -> None:
     with pytest.raises(ValueError, match=r"added mass alone rolls slower than 7\.2 s"):
         computed(wigley(panels=(16, 5)), roll_period_s=7.2, gm_m=0.2)
+
+
+FPSO = Given(density_kg_m3=1025.0, mass_kg=1025 * 97960.9, gravity_centre_m=(0.788631, 0.0, -1.0))
+
+
+@pytest.mark.parametrize(
+    ("file", "given", "size"),
+    [
+        ("wamit-fpso/fpso.1", FPSO, (200.0, 44.0, 12.0)),
+        ("shipx-supply/input.re7", None, (82.8, 19.2, 6.0)),
+    ],
+)
+def test_usual_hull_of_main_particulars_sways_as_that_of_the_ship_s_own_lines(
+    file: str, given: Given | None, size: tuple[float, float, float]
+) -> None:
+    """WAMIT's and VERES' data of two ships against the form that `init --hull` would make."""
+    lines = read_hull(others_file(f"hulls/{file}"), given)
+    about_g, period_s = lines.about_gravity_centre(), free_roll(lines).period_s
+    gm_m = about_g.hydrostatic[3, 3] / (lines.mass_kg * lines.gravity_m_s2)
+    form = HullForm.usual(*size, lines.mass_kg / 1e3, gm_m)
+    omega = 2 * math.pi / period_s * np.array([0.8, 0.9, 1.0, 1.1, 1.25])
+    loading = Loading(gm_m, roll_period_s=period_s)
+    usual = compute_hull(form_mesh(form), loading, "usual", omega)[1]
+    theirs, ours = roll_resonance(lines, 0.05), roll_resonance(usual, 0.05)
+    assert ours.effective_slope == pytest.approx(theirs.effective_slope, rel=0.03)
+    assert ours.sway_share == pytest.approx(theirs.sway_share, rel=0.04)
+    assert ours.sway_phase_rad == pytest.approx(theirs.sway_phase_rad, abs=math.radians(9))
+    for at in omega[[0, -1]]:
+        added, expected = (radiation_at(of, at)[0][1, 1] for of in (usual, lines))
+        assert added == pytest.approx(expected, rel=0.1)
+        force, there = (abs(excitation_at(of, at, 90.0)[1]) for of in (usual, lines))
+        assert force == pytest.approx(there, rel=0.08)
+    assert LateralHull(usual).effective_slope == pytest.approx(ours.effective_slope, rel=1e-3)
