@@ -5,6 +5,7 @@ or a reader), and what must be said. Code in a file would touch the canary ``ran
 has no signs that steer a terminal.
 """
 
+import errno
 import gzip
 import io
 import os
@@ -19,14 +20,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+import typer
 import yaml
 from test_mutated_files import LAW, made_fmu, ring, status_mb, within
 
 from utank_hil.cli import app
-from utank_hil.console.common import failures_named
+from utank_hil.commands.commissioning_record import write_record
+from utank_hil.console.common import failures_named, prepare_out
 from utank_hil.console.terminal import Terminal
 from utank_hil.telemetry.frame_log import FrameLogWriter
-from utank_hil.telemetry.ring import RingReader
+from utank_hil.telemetry.ring import RingKind, RingReader, RingWriter
+from utank_hil.telemetry.rotation import make_room
 
 ROOT = Path(__file__).resolve().parents[1]
 SHIP = f"vessel: {ROOT}/configs/ships/thesis_first.yaml\n"
@@ -149,6 +153,60 @@ def mat_class(number: int) -> Callable[[Path], object]:
         content = bytearray(path.read_bytes())
         content[144] = number
         path.write_bytes(content)
+
+    return make
+
+
+def mat_bomb(path: Path) -> None:
+    """Write a MATLAB file of 400 kB whose matrix A has 400 MB."""
+    mat(A=np.zeros(1))(path)
+    size = 400 << 20
+    name = struct.pack("<LLLLL8s", 6, 8, 6, 0, 5, struct.pack("<ll", size // 8, 1))
+    content = struct.pack("<LL", 14, size + 56) + name
+    content += struct.pack("<LHH4sLL", 1, 1, 0, b"A\0\0\0", 9, size)
+    packing = zlib.compressobj(9)
+    packed = packing.compress(content)
+    packed += b"".join(packing.compress(bytes(1 << 20)) for _ in range(400)) + packing.flush()
+    path.write_bytes(path.read_bytes()[:128] + struct.pack("<LL", 15, len(packed)) + packed)
+
+
+def wide_mat(path: Path) -> None:
+    from scipy.sparse import csc_array
+
+    mat(**(LAW | {"A": csc_array((1 << 30, 2))}))(path)
+
+
+def mat_73(what: str) -> Callable[[Path], object]:
+    """Return what writes a file of MATLAB 7.3 whose matrix A is hostile."""
+
+    def make(path: Path) -> None:
+        import h5py
+
+        with h5py.File(path, "w", userblock_size=512) as file:
+            for name in ("B", "C", "D", "dt"):
+                file[name] = np.ones((1, 1))
+            if what == "bomb":
+                file.create_dataset("A", (1 << 15, 1 << 15), "f8", chunks=True, compression="gzip")
+            elif what == "sparse":
+                file.create_group("A").attrs["MATLAB_sparse"] = 1 << 40
+                file["A/jc"] = np.zeros(2, dtype="u8")
+            elif what == "empty":
+                file["A"] = np.array([1 << 40, 0], dtype="u8")
+                file["A"].attrs["MATLAB_empty"] = 1
+            elif what == "external":
+                file.create_dataset("A", (4, 4), "u1", external=[("/etc/passwd", 0, 16)])
+            elif what == "virtual":
+                layout = h5py.VirtualLayout((4, 4), "f8")
+                layout[:] = h5py.VirtualSource("other.h5", "A", (4, 4))
+                file.create_virtual_dataset("A", layout)
+            elif what == "cycle":
+                file.create_group("A")
+                file["A/A"] = file["A"]
+        if what == "link":
+            with h5py.File(path.with_name("other.h5"), "w") as file:
+                file["A"] = np.ones((1, 1))
+            with h5py.File(path, "a") as file:
+                file["A"] = h5py.ExternalLink("other.h5", "A")
 
     return make
 
@@ -339,6 +397,15 @@ ROWS = [
         CHECK,
         "must hold numbers",
     ),
+    Row("bomb-mat.yaml", law_of(mat_bomb, ".mat"), CHECK, "unpacks to more than"),
+    Row("wide-mat.yaml", law_of(wide_mat, ".mat"), CHECK, "A has more than"),
+    Row("bomb-73.yaml", law_of(mat_73("bomb"), ".mat"), CHECK, "A has more than"),
+    Row("wide-73.yaml", law_of(mat_73("sparse"), ".mat"), CHECK, "A has more than"),
+    Row("empty-73.yaml", law_of(mat_73("empty"), ".mat"), CHECK, "A has more than"),
+    Row("file-73.yaml", law_of(mat_73("external"), ".mat"), CHECK, "A stands in another file"),
+    Row("link-73.yaml", law_of(mat_73("link"), ".mat"), CHECK, "A stands in another file"),
+    Row("view-73.yaml", law_of(mat_73("virtual"), ".mat"), CHECK, "A stands in another file"),
+    Row("cycle-73.yaml", law_of(mat_73("cycle"), ".mat"), CHECK, "holds no matrices"),
     # models of others
     Row("fmu-code.yaml", fmu(), CHECK, "--allow-code"),
     Row("fmu-up.yaml", fmu(**{"../../ran": "x"}), ALLOWED, "would leave the folder"),
@@ -469,9 +536,6 @@ ROWS = [
 ]
 
 
-# A library may leave a file to the garbage collector; the commands' processes end.
-@pytest.mark.filterwarnings("ignore::ResourceWarning")
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: ascii(row.name))
 def test_a_hostile_file_is_refused_in_words(
     row: Row, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
@@ -532,6 +596,60 @@ def test_a_name_in_shared_memory_that_is_no_file_is_no_ring(make: Callable[[Path
             RingReader(path.name)
     finally:
         path.unlink()
+
+
+def test_what_others_left_in_a_folder_of_recordings_is_passed_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    theirs = tmp_path / "theirs"
+    sparse(theirs)  # Its size counts for nothing, and it stays.
+    (tmp_path / "run-1.rrd").symlink_to(theirs)
+    (tmp_path / "run-2.rrd").symlink_to("run-2.rrd")
+    (tmp_path / "run-3.rrd").mkdir()
+    os.mkfifo(tmp_path / "run-4.frames")
+    for number in (5, 6, 7):
+        (tmp_path / f"run-{number}.rrd").write_bytes(bytes(1000))
+    unlink = Path.unlink
+
+    def refused(path: Path, missing_ok: bool = False) -> None:
+        if path.name == "run-5.rrd":
+            raise PermissionError(errno.EPERM, "of another user", str(path))
+        unlink(path, missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", refused)
+    make_room(tmp_path / "run-8.rrd", 1, 2500)
+    left = {path.name for path in tmp_path.iterdir()}
+    assert {f"run-{number}.rrd" for number in (1, 2, 3, 5, 7)} <= left
+    assert "run-6.rrd" not in left
+    assert theirs.stat().st_size == 1 << 40
+
+
+def test_a_record_takes_the_place_of_a_link_and_leaves_what_it_leads_to(tmp_path: Path) -> None:
+    theirs, record = tmp_path / "theirs", tmp_path / "a.commissioning.json"
+    theirs.write_text("theirs")
+    record.symlink_to(theirs)
+    write_record(record, {"passed": True})
+    assert theirs.read_text() == "theirs"
+    assert not record.is_symlink()
+
+
+def test_a_folder_for_results_that_is_a_link_in_a_circle_or_a_socket_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "circle").symlink_to("circle")
+    listening(tmp_path / "socket")
+    os.mkfifo(tmp_path / "pipe")
+    for name in ("circle", "socket", "pipe"):
+        with pytest.raises(typer.Exit), within(MOST_S, name):
+            prepare_out(tmp_path / name, ("a.png",))
+        assert f"{name}: " in capsys.readouterr().err
+
+
+def test_a_ring_of_another_user_is_not_mapped(monkeypatch: pytest.MonkeyPatch) -> None:
+    with RingWriter(RingKind.ROWS, 16, 1, 8, {"columns": ["a", "b"]}) as writer:
+        monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+        with pytest.raises(OSError, match="of another user"):
+            RingReader(writer.name)
 
 
 def test_a_page_shows_names_and_texts_and_runs_none_of_them(tmp_path: Path) -> None:

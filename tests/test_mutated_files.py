@@ -7,23 +7,27 @@ the file. It writes nothing to standard error, leaves no file open, ends within 
 no more than `MOST_MB`; a log still has what stands before the damage.
 
 In `make test` each reader gets 25 files, or a share of them where its library is slow; `make
-search` draws 200 new ones. ``UTANK_HIL_MUTATIONS`` is another number: with 300000 `make search`
-reads ten million, in some two days of a processor.
+search` draws 200 new ones. `make test-all` reads ten million, each the same every time by its
+reader and number; ``UTANK_HIL_MUTATIONS`` is another number of all.
 """
 
 import gzip
 import json
 import os
+import random
 import re
 import shutil
 import signal
+import struct
 import traceback
 import warnings
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import reload
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,10 +35,17 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from others import others_file
+from pydantic import ValidationError
+from telemetry.bus_files.test_formats import blf, blf_message
 
+from firmware_sim.campaign.axes import Draws
+from firmware_sim.campaign.store import METRICS, Store, read_results
 from firmware_sim.campaign.study import load_study
 from firmware_sim.fmu_file import FmuFile
 from firmware_sim.scenario import Scenario
+from utank_hil.analysis.motion.decay import roll_decay
+from utank_hil.analysis.motion.inclining import inclining
+from utank_hil.base.parameters import ParameterError
 from utank_hil.commands.commissioning_record import why_not_commissioned
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
 from utank_hil.configuration.device_files import Eds, _dbc_layouts
@@ -42,19 +53,23 @@ from utank_hil.configuration.files import ALLOW_CODE
 from utank_hil.configuration.hull_files.parts import Given
 from utank_hil.configuration.hull_files.reader import read_hull
 from utank_hil.configuration.matrices import read_system
+from utank_hil.configuration.spectra import TabulatedSpectrum
+from utank_hil.reports.recording import _alarms
 from utank_hil.sea.measured import load_directional
 from utank_hil.sea.moment_table import MomentTable
 from utank_hil.sea.ndbc import load_ndbc
 from utank_hil.telemetry.bus_files.log import BusLog
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.replay import entries_of
+from utank_hil.telemetry.replay_head import ReplayHeadError, causes, recorded_config
 from utank_hil.telemetry.ring import RingReader, RingWriter
-from utank_hil.telemetry.signal_files import read_signals, write_signals
+from utank_hil.telemetry.signal_files import read_signals, require, write_signals
 
 ROOT = Path(__file__).resolve().parents[1]
 OWN = ("utank_hil", "firmware_sim")
 MOST_S, MOST_MB = 20, 700
-EXAMPLES = int(os.environ.get("UTANK_HIL_MUTATIONS", settings.default.max_examples))
+FILES = int(os.environ.get("UTANK_HIL_MUTATIONS", 10_000_000))
+KINDS = ("flip", "cut", "double", "swap", "insert", "number", "count")
 NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 WRONG = [
     b"nan",
@@ -72,12 +87,12 @@ CONTROLLER = ROOT / "configs" / "controllers" / "gpc.yaml"
 
 
 class Reader(NamedTuple):
-    """A kind of file: its name, how it is made and read, and for how many files one counts."""
+    """A kind of file: its name, how it is made and read, and the ms that takes, as drawn here."""
 
     name: str
     make: Callable[[Path], object]
     read: Callable[[Path], Any]
-    cost: int = 1
+    cost: float = 1
     streamed: bool = False  #: What is read is a list, and `notes` say what is left out.
 
 
@@ -119,7 +134,86 @@ def fmu(path: Path) -> object:
         return error  # It was read, and lacks a variable.
 
 
-def candump(lines: int = 40) -> bytes:
+def wrapped(path: Path, name: str, content: bytes, read: Callable[[Path], Any]) -> Any:
+    """Read a content in the container in which readers find it; errors name that."""
+    whole = path.parent / name
+    whole.write_bytes(content)
+    try:
+        return read(whole)
+    except ValueError as error:
+        why = f"{path.name}: {error}" if name in str(error) else f"without {name}: {error}"
+        raise ValueError(why) from error
+    finally:
+        whole.unlink()
+
+
+def described(path: Path) -> object:
+    with zipfile.ZipFile(path.with_name("a.fmu"), "w") as archive:
+        archive.writestr("modelDescription.xml", path.read_bytes())
+    return wrapped(path, "a.fmu", path.with_name("a.fmu").read_bytes(), fmu)
+
+
+def objects(path: Path) -> object:
+    return wrapped(path, "a.blf", blf(path.read_bytes()), frames)
+
+
+def replayable(path: Path) -> object:
+    def read(log: Path) -> object:
+        head = FrameLog(log).head
+        try:
+            with recorded_config(head) as config:
+                return config, causes(head, config, path.parent)
+        except (ReplayHeadError, ParameterError) as error:
+            raise ValueError(f"{log}: {error}") from error
+
+    body = zlib.compress(path.read_bytes(), 1)
+    size = struct.pack("<4sII", b"HEAD", len(body), zlib.crc32(body, zlib.crc32(b"HEAD")))
+    return wrapped(path, "a.frames", b"UTANKHIL frames 1\n" + size + body, read)
+
+
+def made_head(path: Path) -> None:
+    log = FrameLog(ROOT / "tests" / "replay" / "motion-silent.frames")
+    path.write_text(json.dumps(log.head))
+
+
+def made_objects(path: Path) -> None:
+    path.write_bytes(b"".join(blf_message(1_000_000 * i) for i in range(20)))
+
+
+def of_a_test(find: Callable[..., Any], *names: str) -> Callable[[Path], object]:
+    """Return what reads a test's record and evaluates it, as `identify` does."""
+
+    def read(path: Path) -> object:
+        (run,) = read_signals(path).values()
+        require(path, run, *names)
+        try:
+            return find(*(run[name] for name in names))
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from error
+
+    return read
+
+
+def made_decay(path: Path) -> None:
+    time_s = np.arange(0.0, 60.0, 0.2)
+    roll_rad = 0.2 * np.exp(-0.03 * time_s) * np.cos(0.9 * time_s)
+    roll_decay(time_s, roll_rad)  # It is compiled here.
+    write_signals(path, {"time_s": time_s, "roll_rad": roll_rad})
+
+
+def made_inclining(path: Path) -> None:
+    moment_nm = np.array([0.0, 1e5, 2e5, 0.0, -1e5, -2e5, 0.0])
+    write_signals(path, {"moment_nm": moment_nm, "heel_rad": moment_nm * 1e-7 + 1e-4})
+
+
+def nemoh_results(path: Path) -> object:
+    try:
+        return read_hull(path.parents[1] / "Nemoh.cal")
+    except ValueError as error:  # What fails in the whole is of the main file.
+        raise ValueError(f"{path.name}: {error}") from error
+
+
+def candump(lines: int = 12) -> bytes:
     rows = (
         f"({1e9 + i / 50:.6f}) can0 08FF1080#0102030405060{i % 10:X}0{i % 8} R\n"
         for i in range(lines)
@@ -255,73 +349,147 @@ def configured(model: Any) -> Callable[[Path], object]:
     return lambda path: load_config(path, model)
 
 
+def made_description(path: Path) -> None:
+    made_fmu(path)
+    with zipfile.ZipFile(path) as archive:
+        content = archive.read("modelDescription.xml")
+    path.write_bytes(content)
+
+
+def made_sea(path: Path) -> None:
+    rows = (f"{hz / 50},{hz % 7 / 2}\n" for hz in range(2, 20))
+    path.write_text("frequency_hz,density_m2_hz\n" + "".join(rows))
+
+
+def section(model: Any, path: Path, **content: Any) -> Any:
+    """Return a section that names a file; the configuration says which key that is."""
+    try:
+        return model(**content)
+    except ValidationError as error:
+        raise ValueError(f"{path.name}: {error.errors()[0]['msg']}") from error
+
+
+def tabulated(path: Path) -> object:
+    return section(TabulatedSpectrum, path, kind="tabulated", file=path)
+
+
+def dbc(path: Path) -> object:
+    return _dbc_layouts.__wrapped__(str(path))  # Not what was kept of the whole file.
+
+
+def drawn(path: Path) -> object:
+    return section(Draws, path, samples=3, table=path).samples_drawn()
+
+
+def made_campaign(path: Path) -> None:
+    """Write the folder of a campaign with one case of two runs."""
+    about = {
+        "keys": ["a"], "configuration": {"simulation": "linear"}, "machine": {}, "options": {},
+        "data": {}, "program": "a", "version": "1", "commit": "c", "date": "2026", "command": "a",
+    } | {"machine": {"platform": "a", "python": "3", "cpus": 2}}  # fmt: skip
+    loaded = SimpleNamespace(path=CONTROLLER, cases=[SimpleNamespace(
+        name="a", index=0, waves="w", parameters={"a": 1.5})])  # fmt: skip
+    store = Store(path.parent)
+    store.begin(loaded, about, resume=True)  # type: ignore[arg-type]  # what it takes of a study
+    row = {"case": "a", "status": "ok", "reason": "", "mark": "", "wall_s": 1.0}
+    store.write([row | {"run": run} | dict.fromkeys(METRICS, 0.5) for run in ("passive", "b")])
+
+
+def made_events(path: Path) -> None:
+    event = {"event": "alarm", "time_s": 1.0, "fault": "A", "state": "b", "happened": ""}
+    event |= {"remedy": ""}
+    path.write_text("".join(json.dumps(event | {"time_s": i}) + "\n" for i in range(9)))
+
+
+def alarms(path: Path) -> object:
+    return _alarms(path.with_name("run-a.rrd"))
+
+
 EDS = """[FileInfo]\nFileName=a.eds\n[DeviceInfo]\nVendorName=a\n[1000]\nParameterName=type
 DataType=0x7\nDefaultValue=0x191\n[1800sub1]\nDefaultValue=$NODEID+0x180\n[1800sub2]
 DefaultValue=255\n[1A00sub0]\nDefaultValue=1\n[1A00sub1]\nDefaultValue=0x60000010\n[6000]
 DataType=0x6\n"""
 READERS = [
-    Reader("a.log", lambda path: path.write_bytes(candump()), frames, streamed=True),
-    Reader("a.log.gz", lambda path: path.write_bytes(gzip.compress(candump())), frames),
+    Reader("a.log", lambda path: path.write_bytes(candump()), frames, streamed=True, cost=0.6),
+    Reader("a.log.gz", lambda path: path.write_bytes(gzip.compress(candump())), frames, cost=0.4),
     Reader("a.asc", made_log, frames, streamed=True),
-    Reader("a.trc", made_log, frames, streamed=True),
-    Reader("savvy.csv", made_savvycan, frames, streamed=True),
-    Reader("a.blf", made_log, frames),
-    Reader("a.mf4", made_log, frames, cost=5),
-    Reader("a.frames", made_log, records, cost=5, streamed=True),
-    Reader("a.csv", made_signals, read_signals),
-    Reader("a.parquet", made_signals, read_signals),
-    Reader("a.rrd", made_rrd, read_signals, cost=5),
+    Reader("a.trc", made_log, frames, streamed=True, cost=0.9),
+    Reader("savvy.csv", made_savvycan, frames, streamed=True, cost=0.8),
+    Reader("a.blf", made_log, frames, cost=0.3),
+    Reader("a.mf4", made_log, frames, cost=2),
+    Reader("a.frames", made_log, records, streamed=True, cost=0.7),
+    Reader("a.csv", made_signals, read_signals, cost=2),
+    Reader("a.parquet", made_signals, read_signals, cost=2),
+    Reader("a.rrd", made_rrd, read_signals, cost=4),
     Reader("41010w2019.txt", made_ndbc, load_ndbc),
-    Reader("a.nc", made_netcdf, load_directional, cost=12),
-    Reader("moments.csv", made_moments, MomentTable.read),
+    Reader("a.nc", made_netcdf, load_directional, cost=16),
+    Reader("moments.csv", made_moments, MomentTable.read, cost=0.4),
     *(
-        Reader(name, made_law, read_system)
+        Reader(name, made_law, read_system, cost=0.5)
         for name in ("law.json", "law.npz", "law.mat", "packed.mat", "v73.mat")
     ),
-    Reader("a.fmu", made_fmu, fmu),
-    Reader("a.ring", made_ring, ring),
-    Reader("a.commissioning.json", made_record, commissioned, cost=2),
-    Reader("a.eds", lambda path: path.write_text(EDS), lambda path: Eds(str(path)).sent(1)),
+    Reader("a.fmu", made_fmu, fmu, cost=0.6),
+    Reader("a.ring", made_ring, ring, cost=0.4),
+    Reader("a.commissioning.json", made_record, commissioned, cost=7),
     Reader(
-        "a.dbc", copied("utank_hil/canbus/utank.dbc"), lambda path: _dbc_layouts(str(path)), cost=12
+        "a.eds", lambda path: path.write_text(EDS), lambda path: Eds(str(path)).sent(1), cost=0.7
     ),
-    Reader("ship.yaml", copied("configs/ships/patti_b.yaml"), configured(Vessel)),
-    Reader("controller.yaml", copied("configs/controllers/gpc.yaml"), configured(ControllerConfig)),
-    Reader("scenario.yaml", copied("configs/scenarios/patti_b.yaml"), configured(Scenario), cost=2),
-    Reader("study.yaml", copied("configs/studies/storm_seeds.yaml"), load_study, cost=5),
+    Reader("a.dbc", copied("utank_hil/canbus/utank.dbc"), dbc, cost=18),
+    Reader("ship.yaml", copied("configs/ships/patti_b.yaml"), configured(Vessel), cost=1.6),
+    Reader(
+        "controller.yaml",
+        copied("configs/controllers/gpc.yaml"),
+        configured(ControllerConfig),
+        cost=1.4,
+    ),
+    Reader("scenario.yaml", copied("configs/scenarios/patti_b.yaml"), configured(Scenario), cost=4),
+    Reader("study.yaml", copied("configs/studies/storm_seeds.yaml"), load_study, cost=7),
+    Reader("model.xml", made_description, described),
+    Reader("objects.bin", made_objects, objects, cost=0.5),
+    Reader("head.json", made_head, replayable, cost=2),
+    Reader("decay.csv", made_decay, of_a_test(roll_decay, "time_s", "roll_rad"), cost=1.5),
+    Reader(
+        "inclining.csv",
+        made_inclining,
+        of_a_test(lambda m, h: inclining(m, h, 1.9e7), "moment_nm", "heel_rad"),
+        cost=0.6,
+    ),
+    Reader("sea.csv", made_sea, tabulated, cost=0.3),
+    Reader("climate.csv", copied("configs/seas/climate_northern_north_sea.csv"), drawn, cost=1.6),
+    Reader("cases.parquet", made_campaign, lambda path: read_results(path.parent), cost=2),
+    Reader("study.json", made_campaign, lambda path: read_results(path.parent), cost=0.5),
+    Reader("log-a.jsonl", made_events, alarms, cost=0.3),
     Reader(
         "hull.nc",
         lambda path: shutil.copyfile(ROOT / "tests/dynamics/data/wigley.nc", path),
         read_hull,
-        cost=5,
+        cost=20,
     ),
 ]
-OTHERS = {
-    "hulls/wamit-fpso/fpso.1": lambda path: read_hull(path, Given(density_kg_m3=1025.0)),
-    "hulls/aqwa-cylinder/cylinder.AH1": read_hull,
-    "hulls/nemoh3-cylinder/Nemoh.cal": read_hull,
-    "hulls/nemoh3-cylinder/results/ExcitationForce.tec": lambda path: read_hull(
-        path.parents[1] / "Nemoh.cal"
-    ),
-    "hulls/shipx-supply/input.re7": read_hull,
-    "hulls/shipx-supply/supply.mat": read_hull,
-    "seas/41010.data_spec": load_ndbc,
-    "seas/41010w2019part.txt.gz": load_ndbc,
-    "seas/swanfile.spec": load_directional,
-    "seas/ww3station.spec": load_directional,
-    "seas/spotter_20180214.json": load_directional,
-    "seas/era5file.nc": lambda path: load_directional(path, (72.0, 0.0)),
-    "devices/frames/n2k-two-attitudes.candump.log": frames,
-    "logs/test_CanMessage.asc.gz": frames,
-    "logs/test_CanFdMessage64.asc": frames,
-    "logs/test_CanMessage.blf": frames,
-    "logs/test_CanMessage_V1_1.trc": frames,
-    "devices/dbc/sbgCan.dbc": lambda path: _dbc_layouts(str(path)),
-    "devices/eds/lely-simple.eds": lambda path: Eds(str(path)).sent(1),
-    "decay/kvlcc2_21337.csv": read_signals,
+OTHERS: dict[str, tuple[Callable[[Path], Any], float]] = {
+    "hulls/wamit-fpso/fpso.1": (lambda path: read_hull(path, Given(density_kg_m3=1025.0)), 10),
+    "hulls/aqwa-cylinder/cylinder.AH1": (read_hull, 3),
+    "hulls/nemoh3-cylinder/Nemoh.cal": (read_hull, 6),
+    "hulls/nemoh3-cylinder/results/ExcitationForce.tec": (nemoh_results, 11),
+    "hulls/shipx-supply/input.re7": (read_hull, 18),
+    "hulls/shipx-supply/supply.mat": (read_hull, 10),
+    "seas/41010.data_spec": (load_ndbc, 16),
+    "seas/41010w2019part.txt.gz": (load_ndbc, 2),
+    "seas/swanfile.spec": (load_directional, 2),
+    "seas/ww3station.spec": (load_directional, 1.3),
+    "seas/spotter_20180214.json": (load_directional, 3),
+    "seas/era5file.nc": (lambda path: load_directional(path, (72.0, 0.0)), 17),
+    "devices/frames/n2k-two-attitudes.candump.log": (frames, 26),
+    "logs/test_CanMessage.asc.gz": (frames, 0.4),
+    "logs/test_CanFdMessage64.asc": (frames, 0.3),
+    "logs/test_CanMessage.blf": (frames, 0.3),
+    "logs/test_CanMessage_V1_1.trc": (frames, 0.4),
+    "devices/dbc/sbgCan.dbc": (dbc, 7),
+    "devices/eds/lely-simple.eds": (lambda path: Eds(str(path)).sent(1), 1.3),
+    "decay/kvlcc2_21337.csv": (read_signals, 11),
 }
 MUTATION = st.tuples(
-    st.sampled_from(["flip", "cut", "double", "swap", "insert", "number", "count"]),
+    st.sampled_from(KINDS),
     st.integers(0, 1 << 20),
     st.integers(1, 400),
     st.integers(0, 1 << 16),
@@ -382,40 +550,45 @@ def attempt(path: Path, read: Callable[[Path], Any]) -> Any:
         if isinstance(error, OSError) or type(error).__module__.startswith(OWN):
             place = str(ROOT)
     assert str(ROOT) in place, words
-    assert path.name in words
+    assert path.name in words, words
     links = (f"/proc/self/fd/{each}" for each in os.listdir("/proc/self/fd"))
     left = [os.readlink(each) for each in links if os.path.islink(each)]
     assert not [each for each in left if str(path.parent) in each]
     return result
 
 
-def tried(path: Path, read: Callable[[Path], Any], capfd: Any, cost: int, streamed: bool) -> None:
-    """Read a file, then its mutations."""
-    whole = path.read_bytes()
+class Trial:
+    """Reads a file, then its mutations."""
 
-    @settings(max_examples=max(1, EXAMPLES // cost), phases=(Phase.generate, Phase.shrink))
-    @given(st.lists(MUTATION, min_size=1, max_size=3))
-    def holds(mutations: list[tuple[str, int, int, int]]) -> None:
-        content = mutated(whole, mutations)
-        path.write_bytes(content)
-        result = attempt(path, read)
-        if streamed and result is not None:
-            same = next(
-                (i for i, (a, b) in enumerate(zip(whole, content, strict=False)) if a != b),
-                min(len(whole), len(content)),
-            )
-            _nothing_lost(path, read, first[0], result, same, whole)
+    def __init__(self, path: Path, read: Callable[[Path], Any], streamed: bool) -> None:
+        self.path, self.read, self.streamed = path, read, streamed
+        self.whole = path.read_bytes()
+        self.first = attempt(path, read)
+        assert self.first is not None, f"{path} can't be read"
 
+    def one(self, mutations: list[tuple[str, int, int, int]]) -> None:
+        content = mutated(self.whole, mutations)
+        self.path.write_bytes(content)
+        result = attempt(self.path, self.read)
+        if self.streamed and result is not None:
+            pairs = enumerate(zip(self.whole, content, strict=False))
+            least = min(len(self.whole), len(content))
+            same = next((i for i, (a, b) in pairs if a != b), least)
+            _nothing_lost(self.path, self.read, self.first[0], result, same, self.whole)
+
+
+@contextmanager
+def trial(path: Path, read: Callable[[Path], Any], capfd: Any, streamed: bool) -> Iterator[Trial]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # The commands print none of a library's.
-        first = attempt(path, read)
-        assert first is not None, f"{path} can't be read"
+        begun = Trial(path, read, streamed)
         Path("/proc/self/clear_refs").write_text("5")  # VmHWM starts anew.
         before_mb = status_mb("VmRSS")
-        holds()
+        yield begun
         assert status_mb("VmHWM") - before_mb < MOST_MB
-    path.write_bytes(whole)
-    assert capfd.readouterr().err == ""
+    path.write_bytes(begun.whole)
+    said = capfd.readouterr().err.splitlines()
+    assert not [line for line in said if "newer than the local Rerun" not in line]
 
 
 def _nothing_lost(
@@ -430,25 +603,60 @@ def _nothing_lost(
     assert notes or len(found) >= len(intact[0] if intact else [])
 
 
-@pytest.mark.parametrize("reader", READERS, ids=lambda each: each.name)
+KINDS_OF_FILES = {each.name: each for each in READERS} | {
+    name: Reader(name, others_file, read, cost) for name, (read, cost) in OTHERS.items()
+}
+
+
+def placed(reader: Reader, folder: Path) -> Path:
+    """Make the file of a reader in a folder, or copy that of others with what it needs."""
+    path = folder / Path(reader.name).name
+    if reader.name not in OTHERS:
+        reader.make(path)
+        return path
+    theirs = others_file(reader.name)
+    if "hulls" not in reader.name:
+        shutil.copyfile(theirs, path)
+        return path
+    root = theirs.parents[reader.name.count("/") - 2]  # Results may stand below the file read.
+    shutil.copytree(root, folder / "copy")
+    return folder / "copy" / theirs.relative_to(root)
+
+
+@pytest.mark.parametrize("name", KINDS_OF_FILES)
 def test_a_damaged_file_is_read_or_refused_in_words(
-    reader: Reader, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / reader.name
-    reader.make(path)
-    tried(path, reader.read, capfd, reader.cost, reader.streamed)
-
-
-@pytest.mark.parametrize("name", OTHERS)
-def test_a_damaged_file_of_others_is_read_or_refused_in_words(
     name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    theirs = others_file(name)
-    folder = shutil.copytree(theirs.parent, tmp_path / "copy") if "hulls" in name else tmp_path
-    path = folder / Path(name).name
-    if name.count("/") == 3:  # Results stand below the file that is read.
-        shutil.copytree(theirs.parents[1], tmp_path / "whole")
-        path = tmp_path / "whole" / Path(*Path(name).parts[2:])
-    else:
-        shutil.copyfile(theirs, path)
-    tried(path, OTHERS[name], capfd, 12, streamed=False)
+    reader = KINDS_OF_FILES[name]
+    examples = max(1, int(settings.default.max_examples // max(1, reader.cost)))
+    with trial(placed(reader, tmp_path), reader.read, capfd, reader.streamed) as begun:
+
+        @settings(max_examples=examples, phases=(Phase.generate, Phase.shrink))
+        @given(st.lists(MUTATION, min_size=1, max_size=3))
+        def holds(mutations: list[tuple[str, int, int, int]]) -> None:
+            begun.one(mutations)
+
+        holds()
+
+
+@pytest.mark.evidence
+@pytest.mark.timeout(0)
+@pytest.mark.parametrize("name", KINDS_OF_FILES)
+def test_ten_million_damaged_files_are_read_or_refused_in_words(
+    name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    reader = KINDS_OF_FILES[name]
+    whole = sum(1 / each.cost for each in KINDS_OF_FILES.values())
+    with trial(placed(reader, tmp_path), reader.read, capfd, reader.streamed) as begun:
+        for number in range(1 + int(FILES / reader.cost / whole)):
+            draw = random.Random(f"{name} {number}")
+            mutations = [
+                (draw.choice(KINDS), draw.randrange(1 << 20), draw.randint(1, 400),
+                 draw.randrange(1 << 16))
+                for _ in range(draw.randint(1, 3))
+            ]  # fmt: skip
+            try:
+                begun.one(mutations)
+            except BaseException as error:
+                error.add_note(f"{name}, file {number}: {mutations}")
+                raise

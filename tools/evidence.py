@@ -64,7 +64,7 @@ PARTS: Final = {
     "search": Part("make search", 60),
     "mutants": Part("make mutants", 90),
     "coverage": Part("make coverage", 5),
-    "tests": Part("pytest -n auto -rA -m 'evidence and not socketcan'", 10),
+    "tests": Part("pytest -n auto -rA -m 'evidence and not socketcan'", 150),
     "tests_on_vcan": Part(
         "tools/vcan pytest -m evidence tests/socketcan --ignore=tests/socketcan/test_service.py", 60
     ),

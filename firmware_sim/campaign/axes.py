@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from utank_hil.base.parameters import Finite, Range, refuse
+from utank_hil.base.text_files import lines_of, open_text
 from utank_hil.configuration import Section
 from utank_hil.configuration.spectra import read_spectra, utc
 
@@ -149,10 +150,17 @@ class Draws(Section):
 
 def _rows(table: Path) -> tuple[list[dict[str, Value]], list[float]]:
     """Rows of a table without their weights, and the weights."""
-    with table.open(newline="", encoding="utf-8") as lines:
-        written = list(csv.DictReader(line for line in lines if not line.startswith("#")))
-    if not written or any(None in row or None in row.values() for row in written):
+    with open_text(table) as text:
+        lines = (line for _, line in lines_of(table, text) if not line.startswith("#"))
+        try:
+            names, *cells = filter(None, csv.reader(lines))
+        except (csv.Error, ValueError) as error:
+            raise ValueError(f"{table}: is no table: {error}") from error
+    if not cells or any(len(row) != len(names) for row in cells):
         raise ValueError(f"{table}: needs a heading, and rows of as many cells")
+    if len(set(names)) < len(names):
+        raise ValueError(f"{table}: names a column twice: rename one")
+    written = [dict(zip(names, row, strict=True)) for row in cells]
     rows = [{key: _number(cell) for key, cell in row.items() if key != WEIGHT} for row in written]
     weights = [float(row.get(WEIGHT, 1)) for row in written]
     if not (min(weights) >= 0 and 0 < sum(weights) < np.inf):

@@ -61,7 +61,7 @@ _SCHEMA: Final = pa.schema(
 )
 
 
-class StoreError(Exception):
+class StoreError(ValueError):
     """Error for a folder that cannot be used; the message contains the remedy."""
 
 
@@ -107,7 +107,7 @@ class Store:
         files = sorted(self._rows.glob("*.parquet"))
         if not files:
             return _SCHEMA.empty_table()
-        table = pa.concat_tables([pq.read_table(file) for file in files])
+        table = pa.concat_tables([_table(file) for file in files])
         lost = pc.equal(table["status"], LOST)
         table = pa.concat_tables([table.filter(pc.invert(lost)), table.filter(lost)])
         seen: dict[str, set[str]] = {}
@@ -150,13 +150,29 @@ class Results:
 
 
 def read_results(folder: Path) -> Results:
-    """Read a campaign, complete or not."""
-    about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
+    """Read a campaign, complete or not; StoreError if what is there is none of this program."""
     rows: dict[str, list[dict[str, Any]]] = {}
-    for row in Store(folder).rows().to_pylist():
-        rows.setdefault(row["case"], []).append(row)
-    cases = pq.read_table(folder / CASES).to_pylist()
-    return Results(about, tuple(about["keys"]), cases, rows)
+    place = folder / ABOUT
+    try:
+        about = json.loads(place.read_text(encoding="utf-8"))
+        keys, place = tuple(about["keys"]), folder / ROWS
+        for row in Store(folder).rows().to_pylist():
+            rows.setdefault(row["case"], []).append(row)
+        return Results(about, keys, _table(folder / CASES).to_pylist(), rows)
+    except StoreError:
+        raise
+    except (LookupError, TypeError, ValueError, pa.ArrowException) as error:
+        reason = "is damaged, or of another version"
+        raise StoreError(f"{place}: {reason} ({error!r:.200})") from error
+
+
+def _table(file: Path) -> pa.Table:
+    """Read a table; StoreError names it."""
+    try:
+        with file.open("rb") as content:  # The library leaves open what it can't read.
+            return pq.read_table(content)
+    except (OSError, pa.ArrowException) as error:
+        raise StoreError(f"{file}: is no table that can be read: {error}") from error
 
 
 def _column(values: Iterable[Any]) -> pa.Array:

@@ -54,10 +54,10 @@ def campaign(
     store = Store(folder)
     try:
         store.begin(loaded, _about(loaded, folder, context.params), resume=resume)
+        interrupted = _run(loaded, store, workers or len(os.sched_getaffinity(0)))
+        results = read_results(folder)
     except StoreError as error:
         fail(error)
-    interrupted = _run(loaded, store, workers or len(os.sched_getaffinity(0)))
-    results = read_results(folder)
     groups = summary(results)
     failed = failures(results)
     content = {**results.about, "interrupted": interrupted, "groups": groups, "failures": failed}

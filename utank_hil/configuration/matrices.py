@@ -1,6 +1,7 @@
 """Matrices of a discrete system, read from the files of python-control, numpy and MATLAB."""
 
 import json
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -15,7 +16,9 @@ from utank_hil.control.state_space import SystemMatrices
 _NAMES: Final = ("A", "B", "C", "D")
 _SAMPLE_TIMES: Final = ("sample_time_s", "dt", "Ts")
 _LIMIT_BYTES: Final = 1 << 26  #: Of a law's file; one of a hundred states has some 200 kB.
+_MOST_ELEMENTS: Final = 1 << 20  #: Of a matrix; a law of a thousand states has as many.
 _HDF5: Final = b"\x89HDF\r\n\x1a\n"
+_COMPRESSED: Final = 15  #: Type of a compressed element of a MATLAB file.
 _MATLAB_73: Final = b"MATLAB 7.3"
 _AS_STRUCT: Final = (
     "save its matrices: s = struct('A',sys.A,'B',sys.B,'C',sys.C,'D',sys.D,'Ts',sys.Ts); "
@@ -72,6 +75,8 @@ def _sample_time_s(path: Path, name: str, value: Any) -> float:
 
 def _matrix(path: Path, name: str, value: Any) -> Any:
     """Return an array of real numbers; ValueError names the matrix and what it holds."""
+    if np.prod(np.maximum(getattr(value, "shape", 0), 1), dtype=float) > _MOST_ELEMENTS:
+        raise ValueError(f"{path.name}: {name} has more than {_MOST_ELEMENTS} elements")
     toarray = getattr(value, "toarray", None)
     try:
         matrix = np.asarray(value if toarray is None else toarray())
@@ -161,14 +166,42 @@ def _mat(path: Path) -> Mapping[str, Any]:
         head = file.read(512 + len(_HDF5))
     if head.startswith((_HDF5, _MATLAB_73)) or head[512:] == _HDF5:
         return _mat_73(path)
-    from scipy.io import loadmat  # Few configurations need this import.
-    from scipy.io.matlab import MatlabOpaque
+    from scipy.io.matlab import MatlabOpaque  # Few configurations need this import.
 
-    content: dict[str, Any] = loadmat(path, appendmat=False)
+    content = read_mat(path)
     found = {name: value for name, value in content.items() if not name.startswith("__")}
     if any(isinstance(value, MatlabOpaque) for value in found.values()):
         raise ValueError(f"it holds a MATLAB object, not matrices: {_AS_STRUCT}")
     return found
+
+
+def read_mat(path: Path, **options: Any) -> dict[str, Any]:
+    """Read a MATLAB file up to version 7, with options of `scipy.io.loadmat`.
+
+    ValueError is raised for a damaged file, and one that unpacks to more than `_LIMIT_BYTES`.
+    """
+    from scipy.io import loadmat
+
+    try:
+        with path.open("rb") as file:
+            order: Any = "big" if file.read(128)[126:] == b"MI" else "little"
+            left = _LIMIT_BYTES
+            while len(tag := file.read(8)) == 8:
+                size = int.from_bytes(tag[4:], order)
+                if int.from_bytes(tag[:4], order) == _COMPRESSED:
+                    left -= len(zlib.decompressobj().decompress(file.read(size), left + 1))
+                else:
+                    file.seek(size, 1)
+                if left < 0:
+                    raise ValueError(
+                        f"it unpacks to more than {_LIMIT_BYTES} bytes, the most that is read"
+                    )
+            file.seek(0)
+            return dict(loadmat(file, appendmat=False, **options))
+    except OSError:
+        raise
+    except Exception as error:  # The library raises any exception at a damaged file.
+        raise ValueError(f"{error}" or type(error).__name__) from error
 
 
 def _mat_73(path: Path) -> Mapping[str, Any]:
@@ -178,30 +211,40 @@ def _mat_73(path: Path) -> Mapping[str, Any]:
     with h5py.File(path, "r") as file:
         if "#subsystem#" in file:
             raise ValueError(f"it holds a MATLAB object, not matrices: {_AS_STRUCT}")
-        return {name: _of_hdf5(item) for name, item in file.items() if not name.startswith("#")}
+        return {
+            name: _of_hdf5(item, path) for name, item in file.items() if not name.startswith("#")
+        }
 
 
-def _of_hdf5(item: Any) -> Any:
+def _of_hdf5(item: Any, path: Path) -> Any:
     """Return a variable: a structure as a mapping, a sparse or complex matrix as an array."""
     if "MATLAB_sparse" in item.attrs:
         from scipy.sparse import csc_array
 
-        columns = item["jc"][()]
+        columns = _values(item["jc"], path)
         shape = (int(item.attrs["MATLAB_sparse"]), len(columns) - 1)
         if "data" not in item:  # All elements are zero.
-            return np.zeros(shape)
-        return csc_array((_complex(item["data"][()]), item["ir"][()], columns), shape=shape)
+            return csc_array(shape)
+        data, rows = (_values(item[name], path) for name in ("data", "ir"))
+        return csc_array((data, rows, columns), shape=shape)
     if hasattr(item, "items"):
-        return {name: _of_hdf5(field) for name, field in item.items()}
-    if item.attrs.get("MATLAB_empty"):  # The data are the dimensions.
-        return np.zeros(item[()].astype(int).tolist())
+        return {name: _of_hdf5(field, path) for name, field in item.items()}
+    if item.attrs.get("MATLAB_empty"):  # The data are the dimensions, one of them zero.
+        shape = _values(item, path).astype(int).tolist()
+        return np.zeros(shape if 0 in shape else 0)
     if item.attrs.get("MATLAB_class", b"double") in (b"char", b"logical", b"cell"):
         kind = item.attrs["MATLAB_class"].decode()
         raise ValueError(f"{item.name.rpartition('/')[2]} is of MATLAB's class {kind}")
-    return _complex(item[()]).T
+    return _values(item, path).T
 
 
-def _complex(values: Any) -> Any:
+def _values(item: Any, path: Path) -> Any:
+    """Return numbers; ValueError if they are too many, or stand in another file."""
+    if item.external or item.is_virtual or item.file.filename != str(path):
+        raise ValueError(f"{item.name} stands in another file")
+    if item.size > _MOST_ELEMENTS:
+        raise ValueError(f"{item.name} has more than {_MOST_ELEMENTS} elements")
+    values = item[()]
     return values["real"] + 1j * values["imag"] if values.dtype.names else values
 
 

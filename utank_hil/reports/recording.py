@@ -1,22 +1,35 @@
 """The report of a recording of ``utank-hil run``: ship, passive twin, alarms, deadlines."""
 
-import json
 import math
 import tempfile
 from pathlib import Path
 from typing import Any, Final
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
 from utank_hil.analysis.motion.statistics import roll_statistics
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.text_files import lines_of, open_text
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.pictures import BenchCurve, draw_bench
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
 from utank_hil.reports.page import Report, about_section
 from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.rotation import whole_of
+
+
+class _Event(msgspec.Struct):
+    """A line of a run's log; those of retuning have other keys."""
+
+    event: str
+    time_s: float
+    fault: str = ""
+    state: str | None = None
+    happened: str = ""
+    remedy: str = ""
+
 
 STEP_S: Final = 0.05  #: Step between the samples that are drawn: ample for a ship.
 LEAST_ROWS: Final = 3  #: Rows that statistics and a spectrum need.
@@ -43,11 +56,11 @@ def recording_report(file: Path) -> Report:
     except ValueError:
         about = None
     duration_s = float(rows["time_s"][-1] - rows["time_s"][0])
-    alarms = _alarms(file)
+    alarms, unread = _alarms(file)
     sections = [
         ReportSection("Roll, level and pressure", pictures=[_histories(rows, file.stem)]),
         ReportSection("Modes", tables=[_modes(rows)]),
-        _alarm_section(alarms, file),
+        _alarm_section(alarms, unread, file),
     ]
     sections.append(_deadlines(rows))
     if about is not None:
@@ -60,7 +73,7 @@ def recording_report(file: Path) -> Report:
     return Report(f"{title}: run", below, _verdict(rows, alarms), sections)
 
 
-def _verdict(rows: dict[str, FloatArray], alarms: list[dict[str, Any]]) -> Verdict:
+def _verdict(rows: dict[str, FloatArray], alarms: list[_Event]) -> Verdict:
     lines = []
     active = rows["mode"] == Mode.ACTIVE
     if active.any():
@@ -72,7 +85,7 @@ def _verdict(rows: dict[str, FloatArray], alarms: list[dict[str, Any]]) -> Verdi
     codes = np.unique(rows["fault"][in_service(rows)])
     faults = [Fault(int(code)) for code in codes if code != Fault.NONE]
     lines += [fault_text(fault) for fault in faults]
-    raised = {alarm["fault"] for alarm in alarms if alarm.get("state")}
+    raised = {alarm.fault for alarm in alarms if alarm.state}
     lines += [f"Alarm: {name}." for name in sorted(raised - {fault.name for fault in faults})]
     return Verdict(lines, good=not (faults or raised))
 
@@ -128,16 +141,17 @@ def _modes(rows: dict[str, FloatArray]) -> ReportTable:
     return ReportTable(["from", "mode", "fault"], table, text=True)
 
 
-def _alarms(file: Path) -> list[dict[str, Any]]:
-    """Events of the run's log, if there is one; a last line that was cut is left out."""
-    log, found = _log_of(file), []
+def _alarms(file: Path) -> tuple[list[_Event], int]:
+    """Events of the run's log, if there is one, and the number of its lines that are none."""
+    log, found, unread = _log_of(file), [], 0
     if log.exists():
-        for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
-            try:
-                found.append(json.loads(line))
-            except ValueError:
-                break
-    return [event for event in found if event.get("event") != "retuning"]
+        with open_text(log, errors="replace") as text:
+            for _, line in lines_of(log, text):
+                try:
+                    found.append(msgspec.json.decode(line, type=_Event))
+                except ValueError:
+                    unread += 1
+    return [event for event in found if event.event != "retuning"], unread
 
 
 def _log_of(file: Path) -> Path:
@@ -146,16 +160,17 @@ def _log_of(file: Path) -> Path:
     return whole.with_name(whole.name.replace(RUN, LOG, 1)).with_suffix(".jsonl")
 
 
-def _alarm_section(alarms: list[dict[str, Any]], file: Path) -> ReportSection:
+def _alarm_section(alarms: list[_Event], unread: int, file: Path) -> ReportSection:
+    log = _log_of(file)
+    said = [f"{unread} lines of {log.name} are not understood and left out."] if unread else []
     if not alarms:
-        log = _log_of(file)
         absent = f"Not known: there is no {log.name} beside it."
-        return ReportSection("Alarms", [f"None in {log.name}." if log.exists() else absent])
+        return ReportSection("Alarms", [f"None in {log.name}." if log.exists() else absent, *said])
     rows = []
     for alarm in alarms:
-        at, words = f"{alarm['time_s']:.1f} s", f"{alarm['happened']} {alarm['remedy']}"
-        rows.append([at, alarm["fault"], alarm["state"] or alarm["event"], words])
-    return ReportSection("Alarms", tables=[ReportTable(["at", "", "", ""], rows, text=True)])
+        at, words = f"{alarm.time_s:.1f} s", f"{alarm.happened} {alarm.remedy}"
+        rows.append([at, alarm.fault, alarm.state or alarm.event, words])
+    return ReportSection("Alarms", said, tables=[ReportTable(["at", "", "", ""], rows, text=True)])
 
 
 def _deadlines(rows: dict[str, FloatArray]) -> ReportSection:

@@ -140,7 +140,7 @@ def _chunks(path: Path, component: str) -> list[Chunk]:
         done = subprocess.run(command, env=rerun_environment(), check=False, capture_output=True)
         try:
             chunks = _read_chunks(intact, component)
-        except RuntimeError:
+        except (RuntimeError, ValueError):  # ValueError: nothing was left to write.
             chunks = []
     if not chunks:
         raise ValueError(f"{path}: {damage}")

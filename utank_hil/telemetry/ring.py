@@ -263,9 +263,12 @@ def _opened(name: str) -> int:
         descriptor = os.open(_SHM / name, flags)
     except FileNotFoundError as error:
         raise RingError(f"no ring {name!r}: is its writer running?") from error
-    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+    status = os.fstat(descriptor)
+    # Whoever owns a segment may cut it, which kills its reader; root reads those of a service.
+    foreign = os.geteuid() not in (0, status.st_uid)
+    if foreign or not stat.S_ISREG(status.st_mode):
         os.close(descriptor)
-        raise RingError(f"{name!r} is no telemetry ring")
+        raise RingError(f"{name!r} {'is of another user' if foreign else 'is no telemetry ring'}")
     return descriptor
 
 

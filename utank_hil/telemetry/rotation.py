@@ -5,6 +5,7 @@ A recording is a `.rrd` file, a frame log, or both under one name. A long one ha
 """
 
 import os
+import stat
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -41,10 +42,12 @@ def whole_of(file: Path) -> tuple[Path, int]:
 
 
 def _found(paths: Iterable[Path]) -> Iterator[tuple[Path, stat_result]]:
-    """Return files and their status; another process may remove some meanwhile."""
+    """Return files and their status, no links; another process may remove some meanwhile."""
     for path in paths:
         with suppress(FileNotFoundError):
-            yield path, path.stat()
+            status = path.lstat()
+            if stat.S_ISREG(status.st_mode):
+                yield path, status
 
 
 def _alike(file: Path) -> Iterator[tuple[Path, stat_result]]:
@@ -63,15 +66,15 @@ def _put_before(file: Path, now_ns: int) -> None:
     ages = sorted((status.st_mtime_ns, path) for path, status in _alike(file))
     late = [path for time_ns, path in ages if time_ns >= now_ns]
     for before, path in enumerate(reversed(late), 1):
-        with suppress(FileNotFoundError):
+        with suppress(FileNotFoundError, PermissionError):
             os.utime(path, ns=(now_ns - before, now_ns - before))
 
 
 def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
     """Remove the oldest recordings of a folder until its size is within a limit; return them.
 
-    Only names like that of `file` up to the first hyphen count. It stays; other parts of it go
-    last.
+    Only names like that of `file` up to the first hyphen count. It stays, as what another user
+    owns; other parts of it go last.
     """
     alike: dict[str, dict[Path, stat_result]] = {}
     for path, status in _alike(file):
@@ -88,7 +91,10 @@ def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
         if left <= keep_bytes:
             break
         for path, status in alike[stem].items():
-            path.unlink(missing_ok=True)
+            try:
+                path.unlink(missing_ok=True)
+            except PermissionError:  # Of another user.
+                continue
             left -= status.st_size
             removed.append(path)
     return removed

@@ -80,9 +80,14 @@ def _zones(path: Path) -> list[tuple[str, FloatArray]]:
     zones = []
     for part in parts:
         title, *lines = part.splitlines()
-        zones.append((title, np.array([row for line in lines if (row := floats(line))])))
-    if not zones:
-        raise ValueError(f"{path} holds no zone of numbers")
+        rows = [row for line in lines if (row := floats(line))]
+        if len(set(map(len, rows))) != 1 or not np.isfinite(rows).all():
+            raise ValueError(
+                f"{path}: its zone{title} has rows of different lengths, or no finite numbers"
+            )
+        zones.append((title, np.array(rows)))
+    if len({zone.shape for _, zone in zones}) != 1:
+        raise ValueError(f"{path}: holds no zones of numbers, or zones of different sizes")
     return zones
 
 

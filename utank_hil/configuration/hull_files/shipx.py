@@ -21,6 +21,7 @@ from utank_hil.configuration.hull_files.parts import (
     sibling,
     text,
 )
+from utank_hil.configuration.matrices import read_mat
 from utank_hil.dynamics.hull.hull_data import TO_BODY_AXES, HullData, inverse_shift, wave_number
 
 _FROM_SHIPX = np.array([-1.0, -1, 1, -1, -1, 1])
@@ -120,10 +121,8 @@ def _square(rows: Iterator[list[float]]) -> FloatArray:
 
 def read_mss(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same for all readers
     """Read MSS's structure ``vessel`` of a ``.mat``, up to version 7."""
-    from scipy.io import loadmat
-
     try:
-        vessel = loadmat(path, squeeze_me=True, struct_as_record=False)["vessel"]
+        vessel = read_mat(path, squeeze_me=True, struct_as_record=False)["vessel"]
         main, force = vessel.main, vessel.forceRAO
         speeds = np.atleast_1d(vessel.velocities)
         at_rest = int(np.flatnonzero(speeds == 0)[0])
@@ -139,7 +138,7 @@ def read_mss(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same fo
         headings = -np.degrees(np.asarray(vessel.headings, dtype=np.float64))
         density, gravity = float(main.rho), float(main.g)
         body = rigid_body(_SIGN_MSS * np.asarray(vessel.MRB, dtype=np.float64))
-    except (OSError, NotImplementedError, KeyError, AttributeError, IndexError) as error:
+    except (OSError, KeyError, AttributeError, IndexError) as error:
         raise ValueError(
             f"{path} is no structure of MSS with a speed of zero: {error!r}"
         ) from error

@@ -1,5 +1,6 @@
 """Logs in binary formats: BLF of Vector's programs, and MDF 4 (``.mf4``)."""
 
+import logging
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
@@ -179,7 +180,10 @@ def _frame(kind: int, head_size: int, body: bytes, begin_ns: int) -> BusFrame | 
 
 
 class Mf4Log(FrameSource):
-    """Frames of an MF4 file; BusLogError if it can't be read to its end or holds no frames."""
+    """Frames of an MF4 file; BusLogError if it can't be read to its end or holds no frames.
+
+    What the library says of damaged blocks, which it leaves out, is in the notes.
+    """
 
     def __iter__(self) -> Iterator[BusFrame]:
         import can.io.mf4
@@ -187,15 +191,27 @@ class Mf4Log(FrameSource):
         if find_spec("asammdf") is None:  # The reader would not name the package.
             raise ModuleNotFoundError("asammdf is not installed", name="asammdf")
 
-        from asammdf.blocks.mdf_v4 import MDF4
+        from asammdf.blocks import mdf_v4
 
-        # Its own writes to standard error.
-        MDF4.__del__ = _close_what_is_open  # type: ignore[method-assign]
+        # Its own writes to standard error, and where the machine is slow to standard output.
+        mdf_v4.MDF4.__del__ = _close_what_is_open  # type: ignore[method-assign]
+        vars(mdf_v4)["print"] = _say_nothing
+        said = _Said()
+        log = logging.getLogger("asammdf")
+        log.handlers, log.propagate = [said], False
         # It was imported without asammdf (`utank_hil.canbus.python_can`).
-        reader = reload(can.io.mf4).MF4Reader
+        module = reload(can.io.mf4)
+
+        class Reader(module.MF4Reader):  # type: ignore[misc, name-defined]
+            """The library's own opens the file twice and leaves it open, or takes it whole."""
+
+            def __init__(self, content: BinaryIO) -> None:
+                self._mdf = module.MDF(content)
+                self._start_timestamp = self._mdf.header.start_time.timestamp()
+
         try:
-            with reader(self._path) as messages:
-                for message in messages:
+            with self._path.open("rb") as content:
+                for message in Reader(content):
                     self._count += 1
                     yield of_message(message, str(message.channel))
         except OSError:
@@ -206,6 +222,22 @@ class Mf4Log(FrameSource):
             ) from error
         if not self._count:
             raise BusLogError(f"{self._path}: no frames of a bus in it")
+        if said.first:
+            self.notes.append(f"{self._path.name} is damaged, and this left out: {said.first:.200}")
+
+
+class _Said(logging.Handler):
+    """Keeps the first line of what a library says first."""
+
+    first = ""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Take a record."""
+        self.first = self.first or record.getMessage().partition("\n")[0]
+
+
+def _say_nothing(*_: object, **__: object) -> None:
+    """Take the place of `print` in a library."""
 
 
 def _close_what_is_open(file: Any) -> None:
