@@ -24,6 +24,7 @@ from pydantic import (
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.parameters import NotNegative, Problem, Range, refuse
+from utank_hil.base.text_files import kind_of
 from utank_hil.configuration import Section
 from utank_hil.configuration.spectra import (
     IttcSpectrum,
@@ -228,7 +229,7 @@ class MeasuredSea(MeasuredSpectrum, IrregularSea):
     @model_validator(mode="after")
     def _one_direction_for_each_band(self) -> Self:
         problems: list[Problem] = []
-        directional = self.file.suffix.lower() in SUFFIXES
+        directional = kind_of(self.file) in SUFFIXES
         if self.course_deg is None:
             if self.direction_file is not None:
                 problems.append(("course_deg", "is required with direction_file: from true north"))

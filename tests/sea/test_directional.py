@@ -1,5 +1,6 @@
 """Directional spectra of wave models and buoys: heights, directions, and the sea drawn of them."""
 
+import gzip
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,22 @@ def test_a_file_that_is_none_is_named(tmp_path: Path, name: str, content: bytes,
     (tmp_path / name).write_bytes(content)
     with pytest.raises(ValueError, match=said):
         load_directional(tmp_path / name)
+    packed = tmp_path / f"{name}.gz"
+    packed.write_bytes(gzip.compress(content))
+    with pytest.raises(ValueError, match=said) as error:
+        load_directional(packed)
+    assert str(packed) in str(error.value)
+
+
+def test_a_packed_file_gives_the_same_sea(tmp_path: Path) -> None:
+    whole = load_directional(written(tmp_path))
+    packed = tmp_path / "spectra.nc.gz"
+    packed.write_bytes(gzip.compress((tmp_path / "spectra.nc").read_bytes()))
+    found = load_directional(packed)
+    np.testing.assert_array_equal(found.density, whole.density)
+    assert found.source == str(packed)
+    assert [note.replace(".nc.gz", ".nc") for note in found.notes] == list(whole.notes)
+    assert scenario(tmp_path, file="./spectra.nc.gz", course_deg=1.0).sea(1).heading_rad.std() > 0.2
 
 
 # wavespectra leaves the file of SWAN open

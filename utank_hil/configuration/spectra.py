@@ -21,7 +21,7 @@ from pydantic import (
 )
 
 from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
-from utank_hil.base.text_files import read_number_table
+from utank_hil.base.text_files import kind_of, read_number_table
 from utank_hil.configuration.files import Section
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.tank import GRAVITY_M_S2
@@ -233,7 +233,7 @@ def _loaded(
     place: tuple[float, float] | None,
     written: tuple[int, ...],  # noqa: ARG001, a file that is written anew is read anew
 ) -> MeasuredSpectra:
-    if file.suffix.lower() not in SUFFIXES:
+    if kind_of(file) not in SUFFIXES:
         if place is not None:
             raise ValueError(f"{file}: is of one place: remove the key place")
         return load_ndbc(file, direction_file)

@@ -11,12 +11,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
+from shutil import copyfileobj
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.text_files import open_content
 from utank_hil.sea.spectrum import Spectrum, Spread, band_edges
 
 if TYPE_CHECKING:
@@ -131,12 +134,23 @@ _NEAR_DEG: Final = 0.5
 def load_directional(path: Path, place: tuple[float, float] | None = None) -> MeasuredSpectra:
     """Load the directional spectra of one place.
 
-    `place` is latitude and longitude in degrees, and may be omitted for a file of one place. Each
-    band has its mean direction and spread; heights are those of the bands, without a tail beyond
-    the last one. Spectra without values are left out and named in the notes. ValueError is raised
-    if the file can't be read, holds no spectra, or the place is none of its places. OSError is
-    raised if it can't be opened.
+    The file may be compressed with gzip. `place` is latitude and longitude in degrees, and may be
+    omitted for a file of one place. Each band has its mean direction and spread; heights are those
+    of the bands, without a tail beyond the last one. Spectra without values are left out and named
+    in the notes. ValueError is raised if the file can't be read, holds no spectra, or the place is
+    none of its places. OSError is raised if it can't be opened.
     """
+    if path.suffix.lower() == ".gz":
+        with TemporaryDirectory() as folder, open_content(path) as content:
+            file = Path(folder, path.stem)
+            with file.open("wb") as unpacked:
+                copyfileobj(content, unpacked)
+            try:
+                found = load_directional(file, place)
+            except ValueError as error:
+                raise ValueError(str(error).replace(str(file), str(path))) from error
+        named = tuple(note.replace(str(file), str(path)) for note in found.notes)
+        return replace(found, source=str(path), notes=named)
     path.open("rb").close()  # Readers give a less precise reason.
     try:
         import wavespectra

@@ -12,6 +12,9 @@ frequency that the directional files (``.swdir``) lack::
     #YY  MM DD hh mm Sep_Freq  < spec_1 (freq_1) spec_2 (freq_2) ... >
     2019 02 10 05 40 0.153 0.000 (0.033) 0.012 (0.038) ...
 
+wavespectra's reader of these files is not used: it takes mean directions for a sea of 35.6 m, keeps
+a doubled row, and refuses a year whose bands change (4.9, on the reported cases).
+
 A missing value is ``MM``, 99.00 (densities only), 999 or 9999, with any number of decimals. A file
 may be compressed with gzip, and may change its bands from row to row.
 """

@@ -301,35 +301,52 @@ def test_a_copy_is_the_same_to_a_microsecond_and_others_read_the_same(
             assert message.is_rx != original.sent
 
 
-def test_mf4_of_others_is_read_as_they_read_it(tmp_path: Path) -> None:
+def test_channels_of_like_names_stay_apart(tmp_path: Path) -> None:
+    names = ["can1", "can11", "can0", "vcan1", "11", "1"]
+    frames = [BusFrame(number, name, 5, False, D, b"", 0) for number, name in enumerate(names)]
+    for suffix, theirs in (("asc", can.ASCReader), ("blf", can.BLFReader)):
+        write_frames(tmp_path / f"a.{suffix}", frames)
+        with theirs(tmp_path / f"a.{suffix}") as messages:
+            assert len({message.channel for message in messages}) == len(names)
+
+
+@pytest.mark.parametrize("suffix", ["mf4", "trc"])
+def test_files_of_others_are_read_as_they_read_them(tmp_path: Path, suffix: str) -> None:
     pytest.importorskip("asammdf")
     from importlib import reload
 
     import can.io.mf4
+    import can.io.trc
 
-    with reload(can.io.mf4).MF4Writer(tmp_path / "a.mf4") as writer:
+    path = tmp_path / f"a.{suffix}"
+    writer = can.io.trc.TRCWriter if suffix == "trc" else reload(can.io.mf4).MF4Writer
+    with writer(path) as log:
         for number in range(40):
-            writer.on_message_received(
+            log.on_message_received(
                 can.Message(
                     timestamp=1_780_000_000.0 + number / 128,
                     arbitration_id=0x18FF0080 if number % 2 else 0x123,
                     is_extended_id=bool(number % 2),
-                    is_remote_frame=number == 6,
+                    is_remote_frame=number == 6 and suffix == "mf4",
                     data=bytes([number] * (number % 9)) if number != 6 else b"",
-                    dlc=number % 9,
+                    dlc=number % 9 if number != 6 or suffix == "mf4" else 0,
                     is_rx=number % 3 > 0,
                     channel=1,
                 )
             )
     notes: list[str] = []
-    found = list(BusLog(tmp_path / "a.mf4").frames(notes))
+    found = list(BusLog(path).frames(notes))
     assert (len(found), notes) == (40, [])
     begin_ns = found[0].time_ns
     for number, frame in enumerate(found):
-        assert abs(frame.time_ns - begin_ns - round(number / 128 * 1e9)) < 1000
-        assert frame.kind is (R if number == 6 else D)
+        # TRC has a tenth of a millisecond, MF4 a microsecond.
+        off_ns = frame.time_ns - begin_ns - round(number / 128 * 1e9)
+        assert abs(off_ns) < (100_000 if suffix == "trc" else 1000)
+        assert frame.kind is (R if number == 6 and suffix == "mf4" else D)
         assert frame.data == (b"" if number == 6 else bytes([number] * (number % 9)))
         assert (frame.extended, frame.sent) == (bool(number % 2), number % 3 == 0)
+    if suffix == "trc":
+        return
     damaged = bytearray((tmp_path / "a.mf4").read_bytes())
     damaged[200:260] = bytes(60)
     (tmp_path / "b.mf4").write_bytes(damaged)
