@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from configparser import ConfigParser, Error
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
@@ -29,27 +30,29 @@ _TIMED: Final = (254, 255)  #: Types of a PDO that its event timer sends.
 _NODE: Final = re.compile(r"^\$NODEID\s*\+?\s*|\s*\+\s*\$NODEID$", re.IGNORECASE)
 
 
+def _text(kind: str, file: str, encodings: tuple[str, ...]) -> str:
+    """Read a file in the first encoding that it is text in."""
+    try:
+        with open_content(Path(file), LIMIT_BYTES) as opened:
+            content = opened.read()
+    except OSError as error:
+        raise ValueError(f"{kind}: {file} can't be read: {error.strerror}") from error
+    for encoding in encodings:
+        with suppress(UnicodeDecodeError):
+            return content.decode(encoding)
+    raise ValueError(f"{kind}: {file} is text in none of {', '.join(encodings)}")
+
+
 class Eds:
     """The objects of a file; ValueError names file, object and remedy."""
 
     def __init__(self, file: str) -> None:
         self.file = file
-        try:
-            with open_content(Path(file), LIMIT_BYTES) as opened:
-                content = opened.read()
-        except OSError as error:
-            raise ValueError(f"eds: {file} can't be read: {error.strerror}") from error
-        for encoding in ENCODINGS:
-            try:
-                text = content.decode(encoding)
-                break
-            except UnicodeDecodeError:
-                continue
         parser = ConfigParser(
             interpolation=None, delimiters=("=",), inline_comment_prefixes=(";", "#")
         )
         try:
-            parser.read_string(text, Path(file).name)
+            parser.read_string(_text("eds", file, ENCODINGS), Path(file).name)
         except Error as error:
             raise ValueError(f"eds: {file} is no EDS: {error.message}") from error
         self._sections = {name.upper(): dict(parser[name]) for name in parser.sections()}
@@ -370,23 +373,13 @@ def _dbc_layouts(file: str) -> dict[str, dict[str, Any]]:
     """Layouts of all messages of a DBC, as `MessageSection` has them, by their names."""
     from cantools.database.can import Database
 
-    try:
-        with open_content(Path(file), LIMIT_BYTES) as opened:
-            content = opened.read()
-    except OSError as error:
-        raise ValueError(f"dbc: {file} can't be read: {error.strerror}") from error
+    text = _text("dbc", file, DBC_ENCODINGS)
     database = Database(strict=False)  # one message that does not fit spoils no other
-    for encoding in DBC_ENCODINGS:
-        try:
-            database.add_dbc_string(content.decode(encoding))
-            break
-        except UnicodeDecodeError:
-            continue
-        except Exception as error:  # a damaged file makes the library raise errors of any kind
-            why = f"{error}" or type(error).__name__
-            raise ValueError(f"dbc: {file} is no DBC: {why}") from error
-    else:
-        raise ValueError(f"dbc: {file} is text in none of {', '.join(DBC_ENCODINGS)}")
+    try:
+        database.add_dbc_string(text)
+    except Exception as error:  # a damaged file makes the library raise errors of any kind
+        why = f"{error}" or type(error).__name__
+        raise ValueError(f"dbc: {file} is no DBC: {why}") from error
     return {message.name: _layout(message) for message in database.messages}
 
 
