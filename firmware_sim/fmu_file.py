@@ -166,10 +166,11 @@ def read_description(path: Path) -> Any:
     from fmpy import read_model_description
 
     try:
-        with zipfile.ZipFile(path) as archive:
-            _refuse_parts(archive)
-            _refuse_document_type(archive.read(_DESCRIPTION))
-        description = read_model_description(path)
+        with path.open("rb") as file:  # FMPy leaves open what it refuses.
+            with zipfile.ZipFile(file) as archive:
+                _refuse_parts(archive)
+                _refuse_document_type(archive.read(_DESCRIPTION))
+            description = read_model_description(file)
     except OSError:
         raise
     except Exception as error:  # Readers raise any exception at a damaged file.
