@@ -52,6 +52,7 @@ PARTS: Final = {
     "shipped_scenarios": Part(_study("shipped_scenarios"), 10),
     "year_of_seas": Part(_study("year_of_seas"), 30),
     # what the safety code is worth
+    "half_pressure": Part("python -m tools.studies.half_pressure --json", 5),
     "fault_campaign": Part("utank-hil faults --seeds 100 --json", 20),
     "fault_campaign_roll": Part("utank-hil faults --seeds 10 --full --json", 20),
     "false_alarms": Part("python -m tools.studies.false_alarms --hours 50 --json", 1200),

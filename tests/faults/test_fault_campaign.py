@@ -254,7 +254,7 @@ def _after(seconds: float, mode: Mode) -> Callable[[Supervisor, Measurements, in
     [
         (Supervisor, "_while_faulted", _after(2.0, Mode.STANDBY), "levels-stuck", "not latched"),
         (Supervisor, "_while_faulted", _after(15.0, Mode.ACTIVE), "levels-stuck", "armed again"),
-        (RunningLaw, "share", lambda *_: 1.0, "noise-10-fold", "more than it may"),
+        (RunningLaw, "share", lambda *_: 1.0, "roll-drift-slow", "more than it may"),
         (DriveFollowing, "update", lambda *_, **__: 0, "pump-stalled", "was not found"),
     ],
 )

@@ -48,7 +48,9 @@ def test_each_reaction_asks_for_its_own() -> None:
     assert not spoken("roll-spike", calm).passed
     assert spoken("roll-100-ms-late", calm).passed
     assert not spoken("roll-100-ms-late", GOOD).passed
-    assert spoken("noise-10-fold", replace(calm, halved=50.0, alarm=100.0)).passed
+    assert spoken("roll-drift-slow", replace(calm, halved=50.0, alarm=100.0)).passed
+    assert spoken("level-noise", replace(calm, alarm=100.0)).passed
+    assert not spoken("level-noise", replace(calm, halved=50.0, alarm=100.0)).passed
     lossy = replace(calm, alarm=900.0)
     assert spoken("gateway-loses-5-percent", lossy).passed
     assert not spoken("gateway-loses-5-percent", replace(lossy, alarm=5100.0)).passed
@@ -72,8 +74,8 @@ def test_a_fault_that_is_latched_has_a_name_of_the_row() -> None:
 
 def test_where_nothing_is_latched_an_alarm_has_the_row_s_name_in_time() -> None:
     halved = replace(GOOD, mode="ACTIVE", found=None, code="NONE", halved=50.0)
-    assert spoken("noise-10-fold", replace(halved, alarm=2100.0)).passed
-    late = spoken("noise-10-fold", replace(halved, alarm=2101.0))
+    assert spoken("roll-drift-slow", replace(halved, alarm=30100.0)).passed
+    late = spoken("roll-drift-slow", replace(halved, alarm=30101.0))
     assert late.problems == ("seed 1: called NONE",)
     refused = replace(GOOD, mode="INIT", was_active=False, found=None, code="MOTION_SILENT")
     assert spoken("high-level-before-ready", replace(refused, alarm=9000.0)).passed
@@ -102,8 +104,7 @@ def test_what_the_bus_was_not_told_fails_the_row(
         "both-signs-flipped": GOOD,
         "level-offset": replace(GOOD, code="SIGNAL_DELAYED", found=31e3, halved=1e3,
                                 zero=31.5e3),
-        "saturated": replace(GOOD, mode="ACTIVE", found=None, code="NONE", halved=10.1e3,
-                             alarm=10.1e3),
+        "saturated": replace(GOOD, mode="ACTIVE", found=None, code="NONE", alarm=10.1e3),
         "drive-warns": replace(GOOD, mode="ACTIVE", found=None, code="NONE", alarm=100.0),
     }[row]  # fmt: skip
     sound = said(row, outcome)

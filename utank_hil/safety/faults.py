@@ -147,7 +147,7 @@ FAULTS: Final = (
          "DRIVE_STATUS_2.",
          "Find the identifier that is missing on the bus (candump), and in docs/can-catalogue.md "
          "whose it is; check that device's supply, bus connection and firmware.",
-         _found(_HALVE, "DRIVE_STATUS_2, or a heartbeat of drive, sensors, valve or hard-wired "
+         _found(_WARN, "DRIVE_STATUS_2, or a heartbeat of drive, sensors, valve or hard-wired "
              "inputs, silent for 1 s", Finding.NODE_SILENT)),
     _row(Fault.VALVE_SILENT, "The tank's valve sends no status, or does not receive the commands "
          "in time.",
@@ -209,7 +209,7 @@ FAULTS: Final = (
          Condition(_RAMP, "last good sample older than {motion_age_ms:g} ms",
              lambda seen, limits: seen.motion.age_ms > limits.motion_age_ms,
              zero_within_ms=200, awaited=3),  # 250 after the sample, of which 40 ms are allowed
-         Condition(_HALVE, "one of two motion sensors: last good sample older than "
+         Condition(_WARN, "one of two motion sensors: last good sample older than "
              "{motion_spare_age_ms:g} ms",
              lambda seen, limits: seen.motion_spare_age_ms > limits.motion_spare_age_ms)),
     _row(Fault.SENSORS_DISAGREE, "The two motion sensors disagree.",
@@ -257,7 +257,7 @@ FAULTS: Final = (
     _row(Fault.NOISE, "The motion sensor or a level gauge is noisier than its figures.",
          "Check the sensor's fastening, cable and supply, and the section `sensors` of the "
          "configuration.",
-         _found(_HALVE, "five times the noise of the section `sensors`, 3.75 times in the sum of "
+         _found(_WARN, "five times the noise of the section `sensors`, 3.75 times in the sum of "
              "the levels, over 0.7 s", Finding.NOISE)),
     _row(Fault.SIGNAL_DELAYED, "The water moves before the measured roll does: the motion sensor "
          "is late.",
@@ -274,7 +274,7 @@ FAULTS: Final = (
     _row(Fault.SATURATION, "The pump has been held at its limit on one side.",
          "Correct a steady heel by ballast; lower the law's gains if the sea asks for more than "
          "the pump has.",
-         _found(_HALVE, "command at its limit to one side, or drive at one of its own, for 10 s",
+         _found(_WARN, "command at its limit to one side, or drive at one of its own, for 10 s",
              Finding.SATURATED)),
     _row(Fault.ROLL_AMPLIFIED, "The ship rolls more than it would with the pump at rest.",
          "Retune the law, or use one for this load and sea.",

@@ -36,7 +36,7 @@ class SafetyLimits:
     #: Longest age of the motion sensor's last good sample while armed.
     motion_age_ms: _Silence = 40.0
     #: Age of the last good sample of the motion sensor that is not in use, where there are two,
-    #: from which half the pressure is allowed.
+    #: from which it is an alarm.
     motion_spare_age_ms: _Silence = 100.0
     #: Longest age of the hard-wired inputs, where there are such.
     hardwired_age_ms: _Silence = 150.0
