@@ -134,6 +134,12 @@ class CanopenNode:
         frames, self._out = self._out, []
         return frames
 
+    def swap(self) -> None:
+        """Put another device of the same kind in its place: it starts, with another number."""
+        serial = self.entries.setdefault(Place(0x1018, 4), Entry(0, 4))
+        serial.value += 1
+        self.state = NetworkState.BOOT_UP
+
     def emergency(self, code: int) -> None:
         """Send an emergency message; 0 says that errors are over."""
         self.entries[Place(0x1001)].value = int(code != 0)

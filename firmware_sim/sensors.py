@@ -1,5 +1,6 @@
 """Sensor node: motion sensor, level gauges, high-level switches, pump pressure."""
 
+import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -20,6 +21,7 @@ from utank_hil.canbus import (
     Switch,
     Transmitter,
 )
+from utank_hil.canbus.codec import Codec
 from utank_hil.canbus.profiles.device_plan import NO_FOREIGN_DEVICES, DevicePlan, ForeignDevices
 from utank_hil.nodes.housekeeping import Housekeeping
 
@@ -33,20 +35,32 @@ class ForeignFrames:
     ValueError is raised if a cycle is no whole number of ticks: an emulated device has no other.
     """
 
-    def __init__(self, plan: DevicePlan[Any]) -> None:
+    def __init__(self, plan: DevicePlan[Any], native: Transmitter[Any], codec: Codec[Any]) -> None:
         for each in plan.messages:
             if each.cycle_ns % TICK_NS:
                 raise ValueError(
                     f"devices.{plan.name}: a cycle of {each.cycle_ns / 1e6:g} ms can't be "
                     f"emulated, only whole multiples of {TICK_NS / 1e6:g} ms"
                 )
-        self._plan = plan
+        self.plan = plan
+        #: Faults of what it measures: they spoil its message as the catalogue's node would send it.
+        self.spoiled: list[Any] = []
+        self._native, self._codec = native, codec
+        self._kept: tuple[Any, ...] | None = None
         self._counts = [0] * len(plan.messages)
 
     def frames(self, message: tuple[Any, ...], now_ns: int, tick: int) -> list[Frame]:
         """The frames that are due in this tick."""
-        frames = []
-        for place, each in enumerate(self._plan.messages):
+        frames: list[Frame] = []
+        if self.spoiled:
+            if tick % (self.plan.cycle_ns // TICK_NS) == 0:
+                self._kept = self._spoil(message, now_ns)
+            if self._kept is None:
+                return frames
+            message = self._kept
+        measured = [signal.place for each in self.plan.messages for signal in each.signals]
+        missing = any(math.isnan(float(message[place])) for place in measured)
+        for place, each in enumerate(self.plan.messages):
             if tick % (each.cycle_ns // TICK_NS):
                 continue
             word = 0
@@ -54,7 +68,10 @@ class ForeignFrames:
                 value = signal.sign * float(message[signal.place]) - signal.offset
                 word = signal.field.put(word, value / signal.factor, each.length)
             for condition in each.conditions:
-                word = condition.field.put(word, min(condition.allowed), each.length)
+                # a device without a code for it says so by its status
+                good = min(condition.allowed)
+                status = condition.mask & ~good if missing else good
+                word = condition.field.put(word, status, each.length)
             if each.stamp is not None:
                 stamp = round(now_ns / (1e3 * each.stamp_us)) % (1 << each.stamp.bits)
                 word = each.stamp.put(word, stamp, each.length)
@@ -67,6 +84,13 @@ class ForeignFrames:
                 data = data[:at] + bytes([each.crc.of(data)]) + data[at + 1 :]
             frames.append(Frame(each.can_ids[-1], data))
         return frames
+
+    def _spoil(self, message: tuple[Any, ...], now_ns: int) -> tuple[Any, ...] | None:
+        """What is left of a measurement by the faults; None if nothing is."""
+        native = [self._native.frame(message)]
+        for each in self.spoiled:
+            native = [out for frame in native for out in each.frames(frame, now_ns)]
+        return self._codec.decode(native[-1].data) if native else None
 
 
 NOISE_BLOCK = 4096  #: Number of random values drawn at once. Chosen; no study.
@@ -111,6 +135,9 @@ class SensorNode:
         address = Address.SENSORS_2 if second else Address.SENSORS
         self.hears: frozenset[int] = frozenset()
         self._plant = plant
+        self._catalogue = catalogue
+        #: Devices of other makers, by the identifier of the message that each stands for.
+        self.devices: dict[int, ForeignFrames] = {}
         self._errors = errors
         self._draw = standard_normal(seed).__next__
         delay_ticks = round(errors.motion_delay_ms * 1e6 / TICK_NS)
@@ -139,7 +166,15 @@ class SensorNode:
         server = CanopenSensor(plan) if plan.steps else None
         if server is not None:
             self.hears |= server.hears
-        self._foreign.append((ForeignFrames(plan), measure, server))
+        codec = self._catalogue.codec(plan.kind, Address(transmitter.can_id & 0xFF))
+        device = self.devices[codec.can_id] = ForeignFrames(plan, transmitter, codec)
+        self._foreign.append((device, measure, server))
+
+    def swap(self) -> None:
+        """Put other CANopen sensors of the same kind in the place of its own."""
+        for _, _, server in self._foreign:
+            if server is not None:
+                server.swap()
 
     def _publish(self, transmitter: Transmitter[_M], measure: Callable[[], _M]) -> None:
         """Send the result of `measure` once in the message's cycle."""

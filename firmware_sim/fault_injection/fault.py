@@ -102,6 +102,8 @@ class MessageFault(Fault):
     """Fault of one message, at the node that sends it."""
 
     message: MessageName
+    of_frames: ClassVar[bool] = False
+    """Whether frames of any layout can have it; else it spoils what a device measures."""
 
     @property
     def named(self) -> NamedMessage:
@@ -118,8 +120,14 @@ class MessageFault(Fault):
 
     def _place(self, bench: Bench, span: Span, seed: int) -> None:
         _, source, codec = self.named
-        spoiled = Spoiled(span, self._spoil(seed), codec.can_id)
-        bench.nodes[NODE_OF[source]].spoiled.append(spoiled)
+        node = bench.nodes[NODE_OF[source]]
+        device = getattr(node.node, "devices", {}).get(codec.can_id)
+        if device is None or not self.of_frames:
+            spoiled = Spoiled(span, self._spoil(seed), codec.can_id)
+            (node if device is None else device).spoiled.append(spoiled)
+            return
+        for each in device.plan.messages:  # of a device of another maker
+            node.spoiled.append(Spoiled(span, self._spoil(seed), each.can_ids[-1]))
 
 
 def whole_cycles(by_s: float, cycle_ns: int) -> int:

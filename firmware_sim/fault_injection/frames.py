@@ -22,6 +22,7 @@ _FOREIGN_DATA_IDS: Final = data_ids(127)  # Data IDs that no message of the cata
 class Lost(MessageFault):
     """Frames are lost: all of them, or a share by chance."""
 
+    of_frames = True
     kind: Literal["lost"]
     share: Annotated[float, Field(gt=0, le=1)] = 1.0  #: Share of the frames lost at random.
 
@@ -33,6 +34,7 @@ class Lost(MessageFault):
 class Frozen(MessageFault):
     """The same frame is sent again and again."""
 
+    of_frames = True
     kind: Literal["frozen"]
 
     def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
@@ -48,6 +50,7 @@ class Frozen(MessageFault):
 class Replayed(MessageFault):
     """The first frames of the fault are repeated in place of the new ones."""
 
+    of_frames = True
     kind: Literal["replayed"]
     frames: Annotated[int, Field(ge=2)]  #: Number of frames that are repeated.
 
@@ -67,6 +70,7 @@ class Replayed(MessageFault):
 class Doubled(MessageFault):
     """Every frame is sent several times."""
 
+    of_frames = True
     kind: Literal["doubled"]
     times: Annotated[int, Range(least=2, most=100)] = 2  #: Number of times that each frame is sent.
 
@@ -77,6 +81,7 @@ class Doubled(MessageFault):
 class Inserted(MessageFault):
     """An old frame is sent beside each new one."""
 
+    of_frames = True
     kind: Literal["inserted"]
     back: Annotated[int, Range(least=1, most=10_000)]  #: Age of the old frame in cycles.
 

@@ -33,6 +33,7 @@ AnyFault = Annotated[
     | nodes.Mute
     | nodes.Deaf
     | nodes.LostIdentifier
+    | nodes.Replaced
     | nodes.Link
     | nodes.Pump
     | nodes.Drive

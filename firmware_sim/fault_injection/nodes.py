@@ -91,6 +91,19 @@ class LostIdentifier(NodeFault):
         bench.nodes[self.node].spoiled.append(Spoiled(span, lose))
 
 
+class Replaced(NodeFault):
+    """Another device of the same kind, with another serial number, starts in the node's place."""
+
+    kind: Literal["replaced"]
+
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
+        node = bench.nodes[self.node]
+        swap = getattr(node.node, "swap", None)
+        if swap is None:
+            raise ValueError(f"{self.node} is no CANopen device: it has no identity to change")
+        node.at(span.begin_ns, swap)
+
+
 class Link(NodeFault):
     """The node's interface reports an error during the whole fault.
 

@@ -1,22 +1,29 @@
 """Emulated sensors that speak a maker's frames, on a bus of their own."""
 
+import math
 from collections import Counter
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 
+from firmware_sim.fault_injection.bench_parts import FaultyNode
+from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node
-from utank_hil.canbus import Mode
+from utank_hil.canbus import Mode, Quality
 from utank_hil.canbus.frame import BUS_SHIFT
+from utank_hil.canbus.profiles.device import ProfiledDevice
 from utank_hil.configuration import load_config
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.runners import Lockstep, SimulatedBus
 from utank_hil.runners.lockstep import with_more
 
+fault_of = TypeAdapter(AnyFault).validate_python
 SECOND_NS = 1_000_000_000
 SBG = {"profile": "sbg_ellipse", "bus": "can1", "accept_unprotected": True}
 LEVELS = {
@@ -84,4 +91,50 @@ def test_a_cycle_that_is_no_whole_tick_is_refused():
     from firmware_sim.sensors import ForeignFrames
 
     with pytest.raises(ValueError, match="5 ms can't be emulated"):
-        ForeignFrames(foreign.motions[0])
+        ForeignFrames(foreign.motions[0], None, None)
+
+
+@pytest.mark.parametrize(
+    "device", [SBG, {"profile": "j1939_ssi2", "source": 0x20, "accept_unprotected": True}]
+)
+@pytest.mark.parametrize(
+    ("fault", "usable"),
+    [
+        ({"kind": "value", "values": {"roll_rad": None}}, 0),
+        ({"kind": "offset", "signals": ["roll_rad"], "by": 0.25}, 20),
+        ({"kind": "lost"}, 0),
+        ({"kind": "frozen"}, 20),
+    ],
+)
+def test_faults_of_a_message_are_those_of_the_device_that_stands_for_it(device, fault, usable):
+    """What the faults of the campaign do to another maker's frames, as the controller hears it."""
+    scenario = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
+    vessel = scenario.vessel.model_copy(update={"devices": DevicesSection(motion=device)})
+    scenario = scenario.model_copy(update={"vessel": vessel})
+    node = FaultyNode(build_ship_side(scenario, 1, scenario.operator).sensors)
+    bench = SimpleNamespace(nodes={"sensors": node})
+    fault_of(fault | {"message": "SENSOR_MOTION"}).place(bench, SECOND_NS // 5, 0)
+    found, heard = ProfiledDevice(vessel.foreign.motions[0]), []
+    found.deliver = lambda message, now_ns: heard.append((now_ns, message))
+    for k in range(40):
+        for frame in node.tick(k * SECOND_NS // 100):
+            found.takes.get(frame.can_id, lambda *_: None)(frame, k * SECOND_NS // 100)
+    good = [m for now, m in heard if m.quality is Quality.GOOD and math.isfinite(m.roll_rad)]
+    before = [m for now, m in heard if now < SECOND_NS // 5]
+    after = good[len(before) :]
+    assert len(before) in (19, 20)  # the first stamp tells nothing yet
+    if fault["kind"] == "frozen" and device is SBG:  # its stamps stand
+        usable = 1
+    assert len(after) == usable
+    if fault["kind"] == "offset":
+        assert after[0].roll_rad == pytest.approx(before[-1].roll_rad + 0.25, abs=2e-3)
+    if fault["kind"] == "frozen":
+        assert len({m.roll_rad for m in after}) == 1
+
+
+def test_a_native_node_has_no_identity_to_change():
+    scenario = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
+    drive = build_ship_side(scenario, 1, scenario.operator).drive
+    bench = SimpleNamespace(nodes={"drive": FaultyNode(drive)})
+    with pytest.raises(ValueError, match="no CANopen device"):
+        fault_of({"kind": "replaced", "node": "drive"}).place(bench, 0, 0)

@@ -80,10 +80,13 @@ class Field:
     def put(self, word: int, value: float, length: int) -> int:
         """The frame's content as a number, least byte first, with this value in it.
 
-        The value is cut to what the bits, and the counts that are values, can hold.
+        The value is cut to what the bits, and the counts that are values, can hold. NaN is the
+        first count beyond these; zero where every count is a value.
         """
         raw = (value - self.offset) / self.scale
-        if self._ieee:
+        if math.isnan(value) and not self._ieee:
+            counts = self._most + 1 & self._mask
+        elif self._ieee:
             counts = int.from_bytes(struct.pack(self._ieee, raw), "little")
         else:
             low = -self._half if self._half <= self._mask else 0
