@@ -1,4 +1,4 @@
-"""``tuning: auto``: margins on another ship, its sea, what a file may say; how a law is scaled."""
+"""``tuning: auto``: margins and cost of what is found, another ship, and what a file may say."""
 
 import dataclasses
 from pathlib import Path
@@ -7,14 +7,27 @@ import numpy as np
 import pytest
 from shipped_designs import DPC_ROLL_LEVEL, LQG_ROLL_RATE_LEVEL
 
-from utank_hil.analysis.loop.linear_tuning import LINEAR_KINDS, AutoDesign, scaled, varied
+from utank_hil.analysis.loop.linear_tuning import (
+    LINEAR_KINDS,
+    AutoDesign,
+    _Search,
+    auto_tuned,
+    scaled,
+    varied,
+)
 from utank_hil.analysis.loop.margins import robustness
-from utank_hil.analysis.loop.sea_response import moment_of, motion_in_sea
+from utank_hil.analysis.loop.sea_response import motion_in_sea
+from utank_hil.analysis.loop.self_tuning import (
+    NoLawError,
+    cost_weights,
+    passive_roll_rad,
+    unknown_sea,
+)
 from utank_hil.assembly import build_law
 from utank_hil.configuration import ConfigError, ControllerConfig, load_config
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.sea import jonswap
+from utank_hil.sea import EffectiveSlope, Sea, jonswap
 
 CONTROLLERS = Path("configs/controllers").resolve()
 SHIPPED = {
@@ -25,24 +38,61 @@ SPECTRUM = jonswap(1.0, 8.0)
 SEA = SeaModel(tuple(SPECTRUM.frequency_hz), tuple(SPECTRUM.density))
 
 
+@pytest.fixture
+def short_search(monkeypatch):
+    monkeypatch.setattr("utank_hil.analysis.loop.linear_tuning._SIZES", 1)
+    monkeypatch.setattr("utank_hil.analysis.loop.linear_tuning._SWEEPS", 1)
+    monkeypatch.setattr("utank_hil.analysis.loop.linear_tuning.STEP", 8.0)
+
+
+@pytest.mark.evidence("dpc", "gpc")
 @pytest.mark.parametrize("kind", LINEAR_KINDS)
-def test_another_ship_in_a_sea_that_is_not_known_gets_a_law_with_all_margins(kind) -> None:
+def test_the_law_has_all_margins_and_costs_less_than_the_one_that_is_only_scaled(
+    kind, short_search
+):
+    found = auto_tuned(kind, PLANT, SEA)
+    law, measured = found.design.law(PLANT), found.design.predictor.measured
+    assert not robustness(law, PLANT, measured, with_delay_margin=False).failures()
+    assert found.cost < _Search(kind, PLANT, SEA).start.cost
+
+
+@pytest.mark.evidence
+def test_in_mild_weather_it_costs_less_than_the_law_that_was_tuned_in_the_storm():
+    found = auto_tuned("lqg", PLANT, SEA)
+    assert found.cost < 0.95 * _Search("lqg", PLANT, SEA)._cost(SHIPPED["lqg"].law)
+    assert min(found.design.predictor.measurement_std) >= 2e-4  # the sensors' own
+
+
+def test_the_cost_is_that_of_the_sum_over_random_components(short_search):
+    found = auto_tuned("lqg", PLANT, SEA)
+    moment = Sea.irregular(SPECTRUM, 1, components=4096).roll_moment(
+        PLANT.ship.stiffness_nm_rad, EffectiveSlope(SEA.effective_slope)
+    )
+    measured = found.design.predictor.measured
+    motion = motion_in_sea(found.design.law(PLANT), PLANT, measured, moment)
+    passive_rad, limits = passive_roll_rad(PLANT, SEA), PLANT.limits
+    pressure = motion.pressure_rms_pa / limits.pressure_pa
+    squares = np.square([motion.roll_rms_rad, motion.level_rms_m, pressure])
+    expected = squares @ cost_weights(passive_rad, limits) / passive_rad**2
+    assert found.cost == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.evidence
+def test_another_ship_in_a_sea_that_is_not_known_gets_a_law():
     naval = load_config(CONTROLLERS / "naval_constrained_gpc.yaml", ControllerConfig).plant
-    law = AutoDesign(kind, "auto").build(naval)
+    design = AutoDesign("lqg", "auto")
+    law = design.build(naval)
     assert not robustness(law.linear, naval, law.measured, with_delay_margin=False).failures()
-    passive = motion_in_sea(None, naval, law.measured, moment_of(SEA, naval.ship))
-    active = motion_in_sea(law.linear, naval, law.measured, moment_of(SEA, naval.ship))
-    assert active.roll_rms_rad < 0.95 * passive.roll_rms_rad
+    assert design.tuned(naval) == auto_tuned("lqg", naval, unknown_sea(naval.ship)).design
 
 
-def test_the_sea_that_is_named_is_the_one_designed_for() -> None:
-    tuned = AutoDesign("lqg", "auto", SEA).tuned(PLANT)
-    moment = moment_of(SEA, PLANT.ship)
-    roll = motion_in_sea(None, PLANT, (), moment).roll_rms_rad
-    assert tuned.predictor.wave_slope_rad == pytest.approx(1.46 * roll, rel=0.02)
-    higher = SeaModel(SEA.frequency_hz, tuple(4 * density for density in SEA.density_m2_hz))
-    twice = AutoDesign("lqg", "auto", higher).tuned(PLANT).predictor.wave_slope_rad
-    assert twice == pytest.approx(2 * tuned.predictor.wave_slope_rad, rel=0.01)
+def test_a_sea_without_waves_is_refused():
+    class Still:
+        def slope_density(self, omega_rad_s):
+            return 0 * omega_rad_s
+
+    with pytest.raises(NoLawError, match="does not roll"):
+        auto_tuned("lqg", PLANT, Still())
 
 
 def test_an_exact_deadbeat_is_scaled_by_its_horizon_and_keeps_its_window():

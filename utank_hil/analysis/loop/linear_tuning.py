@@ -1,4 +1,4 @@
-"""Tuning of linear laws: a shipped law scaled to ship, pump and sea.
+"""Tuning of linear laws: a shipped law scaled to ship, pump and sea, and a search from there.
 
 The parameters of ``lqg.yaml``, ``gpc.yaml`` and ``dpc.yaml`` in ``configs/controllers`` are those
 of one ship in one sea. Made dimensionless by roll frequency w, effective wave slope s, greatest
@@ -13,20 +13,25 @@ pressure P and level limit h, they serve another ship in another sea (`scaled_la
 Similarity does not guarantee robustness. The weights on the motion of a law that misses a required
 margin are lowered until it has all margins (`first_law`).
 
-``tuning: auto`` (`AutoDesign`) is that law for the sea that a file names, or an unknown one.
+With ``tuning: auto`` (`auto_tuned`) four factors are then varied in turn, in decreasing steps: on
+the weights, on the noises (never below the sensors'), on peak and on damping of the waves in the
+predictor. A law is accepted if it has all margins and costs less in that sea, by linear prediction,
+with the cost of a self-tuned law (`cost_weights`).
 """
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Final, Literal, NamedTuple, TypeVar, get_args
 
 import numpy as np
 
+from utank_hil.analysis.loop.loop_simulation import SensorNoise
 from utank_hil.analysis.loop.margins import Robustness, closed_loop_response, robustness
-from utank_hil.analysis.loop.sea_response import moment_of
+from utank_hil.analysis.loop.sea_response import SlopeDensity, moment_of, motion_in_sea
 from utank_hil.analysis.loop.self_tuning import (
     NoLawError,
+    cost_weights,
     sample_time_of,
     short,
     unknown_sea,
@@ -75,6 +80,11 @@ _SHIPPED: Final[dict[LinearKind, _Shipped]] = {
         (0.35, 0.175, 0.00534, 0.000296),
     ),
 }
+_STEPS: Final = (4.0, 2.0, 1.15, 2.0)
+"""First step of each factor: on weights, noises, peak and damping. Chosen; no study."""
+_SIZES: Final = 3  # Number of step sizes, each the square root of the one before. Chosen; no study.
+_SWEEPS: Final = 3  # Limit on passes over the factors with one step size. Chosen; no study.
+_MOST_DAMPING: Final = 1.0  # Limit on the damping of the predictor's waves: critical damping.
 _SLOPE: Final = 1.46
 """Significant slope of the sea assumed for the scaled law, over the passive roll's RMS."""
 
@@ -85,6 +95,7 @@ class TunedLaw:
 
     design: LinearDesign
     robustness: Robustness
+    cost: float = math.nan  #: Predicted cost, over that with the passive tank; if it was asked for.
 
 
 def varied(design: Design) -> str:
@@ -165,13 +176,39 @@ def first_law(
     failures: tuple[str, ...] = ()
     for trial in range(MOST_TRIALS):
         asked = scaled(design, STEP**-trial)
-        law = asked.law(plant)
-        judged = robustness(law, plant, asked.predictor.measured, with_delay_margin=False)
+        judged = _judged(asked, plant)
         failures = judged.failures()
         if not failures and suits(asked):
             return TunedLaw(asked, judged)
     gentlest = failures[0] if failures else "beyond the limits of pump and tank"
     raise NoLawError(f"no {kind.upper()} law will do on this ship; the gentlest one is {gentlest}")
+
+
+def _judged(design: LinearDesign, plant: DesignPlant) -> Robustness:
+    return robustness(design.law(plant), plant, design.predictor.measured, with_delay_margin=False)
+
+
+def auto_tuned(kind: LinearKind, plant: DesignPlant, sea: SlopeDensity) -> TunedLaw:
+    """Find the law of a kind with all margins that costs least of those tried.
+
+    Raises `NoLawError` if no law has the margins, or the sea does not roll the ship.
+    """
+    search = _Search(kind, plant, sea)
+    best, factors = search.start, [1.0] * len(_STEPS)
+    for size in range(_SIZES):
+        for _ in range(_SWEEPS):
+            before = best.cost
+            for which, first in enumerate(_STEPS):
+                for step in (first ** (0.5**size), first ** -(0.5**size)):
+                    tried = [*factors]
+                    tried[which] *= step
+                    better = search.better(tried, best.cost)
+                    if better is not None:
+                        best, factors = better, tried
+                        break
+            if best.cost == before:
+                break
+    return best
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,16 +223,83 @@ class AutoDesign:
     def tuned(self, plant: DesignPlant) -> LinearDesign:
         """Numbers of the law for a plant.
 
-        Raises `NoLawError` as `first_law`.
+        Raises `NoLawError` as `auto_tuned`.
         """
-        moment = moment_of(self.sea or unknown_sea(plant.ship), plant.ship)
-        w = moment.frequency_rad_s
-        answers, _ = closed_loop_response(None, plant, (), w)
-        energy = np.square(np.abs(answers[:, STATES.index("roll_rad")]) * moment.amplitude) / 2
-        passive_rad = math.sqrt(float(energy.sum()))
-        mean_rad_s = float(energy @ w / energy.sum())
-        return first_law(plant, _SLOPE * passive_rad, mean_rad_s, kind=self.kind).design
+        return auto_tuned(self.kind, plant, self.sea or unknown_sea(plant.ship)).design
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Design the law for a plant."""
         return self.tuned(plant).build(plant)
+
+
+class _Search:
+    """Design, judgement and prediction of laws of a kind for one ship in one sea."""
+
+    def __init__(self, kind: LinearKind, plant: DesignPlant, sea: SlopeDensity) -> None:
+        self._least_std = asdict(SensorNoise())
+        self._plant = plant
+        self._moment = moment_of(sea, plant.ship)
+        w = self._moment.frequency_rad_s
+        answers, _ = closed_loop_response(None, plant, (), w)
+        roll = np.abs(answers[:, STATES.index("roll_rad")])
+        energy = np.square(roll * self._moment.amplitude) / 2
+        self._passive_rad = math.sqrt(float(energy.sum()))
+        if not self._passive_rad > 0:
+            raise NoLawError("the sea does not roll the ship: there is nothing to design a law for")
+        self._weights = cost_weights(self._passive_rad, plant.limits)
+        mean_rad_s = float(energy @ w / energy.sum())
+        peaks = mean_rad_s, math.sqrt(mean_rad_s * plant.ship.natural_frequency_rad_s)
+        first = [first_law(plant, _SLOPE * self._passive_rad, peak, kind=kind) for peak in peaks]
+        self.start = min(
+            (replace(each, cost=self._cost(each.design)) for each in first),
+            key=lambda each: each.cost,
+        )
+
+    def better(self, factors: list[float], cost: float) -> TunedLaw | None:
+        """The law with these factors if it has all margins and costs less than `cost`."""
+        design = _varied(self.start.design, self._least_std, *factors)
+        if design is None:
+            return None
+        try:
+            found = self._cost(design)
+            if not found < cost:
+                return None
+            judged = _judged(design, self._plant)
+        except (ValueError, ArithmeticError):  # LinAlgError is a ValueError
+            return None
+        return None if judged.failures() else TunedLaw(design, judged, found)
+
+    def _cost(self, design: LinearDesign) -> float:
+        plant, limits = self._plant, self._plant.limits
+        law, measured = design.law(plant), design.predictor.measured
+        motion = motion_in_sea(law, plant, measured, self._moment)
+        pressure = motion.pressure_rms_pa / limits.pressure_pa
+        squares = np.square([motion.roll_rms_rad, motion.level_rms_m, pressure])
+        return float(squares @ self._weights) / self._passive_rad**2
+
+
+def _varied(
+    design: LinearDesign,
+    least_std: dict[str, float],
+    weight: float,
+    noise: float,
+    peak: float,
+    damping: float,
+) -> LinearDesign | None:
+    """Return a design with its numbers multiplied, or None if its waves become invalid."""
+    given = design.predictor
+    damping_ratio = given.wave_damping_ratio * damping
+    peak_rad_s = given.wave_peak_rad_s * peak
+    if not (damping_ratio < _MOST_DAMPING and peak_rad_s * given.sample_time_s < math.pi):
+        return None
+    predictor = replace(
+        given,
+        measurement_std=tuple(
+            max(noise * std, least_std.get(name, 0.0))
+            for name, std in zip(given.measured, given.measurement_std, strict=True)
+        ),
+        pressure_noise_pa_rt_s=noise * given.pressure_noise_pa_rt_s,
+        wave_peak_rad_s=peak_rad_s,
+        wave_damping_ratio=damping_ratio,
+    )
+    return scaled(replace(design, predictor=predictor), weight)
