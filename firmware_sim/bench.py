@@ -2,6 +2,7 @@
 
 import math
 import multiprocessing
+import pickle
 import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
@@ -27,6 +28,7 @@ from firmware_sim.ship_side import PASSIVE_SCRIPT
 from firmware_sim.worker_pool import WorkerPool, shared, whole_first
 from utank_hil.assembly import build_law
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import ParameterError
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, PassiveDesign
 from utank_hil.runners import stop_on_signals
@@ -164,7 +166,8 @@ def run_bench(
 
     Each run has its own process. Ctrl-C ends the runs between two ticks, with the pump at zero; the
     rows recorded until then are returned. `progress` is called several times a second; laws that
-    are not given are designed. Raises `OSError` if the interface cannot be used, or everything was
+    are not given are designed. Raises `ParameterError` for a law that its process cannot be given,
+    a lambda for example. Raises `OSError` if the interface cannot be used, or everything was
     ended before the first sample. Raises `BrokenProcessPool` if a process was killed before the
     passive run had ended.
     """
@@ -173,6 +176,7 @@ def run_bench(
     jobs = jobs_of(scenario, seed, duration_s, laws)
     if options.frames is not None:
         jobs = [replace(job, frames=options.frames / frames_name(job.name)) for job in jobs]
+    _refuse_what_can_not_be_sent(jobs)
     started = time.monotonic()
     workers = 2 if options.channel is not None or not options.real_time else 1
     with stop_on_signals() as stopped:
@@ -191,6 +195,18 @@ def run_bench(
     if not runs or len(runs[0].rows) == 0:
         raise InterruptedError("ended before the first sample")
     return replace(_result(jobs, runs, _mode(options), interrupted, started), killed=killed)
+
+
+def _refuse_what_can_not_be_sent(jobs: Iterable[Job]) -> None:
+    for job in jobs:
+        try:
+            pickle.dumps(job)
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            why = (
+                f"can't be given to the process of its run ({error}): "
+                "it may hold functions of a module, but no lambda and no open file"
+            )
+            raise ParameterError("", [(f"controllers.{job.name}.law", why)]) from error
 
 
 def run_in_turn(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.progress import TaskProgressColumn
 
+from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import describe
 from utank_hil.base.shipped import CONFIGS
 from utank_hil.configuration.files import files_named
@@ -167,6 +168,8 @@ def _run(
             return run_bench(
                 scenario, options, lambda name, done: bar.update(tasks[name], completed=done), laws
             )
+        except ParameterError as error:
+            fail(error, ExitCode.USAGE)
         except InterruptedError as error:
             fail(error, ExitCode.INTERRUPTED)
         except OSError as error:

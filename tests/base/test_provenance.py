@@ -157,6 +157,7 @@ def test_a_wheel_brings_its_commit_configurations_and_pages(tmp_path: Path) -> N
     ).stdout
     assert head.startswith(commit_of_wheel.rpartition("-g")[2])
     assert found >= {
+        "SECURITY.md",
         "configs/scenarios/storm.yaml",
         "docs/deployment.md",
         "docs/how-to/buy.md",

@@ -24,6 +24,8 @@ from firmware_sim.report_page import write_files
 from firmware_sim.report_tables import motion_table
 from firmware_sim.run import COLUMNS, RECORD_S, Run, run_lockstep
 from firmware_sim.scenario import Scenario
+from utank_hil.assembly import build_law
+from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import describe
 from utank_hil.canbus import Mode
 from utank_hil.configuration import load_config
@@ -50,6 +52,14 @@ def storm() -> BenchResult:
     scenario = STORM.model_copy(update={"settle_s": SETTLE_S})
     with in_one_process():
         return run_bench(scenario, BenchOptions(duration_s=DURATION_S), lambda *_: None)
+
+
+def test_a_law_that_its_process_can_not_be_given_is_refused_by_its_key() -> None:
+    laws = {name: build_law(each) for name, each in STORM.controllers.items()}
+    made = laws["gpc"].controller
+    laws["gpc"] = dataclasses.replace(laws["gpc"], controller=lambda: made())
+    with pytest.raises(ParameterError, match=r"controllers\.gpc\.law can't be given .*lambda"):
+        run_bench(STORM, BenchOptions(duration_s=1.0), lambda *_: None, laws)
 
 
 def about(result: BenchResult, folder: Path) -> dict[str, Any]:
