@@ -75,6 +75,7 @@ PARTS: Final = {
         f"cost_{name}": Part(f"python -m tools.benchmarks.{name} {options}--json", minutes)
         for name, options, minutes in (
             ("realtime", "--seconds 200 ", 20),
+            ("campaign", "", 1),
             ("slice", "", 1),
         )
     },

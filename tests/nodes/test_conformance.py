@@ -9,7 +9,7 @@ from firmware_sim.sensors import ForeignFrames
 from tests.firmware_sim.drive_bench import VESSEL, calm_plant
 from tests.nodes.canopen_peers import PROFILE, PUMP, Line
 from utank_hil.base.tick import TICK_NS
-from utank_hil.canbus import Frame, Quality, SensorMotion
+from utank_hil.canbus import Frame, Quality, SensorMotion, load_catalogue
 from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.drive_plan import NetworkState, Place
 from utank_hil.configuration.device_sections import DriveSection
@@ -32,7 +32,8 @@ def heel_rad(asked, since_s):
 def sensor_trial(sign=1, rate_sign=1, every=1, repeats=False, silent=False):
     """A trial of an emulated inertial sensor whose person takes three seconds a step."""
     plan = DevicesSection(motion=SBG).foreign().motions[0]
-    device, asked = ForeignFrames(plan), []
+    catalogue, asked = load_catalogue(), []
+    device = ForeignFrames(plan, catalogue.transmitter(SensorMotion), catalogue.codec(SensorMotion))
 
     def ask(what):
         asked.append(now_ns)
