@@ -153,13 +153,16 @@ def load_directional(path: Path, place: tuple[float, float] | None = None) -> Me
         return replace(found, source=str(path), notes=named)
     path.open("rb").close()  # Readers give a less precise reason.
     try:
+        import dask
         import wavespectra
     except ImportError as error:
         reason = "directional spectra need wavespectra: pip install 'utank-hil[files]'"
         raise ValueError(f"{path}: {reason}") from error
     name = _reader(path)
     try:
-        content = getattr(wavespectra, name)(str(path)).load()
+        # one thread: those of dask were seen to wait for each other for ever
+        with dask.config.set(scheduler="synchronous"):
+            content = getattr(wavespectra, name)(str(path)).load()
     except Exception as error:  # Readers raise any exception at a damaged file.
         program = name.removeprefix("read_")
         raise ValueError(f"{path}: can't be read as a file of {program}: {error}") from error
