@@ -14,23 +14,44 @@ from utank_hil.canbus import (
     Address,
     Catalogue,
     Frame,
+    Mode,
+    OperatorCommand,
     Quality,
     SensorMotion,
     SensorPump,
     SensorTank,
     Switch,
     Transmitter,
+    ValveStatus,
 )
 from utank_hil.canbus.codec import Codec
-from utank_hil.canbus.profiles.device_plan import NO_FOREIGN_DEVICES, DevicePlan, ForeignDevices
+from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
+from utank_hil.canbus.profiles.device_plan import (
+    NO_FOREIGN_DEVICES,
+    DevicePlan,
+    ForeignDevices,
+    MessageEncoder,
+)
+from utank_hil.canbus.profiles.drive_plan import HEARTBEAT
 from utank_hil.nodes.housekeeping import Housekeeping
 
 if TYPE_CHECKING:
     from firmware_sim.plant import Plant  # compiled: a scenario is read without it
 
 
+def _said(message: tuple[Any, ...]) -> tuple[float, ...]:
+    """What a message says by `FIELDS`, in their order."""
+    if isinstance(message, ValveStatus):
+        return message.opening, float(message.open_limit), float(message.shut_limit)
+    if isinstance(message, OperatorCommand):
+        passive = message.mode_request is Mode.PASSIVE
+        pressed = message.arm, message.stop, message.acknowledge, message.reset, passive
+        return tuple(map(float, pressed))
+    return tuple(math.nan if value is None else float(value) for value in message)
+
+
 class ForeignFrames:
-    """Encodes what a device of the plan sends: values, status, counters, stamps and checksums.
+    """Encodes what a device of the plan sends, but for the heartbeat that its node sends itself.
 
     ValueError is raised if a cycle is no whole number of ticks: an emulated device has no other.
     """
@@ -47,7 +68,12 @@ class ForeignFrames:
         self.spoiled: list[Any] = []
         self._native, self._codec = native, codec
         self._kept: tuple[Any, ...] | None = None
-        self._counts = [0] * len(plan.messages)
+        own = STANDARD | HEARTBEAT + (plan.node or 0)  # a CANopen node sends it by itself
+        self._encoders = [
+            MessageEncoder(each)
+            for each in plan.messages
+            if not plan.steps or each.can_ids[0] != own | plan.bus << BUS_SHIFT
+        ]
 
     def frames(self, message: tuple[Any, ...], now_ns: int, tick: int) -> list[Frame]:
         """The frames that are due in this tick."""
@@ -58,32 +84,14 @@ class ForeignFrames:
             if self._kept is None:
                 return frames
             message = self._kept
+        values = _said(message)
         measured = [signal.place for each in self.plan.messages for signal in each.signals]
-        missing = any(math.isnan(float(message[place])) for place in measured)
-        for place, each in enumerate(self.plan.messages):
-            if tick % (each.cycle_ns // TICK_NS):
-                continue
-            word = 0
-            for signal in each.signals:
-                value = signal.sign * float(message[signal.place]) - signal.offset
-                word = signal.field.put(word, value / signal.factor, each.length)
-            for condition in each.conditions:
-                # a device without a code for it says so by its status
-                good = min(condition.allowed)
-                status = condition.mask & ~good if missing else good
-                word = condition.field.put(word, status, each.length)
-            if each.stamp is not None:
-                stamp = round(now_ns / (1e3 * each.stamp_us)) % (1 << each.stamp.bits)
-                word = each.stamp.put(word, stamp, each.length)
-            if each.counter is not None:
-                self._counts[place] = (self._counts[place] + 1) % (1 << each.counter.bits)
-                word = each.counter.put(word, self._counts[place], each.length)
-            data = word.to_bytes(each.length, "little")
-            if each.crc is not None:
-                at = each.crc.byte
-                data = data[:at] + bytes([each.crc.of(data)]) + data[at + 1 :]
-            frames.append(Frame(each.can_ids[-1], data))
-        return frames
+        missing = any(math.isnan(values[place]) for place in measured)
+        return [
+            each.frame(values, now_ns, missing=missing)
+            for each in self._encoders
+            if tick % (each.plan.cycle_ns // TICK_NS) == 0
+        ]
 
     def _spoil(self, message: tuple[Any, ...], now_ns: int) -> tuple[Any, ...] | None:
         """What is left of a measurement by the faults; None if nothing is."""

@@ -13,13 +13,14 @@ from functools import partial
 from typing import Any, Final
 
 from firmware_sim.canopen_drive import CanopenPumpDrive
+from firmware_sim.canopen_node import CanopenSensor
 from firmware_sim.drive import PumpDrive
 from firmware_sim.guard.parameters import guard_parameters
 from firmware_sim.guard.reference import GuardNode
 from firmware_sim.plant import Plant
 from firmware_sim.scenario import Scenario
-from firmware_sim.sensors import SensorNode
-from firmware_sim.valve import ValveNode
+from firmware_sim.sensors import ForeignFrames, SensorNode
+from firmware_sim.valve import ForeignValve, ValveNode
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Address,
@@ -27,12 +28,14 @@ from utank_hil.canbus import (
     DriveStatus1,
     Frame,
     HardwiredInputs,
+    OperatorCommand,
     Quality,
     Receiver,
     Switch,
     ValveStatus,
     load_catalogue,
 )
+from utank_hil.canbus.profiles.device_plan import DevicePlan
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.tank import Tank, negligible
@@ -166,6 +169,45 @@ class HardwiredNode:
         return frames
 
 
+class ForeignPanel(OperatorPanel):
+    """Operator station of another maker: the same buttons, in the frames of its plan."""
+
+    def __init__(
+        self,
+        plan: DevicePlan[OperatorCommand],
+        catalogue: Catalogue,
+        script: Iterable[TimedAction] = (),
+    ) -> None:
+        super().__init__(catalogue, configuration_version=0, script=script, period_ns=TICK_NS)
+        self._server = CanopenSensor(plan) if plan.steps else None
+        if self._server is not None:
+            self.hears |= self._server.hears
+        self._frames = ForeignFrames(plan, self._sender, catalogue.codec(OperatorCommand))
+        #: What it sends, by the identifier of the message that it stands for.
+        self.devices = {self._sender.can_id: self._frames}
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Take the controller's status, and what is asked of a CANopen node."""
+        super().receive(frame, now_ns)
+        if self._server is not None:
+            self._server.receive(frame, now_ns)
+
+    def swap(self) -> None:
+        """Put another panel of the same kind in its place."""
+        if self._server is not None:
+            self._server.swap()
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Send what is pressed, and that it lives."""
+        super().tick(now_ns)
+        server, frames = self._server, list[Frame]()
+        if server is not None:
+            frames += server.tick(now_ns)
+        if self._sent is not None and self._spoke and (server is None or server.measures):
+            frames += self._frames.frames(self._sent, now_ns, self._ticks)
+        return frames
+
+
 def _switch(on: bool) -> Switch:
     return Switch.ON if on else Switch.OFF
 
@@ -277,12 +319,14 @@ def build_ship_side(
     version = vessel.version
     foreign = vessel.foreign
     drive: PumpDrive | CanopenPumpDrive | None = None
-    valve = None
+    valve: ValveNode | None = None
     if vessel.pump is not None and foreign.pump is not None:
         drive = CanopenPumpDrive(plant, vessel.pump, foreign.pump)
     elif vessel.pump is not None:
         drive = PumpDrive(plant, scenario.drive, catalogue, configuration_version=version)
-    if vessel.valve is not None:
+    if vessel.valve is not None and foreign.valve is not None:
+        valve = ForeignValve(plant, vessel.tank, vessel.valve, foreign.valve, catalogue)
+    elif vessel.valve is not None:
         valve = ValveNode(
             plant, vessel.tank, vessel.valve, catalogue, configuration_version=version
         )
@@ -301,6 +345,9 @@ def build_ship_side(
         hardwired = HardwiredNode(
             plant, scenario.sensors.high_level_m, catalogue, configuration_version=version
         )
+    panel = OperatorPanel(catalogue, configuration_version=version, script=script)
+    if foreign.panel is not None:
+        panel = ForeignPanel(foreign.panel, catalogue, script)
     guard = None
     if scenario.guard:
         controller = controller or next(iter(scenario.controllers.values()))
@@ -310,7 +357,7 @@ def build_ship_side(
         plant,
         sensors(seed=seed + 1),
         drive,
-        OperatorPanel(catalogue, configuration_version=version, script=script),
+        panel,
         valve,
         second_motion,
         hardwired,

@@ -8,7 +8,9 @@ valve nor one after a fault reset follows commands by itself.
 from collections.abc import Iterable
 from typing import Final
 
+from firmware_sim.canopen_node import CanopenSensor
 from firmware_sim.plant import Plant
+from firmware_sim.sensors import ForeignFrames
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import (
     Address,
@@ -21,6 +23,9 @@ from utank_hil.canbus import (
     ValveState,
     ValveStatus,
 )
+from utank_hil.canbus.profiles.device import HeardMessage
+from utank_hil.canbus.profiles.device_plan import COMMANDS, DevicePlan
+from utank_hil.canbus.profiles.drive_plan import NetworkState
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve
 from utank_hil.nodes.housekeeping import Housekeeping
@@ -33,6 +38,7 @@ MISCODED_COMMANDS_TO_TRIP: Final = 5
 STUCK_OFF: Final = 0.05
 """Deviation from the target above which the valve must move. Chosen; no study."""
 STUCK_NS: Final = 200_000_000  #: Time in ns in which it must move. Chosen; no study.
+_OPENING, _FOLLOW, _ = range(len(COMMANDS))
 _AT_END: Final = 1e-3
 """Distance from an end position below which its limit switch is set. Chosen; no study."""
 
@@ -159,7 +165,7 @@ class ValveNode:
         self._move(self._asked if following else self._valve.fail_opening, now_ns)
         frames = []
         if self._ticks % self._status_ticks == 0:
-            frames.append(self._status_frame())
+            frames.append(self._statuses.frame(self._status()))
         frames.extend(self._housekeeping.frames(now_ns, faulted=self._state is ValveState.FAULT))
         self._ticks += 1
         return frames
@@ -177,16 +183,88 @@ class ValveNode:
         elif self.powered and now_ns - self._free_ns > STUCK_NS:
             self._trip(ValveFault.STUCK)
 
-    def _status_frame(self) -> Frame:
-        return self._statuses.frame(
-            ValveStatus(
-                opening=self.opening,
-                state=self._state,
-                fault=self._fault,
-                command_echo=self._echo,
-                fail_position=self._fail_position,
-                moving=self._moving,
-                open_limit=self.opening > 1 - _AT_END,
-                shut_limit=self.opening < _AT_END,
-            )
+    def _status(self) -> ValveStatus:
+        return ValveStatus(
+            opening=self.opening,
+            state=self._state,
+            fault=self._fault,
+            command_echo=self._echo,
+            fail_position=self._fail_position,
+            moving=self._moving,
+            open_limit=self.opening > 1 - _AT_END,
+            shut_limit=self.opening < _AT_END,
         )
+
+
+class ForeignValve(ValveNode):
+    """Valve of another maker, commanded and heard by its plan.
+
+    It follows as long as it is commanded, and by CANopen as long as it is operational and hears the
+    controller's heartbeat; else it goes to its fail position.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        tank: Tank,
+        valve: Valve,
+        plan: DevicePlan[ValveStatus],
+        catalogue: Catalogue,
+    ) -> None:
+        assert plan.command is not None
+        self._plan, self._command = plan, plan.command
+        self._server = CanopenSensor(plan) if plan.steps else None
+        self._heard = HeardMessage(
+            self._command.can_ids[0], self._command.cycle_ns, self._command.length,
+            self._command.counter, self._command.crc,
+        )  # fmt: skip
+        super().__init__(plant, tank, valve, catalogue, configuration_version=0)
+        frames = ForeignFrames(plan, self._statuses, catalogue.codec(ValveStatus))
+        #: What it sends, by the identifier of the message that it stands for.
+        self.devices = {self._statuses.can_id: frames}
+        self._frames = frames
+        self.hears = frozenset(self._command.can_ids)
+        if self._server is not None:
+            self.hears |= self._server.hears
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Take a command that is whole and in order."""
+        server = self._server
+        if not self.powered:
+            return
+        if server is not None:
+            server.receive(frame, now_ns)
+        if frame.can_id not in self._command.can_ids or (server and not server.measures):
+            return
+        if not self._heard.passes(frame.data):
+            self.refused += 1
+            return
+        told = {each.place: each.value(frame.data) for each in self._command.signals}
+        self._asked = told[_OPENING]
+        self._accepted_ns = now_ns
+        self._state = ValveState.FOLLOWING if told.get(_FOLLOW, 1.0) else ValveState.FAIL_POSITION
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Move, and send where it stands."""
+        self._plant.advance(now_ns)
+        server, frames = self._server, list[Frame]()
+        if not self.powered:
+            self._start()
+            if server is not None:
+                server.state = NetworkState.BOOT_UP
+        elif server is not None:
+            frames = server.tick(now_ns)
+        late = now_ns - self._accepted_ns > round(LONGEST_TIMEOUT_S / NANOSECONDS)
+        deaf = server is not None and (server.lost_controller or not server.measures)
+        if late or deaf:
+            self._state = ValveState.FAIL_POSITION
+        self._move(self._asked if self.following else self._valve.fail_opening, now_ns)
+        if self.powered and (server is None or server.measures):
+            frames += self._frames.frames(self._status(), now_ns, self._ticks)
+        self._ticks += 1
+        return frames
+
+    def swap(self) -> None:
+        """Put another valve of the same kind in its place."""
+        if self._server is not None:
+            self._server.swap()

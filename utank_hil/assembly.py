@@ -180,7 +180,8 @@ def build_controller_node(
     timeout_s = config.command_timeout_ms * 1e-3
     valve = None
     if vessel.valve is not None:
-        valve = ValveCommander(vessel.valve, tank, catalogue, timeout_s)
+        plan = vessel.foreign.valve
+        valve = ValveCommander(vessel.valve, tank, catalogue, timeout_s, plan)
     pump = vessel.pump is not None
     monitors = None
     if monitored:
@@ -204,9 +205,9 @@ def build_controller_node(
     limiter = CommandLimiter(config.limits, tank, TICK_S)
     foreign, drive = vessel.foreign, None
     if foreign.pump is not None and vessel.pump is not None:
-        plan = foreign.pump
-        loop = PressureLoop(vessel.pump, COMMAND_MS * 1e-3, plan.delay_s, torque=plan.mode.torque)
-        drive = CanopenDrive(plan, loop, tank.reservoir_area_m2)
+        of = foreign.pump
+        loop = PressureLoop(vessel.pump, COMMAND_MS * 1e-3, of.delay_s, torque=of.mode.torque)
+        drive = CanopenDrive(of, loop, tank.reservoir_area_m2)
     return ControllerNode(
         running,
         Safety(

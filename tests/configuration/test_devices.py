@@ -29,6 +29,16 @@ DRIVE = {
     "profile": "cia402", "node": 5, "mode": "torque", "pressure_pa_per_unit": 80.0,
     "speed_rad_s_per_unit": 0.001,
 }  # fmt: skip
+ON_OFF = {"profile": "cia401_valve", "node": 9, "age_ms": 700, "accept_unprotected": True}
+_KEYS = {name: {"start": place, "bits": 1}
+         for place, name in enumerate(("ARM", "STOP", "ACCEPT", "TOGGLE"))}  # fmt: skip
+PANEL = {
+    "profile": "", "messages": {"keys": {"id": 5, "bytes": 1, "signals": _KEYS}},
+    "signals": {"arm": {"from": "keys.ARM"}, "stop": {"from": "keys.STOP"},
+                "acknowledge": {"from": "keys.ACCEPT"}},
+    "protection": {"counters": ["keys.TOGGLE"]}, "cycle_ms": 100, "age_ms": 300,
+    "accept_unprotected": True,
+}  # fmt: skip
 
 
 def ship_file(folder, devices, **more):
@@ -72,7 +82,7 @@ def test_a_change_of_a_device_voids_the_commissioning(tmp_path):
 @pytest.mark.parametrize(
     ("devices", "reason"),
     [
-        ({"motion": {"profile": "sbg"}}, "no profile 'sbg': there are native, cia404_levels"),
+        ({"motion": {"profile": "sbg"}}, "no profile 'sbg': there are native, cia401_valve,"),
         ({"motion": {"profile": "sbg_ellipse"}}, "accept_unprotected: must be set to true"),
         ({"motion": SBG | {"cycle_ms": 100, "age_ms": 300}}, "10 Hz: too slow"),
         ({"motion": SBG | {"age_ms": 10}}, "must be 20 or more, two cycles"),
@@ -100,6 +110,19 @@ def test_a_change_of_a_device_voids_the_commissioning(tmp_path):
         ({"motion": SSI2, "motion_2": SSI2}, "is no second source for itself"),
         ({"levels": LEVELS | {"node": 5}, "pump": DRIVE}, "levels.node: is the drive's"),
         ({"levels": LEVELS | {"node": 127}, "pump": DRIVE}, "levels.node: is the drive's"),
+        ({"valve": ON_OFF}, "devices.valve: is a valve, but the ship has none"),
+        ({"valve": ON_OFF | {"commands": {"lift": {"to": "order.OUTPUT"}}}},
+         "commands.lift: is no command; there are opening, follow, reset"),
+        ({"valve": ON_OFF | {"commands": {"opening": {"to": "order.X"}}}}, "'order.X' is no sig"),
+        ({"valve": ON_OFF | {"commands": {"opening": {"to": "position.OPEN"}}}},
+         "position is what the valve sends"),
+        ({"valve": ON_OFF | {"bus": "can1"}, "receive_only": ["can1"]}, "valve.bus: can1 is rec"),
+        ({"valve": ON_OFF | {"accept_unprotected": False}}, "valve.accept_unprotected: must be"),
+        ({"valve": ON_OFF | {"signals": {"is_open": {"from": "position.UP"}}}}, "is no signal of"),
+        ({"panel": PANEL | {"protection": {}}}, "nothing says that the panel lives"),
+        ({"panel": PANEL | {"accept_unprotected": False}}, "Any other sender on that bus may arm"),
+        ({"panel": PANEL | {"signals": {"arm": {"from": "keys.ARM"}}}},
+         "panel.signals.stop: is required but missing"),
     ],
 )  # fmt: skip
 def test_what_is_refused(tmp_path, devices, reason):
@@ -134,17 +157,23 @@ def test_a_motion_signal_without_unit_is_refused(tmp_path):
 def test_every_shipped_profile_is_cited_and_usable(tmp_path):
     needs = {"j1939_ssi2": {"source": 0x20}, "cia410": {"node": 3}, "cia404_levels": {"node": 9}}
     scaled = {name: {"scale": 0.25, "offset": -3} for name in ("port_level_m", "starboard_level_m")}
+    needs["cia401_valve"] = {"node": 9, "age_ms": 700}
     needs["n2k_attitude"] = {"source": 0x20, "cycle_ms": 50}
     needs["cia404_levels"] |= {"signals": scaled, "high_level_m": 4.6}
     both = {"redundancy": {"second_motion_sensor": True}}
     for name in shipped_profiles():
-        role = "levels" if "levels" in name else "motion"
+        role = next((each for each in ("levels", "valve") if each in name), "motion")
         device = {"profile": name, "accept_unprotected": True, **needs.get(name, {})}
-        found = ship(tmp_path, {role: device}, **both)
+        more = (
+            {"valve": {"kind": "duct", "opening_time_s": 0.5, "leakage": 0.1}}
+            if role == "valve"
+            else {}
+        )
+        found = ship(tmp_path, {role: device}, **both, **more)
         section = getattr(found.devices, role)
         assert section.device
         assert section.documents
-        assert getattr(found.devices.foreign(), "levels" if role == "levels" else "motions")
+        assert getattr(found.devices.foreign(), "motions" if role == "motion" else role)
 
 
 def test_a_slow_sensor_is_refused_by_the_delay_of_the_law_with_the_number(tmp_path):
@@ -280,3 +309,19 @@ def test_a_source_finds_a_message_of_a_dbc_by_its_group(tmp_path):
     group = SLOPE_ID >> 8 & 0x3FFFF
     assert {each & 0x3FFFFFF for each in plan.messages[1].can_ids} == {group << 8 | 0x21}
     assert len(plan.messages[1].can_ids) == 8
+
+
+def test_the_way_of_a_valve_with_switches_and_what_a_panel_of_a_bit_is_told(tmp_path):
+    valve = {"valve": {"kind": "duct", "opening_time_s": 0.7, "leakage": 0.1}}
+    said = problems(tmp_path, {"valve": ON_OFF}, **valve)
+    assert "devices.valve.age_ms: must be 840 or more, its way and a fifth" in said
+    found = ship(tmp_path, {"valve": ON_OFF | {"age_ms": 840}, "panel": PANEL}, **valve)
+    plan = found.foreign.valve
+    assert [each.name for each in plan.messages] == ["position"]
+    assert plan.command.can_ids == (STANDARD | 0x209,)
+    steps = {str(step.place): step.value for step in plan.steps if step.value}
+    assert (steps["1016h:1"], steps["1600h:1"]) == (127 << 16 | 50, 0x62000108)
+    assert found.default_safety["valve_age_ms"] == 840
+    beats = DevicesSection(valve=ON_OFF, pump=DRIVE).foreign(found.pump)
+    assert beats.valve.beat is None  # the drive's command brings it
+    assert plan.beat == Frame(STANDARD | 0x77F, b"\x05")

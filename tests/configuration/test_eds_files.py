@@ -166,7 +166,7 @@ def test_errors_name_file_object_and_remedy(tmp_path, old, new, reason):
 
 @pytest.mark.parametrize("messages", [None, {"m": "TPDO0"}, {"m": {"cob": 384}}, ["TPDO1"]])
 def test_messages_must_be_pdos(tmp_path, messages):
-    with pytest.raises(ValueError, match="messages names PDOs that are sent"):
+    with pytest.raises(ValueError, match="messages names its PDOs"):
         device(eds=written(tmp_path), **(MOTION | {"messages": messages}))
 
 

@@ -107,6 +107,10 @@ class Receiver(Generic[T]):
         """Return the message of a whole frame, also out of sequence, as a stop; nothing changes."""
         return self._decode(frame.data) if len(frame.data) == FRAME_BYTES else None
 
+    def changed(self, new: bool) -> None:
+        """Count a frame that came because its content is new."""
+        self.changes += new
+
     def _accept_out_of_step(self, message: T, counter: int) -> T | None:
         following = (counter + 1) & _COUNTER_MASK
         if not self._protected:

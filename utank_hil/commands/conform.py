@@ -16,17 +16,23 @@ from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import PortError
 from utank_hil.commands.commission import print_checks
 from utank_hil.commands.commissioning_record import listed, write_record
-from utank_hil.configuration.devices import KINDS
+from utank_hil.configuration.devices import ROLES
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.console.common import Bus, Json, fail, load, print_json, why_not_writable
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, notes, shown
-from utank_hil.nodes.commissioning.conformance import Ask, DriveTrial, SensorTrial, Trial
+from utank_hil.nodes.commissioning.conformance import (
+    Ask,
+    DriveTrial,
+    SensorTrial,
+    Trial,
+    ValveTrial,
+)
 from utank_hil.runners import RealTimeLoop, stop_on_signals
 
 
 def conform(
-    device: Annotated[str, typer.Argument(help="motion, motion_2, levels, pump_sensor or pump.")],
+    device: Annotated[str, typer.Argument(help="Its key in section devices, as motion or pump.")],
     channel: Bus,
     ship: Annotated[Path, typer.Option(help="Ship whose section devices has the device.")],
     record: Annotated[
@@ -44,8 +50,9 @@ def conform(
     """Put a device of another maker through its profile, and write the record of it.
 
     A sensor: rate and jitter, validity, signs by hand, silence. A drive: its configuration read
-    back, what it must refuse, its time to stop; the pump turns. Nothing else may command it. Exit
-    code 1 if it does not conform.
+    back, what it must refuse, its time to stop; the pump turns. A valve: its way, and that it goes
+    to its fail position by itself. A panel: its buttons. Nothing else may command it. Exit code 1
+    if it does not conform.
 
     **Example:** utank-hil conform pump --bus can2 --ship configs/ships/thesis_first_devices.yaml
     """
@@ -96,7 +103,7 @@ def trial_of(
 ) -> tuple[Trial, bool]:
     """The trial of a device on the first interface, and whether nothing may be sent there."""
     devices = vessel.devices
-    names = (*KINDS, "pump")
+    names = (*ROLES, "pump")
     if device not in names:
         fail(f"no device {device!r}: there are {', '.join(names)}")
     if devices is None or getattr(devices, device).native:
@@ -104,9 +111,13 @@ def trial_of(
     if device == "pump":
         assert vessel.pump is not None  # else the file would have been refused
         return DriveTrial(devices.pump.plan(0, vessel.pump), vessel.pump, ask), False
-    section = devices.sensors()[device]
+    section = devices.devices()[device]
     silent = section.bus in devices.receive_only
-    return SensorTrial(section.plan(KINDS[device], device, 0, silent=silent), ask, seconds), silent
+    plan = section.plan(ROLES[device], device, 0, silent=silent)
+    if device == "valve":
+        assert vessel.valve is not None  # likewise
+        return ValveTrial(plan, vessel.valve, ask, seconds), silent
+    return SensorTrial(plan, ask, seconds), silent
 
 
 def asks(hand_s: float | None) -> Ask:

@@ -96,19 +96,20 @@ class Eds:
         found = self._sections.get("DEVICECOMISSIONING", {})  # so the standard spells it
         return self._number(found.get("nodeid", ""), Place(0))
 
-    def sent(self, pdo: int) -> dict[str, Any]:
-        """The layout of a sent PDO, 1 to 512, as `MessageSection` has it."""
-        settings, mapping = 0x1800 + pdo - 1, 0x1A00 + pdo - 1
+    def sent(self, pdo: int, *, received: bool = False) -> dict[str, Any]:
+        """The layout of a sent or `received` PDO, 1 to 512, as `MessageSection` has it."""
+        settings = (0x1400 if received else 0x1800) + pdo - 1
+        name = f"{'R' if received else 'T'}PDO{pdo}"
         found = self.value(Place(settings, 1))
         if found is None:
-            raise self._error(Place(settings, 1), f"has no value: TPDO{pdo} is not in this device")
+            raise self._error(Place(settings, 1), f"has no value: {name} is not in this device")
         cob, relative = found
         if cob & DISABLED:
-            reason = f"has bit 31: TPDO{pdo} is off as delivered. Turn it on in device and file"
+            reason = f"has bit 31: {name} is off as delivered. Turn it on in device and file"
             raise self._error(Place(settings, 1), reason)
         kind = self.number(Place(settings, 2))
-        timed = kind in _TIMED
-        signals, bits = self._mapped(mapping, pdo)
+        timed = kind in _TIMED and not received
+        signals, bits = self._mapped(settings + 0x200, name)
         can_id = cob & (_LONG_ID - 1)
         place: dict[str, Any] = {"id": can_id, "format": "29bit" if cob & _LONG_ID else "11bit"}
         return {
@@ -120,10 +121,10 @@ class Eds:
             "signals": signals,
         }
 
-    def _mapped(self, index: int, pdo: int) -> tuple[dict[str, dict[str, Any]], int]:
+    def _mapped(self, index: int, name: str) -> tuple[dict[str, dict[str, Any]], int]:
         count = self.number(Place(index, 0))
         if not count:
-            reason = f"is 0: TPDO{pdo} carries nothing as delivered. Map it in device and file"
+            reason = f"is 0: {name} carries nothing as delivered. Map it in device and file"
             raise self._error(Place(index, 0), reason)
         if not 1 <= count <= _MOST_MAPPED:
             raise self._error(Place(index, 0), f"is {count}: a PDO maps 1 to {_MOST_MAPPED}")
@@ -182,17 +183,18 @@ def eds_file(file: str) -> Eds:
 def with_eds(content: dict[str, Any]) -> dict[str, Any]:
     """A sensor's section with the layouts of its PDOs in the place of their names."""
     rest = {key: value for key, value in content.items() if key not in ("eds", "messages")}
-    named = _named(content, "eds", r"TPDO[1-9][0-9]*")
-    pdos = [of for of, _ in named.values()]
+    named = _named(content, "eds", r"[TR]PDO[1-9][0-9]*")
+    pdos = [of for of, _ in named.values() if of[0] in "Tt"]
     eds = eds_file(str(content["eds"]))
     _same_node(eds, content)
     if profile := eds.number(Place(0x1000)) & 0xFFFF:
         rest = {"canopen_profile": profile, "identity": _identity(eds)} | rest
     messages = {
-        name: _otherwise(eds.sent(int(of[4:])), changes) for name, (of, changes) in named.items()
+        name: _otherwise(eds.sent(int(of[4:]), received=of[0] in "Rr"), changes)
+        for name, (of, changes) in named.items()
     }
     if "cycle_ms" not in rest:
-        cycles = [each["cycle_ms"] for each in messages.values()]
+        cycles = [messages[name]["cycle_ms"] for name, (of, _) in named.items() if of in pdos]
         if None in cycles:
             pdo = pdos[cycles.index(None)]
             raise ValueError(
@@ -292,7 +294,7 @@ def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
 
 
 _NAMED: Final = {
-    "dbc": ("messages of the file", "MESSAGE"), "eds": ("PDOs that are sent", "TPDO1"),
+    "dbc": ("messages of the file", "MESSAGE"), "eds": ("its PDOs", "TPDO1"),
 }  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from utank_hil.base.parameters import Problem, Range
 from utank_hil.canbus.frame import BUS_SHIFT, LONGEST_STANDARD_ID, STANDARD, Frame
-from utank_hil.canbus.messages import SensorTank
+from utank_hil.canbus.messages import OperatorCommand, SensorMotion, SensorTank, ValveStatus
 from utank_hil.canbus.profiles.device_plan import (
     FIELDS,
     SWITCHES,
@@ -34,6 +34,12 @@ from utank_hil.configuration.device_sections import (
 )
 
 LEAST_AGE_CYCLES: Final = 2.0  #: One lost frame must not end the run.
+OPTIONAL: Final = (*SWITCHES, "flow_m3_s", "is_open", "is_shut", "reset", "passive")
+UNPROTECTED: Final[dict[type[tuple[Any, ...]], str]] = {
+    SensorMotion: ". The pressure stays at half until a second motion sensor agrees",
+    OperatorCommand: ". Any other sender on that bus may arm",
+}
+"""What a device without counter and checksum costs, by the message that it stands for."""
 PRIORITIES: Final = range(8)
 _NAME_PGN: Final = 0xEEFF  #: Address claimed, to all.
 _REQUEST_PGN: Final = 0xEA00
@@ -86,9 +92,15 @@ class DeviceSection(CanopenSection):
         return self.profile == NATIVE
 
     @property
+    def told(self) -> str:
+        """Name of the message that the device is commanded with, if it is commanded."""
+        return ""
+
+    @property
     def protected(self) -> bool:
         """Whether a counter or a checksum is in each message with a value."""
-        guarded = {each.partition(".")[0] for each in self.protection.counters}
+        counts = [each for each in self.protection.counters if self._bits(each) > 1]
+        guarded = {each.partition(".")[0] for each in counts}
         guarded |= {each.message for each in self.protection.crcs}
         return all(
             each.from_.partition(".")[0] in guarded
@@ -128,14 +140,29 @@ class DeviceSection(CanopenSection):
             elif crc.byte >= said.bytes:
                 reason = f"byte {crc.byte} is not in {crc.message}, which has {said.bytes}"
                 yield "protection.crcs", f"{reason}: the first is byte 0"
-        guards = self.protection
         if not self.protected and not self.accept_unprotected:
             reason = (
                 "must be set to true: no counter or checksum tells frames of another sender, old "
-                "or spoilt ones. The pressure stays at half until a second motion sensor agrees"
+                f"or spoilt ones{UNPROTECTED.get(kind, '')}"
             )
             yield "accept_unprotected", reason
-        if not (guards.counters or guards.stamps or guards.unchanged_ms):
+        yield from self._life_problems(kind)
+
+    def _life_problems(self, kind: type[tuple[Any, ...]]) -> Iterator[Problem]:
+        """A device that may hang and send the same for ever."""
+        guards = self.protection
+        if kind is OperatorCommand:
+            said = {path.partition(".")[0] for key, path in self._paths() if key == "valid_when"}
+            values = {each.from_.partition(".")[0] for each in self.signals.values()}
+            if not (guards.counters or said - values):
+                reason = (
+                    "is required: nothing says that the panel lives. Name a signal that counts or "
+                    "toggles, or put its heartbeat, a message of its own, into valid_when"
+                )
+                yield "protection.counters", reason
+        elif kind is not ValveStatus and not (
+            guards.counters or guards.stamps or guards.unchanged_ms
+        ):
             reason = "is required where nothing counts: a device that hangs sends the same for ever"
             yield "protection.unchanged_ms", reason
 
@@ -182,12 +209,15 @@ class DeviceSection(CanopenSection):
                 yield f"signals.{name}.scale", reason
         for name in self.noise.keys() - set(known):
             yield f"noise.{name}", f"is no value of it; there are {', '.join(known)}"
-        needed = [name for name in known if name not in SWITCHES and name != "flow_m3_s"]
+        needed = [name for name in known if name not in OPTIONAL]
         if kind is SensorTank and self.high_level_m is None:
             needed += SWITCHES
+        if kind is ValveStatus and self.signals.keys() & {"is_open", "is_shut"}:
+            needed = ["is_open", "is_shut"]
         for name in needed:
             if name not in self.signals:
                 more = ", or else high_level_m" if name in SWITCHES else ""
+                more = ", or else is_open and is_shut" if name == "opening" else more
                 yield f"signals.{name}", f"is required but missing{more}"
 
     def _paths(self) -> Iterator[tuple[str, str]]:
@@ -213,6 +243,10 @@ class DeviceSection(CanopenSection):
         message, _, signal = path.partition(".")
         section = self.messages.get(message)
         return None if section is None else section.signals.get(signal)
+
+    def _bits(self, path: str) -> int:
+        layout = self._field(path)
+        return 0 if layout is None else layout.bits
 
     def _factor(self, signal: SignalSection, layout: FieldSection) -> float:
         """Value, in the unit of its name, of one unit of the maker's."""
@@ -272,22 +306,29 @@ class DeviceSection(CanopenSection):
         yield from identity_steps(self.canopen_profile, self.identity)
         for place, value in self.required():
             yield Step(place, value, "set require as the device's manual says, or null")
-        for message in self.messages.values():
+        for name, message in self.messages.items():
             if message.pdo is None:
                 continue
             layouts = sorted(message.signals.values(), key=lambda layout: layout.start)
-            mapped = [(place_of(each.object), each.bits) for each in layouts if each.object]
+            objects = [each for each in layouts if each.object]
+            whole = all(any(each.within(of) for of in objects) for each in layouts)
+            mapped = [(place_of(each.object), each.bits) for each in objects]
             can_id = self._can_ids(message)[0]
             cob = can_id if message.format == "29bit" else can_id & LONGEST_STANDARD_ID
             yield from pdo_steps(
-                0x1800 + message.pdo - 1, cob, mapped if len(mapped) == len(layouts) else (),
-                message.pdo_type, round(message.cycle_ms or self.period_ms()),
+                (0x1400 if name == self.told else 0x1800) + message.pdo - 1, cob,
+                mapped if whole else (), message.pdo_type,
+                round(message.cycle_ms or self.period_ms()),
             )  # fmt: skip
 
     def read_back(self) -> list[str]:
         """What a CANopen node must be, in words."""
         known = [str(value) for value in self.identity if value is not None]
-        pdos = [f"TPDO{each.pdo}" for each in self.messages.values() if each.pdo is not None]
+        pdos = [
+            f"{'R' if name == self.told else 'T'}PDO{each.pdo}"
+            for name, each in self.messages.items()
+            if each.pdo is not None
+        ]
         return [
             f"CiA {self.canopen_profile}",
             *(f"identity {' '.join(known)}" for _ in known[:1]),

@@ -42,7 +42,7 @@ UNITS: Final[dict[str, tuple[str, float]]] = {
     "deg/s": ("rad_s", _DEGREE), "°/s": ("rad_s", _DEGREE),
     "m": ("m", 1.0), "cm": ("m", 1e-2), "mm": ("m", 1e-3),
     "Pa": ("pa", 1.0), "kPa": ("pa", 1e3), "mbar": ("pa", 1e2), "bar": ("pa", 1e5),
-    "m3/s": ("m3_s", 1.0), "l/s": ("m3_s", 1e-3), "m3/h": ("m3_s", 1 / 3600),
+    "m3/s": ("m3_s", 1.0), "l/s": ("m3_s", 1e-3), "m3/h": ("m3_s", 1 / 3600), "%": ("", 1e-2),
 }  # fmt: skip
 """Units that makers write: end of the name of what is measured, and factor."""
 
@@ -66,6 +66,11 @@ class FieldSection(_Part):
     object: str = ""  #: CANopen object that is mapped there, as 7130h:1.
     least_raw: Whole | None = None  #: Least count that is a value.
     most_raw: Whole | None = None  #: Counts outside of these two are not available, or an error.
+
+    def within(self, other: "FieldSection") -> bool:
+        """Whether its bits are among another's."""
+        end, last = self.start + self.bits, other.start + other.bits
+        return self is other or (other.start <= self.start and end <= last and self.bits < 8)
 
     def field(self, length: int) -> BusField:
         """The signal in a frame of so many bytes."""
@@ -140,6 +145,17 @@ class SignalSection(_Part):
     least: Finite = -1e300  #: Least physical value, in the maker's unit, that is one.
     most: Finite = 1e300
     """Range in the maker's unit, outside of which there is no value, as a broken 4-20 mA wire."""
+
+
+class CommandSection(_Part):
+    """Where a command goes: the signal's value is that of the command, as of `SignalSection`."""
+
+    to: str  #: Signal, as MESSAGE.SIGNAL; all commands of a device are in one message.
+    sign: Literal[1, -1] = 1  #: As of the signals that a device sends.
+    scale: Annotated[float, Range(least=-1e9, most=1e9)] | None = None
+    """In place of the factor of its unit."""
+    offset: Annotated[float, Range(least=-1e9, most=1e9)] = 0.0
+    """Added, before the sign is applied."""
 
 
 class ConditionSection(_Part):

@@ -2,32 +2,42 @@
 
 import math
 from collections.abc import Iterator
-from typing import Any, Final
+from dataclasses import replace
+from typing import Annotated, Any, Final
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from utank_hil.base.parameters import Problem, refuse
+from utank_hil.base.parameters import Problem, Range, refuse
 from utank_hil.canbus.catalogue import load_catalogue
 from utank_hil.canbus.enumerations import Address
-from utank_hil.canbus.frame import MOST_BUSES, STANDARD
-from utank_hil.canbus.messages import SensorMotion, SensorPump, SensorTank
-from utank_hil.canbus.profiles.device_plan import (
-    DevicePlan,
-    ForeignDevices,
+from utank_hil.canbus.frame import BUS_SHIFT, MOST_BUSES, STANDARD, Frame
+from utank_hil.canbus.messages import (
+    OperatorCommand,
+    SensorMotion,
+    SensorPump,
+    SensorTank,
+    ValveStatus,
 )
+from utank_hil.canbus.profiles.device_plan import COMMANDS, DevicePlan, ForeignDevices
+from utank_hil.canbus.profiles.drive_plan import HEARTBEAT, HEARTBEAT_CONSUMER, NetworkState, Step
+from utank_hil.canbus.profiles.field import SignalPlan
 from utank_hil.configuration.device_section import NATIVE_NODE, DeviceSection
 from utank_hil.configuration.device_sections import (
     LEAST_GAIN,
     LEAST_PHASE_DEG,
     NATIVE_DRIVE,
+    UNITS,
+    CommandSection,
     DriveSection,
     Id11,
     Id29,
+    NodeNumber,
     Pgn,
 )
 from utank_hil.configuration.files import Section
 from utank_hil.control.pressure_loop import LoopMargins
 from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.valves import Valve
 from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.safety.safety_limits import SafetyLimits
 
@@ -39,6 +49,89 @@ MOST_MOTION_CYCLE_MS: Final = 50.0
 """The monitors look at motion every 50 ms and take a gap of 100 ms as a loss: below 20 Hz they see
 nothing."""
 NATIVE_PUMP_MS: Final = 20.0  #: Cycle of SENSOR_PUMP.
+
+
+class ValveSection(DeviceSection):
+    """Valve of the tank."""
+
+    commands: Annotated[dict[str, CommandSection], Field(default_factory=dict)]
+    """What it is told, each 20 ms: `opening`; `follow`, without which it goes to its fail position;
+    `reset` of a fault."""
+    controller_node: NodeNumber = 127  #: CANopen node that the controller's heartbeat is from.
+    heartbeat_ms: Annotated[int, Range(least=20, most=100)] = 50
+    """Time without the controller's heartbeat after which a CANopen valve goes to what `require`
+    says of its outputs."""
+
+    @property
+    def told(self) -> str:
+        """Name of the message that the valve is commanded with."""
+        return next((each.to.partition(".")[0] for each in self.commands.values()), "")
+
+    def problems(self, kind: type[tuple[Any, ...]]) -> Iterator[Problem]:
+        """What is wrong with the valve; a native one is right."""
+        yield from super().problems(kind)
+        if self.native:
+            return
+        if "opening" not in self.commands:
+            yield "commands.opening", "is required but missing"
+        for name, each in self.commands.items():
+            message, key = each.to.partition(".")[0], f"commands.{name}"
+            layout = self._field(each.to)
+            if name not in COMMANDS:
+                yield key, f"is no command; there are {', '.join(COMMANDS)}"
+            elif layout is None:
+                yield f"{key}.to", f"{each.to!r} is no signal of messages: write MESSAGE.SIGNAL"
+            elif message != self.told:
+                yield f"{key}.to", f"is not in {self.told}: all commands go in one message"
+            elif each.scale is None and layout.unit not in ("", "%"):
+                yield f"{key}.scale", f"is required: {each.to} has the unit {layout.unit!r}"
+        if any(each.from_.partition(".")[0] == self.told for each in self.signals.values()):
+            yield "commands", f"{self.told} is what the valve sends: it is told by another message"
+
+    def valve_problems(self, valve: Valve | None) -> Iterator[Problem]:
+        """What does not fit to the ship's valve."""
+        if self.native:
+            return
+        if valve is None:
+            yield "devices.valve", "is a valve, but the ship has none: add it, or leave this out"
+        elif "is_open" in self.signals and (self.age_ms or 0) < 1.2e3 * valve.opening_time_s:
+            least_ms = 1.2e3 * valve.opening_time_s
+            reason = (
+                f"must be {least_ms:g} or more, its way and a fifth: between its switches nobody "
+                "knows where it stands"
+            )
+            yield "devices.valve.age_ms", reason
+
+    def plan(
+        self, kind: type[tuple[Any, ...]], name: str, bus: int, *, silent: bool = False
+    ) -> DevicePlan[Any]:
+        """The valve as it is commanded and heard."""
+        plan = super().plan(kind, name, bus, silent=silent)
+        section = self.messages[self.told]
+        signals = []
+        for command, each in self.commands.items():
+            layout = section.signals[each.to.partition(".")[2]]
+            factor = UNITS.get(layout.unit, ("", 1.0))[1] if each.scale is None else each.scale
+            place, field = COMMANDS.index(command), layout.field(section.bytes)
+            signals.append(SignalPlan(place, field, factor, each.offset, each.sign, -1e300, 1e300))
+        told = next(each for each in plan.messages if each.name == self.told)
+        tag = bus << BUS_SHIFT | STANDARD
+        beat = Frame(tag | HEARTBEAT + self.controller_node, bytes((NetworkState.OPERATIONAL,)))
+        return replace(
+            plan,
+            messages=tuple(each for each in plan.messages if each is not told),
+            command=replace(told, signals=tuple(signals)),
+            beat=beat if plan.steps else None,
+        )
+
+    def _steps(self) -> Iterator[Step]:
+        yield from super()._steps()
+        consumed = self.controller_node << 16 | self.heartbeat_ms
+        remedy = "a valve that does not watch the controller's heartbeat stays where it is"
+        yield Step(HEARTBEAT_CONSUMER, consumed, f"{remedy}: take another one")
+
+
+NATIVE_VALVE: Final = ValveSection.model_validate({})
 
 
 class OthersSection(Section):
@@ -55,6 +148,7 @@ KINDS: Final[dict[str, type[tuple[Any, ...]]]] = {
     "levels": SensorTank,
     "pump_sensor": SensorPump,
 }
+ROLES: Final = {**KINDS, "valve": ValveStatus, "panel": OperatorCommand}
 
 
 class DevicesSection(Section):
@@ -65,6 +159,8 @@ class DevicesSection(Section):
     levels: DeviceSection = NATIVE_NODE  #: Level gauges.
     pump_sensor: DeviceSection = NATIVE_NODE  #: Sensor of the pump's pressure.
     pump: DriveSection = NATIVE_DRIVE  #: Drive of the pump.
+    valve: ValveSection = NATIVE_VALVE  #: Valve of the tank.
+    panel: DeviceSection = NATIVE_NODE  #: The first operator station.
     receive_only: tuple[str, ...] = ()  #: Interfaces on which the controller sends nothing.
     others: OthersSection = OthersSection()  #: Devices that the controller has nothing to do with.
 
@@ -72,8 +168,8 @@ class DevicesSection(Section):
     def _usable(self) -> "DevicesSection":
         problems = [
             (f"{role}.{name}", reason)
-            for role, device in self.sensors().items()
-            for name, reason in device.problems(KINDS[role])
+            for role, device in self.devices().items()
+            for name, reason in device.problems(ROLES[role])
         ]
         for role in ("motion", "motion_2"):
             cycle_ms = self.sensors()[role].cycle_ms
@@ -86,12 +182,13 @@ class DevicesSection(Section):
         problems += [(f"pump.{name}", reason) for name, reason in self.pump.problems()]
         if not self.pump.native:
             problems += self._loop_problems()
-        if self.pump.bus in self.receive_only:
-            problems.append(("pump.bus", f"{self.pump.bus} is receive-only: it can't be commanded"))
+        for role, bus in (("pump", self.pump.bus), ("valve", self.valve.bus)):
+            if bus in self.receive_only:
+                problems.append((f"{role}.bus", f"{bus} is receive-only: it can't be commanded"))
         buses = self.buses()
         if len(buses) > MOST_BUSES:
             problems.append(("", f"are on {len(buses)} interfaces, {MOST_BUSES} is the most"))
-        for role, device in self.sensors().items():
+        for role, device in self.devices().items():
             if device.protection.n2k_name is not None and device.bus in self.receive_only:
                 reason = f"has to be asked for, but {device.bus} is receive-only: leave one out"
                 problems.append((f"{role}.protection.n2k_name", reason))
@@ -103,10 +200,10 @@ class DevicesSection(Section):
 
     def _clashes(self) -> Iterator[Problem]:
         """What two devices, or a device and a native node, both are by their identifiers."""
-        ids = {role: each.can_ids() for role, each in self.sensors().items() if not each.native}
+        ids = {role: each.can_ids() for role, each in self.devices().items() if not each.native}
         native = load_catalogue().can_ids
         for role, own in ids.items():
-            device = self.sensors()[role]
+            device = self.devices()[role]
             if not device.bus and (taken := own & native):
                 reason = f"{min(taken):#x} is a native node's on this bus: change it in the device"
                 yield f"{role}.messages", reason
@@ -143,6 +240,10 @@ class DevicesSection(Section):
         """The sensors by their roles."""
         return {role: getattr(self, role) for role in KINDS}
 
+    def devices(self) -> dict[str, DeviceSection]:
+        """Sensors, valve and panel by their roles."""
+        return {role: getattr(self, role) for role in ROLES}
+
     def redundancy_problems(self, redundancy: Redundancy) -> Iterator[Problem]:
         """What a second motion sensor must be there for, or is there without need."""
         if redundancy.second_motion_sensor:
@@ -163,6 +264,7 @@ class DevicesSection(Section):
             "motion_age_ms": self.motion.age_ms,
             "tank_degraded_age_ms": self.levels.age_ms,
             "pump_degraded_age_ms": self.pump_sensor.age_ms,
+            "valve_age_ms": self.valve.age_ms,
         }
         both = [each.age_ms for each in (self.motion, self.motion_2) if each.age_ms is not None]
         if both:
@@ -183,7 +285,7 @@ class DevicesSection(Section):
 
     def buses(self) -> tuple[str, ...]:
         """Interfaces, the controller's own first, which has no name."""
-        names = {each.bus for each in self.sensors().values()} | {self.pump.bus}
+        names = {each.bus for each in self.devices().values()} | {self.pump.bus}
         named = sorted(names - {""})
         return ("", *named)
 
@@ -191,13 +293,21 @@ class DevicesSection(Section):
         """The devices as the controller node hears them, with the drive of the pump."""
         buses, others = self.buses(), self.others
         bus_of_pump = buses.index(self.pump.bus)
-        own = [each for each in self.sensors().values() if not each.bus]
+        own = [each for each in self.devices().values() if not each.bus]
         nodes = {self.pump.node if not self.pump.bus else None, *(each.node for each in own)}
-        plans: dict[str, DevicePlan[Any] | None] = dict.fromkeys(KINDS)
-        for role, device in self.sensors().items():
+        plans: dict[str, DevicePlan[Any] | None] = dict.fromkeys(ROLES)
+        for role, device in self.devices().items():
             if not device.native:
                 bus, silent = buses.index(device.bus), device.bus in self.receive_only
-                plans[role] = device.plan(KINDS[role], role, bus, silent=silent)
+                plans[role] = device.plan(ROLES[role], role, bus, silent=silent)
+        valve, pump_plan = plans["valve"], None
+        if not self.pump.native and pump is not None:
+            pump_plan = self.pump.plan(bus_of_pump, pump)
+        told_together = pump_plan is not None and self.valve.bus == self.pump.bus
+        same_node = self.valve.controller_node == self.pump.controller_node
+        if valve is not None and told_together and same_node:
+            # one node has one heartbeat, and the drive's command brings it
+            valve = replace(valve, beat=None)
         return ForeignDevices(
             (plans["motion"], plans["motion_2"]),
             plans["levels"],
@@ -206,8 +316,9 @@ class DevicesSection(Section):
             frozenset(self.receive_only),
             frozenset((*others.ids_29bit, *(STANDARD | each for each in others.ids_11bit))),
             frozenset(others.pgns),
-            None if self.pump.native or pump is None else self.pump.plan(bus_of_pump, pump),
+            pump_plan,
+            valve,
+            plans["panel"],
             frozenset(node for node in nodes if node is not None),
-            frozenset(each.source for each in self.sensors().values()
-                      if not each.bus and each.source is not None),
-        )  # fmt: skip
+            frozenset(each.source for each in own if each.source is not None),
+        )

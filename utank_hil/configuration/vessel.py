@@ -67,7 +67,8 @@ class Vessel(Section):
         if not self.emulated:
             content.append({"emulated": False})
         if self.devices is not None:
-            native = {"pump"} if self.devices.pump.native else None
+            later = ("pump", "valve", "panel")  # so a ship without these has the version she had
+            native = {each for each in later if getattr(self.devices, each).native}
             content.append({"devices": self.devices.model_dump(mode="json", exclude=native)})
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).digest()
         return int.from_bytes(digest[:4], "big") % NOT_AVAILABLE
@@ -164,6 +165,7 @@ class Vessel(Section):
             lacking = vessel.devices.redundancy_problems(vessel.redundancy)
             problems += [(f"devices.{name}", reason) for name, reason in lacking]
             problems += vessel.devices.pump.pump_problems(vessel.pump)
+            problems += vessel.devices.valve.valve_problems(vessel.valve)
         refuse("", in_written_keys(problems, vessel._written))
         return vessel
 

@@ -9,7 +9,7 @@ from utank_hil.analysis.tank_sizing import pump_demand, pump_level_m
 from utank_hil.configuration import Vessel
 from utank_hil.configuration.device_section import DeviceSection
 from utank_hil.configuration.device_sections import unit_of
-from utank_hil.configuration.devices import UNGUARDED, DevicesSection
+from utank_hil.configuration.devices import UNGUARDED, DevicesSection, ValveSection
 from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
 from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.control.optimal_tank import tank_figures
@@ -230,10 +230,10 @@ def power_words(power_w: float) -> str:
 
 def devices_json(devices: DevicesSection | None) -> dict[str, Any]:
     """Devices by their roles; those that are native nodes are left out."""
-    sensors = {} if devices is None else devices.sensors()
+    others = {} if devices is None else devices.devices()
     found = {
         role: _figures(each, silent=devices is not None and each.bus in devices.receive_only)
-        for role, each in sensors.items()
+        for role, each in others.items()
         if not each.native
     }
     if devices is not None and not devices.pump.native:
@@ -249,7 +249,13 @@ def devices_json(devices: DevicesSection | None) -> dict[str, Any]:
 def _figures(device: DeviceSection, *, silent: bool) -> dict[str, Any]:
     read_back = device.canopen_profile is not None and not silent
     has, lacks = _protection(device, read_back=read_back)
+    told = {}
+    if isinstance(device, ValveSection):
+        told = {"commands": {name: each.to for name, each in device.commands.items()}}
+        (has if read_back else lacks).append("watch on the controller's heartbeat")
+        lacks.append("echo of the command")
     return {
+        **told,
         "profile": device.profile,
         "device": device.device or device.profile,
         "documents": device.documents,
@@ -296,8 +302,11 @@ def print_devices(console: Terminal, devices: DevicesSection | None) -> None:
         console.say(f"  promises {each['rate_hz']:.3g} Hz, {each['latency_ms']:g} ms late at most")
         for name, step in each["steps"].items():
             what = f"in steps of {step:.2g} {_UNITS.get(unit_of(name), '')}".rstrip()
+            what = "on or off" if step == 1 and not unit_of(name) else what
             what = "derived, not measured" if name in each["derived"] else what
             console.say(f"  {name}: {what}")
+        for name, signal in each.get("commands", {}).items():
+            console.say(f"  {name}: told by {signal} each 20 ms")
         if each["read_back"]:
             console.say("  read back by SDO before it counts: " + ", ".join(each["read_back"]))
         else:

@@ -13,8 +13,10 @@ from utank_hil.canbus import (
     SensorTank,
     ValveCommand,
     ValveControl,
+    ValveStatus,
 )
 from utank_hil.canbus.measurements import Measurements
+from utank_hil.canbus.profiles.device_plan import DevicePlan, MessageEncoder
 from utank_hil.control.interface import VALVE
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limiter import CommandLimiter
@@ -129,6 +131,7 @@ class CommandEcho:
             self.heard_ns = now_ns
 
 
+_ABSENT_NS: Final = 1 << 62  #: As never.
 STALE_MS: Final = 100.0
 """Where the valve stands is not known from an older report: VALVE_SILENT, and no more."""
 
@@ -140,7 +143,17 @@ class ValveCommander:
     after a silence of `timeout_s`, which is sent with every command.
     """
 
-    def __init__(self, valve: Valve, tank: Tank, catalogue: Catalogue, timeout_s: float) -> None:
+    def __init__(
+        self,
+        valve: Valve,
+        tank: Tank,
+        catalogue: Catalogue,
+        timeout_s: float,
+        plan: DevicePlan[ValveStatus] | None = None,
+    ) -> None:
+        command = None if plan is None else plan.command
+        self._foreign = None if command is None else MessageEncoder(command)
+        self._beat = None if plan is None else plan.beat
         self._valve = valve
         self._tank = tank
         self._sender = catalogue.transmitter(ValveCommand)
@@ -155,7 +168,8 @@ class ValveCommander:
         self._resets_left = 0
         self._followed_ns = self._at_place_ns = 0
         self._heard = False
-        self._echo = CommandEcho()
+        # a valve of another maker sends none: where it stands is what tells
+        self._echo = CommandEcho() if plan is None else CommandEcho(_ABSENT_NS)
 
     def ask(self, loss: float) -> None:
         """Take the loss that the law wants, in Pa per (m/s)^2 of dh/dt."""
@@ -202,7 +216,7 @@ class ValveCommander:
             (now_ns - self._at_place_ns) / MILLISECOND_NS,
         )
 
-    def frame(self, *, faulted: bool, follow: bool) -> Frame:
+    def frames(self, now_ns: int, *, faulted: bool, follow: bool) -> list[Frame]:
         """Return the next command; `faulted` says whether the valve reports a fault."""
         control = ValveControl.FOLLOW if follow else ValveControl.FAIL_POSITION
         if self._resets_left and faulted:
@@ -212,14 +226,18 @@ class ValveCommander:
             self._resets_left = 0
         self._following = control is ValveControl.FOLLOW
         self._told = self._asked if self._following else self._valve.fail_opening
+        if self._foreign is not None:
+            self._told = self._foreign.held(0, self._told)
+            values = self._told, float(self._following), float(control is ValveControl.RESET)
+            beat = [] if self._beat is None else [self._beat]
+            return [*beat, self._foreign.frame(values, now_ns)]
         frame = self._sender.frame(ValveCommand(self._told, control, self._timeout_s))
         self._echo.sent(self._sender.counter)
-        return frame
+        return [frame]
 
 
 _CONTROL = Demand.CONTROL
 _RAMP = Demand.RAMP
-_ABSENT_NS = 1 << 62  #: As never.
 
 
 class Actuators:
@@ -243,6 +261,7 @@ class Actuators:
         self.pump = pump
         self.valve, self.drive = valve, drive
         self._rate_m_s = 0.0
+        self._now_ns = 0
         self.command_pa = 0.0  #: Pressure commanded.
         self._limiter = limiter
         self._timeout_s = timeout_s
@@ -313,6 +332,7 @@ class Actuators:
     def frames(self, judgement: Judgement, measured: Measurements) -> list[Frame]:
         """The next commands of what is on board."""
         word = self._sequence.next_word(measured.drive_state, wanted=judgement.drive_wanted)
+        self._now_ns = measured.now_ns
         frames = self._valve_frames(
             faulted=measured.valve_fault, follow=judgement.demand is _CONTROL
         )
@@ -336,4 +356,6 @@ class Actuators:
         return [command]
 
     def _valve_frames(self, *, faulted: bool, follow: bool) -> list[Frame]:
-        return [] if self.valve is None else [self.valve.frame(faulted=faulted, follow=follow)]
+        if self.valve is None:
+            return []
+        return self.valve.frames(self._now_ns, faulted=faulted, follow=follow)

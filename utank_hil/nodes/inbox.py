@@ -21,6 +21,7 @@ from utank_hil.canbus import (
     Frame,
     HardwiredInputs,
     Heartbeat,
+    OperatorCommand,
     Receiver,
     SensorMotion,
     SensorPump,
@@ -32,7 +33,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.frame import OTHER_BUS, STANDARD
 from utank_hil.canbus.measurements import Measurements
-from utank_hil.canbus.profiles.device import ProfiledDevice, hear
+from utank_hil.canbus.profiles.device import ProfiledDevice, ProfiledPanel, ProfiledValve, hear
 from utank_hil.canbus.profiles.device_plan import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.nodes.canopen_drive import CanopenDrive, DriveReport
 from utank_hil.nodes.canopen_setup import SensorSetup
@@ -76,7 +77,8 @@ STRANGE_NS: Final = 1_000_000_000
 
 _OF_SENSORS: Final = {
     Fault.MOTION_SILENT: SensorMotion, Fault.TANK_SILENT: SensorTank,
-    Fault.PUMP_SENSOR_SILENT: SensorPump,
+    Fault.PUMP_SENSOR_SILENT: SensorPump, Fault.VALVE_SILENT: ValveStatus,
+    Fault.OPERATOR_SILENT: OperatorCommand,
 }  # fmt: skip
 _ABSENT_NS: Final = 1 << 62
 """Time of receipt of what is not on board: it is never late."""
@@ -157,7 +159,9 @@ class Inbox:
             matched.append(Address.DRIVE)
             self._drive = self._subscribe(catalogue.receiver(DriveStatus1), self._on_drive_1)
             self._subscribe(catalogue.receiver(DriveStatus2), self._on_drive_2)
-        if valve:
+        if valve and foreign.valve is not None:
+            self._hear(ProfiledValve(foreign.valve), self._on_valve)
+        elif valve:
             matched.append(Address.VALVE)
             self._subscribe(catalogue.receiver(ValveStatus), self._on_valve)
         self._hardwired_declared = redundancy.hardwired_inputs
@@ -166,8 +170,13 @@ class Inbox:
         self.hardwired = hardwired = HardwiredHeard(catalogue.receiver(HardwiredInputs))
         self._subscriptions[hardwired.receiver.can_id] = hardwired.accept, hardwired.take
         self.watched.append(hardwired.receiver)
-        self.stations = Stations(catalogue, self._versions, second=redundancy.second_station)
+        panel = None if foreign.panel is None else ProfiledPanel(foreign.panel)
+        second = redundancy.second_station
+        self.stations = Stations(catalogue, self._versions, second=second, panel=panel)
         for orders in self.stations.orders.values():
+            if isinstance(orders.receiver, ProfiledPanel):
+                self._hear(orders.receiver, orders.receiver.deliver)
+                continue
             self._subscriptions[orders.receiver.can_id] = orders.accept, orders.obey
             self.watched.append(orders.receiver)
         if len(senders) == 2 and foreign.motions[1] is None:
@@ -186,6 +195,8 @@ class Inbox:
         #: Identifiers of messages whose silence is not judged by their age.
         self.expected = frozenset((*slow, *self._matched_ns))
         for station, address in ADDRESSES.items():
+            if isinstance(self.stations.orders[station].receiver, ProfiledPanel):
+                continue
             beats = catalogue.receiver(Heartbeat, address)
             self._subscribe(beats, partial(self.stations.beat, station))
         self._names: dict[int, int | None] = {}

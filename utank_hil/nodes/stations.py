@@ -23,6 +23,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.endpoints import MAX_LOST, Rejection
 from utank_hil.canbus.measurements import Wishes
+from utank_hil.canbus.profiles.device import ProfiledPanel
 from utank_hil.nodes.plausibility import NEVER_HEARD_NS
 
 _NOTHING: Final = RetuningOrder()
@@ -45,7 +46,7 @@ class Orders:
     anew: it has claimed its address, or frames before it were out of sequence.
     """
 
-    def __init__(self, receiver: Receiver[OperatorCommand]) -> None:
+    def __init__(self, receiver: Receiver[OperatorCommand] | ProfiledPanel) -> None:
         self.receiver = receiver
         self._gap_ns = (MAX_LOST + 1) * receiver.cycle_ns
         self.requested_mode = Mode.STANDBY
@@ -64,17 +65,23 @@ class Orders:
 
     def accept(self, frame: Frame) -> OperatorCommand | None:
         """Return the message of a frame, None if it is rejected; hear its stop or disarm."""
-        order = self.receiver.accept(frame)
-        heard = order or self.receiver.intact(frame)
+        receiver = self.receiver
+        assert isinstance(receiver, Receiver)
+        order = receiver.accept(frame)
+        heard = order or receiver.intact(frame)
         if heard is not None:
-            self.news = True
-            self._stop_heard |= heard.stop
-            # where it was not pressed before, what is pressed later in the tick counts
-            before = self.last is None or _arms(self.last)
-            disarms = before and not _arms(heard)
-            self._disarm_heard |= disarms
-            self.lets_go |= disarms and self.last is not None
+            self.overhear(heard)
         return order
+
+    def overhear(self, heard: OperatorCommand) -> None:
+        """Take a stop, or what disarms, of an intact frame."""
+        self.news = True
+        self._stop_heard |= heard.stop
+        # where it was not pressed before, what is pressed later in the tick counts
+        before = self.last is None or _arms(self.last)
+        disarms = before and not _arms(heard)
+        self._disarm_heard |= disarms
+        self.lets_go |= disarms and self.last is not None
 
     def begin_anew(self) -> None:
         """Take no bit of the next frame for an edge: the panel has started."""
@@ -103,7 +110,7 @@ class Orders:
             undo or (order.undo and not before.undo),
             forbidden or order.forbid_retuning,
         )
-        self.receiver.changes += order != before
+        self.receiver.changed(order != before)
         self.last, self.heard_ns = order, now_ns
         self.requested_mode = Mode.STANDBY if asked is None else asked
 
@@ -168,11 +175,16 @@ class Stations:
     """The orders of all stations.
 
     `versions` are those of the controller's catalogue and configuration; `second` says whether the
-    second station may take the command.
+    second station may take the command. The first is the `panel` of another maker, if there is one.
     """
 
     def __init__(
-        self, catalogue: Catalogue, versions: tuple[int, int], *, second: bool = False
+        self,
+        catalogue: Catalogue,
+        versions: tuple[int, int],
+        *,
+        second: bool = False,
+        panel: ProfiledPanel | None = None,
     ) -> None:
         self._versions, self._second = versions, second
         self._beats_ns = dict.fromkeys(ADDRESSES, NEVER_HEARD_NS)
@@ -181,6 +193,9 @@ class Stations:
             station: Orders(catalogue.receiver(OperatorCommand, address))
             for station, address in ADDRESSES.items()
         }
+        if panel is not None:
+            self.orders[Station.OPERATOR] = orders = Orders(panel)
+            panel.overhear, panel.deliver = orders.overhear, self._obey
         self.in_command = Station.OPERATOR
         self._leads = self.orders[Station.OPERATOR]
         self._watches = self.orders[Station.OPERATOR_2]
@@ -207,6 +222,11 @@ class Stations:
             beat.catalogue_version,
             beat.configuration_version,
         ) == self._versions
+
+    def _obey(self, order: OperatorCommand, now_ns: int) -> None:
+        """Take an order of a panel of another maker: it is the ship's, well and alive."""
+        self._beats_ns[Station.OPERATOR], self._matches[Station.OPERATOR] = now_ns, True
+        self.orders[Station.OPERATOR].obey(order, now_ns)
 
     def started(self, address: int) -> None:
         """Note that the panel with an address has claimed it."""

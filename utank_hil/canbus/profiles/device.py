@@ -1,14 +1,14 @@
 """A device of another maker: from its frames to a measurement of the catalogue's own type."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Final, Generic
 
 from utank_hil.canbus.endpoints import BUCKET_LIMIT, MAX_LOST, RESYNC_FRAMES, Rejection
-from utank_hil.canbus.enumerations import Quality, Switch
+from utank_hil.canbus.enumerations import Mode, Quality, Switch, ValveFault, ValveState
 from utank_hil.canbus.frame import Frame
-from utank_hil.canbus.messages import SensorTank
+from utank_hil.canbus.messages import OperatorCommand, SensorTank, ValveStatus
 from utank_hil.canbus.profiles.device_plan import FIELDS, Crc8, DevicePlan, MessagePlan, T
 from utank_hil.canbus.profiles.field import ConditionPlan, Field, SignalPlan
 
@@ -37,13 +37,18 @@ class HeardMessage:
         self._last = self._candidate = -1
         self._run = self._bucket = 0
 
+    def intact(self, data: bytes) -> bool:
+        """Whether a frame is whole; nothing changes."""
+        if len(data) != self.length:
+            return False
+        return self._crc is None or self._crc.of(data) == data[self._crc.byte]
+
     def passes(self, data: bytes) -> bool:
         """Judge the next frame; a rejected one does not change the counter."""
         self.heard += 1
-        if len(data) != self.length:
-            return self._reject(Rejection.LENGTH)
-        if self._crc is not None and self._crc.of(data) != data[self._crc.byte]:
-            return self._reject(Rejection.CRC)
+        if not self.intact(data):
+            whole = len(data) == self.length
+            return self._reject(Rejection.CRC if whole else Rejection.LENGTH)
         if self._counter is not None:
             counter = self._counter.raw(data) % self._counts  # it may have a sign
             if self._last >= 0:
@@ -153,6 +158,8 @@ class _Message(HeardMessage):
         self.only: ConditionPlan | None = plan.only
         self.stamp = None if plan.stamp is None else Stamp(plan.stamp, plan.stamp_us, late_ms)
         self.needed: bool = bool(plan.signals) or plan.stamp is not None
+        #: Whether it says of the device that it is well, or at least that it lives.
+        self.status: bool = bool(plan.conditions) or not (self.needed or plan.counter is None)
         self.bit = bit if self.needed else 0
         self.came_ns = self.good_ns = _LONG_AGO
         self.old_ns = STATUS_CYCLES * plan.cycle_ns  #: Age from which its status says nothing.
@@ -174,7 +181,7 @@ class ProfiledDevice(Generic[T]):
         ]
         self.watched: tuple[HeardMessage, ...] = tuple(messages)
         self._needed = [each for each in messages if each.needed]
-        self._status = [each for each in messages if each.conditions]
+        self._status = [each for each in messages if each.status]
         #: Whether a counter or a stamp tells a new measurement.
         self.counts = any(each.counter or each.stamp for each in plan.messages)
         self._all = sum(each.bit for each in messages)
@@ -231,7 +238,7 @@ class ProfiledDevice(Generic[T]):
             return
         if not message.passes(data):
             return
-        if message.conditions:
+        if message.status:
             message.good_ns = now_ns
             for condition in message.conditions:
                 if not condition.holds(data):
@@ -270,15 +277,18 @@ class ProfiledDevice(Generic[T]):
         usable = self.named and self._changes(now_ns)
         for message in self._status:
             usable = usable and now_ns - message.good_ns <= message.old_ns
-        quality = _GOOD if usable else _BAD
-        content: tuple[Any, ...]
-        if self._tank:
-            port_m, starboard_m, port, starboard = values
-            switches = self._switch(port, port_m), self._switch(starboard, starboard_m)
-            content = (port_m, starboard_m, *switches, quality)
-        else:
-            content = (values[0], values[1], quality)
-        self.deliver(_new(self._kind, content), now_ns)
+        content = self._content(usable)
+        if content is not None:
+            self.deliver(_new(self._kind, content), now_ns)
+
+    def _content(self, usable: bool) -> tuple[Any, ...] | None:
+        """The message's fields, of the present values; None if there is nothing to be said."""
+        values, quality = self._values, _GOOD if usable else _BAD
+        if not self._tank:
+            return (values[0], values[1], quality)
+        port_m, starboard_m, port, starboard = values
+        switches = self._switch(port, port_m), self._switch(starboard, starboard_m)
+        return (port_m, starboard_m, *switches, quality)
 
     def _changes(self, now_ns: int) -> bool:
         """Whether the content has changed within its time; without a limit it always has."""
@@ -293,3 +303,80 @@ class ProfiledDevice(Generic[T]):
         if math.isfinite(self.plan.high_level_m):
             return Switch.OFF if level_m <= self.plan.high_level_m else Switch.ON
         return Switch.OFF if raw == 0.0 else Switch.ON
+
+
+class ProfiledValve(ProfiledDevice[ValveStatus]):
+    """A valve: where it stands, by its position or by the switches at both ends of its way.
+
+    Between these its position is not known. One that is not known to be the ship's says nothing.
+    """
+
+    def _content(self, usable: bool) -> tuple[Any, ...] | None:
+        if not self.named:
+            return None
+        opening, is_open, is_shut = self._values
+        if not (math.isnan(is_open) and math.isnan(is_shut)):
+            at_an_end = (is_open == 1.0) != (is_shut == 1.0)
+            opening = float(is_open == 1.0) if at_an_end else math.nan
+        state = ValveState.FOLLOWING if usable else ValveState.FAULT
+        return (opening, state, ValveFault.NONE, None, None, False, False, False)
+
+
+_STOP: Final = FIELDS[OperatorCommand].index("stop")
+
+
+class ProfiledPanel(ProfiledDevice[OperatorCommand]):
+    """An operator station: what is pressed, and whether it lives.
+
+    Only a panel that is known, well and alive is delivered. A stop, and what disarms, is told to
+    `overhear` from any whole frame, whatever else is wrong with it. A stop that is not available
+    counts as pressed, another button as not.
+    """
+
+    def __init__(self, plan: DevicePlan[OperatorCommand]) -> None:
+        super().__init__(plan)
+        self.overhear: Callable[[OperatorCommand], None] = _overhears_nothing
+        self._values[_STOP] = 0.0  # nothing is pressed before it is heard
+
+    @property
+    def rejected(self) -> dict[Rejection, int]:
+        """Frames of its messages that were not accepted, by reason."""
+        return {
+            reason: sum([each.rejected[reason] for each in self._needed]) for reason in Rejection
+        }
+
+    def changed(self, new: bool) -> None:
+        """Count a frame that came because its content is new."""
+        for message in self._needed:
+            message.changes += new
+
+    def _take(self, message: _Message, frame: Frame, now_ns: int) -> None:
+        if message.signals and message.intact(frame.data):
+            values = list(self._values)
+            for signal in message.signals:
+                values[signal.place] = signal.value(frame.data)
+            self.overhear(_order(values))
+        super()._take(message, frame, now_ns)
+
+    def _content(self, usable: bool) -> tuple[Any, ...] | None:
+        return tuple(_order(self._values)) if usable else None
+
+
+def _order(values: Sequence[float]) -> OperatorCommand:
+    arm, stop, acknowledge, reset, passive = [each == 1.0 for each in values]
+    stop = values[_STOP] != 0.0
+    mode = Mode.STANDBY if stop else Mode.ACTIVE if arm else Mode.PASSIVE
+    if mode is Mode.PASSIVE and not passive:
+        mode = Mode.STANDBY
+    return OperatorCommand(mode, arm, stop, reset, acknowledge)
+
+
+def _overhears_nothing(order: OperatorCommand) -> None:
+    """Take what nobody has asked for yet."""
+
+
+def device_of(plan: DevicePlan[Any]) -> ProfiledDevice[Any]:
+    """What hears the device of a plan."""
+    if plan.kind is ValveStatus:
+        return ProfiledValve(plan)
+    return ProfiledPanel(plan) if plan.kind is OperatorCommand else ProfiledDevice(plan)

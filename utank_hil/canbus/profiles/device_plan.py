@@ -1,12 +1,19 @@
 """What a device of another maker sends, worked out beforehand from its profile."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final, Generic, TypeVar
 
 from utank_hil.canbus.frame import STANDARD, Frame
-from utank_hil.canbus.messages import SensorMotion, SensorPump, SensorTank
+from utank_hil.canbus.messages import (
+    OperatorCommand,
+    SensorMotion,
+    SensorPump,
+    SensorTank,
+    ValveStatus,
+)
 from utank_hil.canbus.profiles.drive_plan import DrivePlan, Step
 from utank_hil.canbus.profiles.field import ConditionPlan, Field, SignalPlan
 
@@ -16,9 +23,15 @@ FIELDS: Final[dict[type[tuple[Any, ...]], tuple[str, ...]]] = {
     SensorMotion: ("roll_rad", "roll_rate_rad_s"),
     SensorTank: ("port_level_m", "starboard_level_m", "port_high", "starboard_high"),
     SensorPump: ("pressure_pa", "flow_m3_s"),
+    ValveStatus: ("opening", "is_open", "is_shut"),
+    OperatorCommand: ("arm", "stop", "acknowledge", "reset", "passive"),
 }
-"""What a device may measure, in the order of the message's fields before the quality."""
+"""What a device may say: of a sensor in the order of the message's fields before the quality, of a
+valve its position, of a panel what is pressed."""
 SWITCHES: Final = ("port_high", "starboard_high")
+COMMANDS: Final = ("opening", "follow", "reset")
+"""What a valve may be told: its opening; whether it is to follow, or go to its fail position; to
+forget a fault."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +84,46 @@ class MessagePlan:
     only: ConditionPlan | None = None  #: Other frames of the identifier are none of this message.
 
 
+class MessageEncoder:
+    """Encodes one message by its plan: values, status, counter, stamp and checksum."""
+
+    def __init__(self, plan: MessagePlan) -> None:
+        self.plan = plan
+        self._count = 0
+
+    def frame(self, values: Sequence[float], now_ns: int, *, missing: bool = False) -> Frame:
+        """The next frame, of values by their places; the status says whether any is `missing`."""
+        plan, word = self.plan, 0
+        for signal in plan.signals:
+            value = signal.sign * values[signal.place] - signal.offset
+            word = signal.field.put(word, value / signal.factor, plan.length)
+        for condition in plan.conditions:
+            # a device without a code for it says so by its status
+            good = min(condition.allowed)
+            status = condition.mask & ~good if missing else good
+            word = condition.field.put(word, status, plan.length)
+        if plan.stamp is not None:
+            stamp = round(now_ns / (1e3 * plan.stamp_us)) % (1 << plan.stamp.bits)
+            word = plan.stamp.put(word, stamp, plan.length)
+        if plan.counter is not None:
+            self._count = (self._count + 1) % (1 << plan.counter.bits)
+            word = plan.counter.put(word, self._count, plan.length)
+        data = word.to_bytes(plan.length, "little")
+        if plan.crc is not None:
+            at = plan.crc.byte
+            data = data[:at] + bytes([plan.crc.of(data)]) + data[at + 1 :]
+        return Frame(plan.can_ids[-1], data)
+
+    def held(self, place: int, value: float) -> float:
+        """What is left of a value in the bits that it has."""
+        for signal in self.plan.signals:
+            if signal.place == place:
+                counts = (signal.sign * value - signal.offset) / signal.factor
+                word = signal.field.put(0, counts, self.plan.length)
+                return signal.value(word.to_bytes(self.plan.length, "little"))
+        return value
+
+
 @dataclass(frozen=True, slots=True)
 class DevicePlan(Generic[T]):
     """All that is needed to hear a device."""
@@ -95,6 +148,8 @@ class DevicePlan(Generic[T]):
     bus: int = 0
     node: int | None = None
     steps: tuple[Step, ...] = ()
+    command: MessagePlan | None = None  #: What a valve is told, by `COMMANDS`.
+    beat: Frame | None = None  #: The controller's heartbeat, sent with each command.
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +166,8 @@ class ForeignDevices:
     other_ids: frozenset[int] = frozenset()  #: Identifiers that are nobody's fault.
     other_pgns: frozenset[int] = frozenset()
     pump: DrivePlan | None = None  #: Drive of the pump.
+    valve: DevicePlan[ValveStatus] | None = None
+    panel: DevicePlan[OperatorCommand] | None = None  #: The first operator station.
     #: nodes, sources: CANopen nodes and source addresses of devices on the controller's own bus.
     nodes: frozenset[int] = frozenset()
     sources: frozenset[int] = frozenset()

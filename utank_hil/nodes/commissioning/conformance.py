@@ -11,14 +11,17 @@ from utank_hil.canbus import (
     ControlWord,
     DriveState,
     Frame,
+    OperatorCommand,
     Quality,
     SensorMotion,
     SensorPump,
     SensorTank,
+    ValveState,
+    ValveStatus,
 )
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
-from utank_hil.canbus.profiles.device import ProfiledDevice
-from utank_hil.canbus.profiles.device_plan import FIELDS, DevicePlan
+from utank_hil.canbus.profiles.device import device_of
+from utank_hil.canbus.profiles.device_plan import DevicePlan, MessageEncoder
 from utank_hil.canbus.profiles.drive_plan import (
     COMMAND_MS,
     SDO_ANSWER,
@@ -35,6 +38,7 @@ from utank_hil.canbus.profiles.drive_plan import (
     write_request,
 )
 from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.valves import Valve
 from utank_hil.nodes.actuators import DriveSequence
 from utank_hil.nodes.canopen_drive import CanopenDrive, state_of
 from utank_hil.nodes.canopen_setup import CanopenSetup, SensorSetup
@@ -54,6 +58,9 @@ MOVES: Final[dict[type[tuple[Any, ...]], tuple[tuple[str, float, str, str], ...]
                     "Heel the ship, or tilt the sensor, to starboard by two degrees or more"),),
     SensorTank: (("port_level_m", 0.05, "m", "Raise the port level, or its float, by 0.1 m"),
                  ("starboard_level_m", 0.05, "m", "Raise the starboard level by 0.1 m")),
+    OperatorCommand: (("stop", 1.0, "", "Press stop, and hold it"),
+                      ("acknowledge", 1.0, "", "Let it go, press acknowledge, and hold that"),
+                      ("arm", 1.0, "", "Let it go, and turn the key to arm")),
     SensorPump: (("pressure_pa", 500.0, "Pa", "Press with 0.1 m of water on the starboard side"),),
 }  # fmt: skip
 """What is moved by hand: value, least move in its unit, and what to do."""
@@ -118,7 +125,7 @@ class SensorTrial(Trial):
     """A sensor: its pace, what it says, its signs by hand, its silence."""
 
     def __init__(self, plan: DevicePlan[Any], ask: Ask, listen_s: float) -> None:
-        self._plan, self._device, self._listen_s = plan, ProfiledDevice(plan), listen_s
+        self._plan, self._device, self._listen_s = plan, device_of(plan), listen_s
         self._device.deliver = lambda message, now_ns: self._heard.append((now_ns, message))
         self._heard: list[tuple[int, tuple[Any, ...]]] = []
         self._setup = SensorSetup(self._device) if plan.steps else None
@@ -162,8 +169,7 @@ class SensorTrial(Trial):
         ]  # fmt: skip
         if not self._heard:
             return
-        for move in MOVES[self._plan.kind]:
-            yield from self._move(*move)
+        yield from self._moves()
         yield from self._by_hand("Take the device off the bus or its power")
         yield from self._wait(self._plan.age_ms * 1e-3)  # what was under way
         self._heard = []
@@ -179,10 +185,18 @@ class SensorTrial(Trial):
         remedy = "It has to send by itself after its power is back: save its settings in it."
         self.checks.append(flag("back", "it measures again by itself", remedy, right=back))
 
+    def _moves(self) -> Script:
+        for move in MOVES[self._plan.kind]:
+            yield from self._move(*move)
+
     def _rejected(self) -> int:
         return sum(sum(each.rejected.values()) for each in self._device.watched)
 
     def _usable(self, message: tuple[Any, ...]) -> bool:
+        if isinstance(message, OperatorCommand):  # it is delivered only if it is usable
+            return True
+        if isinstance(message, ValveStatus):
+            return message.state is ValveState.FOLLOWING and math.isfinite(message.opening)
         values = message[: 1 if self._plan.kind is SensorPump else 2]  # a flow need not be there
         return message[-1] in GOOD and all(map(math.isfinite, values))
 
@@ -204,19 +218,20 @@ class SensorTrial(Trial):
         ]  # fmt: skip
 
     def _move(self, value: str, least: float, unit: str, what: str) -> Script:
-        place = FIELDS[self._plan.kind].index(value)
+        turns = self._plan.kind is SensorMotion
         self._heard = []
         yield from self._wait(1.0)
-        at_rest, rest_rate, begun = self._mean(place), self._mean(1), len(self._heard) - 1
+        at_rest, begun = self._mean(value), len(self._heard) - 1
+        rest_rate = self._mean("roll_rate_rad_s") if turns else 0.0
         yield from self._by_hand(what)
         moving, self._heard = self._heard[max(begun, 0) :], []
         yield from self._wait(1.0)
-        moved = self._mean(place) - at_rest
+        moved = self._mean(value) - at_rest
         self.checks.append(
             flag(f"{value}_sign", f"{value} moved by {moved:.3g} {unit}",
                  "Turn the device, exchange its channels, or change sign.", right=moved >= least)
         )  # fmt: skip
-        if self._plan.kind is SensorMotion:
+        if turns:
             turned = math.fsum(
                 (after_ns - before_ns) * 1e-9 * ((before[1] + after[1]) / 2 - rest_rate)
                 for (before_ns, before), (after_ns, after) in pairwise(moving)
@@ -227,9 +242,66 @@ class SensorTrial(Trial):
                       "Change sign, scale or the axis of roll_rate_rad_s.")
             )  # fmt: skip
 
-    def _mean(self, place: int) -> float:
-        values = [message[place] for _, message in self._heard]
+    def _mean(self, value: str) -> float:
+        values = [float(getattr(message, value)) for _, message in self._heard]
         return sum(values) / len(values) if values else math.nan
+
+
+WAY_SHARE: Final = 0.15
+"""Of its time from end to end: as VALVE_NOT_FOLLOWING lets it be off."""
+AT_PLACE: Final = 0.1  #: Of its way.
+SILENCE_MS: Final = (
+    100.0  #: For a valve to notice that it is commanded no longer, as the native one.
+)
+
+
+class ValveTrial(SensorTrial):
+    """A valve: its pace, its way under command, and where it goes when nobody commands it."""
+
+    def __init__(self, plan: DevicePlan[Any], valve: Valve, ask: Ask, listen_s: float) -> None:
+        assert plan.command is not None
+        self._valve, self._command = valve, MessageEncoder(plan.command)
+        self._told, self._speaks = valve.fail_opening, False
+        super().__init__(plan, ask, listen_s)
+
+    def _frames(self) -> list[Frame]:
+        frames = super()._frames()
+        if not self._speaks or self.now_ns // TICK_NS % (COMMAND_MS * 1_000_000 // TICK_NS):
+            return frames
+        beat = [] if self._plan.beat is None else [self._plan.beat]
+        command = self._command.frame((self._told, 1.0, 0.0), self.now_ns)
+        return [*frames, *beat, command]
+
+    def _moves(self) -> Script:
+        yield from self._by_hand("The valve will move: nobody at its spindle")
+        way_ms, fails = 1e3 * self._valve.opening_time_s, self._valve.fail_opening
+        self._speaks = True
+        yield from self._wait(2 * self._valve.opening_time_s)
+        self._told = 1.0 - fails
+        yield from self._way(
+            "way_ms",
+            "from its fail position to the other end",
+            way_ms,
+            WAY_SHARE * way_ms,
+            "Set opening_time_s of the ship's valve.",
+        )
+        self._told, self._speaks = fails, False
+        yield from self._way(
+            "silence_ms",
+            "to its fail position, from the last command",
+            way_ms,
+            SILENCE_MS + WAY_SHARE * way_ms,
+            "It must go there by itself: spring, own timeout, 1016h and 1029h.",
+        )
+
+    def _way(self, name: str, what: str, right_ms: float, off_ms: float, remedy: str) -> Script:
+        begin_ns, self._heard = self.now_ns, []
+        yield from self._wait(3 * self._valve.opening_time_s + SILENCE_MS * 1e-3)
+        away = [now_ns for now_ns, message in self._heard
+                if not abs(message[0] - self._told) < AT_PLACE]  # fmt: skip
+        back = bool(self._heard) and abs(self._heard[-1][1][0] - self._told) < AT_PLACE
+        took_ms = (max(away, default=begin_ns) - begin_ns) * 1e-6 if back else math.nan
+        self.checks.append(Check(name, what, took_ms, right_ms, off_ms, "ms", remedy))
 
 
 STOP_MS: Final = 130.0 + COMMAND_MS

@@ -1,0 +1,373 @@
+"""A valve and a panel of other makers: commanded, heard, armed from, on buses of their own."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cantools.database.can import Database
+
+from firmware_sim.scenario import Scenario
+from firmware_sim.ship_side import build_ship_side
+from utank_hil.assembly import build_controller_node
+from utank_hil.canbus import Fault, Frame, Mode, OperatorCommand, load_catalogue
+from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
+from utank_hil.configuration import load_config
+from utank_hil.configuration.devices import ROLES, DevicesSection
+from utank_hil.console.ship_report import print_devices
+from utank_hil.console.terminal import Terminal
+from utank_hil.nodes.commissioning.conformance import SensorTrial, ValveTrial
+from utank_hil.nodes.panel import Action, OperatorPanel, TimedAction
+from utank_hil.runners import Lockstep, SimulatedBus
+from utank_hil.runners.lockstep import with_more
+
+SECOND_NS = 1_000_000_000
+DBC = """VERSION ""
+NS_ :
+BS_:
+BU_: C V P
+BO_ 801 VALVE_ORDER: 4 C
+ SG_ SETPOINT : 0|16@1+ (0.01,0) [0|100] "%" V
+ SG_ FOLLOW : 16|1@1+ (1,0) [0|1] "" V
+ SG_ COUNT : 20|4@1+ (1,0) [0|15] "" V
+ SG_ CRC : 24|8@1+ (1,0) [0|255] "" V
+BO_ 802 VALVE_POSITION: 4 V
+ SG_ ACTUAL : 7|16@0+ (0.01,0) [0|100] "%" C
+ SG_ STATE : 16|4@1+ (1,0) [0|15] "" C
+ SG_ COUNT : 20|4@1+ (1,0) [0|15] "" C
+ SG_ CRC : 24|8@1+ (1,0) [0|255] "" C
+BO_ 2566841389 PANEL_KEYS: 3 P
+ SG_ ARM : 0|2@1+ (1,0) [0|1] "" C
+ SG_ STOP_CLOSED : 2|2@1+ (1,0) [0|1] "" C
+ SG_ ACCEPT : 4|2@1+ (1,0) [0|1] "" C
+ SG_ RESET : 6|2@1+ (1,0) [0|1] "" C
+ SG_ COUNT : 8|4@1+ (1,0) [0|15] "" C
+ SG_ CRC : 16|8@1+ (1,0) [0|255] "" C
+BO_ 2566841645 PANEL_LIFE: 1 P
+ SG_ TOGGLE : 0|1@1+ (1,0) [0|1] "" C
+ SG_ STATE : 1|3@1+ (1,0) [0|7] "" C
+"""
+CRC = {"byte": 3}
+VALVE = {
+    "bus": "can1", "messages": {"order": "VALVE_ORDER", "position": "VALVE_POSITION"},
+    "commands": {"opening": {"to": "order.SETPOINT"}, "follow": {"to": "order.FOLLOW"}},
+    "signals": {"opening": {"from": "position.ACTUAL"}},
+    "valid_when": [{"from": "position.STATE", "in": [1]}],
+    "protection": {
+        "counters": ["order.COUNT", "position.COUNT"],
+        "crcs": [{"message": "order", **CRC}, {"message": "position", **CRC}],
+    },
+    "cycle_ms": 20, "age_ms": 60,
+}  # fmt: skip
+ON_OFF = {
+    "profile": "cia401_valve", "bus": "can2", "node": 9, "age_ms": 700,
+    "accept_unprotected": True,
+    "commands": {"opening": {"sign": -1, "offset": -1}},
+}  # fmt: skip
+PANEL = {
+    "bus": "can1", "messages": {"keys": "PANEL_KEYS", "life": "PANEL_LIFE"},
+    "signals": {"arm": {"from": "keys.ARM"}, "acknowledge": {"from": "keys.ACCEPT"},
+                "stop": {"from": "keys.STOP_CLOSED", "scale": -1, "offset": 1},
+                "reset": {"from": "keys.RESET"}},
+    "valid_when": [{"from": "life.STATE", "in": [2]}],
+    "protection": {"counters": ["keys.COUNT", "life.TOGGLE"],
+                   "crcs": [{"message": "keys", "byte": 2}]},
+    "cycle_ms": 100, "age_ms": 300,
+}  # fmt: skip
+
+
+@pytest.fixture
+def theirs(tmp_path):
+    path = tmp_path / "theirs.dbc"
+    path.write_text(DBC)
+
+    def section(**devices):
+        return {
+            role: device if "profile" in device else {"dbc": str(path), **device}
+            for role, device in devices.items()
+        }
+
+    return section
+
+
+class Bench:
+    """The semi-active ship of a scenario with devices, and its controller."""
+
+    def __init__(self, devices, controller="clipped", leave_out=()):
+        scenario = load_config(Path("configs/scenarios/semi_active.yaml"), Scenario)
+        section = DevicesSection(**devices) if devices else None
+        vessel = scenario.vessel.model_copy(update={"devices": section})
+        config = scenario.controllers[controller]
+        safety = replace(config.safety, **vessel.default_safety)
+        config = config.model_copy(update={"vessel": vessel, "safety": safety})
+        scenario = scenario.model_copy(update={"vessel": vessel})
+        self.ship = build_ship_side(scenario, 1, scenario.operator)
+        self.node = build_controller_node(config, commissioned=True)
+        nodes = [each for each in self.ship.nodes if each.name not in leave_out]
+        self.sent = []
+        self.run = Lockstep(
+            [*nodes, self.node],
+            with_more(SimulatedBus(), len(vessel.foreign.buses) - 1, 250_000),
+            trace=lambda now_ns, sender, frame: self.sent.append((now_ns, sender, frame)),
+        )
+
+    def to(self, seconds):
+        rolls = []
+        while self.run.now_ns < seconds * SECOND_NS:
+            self.run.run_until(self.run.now_ns + SECOND_NS // 10)
+            rolls.append(self.ship.plant.roll_rad)
+        return np.array(rolls)
+
+
+@pytest.mark.slow
+def test_a_valve_and_a_panel_by_their_dbc_do_as_the_native_ones(theirs):
+    native, foreign = Bench(None), Bench(theirs(valve=VALVE, panel=PANEL))
+    for bench in (native, foreign):
+        bench.to(7)
+        assert (bench.node.mode, bench.node.fault) == (Mode.ACTIVE, 0)
+    both = [bench.to(60) for bench in (native, foreign)]
+    assert (foreign.node.mode, foreign.node.fault) == (Mode.ACTIVE, 0)
+    assert np.sqrt(np.mean((both[0] - both[1]) ** 2)) < 0.03 * np.sqrt(np.mean(both[0] ** 2))
+    openings = {round(each, 1) for each in (foreign.ship.valve.opening, native.ship.valve.opening)}
+    assert len(openings) == 1
+    # as the maker's own library reads it
+    database = Database()
+    database.add_dbc_string(DBC)
+    orders = [f.data for _, by, f in foreign.sent
+              if by == "controller" and f.can_id == 1 << BUS_SHIFT | STANDARD | 801]  # fmt: skip
+    told = [database.decode_message(801, data) for data in orders]
+    assert {each["FOLLOW"] for each in told} == {0, 1}
+    assert {each["SETPOINT"] for each in told} >= {100.0, 0.0}
+    assert [each["COUNT"] for each in told[:20]] == [n % 16 for n in range(1, 21)]
+
+
+@pytest.mark.slow
+def test_an_open_or_shut_valve_by_cia_401_with_its_switches(theirs):
+    bench = Bench(theirs(valve=ON_OFF), "on_off")
+    bench.to(8)
+    assert (bench.node.mode, bench.node.fault) == (Mode.ACTIVE, 0)
+    openings = set()
+    for second in range(9, 30):
+        bench.to(second)
+        openings.add(round(bench.ship.valve.opening))
+    assert (bench.node.mode, bench.node.fault) == (Mode.ACTIVE, 0)
+    assert openings == {0, 1}
+
+
+@pytest.mark.parametrize(
+    ("break_it", "fault"),
+    [
+        (lambda bench: setattr(bench.ship.valve, "stuck", True), Fault.VALVE_NOT_FOLLOWING),
+        (lambda bench: setattr(bench.ship.valve, "powered", False), Fault.VALVE_SILENT),
+    ],
+)
+@pytest.mark.slow
+def test_a_valve_that_is_stuck_or_dead_is_found(theirs, break_it, fault):
+    bench = Bench(theirs(valve=VALVE))
+    bench.to(7)
+    break_it(bench)
+    bench.to(17)
+    assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, fault)
+
+
+@pytest.fixture
+def station(theirs):
+    database = Database()
+    database.add_dbc_string(DBC)
+    bench = Bench(theirs(panel=PANEL), leave_out=("panel",))
+    return Station(bench, database)
+
+
+class Station:
+    """A panel by cantools, on the first interface of its own."""
+
+    def __init__(self, bench, database):
+        self.bench, self.database = bench, database
+        self.keys = {"ARM": 0, "STOP_CLOSED": 1, "ACCEPT": 0, "RESET": 0}
+        self.count = self.toggle = 0
+        self.lives, self.state, self.counts, self.sends = True, 2, True, True
+
+    def frames(self):
+        self.count = (self.count + self.counts) % 16
+        self.toggle ^= self.lives
+        data = bytearray(
+            self.database.encode_message(
+                "PANEL_KEYS", {**self.keys, "COUNT": self.count, "CRC": 0}, strict=False
+            )
+        )
+        data[2] = crc8(data[:2])
+        life = self.database.encode_message(
+            "PANEL_LIFE", {"TOGGLE": self.toggle, "STATE": self.state}
+        )
+        ids = (self.database.get_message_by_name(name).frame_id
+               for name in ("PANEL_KEYS", "PANEL_LIFE"))  # fmt: skip
+        pairs = zip(ids, (bytes(data), bytes(life)), strict=True)
+        return [Frame(1 << BUS_SHIFT | can_id, content) for can_id, content in pairs]
+
+    def to(self, seconds):
+        bench = self.bench
+        while bench.run.now_ns < seconds * SECOND_NS:
+            if self.sends:
+                for frame in self.frames():
+                    bench.node.receive(frame, bench.run.now_ns)
+            bench.run.run_until(bench.run.now_ns + SECOND_NS // 10)
+
+    @property
+    def mode(self):
+        return self.bench.node.mode
+
+
+def crc8(data):
+    """SAE J1850, bit by bit."""
+    register = 0xFF
+    for byte in data:
+        register ^= byte
+        for _ in range(8):
+            register = ((register << 1) ^ (0x1D if register & 0x80 else 0)) & 0xFF
+    return register ^ 0xFF
+
+
+def armed(station):
+    station.to(3)
+    station.keys["ARM"] = 1
+    station.to(8)
+    assert station.mode is Mode.ACTIVE
+    return station
+
+
+def test_a_panel_by_its_dbc_arms_and_stops(station):
+    armed(station)
+    station.keys["STOP_CLOSED"] = 0
+    station.to(8.2)
+    assert station.mode is Mode.STANDBY
+    station.keys |= {"STOP_CLOSED": 1, "ARM": 0}
+    station.to(9)
+    station.keys["ARM"] = 1
+    station.to(13)
+    assert station.mode is Mode.ACTIVE
+    station.keys["ARM"] = 0
+    station.to(15)
+    assert station.mode is not Mode.ACTIVE
+
+
+def test_a_stop_counts_out_of_sequence_from_a_sick_panel_and_where_its_wire_is_broken(station):
+    armed(station)
+    station.counts, station.state = False, 5
+    station.keys["STOP_CLOSED"] = 3  # not available
+    station.to(8.2)
+    assert station.mode is Mode.STANDBY
+
+
+@pytest.mark.parametrize("sick", [{"lives": False}, {"state": 3}, {"counts": False}])
+def test_a_panel_that_hangs_does_not_arm_and_ends_what_it_armed(station, sick):
+    armed(station)
+    for name, value in sick.items():
+        setattr(station, name, value)
+    station.to(15)
+    assert (station.mode, station.bench.node.fault) == (Mode.FAULT, Fault.OPERATOR_SILENT)
+
+
+@pytest.mark.parametrize("sick", [{"lives": False}, {"state": 3}, {"counts": False}])
+def test_a_sick_panel_does_not_arm(station, sick):
+    for name, value in sick.items():
+        setattr(station, name, value)
+    station.to(3)
+    station.keys["ARM"] = 1
+    station.to(8)
+    assert station.mode is Mode.STANDBY
+
+
+def test_the_native_panel_of_that_station_does_not_arm(theirs):
+    bench = Bench(theirs(panel=PANEL), leave_out=("panel",))
+    version = bench.ship.vessel.version
+    panel = OperatorPanel(load_catalogue(), configuration_version=version,
+                          script=[TimedAction(1.0, Action.ARM)])  # fmt: skip
+    for k in range(80):
+        for frame in panel.tick(k * SECOND_NS // 10):
+            bench.node.receive(frame, bench.run.now_ns)
+        bench.run.run_until(bench.run.now_ns + SECOND_NS // 10)
+    assert bench.node.mode is Mode.STANDBY
+
+
+def conformed(theirs, role, device, moves):
+    """A trial of an emulated device; a person does what is asked in two seconds."""
+    bench = Bench(theirs(**{role: device}))
+    vessel = bench.ship.vessel
+    plan = vessel.devices.devices()[role].plan(ROLES[role], role, 0)
+    node = bench.ship.valve if role == "valve" else Buttons(bench.ship.panel)
+    asked = []
+
+    def ask(what):
+        begin_ns = now_ns
+        asked.append(what)
+        moves(node, what)
+        return lambda: now_ns - begin_ns > 2 * SECOND_NS
+
+    trial = SensorTrial(plan, ask, 2.0)
+    if role == "valve":
+        trial = ValveTrial(plan, vessel.valve, ask, 2.0)
+    own, now_ns = 1 << BUS_SHIFT, 0
+    while not trial.done:
+        assert now_ns < 90 * SECOND_NS
+        off = asked and "off the bus" in asked[-1]
+        for frame in node.tick(now_ns):
+            if frame.can_id >= own and not off:
+                trial.receive(frame._replace(can_id=frame.can_id & (own - 1)), now_ns)
+        for frame in trial.tick(now_ns):
+            node.receive(frame._replace(can_id=frame.can_id | own), now_ns)
+        now_ns += SECOND_NS // 100
+    return {each.name for each in trial.checks if not each.passed}
+
+
+def test_a_valve_conforms_and_one_that_is_slow_or_stays_where_it_is_does_not(theirs):
+    assert conformed(theirs, "valve", VALVE, lambda *_: None) == set()
+
+    def slow(valve, _):
+        valve._most_step = 0.01
+
+    assert "way_ms" in conformed(theirs, "valve", VALVE, slow)
+
+    def stays(valve, _):
+        valve._valve = replace(valve._valve, fail_position="shut")
+
+    assert conformed(theirs, "valve", VALVE, stays) >= {"silence_ms"}
+
+
+def test_check_says_what_protects_them_and_what_does_not(theirs, capsys):
+    print_devices(Terminal(), DevicesSection(**theirs(valve=ON_OFF, panel=PANEL)))
+    said = " ".join(capsys.readouterr().out.split())
+    assert "valve: CiA 401 module with an open or shut valve on can2" in said
+    assert "opening: told by order.OUTPUT each 20 ms" in said
+    assert "1029h:1 = 0x2, 6206h:1 = 0x1, 6207h:1 = 0x0, mapping and pace of RPDO1" in said
+    assert "not protected by counter, checksum, time stamp, status, identity, echo" in said
+    assert "panel: DBC theirs.dbc on can1" in said
+    assert "stop: on or off" in said
+    assert "protected by length, range, cycle, counter, checksum, status" in said
+
+
+class Buttons:
+    """Sends what is pressed in the frames of a panel."""
+
+    def __init__(self, panel):
+        self.frames, self.held, self.ticks = panel._frames, "", -1
+
+    def tick(self, now_ns):
+        self.ticks += 1
+        order = OperatorCommand(
+            Mode.STANDBY, "to arm" in self.held, "ress stop" in self.held, False,
+            "press acknowledge" in self.held,
+        )  # fmt: skip
+        return self.frames.frames(order, now_ns, self.ticks)
+
+    def receive(self, frame, now_ns):
+        """Nothing."""
+
+
+def test_a_panel_conforms_by_its_buttons(theirs):
+    def pressed(buttons, what):
+        buttons.held = what
+
+    assert conformed(theirs, "panel", PANEL, pressed) == set()
+    assert conformed(theirs, "panel", PANEL, lambda *_: None) == {
+        "stop_sign", "acknowledge_sign", "arm_sign"
+    }  # fmt: skip
