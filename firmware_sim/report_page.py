@@ -7,12 +7,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from firmware_sim.bench import BenchResult
 from firmware_sim.figures import NO_TANK as BARE
 from firmware_sim.figures import BenchFigures, RunFigures
 from firmware_sim.report_tables import few_rolls, in_one_unit, roll_interval, tables
 from firmware_sim.retuning_figures import events_on_ships_time
-from firmware_sim.run import COLUMNS
+from firmware_sim.run import COLUMNS, RECORD_S
 from firmware_sim.scenario import PASSIVE
 from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import Vessel
@@ -28,6 +30,7 @@ PICTURE, RECORDING, FIGURES, PAGE = "bench.png", "bench.rrd", "bench.json", "rep
 
 _SEAS: Final = {
     "measured": "measured",
+    "tabulated": "of a table",
     "jonswap": "growing (JONSWAP)",
     "ittc": "of given height and period (ITTC)",
     "pierson_moskowitz": "fully developed (Pierson-Moskowitz)",
@@ -172,6 +175,7 @@ def _draw(result: BenchResult, found: BenchFigures, about: Mapping[str, Any], pa
             run.column("true_level_m"),
             run.column("true_pressure_pa"),
             run.column("retuning") if run.retuning else None,
+            run.column("mode"),
         )
         for run, judged in zip(result.runs, found.runs, strict=True)
     ]
@@ -180,10 +184,19 @@ def _draw(result: BenchResult, found: BenchFigures, about: Mapping[str, Any], pa
         path,
         title=f"{found.scenario}, seed {found.seed}, {found.mode}",
         about=about,
+        bare=_bare_curve(result),
         bars=[_bare_bar(found), *map(bar_of, found.runs, COLORS)],
         wrong=found.wrong,
         interval=roll_interval(found, result.scenario.vessel.ship.natural_frequency_rad_s),
     )
+
+
+def _bare_curve(result: BenchResult) -> BenchCurve:
+    """The ship without a tank, until it capsizes."""
+    time_s = RECORD_S * np.arange(len(result.without_tank_rad), dtype=np.float64)
+    upright = time_s < result.without_tank_capsized_s
+    none = np.full(int(upright.sum()), np.nan)
+    return BenchCurve(BARE, time_s[upright], result.without_tank_rad[upright], none, none)
 
 
 def _bare_bar(found: BenchFigures) -> BenchBar:

@@ -186,7 +186,7 @@ def _retuning_cells(retuning: RetuningFigures) -> tuple[str, ...]:
 
 
 def _percent(share: float | None) -> str:
-    return "" if share is None else f"{round(share, 3) + 0.0:.1%}"  # no -0.0%
+    return "" if share is None else f"{round(share, 2) + 0.0:.0%}"  # no -0%
 
 
 def _roll_cells(roll: RollStatistics) -> tuple[str, ...]:

@@ -122,7 +122,9 @@ def bench(
     if json_:
         print_json(found.as_json(files, about))
     else:
-        _print(result, found, files, out, scenario)
+        _print(result, found, files)
+        following = (("monitor", out), *_run_next(found, scenario))
+        Terminal().lead_on(*following, allow_code=allow_code)
     if failures:
         fail("; ".join(failures))
     raise typer.Exit(found.exit_code)
@@ -179,13 +181,7 @@ def _run(
             fail(error, ExitCode.NO_BUS if of_bus else ExitCode.USAGE)
 
 
-def _print(
-    result: "BenchResult",
-    found: "BenchFigures",
-    files: Mapping[str, Path],
-    out: Path,
-    scenario: Path,
-) -> None:
+def _print(result: "BenchResult", found: "BenchFigures", files: Mapping[str, Path]) -> None:
     from firmware_sim.report_tables import few_rolls, tables
 
     console = Terminal()
@@ -209,7 +205,6 @@ def _print(
             "no deadlines there."
         )
     console.files(files)
-    console.lead_on(("monitor", out), *_run_next(found, scenario))
 
 
 def _run_next(found: "BenchFigures", scenario: Path) -> list[Command]:

@@ -70,7 +70,7 @@ def campaign(
     if interrupted:
         again = ("campaign", study, "--resume", *(() if out is None else ("--out", out)))
         notes.say("interrupted: --resume goes on from here")
-        notes.lead_on(again)
+        notes.lead_on(again, allow_code=allow_code)
         raise typer.Exit(ExitCode.INTERRUPTED)
 
 

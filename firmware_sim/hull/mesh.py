@@ -68,7 +68,9 @@ def read_mesh(
     except MemoryError:
         raise
     except Exception as error:  # whatever the formats' readers raise
-        raise MeshError(f"can't be read as a mesh ({error!r}); known are {FORMATS}") from error
+        why = " ".join(str(error).split()) or type(error).__name__
+        higher = "; WAMIT's higher-order panels (IGDEF) are none" if path.suffix == ".gdf" else ""
+        raise MeshError(f"can't be read as panels: {why}; known are {FORMATS}{higher}") from error
     points = mesh.vertices * scale
     _refuse_size(points)
     midship_m = (points[:, 0].min() + points[:, 0].max()) / 2

@@ -419,3 +419,5 @@ def test_what_comes_next_is_what_this_machine_can_do(
     bench, run = following(pd)
     assert bench == f"utank-hil bench {tmp_path / 'scenario.yaml'}"
     assert run == f"  utank-hil run {pd} --bus can3"
+    allowed = invoke("check", pd, "--allow-code").stdout.splitlines()[-2:]
+    assert allowed == [f"{bench:>{len(bench) + 2}} --allow-code", f"{run} --allow-code"]

@@ -3,6 +3,7 @@
 import copy
 import json
 import os
+import shlex
 import stat
 from pathlib import Path
 from typing import Any
@@ -269,12 +270,39 @@ def test_the_command_leads_through_and_writes_the_record(
     assert result.exit_code == ExitCode.OK, result.output
     assert "roll, by what it does to the water" in result.stdout
     assert "passed; record: " in result.stdout
+    assert f"  utank-hil run {file} --bus can0 --out log\n" in result.stdout
     said = capfd.readouterr().err
     places = [said.index(words) for words in ("Waiting until", "Measuring the zeros", "Arm at the",
                                               "move a little. Stop", "Done.")]  # fmt: skip
     assert places == sorted(places)
     assert " of 27 s" in said
     assert reason(file) == ""
+
+
+def test_the_command_that_it_prints_finds_the_record_and_allows_the_law(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The words of a folder are quoted; a record elsewhere and a law that is code are named."""
+    folder = tmp_path / "the ship"
+    folder.mkdir()
+    law = {"kind": "python", "factory": "./mine.py:law", "measured": ["roll_rad"]}
+    file, record = folder / "own.yaml", folder / "elsewhere.json"
+    file.write_text(yaml.safe_dump({"name": "Own", "vessel": ON_BOARD, "law": law}))
+    (folder / "mine.py").write_text("def law():\n    raise AssertionError\n")
+    result = commission(monkeypatch, AtTheQuay, file, "--record", record)
+    assert result.exit_code == ExitCode.OK, result.output
+    (printed,) = [line for line in result.stdout.splitlines() if line.startswith("  utank-hil ")]
+    assert shlex.split(printed) == [
+        *("utank-hil", "run", str(file), "--bus", "can0", "--record", str(record)),
+        *("--out", "log", "--allow-code"),
+    ]
+    config = load_config(file, ControllerConfig, allow_code=True)
+    assert why_not_commissioned(config, "can0", file, record) == ""
+    record.unlink()
+    remedy = why_not_commissioned(config, "can0", file, record).partition("; run ")[2]
+    assert shlex.split(remedy.removesuffix(" at the quay")) == [
+        *("utank-hil", "commission", str(file), "--bus", "can0", "--record", str(record)),
+    ]
 
 
 @pytest.mark.evidence

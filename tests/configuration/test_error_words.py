@@ -229,4 +229,7 @@ def test_a_file_that_its_reader_names_is_not_named_twice(tmp_path: Path) -> None
     waves = tmp_path / "waves.txt"
     waves.write_text("none\n")
     reason = refused(tmp_path, f"sea: {{kind: measured, file: {waves}}}\n", Scenario)["sea.file"]
-    assert reason == f"{waves}, line 1: no header line with frequencies stands before the data"
+    assert reason == (
+        f"{waves}, line 1: no header line with frequencies stands before the data; if it is not "
+        "NDBC's, make a table of it, kind: tabulated"
+    )

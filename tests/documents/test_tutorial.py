@@ -67,9 +67,9 @@ def test_its_commands_give_its_figures(tmp_path: Path, monkeypatch: pytest.Monke
         rolls["no tank"] = math.degrees(report["no_tank"]["rms_rad"])
         assert {name: round(roll, 2) for name, roll in rolls.items()} == table
         passive, active = report["runs"]
-        assert f"tank takes {100 * passive['roll_below_no_tank']:.1f} % of the roll" in page
+        assert f"tank takes {100 * passive['roll_below_no_tank']:.0f} % of the roll" in page
         if folder == "out":
-            assert f"the pump {100 * active['roll_below_passive']:.1f} % of the rest" in page
+            assert f"the pump {100 * active['roll_below_passive']:.0f} % of the rest" in page
     watched, faulty = shown
     assert watched[0] == "patrol/out/bench.rrd"
     assert faulty == ("patrol/faulty/bench.rrd", pytest.approx(100.4, abs=0.06))

@@ -198,7 +198,7 @@ def test_picture_says_the_same_figures_as_the_table(storm, tmp_path: Path, monke
             share = re.search(r"\((−|\+)(\d+)%\)", curve.label)
             assert share
             sign = -1 if share[1] == "+" else 1
-            assert sign * int(share[2]) == pytest.approx(float(below.rstrip("%")), abs=0.51)
+            assert sign * int(share[2]) == pytest.approx(float(below.rstrip("%")), abs=0.01)
 
 
 @pytest.mark.evidence

@@ -9,6 +9,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 
+from utank_hil.canbus import Mode
 from utank_hil.pictures import BenchCurve, draw_bench
 from utank_hil.pictures.style import COLORS
 
@@ -55,6 +56,28 @@ def test_a_short_run_needs_no_zoom(tmp_path: Path) -> None:
     assert pixels(long, YELLOW_BAND).any()
     assert not pixels(short, YELLOW_BAND).any()
     assert short.shape[1] < long.shape[1]
+
+
+def test_the_ship_without_a_tank_is_drawn_and_arming_and_fault_are_marked(tmp_path: Path) -> None:
+    passive, active = curve("passive", 300.0, 0.1, 50.0), curve("active", 300.0, 0.05, 50.0)
+    plain = read(draw_bench([passive, active], tmp_path / "a.png", "A run"))
+    empty = np.full_like(passive.time_s, np.nan)
+    bare = BenchCurve("no tank", passive.time_s, 0.2 * np.cos(passive.time_s), empty, empty)
+    drawn = read(draw_bench([passive, active], tmp_path / "a.png", "A run", bare=bare))
+    light = np.array([0xBB, 0xBB, 0xBB]) / 255
+    assert pixels(drawn, light).sum() > pixels(plain, light).sum() + 1000
+    assert pixels(drawn, BLUE).sum() > 1000
+    calm = replace(active, roll_rad=np.zeros_like(empty), level_m=empty, pressure_pa=empty)
+    columns = {}
+    for name, mode in (("none", None), ("armed", Mode.ACTIVE), ("fault", Mode.FAULT)):
+        modes = None if mode is None else np.where(active.time_s < 150.0, Mode.PASSIVE, mode)
+        image = read(draw_bench([passive, replace(calm, mode=modes)], tmp_path / "a.png", "A run"))
+        blue = pixels(image, BLUE)[: int(0.85 * image.shape[0])].sum(axis=0)
+        columns[name] = np.flatnonzero(blue > 100)
+        middle = np.flatnonzero(blue).mean()  # the calm roll's line lies along the whole plot
+    assert not len(columns["none"])
+    assert columns["armed"] == pytest.approx(middle, abs=3)
+    assert columns["fault"] == pytest.approx(middle, abs=3)
 
 
 @pytest.mark.evidence

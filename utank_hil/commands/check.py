@@ -365,7 +365,7 @@ def check(
             "ship": [("design", "tank", config)],
             "controller": [*_bench_of(config), *run_command(config)],
         }
-        Terminal().lead_on(*following.get(kind, [("bench", config)]))
+        Terminal().lead_on(*following.get(kind, [("bench", config)]), allow_code=allow_code)
 
 
 def _bench_of(controller: Path) -> list[Command]:

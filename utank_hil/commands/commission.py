@@ -112,7 +112,7 @@ def commission(
         if json_:
             print_json({**made, "record": str(path)})
         else:
-            _print(made, path, config)
+            _print(made, path, config, code=loaded.law.kind == "python")
     if unwritten:
         fail(unwritten)
     raise typer.Exit(ExitCode.OK if made["passed"] else ExitCode.REFUSED)
@@ -158,7 +158,7 @@ class Guide:
         return node.stage is Stage.DONE
 
 
-def _print(record: dict[str, Any], path: Path, config: Path) -> None:
+def _print(record: dict[str, Any], path: Path, config: Path, *, code: bool) -> None:
     console = Terminal()
     print_checks(console, f"Commissioning of {record['vessel']}", record["checks"])
     if record["ended"]:
@@ -168,7 +168,9 @@ def _print(record: dict[str, Any], path: Path, config: Path) -> None:
         console.say(where, red="not passed: arming is refused;")
     else:
         console.say(where, green="passed;")
-        console.lead_on(("run", config, "--bus", record["bus"], "--out", "log"))
+        named = ("--record", path) if path != record_path(config) else ()
+        following = ("run", config, "--bus", record["bus"], *named, "--out", "log")
+        console.lead_on(following, allow_code=code)
 
 
 def print_checks(console: Terminal, title: str, checks: list[dict[str, Any]]) -> None:

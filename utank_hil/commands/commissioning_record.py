@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import shlex
 import tempfile
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -138,8 +139,10 @@ def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: P
         return ""
     for key, reason in config.held_pressure_problems():
         return f"{file}: {key} {reason}"
+    named = () if path is None else ("--record", str(path))
     path = path or record_path(file)
-    remedy = f"run utank-hil commission {file} --bus {bus} at the quay"
+    words = ("utank-hil", "commission", str(file), "--bus", bus, *named)
+    remedy = f"run {shlex.join(words)} at the quay"
     try:
         refuse_device(path)
         record = _Record.model_validate_json(path.read_bytes(), strict=True)

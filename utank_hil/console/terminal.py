@@ -27,6 +27,7 @@ UNLIMITED: Final = 10_000  #: Columns, wider than any table.
 
 INTERFACES: Final = Path("/sys/class/net")  #: Where Linux lists the network's interfaces.
 _CAN: Final = "280"  # ARPHRD_CAN of <linux/if_arp.h>
+_ALLOW_CODE: Final = frozenset({"bench", "campaign", "run"})  #: Commands with that option.
 Command = tuple[str | Path, ...]
 
 
@@ -94,12 +95,18 @@ class Terminal(Console):
         for name, path in files.items():
             self.say(f"{name:>10}: {shown(path)}")
 
-    def lead_on(self, *commands: Command) -> None:
-        """Print which commands come next, by their words, as they can be pasted into a shell."""
+    def lead_on(self, *commands: Command, allow_code: bool = False) -> None:
+        """Print which commands come next, by their words, as they can be pasted into a shell.
+
+        With `allow_code` those that design a law get the word, without which they refuse one that
+        is code.
+        """
         if commands:
             self.say("Next:")
         for command in commands:
             words = [shown(word) if isinstance(word, Path) else word for word in command]
+            if allow_code and words[0] in _ALLOW_CODE:
+                words.append("--allow-code")
             self.say(f"  utank-hil {shlex.join(words)}")
 
     def table(self, table: Table) -> None:

@@ -10,8 +10,17 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.canbus.enumerations import RetuningState
-from utank_hil.pictures.style import BELOW, COLORS, DASHES, HIGHLIGHT, WIDEST_IN, WRONG, picture
+from utank_hil.canbus.enumerations import Mode, RetuningState
+from utank_hil.pictures.style import (
+    BELOW,
+    COLORS,
+    DASHES,
+    HIGHLIGHT,
+    NO_TANK,
+    WIDEST_IN,
+    WRONG,
+    picture,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,6 +39,7 @@ _LANES: Final[dict[int, tuple[str, float]]] = {
     RetuningState.UNDONE: ("undone", 0.1),
 }  # Label and opacity of each retuning state.
 _LETTER: Final = 0.014  #: Width of a letter in a lane over the axis; a short section has no label.
+_MARKS: Final = (("armed", Mode.ACTIVE), ("fault", Mode.FAULT))
 _LABELS: Final = ("Roll (°)", "Tank level (m)", "Pump pressure (kPa)")
 
 
@@ -44,6 +54,7 @@ class BenchCurve:
     level_m: FloatArray
     pressure_pa: FloatArray
     retuning: FloatArray | None = None  #: `RetuningState` of a retuning run, drawn as a lane.
+    mode: FloatArray | None = None  #: `Mode`: the first ACTIVE and the first FAULT are marked.
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +75,7 @@ def draw_bench(
     title: str,
     about: Mapping[str, Any] | None = None,
     *,
+    bare: BenchCurve | None = None,
     bars: Sequence[BenchBar] = (),
     wrong: Sequence[str] = (),
     interval: float | None = None,
@@ -73,9 +85,10 @@ def draw_bench(
     The whole run is drawn as the greatest value in each of `WINDOWS` parts, and three minutes in
     full, around the largest roll, or around the first trial of a new law. Lanes below show the
     retuning states. The first curve is the reference, the passive tank: drawn in grey, and searched
-    for the largest roll. `bars` are the runs of the summary, those of the curves last, or none; the
-    problems in `wrong` are written above them. `interval` is the relative half-width of each roll
-    RMS. Raises `ValueError` without curves, or for more than there are colours.
+    for the largest roll. `bare` is the ship without a tank. `bars` are the runs of the summary,
+    those of the curves last, or none; the problems in `wrong` are written above them. `interval` is
+    the relative half-width of each roll RMS. Raises `ValueError` without curves, or for more than
+    there are colours.
     """
     if not 1 <= len(curves) <= len(COLORS):
         raise ValueError(f"can draw 1 to {len(COLORS)} runs in one picture, got {len(curves)}")
@@ -100,7 +113,7 @@ def draw_bench(
         shape, ratios = (3 + retuning, len(spans)), [2.0, 2.0, 2.0, lane][: 3 + retuning]
         axes = figure.subplots(*shape, sharex="col", squeeze=False, height_ratios=ratios)
         for column, span_s in zip(axes.T, spans, strict=True):
-            _draw_column(column, curves, span_s, as_they_were=span_s == spans[-1])
+            _draw_column(column, curves, bare, span_s, as_they_were=span_s == spans[-1])
         if len(spans) > 1:
             unit_s, _ = _time_unit(whole)
             for axis in axes[:3, 0]:
@@ -114,9 +127,10 @@ def draw_bench(
         if retuning:
             axes[-1, 0].set_ylabel("Retuning", rotation=0, ha="right", va="center")
         figure.align_ylabels()
-        handles = axes[0, -1].get_lines()[: len(curves)]
-        names = [bar.name for bar in bars[-len(curves) :]] or [curve.label for curve in curves]
-        whole_figure.legend(handles, names, **BELOW | {"ncols": len(curves)})
+        drawn = [*([] if bare is None else [bare]), *curves]
+        names = [bar.name for bar in bars[-len(drawn) :]] or [curve.label for curve in drawn]
+        handles = axes[0, -1].get_lines()[: len(drawn)]
+        whole_figure.legend(handles, names, **BELOW | {"ncols": len(drawn)})
     return path
 
 
@@ -168,25 +182,48 @@ def _time_unit(span_s: tuple[float, float]) -> tuple[float, str]:
 def _draw_column(
     axes: "Sequence[Axes]",
     curves: Sequence[BenchCurve],
+    bare: BenchCurve | None,
     span_s: tuple[float, float],
     *,
     as_they_were: bool,
 ) -> None:
     unit_s, unit = _time_unit(span_s)
-    for curve, color, dashes in zip(curves, COLORS, DASHES, strict=False):
+    without = [] if bare is None else [(bare, NO_TANK, "-")]
+    plots = axes[: len(_LABELS)]
+    for curve, color, dashes in (*without, *zip(curves, COLORS, DASHES, strict=False)):
         shown = (curve.time_s >= span_s[0]) & (curve.time_s <= span_s[1])
         time = curve.time_s[shown] / unit_s
         values = (np.rad2deg(curve.roll_rad), curve.level_m, curve.pressure_pa / 1e3)
-        for axis, value in zip(axes, values, strict=False):
+        for axis, value in zip(plots, values, strict=True):
             x, y = (time, value[shown]) if as_they_were else _greatest(time, value[shown])
             axis.plot(x, y, color=color, linewidth=1.4, linestyle=dashes)
     if not as_they_were:
-        for axis in axes[: len(values)]:
+        for axis in plots:
             axis.set_ylim(bottom=0.0)
-    if len(axes) > len(values):
+    _mark(plots, curves, span_s)
+    if len(axes) > len(plots):
         _draw_lanes(axes[-1], curves, span_s)
     axes[-1].set_xlim(span_s[0] / unit_s, span_s[1] / unit_s)
     axes[-1].set_xlabel(f"Time ({unit})")
+
+
+def _mark(
+    axes: "Sequence[Axes]", curves: Sequence[BenchCurve], span_s: tuple[float, float]
+) -> None:
+    """Mark when each run was first armed, and when it ended in a fault; words stand once."""
+    unit_s, _ = _time_unit(span_s)
+    said: set[tuple[str, int]] = set()
+    for curve, color in zip(curves, COLORS, strict=False):
+        for word, mode in _MARKS if curve.mode is not None else ():
+            at_s = next(iter(curve.time_s[curve.mode == mode]), math.inf)
+            if not span_s[0] <= at_s <= span_s[1]:
+                continue
+            for axis in axes:
+                axis.axvline(at_s / unit_s, color=color, linewidth=0.9, linestyle=":")
+            if (word, round(at_s)) not in said:
+                said.add((word, round(at_s)))
+                top = axes[0].get_xaxis_transform()
+                axes[0].text(at_s / unit_s, 1.0, f" {word}", va="top", fontsize=9, transform=top)
 
 
 def _greatest(time: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:

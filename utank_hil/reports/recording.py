@@ -120,7 +120,7 @@ def _histories(rows: dict[str, FloatArray], title: str) -> ReportPicture:
     nothing = np.full_like(level_m, np.nan)
     time_s, pressure_pa = thin["time_s"], thin["pressure_actual_pa"]
     twin = BenchCurve("passive twin", time_s, thin["twin_roll_rad"], nothing, nothing)
-    ship = BenchCurve("ship", time_s, thin["roll_rad"], level_m, pressure_pa)
+    ship = BenchCurve("ship", time_s, thin["roll_rad"], level_m, pressure_pa, mode=thin["mode"])
     says = "Roll of the ship and of its passive twin, level and pressure"
     with tempfile.TemporaryDirectory() as scratch:
         file = draw_bench([twin, ship], Path(scratch) / "histories.png", title)

@@ -41,7 +41,8 @@ class MomentTable:
         except OSError as error:
             raise ValueError(f"{file} can't be read: {error.strerror}") from error
         if set(columns) != set(COLUMNS):
-            raise ValueError(f"{file} needs the columns {', '.join(COLUMNS)}, has {tuple(columns)}")
+            has = ", ".join(columns)
+            raise ValueError(f"{file} needs the columns {', '.join(COLUMNS)}, has {has}")
         values = np.column_stack([columns[name] for name in COLUMNS])
         omega, heading = np.unique(values[:, 0]), np.unique(values[:, 1])
         if not np.isfinite(values).all() or len(omega) < 2 or omega[0] <= 0:

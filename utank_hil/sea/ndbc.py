@@ -209,7 +209,8 @@ def _data_lines(path: Path, quantity: str) -> tuple[list[DataLine], list[ValueEr
                     row = _pairs(path, number, line)
                 elif header is None:
                     reason = "no header line with frequencies stands before the data"
-                    raise _error(path, number, reason)
+                    remedy = "if it is not NDBC's, make a table of it, kind: tabulated"
+                    raise _error(path, number, f"{reason}; {remedy}")
                 else:
                     row = _columns(path, number, line.split(), *header)
             except ValueError as error:

@@ -77,8 +77,8 @@ def test_what_is_no_hull_in_its_place_is_refused(points, panels, reason, tmp_pat
     ("name", "content", "reason"),
     [
         ("none.gdf", None, "there is no such file"),
-        ("text.gdf", "four\nlines\nof\ntext\n", r"can't be read as a mesh .*known are WAMIT .gdf"),
-        ("ship.step", "ISO-10303-21;", "can't be read as a mesh"),
+        ("text.gdf", "four\nlines\nof\ntext\n", r"as panels: [^(\\]*known are WAMIT .gdf.*IGDEF"),
+        ("ship.step", "ISO-10303-21;", "can't be read as panels"),
     ],
 )
 def test_what_is_no_mesh_is_refused(name, content, reason, tmp_path: Path) -> None:
