@@ -109,6 +109,12 @@ def test_what_a_commissioning_stands_for_makes_it_void_when_it_changes(file: Pat
     (file.parent / "ship.yaml").write_text(yaml.safe_dump(vessel | {"redundancy": both}))
     changed = "redundancy.second_motion_sensor"
     assert f"these changed: {changed}" in reason(file)
+    sensor = {"motion": {"profile": "sbg_ellipse", "accept_unprotected": True}}
+    for devices, key in (
+        (sensor, "devices"), ({"pump": {"stop_within_ms": 200}}, "devices, stop_within_ms")
+    ):  # fmt: skip
+        (file.parent / "ship.yaml").write_text(yaml.safe_dump(vessel | {"devices": devices}))
+        assert f"these changed: {key};" in reason(file)
     (file.parent / "ship.yaml").write_text(yaml.safe_dump(vessel))
     file.write_text(yaml.safe_dump(content | {"sensors": {"level_noise_m": 0.006}}))
     assert "these changed: sensors.level_noise_m" in reason(file)
@@ -275,7 +281,7 @@ def test_the_command_leads_through_and_writes_the_record(
     places = [said.index(words) for words in ("Waiting until", "Measuring the zeros", "Arm at the",
                                               "move a little. Stop", "Done.")]  # fmt: skip
     assert places == sorted(places)
-    assert " of 27 s" in said
+    assert " of 28 s" in said
     assert reason(file) == ""
 
 
@@ -315,7 +321,7 @@ def test_json_is_the_record_and_nothing_else(
     printed = json.loads(result.stdout)
     assert printed.pop("record") == str(path)
     assert printed == json.loads(path.read_text())
-    assert len(printed["checks"]) == 16
+    assert len(printed["checks"]) == 17
 
 
 def test_ended_before_the_end_it_writes_nothing(

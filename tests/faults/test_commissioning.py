@@ -11,6 +11,7 @@ import pytest
 from fault_bench import SECOND, FaultBench, altered, dropped
 from quay import ARM_S, another_ship, commissioned, controller, still_water
 
+from firmware_sim import plant_kernel as kernel
 from firmware_sim.scenario_sea import RegularSea
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_commissioning_node, build_controller_node, build_law
@@ -29,8 +30,15 @@ from utank_hil.canbus import (
     Switch,
 )
 from utank_hil.canbus.events import AlarmEvent, RetuningEvent
+from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.commissioning.checks import RATE_SCALE, SCALE, Each, remedies_of
-from utank_hil.nodes.commissioning.node import REST_S, ROW_S, CommissioningNode, Stage
+from utank_hil.nodes.commissioning.node import (
+    PUSH_S,
+    REST_S,
+    ROW_S,
+    CommissioningNode,
+    Stage,
+)
 from utank_hil.nodes.commissioning.pulses import plan_pulses
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.nodes.redundancy import Redundancy
@@ -67,7 +75,7 @@ def test_every_shipped_ship_passes_with_room_to_spare(name: str) -> None:
     assert node.stage is Stage.DONE
     assert not node.ended
     checks = node.checks()
-    assert len(checks) == (18 if name == "pump_with_valve" else 16)
+    assert len(checks) == (19 if name == "pump_with_valve" else 17)
     for check in checks:
         assert abs(check.measured - check.expected) <= 0.5 * check.tolerance, check
 
@@ -204,7 +212,10 @@ def test_pulses_stay_within_their_bounds_and_the_pump_ends_at_zero(
     assert plan.level_m <= 0.2 * limits.level_m
     assert plan.roll_rad <= 0.035
     record = healthy.moved
-    assert np.abs(record["command_pa"]).max() == pytest.approx(plan.pressure_pa)
+    push = round(PUSH_S / ROW_S) + 1
+    assert np.abs(record["command_pa"][:-push]).max() == pytest.approx(plan.pressure_pa)
+    assert record["command_pa"].max() == pytest.approx(plan.push_pa)
+    assert plan.push_pa <= 0.12 * limits.pressure_pa
     level_m = np.abs(record["starboard_level_m"] - record["port_level_m"]).max() / 2
     assert level_m == pytest.approx(plan.level_m, rel=0.15)
     assert healthy.node.command_pa == 0.0
@@ -261,10 +272,51 @@ def test_ticks_that_the_loop_leaves_out_leave_out_no_check() -> None:
         lockstep.run_until(lockstep.now_ns + SECOND)
     assert not node.ended
     checks = node.checks()
-    assert len(checks) == 18
+    assert len(checks) == 19
     assert all(check.passed for check in checks)
     # the stage ended when its time was over, with a row for each 50 ms of it
     assert len(node.moved["roll_rad"]) == pytest.approx(node.length_s / ROW_S, abs=1)
+
+
+@pytest.mark.parametrize(
+    ("late_ms", "limit_ms", "passes"),
+    [(0, 150, True), (200, 150, False), (200, 350, True), (9e9, 350, False)],
+)
+def test_the_time_to_stop_is_measured_and_held_against_the_ships_file(
+    late_ms: float, limit_ms: float, passes: bool
+) -> None:
+    """A drive that goes on with its last pressure for so long before it brakes."""
+    vessel = NAVAL.vessel.model_copy(
+        update={"devices": DevicesSection.model_validate({"pump": {"stop_within_ms": limit_ms}})}
+    )
+    config = NAVAL.model_copy(update={"vessel": vessel})
+    scenario = still_water(config)
+    ship = build_ship_side(scenario, 3, scenario.operator)
+    plant, asked = ship.plant, 0.0
+    held: list[float] = []
+
+    def drive(setpoint_pa: float, *, enabled: bool) -> None:
+        nonlocal asked
+        asked = setpoint_pa
+        held.clear()
+        type(plant).drive_pump(plant, setpoint_pa, enabled=enabled)
+
+    def brake() -> None:
+        held.append(asked)
+        if len(held) * TICK_NS * 1e-6 > late_ms:
+            type(plant).drive_pump(plant, 0.0, enabled=True)
+            plant._state[kernel.REFERENCE] = 0.0
+
+    plant.drive_pump, plant.brake_pump = drive, brake  # type: ignore[method-assign]
+    node = commissioned(config, nodes=ship.nodes)
+    assert (node.stage, node.ended) == (Stage.DONE, "")
+    (stop,) = (check for check in node.checks() if check.name == "stop_ms")
+    assert stop.passed is passes
+    if late_ms < 1e9:
+        assert stop.measured == pytest.approx(60 + late_ms, abs=30)
+    else:
+        assert np.isnan(stop.measured)
+    assert failed(node).keys() == (set() if passes else {"stop_ms"})
 
 
 def test_who_arms_before_the_zeros_are_right_has_to_arm_again() -> None:

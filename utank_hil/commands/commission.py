@@ -121,7 +121,7 @@ def commission(
 def _give_up(stage: Stage, path: Path) -> NoReturn:
     """End before all was checked; a record is void once pump and valve have moved."""
     what = "ended before all was checked; there is no new record"
-    if stage is Stage.MOVING:
+    if stage in (Stage.MOVING, Stage.STOPPING):
         try:
             remove_record(path)
         except OSError as error:

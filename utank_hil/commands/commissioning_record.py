@@ -36,6 +36,8 @@ def commissioned_for(config: ControllerConfig) -> dict[str, Any]:
         **{name: asdict(part) for name, part in parts.items() if part is not None},
         "redundancy": asdict(vessel.redundancy),
         "sensors": asdict(config.sensors),
+        **({} if vessel.devices is None else {"devices": vessel.devices.model_dump(mode="json")}),
+        **({} if vessel.pump is None else {"stop_within_ms": vessel.stop_within_ms}),
         **({"emulated": True} if vessel.emulated else {}),
     }
 

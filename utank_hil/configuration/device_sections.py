@@ -239,6 +239,10 @@ class DriveSection(CanopenSection):
     echo: Literal["command", "demand"] = "command"
     """What the drive sends back: control word and target, or its demand (6074h, 606Bh)."""
     synchronous: bool = True  #: The drive sends at SYNC, else by its event timer.
+    stop_within_ms: Annotated[float, Range(least=20, most=500)] = 150.0
+    """From a stop to a fifth of the pressure, and from a stop or the controller's last frame to a
+    tenth of the speed: measured by `commission` and `conform`, and refused beyond. Of a native
+    drive, too."""
 
     @model_validator(mode="before")
     @classmethod
@@ -319,6 +323,7 @@ class DriveSection(CanopenSection):
             self.required(),
             self.echo == "command",
             self.synchronous,
+            self.stop_within_ms,
         )
 
 

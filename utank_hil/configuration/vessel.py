@@ -12,6 +12,7 @@ from pydantic import ValidationInfo, field_validator, model_validator
 from utank_hil.base.parameters import Problem, Range, refuse
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus.profiles.device_plan import NO_FOREIGN_DEVICES, ForeignDevices
+from utank_hil.configuration.device_sections import NATIVE_DRIVE
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.hull_files.reader import HullFile
@@ -72,6 +73,11 @@ class Vessel(Section):
             content.append({"devices": self.devices.model_dump(mode="json", exclude=native)})
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).digest()
         return int.from_bytes(digest[:4], "big") % NOT_AVAILABLE
+
+    @property
+    def stop_within_ms(self) -> float:
+        """Longest time from a stop to a fifth of the pump's pressure."""
+        return (NATIVE_DRIVE if self.devices is None else self.devices.pump).stop_within_ms
 
     @property
     def default_limits(self) -> dict[str, float]:

@@ -236,6 +236,7 @@ class DrivePlan:
     require: tuple[tuple[Place, int], ...]
     echoes_command: bool  #: Control word and target come back, else the drive's demand.
     synchronous: bool
+    stop_within_ms: float
 
     @property
     def received(self) -> tuple[tuple[Place, int], ...]:

@@ -16,13 +16,14 @@ taken out, so that a wrong one shows in its own check alone.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_S
 from utank_hil.control.interface import DesignPlant
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.tank import GRAVITY_M_S2
@@ -63,6 +64,28 @@ class Check:
     def passed(self) -> bool:
         """Whether it is within its tolerance."""
         return abs(self.measured - self.expected) <= self.tolerance
+
+
+SETTLED_S: Final = 0.5  #: After a stop the rotor turns with the water that it has moved.
+STOPPED: Final = 0.1  #: Of the fall until then.
+PRESSED: Final = 0.2  #: Likewise of a pressure, whose sensor is noisy.
+AT_REST: Final = 5  #: Ticks for which it must stay there: a noisy sensor is not always.
+RUNS_ON: Final = 0.5  #: Of what it was before: no stop. The water turned it at 0.2 on the bench.
+
+
+def stopped_ms(shares: Sequence[float], share: float = STOPPED) -> float:
+    """Time in ms that a pump takes to stop; NaN if it runs on.
+
+    `shares`, one each tick from the stop on, are of the speed or pressure before; it has stopped
+    with so small a `share` of the fall left.
+    """
+    last = shares[-AT_REST:]
+    end = math.fsum(last) / max(len(last), 1)
+    if not (last and abs(end) <= RUNS_ON):
+        return math.nan
+    low = [each <= end + share * (1 - end) for each in shares]
+    rests = (place for place in range(len(low)) if all(low[place : place + AT_REST]))
+    return next(rests) * TICK_S * 1e3
 
 
 def judge_rest(

@@ -42,7 +42,7 @@ from utank_hil.dynamics.valves import Valve
 from utank_hil.nodes.actuators import DriveSequence
 from utank_hil.nodes.canopen_drive import CanopenDrive, state_of
 from utank_hil.nodes.canopen_setup import CanopenSetup, SensorSetup
-from utank_hil.nodes.commissioning.checks import Check
+from utank_hil.nodes.commissioning.checks import SETTLED_S, Check, stopped_ms
 
 SECOND_NS: Final = 1_000_000_000
 RATE_SHARE: Final = 0.05
@@ -304,13 +304,8 @@ class ValveTrial(SensorTrial):
         self.checks.append(Check(name, what, took_ms, right_ms, off_ms, "ms", remedy))
 
 
-STOP_MS: Final = 130.0 + COMMAND_MS
-"""From the controller's last frame, as the native drive (docs/safety.md); a PDO tells it late."""
 SHARE: Final = 0.2  #: Of the greatest torque or speed, for a second: it moves the water by little.
 TURN_S: Final = 1.0
-SETTLED_S: Final = 0.5  #: After it the rotor turns with the water that it has moved.
-STOPPED: Final = 0.1  #: Of the fall of its speed until then.
-RUNS_ON: Final = 0.5  #: Of the speed before: no stop. The water turned it at 0.2 on the bench.
 CONFIGURED_S: Final = 15.0  #: Some forty entries at 0.3 s each, as slow as a server may be.
 STATE_S: Final = 2.0  #: For a change of state; a drive that charges its capacitors takes one.
 IDENTITY: Final = Place(0x1018, 1)  #: Read-only by CiA 301.
@@ -427,11 +422,8 @@ class DriveTrial(Trial):
         while self.now_ns < end_ns:
             shares.append(self._speed_rad_s / speed_rad_s if turns else math.nan)
             yield self._frames()
-        end = shares[-1]
-        above = [place for place, each in enumerate(shares) if each > end + STOPPED * (1 - end)]
-        stopped_ms = (max(above, default=0) + 1) * TICK_NS * 1e-6
         self.checks.append(
-            Check(f"{name}_ms", what, stopped_ms if end <= RUNS_ON else math.nan, 0.0, STOP_MS,
+            Check(f"{name}_ms", what, stopped_ms(shares), 0.0, self._plan.stop_within_ms,
                   "ms", "Shorten heartbeat_ms and the ramp of the stop (6085h); see 6007h, 605Ah.")
         )  # fmt: skip
         yield from self._wait(STATE_S / 2)

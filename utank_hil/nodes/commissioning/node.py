@@ -1,5 +1,6 @@
 """The commissioning as a node: a controller node whose law gives pulses, and what looks on."""
 
+import math
 from collections.abc import Callable, Iterable
 from enum import Enum
 from typing import Final
@@ -8,14 +9,17 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.tick import TICK_NS, TICK_S
-from utank_hil.canbus import Frame, Mode
+from utank_hil.canbus import Frame, Mode, OperatorCommand, Station
 from utank_hil.control.interface import PRESSURE, VALVE, DesignPlant
 from utank_hil.nodes.commissioning.checks import (
+    PRESSED,
+    SETTLED_S,
     Check,
     Record,
     judge_pulses,
     judge_rest,
     judge_valve,
+    stopped_ms,
 )
 from utank_hil.nodes.commissioning.pulses import PulseLaw, PulsePlan, ValveStroke
 from utank_hil.nodes.controller import ControllerNode
@@ -27,6 +31,9 @@ ROW_S: Final = ROW_TICKS * TICK_S
 REST_S: Final = 20.0
 SETTLE_S: Final = 1.0
 """From ACTIVE to the first pulse."""
+PUSH_S: Final = 1.0
+"""Before the stop that is timed: the water hardly moves in it."""
+_STOP: Final = OperatorCommand(Mode.STANDBY, arm=False, stop=True, reset=False, acknowledge=False)
 STALE_MS: Final = 100.0
 """A motion sensor that is silent for longer is not commissioned."""
 MOST_OVER_PLAN: Final = 3.0
@@ -61,6 +68,7 @@ class Stage(Enum):
     REST = "Measuring the zeros. Keep the ship still."
     ARM = "The zeros are right. Arm at the panel: pump and valve will move a little."
     MOVING = "Pump and valve move a little. Stop or disarm at the panel ends it."
+    STOPPING = "The pump is stopped, and its time is measured."
     DONE = "Done."
 
 
@@ -68,7 +76,8 @@ class CommissioningNode:
     """Leads through a commissioning; on the bus it is the controller.
 
     `node` has the law of the pulses in it. `plan` is None without a pump, `stroke` without a valve.
-    `volume_m` is the sum of both levels at which the volume's monitor speaks.
+    `volume_m` is the sum of both levels at which the volume's monitor speaks, `stop_within_ms` the
+    time that the pump may take to stop.
     """
 
     name = "controller"
@@ -83,6 +92,7 @@ class CommissioningNode:
         plan: PulsePlan | None,
         stroke: ValveStroke | None,
         volume_m: float,
+        stop_within_ms: float,
     ) -> None:
         self.node = node
         self.receive, self.other_frames = node.receive, node.other_frames
@@ -91,9 +101,12 @@ class CommissioningNode:
         self._plant = plant
         self._plan = plan
         self._stroke = stroke
-        self._volume_m = volume_m
+        self._volume_m, self._stop_within_ms = volume_m, stop_within_ms
         self._pulses_s = 0.0 if plan is None else plan.duration_s
-        self._moving_s = self._pulses_s + (0.0 if stroke is None else stroke.duration_s)
+        self._push_s = self._pulses_s + (0.0 if stroke is None else stroke.duration_s)
+        self._moving_s = self._push_s + (0.0 if plan is None else PUSH_S)
+        self._pushed: list[float] = []  # pressure of each tick before the stop, and after it
+        self._stopping: list[float] = []
         sources = dict(_ALWAYS)
         if plan is not None:
             sources |= _OF_PUMP
@@ -127,8 +140,28 @@ class CommissioningNode:
             pulses = {name: column[begin:end] for name, column in record.items()}
             checks += judge_pulses(self.rest, pulses, self._plant, plan, ROW_S)
         if stroke is not None and (whole or rows >= end + stroke.duration_s / ROW_S - 1):
-            checks += judge_valve(record["valve_opening"][end:], stroke, ROW_S)
+            there = end + round(stroke.duration_s / ROW_S)
+            checks += judge_valve(record["valve_opening"][end:there], stroke, ROW_S)
+        if plan is not None and whole:
+            checks.append(self._stop_check(plan))
         return checks
+
+    def _stop_check(self, plan: PulsePlan) -> Check:
+        """The time from the stop to a fifth of the pressure, each pressure the mean of three."""
+        zero_pa = float(self.rest["pressure_pa"].mean())
+        before_pa = float(np.mean(self._pushed or [math.nan])) - zero_pa
+        pressures = np.array([before_pa, before_pa, *(each - zero_pa for each in self._stopping)])
+        smooth: list[float] = np.convolve(pressures, np.full(3, 1 / 3), "valid").tolist()
+        pressed = abs(before_pa) > plan.push_pa / 2  # its sign is the pulses' business
+        shares = [each / before_pa if pressed else 1.0 for each in smooth]
+        remedy = (
+            "Shorten the drive's quick stop ramp and its way through the bus, or set stop_within_ms"
+            " of devices.pump in the ship's file to what is safe."
+        )
+        return Check(
+            "stop_ms", "pump: from a stop to a fifth of its pressure", stopped_ms(shares, PRESSED),
+            0.0, self._stop_within_ms, "ms", remedy,
+        )  # fmt: skip
 
     @property
     def duration_s(self) -> float:
@@ -138,6 +171,8 @@ class CommissioningNode:
     @property
     def length_s(self) -> float:
         """Length of the stage that it is in, where it has one."""
+        if self.stage is Stage.STOPPING:
+            return SETTLED_S
         return REST_S if self.stage is Stage.REST else SETTLE_S + self._moving_s
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
@@ -147,6 +182,8 @@ class CommissioningNode:
         frames = self.node.tick(now_ns)
         if self.stage in (Stage.REST, Stage.MOVING):
             self._note(now_ns)
+        if self.stage is Stage.STOPPING:
+            self._stopping.append(self.node.measured.pressure_pa)
         if self.stage is not Stage.DONE:
             self._go_on(now_ns)
         return frames
@@ -183,7 +220,10 @@ class CommissioningNode:
     def _go_on(self, now_ns: int) -> None:
         mode = self.node.mode
         passed_s = (now_ns - self._since_ns) * 1e-9
-        if self.stage is Stage.MOVING:
+        if self.stage is Stage.STOPPING:
+            if passed_s >= SETTLED_S:
+                self._enter(Stage.DONE, now_ns)
+        elif self.stage is Stage.MOVING:
             self._move(passed_s - SETTLE_S, now_ns)
         elif self.stage is Stage.ARM and mode is Mode.ACTIVE:
             self._enter(Stage.MOVING, now_ns)  # whatever fell silent now ends it as under way
@@ -215,11 +255,18 @@ class CommissioningNode:
         if self.ended or time_s >= self._moving_s:
             self._law.reset()
             self.moved = self._record()
-            self._enter(Stage.DONE, now_ns)
+            stops = plan is not None and not self.ended
+            self._enter(Stage.STOPPING if stops else Stage.DONE, now_ns)
+            if stops:  # by the way of a panel's: the next tick hears it
+                node.inbox.stations.orders[Station.OPERATOR].overhear(_STOP)
         elif time_s >= 0:
+            pushes = plan is not None and time_s >= self._push_s
+            if pushes and time_s >= self._push_s + PUSH_S / 2:
+                self._pushed.append(node.measured.pressure_pa)
+            pressure_pa = 0.0 if plan is None else plan.pressure_at(time_s)
             self._law.set(
                 {
-                    PRESSURE: 0.0 if plan is None else plan.pressure_at(time_s),
+                    PRESSURE: plan.push_pa if plan is not None and pushes else pressure_pa,
                     VALVE: 0.0
                     if self._stroke is None
                     else self._stroke.loss_at(time_s - self._pulses_s),

@@ -36,6 +36,7 @@ class PulsePlan:
     #: level_m, roll_rad: greatest level and roll that the linear model predicts.
     level_m: float
     roll_rad: float
+    push_pa: float = 0.0  #: Pressure before the stop that is timed.
 
     @property
     def duration_s(self) -> float:
@@ -69,7 +70,9 @@ def plan_pulses(plant: DesignPlant) -> PulsePlan:
         MOST_ROLL_RAD / roll_per_pa,
         PRESSURE_SHARE * limits.pressure_pa,
     )
-    return PulsePlan(pressure_pa, period_s, level_per_pa * pressure_pa, roll_per_pa * pressure_pa)
+    level_m, roll_rad = level_per_pa * pressure_pa, roll_per_pa * pressure_pa
+    push_pa = PRESSURE_SHARE * limits.pressure_pa
+    return PulsePlan(pressure_pa, period_s, level_m, roll_rad, push_pa)
 
 
 @dataclass(frozen=True, slots=True)
