@@ -19,9 +19,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pyarrow
 import pytest
 import typer
 import yaml
+from pyarrow import parquet
 from test_mutated_files import LAW, made_fmu, ring, status_mb, within
 
 from utank_hil.cli import app
@@ -112,6 +114,22 @@ def bomb(path: Path) -> None:
     """Write gzip of a GB and more, without a line feed in it, in a MB."""
     member = gzip.compress(b"0" * (1 << 26))
     path.write_bytes(member * 17)
+
+
+def parquet_bomb(path: Path) -> None:
+    """Write 100 million numbers that are all the same."""
+    table = pyarrow.table({"time_s": np.zeros(1_000_000)})
+    with parquet.ParquetWriter(path, table.schema, compression="zstd") as writer:
+        for _ in range(100):
+            writer.write_table(table)
+
+
+def wide_text(path: Path) -> None:
+    """Write a text of a MB, once, that 5000 rows have."""
+    places = pyarrow.array(np.zeros(5000, dtype=np.int32))
+    text = pyarrow.DictionaryArray.from_arrays(places, pyarrow.array(["x" * 1_000_000]))
+    columns = {"time_s": np.arange(5000) * 0.1, "text": text}
+    parquet.write_table(pyarrow.table(columns), path, store_schema=False)
 
 
 def npz_bomb(path: Path) -> None:
@@ -495,6 +513,8 @@ ROWS = [
     Row("page.rrd", "<script>alert(1)</script>", EXPORT, "page.rrd"),
     Row("pickle.rrd", pickled, EXPORT, "pickle.rrd"),
     Row("pickle.parquet", pickled, EXPORT, "no Parquet file"),
+    Row("rows.parquet", parquet_bomb, EXPORT, "more than 40000000 values"),
+    Row("text.parquet", wide_text, EXPORT, "left out: text (string)", code=0),
     Row("names.csv", "time_s," + "a" * (1 << 18) + "\n1,2\n", EXPORT, "names.csv"),
     Row("quotes.csv", 'time_s,"' + "a\n" * (1 << 17), EXPORT, "quotes.csv"),
     Row("escape.csv", csv_of("roll_rad") + f"0.3,{ESCAPE}\n", EXPORT, "is no number"),

@@ -3,7 +3,9 @@
 import csv
 import json
 import re
-from collections.abc import Callable
+import tracemalloc
+from collections.abc import Callable, Iterator
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any
 
@@ -24,15 +26,17 @@ from utank_hil.commands.replay import replay
 from utank_hil.console.common import new_app
 from utank_hil.identification.record import logged_samples
 from utank_hil.nodes.signals import SIGNALS
+from utank_hil.telemetry import logged_signals
 from utank_hil.telemetry.frame_log import FrameLog, Kind
+from utank_hil.telemetry.logged_signals import signal_parts, signal_table
 from utank_hil.telemetry.recording import write_recording
 from utank_hil.telemetry.replay import Entry, entries_of
 from utank_hil.telemetry.replay_head import recorded_config
 from utank_hil.telemetry.signal_files import (
     TABLE_SUFFIXES,
     even_rows,
+    export_parts,
     read_signals,
-    signal_table,
     write_signals,
 )
 
@@ -119,7 +123,7 @@ def test_values_of_a_table_are_those_that_cantools_reads_of_the_frames(tmp_path:
 def test_both_tables_hold_the_same_numbers_bit_for_bit(
     tmp_path: Path, entries: list[Entry]
 ) -> None:
-    expected = signal_table(entries)
+    expected = signal_table(signal_parts(entries))
     with exported(tmp_path, "a.csv").open(newline="") as content:
         names, *rows = csv.reader(content)
     assert names == list(expected)
@@ -136,6 +140,78 @@ def test_both_tables_hold_the_same_numbers_bit_for_bit(
             np.testing.assert_array_equal(again[name], values, err_msg=name)
 
 
+def test_parts_of_a_table_are_the_whole_and_none_but_one_is_held(
+    tmp_path: Path, entries: list[Entry], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = signal_table(signal_parts(entries))
+    monkeypatch.setattr(logged_signals, "_PART", 7)
+    for name, values in signal_table(signal_parts(entries)).items():
+        np.testing.assert_array_equal(values, whole[name], err_msg=name)
+    exported(tmp_path, "parts.csv")
+    exported(tmp_path, "a.parquet")
+    (found,) = read_signals(tmp_path / "parts.csv").values()
+    assert list(found) == list(whole)
+    for name, values in whole.items():
+        np.testing.assert_array_equal(found[name], values, err_msg=name)
+        np.testing.assert_array_equal(
+            pyarrow.parquet.read_table(tmp_path / "a.parquet")[name].to_numpy(), values
+        )
+
+    def long_log() -> Iterator[Entry]:
+        for turn in range(40):
+            for each in entries:
+                yield each._replace(time_ns=each.time_ns + turn * 14_000_000_000)
+
+    monkeypatch.setattr(logged_signals, "_PART", 500)
+    tracemalloc.start()
+    try:
+        rows = export_parts(tmp_path / "long.parquet", signal_parts(long_log()))
+        _, most_bytes = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    table = pyarrow.parquet.read_table(tmp_path / "long.parquet")
+    assert table.num_rows == rows == 40 * 1400
+    assert most_bytes < table.num_rows * table.num_columns * 8 / 6
+
+
+def test_of_a_long_log_a_part_is_held_and_more_than_the_limit_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measured, names = ("roll_rad", "level_m"), ("roll_rad", "port_level_m", "starboard_level_m")
+    (whole,) = read_signals(LOG).values()
+    monkeypatch.setattr(logged_signals, "_PART", 100)
+    monkeypatch.setattr(logged_signals, "VALUES_LIMIT", 4000)
+    (part,) = read_signals(
+        LOG, names=(*names, "pressure_command_pa"), between_s=(1.8, 7.2)
+    ).values()
+    assert set(part) == {"time_s", "pressure_command_pa", *names}
+    np.testing.assert_array_equal(
+        logged_samples(part, measured, 0.2, 2.0, 7.0),
+        logged_samples(whole, measured, 0.2, 2.0, 7.0),
+    )
+    with pytest.raises(ValueError, match=r"every-mode.frames: has more than .* values"):
+        read_signals(LOG)
+    with pytest.raises(ValueError, match="holds no tick between 100 and 101 s"):
+        read_signals(LOG, between_s=(100.0, 101.0))
+
+
+def test_of_frames_before_the_first_tick_the_last_of_each_message_are_held(
+    entries: list[Entry],
+) -> None:
+    received = [each for each in entries if each.kind == Kind.RECEIVED]
+    ticks = [each for each in entries if each.kind == Kind.TICK]
+    tracemalloc.start()
+    try:
+        (part,) = signal_parts(chain(*repeat(received, 20), ticks[:3]))
+        _, most_bytes = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    (once,) = signal_parts(chain(received, ticks[:3]))
+    np.testing.assert_array_equal(part["roll_rad"], once["roll_rad"])
+    assert np.isfinite(once["roll_rad"]).all()
+    assert most_bytes < 1 << 20
+
+
 def test_a_table_of_the_frames_shows_what_the_telemetry_showed(entries: list[Entry]) -> None:
     rows: list[FloatArray] = []
     with recorded_config(FrameLog(LOG).head) as config:
@@ -147,7 +223,7 @@ def test_a_table_of_the_frames_shows_what_the_telemetry_showed(entries: list[Ent
             node.receive(Frame(number, data), time_ns)
         elif kind == Kind.TICK:
             node.tick(time_ns)
-    shown, found = np.array(rows), signal_table(entries)
+    shown, found = np.array(rows), signal_table(signal_parts(entries))
     for name in ("time_s", "roll_rad", "roll_rate_rad_s", "starboard_level_m",
                  "pressure_actual_pa", "pump_power_w"):  # fmt: skip
         # before its first frame the node shows 0, the table that there is nothing
@@ -207,7 +283,7 @@ def test_a_ship_is_identified_from_a_table_in_other_units(tmp_path: Path) -> Non
         "wind_kn": np.full(len(signals["time_s"]), 12.0),
     }
     every = slice(3505, 16605, 10)  # ten rows a second
-    write_signals(tmp_path / "t.csv", {name: values[every] for name, values in theirs.items()})
+    write_signals(tmp_path / "t.csv", [{name: values[every] for name, values in theirs.items()}])
     words = (tmp_path / "t.csv", "configs/controllers/adaptive_dpc.yaml", "--order", 30, "--json")
     result = invoke(identify_log, *words, "--out", tmp_path / "out")
     assert result.exit_code in (0, 1), result.stderr
@@ -228,6 +304,7 @@ def test_a_ship_is_identified_from_a_table_in_other_units(tmp_path: Path) -> Non
         ((LOG, "--to", "{}/a.csv", "--run", "x"), "--run is for recordings"),
         (("{}/none.frames", "--to", "{}/a.csv"), "none.frames"),
         (("{}/none.csv", "--to", "{}/a.blf"), "holds signals and no frames"),
+        (("{}/none.csv", "--to", "{}/a.csv", "--from", 3), "a table is exported whole"),
     ],
 )
 def test_what_can_not_be_done_is_said_with_its_reason(

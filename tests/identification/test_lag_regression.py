@@ -40,6 +40,12 @@ def test_record_without_a_long_enough_stretch_is_refused() -> None:
         LagRegression(z, 1, 3, np.empty((0, 10)))
 
 
+def test_a_record_that_takes_too_much_memory_is_refused() -> None:
+    z = np.zeros((100_000, 3))  # Six hours at five samples a second.
+    with pytest.raises(IdentificationError, match="a part of 33057 samples at most"):
+        LagRegression(z, 2, 120, np.empty((0, len(z))))
+
+
 def _regression(u: FloatArray, y: FloatArray, order: int) -> LagRegression:
     z = np.column_stack([y, u])
     z = z / np.sqrt(np.mean(z**2, axis=0))

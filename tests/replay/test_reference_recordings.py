@@ -6,6 +6,7 @@ A difference is a change of behaviour. If it is meant, ``python -m tools.referen
 
 from dataclasses import replace
 from functools import cache
+from itertools import chain, repeat
 from pathlib import Path
 
 import numpy as np
@@ -187,7 +188,9 @@ def test_a_case_gives_the_same_bytes_every_time(tmp_path: Path) -> None:
     ).read_bytes()
 
 
-def test_one_bit_of_one_sensor_frame_is_found_at_its_tick_and_named() -> None:
+def test_one_bit_of_one_sensor_frame_is_found_at_its_tick_and_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     log = FrameLog(LOGS / "every-mode.frames")
     entries = list(entries_of(log.blocks()))
     at = [n for n, each in enumerate(entries)
@@ -200,3 +203,10 @@ def test_one_bit_of_one_sensor_frame_is_found_at_its_tick_and_named() -> None:
         assert replay(entries, config, law).damaged == []
         entries[at] = entries[at]._replace(data=bytes(flipped))
         assert replay(entries, config, law).damaged == [(tick, "SENSOR_MOTION")]
+        monkeypatch.setattr("utank_hil.telemetry.replay._NAMED", 3)
+        wrong = [each._replace(data=bytes(8)) if each.number == MOTION.can_id else each
+                 for each in entries[:at]]  # fmt: skip
+        found = replay(wrong, config, law)
+        assert (len(found.damaged), found.damaged_frames) == (3, 400)
+        with pytest.raises(ValueError, match="sent more than 65536 frames"):
+            replay(chain(entries[:at], repeat(entries[-1]._replace(kind=Kind.SENT))), config, law)

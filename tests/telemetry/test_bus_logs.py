@@ -294,6 +294,20 @@ def test_a_stranger_with_the_controllers_identifier_is_received_where_marks_can_
     assert result["frames"] == 71
 
 
+def test_stamps_that_stand_still_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("utank_hil.telemetry.bus_logs._MOST", 400)
+    text = field_case("02-candump-one-stamp-ahead/ref.log").read_text()
+    moving, still = (lines := text.splitlines())[:60], lines[60:] * 2
+    stamp = moving[-1].partition(" ")[0]
+    still = [f"{stamp} {line.partition(' ')[2]}" for line in still]
+    (tmp_path / "still.log").write_text("\n".join([*moving, *still, ""]))
+    result = invoke(export, tmp_path / "still.log", "--to", tmp_path / "a.csv")
+    assert result.exit_code == 2
+    assert "still.log: more than 400 frames within one tick of 10 ms" in result.stderr
+
+
 def test_rows_of_a_csv_are_all_there(tmp_path: Path) -> None:
     exported("28-bus-logged-before-the-controller-starts/early.log", tmp_path / "a.csv")
     with (tmp_path / "a.csv").open() as content:

@@ -45,6 +45,16 @@ def test_units_are_read_from_the_names(tmp_path: Path) -> None:
     np.testing.assert_allclose(found["pressure_actual_pa"], [5e4, -5e4])
 
 
+def test_a_table_of_too_many_values_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("utank_hil.base.text_files.VALUES_LIMIT", 100)
+    text = "time_s,roll_rad\n" + "1,2\n" * 50
+    assert len(read(tmp_path, text)["roll_rad"]) == 50
+    with pytest.raises(ValueError, match=r"theirs\.csv: has more than 100 values"):
+        read(tmp_path, text + "1,2\n")
+
+
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
 def test_any_usual_separator_and_a_byte_order_mark_are_read(tmp_path: Path, separator: str) -> None:
     text = "\ufefftime_s,roll_rad\n0,1\n0.5,2\n\n".replace(",", separator)

@@ -24,7 +24,9 @@ from utank_hil.base.arrays import FloatArray
 _GZIP: Final = b"\x1f\x8b"
 _UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
 LIMIT_BYTES: Final = 1 << 30
-"""Largest content that is read whole: a table of a day at 10 Hz with a hundred columns."""
+"""Largest content that is read whole."""
+VALUES_LIMIT: Final = 40_000_000
+"""Most values of a table that are held, 320 MB: a day at 10 Hz with 46 columns."""
 LINE_LIMIT: Final = 1 << 16
 """Longest line of a log in characters; that of a CAN FD frame has some 300."""
 
@@ -162,12 +164,22 @@ def read_number_table(path: Path) -> dict[str, FloatArray]:
             dates: set[int] = set()
             for row in filter(None, lines):
                 dates |= _append_row(path, names, row, lines.line_num, values)
+                if len(values) > VALUES_LIMIT:
+                    raise more_values(path)
         except csv.Error as error:
             raise TextFileError(f"{path}: line {lines.line_num} is no row: {error}") from error
     if not values:
         raise TextFileError(f"{path}: has a line of names and no rows")
     table = np.frombuffer(values).reshape(-1, len(names))
     return dict(_named(path, names, table, dates))
+
+
+def more_values(path: object) -> TextFileError:
+    """Return the error of a table with more than `VALUES_LIMIT` values."""
+    return TextFileError(
+        f"{path}: has more than {VALUES_LIMIT} values, the most of a table that are held: take a "
+        "part, or fewer columns"
+    )
 
 
 def since_first(path: Path, name: str, seconds: FloatArray) -> tuple[str, FloatArray]:

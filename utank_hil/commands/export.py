@@ -40,7 +40,7 @@ def export(
     channel: Channel = None,
     from_s: Annotated[
         float | None,
-        typer.Option("--from", metavar="SECONDS", help="From the first record; of frames only."),
+        typer.Option("--from", metavar="SECONDS", help="From the first record; of logs only."),
     ] = None,
     until_s: Annotated[float | None, typer.Option("--until", metavar="SECONDS")] = None,
     json_: Json = False,
@@ -64,14 +64,17 @@ def export(
         if kind in BUS_SUFFIXES:
             frames = _frames(recording, channel, from_s, until_s, said)
             count, unit = write_frames(to, frames, said), "frames"
-        else:
-            runs = signal_files.read_signals(
-                recording, said.append, channel=channel, from_s=from_s, to_s=until_s
-            )
+        elif recording.suffix.lower() == ".rrd" or signal_files.is_table(recording):
+            if (channel, from_s, until_s) != (None, None, None):
+                fail("--channel, --from and --until are for logs: a table is exported whole")
+            runs = signal_files.read_signals(recording, said.append)
             name = chosen_run(recording, runs, run)
             signal_files.require(recording, runs[name], "time_s")
-            signal_files.write_signals(to, runs[name])
+            signal_files.write_signals(to, [runs[name]])
             count, unit = len(runs[name]["time_s"]), "rows"
+        else:
+            parts = signal_files.logged_parts(recording, said.append, channel, from_s, until_s)
+            count, unit = signal_files.export_parts(to, parts), "rows"
     except (OSError, ValueError) as error:
         fail(error)
     for text in said:

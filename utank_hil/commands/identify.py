@@ -262,9 +262,14 @@ def identify_log(
     out = common.prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
     measured = task.design.predictor.measured
     try:
-        runs = read_signals(log, say_note, channel=channel)
-        name = common.chosen_run(log, runs, run)
         sample_time_s = task.design.predictor.sample_time_s
+        low_s, high_s = -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s
+        runs = read_signals(
+            log, say_note, channel=channel,
+            names=("pressure_command_pa", "port_level_m", "starboard_level_m", *measured),
+            between_s=(low_s - sample_time_s, high_s + sample_time_s),
+        )  # fmt: skip
+        name = common.chosen_run(log, runs, run)
         signals = runs[name]
         require(log, signals, "time_s", "pressure_command_pa", *measured)
         if is_table(log):

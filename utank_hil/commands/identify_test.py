@@ -48,10 +48,9 @@ def decay(
     if from_s is not None and to_s is not None and from_s >= to_s:
         fail(f"--from {from_s:g} is not before --to {to_s:g}")
     vessel = None if ship is None else load(ship, Vessel)
-    time_s, roll_rad = _columns(record, "time_s", "roll_rad")
-    part = np.ones(len(time_s), dtype=bool)
-    part &= True if from_s is None else time_s >= from_s
-    part &= True if to_s is None else time_s <= to_s
+    low_s, high_s = -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s
+    time_s, roll_rad = _columns(record, "time_s", "roll_rad", between_s=(low_s, high_s))
+    part = (time_s >= low_s) & (time_s <= high_s)
     try:
         found = roll_decay(time_s[part], roll_rad[part])
     except ValueError as error:
@@ -119,11 +118,13 @@ def inclining_test(
     terminal.say(f"The ship lists by {math.degrees(found.list_rad):.2f}°.")
 
 
-def _columns(path: Path, *names: str) -> list[FloatArray]:
+def _columns(
+    path: Path, *names: str, between_s: tuple[float, float] = (-math.inf, math.inf)
+) -> list[FloatArray]:
     from utank_hil.telemetry.signal_files import read_signals, require
 
     try:
-        run = list(read_signals(path).values())[-1]
+        run = list(read_signals(path, names=names, between_s=between_s).values())[-1]
         require(path, run, *names)
     except (OSError, ValueError) as error:
         fail(error)

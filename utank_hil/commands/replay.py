@@ -145,6 +145,7 @@ def _as_json(
         "causes": why,
         "law": None if law is None else _law_as_json(law),
         "damaged_frames": [{"tick": tick, "message": message} for tick, message in result.damaged],
+        "damaged": result.damaged_frames,
         "cut": cut,
         "other_machine": elsewhere,
     }
@@ -209,6 +210,7 @@ def _print(
         _print_law(console, law)
     if result.damaged:
         each = [f"tick {tick}, {message}" for tick, message in result.damaged]
-        console.say("; ".join(few(each)), yellow="received with a wrong checksum:")
+        text = f"{result.damaged_frames} received with a wrong checksum:"
+        console.say("; ".join(few(each)), yellow=text)
     if cut:
         console.say("compared up to there", yellow=f"{cut}:")

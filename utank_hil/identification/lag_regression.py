@@ -25,6 +25,7 @@ _NULL = 1e-12  # Smallest eigenvalue, relative to the largest.
 _LOG_KAPPA = (-15.0, 30.0)  # The range is from zero input coefficients to plain least squares.
 _RANK = 1e-10  # Inverse of the largest condition number that determines all coefficients.
 _EXACT = 1e-10  # Relative residual of data without noise.
+_MOST = 12_000_000  # Largest number of elements of a regression: some 450 MB with its solution.
 _INFLATION = 100.0  # Above this, noise in weak directions of the input exceeds shrinkage's bias.
 
 
@@ -51,6 +52,12 @@ class LagRegression:
             raise IdentificationError(
                 f"no stretch of the record without gaps is longer than the order {order}; "
                 "record longer, mend the gaps or lower the order"
+            )
+        rows, lags = sum(stop - start - order for start, stop in bounds), (order + 1) * z.shape[1]
+        if rows * lags > _MOST:
+            raise IdentificationError(
+                f"{rows} samples of order {order} take more memory than is given to them; take a "
+                f"part of {_MOST // lags} samples at most (--from, --to), or lower the order"
             )
         lagged = [
             np.lib.stride_tricks.sliding_window_view(z[start:stop], order + 1, axis=0)

@@ -21,6 +21,10 @@ _EARLY_NS: Final = TICK_NS // 5
 """Largest lead of a frame in its tick over the controller's first frame in its own."""
 
 
+_MOST: Final = 1 << 18
+"""Most frames that are held for a tick: stamps in whole seconds have some 5000 of a full bus."""
+
+
 class LoggedController:
     """A controller on a logged bus; the log is read once here, and again by `entries`.
 
@@ -90,6 +94,11 @@ class LoggedController:
                 sent.append(canbus.Frame(number, frame.data))
             else:
                 received.append(Entry(number, frame.data, Kind.RECEIVED, frame.time_ns))
+            if len(received) + len(sent) > _MOST:
+                raise BusLogError(
+                    f"{self._log.path}: more than {_MOST} frames within one tick of 10 ms: its "
+                    "stamps are no times"
+                )
             while received and frame.time_ns <= self._begin_ns:  # The log may begin days before.
                 yield received.popleft()
         for rest in range(tick, max(tick, last) + 1):

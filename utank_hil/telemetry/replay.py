@@ -103,6 +103,10 @@ def _of_array(name: str, before: FloatArray | None, now: FloatArray) -> list[Num
 
 
 _FEW: Final = 20
+_NAMED: Final = 1000
+_MOST_SENT: Final = (
+    1 << 16
+)  #: Largest number of frames that a recorded tick sent; it sends some 20.
 _NOTHING: Final = "nothing"
 
 
@@ -145,8 +149,10 @@ class ReplayResult:
     #: Number of frames that differ, by message.
     different: Counter[str] = field(default_factory=Counter)
     first: Difference | None = None  #: First difference; None if every frame is equal bit for bit.
-    #: Received frames whose checksum is wrong: the tick that they came before, and their message.
+    #: Received frames whose checksum is wrong: the tick that they came before, and their message,
+    #: of the first `_NAMED` of them, and how many they are.
     damaged: list[tuple[int, str]] = field(default_factory=list)
+    damaged_frames: int = 0
     lost_rows: int = 0  #: Rows that the recorder lost; after these an exact replay is impossible.
 
     @property
@@ -299,6 +305,8 @@ def replay(
     for number, data, kind, time_ns in entries:
         if kind == Kind.SENT:
             recorded.append(Frame(number, data))
+            if len(recorded) > _MOST_SENT:
+                raise ValueError(f"tick {result.ticks} sent more than {_MOST_SENT} frames")
             continue
         if waiting:
             compare()
@@ -349,7 +357,9 @@ class _Comparison:
         """Count a received frame whose checksum is wrong."""
         known = can_id in self._catalogue.can_ids and len(data) == PAYLOAD_BYTES
         if known and self._catalogue.decoded(Frame(can_id, data)) is None:
-            self._result.damaged.append((self._result.ticks, self._name(can_id)))
+            self._result.damaged_frames += 1
+            if len(self._result.damaged) < _NAMED:
+                self._result.damaged.append((self._result.ticks, self._name(can_id)))
 
     def retuner(self, who: str, answers: RecordedRetuner) -> None:
         left = answers.left_over()

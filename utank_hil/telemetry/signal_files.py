@@ -6,111 +6,35 @@ Tables (CSV, Parquet) may have other units, by their names (``roll_deg``, ``pres
 
 import csv
 import math
-from array import array
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import zlib
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from itertools import chain
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any, Final
 
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.text_files import (
+    VALUES_LIMIT,
     TextFileError,
     is_time,
     kind_of,
+    more_values,
     read_number_table,
     refuse_device,
     since_first,
 )
-from utank_hil.base.whole_file import left_whole
-from utank_hil.canbus import AddressClaim, DriveStatus2, load_catalogue
-from utank_hil.canbus.codec import FRAME_BYTES, Codec
+from utank_hil.base.whole_file import errors_name, left_whole
 from utank_hil.telemetry.bus_files.log import BusLog, format_of
 from utank_hil.telemetry.bus_logs import LoggedController
-from utank_hil.telemetry.frame_log import SUFFIX, FrameLog, Kind
+from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
+from utank_hil.telemetry.logged_signals import Columns, signal_parts, signal_table
 from utank_hil.telemetry.replay import Entry, entries_of
 from utank_hil.telemetry.units import column_of
 
-_NAMES: Final = {
-    ("SENSOR_MOTION", "roll_rad"): "roll_rad",
-    ("SENSOR_MOTION", "roll_rate_rad_s"): "roll_rate_rad_s",
-    ("SENSOR_TANK", "port_level_m"): "port_level_m",
-    ("SENSOR_TANK", "starboard_level_m"): "starboard_level_m",
-    ("PUMP_CMD", "pressure_pa"): "pressure_command_pa",
-    ("SENSOR_PUMP", "pressure_pa"): "pressure_actual_pa",
-    ("VALVE_STATUS", "opening"): "valve_opening",
-    ("CTRL_STATUS", "mode"): "mode",
-    ("CTRL_STATUS", "fault"): "fault",
-    ("CTRL_STATUS", "bus_load"): "bus_load",
-    ("CTRL_STATUS", "retuning"): "retuning",
-    ("PASSIVE_TWIN", "twin_roll_rad"): "twin_roll_rad",
-    ("PASSIVE_TWIN", "twin_rms_rad"): "twin_roll_rms_rad",
-    ("PASSIVE_TWIN", "roll_rms_rad"): "roll_rms_rad",
-}  # Signals with the name of a telemetry column; others are named after their message.
-
-
-class _Heard:
-    """Frames of one message, by tick."""
-
-    def __init__(self, codec: Codec[Any]) -> None:
-        self.decode = codec.decode
-        self.ticks = array("q")
-        self.values = array("d")
-
-    def add(self, tick: int, data: bytes) -> None:
-        """Take a frame that is visible from a tick on; a damaged one is ignored."""
-        message = self.decode(data) if len(data) == FRAME_BYTES else None
-        if message is not None:
-            self.ticks.append(tick)
-            self.values.extend(math.nan if value is None else float(value) for value in message)
-
-    def held(self, ticks: int, fields: int) -> FloatArray:
-        """Return the last values in each tick, (ticks, fields); NaN before the first frame."""
-        if not self.ticks:
-            return np.full((ticks, fields), np.nan)
-        values = np.asarray(self.values).reshape(-1, fields)
-        last = np.searchsorted(np.asarray(self.ticks), np.arange(ticks), side="right") - 1
-        return np.where((last < 0)[:, None], np.nan, values[last])
-
-
-def signal_table(entries: Iterable[Entry]) -> dict[str, FloatArray]:
-    """Decode the frames of a recording, whatever the controller's checks said of them.
-
-    A received frame counts from the next tick on, a sent one from its own. Returned are arrays
-    (n,), one value per tick: ``time_s`` since the first tick, the telemetry's columns, and every
-    other signal as ``<message>_<signal>``, in SI units, states and flags as numbers. NaN before the
-    first frame and where unavailable; all-NaN signals are left out.
-    """
-    messages = load_catalogue().messages
-    heard = {codec.can_id: _Heard(codec) for _, _, codec in messages}
-    times_ns = array("q")
-    for number, data, kind, time_ns in entries:
-        if kind == Kind.TICK:
-            times_ns.append(time_ns)
-        elif kind in (Kind.RECEIVED, Kind.SENT) and number in heard:
-            heard[number].add(len(times_ns) - (kind == Kind.SENT), data)
-    ticks_ns = np.asarray(times_ns, dtype=np.int64)
-    columns: dict[str, FloatArray] = {}
-    for message, _, codec in messages:
-        if message is AddressClaim:
-            continue
-        fields: tuple[str, ...] = message._fields
-        held = heard[codec.can_id].held(len(ticks_ns), len(fields))
-        for name, column in zip(fields, held.T, strict=True):
-            columns[_NAMES.get((codec.name, name), f"{codec.name.lower()}_{name}")] = column
-        if message is DriveStatus2:
-            volts, amperes = (fields.index(name) for name in ("bus_voltage_v", "current_a"))
-            columns["pump_power_w"] = held[:, volts] * held[:, amperes]
-    first = (*_NAMES.values(), "pump_power_w")
-    order = (*first, *(name for name in columns if name not in first))
-    return {
-        "time_s": (ticks_ns - ticks_ns[:1]).astype(np.float64) * 1e-9,
-        **{name: columns[name] for name in order if not np.isnan(columns[name]).all()},
-    }
-
-
 TABLE_SUFFIXES: Final = (".csv", ".parquet")
-Columns = dict[str, FloatArray]
 _Column = tuple[str, FloatArray]
 _OTHER_UNITS: Final = {
     "_mm": ("_m", 1e-3), "_cm": ("_m", 1e-2), "_ms": ("_s", 1e-3),
@@ -129,15 +53,16 @@ def read_signals(
     note: Callable[[str], None] | None = None,
     *,
     channel: str | None = None,
-    from_s: float | None = None,
-    to_s: float | None = None,
+    names: Container[str] | None = None,
+    between_s: tuple[float, float] = (-math.inf, math.inf),
 ) -> dict[str, Columns]:
     """Read the runs of a file by name; a file without names has one run, named by its stem.
 
     `note` is called with what was not read as it stands: a cut, a step of a clock, and the columns
     of a table that hold no numbers, which are an error without it. `channel` is the bus to read of
-    a log with several, `from_s` and `to_s` a part of a frame log or a log of the bus, in seconds
-    from its first record. ValueError has the file's name, the line if any, and the remedy.
+    a log with several. Of a frame log or a log of the bus, which may be of days, `names` and rows
+    `between_s` are kept (`signal_table`); of other files all. ValueError has the file's name, the
+    line if any, and the remedy.
     """
     suffix = kind_of(path)
     refuse_device(path)
@@ -146,21 +71,35 @@ def read_signals(
         from utank_hil.telemetry.recording import read_recording  # This imports Rerun.
 
         return read_recording(path)
-    if suffix == SUFFIX:
-        entries = part_of_entries(entries_of(FrameLog(path).blocks(note)), from_s, to_s)
-        columns = signal_table(entries)
-    elif not is_table(path):
-        notes: list[str] = []
-        controller = LoggedController(BusLog(path, channel, from_s, to_s), notes)
-        if note is not None and notes:
-            note("; ".join(notes))
-        columns = signal_table(controller.entries())
+    if not is_table(path):
+        columns = signal_table(logged_parts(path, note, channel), names, between_s, path)
     elif suffix == ".csv":
         columns = _all_in_si(path, read_number_table(path).items())
     else:
         columns = _all_in_si(path, _read_parquet(path, note))
     packed = path.suffix.lower() == ".gz"
     return {Path(path.stem).stem if packed else path.stem: columns}
+
+
+def logged_parts(
+    path: Path,
+    note: Callable[[str], None] | None,
+    channel: str | None,
+    from_s: float | None = None,
+    to_s: float | None = None,
+) -> Iterator[Columns]:
+    """Yield the table of a frame log or a log of the bus by parts, as `signal_parts` does.
+
+    `from_s` and `to_s` are in seconds from the first record.
+    """
+    if kind_of(path) == SUFFIX:
+        entries = part_of_entries(entries_of(FrameLog(path).blocks(note)), from_s, to_s)
+    else:
+        notes: list[str] = []
+        entries = LoggedController(BusLog(path, channel, from_s, to_s), notes).entries()
+        if note is not None and notes:
+            note("; ".join(notes))
+    yield from signal_parts(entries)
 
 
 def is_table(path: Path) -> bool:
@@ -180,24 +119,62 @@ def part_of_entries(
             yield entry
 
 
-def write_signals(path: Path, columns: Mapping[str, FloatArray]) -> None:
-    """Write columns exactly, as CSV or Parquet; NaN is an empty field or a null."""
+def export_parts(path: Path, parts: Iterable[Columns]) -> int:
+    """Write the table of a log as it comes, in bounded memory; return its number of rows.
+
+    Which signals are NaN throughout, and left out, shows at the end. Until then the parts are kept,
+    compressed, in a file beside `path` that has no name.
+    """
+    seen: dict[str, bool] = {}
+    blocks: list[tuple[int, int]] = []
+    with errors_name(path):
+        kept = TemporaryFile(dir=path.parent)  # noqa: SIM115 - errors below are of what is read
+    with kept:
+        for part in parts:
+            for name, column in part.items():
+                seen[name] = seen.get(name, name == "time_s") or not np.isnan(column).all()
+            block = zlib.compress(np.array(list(part.values())).tobytes(), level=1)
+            blocks.append((len(part["time_s"]), len(block)))
+            with errors_name(path):
+                kept.write(block)
+        kept.seek(0)
+
+        def again() -> Iterator[Columns]:
+            for rows, size in blocks:
+                table = np.frombuffer(zlib.decompress(kept.read(size))).reshape(len(seen), rows)
+                pairs = zip(seen.items(), table, strict=True)
+                yield {name: column for (name, is_seen), column in pairs if is_seen}
+
+        write_signals(path, again())
+    return sum(rows for rows, _ in blocks)
+
+
+def write_signals(path: Path, parts: Iterable[Mapping[str, FloatArray]]) -> None:
+    """Write parts of the same columns exactly, as CSV or Parquet; NaN is an empty field or null."""
+    parts = iter(parts)
+    first = next(parts)
     if path.suffix.lower() == ".parquet":
         import pyarrow
         from pyarrow import parquet
 
-        arrays = {name: pyarrow.array(values, from_pandas=True) for name, values in columns.items()}
-        with left_whole(path):
-            parquet.write_table(pyarrow.table(arrays), path)
+        tables = (
+            pyarrow.table(
+                {n: pyarrow.array(values, from_pandas=True) for n, values in part.items()}
+            )
+            for part in chain([first], parts)
+        )
+        table = next(tables)
+        with left_whole(path), parquet.ParquetWriter(path, table.schema) as writer:
+            for each in chain([table], tables):
+                writer.write_table(each)
         return
     with left_whole(path), path.open("w", newline="", encoding="utf-8") as content:
         writer = csv.writer(content)
         # A spreadsheet runs what begins so; an apostrophe makes it text.
-        writer.writerow(
-            f"'{name}" if name[:1] in ("=", "+", "-", "@") else name for name in columns
-        )
-        for row in zip(*(values.tolist() for values in columns.values()), strict=True):
-            writer.writerow("" if value != value else repr(value) for value in row)
+        writer.writerow(f"'{name}" if name[:1] in ("=", "+", "-", "@") else name for name in first)
+        for part in chain([first], parts):
+            for row in zip(*(values.tolist() for values in part.values()), strict=True):
+                writer.writerow("" if value != value else repr(value) for value in row)
 
 
 def even_rows(
@@ -297,27 +274,31 @@ def _line(path: Path, rows: Any, index: int) -> str:
 def _read_parquet(path: Path, note: Callable[[str], None] | None) -> Iterator[_Column]:
     """Yield the columns of numbers; `note` is called with the columns of other types."""
     import pyarrow
-    from pyarrow import parquet
+    from pyarrow import parquet, types
 
     try:
         with path.open("rb") as content:  # The library leaves open what it can't read.
-            table = parquet.read_table(content)
+            file = parquet.ParquetFile(content)
+            numbers, other = [], []
+            for name, kind in zip(file.schema_arrow.names, file.schema_arrow.types, strict=True):
+                number = types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind)
+                dated = types.is_timestamp(kind) and is_time(name)
+                fits = number or dated or types.is_boolean(kind)
+                numbers.append(name) if fits else other.append(f"{name} ({kind})")
+            if file.metadata.num_rows * len(numbers) > VALUES_LIMIT:
+                raise more_values(path)
+            table = file.read(columns=numbers)
     except (pyarrow.ArrowException, OSError) as error:
         raise TextFileError(f"{path}: is no Parquet file that can be read: {error}") from error
-    other = []
-    for field in table.schema:
-        kind, types = field.type, pyarrow.types
-        column = table.column(field.name)
-        if types.is_timestamp(kind) and is_time(field.name):
-            seconds = column.cast(pyarrow.timestamp("ns", kind.tz)).cast(pyarrow.int64())
+    for field, column in zip(table.schema, table.columns, strict=True):
+        if types.is_timestamp(field.type):
+            seconds = column.cast(pyarrow.timestamp("ns", field.type.tz)).cast(pyarrow.int64())
             values = seconds.cast(pyarrow.float64(), safe=False).to_numpy(zero_copy_only=False)
             yield since_first(path, field.name, values * 1e-9)
-        elif types.is_boolean(kind):
-            yield field.name, column.cast(pyarrow.int8()).cast(pyarrow.float64()).to_numpy()
-        elif types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind):
-            yield field.name, column.cast(pyarrow.float64(), safe=False).to_numpy()
-        else:
-            other.append(f"{field.name} ({kind})")
+            continue
+        if types.is_boolean(field.type):
+            column = column.cast(pyarrow.int8())
+        yield field.name, column.cast(pyarrow.float64(), safe=False).to_numpy()
     if other:
         why = f"{path}: columns that are no numbers are left out: {', '.join(other)}"
         if note is None:
