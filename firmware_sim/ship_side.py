@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any, Final
 
 from firmware_sim.canopen_drive import CanopenPumpDrive
@@ -35,6 +36,8 @@ from utank_hil.canbus import (
     ValveStatus,
     load_catalogue,
 )
+from utank_hil.canbus.cmac import cmac, read_key
+from utank_hil.canbus.profiles.acting import PROOF
 from utank_hil.canbus.profiles.device_plan import DevicePlan
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.dynamics.pump import Pump
@@ -185,10 +188,17 @@ class ForeignPanel(OperatorPanel):
         self._frames = ForeignFrames(plan, self._sender, catalogue.codec(OperatorCommand))
         #: What it sends, by the identifier of the message that it stands for.
         self.devices = {self._sender.can_id: self._frames}
+        self._proves = plan.authentication
+        self._challenge = b""
+        if self._proves is not None:
+            self._key = read_key(Path(self._proves.key))
+            self.hears |= {self._proves.challenge_id}
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take the controller's status, and what is asked of a CANopen node."""
         super().receive(frame, now_ns)
+        if self._proves is not None and frame.can_id == self._proves.challenge_id:
+            self._challenge = frame.data
         if self._server is not None:
             self._server.receive(frame, now_ns)
 
@@ -204,7 +214,11 @@ class ForeignPanel(OperatorPanel):
         if server is not None:
             frames += server.tick(now_ns)
         if self._sent is not None and self._spoke and (server is None or server.measures):
-            frames += self._frames.frames(self._sent, now_ns, self._ticks)
+            orders = self._frames.frames(self._sent, now_ns, self._ticks)
+            frames += orders
+            if self._proves is not None and self._sent.arm and self._challenge and orders:
+                proof = cmac(self._key, self._challenge + orders[0].data)[:PROOF]
+                frames.append(Frame(self._proves.proof_ids[-1], proof))
         return frames
 
 

@@ -37,6 +37,7 @@ PATTERNS: Final = (
     "firmware_sim/waves.py",
     "utank_hil/analysis/loop/loop_ticks.py",
     "utank_hil/canbus/endpoints.py",
+    "utank_hil/canbus/profiles/acting.py",
     "utank_hil/canbus/profiles/device.py",
     "utank_hil/canbus/profiles/field.py",
     "utank_hil/control/level_observer.py",

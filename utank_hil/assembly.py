@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from operator import attrgetter
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -16,7 +17,9 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.tick import TICK_S, is_whole_ticks
 from utank_hil.canbus import load_catalogue
+from utank_hil.canbus.cmac import read_key
 from utank_hil.canbus.measurements import MEASURED, Measurements, MotionSample
+from utank_hil.canbus.profiles.device_plan import ForeignDevices
 from utank_hil.canbus.profiles.drive_plan import COMMAND_MS
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign
@@ -165,7 +168,7 @@ def build_controller_node(
     ship from the motion, if it asks for that. `statistics`, `sink`, `sink_every` and `event_sink`
     are those of `Telemetry`. A controller may be armed if it is `commissioned`: a commissioning was
     passed, or it is on a bench, whose ship is made of the same files. One that is not `monitored`
-    has no monitors.
+    has no monitors. KeyFileError is raised where the key of the ship's panel is not there.
     """
     law = law or build_law(config)
     vessel, tank, catalogue = config.vessel, config.vessel.tank, load_catalogue()
@@ -220,10 +223,20 @@ def build_controller_node(
         ),
         Actuators(limiter, catalogue, timeout_s, pump=pump, valve=valve, drive=drive),
         Telemetry(statistics, sink, sink_every, event_sink),
-        ControllerSettings(config.vessel.version, commissioned, tank, vessel.redundancy, foreign),
+        ControllerSettings(
+            config.vessel.version, commissioned, tank, vessel.redundancy, foreign, key_of(foreign)
+        ),
         catalogue,
         estimator,
     )
+
+
+def key_of(foreign: ForeignDevices) -> bytes:
+    """The key of a ship's panel; empty where it needs none (`read_key`)."""
+    panel = foreign.panel
+    if panel is None or panel.authentication is None:
+        return b""
+    return read_key(Path(panel.authentication.key))
 
 
 def build_commissioning_node(

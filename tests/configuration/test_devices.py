@@ -121,6 +121,8 @@ def test_a_change_of_a_device_voids_the_commissioning(tmp_path):
         ({"valve": ON_OFF | {"signals": {"is_open": {"from": "position.UP"}}}}, "is no signal of"),
         ({"panel": PANEL | {"protection": {}}}, "nothing says that the panel lives"),
         ({"panel": PANEL | {"accept_unprotected": False}}, "Any other sender on that bus may arm"),
+        ({"panel": PANEL | {"authentication": {"challenge": "keys", "proof": "p", "key": "./k"}}},
+         "authentication.challenge: must be a message of its own with 8 bytes"),
         ({"panel": PANEL | {"signals": {"arm": {"from": "keys.ARM"}}}},
          "panel.signals.stop: is required but missing"),
     ],

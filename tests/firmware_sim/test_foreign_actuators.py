@@ -1,5 +1,6 @@
 """A valve and a panel of other makers: commanded, heard, armed from, on buses of their own."""
 
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,8 +10,9 @@ from cantools.database.can import Database
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
-from utank_hil.assembly import build_controller_node
+from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.canbus import Fault, Frame, Mode, OperatorCommand, load_catalogue
+from utank_hil.canbus.cmac import KeyFileError
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.configuration import load_config
 from utank_hil.configuration.devices import ROLES, DevicesSection
@@ -20,6 +22,8 @@ from utank_hil.nodes.commissioning.conformance import SensorTrial, ValveTrial
 from utank_hil.nodes.panel import Action, OperatorPanel, TimedAction
 from utank_hil.runners import Lockstep, SimulatedBus
 from utank_hil.runners.lockstep import with_more
+from utank_hil.telemetry.frame_log import Kind
+from utank_hil.telemetry.replay import Entry, replay
 
 SECOND_NS = 1_000_000_000
 DBC = """VERSION ""
@@ -43,6 +47,8 @@ BO_ 2566841389 PANEL_KEYS: 3 P
  SG_ RESET : 6|2@1+ (1,0) [0|1] "" C
  SG_ COUNT : 8|4@1+ (1,0) [0|15] "" C
  SG_ CRC : 16|8@1+ (1,0) [0|255] "" C
+BO_ 2566842157 PANEL_CHALLENGE: 8 C
+BO_ 2566842413 PANEL_PROOF: 8 P
 BO_ 2566841645 PANEL_LIFE: 1 P
  SG_ TOGGLE : 0|1@1+ (1,0) [0|1] "" C
  SG_ STATE : 1|3@1+ (1,0) [0|7] "" C
@@ -74,6 +80,7 @@ PANEL = {
                    "crcs": [{"message": "keys", "byte": 2}]},
     "cycle_ms": 100, "age_ms": 300,
 }  # fmt: skip
+KEY = bytes(range(16))
 
 
 @pytest.fixture
@@ -102,7 +109,7 @@ class Bench:
         config = config.model_copy(update={"vessel": vessel, "safety": safety})
         scenario = scenario.model_copy(update={"vessel": vessel})
         self.ship = build_ship_side(scenario, 1, scenario.operator)
-        self.node = build_controller_node(config, commissioned=True)
+        self.config, self.node = config, build_controller_node(config, commissioned=True)
         nodes = [each for each in self.ship.nodes if each.name not in leave_out]
         self.sent = []
         self.run = Lockstep(
@@ -225,6 +232,134 @@ def crc8(data):
         for _ in range(8):
             register = ((register << 1) ^ (0x1D if register & 0x80 else 0)) & 0xFF
     return register ^ 0xFF
+
+
+def authenticated(theirs, tmp_path, mode=0o600, content=None):
+    path = tmp_path / "panel.key"
+    path.write_text(KEY.hex() if content is None else content)
+    path.chmod(mode)
+    messages = PANEL["messages"] | {"challenge": "PANEL_CHALLENGE", "proof": "PANEL_PROOF"}
+    of = {"challenge": "challenge", "proof": "proof", "key": str(path)}
+    return theirs(panel=PANEL | {"messages": messages, "authentication": of})
+
+
+class Prover(Station):
+    """A panel that has a key, and a thief who has recorded it."""
+
+    def __init__(self, bench, database, key=KEY):
+        super().__init__(bench, database)
+        self.key, self.recorded, self.thief = key, [], None
+        self.proof, self.challenge = (
+            1 << BUS_SHIFT | database.get_message_by_name(name).frame_id
+            for name in ("PANEL_PROOF", "PANEL_CHALLENGE")
+        )
+
+    def frames(self):
+        frames = super().frames()
+        said = [f.data for _, by, f in self.bench.sent
+                if by == "controller" and f.can_id == self.challenge]  # fmt: skip
+        if self.keys["ARM"] and said:
+            proof = openssl_cmac(self.key, said[-1] + frames[0].data)[:8]
+            frames.insert(1, Frame(self.proof, proof))
+        self.recorded.append(frames)
+        return frames if self.thief is None else self.thief.pop(0) if self.thief else []
+
+
+def openssl_cmac(key, message):
+    """AES-CMAC by another program."""
+    done = subprocess.run(
+        ["openssl", "mac", "-cipher", "AES-128-CBC", "-macopt", f"hexkey:{key.hex()}", "CMAC"],
+        input=message, capture_output=True, check=True,
+    )  # fmt: skip
+    return bytes.fromhex(done.stdout.decode())
+
+
+def prover(theirs, tmp_path, key=KEY):
+    database = Database()
+    database.add_dbc_string(DBC)
+    return Prover(Bench(authenticated(theirs, tmp_path), leave_out=("panel",)), database, key)
+
+
+def test_a_panel_with_the_key_arms_and_its_recording_does_not(theirs, tmp_path):
+    station = armed(prover(theirs, tmp_path))
+    recorded = list(station.recorded)
+    another = prover(theirs, tmp_path)
+    another.thief = recorded
+    another.to(7.9)
+    assert another.mode is Mode.STANDBY
+    assert another.bench.node.inbox.panel.refused > 3
+    # nor does it later in the same run
+    station.keys["ARM"] = 0
+    station.to(10)
+    station.thief = recorded[-60:]
+    station.to(15.9)
+    assert station.mode is not Mode.ACTIVE
+
+
+def test_without_the_key_it_stops_and_does_not_arm(theirs, tmp_path):
+    station = prover(theirs, tmp_path, key=bytes(16))
+    station.to(3)
+    station.keys["ARM"] = 1
+    station.to(6)
+    assert station.mode is Mode.STANDBY
+    station.key = KEY
+    station.keys["ARM"] = 0
+    station.to(7)
+    station.keys["ARM"] = 1
+    station.to(12)
+    assert station.mode is Mode.ACTIVE
+    station.key = bytes(16)
+    station.keys["STOP_CLOSED"] = 0
+    station.to(12.2)
+    assert station.mode is Mode.STANDBY
+
+
+@pytest.mark.parametrize(
+    ("mode", "content", "words"),
+    [(0o640, KEY.hex(), "chmod 600"), (0o600, "0123", "a key is 32 hexadecimal digits"),
+     (0o600, "zz" * 16, "a key is 32"), (0o000, None, "can't be read")],
+)  # fmt: skip
+def test_a_key_that_is_not_there_or_others_may_read_is_refused(
+    theirs, tmp_path, mode, content, words
+):
+    devices = authenticated(theirs, tmp_path, mode, content)
+    if content is None:
+        (tmp_path / "panel.key").unlink()
+    with pytest.raises(KeyFileError, match=words) as refused:
+        Bench(devices)
+    assert "panel.key" in str(refused.value)
+
+
+def test_a_run_with_authentication_is_replayed_with_its_key_and_not_without(theirs, tmp_path):
+    devices = authenticated(theirs, tmp_path)
+    bench = Bench(devices)
+    tap = [[Entry(0, b"\x01", Kind.STARTED, 0)]]
+
+    def noted(node):
+        receive, tick = node.receive, node.tick
+
+        def hear(frame, now_ns):
+            tap[0].append(Entry(frame.can_id, frame.data, Kind.RECEIVED, now_ns))
+            receive(frame, now_ns)
+
+        def sends(now_ns):
+            tap[0].append(Entry(0, b"", Kind.TICK, now_ns))
+            frames = list(tick(now_ns))
+            tap[0].extend(Entry(f.can_id, f.data, Kind.SENT, now_ns) for f in frames)
+            return frames
+
+        node.receive, node.tick = hear, sends
+
+    noted(bench.node)
+    bench.run = Lockstep([*bench.ship.nodes, bench.node],
+                         with_more(SimulatedBus(), 1, 250_000))  # fmt: skip
+    bench.to(12)
+    assert bench.node.mode is Mode.ACTIVE
+    law = build_law(bench.config)
+    assert replay(tap[0], bench.config, law).exact
+    (tmp_path / "panel.key").unlink()
+    with pytest.raises(KeyFileError, match="no log of hers be replayed"):
+        replay(tap[0], bench.config, law)
 
 
 def armed(station):

@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from utank_hil.assembly import key_of
 from utank_hil.base.provenance import PROGRAM, version
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import PortError
@@ -117,7 +118,8 @@ def trial_of(
     if device == "valve":
         assert vessel.valve is not None  # likewise
         return ValveTrial(plan, vessel.valve, ask, seconds), silent
-    return SensorTrial(plan, ask, seconds), silent
+    key = key_of(vessel.foreign) if device == "panel" else b""
+    return SensorTrial(plan, ask, seconds, key), silent
 
 
 def asks(hand_s: float | None) -> Ask:

@@ -187,6 +187,18 @@ class CrcSection(_Part):
     """Value that is applied to the result by exclusive or."""
 
 
+class AuthenticationSection(_Part):
+    """How a panel shows that it has a key, before it may arm."""
+
+    challenge: str  #: Message of 8 bytes that the controller sends each second.
+    proof: str
+    """Message of 8 bytes that the panel sends after an order with `arm`: the first 8 of the
+    AES-CMAC of challenge and order's frame."""
+    key: str
+    """File of the AES-128 key in 32 hexadecimal digits, readable by its owner only; a path begins
+    with `./`. It is read where the controller starts, and is no part of the ship's version."""
+
+
 class ProtectionSection(_Part):
     """What tells frames that are wrong, old or not the device's."""
 

@@ -18,7 +18,13 @@ from utank_hil.canbus.messages import (
     SensorTank,
     ValveStatus,
 )
-from utank_hil.canbus.profiles.device_plan import COMMANDS, DevicePlan, ForeignDevices
+from utank_hil.canbus.profiles.acting import PROOF
+from utank_hil.canbus.profiles.device_plan import (
+    COMMANDS,
+    Authentication,
+    DevicePlan,
+    ForeignDevices,
+)
 from utank_hil.canbus.profiles.drive_plan import HEARTBEAT, HEARTBEAT_CONSUMER, NetworkState, Step
 from utank_hil.canbus.profiles.field import SignalPlan
 from utank_hil.configuration.device_section import NATIVE_NODE, DeviceSection
@@ -27,6 +33,7 @@ from utank_hil.configuration.device_sections import (
     LEAST_PHASE_DEG,
     NATIVE_DRIVE,
     UNITS,
+    AuthenticationSection,
     CommandSection,
     DriveSection,
     Id11,
@@ -131,6 +138,39 @@ class ValveSection(DeviceSection):
         yield Step(HEARTBEAT_CONSUMER, consumed, f"{remedy}: take another one")
 
 
+class PanelSection(DeviceSection):
+    """The first operator station."""
+
+    authentication: AuthenticationSection | None = None
+    """A key that the panel must have to arm; stop never asks for it."""
+
+    def problems(self, kind: type[tuple[Any, ...]]) -> Iterator[Problem]:
+        """What is wrong with the panel; a native one is right."""
+        yield from super().problems(kind)
+        of = self.authentication
+        used = {path.partition(".")[0] for _, path in self._paths()}
+        for name in () if of is None else ("challenge", "proof"):
+            message = self.messages.get(getattr(of, name))
+            if message is None or message.bytes != PROOF or getattr(of, name) in used:
+                yield f"authentication.{name}", f"must be a message of its own with {PROOF} bytes"
+        orders = {each.from_.partition(".")[0] for each in self.signals.values()}
+        if of is not None and len(orders) > 1:
+            yield "authentication", f"needs one message with all buttons, not {len(orders)}"
+
+    def plan(
+        self, kind: type[tuple[Any, ...]], name: str, bus: int, *, silent: bool = False
+    ) -> DevicePlan[Any]:
+        """The panel as it is heard."""
+        plan, of = super().plan(kind, name, bus, silent=silent), self.authentication
+        if of is None:
+            return plan
+        by_name = {each.name: each for each in plan.messages}
+        challenge, proof = by_name.pop(of.challenge), by_name.pop(of.proof)
+        found = Authentication(challenge.can_ids[-1], proof.can_ids, of.key)
+        return replace(plan, messages=tuple(by_name.values()), authentication=found)
+
+
+NATIVE_PANEL: Final = PanelSection.model_validate({})
 NATIVE_VALVE: Final = ValveSection.model_validate({})
 
 
@@ -160,7 +200,7 @@ class DevicesSection(Section):
     pump_sensor: DeviceSection = NATIVE_NODE  #: Sensor of the pump's pressure.
     pump: DriveSection = NATIVE_DRIVE  #: Drive of the pump.
     valve: ValveSection = NATIVE_VALVE  #: Valve of the tank.
-    panel: DeviceSection = NATIVE_NODE  #: The first operator station.
+    panel: PanelSection = NATIVE_PANEL  #: The first operator station.
     receive_only: tuple[str, ...] = ()  #: Interfaces on which the controller sends nothing.
     others: OthersSection = OthersSection()  #: Devices that the controller has nothing to do with.
 
@@ -182,7 +222,10 @@ class DevicesSection(Section):
         problems += [(f"pump.{name}", reason) for name, reason in self.pump.problems()]
         if not self.pump.native:
             problems += self._loop_problems()
-        for role, bus in (("pump", self.pump.bus), ("valve", self.valve.bus)):
+        told = {"pump": self.pump.bus, "valve": self.valve.bus}
+        if self.panel.authentication is not None:
+            told["panel"] = self.panel.bus
+        for role, bus in told.items():
             if bus in self.receive_only:
                 problems.append((f"{role}.bus", f"{bus} is receive-only: it can't be commanded"))
         buses = self.buses()

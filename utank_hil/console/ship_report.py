@@ -9,7 +9,7 @@ from utank_hil.analysis.tank_sizing import pump_demand, pump_level_m
 from utank_hil.configuration import Vessel
 from utank_hil.configuration.device_section import DeviceSection
 from utank_hil.configuration.device_sections import unit_of
-from utank_hil.configuration.devices import UNGUARDED, DevicesSection, ValveSection
+from utank_hil.configuration.devices import UNGUARDED, DevicesSection, PanelSection, ValveSection
 from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
 from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.control.optimal_tank import tank_figures
@@ -254,6 +254,9 @@ def _figures(device: DeviceSection, *, silent: bool) -> dict[str, Any]:
         told = {"commands": {name: each.to for name, each in device.commands.items()}}
         (has if read_back else lacks).append("watch on the controller's heartbeat")
         lacks.append("echo of the command")
+    if isinstance(device, PanelSection):
+        authenticated = device.authentication is not None
+        (has if authenticated else lacks).append("authentication of arm (AES-CMAC, a challenge)")
     return {
         **told,
         "profile": device.profile,

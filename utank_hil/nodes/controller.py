@@ -53,6 +53,7 @@ class ControllerSettings:
     tank: Tank
     redundancy: Redundancy  #: What the ship has twice.
     foreign: ForeignDevices = NO_FOREIGN_DEVICES  #: Devices that are not nodes of the catalogue.
+    key: bytes = b""  #: Of the panel.
 
 
 class ControllerNode:
@@ -94,6 +95,7 @@ class ControllerNode:
             redundancy=settings.redundancy,
             foreign=settings.foreign,
             drive=actuators.drive,
+            key=settings.key,
         )
         if monitors is not None:
             monitors.watch(self.inbox.watched, self.inbox.expected)

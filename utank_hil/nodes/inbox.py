@@ -33,7 +33,8 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.frame import OTHER_BUS, STANDARD
 from utank_hil.canbus.measurements import Measurements
-from utank_hil.canbus.profiles.device import ProfiledDevice, ProfiledPanel, ProfiledValve, hear
+from utank_hil.canbus.profiles.acting import ProfiledPanel, ProfiledValve
+from utank_hil.canbus.profiles.device import ProfiledDevice, hear
 from utank_hil.canbus.profiles.device_plan import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.nodes.canopen_drive import CanopenDrive, DriveReport
 from utank_hil.nodes.canopen_setup import SensorSetup
@@ -96,7 +97,7 @@ class Inbox:
     `configuration_version` is compared with the other nodes'. `level_limit_m` is the level at which
     a reservoir is full or empty. `pump` and `valve` say whether there is one to be heard. Without
     `thresholds`, what no motion of ship and water exceeds, no sample is a spike. `drive` is that of
-    `foreign`, the devices of other makers, as it is commanded.
+    `foreign`, the devices of other makers, as it is commanded; `key` is that of a panel of them.
 
     What `hardwired` says counts wherever it is heard. `frames` were heard so far, good and bad, of
     any kind; `foreign` are those of them that are none of the catalogue's.
@@ -114,6 +115,7 @@ class Inbox:
         redundancy: Redundancy = NO_REDUNDANCY,
         foreign: ForeignDevices = NO_FOREIGN_DEVICES,
         drive: CanopenDrive | None = None,
+        key: bytes = b"",
     ) -> None:
         self._most_level_m = LEVEL_MARGIN * level_limit_m
         self._most_sum_m = SUM_SHARE * level_limit_m
@@ -170,7 +172,7 @@ class Inbox:
         self.hardwired = hardwired = HardwiredHeard(catalogue.receiver(HardwiredInputs))
         self._subscriptions[hardwired.receiver.can_id] = hardwired.accept, hardwired.take
         self.watched.append(hardwired.receiver)
-        panel = None if foreign.panel is None else ProfiledPanel(foreign.panel)
+        self.panel = panel = None if foreign.panel is None else ProfiledPanel(foreign.panel, key)
         second = redundancy.second_station
         self.stations = Stations(catalogue, self._versions, second=second, panel=panel)
         for orders in self.stations.orders.values():

@@ -23,7 +23,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.endpoints import MAX_LOST, Rejection
 from utank_hil.canbus.measurements import Wishes
-from utank_hil.canbus.profiles.device import ProfiledPanel
+from utank_hil.canbus.profiles.acting import ProfiledPanel
 from utank_hil.nodes.plausibility import NEVER_HEARD_NS
 
 _NOTHING: Final = RetuningOrder()

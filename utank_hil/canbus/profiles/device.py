@@ -1,14 +1,14 @@
 """A device of another maker: from its frames to a measurement of the catalogue's own type."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import Any, Final, Generic
 
 from utank_hil.canbus.endpoints import BUCKET_LIMIT, MAX_LOST, RESYNC_FRAMES, Rejection
-from utank_hil.canbus.enumerations import Mode, Quality, Switch, ValveFault, ValveState
+from utank_hil.canbus.enumerations import Quality, Switch
 from utank_hil.canbus.frame import Frame
-from utank_hil.canbus.messages import OperatorCommand, SensorTank, ValveStatus
+from utank_hil.canbus.messages import SensorTank
 from utank_hil.canbus.profiles.device_plan import FIELDS, Crc8, DevicePlan, MessagePlan, T
 from utank_hil.canbus.profiles.field import ConditionPlan, Field, SignalPlan
 
@@ -123,14 +123,14 @@ class Stamp:
 STATUS_CYCLES: Final = 3  #: A status that is older by this many cycles says nothing.
 SILENT_NS: Final = 1_000_000_000
 """A device that brings nothing for so long is woken: the time in which a node is back by itself."""
-_LONG_AGO: Final = -(1 << 62)
+LONG_AGO: Final = -(1 << 62)
 _new: Final = tuple.__new__
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _GOOD: Final = Quality.GOOD
 _BAD: Final = Quality.BAD
 
 
-def _nobody(message: Any, now_ns: int) -> None:
+def nobody(message: Any, now_ns: int) -> None:
     """Take what nobody has asked for yet."""
 
 
@@ -148,7 +148,7 @@ def _both(first: Take, second: Take, frame: Frame, now_ns: int) -> None:
     second(frame, now_ns)
 
 
-class _Message(HeardMessage):
+class MessageHeard(HeardMessage):
     """One message of a device: its protection, what it says, and when it said it."""
 
     def __init__(self, plan: MessagePlan, late_ms: float, bit: int) -> None:
@@ -161,7 +161,7 @@ class _Message(HeardMessage):
         #: Whether it says of the device that it is well, or at least that it lives.
         self.status: bool = bool(plan.conditions) or not (self.needed or plan.counter is None)
         self.bit = bit if self.needed else 0
-        self.came_ns = self.good_ns = _LONG_AGO
+        self.came_ns = self.good_ns = LONG_AGO
         self.old_ns = STATUS_CYCLES * plan.cycle_ns  #: Age from which its status says nothing.
 
 
@@ -174,10 +174,10 @@ class ProfiledDevice(Generic[T]):
 
     def __init__(self, plan: DevicePlan[T]) -> None:
         self.plan = plan
-        self.deliver: Callable[[T, int], None] = _nobody
+        self.deliver: Callable[[T, int], None] = nobody
         self.cycle_ns: int = plan.cycle_ns
         messages = [
-            _Message(each, plan.age_ms, 1 << place) for place, each in enumerate(plan.messages)
+            MessageHeard(each, plan.age_ms, 1 << place) for place, each in enumerate(plan.messages)
         ]
         self.watched: tuple[HeardMessage, ...] = tuple(messages)
         self._needed = [each for each in messages if each.needed]
@@ -193,7 +193,7 @@ class ProfiledDevice(Generic[T]):
         self._values: list[float] = [math.nan] * len(FIELDS[plan.kind])
         self._tank = plan.kind is SensorTank
         self._moved = False
-        self._changed_ns = self._delivered_ns = _LONG_AGO
+        self._changed_ns = self._delivered_ns = LONG_AGO
         self._last_roll_rad, self._last_ns = math.nan, 0
         self.named = plan.name_id is None
         self.takes: dict[int, Take] = {}
@@ -231,7 +231,7 @@ class ProfiledDevice(Generic[T]):
         assert self.plan.name_id is not None
         self.named = int.from_bytes(frame.data, "little") == self.plan.name_id[1]
 
-    def _take(self, message: _Message, frame: Frame, now_ns: int) -> None:
+    def _take(self, message: MessageHeard, frame: Frame, now_ns: int) -> None:
         data = frame.data
         only = message.only
         if only is not None and len(data) == message.length and not only.holds(data):
@@ -242,7 +242,7 @@ class ProfiledDevice(Generic[T]):
             message.good_ns = now_ns
             for condition in message.conditions:
                 if not condition.holds(data):
-                    message.good_ns = _LONG_AGO
+                    message.good_ns = LONG_AGO
                     break
         stamp = message.stamp
         if stamp is not None and not stamp.passes(data, now_ns):
@@ -303,80 +303,3 @@ class ProfiledDevice(Generic[T]):
         if math.isfinite(self.plan.high_level_m):
             return Switch.OFF if level_m <= self.plan.high_level_m else Switch.ON
         return Switch.OFF if raw == 0.0 else Switch.ON
-
-
-class ProfiledValve(ProfiledDevice[ValveStatus]):
-    """A valve: where it stands, by its position or by the switches at both ends of its way.
-
-    Between these its position is not known. One that is not known to be the ship's says nothing.
-    """
-
-    def _content(self, usable: bool) -> tuple[Any, ...] | None:
-        if not self.named:
-            return None
-        opening, is_open, is_shut = self._values
-        if not (math.isnan(is_open) and math.isnan(is_shut)):
-            at_an_end = (is_open == 1.0) != (is_shut == 1.0)
-            opening = float(is_open == 1.0) if at_an_end else math.nan
-        state = ValveState.FOLLOWING if usable else ValveState.FAULT
-        return (opening, state, ValveFault.NONE, None, None, False, False, False)
-
-
-_STOP: Final = FIELDS[OperatorCommand].index("stop")
-
-
-class ProfiledPanel(ProfiledDevice[OperatorCommand]):
-    """An operator station: what is pressed, and whether it lives.
-
-    Only a panel that is known, well and alive is delivered. A stop, and what disarms, is told to
-    `overhear` from any whole frame, whatever else is wrong with it. A stop that is not available
-    counts as pressed, another button as not.
-    """
-
-    def __init__(self, plan: DevicePlan[OperatorCommand]) -> None:
-        super().__init__(plan)
-        self.overhear: Callable[[OperatorCommand], None] = _overhears_nothing
-        self._values[_STOP] = 0.0  # nothing is pressed before it is heard
-
-    @property
-    def rejected(self) -> dict[Rejection, int]:
-        """Frames of its messages that were not accepted, by reason."""
-        return {
-            reason: sum([each.rejected[reason] for each in self._needed]) for reason in Rejection
-        }
-
-    def changed(self, new: bool) -> None:
-        """Count a frame that came because its content is new."""
-        for message in self._needed:
-            message.changes += new
-
-    def _take(self, message: _Message, frame: Frame, now_ns: int) -> None:
-        if message.signals and message.intact(frame.data):
-            values = list(self._values)
-            for signal in message.signals:
-                values[signal.place] = signal.value(frame.data)
-            self.overhear(_order(values))
-        super()._take(message, frame, now_ns)
-
-    def _content(self, usable: bool) -> tuple[Any, ...] | None:
-        return tuple(_order(self._values)) if usable else None
-
-
-def _order(values: Sequence[float]) -> OperatorCommand:
-    arm, stop, acknowledge, reset, passive = [each == 1.0 for each in values]
-    stop = values[_STOP] != 0.0
-    mode = Mode.STANDBY if stop else Mode.ACTIVE if arm else Mode.PASSIVE
-    if mode is Mode.PASSIVE and not passive:
-        mode = Mode.STANDBY
-    return OperatorCommand(mode, arm, stop, reset, acknowledge)
-
-
-def _overhears_nothing(order: OperatorCommand) -> None:
-    """Take what nobody has asked for yet."""
-
-
-def device_of(plan: DevicePlan[Any]) -> ProfiledDevice[Any]:
-    """What hears the device of a plan."""
-    if plan.kind is ValveStatus:
-        return ProfiledValve(plan)
-    return ProfiledPanel(plan) if plan.kind is OperatorCommand else ProfiledDevice(plan)

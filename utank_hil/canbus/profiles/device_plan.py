@@ -125,6 +125,15 @@ class MessageEncoder:
 
 
 @dataclass(frozen=True, slots=True)
+class Authentication:
+    """How a panel shows that it has the key: it answers a challenge that is used once."""
+
+    challenge_id: int  #: What the controller sends each second.
+    proof_ids: tuple[int, ...]  #: AES-CMAC of challenge and order, its first 8 bytes.
+    key: str  #: File of the key.
+
+
+@dataclass(frozen=True, slots=True)
 class DevicePlan(Generic[T]):
     """All that is needed to hear a device."""
 
@@ -149,6 +158,7 @@ class DevicePlan(Generic[T]):
     node: int | None = None
     steps: tuple[Step, ...] = ()
     command: MessagePlan | None = None  #: What a valve is told, by `COMMANDS`.
+    authentication: Authentication | None = None  #: Of a panel.
     beat: Frame | None = None  #: The controller's heartbeat, sent with each command.
 
 

@@ -20,7 +20,7 @@ from utank_hil.canbus import (
     ValveStatus,
 )
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
-from utank_hil.canbus.profiles.device import device_of
+from utank_hil.canbus.profiles.acting import device_of
 from utank_hil.canbus.profiles.device_plan import DevicePlan, MessageEncoder
 from utank_hil.canbus.profiles.drive_plan import (
     COMMAND_MS,
@@ -124,8 +124,8 @@ class Trial(ABC):
 class SensorTrial(Trial):
     """A sensor: its pace, what it says, its signs by hand, its silence."""
 
-    def __init__(self, plan: DevicePlan[Any], ask: Ask, listen_s: float) -> None:
-        self._plan, self._device, self._listen_s = plan, device_of(plan), listen_s
+    def __init__(self, plan: DevicePlan[Any], ask: Ask, listen_s: float, key: bytes = b"") -> None:
+        self._plan, self._device, self._listen_s = plan, device_of(plan, key), listen_s
         self._device.deliver = lambda message, now_ns: self._heard.append((now_ns, message))
         self._heard: list[tuple[int, tuple[Any, ...]]] = []
         self._setup = SensorSetup(self._device) if plan.steps else None

@@ -1,0 +1,130 @@
+"""Devices of other makers that do more than measure: a valve, an operator station."""
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from hmac import compare_digest
+from typing import Any, Final
+
+from utank_hil.canbus.cmac import cmac
+from utank_hil.canbus.endpoints import Rejection
+from utank_hil.canbus.enumerations import Mode, ValveFault, ValveState
+from utank_hil.canbus.frame import Frame
+from utank_hil.canbus.messages import OperatorCommand, ValveStatus
+from utank_hil.canbus.profiles.device import LONG_AGO, MessageHeard, ProfiledDevice, hear
+from utank_hil.canbus.profiles.device_plan import FIELDS, DevicePlan
+
+
+class ProfiledValve(ProfiledDevice[ValveStatus]):
+    """A valve: where it stands, by its position or by the switches at both ends of its way.
+
+    Between these its position is not known. One that is not known to be the ship's says nothing.
+    """
+
+    def _content(self, usable: bool) -> tuple[Any, ...] | None:
+        if not self.named:
+            return None
+        opening, is_open, is_shut = self._values
+        if not (math.isnan(is_open) and math.isnan(is_shut)):
+            at_an_end = (is_open == 1.0) != (is_shut == 1.0)
+            opening = float(is_open == 1.0) if at_an_end else math.nan
+        state = ValveState.FOLLOWING if usable else ValveState.FAULT
+        return (opening, state, ValveFault.NONE, None, None, False, False, False)
+
+
+PROOF: Final = 8  #: Bytes of challenge and proof: what a classic frame holds.
+TRY_NS: Final = 50_000_000
+"""Between two proofs that are tried: who floods the bus with them takes no time of the tick."""
+_STOP: Final = FIELDS[OperatorCommand].index("stop")
+
+
+class ProfiledPanel(ProfiledDevice[OperatorCommand]):
+    """An operator station: what is pressed, and whether it lives.
+
+    Only a panel that is known, well and alive is delivered. A stop, and what disarms, is told to
+    `overhear` from any whole frame, whatever else is wrong with it. A stop that is not available
+    counts as pressed, another button as not.
+
+    With a `key`, where the plan asks for one, `arm` counts once the panel has answered the last
+    challenge for a frame that has it, and until it is let go. Stop is never authenticated.
+    """
+
+    def __init__(self, plan: DevicePlan[OperatorCommand], key: bytes = b"") -> None:
+        super().__init__(plan)
+        self._key, self._said, self._tried_ns = key, b"", LONG_AGO
+        self.nonce = os.urandom(PROOF)  #: The challenge; the next follows from it by the key.
+        self.proved = plan.authentication is None
+        self.refused = 0  #: Proofs that were wrong.
+        if plan.authentication is not None:
+            for can_id in plan.authentication.proof_ids:
+                hear(self.takes, can_id, self._take_proof)
+        self.overhear: Callable[[OperatorCommand], None] = _overhears_nothing
+        self._values[_STOP] = 0.0  # nothing is pressed before it is heard
+
+    @property
+    def rejected(self) -> dict[Rejection, int]:
+        """Frames of its messages that were not accepted, by reason."""
+        return {
+            reason: sum([each.rejected[reason] for each in self._needed]) for reason in Rejection
+        }
+
+    def changed(self, new: bool) -> None:
+        """Count a frame that came because its content is new."""
+        for message in self._needed:
+            message.changes += new
+
+    def _take(self, message: MessageHeard, frame: Frame, now_ns: int) -> None:
+        if message.signals and message.intact(frame.data):
+            values = list(self._values)
+            for signal in message.signals:
+                values[signal.place] = signal.value(frame.data)
+            order = _order(values)
+            self.overhear(order)
+            self._said = frame.data
+            if not order.arm and self.plan.authentication is not None:
+                self.proved = False
+        super()._take(message, frame, now_ns)
+
+    def _take_proof(self, frame: Frame, now_ns: int) -> None:
+        """Try a proof of the last order, one in `TRY_NS`; a challenge that was met is used up."""
+        if self.proved or not self._key or now_ns - self._tried_ns < TRY_NS:
+            return
+        self._tried_ns = now_ns
+        if compare_digest(cmac(self._key, self.nonce + self._said)[:PROOF], frame.data):
+            self.proved = True
+            self.nonce = cmac(self._key, self.nonce)[:PROOF]
+        else:
+            self.refused += 1
+
+    def wake(self, now_ns: int) -> Frame | None:
+        """What is to be sent to it: the challenge, where it has to be met."""
+        authentication = self.plan.authentication
+        if authentication is not None and self.named:
+            return Frame(authentication.challenge_id, self.nonce)
+        return super().wake(now_ns)
+
+    def _content(self, usable: bool) -> tuple[Any, ...] | None:
+        if not usable:
+            return None
+        values = self._values
+        return tuple(_order(values if self.proved else [0.0, *values[1:]]))
+
+
+def _order(values: Sequence[float]) -> OperatorCommand:
+    arm, stop, acknowledge, reset, passive = [each == 1.0 for each in values]
+    stop = values[_STOP] != 0.0
+    mode = Mode.STANDBY if stop else Mode.ACTIVE if arm else Mode.PASSIVE
+    if mode is Mode.PASSIVE and not passive:
+        mode = Mode.STANDBY
+    return OperatorCommand(mode, arm, stop, reset, acknowledge)
+
+
+def _overhears_nothing(order: OperatorCommand) -> None:
+    """Take what nobody has asked for yet."""
+
+
+def device_of(plan: DevicePlan[Any], key: bytes = b"") -> ProfiledDevice[Any]:
+    """What hears the device of a plan; a panel with its key."""
+    if plan.kind is ValveStatus:
+        return ProfiledValve(plan)
+    return ProfiledPanel(plan, key) if plan.kind is OperatorCommand else ProfiledDevice(plan)
