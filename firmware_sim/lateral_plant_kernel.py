@@ -1,4 +1,4 @@
-"""Compiled integration of a ship in sway, roll and yaw with tank and pump; imports numba.
+"""Compiled integration of a ship in three or six degrees with tank and pump; imports numba.
 
 As `plant_kernel`, with the ship by the step of `utank_hil.dynamics.hull.lateral_kernel`, which
 takes two steps of the pump at once.
@@ -31,6 +31,7 @@ def advance_tick(
     ahead: FloatArray,
     parameters: FloatArray,
     oscillators: FloatArray,
+    vertical: FloatArray,
     per_piece: float,
     restoring: FloatArray,
     coefficients: tuple[float, ...],
@@ -46,9 +47,9 @@ def advance_tick(
         As of `plant_kernel`.
     x : ndarray
         State of `lateral_kernel`.
-    ahead : ndarray, shape (3, 4)
-        Sway force, roll and yaw moment of the waves at t - 1, t, t + 1 and t + 2 ticks.
-    parameters, oscillators, per_piece, restoring
+    ahead : ndarray, shape (3 or 6, 4)
+        Forces of `LateralHull.forces` at t - 1, t, t + 1 and t + 2 ticks.
+    parameters, oscillators, vertical, per_piece, restoring
         Of `LateralModel`.
     """
     pump_coefficients = PumpCoefficients(*coefficients)
@@ -56,7 +57,8 @@ def advance_tick(
     area, valve = parameters[22], parameters[22] * state[kernel.VALVE_LOSS]
     books, shaft_j = np.zeros(lateral.BOOKS), 0.0
     books[lateral.IMPULSE] = summary[MAX_IMPULSE]
-    forces, room = np.empty((3, 3)), np.empty((4, max(len(x), 29)))
+    degrees = len(ahead)
+    forces, room = np.empty((3, degrees)), np.empty((4, max(len(x), lateral.ROOM)))
     forces[2] = ahead[:, 1]
     for step in range(len(weights) // 4):
         if summary[CAPSIZED_S] < np.inf:
@@ -67,20 +69,20 @@ def advance_tick(
             pump = pump_after(state, pump, area * x[lateral.LEVEL_RATE], pump_coefficients)
             shaft_j += pump.power_w * STEP_S
             push += area * pump.pressure_pa / 2
-        for i in range(3):
+        for i in range(degrees):
             forces[0, i] = forces[2, i]
             forces[1, i] = interpolated(weights, 4 * step + 2, ahead[i])
             forces[2, i] = interpolated(weights, 4 * step + 4, ahead[i])
         lateral.advance(
-            parameters, oscillators, per_piece, restoring, x, forces, push, valve,
+            parameters, oscillators, vertical, per_piece, restoring, x, forces, push, valve,
             2 * STEP_S, books, room,
         )  # fmt: skip
         if abs(x[lateral.ROLL]) >= CAPSIZE_RAD:
             summary[CAPSIZED_S] = state[kernel.TIME] + (step + 1) * 2 * STEP_S
     rates = np.empty(len(x))
     lateral.rates(
-        parameters, oscillators, per_piece, restoring, x, forces[2], area * pump.pressure_pa, valve,
-        room[3, :16].reshape(4, 4), room[3, 16:20], rates,
+        parameters, oscillators, vertical, per_piece, restoring, x, forces[2],
+        area * pump.pressure_pa, valve, room[3, :49].reshape(7, 7), room[3, 49:56], rates,
     )  # fmt: skip
     state[kernel.ROLL], state[kernel.ROLL_RATE] = x[lateral.ROLL], x[lateral.ROLL_RATE]
     state[kernel.LEVEL], state[kernel.LEVEL_RATE] = x[lateral.LEVEL], x[lateral.LEVEL_RATE]
@@ -94,7 +96,10 @@ def advance_tick(
     summary[STRIKES] += books[lateral.NUMBER]
     summary[MAX_IMPULSE] = books[lateral.IMPULSE]
     state[kernel.TIME] += (len(weights) // 2) * STEP_S
-    for i in range(3):
+    if degrees > 3:
+        at = lateral.WAVES + 2 * len(oscillators) + 3
+        state[kernel.HEAVE_NOW] = rates[at + 1] - parameters[11] * rates[at + 2]
+    for i in range(degrees):
         row = ahead[i]
         row[0], row[1], row[2] = row[1], row[2], row[3]
         row[3] = turned_sum(phasors[i], rotations[i])

@@ -56,6 +56,8 @@ class Plant:
     hull : LateralHull, optional
         Hull of a ship that is free to sway and yaw; the waves are then sway force, roll and yaw
         moment.
+    six : bool
+        Whether the hull is free to surge, heave and pitch, too; their forces follow the others.
     """
 
     def __init__(
@@ -67,12 +69,13 @@ class Plant:
         *,
         linear: bool = False,
         hull: LateralHull | None = None,
+        six: bool = False,
     ) -> None:
         self._ship_at = ship if callable(ship) else None
         self._ship = ship(0.0) if callable(ship) else ship
         self._tank = tank
         self._linear = linear
-        self._lateral = None if hull is None else LateralModel(hull, self._ship, tank)
+        self._lateral = None if hull is None else LateralModel(hull, self._ship, tank, six)
         self._load(self._ship)
         self._area_m2 = tank.reservoir_area_m2
         self._has_pump = pump is not None
@@ -87,9 +90,9 @@ class Plant:
         phasors, rotations = self._waves.begin()
         ahead = [self._state[kernel.MOMENTS], self._state[kernel.SWAY]]
         if self._lateral is not None:
-            self._oscillators = self._lateral.oscillators
-            self._x = np.zeros(8 + 2 * len(self._oscillators))
-            self._ahead = np.zeros((3, 4))
+            self._oscillators = self._lateral.oscillators, self._lateral.vertical
+            self._x = np.zeros(self._lateral.states)
+            self._ahead = np.zeros((len(phasors), 4))
             ahead = list(self._ahead)
         for index in range(4):
             for wave, phasor, rotation in zip(ahead, phasors, rotations, strict=False):
@@ -159,7 +162,7 @@ class Plant:
         from firmware_sim import lateral_plant_kernel
 
         lateral_plant_kernel.advance_tick(
-            self._state, self._x, self._ahead, self._row, self._oscillators, self._per_piece,
+            self._state, self._x, self._ahead, self._row, *self._oscillators, self._per_piece,
             self._restoring, self._coefficients, phasors, rotations, self._weights,
         )  # fmt: skip
 
@@ -288,6 +291,11 @@ class Plant:
     def lateral_m_s2(self) -> float:
         """Lateral acceleration of the ship's centre of gravity, positive to starboard."""
         return GRAVITY_M_S2 * self._values[kernel.SWAY_NOW]
+
+    @property
+    def heave_m_s2(self) -> float:
+        """Downward acceleration of the tank by heave and pitch; 0 if the ship does not."""
+        return self._values[kernel.HEAVE_NOW]
 
     @property
     def pressure_limited(self) -> bool:

@@ -43,7 +43,8 @@ SUMMED = slice(23, 23 + SUMMARY)  # summary of `utank_hil.dynamics.kernels`
 # lateral acceleration of the centre of gravity over g, at the times of MOMENTS
 SWAY = slice(23 + SUMMARY, 27 + SUMMARY)
 SWAY_NOW = 24 + SUMMARY
-STATES = 27 + SUMMARY
+HEAVE_NOW = 27 + SUMMARY  # downward acceleration at the tank, m/s^2
+STATES = 28 + SUMMARY
 CAPSIZED, STRUCK, DAMPED_STRIKING = 23 + CAPSIZED_S, 23 + STRIKE_LOSS, 23 + DAMPED_AROUND
 
 # values of MODE: the rotor turns freely; it follows the set-point; the set-point is the pressure;

@@ -63,6 +63,7 @@ SWAY: Final = "sway_of_slope"  #: Another one, which does not change under way.
 
 LONGEST_S: Final = 86_400.0  #: Longest run in s, a day: its rows are kept in memory.
 
+_OF_HULL: Final = ("sway_roll_yaw", "six_degrees")  # plants whose ship is `hull`
 _TINY: Final = 1e-30  # Term that keeps a quotient finite on still water.
 _NO_MOMENT: Final = 1e-9  # Share of the waves' slope below which they do not act on the ship.
 
@@ -109,11 +110,11 @@ class Scenario(Section):
     duration_s: Annotated[float, Range(above=0, most=LONGEST_S)]
     settle_s: NotNegative  #: Time at the start that is left out of the statistics.
     seed: Annotated[int, Range(least=0)] = 1
-    plant: Literal["roll", "linear", "sway_roll_yaw", "fmu"] = "roll"
-    """Equations of the emulated ship: roll, its small-motion limit, three degrees of `hull`, or
-    those of another program in `fmu`."""
+    plant: Literal["roll", "linear", "sway_roll_yaw", "six_degrees", "fmu"] = "roll"
+    """Equations of the emulated ship: roll, its small-motion limit, three or six degrees of `hull`,
+    or those of another program in `fmu`."""
     hull: Annotated[HullFile | None, Field(validate_default=True)] = None
-    """Hull data of the ship at rest, for plant: sway_roll_yaw; by default the vessel's."""
+    """Hull data of the ship at rest, for the plants that sway; by default the vessel's."""
     fmu: FmuFile | None = None  #: Ship and tank of another program, for plant: fmu.
     actual_ship: dict[str, Finite] = Field(default_factory=dict)
     """Parameters of the actual ship that differ from the vessel's, on which the controller relies.
@@ -137,7 +138,7 @@ class Scenario(Section):
     @classmethod
     def _of_the_vessel(cls, hull: Any, info: ValidationInfo) -> Any:
         vessel = info.data.get("vessel")
-        sways = info.data.get("plant") == "sway_roll_yaw"
+        sways = info.data.get("plant") in _OF_HULL
         return vessel.hull if hull is None and sways and vessel is not None else hull
 
     @field_validator("drive", mode="before")
@@ -193,24 +194,29 @@ class Scenario(Section):
         """Hull of a plant that sways and yaws."""
         return None if self.hull is None else self.hull.hull
 
-    def _of_plant(self, key: str, plant: str) -> list[Problem]:
-        """Reasons why a section and the only plant that has it do not go together."""
-        if self.plant == plant:
-            return [(key, f"is required with plant: {plant} but missing")]
-        return [(key, f"needs plant: {plant}")] if getattr(self, key) else []
+    @property
+    def six(self) -> bool:
+        """Whether the plant surges, heaves and pitches, too."""
+        return self.plant == "six_degrees"
+
+    def _of_plant(self, key: str, *plants: str) -> list[Problem]:
+        """Reasons why a section and the only plants that have it do not go together."""
+        if self.plant in plants:
+            return [(key, f"is required with plant: {self.plant} but missing")]
+        return [(key, f"needs plant: {' or '.join(plants)}")] if getattr(self, key) else []
 
     def _hull_problems(self) -> list[Problem]:
         """Reasons why the plant can't be that of the hull."""
-        if self.hull is None or self.plant != "sway_roll_yaw":
-            return self._of_plant("hull", "sway_roll_yaw")
+        if self.hull is None or self.plant not in _OF_HULL:
+            return self._of_plant("hull", *_OF_HULL)
         problems = []
         if self.voyage or len(self.sea.spectra) > 1:
             reason = "keeps course, speed and sea: remove voyage and sea.until, or take plant: roll"
-            problems.append(("plant", f"is sway_roll_yaw, which {reason}"))
+            problems.append(("plant", f"is {self.plant}, which {reason}"))
         given = {"effective_slope", "roll_moment_table"} & self.sea.model_fields_set
         problems += [(f"sea.{key}", "and hull exclude each other: remove one") for key in given]
         try:
-            LateralModel(self.hull.hull, self.sailing_ship, self.vessel.tank)
+            LateralModel(self.hull.hull, self.sailing_ship, self.vessel.tank, self.six)
         except (OSError, ValueError) as error:
             problems.append(("hull", f"does not fit: {error}"))
         return problems
@@ -461,8 +467,8 @@ class Scenario(Section):
         return self.sea.roll_moment(self.sea.sea(seed), self.vessel.ship.stiffness_nm_rad)
 
     def _hull_forces(self, seed: int) -> list[Harmonics]:
-        """Sway force, roll and yaw moment of the initial sea."""
+        """Forces of the initial sea in the order of `LateralHull.forces`."""
         sea, hull = self.sea.sea(seed), self.lateral_hull
         assert hull is not None
-        forces = hull.forces(sea.omega_rad_s, sea.heading_rad)
+        forces = hull.forces(sea.omega_rad_s, sea.heading_rad, six=self.six)
         return [sea.harmonics(sea.amplitude_m * force) for force in forces]

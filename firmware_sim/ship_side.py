@@ -307,6 +307,7 @@ def _plant(scenario: Scenario, seed: int, tank: Tank, pump: Pump | None) -> Plan
         scenario.waves(seed),
         linear=scenario.plant == "linear",
         hull=scenario.lateral_hull,
+        six=scenario.six,
     )
 
 

@@ -1,4 +1,4 @@
-"""A ship in sway, roll and yaw with its tank, from the data of its hull.
+"""A ship in sway, roll and yaw, or all six degrees, with its tank, from the data of its hull.
 
 Body axes of the project (y to starboard, z down) about the centre of gravity of the ship without
 its tank's water. With the velocities u = (sway, roll, yaw, level), mass matrix M(phi, h) of hull
@@ -10,6 +10,15 @@ directions b (`fit_radiation`) and wave forces F, Lagrange's equations are ::
 They are exact in roll and level, and linear in what the hull makes of sway and yaw. What roll,
 pump and valve are is that of `RollModel`; its roll equation follows where sway and yaw are held.
 The data are those of the ship at rest, at the frequency of encounter.
+
+A hull with port like starboard couples surge, heave and pitch with each other alone. In six degrees
+they have equations of the same form, with the restoring matrix of the data. The water is at rest in
+them but for its height Z (positive down), which the tank's downward velocity w - lx q meets::
+
+    T has (w - lx q) Z',    Z = S_y sin phi + S_z cos phi
+
+So gravity at the tank is g - w' + lx q', and the water pulls on heave and pitch by -Z''. Left out
+is what pitch and surge make of the water's move off its place: second order, and small as they are.
 """
 
 import math
@@ -17,6 +26,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.parameters import refuse
@@ -31,14 +41,17 @@ from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
-_OSCILLATORS = 3  # Number for each motion.
+_OSCILLATORS = 3  # Number for each motion; surge, heave and pitch need one more for 1 %.
 _START_RATIO = 0.5
 """Damping ratio of the oscillators before the fit; radiation of hulls is a broad hump."""
 _MOST_STEPS = 200
 
 
 LATERAL = np.array([1, 3, 5])  #: Sway, roll and yaw among the six degrees.
-SIGN = TO_BODY_AXES[LATERAL]
+VERTICAL = np.array([0, 2, 4])  #: Surge, heave and pitch.
+_HEAVE = 2
+_MOST_COUPLING = 0.05
+"""Of surge, heave and pitch with the others, per root of the diagonals: as asymmetry of meshes."""
 _MOST_STIFFNESS_ERROR = 0.05
 """Inclining tests and hydrostatics of a mesh agree within some per cent."""
 
@@ -61,6 +74,7 @@ def fit_radiation(
     added_mass: FloatArray,
     damping: FloatArray,
     infinite_added_mass: FloatArray | None = None,
+    oscillators: int = _OSCILLATORS,
 ) -> Radiation:
     """Fit oscillators to added mass and damping, by least squares.
 
@@ -77,14 +91,15 @@ def fit_radiation(
     takes energy and never gives more than it took.
 
     Added mass and damping, shape (k, m, m), are symmetric. Without the limit of the added mass,
-    shape (m, m), the one that fits best is taken.
+    shape (m, m), the one that fits best is taken. `oscillators` is the number for each motion.
     """
     from scipy.optimize import least_squares
 
     size = added_mass.shape[1]
-    count = size * _OSCILLATORS
+    count = size * oscillators
     # Each motion in a unit in which its largest damping is 1.
     unit = np.sqrt(np.max(np.einsum("kaa->ka", damping), axis=0))
+    unit[unit == 0] = 1.0  # strip theory has no radiation of surge
     scale = unit[:, None] * unit[None, :]
     added, damped = added_mass / scale, damping / scale
     limit = added[-1] if infinite_added_mass is None else infinite_added_mass / scale
@@ -129,9 +144,9 @@ def fit_radiation(
         return flat(np.concatenate(shapes, axis=1)).T
 
     low, high = np.log(omega_rad_s[0]), np.log(omega_rad_s[-1])
-    centres = low + (high - low) * (np.arange(_OSCILLATORS) + 1) / (_OSCILLATORS + 1)
+    centres = low + (high - low) * (np.arange(oscillators) + 1) / (oscillators + 1)
     centres = np.tile(centres, size)
-    own = np.repeat(np.eye(size), _OSCILLATORS, axis=0)
+    own = np.repeat(np.eye(size), oscillators, axis=0)
     start = [own, own * np.sqrt(2 * _START_RATIO * np.exp(centres))[:, None], centres]
     if infinite_added_mass is None:
         start.append(limit[upper])
@@ -172,19 +187,42 @@ class LateralHull:
     @cached_property
     def rigid_mass(self) -> FloatArray:
         """Mass matrix, shape (3, 3)."""
-        return _lateral(self.about_g.mass_matrix)
+        return _part(self.about_g.mass_matrix, LATERAL)
 
     @cached_property
     def radiation(self) -> Radiation:
-        """Fitted radiation force."""
+        """Fitted radiation force of sway, roll and yaw."""
+        return self._fitted(LATERAL, _OSCILLATORS)
+
+    @cached_property
+    def vertical_radiation(self) -> Radiation:
+        """Fitted radiation force of surge, heave and pitch."""
+        return self._fitted(VERTICAL, _OSCILLATORS + 1)
+
+    def _fitted(self, degrees: npt.NDArray[np.intp], oscillators: int) -> Radiation:
         hull = self.about_g
         limit = hull.infinite_added_mass
-        return fit_radiation(
-            hull.frequency_rad_s,
-            np.array([_lateral(each) for each in hull.added_mass]),
-            np.array([_lateral(each) for each in hull.damping]),
-            None if limit is None else _lateral(limit),
+        added, damping = (
+            np.array([_part(each, degrees) for each in matrices])
+            for matrices in (hull.added_mass, hull.damping)
         )
+        known = None if limit is None else _part(limit, degrees)
+        return fit_radiation(hull.frequency_rad_s, added, damping, known, oscillators)
+
+    def coupling(self) -> float:
+        """Greatest mass or stiffness between the lateral degrees and the others.
+
+        It is per root of the diagonals of both; a hull with port like starboard has none.
+        """
+        hull = self.about_g
+        found = 0.0
+        for matrix in (*(hull.mass_matrix + hull.added_mass), hull.known("hydrostatic")):
+            size = np.sqrt(np.abs(np.diag(matrix)))
+            shares = np.abs(matrix) / np.maximum(np.outer(size, size), 1e-300)
+            free = np.outer(size, size) > 0
+            between = np.ix_(LATERAL, VERTICAL)
+            found = max(found, float(np.max(np.where(free, shares, 0.0)[between])))
+        return found
 
     @property
     def radiation_ratio(self) -> float:
@@ -223,26 +261,30 @@ class LateralHull:
             displacement_n=self.data.known("mass_kg") * GRAVITY_M_S2,
         )
 
-    def forces(self, omega_rad_s: FloatArray, heading_rad: FloatArray) -> ComplexArray:
+    def forces(
+        self, omega_rad_s: FloatArray, heading_rad: FloatArray, *, six: bool = False
+    ) -> ComplexArray:
         """Return sway force, roll and yaw moment per m of waves, shape (3, N), leads on the crest.
 
-        Below the frequencies of the data they go with the slope, above they are zero. The heading
+        Those of surge, heave and pitch follow if `six`, shape (6, N). Below the frequencies of the
+        data they go with the slope, but heave with the height; above they are zero. The heading
         is the project's: a half pi from port to starboard. ValueError is raised for headings that
         the data do not cover.
         """
         hull = self.about_g
         least, most = hull.wave_frequency_rad_s[[0, -1]]
         forward_m = hull.reference_m[0]
-        found = np.zeros((3, len(omega_rad_s)), dtype=np.complex128)
+        degrees = np.concatenate([LATERAL, VERTICAL]) if six else LATERAL
+        found = np.zeros((len(degrees), len(omega_rad_s)), dtype=np.complex128)
         for n, (omega, heading) in enumerate(
             zip(omega_rad_s, np.broadcast_to(heading_rad, omega_rad_s.shape), strict=True)
         ):
             if omega > most:
                 continue
             at = max(float(omega), float(least))
-            force = excitation_at(hull, at, -math.degrees(heading))[LATERAL] * SIGN
+            force = (excitation_at(hull, at, -math.degrees(heading)) * TO_BODY_AXES)[degrees]
             number = wave_number(np.array([omega, at]), hull.water_depth_m, hull.gravity_m_s2)
-            force *= number[0] / number[1]  # long waves push as their slope
+            force *= np.where(degrees == _HEAVE, 1.0, number[0] / number[1])
             found[:, n] = force * np.exp(1j * number[0] * forward_m * math.cos(heading))
         return found
 
@@ -251,8 +293,8 @@ class LateralHull:
 class LateralModel:
     """A hull with the roll of a ship and a tank.
 
-    ValueError is raised if the ship's stiffness is not that of the hull, or its damping less than
-    radiation's.
+    ValueError is raised if the ship's stiffness is not that of the hull, its damping less than
+    radiation's, or, in six degrees, the hull's port is not like its starboard.
     """
 
     hull: LateralHull
@@ -260,9 +302,14 @@ class LateralModel:
     #: gives, radiation is taken off. Its inertia is the hull's.
     ship: RollShip
     tank: Tank
+    six: bool = False  #: Whether surge, heave and pitch are free.
 
     def __post_init__(self) -> None:
         problems = []
+        if self.six and (found := self.hull.coupling()) > _MOST_COUPLING:
+            reason = f"couple heave, pitch or surge with roll, sway or yaw by {100 * found:.0f} %"
+            reason = f"of {self.hull.data.source} {reason}: take sway_roll_yaw"
+            refuse("hull", [("port and starboard", reason)])
         of_hull, of_ship = self.hull.stiffness_nm_rad, self.ship.stiffness_nm_rad
         if abs(of_hull / of_ship - 1) > _MOST_STIFFNESS_ERROR:
             reason = f"is {of_ship:.4g}, but {self.hull.data.source} has {of_hull:.4g}: make them"
@@ -292,16 +339,44 @@ class LateralModel:
             *reversed(tank.water_squares_kg_m2),
             viscous, c.quadratic_damping, c.offset_moment, c.wind_moment,
             c.area, c.loss, c.quadratic_loss, c.level_limit, c.restitution,
+            *(self._vertical if self.six else ()),
         ])  # fmt: skip
+
+    @cached_property
+    def _vertical(self) -> FloatArray:
+        """Upper halves of mass and stiffness of surge, heave and pitch, water included."""
+        hull, tank = self.hull.about_g, self.tank
+        water, lever, lx = tank.water_kg, tank.water_lever_kgm, tank.lx_m
+        of_water = np.diag([water, water, water * lx * lx + tank.water_squares_kg_m2[1]])
+        of_water[0, 2], of_water[1, 2] = lever, -lx * water
+        upper = np.triu_indices(3)
+        mass = _part(hull.mass_matrix, VERTICAL) + self.hull.vertical_radiation.infinite_added_mass
+        stiffness = _part(hull.known("hydrostatic"), VERTICAL)
+        stiffness[2, 2] += GRAVITY_M_S2 * lever  # the water's weight
+        return np.concatenate([(mass + of_water)[upper], stiffness[upper]])
+
+    @property
+    def states(self) -> int:
+        """Number of states."""
+        return 8 + 2 * len(self.oscillators) + (6 + 2 * len(self.vertical) if self.six else 0)
 
     @property
     def oscillators(self) -> FloatArray:
         """Directions, square of the frequency, and losses, shape (n, 7)."""
-        found = self.hull.radiation
-        return np.column_stack([found.direction, found.frequency_rad_s**2, found.loss])
+        return _packed(self.hull.radiation)
+
+    @property
+    def vertical(self) -> FloatArray:
+        """The same of surge, heave and pitch; without rows if they are not free."""
+        return _packed(self.hull.vertical_radiation) if self.six else np.zeros((0, 7))
 
 
-def _lateral(matrix: FloatArray) -> FloatArray:
-    """Return sway, roll and yaw of a (6, 6) matrix in body axes, made symmetric."""
-    part = matrix[np.ix_(LATERAL, LATERAL)] * np.outer(SIGN, SIGN)
+def _packed(found: Radiation) -> FloatArray:
+    return np.column_stack([found.direction, found.frequency_rad_s**2, found.loss])
+
+
+def _part(matrix: FloatArray, degrees: npt.NDArray[np.intp]) -> FloatArray:
+    """Return the degrees of a (6, 6) matrix in body axes, made symmetric."""
+    sign = TO_BODY_AXES[degrees]
+    part = matrix[np.ix_(degrees, degrees)] * np.outer(sign, sign)
     return np.asarray((part + part.T) / 2)

@@ -1,8 +1,9 @@
 """Compiled integration of `LateralModel`; imports numba, so import it late.
 
 The state is roll, its rate, level, its rate, sway, its velocity, yaw, its rate, and position and
-velocity of each oscillator of the radiated waves. The method is the classical Runge-Kutta of order
-four. A step in which the level passes its limit ends at the impact, found by the Illinois method;
+velocity of each oscillator of the radiated waves; in six degrees surge, heave, pitch, their
+velocities and their own oscillators follow. The method is the classical Runge-Kutta of order four.
+A step in which the level passes its limit ends at the impact, found by the Illinois method;
 all velocities jump by the mass matrix, and the rest of the step follows.
 """
 
@@ -15,54 +16,124 @@ from utank_hil.dynamics.nonlinear import INSIDE_M, REST_M_S
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 ROLL, ROLL_RATE, LEVEL, LEVEL_RATE, SWAY, SWAY_RATE, YAW, YAW_RATE, WAVES = range(9)
+# Rows of the mass matrix; without surge, heave and pitch the first three are not used.
+M_HEAVE, M_PITCH, M_SWAY, M_ROLL, M_YAW, M_LEVEL = range(1, 7)
 # Work and losses of a step in J, the impulses of impacts on the ship, and their number.
 WAVE_WORK, PUMP_WORK, DAMPED, STRUCK, IMPULSE, NUMBER = range(6)
 BOOKS = 6
+ROOM = 7 * 7 + 7 + 3 * 6  #: Numbers that a step needs beside four states.
 G = GRAVITY_M_S2
 
 
 @njit(error_model="numpy")
-def mass_matrix(p: FloatArray, phi: float, h: float, m: FloatArray) -> None:
-    """Write the mass matrix of (sway, roll, yaw, level) to `m` (4, 4), its upper half."""
+def mass_matrix(p: FloatArray, phi: float, h: float, six: bool, m: FloatArray) -> None:
+    """Write the mass matrix of (surge, heave, pitch, sway, roll, yaw, level) to `m`, (7, 7).
+
+    It is the upper half, from the row of sway on where there are not `six` degrees.
+    """
     sin, cos = sine_cosine(phi)
     flow, across, lx = p[12], p[12] * p[13], p[11]
     side, down = across * h, p[14] - flow * h * h
     lever = -(down * cos + side * sin)
     depth = p[16] + p[7] * h * h
-    m[0, 0] = p[0] + p[10]
-    m[0, 1] = p[1] + lever
-    m[0, 2] = p[2] + p[10] * lx
-    m[0, 3] = across * cos + 2 * flow * h * sin
-    m[1, 1] = p[3] + p[6] + p[7] * h * h
-    m[1, 2] = p[4] + lx * lever
-    m[1, 3] = p[8]
-    m[2, 2] = (
+    m[3, 3] = p[0] + p[10]
+    m[3, 4] = p[1] + lever
+    m[3, 5] = p[2] + p[10] * lx
+    m[3, 6] = across * cos + 2 * flow * h * sin
+    m[4, 4] = p[3] + p[6] + p[7] * h * h
+    m[4, 5] = p[4] + lx * lever
+    m[4, 6] = p[8]
+    m[5, 5] = (
         p[5] + p[10] * lx * lx + depth * sin * sin + 2 * across * p[15] * h * sin * cos
         + p[17] * cos * cos
     )  # fmt: skip
-    m[2, 3] = lx * m[0, 3]
-    m[3, 3] = p[9]
+    m[5, 6] = lx * m[3, 6]
+    m[6, 6] = p[9]
+    if not six:
+        return
+    at = 27
+    for i in range(3):
+        for j in range(i, 3):
+            m[i, j] = p[at]
+            at += 1
+        for j in range(3, 7):
+            m[i, j] = 0.0
+    m[1, 4] = side * cos - down * sin
+    m[1, 6] = across * sin - 2 * flow * h * cos
+    m[2, 4], m[2, 6] = -lx * m[1, 4], -lx * m[1, 6]
 
 
 @njit(error_model="numpy")
-def _solve(m: FloatArray, x: FloatArray, count: int) -> None:
-    """Solve the first `count` symmetric equations in place; `m` holds the upper half."""
-    for i in range(count):
-        for k in range(i + 1, count):
+def _solve(m: FloatArray, x: FloatArray, first: int, end: int) -> None:
+    """Solve the symmetric equations `first` to `end` in place; `m` holds the upper half."""
+    for i in range(first, end):
+        for k in range(i + 1, end):
             share = m[i, k] / m[i, i]
-            for j in range(k, count):
+            for j in range(k, end):
                 m[k, j] -= share * m[i, j]
             x[k] -= share * x[i]
-    for i in range(count - 1, -1, -1):
-        for j in range(i + 1, count):
+    for i in range(end - 1, first - 1, -1):
+        for j in range(i + 1, end):
             x[i] -= m[i, j] * x[j]
         x[i] /= m[i, i]
+
+
+@njit(error_model="numpy")
+def _radiate(
+    oscillators: FloatArray, x: FloatArray, at: int, v: tuple[float, float, float],
+    q: FloatArray, row: int, out: FloatArray,
+) -> None:  # fmt: skip
+    """Take the force of radiated waves off three rows of `q`, and write the oscillators' rates.
+
+    Their states begin at `at`; they are driven by the velocities `v`.
+    """
+    count = len(oscillators)
+    lost0, lost1, lost2 = 0.0, 0.0, 0.0
+    for j in range(count):
+        rate = x[at + count + j]
+        lost0 += oscillators[j, 4] * rate
+        lost1 += oscillators[j, 5] * rate
+        lost2 += oscillators[j, 6] * rate
+    for j in range(count):
+        place, rate = x[at + j], x[at + count + j]
+        b0, b1, b2 = oscillators[j, 0], oscillators[j, 1], oscillators[j, 2]
+        q[row] -= b0 * rate
+        q[row + 1] -= b1 * rate
+        q[row + 2] -= b2 * rate
+        out[at + j] = rate
+        driven = b0 * v[0] + b1 * v[1] + b2 * v[2]
+        lost = oscillators[j, 4] * lost0 + oscillators[j, 5] * lost1 + oscillators[j, 6] * lost2
+        out[at + count + j] = driven - lost - oscillators[j, 3] * place
+
+
+@njit(error_model="numpy")
+def _move_up_and_along(
+    p: FloatArray, vertical: FloatArray, x: FloatArray, at: int, force: FloatArray, m: FloatArray,
+    q: FloatArray, out: FloatArray,
+) -> None:  # fmt: skip
+    """Write the forces of surge, heave and pitch, whose states begin at `at`, to `q`."""
+    speeds = (x[at + 3], x[at + 4], x[at + 5])
+    for i in range(3):
+        out[at + i] = speeds[i]
+    x0, x1, x2 = x[at], x[at + 1], x[at + 2]
+    # The water's acceleration downwards but for those of roll and level, times its mass.
+    sin, cos = sine_cosine(x[ROLL])
+    flow, across, h = p[12], p[12] * p[13], x[LEVEL]
+    side, down = across * h, p[14] - flow * h * h
+    roll, speed = x[ROLL_RATE], x[LEVEL_RATE]
+    moved = 2 * m[M_SWAY, M_LEVEL] * roll * speed - (side * sin + down * cos) * roll * roll
+    moved -= 2 * flow * cos * speed * speed
+    q[0] = force[3] - (p[33] * x0 + p[34] * x1 + p[35] * x2)
+    q[1] = force[4] - (p[34] * x0 + p[36] * x1 + p[37] * x2) - moved
+    q[2] = force[5] - (p[35] * x0 + p[37] * x1 + p[38] * x2) + p[11] * moved
+    _radiate(vertical, x, at + 6, speeds, q, 0, out)
 
 
 @njit(error_model="numpy")
 def rates(
     p: FloatArray,
     oscillators: FloatArray,
+    vertical: FloatArray,
     per_piece: float,
     restoring: FloatArray,
     x: FloatArray,
@@ -75,16 +146,19 @@ def rates(
 ) -> None:
     """Write the rates of the state `x` to `out`.
 
-    `force`, shape (3,), is the waves' sway force, roll and yaw moment; `pump` and `valve` are the
-    reservoir area times pressure, and times valve loss; `m`, shape (4, 4), and `q`, shape (4,), are
-    room to work in.
+    `force`, shape (3,) or (6,), is the waves' sway force, roll and yaw moment, then surge and heave
+    force and pitch moment; `pump` and `valve` are the reservoir area times pressure, and times
+    valve loss; `m`, shape (7, 7), and `q`, shape (7,), are room to work in.
     """
     phi, roll, h, speed, sway, yaw = x[0], x[1], x[2], x[3], x[5], x[7]
     sin, cos = sine_cosine(phi)
     flow, across, lx = p[12], p[12] * p[13], p[11]
     side, down = across * h, p[14] - flow * h * h
     righting = righting_moment(per_piece, restoring, phi)
-    mass_matrix(p, phi, h, m)
+    at = WAVES + 2 * len(oscillators)
+    six = len(x) > at
+    first = 0 if six else 3
+    mass_matrix(p, phi, h, six, m)
     # Derivatives of the mass matrix by roll and level.
     lever_phi = down * sin - side * cos
     lever_h = 2 * flow * h * cos - across * sin
@@ -101,61 +175,64 @@ def rates(
     lever = lever_phi * roll + lever_h * speed
     pull = pull_phi * roll + pull_h * speed
     moved = lever * roll + pull * speed
-    q[0] = force[0] - moved
-    q[1] = (
+    q[3] = force[0] - moved
+    q[4] = (
         force[1] + p[21] + p[20] * cos - (p[18] + p[19] * abs(roll)) * roll - righting
         + G * (side * cos - down * sin) + by_phi - lever * along - 2 * p[7] * h * speed * roll
     )  # fmt: skip
-    q[2] = force[2] - lx * moved - (spin_phi * roll + spin_h * speed) * yaw
-    q[3] = (
+    q[5] = force[2] - lx * moved - (spin_phi * roll + spin_h * speed) * yaw
+    q[6] = (
         pump - (p[23] + (p[24] + valve) * abs(speed)) * speed
         + G * (across * sin - 2 * flow * h * cos) + by_h - pull * along
     )  # fmt: skip
-    count = len(oscillators)
-    lost0, lost1, lost2 = 0.0, 0.0, 0.0
-    for j in range(count):
-        rate = x[WAVES + count + j]
-        lost0 += oscillators[j, 4] * rate
-        lost1 += oscillators[j, 5] * rate
-        lost2 += oscillators[j, 6] * rate
-    for j in range(count):
-        place, rate = x[WAVES + j], x[WAVES + count + j]
-        b0, b1, b2 = oscillators[j, 0], oscillators[j, 1], oscillators[j, 2]
-        q[0] -= b0 * rate
-        q[1] -= b1 * rate
-        q[2] -= b2 * rate
-        out[WAVES + j] = rate
-        driven = b0 * sway + b1 * roll + b2 * yaw
-        lost = oscillators[j, 4] * lost0 + oscillators[j, 5] * lost1 + oscillators[j, 6] * lost2
-        out[WAVES + count + j] = driven - lost - oscillators[j, 3] * place
+    _radiate(oscillators, x, WAVES, (sway, roll, yaw), q, 3, out)
+    if six:
+        _move_up_and_along(p, vertical, x, at, force, m, q, out)
     at_stop = abs(h) >= p[25] and h * speed >= 0
-    level_force = q[3]
     if at_stop:
-        q0, q1, q2 = q[0], q[1], q[2]
-        _solve(m, q, 4)
-        if h * q[3] > 0:  # pressed against the stop
-            q[0], q[1], q[2], q[3] = q0, q1, q2, level_force
-            mass_matrix(p, phi, h, m)
-            _solve(m, q, 3)
-            q[3] = 0.0
+        for i in range(first, 7):
+            out[i] = q[i]
+        _solve(m, q, first, 7)
+        if h * q[6] > 0:  # pressed against the stop
+            for i in range(first, 7):
+                q[i] = out[i]
+            mass_matrix(p, phi, h, six, m)
+            _solve(m, q, first, 6)
+            q[6] = 0.0
     else:
-        _solve(m, q, 4)
-    out[ROLL], out[ROLL_RATE], out[LEVEL], out[LEVEL_RATE] = roll, q[1], speed, q[3]
-    out[SWAY], out[SWAY_RATE], out[YAW], out[YAW_RATE] = sway, q[0], yaw, q[2]
+        _solve(m, q, first, 7)
+    out[ROLL], out[ROLL_RATE], out[LEVEL], out[LEVEL_RATE] = roll, q[4], speed, q[6]
+    out[SWAY], out[SWAY_RATE], out[YAW], out[YAW_RATE] = sway, q[3], yaw, q[5]
+    if six:
+        for i in range(3):
+            out[at + 3 + i] = q[i]
 
 
 @njit(error_model="numpy")
-def dissipation_w(p: FloatArray, oscillators: FloatArray, x: FloatArray, valve: float) -> float:
-    """Return the power that roll damping, the tank's losses and radiated waves take."""
-    roll, speed = x[ROLL_RATE], x[LEVEL_RATE]
-    power = (p[18] + p[19] * abs(roll)) * roll * roll
-    power += (p[23] + (p[24] + valve) * abs(speed)) * speed * speed
+def _radiated_w(oscillators: FloatArray, x: FloatArray, at: int) -> float:
+    """Power that the losses of oscillators take, whose states begin at `at`."""
+    power = 0.0
     count = len(oscillators)
     for channel in range(4, 7):
         lost = 0.0
         for j in range(count):
-            lost += oscillators[j, channel] * x[WAVES + count + j]
+            lost += oscillators[j, channel] * x[at + count + j]
         power += lost * lost
+    return power
+
+
+@njit(error_model="numpy")
+def dissipation_w(
+    p: FloatArray, oscillators: FloatArray, vertical: FloatArray, x: FloatArray, valve: float
+) -> float:
+    """Return the power that roll damping, the tank's losses and radiated waves take."""
+    roll, speed = x[ROLL_RATE], x[LEVEL_RATE]
+    power = (p[18] + p[19] * abs(roll)) * roll * roll
+    power += (p[23] + (p[24] + valve) * abs(speed)) * speed * speed
+    power += _radiated_w(oscillators, x, WAVES)
+    at = WAVES + 2 * len(oscillators)
+    if len(x) > at:
+        power += _radiated_w(vertical, x, at + 6)
     return float(power)
 
 
@@ -163,6 +240,7 @@ def dissipation_w(p: FloatArray, oscillators: FloatArray, x: FloatArray, valve: 
 def _rk4(
     p: FloatArray,
     oscillators: FloatArray,
+    vertical: FloatArray,
     per_piece: float,
     restoring: FloatArray,
     x: FloatArray,
@@ -175,16 +253,17 @@ def _rk4(
     q: FloatArray,
     after: FloatArray,
 ) -> None:
-    """Write the state after a step to `after`; `forces` (3, 3) are at start, middle and end."""
+    """Write the state after a step to `after`; `forces` (3, n) are at start, middle and end."""
     count = len(x)
-    k, y = room[0], room[1]
+    k, y = room[0, :count], room[1, :count]
     for i in range(count):
         after[i] = x[i]
         y[i] = x[i]
     for stage in range(4):
         rates(
-            p, oscillators, per_piece, restoring, y, forces[(stage + 1) // 2], pump, valve, m, q, k
-        )
+            p, oscillators, vertical, per_piece, restoring, y, forces[(stage + 1) // 2], pump,
+            valve, m, q, k,
+        )  # fmt: skip
         weight = dt / 3 if 0 < stage < 3 else dt / 6
         ahead = dt if stage == 2 else dt / 2
         for i in range(count):
@@ -195,7 +274,7 @@ def _rk4(
 @njit(error_model="numpy")
 def _within(forces: FloatArray, begin: float, end: float, part: FloatArray) -> None:
     """Interpolate forces at start, middle and end of a part of the step, quadratically."""
-    for i in range(3):
+    for i in range(forces.shape[1]):
         values = (forces[0, i], forces[1, i], forces[2, i])
         part[0, i], part[1, i], part[2, i] = within(values, begin, end)
 
@@ -204,6 +283,7 @@ def _within(forces: FloatArray, begin: float, end: float, part: FloatArray) -> N
 def advance(
     p: FloatArray,
     oscillators: FloatArray,
+    vertical: FloatArray,
     per_piece: float,
     restoring: FloatArray,
     x: FloatArray,
@@ -216,17 +296,23 @@ def advance(
 ) -> None:
     """Advance the state `x` by a step, in place, and add to `books`.
 
-    The parameters are those of `LateralModel`. `forces`, shape (3, 3), are the waves' at start,
-    middle and end of the step; `room`, shape (4, n), has n of at least the length of `x` and 29.
+    The parameters are those of `LateralModel`. `forces`, shape (3, 3) or (3, 6), are the waves' at
+    start, middle and end of the step; `room`, shape (4, n), has n of at least the length of `x` and
+    `ROOM`.
     """
     count = len(x)
     after = room[2, :count]
-    m, q, part = room[3, :16].reshape(4, 4), room[3, 16:20], room[3, 20:29].reshape(3, 3)
+    degrees = forces.shape[1]
+    m, q = room[3, :49].reshape(7, 7), room[3, 49:56]
+    part = room[3, 56 : 56 + 3 * degrees].reshape(3, degrees)
+    at = WAVES + 2 * len(oscillators)
+    six = len(x) > at
+    first = 0 if six else 3
     limit, done = p[25], 0.0
     for strike in range(9):
         left = 1.0 - done
         _within(forces, done, 1.0, part)
-        _rk4(p, oscillators, per_piece, restoring, x, part, pump, valve, left * dt,
+        _rk4(p, oscillators, vertical, per_piece, restoring, x, part, pump, valve, left * dt,
              room, m, q, after)  # fmt: skip
         struck = abs(after[LEVEL]) > limit
         if struck and strike == 8:
@@ -241,7 +327,7 @@ def advance(
                     break
                 s = high - g_high * (high - low) / (g_high - g_low)
                 _within(forces, done, done + s, part)
-                _rk4(p, oscillators, per_piece, restoring, x, part, pump, valve, s * dt,
+                _rk4(p, oscillators, vertical, per_piece, restoring, x, part, pump, valve, s * dt,
                      room, m, q, after)  # fmt: skip
                 g = side * after[LEVEL] - limit
                 if g > 0:
@@ -252,13 +338,17 @@ def advance(
                     g_high *= 0.5
             left = high
             _within(forces, done, done + left, part)
-            _rk4(p, oscillators, per_piece, restoring, x, part, pump, valve, left * dt,
+            _rk4(p, oscillators, vertical, per_piece, restoring, x, part, pump, valve, left * dt,
                  room, m, q, after)  # fmt: skip
         for i, place in enumerate((SWAY, ROLL, YAW)):
             work = 0.5 * (part[0, i] + part[2, i]) * (after[place] - x[place])
             books[WAVE_WORK] += work
+        for i in range(3, degrees):
+            work = 0.5 * (part[0, i] + part[2, i]) * (after[at + i - 3] - x[at + i - 3])
+            books[WAVE_WORK] += work
         books[PUMP_WORK] += pump * (after[LEVEL] - x[LEVEL])
-        lost = dissipation_w(p, oscillators, x, valve) + dissipation_w(p, oscillators, after, valve)
+        lost = dissipation_w(p, oscillators, vertical, x, valve)
+        lost += dissipation_w(p, oscillators, vertical, after, valve)
         books[DAMPED] += lost / 2 * left * dt
         for i in range(count):
             x[i] = after[i]
@@ -270,20 +360,22 @@ def advance(
         if p[26] < 1 and abs(rebound) < REST_M_S:
             rebound = 0.0
         jump = rebound - speed
-        mass_matrix(p, x[ROLL], x[LEVEL], m)
-        for i in range(3):
-            q[i] = -m[i, 3] * jump
-        impulse = m[3, 3] * jump
-        pulls = (m[0, 3], m[1, 3], m[2, 3])
-        inertia = p[3]
-        _solve(m, q, 3)
-        for i in range(3):
-            impulse += pulls[i] * q[i]
-        x[SWAY_RATE] += q[0]
-        x[ROLL_RATE] += q[1]
-        x[YAW_RATE] += q[2]
+        mass_matrix(p, x[ROLL], x[LEVEL], six, m)
+        impulse = m[M_LEVEL, M_LEVEL] * jump
+        for i in range(first, M_LEVEL):
+            q[i] = -m[i, M_LEVEL] * jump
+            part[0, i - first] = m[i, M_LEVEL]  # `_solve` changes the matrix
+        _solve(m, q, first, M_LEVEL)
+        for i in range(first, M_LEVEL):
+            impulse += part[0, i - first] * q[i]
+        x[SWAY_RATE] += q[M_SWAY]
+        x[ROLL_RATE] += q[M_ROLL]
+        x[YAW_RATE] += q[M_YAW]
+        if six:
+            for i in range(3):
+                x[at + 3 + i] += q[i]
         x[LEVEL_RATE] = rebound
         x[LEVEL] = side * (limit if rebound == 0.0 else limit - INSIDE_M)
         books[STRUCK] -= impulse * (speed + rebound) / 2
-        books[IMPULSE] = max(books[IMPULSE], abs(inertia * q[1]))
+        books[IMPULSE] = max(books[IMPULSE], abs(p[3] * q[M_ROLL]))
         books[NUMBER] += 1
