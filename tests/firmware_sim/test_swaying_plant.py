@@ -158,11 +158,30 @@ def test_scenario_with_a_hull_sways_rolls_and_yaws() -> None:
     assert ship.plant.wave_moment_nm == pytest.approx(float(moment), rel=1e-6)
 
 
+@pytest.mark.evidence
+def test_scenario_in_six_degrees_heaves_and_pitches_too() -> None:
+    """In a beam wave of 15 s and 0.5 m the ship and its tank go up and down as the water does."""
+    still, moving = (
+        build_ship_side(hull_scenario(sea={**SEA, "period_s": 15.0}, plant=plant), 1, ()).plant
+        for plant in ("sway_roll_yaw", "six_degrees")
+    )
+    found = []
+    for tick in range(6001):
+        still.advance(tick * TICK_NS)
+        moving.advance(tick * TICK_NS)
+        found.append(moving.heave_m_s2)
+    assert still.heave_m_s2 == 0.0
+    assert still.roll_rad != moving.roll_rad
+    assert still.roll_rad == pytest.approx(moving.roll_rad, rel=0.05)
+    assert max(found[4500:]) == pytest.approx(0.5 * (2 * math.pi / 15.0) ** 2, rel=0.1)
+
+
 @pytest.mark.parametrize(
     ("changes", "key", "reason"),
     [
         ({"hull": None}, "hull", "is required with plant: sway_roll_yaw"),
-        ({"plant": "roll"}, "hull", "needs plant: sway_roll_yaw"),
+        ({"plant": "roll"}, "hull", "needs plant: sway_roll_yaw or six_degrees"),
+        ({"plant": "six_degrees", "hull": None}, "hull", "is required with plant: six_degrees"),
         ({"sea": {**SEA, "effective_slope": {"coefficient": 0.5}}}, "sea.effective_slope", "hull"),
         ({"voyage": [{"time_s": 5.0, "speed_m_s": 3.0}]}, "plant", "remove voyage"),
         ({"hull": {"file": HULL["file"]}}, "hull", "inertia_kg_m2 is missing"),
