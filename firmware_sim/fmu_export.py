@@ -72,6 +72,8 @@ def write_fmu(scenario: Scenario, path: Path, seed: int) -> None:
         raise ValueError(f"plant: is {scenario.plant}; an FMU is made of plant: roll")
     if scenario.voyage or scenario.actual_from_s or len(scenario.sea.spectra) > 1:
         raise ValueError("voyage, actual_from_s, sea: a ship or sea that changes makes no FMU yet")
+    if scenario.righting_in_waves is not None:
+        raise ValueError("righting_in_waves: a righting moment that changes makes no FMU yet")
     plant = plant_of(scenario, seed)
     source = SOURCE.read_text(encoding="utf-8")
     data = _data(plant, has_pump=scenario.vessel.pump is not None)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from firmware_sim import plant_kernel as kernel
-from firmware_sim.waves import SteadyWaves, Waves
+from firmware_sim.waves import AHEAD_TICKS, SteadyWaves, Waves
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.dynamics.hull.lateral import LateralHull, LateralModel
@@ -49,8 +49,8 @@ class Plant:
     pump : Pump or None
         None for a tank without one.
     waves : Waves or Harmonics
-        Roll moment of the waves in N m, and lateral acceleration over g if the ship sways, from the
-        plant's start on.
+        Roll moment of the waves in N m, lateral acceleration over g if the ship sways, and change
+        of the righting moment as a share if it has one, from the plant's start on.
     linear : bool
         Whether to integrate the small-angle limit: no quadratic loss, level limit or capsizing.
     hull : LateralHull, optional
@@ -58,6 +58,9 @@ class Plant:
         moment.
     six : bool
         Whether the hull is free to surge, heave and pitch, too; their forces follow the others.
+    turning : callable, optional
+        Roll moment in N m, and lateral acceleration over g, besides those of the waves, as a
+        function of the time in s; the waves then have a lateral acceleration, if of zero.
     """
 
     def __init__(
@@ -70,7 +73,9 @@ class Plant:
         linear: bool = False,
         hull: LateralHull | None = None,
         six: bool = False,
+        turning: Callable[[float], tuple[float, float]] | None = None,
     ) -> None:
+        self._turning = turning
         self._ship_at = ship if callable(ship) else None
         self._ship = ship(0.0) if callable(ship) else ship
         self._tank = tank
@@ -88,7 +93,7 @@ class Plant:
         self._state[kernel.MODE] = kernel.ABSENT if pump is None else kernel.FREE
         self._ticks = 0
         phasors, rotations = self._waves.begin()
-        ahead = [self._state[kernel.MOMENTS], self._state[kernel.SWAY]]
+        ahead = [self._state[each] for each in (kernel.MOMENTS, kernel.SWAY, kernel.CHANGE)]
         if self._lateral is not None:
             self._oscillators = self._lateral.oscillators, self._lateral.vertical
             self._x = np.zeros(self._lateral.states)
@@ -134,6 +139,11 @@ class Plant:
                 self._sail(self._ship_at(self._ticks * TICK_S))
             phasors, rotations = self._waves.at(self._ticks)
             self._tick(phasors, rotations)
+            if self._turning is not None:
+                # the tick has moved the waves on to three ticks after its start
+                turned = self._turning((self._ticks + 1 + AHEAD_TICKS) * TICK_S)
+                self._state[kernel.MOMENTS][3] += turned[0]
+                self._state[kernel.SWAY][3] += turned[1]
             self._now_ns += TICK_NS
             self._ticks += 1
         # plain numbers: reading array elements one by one costs more than converting all

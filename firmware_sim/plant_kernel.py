@@ -19,6 +19,7 @@ from utank_hil.dynamics.kernels import (
     InStep,
     State,
     damping_w,
+    righting_moment,
     rk4,
     step_with_impacts,
     sway_work_j,
@@ -44,7 +45,9 @@ SUMMED = slice(23, 23 + SUMMARY)  # summary of `utank_hil.dynamics.kernels`
 SWAY = slice(23 + SUMMARY, 27 + SUMMARY)
 SWAY_NOW = 24 + SUMMARY
 HEAVE_NOW = 27 + SUMMARY  # downward acceleration at the tank, m/s^2
-STATES = 28 + SUMMARY
+# change of the righting moment as a share, at the times of MOMENTS
+CHANGE = slice(28 + SUMMARY, 32 + SUMMARY)
+STATES = 32 + SUMMARY
 CAPSIZED, STRUCK, DAMPED_STRIKING = 23 + CAPSIZED_S, 23 + STRIKE_LOSS, 23 + DAMPED_AROUND
 
 # values of MODE: the rotor turns freely; it follows the set-point; the set-point is the pressure;
@@ -132,9 +135,9 @@ def advance_tick(
         effect of wave moment, accelerations by steady heeling moments, effect of sway.
     coefficients : tuple of float
         `PumpCoefficients` as a plain tuple: numba needs 2 us to unbox a named one.
-    phasors, rotations : ndarray, shape (1 or 2, n)
-        Wave components of moment and lateral acceleration two ticks ahead, and their rotation per
-        tick; `phasors` is advanced.
+    phasors, rotations : ndarray, shape (1 to 3, n)
+        Wave components of moment, lateral acceleration and change of the righting moment, two ticks
+        ahead, and their rotation per tick; `phasors` is advanced.
     weights : ndarray
         Result of `interpolation_weights`.
     """
@@ -145,8 +148,8 @@ def advance_tick(
     valve = c.area * state[VALVE_LOSS]
     moments, summary = state[MOMENTS], state[SUMMED]
     shaft_j, wave_j, pump_j, damped_j = 0.0, 0.0, 0.0, 0.0
-    sway = state[SWAY]
-    first, sway_first = moments[1], sway[1]
+    sway, change = state[SWAY], state[CHANGE]
+    first, sway_first, change_first = moments[1], sway[1], change[1]
     # not STEPS: numba's cache would keep the number of an earlier tick
     for step in range(len(weights) // 2):
         if summary[CAPSIZED_S] < np.inf:
@@ -158,15 +161,21 @@ def advance_tick(
         last = interpolated(weights, 2 * step + 2, moments)
         sway_middle = interpolated(weights, 2 * step + 1, sway)
         sway_last = interpolated(weights, 2 * step + 2, sway)
-        waves, sways = (first, middle, last), (sway_first, sway_middle, sway_last)
+        change_middle = interpolated(weights, 2 * step + 1, change)
+        change_last = interpolated(weights, 2 * step + 2, change)
+        waves = (
+            (first, middle, last),
+            (sway_first, sway_middle, sway_last),
+            (change_first, change_middle, change_last),
+        )
         force = c.area * pump.pressure_pa
         if len(linear) > 0:
-            after = _linear_step(linear, x, waves, sways, pump.pressure_pa)
+            after = _linear_step(linear, x, waves[0], waves[1], pump.pressure_pa)
         else:
-            after = rk4(c, row[17], restoring, x, waves, sways, force, valve, STEP_S)
+            after = rk4(c, row[17], restoring, x, waves, force, valve, STEP_S)
         if abs(after[2]) > c.level_limit and len(linear) == 0:
             after = step_with_impacts(
-                c, row[17], restoring, x, waves, sways, force, valve, STEP_S,
+                c, row[17], restoring, x, waves, force, valve, STEP_S,
                 state[TIME] + step * STEP_S, np.empty((0, 5)), summary,
             )  # fmt: skip
         else:
@@ -177,7 +186,11 @@ def advance_tick(
         pump_j += force * (after[2] - x[2])
         if len(phasors) > 1:
             wave_j += sway_work_j(c, x, after, (sway_first + sway_last) / 2)
-        x, first, sway_first = after, last, sway_last
+        if len(phasors) > 2:
+            middle_rad = (x[0] + after[0]) / 2
+            righting_nm = righting_moment(row[17], restoring, middle_rad)
+            wave_j -= (change_first + change_last) / 2 * righting_nm * (after[0] - x[0])
+        x, first, sway_first, change_first = after, last, sway_last, change_last
         if abs(x[0]) >= CAPSIZE_RAD and len(linear) == 0:
             summary[CAPSIZED_S] = state[TIME] + (step + 1) * STEP_S
     state[ROLL], state[ROLL_RATE], state[LEVEL], state[LEVEL_RATE] = x
@@ -187,7 +200,7 @@ def advance_tick(
     state[PUMP_WORK] += pump_j
     state[DAMPED] += damped_j
     state[TIME] += (len(weights) // 2) * STEP_S
-    for k, ahead in enumerate((moments, sway)):
+    for k, ahead in enumerate((moments, sway, change)):
         ahead[0], ahead[1], ahead[2] = ahead[1], ahead[2], ahead[3]
         if k < len(phasors):
             ahead[3] = turned_sum(phasors[k], rotations[k])

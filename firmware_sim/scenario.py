@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
@@ -11,19 +11,21 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.fmu_file import FmuFile
 from firmware_sim.scenario_sea import ScenarioSea
-from firmware_sim.scenario_sections import DriveLimits, SensorErrors
+from firmware_sim.scenario_sections import DriveLimits, RightingInWaves, SensorErrors
 from firmware_sim.voyage import (
     Waypoint,
     moment_problems,
     ship_on_the_way,
     spectra_on_the_way,
     track,
+    turning,
     unusual_loadings,
     unusual_sea,
     unusual_waypoints,
     waypoint_problems,
 )
-from firmware_sim.waves import PassingWaves, Response, SteadyWaves, Waves
+from firmware_sim.waves import PassingWaves, Response, SteadyWaves, Waves, beside
+from firmware_sim.wind import Gusts
 from utank_hil.base.parameters import (
     Finite,
     NotNegative,
@@ -39,6 +41,7 @@ from utank_hil.configuration.plausibility import tank_problems
 from utank_hil.dynamics.hull.lateral import LateralHull, LateralModel
 from utank_hil.dynamics.nonlinear import RollModel, steady_heel
 from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.nodes.panel import TimedAction
 from utank_hil.sea import Harmonics
 from utank_hil.sea.sea import slope_per_m, wavenumber_rad_m
@@ -64,6 +67,7 @@ SWAY: Final = "sway_of_slope"  #: Another one, which does not change under way.
 LONGEST_S: Final = 86_400.0  #: Longest run in s, a day: its rows are kept in memory.
 
 _OF_HULL: Final = ("sway_roll_yaw", "six_degrees")  # plants whose ship is `hull`
+_GUSTS: Final = 1 << 32  # Beyond the seeds that other draws count up from a scenario's.
 _TINY: Final = 1e-30  # Term that keeps a quotient finite on still water.
 _NO_MOMENT: Final = 1e-9  # Share of the waves' slope below which they do not act on the ship.
 
@@ -123,6 +127,12 @@ class Scenario(Section):
     actual_from_s: NotNegative = 0.0
     """Time at which the difference arises, as by shifted cargo or burnt fuel."""
     voyage: tuple[Waypoint, ...] = ()  #: Changes of course, speed, loading and sea under way.
+    turning_lever_m: Annotated[float, Range(least=-20, most=20)] | None = None
+    """Height of the centre of gravity above the force on the hull in a turn, some KG less half the
+    draught: the ship heels outward in the turns of the voyage. Without it they do not heel it."""
+    gusts: Gusts | None = None  #: Gusts about the steady wind of ``wind_moment_nm``.
+    righting_in_waves: RightingInWaves | None = None
+    """Change of the righting moment as waves pass along the hull, for plant: roll."""
     faults: tuple[AnyFault, ...] = ()
     """Faults in simulated runs with a controller; the passive run has none."""
 
@@ -184,6 +194,7 @@ class Scenario(Section):
                 reason = f"names one {name!r}: files are named by it, so it can't be a path"
                 problems.append(("controllers", reason))
             problems += self._controller_problems(name, controller)
+        problems += self._weather_problems()
         refuse("", [*problems, *self._hull_problems(), *self._fmu_problems()])
         problems = [*self._ship_problems(), *self._sea_problems(), *self._voyage_problems()]
         refuse("", [*problems, *self._fault_problems()])
@@ -221,13 +232,30 @@ class Scenario(Section):
             problems.append(("hull", f"does not fit: {error}"))
         return problems
 
+    def _weather_problems(self) -> list[Problem]:
+        """Reasons why gusts, or turns, can't act on the ship."""
+        problems, ship = [], {**asdict(self.vessel.ship), **self.actual_ship}
+        if self.gusts is not None and ship["wind_moment_nm"] == 0:
+            reason = "needs a steady wind: give actual_ship.wind_moment_nm, the moment of its mean"
+            problems.append(("gusts", reason))
+        if self.righting_in_waves is not None and self.plant != "roll":
+            problems.append(("righting_in_waves", "needs plant: roll"))
+        if self.turning_lever_m is None:
+            return problems
+        if not self.voyage:
+            problems.append(("turning_lever_m", "is for a voyage with turns: leave it out"))
+        if ship["displacement_n"] <= 0:
+            reason = "needs the ship's mass: give actual_ship.displacement_n, its weight"
+            problems.append(("turning_lever_m", reason))
+        return problems
+
     def _fmu_problems(self) -> list[Problem]:
         """Reasons why the plant can't be that of the FMU."""
         if self.fmu is None or self.plant != "fmu":
             return self._of_plant("fmu", "fmu")
         problems = [
             (key, "does not act on the ship of an FMU: remove it; fmu.parameters change that")
-            for key in ("actual_ship", "voyage")
+            for key in ("actual_ship", "voyage", "gusts")
             if getattr(self, key)
         ]
         variables = self.fmu.variables
@@ -280,32 +308,52 @@ class Scenario(Section):
     def _speed_m_s(self) -> Callable[[float], float]:
         return track(self.voyage, self.sea.speed_m_s, lambda point: point.speed_m_s)
 
-    def turn_rad(self, time_s: float) -> float:
-        """Clockwise turn of the ship since the start."""
+    @property
+    def turn_rad(self) -> Callable[[float], float]:
+        """Turn of the ship to starboard since the start."""
         start_deg, is_course = self.sea.turn_deg
-        name = "course_deg" if is_course else "heading_deg"
+        name, sign = ("course_deg", 1.0) if is_course else ("heading_deg", -1.0)
         angle = track(self.voyage, start_deg, lambda point: getattr(point, name), angle=True)
-        turn_deg = angle(time_s) - start_deg
-        return math.radians(turn_deg if is_course else -turn_deg)
+        return lambda time_s: sign * math.radians(angle(time_s) - start_deg)
+
+    @property
+    def turning(self) -> Callable[[float], tuple[float, float]] | None:
+        """Roll moment in N m and lateral acceleration over g of the ship's turns."""
+        if self.turning_lever_m is None:
+            return None
+        mass_kg = self.sailing_ship.displacement_n / GRAVITY_M_S2
+        return turning(self.turn_rad, self._speed_m_s, mass_kg, self.turning_lever_m)
 
     def waves(self, seed: int) -> Waves:
         """Waves that the ship meets."""
         spectra = spectra_on_the_way(self.voyage, self.sea.spectra)
+        gusts = None
+        if self.gusts is not None:  # drawn apart from waves and noise
+            gusts = self.gusts.moment(self.sailing_ship.wind_moment_nm, seed + _GUSTS)
         if self.hull is not None:
-            return SteadyWaves(*self._hull_forces(seed))
-        sway = self.sailing_ship.sway_of_slope
+            forces = self._hull_forces(seed)
+            return SteadyWaves(*(forces if gusts is None else beside(forces, gusts, 1)))
+        sway, changing = self.sailing_ship.sway_of_slope, self.righting_in_waves
+        if sway is None and (changing is not None or self.turning_lever_m is not None):
+            sway = 0.0  # a row for the lateral acceleration of turns
         if not self.voyage and len(spectra) <= 1:
             forces = [self.wave_moment(seed)]
+            sea = self.sea.sea(seed)
             if sway is not None:
-                slope = self.sea.sea(seed).slope
-                forces.append(replace(slope, amplitude=sway * slope.amplitude))
-            return SteadyWaves(*forces)
+                forces.append(replace(sea.slope, amplitude=sway * sea.slope.amplitude))
+            if changing is not None:
+                change = changing.change_per_m(sea.omega_rad_s, sea.heading_rad)
+                forces.append(sea.harmonics(sea.amplitude_m * change))
+            return SteadyWaves(*(forces if gusts is None else beside(forces, gusts, 0)))
         responses: list[Response] = [self.sea.moment(self.vessel.ship.stiffness_nm_rad)]
         if sway is not None:
             responses.append(lambda omega, heading: sway * slope_per_m(omega, heading))
+        if changing is not None:
+            responses.append(changing.change_per_m)
         return PassingWaves(
-            self.sea.passing_sea(spectra, seed), self.turn_rad, self._speed_m_s, *responses
-        )
+            self.sea.passing_sea(spectra, seed), self.turn_rad, self._speed_m_s, *responses,
+            gusts=gusts,
+        )  # fmt: skip
 
     def _controller_problems(self, name: str, controller: ControllerConfig) -> list[Problem]:
         """Reasons why a controller would never arm, or the drive would refuse its commands."""

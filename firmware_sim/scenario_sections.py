@@ -1,10 +1,17 @@
-"""Sections of a scenario: errors of the sensors, limits of the drive."""
+"""Sections of a scenario: errors of the sensors, limits of the drive, righting in waves."""
 
+import math
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
+
+from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.elementary import sines_cosines
 from utank_hil.base.parameters import NotNegative, Positive, Range, range_problems, refuse
 from utank_hil.base.tick import TICK_NS
+from utank_hil.configuration import Section
+from utank_hil.sea.sea import wavenumber_rad_m
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,3 +56,28 @@ class DriveLimits:
 
     def __post_init__(self) -> None:
         refuse("drive", range_problems(self))
+
+
+class RightingInWaves(Section):
+    """Righting moment that changes as waves pass along: parametric roll, loss of stability.
+
+    Each wave counts as the wave of the ship's length, its crest or trough amidships, that is
+    nearest to it over the hull by least squares (Grim 1961)::
+
+        a = 2 q sin q / (pi^2 - q^2),   q = k |cos(heading)| length / 2
+    """
+
+    length_m: Annotated[float, Range(above=0, most=600)]  #: Length of the waterline.
+    share_per_m: Annotated[float, Range(least=-1, most=1)]
+    """Change of the righting moment at every heel, as a share, for a wave of the ship's length and
+    1 m of amplitude with its crest amidships; negative for most hulls."""
+
+    def change_per_m(self, omega_rad_s: FloatArray, heading_rad: FloatArray) -> ComplexArray:
+        """Change as a share per m of amplitude; its argument is the lead on the crest."""
+        along = np.abs(sines_cosines(heading_rad)[1])
+        q = wavenumber_rad_m(omega_rad_s) * along * self.length_m / 2
+        rest = math.pi - q
+        near = np.abs(rest) < 1e-6
+        # 2 q sin q / ((pi - q) (pi + q)), which is 1 at q = pi
+        shape = 2 * q * sines_cosines(rest)[0] / (np.where(near, 1.0, rest) * (math.pi + q))
+        return np.asarray(self.share_per_m * np.where(near, 1.0, shape), dtype=np.complex128)

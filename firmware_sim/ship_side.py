@@ -308,6 +308,7 @@ def _plant(scenario: Scenario, seed: int, tank: Tank, pump: Pump | None) -> Plan
         linear=scenario.plant == "linear",
         hull=scenario.lateral_hull,
         six=scenario.six,
+        turning=scenario.turning,
     )
 
 

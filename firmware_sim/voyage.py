@@ -19,6 +19,7 @@ from utank_hil.configuration import Section, Vessel
 from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
 from utank_hil.configuration.spectra import AnySpectrum
 from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea.moment_table import MomentTable
 from utank_hil.sea.sea import EffectiveSlope
 
@@ -102,6 +103,31 @@ def spectra_on_the_way(
         for point in voyage:
             known.append((point.time_s, point.sea or known[-1][1]))
     return known
+
+
+TURN_S: Final = 10.0
+"""Time in which a ship comes into a turn, and out of it. Chosen; no study."""
+
+
+def turning(
+    turn_rad: Callable[[float], float],
+    speed_m_s: Callable[[float], float],
+    mass_kg: float,
+    lever_m: float,
+) -> Callable[[float], tuple[float, float]]:
+    """Roll moment in N m, and lateral acceleration over g, of turns as a function of time in s.
+
+    At speed V and rate of turn r the centre of gravity is accelerated by V r to the inside. The
+    force on the hull acts `lever_m` below it, so its moment m V r lever heels the ship outward.
+    `turn_rad` is the turn to starboard since the start.
+    """
+
+    def at(time_s: float) -> tuple[float, float]:
+        rate_rad_s = (turn_rad(time_s) - turn_rad(time_s - TURN_S)) / TURN_S
+        inward_m_s2 = speed_m_s(time_s) * rate_rad_s
+        return -mass_kg * inward_m_s2 * lever_m, inward_m_s2 / GRAVITY_M_S2
+
+    return at
 
 
 _ROLL_DEG: Final = (0.05, 20.0)

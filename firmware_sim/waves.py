@@ -1,6 +1,6 @@
-"""Roll moment of the waves as rotating phasors, one for each component."""
+"""Forces of the waves as rotating phasors, one for each component."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final, Protocol
 
 import numpy as np
@@ -47,8 +47,25 @@ class Waves(Protocol):
         """
 
 
+def beside(forces: Sequence[Harmonics], other: Harmonics, row: int) -> list[Harmonics]:
+    """Return forces of common frequencies with components besides, which act on one of them."""
+    frequency = np.concatenate([forces[0].frequency_rad_s, other.frequency_rad_s])
+    nothing = np.zeros(len(other.amplitude))
+    return [
+        Harmonics(
+            np.concatenate([force.amplitude, other.amplitude if place == row else nothing]),
+            frequency,
+            np.concatenate([force.phase_rad, other.phase_rad]),
+        )
+        for place, force in enumerate(forces)
+    ]
+
+
 class SteadyWaves:
-    """Constant components of a roll moment in N m, and of a lateral acceleration over g if any."""
+    """Components of a ship that keeps course and speed; all forces have the same frequencies.
+
+    The first is a roll moment in N m, the second, if any, a lateral acceleration over g.
+    """
 
     def __init__(self, *forces: Harmonics) -> None:
         frequency = forces[0].frequency_rad_s
@@ -72,8 +89,9 @@ class PassingWaves:
 
     The angle of each component at the ship is the integral of its frequency of encounter, so
     changes of course and speed cause no jump of the moment. `turn_rad` and `speed_m_s` are
-    functions of time in s: clockwise turn of the ship since the start, and its speed. `moment`
-    gives the complex roll moment in N m per m of amplitude for frequency and heading.
+    functions of time in s: clockwise turn of the ship since the start, and its speed. Each response
+    gives a force's complex amplitude per m of the wave's. `gusts` act on the first force besides,
+    whatever the course.
     """
 
     def __init__(
@@ -82,15 +100,22 @@ class PassingWaves:
         turn_rad: Callable[[float], float],
         speed_m_s: Callable[[float], float],
         *responses: Response,
+        gusts: Harmonics | None = None,
     ) -> None:
         self._sea, self._turn_rad, self._speed_m_s = sea, turn_rad, speed_m_s
         self._responses = responses
         lead_s = AHEAD_TICKS * TICK_S
         self._angle_rad = sea.phase_rad - lead_s * self._encounter_rad_s(0.0)
         self._amplitude = self._amplitudes(0.0)
-        self._phasors = _product(self._amplitude, phasors(1.0, self._angle_rad))
+        waves = _product(self._amplitude, phasors(1.0, self._angle_rad))
         rotation = phasors(1.0, TICK_S * self._encounter_rad_s(0.0))
-        self._rotations = np.tile(rotation, (len(responses), 1))
+        rotations = np.tile(rotation, (len(responses), 1))
+        self._count = waves.shape[1]
+        if gusts is not None:
+            others, turns = SteadyWaves(gusts).begin()
+            waves = np.hstack([waves, np.vstack([others, np.zeros((len(waves) - 1, others.size))])])
+            rotations = np.hstack([rotations, np.tile(turns, (len(waves), 1))])
+        self._phasors, self._rotations = waves, rotations
 
     def begin(self) -> tuple[ComplexArray, ComplexArray]:
         """Return the phasors and rotations at the start."""
@@ -112,10 +137,10 @@ class PassingWaves:
         turn_rad = step_s / 6 * (first + 4 * middle + last)
         before, after = self._amplitude, self._amplitudes(now_s + step_s)
         # rounding does not accumulate
-        self._phasors[:] = _product(before, phasors(1.0, self._angle_rad))
+        self._phasors[:, : self._count] = _product(before, phasors(1.0, self._angle_rad))
         growth = each(log, sizes(after) / sizes(before)) / RENEWED_TICKS
         angle_rad = angles_of(_product(after, before.conj())) + turn_rad
-        self._rotations = phasors(each(exp, growth), angle_rad / RENEWED_TICKS)
+        self._rotations[:, : self._count] = phasors(each(exp, growth), angle_rad / RENEWED_TICKS)
         self._angle_rad += turn_rad
         self._amplitude = after
 

@@ -155,6 +155,8 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
         raise ValueError("simulation: linear knows no steady heel: take bus")
     if ship.sway_of_slope or scenario.hull:
         raise ValueError("simulation: linear knows no sway: take bus")
+    if scenario.righting_in_waves:
+        raise ValueError("simulation: linear has one righting moment: take bus")
     if scenario.fmu:
         raise ValueError("simulation: linear knows no ship of an FMU: take bus")
     moment = scenario.wave_moment(seed)

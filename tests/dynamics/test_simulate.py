@@ -76,6 +76,7 @@ def test_compiled_accelerations_equal_the_model(ship):
             *state,
             w,
             s,
+            0.0,
             tank.reservoir_area_m2 * p,
             tank.reservoir_area_m2 * 3e4,
         )

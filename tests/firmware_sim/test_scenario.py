@@ -189,7 +189,7 @@ def test_between_waypoints_ship_course_and_speed_pass_linearly(tmp_path: Path) -
     # from -170 to 150 the shorter way, by way of 180: the heading falls by 40 degrees
     sailing = scenario.waves(1)
     assert isinstance(sailing, PassingWaves)
-    turns = [scenario.turn_rad(time_s) for time_s in (0, 10, 20, 30, 60)]
+    turns = [scenario.turn_rad(float(time_s)) for time_s in (0, 10, 20, 30, 60)]
     assert turns == pytest.approx(np.radians([0, 0, 20, 40, 40]))
 
 

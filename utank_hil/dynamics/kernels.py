@@ -28,7 +28,10 @@ SUMMARY = 7
 
 State = tuple[float, float, float, float]
 InStep = tuple[float, float, float]  #: Values of a quantity at start, middle and end of a step.
-NO_SWAY = (0.0, 0.0, 0.0)
+InWaves = tuple[InStep, InStep, InStep]
+"""Roll moment of the waves, lateral acceleration over g, and the righting moment's change as a
+share."""
+NONE = (0.0, 0.0, 0.0)
 # No kernel reorders or fuses sums (`fastmath`): processors would differ in their last digits.
 sine_cosine = njit(error_model="numpy")(elementary.sine_cosine)
 forces = njit(error_model="numpy", inline="always")(nonlinear.forces)
@@ -68,12 +71,13 @@ def accelerations(
     h_dot: float,
     moment: float,
     sway: float,
+    change: float,
     pump: float,
     valve: float,
 ) -> tuple[float, float]:
     """Roll and level acceleration by `utank_hil.dynamics.nonlinear.forces`."""
     sin, cos = sine_cosine(phi)
-    righting = righting_moment(per_piece, restoring, phi)
+    righting = (1.0 + change) * righting_moment(per_piece, restoring, phi)
     roll_inertia, roll_moment, level_force = forces(
         c, righting, sin, cos, phi_dot, h, h_dot, moment, sway, pump, valve
     )
@@ -90,31 +94,31 @@ def rk4(
     per_piece: float,
     restoring: FloatArray,
     state: State,
-    moments: InStep,
-    sways: InStep,
+    waves: InWaves,
     pump: float,
     valve: float,
     dt: float,
 ) -> State:
-    """Advance by one Runge-Kutta step in a wave's moments and lateral accelerations over g."""
+    """Advance by one Runge-Kutta step."""
     x, v1, h, w1 = state
-    start, middle, end = moments
-    sway_start, sway_middle, sway_end = sways
+    (start, middle, end), (sway, sway_middle, sway_end), (change, change_middle, change_end) = waves
     half = 0.5 * dt
-    a1, b1 = accelerations(c, per_piece, restoring, x, v1, h, w1, start, sway_start, pump, valve)
+    a1, b1 = accelerations(c, per_piece, restoring, x, v1, h, w1, start, sway, change, pump, valve)
     v2, w2 = v1 + half * a1, w1 + half * b1
     x2, h2 = x + half * v1, h + half * w1
     a2, b2 = accelerations(
-        c, per_piece, restoring, x2, v2, h2, w2, middle, sway_middle, pump, valve
+        c, per_piece, restoring, x2, v2, h2, w2, middle, sway_middle, change_middle, pump, valve
     )
     v3, w3 = v1 + half * a2, w1 + half * b2
     x3, h3 = x + half * v2, h + half * w2
     a3, b3 = accelerations(
-        c, per_piece, restoring, x3, v3, h3, w3, middle, sway_middle, pump, valve
+        c, per_piece, restoring, x3, v3, h3, w3, middle, sway_middle, change_middle, pump, valve
     )
     v4, w4 = v1 + dt * a3, w1 + dt * b3
     x4, h4 = x + dt * v3, h + dt * w3
-    a4, b4 = accelerations(c, per_piece, restoring, x4, v4, h4, w4, end, sway_end, pump, valve)
+    a4, b4 = accelerations(
+        c, per_piece, restoring, x4, v4, h4, w4, end, sway_end, change_end, pump, valve
+    )
     sixth = dt / 6
     return (
         x + sixth * (v1 + 2 * (v2 + v3) + v4),
@@ -160,6 +164,12 @@ def within(values: InStep, begin: float, end: float) -> InStep:
 
 
 @njit(error_model="numpy")
+def _part_of(waves: InWaves, begin: float, end: float) -> InWaves:
+    moment, sway, change = waves
+    return within(moment, begin, end), within(sway, begin, end), within(change, begin, end)
+
+
+@njit(error_model="numpy")
 def _damped_j(c: RollCoefficients, before: State, after: State, valve: float, time: float) -> float:
     return (damping_w(c, before, valve) + damping_w(c, after, valve)) / 2 * time
 
@@ -170,8 +180,7 @@ def step_with_impacts(
     per_piece: float,
     restoring: FloatArray,
     state: State,
-    moments: InStep,
-    sways: InStep,
+    waves: InWaves,
     pump: float,
     valve: float,
     dt: float,
@@ -184,8 +193,8 @@ def step_with_impacts(
     limit = c.level_limit
     for strike in range(STRIKES_PER_STEP + 1):
         left = 1.0 - done
-        moment, sway = within(moments, done, 1.0), within(sways, done, 1.0)
-        after = rk4(c, per_piece, restoring, state, moment, sway, pump, valve, left * dt)
+        part = _part_of(waves, done, 1.0)
+        after = rk4(c, per_piece, restoring, state, part, pump, valve, left * dt)
         if abs(after[2]) <= limit:
             summary[DAMPED_AROUND] += _damped_j(c, state, after, valve, left * dt)
             return after
@@ -196,8 +205,8 @@ def step_with_impacts(
             if g_high < 1e-13 or high - low < 1e-15 or g_low >= 0:
                 break
             s = high - g_high * (high - low) / (g_high - g_low)
-            moment, sway = within(moments, done, done + s), within(sways, done, done + s)
-            candidate = rk4(c, per_piece, restoring, state, moment, sway, pump, valve, s * dt)
+            part = _part_of(waves, done, done + s)
+            candidate = rk4(c, per_piece, restoring, state, part, pump, valve, s * dt)
             g = side * candidate[2] - limit
             if g > 0:
                 high, g_high, after = s, g, candidate
@@ -229,9 +238,8 @@ def step_with_impacts(
         # next impact is a change of sign.
         h = side * (limit if rebound == 0.0 else limit - INSIDE_M)
         state = (x, v + roll_jump, h, rebound)
-    moment, sway = within(moments, done, 1.0), within(sways, done, 1.0)
-    left = 1.0 - done
-    x, v, h, w = rk4(c, per_piece, restoring, state, moment, sway, pump, valve, left * dt)
+    part, left = _part_of(waves, done, 1.0), 1.0 - done
+    x, v, h, w = rk4(c, per_piece, restoring, state, part, pump, valve, left * dt)
     return x, v, math.copysign(min(abs(h), limit), h), w
 
 
@@ -309,13 +317,12 @@ def advance(
             pump = c.area * pressure[min(sample, len(pressure) - 1)]
             valve = c.area * valve_loss[min(sample, len(valve_loss) - 1)]
         held += 1
-        moments = (start, middle, end)
-        after = rk4(c, per_piece, restoring, now, moments, NO_SWAY, pump, valve, dt)
+        in_step = ((start, middle, end), NONE, NONE)
+        after = rk4(c, per_piece, restoring, now, in_step, pump, valve, dt)
         if abs(after[2]) > c.level_limit:
             after = step_with_impacts(
-                c, per_piece, restoring, now, moments, NO_SWAY, pump, valve, dt, step * dt,
-                impacts, summary,
-            )  # fmt: skip
+                c, per_piece, restoring, now, in_step, pump, valve, dt, step * dt, impacts, summary
+            )
         now, start = after, end
         max_roll, max_level = max(max_roll, abs(now[0])), max(max_level, abs(now[2]))
         if not abs(now[0]) < capsize:

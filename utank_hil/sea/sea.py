@@ -248,7 +248,7 @@ def drawn_components(
         raise ValueError("the spectrum holds no energy: choose another hour")
     if spreading is not None and not (math.isfinite(spreading) and spreading >= 0):
         raise ValueError(f"spreading exponent must be zero or more, got {spreading}")
-    within, phase, order, across = _uniform(seed, (4, components))
+    within, phase, order, across = uniform_numbers(seed, (4, components))
     edges = np.unique([edge for each in spectra for edge in each.band_edges_hz.ravel()])
     energy = np.stack([_energy_below(each, edges) for each in spectra])
     share = (energy / energy[:, -1:]).mean(axis=0)
@@ -297,8 +297,8 @@ def _heading_at(
     return heading + spectrum.spread.offset_rad(spectrum.direction_from_deg, band, quantile)
 
 
-def _uniform(seed: int, shape: tuple[int, int]) -> FloatArray:
-    """Uniform random numbers in [0, 1) from the top 53 bits of PCG64's raw output."""
+def uniform_numbers(seed: int, shape: tuple[int, int]) -> FloatArray:
+    """Return uniform random numbers in [0, 1) from the top 53 bits of PCG64's raw output."""
     raw = np.random.PCG64(seed).random_raw(shape)
     return (raw >> np.uint64(11)).astype(np.float64) * 2.0**-53
 
