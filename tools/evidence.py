@@ -47,6 +47,7 @@ PARTS: Final = {
     "renewed_seas": Part("python -m tools.studies.renewed_seas --seeds 3 --json", 30),
     "ten_hulls": Part("python -m tools.studies.ten_hulls --json", 15),
     "less_pressure": Part("python -m tools.studies.less_pressure --json", 12),
+    "identified_ships": Part("python -m tools.studies.identified_ships --json", 15),
     "february_hours": Part(_study("february_hours"), 80),
     "storm_seeds": Part(_study("storm_seeds"), 30),
     "shipped_scenarios": Part(_study("shipped_scenarios"), 10),

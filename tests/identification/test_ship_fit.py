@@ -129,6 +129,21 @@ def test_way_that_is_not_quite_as_configured_is_not_laid_to_the_ship(
     assert fit.deviation[0] < 0.02
 
 
+@pytest.mark.parametrize(("outputs", "order"), [(2, 60), (1, 120)])
+def test_what_a_law_answers_to_the_waves_tells_nothing_of_the_ship(
+    outputs: int, order: int
+) -> None:
+    u, plant = pulses(3, SLOW_PUMP), DesignPlant(CONFIGURED, TANK, DELAY_S, LAG_S)
+    y = noisy(respond(ship_of(12.6), TANK, u, jonswap_moment(len(u), 5, 2.5e7)), 5e-3, 6)
+    result = okid(u, y[:, :outputs], order, sample_time_s=SAMPLE_TIME_S)
+    answer = np.convolve(np.nan_to_num(result.errors[:, 0]), 0.9 ** np.arange(40))[: len(u)]
+    answer *= 3 * np.std(u) / np.std(answer)
+    alone = fit_ship(result, u, plant, MEASURED[:outputs])
+    beside = fit_ship(result, u + answer, plant, MEASURED[:outputs])
+    assert beside.deviation == pytest.approx(alone.deviation, rel=0.2)
+    assert beside.period_deviation == pytest.approx(alone.period_deviation, rel=0.2)
+
+
 def test_what_the_record_does_not_show_stays_as_configured() -> None:
     u = pulses(1, SLOW_PUMP) * 1e-4  # pulses that drown in the waves
     y = respond(ship_of(8.5), TANK, u, jonswap_moment(len(u), 5, 2.5e7))

@@ -15,6 +15,7 @@ from utank_hil.retuning import (
     Candidate,
     ModelSummary,
     MotionEstimate,
+    Pulses,
     RetuningSettings,
     ShipFigures,
 )
@@ -77,12 +78,19 @@ class Rig:
         settings: RetuningSettings = SETTINGS,
         roll: Callable[[int, float], float] = lambda k, u: 0.02 * np.sin(0.1 * k),
         stiffness: Callable[[int], float] = lambda k: 1.0,
+        pulse_roll_rad: float = 0.0,
     ) -> None:
         count = round(settings.identification_s / SAMPLE_TIME_S)
         self.pulses_pa = 1e3 * np.where(np.arange(count) % 7 < 3, 1.0, -1.0)
         law = law_of(1e5)
         self.controller = AdaptiveController(
-            law, law.controller(), SHIP, 0, settings, self.pulses_pa, retuner
+            law,
+            law.controller(),
+            SHIP,
+            0,
+            settings,
+            Pulses(self.pulses_pa, pulse_roll_rad),
+            retuner,
         )
         self.roll = roll
         self.stiffness = stiffness
@@ -92,6 +100,7 @@ class Rig:
         self.order = QUIET
         self._before: OperatorCommand | None = None
         self.engaged = self.fresh = True
+        self.told = Verdict.GOOD
 
     def run(self, samples: int) -> None:
         for _ in range(samples):
@@ -110,7 +119,7 @@ class Rig:
             )
             if self.samples % TOLD_EVERY == 0:
                 found = replace(SHIP, stiffness_nm_rad=self.stiffness(self.samples) * 1e9)
-                controller.note(MotionEstimate(Verdict.GOOD, Verdict.GOOD, found))
+                controller.note(MotionEstimate(Verdict.GOOD, self.told, found))
             y = np.array([self.roll(self.samples, self.command_pa)])
             self.command_pa = float(controller.step(y)[0])
             self.commands.append(self.command_pa)

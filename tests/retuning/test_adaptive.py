@@ -79,6 +79,29 @@ def test_pulses_can_be_added_to_the_law() -> None:
     assert rig.commands[300] == pytest.approx(steady + rig.pulses_pa[0], rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("pulse_roll_rad", "rms_rad", "part"),
+    [
+        (1e-4, 0.02, 1.0),
+        (0.02, 0.02, np.sqrt(1.05**2 - 1)),
+        (0.02, 1e-3, np.sqrt(1.05**2 - 1) * np.radians(0.25) / 0.02),
+    ],
+)
+def test_pulses_add_five_per_cent_to_the_roll_before(
+    pulse_roll_rad: float, rms_rad: float, part: float
+) -> None:
+    def roll(k: int, u: float) -> float:
+        return rms_rad if k % 2 else -rms_rad
+
+    first_pa = []
+    for size_rad in (0.0, pulse_roll_rad):  # with nothing known of them they are not scaled
+        rig = Rig(ToyRetuner(), replace(SETTINGS, alone=False), roll, pulse_roll_rad=size_rad)
+        rig.run(300)
+        rig.press(retune=True)
+        first_pa.append(rig.commands[300])
+    assert first_pa[0] - first_pa[1] == pytest.approx((1 - part) * rig.pulses_pa[0], abs=1e-6)
+
+
 def test_samples_that_were_not_measured_are_gaps_in_the_record() -> None:
     retuner = ToyRetuner()
     rig = Rig(retuner)
@@ -228,6 +251,14 @@ def test_a_ship_that_the_motion_contradicts_is_refused(longer: float, *, kept: b
     rig.retune_until(RETUNED if kept else REFUSED)
     if not kept:
         (reason,) = rig.controller.events[-1].reasons
-        assert "found, 8.89 s, is not that of the motion without pulses, 9.77 s" in reason
-        rig.controller.note(MotionEstimate(Verdict.OUTDATED, Verdict.OUTDATED))
-        rig.retune_until(RETUNED, after=10)
+        assert "found, 8.89 s, is not that of the motion, 9.77 s" in reason
+
+
+@pytest.mark.parametrize(("told", "state"), [(Verdict.GOOD, RETUNED), (Verdict.OUTDATED, REFUSED)])
+def test_an_answer_that_no_motion_confirms_is_refused(told: Verdict, state: RetuningState) -> None:
+    rig = Rig(ToyRetuner(candidate_of(9e4)))
+    rig.told = told
+    rig.retune_until(state)
+    if state is REFUSED:
+        (reason,) = rig.controller.events[-1].reasons
+        assert "the motion has not told the ship" in reason

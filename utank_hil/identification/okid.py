@@ -101,6 +101,7 @@ class OkidResult:
     #: more.
     excitation_order: int
     rows: int  #: Number of equations, without gaps.
+    errors: FloatArray  #: shape (N, m): one-step prediction errors; NaN where there is none.
 
 
 def okid(
@@ -150,7 +151,9 @@ def okid(
             f"the input is persistently exciting of order {solution.excitation_order} only, "
             f"one oscillation takes {_LEAST_EXCITATION}; use random pulses or a PRBS"
         )
-    fitted = _in_units(solution, regression, scale, sample_time_s, basis)
+    errors = np.full((len(z), m), np.nan)
+    errors[regression.at] = regression.residuals(solution.coefficients) * scale[:m]
+    fitted = _in_units(solution, regression, scale, sample_time_s, basis, errors)
     with np.errstate(over="ignore", invalid="ignore"):
         markov, observer_gain = markov_parameters(
             fitted.arx, max(_MARKOV_COUNT, 2 * fitted.arx.order + 1)
@@ -169,6 +172,7 @@ def _in_units(
     scale: FloatArray,
     sample_time_s: float,
     basis: DisturbanceBasis,
+    errors: FloatArray,
 ) -> OkidResult:
     """Convert a solution to the units of the record, yet without Markov parameters."""
     p, m = regression.order, regression.outputs
@@ -193,4 +197,5 @@ def _in_units(
         rank=solution.rank,
         excitation_order=solution.excitation_order,
         rows=regression.rows,
+        errors=errors,
     )

@@ -35,6 +35,7 @@ from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.tick import TICK_S
 from utank_hil.control import DesignPlant
 from utank_hil.dynamics import RollShip, Tank
+from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.okid import OkidResult
 from utank_hil.identification.record import IdentificationError
 from utank_hil.identification.validation import Validation
@@ -47,6 +48,7 @@ _DELAY_SPREAD_S = 2 * TICK_S  # A frame arrives in one tick or the next.
 _PRESSURE = len(_SPREAD)  # Index of the pressure gain in theta; the delays follow.
 _STARTS = np.log([0.5, 0.7, 1.0, 1.4, 2.0, 2.8])  # Initial values of the stiffness factor.
 _PASSES = 5  # Largest number of passes.
+_ROWS_PER_COLUMN = 4  # Least rows for a coefficient of the law's answer to prediction errors.
 _CONVERGED = 1e-3  # Relative change of the dispersion, far below its own uncertainty.
 
 
@@ -98,7 +100,7 @@ def fit_ship(
     left = np.eye(arx.outputs) - np.einsum("wi,iab->wab", powers[:, 1:], arx.alpha)
     right = np.einsum("wi,iab->wab", powers, arx.beta)
     spread = np.array([*_SPREAD, _PRESSURE_SPREAD, *[_DELAY_SPREAD_S] * arx.outputs])
-    amplitude = _amplitude(np.asarray(u, dtype=np.float64).ravel(), arx.sample_time_s)
+    amplitude = _amplitude(np.asarray(u, dtype=np.float64).ravel(), result)
 
     def physical_model(theta: FloatArray) -> DesignPlant:
         factor = np.exp(theta[:_PRESSURE]).tolist()
@@ -154,11 +156,23 @@ def fit_ship(
     )
 
 
-def _amplitude(u: FloatArray, sample_time_s: float) -> FloatArray:
-    """Return the root of the input's two-sided energy around each frequency; shape (_LINES,)."""
-    here = np.isfinite(u)
-    energy = 2 * np.abs(np.fft.rfft(np.where(here, u - u[here].mean(), 0.0))) ** 2 / len(u)
-    frequency = 2 * np.pi * np.fft.rfftfreq(len(u), sample_time_s)
+def _amplitude(u: FloatArray, result: OkidResult) -> FloatArray:
+    """Return the root of the energy, around each frequency, of what informs of the ship.
+
+    It is the two-sided energy of the input less what follows from the prediction errors up to now:
+    the law's answer to the waves. Shape (_LINES,).
+    """
+    errors, here = result.errors, np.isfinite(u)
+    lags = min(result.arx.order, result.rows // (_ROWS_PER_COLUMN * errors.shape[1]))
+    lagged = LagRegression(errors, 0, lags, np.empty((0, len(u))))
+    at = lagged.at[here[lagged.at]]
+    matrix = lagged.matrix[here[lagged.at]]
+    free = np.zeros(len(u))
+    free[at] = u[at] - u[here].mean()
+    free[at] -= matrix @ np.linalg.lstsq(matrix, free[at])[0]
+    rows = max(1, len(at) - matrix.shape[1])  # as many degrees of freedom are left
+    energy = 2 * np.abs(np.fft.rfft(free)) ** 2 / rows * np.count_nonzero(here) / len(u)
+    frequency = 2 * np.pi * np.fft.rfftfreq(len(u), result.arx.sample_time_s)
     band = np.digitize(frequency, np.linspace(0, _BAND_RAD_S, _LINES + 1)) - 1
     inside = band < _LINES
     amplitude: FloatArray = np.sqrt(np.bincount(band[inside], energy[inside], minlength=_LINES))

@@ -7,6 +7,7 @@ of their own and are not imported here.
 from utank_hil.canbus.events import ModelSummary as ModelSummary
 from utank_hil.canbus.events import RetuningEvent as RetuningEvent
 from utank_hil.retuning.adaptive import AdaptiveController as AdaptiveController
+from utank_hil.retuning.adaptive import Pulses as Pulses
 from utank_hil.retuning.adaptive import make_pulses as make_pulses
 from utank_hil.retuning.answer import Answer as Answer
 from utank_hil.retuning.answer import Candidate as Candidate

@@ -10,7 +10,8 @@
 The limits on pressure, rate, level and power apply to the sum of law and pulses.
 """
 
-from typing import Final
+import math
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -43,17 +44,30 @@ GAIN_FACTOR: Final = 30.0  #: Largest gains of a candidate, relative to the conf
 MOST_COEFFICIENTS: Final = 1e9
 """Largest sum of the gains on a reference; it prevents an overflow. Chosen; no study."""
 
+MOST_ADDED: Final = 1.05  #: Largest roll with pulses, relative to the law's before them.
+LEAST_ROLL_RAD: Final = math.radians(0.25)
+"""Root mean square of the roll before, at least, for `MOST_ADDED`: in a calm sea the pulses may add
+what nobody notices. Chosen; no study.
+"""
+
 _NEW: Final = (RetuningState.TRIAL, RetuningState.RETUNED)
 # in Python 3.11 a member costs eight times as much to read from its class as from the module
 _IDENTIFY: Final = RetuningState.IDENTIFY
+
+
+class Pulses(NamedTuple):
+    """Excitation: pressure of each sample, and the RMS of the roll that it makes in still water."""
+
+    pressure_pa: FloatArray  #: shape (N,)
+    roll_rad: float
 
 
 class AdaptiveController(LawExchange):
     """A controller that identifies its ship and has a law designed for it.
 
     `controller` is that of `law`, at rest; `ship` the one that the law was designed for; `roll` the
-    index of the roll among the outputs. `pulses_pa`, shape (N,), is the excitation pressure, one
-    value per sample.
+    index of the roll among the outputs. Pulses that are added to the law's pressure are scaled to
+    the roll before them, so that they roll the ship 5 % more at most (`MOST_ADDED`).
     """
 
     def __init__(
@@ -63,7 +77,7 @@ class AdaptiveController(LawExchange):
         ship: ShipFigures,
         roll: int,
         settings: RetuningSettings,
-        pulses_pa: FloatArray,
+        pulses: Pulses,
         retuner: Retuner,
     ) -> None:
         super().__init__(
@@ -72,21 +86,22 @@ class AdaptiveController(LawExchange):
             roll,
             settings,
             retuner,
-            len(pulses_pa),
+            len(pulses.pressure_pa),
         )
         self.candidate: Candidate | None = None  #: Latest admitted candidate.
         self._settings = settings
-        self._pulses_pa = pulses_pa
+        self._pulses, self._part = pulses, 1.0
         self._law = law
         self._seen: ShipFigures | None = None
+        self._estimated = False
         self._pulses_given = 0
         self._tries = 0
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take the newest measurement and return the command; see `Controller`."""
         command = super().step(y, reference)
-        if self.state is _IDENTIFY and self._pulses_given < len(self._pulses_pa):
-            pulse_pa = self._pulses_pa[self._pulses_given]
+        if self.state is _IDENTIFY and self._pulses_given < len(self._pulses.pressure_pa):
+            pulse_pa = self._part * self._pulses.pressure_pa[self._pulses_given]
             self._pulses_given += 1
             command = np.full(1, pulse_pa) if self._settings.alone else command + pulse_pa
         return command
@@ -98,6 +113,7 @@ class AdaptiveController(LawExchange):
 
     def note(self, estimate: MotionEstimate) -> None:
         """Take an estimate of the ship."""
+        self._estimated = True
         if estimate.of_ship is Verdict.GOOD:
             self._seen = estimate.ship
         elif estimate.of_ship is Verdict.OUTDATED:
@@ -107,6 +123,8 @@ class AdaptiveController(LawExchange):
 
     def _begin(self, reason: str) -> None:
         self._pulses_given = 0
+        if not self._settings.alone:
+            self._part = bearable(self._pulses, self._baseline.roll_rad)
         self._enter(_IDENTIFY, reason)
 
     def _automatic_reason(self) -> str:
@@ -138,7 +156,7 @@ class AdaptiveController(LawExchange):
         # The roll is judged by its last known value, whatever else is outdated.
         elif abs(self._roll_rad) > self._settings.roll_limit_rad:
             self._abort("the roll is above the limit for identification")
-        elif self._pulses_given == len(self._pulses_pa):
+        elif self._pulses_given == len(self._pulses.pressure_pa):
             self._submit(self._history.record(self._pulses_given))
 
     def _admit(self, answer: Answer) -> WarmUp | str:
@@ -160,12 +178,14 @@ class AdaptiveController(LawExchange):
         if not _sum(answer.law.reference_gains) <= MOST_COEFFICIENTS:
             return "the law's gains on a reference are out of bounds"
         seen = self._seen
+        if seen is None and self._estimated:
+            return "the motion has not told the ship, so there is nothing to check the answer by"
         if seen is not None and abs(log(found.roll_period_s / seen.roll_period_s)) > max(
             log(AGREES), SIGNIFICANT * seen.period_deviation
         ):
             return (
-                f"the roll period found, {found.roll_period_s:.2f} s, is not that of the motion"
-                f" without pulses, {seen.roll_period_s:.2f} s"
+                f"the roll period found, {found.roll_period_s:.2f} s, is not that of the motion,"
+                f" {seen.roll_period_s:.2f} s"
             )
         self.candidate = answer
         service = MonitoredLaw(law.controller(), ChangeMonitor(found), answer.summary)
@@ -227,8 +247,8 @@ def _sum(values: FloatArray) -> float:
         return float(np.abs(values).sum())
 
 
-def make_pulses(settings: RetuningSettings, plant: DesignPlant, sample_time_s: float) -> FloatArray:
-    """Return the excitation pressure in Pa, shape (N,), within all limits of pump, roll and level.
+def make_pulses(settings: RetuningSettings, plant: DesignPlant, sample_time_s: float) -> Pulses:
+    """Return an excitation within all limits of pump, roll and level.
 
     Roll and level are predicted for the pulses alone, in still water on the given plant. In service
     the limiter applies the level limit to the sum of waves, law and pulses.
@@ -250,4 +270,14 @@ def make_pulses(settings: RetuningSettings, plant: DesignPlant, sample_time_s: f
     sampled = plant.sampled(("roll_rad", "level_m"), sample_time_s)
     model = ARX.from_state_space(sampled, len(sampled.A))
     response_limits = np.array([settings.added_roll_rad, limits.level_m])
-    return pulses * response_scale(pulses, model, response_limits)
+    pulses = pulses * response_scale(pulses, model, response_limits)
+    return Pulses(pulses, float(np.std(model.simulate(pulses[:, None])[:, 0])))
+
+
+def bearable(pulses: Pulses, roll_rad: float) -> float:
+    """Part of the pulses with which a ship that rolls `roll_rad` RMS rolls `MOST_ADDED` times that.
+
+    Waves and pulses are independent, so mean squares add up.
+    """
+    added_rad = math.sqrt(MOST_ADDED**2 - 1) * max(LEAST_ROLL_RAD, roll_rad)
+    return min(1.0, added_rad / max(pulses.roll_rad, 1e-12))

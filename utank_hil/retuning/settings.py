@@ -38,7 +38,9 @@ class RetuningSettings:
     #: Shortest and longest natural roll period of the ship's stability booklet; a model outside it
     #: is refused.
     roll_period_range_s: tuple[Positive, Positive]
-    order: Annotated[int, Range(least=2)] = 120  #: Order of the identified ARX model.
+    #: Order of the identified ARX model. 120 is enough where the waves are regular; in a sea the
+    #: intervals of its ship are too narrow.
+    order: Annotated[int, Range(least=2)] = 200
     identification_s: Positive = 500.0  #: Time for which pulses are given and recorded.
     pulse_pa: Positive = 30e3  #: Greatest pressure of the pulses.
     pulse_hold_s: tuple[Positive, Positive] = (1.0, 5.0)  #: Shortest and longest pulse.
