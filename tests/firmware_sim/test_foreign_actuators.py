@@ -4,12 +4,14 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 
+import canopen
 import numpy as np
 import pytest
 from cantools.database.can import Database
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
+from tests.nodes.canopen_peers import Wire, valve_dictionary
 from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.canbus import Fault, Frame, Mode, OperatorCommand, load_catalogue
 from utank_hil.canbus.cmac import KeyFileError
@@ -478,6 +480,43 @@ def test_check_says_what_protects_them_and_what_does_not(theirs, capsys):
     assert "panel: DBC theirs.dbc on can1" in said
     assert "stop: on or off" in said
     assert "protected by length, range, cycle, counter, checksum, status" in said
+
+
+def test_a_module_that_canopen_plays_is_configured_commanded_and_heard(theirs):
+    bench = Bench(theirs(valve=ON_OFF | {"bus": ""}), "on_off", leave_out=("valve",))
+    wire, module = Wire(), canopen.LocalNode(9, valve_dictionary())
+    wire.add_node(module)
+    module.nmt.state = "PRE-OPERATIONAL"
+    inbox, valve = bench.node.inbox, bench.node.actuators.valve
+    seen, openings = {}, []
+    for tick in range(400):
+        now_ns = tick * SECOND_NS // 100
+        told = float(tick // 100 % 2)
+        valve._asked = told
+        for frame in [*inbox.setups(now_ns), *valve.frames(now_ns, faulted=False, follow=True)]:
+            wire.notify(frame.can_id & 0x7FF, bytearray(frame.data), 0.0)
+            seen.setdefault(frame.can_id & 0x7FF, []).append(frame.data)
+        sdo = module.sdo
+        if module.nmt.state == "OPERATIONAL":
+            module.rpdo.read()
+            module.rpdo[1].on_message(0x209, bytearray(seen[0x209][-1]), 0.0)
+            output = module.rpdo[1].map[0].raw
+            sdo[0x6000][1].raw = 2 if output & 1 else 1  # switched on it is shut
+            module.tpdo.read()
+            module.tpdo[1].map[0].raw = sdo[0x6000][1].raw
+            module.tpdo[1].transmit()
+            openings.append((told, inbox.snapshot(now_ns).valve_opening))
+        for can_id, data in wire.said:
+            inbox.receive(Frame(can_id | STANDARD, data), now_ns)
+        wire.said.clear()
+    assert module.nmt.state == "OPERATIONAL", inbox.received(Fault.VALVE_SILENT)
+    assert [sdo[0x1600][n].raw for n in (0, 1)] == [1, 0x62000108]
+    assert [sdo[0x1A00][n].raw for n in (0, 1)] == [1, 0x60000108]
+    assert (sdo[0x1016][1].raw, sdo[0x1029][1].raw) == (127 << 16 | 50, 2)
+    assert (sdo[0x6206][1].raw, sdo[0x6207][1].raw) == (1, 0)
+    assert set(seen[0x77F]) == {b"\x05"}
+    assert openings[-120][1] == openings[-120][0]
+    assert {each for each, _ in openings} == {each for _, each in openings} == {0.0, 1.0}
 
 
 class Buttons:

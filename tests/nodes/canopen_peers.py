@@ -45,8 +45,8 @@ class Wire(canopen.Network):
         return Task()
 
 
-def dictionary():
-    """Object dictionary of a drive in torque mode."""
+def objects():
+    """An empty object dictionary, and what adds an entry or a record to it."""
     found = od.ObjectDictionary()
     types = {1: od.UNSIGNED8, 2: od.UNSIGNED16, 4: od.UNSIGNED32}
 
@@ -64,6 +64,28 @@ def dictionary():
             entry(index, subindex, size, default, access, whole)
         found.add_object(whole)
 
+    return found, entry, record
+
+
+def valve_dictionary():
+    """Object dictionary of a digital input and output module."""
+    found, entry, record = objects()
+    entry(0x1000, 0, 4, 0x30191, "ro")
+    entry(0x1017, 0, 2, 0)
+    record(0x1016, {0: (1, 1, "ro"), 1: (4, 0, "rw")})
+    record(0x1029, {0: (1, 1, "ro"), 1: (1, 0, "rw")})
+    for index, cob in ((0x1400, 0x200), (0x1800, 0x180)):
+        sizes = {0: (1, 5, "ro"), 1: (4, cob + 9, "rw"), 2: (1, 254, "rw"), 3: (2, 300, "rw")}
+        record(index, sizes | {5: (2, 100, "rw")})
+        record(index + 0x200, {0: (1, 0, "rw"), **dict.fromkeys(range(1, 9), (4, 0, "rw"))})
+    for index in (0x6000, 0x6200, 0x6206, 0x6207):
+        record(index, {0: (1, 1, "ro"), 1: (1, 0xFF if index == 0x6207 else 0, "rw")})
+    return found
+
+
+def dictionary():
+    """Object dictionary of a drive in torque mode."""
+    found, entry, record = objects()
     entry(0x1000, 0, 4, 0x20192, "ro")
     entry(0x1017, 0, 2, 0)
     record(0x1016, {0: (1, 1, "ro"), 1: (4, 0, "rw")})

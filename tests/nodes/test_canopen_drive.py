@@ -197,3 +197,14 @@ def test_a_drive_that_falls_out_of_operation_counts_no_longer_and_is_started_aga
     line.run(400)
     assert line.node.nmt.state == "OPERATIONAL"
     assert line.reports[-1][0] > line.now_ns - 60 * MS
+
+
+def test_an_emergency_of_the_drive_is_in_its_words_until_it_is_over():
+    line = Line().run(400)
+    assert "emergency" not in line.drive.words
+    line.node.emcy.send(0x2310, 0x02)  # continuous over current, as canopen sends it
+    line.run(2)
+    assert line.drive.words.endswith("emergency 2310h, register 0x02")
+    line.node.emcy.reset()
+    line.run(2)
+    assert "emergency" not in line.drive.words

@@ -267,6 +267,18 @@ def test_another_device_at_the_node_is_found_after_it_was_swapped():
     assert "another serial number" in gauges.inbox.received(Fault.TANK_SILENT)
 
 
+def test_an_emergency_of_a_sensor_is_in_its_alarm_until_it_is_over():
+    gauges = Gauges()
+    gauges.run(200)
+    gauges.node.emcy.send(0x5000, 0x81)  # device hardware, as canopen sends it
+    gauges.run(4)
+    said = gauges.inbox.received(Fault.TANK_SILENT)
+    assert said == "node 7: emergency 5000h, register 0x81"
+    gauges.node.emcy.reset()
+    gauges.run(4)
+    assert gauges.inbox.received(Fault.TANK_SILENT) == ""
+
+
 def test_a_name_is_asked_for_until_it_is_told():
     name = 0xC0FFEE0102030405
     found = inbox({"motion": SSI2 | {"protection": {"n2k_name": name}}})

@@ -21,6 +21,7 @@ from utank_hil.canbus.profiles.drive_plan import (
     DrivePlan,
     NetworkState,
     NodeCommand,
+    emergency_words,
 )
 from utank_hil.canbus.profiles.field import Field
 from utank_hil.control.pressure_loop import PressureLoop
@@ -266,7 +267,6 @@ class CanopenDrive:
             self.setup.restart(now_ns)
 
     def _on_emergency(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
-        if len(frame.data) == 8:
-            code = int.from_bytes(frame.data[:2], "little")
-            said = f", emergency {code:04X}h, register {frame.data[2]:#04x}"
-            self._emergency = said if code else ""
+        said = emergency_words(frame.data)
+        if said is not None:
+            self._emergency = said and f", {said}"

@@ -11,6 +11,7 @@ from utank_hil.canbus import Frame
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.profiles.device import SILENT_NS, ProfiledDevice, hear
 from utank_hil.canbus.profiles.drive_plan import (
+    EMERGENCY,
     HEARTBEAT,
     NMT,
     SDO_ANSWER,
@@ -23,6 +24,7 @@ from utank_hil.canbus.profiles.drive_plan import (
     Step,
     abort_words,
     answer,
+    emergency_words,
     read_request,
     write_request,
 )
@@ -149,13 +151,20 @@ class SensorSetup:
     def __init__(self, device: ProfiledDevice[Any]) -> None:
         plan = self._plan = device.plan
         assert plan.node is not None
-        self._device = device
+        self._device, self._node = device, plan.node
         self.setup = CanopenSetup(plan.bus, plan.node, plan.steps)
         tag = (plan.bus << BUS_SHIFT | STANDARD) + plan.node
         hear(device.takes, tag + SDO_ANSWER, self._take_answer)
         hear(device.takes, tag + HEARTBEAT, self._take_heartbeat)
+        hear(device.takes, tag + EMERGENCY, self._take_emergency)
+        self._emergency = ""
         device.named = False
         self._done_ns = 0
+
+    @property
+    def words(self) -> str:
+        """What is wrong with the sensor, by its own words; else empty."""
+        return self.setup.problem or (self._emergency and f"node {self._node}: {self._emergency}")
 
     @property
     def kind(self) -> type[tuple[Any, ...]]:
@@ -172,6 +181,10 @@ class SensorSetup:
             self._done_ns = now_ns
         self._device.named = setup.done
         return frames
+
+    def _take_emergency(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
+        said = emergency_words(frame.data)
+        self._emergency = self._emergency if said is None else said
 
     def _take_answer(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
         self.setup.take(frame.data)

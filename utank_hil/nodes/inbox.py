@@ -339,7 +339,7 @@ class Inbox:
         """Node, message and value that a fault was last judged by, in words."""
         if code in _OF_SENSORS:
             kind, each = _OF_SENSORS[code], self._setups
-            return "; ".join([one.setup.problem for one in each if one.kind is kind])
+            return "; ".join([one.words for one in each if one.kind is kind and one.words])
         if code in (Fault.DRIVE_FAULT, Fault.DRIVE_SILENT):
             if self.canopen_drive is not None:
                 return self.canopen_drive.words

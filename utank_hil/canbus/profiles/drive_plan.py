@@ -59,6 +59,14 @@ def abort_words(code: int) -> str:
     return f"abort code {code:#010x}" + (f", {known[code]}" if code in known else "")
 
 
+def emergency_words(data: bytes) -> str | None:
+    """What an emergency message (CiA 301 7.2.7) says; empty: all is over; None: it is none."""
+    if len(data) != 8:
+        return None
+    code = int.from_bytes(data[:2], "little")
+    return f"emergency {code:04X}h, register {data[2]:#04x}" if code else ""
+
+
 class Place(NamedTuple):
     """An entry of the object dictionary."""
 
