@@ -46,9 +46,9 @@ def faults(
 
     **Example:** utank-hil faults --rows motion,F19 --seeds 10
 
-    In lockstep on all cores. Without **--full** the roll is compared over 60 s, and over
-    20 s where the controller stays in charge, and rows that take minutes are left out. The exit
-    code says whether a row failed (docs/deployment.md).
+    In lockstep on all cores. Without **--full** the roll is compared over 60 s (an own ship's over
+    600 s), and over 20 s where the controller stays in charge, and rows that take minutes are left
+    out. The exit code says whether a row failed (docs/deployment.md).
     """
     # imported late: `--help` needs none of it
     from firmware_sim.fault_campaign.campaign import Campaign
@@ -62,7 +62,8 @@ def faults(
         loaded = _on(whole, scenario)
     names = [name.strip() for name in rows.split(",") if name.strip()]
     chosen = loaded.chosen(names)
-    window = Window() if full else Window(60.0, 20.0)
+    # an own ship may be lightly damped: after a stop it rolls on for minutes
+    window = Window() if full else Window(60.0 if scenario is None else 600.0, 20.0)
     too_long = [row for row in chosen if row.long and not (full or names)]
     chosen = [row for row in chosen if row not in too_long]
     _refuse_names(whole, names, chosen)
@@ -101,9 +102,9 @@ def faults(
         _print(results)
         failed = sum(not result.passed for result in results)
         Terminal().say(
-            f"{len(results)} rows in {seeds} seas, {failed} failed, {len(not_run)} not run; roll "
-            f"compared over {window.stopped_s:g} s, in charge over {window.running_s:g} s; "
-            f"{time.monotonic() - began:.0f} s."
+            f"{len(results)} rows in {seeds} sea{'s' * (seeds > 1)}, {failed} failed, "
+            f"{len(not_run)} not run; roll compared over {window.stopped_s:g} s, "
+            f"in charge over {window.running_s:g} s; {time.monotonic() - began:.0f} s."
         )
     if killed:
         fail(KILLED, ExitCode.SYSTEM)

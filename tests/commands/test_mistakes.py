@@ -28,6 +28,7 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
     ("a table to check", "check {here}/table.csv", ("table.csv",)),
     ("an empty file", "check {here}/empty.yaml", ("empty.yaml", "empty")),
     ("tabs", "check {here}/tabs.yaml", ("tabs.yaml", "line 2", "tab")),
+    ("a key under a value", "check {here}/indent.yaml", ("indent.yaml", "line 3", "indented")),
     ("letters of Windows", "check {here}/latin.yaml", ("latin.yaml", "UTF-8")),
     ("a file that is not there", "bench {here}/strom.yaml", ("strom.yaml", "no such file")),
     ("no recording", "report {here}/table.csv", ("table.csv",)),
@@ -73,6 +74,18 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
     ("kilograms for tonnes", "identify inclining {here}/shifts.csv --displacement 2000000",
      ("GM would be", "N m", "2e+06 t")),
     # commands that take another's files
+    ("rows that are none", "faults --rows nothing", ("--rows", "nothing")),
+    ("a controller for the decay's ship", f"identify decay {{here}}/radians.csv "
+     f"--ship {{configs}}/{GPC}", ("gpc.yaml", "a ship is wanted")),
+    ("a controller for the tank's sea", f"design tank {{configs}}/{FIRST} "
+     f"--scenario {{configs}}/{GPC}", ("gpc.yaml", "a scenario is wanted")),
+    ("an outlet of the web", f"run {{configs}}/{GPC} --bus can0 --outward http://127.0.0.1:80",
+     ("--outward", "modbus://")),
+    ("an export onto itself", "export {here}/table.csv --to {here}/table.csv",
+     ("table.csv", "another file")),
+    ("a duration with its unit", "bench --duration 5min", ("--duration", "number")),
+    ("a length with its unit", "init {here}/a --length 90m --beam 14 --displacement 2800 --gm 1.1",
+     ("--length", "number")),
     ("a ship to the fault table", "faults --scenario {here}/used/ship.yaml",
      ("ship.yaml",)),
     ("a report of a table", "report {here}/table.csv", ("table.csv",)),
@@ -125,6 +138,36 @@ IN_A_FILE: list[tuple[str, str, str, object, tuple[str, ...]]] = [
     ("a fault of a signal that is none", STORM, "faults",
      [{"kind": "stuck", "message": "SENSOR_MOTION", "signals": ["roll_deg"], "at_s": 50}],
      ("faults.0.signals.0", "roll_rad")),
+    ("a slope as a number", STORM, "sea",
+     {"kind": "jonswap", "hs_m": 3.0, "tp_s": 9.0, "effective_slope": 0.7},
+     ("sea.effective_slope", "0.7", "beam_m, coefficient, depth_m")),
+    ("a course of waves without directions", STORM, "sea",
+     {"kind": "jonswap", "hs_m": 3.0, "tp_s": 9.0, "course_deg": 20},
+     ("sea.course_deg", "heading_deg")),
+    ("a date of home", STORM, "sea", {"kind": "measured", "time": "10.02.2019 05:40",
+     "file": str(CONFIGS / "seas/ndbc_41010_2019-02_spectral_density.txt")},
+     ("sea.time", "2019-02-10T05:40")),
+    ("an hour between two records", STORM, "sea", {"kind": "measured", "time": "2019-02-10T05:41",
+     "file": str(CONFIGS / "seas/ndbc_41010_2019-02_spectral_density.txt")},
+     ("sea.time", "the nearest is of 2019-02-10T05:40")),
+    ("a table of waves that is not there", STORM, "sea",
+     {"kind": "tabulated", "file": "waves.csv"}, ("sea.file", "waves.csv", "beside the file")),
+    ("a negative spreading", STORM, "sea",
+     {"kind": "jonswap", "hs_m": 3.0, "tp_s": 9.0, "spreading": -2}, ("sea.spreading", "zero")),
+    ("a time with its unit", STORM, "operator", [{"time_s": "5 s", "action": "arm"}],
+     ("operator.0.time_s", "5 s", "the number alone")),
+    ("one order that is no list", STORM, "operator", {"time_s": 5.0, "action": "arm"},
+     ("operator", "a list")),
+    ("half the name of a plant", STORM, "plant", "sway", ("plant", "sway_roll_yaw")),
+    ("a ship that sways without a hull", STORM, "plant", "sway_roll_yaw", ("hull", "required")),
+    ("laws as a list", STORM, "controllers", ["gpc.yaml"], ("controllers", "gpc.yaml", "mapping")),
+    ("a fault of nearly that name", STORM, "faults",
+     [{"kind": "stuckk", "message": "SENSOR_MOTION"}], ("faults.0.kind", "did you mean stuck")),
+    ("a wave without a period", STORM, "sea",
+     {"kind": "regular", "amplitude_m": 1.0, "period_s": 0}, ("sea.period_s", "above 0")),
+    ("matrices that are not there", GPC, "law",
+     {"kind": "state_space", "measured": ["roll_rad"], "system": "./x.npz"},
+     ("law.system", "x.npz", "No such file")),
     ("a scenario for a ship", GPC, "vessel", str(CONFIGS / STORM), ("vessel", "storm.yaml")),
 ]  # fmt: skip
 
@@ -134,6 +177,7 @@ def here(tmp_path: Path) -> Path:
     (tmp_path / "table.csv").write_text("time_s,roll_deg\n0,1\n")
     (tmp_path / "empty.yaml").write_text("")
     (tmp_path / "tabs.yaml").write_text("name: ship\n\tship: 1\n")
+    (tmp_path / "indent.yaml").write_text("name: mine\nsea: {kind: jonswap}\n  hs_m: 3\n")
     (tmp_path / "latin.yaml").write_bytes("name: Größe\n".encode("latin-1"))
     swings = [(0.1 * n, 8 * 0.995**n * math.cos(0.06 * n)) for n in range(1000)]
     for name, head, rows in (

@@ -246,4 +246,4 @@ def test_a_file_that_is_no_log_is_an_error_with_its_name(tmp_path: Path, content
     result = invoke(replay, file)
     assert result.exit_code == 2
     assert "x.frames: is no frame log" in result.stderr
-    assert "x.rrd holds no frames: give the .frames" in invoke(replay, tmp_path / "x.rrd").stderr
+    assert "x.rrd holds no frames: give a .frames" in invoke(replay, tmp_path / "x.rrd").stderr

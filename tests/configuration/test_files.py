@@ -7,6 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel, Field
 
+from firmware_sim.scenario_sea import ScenarioSea
 from utank_hil.configuration import ConfigError, Section, load_config
 from utank_hil.configuration.files import kind_of
 from utank_hil.configuration.yaml_text import parse_yaml
@@ -20,6 +21,10 @@ class Ship(Section):
 class Scenario(Section):
     ship: Ship
     duration_s: float = Field(gt=0)
+
+
+class SeaHolder(Section):
+    sea: ScenarioSea
 
 
 def write(folder: Path, name: str, text: str) -> Path:
@@ -185,6 +190,24 @@ def test_path_of_a_data_file_is_relative_to_the_file_that_names_it(tmp_path: Pat
     write(tmp_path, "ships/a.yaml", "length_m: 20\nname: ./data.txt\n")
     top = write(tmp_path, "top.yaml", "ship: ships/a.yaml\nduration_s: 10\n")
     assert load_config(top, Scenario).ship.name == str(tmp_path / "ships" / "data.txt")
+
+
+def test_a_name_of_a_file_beside_the_one_that_names_it_is_its_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Wherever the command is called from; the name of a ship is text, whatever stands beside."""
+    write(tmp_path, "seas/table.csv", "frequency_hz,density_m2_hz\n0.08,1\n0.1,4\n0.12,2\n")
+    words = "sea: {kind: tabulated, file: table.csv}\n"
+    monkeypatch.chdir(tmp_path)
+    found = load_config(write(tmp_path, "seas/sea.yaml", words), SeaHolder).sea
+    assert found.file == tmp_path / "seas" / "table.csv"
+    write(tmp_path, "ships/a.yaml", "length_m: 20\nname: data.txt\n")
+    write(tmp_path, "ships/data.txt", "1")
+    top = write(tmp_path, "top.yaml", "ship: ships/a.yaml\nduration_s: 10\n")
+    assert load_config(top, Scenario).ship.name == "data.txt"
+    other = write(tmp_path, "seas/sea.yaml", words.replace("table", "nowhere"))
+    with pytest.raises(ConfigError, match=r"sea\.file: nowhere\.csv .*beside the file"):
+        load_config(other, SeaHolder)
 
 
 @pytest.mark.parametrize("text", ["1e-05", "2e3", "-1E+2", "3.e4", "1.5e-7"])

@@ -567,10 +567,12 @@ def test_a_drive_of_another_maker_that_misses_frames_is_stopped(row: str, found_
 @pytest.mark.slow
 def test_rows_run_on_another_ship() -> None:
     patti = "configs/scenarios/patti_b.yaml"
-    done = invoke("--scenario", patti, "--seeds", "1", "--json", "--rows", "F35,F31")
+    done = invoke("--scenario", patti, "--seeds", "1", "--json", "--rows", "F35,F31,motion-zero")
     found = json.loads(done.stdout)
     assert done.exit_code == 0
-    assert [row["id"] for row in found["rows"]] == ["not-commissioned"]
+    windows = {row["id"]: row["roll_window_s"] for row in found["rows"]}
+    assert windows.keys() == {"not-commissioned", "motion-zero"}
+    assert windows["motion-zero"] == 600.0  # a lightly damped ship rolls on for minutes
     assert {row["why"] for row in found["not_run"]} == {"needs the ship of setup valve"}
     ship = load_config(Path(patti), Scenario)
     moved = CAMPAIGN.on(ship, "constrained")

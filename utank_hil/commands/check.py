@@ -217,9 +217,10 @@ def _remarks(judged: JudgedLaw, report: Robustness) -> list[str]:
     notes = [note for note in (_at_rest(law),) if note is not None]
     if len(tanks) > 1:
         working, calm = (f"{tank.damping_ratio:.2g}" for tank in tanks)
+        sea = "the sea that the law expects" if hasattr(judged.config.law, "sea") else "waves"
         notes.append(
-            f"The worse of two tanks counts: the water's damping ratio is {working} in the sea "
-            f"that the law expects, {calm} in small motions."
+            f"The worse of two tanks counts: the water's damping ratio is {working} in {sea}, "
+            f"{calm} in small motions."
         )
     gain = report.nominal.peak_loop_gain
     if gain < LEAST_LOOP_GAIN and not law.adapts:

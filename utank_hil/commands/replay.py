@@ -64,7 +64,7 @@ def replay(
     named = None if config is None else load(config, ControllerConfig, allow_code=allow_code)
     try:
         if log.suffix.lower() == ".rrd":
-            fail(f"{log} holds no frames: give the {SUFFIX} file beside it")
+            fail(f"{log} holds no frames: give a {SUFFIX} file, as run and bench --frames write it")
         if log.suffix.lower() != SUFFIX:
             (result, why), law = _replay_bus_log(BusLog(log, channel), named, explained), None
         else:

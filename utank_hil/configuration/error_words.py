@@ -12,13 +12,19 @@ from pydantic import BaseModel
 
 
 def instead_of(model: type[BaseModel], location: tuple[str | int, ...]) -> str:
-    """Return advice for an unknown key of a model; empty if none resembles it.
+    """Return advice for an unknown key of a model: the one it resembles, or all, if they are few.
 
     `location` is the key as a validation error gives it, with the kinds of sections chosen by kind.
     """
     *parents, written = location
     near = nearest(str(written), sorted(known_keys(model, parents)))
-    return f"; did you mean {near}?" if near else ""
+    return f"; did you mean {near}?" if near else _keys(model, parents)
+
+
+def _keys(model: type[BaseModel], location: Iterable[str | int]) -> str:
+    """Return the keys of a place for the end of a message; empty if there are none or many."""
+    known = sorted(known_keys(model, location))
+    return f"; its keys are {', '.join(known)}" if 0 < len(known) <= _FEW_KEYS else ""
 
 
 def nearest(written: str, known: Sequence[str]) -> str | None:
@@ -96,6 +102,7 @@ def _inside(place: Any, part: str | int) -> Iterator[Any]:
 
 _NUMBER: Final = "a number"
 _WHOLE: Final = "a whole number"
+_FEW_KEYS: Final = 10  #: Most keys that a message lists.
 _MAPPING: Final = "a mapping of keys to values"
 _TIME: Final = "a date and time such as 2019-02-10T05:40"
 
@@ -138,7 +145,9 @@ def words_for(error: Any, model: type[BaseModel]) -> str:
         bound = f"{context['max_length']} at most" if most else f"{context['min_length']} or more"
         return f"must have {bound}, got {len(value)}"
     if kind in WANTED:
-        return f"must be {WANTED[kind]}, got {_shown(value)}{_remedy(WANTED[kind], value)}"
+        wanted = WANTED[kind]
+        keys = _keys(model, error["loc"]) if wanted is _MAPPING else ""
+        return f"must be {wanted}, got {_shown(value)}{_remedy(wanted, value)}{keys}"
     words = str(error["msg"]).removeprefix("Value error, ")
     if isinstance(value, dict | list | tuple | BaseModel):
         return words

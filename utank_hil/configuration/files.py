@@ -1,11 +1,12 @@
 """Reader of configuration files: YAML that may name other YAML files, with errors at their place.
 
 A value that is the name of a ``.yaml`` or ``.yml`` file stands for that file's content, and one
-that begins with ``./`` or ``../`` is the path of a data file; both are relative to the file they
-stand in. The key ``name`` of a file is text, whatever it looks like.
+that begins with ``./`` or ``../``, or names a file beside it, is the path of a data file; both are
+relative to the file they stand in. The key ``name`` of a file is text, whatever it looks like.
 Every error carries the file and key where the wrong value was written.
 """
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -262,7 +263,8 @@ class _Reader:
         named = key[-1:] == ("name",) and key[:-1] in self.origins
         if isinstance(value, str) and value.lower().endswith(_SUFFIXES) and not named:
             return self.read(file.parent / value, key, stack, key)
-        if isinstance(value, str) and value.startswith(("./", "../")):
+        beside = isinstance(value, str) and "." in value and os.path.isfile(file.parent / value)
+        if isinstance(value, str) and (value.startswith(("./", "../")) or (beside and not named)):
             try:
                 refuse_device(file.parent / value)
             except (OSError, ValueError) as error:

@@ -155,7 +155,10 @@ class TabulatedSpectrum(Section):
 
     @model_validator(mode="after")
     def _readable(self) -> Self:
-        height_m = self.spectrum().hs_m
+        try:
+            height_m = self.spectrum().hs_m
+        except ValueError as error:
+            refuse("sea", [("file", str(error))])
         if not 0 < height_m <= HIGHEST_M:
             reason = f"holds a sea of {height_m:.3g} m: is the density in m2/Hz, of waves?"
             refuse("sea", [("file", reason)])
@@ -166,7 +169,7 @@ class TabulatedSpectrum(Section):
         try:
             columns = read_number_table(self.file)
         except OSError as error:
-            raise ValueError(f"{error.filename} can't be read: {error.strerror}") from error
+            raise ValueError(_unread(error)) from error
         if set(columns) != set(_BANDS):
             has = ", ".join(columns)
             raise ValueError(f"{self.file} needs the columns {' and '.join(_BANDS)}, has {has}")
@@ -174,6 +177,13 @@ class TabulatedSpectrum(Section):
             return Spectrum(columns["frequency_hz"], columns["density_m2_hz"])
         except ValueError as error:
             raise ValueError(f"{self.file}: {error}") from error
+
+
+def _unread(error: OSError) -> str:
+    """Say that a data file can't be read, and where its name is looked up."""
+    missing = isinstance(error, FileNotFoundError)
+    remedy = "; a path begins beside the file that names it" if missing else ""
+    return f"{error.filename} can't be read: {error.strerror}{remedy}"
 
 
 def utc(time: datetime) -> datetime:
@@ -223,7 +233,7 @@ def read_spectra(
         written = tuple(each.stat().st_mtime_ns for each in (file, direction_file) if each)
         return _loaded(file, direction_file, place, written)
     except OSError as error:
-        raise ValueError(f"{error.filename} can't be read: {error.strerror}") from error
+        raise ValueError(_unread(error)) from error
 
 
 @lru_cache(maxsize=4)

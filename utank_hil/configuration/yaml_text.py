@@ -72,7 +72,9 @@ def parse_yaml(text: str) -> tuple[Any, list[Finding]]:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         place = "" if mark is None else f" in line {mark.line + 1}, column {mark.column + 1}"
-        raise YamlError(f"is not valid YAML{place}: {error.problem}") from error
+        block = "block" in (error.problem or "")  # its parser's word for lines indented alike
+        remedy = "; keys of one section are indented alike, below a key without a value" * block
+        raise YamlError(f"is not valid YAML{place}: {error.problem}{remedy}") from error
     except yaml.YAMLError as error:
         raise YamlError(f"is not valid YAML: {error}") from error
     except RecursionError:
