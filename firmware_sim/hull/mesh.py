@@ -12,6 +12,7 @@ waterline and block.
 
 import io
 import math
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,6 +27,7 @@ from utank_hil.dynamics.roll_damping import HullForm
 Panels = npt.NDArray[np.int64]
 
 FORMATS: Final = "WAMIT .gdf, HAMS .pnl, NEMOH .mar, HydroStar .hst; with meshio .stl, .obj, .ply"
+_BY_MESHIO: Final = (".stl", ".obj", ".ply")
 _LENGTHS_M: Final = (3.0, 600.0)
 """Lengths of hulls: a model's, and more than the longest ship's."""
 _UNITS: Final = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048, "km": 1e3}
@@ -61,10 +63,14 @@ def read_mesh(
     cpt.set_logging("ERROR")  # its checks of single panels say less than ours
     if not path.is_file():
         raise MeshError("there is no such file")
+    if path.suffix in _BY_MESHIO and find_spec("meshio") is None:
+        raise MeshError(f"{path.suffix} needs meshio: pip install meshio")
     try:
         with open_content(path, _LIMIT_BYTES) as content:
-            text = io.StringIO(content.read().decode("latin-1"))
-        mesh = cpt.load_mesh(text, file_format=path.suffix).merged()
+            source: Any = io.StringIO(content.read().decode("latin-1"))
+        if path.suffix in _BY_MESHIO:  # they may be binary, and meshio asks the file for its size
+            source = str(path)
+        mesh = cpt.load_mesh(source, file_format=path.suffix).merged()
     except MemoryError:
         raise
     except Exception as error:  # whatever the formats' readers raise

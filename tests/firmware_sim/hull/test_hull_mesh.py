@@ -3,6 +3,7 @@
 import math
 from pathlib import Path
 
+import capytaine as cpt
 import numpy as np
 import pytest
 from bodies import both_sides, box, hemisphere, wigley, written
@@ -31,6 +32,29 @@ def test_normals_that_point_into_the_hull_are_turned_and_that_is_said(tmp_path: 
     side, said = read_mesh(written(tmp_path / "in.gdf", (points, panels[:, ::-1])))
     assert side.volume > 0
     assert said == ["normals pointed into the hull: turned"]
+
+
+@pytest.mark.parametrize("kind", ["stl", "obj", "ply"])
+def test_formats_that_may_be_binary_go_to_meshio_as_files(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As text their bytes would be others: that of a binary .stl was "not a float"."""
+    file = tmp_path / f"hull.{kind}"
+    file.write_bytes(b"\xff\x00")
+    monkeypatch.setattr("firmware_sim.hull.mesh.find_spec", lambda _: None)
+    with pytest.raises(MeshError, match="needs meshio: pip install meshio"):
+        read_mesh(file)
+    asked: list[object] = []
+
+    def load_mesh(source: object, file_format: str) -> cpt.Mesh:
+        asked.extend((source, file_format))
+        return cpt.Mesh(*wigley())
+
+    monkeypatch.setattr("firmware_sim.hull.mesh.find_spec", lambda _: object())
+    monkeypatch.setattr(cpt, "load_mesh", load_mesh)
+    side, _ = read_mesh(file)
+    assert asked == [str(file), f".{kind}"]
+    assert 2 * side.volume == pytest.approx(4 / 9 * 60 * 12 * 4, rel=0.005)
 
 
 def test_draught_trim_and_unit_place_the_hull_in_the_water(tmp_path: Path) -> None:
