@@ -1,19 +1,14 @@
-"""AES-CMAC against the vectors of FIPS 197 and RFC 4493."""
+"""AES-CMAC against the vectors of RFC 4493."""
 
 import pytest
 
-from utank_hil.canbus.cmac import cmac, encrypted
+from utank_hil.canbus.cmac import cmac
 
 KEY = bytes.fromhex("2b7e151628aed2a6abf7158809cf4f3c")
 MESSAGE = bytes.fromhex(
     "6bc1bee22e409f96e93d7e117393172aae2d8a571e03ac9c9eb76fac45af8e51"
     "30c81c46a35ce411e5fbc1191a0a52eff69f2445df4f9b17ad2b417be66c3710"
 )
-
-
-def test_a_block_of_the_standard():
-    key, block = bytes(range(16)), bytes.fromhex("00112233445566778899aabbccddeeff")
-    assert encrypted(key, block).hex() == "69c4e0d86a7b0430d8cdb78070b4c55a"
 
 
 @pytest.mark.parametrize(

@@ -360,7 +360,7 @@ def test_a_run_with_authentication_is_replayed_with_its_key_and_not_without(thei
     law = build_law(bench.config)
     assert replay(tap[0], bench.config, law).exact
     (tmp_path / "panel.key").unlink()
-    with pytest.raises(KeyFileError, match="no log of hers be replayed"):
+    with pytest.raises(KeyFileError, match="no log of the ship be replayed"):
         replay(tap[0], bench.config, law)
 
 

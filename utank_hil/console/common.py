@@ -214,6 +214,7 @@ def _claimed(folder: Path) -> bool:
 EXTRA_OF: Final = {
     "asammdf": "files",
     "capytaine": "hulls",
+    "cryptography": "keys",
     "fmpy": "models",
     **dict.fromkeys(("clarabel", "control", "jinja2"), "bench"),
     **dict.fromkeys(("matplotlib", "numba"), "bench"),
