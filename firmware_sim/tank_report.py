@@ -7,6 +7,7 @@ from typing import Any
 
 from rich.table import Table
 
+from utank_hil.analysis.tank_filling import Filling
 from utank_hil.analysis.tank_prediction import LoadingPoint, RollPrediction
 from utank_hil.analysis.tank_sizing import TankCost
 from utank_hil.console.ship_report import power_words, tonnes
@@ -87,6 +88,28 @@ def loading_table(points: Sequence[LoadingPoint]) -> Table:
         rolls = (point.without_tank_rad, point.passive_rad, point.active_rad)
         cells = ("" if roll is None else f"{math.degrees(roll):.2f}" for roll in rolls)
         table.add_row(f"×{point.period_scale:g}", *cells)
+    return table
+
+
+def filling_table(found: Sequence[Filling], present_m: float, sea: str) -> Table:
+    """Table of filling advice by loading."""
+    figures = ("GM m", "roll s", "level m", "water t", "water s", "GM loss m", "passive")
+    caption = (
+        f"level: still water above the duct, {present_m:.2f} m in the file; passive: roll against "
+        f"no tank in {sea}; *: bound by the tank's height"
+    )
+    table = new_table("Filling", *figures, names=("load t",), caption=caption)
+    for each in found:
+        table.add_row(
+            f"{each.displacement_t:.5g}",
+            f"{each.gm_m:.2f}",
+            f"{each.roll_period_s:.1f}",
+            f"{'' if each.tuned else '* '}{each.level_m:.2f}",
+            f"{each.water_t:.4g}",
+            f"{each.water_period_s:.1f}",
+            f"{each.gm_loss_m:.2f}",
+            less(each.passive_below_no_tank),
+        )
     return table
 
 

@@ -1,6 +1,7 @@
-"""``utank-hil design tank``: a tank with its cost and its roll, beside the best passive one."""
+"""``utank-hil design``: a tank beside the best passive one, and how far to fill it."""
 
 import json
+import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
 
 
 PICTURE, FIGURES = "tank.png", "tank.json"
+GMS = (0.6, 0.8, 1.0, 1.2, 1.4, 1.6)
+DISPLACEMENTS = (0.85, 1.0, 1.15)
+"""Loadings that filling is advised for by default, over those of the file."""
 
 
 def tank(
@@ -111,6 +115,72 @@ def tank(
     console.files(files)
 
 
+def filling(
+    context: typer.Context,
+    vessel: Annotated[Path, typer.Argument(help="Ship with displacement, and tank with roof.")],
+    scenario: Annotated[
+        Path | None,
+        typer.Option(
+            help="Scenario whose sea counts.",
+            show_default="scenario.yaml beside, or a shipped one",
+        ),
+    ] = None,
+    gm: Annotated[
+        list[float] | None,
+        typer.Option(help="GM without the tank's free surface, in m; may be given again."),
+    ] = None,
+    displacement: Annotated[
+        list[float] | None, typer.Option(help="Displacement in t; may be given again.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for picture and figures.")] = OUT,
+    json_: Json = False,
+) -> None:
+    """Say how far to fill the tank, by displacement and GM: the still level that rolls her least.
+
+    The tank's walls stay. Roll is a linear prediction for the passive tank in the scenario's sea,
+    with the same waves for every loading. Without --gm and --displacement: 0.6 to 1.6 times the
+    file's GM, 0.85 to 1.15 times its displacement.
+
+    **Example:** utank-hil design filling VESSEL --gm 0.8 --gm 1.2 --displacement 14500
+    """
+    from firmware_sim.tank_report import filling_table
+    from utank_hil.analysis.tank_filling import fillings
+    from utank_hil.pictures.tank import draw_filling
+
+    loaded = load(vessel, Vessel)
+    path = scenario or usual_scenario(loaded, vessel)
+    if path is None:
+        fail(f"{vessel}: no shipped scenario has this ship: name a sea with --scenario")
+    for name, values in (("--gm", gm), ("--displacement", displacement)):
+        if any(not 0 < value < math.inf for value in values or ()):
+            fail(f"{name}: must be above 0")
+    ship, (chosen, sea) = loaded.ship, _sea(path, loaded)
+    if not ship.displacement_n > 0:
+        fail(f"{vessel}: ship.displacement_t is needed to tell GM from stiffness: state it")
+    own_t, own_m = ship.displacement_n / 9806.65, ship.stiffness_nm_rad / ship.displacement_n
+    loads_t = displacement or [share * own_t for share in DISPLACEMENTS]
+    gms_m = gm or [share * own_m for share in GMS]
+    loadings = [(load_t, gm_m) for load_t in sorted(loads_t) for gm_m in sorted(gms_m)]
+    try:
+        found = fillings(_plant(loaded, loaded.tank), sea.wave_moment, loadings)
+    except ValueError as error:
+        fail(f"{vessel}: {error}")
+    out = prepare_out(out, ("filling.png", "filling.json"))
+    about = describe("design filling", loaded, out, options=context.params, scenario=chosen)
+    files = {"picture": out / "filling.png", "figures": out / "filling.json"}
+    draw_filling(found, files["picture"], f"{loaded.name}: filling for {chosen.name}", about)
+    rows = [asdict(each) for each in found]
+    figures = about | {"vessel": loaded.name, "scenario": chosen.name, "fillings": rows}
+    figures |= {"files": {key: str(file) for key, file in files.items()}}
+    write_whole(files["figures"], json.dumps(figures, indent=2) + "\n")
+    if json_:
+        print_json(figures)
+        return
+    console = Terminal()
+    console.table(filling_table(found, loaded.tank.height_m, chosen.name))
+    console.files(files)
+
+
 def _sea(path: Path, vessel: Vessel) -> tuple[Scenario, "SeaState"]:
     """Scenario, and its sea as it acts on the vessel's ship."""
     from utank_hil.analysis.loop.sea_response import CalmSeaError
@@ -181,8 +251,4 @@ def usual_scenario(vessel: Vessel, file: Path) -> Path | None:
 
 design = new_app("Design a tank: what it could be, and what it would cost.")
 design.command()(tank)
-
-
-@design.callback()
-def _design() -> None:
-    """Keep `tank` a word of its own."""
+design.command()(filling)

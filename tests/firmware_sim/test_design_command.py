@@ -112,3 +112,57 @@ def test_a_tank_of_quadratic_loss_is_compared_at_the_level_of_its_pump(tmp_path:
     assert found["present"]["peak"] == pytest.approx(found["best"]["peak"], rel=0.03)
     assert found["present"]["damping_ratio"] == pytest.approx(0.234, abs=0.002)
     assert found["best"]["damping_ratio"] == pytest.approx(0.234, abs=0.005)
+
+
+OWN = """\
+name: own
+ship: {displacement_t: 1900, gm_m: 0.9, roll_period_s: 9.5, damping_ratio: 0.05}
+tank: {width_m: 7, height_m: 1.7, reservoir_area_m2: 8, duct_area_m2: 1.9, damping_ratio: 0.1,
+  headroom_m: HEADROOM}
+"""
+STILL = """\
+name: light sea
+vessel: own.yaml
+sea: {kind: jonswap, hs_m: 0.3, tp_s: 9.0}
+controllers: {rest: {name: rest, vessel: own.yaml, law: {kind: passive}}}
+duration_s: 600
+settle_s: 60
+"""
+
+
+def filled(folder: Path, *options: str, headroom: str = "1.7"):
+    (folder / "own.yaml").write_text(OWN.replace("HEADROOM", headroom))
+    (folder / "scenario.yaml").write_text(STILL)
+    return run("filling", folder / "own.yaml", "--out", folder, *options)
+
+
+def test_filling_follows_the_roll_period_until_the_tank_ends(tmp_path: Path):
+    done = filled(tmp_path, "--gm", "1.1", "--gm", "1.3", "--gm", "1.6", "--json")
+    found = json.loads(done.stdout)
+    assert json.loads((tmp_path / "filling.json").read_text()) == found
+    assert (tmp_path / "filling.png").stat().st_size > 20_000
+    rows = found["fillings"]
+    assert [round(row["displacement_t"]) for row in rows[::3]] == [1615, 1900, 2185]
+    own = rows[3:6]
+    for row in own:
+        # rho g At L^2 / 2 over the weight, whatever the level
+        assert row["gm_loss_m"] == pytest.approx(8 * 7**2 / 2 / 1900, rel=1e-3)
+        period_s = 2 * math.pi * math.sqrt((2 * row["level_m"] + 7 * 8 / 1.9) / 2 / 9.80665)
+        assert row["water_period_s"] == pytest.approx(period_s, rel=1e-6)
+        assert row["roll_period_s"] == pytest.approx(9.5 * math.sqrt(0.9 / row["gm_m"]), rel=1e-6)
+        assert row["passive_rad"] < row["without_tank_rad"]
+    levels = [row["level_m"] for row in own]
+    assert levels == sorted(levels, reverse=True)  # a stiffer ship rolls faster
+    assert [row["tuned"] for row in own] == [True, True, False]
+    assert levels[0] > 2 * levels[1]
+
+
+def test_filling_says_what_the_file_lacks_and_takes_no_other_sign(tmp_path: Path):
+    lacks = run("filling", FIRST, "--out", tmp_path)
+    assert lacks.exit_code == 1
+    assert "ship.displacement_t is needed" in lacks.stderr
+    open_tank = filled(tmp_path, headroom=".inf")
+    assert "tank.headroom_m is needed" in open_tank.stderr
+    assert "--gm: must be above 0" in filled(tmp_path, "--gm", "-1").stderr
+    table = filled(tmp_path, "--gm", "0.9", "--displacement", "1900").stdout
+    assert "1.70 m in the file" in table

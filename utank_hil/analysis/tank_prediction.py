@@ -150,7 +150,7 @@ def roll_curves(plant: DesignPlant, sea: SeaState, law: TunedLaw | None) -> Roll
 def predict_roll(plant: DesignPlant, sea: SeaState, *, pump: bool = True) -> RollPrediction:
     """Predict the roll of a ship without, with a passive and, given a pump, an active tank."""
     waves = sea.wave_moment
-    without = _without_tank(plant, waves)
+    without = roll_without_tank(plant, waves)
     passive = motion_in_sea(None, at_its_motion(None, plant, (), waves), (), waves)
     if not pump:
         return RollPrediction(without, passive, None, None, None, "there is no pump")
@@ -191,7 +191,7 @@ def loading_sensitivity(
         points.append(
             LoadingPoint(
                 scale,
-                _without_tank(loaded, waves),
+                roll_without_tank(loaded, waves),
                 motion_in_sea(None, at_its_motion(None, loaded, (), waves), (), waves).roll_rms_rad,
                 active,
             )
@@ -212,7 +212,7 @@ def _active(
     return motion_in_sea(law, at_its_motion(law, plant, measured, waves), measured, waves)
 
 
-def _without_tank(plant: DesignPlant, waves: Harmonics) -> float:
+def roll_without_tank(plant: DesignPlant, waves: Harmonics) -> float:
     """Roll RMS of the ship alone."""
     bare = at_its_motion(None, replace(plant, tank=negligible(plant.tank)), (), waves).ship
     return rms(roll_response_without_tank(bare, waves.frequency_rad_s), waves)

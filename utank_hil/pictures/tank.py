@@ -1,16 +1,15 @@
 """Picture of a tank for a ship: roll in waves, other loadings."""
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from utank_hil.analysis.tank_filling import Filling
 from utank_hil.analysis.tank_prediction import LoadingPoint, RollCurves
 from utank_hil.pictures.style import BELOW, COLORS, DASHES, WIDEST_IN, picture
-
-if TYPE_CHECKING:
-    pass
 
 _NAMES = ("without tank", "passive tank", "active tank")
 
@@ -47,4 +46,29 @@ def draw_tank(
         loading.set_xlabel("Roll period, times the ship's: tank and law as they are")
         loading.set_ylabel("Roll RMS in the sea (°)")
         figure.legend(*waves.get_legend_handles_labels(), **BELOW)
+    return path
+
+
+def draw_filling(
+    found: Sequence[Filling], path: Path, title: str, about: Mapping[str, Any] | None = None
+) -> Path:
+    """Draw the best still level and the roll that it leaves over GM, a curve per displacement."""
+    with picture(path, title, (WIDEST_IN, 4.6), about) as figure:
+        levels, rolls = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2)
+        loads = dict.fromkeys(each.displacement_t for each in found)
+        for load_t, color, dash in zip(loads, cycle(COLORS), cycle(DASHES)):
+            here = [each for each in found if each.displacement_t == load_t]
+            gm_m, label = [each.gm_m for each in here], f"{load_t:.5g} t"
+            style: dict[str, Any] = {
+                "color": color,
+                "linestyle": dash,
+                "marker": "o",
+                "label": label,
+            }
+            levels.plot(gm_m, [each.level_m for each in here], **style)
+            rolls.plot(gm_m, [100 * each.passive_below_no_tank for each in here], **style)
+        levels.set(xlabel="GM, solid (m)", ylabel="Still level above the duct (m)")
+        rolls.set(xlabel="GM, solid (m)", ylabel="Roll below no tank, passive (%)")
+        levels.set_ylim(bottom=0)
+        figure.legend(*levels.get_legend_handles_labels(), **BELOW)
     return path
