@@ -22,6 +22,7 @@ from tools.reference_recordings.cases import (
     compare,
     record,
 )
+from utank_hil.analysis.loop.margins import margins
 from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.canbus import (
     ControllerStatus,
@@ -33,6 +34,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control.constrained.design import ConstrainedDesign
+from utank_hil.dynamics.linear import pump_model
 from utank_hil.telemetry.frame_log import FrameLog, Kind
 from utank_hil.telemetry.law_values import decoded, encoded, law_values
 from utank_hil.telemetry.replay import RecordedRetuner, entries_of, replay, replay_log
@@ -106,6 +108,18 @@ def test_a_recorded_law_answers_for_itself_and_today_s_design_is_judged_beside()
     (gains,) = (each for each in law.differences if each.name.startswith("gains"))
     assert gains.deviation == law.deviation == pytest.approx(1e-3, rel=2e-3)
     assert law.deviation > DESIGN_BOUND
+    assert law.loops is not None
+    before, now = (np.array(each) for each in law.loops)
+    np.testing.assert_allclose(before, now, rtol=0.01)  # A thousandth of gain does as little.
+    assert (abs(before - now) > 1e-5 * now).all()
+    assert 0.4 < now[0] < 0.8
+    with recorded_config(log.head) as config:
+        linear = build_law(config).linear
+        plant = config.design_plant
+        model = pump_model(plant.ship, plant.tank, build_law(config).measured)
+        own = margins(linear, model, plant.delay_s, plant.lag_s, with_delay_margin=False)
+    expected = own.peak_sensitivity, own.gain_high, own.phase_margin_rad
+    assert now[1:] == pytest.approx(expected, rel=1e-5)
 
 
 @pytest.mark.slow

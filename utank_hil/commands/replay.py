@@ -7,11 +7,12 @@ from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import typer
 
 from utank_hil.assembly import build_law
+from utank_hil.base.finite import finite
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import kernels, machine
 from utank_hil.configuration.controller import ControllerConfig
@@ -21,7 +22,8 @@ from utank_hil.console.terminal import Terminal, say_note
 from utank_hil.telemetry.bus_files.log import BusLog
 from utank_hil.telemetry.bus_logs import LoggedController
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
-from utank_hil.telemetry.replay import ExplainedTick, LawVerdict, Number, ReplayResult, replay_log
+from utank_hil.telemetry.law_verdict import LawVerdict
+from utank_hil.telemetry.replay import ExplainedTick, Number, ReplayResult, replay_log
 from utank_hil.telemetry.replay import replay as run_replay
 from utank_hil.telemetry.replay_head import ReplayHeadError, few, recorded_config
 
@@ -165,6 +167,12 @@ def _print_numbers(console: Terminal, numbers: list[Number]) -> None:
             )
 
 
+_LOOP: Final = (
+    "predicted roll over that of the passive tank", "peak sensitivity", "gain margin",
+    "phase margin, rad",
+)  # fmt: skip
+
+
 def _print_law(console: Terminal, law: LawVerdict) -> None:
     if law.why_not_recorded:
         console.say(f"the law designed here answered: {law.why_not_recorded}")
@@ -175,6 +183,11 @@ def _print_law(console: Terminal, law: LawVerdict) -> None:
     console.say(f"the law designed here is not the recorded one{size}:")
     for line in few([str(each) for each in law.differences]):
         console.say(f"  {line}")
+    if law.loops is None:
+        return
+    for name, before, now in zip(_LOOP, *law.loops, strict=True):
+        apart = 0.0 if before == now else now / before - 1
+        console.say(f"  {name}: recorded {before:.6g}, designed here {now:.6g}, {apart:+.1e} of it")
 
 
 def _law_as_json(law: LawVerdict) -> dict[str, Any]:
@@ -183,6 +196,7 @@ def _law_as_json(law: LawVerdict) -> dict[str, Any]:
         "recorded_law_ran": not law.why_not_recorded,
         "why_not": law.why_not_recorded,
         "same_design": not law.differences,
+        "loops": law.loops and finite([each._asdict() for each in law.loops]),
         "differences": [
             asdict(each) | {"deviation": each.deviation if math.isfinite(each.deviation) else None}
             for each in law.differences

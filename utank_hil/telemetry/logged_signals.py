@@ -35,7 +35,7 @@ _NAMES: Final = {
     ("PASSIVE_TWIN", "twin_rms_rad"): "twin_roll_rms_rad",
     ("PASSIVE_TWIN", "roll_rms_rad"): "roll_rms_rad",
 }  # Signals with the name of a telemetry column; others are named after their message.
-_PART: Final = 1 << 15  #: Number of ticks that are decoded at once.
+_PART: Final = 1 << 14  #: Number of ticks that are decoded at once.
 
 
 class _Heard:

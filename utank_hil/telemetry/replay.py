@@ -24,7 +24,8 @@ from utank_hil.retuning.answer import Answer, read_answer
 from utank_hil.retuning.retuner import Request
 from utank_hil.runners import LoopStatistics
 from utank_hil.telemetry.frame_log import LAYOUT, PAYLOAD_BYTES, FrameLog, Kind, Records
-from utank_hil.telemetry.law_values import ValueDifference, Values, differences, law_values
+from utank_hil.telemetry.law_values import Values, differences, law_values
+from utank_hil.telemetry.law_verdict import LawVerdict, law_verdict
 from utank_hil.telemetry.replay_head import causes, law_differences, recorded_law
 
 NONE: Final = "none"
@@ -161,20 +162,6 @@ class ReplayResult:
         return self.first is None
 
 
-@dataclass(frozen=True, slots=True)
-class LawVerdict:
-    """The law that answered recorded frames, and its distance from the one designed today."""
-
-    why_not_recorded: str  #: Why the law designed here answered; empty if the recorded one did.
-    #: Differences between the recorded law and the one designed here; they fail no replay.
-    differences: list[ValueDifference]
-
-    @property
-    def deviation(self) -> float:
-        """Largest relative deviation in any array of the design; 0 if the designs are equal."""
-        return max((each.deviation for each in self.differences), default=0.0)
-
-
 class ReplayedLog(NamedTuple):
     """A replayed log: the result, other differences from the recording, and the law."""
 
@@ -246,11 +233,10 @@ def replay_log(
     If `config` is the recorded one (`as_recorded`), the recorded law runs if possible, else that of
     `config`.
     """
-    law = build_law(config)
-    differences = law_differences(log.head, law)
+    law = designed = build_law(config)
     why_not = "another configuration was named"
     if as_recorded or isinstance(config.law, PythonDesign):
-        law, why_not = recorded_law(log.head, config, law)
+        law, why_not = recorded_law(log.head, config, designed)
     result = replay(
         entries_of(log.blocks()),
         config,
@@ -260,7 +246,9 @@ def replay_log(
         commissioned=log.head.get("commissioned", True),
         explained=explained,
     )
-    return ReplayedLog(result, causes(log.head, config, folder), LawVerdict(why_not, differences))
+    apart = law_differences(log.head, designed)
+    verdict = law_verdict(law, designed, config, why_not, apart)
+    return ReplayedLog(result, causes(log.head, config, folder), verdict)
 
 
 def replay(
