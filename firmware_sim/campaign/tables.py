@@ -25,7 +25,7 @@ def runs_table(groups: list[dict[str, Any]], title: str) -> Table:
     power = _power(groups)
     marked = any(run["marked"] for group in groups for run in group["runs"].values())
     figures = (
-        "cases", "roll\nRMS °", "below\npassive %", "max.\nroll °", "level\npeak m",
+        "cases", "roll\nRMS °", "below\npassive %", "max.\nroll °", "level\npeak\nm",
         f"power\n{power[1]}", *(["not\ncounted"] if marked else []),
     )  # fmt: skip
     caption = "mean ± 95 % of the mean"
@@ -34,7 +34,7 @@ def runs_table(groups: list[dict[str, Any]], title: str) -> Table:
         for run, found in group["runs"].items():
             marks = [f"{count} {mark}" for mark, count in found["marked"].items()]
             worst = found["worst"]["roll_max_rad"]
-            passive = "" if run == "passive" else interval(found["roll_below_passive"], 100, 1)
+            passive = "" if run == "passive" else interval(found["roll_below_passive"], 100, 0)
             table.add_row(
                 run,
                 *(_short(value) for value in group["parameters"].values()),
@@ -84,7 +84,7 @@ def _power(groups: list[dict[str, Any]]) -> tuple[float, str]:
         for run, found in group["runs"].items()
         if run != NO_TANK
     ]
-    return (1e-6, "mean MW") if max(means, default=0.0) >= 1e6 else (1e-3, "mean kW")
+    return (1e-6, "mean\nMW") if max(means, default=0.0) >= 1e6 else (1e-3, "mean\nkW")
 
 
 def _short_keys(groups: list[dict[str, Any]]) -> list[str]:

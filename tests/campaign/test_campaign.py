@@ -1,6 +1,7 @@
 """The command and its workers: killed ones change nothing, and what is there is not done again."""
 
 import importlib
+import io
 import json
 import multiprocessing
 import os
@@ -10,13 +11,15 @@ from pathlib import Path
 import pytest
 import yaml
 from one_process import in_one_process
+from rich.console import Console
+from rich.measure import Measurement
 from studies import small, written
 from typer.testing import CliRunner, Result
 
 from firmware_sim.campaign.driver import Count, Driver, batch_of
 from firmware_sim.campaign.simulations import LOST, OK, Batch, Row, run_batch
 from firmware_sim.campaign.store import Store, read_results
-from firmware_sim.campaign.tables import pairs_table
+from firmware_sim.campaign.tables import pairs_table, runs_table
 from firmware_sim.commands.campaign import campaign
 from utank_hil.console.common import new_app
 from utank_hil.console.exit_codes import ExitCode
@@ -190,3 +193,20 @@ def test_entry_point_is_the_command():
     module, name = points["utank_hil.commands"]["campaign"].split(":")
     assert getattr(importlib.import_module(module), name) is campaign
     assert yaml.safe_load(Path("configs/studies/storm_seeds.yaml").read_text())["name"]
+
+
+def test_a_campaign_over_one_key_is_a_table_of_80_columns() -> None:
+    """Narrower than a terminal it is a list, in which nothing can be compared."""
+    one = {"mean": 0.09, "half_width": 0.05, "cases": 3}
+    figures = {
+        "marked": {},
+        "worst": {"roll_max_rad": 0.4},
+        "roll_rms_rad": one,
+        "roll_below_passive": {**one, "mean": 0.299, "half_width": 0.369},
+        "level_peak_m": one,
+        "power_mean_w": {**one, "mean": 25.1e3},
+    }
+    group = {"parameters": {"sea.tp_s": 9.5}, "runs": {"no tank": figures, "self_tuned": figures}}
+    console = Console(width=80, file=io.StringIO())
+    wide = Measurement.get(console, console.options.update(max_width=1000), runs_table([group], ""))
+    assert wide.maximum <= 80

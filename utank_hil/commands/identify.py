@@ -257,7 +257,7 @@ def identify_log(
         if value is not None and not math.isfinite(value):
             common.fail(f"{option} must be a number of seconds, got {value}")
     loaded = common.load(config, ControllerConfig, allow_code=True)  # Code is refused, not run.
-    task = _task(loaded, order)
+    task = _task(config, loaded, order)
     content = read_controller(config)
     out = common.prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
     measured = task.design.predictor.measured
@@ -297,7 +297,7 @@ def identify_log(
         raise typer.Exit(ExitCode.REFUSED)
 
 
-def _task(config: ControllerConfig, order: int | None) -> RetuningTask:
+def _task(file: Path, config: ControllerConfig, order: int | None) -> RetuningTask:
     settings = config.retuning
     if order is None:
         order = 120 if settings is None else settings.order
@@ -305,7 +305,7 @@ def _task(config: ControllerConfig, order: int | None) -> RetuningTask:
     try:
         return retuning_task(config, order, period_range_s)
     except ValueError as error:
-        common.fail(error)
+        common.fail(f"{file}: {error}")
 
 
 class _LogUnlessNamed(TyperGroup):
