@@ -117,8 +117,7 @@ def test_a_tank_of_quadratic_loss_is_compared_at_the_level_of_its_pump(tmp_path:
 OWN = """\
 name: own
 ship: {displacement_t: 1900, gm_m: 0.9, roll_period_s: 9.5, damping_ratio: 0.05}
-tank: {width_m: 7, height_m: 1.7, reservoir_area_m2: 8, duct_area_m2: 1.9, damping_ratio: 0.1,
-  headroom_m: HEADROOM}
+tank: {width_m: 7, height_m: 1.7, reservoir_area_m2: 8, duct_area_m2: 1.9, damping_ratio: 0.1ROOF}
 """
 STILL = """\
 name: light sea
@@ -130,8 +129,8 @@ settle_s: 60
 """
 
 
-def filled(folder: Path, *options: str, headroom: str = "1.7"):
-    (folder / "own.yaml").write_text(OWN.replace("HEADROOM", headroom))
+def filled(folder: Path, *options: str, roof: str = ",\n  headroom_m: 1.7"):
+    (folder / "own.yaml").write_text(OWN.replace("ROOF", roof))
     (folder / "scenario.yaml").write_text(STILL)
     return run("filling", folder / "own.yaml", "--out", folder, *options)
 
@@ -159,9 +158,9 @@ def test_filling_follows_the_roll_period_until_the_tank_ends(tmp_path: Path):
 
 def test_filling_says_what_the_file_lacks_and_takes_no_other_sign(tmp_path: Path):
     lacks = run("filling", FIRST, "--out", tmp_path)
-    assert lacks.exit_code == 1
+    assert lacks.exit_code == 2
     assert "ship.displacement_t is needed" in lacks.stderr
-    open_tank = filled(tmp_path, headroom=".inf")
+    open_tank = filled(tmp_path, roof="")
     assert "tank.headroom_m is needed" in open_tank.stderr
     assert "--gm: must be above 0" in filled(tmp_path, "--gm", "-1").stderr
     table = filled(tmp_path, "--gm", "0.9", "--displacement", "1900").stdout
