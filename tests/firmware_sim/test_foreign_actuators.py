@@ -286,16 +286,21 @@ def test_a_panel_with_the_key_arms_and_its_recording_does_not(theirs, tmp_path):
     station = armed(prover(theirs, tmp_path))
     recorded = list(station.recorded)
     another = prover(theirs, tmp_path)
-    another.thief = recorded
+    another.thief = list(recorded)
     another.to(7.9)
     assert another.mode is Mode.STANDBY
     assert another.bench.node.inbox.panel.refused > 3
     # nor does it later in the same run
+    panel = station.bench.node.inbox.panel
+    assert panel.proved
     station.keys["ARM"] = 0
     station.to(10)
+    assert not panel.proved
     station.thief = recorded[-60:]
     station.to(15.9)
     assert station.mode is not Mode.ACTIVE
+    assert not panel.proved
+    assert panel.refused > 3
 
 
 def test_without_the_key_it_stops_and_does_not_arm(theirs, tmp_path):

@@ -55,6 +55,7 @@ class ProfiledPanel(ProfiledDevice[OperatorCommand]):
         self.nonce = os.urandom(PROOF)  #: The challenge; the next follows from it by the key.
         self.proved = plan.authentication is None
         self.refused = 0  #: Proofs that were wrong.
+        self._arms = self._asked = False
         if plan.authentication is not None:
             for can_id in plan.authentication.proof_ids:
                 hear(self.takes, can_id, self._take_proof)
@@ -81,8 +82,10 @@ class ProfiledPanel(ProfiledDevice[OperatorCommand]):
             order = _order(values)
             self.overhear(order)
             self._said = frame.data
-            if not order.arm and self.plan.authentication is not None:
+            if not order.arm and self._arms and self.plan.authentication is not None:
                 self.proved = False
+                self._renew()  # what was said for it and not used is worth nothing
+            self._arms = order.arm
         super()._take(message, frame, now_ns)
 
     def _take_proof(self, frame: Frame, now_ns: int) -> None:
@@ -92,16 +95,23 @@ class ProfiledPanel(ProfiledDevice[OperatorCommand]):
         self._tried_ns = now_ns
         if compare_digest(cmac(self._key, self.nonce + self._said)[:PROOF], frame.data):
             self.proved = True
-            self.nonce = cmac(self._key, self.nonce)[:PROOF]
+            self._renew()
         else:
             self.refused += 1
 
     def wake(self, now_ns: int) -> Frame | None:
         """What is to be sent to it: the challenge, where it has to be met."""
         authentication = self.plan.authentication
-        if authentication is not None and self.named:
-            return Frame(authentication.challenge_id, self.nonce)
-        return super().wake(now_ns)
+        if authentication is None or not self.named:
+            return super().wake(now_ns)
+        if self._asked:
+            self._renew()
+        self._asked = True
+        return Frame(authentication.challenge_id, self.nonce)
+
+    def _renew(self) -> None:
+        """Take the next challenge: only who has the key knows it beforehand."""
+        self.nonce = cmac(self._key, self.nonce)[:PROOF]
 
     def _content(self, usable: bool) -> tuple[Any, ...] | None:
         if not usable:
