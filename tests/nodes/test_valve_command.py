@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from utank_hil.canbus import (
     Quality,
     SensorMotion,
     SensorPump,
+    SensorTank,
     ValveCommand,
     ValveControl,
     ValveFault,
@@ -344,6 +346,22 @@ def test_the_last_frames_of_the_controller_send_the_valve_to_its_fail_position()
     assert bench.pressure_pa == 0
 
 
+@pytest.mark.parametrize("rate_m_s", [-0.4, 0.01, 0.4])
+def test_the_valve_holds_water_back_by_one_implicit_step_of_its_loss(rate_m_s: float) -> None:
+    bench = throttling()
+    commander = bench.node.actuators.valve
+    assert commander is not None
+    measured = bench.node.inbox.snapshot(bench.now_ns)
+    # water of inertia m slowed by c |r0| r, from r0 for one gauge cycle, Euler backwards: r1
+    inertia = TANK.density_kg_m3 * TANK.effective_length_m
+    damping = commander.applied_loss(measured) * abs(rate_m_s)
+    cycle_s = CATALOGUE.codec(SensorTank).cycle_ns * 1e-9
+    after_m_s = rate_m_s / (1 + damping * cycle_s / inertia)
+    taken_pa = (rate_m_s - after_m_s) * inertia / cycle_s
+    assert commander.held_pa(measured, rate_m_s) == pytest.approx(taken_pa, rel=1e-9)
+    assert abs(taken_pa) > 1.0
+
+
 def test_the_level_is_observed_with_what_the_valve_holds_back(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -423,3 +441,17 @@ def test_a_valve_that_stands_anywhere_when_the_controller_starts_is_no_fault(
     bench.run(1000)
     off = bench.node.safety.situation.own.valve.off_ms
     assert off == 0.0 if opening == 1.0 else off > 300
+
+
+def test_with_a_drive_of_another_maker_the_last_frames_stop_both() -> None:
+    bench = throttling()
+    stops = Frame(0, bytes((2, 5)))
+    actuators = bench.node.actuators
+    actuators.command_pa = 5e3
+    actuators.drive = SimpleNamespace(stop=lambda: [stops])
+    first, *rest = actuators.stop()
+    assert first is stops
+    assert len(rest) == 1
+    bench.hear(rest)
+    assert bench.control is ValveControl.FAIL_POSITION
+    assert actuators.command_pa == 0

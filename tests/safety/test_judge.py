@@ -118,3 +118,11 @@ def test_a_motion_sensor_that_is_silent_is_left_for_one_that_is_not(
     assert judgement.motion == used
     assert safety.situation.motion.roll_rad == motions[used].roll_rad
     assert safety.situation.motion_spare_age_ms == motions[1 - used].age_ms
+
+
+def test_the_second_motion_sensor_is_left_for_the_first_one_that_is_back() -> None:
+    safety, used = Safety(SafetyLimits(), 250_000), []
+    for first_ms, second_ms in ((1e9, 0.0), (0.0, 0.0), (0.0, 1e9), (0.0, 0.0)):
+        motions = MotionSample(0.1, age_ms=first_ms), MotionSample(0.2, age_ms=second_ms)
+        used.append(safety.judge(replace(MEASURED, motions=motions), OWN).motion)
+    assert used == [1, 1, 0, 0]
