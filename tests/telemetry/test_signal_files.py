@@ -45,6 +45,14 @@ def test_units_are_read_from_the_names(tmp_path: Path) -> None:
     np.testing.assert_allclose(found["pressure_actual_pa"], [5e4, -5e4])
 
 
+def test_a_name_of_a_column_that_is_no_text_is_refused_with_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "a.parquet"
+    parquet.write_table(pyarrow.table({"roll_rad": [0.0]}), file, store_schema=False)
+    file.write_bytes(file.read_bytes().replace(b"roll_rad", b"roll_\xf2ad"))
+    with pytest.raises(ValueError, match=r"a\.parquet: is no Parquet file that can be read"):
+        read_signals(file)
+
+
 def test_a_table_of_too_many_values_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -288,7 +288,7 @@ def _read_parquet(path: Path, note: Callable[[str], None] | None) -> Iterator[_C
             if file.metadata.num_rows * len(numbers) > VALUES_LIMIT:
                 raise more_values(path)
             table = file.read(columns=numbers)
-    except (pyarrow.ArrowException, OSError) as error:
+    except (pyarrow.ArrowException, OSError, UnicodeError) as error:
         raise TextFileError(f"{path}: is no Parquet file that can be read: {error}") from error
     for field, column in zip(table.schema, table.columns, strict=True):
         if types.is_timestamp(field.type):
