@@ -48,9 +48,9 @@ class Gusts(Section):
     def speed_density(self, frequency_hz: FloatArray) -> FloatArray:
         """Spectral density of the wind's speed in m^2/s^2 per Hz."""
         mean, height = self.mean_speed_m_s / 10, self.height_m / 10
-        scale = 172 * math.pow(height, 2 / 3) * math.pow(mean, -0.75)
+        scale = 172 * exp(2 / 3 * log(height) - 0.75 * log(mean))
         shape = _power(1 + _power(scale * frequency_hz, _N), 5 / (3 * _N))
-        return 320 * mean * mean * math.pow(height, 0.45) / shape
+        return 320 * mean * mean * exp(0.45 * log(height)) / shape
 
     def admittance(self, frequency_hz: FloatArray) -> FloatArray:
         """Share of a gust that acts on the whole windage."""
@@ -65,7 +65,7 @@ class Gusts(Section):
         A component's frequency is drawn in a band of its own, all bands as wide in proportion.
         """
         low, high = BAND_HZ
-        ratio = math.log(high / low) * np.arange(COMPONENTS + 1) / COMPONENTS
+        ratio = log(high / low) * np.arange(COMPONENTS + 1) / COMPONENTS
         edges = low * each(exp, ratio)
         within, phase = uniform_numbers(seed, (2, COMPONENTS))
         width = np.diff(edges)

@@ -93,6 +93,7 @@ def test_a_run_in_real_time_is_replayed_bit_for_bit(folder: Path) -> None:
     assert found["causes"] == []
     assert found["law"] == {
         "recorded_law_ran": True, "why_not": "", "same_design": True, "differences": [],
+        "loops": None,
     }  # fmt: skip
     assert found["ticks"] > 200
     assert found["frames"] > found["ticks"] / 2

@@ -180,7 +180,7 @@ def test_table_says_what_was_found_beside_the_truth_and_the_json_the_same() -> N
     table = retuning_table(bench_figures(result))
     dpc, gpc = zip(*(column.cells for column in table.columns), strict=True)
     assert dpc == (
-        "dpc", "210", "1.15", "0.57", "50.0%", "7.600 ± 0.076 / 7.500", "49.00 / 48.19",
+        "dpc", "210", "1.15", "0.57", "50%", "7.600 ± 0.076 / 7.500", "49.00 / 48.19",
         "0.1100 / 0.1000", "RETUNED", "ordered",
     )  # fmt: skip
     assert gpc[:-1] == ("gpc", "", "1.15", "", "", "", "", "", "REFUSED")

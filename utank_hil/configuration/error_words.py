@@ -69,8 +69,8 @@ def _members(place: Any) -> dict[str, Any]:
     """Return the annotations of a section's keys, without the marks on them."""
     if get_origin(place) in (Union, UnionType):
         return {name: hint for kind in get_args(place) for name, hint in _members(kind).items()}
-    if isinstance(place, type) and issubclass(place, BaseModel):
-        return {field.alias or name: field.annotation for name, field in place.model_fields.items()}
+    if model_fields := getattr(place, "model_fields", None):  # of pydantic
+        return {field.alias or name: field.annotation for name, field in model_fields.items()}
     if isinstance(place, type) and is_dataclass(place):
         hints = get_type_hints(place)
         return {field.name: hints[field.name] for field in fields(place) if field.init}

@@ -279,5 +279,5 @@ def bearable(pulses: Pulses, roll_rad: float) -> float:
 
     Waves and pulses are independent, so mean squares add up.
     """
-    added_rad = math.sqrt(MOST_ADDED**2 - 1) * max(LEAST_ROLL_RAD, roll_rad)
+    added_rad = math.sqrt(MOST_ADDED * MOST_ADDED - 1) * max(LEAST_ROLL_RAD, roll_rad)
     return min(1.0, added_rad / max(pulses.roll_rad, 1e-12))
