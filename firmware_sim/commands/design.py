@@ -31,17 +31,18 @@ GMS = (0.6, 0.8, 1.0, 1.2, 1.4, 1.6)
 DISPLACEMENTS = (0.85, 1.0, 1.15)
 """Loadings that filling is advised for by default, over those of the file."""
 
+SeaOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Scenario whose sea counts.", show_default="scenario.yaml beside, or a shipped one"
+    ),
+]
+
 
 def tank(
     context: typer.Context,
     vessel: Annotated[Path, typer.Argument(help="Ship, tank and pump: a file of configs/ships.")],
-    scenario: Annotated[
-        Path | None,
-        typer.Option(
-            help="Scenario whose sea counts.",
-            show_default="scenario.yaml beside, or a shipped one",
-        ),
-    ] = None,
+    scenario: SeaOption = None,
     out: Annotated[Path, typer.Option(help="Folder for pictures and figures.")] = OUT,
     json_: Json = False,
 ) -> None:
@@ -118,13 +119,7 @@ def tank(
 def filling(
     context: typer.Context,
     vessel: Annotated[Path, typer.Argument(help="Ship with displacement, and tank with roof.")],
-    scenario: Annotated[
-        Path | None,
-        typer.Option(
-            help="Scenario whose sea counts.",
-            show_default="scenario.yaml beside, or a shipped one",
-        ),
-    ] = None,
+    scenario: SeaOption = None,
     gm: Annotated[
         list[float] | None,
         typer.Option(help="GM without the tank's free surface, in m; may be given again."),
