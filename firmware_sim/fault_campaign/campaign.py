@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from firmware_sim.fault_injection.fault import FaultSpan, FaultTime
 from firmware_sim.fault_injection.kinds import AnyFault
@@ -68,6 +68,7 @@ class Setup(Section):
     least_gm_m: Positive | None = None
     sea_estimate: EstimateSettings | None = None  #: Settings that replace the controller's.
     devices: DevicesSection | None = None  #: Devices that replace the vessel's.
+    delay_s: Positive | None = None  #: Delay that the law is made for, instead of its own.
     commissioned: bool = True  #: Whether the controller may be armed.
 
     @property
@@ -85,7 +86,11 @@ class Setup(Section):
         )
         controllers = {
             name: config.model_copy(
-                update={"vessel": vessel, "sea_estimate": self.sea_estimate or config.sea_estimate}
+                update={
+                    "vessel": vessel,
+                    "sea_estimate": self.sea_estimate or config.sea_estimate,
+                    "delay_s": self.delay_s or config.delay_s,
+                }
             )
             for name, config in scenario.controllers.items()
         }
@@ -110,6 +115,7 @@ class Setup(Section):
         names = list(self.scenario.controllers)
         if self.controller not in names:
             refuse("", [("controller", f"must be one of {', '.join(names)}")])
+        refuse("", self.config.late_problems())
         return self
 
 
@@ -199,6 +205,23 @@ class Row(Section):
         return self.fault.followed_s > LONG_S
 
 
+def _each_setup(rows: Any) -> Any:
+    """Append a copy of a row for each further setup of a list; names begin with the setup's."""
+    further: list[Any] = []
+    first: list[Any] = []
+    for row in rows if isinstance(rows, list) else ():
+        fault = row.get("fault") if isinstance(row, dict) else None
+        names = fault.get("setup") if isinstance(fault, dict) else None
+        if fault and isinstance(names, list) and names:
+            row, *others = (
+                row | {"id": f"{name}-{row.get('id')}", "fault": fault | {"setup": name}}
+                for name in names
+            )
+            further += others
+        first.append(row)
+    return first + further if first else rows
+
+
 class Campaign(Section):
     """Requirements and rows."""
 
@@ -207,7 +230,8 @@ class Campaign(Section):
     arm_s: FaultTime  #: Time at which the operator arms.
     setups: dict[str, Setup]
     requirements: tuple[Requirement, ...]
-    rows: tuple[Row, ...]
+    #: `setup` of a fault may be a list: a row for each, named by it (`sbg-silent`).
+    rows: Annotated[tuple[Row, ...], BeforeValidator(_each_setup)]
 
     @model_validator(mode="after")
     def _consistent(self) -> "Campaign":

@@ -5,6 +5,7 @@ import re
 import struct
 
 import cantools
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,7 +15,7 @@ from others import others_file
 from utank_hil.canbus import Frame, Quality, Rejection, SensorMotion, SensorTank, Switch
 from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.device import HeardMessage, ProfiledDevice, Stamp
-from utank_hil.canbus.profiles.device_plan import Crc8
+from utank_hil.canbus.profiles.device_plan import SLOPE_S, Crc8
 from utank_hil.canbus.profiles.field import Field
 from utank_hil.configuration.devices import DevicesSection
 
@@ -375,6 +376,18 @@ def test_a_derived_rate_is_the_slope_of_the_roll():
     assert isinstance(heard[-1][1], SensorMotion)
     assert heard[-1][1].roll_rad == pytest.approx(math.radians(1.4))
     assert heard[-1][1].roll_rate_rad_s == pytest.approx(math.radians(10))
+
+
+def test_a_derived_rate_has_the_noise_of_two_rolls_a_slope_apart():
+    """A slope over one cycle of 10 ms would have ten times as much, as much as a rolling ship."""
+    found, heard = device(profile="cia410", node=5)
+    noise = np.random.default_rng(3).normal(0, 2e-4, 2000)
+    for k, roll_rad in enumerate(0.1 * np.sin(0.008 * np.arange(2000)) + noise):
+        slopes = struct.pack("<hh", 0, round(math.degrees(roll_rad) * 100))
+        give(found, STANDARD | 0x185, slopes, 10 * k * MS)
+    rates = np.array([message.roll_rate_rad_s for _, message in heard[20:]])
+    motion = 0.08 * np.cos(0.008 * (np.arange(20, 2000) - 5))  # half a slope late
+    assert np.std(rates - motion) == pytest.approx(math.sqrt(2) * 2e-4 / SLOPE_S, rel=0.1)
 
 
 @given(st.binary(min_size=7, max_size=7), st.integers(0, 255))

@@ -1,5 +1,6 @@
 """Section `devices` of a ship's file: what it refuses, and what it changes."""
 
+import math
 import re
 from pathlib import Path
 
@@ -193,6 +194,20 @@ def test_a_slow_sensor_is_refused_by_the_delay_of_the_law_with_the_number(tmp_pa
     config = load_config(path, ControllerConfig)
     assert config.safety.motion_age_ms == 120
     assert config.sensor_figures.roll_rate_noise_rad_s == pytest.approx(5e-4)
+
+
+def test_a_derived_rate_costs_delay_and_noise(tmp_path):
+    """The slope over 0.1 s is 50 ms late, and has the noise of two rolls."""
+    slopes = {"profile": "cia410", "node": 5, "bus": "can1", "accept_unprotected": True}
+    ship_file(tmp_path, {"motion": slopes}, redundancy={"second_motion_sensor": True})
+    law = yaml.safe_load(Path("configs/controllers/pd.yaml").read_text()) | {"vessel": "ship.yaml"}
+    path = tmp_path / "c.yaml"
+    path.write_text(yaml.safe_dump(law | {"delay_s": 0.05}))
+    with pytest.raises(ConfigError, match=r"a derived rate 80 ms late.*bears 50: set delay_s"):
+        load_config(path, ControllerConfig)
+    path.write_text(yaml.safe_dump(law | {"delay_s": 0.08}))
+    figures = load_config(path, ControllerConfig).sensor_figures
+    assert figures.roll_rate_noise_rad_s == pytest.approx(math.sqrt(2) * 2e-4 / 0.1)
 
 
 def test_a_ship_that_was_written_out_is_read_again(tmp_path):

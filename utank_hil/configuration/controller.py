@@ -14,6 +14,7 @@ from utank_hil.analysis.loop.sea_response import at_work, moment_of
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign, unknown_sea
 from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
 from utank_hil.base.tick import TICK_S, is_whole_ticks
+from utank_hil.canbus.profiles.device_plan import SLOPE_S
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.laws import AnyDesign, sample_time
 from utank_hil.configuration.plausibility.controller import controller_warnings
@@ -85,7 +86,7 @@ class ControllerConfig(Section):
     def _consistent(self) -> "ControllerConfig":
         problems = [*self._limit_problems(), *self._retuning_problems(), *self._law_problems()]
         problems += self._roll_problems()
-        problems += self._late_problems()
+        problems += self.late_problems()
         if self.renews and not isinstance(self.law, SelfTunedDesign):
             reason = f"is for a law of kind self_tuned, not {self.law.kind}: leave it out"
             problems.append(("sea_estimate.renew", reason))
@@ -144,9 +145,12 @@ class ControllerConfig(Section):
             ],
         }
         most = {name: max(getattr(self.sensors, name), *found) for name, found in values.items()}
+        if devices.motion.derived or devices.motion_2.derived:
+            slope_rad_s = math.sqrt(2) * most["roll_noise_rad"] / SLOPE_S
+            most["roll_rate_noise_rad_s"] = max(most["roll_rate_noise_rad_s"], slope_rad_s)
         return SensorFigures(**most)
 
-    def _late_problems(self) -> list[Problem]:
+    def late_problems(self) -> list[Problem]:
         """Problems of a motion sensor that is too slow for the delay that the law is made for."""
         devices = self.vessel.devices
         problems: list[Problem] = []
@@ -158,13 +162,15 @@ class ControllerConfig(Section):
             device = None if devices is None else devices.sensors()[role]
             if device is None or device.native or device.cycle_ms is None:
                 continue
-            late_ms = device.latency_ms + device.cycle_ms
+            late_ms = device.late_ms
             borne_ms = 1e3 * (self.delay_s + EXTRA_DELAY_S - COMMAND_S)
             if late_ms > borne_ms:
+                brings = "a derived rate" if device.derived else "roll"
+                left_ms = borne_ms - late_ms + device.cycle_ms
+                faster = f"use a sensor of {1e3 / left_ms:.3g} Hz or more, or " * (left_ms > 5)
                 reason = (
-                    f"brings roll {late_ms:g} ms late, cycle and latency, but the law is made for "
-                    f"a delay of {1e3 * self.delay_s:g} ms and bears {borne_ms:g}: use a sensor of "
-                    f"{1e3 / max(borne_ms - device.latency_ms, 1.0):.3g} Hz or more, or set "
+                    f"brings {brings} {late_ms:g} ms late, cycle and latency, but the law is made "
+                    f"for a delay of {1e3 * self.delay_s:g} ms and bears {borne_ms:g}: {faster}set "
                     f"delay_s to {late_ms * 1e-3 + COMMAND_S - EXTRA_DELAY_S:.3g} or more"
                 )
                 problems.append((f"vessel.devices.{role}.cycle_ms", reason))

@@ -11,6 +11,7 @@ from utank_hil.canbus.frame import BUS_SHIFT, LONGEST_STANDARD_ID, STANDARD, Fra
 from utank_hil.canbus.messages import OperatorCommand, SensorMotion, SensorTank, ValveStatus
 from utank_hil.canbus.profiles.device_plan import (
     FIELDS,
+    SLOPE_S,
     SWITCHES,
     Crc8,
     DevicePlan,
@@ -90,6 +91,17 @@ class DeviceSection(CanopenSection):
     def native(self) -> bool:
         """Whether it is the node of this project's own catalogue."""
         return self.profile == NATIVE
+
+    @property
+    def derived(self) -> bool:
+        """Whether the rate is the slope of the roll."""
+        return any(each.source == "derived" for each in self.signals.values())
+
+    @property
+    def late_ms(self) -> float:
+        """Delay of roll and rate: latency, cycle, and half the time of a slope."""
+        slope_ms = 1e3 * SLOPE_S if self.derived else 0.0
+        return self.latency_ms + (self.cycle_ms or 0.0) + slope_ms / 2
 
     @property
     def told(self) -> str:
@@ -292,7 +304,7 @@ class DeviceSection(CanopenSection):
             self.age_ms,
             round((guards.unchanged_ms or 0.0) * 1e6),
             math.inf if self.high_level_m is None else self.high_level_m,
-            any(each.source == "derived" for each in self.signals.values()),
+            self.derived,
             claim,
             None if silent or steps else self._wake(bus),
             bus,

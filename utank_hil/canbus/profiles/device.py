@@ -1,6 +1,7 @@
 """A device of another maker: from its frames to a measurement of the catalogue's own type."""
 
 import math
+from collections import deque
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Final, Generic
@@ -9,7 +10,14 @@ from utank_hil.canbus.endpoints import BUCKET_LIMIT, MAX_LOST, RESYNC_FRAMES, Re
 from utank_hil.canbus.enumerations import Quality, Switch
 from utank_hil.canbus.frame import Frame
 from utank_hil.canbus.messages import SensorTank
-from utank_hil.canbus.profiles.device_plan import FIELDS, Crc8, DevicePlan, MessagePlan, T
+from utank_hil.canbus.profiles.device_plan import (
+    FIELDS,
+    SLOPE_S,
+    Crc8,
+    DevicePlan,
+    MessagePlan,
+    T,
+)
 from utank_hil.canbus.profiles.field import ConditionPlan, Field, SignalPlan
 
 
@@ -124,6 +132,7 @@ STATUS_CYCLES: Final = 3  #: A status that is older by this many cycles says not
 SILENT_NS: Final = 1_000_000_000
 """A device that brings nothing for so long is woken: the time in which a node is back by itself."""
 LONG_AGO: Final = -(1 << 62)
+_SLOPE_NS: Final = round(SLOPE_S * 1e9)
 _new: Final = tuple.__new__
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _GOOD: Final = Quality.GOOD
@@ -194,7 +203,7 @@ class ProfiledDevice(Generic[T]):
         self._tank = plan.kind is SensorTank
         self._moved = False
         self._changed_ns = self._delivered_ns = LONG_AGO
-        self._last_roll_rad, self._last_ns = math.nan, 0
+        self._past: deque[tuple[int, float]] = deque()  # times and rolls, of `SLOPE_S` and before
         self.named = plan.name_id is None
         self.takes: dict[int, Take] = {}
         for message, each in zip(messages, plan.messages, strict=True):
@@ -271,15 +280,22 @@ class ProfiledDevice(Generic[T]):
         self._delivered_ns = now_ns
         values = self._values
         if self._derived:
-            rate_rad_s = (values[0] - self._last_roll_rad) / max(now_ns - self._last_ns, 1) * 1e9
-            self._last_roll_rad, self._last_ns = values[0], now_ns
-            values[1] = rate_rad_s
+            values[1] = self._slope_rad_s(values[0], now_ns)
         usable = self.named and self._changes(now_ns)
         for message in self._status:
             usable = usable and now_ns - message.good_ns <= message.old_ns
         content = self._content(usable)
         if content is not None:
             self.deliver(_new(self._kind, content), now_ns)
+
+    def _slope_rad_s(self, roll_rad: float, now_ns: int) -> float:
+        """The slope of the roll over `SLOPE_S`, or since the roll before if that is longer ago."""
+        past = self._past
+        past.append((now_ns, roll_rad))
+        while len(past) > 2 and now_ns - past[1][0] >= _SLOPE_NS:
+            past.popleft()
+        then_ns, then_rad = past[0]
+        return (roll_rad - then_rad) / (now_ns - then_ns) * 1e9 if then_ns < now_ns else math.nan
 
     def _content(self, usable: bool) -> tuple[Any, ...] | None:
         """The message's fields, of the present values; None if there is nothing to be said."""

@@ -28,6 +28,9 @@ FIELDS: Final[dict[type[tuple[Any, ...]], tuple[str, ...]]] = {
 }
 """What a device may say: of a sensor in the order of the message's fields before the quality, of a
 valve its position, of a panel what is pressed."""
+SLOPE_S: Final = 0.1
+"""Time over which a rate is derived of the roll: half of it later, with a tenth of the noise that
+two rolls 10 ms apart would give. The waves turn it by three degrees (period 6 s)."""
 SWITCHES: Final = ("port_high", "starboard_high")
 COMMANDS: Final = ("opening", "follow", "reset")
 """What a valve may be told: its opening; whether it is to follow, or go to its fail position; to
@@ -147,7 +150,7 @@ class DevicePlan(Generic[T]):
     unchanged_ns: int = 0
     #: Level above which a reservoir counts as high where there are no switches.
     high_level_m: float = math.inf
-    derived: bool = False  #: Whether the rate is the difference of two rolls.
+    derived: bool = False  #: Whether the rate is the slope of the roll over `SLOPE_S`.
     #: Identifier (priority 6) of the device's address claim, and the NAME it must carry.
     name_id: tuple[int, int] | None = None
     #: Sent each second to a device that is silent, or has not said its name: start of a CANopen
