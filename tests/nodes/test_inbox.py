@@ -111,15 +111,23 @@ class Line:
             "rejected",
             "frames",
             "foreign",
-            "_tank_lost",
-            "_cycles",
-            "_tank_due_ns",
+            "_lost",
+            "_counted",
+            "_due_ns",
         }
+        parts = (
+            self.inbox,
+            self.inbox._levels,
+            self.inbox._drive,
+            self.inbox._valve,
+            self.inbox._nodes,
+        )
         orders = self.inbox.stations.orders[Station.OPERATOR]
         return {
             **{
-                name: value
-                for name, value in vars(self.inbox).items()
+                f"{name}_{place}": value
+                for place, part in enumerate(parts)
+                for name, value in vars(part).items()
                 if name not in counts and isinstance(value, bool | int | float | Enum | None)
             },
             **{

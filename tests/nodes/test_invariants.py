@@ -307,7 +307,7 @@ def restore(table: Table) -> None:
     table.law.answer_pa = table._draw.choice((-1, 1)) * table._draw.uniform(5e3, 60e3)
     table.order_is(mode_request=Mode.STANDBY, arm=False, stop=False, reset=False, acknowledge=False)
     if conflict:  # nor is waiting for it what is tried here
-        table.node.inbox._conflict_ns = -(1 << 62)
+        table.node.inbox._nodes._conflict_ns = -(1 << 62)
     table.run(2000 if flood else 120)  # the load is that of the last whole second
     for _ in range(4):
         table.order_is(reset=True)
