@@ -15,8 +15,8 @@ from others import others_file
 from utank_hil.canbus import Frame, Quality, Rejection, SensorMotion, SensorTank, Switch
 from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.device import HeardMessage, ProfiledDevice, Stamp
-from utank_hil.canbus.profiles.device_plan import SLOPE_S, Crc8
-from utank_hil.canbus.profiles.field import Field
+from utank_hil.canbus.profiles.device_plan import SLOPE_S, Crc8, MessageEncoder, MessagePlan
+from utank_hil.canbus.profiles.field import ConditionPlan, Field
 from utank_hil.configuration.devices import DevicesSection
 
 MS = 1_000_000
@@ -135,6 +135,18 @@ def test_a_restart_loses_two_samples():
     for k in range(10, 20):
         sensor.cycle(k * 10 * MS, stamp=10_000 * k)
     assert len(heard) == before + 9
+
+
+@pytest.mark.parametrize("off_s", [60.0, 2040.0, 3600.0, 4400.0])
+def test_a_sensor_that_was_off_is_back_whatever_its_stamp_says(off_s):
+    """After 40 min of 71 a start from zero looks like a step forward, and after 71 any does."""
+    sensor, heard = ellipse()
+    for k in range(10):
+        sensor.cycle(k * 10 * MS, stamp=2_400_000_000 + 10_000 * k)
+    before = len(heard)
+    for k in range(10):
+        sensor.cycle(round((off_s * 1e3 + 10 * k) * MS), stamp=1_000_000 + 10_000 * k)
+    assert len(heard) >= before + 8
 
 
 def test_what_comes_late_is_left_out_though_it_moves_on():
@@ -390,6 +402,30 @@ def test_a_derived_rate_has_the_noise_of_two_rolls_a_slope_apart():
     assert np.std(rates - motion) == pytest.approx(math.sqrt(2) * 2e-4 / SLOPE_S, rel=0.1)
 
 
+def slopes(times_ms, roll_deg):
+    """Derived rates in degrees a second, of rolls received at these times in milliseconds."""
+    found, heard = device(profile="cia410", node=5)
+    for k, time_ms in enumerate(times_ms):
+        data = bytes(2) + round(100 * roll_deg(k)).to_bytes(2, "little", signed=True)
+        give(found, STANDARD | 0x185, data, round(time_ms * MS))
+    return [math.degrees(message.roll_rate_rad_s) for _, message in heard]
+
+
+@pytest.mark.parametrize("clock", [0.99, 1.01])
+def test_a_derived_rate_bears_that_ticks_and_the_sensor_beat(clock):
+    """Frames are read at the ticks: now and then a tick has two of them, or none."""
+    times_ms = [10 * math.ceil(0.999 * clock * k) for k in range(1000)]
+    rates = slopes(times_ms, lambda k: 0.1 * k)
+    assert rates[20:] == pytest.approx([10 / clock] * 980, rel=0.02)
+
+
+def test_a_derived_rate_reaches_over_no_silence():
+    times_ms = [*range(0, 200, 10), *range(3000, 3200, 10)]
+    rates = slopes(times_ms, lambda k: 0.0 if k < 20 else 0.1 * k)
+    assert math.isnan(rates[20])
+    assert rates[21:] == pytest.approx([10.0] * 19)
+
+
 @given(st.binary(min_size=7, max_size=7), st.integers(0, 255))
 def test_the_checksum_is_the_published_one(content, flip):
     crc = Crc8(byte=7)
@@ -423,6 +459,47 @@ def test_a_stamp_that_stands_is_seen_at_once():
     times = [0, 10, 20, 20, 30]
     passed = [stamp.passes(t.to_bytes(2, "little"), 10 * k * MS) for k, t in enumerate(times)]
     assert passed == [False, True, True, False, True]
+
+
+def test_what_is_encoded_keeps_every_condition_counter_and_stamp():
+    """Two conditions of one status, counts with a sign, a stamp that its DBC has in seconds."""
+    status = Field(0, 16, 8)
+    conditions = tuple(
+        ConditionPlan(status, mask, frozenset(allowed))
+        for mask, allowed in ((0x10, {0x10}), (0x0F, {1, 2, 4}))
+    )
+    counter, stamp = Field(16, 4, 8, signed=True, scale=0.5), Field(32, 32, 8, scale=1e-6)
+    plan = MessagePlan("m", (1,), 8, 10 * MS, (), conditions, counter, stamp=stamp)
+    encoder = MessageEncoder(plan)
+    frames = [encoder.frame((), k * 10 * MS).data for k in range(40)]
+    assert all(each.holds(data) for data in frames for each in conditions)
+    assert [counter.raw(data) % 16 for data in frames] == [k % 16 for k in range(1, 41)]
+    assert [stamp.raw(data) for data in frames] == [10_000 * k for k in range(40)]
+    missing = encoder.frame((), 0, missing=True).data
+    assert not any(each.holds(missing) for each in conditions)
+
+
+@pytest.mark.parametrize(
+    ("field", "counts"),
+    [
+        (Field(0, 8, 8), 0),
+        (Field(0, 1, 8), 0),
+        (Field(0, 8, 8, most_raw=250), 251),
+        (Field(0, 8, 8, signed=True), 0),
+        (Field(0, 8, 8, signed=True, least_raw=-127), -128),
+        (Field(0, 8, 8, signed=True, least_raw=-127, most_raw=127), -128),
+        (Field(0, 8, 8, signed=True, most_raw=126), 127),
+    ],
+)
+def test_what_is_not_available_is_the_first_count_beyond_the_values(field, counts):
+    assert field.raw(field.put(0, math.nan, 8).to_bytes(8, "little")) == counts
+
+
+@pytest.mark.parametrize("bits", [16, 32])
+def test_a_real_number_is_cut_to_what_its_bits_hold(bits):
+    field = Field(0, bits, 8, real=True, scale=1e-30)
+    value = field.value(field.put(0, -1e30, 8).to_bytes(8, "little"))
+    assert -math.inf < value < -6e-26
 
 
 def test_counter_and_stamp_may_have_a_sign():

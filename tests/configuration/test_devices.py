@@ -94,6 +94,8 @@ def test_a_change_of_a_device_voids_the_commissioning(tmp_path):
         ({"motion_2": SBG}, "second_motion_sensor: true"),
         ({"motion": SBG | {"signals": {"roll_rad": {"from": "attitude.YAW"}}}}, "is no signal"),
         ({"motion": SBG | {"signals": {"heave_m": {"from": "attitude.ROLL"}}}}, "is no value"),
+        ({"motion": SBG | {"signals": {"roll_rad": {"scale": 0}}}}, "roll_rad.scale: must not be"),
+        ({"valve": ON_OFF | {"commands": {"opening": {"scale": 0}}}}, "opening.scale: must not be"),
         ({"motion": {"bus": "can1"}}, "native nodes"),
         ({"motion": SBG, "receive_only": ["can3"]}, "no device is on can3"),
         ({"motion": SBG | {"dbc": "./none.dbc", "messages": {"a": "B"}}}, "can't be read"),

@@ -16,8 +16,10 @@ from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.canbus import Fault, Frame, Mode, OperatorCommand, load_catalogue
 from utank_hil.canbus.cmac import KeyFileError
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
+from utank_hil.canbus.profiles.acting import ProfiledPanel
 from utank_hil.configuration import load_config
-from utank_hil.configuration.devices import ROLES, DevicesSection
+from utank_hil.configuration.device_files import with_profile
+from utank_hil.configuration.devices import ROLES, DevicesSection, PanelSection
 from utank_hil.console.ship_report import print_devices
 from utank_hil.console.terminal import Terminal
 from utank_hil.nodes.commissioning.conformance import SensorTrial, ValveTrial
@@ -250,7 +252,7 @@ class Prover(Station):
 
     def __init__(self, bench, database, key=KEY):
         super().__init__(bench, database)
-        self.key, self.recorded, self.thief = key, [], None
+        self.key, self.recorded, self.thief, self.proves_all = key, [], None, False
         self.proof, self.challenge = (
             1 << BUS_SHIFT | database.get_message_by_name(name).frame_id
             for name in ("PANEL_PROOF", "PANEL_CHALLENGE")
@@ -260,7 +262,7 @@ class Prover(Station):
         frames = super().frames()
         said = [f.data for _, by, f in self.bench.sent
                 if by == "controller" and f.can_id == self.challenge]  # fmt: skip
-        if self.keys["ARM"] and said:
+        if (self.keys["ARM"] or self.proves_all) and said:
             proof = openssl_cmac(self.key, said[-1] + frames[0].data)[:8]
             frames.insert(1, Frame(self.proof, proof))
         self.recorded.append(frames)
@@ -321,6 +323,76 @@ def test_without_the_key_it_stops_and_does_not_arm(theirs, tmp_path):
     assert station.mode is Mode.STANDBY
 
 
+def test_a_key_that_was_turned_before_the_start_arms_by_no_proof(theirs, tmp_path):
+    station = prover(theirs, tmp_path)
+    station.keys["ARM"] = 1  # so it is where the controller's process starts anew
+    station.to(8)
+    assert station.bench.node.inbox.panel.proved
+    assert station.mode is Mode.STANDBY
+    station.keys["ARM"] = 0
+    armed(station, 9)
+
+
+def test_a_frame_that_disarms_is_undone_by_no_proof(theirs, tmp_path):
+    station = armed(prover(theirs, tmp_path))
+    station.keys["ARM"] = 0
+    forged = station.frames()[0]
+    station.keys["ARM"] = 1
+    station.bench.node.receive(forged, station.bench.run.now_ns)
+    station.to(14)
+    assert station.mode is not Mode.ACTIVE
+
+
+def test_a_proof_of_an_order_without_arm_lets_nobody_arm(theirs, tmp_path):
+    station = prover(theirs, tmp_path)
+    station.proves_all = True
+    station.to(3)
+    assert not station.bench.node.inbox.panel.proved
+    station.key = bytes(16)
+    station.keys["ARM"] = 1
+    station.to(8)
+    assert station.mode is Mode.STANDBY
+
+
+def test_a_stop_ends_an_arm_that_waits_for_its_proof(theirs, tmp_path):
+    station = prover(theirs, tmp_path, key=bytes(16))
+    station.to(3)
+    station.keys["ARM"] = 1
+    station.to(5)
+    station.keys["STOP_CLOSED"] = 0
+    station.to(5.5)
+    station.keys["STOP_CLOSED"], station.key = 1, KEY
+    station.to(10)
+    assert station.bench.node.inbox.panel.proved
+    assert station.mode is Mode.STANDBY
+
+
+def test_another_content_of_the_keys_identifier_presses_nothing(theirs):
+    devices = theirs(panel=PANEL)["panel"]
+    keys = with_profile(devices)["messages"]["keys"]
+    only = keys | {"only": {"from": "COUNT", "in": [1, 2]}}
+    panel = PanelSection(
+        **with_profile(devices)
+        | {"messages": {"keys": only}, "valid_when": []}
+        | {"protection": {"crcs": [{"message": "keys", "byte": 2}], "counters": ["keys.COUNT"]}}
+    )
+    device = ProfiledPanel(panel.plan(OperatorCommand, "panel", 0))
+    said = []
+    device.overhear = said.append
+    (take,) = {*device.takes.values()}
+    for count, stopped in ((1, False), (3, None), (2, True)):
+        data = bytes([0 if stopped is not False else 4, count])
+        take(Frame(0, data + bytes([crc8(data)])), 0)
+    assert [order.stop for order in said] == [False, True]
+
+
+@pytest.mark.parametrize("right", [True, False])
+def test_a_panel_with_a_key_conforms_and_one_with_another_does_not(theirs, tmp_path, right):
+    panel = authenticated(theirs, tmp_path)["panel"]
+    wrong = conformed(theirs, "panel", panel, pressed, KEY if right else bytes(16))
+    assert wrong == (set() if right else {"arm_sign"})
+
+
 @pytest.mark.parametrize(
     ("mode", "content", "words"),
     [(0o640, KEY.hex(), "chmod 600"), (0o600, "0123", "a key is 32 hexadecimal digits"),
@@ -369,10 +441,10 @@ def test_a_run_with_authentication_is_replayed_with_its_key_and_not_without(thei
         replay(tap[0], bench.config, law)
 
 
-def armed(station):
-    station.to(3)
+def armed(station, begin_s=3):
+    station.to(begin_s)
     station.keys["ARM"] = 1
-    station.to(8)
+    station.to(begin_s + 5)
     assert station.mode is Mode.ACTIVE
     return station
 
@@ -431,7 +503,7 @@ def test_the_native_panel_of_that_station_does_not_arm(theirs):
     assert bench.node.mode is Mode.STANDBY
 
 
-def conformed(theirs, role, device, moves):
+def conformed(theirs, role, device, moves, key=b""):
     """A trial of an emulated device; a person does what is asked in two seconds."""
     bench = Bench(theirs(**{role: device}))
     vessel = bench.ship.vessel
@@ -445,7 +517,7 @@ def conformed(theirs, role, device, moves):
         moves(node, what)
         return lambda: now_ns - begin_ns > 2 * SECOND_NS
 
-    trial = SensorTrial(plan, ask, 2.0)
+    trial = SensorTrial(plan, ask, 2.0, key)
     if role == "valve":
         trial = ValveTrial(plan, vessel.valve, ask, 2.0)
     own, now_ns = 1 << BUS_SHIFT, 0
@@ -529,6 +601,7 @@ class Buttons:
 
     def __init__(self, panel):
         self.frames, self.held, self.ticks = panel._frames, "", -1
+        self.proves, self.challenge = panel._proves, b""
 
     def tick(self, now_ns):
         self.ticks += 1
@@ -536,16 +609,23 @@ class Buttons:
             Mode.STANDBY, "to arm" in self.held, "ress stop" in self.held, False,
             "press acknowledge" in self.held,
         )  # fmt: skip
-        return self.frames.frames(order, now_ns, self.ticks)
+        frames = self.frames.frames(order, now_ns, self.ticks)
+        if frames and order.arm and self.challenge:
+            proof = openssl_cmac(KEY, self.challenge + frames[0].data)[:8]
+            frames.append(Frame(self.proves.proof_ids[-1], proof))
+        return frames
 
     def receive(self, frame, now_ns):
-        """Nothing."""
+        """Take the challenge."""
+        if self.proves is not None and frame.can_id == self.proves.challenge_id:
+            self.challenge = frame.data
+
+
+def pressed(buttons, what):
+    buttons.held = what
 
 
 def test_a_panel_conforms_by_its_buttons(theirs):
-    def pressed(buttons, what):
-        buttons.held = what
-
     assert conformed(theirs, "panel", PANEL, pressed) == set()
     assert conformed(theirs, "panel", PANEL, lambda *_: None) == {
         "stop_sign", "acknowledge_sign", "arm_sign"

@@ -173,7 +173,7 @@ class Line:
                     for variable in pdo.map:
                         variable.set_data(self.node.get_data(variable.index, 0))
                     pdo.transmit()
-        else:
+        elif can_id == 0 or self.node.nmt.state != "STOPPED":  # where there is no SDO, by CiA 301
             self.wire.notify(can_id, bytearray(frame.data), 0.0)
             if can_id == 0 and frame.data[0] == 1:
                 self.node.rpdo.read()

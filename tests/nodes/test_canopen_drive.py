@@ -1,5 +1,6 @@
 """A drive that canopen plays: configured, commanded, heard; what it lacks is said by name."""
 
+import math
 import re
 from itertools import pairwise
 
@@ -185,6 +186,48 @@ def test_a_drive_that_was_off_is_configured_anew_whether_its_start_was_heard_or_
     assert line.drive.setup.done
     assert line.reports[before:]
     assert line.reports[-1][0] > line.now_ns - 60 * MS
+
+
+def test_a_drive_whose_power_went_while_it_ran_is_configured_anew():
+    """What it said last is no reason to stop its node again and again: then it has no SDO."""
+    line = Line().run(400)
+    for word in (ControlWord.SHUTDOWN, ControlWord.SWITCH_ON, ControlWord.ENABLE_OPERATION):
+        line.run(4, word)
+    assert line.drive.state is DriveState.OPERATION_ENABLED
+    powered_anew(line)
+    line.wire.said.append((0x705, b"\0"))
+    follow = line.drive.follow
+
+    def commanded(target, word):
+        line.drive.follow = follow
+        frames = line.drive.command(target, word, None, 0.0)
+        line.drive.follow = commanded
+        return frames
+
+    line.drive.follow = commanded
+    line.run(400, ControlWord.DISABLE_VOLTAGE)
+    assert line.node.nmt.state == "OPERATIONAL", line.drive.words
+    assert line.reports[-1][1].state is DriveState.SWITCH_ON_DISABLED
+
+
+def test_a_drive_that_runs_on_after_stops_has_its_node_stopped():
+    line = Line().run(400)
+    line.node.sdo[0x6041].raw = 0x237
+    line.run(2, ControlWord.ENABLE_OPERATION)
+    assert line.drive.state is DriveState.OPERATION_ENABLED
+    stops = [frame.data for _ in range(6)
+             for frame in line.drive.command(0.0, ControlWord.QUICK_STOP, None, 0.0)
+             if frame.can_id & 0x7FF == 0]  # fmt: skip
+    assert stops == [bytes((2, 5))] * 3
+
+
+def test_a_speed_that_came_long_ago_is_none():
+    line = Line().run(400)
+    assert line.drive.speed_rad_s == 0.0
+    line.node.tpdo[2].enabled = False
+    line.run(30)
+    assert line.reports[-1][0] > line.now_ns - 60 * MS
+    assert math.isnan(line.drive.speed_rad_s)
 
 
 def test_a_drive_that_falls_out_of_operation_counts_no_longer_and_is_started_again():

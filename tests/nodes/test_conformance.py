@@ -14,6 +14,7 @@ from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.drive_plan import NetworkState, Place
 from utank_hil.configuration.device_sections import DriveSection
 from utank_hil.configuration.devices import DevicesSection
+from utank_hil.nodes.commissioning.checks import stopped_ms
 from utank_hil.nodes.commissioning.conformance import DriveTrial, SensorTrial
 
 SBG = {"profile": "sbg_ellipse", "accept_unprotected": True}
@@ -185,3 +186,10 @@ def test_its_times_are_those_of_the_pumps_pressure(mode):
         before_pa = pressures_pa[end - 1][1]
         stopped = next(k for k in range(end, end + 50) if pressures_pa[k][1] < 0.1 * before_pa)
         assert abs(time_ms - 10 * (stopped - end)) <= 30  # a PDO, and a speed of it, late
+
+
+def test_a_pump_that_swings_after_its_stop_has_no_time_of_it():
+    assert stopped_ms([1.0, 0.5, *[0.0] * 48]) == 20.0
+    swings = [0.5 * (-1) ** k for k in range(51)]
+    assert math.isnan(stopped_ms(swings))
+    assert math.isnan(stopped_ms([*swings, 0.0]))  # at rest for a tick alone

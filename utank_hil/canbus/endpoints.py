@@ -61,6 +61,7 @@ class Receiver(Generic[T]):
     """
 
     counts: ClassVar[bool] = True  #: Whether a counter tells a new frame.
+    proved: ClassVar[bool] = True  #: Nothing has to be proved before an order counts.
     __slots__ = (
         "_bucket", "_candidate", "_decode", "_expected", "_protected", "_run",
         "can_id", "changes", "cycle_ns", "heard", "lost", "rejected", "valid",

@@ -213,12 +213,15 @@ class DeviceSection(CanopenSection):
                 yield f"signals.{name}", f"is no value of it; there are {', '.join(known)}"
                 continue
             layout = self._field(signal.from_)
-            if layout is None or signal.source == "derived" or name in SWITCHES:
+            if layout is None or signal.source == "derived":
                 continue
-            if signal.scale is None and UNITS.get(layout.unit, ("",))[0] != unit_of(name):
+            units = name not in SWITCHES and signal.scale is None
+            if units and UNITS.get(layout.unit, ("",))[0] != unit_of(name):
                 unit = f"has the unit {layout.unit!r}" if layout.unit else "has no unit"
                 reason = f"{signal.from_} {unit}: give scale, from it to {unit_of(name)}"
                 yield f"signals.{name}.scale", reason
+            elif not layout.scale * self._factor(signal, layout):
+                yield f"signals.{name}.scale", f"must not be 0, nor that of {signal.from_}"
         for name in self.noise.keys() - set(known):
             yield f"noise.{name}", f"is no value of it; there are {', '.join(known)}"
         needed = [name for name in known if name not in OPTIONAL]

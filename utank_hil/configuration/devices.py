@@ -92,6 +92,8 @@ class ValveSection(DeviceSection):
                 yield f"{key}.to", f"is not in {self.told}: all commands go in one message"
             elif each.scale is None and layout.unit not in ("", "%"):
                 yield f"{key}.scale", f"is required: {each.to} has the unit {layout.unit!r}"
+            elif not layout.scale or each.scale == 0:
+                yield f"{key}.scale", f"must not be 0, nor that of {each.to}"
         if any(each.from_.partition(".")[0] == self.told for each in self.signals.values()):
             yield "commands", f"{self.told} is what the valve sends: it is told by another message"
 

@@ -14,6 +14,7 @@ from utank_hil.canbus import (
     ValveState,
     ValveStatus,
 )
+from utank_hil.canbus.profiles.device import hear
 from utank_hil.nodes.canopen_drive import CanopenDrive, DriveReport
 from utank_hil.nodes.plausibility import NEVER_HEARD_NS
 from utank_hil.nodes.routing import Routing
@@ -48,14 +49,18 @@ class DriveHeard:
         self._canopen = canopen
         self._first: Receiver[DriveStatus1] | None = None
         self._second_heard = True
+        self.slow: tuple[int, ...] = ()  #: Its second message: no age tells of its silence.
         if pump and canopen is not None:
             canopen.deliver = self._take_report
-            routing.devices |= canopen.takes
+            for can_id, take in canopen.takes.items():
+                hear(routing.devices, can_id, take)
             routing.watched += canopen.watched
+            self.slow = (canopen.watched[1].can_id,)
         elif pump:
             self._second_heard = False
             self._first = routing.subscribe(catalogue.receiver(DriveStatus1), self._take_first)
-            routing.subscribe(catalogue.receiver(DriveStatus2), self._take_second)
+            second = routing.subscribe(catalogue.receiver(DriveStatus2), self._take_second)
+            self.slow = (second.can_id,)
 
     @property
     def native(self) -> bool:

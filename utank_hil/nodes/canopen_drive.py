@@ -123,7 +123,7 @@ class CanopenDrive:
         self._sent: deque[tuple[int, int]] = deque(maxlen=KEPT)
         self._count = 0
         self._echo = -1
-        self.echo_ns = self._beat_ns = self._now_ns = NEVER_HEARD_NS
+        self.echo_ns = self._beat_ns = self._measured_ns = self._now_ns = NEVER_HEARD_NS
         self._operational = False
         self._started_ns = NEVER_HEARD_NS
         self._speed_rad_s = self._torque = math.nan
@@ -150,7 +150,7 @@ class CanopenDrive:
             # without a heartbeat, its start was not heard: it has forgotten all
             lives = self._operational and now_ns - self._beat_ns <= START_NS
             if not lives and now_ns - self._started_ns > START_NS:
-                setup.restart(now_ns)
+                self._restart(now_ns)
             return []
         frames = setup.frames(now_ns)
         if setup.done:
@@ -188,7 +188,7 @@ class CanopenDrive:
 
     @property
     def speed_rad_s(self) -> float:
-        """Speed of the rotor by the last PDO; NaN before the first."""
+        """Speed of the rotor by the last PDO; NaN before the first, and if that is long ago."""
         return self._speed_rad_s
 
     @property
@@ -216,6 +216,8 @@ class CanopenDrive:
         if not self.watched[0].passes(data):
             return
         self._status = data[0] | data[1] << 8
+        if now_ns - self._measured_ns > self._late_ns:
+            self._speed_rad_s = self._torque = math.nan
         state = state_of(self._status)
         if self._marked or state is _ENABLED:
             self._heard(int.from_bytes(data[2:], "little"))
@@ -245,10 +247,11 @@ class CanopenDrive:
                 self.echo_ns = sent_ns - phase_ns
                 return
 
-    def _on_measured(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
+    def _on_measured(self, frame: Frame, now_ns: int) -> None:
         data = frame.data
         if not self.watched[1].passes(data):
             return
+        self._measured_ns = now_ns
         self._speed_rad_s = self._speed.value(data)
         if self._in_nm:
             self._torque = self._torque_field.value(data)
@@ -264,7 +267,12 @@ class CanopenDrive:
         state = frame.data[0] & 0x7F
         self._operational = state == _OPERATIONAL
         if state == NetworkState.BOOT_UP:
-            self.setup.restart(now_ns)
+            self._restart(now_ns)
+
+    def _restart(self, now_ns: int) -> None:
+        """Configure it anew; what it said before, as that it runs, says nothing of now."""
+        self.setup.restart(now_ns)
+        self._status = 0
 
     def _on_emergency(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
         said = emergency_words(frame.data)

@@ -130,9 +130,8 @@ class Inbox:
             routing, catalogue, self._versions, matched, self.stations, self._received
         )
         self._hear_panels(catalogue)
-        slow = (catalogue.codec(DriveStatus2).can_id,) if self._drive.native else ()
         self.watched: list[Heard] = routing.watched
-        self.expected = frozenset((*slow, *self._nodes.beats))
+        self.expected = frozenset((*self._drive.slow, *self._nodes.beats))
         self._link_lost_until_ns = NEVER_HEARD_NS
         self.frames = self.foreign = 0
 

@@ -95,7 +95,7 @@ class Orders:
         self._out_of_sequence = out_of_sequence
         before = self.last
         if before is None or self._anew or now_ns - self.heard_ns > self._gap_ns:
-            before = order
+            before, self._arm_edge = order, False
         self._anew = False
         asked = order.mode_request
         self._passive_edge |= asked is _PASSIVE and before.mode_request is not _PASSIVE
@@ -129,18 +129,21 @@ class Orders:
         """Return what was ordered since the last call."""
         if not self.news:
             return self._lasting
-        last = self.last
+        last, proved = self.last, self.receiver.proved
         armed, stop = last is not None and last.arm, last is not None and last.stop
         wishes = (
-            armed and not self._disarm_heard,
+            armed and proved and not self._disarm_heard,
             self._stop_heard or stop,
-            self._arm_edge,
+            self._arm_edge and proved,
             self._reset_edge,
             self._passive_edge,
         )
-        self._lasting = Wishes(armed, stop)
+        self._lasting = Wishes(armed and proved, stop)
+        # an arm that was pressed waits for its proof, but no stop or disarm between
+        waits = armed and not (proved or self._stop_heard or stop or self._disarm_heard)
+        self._arm_edge = self._arm_edge and waits
         self._stop_heard = self._disarm_heard = False
-        self._arm_edge = self._reset_edge = self._passive_edge = False
+        self._reset_edge = self._passive_edge = False
         self.news = self.takes_command = self.lets_go = False
         return _new(Wishes, wishes)
 

@@ -45,8 +45,9 @@ class ProfiledPanel(ProfiledDevice[OperatorCommand]):
     `overhear` from any whole frame, whatever else is wrong with it. A stop that is not available
     counts as pressed, another button as not.
 
-    With a `key`, where the plan asks for one, `arm` counts once the panel has answered the last
-    challenge for a frame that has it, and until it is let go. Stop is never authenticated.
+    With a `key`, where the plan asks for one, `arm` is `proved` once the panel has answered the
+    last challenge for a frame that has it, and until it is let go: before, `Orders` does not count
+    it. Stop is never authenticated.
     """
 
     def __init__(self, plan: DevicePlan[OperatorCommand], key: bytes = b"") -> None:
@@ -75,7 +76,7 @@ class ProfiledPanel(ProfiledDevice[OperatorCommand]):
             message.changes += new
 
     def _take(self, message: MessageHeard, frame: Frame, now_ns: int) -> None:
-        if message.signals and message.intact(frame.data):
+        if message.signals and message.intact(frame.data) and not message.is_another(frame.data):
             values = list(self._values)
             for signal in message.signals:
                 values[signal.place] = signal.value(frame.data)
@@ -90,12 +91,13 @@ class ProfiledPanel(ProfiledDevice[OperatorCommand]):
 
     def _take_proof(self, frame: Frame, now_ns: int) -> None:
         """Try a proof of the last order, one in `TRY_NS`; a challenge that was met is used up."""
-        if self.proved or not self._key or now_ns - self._tried_ns < TRY_NS:
+        if self.proved or not (self._arms and self._key) or now_ns - self._tried_ns < TRY_NS:
             return
         self._tried_ns = now_ns
         if compare_digest(cmac(self._key, self.nonce + self._said)[:PROOF], frame.data):
             self.proved = True
             self._renew()
+            self.overhear(_order(self._values))  # there is something new in it
         else:
             self.refused += 1
 
@@ -114,10 +116,7 @@ class ProfiledPanel(ProfiledDevice[OperatorCommand]):
         self.nonce = cmac(self._key, self.nonce)[:PROOF]
 
     def _content(self, usable: bool) -> tuple[Any, ...] | None:
-        if not usable:
-            return None
-        values = self._values
-        return tuple(_order(values if self.proved else [0.0, *values[1:]]))
+        return tuple(_order(self._values)) if usable else None
 
 
 def _order(values: Sequence[float]) -> OperatorCommand:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Final, Generic
 
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus.endpoints import BUCKET_LIMIT, MAX_LOST, RESYNC_FRAMES, Rejection
 from utank_hil.canbus.enumerations import Quality, Switch
 from utank_hil.canbus.frame import Frame
@@ -82,6 +83,8 @@ class HeardMessage:
         return False
 
 
+SILENT_NS: Final = 1_000_000_000
+"""A device that brings nothing for so long is woken: the time in which a node is back by itself."""
 DRIFT: Final = 0.02
 """Two clocks may run apart by so much: one part in a hundred was measured, of an inertial sensor;
 twice that."""
@@ -100,6 +103,8 @@ class Stamp:
         self._unit_ns = unit_us * 1e3
         self._late_ns = late_ms * 1e6
         self._counts = 1 << field.bits
+        half_ns = self._counts // 2 * self._unit_ns  # from here on it may have wrapped
+        self._silent_ns = min(max(SILENT_NS, 3 * self._late_ns), half_ns)
         self._last = -1
         self._time_ns = self._least_ns = 0.0
         self._came_ns = 0
@@ -108,12 +113,13 @@ class Stamp:
     def passes(self, data: bytes, now_ns: int) -> bool:
         """Take the next stamp; False where it stands, steps back, or comes late.
 
-        A step back that is no wrap is a device that has restarted: its next stamp is taken.
+        A step back that is no wrap is a device that has restarted: its next stamp is taken. So it
+        is after a silence: the device may have been off, or its stamp have wrapped unseen.
         """
         stamp = self._field.raw(data) % self._counts  # it may have a sign
         last, self._last = self._last, stamp
         steps = (stamp - last) % self._counts
-        if last < 0 or steps > self._counts // 2:
+        if last < 0 or steps > self._counts // 2 or now_ns - self._came_ns > self._silent_ns:
             self._time_ns, self._least_ns, self._came_ns = 0.0, float(now_ns), now_ns
             return False
         if steps == 0:
@@ -129,8 +135,6 @@ class Stamp:
 
 
 STATUS_CYCLES: Final = 3  #: A status that is older by this many cycles says nothing.
-SILENT_NS: Final = 1_000_000_000
-"""A device that brings nothing for so long is woken: the time in which a node is back by itself."""
 LONG_AGO: Final = -(1 << 62)
 _SLOPE_NS: Final = round(SLOPE_S * 1e9)
 _new: Final = tuple.__new__
@@ -164,7 +168,7 @@ class MessageHeard(HeardMessage):
         super().__init__(plan.can_ids[0], plan.cycle_ns, plan.length, plan.counter, plan.crc)
         self.signals: tuple[SignalPlan, ...] = plan.signals
         self.conditions: tuple[ConditionPlan, ...] = plan.conditions
-        self.only: ConditionPlan | None = plan.only
+        self._only: ConditionPlan | None = plan.only
         self.stamp = None if plan.stamp is None else Stamp(plan.stamp, plan.stamp_us, late_ms)
         self.needed: bool = bool(plan.signals) or plan.stamp is not None
         #: Whether it says of the device that it is well, or at least that it lives.
@@ -172,6 +176,11 @@ class MessageHeard(HeardMessage):
         self.bit = bit if self.needed else 0
         self.came_ns = self.good_ns = LONG_AGO
         self.old_ns = STATUS_CYCLES * plan.cycle_ns  #: Age from which its status says nothing.
+
+    def is_another(self, data: bytes) -> bool:
+        """Whether a frame of its identifier has another content."""
+        only = self._only
+        return only is not None and len(data) == self.length and not only.holds(data)
 
 
 class ProfiledDevice(Generic[T]):
@@ -205,6 +214,7 @@ class ProfiledDevice(Generic[T]):
         self._changed_ns = self._delivered_ns = LONG_AGO
         self._past: deque[tuple[int, float]] = deque()  # times and rolls, of `SLOPE_S` and before
         self.named = plan.name_id is None
+        self.proved = True  #: Whether what it orders counts; all, but of a panel that has a key.
         self.takes: dict[int, Take] = {}
         for message, each in zip(messages, plan.messages, strict=True):
             for can_id in each.can_ids:
@@ -242,10 +252,7 @@ class ProfiledDevice(Generic[T]):
 
     def _take(self, message: MessageHeard, frame: Frame, now_ns: int) -> None:
         data = frame.data
-        only = message.only
-        if only is not None and len(data) == message.length and not only.holds(data):
-            return
-        if not message.passes(data):
+        if message.is_another(data) or not message.passes(data):
             return
         if message.status:
             message.good_ns = now_ns
@@ -290,12 +297,19 @@ class ProfiledDevice(Generic[T]):
 
     def _slope_rad_s(self, roll_rad: float, now_ns: int) -> float:
         """The slope of the roll over `SLOPE_S`, or since the roll before if that is longer ago."""
-        past = self._past
-        past.append((now_ns, roll_rad))
-        while len(past) > 2 and now_ns - past[1][0] >= _SLOPE_NS:
+        past, time_ns = self._past, now_ns - TICK_NS // 2  # it came in the tick that has ended
+        if past:
+            if time_ns - past[-1][0] > max(_SLOPE_NS, 2 * self.cycle_ns):
+                past.clear()  # nothing is known of the time between
+            else:  # a cycle after the one before, which the ticks correct by and by
+                due_ns = past[-1][0] + self.cycle_ns
+                if 2 * abs(time_ns - due_ns) <= 3 * TICK_NS:
+                    time_ns = due_ns + (time_ns - due_ns) // 32
+        past.append((time_ns, roll_rad))
+        while len(past) > 2 and time_ns - past[1][0] >= _SLOPE_NS:
             past.popleft()
         then_ns, then_rad = past[0]
-        return (roll_rad - then_rad) / (now_ns - then_ns) * 1e9 if then_ns < now_ns else math.nan
+        return (roll_rad - then_rad) / (time_ns - then_ns) * 1e9 if then_ns < time_ns else math.nan
 
     def _content(self, usable: bool) -> tuple[Any, ...] | None:
         """The message's fields, of the present values; None if there is nothing to be said."""

@@ -104,13 +104,13 @@ class MessageEncoder:
             # a device without a code for it says so by its status
             good = min(condition.allowed)
             status = condition.mask & ~good if missing else good
-            word = condition.field.put(word, status, plan.length)
+            word = condition.field.put_counts(word, status, plan.length, condition.mask)
         if plan.stamp is not None:
-            stamp = round(now_ns / (1e3 * plan.stamp_us)) % (1 << plan.stamp.bits)
-            word = plan.stamp.put(word, stamp, plan.length)
+            stamp = round(now_ns / (1e3 * plan.stamp_us))
+            word = plan.stamp.put_counts(word, stamp, plan.length)
         if plan.counter is not None:
-            self._count = (self._count + 1) % (1 << plan.counter.bits)
-            word = plan.counter.put(word, self._count, plan.length)
+            self._count += 1
+            word = plan.counter.put_counts(word, self._count, plan.length)
         data = word.to_bytes(plan.length, "little")
         if plan.crc is not None:
             at = plan.crc.byte

@@ -4,7 +4,8 @@ import math
 import struct
 from typing import Final
 
-_REAL: Final = {16: "<e", 32: "<f", 64: "<d"}
+_REAL: Final = {16: ("<e", 65504.0), 32: ("<f", (2 - 2**-23) * 2.0**127), 64: ("<d", math.inf)}
+"""Real numbers by their bits: how they are packed, and the greatest."""
 
 
 class Field:
@@ -18,8 +19,8 @@ class Field:
     """
 
     __slots__ = (
-        "_big", "_count", "_first", "_half", "_ieee", "_least", "_mask", "_most", "_shift",
-        "_spare", "bits", "offset", "scale",
+        "_big", "_count", "_first", "_greatest", "_half", "_ieee", "_least", "_mask", "_most",
+        "_shift", "_spare", "bits", "offset", "scale",
     )  # fmt: skip
 
     def __init__(
@@ -52,7 +53,7 @@ class Field:
         self._spare = shift % 8
         self._mask = (1 << bits) - 1
         self._half = 1 << (bits - 1) if signed and not real else 1 << bits
-        self._ieee = _REAL[bits] if real else ""
+        self._ieee, self._greatest = _REAL[bits] if real else ("", 0.0)
         self._least = -(1 << bits) if least_raw is None else least_raw
         self._most = 1 << bits if most_raw is None else most_raw
         self.bits, self.scale, self.offset = bits, scale, offset
@@ -84,19 +85,27 @@ class Field:
         first count beyond these; zero where every count is a value.
         """
         raw = (value - self.offset) / self.scale
-        if math.isnan(value) and not self._ieee:
-            counts = self._most + 1 & self._mask
-        elif self._ieee:
+        if self._ieee:
+            raw = min(max(raw, -self._greatest), self._greatest) if raw == raw else raw
             counts = int.from_bytes(struct.pack(self._ieee, raw), "little")
+            return self.put_counts(word, counts, length)
+        least, most = self._least, self._most
+        low, high = -self._half if self._half <= self._mask else 0, min(self._half - 1, self._mask)
+        if math.isnan(value):
+            counts = most + 1 if most < high else least - 1 if least > low else 0
         else:
-            low = -self._half if self._half <= self._mask else 0
-            high = self._half - 1 if self._half <= self._mask else self._mask
-            counts = round(min(max(raw, low, self._least), high, self._most)) & self._mask
+            counts = round(min(max(raw, low, least), high, most))
+        return self.put_counts(word, counts, length)
+
+    def put_counts(self, word: int, counts: int, length: int, mask: int = -1) -> int:
+        """Likewise with these counts, or the bits of a `mask` of them."""
+        mask = (mask & self._mask) << self._shift
         if self._big:
-            turned = int.from_bytes(word.to_bytes(length, "little"), "big")
-            turned = turned & ~(self._mask << self._shift) | counts << self._shift
-            return int.from_bytes(turned.to_bytes(length, "big"), "little")
-        return word & ~(self._mask << self._shift) | counts << self._shift
+            word = int.from_bytes(word.to_bytes(length, "little"), "big")
+        word = word & ~mask | counts << self._shift & mask
+        if self._big:
+            word = int.from_bytes(word.to_bytes(length, "big"), "little")
+        return word
 
 
 class SignalPlan:

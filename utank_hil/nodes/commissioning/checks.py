@@ -84,8 +84,8 @@ def stopped_ms(shares: Sequence[float], share: float = STOPPED) -> float:
     if not (last and abs(end) <= RUNS_ON):
         return math.nan
     low = [each <= end + share * (1 - end) for each in shares]
-    rests = (place for place in range(len(low)) if all(low[place : place + AT_REST]))
-    return next(rests) * TICK_S * 1e3
+    rests = (at for at in range(len(low) - AT_REST + 1) if all(low[at : at + AT_REST]))
+    return next(rests, math.nan) * TICK_S * 1e3
 
 
 def judge_rest(

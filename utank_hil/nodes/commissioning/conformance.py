@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any, Final
 
-from utank_hil.base.tick import TICK_NS
+from utank_hil.base.tick import TICK_NS, Schedule
 from utank_hil.canbus import (
     ControlWord,
     DriveState,
@@ -21,6 +21,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.profiles.acting import device_of
+from utank_hil.canbus.profiles.device import SILENT_NS
 from utank_hil.canbus.profiles.device_plan import DevicePlan, MessageEncoder
 from utank_hil.canbus.profiles.drive_plan import (
     COMMAND_MS,
@@ -129,7 +130,7 @@ class SensorTrial(Trial):
         self._device.deliver = lambda message, now_ns: self._heard.append((now_ns, message))
         self._heard: list[tuple[int, tuple[Any, ...]]] = []
         self._setup = SensorSetup(self._device) if plan.steps else None
-        self._woken_ns = 0
+        self._wakes = Schedule(SILENT_NS)
         super().__init__(ask)
 
     def receive(self, frame: Frame, now_ns: int) -> None:
@@ -139,13 +140,10 @@ class SensorTrial(Trial):
             take(frame, now_ns)
 
     def _frames(self) -> list[Frame]:
-        if self._setup is not None:
-            return self._setup.frames(self.now_ns)
-        wake = self._device.wake(self.now_ns)
-        if wake is None or self.now_ns - self._woken_ns < SECOND_NS:
-            return []
-        self._woken_ns = self.now_ns
-        return [wake]
+        frames = [] if self._setup is None else self._setup.frames(self.now_ns)
+        if self._wakes.due(self.now_ns) and (wake := self._device.wake(self.now_ns)) is not None:
+            frames.append(wake)
+        return frames
 
     def script(self) -> Script:
         """Listen, move by hand, take the plug off, and put it back."""
@@ -226,10 +224,12 @@ class SensorTrial(Trial):
         yield from self._by_hand(what)
         moving, self._heard = self._heard[max(begun, 0) :], []
         yield from self._wait(1.0)
-        moved = self._mean(value) - at_rest
+        moved, right = self._mean(value) - at_rest, self._device.proved or value != "arm"
+        remedy = "Turn the device, exchange its channels, or change sign."
+        remedy = remedy if right else "Its proof is wrong: compare key, challenge and proof."
         self.checks.append(
-            flag(f"{value}_sign", f"{value} moved by {moved:.3g} {unit}",
-                 "Turn the device, exchange its channels, or change sign.", right=moved >= least)
+            flag(f"{value}_sign", f"{value} moved by {moved:.3g} {unit}", remedy,
+                 right=right and moved >= least)
         )  # fmt: skip
         if turns:
             turned = math.fsum(
