@@ -99,6 +99,7 @@ class RunFigures:
     roll_below_no_tank: float | None = None
     roll_below_passive: float | None = None
     pump: PumpStatistics | None = None
+    flow_peak_m3_s: float | None = None  #: Largest flow through the duct, which is the pump's.
     mode: str | None = None
     fault: str | None = None
     active_share: float | None = None
@@ -185,6 +186,7 @@ def run_figures(result: BenchResult) -> tuple[RunFigures, ...]:
                     run.column("true_shaft_power_w")[window],
                     run.column("true_level_m")[window],
                 ),
+                "flow_peak_m3_s": _flow_peak_m3_s(result, run, window),
                 "mode": Mode(int(run.column("mode")[-1])).name,
                 "fault": Fault(int(run.column("fault")[-1])).name,
                 "active_share": float((run.column("mode")[window] == Mode.ACTIVE).mean()),
@@ -286,6 +288,12 @@ def _roll(result: BenchResult, run: Run) -> FloatArray:
 
 def _window(result: BenchResult, run: Run) -> npt.NDArray[np.bool_]:
     return run.between(result.settle_s, result.end_s)
+
+
+def _flow_peak_m3_s(result: BenchResult, run: Run, window: npt.NDArray[np.bool_]) -> float:
+    rates_m_s = np.diff(run.column("true_level_m")[window]) / RECORD_S
+    area_m2 = result.scenario.vessel.tank.reservoir_area_m2
+    return area_m2 * float(np.abs(rates_m_s).max(initial=0.0))
 
 
 def _share_below(roll: RollStatistics, reference: RollStatistics | None) -> float | None:

@@ -6,19 +6,15 @@ from typing import Final
 import numpy as np
 
 from firmware_sim.scenario import Scenario
-from utank_hil.dynamics.ship import RollShip
 from utank_hil.sea import Harmonics
 
 REALISATIONS: Final = 16
 """Number of realisations: a lightly damped ship needs a fine spectrum. Chosen; no study."""
 
 
-def pooled_wave_moment(scenario: Scenario, ship: RollShip) -> Harmonics:
+def pooled_wave_moment(scenario: Scenario) -> Harmonics:
     """Wave moment on the ship: many realisations, each with an equal share of the energy."""
-    seas = [
-        scenario.sea.roll_moment(scenario.sea.sea(seed), ship.stiffness_nm_rad)
-        for seed in range(REALISATIONS)
-    ]
+    seas = [scenario.wave_moment(seed) for seed in range(REALISATIONS)]
     return Harmonics(
         np.concatenate([sea.amplitude for sea in seas]) / math.sqrt(REALISATIONS),
         np.concatenate([sea.frequency_rad_s for sea in seas]),

@@ -90,7 +90,7 @@ def _motion_cells(run: RunFigures) -> tuple[str, ...]:
 
 
 def pump_table(found: BenchFigures) -> RichTable:
-    """Table of pump and bus."""
+    """Table of the pump."""
     pumps = [(run, run.pump) for run in found.compared if run.pump is not None]
     columns = [
         (heading, *in_one_unit([getattr(pump, name) for _, pump in pumps], unit))
@@ -102,10 +102,10 @@ def pump_table(found: BenchFigures) -> RichTable:
         )
     ]
     table = new_table(
-        "Pump and bus",
+        "Pump",
         *(f"{heading} {unit}" for heading, unit, _ in columns),
         "level\npeak m",
-        "bus\nload",
+        "flow peak\nm³/s",
     )
     table.caption = "peaks of values every 50 ms; power that\nthe shaft draws, not what flows back"
     for index, (run, pump) in enumerate(pumps):
@@ -113,7 +113,7 @@ def pump_table(found: BenchFigures) -> RichTable:
             run.name,
             *(cells[index] for _, _, cells in columns),
             f"{pump.level_peak_m:.2f}",
-            f"{run.bus_load:.1%}",
+            "" if run.flow_peak_m3_s is None else f"{run.flow_peak_m3_s:.3g}",
         )
     return table
 

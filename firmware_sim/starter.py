@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from firmware_sim.pooled_waves import pooled_wave_moment
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis.loop.self_tuning import SelfTuned, SelfTunedDesign
-from utank_hil.analysis.tank_prediction import RollPrediction, SeaState, predict_roll
+from utank_hil.analysis.tank_response import expected_sea
 from utank_hil.analysis.tank_sizing import (
     DUCT_LOSS,
     LOADINGS,
@@ -177,8 +177,6 @@ class StarterProject:
     sized: SizedTank
     demand: PumpDemand
     law: SelfTuned
-    #: Roll in the scenario's sea; with the pump, for a gentle LQG law that stays within the limits.
-    prediction: RollPrediction
     sea: dict[str, Any]
     texts: dict[str, str]  #: Contents of `FILES`.
 
@@ -246,14 +244,13 @@ def make_starter(
     texts[SCENARIO] = scenario_file(ship.name, sea)
     parts = {"vessel": vessel, "controllers": {"self_tuned": config}}
     scenario = _valid(Scenario, yaml.safe_load(texts[SCENARIO]) | parts)
-    state = SeaState.on(vessel.ship, pooled_wave_moment(scenario, vessel.ship))
+    expected_sea(vessel.ship, pooled_wave_moment(scenario))  # it rolls the ship
     assert isinstance(config.law, SelfTunedDesign)
     law = config.law.tuned(config.design_plant)
     texts[README] = readme(ship.name)
-    prediction = predict_roll(config.plant, state)
     if effective_slope is not None:
         texts |= {SHIP: _with_hull(texts[SHIP]), SCENARIO: _swaying(texts[SCENARIO])}
-    return StarterProject(vessel, sized, demand, law, prediction, sea, texts)
+    return StarterProject(vessel, sized, demand, law, sea, texts)
 
 
 def _valid(model: type[ModelT], content: dict[str, Any]) -> ModelT:

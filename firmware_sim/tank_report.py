@@ -1,26 +1,25 @@
-"""Properties of a tank as table and JSON, for `init` and `design tank`."""
+"""Properties of a tank as tables, for `init` and `design`."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
-from typing import Any
 
 from rich.table import Table
 
+from firmware_sim.prediction import Expected, Loading
+from utank_hil.analysis.motion.statistics import Interval
 from utank_hil.analysis.tank_filling import Filling
-from utank_hil.analysis.tank_prediction import LoadingPoint, RollPrediction
 from utank_hil.analysis.tank_sizing import TankCost
-from utank_hil.console.ship_report import power_words, tonnes
+from utank_hil.console.ship_report import power_words, three_digits, tonnes
 from utank_hil.console.terminal import new_table
 from utank_hil.control.optimal_tank import TankFigures
 
 Rows = list[tuple[str, str]]
 
-_ACTIVE = "  active tank, against passive"
 _NEEDS = (
-    "level it needs, significant",
-    "pressure it needs, significant",
-    "shaft power it needs, mean",
+    "pressure RMS, at most",
+    "level, flow at most",
+    "shaft power mean",
+    "  at most",
 )
 
 
@@ -52,43 +51,51 @@ def figure_rows(figures: TankFigures) -> Rows:
     ]
 
 
-def roll_rows(found: RollPrediction) -> Rows:
-    """Rows of expected roll, and of the pump's effect on it."""
-    active = found.active
+def roll_rows(found: Expected) -> Rows:
+    """Rows of expected roll, and of what the pump does for it: the words of a bench."""
+    pump, mean_w, flow_m3_s = found.pump, found.mean_power_w, found.flow_peak_m3_s
     rows = [
         ("roll RMS without tank", _degrees(found.without_tank_rad)),
-        (
-            "  passive tank",
-            f"{_degrees(found.passive.roll_rms_rad)}, {less(found.passive_below_no_tank)}",
-        ),
+        ("  passive tank", _degrees(found.passive_rad)),
+        ("  below no tank", percent(found.passive_below_no_tank)),
+        ("  active tank", _degrees(found.active_rad)),
+        ("  below passive", percent(found.active_below_passive)),
     ]
-    if active is None or found.mean_power_w is None:
-        return [*rows, (_ACTIVE, "none"), *((text, "") for text in _NEEDS)]
-    return [
-        *rows,
-        (_ACTIVE, f"{_degrees(active.roll_rms_rad)}, {less(found.active_below_passive)}"),
-        *zip(
-            _NEEDS,
-            (
-                f"{2 * active.level_rms_m:.2f} m",
-                f"{2e-3 * active.pressure_rms_pa:.1f} kPa",
-                power_words(found.mean_power_w),
-            ),
-            strict=True,
-        ),
-    ]
+    if pump is None or mean_w is None or flow_m3_s is None:
+        return [*rows, *((text, "") for text in _NEEDS)]
+    pressures = f"{pump.pressure_rms_pa / 1e3:.1f}, {pump.pressure_peak_pa / 1e3:.1f} kPa"
+    needs = (
+        pressures,
+        f"{pump.level_peak_m:.2f} m, {three_digits(flow_m3_s)} m³/s",
+        f"{power_words(mean_w.mean)} ± {power_words(mean_w.half_width)}",
+        power_words(pump.power_peak_w),
+    )
+    return [*rows, *zip(_NEEDS, needs, strict=True)]
 
 
-def loading_table(points: Sequence[LoadingPoint]) -> Table:
-    """Table of the roll at other loadings."""
+def interval_words(found: Expected, scenario: str) -> str:
+    """Meaning of the rows of `roll_rows`, for a caption."""
+    return f"roll and pump in {scenario}; ±: 95 % of its benches, of {found.window_s:.0f} s each"
+
+
+def loading_table(loadings: Sequence[Loading]) -> Table:
+    """Table of the roll at other loadings; marked where the law rolls the ship more."""
     title = "Other loadings: the same tank and law, roll RMS in °"
     figures = ("roll period", "without tank", "passive tank", "active tank")
     table = new_table(title, *figures, names=())
-    for point in points:
-        rolls = (point.without_tank_rad, point.passive_rad, point.active_rad)
-        cells = ("" if roll is None else f"{math.degrees(roll):.2f}" for roll in rolls)
-        table.add_row(f"×{point.period_scale:g}", *cells)
+    for each in loadings:
+        cells = [_degrees(roll, "") for roll in rolls(each.expected)]
+        gain = each.expected.active_below_passive
+        if gain is not None and gain.mean < 0:
+            cells[-1] = f"* {cells[-1]}"
+            table.caption = "*: more than passive; a bench gives the law up there (ROLL_AMPLIFIED)"
+        table.add_row(f"×{each.period_scale:g}", *cells)
     return table
+
+
+def rolls(found: Expected) -> tuple[Interval | None, Interval | None, Interval | None]:
+    """Roll RMS in rad without tank, with it passive and active."""
+    return found.without_tank_rad, found.passive_rad, found.active_rad
 
 
 def filling_table(found: Sequence[Filling], present_m: float, sea: str) -> Table:
@@ -113,20 +120,6 @@ def filling_table(found: Sequence[Filling], present_m: float, sea: str) -> Table
     return table
 
 
-def prediction_json(found: RollPrediction) -> dict[str, Any]:
-    """Prediction in SI units."""
-    active = found.active
-    return {
-        "without_tank_rad": found.without_tank_rad,
-        "passive": asdict(found.passive),
-        "active": None if active is None else asdict(active),
-        "mean_power_w": found.mean_power_w,
-        "passive_below_no_tank": found.passive_below_no_tank,
-        "active_below_passive": found.active_below_passive,
-        "no_law": found.no_law or None,
-    }
-
-
 def less(share: float | None) -> str:
     """Reduction of roll in words, also a negative one; empty without one."""
     if share is None:
@@ -134,5 +127,12 @@ def less(share: float | None) -> str:
     return f"{abs(share):.0%} {'more' if share < 0 else 'less'}"
 
 
-def _degrees(angle_rad: float) -> str:
-    return f"{math.degrees(angle_rad):.2f}°"
+def percent(share: Interval | None) -> str:
+    """A share and its interval in percent; empty without one."""
+    return "" if share is None else f"{share.mean:.0%} ± {share.half_width:.0%}"
+
+
+def _degrees(angle_rad: Interval | None, unit: str = "°") -> str:
+    if angle_rad is None:
+        return ""
+    return " ± ".join(f"{math.degrees(value):.2f}{unit}" for value in angle_rad)

@@ -14,15 +14,11 @@ from pydantic import ValidationError
 from firmware_sim.bench import run_in_turn
 from firmware_sim.campaign.study import Content, as_text, changed, code_digest
 from firmware_sim.figures import LEAST_ROLL_RAD, NO_TANK, bare_figures, run_figures
+from firmware_sim.prediction import noise_of
 from firmware_sim.run import RECORD_S
 from firmware_sim.scenario import PASSIVE, Scenario
 from utank_hil.analysis.loop import sea_response
-from utank_hil.analysis.loop.loop_simulation import (
-    SensorNoise,
-    between,
-    passive_motion,
-    simulate_loop,
-)
+from utank_hil.analysis.loop.loop_simulation import between, passive_motion, simulate_loop
 from utank_hil.analysis.motion.statistics import (
     PumpStatistics,
     RollStatistics,
@@ -172,13 +168,6 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
     passive = passive_motion(ship, tank, moment, RECORD_S, count + 1)
     in_ticks = between(passive, RECORD_S, ROW_TICKS)
     yield _Record(PASSIVE, passive[:-1, 0], passive[:-1, _LEVEL], at_rest, at_rest)
-    errors = scenario.sensors
-    noise = SensorNoise(
-        errors.roll_noise_rad,
-        errors.roll_rate_noise_rad_s,
-        errors.level_noise_m / math.sqrt(2.0),
-        errors.pressure_noise_pa,
-    )
     for name, controller in scenario.controllers.items():
         law = _pump_law(name, laws[name])
         plant = controller.plant
@@ -187,7 +176,7 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
             in_ticks,
             law.controller(),
             law.measured,
-            noise=noise,
+            noise=noise_of(scenario),
             seed=seed,
             every=ROW_TICKS,
         )

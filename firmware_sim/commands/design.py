@@ -22,8 +22,9 @@ from utank_hil.console.terminal import Terminal, new_table, notes
 from utank_hil.dynamics.tank import Tank
 
 if TYPE_CHECKING:
-    from utank_hil.analysis.tank_prediction import RollPrediction, SeaState
-    from utank_hil.control import DesignPlant
+    from firmware_sim.prediction import Expected
+    from utank_hil.control import BuiltLaw, DesignPlant
+    from utank_hil.sea import Harmonics
 
 
 PICTURE, FIGURES = "tank.png", "tank.json"
@@ -49,17 +50,15 @@ def tank(
     """Say what a tank costs the ship and what it does in a sea, beside the best passive one.
 
     The best one has the least greatest roll over all wave frequencies; it keeps reservoirs, width,
-    height and place, and differs in duct area and damping. Roll is a linear prediction. The active
-    tank has an LQG law that meets the required margins, within the limits of pump and level.
+    height and place, and differs in duct area and damping. Roll and pump are what a bench is
+    expected to give. The active tank has the scenario's self-tuned law, designed for each tank;
+    without one there, a self-tuned law for its sea.
 
     **Example:** utank-hil design tank configs/ships/naval_vessel.yaml
     """
-    from firmware_sim.tank_report import loading_table
-    from utank_hil.analysis.tank_prediction import (
-        loading_sensitivity,
-        predict_roll,
-        roll_curves,
-    )
+    from firmware_sim.prediction import other_loadings, predict
+    from firmware_sim.tank_report import interval_words, loading_table, rolls
+    from utank_hil.analysis.tank_response import roll_curves
     from utank_hil.analysis.tank_sizing import with_duct_loss
     from utank_hil.control.optimal_tank import best_passive_tank
     from utank_hil.pictures.tank import draw_tank
@@ -83,36 +82,42 @@ def tank(
         console.table(_table(loaded, tanks, {}))
         console.say("Name a sea with --scenario for the roll to be expected.")
         return
-    chosen, sea = _sea(path, loaded)
+    chosen, waves = _sea(path, loaded)
     name = chosen.name
-    plants = {key: _plant(loaded, each) for key, each in tanks.items()}
-    pump = loaded.pump is not None
     out = prepare_out(out, (PICTURE, FIGURES))
-    with notes.busy(f"{loaded.name}: a law for each tank and loading"):
-        found = {key: predict_roll(plant, sea, pump=pump) for key, plant in plants.items()}
-        plant, own = plants["present"], found["present"]
-        loadings = loading_sensitivity(plant, sea, own)
+    with notes.busy(f"{loaded.name}: a law for each tank, and what a bench would give"):
+        benches = {key: _bench(chosen, loaded, each, waves) for key, each in tanks.items()}
+        found = {key: predict(*bench) for key, bench in benches.items()}
+        _, plant, law = benches["present"]
+        loadings = other_loadings(*benches["present"], found["present"])
     # a scenario of `init` begins with the ship's name
     title = name if name.startswith(loaded.name) else f"{loaded.name}: {name}"
     about = describe("design tank", loaded, out, options=context.params, scenario=chosen)
     files = {"picture": out / PICTURE, "figures": out / FIGURES}
-    draw_tank(roll_curves(plant, sea, own.law), loadings, files["picture"], title, about)
+    drawn = {
+        each.period_scale: [roll.mean if roll else math.nan for roll in rolls(each.expected)]
+        for each in loadings
+    }
+    draw_tank(roll_curves(plant, waves, law), drawn, files["picture"], title, about)
     figures |= about | {
         "scenario": name,
         **{key: _figures(loaded, each, found[key]) for key, each in tanks.items()},
-        "loading": [asdict(point) for point in loadings],
+        "loading": [
+            {"period_scale": each.period_scale, **each.expected.as_json()} for each in loadings
+        ],
         "files": {key: str(file) for key, file in files.items()},
     }
     write_whole(files["figures"], json.dumps(figures, indent=2) + "\n")
     if json_:
         print_json(figures)
         return
-    console.table(_table(loaded, tanks, found, f"roll: linear prediction for {name}"))
+    console.table(_table(loaded, tanks, found, interval_words(found["present"], name)))
+    if loaded.pump is not None and law is None:
+        console.say("no self-tuned law has all margins with this tank", yellow="not active:")
     if loaded.pump is not None:
         console.say(f"pump: net head, flow, shaft, duty: {order_words(loaded)}")
-    if loaded.ship.restoring_odd_nm or loaded.ship.gz_m:
-        console.say("left out of the roll: the restoring moment's curve; utank-hil bench has it")
-    console.table(loading_table(loadings))
+    if loadings:
+        console.table(loading_table(loadings))
     console.files(files)
 
 
@@ -149,7 +154,7 @@ def filling(
     for name, values in (("--gm", gm), ("--displacement", displacement)):
         if any(not 0 < value < math.inf for value in values or ()):
             fail(f"{name}: must be above 0")
-    ship, (chosen, sea) = loaded.ship, _sea(path, loaded)
+    ship, (chosen, waves) = loaded.ship, _sea(path, loaded)
     if not ship.displacement_n > 0:
         fail(f"{vessel}: ship.displacement_t is needed to tell GM from stiffness: state it")
     own_t, own_m = ship.displacement_n / 9806.65, ship.stiffness_nm_rad / ship.displacement_n
@@ -157,7 +162,7 @@ def filling(
     gms_m = gm or [share * own_m for share in GMS]
     loadings = [(load_t, gm_m) for load_t in sorted(loads_t) for gm_m in sorted(gms_m)]
     try:
-        found = fillings(_plant(loaded, loaded.tank), sea.wave_moment, loadings)
+        found = fillings(_plant(loaded), waves, loadings)
     except ValueError as error:
         fail(f"{vessel}: {error}")
     out = prepare_out(out, ("filling.png", "filling.json"))
@@ -176,40 +181,79 @@ def filling(
     console.files(files)
 
 
-def _sea(path: Path, vessel: Vessel) -> tuple[Scenario, "SeaState"]:
-    """Scenario, and its sea as it acts on the vessel's ship."""
+def _sea(path: Path, vessel: Vessel) -> "tuple[Scenario, Harmonics]":
+    """Scenario of the vessel, and the roll moment of its sea in N m.
+
+    One of another ship gives its sea alone.
+    """
     from utank_hil.analysis.loop.sea_response import CalmSeaError
-    from utank_hil.analysis.tank_prediction import SeaState
+    from utank_hil.analysis.tank_response import expected_sea
 
     scenario = load(path, Scenario, allow_code=True)  # laws are not built from it
+    if scenario.vessel.version != vessel.version:
+        if scenario.hull is not None or scenario.fmu is not None:
+            fail(f"{path}: plant: {scenario.plant} is {scenario.vessel.name}, not {vessel.name}; "
+                 "name a scenario with plant: roll")  # fmt: skip
+        others: dict[str, Any] = {"actual_ship": {}, "voyage": (), "gusts": None}
+        others |= {"vessel": vessel, "controllers": {}}
+        scenario = scenario.model_copy(update=others)
+    waves = pooled_wave_moment(scenario)
     try:
-        return scenario, SeaState.on(vessel.ship, pooled_wave_moment(scenario, vessel.ship))
+        expected_sea(vessel.ship, waves)
     except CalmSeaError as error:
         fail(f"{path}: sea: {error}; name another scenario with --scenario")
+    return scenario, waves
 
 
-def _plant(vessel: Vessel, tank: Tank) -> "DesignPlant":
+def _plant(vessel: Vessel) -> "DesignPlant":
     """Plant for the design of a law, with the vessel's level limit and lag."""
     from utank_hil.control import DesignPlant, PumpLimits
 
-    lag_s = 0.0 if vessel.pump is None else vessel.pump.lag_s
-    return DesignPlant(vessel.ship, tank, lag_s=lag_s, limits=PumpLimits(**vessel.default_limits))
+    limits, lag_s = PumpLimits(**vessel.default_limits), 0.0
+    if vessel.pump is not None:
+        lag_s = vessel.pump.lag_s
+    return DesignPlant(vessel.ship, vessel.tank, lag_s=lag_s, limits=limits)
 
 
-def _figures(vessel: Vessel, tank: Tank, found: "RollPrediction | None") -> dict[str, Any]:
-    from firmware_sim.tank_report import prediction_json
+def _bench(
+    scenario: Scenario, vessel: Vessel, tank: Tank, waves: "Harmonics"
+) -> "tuple[Scenario, DesignPlant, BuiltLaw | None]":
+    """Scenario with a tank, its plant, and the self-tuned law for it, if there is one."""
+    from utank_hil.analysis.loop.self_tuning import NoLawError, SelfTunedDesign
+    from utank_hil.analysis.tank_response import expected_sea
+    from utank_hil.configuration import ControllerConfig
+
+    vessel = vessel.model_copy(update={"tank": tank})
+    scenario = scenario.model_copy(update={"vessel": vessel})
+    if vessel.pump is None:
+        return scenario, _plant(vessel), None
+    own: list[ControllerConfig] = [
+        each for each in scenario.controllers.values() if isinstance(each.law, SelfTunedDesign)
+    ]
+    content = {"name": "", "vessel": vessel, "law": {"kind": "self_tuned"}}
+    config = own[0] if own else ControllerConfig.model_validate(content)
+    design = config.law if own else SelfTunedDesign("self_tuned", expected_sea(vessel.ship, waves))
+    config = config.model_copy(update={"vessel": vessel, "law": design})
+    assert isinstance(design, SelfTunedDesign)
+    try:
+        return scenario, config.plant, design.build(config.design_plant)
+    except NoLawError:
+        return scenario, config.plant, None
+
+
+def _figures(vessel: Vessel, tank: Tank, found: "Expected | None") -> dict[str, Any]:
     from utank_hil.analysis.tank_sizing import moving, tank_cost
     from utank_hil.control.optimal_tank import tank_figures
 
     return {
         **asdict(tank_figures(vessel.ship, moving(vessel.ship, tank))),
         **asdict(tank_cost(vessel.ship, tank)),
-        "prediction": None if found is None else prediction_json(found),
+        "expected": None if found is None else found.as_json(),
     }
 
 
 def _table(
-    vessel: Vessel, tanks: dict[str, Tank], found: dict[str, "RollPrediction"], caption: str = ""
+    vessel: Vessel, tanks: dict[str, Tank], found: dict[str, "Expected"], caption: str = ""
 ) -> Table:
     """Table of the present tank beside the best passive one."""
     from firmware_sim.tank_report import cost_rows, figure_rows, roll_rows

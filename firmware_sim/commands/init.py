@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
 import typer
 from rich.table import Table
 
-from firmware_sim.tank_report import cost_rows, prediction_json, roll_rows
+from firmware_sim.tank_report import cost_rows, interval_words, roll_rows
 from utank_hil.analysis.tank_sizing import tank_cost
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.whole_file import write_whole
-from utank_hil.console.common import Json, fail, prepare_out, print_json
+from utank_hil.console.common import Json, fail, load, prepare_out, print_json
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.ship_report import order_words
 from utank_hil.console.terminal import Terminal, new_table, notes, shown
 
 if TYPE_CHECKING:
+    from firmware_sim.prediction import Expected
     from firmware_sim.starter import StarterProject
     from utank_hil.analysis.tank_sizing import SizedTank
 
@@ -117,10 +118,13 @@ def init(
     """
     from firmware_sim.hull.compute import Loading, usual_hull, write_hull
     from firmware_sim.hull.mesh import MeshError
-    from firmware_sim.starter import FILES, HULL, StarterShip, make_starter
+    from firmware_sim.prediction import predict
+    from firmware_sim.scenario import Scenario
+    from firmware_sim.starter import FILES, HULL, SCENARIO, StarterShip, make_starter
     from utank_hil.analysis.loop.sea_response import CalmSeaError
     from utank_hil.analysis.loop.self_tuning import NoLawError
     from utank_hil.analysis.tank_sizing import TankImpossibleError, TankRoom
+    from utank_hil.assembly import build_law
 
     for path in (folder / file for file in (*FILES, *([HULL] * hull))):
         if path.exists():
@@ -181,15 +185,20 @@ def init(
     if data is not None:
         files[HULL] = folder / HULL
         write_hull(files[HULL], data)
-    little = _little_help(project)
+    scenario = load(files[SCENARIO], Scenario)
+    (config,) = scenario.controllers.values()
+    with notes.busy(f"{ship_name}: what a bench of its scenario would give"):
+        expected = predict(scenario, config.plant, build_law(config))
+    little = _little_help(project, expected)
     if json_:
         figures = {"possible": True, "little_help": little, **_as_json(project)}
+        figures["expected"] = expected.as_json()
         print_json(
             {**figures, "files": {Path(file).stem: str(path) for file, path in files.items()}}
         )
         return
     console = Terminal()
-    console.table(_table(project))
+    console.table(_table(project, expected))
     if little:
         console.say(little, yellow="little help:")
     for path in files.values():
@@ -198,11 +207,11 @@ def init(
     console.lead_on(*((command, files[file]) for command, file in steps))
 
 
-def _little_help(project: "StarterProject") -> str | None:
+def _little_help(project: "StarterProject", found: "Expected") -> str | None:
     """Warning where the tank reduces roll by little; None where it does not."""
-    found = project.prediction
-    best = found.passive if found.active is None else found.active
-    less = 1 - best.roll_rms_rad / found.without_tank_rad
+    if found.active_rad is None or found.without_tank_rad is None:
+        return None  # a ship that capsizes has no roll to compare with
+    less = 1 - found.active_rad.mean / found.without_tank_rad.mean
     if less >= WORTH_IT:
         return None
     period_s = 2 * math.pi / project.vessel.ship.natural_frequency_rad_s
@@ -255,16 +264,13 @@ def _as_json(project: "StarterProject") -> dict[str, Any]:
             "worst_radius": law.robustness.worst_radius,
         },
         "sea": project.sea,
-        "linear_prediction": prediction_json(project.prediction),
     }
 
 
-def _table(project: "StarterProject") -> Table:
+def _table(project: "StarterProject", expected: "Expected") -> Table:
     sized, demand, law = project.sized, project.demand, project.law
     sea = f"{project.sea['hs_m']:g} m, {project.sea['tp_s']:g} s"
-    caption = (
-        f"roll: linear prediction in a sea of {sea}, with a gentler law than the self-tuned one"
-    )
+    caption = interval_words(expected, f"a sea of {sea}")
     table = new_table(project.vessel.name, "", caption=caption)
     table.show_header = False
     ship, tank = project.vessel.ship, project.vessel.tank
@@ -281,7 +287,7 @@ def _table(project: "StarterProject") -> Table:
         ("pump: net head, flow, shaft, duty", order_words(project.vessel)),
         ("law", "self-tuned"),
         ("peak sensitivity, 2 at most", f"{law.robustness.nominal.peak_sensitivity:.2f}"),
-        *roll_rows(project.prediction),
+        *roll_rows(expected),
     ]
     for text, value in rows:
         table.add_row(text, value)

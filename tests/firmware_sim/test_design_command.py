@@ -35,11 +35,13 @@ def test_tank_command_says_how_far_the_tank_is_from_the_best(first_tank, tmp_pat
 def test_tank_command_expects_the_roll_that_the_storm_gives(first_tank):
     found = first_tank
     assert found["scenario"] == "Storm of 10 February 2019"
-    expected = found["present"]["prediction"]
-    # docs/how-to/ship.md: by `compare`, another way to the same figures
-    assert math.degrees(expected["without_tank_rad"]) == pytest.approx(2.73, abs=0.01)
-    assert math.degrees(expected["passive"]["roll_rms_rad"]) == pytest.approx(2.21, abs=0.01)
-    assert 0.1 < expected["active_below_passive"] < 0.4
+    expected = found["present"]["expected"]
+    # README.md: the hour of `make bench`; its self-tuning law learns the ship
+    for name, rms_deg in (("without_tank", 2.67), ("passive", 2.08), ("active", 1.36)):
+        interval = expected[f"{name}_rad"]
+        bench_rad = math.radians(rms_deg)
+        assert abs(interval["mean"] - bench_rad) < interval["half_width"] < 0.2 * bench_rad
+    assert 0.3 < expected["active_below_passive"]["mean"] < 0.45
     assert [point["period_scale"] for point in found["loading"]] == [0.7, 0.85, 1.0, 1.15, 1.3]
     picture = Path(found["files"]["picture"])
     assert found == json.loads((picture.parent / "tank.json").read_text())
@@ -61,20 +63,10 @@ def test_tank_command_takes_a_vessel_without_pump_in_any_named_sea(tmp_path: Pat
     sea = CONFIGS / "scenarios" / "naval_vessel.yaml"
     named = run("tank", vessel, "--scenario", sea, "--out", tmp_path, "--json")
     assert named.exit_code == 0, named.output
-    expected = json.loads(named.stdout)["present"]["prediction"]
-    assert (expected["active"], expected["no_law"]) == (None, "there is no pump")
+    expected = json.loads(named.stdout)["present"]["expected"]
+    assert (expected["active_rad"], expected["pump"]) == (None, None)
+    assert expected["passive_rad"]["mean"] < expected["without_tank_rad"]["mean"]
     assert run("tank", vessel, "--scenario", sea, "--out", tmp_path).exit_code == 0
-
-
-@pytest.mark.evidence
-@pytest.mark.parametrize(("ship", "said"), [("patti_b", True), ("thesis_first", False)])
-def test_tank_command_says_what_a_linear_prediction_leaves_out(
-    ship: str, said: bool, tmp_path: Path
-):
-    done = run("tank", CONFIGS / "ships" / f"{ship}.yaml", "--out", tmp_path)
-    assert done.exit_code == 0, done.output
-    left_out = "left out of the roll: the restoring moment's curve"
-    assert (left_out in done.stdout) is said
 
 
 def test_tank_command_refuses_a_calm_sea(tmp_path: Path):

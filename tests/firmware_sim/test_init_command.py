@@ -75,9 +75,9 @@ def test_project_is_valid_and_its_law_is_let_on_the_bus(
     assert told["law"]["peak_sensitivity"] == pytest.approx(peak, rel=1e-4)
     scenario = load_config(folder / "scenario.yaml", Scenario)
     assert scenario.controllers["self_tuned"] == controller
-    found = told["linear_prediction"]
-    assert found["passive_below_no_tank"] > 0.2
-    assert found["active_below_passive"] > 0.2
+    found = told["expected"]
+    assert found["passive_below_no_tank"]["mean"] > 0.2
+    assert found["active_below_passive"]["mean"] > 0.2
     assert set(told["files"]) == {"ship", "controller", "scenario", "README"}
 
 

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from utank_hil.analysis.loop.sea_response import at_its_motion, motion_in_sea
-from utank_hil.analysis.tank_prediction import roll_without_tank
+from utank_hil.analysis.tank_response import roll_without_tank
 from utank_hil.analysis.tank_sizing import tank_cost
 from utank_hil.control import DesignPlant
 from utank_hil.dynamics import GRAVITY_M_S2, RollShip, Tank

@@ -189,8 +189,8 @@ def ship_line(vessel: Vessel) -> str:
     pump = "there is no pump"
     if vessel.pump is not None:
         pump = (
-            f"the pump presses {figures['pump_head_m']:.2g} m of water, moves up to "
-            f"{three_digits(figures['pump_flow_m3_s'])} m³/s and has "
+            f"the pump presses {figures['pump_head_m']:.2g} m of water, at "
+            f"{three_digits(figures['pump_flow_m3_s'])} m³/s with "
             f"{power_words(figures['pump_power_w'])}"
         )
     if vessel.valve is not None:

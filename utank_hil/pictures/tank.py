@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from utank_hil.analysis.tank_filling import Filling
-from utank_hil.analysis.tank_prediction import LoadingPoint, RollCurves
+from utank_hil.analysis.tank_response import RollCurves
 from utank_hil.pictures.style import BELOW, COLORS, DASHES, WIDEST_IN, picture
 
 _NAMES = ("without tank", "passive tank", "active tank")
@@ -16,12 +16,16 @@ _NAMES = ("without tank", "passive tank", "active tank")
 
 def draw_tank(
     curves: RollCurves,
-    loadings: Sequence[LoadingPoint],
+    loadings: Mapping[float, Sequence[float]],
     path: Path,
     title: str,
     about: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Draw roll over wave period, and roll in the sea over the ship's loading."""
+    """Draw roll over wave period, and roll RMS in the sea over the ship's loading.
+
+    `loadings` has, by the factor on the roll period, the roll in rad without tank, passive and
+    active; NaN where there is none.
+    """
     with picture(path, title, (WIDEST_IN, 4.6), about) as figure:
         waves, loading = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2)
         energy = curves.sea * 0.5 * curves.without_tank.max()
@@ -32,16 +36,10 @@ def draw_tank(
             if roll is not None:
                 waves.plot(curves.period_s, roll, color=color, linestyle=dash, label=name)
         waves.set(xlabel="Wave period (s)", ylabel="Roll per effective wave slope")
-        scales = [point.period_scale for point in loadings]
-        series: tuple[Sequence[float | None], ...] = (
-            [point.without_tank_rad for point in loadings],
-            [point.passive_rad for point in loadings],
-            [point.active_rad for point in loadings],
-        )
-        for values, color, dash in zip(series, COLORS, DASHES, strict=False):
-            known = [np.nan if value is None else np.degrees(value) for value in values]
-            if not np.isnan(known).all():
-                loading.plot(scales, known, marker="o", color=color, linestyle=dash)
+        rolls_deg = np.degrees(np.reshape(list(loadings.values()), (-1, len(_NAMES))))
+        for values, color, dash in zip(rolls_deg.T, COLORS, DASHES, strict=False):
+            if not np.isnan(values).all():
+                loading.plot(list(loadings), values, marker="o", color=color, linestyle=dash)
         loading.set_ylim(bottom=0)
         loading.set_xlabel("Roll period, times the ship's: tank and law as they are")
         loading.set_ylabel("Roll RMS in the sea (°)")

@@ -5,7 +5,7 @@ to the pump. Sensors, limiter and drive run every tick, level gauges and level o
 `LEVEL_TICKS`, the controller at its own sample time.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -13,6 +13,7 @@ from scipy.interpolate import CubicHermiteSpline
 from utank_hil.analysis.loop.loop_ticks import (
     LEVEL_TICKS,
     LinearShip,
+    MovedShip,
     run_ticks,
     sensed_at,
 )
@@ -113,25 +114,46 @@ def simulate_loop(
     transition, step = transition_and_step(
         lagged, np.append(np.zeros(n), pump_gain / lag_s)[:, None], TICK_S
     )
-    delay_ticks = _ticks("delay_s", plant.delay_s)
-    sample_ticks = _ticks("sample_time_s", controller.sample_time_s)
-    shown = sensed_at(sample_ticks, ticks)
-    passive = _noise(noise, ticks, seed)[shown]
-    passive[:, :n] += wave_motion[shown]
+    sensed, shown = sensed_noise(noise, ticks, seed, controller.sample_time_s)
+    sensed[:, :n] += wave_motion[shown]
+    ship = LinearShip(np.hstack([transition, step]), sensed)
+    run = run_law(ship, plant, controller, measured, ticks, every)
+    return replace(run, motion=run.motion + wave_motion[::every])
+
+
+def run_law(
+    ship: MovedShip,
+    plant: DesignPlant,
+    controller: Controller,
+    measured: tuple[str, ...],
+    ticks: int,
+    every: int = 1,
+) -> LoopRun:
+    """Run a law, armed from the start, on a ship of which `plant` gives tank, limits and delay.
+
+    The motion is what the ship gives as truth; see `simulate_loop` for the rest.
+    """
     truth, commands, wishes = run_ticks(
-        LinearShip(np.hstack([transition, step]), passive),
+        ship,
         controller,
         [STATES.index(name) for name in measured],
         LevelObserver(plant.tank, LEVEL_TICKS * TICK_S),
         CommandLimiter(plant.limits, plant.tank, TICK_S),
-        delay_ticks,
-        sample_ticks,
+        _ticks("delay_s", plant.delay_s),
+        _ticks("sample_time_s", controller.sample_time_s),
         ticks,
         every,
     )
-    by_pump = np.array(truth)
-    motion = by_pump[:, :n] + wave_motion[::every]
-    return LoopRun(motion, by_pump[:, n], np.array(commands), np.array(wishes))
+    kept = np.array(truth)
+    return LoopRun(kept[:, :-1], kept[:, -1], np.array(commands), np.array(wishes))
+
+
+def sensed_noise(
+    noise: SensorNoise | None, ticks: int, seed: int, sample_time_s: float
+) -> tuple[FloatArray, list[int]]:
+    """Noise of `Signals` at the ticks at which a law's loop senses, shape (n, 5), and these."""
+    shown = sensed_at(_ticks("sample_time_s", sample_time_s), ticks)
+    return _noise(noise, ticks, seed)[shown], shown
 
 
 def _noise(noise: SensorNoise | None, ticks: int, seed: int) -> FloatArray:

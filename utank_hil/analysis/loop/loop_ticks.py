@@ -3,7 +3,7 @@
 No row of the ship's motion is an array before a block of them is done.
 """
 
-from typing import Final, TypeAlias
+from typing import Final, Protocol, TypeAlias
 
 import numpy as np
 
@@ -18,6 +18,19 @@ _BLOCK: Final = 256  # signals that are Python's own numbers at a time
 Signals: TypeAlias = tuple[float, float, float, float, float]
 """Roll, its rate, level, its rate (`STATES`), and the pump's actual pressure."""
 _Row: TypeAlias = tuple[float, float, float, float, float, float]
+
+
+class MovedShip(Protocol):
+    """A ship as `run_ticks` moves it."""
+
+    def sensed(self) -> Signals:
+        """Signals of this tick with the sensors' noise; called at the ticks of `sensed_at`."""
+
+    def truth(self) -> Signals:
+        """Signals of this tick as they are kept."""
+
+    def advance(self, command_pa: float) -> None:
+        """Move by one tick with a pump that is commanded this pressure."""
 
 
 class LinearShip:
@@ -91,7 +104,7 @@ def sensed_at(sample_ticks: int, ticks: int) -> list[int]:
 
 
 def run_ticks(
-    ship: LinearShip,
+    ship: MovedShip,
     controller: Controller,
     columns: list[int],
     observer: LevelObserver,
