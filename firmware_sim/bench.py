@@ -23,7 +23,8 @@ from firmware_sim.run import (
     run_lockstep,
     run_ship,
 )
-from firmware_sim.scenario import PASSIVE, Scenario
+from firmware_sim.scenario import Scenario
+from firmware_sim.scenario_content import PASSIVE
 from firmware_sim.ship_side import PASSIVE_SCRIPT
 from firmware_sim.worker_pool import WorkerPool, shared, whole_first
 from utank_hil.assembly import build_law

@@ -12,7 +12,7 @@ from firmware_sim.bench import BenchResult
 from firmware_sim.model_limits import passed_limits
 from firmware_sim.retuning_figures import RetuningFigures, retuning_figures
 from firmware_sim.run import RECORD_S, Run
-from firmware_sim.scenario import PASSIVE
+from firmware_sim.scenario_content import PASSIVE
 from firmware_sim.ship_side import PASSIVE_SCRIPT
 from utank_hil.analysis.motion.statistics import (
     PumpStatistics,

@@ -15,7 +15,7 @@ from firmware_sim.figures import BenchFigures, RunFigures
 from firmware_sim.report_tables import few_rolls, in_one_unit, roll_interval, tables
 from firmware_sim.retuning_figures import events_on_ships_time
 from firmware_sim.run import COLUMNS, RECORD_S
-from firmware_sim.scenario import PASSIVE
+from firmware_sim.scenario_content import PASSIVE
 from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import Vessel
 from utank_hil.console.common import why

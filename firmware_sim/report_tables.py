@@ -9,7 +9,7 @@ from rich.table import Table as RichTable
 
 from firmware_sim.figures import NO_TANK, BenchFigures, RunFigures
 from firmware_sim.retuning_figures import SETTLING_S, RetuningFigures
-from firmware_sim.scenario import PASSIVE
+from firmware_sim.scenario_content import PASSIVE
 from utank_hil.analysis.motion.statistics import RollStatistics
 from utank_hil.console.terminal import new_table
 

@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from firmware_sim.faulty_bench import FaultyBench, Tap
-from firmware_sim.scenario import PASSIVE, Scenario
+from firmware_sim.scenario import Scenario
+from firmware_sim.scenario_content import PASSIVE
 from firmware_sim.ship_side import ShipSide, bare_plant, build_ship_side, load_compiled_code
 from firmware_sim.truth import TRUTH, MemoryLog, TruthRecorder
 from utank_hil.assembly import build_controller_node, retuner_process, works_of

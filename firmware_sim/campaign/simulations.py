@@ -16,7 +16,8 @@ from firmware_sim.campaign.study import Content, as_text, changed, code_digest
 from firmware_sim.figures import LEAST_ROLL_RAD, NO_TANK, bare_figures, run_figures
 from firmware_sim.prediction import noise_of
 from firmware_sim.run import RECORD_S
-from firmware_sim.scenario import PASSIVE, Scenario
+from firmware_sim.scenario import Scenario
+from firmware_sim.scenario_content import PASSIVE
 from utank_hil.analysis.loop import sea_response
 from utank_hil.analysis.loop.loop_simulation import between, passive_motion, simulate_loop
 from utank_hil.analysis.motion.statistics import (

@@ -8,7 +8,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from firmware_sim.fault_injection.fault import FaultSpan, FaultTime
 from firmware_sim.fault_injection.kinds import AnyFault
-from firmware_sim.scenario import Scenario, missing_nodes
+from firmware_sim.scenario import Scenario
+from firmware_sim.scenario_problems import missing_nodes
 from utank_hil.base.parameters import Finite, Positive, refuse
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import Fault

@@ -13,7 +13,8 @@ from firmware_sim.bench import jobs_of
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.run import run_lockstep
-from firmware_sim.scenario import Scenario, missing_nodes
+from firmware_sim.scenario import Scenario
+from firmware_sim.scenario_problems import missing_nodes
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.canbus import (

@@ -10,7 +10,8 @@ from typer.testing import CliRunner
 from firmware_sim.bench import jobs_of
 from firmware_sim.plant import Plant
 from firmware_sim.run import run_lockstep
-from firmware_sim.scenario import PASSIVE, Scenario
+from firmware_sim.scenario import Scenario
+from firmware_sim.scenario_content import PASSIVE
 from utank_hil.analysis.loop.sea_response import motion_in_sea
 from utank_hil.base.tick import TICK_NS
 from utank_hil.cli import app

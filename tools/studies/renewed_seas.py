@@ -21,7 +21,8 @@ from pydantic import ConfigDict
 
 from firmware_sim.bench import jobs_of
 from firmware_sim.run import RECORD_S, Job, Run, run_lockstep
-from firmware_sim.scenario import PASSIVE, Scenario
+from firmware_sim.scenario import Scenario
+from firmware_sim.scenario_content import PASSIVE
 from firmware_sim.scenario_sea import IrregularSea
 from tools.printing import command_line, show
 from tools.studies.clairvoyant import clairvoyant_bound

@@ -23,7 +23,6 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.frame import OTHER_BUS, STANDARD
 from utank_hil.canbus.measurements import Measurements
-from utank_hil.canbus.messages import DriveStatus2
 from utank_hil.canbus.profiles.acting import ProfiledPanel, ProfiledValve
 from utank_hil.canbus.profiles.device import ProfiledDevice
 from utank_hil.canbus.profiles.device_plan import NO_FOREIGN_DEVICES, ForeignDevices
