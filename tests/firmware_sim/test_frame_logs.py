@@ -15,8 +15,9 @@ from firmware_sim.run import Job, run_in_one_process, run_lockstep
 from firmware_sim.scenario import Scenario
 from utank_hil.cli import app
 from utank_hil.configuration import load_config
+from utank_hil.telemetry.frame_comparison import ReplayResult
 from utank_hil.telemetry.frame_log import FrameLog
-from utank_hil.telemetry.replay import ReplayResult, replay_log
+from utank_hil.telemetry.replay import replay_log
 from utank_hil.telemetry.replay_head import recorded_config
 
 STORM = Path("configs/scenarios/storm.yaml")

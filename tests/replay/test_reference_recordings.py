@@ -37,7 +37,8 @@ from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.dynamics.linear import pump_model
 from utank_hil.telemetry.frame_log import FrameLog, Kind
 from utank_hil.telemetry.law_values import decoded, encoded, law_values
-from utank_hil.telemetry.replay import RecordedRetuner, entries_of, replay, replay_log
+from utank_hil.telemetry.recorded_retuner import RecordedRetuner
+from utank_hil.telemetry.replay import entries_of, replay, replay_log
 from utank_hil.telemetry.replay_head import law_differences, recorded_config, recorded_law
 
 STATUS = load_catalogue().codec(ControllerStatus)
@@ -217,7 +218,7 @@ def test_one_bit_of_one_sensor_frame_is_found_at_its_tick_and_named(
         assert replay(entries, config, law).damaged == []
         entries[at] = entries[at]._replace(data=bytes(flipped))
         assert replay(entries, config, law).damaged == [(tick, "SENSOR_MOTION")]
-        monkeypatch.setattr("utank_hil.telemetry.replay._NAMED", 3)
+        monkeypatch.setattr("utank_hil.telemetry.frame_comparison._NAMED", 3)
         wrong = [each._replace(data=bytes(8)) if each.number == MOTION.can_id else each
                  for each in entries[:at]]  # fmt: skip
         found = replay(wrong, config, law)

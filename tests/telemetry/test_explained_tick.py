@@ -8,8 +8,9 @@ from typer.testing import CliRunner
 from utank_hil.assembly import build_law
 from utank_hil.canbus import SensorMotion, load_catalogue
 from utank_hil.cli import app
+from utank_hil.telemetry.explained_tick import ExplainedTick
 from utank_hil.telemetry.frame_log import FrameLog, Kind
-from utank_hil.telemetry.replay import ExplainedTick, entries_of, replay
+from utank_hil.telemetry.replay import entries_of, replay
 from utank_hil.telemetry.replay_head import recorded_config
 
 LOG = Path("tests/replay/every-mode.frames")

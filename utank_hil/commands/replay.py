@@ -21,10 +21,12 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, say_note
 from utank_hil.telemetry.bus_files.log import BusLog
 from utank_hil.telemetry.bus_logs import LoggedController
+from utank_hil.telemetry.explained_tick import ExplainedTick, Number
+from utank_hil.telemetry.frame_comparison import ReplayResult
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
 from utank_hil.telemetry.law_verdict import LawVerdict
-from utank_hil.telemetry.replay import ExplainedTick, Number, ReplayResult, replay_log
 from utank_hil.telemetry.replay import replay as run_replay
+from utank_hil.telemetry.replay import replay_log
 from utank_hil.telemetry.replay_head import ReplayHeadError, few, recorded_config
 
 
