@@ -118,6 +118,7 @@ class BenchFigures:
     interrupted: bool
     not_run: tuple[str, ...]
     wall_s: float
+    hs_m: float  #: Significant wave height at the start.
     exit_code: int
     endings: tuple[str, ...]  #: Remarks on the ends of runs; empty where all went as ordered.
     limits_passed: tuple[str, ...]  #: Limits of the model that were passed.
@@ -145,6 +146,7 @@ def figures(result: BenchResult) -> BenchFigures:
     return BenchFigures(
         **{name: getattr(result, name) for name in _OF_BENCH},
         scenario=result.scenario.name,
+        hs_m=result.scenario.figures()["hs_m"],
         exit_code=int(_exit_code(result, marks)),
         endings=tuple(_endings(result, marks)),
         limits_passed=tuple(passed_limits(result)),

@@ -2,6 +2,7 @@
 
 import json
 import math
+import shlex
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -55,7 +56,7 @@ def bench_page(found: BenchFigures, about: Mapping[str, Any], picture: bytes | N
     few = few_rolls(found, vessel.ship.natural_frequency_rad_s)
     says = "Roll and power of each run, and roll, level and pressure over time"
     sections = [
-        ReportSection("What was run", _what_was_run(found, about["configuration"], vessel)),
+        ReportSection("What was run", _what_was_run(found, about, vessel)),
         ReportSection(
             "Roll and cost",
             pictures=[] if picture is None else [ReportPicture(picture, says)],
@@ -106,13 +107,29 @@ def sea_words(sea: Mapping[str, Any]) -> str:
     return ", ".join(words)
 
 
-def _what_was_run(found: BenchFigures, scenario: Mapping[str, Any], vessel: Vessel) -> list[str]:
+def _what_was_run(found: BenchFigures, about: Mapping[str, Any], vessel: Vessel) -> list[str]:
     names = [run.name for run in found.runs if run.name != PASSIVE]
+    sea = about["configuration"]["sea"]
+    height = "" if "hs_m" in sea else f", significant height {found.hs_m:.2f} m at the start"
     return [
         f"Ship: {vessel.name}. {ship_line(vessel)}",
-        f"Sea: {sea_words(scenario['sea'])}.",
+        f"Sea: {sea_words(sea)}{height}.",
         f"Runs: {', '.join(['without a tank', 'with the passive tank', *names])}.",
+        f"Again: {again(about)}",
     ]
+
+
+def again(about: Mapping[str, Any]) -> str:
+    """Command of a bench for a shell, with its seed; the folder of results is left to it."""
+    options = {"seed": about["seed"], **about["options"]}
+    options["seed"] = about["seed"]
+    words = ["utank-hil", about["command"], str(options.pop("scenario", ""))]
+    for name, value in options.items():
+        if name in ("out", "json_", "frames", "fmu") or value is None or value is False:
+            continue
+        words.append(f"--{_FLAGS.get(name, name.replace('_', '-'))}")
+        words += [] if value is True else [f"{value:g}" if isinstance(value, float) else str(value)]
+    return shlex.join(filter(None, words))
 
 
 def _deadlines(found: BenchFigures) -> ReportSection:
@@ -127,6 +144,9 @@ def _deadlines(found: BenchFigures) -> ReportSection:
     headings = ["", *(key.replace("_", " ") for key in keys)]
     return ReportSection("Deadlines", tables=[ReportTable(headings, rows)])
 
+
+_FLAGS: Final = {"real_time": "realtime"}
+"""Options whose names differ from their parameters."""
 
 REPORT_FILES: Final = (PICTURE, RECORDING, FIGURES, PAGE)
 

@@ -89,6 +89,9 @@ class StarterShip:
 
     def _shape_problems(self) -> list[Problem]:
         """Implausible combinations for the beam: displacement and length, period and GM."""
+        if self.beam_m >= self.length_m:
+            reason = f"is {self.beam_m:g} m, and the length {self.length_m:g} m: swap the two"
+            return [("beam_m", reason)]
         depth_m = self.displacement_t / (self.length_m * self.beam_m)  # in fresh water
         least, most = _DEPTH_PER_BEAM
         if not least <= depth_m / self.beam_m <= most:

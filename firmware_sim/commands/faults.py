@@ -1,6 +1,7 @@
 """``utank-hil faults``: injects every fault of the table and checks that it is found in time."""
 
 import json
+import math
 import sys
 import time
 from collections.abc import Sequence
@@ -18,10 +19,12 @@ from utank_hil.console.terminal import Terminal, progress_bar
 
 if TYPE_CHECKING:
     from firmware_sim.fault_campaign.campaign import Campaign, Row
+    from firmware_sim.fault_campaign.trial import Window
     from firmware_sim.fault_campaign.verdict import Result
 
 CAMPAIGN = CONFIGS / "faults" / "campaign.yaml"
 INTERRUPTED: Final = "interrupted"
+ROLLS_IN_CHARGE: Final = 5  #: Rolls over which an own ship with its law is compared. Chosen.
 
 
 def faults(
@@ -47,8 +50,9 @@ def faults(
     **Example:** utank-hil faults --rows motion,F19 --seeds 10
 
     In lockstep on all cores. Without **--full** the roll is compared over 60 s (an own ship's over
-    600 s), and over 20 s where the controller stays in charge, and rows that take minutes are left
-    out. The exit code says whether a row failed (docs/deployment.md).
+    600 s), and over 20 s where the controller stays in charge (an own ship's over five rolls, if
+    these are longer), and rows that take minutes are left out. The exit code says whether a row
+    failed (docs/deployment.md).
     """
     # imported late: `--help` needs none of it
     from firmware_sim.fault_campaign.campaign import Campaign
@@ -62,8 +66,7 @@ def faults(
         loaded = _on(whole, scenario)
     names = [name.strip() for name in rows.split(",") if name.strip()]
     chosen = loaded.chosen(names)
-    # an own ship may be lightly damped: after a stop it rolls on for minutes
-    window = Window() if full else Window(60.0 if scenario is None else 600.0, 20.0)
+    window = Window() if full else Window(60.0, 20.0) if scenario is None else _window(loaded)
     too_long = [row for row in chosen if row.long and not (full or names)]
     chosen = [row for row in chosen if row not in too_long]
     _refuse_names(whole, names, chosen)
@@ -125,6 +128,16 @@ def _on(campaign: "Campaign", path: Path) -> "Campaign":
     if not ship.controllers:
         fail(f"{path}: controllers: one is needed that is to find the faults")
     return campaign.on(ship, next(iter(ship.controllers)))
+
+
+def _window(campaign: "Campaign") -> "Window":
+    """Window for an own ship: it may be slow, or roll on for minutes after a stop."""
+    from firmware_sim.fault_campaign.campaign import COMMON
+    from firmware_sim.fault_campaign.trial import Window
+
+    ship = campaign.setups[COMMON].scenario.vessel.ship
+    rolls_s = ROLLS_IN_CHARGE * 2 * math.pi / ship.natural_frequency_rad_s
+    return Window(600.0, max(20.0, round(rolls_s)))
 
 
 def _refuse_names(campaign: "Campaign", names: Sequence[str], chosen: Sequence["Row"]) -> None:

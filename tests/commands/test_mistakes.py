@@ -26,7 +26,30 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
     ("a controller to the panel", f"panel {{configs}}/{GPC} --bus can0", ("gpc.yaml", "ship")),
     ("a folder to check", "check {here}", ("{here}", "file")),
     ("a table to check", "check {here}/table.csv", ("table.csv",)),
-    ("an empty file", "check {here}/empty.yaml", ("empty.yaml", "empty")),
+    ("an empty file", "check {here}/empty.yaml", ("empty.yaml", "is empty and must hold")),
+    ("an empty file to the bench", "bench {here}/empty.yaml", ("is empty and must hold",)),
+    ("an empty study", "campaign {here}/empty.yaml", ("is empty and must hold",)),
+    ("items indented unlike", "campaign {here}/items.yaml", ("line 4", "items of one list")),
+    ("an item among keys", "campaign {here}/mixed.yaml", ("line 3", "keys or items, not both")),
+    ("no space after a colon", "check {here}/colon.yaml", ("line 4", "a colon and a space")),
+    ("a minute in a number", "check {here}/minute.yaml", ("period_s", "'0:22'", "number alone")),
+    ("a percent", "check {here}/percent.yaml", ("damping_ratio", "as a share, 0.02")),
+    ("a report of a ship", f"report {{configs}}/{FIRST}", ("is no recording", ".rrd")),
+    ("a replay of a ship", f"replay {{configs}}/{FIRST}", ("is no .frames file", "--config")),
+    ("a ship to faults", f"faults --scenario {{configs}}/{FIRST}", ("is a ship", "scenario")),
+    ("a sea that is a ship", f"design tank {{configs}}/{FIRST} --scenario {{configs}}/{FIRST}",
+     ("is a ship, and a scenario is wanted",)),
+    ("a scenario to design", f"design tank {{configs}}/{STORM}", ("is a scenario", "a ship is")),
+    ("a folder to the bench", "bench {here}", ("is a folder; name a file in it",)),
+    ("an empty decay", "identify decay {here}/nothing.csv", ("line 1", "time_s,roll_deg")),
+    ("a typo in a row", "identify decay {here}/typo.csv", ("line 3", "roll_deg", "'x'")),
+    ("length and beam swapped", "init {here}/new --length 14 --beam 90 --displacement 2800 "
+     "--gm 1.1 --roll-period 10", ("--beam", "swap the two")),
+    ("kilograms", "init {here}/new --length 90 --beam 14 --displacement 2800000 --gm 1.1 "
+     "--roll-period 10", ("--displacement", "in tonnes")),
+    ("feet", "init {here}/new --length 295 --beam 46 --displacement 2800 --gm 3.6 "
+     "--roll-period 10", ("--displacement", "in metres")),
+    ("a recording that is not there", "monitor {here}/nothing", ("is not there",)),
     ("tabs", "check {here}/tabs.yaml", ("tabs.yaml", "line 2", "tab")),
     ("a key under a value", "check {here}/indent.yaml", ("indent.yaml", "line 3", "indented")),
     ("letters of Windows", "check {here}/latin.yaml", ("latin.yaml", "UTF-8")),
@@ -178,6 +201,16 @@ def here(tmp_path: Path) -> Path:
     (tmp_path / "empty.yaml").write_text("")
     (tmp_path / "tabs.yaml").write_text("name: ship\n\tship: 1\n")
     (tmp_path / "indent.yaml").write_text("name: mine\nsea: {kind: jonswap}\n  hs_m: 3\n")
+    (tmp_path / "items.yaml").write_text("name: mine\nset:\n    - 1\n   - 2\n")
+    (tmp_path / "mixed.yaml").write_text("grid:\n  seed: [1, 2]\n  - sea.hs_m: [1, 2]\n")
+    ship = "ship: {displacement_t: 900, gm_m: 1, roll_period_s: 8, damping_ratio: 0.05}"
+    for name, old, new in (
+        ("minute", "period_s: 8", "period_s: '0:22'"), ("percent", "0.05", "2%")
+    ):  # fmt: skip
+        (tmp_path / f"{name}.yaml").write_text(f"name: mine\n{ship.replace(old, new)}\ntank: {{}}")
+    (tmp_path / "colon.yaml").write_text("name: mine\nship:\n  displacement_t:900\n  gm_m: 1\n")
+    (tmp_path / "nothing.csv").write_text("")
+    (tmp_path / "typo.csv").write_text("time_s,roll_deg\n0,5\n0.1,x\n")
     (tmp_path / "latin.yaml").write_bytes("name: Größe\n".encode("latin-1"))
     swings = [(0.1 * n, 8 * 0.995**n * math.cos(0.06 * n)) for n in range(1000)]
     for name, head, rows in (

@@ -578,3 +578,16 @@ def test_rows_run_on_another_ship() -> None:
     moved = CAMPAIGN.on(ship, "constrained")
     assert set(moved.setups) == {"pump", "redundant", "uncommissioned"}
     assert all(setup.config.vessel.ship == ship.vessel.ship for setup in moved.setups.values())
+
+
+def test_an_own_ship_with_its_law_is_compared_over_five_rolls() -> None:
+    setup = CAMPAIGN.setups["pump"]
+    ship = setup.scenario.vessel.ship
+    assert commands._window(CAMPAIGN) == Window(600.0, 63.0)  # of 12.6 s
+    for stiffer, window_s in ((100.0, 20.0), (0.25, 126.0)):
+        quick = replace(ship, stiffness_nm_rad=stiffer * ship.stiffness_nm_rad)
+        vessel = setup.scenario.vessel.model_copy(update={"ship": quick})
+        scenario = setup.scenario.model_copy(update={"vessel": vessel})
+        setups = {**CAMPAIGN.setups, "pump": setup.model_copy(update={"scenario": scenario})}
+        own = CAMPAIGN.model_copy(update={"setups": setups})
+        assert commands._window(own) == Window(600.0, window_s)

@@ -110,7 +110,10 @@ def _replay_bus_log(
     log: BusLog, chosen: ControllerConfig | None, explained: ExplainedTick | None
 ) -> tuple[ReplayResult, list[str]]:
     if chosen is None:
-        fail(f"{log.path} says nothing of the controller: name its configuration by --config")
+        fail(
+            f"{log.path} is no {SUFFIX} file, so it says nothing of the controller: name its "
+            "configuration by --config"
+        )
     said: list[str] = []
     controller = LoggedController(log, said)
     for text in said:

@@ -28,6 +28,8 @@ def report(
 
     if recording.is_dir():
         fail(f"{recording}: is a folder; name a recording of `utank-hil run` (.rrd) in it")
+    if recording.exists() and recording.suffix != ".rrd":
+        fail(f"{recording}: is no recording; name one of `utank-hil run` (.rrd)")
     try:
         page = out or recording.with_suffix(".html")
         written = write_report(recording_report(recording), page)

@@ -190,6 +190,8 @@ def _remedy(wanted: str, value: Any) -> str:
         return f": write {float(value):.15g}, without quotes"
     except ValueError:
         pass
+    if re.fullmatch(r"\s*[-+]?\d+(\.\d*)?\s*%\s*", value):
+        return f": write it as a share, {float(value.strip().rstrip('%')) / 100:.12g}"
     if re.match(r"\s*[-+]?\.?\d", value):
         return ": write the number alone, in the unit that the key ends with"
     return ""

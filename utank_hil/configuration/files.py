@@ -199,6 +199,8 @@ class _Reader:
             self.problems.append(ConfigProblem(file, _dotted(at), reason))
         if not isinstance(content, dict):
             reason = "must hold a mapping of keys to values"
+            if content is None:
+                reason = f"is empty and {reason}"
             return self._give_up(key, ConfigProblem(file, "", reason))
         self.origins[key] = file
         return self._resolve(content, key, file, (*stack, resolved))

@@ -72,13 +72,31 @@ def parse_yaml(text: str) -> tuple[Any, list[Finding]]:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         place = "" if mark is None else f" in line {mark.line + 1}, column {mark.column + 1}"
-        block = "block" in (error.problem or "")  # its parser's word for lines indented alike
-        remedy = "; keys of one section are indented alike, below a key without a value" * block
-        raise YamlError(f"is not valid YAML{place}: {error.problem}{remedy}") from error
+        raise YamlError(f"is not valid YAML{place}: {_in_words(error.problem or '')}") from error
     except yaml.YAMLError as error:
         raise YamlError(f"is not valid YAML: {error}") from error
     except RecursionError:
         raise YamlError("is not valid YAML: it is nested too deeply") from None
+
+
+def _in_words(problem: str) -> str:
+    """Return the parser's words, or for a line that does not fit those above it what is wrong."""
+    if "expected ':'" in problem or "mapping values" in problem:
+        return (
+            "this line or the one above is no key and value; a colon and a space part the two, as "
+            "in hs_m: 3, and a text with a colon needs quotes"
+        )
+    if "<block" not in problem:  # its word for lines indented alike
+        return problem
+    if "'-'" in problem or "sequence" in problem:
+        return (
+            "an item of a list (-) does not fit the lines above; items of one list are indented "
+            "alike, and a section has either keys or items, not both"
+        )
+    return (
+        "a line does not fit those above; keys of one section are indented alike, below a key "
+        "without a value"
+    )
 
 
 def _values(node: yaml.Node, known: dict[yaml.Node, int]) -> int:
