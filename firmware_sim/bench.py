@@ -25,7 +25,7 @@ from firmware_sim.run import (
 )
 from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_content import PASSIVE
-from firmware_sim.ship_side import PASSIVE_SCRIPT
+from firmware_sim.ship_side import passive_script
 from firmware_sim.worker_pool import WorkerPool, shared, whole_first
 from utank_hil.assembly import build_law
 from utank_hil.base.arrays import FloatArray
@@ -148,8 +148,9 @@ def jobs_of(
         passive = first.model_copy(
             update={"law": PassiveDesign(), "retuning": None, "sea_estimate": None}
         )
+    script = passive_script(scenario.vessel)
     return [
-        Job(PASSIVE, scenario, passive, build_law(passive), PASSIVE_SCRIPT, seed, duration_s),
+        Job(PASSIVE, scenario, passive, build_law(passive), script, seed, duration_s),
         *(
             Job(name, scenario, controller, laws[name], scenario.operator, seed, duration_s)
             for name, controller in scenario.controllers.items()

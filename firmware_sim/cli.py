@@ -62,7 +62,7 @@ app = new_app("Ship emulator, sensors, pump drive and operator panel on a CAN bu
 @app.command()
 def firmware_sim(
     scenario: Annotated[Path, typer.Argument(help="Scenario file.")],
-    bus: Annotated[str, typer.Option(help="SocketCAN interface, for example can0 or vcan0.")],
+    bus: Annotated[str, typer.Option(help="CAN interface, for example can0 or vcan0.")],
     seed: Annotated[
         int | None, typer.Option(min=0, help="Of waves and noise, instead of the scenario's.")
     ] = None,

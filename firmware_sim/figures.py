@@ -13,7 +13,7 @@ from firmware_sim.model_limits import passed_limits
 from firmware_sim.retuning_figures import RetuningFigures, retuning_figures
 from firmware_sim.run import RECORD_S, Run
 from firmware_sim.scenario_content import PASSIVE
-from firmware_sim.ship_side import PASSIVE_SCRIPT
+from firmware_sim.ship_side import passive_script
 from utank_hil.analysis.motion.statistics import (
     PumpStatistics,
     RollStatistics,
@@ -223,7 +223,8 @@ def mark_of(result: BenchResult, run: Run) -> Mark | None:
     if fault != Fault.NONE:
         words = fault_text(Fault(fault))
         return Mark("fault", f"the controller ended in {Mode(mode).name}, fault {words}")
-    wanted = Mode.PASSIVE if run.name == PASSIVE else Mode.ACTIVE
+    reference = run.name == PASSIVE
+    wanted = _ORDERS[passive_script(result.scenario.vessel)[0].action] if reference else Mode.ACTIVE
     ordered = _window(result, run) & (_orders(result, run) == wanted)
     if not ordered.any():
         return Mark("idle", f"no order to go to {wanted.name} before the end of the window")
@@ -242,7 +243,8 @@ def _orders(result: BenchResult, run: Run) -> npt.NDArray[np.int64]:
 
     In the passive run it is zero pressure: a pump switched off would turn with the water.
     """
-    script = PASSIVE_SCRIPT if run.name == PASSIVE else result.scenario.operator
+    scenario = result.scenario
+    script = passive_script(scenario.vessel) if run.name == PASSIVE else scenario.operator
     time_s, orders = run.column("time_s"), np.full(len(run.rows), int(Mode.STANDBY))
     ready = np.flatnonzero(run.column("mode") != Mode.INIT)
     start_s = time_s[ready[0]] if len(ready) else np.inf

@@ -29,12 +29,34 @@ def missing_nodes(vessel: Vessel, faults: Sequence[AnyFault], key: str = "faults
         "sensors_2": not vessel.redundancy.second_motion_sensor,
         "hardwired": not vessel.redundancy.hardwired_inputs,
     }
-    return [
+    problems = [
         (f"{key}.{place}", f"can't be: the vessel has no {name}")
         for place, fault in enumerate(faults)
         for name in fault.node_names()
         if missing.get(name)
     ]
+    for place, fault in enumerate(faults):
+        role = foreign_role(vessel, fault)
+        if role and (getattr(fault, "of_catalogue", False) or role == "pump"):
+            problems.append(
+                (f"{key}.{place}", f"can't be: devices.{role} sends no {fault.spoiled_message}; "
+                 "take kind lost, frozen or value of what is measured, or lost_identifier")
+            )  # fmt: skip
+    return problems
+
+
+_ROLE_OF: Final = {
+    "SENSOR_MOTION": "motion", "SENSOR_MOTION_2": "motion_2", "SENSOR_TANK": "levels",
+    "SENSOR_PUMP": "pump_sensor", "VALVE_STATUS": "valve", "OPERATOR_CMD": "panel",
+    **dict.fromkeys(("DRIVE_STATUS_1", "DRIVE_STATUS_2", "PUMP_CMD"), "pump"),
+}  # fmt: skip
+
+
+def foreign_role(vessel: Vessel, fault: AnyFault) -> str:
+    """The ship's device of another maker whose message a fault spoils; empty if it is none."""
+    role = _ROLE_OF.get(fault.spoiled_message or "", "")
+    there = role and vessel.devices is not None and not getattr(vessel.devices, role).native
+    return role if there else ""
 
 
 def part_problems(scenario: ScenarioContent) -> list[Problem]:

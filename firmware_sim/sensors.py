@@ -47,6 +47,8 @@ def _said(message: tuple[Any, ...]) -> tuple[float, ...]:
         passive = message.mode_request is Mode.PASSIVE
         pressed = message.arm, message.stop, message.acknowledge, message.reset, passive
         return tuple(map(float, pressed))
+    if message[-1] is Quality.BAD:  # a device has no such word: it has no value
+        return (math.nan,) * len(message)
     return tuple(math.nan if value is None else float(value) for value in message)
 
 

@@ -232,9 +232,14 @@ NODE_NAMES: Final = ("sensors", "sensors_2", "hardwired", "drive", "valve", "pan
 Only a ship with a pump has a drive, and only one with a valve has that node; the second motion
 sensor and the hard-wired inputs exist if the vessel's section `redundancy` lists them."""
 
+
 # at zero pressure an enabled pump does not affect the tank; switched off, its rotor turns with the
 # water and changes the tank
-PASSIVE_SCRIPT = (TimedAction(1.0, Action.PASSIVE),)
+def passive_script(vessel: Vessel) -> tuple[TimedAction, ...]:
+    """Operator of the run without a law; a panel without `passive` arms a law of zero pressure."""
+    panel = vessel.devices and vessel.devices.panel
+    told = not panel or panel.native or "passive" in panel.signals
+    return (TimedAction(1.0, Action.PASSIVE if told else Action.ARM),)
 
 
 @dataclass(frozen=True, slots=True)

@@ -91,7 +91,7 @@ def faults(
     }
     kept = {row.id for row in loaded.rows}
     not_run |= {
-        row.id: f"needs the ship of setup {row.fault.setup}"
+        row.id: f"needs a ship, nodes and counters as of setup {row.fault.setup}"
         for row in whole.chosen(names)
         if row.id not in kept
     }

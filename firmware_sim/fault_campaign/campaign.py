@@ -9,11 +9,11 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from firmware_sim.fault_injection.fault import FaultSpan, FaultTime
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.scenario import Scenario
-from firmware_sim.scenario_problems import missing_nodes
+from firmware_sim.scenario_problems import foreign_role, missing_nodes
 from utank_hil.base.parameters import Finite, Positive, refuse
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import Fault
-from utank_hil.configuration import ControllerConfig, Section
+from utank_hil.configuration import ControllerConfig, Section, Vessel
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.panel import TimedAction
 from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
@@ -289,7 +289,7 @@ class Campaign(Section):
         """Campaign with another ship in the place of that of the setup `COMMON`.
 
         Left are the rows of setups that change neither its parameters nor its devices, with faults
-        of nodes that the ship has.
+        that its nodes can have. Of a device without counters no single frame is missed.
         """
         common = self.setups[COMMON]
         bare = {"redundancy": common.redundancy, "commissioned": common.commissioned}
@@ -304,6 +304,7 @@ class Campaign(Section):
             for row in self.rows
             if (vessel := vessels.get(row.fault.setup)) is not None
             and not missing_nodes(vessel, row.fault.inject)
+            and not (row.expect.reaction == "note" and _uncounted(vessel, row.fault.inject))
         )
         return self.model_copy(update={"setups": setups, "rows": rows})
 
@@ -319,6 +320,11 @@ class Campaign(Section):
     def shown_elsewhere(self, names: Sequence[str]) -> list[Requirement]:
         """Requirements with these names, or all, that tests verify and no row does."""
         return [each for each in self.requirements if each.elsewhere and _begins(each.id, names)]
+
+
+def _uncounted(vessel: Vessel, faults: Sequence[AnyFault]) -> bool:
+    roles = filter(None, (foreign_role(vessel, fault) for fault in faults))
+    return any(not getattr(vessel.devices, role).protection.counters for role in roles)
 
 
 def _begins(own: str, names: Sequence[str]) -> bool:

@@ -104,6 +104,8 @@ class MessageFault(Fault):
     message: MessageName
     of_frames: ClassVar[bool] = False
     """Whether frames of any layout can have it; else it spoils what a device measures."""
+    of_catalogue: ClassVar[bool] = False
+    """Whether it spoils counter, CRC or length, which are only the catalogue's own."""
 
     @property
     def named(self) -> NamedMessage:

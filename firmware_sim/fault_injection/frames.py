@@ -98,6 +98,7 @@ class Inserted(MessageFault):
 class Counter(MessageFault):
     """The counter has a wrong step, with a correct CRC; with step zero it stands still."""
 
+    of_catalogue = True
     kind: Literal["counter"]
     step: Annotated[int, Field(ge=0, le=15)]
     """Step of the counter from frame to frame; the correct step is 1."""
@@ -124,6 +125,7 @@ class Counter(MessageFault):
 class Damaged(MessageFault):
     """Base of faults that damage one frame in `every`."""
 
+    of_catalogue = True
     every: Annotated[int, Field(ge=1)] = 1
 
     @abstractmethod

@@ -91,6 +91,12 @@ def test_number_of_hundreds_of_digits_is_in_no_range() -> None:
     assert not Range().holds(10**400)
 
 
+def test_the_last_whole_number_of_a_range_is_in_it() -> None:
+    most = (1 << 64) - 1
+    assert Range(least=0, most=most).holds(most)
+    assert not Range(least=0, most=most).holds(most + 1)
+
+
 @pytest.mark.parametrize(
     ("mark", "demand"),
     [

@@ -193,14 +193,16 @@ def test_no_file(tmp_path):
 
 def drive(name, **more):
     given = {key: value for key, value in PROFILE.items() if key != "identity"}
-    return DevicesSection(pump=given | {"eds": str(others_file(f"devices/eds/{name}"))} | more)
+    del given["profile"]  # an EDS of a drive is one by CiA 402
+    file = {"eds": str(others_file(f"devices/eds/{name}"))}
+    return DevicesSection(pump=given | file | more)
 
 
 def test_a_drives_identity_is_that_of_its_file():
-    found = drive("maxon-epos4_50_15_node1.dcf", node=1)
+    found = drive("maxon-epos4_50_15_node1.dcf", node=1, mode="cyclic_torque")
     assert found.pump.identity == (0xFB, 0x65520000, 0x1700000, 0x29001321)
-    assert drive("faulhaber-605.3150.68-B.eds").pump.identity == (0x147, 3150, 2, None)
-    assert drive("faulhaber-605.3150.68-B.eds", identity=[1]).pump.identity == (1,)
+    given = drive("maxon-epos4_50_15_node1.dcf", node=1, mode="velocity", identity=[1])
+    assert given.pump.identity == (1,)
     assert DevicesSection.model_validate(found.model_dump(mode="json")) == found
 
 
@@ -210,8 +212,18 @@ def test_a_drives_identity_is_that_of_its_file():
         ("maxon-epos4_50_15_node1.dcf", "is the DCF of node 1, not of node 5"),
         ("technosoft-iPOS.eds", r"no 1016h \(heartbeat consumer\)"),
         ("systec-IO-C12.eds", "1000h:0 says profile 401; a drive has 402"),
+        ("faulhaber-605.3150.68-B.eds", "6502h:0 is 0x25, without mode torque: choose velocity; "
+         "there is no 6071h:0.*another echo.*there is no 6077h:0.*another drive.*"
+         "there is no 0x6007: set it to null"),
     ],
-)
-def test_a_drive_that_cannot_be_watched_is_refused(name, reason):
+)  # fmt: skip
+def test_a_drive_that_cannot_be_led_is_refused(name, reason):
     with pytest.raises((ParameterError, ValueError), match=reason):
         drive(name)
+
+
+def test_what_a_drives_file_lacks_is_said_before_the_quay():
+    with pytest.raises((ParameterError, ValueError), match="without mode torque: choose cyclic_"):
+        drive("maxon-epos4_50_15_node1.dcf", node=1)
+    with pytest.raises((ParameterError, ValueError), match=r"no 6074h:0.*another echo"):
+        drive("maxon-epos4_50_15_node1.dcf", node=1, mode="cyclic_torque", echo="demand")

@@ -8,7 +8,7 @@ import pytest
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_sections import DriveLimits, SensorErrors
-from firmware_sim.ship_side import PASSIVE_SCRIPT, build_ship_side
+from firmware_sim.ship_side import build_ship_side, passive_script
 from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Fault, Mode
@@ -95,7 +95,7 @@ def test_self_tuning_law_keeps_roll_and_level_after_it_was_armed(ship: str, seed
     scenario = load_config(CONFIGS / "scenarios" / f"{ship}.yaml", Scenario)
     config = scenario.controllers["self-tuning"]
     law, most_rad = build_law(config), []
-    for script in (PASSIVE_SCRIPT, scenario.operator):
+    for script in (passive_script(scenario.vessel), scenario.operator):
         node = build_controller_node(config, law, commissioned=True)
         lockstep = Lockstep([*build_ship_side(scenario, seed, script).nodes, node])
         largest = 0.0
@@ -110,7 +110,7 @@ def test_self_tuning_law_keeps_roll_and_level_after_it_was_armed(ship: str, seed
 def roll_rms_rad(scenario: Scenario, config: ControllerConfig | None, duration_s: int) -> float:
     """Measured roll, the first minute left out, with a controller or with the tank alone."""
     controller = config or next(iter(scenario.controllers.values()))
-    script = PASSIVE_SCRIPT if config is None else scenario.operator
+    script = passive_script(scenario.vessel) if config is None else scenario.operator
     roll_rad: list[float] = []
     at = SIGNALS.index("roll_rad")
     node = build_controller_node(

@@ -32,6 +32,7 @@ from utank_hil.assembly import build_law
 from utank_hil.canbus import Fault, Mode
 from utank_hil.canbus.measurements import Measurements
 from utank_hil.configuration import ConfigError, load_config
+from utank_hil.configuration.devices import DevicesSection
 from utank_hil.configuration.files import problems_in_words
 from utank_hil.console.common import KILLED
 from utank_hil.console.exit_codes import ExitCode
@@ -573,7 +574,8 @@ def test_rows_run_on_another_ship() -> None:
     windows = {row["id"]: row["roll_window_s"] for row in found["rows"]}
     assert windows.keys() == {"not-commissioned", "motion-zero"}
     assert windows["motion-zero"] == 600.0  # a lightly damped ship rolls on for minutes
-    assert {row["why"] for row in found["not_run"]} == {"needs the ship of setup valve"}
+    words = "needs a ship, nodes and counters as of setup valve"
+    assert {row["why"] for row in found["not_run"]} == {words}
     ship = load_config(Path(patti), Scenario)
     moved = CAMPAIGN.on(ship, "constrained")
     assert set(moved.setups) == {"pump", "redundant", "uncommissioned"}
@@ -591,3 +593,29 @@ def test_an_own_ship_with_its_law_is_compared_over_five_rolls() -> None:
         setups = {**CAMPAIGN.setups, "pump": setup.model_copy(update={"scenario": scenario})}
         own = CAMPAIGN.model_copy(update={"setups": setups})
         assert commands._window(own) == Window(600.0, window_s)
+
+
+def test_of_a_device_without_counters_no_row_asks_for_what_only_they_show() -> None:
+    storm = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
+    bought = {"profile": "sbg_ellipse", "accept_unprotected": True}
+    drive = {"profile": "cia402", "node": 5, "mode": "torque", "pressure_pa_per_unit": 80.0,
+             "speed_rad_s_per_unit": 1e-3}  # fmt: skip
+    vessel = storm.vessel.model_copy(update={"devices": DevicesSection(motion=bought, pump=drive)})
+    kept = {row.id for row in CAMPAIGN.on(storm, "gpc").rows}
+    other = storm.model_copy(update={"vessel": vessel})
+    left = {row.id for row in CAMPAIGN.on(other, "gpc").rows}
+    assert {"motion-silent", "motion-bad-quality", "motion-frozen", "tank-corrupted"} <= left < kept
+    dropped = {"motion-1-frame-lost", "motion-corrupted-once", "motion-short-once",
+               "motion-counter-frozen", "drive-status-corrupted"}  # fmt: skip
+    assert dropped <= kept - left
+
+
+def test_a_scenario_can_not_spoil_what_a_device_does_not_send() -> None:
+    storm = load_config(Path("configs/scenarios/storm.yaml"), Scenario).model_dump(mode="json")
+    bought = {"profile": "sbg_ellipse", "accept_unprotected": True}
+    storm["vessel"]["devices"] = DevicesSection(motion=bought).model_dump(mode="json")
+    del storm["vessel"]["tank"]["headroom_m"]
+    storm["controllers"] = {"law": {"name": "L", "vessel": storm["vessel"], "law": {"kind": "pd"}}}
+    storm["faults"] = [{"kind": "length", "message": "SENSOR_MOTION", "length": 7, "at_s": 5}]
+    with pytest.raises(ValueError, match=r"devices\.motion sends no SENSOR_MOTION; take kind lost"):
+        Scenario.model_validate(storm)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from fault_bench import ARMED, SECOND, FaultBench, storm
 
-from firmware_sim.ship_side import PASSIVE_SCRIPT
 from utank_hil.canbus import Frame, Mode
+from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.runners import Node
 
 pytestmark = pytest.mark.slow
@@ -56,7 +56,7 @@ def recorded(
 @pytest.fixture(scope="module")
 def passive() -> np.ndarray:
     """The passive ship's roll and her twin's."""
-    bench, passive = recorded(PASSIVE_SCRIPT)
+    bench, passive = recorded((TimedAction(1.0, Action.PASSIVE),))
     assert bench.mode is Mode.PASSIVE
     # without a pump the twin is the ship, later by the motion sensor's 20 ms and a tick
     assert np.abs(passive[60:, 0] - passive[60:, 1]).max() < math.radians(0.3)

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from cantools.database.can import Database
 
+from firmware_sim.bench import BenchOptions, run_bench
+from firmware_sim.figures import mark_of
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from tests.nodes.canopen_peers import Wire, valve_dictionary
@@ -17,7 +19,7 @@ from utank_hil.canbus import Fault, Frame, Mode, OperatorCommand, load_catalogue
 from utank_hil.canbus.cmac import KeyFileError
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.profiles.acting import ProfiledPanel
-from utank_hil.configuration import load_config
+from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.configuration.device_files import with_profile
 from utank_hil.configuration.devices import ROLES, DevicesSection, PanelSection
 from utank_hil.console.ship_report import print_devices
@@ -165,6 +167,14 @@ def test_an_open_or_shut_valve_by_cia_401_with_its_switches(theirs):
     assert openings == {0, 1}
 
 
+@pytest.mark.parametrize("law", ["clipped", "pump_with_valve"])
+def test_a_law_that_throttles_is_refused_for_a_valve_of_one_bit(law):
+    controller = load_config(Path("configs/scenarios/semi_active.yaml"), Scenario).controllers[law]
+    vessel = controller.vessel.model_copy(update={"devices": DevicesSection(valve=ON_OFF)})
+    with pytest.raises(ValueError, match=r"devices\.valve has one bit.*valve_on_off"):
+        ControllerConfig(name="L", vessel=vessel, law=controller.law)
+
+
 @pytest.mark.parametrize(
     ("break_it", "fault"),
     [
@@ -179,6 +189,19 @@ def test_a_valve_that_is_stuck_or_dead_is_found(theirs, break_it, fault):
     break_it(bench)
     bench.to(17)
     assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, fault)
+
+
+def test_a_panel_that_cannot_ask_for_passive_leaves_the_bench_its_reference(theirs):
+    scenario = load_config(Path("configs/scenarios/semi_active.yaml"), Scenario)
+    section = DevicesSection(**theirs(panel=PANEL))
+    vessel = scenario.vessel.model_copy(update={"devices": section})
+    config = scenario.controllers["clipped"].model_copy(update={"vessel": vessel})
+    changes = {"vessel": vessel, "controllers": {"clipped": config}, "settle_s": 5.0}
+    scenario = scenario.model_copy(update=changes)
+    result = run_bench(scenario, BenchOptions(duration_s=20.0), lambda *_: None)
+    assert [mark_of(result, run) for run in result.runs] == [None, None]
+    # its report reads the section as it was written: an open mask is a whole number of 64 bits
+    assert DevicesSection.model_validate(section.model_dump(mode="json")) == section
 
 
 @pytest.fixture

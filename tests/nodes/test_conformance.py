@@ -72,6 +72,12 @@ def test_a_sensor_conforms_or_what_is_wrong_is_named(changes, wrong):
     assert failed(sensor_trial(**changes)) == wrong
 
 
+def test_a_sensor_that_nobody_moved_is_not_said_to_be_turned_round():
+    (check,) = [each for each in sensor_trial(sign=0).checks if each.name == "roll_rad_sign"]
+    assert (check.passed, check.what) == (False, "roll_rad moved by 0 rad")
+    assert "has to move by 0.0175 rad" in check.remedy
+
+
 def test_a_sensor_whose_measurements_come_all_at_once_has_no_rate():
     trial = sensor_trial()
     trial._heard, trial.checks = [trial._heard[0]] * 3, []

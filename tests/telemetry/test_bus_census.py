@@ -1,5 +1,6 @@
 """Who is on a bus: emulated ships, and logs that other people recorded."""
 
+import re
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -76,7 +77,25 @@ def test_a_device_by_its_profile_is_expected_like_a_node():
     without = [each for each in messages if each.number >> 8 & 0xFFFF != 0xF029]
     (problem,) = census(without, ship.vessel).problems()
     assert problem[0] == "missing"
-    assert "PGN 61481" in problem[1]
+    assert "motion slope PGN 61481" in problem[1]
+
+
+def test_a_device_of_the_ships_file_has_its_name_in_the_table_and_its_remedy():
+    gauges = {
+        "profile": "cia404_levels",
+        "node": 7,
+        "accept_unprotected": True,
+        "high_level_m": 4.6,
+    }
+    gauges["signals"] = {f"{side}_level_m": {"scale": 1e-3} for side in ("port", "starboard")}
+    ship = scenario({"motion": {"profile": "sbg_ellipse", "accept_unprotected": True},
+                     "levels": gauges})  # fmt: skip
+    messages, _ = traffic(ship)
+    found = census([each for each in messages if each.extended or each.number < 0x180], ship.vessel)
+    named = {row["id"]: (row["node"], row["message"]) for row in found.rows()}
+    assert named["132"] == ("motion", "attitude")
+    silent = [text for _, text in found.problems()]
+    assert any(re.match(r"levels \w+ 187 was not heard; .*conform levels", text) for text in silent)
 
 
 def test_hard_wired_inputs_are_missed_only_by_a_ship_that_has_them():

@@ -46,10 +46,12 @@ class Range:
     def holds(self, value: float) -> bool:
         """Whether a value lies in the range; what is not a number never does."""
         try:
-            value = float(value)
-        except OverflowError:  # a whole number of hundreds of digits
+            finite = math.isfinite(
+                value
+            )  # of a whole number no digit is lost, as a float's would be
+        except OverflowError:  # one of hundreds of digits
             return False
-        if not (self.infinite or math.isfinite(value)):
+        if not (self.infinite or finite):
             return False
         low = value >= self.least if self.above is None else value > self.above
         high = value <= self.most if self.below is None else value < self.below

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from utank_hil.canbus.frame import BUS_SHIFT, OTHER_BUS, Frame, Port, PortError
 from utank_hil.canbus.profiles.device_plan import ForeignDevices
+from utank_hil.canbus.serial_names import SLCAN, tty_and_bit_rate
 
 
 def why_other_bit_rate(channel: str, bit_rate: int) -> str:
@@ -14,16 +15,21 @@ def why_other_bit_rate(channel: str, bit_rate: int) -> str:
     Also empty where `ip` (iproute2) tells none: it is missing, or the interface is virtual.
     """
     words = ["ip", "-details", "-json", "link", "show", channel]
+    remedy = f"ip link set {channel} type can bitrate {bit_rate}"
     try:
-        said = subprocess.run(words, capture_output=True, check=True, timeout=5).stdout
-        found = int(json.loads(said)[0]["linkinfo"]["info_data"]["bittiming"]["bitrate"])
+        if channel.startswith(SLCAN):
+            tty, found = tty_and_bit_rate(channel)
+            remedy = f"{SLCAN}{tty}:{bit_rate}"
+        else:
+            said = subprocess.run(words, capture_output=True, check=True, timeout=5).stdout
+            found = int(json.loads(said)[0]["linkinfo"]["info_data"]["bittiming"]["bitrate"])
     except (OSError, subprocess.SubprocessError, ValueError, LookupError, TypeError):
         return ""
     if found == bit_rate:
         return ""
     return (
         f"is {bit_rate}, but {channel} runs at {found}: load and delay would be judged by the "
-        f"wrong one; give both the same (ip link set {channel} type can bitrate {bit_rate})"
+        f"wrong one; give both the same ({remedy})"
     )
 
 

@@ -7,10 +7,12 @@ start of its tick and sends at the end, so a loop that hangs is silent on the bu
 import errno
 import socket
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from typing import Final
 
 from utank_hil.canbus.frame import LONGEST_ID, STANDARD, Frame, PortError
 from utank_hil.canbus.python_can import SocketcanBus, can
+from utank_hil.canbus.serial_names import SERIAL_REMEDY, SLCAN
 
 #: More than the kernel's receive buffer (about 280 frames); bounds the time on a babbling bus.
 MAX_FRAMES_PER_CALL: Final = 320
@@ -42,8 +44,32 @@ _CONTROLLER_PROBLEMS: Final = {
 _CHECK_BUS: Final = "check wiring, termination and bit rate"
 
 
+def open_bus(
+    name: str,
+    filters: list[can.typechecking.CanFilter] | None = None,
+    *,
+    listens: bool = False,
+) -> can.BusABC:
+    """A SocketCAN interface, or a serial adapter; that `listens` without acknowledging.
+
+    OSError is raised if there is none.
+    """
+    if name.startswith(SLCAN):
+        from utank_hil.canbus.slcan import SerialBus  # here: pyserial need not be there
+
+        try:
+            return SerialBus(name, listens=listens, can_filters=filters)
+        except (can.CanError, OSError, ValueError) as error:
+            raise OSError(f"{error}; {SERIAL_REMEDY}") from error
+    try:
+        socket.if_nametoindex(name)  # python-can leaks its socket if it can't bind it
+    except OSError as error:
+        raise OSError(errno.ENODEV, f"no interface {name}") from error
+    return SocketcanBus(name, receive_own_messages=False, can_filters=filters)
+
+
 class SocketCanPort:
-    """A SocketCAN interface; see `Port` for `send`, `receive` and `close`.
+    """A SocketCAN interface, or a serial adapter (`SLCAN`); see `Port` for what it does.
 
     An interface that was down is used again when it is up. One that was deleted is reopened by the
     first call after it exists again; until then, or if there never was one, calls raise PortError.
@@ -159,16 +185,10 @@ class SocketCanPort:
             raise self._port_error("closed", "open a new port")
         if self._bus is None:
             try:
-                # python-can leaks its socket if it can't bind it: check the interface first
-                socket.if_nametoindex(self.channel)
+                self._bus = open_bus(self.channel, self._filters)
             except OSError as error:
-                number = errno.ENODEV
-                raise self._port_error("not found", _REMEDIES[number], number) from error
-            try:
-                self._bus = SocketcanBus(
-                    self.channel, receive_own_messages=False, can_filters=self._filters
-                )
-            except OSError as error:
+                if error.errno == errno.ENODEV:
+                    raise self._port_error("not found", _CREATE, errno.ENODEV) from error
                 raise self._failure(error) from error
         return self._bus
 
@@ -186,7 +206,12 @@ class SocketCanPort:
         return None
 
     def _failure(self, error: can.CanError | OSError) -> PortError:
-        number = error.error_code if isinstance(error, can.CanError) else error.errno
+        number = getattr(error, "error_code", None) or getattr(error, "errno", None)
+        if self.channel.startswith(SLCAN):
+            with suppress(can.CanError, OSError):  # its port may be gone
+                self._close_bus()
+            self._bus = None
+            return self._port_error(str(error), SERIAL_REMEDY)
         if number in _GONE:
             self._close_bus()
         if number == errno.ENETDOWN:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from utank_hil.base.text_files import TextFileError
+from utank_hil.canbus.serial_names import DEFAULT_BIT_RATE, SLCAN
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.configuration.files import ConfigError, kind_of
 from utank_hil.configuration.vessel import Vessel
@@ -17,8 +18,6 @@ from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.telemetry.bus_census import BusCensus
 from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError, of_message
 from utank_hil.telemetry.bus_files.log import READ, BusLog
-
-DEFAULT_BIT_RATE = 250_000
 
 
 def bus(
@@ -50,7 +49,7 @@ def bus(
     """
     vessel, said = _ship(ship)
     rate = bit_rate or said or DEFAULT_BIT_RATE
-    log = Path(place).exists() or bool(Path(place).suffix)
+    log = not place.startswith(SLCAN) and (Path(place).exists() or bool(Path(place).suffix))
     census = BusCensus(rate, vessel, interface if log else place)
     try:
         for message in BusLog(Path(place), channel).frames() if log else _heard(place, seconds):
@@ -82,12 +81,9 @@ def _ship(path: Path | None) -> tuple[Vessel | None, int | None]:
 
 
 def _heard(interface: str, seconds: float) -> Iterator[BusFrame]:
-    import socket
+    from utank_hil.canbus.socketcan import open_bus
 
-    from can.interfaces.socketcan import SocketcanBus
-
-    socket.if_nametoindex(interface)  # python-can leaks its socket where there is none
-    listening = SocketcanBus(interface, receive_own_messages=False)
+    listening = open_bus(interface, listens=True)
     try:
         end_s = time.monotonic() + seconds
         while (left_s := end_s - time.monotonic()) > 0:

@@ -29,6 +29,7 @@ from utank_hil.safety.monitors.thresholds import SensorFigures
 from utank_hil.safety.safety_limits import SafetyLimits
 
 _WITHOUT_PUMP: Final = (PassiveDesign, OnOffValveDesign, ClippedValveDesign)
+_OF_ANY_OPENING: Final = ("valve_clipped", "pump_with_valve")  #: Laws that throttle.
 
 MOST_PRESSURE_PA: Final = 250e3
 """Largest pressure of PUMP_CMD: the codec cuts larger ones without the controller's knowledge."""
@@ -248,6 +249,13 @@ class ControllerConfig(Section):
             reason = (
                 f"is {self.law.kind}, which drives a pump, but {self.vessel.name} has none: give "
                 "the vessel a pump, or take kind: passive"
+            )
+            return [("law.kind", reason)]
+        devices = self.vessel.devices
+        if self.law.kind in _OF_ANY_OPENING and devices is not None and devices.valve.of_one_bit:
+            reason = (
+                f"is {self.law.kind}, which asks for any opening, but devices.valve has one bit: "
+                "it would chatter. Take kind: valve_on_off, or a valve with a position"
             )
             return [("law.kind", reason)]
         found = sample_time(self.law)

@@ -10,7 +10,18 @@ from typing import Any, Final
 
 from utank_hil.base.text_files import open_content
 from utank_hil.canbus import profiles
-from utank_hil.canbus.profiles.drive_plan import DISABLED, PROFILE, Place
+from utank_hil.canbus.profiles.drive_plan import (
+    CONTROL_WORD,
+    DISABLED,
+    HEARTBEAT_PRODUCER,
+    MODES,
+    MODES_SUPPORTED,
+    PROFILE,
+    SPEED,
+    STATUS_WORD,
+    TORQUE,
+    Place,
+)
 from utank_hil.configuration.yaml_text import parse_yaml
 
 OF_AN_EDS: Final = "EDS "  #: Begins the name of a device whose layouts were read from an EDS.
@@ -219,7 +230,39 @@ def drive_with_eds(content: dict[str, Any]) -> dict[str, Any]:
     if eds.entry(Place(0x1016, 1)) is None:
         reason = "the drive would run on after the controller's end. Take one that watches it"
         raise ValueError(f"eds: {eds.file}: there is no 1016h (heartbeat consumer): {reason}")
+    if lacking := "; ".join(_lacking(eds, rest)):
+        raise ValueError(f"eds: {eds.file}: {lacking}")
     return {"identity": _identity(eds)} | rest
+
+
+def _lacking(eds: Eds, content: dict[str, Any]) -> Iterator[str]:
+    """What the controller would refuse at its start, since the drive's file has it otherwise."""
+    mode, able = MODES.get(str(content.get("mode"))), eds.number(MODES_SUPPORTED)
+    if mode is None:
+        return  # refused elsewhere
+    if able and not able >> mode.number - 1 & 1:
+        others = [name for name, each in MODES.items() if able >> each.number - 1 & 1]
+        others_said = f"choose {' or '.join(others)}" if others else "take another drive"
+        yield f"{MODES_SUPPORTED} is {able:#x}, without mode {content['mode']}: {others_said}"
+    echo = mode.demand if content.get("echo") == "demand" else CONTROL_WORD
+    for place in (CONTROL_WORD, echo, mode.target, STATUS_WORD, SPEED, TORQUE, HEARTBEAT_PRODUCER):
+        if eds.entry(place) is None:
+            ways = place == echo or place == mode.target
+            remedy = "choose another echo or mode" if ways else "take another drive or firmware"
+            yield f"there is no {place}, which the controller needs: {remedy}"
+    for name, value in content["require"].items():
+        with suppress(ValueError):  # no object: refused elsewhere
+            if value is not None and eds.entry(place_of(name)) is None:
+                yield f"there is no {name}: set it to null in require, the maker's own in its place"
+
+
+def place_of(written: str) -> Place:
+    """An object as a file writes it; ValueError if it is none."""
+    index, _, subindex = written.partition(":")
+    place = Place(int(index.removesuffix("h"), 16), int(subindex or "0", 0))
+    if not (0x1000 <= place.number <= 0xFFFF and 0 <= place.subindex <= 0xFF):
+        raise ValueError(written)
+    return place
 
 
 def _identity(eds: Eds) -> list[int | None]:

@@ -19,7 +19,7 @@ from utank_hil.canbus.profiles.device_plan import (
 )
 from utank_hil.canbus.profiles.drive_plan import Step, identity_steps, pdo_steps
 from utank_hil.canbus.profiles.field import ConditionPlan, SignalPlan
-from utank_hil.configuration.device_files import NATIVE, with_profile
+from utank_hil.configuration.device_files import NATIVE, place_of, with_profile
 from utank_hil.configuration.device_sections import (
     UNITS,
     CanopenSection,
@@ -30,7 +30,6 @@ from utank_hil.configuration.device_sections import (
     ProtectionSection,
     SignalSection,
     SourceAddress,
-    place_of,
     unit_of,
 )
 

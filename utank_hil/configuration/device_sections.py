@@ -11,7 +11,7 @@ from utank_hil.base.tick import TICK_S
 from utank_hil.canbus.frame import LONGEST_ID, LONGEST_STANDARD_ID
 from utank_hil.canbus.profiles.drive_plan import COMMAND_MS, MODES, DrivePlan, Place
 from utank_hil.canbus.profiles.field import Field as BusField
-from utank_hil.configuration.device_files import NATIVE, drive_with_eds
+from utank_hil.configuration.device_files import NATIVE, drive_with_eds, place_of
 from utank_hil.configuration.files import Section
 from utank_hil.control.pressure_loop import LoopMargins, loop_margins
 from utank_hil.dynamics.pump import Pump
@@ -101,15 +101,6 @@ class CanopenSection(Section):
         return tuple(
             (place_of(key), value) for key, value in self.require.items() if value is not None
         )
-
-
-def place_of(written: str) -> Place:
-    """An object as a file writes it; ValueError if it is none."""
-    index, _, subindex = written.partition(":")
-    place = Place(int(index.removesuffix("h"), 16), int(subindex or "0", 0))
-    if not (0x1000 <= place.number <= 0xFFFF and 0 <= place.subindex <= 0xFF):
-        raise ValueError(written)
-    return place
 
 
 class MessageSection(_Part):
@@ -259,11 +250,14 @@ class DriveSection(CanopenSection):
     @model_validator(mode="before")
     @classmethod
     def _complete(cls, content: Any) -> Any:
-        if not isinstance(content, dict) or content.get("profile", NATIVE) == NATIVE:
+        if not isinstance(content, dict):
             return content
-        content = drive_with_eds(content) if "eds" in content else content
+        content = {"profile": "cia402", **content} if "eds" in content else content
+        if content.get("profile", NATIVE) == NATIVE:
+            return content
         given = content.get("require", {})
-        return content | {"require": REQUIRE | given if isinstance(given, dict) else given}
+        content = content | {"require": REQUIRE | given if isinstance(given, dict) else given}
+        return drive_with_eds(content) if "eds" in content else content
 
     @property
     def native(self) -> bool:
@@ -299,9 +293,9 @@ class DriveSection(CanopenSection):
         """What suits no drive of this pump, by its counts at the greatest pressure and speed."""
         for name, of, most, (least_counts, most_counts), words in (
             ("pressure_pa_per_unit", self.pressure_pa_per_unit, pump.max_pressure_pa, _TORQUES,
-             "6071h counts thousandths of the rated torque"),
+             "6071h counts thousandths of the rated torque (6076h): measure it once more"),
             ("speed_rad_s_per_unit", self.speed_rad_s_per_unit, pump.max_speed_rad_s, _SPEEDS,
-             "606Ch counts the rotor's speed in 32 bits"),
+             "few for 606Ch. If its unit (60A9h) and the gear are right, all is well"),
         ):  # fmt: skip
             if of and not least_counts <= most / abs(of) <= most_counts:
                 at_most = f"{most:.4g} are {most / abs(of):.3g} counts"

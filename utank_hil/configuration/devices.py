@@ -74,6 +74,12 @@ class ValveSection(DeviceSection):
         """Name of the message that the valve is commanded with."""
         return next((each.to.partition(".")[0] for each in self.commands.values()), "")
 
+    @property
+    def of_one_bit(self) -> bool:
+        """Whether it can only be told to open or to shut."""
+        layout = self._field(self.commands["opening"].to) if "opening" in self.commands else None
+        return layout is not None and layout.bits == 1
+
     def problems(self, kind: type[tuple[Any, ...]]) -> Iterator[Problem]:
         """What is wrong with the valve; a native one is right."""
         yield from super().problems(kind)

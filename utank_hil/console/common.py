@@ -61,7 +61,7 @@ def _named(bus: str) -> str:
 
 
 Bus = Annotated[
-    str, typer.Option("--bus", help="SocketCAN interface, for example can0.", callback=_named)
+    str, typer.Option("--bus", help="CAN interface, for example can0.", callback=_named)
 ]
 Run = Annotated[str | None, typer.Option(help="Run of a recording; without it the last one.")]
 From = Annotated[float | None, typer.Option("--from", metavar="SECONDS")]

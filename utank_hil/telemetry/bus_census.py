@@ -64,11 +64,17 @@ class BusCensus:
         self.identities: dict[int, set[int]] = {}
         self.states: dict[int, str] = {}
         self._tag = 0
+        self._devices: dict[int, tuple[str, str, bool]] = {}
         self._inbox: Inbox | None = None
         if vessel is not None:
             foreign = vessel.foreign
             if interface in foreign.buses[1:]:
                 self._tag = foreign.buses.index(interface) << BUS_SHIFT
+            self._devices = {
+                can_id & (OTHER_BUS - 1): said
+                for can_id, said in foreign.said().items()
+                if can_id & -OTHER_BUS == self._tag
+            }
             self._inbox = Inbox(
                 self._catalogue,
                 vessel.version,
@@ -142,13 +148,16 @@ class BusCensus:
     def _name(self, can_id: int) -> str:
         if can_id in self._catalogue.by_id:
             return str(self._catalogue.by_id[can_id].codec.name)
+        name = self._devices[can_id][1] if can_id in self._devices else ""
         if can_id & STANDARD:
             node = (can_id & ~STANDARD) - 0x700
-            return "CANopen heartbeat" if node in self.states else ""
+            return name or ("CANopen heartbeat" if node in self.states else "")
         group = can_id >> 8 & 0x3FFFF
-        return f"PGN {group if group & 0xFF00 >= 0xF000 else group & 0x3FF00}"
+        return f"{name} PGN {group if group & 0xFF00 >= 0xF000 else group & 0x3FF00}".lstrip()
 
     def _node(self, can_id: int) -> str:
+        if can_id in self._devices:
+            return self._devices[can_id][0]
         if can_id in self._catalogue.by_id:
             return self._catalogue.by_id[can_id].source.name
         if can_id & STANDARD:
@@ -184,9 +193,11 @@ class BusCensus:
 
     def _message_problems(self, heard: Any) -> list[tuple[str, str]]:
         bare = heard.can_id & (OTHER_BUS - 1)
-        what = " ".join(filter(None, (self._name(bare), written(bare))))
+        device, _, silent = self._devices.get(bare, ("", "", False))
+        what = " ".join(filter(None, (device, self._name(bare), written(bare))))
         if not heard.heard:
-            return [("missing", f"{what} was not heard")]
+            why = f"; controller or utank-hil conform {device} must configure it before it sends"
+            return [("missing", f"{what} was not heard" + (why if silent else ""))]
         found = []
         for reason in Rejection:
             if heard.rejected[reason]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final, Generic, TypeVar
 
-from utank_hil.canbus.frame import STANDARD, Frame
+from utank_hil.canbus.frame import BUS_SHIFT, STANDARD, Frame
 from utank_hil.canbus.messages import (
     OperatorCommand,
     SensorMotion,
@@ -14,7 +14,7 @@ from utank_hil.canbus.messages import (
     SensorTank,
     ValveStatus,
 )
-from utank_hil.canbus.profiles.drive_plan import DrivePlan, Step
+from utank_hil.canbus.profiles.drive_plan import RECEIVED_1, SENT_1, SENT_2, DrivePlan, Step
 from utank_hil.canbus.profiles.field import ConditionPlan, Field, SignalPlan
 
 T = TypeVar("T", bound=tuple[Any, ...])
@@ -189,6 +189,20 @@ class ForeignDevices:
     def any(self) -> bool:
         """Whether there are any."""
         return self != NO_FOREIGN_DEVICES
+
+    def said(self) -> dict[int, tuple[str, str, bool]]:
+        """Identifiers: device, message, and whether its node is silent until it is configured."""
+        found: dict[int, tuple[str, str, bool]] = {}
+        for plan in (*self.motions, self.levels, self.pump_sensor, self.valve, self.panel):
+            if plan is not None:
+                for each in filter(None, (*plan.messages, plan.command)):
+                    of = plan.name, each.name, bool(plan.steps)
+                    found |= dict.fromkeys(each.can_ids, of)
+        if self.pump is not None:
+            own = self.pump.bus << BUS_SHIFT | STANDARD | self.pump.node
+            for name, cob in (("RPDO1", RECEIVED_1), ("TPDO1", SENT_1), ("TPDO2", SENT_2)):
+                found[own + cob] = "pump", name, True
+        return found
 
     def knows(self, can_id: int) -> bool:
         """Whether a frame on the controller's own bus is of a declared device.

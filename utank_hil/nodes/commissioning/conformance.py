@@ -174,7 +174,7 @@ class SensorTrial(Trial):
         yield from self._wait(1.0)
         self.checks.append(
             Check("silence", "measurements of a device that is off", len(self._heard), 0.0, 0.0,
-                  "1", "Another sender or a gateway repeats its frames: see utank-hil bus.")
+                  "1", "If it was off, a gateway or another sender repeats it: utank-hil bus.")
         )  # fmt: skip
         yield from self._by_hand("Connect the device again")
         self._heard = []
@@ -226,11 +226,12 @@ class SensorTrial(Trial):
         yield from self._wait(1.0)
         moved, right = self._mean(value) - at_rest, self._device.proved or value != "arm"
         remedy = "Turn the device, exchange its channels, or change sign."
-        remedy = remedy if right else "Its proof is wrong: compare key, challenge and proof."
-        self.checks.append(
-            flag(f"{value}_sign", f"{value} moved by {moved:.3g} {unit}", remedy,
-                 right=right and moved >= least)
-        )  # fmt: skip
+        if not right:
+            remedy = "Its proof is wrong: compare key, challenge and proof."
+        elif abs(moved) < least:
+            remedy = f"It has to move by {least:.3g} {unit} in the time given; else look at scale."
+        words = f"{value} moved by {round(moved, 4) + 0.0:g} {unit}"
+        self.checks.append(flag(f"{value}_sign", words, remedy, right=right and moved >= least))
         if turns:
             turned = math.fsum(
                 (after_ns - before_ns) * 1e-9 * ((before[1] + after[1]) / 2 - rest_rate)
