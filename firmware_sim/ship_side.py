@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from firmware_sim.canopen_drive import CanopenPumpDrive
 from firmware_sim.canopen_node import CanopenSensor
@@ -37,8 +37,11 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.canbus.cmac import cmac, read_key
+from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.profiles.acting import PROOF
 from utank_hil.canbus.profiles.device_plan import DevicePlan
+from utank_hil.canbus.profiles.drive_plan import SENT_2, DrivePlan
+from utank_hil.canbus.profiles.field import Field
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.tank import Tank, negligible
@@ -61,7 +64,7 @@ class ExternalNode:
         self,
         name: str,
         plant: Plant,
-        receiver: Receiver[Any],
+        receiver: "Receiver[Any] | ReportedTorque",
         signal: str,
         act: Callable[[float | None], None],
     ) -> None:
@@ -95,8 +98,34 @@ class ExternalNode:
         return ()
 
 
-def external_drive(plant: Plant) -> ExternalNode:
-    """Node that imposes the pressure of DRIVE_STATUS_1, in every state of the drive.
+class TorqueReport(NamedTuple):
+    """What a drive's torque is on the water."""
+
+    pressure_pa: float
+
+
+class ReportedTorque:
+    """Takes the torque 6077h of a CiA 402 drive as `Receiver` takes DRIVE_STATUS_1.
+
+    ValueError is raised if the drive is led by its speed: the unit of its torque is not known then.
+    """
+
+    def __init__(self, plan: DrivePlan, pump: Pump) -> None:
+        if not plan.mode.torque:
+            raise ValueError("devices.pump: without the emulated drive a torque mode is needed")
+        self.can_id = plan.bus << BUS_SHIFT | STANDARD | SENT_2 + plan.node
+        self._length = sum(bits for _, bits in plan.measured) // 8
+        per_unit = 1 / (plan.units_per_si * pump.pitch_m * pump.duct_area_m2)
+        self._field = Field(32, 16, self._length, signed=True, scale=per_unit)
+
+    def accept(self, frame: Frame) -> TorqueReport | None:
+        """The report in a frame; None if it is none."""
+        whole = len(frame.data) == self._length
+        return TorqueReport(self._field.value(frame.data)) if whole else None
+
+
+def external_drive(plant: Plant, vessel: Vessel | None = None) -> ExternalNode:
+    """Node that imposes the pressure of DRIVE_STATUS_1, or a drive's torque, in each of its states.
 
     Without a report the rotor turns freely.
     """
@@ -107,7 +136,9 @@ def external_drive(plant: Plant) -> ExternalNode:
         else:
             plant.impose_pressure(pressure_pa)
 
-    receiver = load_catalogue().receiver(DriveStatus1)
+    receiver: Receiver[Any] | ReportedTorque = load_catalogue().receiver(DriveStatus1)
+    if vessel is not None and vessel.foreign.pump is not None and vessel.pump is not None:
+        receiver = ReportedTorque(vessel.foreign.pump, vessel.pump)
     return ExternalNode(EXTERNAL_DRIVE, plant, receiver, "pressure_pa", act)
 
 
@@ -282,7 +313,9 @@ class ShipSide:
                 raise ValueError(f"no node {name!r} to leave out; there are {', '.join(known)}")
         nodes: list[Node] = [node for node in self.nodes if node.name not in names]
         if "drive" in names:
-            nodes.append(external_drive(self.plant))
+            nodes.append(external_drive(self.plant, self.vessel))
+        if "valve" in names and self.vessel.foreign.valve is not None:
+            raise ValueError("devices.valve can't be left out: its position does not move the ship")
         if "valve" in names and self.vessel.valve is not None:
             nodes.append(external_valve(self.plant, self.vessel.tank, self.vessel.valve))
         return nodes

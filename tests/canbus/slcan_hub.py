@@ -42,7 +42,10 @@ class Hub:
 
     def say(self, number: int, text: bytes) -> None:
         """Hand a text to who has opened a port, whole; lines that nobody reads are lost."""
-        waiting = self._behind[number] + text if len(self._behind[number]) < 1 << 16 else b""
+        behind = self._behind[number]
+        if len(behind) > 1 << 16:
+            behind = behind[: behind.index(b"\r") + 1]  # the rest of a line that has begun
+        waiting = behind + text
         with suppress(BlockingIOError):
             waiting = waiting[os.write(self._ends[number][0], waiting) :]
         self._behind[number] = waiting

@@ -25,16 +25,16 @@ def hub():
         yield hub
 
 
-def opened(hub, number):
+def opened(hub, number, how="O"):
     """Wait until the hub has seen that an adapter was opened."""
-    end_s = time.monotonic() + 1
-    while "O" not in hub.told[number] and time.monotonic() < end_s:
+    end_s = time.monotonic() + 20
+    while how not in hub.told[number] and time.monotonic() < end_s:
         time.sleep(1e-3)
 
 
 def received(port, count):
-    """Frames until so many have come, within a second."""
-    frames, end_s = [], time.monotonic() + 1
+    """Frames until so many have come, within five seconds."""
+    frames, end_s = [], time.monotonic() + 5
     while len(frames) < count and time.monotonic() < end_s:
         frames += port.receive()
     return frames
@@ -100,11 +100,11 @@ def test_its_bit_rate_is_compared_with_that_of_the_file():
 
 def test_bus_lists_what_an_adapter_hears_and_only_listens(hub):
     line = f"T{LONG.can_id:08X}8{LONG.data.hex()}\r".encode()
-    later = threading.Timer(0.2, hub.say, (0, line * 3))
+    later = threading.Thread(target=lambda: (opened(hub, 0, "L"), hub.say(0, line * 3)))
     later.start()
     app = new_app()
     app.command()(bus)
-    done = CliRunner().invoke(app, [f"slcan:{hub.ports[0]}", "--seconds", "0.5", "--json"])
+    done = CliRunner().invoke(app, [f"slcan:{hub.ports[0]}", "--seconds", "1", "--json"])
     assert done.exit_code == ExitCode.OK, done.output
     assert [row["frames"] for row in json.loads(done.stdout)["messages"]] == [3]
     assert "L" in hub.told[0]

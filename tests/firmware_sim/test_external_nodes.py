@@ -21,7 +21,9 @@ from firmware_sim.truth import TRUTH, MemoryLog, TruthRecorder
 from utank_hil.assembly import build_controller_node
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Fault, Frame, Mode, load_catalogue
+from utank_hil.canbus.frame import STANDARD
 from utank_hil.configuration import load_config
+from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.runners import Lockstep
 
@@ -239,3 +241,28 @@ def test_a_valve_of_another_maker_throttles_the_emulated_tank() -> None:
     lockstep.run_until(lockstep.now_ns + 10 * TICK_NS)
     assert losses[-1] == loss_at(1.0)
     assert controller.fault is Fault.VALVE_SILENT
+
+
+def test_a_real_cia_402_drive_moves_the_emulated_ship_by_its_torque() -> None:
+    drive = {"profile": "cia402", "node": 5, "mode": "torque", "pressure_pa_per_unit": 80.0,
+             "speed_rad_s_per_unit": 1e-3}  # fmt: skip
+    section = DevicesSection.model_validate({"pump": drive})
+    scenario = STORM.model_copy(
+        update={"vessel": STORM.vessel.model_copy(update={"devices": section})}
+    )
+    ship = build_ship_side(scenario, 1, ())
+    node = ship.without(["drive"])[-1]
+    report = (1234).to_bytes(4, "little") + (-50).to_bytes(2, "little", signed=True) + b"\x04"
+    node.receive(Frame(0x285 | STANDARD, report), 0)
+    list(node.tick(0))
+    ship.plant.advance(10 * TICK_NS)
+    assert ship.plant.pressure_pa == pytest.approx(-50 * 80.0)
+    node.receive(Frame(0x285 | STANDARD, report[:6]), 20 * TICK_NS)  # another length
+    list(node.tick(20 * TICK_NS))
+    ship.plant.advance(30 * TICK_NS)
+    assert abs(ship.plant.pressure_pa) < 1000.0  # nothing drives it
+    by_speed = DevicesSection.model_validate({"pump": drive | {"mode": "velocity"}})
+    vessel = STORM.vessel.model_copy(update={"devices": by_speed})
+    other = build_ship_side(STORM.model_copy(update={"vessel": vessel}), 1, ())
+    with pytest.raises(ValueError, match="a torque mode is needed"):
+        other.without(["drive"])
