@@ -79,6 +79,9 @@ class Outcome:
     #: variance, passive_variance: roll variances in rad^2 of the ship and of the passive one.
     variance: float = math.nan
     passive_variance: float = math.nan
+    #: The same without the fault, where control continues over a window shorter than that of
+    #: `--full`; NaN elsewhere. In a lull a sound law may roll the ship more than the passive one.
+    sound_variance: float = math.nan
     window_s: float = math.nan
     wire: str = ""  #: First frame that the fault changed; empty if none differs.
     error: str = ""
@@ -120,6 +123,7 @@ class Sea:
         self._underway = self._start()
         self._underway.bench.run(self._fault_ns)
         self._passive: dict[bool, FloatArray] = {}
+        self._sound: FloatArray = np.zeros(0)
 
     def _start(self) -> Underway:
         log, config = BusLog(), self._setup.config
@@ -142,7 +146,12 @@ class Sea:
         followed_s = max((row.fault.followed_s for row in rows if row.fault.on_bus), default=0.0)
         end_ns = self._fault_ns + round(followed_s * SECOND_NS)
         log = self._underway.log
-        log.frames += in_a_copy(lambda: self._frames_until(end_ns), self._stopped)
+        running_s = self._window.running_s
+        running_ns = round(running_s * SECOND_NS) if running_s < Window().running_s else 0
+        frames, self._sound = in_a_copy(
+            lambda: self._without_fault(end_ns, self._fault_ns + running_ns), self._stopped
+        )
+        log.frames += frames
         self._underway.reference, log.frames = (
             log.frames,
             [each for each in log.frames if each[0] < self._fault_ns],
@@ -159,10 +168,14 @@ class Sea:
                 self._stopped,
             )
 
-    def _frames_until(self, end_ns: int) -> list[Heard]:
-        known = len(self._underway.log.frames)
-        self._underway.bench.run(end_ns)
-        return self._underway.log.frames[known:]
+    def _without_fault(self, end_ns: int, roll_end_ns: int) -> tuple[list[Heard], FloatArray]:
+        """Frames until a time, and the roll until another or the same."""
+        bench, frames = self._underway.bench, self._underway.log.frames
+        known, rolls = len(frames), []
+        for time_ns in range(self._fault_ns, max(end_ns, roll_end_ns), SAMPLE_NS):
+            bench.run(time_ns + SAMPLE_NS)
+            rolls.append(bench.ship.plant.roll_rad)
+        return [heard for heard in frames[known:] if heard[0] < end_ns], np.array(rolls)
 
     def _passive_roll(
         self, seconds: float, *, enabled: bool, opening: float | None = None
@@ -226,6 +239,9 @@ class Sea:
             bench.run(end_ns)
         passive = self._passive_beside(bench, (end_ns - self._fault_ns) / SECOND_NS, stopped)
         passive = passive[start_ns // SAMPLE_NS : end_ns // SAMPLE_NS]
+        sound = self._sound[: len(passive)]
+        compared = not (stopped or row.fault.from_start) and len(sound) == len(passive)
+        compared = compared and window_s < Window().running_s
         wire = ""
         if row.fault.on_bus:
             difference = first_difference(reference, log.frames, watched_ns)
@@ -244,6 +260,7 @@ class Sea:
             steepest_pa_s=steepest_pa_s,
             variance=watch.rolls.variance,
             passive_variance=float(passive.var()),
+            sound_variance=float(sound.var()) if compared else math.nan,
             window_s=window_s,
             wire=wire,
         )

@@ -63,7 +63,8 @@ class Result:
     zero_limit_ms: float | None
     codes: tuple[str, ...]
     wire: str  #: First frame that the fault changed, in the first seed.
-    roll_ratio: float  #: Roll variance divided by that of the passive ship.
+    #: Roll variance divided by that of the passive ship, or, if larger, of the ship without fault.
+    roll_ratio: float
     window_s: float  #: Time over which `roll_ratio` was computed.
     problems: tuple[str, ...]  #: Reasons for failure; empty if passed.
     outcomes: tuple[Outcome, ...] = field(repr=False)
@@ -112,9 +113,11 @@ def judged(campaign: Campaign, row: Row, outcomes: Sequence[Outcome]) -> Result:
     for each in sound:
         problems += [f"seed {each.seed}: {why}" for why in _problems(row, setup, each)]
     passive = sum(each.passive_variance for each in sound)
-    ratio = sum(each.variance for each in sound) / passive if passive else math.nan
+    without_fault = sum(each.sound_variance for each in sound)
+    least, whose = max((passive, "passive"), (without_fault, "sound"))  # NaN is not larger
+    ratio = sum(each.variance for each in sound) / least if least else math.nan
     if not ratio <= row.limit.roll:
-        problems.append(f"rolls {ratio:.2f} times the passive ship's variance")
+        problems.append(f"rolls {ratio:.2f} times the {whose} ship's variance")
     return Result(
         row,
         campaign.asked_by(row),
@@ -276,7 +279,7 @@ def table(results: Sequence[Result]) -> Table:
     drawn.caption = (
         "worst of the seeds; times after the fault, ≤ their limits; zero: of the drive's "
         "set-point,\nor the end of the valve's following; variance of the roll over that of the "
-        "passive ship, ≤ 1.05"
+        "passive ship,\nor, in charge, of the sound one if that is more, ≤ 1.05"
     )
     for result in results:
         said = " ".join((result.row.expect.reaction, *result.codes))

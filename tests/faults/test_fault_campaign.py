@@ -568,12 +568,15 @@ def test_a_drive_of_another_maker_that_misses_frames_is_stopped(row: str, found_
 @pytest.mark.slow
 def test_rows_run_on_another_ship() -> None:
     patti = "configs/scenarios/patti_b.yaml"
-    done = invoke("--scenario", patti, "--seeds", "1", "--json", "--rows", "F35,F31,motion-zero")
+    rows = "F35,F31,motion-zero,motion-silent-of-two"
+    done = invoke("--scenario", patti, "--seeds", "1", "--json", "--rows", rows)
     found = json.loads(done.stdout)
     assert done.exit_code == 0
     windows = {row["id"]: row["roll_window_s"] for row in found["rows"]}
-    assert windows.keys() == {"not-commissioned", "motion-zero"}
+    assert windows.keys() == {"not-commissioned", "motion-zero", "motion-silent-of-two"}
     assert windows["motion-zero"] == 600.0  # a lightly damped ship rolls on for minutes
+    # a lull, in which the law rolls the ship more than the passive tank, with the fault or without
+    assert windows["motion-silent-of-two"] == 54.0  # five rolls
     words = "needs a ship, nodes and counters as of setup valve"
     assert {row["why"] for row in found["not_run"]} == {words}
     ship = load_config(Path(patti), Scenario)

@@ -33,6 +33,16 @@ def test_one_seed_of_two_fails_the_row(change: dict[str, object], words: str) ->
     assert any(words in problem for problem in result.problems)
 
 
+def test_in_charge_a_fault_may_roll_the_ship_as_the_sound_law_does_in_a_lull() -> None:
+    """Where that is more than the passive ship."""
+    calm = replace(GOOD, mode="ACTIVE", found=None, code="NONE", noted=10.0, variance=1.5)
+    assert spoken("roll-spike", replace(calm, sound_variance=1.45)).passed
+    for variance, words in ((1.4, "1.07 times the sound"), (0.5, "1.50 times the passive")):
+        problems = spoken("roll-spike", replace(calm, sound_variance=variance)).problems
+        assert [words in problem for problem in problems] == [True]
+    assert not spoken("roll-spike", calm).passed  # of which no sound run is known
+
+
 def test_commands_that_change_faster_than_the_limit_fail_a_ramp() -> None:
     limit_pa_s = CAMPAIGN.setups["pump"].config.limits.rate_pa_s
     ramp = replace(GOOD, row="motion-silent", found=50.0, zero=240.0, code="MOTION_SILENT")
