@@ -225,6 +225,21 @@ def test_sound_law_is_kept_through_a_lull_and_given_up_if_it_goes_on() -> None:
     assert patient < ends_s < t[np.argmax(amplified)] < begins_s + 17 * PERIOD_S
 
 
+def test_a_law_that_halves_the_roll_is_kept_through_minutes_of_a_lull() -> None:
+    """As GPC on the day of the storm: over the first limit, its record below the passive roll."""
+    begins_s = 60 * PERIOD_S
+    t = np.arange(0.0, 75 * PERIOD_S, STEP_S)
+    lull = t > begins_s
+    waves_rad = np.where(lull, 0.06, 0.08) * np.sin(0.6 * t)
+    pressure_pa, made_rad = made_by_pump(t, np.where(lull, 0.03, -0.04))
+    twin, ratios = PassiveTwin(FIRST.ship, FIRST.tank, STEP_S, LEAST_RAD), []
+    for own_rad, effort_pa in zip(waves_rad + made_rad, pressure_pa, strict=True):
+        twin.update(own_rad, 0.0, 0.0, effort_pa)
+        ratios.append(twin.ship_rms_rad / twin.rms_rad if twin.rms_rad else 0.0)
+        assert not twin.amplified
+    assert ratios[-1] > 1.1 * AMPLIFIED
+
+
 @pytest.mark.parametrize("room", [1.0, 1.1])
 def test_room_is_a_factor_on_the_ratios_at_which_a_law_has_lost(room: float) -> None:
     t = np.arange(0.0, 60 * PERIOD_S, STEP_S)

@@ -278,9 +278,9 @@ FAULTS: Final = (
              Finding.SATURATED)),
     _row(Fault.ROLL_AMPLIFIED, "The ship rolls more than it would with the pump at rest.",
          "Retune the law, or use one for this load and sea.",
-         _found(_RAMP, "roll over 1.25 times the passive twin's for a quarter of a roll period, "
-             "over 1.1 times in twelve roll periods, with a valve a tenth more, and over 0.5 "
-             "degrees RMS", Finding.ROLL_AMPLIFIED)),
+         _found(_RAMP, "roll over 1.25 times the passive twin's for a quarter of a roll period "
+             "and over 1.1 times in 36 roll periods, or over 1.6 times; with a valve a tenth "
+             "more; and over 0.5 degrees RMS", Finding.ROLL_AMPLIFIED)),
     _row(Fault.HEEL_LIMIT, "The ship rolls or heels beyond the limit for active control.",
          "Wait until the roll is small; correct the heel by ballast; check the motion sensor.",
          Condition(_RAMP, "roll over {roll_limit_rad:g} rad, or its mean over a minute over "

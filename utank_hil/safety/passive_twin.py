@@ -44,10 +44,13 @@ RECOVERED: Final = 1.05
 UNKNOWN: Final = 1.0
 """So much more at the start, when nothing is remembered: over their first roll period sound laws
 rolled a ship 1.63 times as much, over the first five 1.5 times."""
-RECORD_PERIODS: Final = 12.0
+RECORD_PERIODS: Final = 36.0
 RECORD: Final = 1.1
-"""Own roll over the twin's that a law has lost by over so many roll periods, too. In the lull after
-a group of waves, two laws came to 1.34 and 1.28 over six periods, to 1.05 over twelve at most."""
+"""Own roll over the twin's that a law has lost by over so many roll periods, too. A lull may last
+minutes: GPC, which takes half of the roll off on the day of the storm, came to 1.38 over six
+periods there, to 1.25 over twelve and to 1.06 over these."""
+GROSS: Final = 1.6
+"""Own roll over the twin's over six periods at which a law has lost whatever its record."""
 MOST_MADE_RAD: Final = 1.0
 """Roll that no pump makes: a pressure was wrong, and the comparison begins anew."""
 DECAY_PERIODS: Final = 6.0
@@ -79,6 +82,7 @@ class PassiveTwin:
     ) -> None:
         self._period_s = period_s
         self._amplified, self._record = room * AMPLIFIED, room * RECORD
+        self._gross = room * GROSS
         self._open_loss = open_loss
         self._made = np.zeros(7)
         self._effort = self._made[4:]
@@ -129,8 +133,10 @@ class PassiveTwin:
         """How near the comparison is to its threshold, 1; NaN where nothing is judged."""
         if self._losing_s < 0 or self._power <= self._least_power or not self._twin_power:
             return math.nan
-        lately = math.sqrt(self._power / self._twin_power) / (self._amplified + self._unknown)
-        return min(lately, math.sqrt(self._record_power / self._twin_record_power) / self._record)
+        lately = math.sqrt(self._power / self._twin_power)
+        record = math.sqrt(self._record_power / self._twin_record_power) / self._record
+        lost = min(lately / (self._amplified + self._unknown), record)
+        return max(lost, lately / (self._gross + self._unknown))
 
     def update(
         self,
@@ -192,7 +198,12 @@ class PassiveTwin:
         ratio = RECOVERED if self.amplified else self._amplified + self._unknown
         least_power = max(self._least_power, ratio * ratio * self._twin_power)
         record_power = self._record * self._record * self._twin_record_power
-        on_record = self.amplified or self._record_power > record_power
+        gross = self._gross + self._unknown
+        on_record = (
+            self.amplified
+            or self._record_power > record_power
+            or self._power > gross * gross * self._twin_power
+        )
         if on_record and self._power > least_power:
             self._losing_s += self._period_s
         else:
