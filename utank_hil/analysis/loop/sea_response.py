@@ -17,11 +17,6 @@ from utank_hil.dynamics import STATES, RollShip
 from utank_hil.dynamics.tank import IRREGULAR
 from utank_hil.sea import Harmonics
 
-LEAST_ROLL_RAD: Final = 1e-6
-"""Roll RMS below which the sea counts as calm, as a ratio to it is meaningless. Chosen; no study.
-"""
-
-
 _ROUNDS: Final = 50  # Limit on the iterations: each halves the difference at least.
 _BANDS: Final = 400  # Widths of a hundredth of a roll frequency, far below a resonance's.
 _AGREE: Final = 1e-3  # Relative difference of rates at which the iteration ends.
@@ -124,15 +119,6 @@ def _answers(
         seen = (w > 0) & (w < np.pi / law.sample_time_s)
         motions[seen], pressure[seen] = closed_loop_response(law, plant, measured, w[seen])
     return motions, pressure
-
-
-def require_roll(passive: MotionInSea) -> None:
-    """Raise a `CalmSeaError` if the ship with passive tank does not roll."""
-    if not passive.roll_rms_rad >= LEAST_ROLL_RAD:
-        raise CalmSeaError(
-            "the sea does not roll the ship, so no law can be compared: it needs waves, and not "
-            "from ahead or astern"
-        )
 
 
 def rms(response: ComplexArray, waves: Harmonics) -> float:
