@@ -113,6 +113,8 @@ def test_a_change_of_a_device_voids_the_commissioning(tmp_path):
         ({"motion": SSI2, "motion_2": SSI2}, "is no second source for itself"),
         ({"levels": LEVELS | {"node": 5}, "pump": DRIVE}, "levels.node: is the drive's"),
         ({"levels": LEVELS | {"node": 127}, "pump": DRIVE}, "levels.node: is the drive's"),
+        ({"motion": SBG | {"messages": {"attitude": {"id": 0x185}}}, "pump": DRIVE},
+         "motion.messages: 0x185 is the drive's on this bus"),
         ({"valve": ON_OFF}, "devices.valve: is a valve, but the ship has none"),
         ({"valve": ON_OFF | {"commands": {"lift": {"to": "order.OUTPUT"}}}},
          "commands.lift: is no command; there are opening, follow, reset"),

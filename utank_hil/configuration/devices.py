@@ -25,7 +25,15 @@ from utank_hil.canbus.profiles.device_plan import (
     DevicePlan,
     ForeignDevices,
 )
-from utank_hil.canbus.profiles.drive_plan import HEARTBEAT, HEARTBEAT_CONSUMER, NetworkState, Step
+from utank_hil.canbus.profiles.drive_plan import (
+    HEARTBEAT,
+    HEARTBEAT_CONSUMER,
+    SDO_ANSWER,
+    SENT_1,
+    SENT_2,
+    NetworkState,
+    Step,
+)
 from utank_hil.canbus.profiles.field import SignalPlan
 from utank_hil.configuration.device_section import NATIVE_NODE, DeviceSection
 from utank_hil.configuration.device_sections import (
@@ -48,6 +56,8 @@ from utank_hil.dynamics.valves import Valve
 from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.safety.safety_limits import SafetyLimits
 
+_OF_DRIVE: Final = (SENT_1, SENT_2, SDO_ANSWER)
+"""What the controller itself has the drive send, by function (CiA 301)."""
 UNGUARDED: Final = (
     "The guard (docs/safety.md) reads native frames and hears none of these devices: cut the "
     "drive's power by a hard-wired stop instead, and say redundancy: {hardwired_inputs: true}"
@@ -261,10 +271,14 @@ class DevicesSection(Section):
             if not device.bus and device.source in set(Address):
                 reason = f"is the address of {Address(device.source).name.lower()}: change it there"
                 yield f"{role}.source", reason
-            if self.pump.native or device.node is None or device.bus != self.pump.bus:
+            drive = self.pump.node
+            if self.pump.native or device.bus != self.pump.bus or drive is None:
                 continue
-            if device.node in (self.pump.node, self.pump.controller_node):
+            if device.node in (drive, self.pump.controller_node):
                 yield f"{role}.node", "is the drive's or the controller's: give it another number"
+            elif taken := own & {STANDARD | each + drive for each in _OF_DRIVE}:
+                reason = f"{min(taken) - STANDARD:#x} is the drive's on this bus: change it there"
+                yield f"{role}.messages", reason
         both = [ids.get(role, frozenset()) for role in ("motion", "motion_2")]
         if self.motion.bus == self.motion_2.bus and (same := both[0] & both[1]):
             reason = f"has {min(same):#x} of motion: a sensor is no second source for itself"
