@@ -20,7 +20,6 @@ with the cost of a self-tuned law (`cost_weights`).
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Final, Literal, NamedTuple, TypeVar, get_args
 
@@ -164,13 +163,11 @@ def first_law(
     plant: DesignPlant,
     slope_rad: float,
     peak_rad_s: float,
-    suits: Callable[[LinearDesign], bool] = lambda _: True,
     kind: LinearKind = "lqg",
 ) -> TunedLaw:
     """Find the law of `scaled_law` with the greatest weights at which it has the required margins.
 
-    `suits` is a further requirement on a law with all margins; smaller weights must help to meet
-    it. Raises `NoLawError` if no weights do.
+    Raises `NoLawError` if no weights do.
     """
     design = scaled_law(kind, plant, slope_rad, peak_rad_s)
     failures: tuple[str, ...] = ()
@@ -178,10 +175,11 @@ def first_law(
         asked = scaled(design, STEP**-trial)
         judged = _judged(asked, plant)
         failures = judged.failures()
-        if not failures and suits(asked):
+        if not failures:
             return TunedLaw(asked, judged)
-    gentlest = failures[0] if failures else "beyond the limits of pump and tank"
-    raise NoLawError(f"no {kind.upper()} law will do on this ship; the gentlest one is {gentlest}")
+    raise NoLawError(
+        f"no {kind.upper()} law will do on this ship; the gentlest one is {failures[0]}"
+    )
 
 
 def _judged(design: LinearDesign, plant: DesignPlant) -> Robustness:
