@@ -196,6 +196,7 @@ def build_controller_node(
             compares=law.closes_loop,
             second_motion=vessel.redundancy.second_motion_sensor,
             motion_cycles_s=vessel.motion_cycles_s,
+            of_hull=vessel.hull is not None,
         )
     controller = law.controller() if exchange is None else exchange
     running = RunningLaw(

@@ -79,7 +79,8 @@ class Monitors:
 
     `roll_limit_rad` is the largest roll under control, `bit_rate` that of the bus. `compares` says
     whether the law is meant to roll the ship less than its passive twin; one without a loop is
-    not. `motion_cycles_s` are the times between two samples of each motion sensor.
+    not. `motion_cycles_s` are the times between two samples of each motion sensor, `of_hull` says
+    whether the ship has hull data.
     """
 
     def __init__(
@@ -92,8 +93,11 @@ class Monitors:
         compares: bool = True,
         second_motion: bool = False,
         motion_cycles_s: tuple[float, ...] = (TICK_S, TICK_S),
+        of_hull: bool = False,
     ) -> None:
-        self.thresholds: MonitorThresholds = thresholds_of(plant, roll_limit_rad, sensors)
+        self.thresholds: MonitorThresholds = thresholds_of(
+            plant, roll_limit_rad, sensors, of_hull=of_hull
+        )
         thresholds, ship, tank = self.thresholds, plant.ship, plant.tank
         self._spikes = SpikeCount()
         self.drive = DriveFollowing(plant.lag_s, thresholds, SHORT_S)
@@ -234,7 +238,7 @@ class Monitors:
         fresh = True
         for watch, sample in zip(self.watches, motions, strict=True):
             stale = backlog or sample.age_ms > STALE_MS
-            watch.update(sample, elapsed_s, stale=stale)
+            watch.update(sample, elapsed_s, stale=stale, water_moves=self.equation.water_moves)
             fresh = fresh and not stale
         if len(motions) == 1:
             return 0

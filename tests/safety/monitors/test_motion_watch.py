@@ -108,3 +108,37 @@ def test_a_sensor_of_20_hz_is_as_noisy_as_its_samples(
             watch.update(sample, 0.05, stale=False)
             seen.append(watch.found & Finding.NOISE)
     assert set(seen[100:]) == {found}
+
+
+def found_dead(
+    samples: list[tuple[float, float]], period_s: float = 10.0, *, water_moves: bool = True
+) -> float:
+    """Time of the samples, 50 ms apart, until they are found to repeat themselves."""
+    watch = MotionWatch(replace(LOOSE, tank_period_s=period_s))
+    for k, (roll_rad, rate_rad_s) in enumerate(samples):
+        sample = MotionSample(roll_rad, rate_rad_s)
+        watch.update(sample, STEP_S, stale=False, water_moves=water_moves)
+        if watch.found & Finding.ROLL_STUCK:
+            return k * STEP_S
+    return math.inf
+
+
+@pytest.mark.parametrize(("period_s", "within_s"), [(22.0, 4.4), (10.0, 2.0), (3.0, 1.0)])
+@pytest.mark.parametrize("at", [(0.0, 0.0), (0.1, -0.02)])
+def test_a_sensor_that_repeats_itself_is_dead_after_a_fifth_of_a_period_or_a_second(
+    period_s: float, within_s: float, at: tuple[float, float]
+) -> None:
+    assert found_dead([at] * 100, period_s) == pytest.approx(within_s, abs=1.1 * STEP_S)
+    assert found_dead([at] * 100, period_s, water_moves=False) == math.inf
+
+
+def test_a_digit_of_either_signal_in_each_fifth_of_a_period_is_alive() -> None:
+    for digit in ((1e-4, 0.0), (0.0, 3e-5)):
+        assert found_dead(([(0.0, 0.0)] * 20 + [digit] * 20) * 9) == math.inf
+
+
+def test_a_held_ship_has_a_sensor_with_noise() -> None:
+    """Digits of SENSOR_MOTION: 1e-4 rad and 3.125e-5 rad/s."""
+    draw = np.random.default_rng(4)
+    noise = draw.standard_normal((36000, 2)) * [2e-4, 5e-4]
+    assert found_dead([(round(a, 4), round(b / 3.125e-5)) for a, b in noise]) == math.inf

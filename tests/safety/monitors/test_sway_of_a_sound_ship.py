@@ -1,13 +1,18 @@
 """The tank's equation in a ship that sways, with a sound and with a reversed motion sensor."""
 
 import cmath
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from moving_ship import SHIP, TANK, THRESHOLDS
 
 from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+from utank_hil.safety.monitors import tank_equation
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.level_stuck import LevelStuck
 from utank_hil.safety.monitors.sway import most_sway
@@ -17,6 +22,7 @@ STEP_S = 0.1
 G = 9.80665
 T = THRESHOLDS.tank_period_s
 UNSTATED = replace(SHIP, sway_of_slope=None)
+OF_HULL = replace(THRESHOLDS, of_hull=True)
 
 
 def swaying(share: float, w: float, slope_rad: float, pressure_pa: float, effective: float):
@@ -32,13 +38,13 @@ def swaying(share: float, w: float, slope_rad: float, pressure_pa: float, effect
 
 
 def found_in(
-    ship, phasors, w: float, sign: float = 1.0, until_s: float = 120.0, noise_share: float = 1.0
+    ship, phasors, w: float, sign: float = 1.0, noise_share: float = 1.0, thresholds=THRESHOLDS
 ):
-    equation = TankEquation(ship, TANK, THRESHOLDS, STEP_S)
-    stuck = LevelStuck(ship, TANK, THRESHOLDS, STEP_S)
+    equation = TankEquation(ship, TANK, thresholds, STEP_S)
+    stuck = LevelStuck(ship, TANK, thresholds, STEP_S)
     noise = np.random.default_rng(1)
     first: dict[Finding, float] = {}
-    for k in range(round(until_s / STEP_S)):
+    for k in range(round(120.0 / STEP_S)):
         at = [(each * cmath.exp(1j * w * k * STEP_S)).real for each in phasors]
         roll, level, pressure = np.array(at) + noise_share * noise.standard_normal(3) * [
             2e-4, 0.0035, 100.0
@@ -55,12 +61,14 @@ def found_in(
 @pytest.mark.parametrize("w", [0.3, 0.5, 0.8])
 @pytest.mark.parametrize("slope_rad", [0.01, 0.05])
 @pytest.mark.parametrize("pressure_pa", [0.0, 20e3])
+@pytest.mark.parametrize("thresholds", [THRESHOLDS, OF_HULL])
 def test_no_sway_that_a_ship_may_have_is_a_fault(
-    share: float, w: float, slope_rad: float, pressure_pa: float
+    share: float, w: float, slope_rad: float, pressure_pa: float, thresholds
 ) -> None:
     phasors = swaying(share, w, slope_rad, pressure_pa, effective=0.6)
-    assert not found_in(UNSTATED, phasors, w)
-    assert not found_in(replace(SHIP, sway_of_slope=share), phasors, w)
+    assert not found_in(UNSTATED, phasors, w, thresholds=thresholds)
+    ship = replace(SHIP, sway_of_slope=share)
+    assert not found_in(ship, phasors, w, thresholds=thresholds)
 
 
 def test_without_the_term_a_swaying_ship_is_told_to_check_its_wiring() -> None:
@@ -82,12 +90,78 @@ def test_the_most_sway_in_a_long_swell_without_noise_is_no_fault(
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.5, 0.7, 0.9, 1.0])
 @pytest.mark.parametrize("w", [0.45, 0.6, 0.8])
 @pytest.mark.parametrize("pressure_pa", [0.0, 10e3])
+@pytest.mark.parametrize(("thresholds", "slope_rad"), [(THRESHOLDS, 0.03), (OF_HULL, 0.035)])
 def test_reversed_motion_sensor_is_found_within_two_roll_periods(
-    share: float, w: float, pressure_pa: float
+    share: float, w: float, pressure_pa: float, thresholds, slope_rad: float
 ) -> None:
-    phasors = swaying(share, w, 0.03, pressure_pa, effective=0.7)
-    found = found_in(UNSTATED, phasors, w, sign=-1.0)
+    phasors = swaying(share, w, slope_rad, pressure_pa, effective=0.7)
+    found = found_in(UNSTATED, phasors, w, sign=-1.0, thresholds=thresholds)
     assert found[Finding.WATER_SIGN] <= 2 * T
+
+
+def wide_hull(share: float, w: float, slope_rad: float, pressure_pa: float):
+    """Her roll moment per sway falls with the frequency: 0 at 1.65 w0, then of the other sign."""
+    times = w / TANK.natural_frequency_rad_s
+    return swaying(share, w, slope_rad, pressure_pa, effective=share * (0.9 - 0.33 * times**2))
+
+
+RECORDED = json.loads((Path(__file__).parent / "data/swaying_ships.json").read_text())
+"""Two ships of `tools.studies.ten_hulls` in their seas, sound sensors: the first 70 s of a record,
+every 0.1 s, with their self-tuned laws in charge from 5 s on."""
+
+
+def found_in_record(name: str, sign: float = 1.0) -> tuple[Finding, float]:
+    """All that is found in a record of a ship, and the greatest doubt."""
+    at = RECORDED[name]
+    equation = TankEquation(
+        RollShip(**at["ship"]), Tank(**at["tank"]), replace(OF_HULL, **at["thresholds"]), STEP_S
+    )
+    found, doubt = Finding(0), 0.0
+    for roll, level, pressure in zip(
+        at["roll_1e-4_rad"], at["level_mm"], at["pressure_100_pa"], strict=True
+    ):
+        found |= Finding(equation.update(sign * 1e-4 * roll, 1e-3 * level, 100.0 * pressure))
+        doubt = max(doubt, equation.doubt) if equation.doubt == equation.doubt else doubt
+    return found, doubt
+
+
+@pytest.mark.parametrize("name", RECORDED)
+def test_short_waves_that_sway_a_wide_hull_are_no_fault(name: str) -> None:
+    found, doubt = found_in_record(name)
+    assert not found
+    assert doubt < 0.8
+    assert Finding.WATER_SIGN in found_in_record(name, sign=-1.0)[0]
+
+
+@pytest.mark.parametrize("name", RECORDED)
+def test_without_the_band_they_look_like_a_wrong_sign(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tank_equation, "BAND", 40.0)
+    monkeypatch.setattr(tank_equation, "NOTCH", 1e6)
+    found, doubt = found_in_record(name)
+    assert Finding.WATER_SIGN in found
+    assert doubt > 1.5
+
+
+@pytest.mark.parametrize("times", [0.8, 1.0, 1.1])
+def test_reversed_motion_sensor_of_a_wide_hull_is_found(times: float) -> None:
+    w = times * TANK.natural_frequency_rad_s
+    found = found_in(UNSTATED, wide_hull(0.8, w, 0.04, 5e3), w, sign=-1.0, thresholds=OF_HULL)
+    assert found[Finding.WATER_SIGN] <= 2 * T
+
+
+@pytest.mark.parametrize(("ship", "stuck"), [(UNSTATED, False), (SHIP, True)])
+def test_a_ship_held_still_while_sway_moves_the_water_is_not_stuck(ship, stuck: bool) -> None:
+    """The moment of the water holds her; with no sway nothing would explain the water."""
+    w, slope_rad, share = TANK.natural_frequency_rad_s, 0.05, 0.8
+    mass, damping, stiffness = coupled_matrices(SHIP, TANK)
+    dynamics = stiffness - w**2 * mass + 1j * w * damping
+    level = 0.2 * SHIP.stiffness_nm_rad * slope_rad / dynamics[0, 1]
+    pressure = dynamics[1, 1] * level / TANK.reservoir_area_m2
+    pressure += TANK.density_kg_m3 * TANK.width_m * share * G * slope_rad
+    found = found_in(ship, (0j, level, pressure), w, thresholds=OF_HULL)
+    assert (Finding.ROLL_STUCK in found) is stuck
 
 
 def test_most_sway_is_that_of_long_waves_unless_the_ship_states_less() -> None:

@@ -55,6 +55,7 @@ def test_every_threshold_is_what_the_documents_say_of_ship_and_sensors() -> None
         "unconfirmed_share": 0.25,
         "degraded_share": 0.5,
         "amplified_roll_rad": math.radians(0.5),
+        "of_hull": False,
     }
     assert {name: getattr(found, name) for name in found.__slots__} == pytest.approx(expected)
 

@@ -178,9 +178,15 @@ class SpikeCount:
         return self.found
 
 
+DEAD_PERIODS: Final = 0.2
+DEAD_S: Final = 1.0
+"""So much of T, and so long at least, a live sensor does not repeat itself: noise changes its last
+digit, and without any a roll of five digits at w0 stays within one at a crest for 0.2 T. A gateway
+repeats for less than a second."""
 SLOW_CYCLE_S: Final = 0.02
 """Of a slower sensor not every look finds a new sample, nor two looks the same number of them."""
 _SPIKES: Final = int(Finding.SPIKES)
+_ROLL_STUCK: Final = int(Finding.ROLL_STUCK)
 
 
 class MotionWatch:
@@ -194,7 +200,9 @@ class MotionWatch:
         self.rate_noise = Noise(math.sqrt(6) * thresholds.rate_noise_rad_s)
         self._rate_bend = SecondDifference()
         self._spikes = SpikeCount()
-        self._last_rate_rad_s = 0.0
+        self._last_roll_rad = self._last_rate_rad_s = 0.0
+        self._dead_s = max(DEAD_PERIODS * thresholds.tank_period_s, DEAD_S)
+        self._repeated_s = 0.0
         self._heard_ns = 0
         self._waited_s = self._turned_rad = 0.0
         self.found = 0  #: Bits of `Finding`.
@@ -211,13 +219,23 @@ class MotionWatch:
             self._turned_rad += sample.roll_rate_rad_s * self._waited_s
             self._waited_s = 0.0
 
-    def update(self, sample: MotionSample, elapsed_s: float, *, stale: bool) -> None:
-        """Take a sample, and set `found`; one that is `stale` begins anew."""
-        rate_rad_s = sample.roll_rate_rad_s
+    def update(
+        self, sample: MotionSample, elapsed_s: float, *, stale: bool, water_moves: bool = False
+    ) -> None:
+        """Take a sample, and set `found`; one that is `stale` begins anew.
+
+        Roll and rate that repeat themselves to the last digit count while the water moves: one
+        that is coarse may do so at a quay.
+        """
+        roll_rad, rate_rad_s = sample.roll_rad, sample.roll_rate_rad_s
+        if stale or roll_rad != self._last_roll_rad or rate_rad_s != self._last_rate_rad_s:
+            self._repeated_s = 0.0
+        elif water_moves:
+            self._repeated_s += elapsed_s
         # half a cycle of the ends makes a trapezoid of the sum, where no sample was lost
         turned_rad = self._turned_rad - self._half_s * (rate_rad_s - self._last_rate_rad_s)
         self._turned_rad = 0.0
-        self._last_rate_rad_s = rate_rad_s
+        self._last_roll_rad, self._last_rate_rad_s = roll_rad, rate_rad_s
         if stale:
             self.motion.restart()
             self._rate_bend.restart()
@@ -227,7 +245,7 @@ class MotionWatch:
         # the largest samples of noise are discarded, too
         if self._spikes.update(sample.discarded, elapsed_s) and not found & _NOISE:
             found |= _SPIKES
-        self.found = found
+        self.found = found | _ROLL_STUCK if self._repeated_s > self._dead_s else found
 
     def _look(self, sample: MotionSample, turned_rad: float, elapsed_s: float) -> int:
         """Roll against rate, and the noise of both; of a slow sensor each sample counts once."""

@@ -23,6 +23,8 @@ LEAST_SLOPE: Final = 0.5
 SPREAD: Final = 0.15
 """Of the largest share: so much of `SlopePush`, 0.3, may be left by a k that is not constant. The
 three hulls leave 0.10 to 0.21, root mean square, from 0.75 to 1.25 of the frequency of roll."""
+SPREAD_OF_SHARE: Final = 0.1
+"""The same of the share that fits best. Chosen, see `tank_equation.BAND`."""
 MEAN_PERIODS: Final = 3.0
 """Of the tank, in the mean that is taken off: it shifts a wave of twice the period by 6 degrees."""
 
@@ -69,13 +71,13 @@ class Misfit:
     """Squares of e + k u - z, with the share k of sway and the zero z that leave the least of them.
 
     e is what a case does not explain of the water's motion, u what a sway of g times the slope
-    takes from the water in that case. The sums fade.
+    takes from the water in that case. The sums fade. `share` is the last one found.
     """
 
-    __slots__ = ("_e", "_ee", "_eu", "_u", "uu", "weight")
+    __slots__ = ("_e", "_ee", "_eu", "_u", "share", "uu", "weight")
 
     def __init__(self) -> None:
-        self._e = self._u = self._ee = self._eu = self.uu = self.weight = 0.0
+        self._e = self._u = self._ee = self._eu = self.share = self.uu = self.weight = 0.0
 
     def add(self, e: float, u: float, keep: float) -> None:
         """Fade by `keep`, then add a sample."""
@@ -94,6 +96,7 @@ class Misfit:
             zero = within((e + share * u) / weight, most_zero)
             if uu > 0.0:
                 share = min(max((zero * u - eu) / uu, 0.0), most_share)
+        self.share = share
         of_share = share * (2.0 * eu + share * uu)
         of_zero = zero * (weight * zero - 2.0 * (e + share * u))
         return max(self._ee + of_share + of_zero, 0.0)

@@ -86,10 +86,11 @@ class MonitorThresholds:
     degraded_share: float  #: Share while a sensor or the drive is in doubt.
     #: Root mean square of the roll below which it is not compared with the twin's.
     amplified_roll_rad: float
+    of_hull: bool = False  #: Whether hull data say that the ship may be a wide one that sways.
 
 
 def thresholds_of(
-    plant: DesignPlant, roll_limit_rad: float, sensors: SensorFigures
+    plant: DesignPlant, roll_limit_rad: float, sensors: SensorFigures, *, of_hull: bool = False
 ) -> MonitorThresholds:
     """The thresholds for a ship.
 
@@ -131,6 +132,7 @@ def thresholds_of(
         unconfirmed_share=_unconfirmed_share(plant),
         degraded_share=DEGRADED_SHARE * held_pa / limits.pressure_pa,
         amplified_roll_rad=math.radians(0.5),
+        of_hull=of_hull,
     )
 
 
