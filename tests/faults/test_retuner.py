@@ -130,7 +130,7 @@ def test_after_a_refusal_the_law_is_the_one_it_was() -> None:
         voyage = Voyage(retuner)
         if retuner is not None:
             adaptive = voyage.node.law.law
-            adaptive._pulses_pa = np.zeros_like(adaptive._pulses_pa)
+            adaptive._pulses.pressure_pa[:] = 0.0
         return voyage.run(80)
 
     tried = silent(Broken(Refusal(("no",))))
