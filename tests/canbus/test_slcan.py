@@ -59,13 +59,14 @@ def test_frames_of_both_lengths_pass_and_the_bit_rate_is_set(hub):
     assert "S6" in hub.told[1]
 
 
-def test_a_filter_a_spoilt_line_and_an_empty_line_end_do_no_harm(hub):
+def test_a_spoilt_line_is_counted_and_neither_it_nor_a_filter_does_harm(hub):
     port = SocketCanPort(f"slcan:{hub.ports[0]}", [LONG.can_id])
     try:
         opened(hub, 0)
-        hub.say(0, b"Tnonsense\r\rT08FF3081100\rT08FF308")  # another identifier, half a frame
+        hub.say(0, b"\xff\rTnonsense\r\rT08FF3081100\rT08FF308")  # another identifier, half a frame
         hub.say(0, b"28" + LONG.data.hex().encode() + b"\r")
         assert received(port, 1) == [LONG]
+        assert port.error_frames == 2  # nothing is lost in silence
     finally:
         port.close()
 

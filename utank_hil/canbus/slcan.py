@@ -2,14 +2,16 @@
 
 from typing import Any
 
+from can import CanOperationError, Message
 from can.interfaces.slcan import slcanBus
 
 from utank_hil.canbus.serial_names import tty_and_bit_rate
 
 
 class SerialBus(slcanBus):
-    """python-can's bus, which never waits, and passes over acknowledgements and spoilt lines.
+    """python-can's bus, which never waits, and passes over acknowledgements.
 
+    A line that is no frame comes as an error frame of no class, which is counted and ends nothing.
     The adapter filters nothing, and tells neither bus-off nor missing acknowledgements.
     """
 
@@ -24,8 +26,13 @@ class SerialBus(slcanBus):
         while True:
             try:
                 message, _ = super()._recv_internal(timeout)
-            except (ValueError, IndexError, KeyError):  # a line that is no frame
-                continue
+            except (ValueError, IndexError, KeyError):
+                return Message(is_error_frame=True), True
+            except CanOperationError as error:
+                if not isinstance(error.__cause__, UnicodeDecodeError):
+                    raise
+                self._buffer.clear()  # python-can would read it again and again
+                return Message(is_error_frame=True), True
             if message is None and (self._queue.qsize() or self.serialPortOrig.in_waiting):
                 continue  # an acknowledgement of what was sent
             if message is None or (not message.is_fd and self._matches_filters(message)):
