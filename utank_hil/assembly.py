@@ -273,6 +273,7 @@ def build_commissioning_node(
         plant,
         plan=None if vessel.pump is None else plan_pulses(plant),
         stroke=None if vessel.valve is None else plan_stroke(vessel.valve, vessel.tank),
+        pump=vessel.pump,
         stop_within_ms=vessel.stop_within_ms,
         volume_m=thresholds_of(plant, config.safety.roll_limit_rad, config.sensor_figures).volume_m,
     )

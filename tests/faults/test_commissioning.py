@@ -1,5 +1,6 @@
 """Commissioning in lockstep: a ship that is as her files say passes; whatever is not is named."""
 
+import math
 import tracemalloc
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -30,6 +31,8 @@ from utank_hil.canbus import (
     Switch,
 )
 from utank_hil.canbus.events import AlarmEvent, RetuningEvent
+from utank_hil.canbus.frame import STANDARD
+from utank_hil.canbus.profiles.drive_plan import SENT_2
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.commissioning.checks import RATE_SCALE, SCALE, Each, remedies_of
 from utank_hil.nodes.commissioning.node import (
@@ -42,7 +45,8 @@ from utank_hil.nodes.commissioning.node import (
 from utank_hil.nodes.commissioning.pulses import plan_pulses
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.nodes.redundancy import Redundancy
-from utank_hil.runners import Lockstep
+from utank_hil.runners import Lockstep, SimulatedBus
+from utank_hil.runners.lockstep import with_more
 from utank_hil.telemetry.events import event_text
 from utank_hil.telemetry.frame_log import RECORD
 from utank_hil.telemetry.node_tap import NodeTap
@@ -480,3 +484,47 @@ def test_what_passes_at_the_quay_does_not_trip_at_sea(
     bench.sensors.begin_ns, bench.sensors.spoil = 0, spoil
     bench.run(60.0)
     assert (bench.mode, bench.node.fault) == (Mode.ACTIVE, Fault.NONE)
+
+
+@pytest.mark.parametrize(
+    ("told", "failed"),
+    [
+        (1.0, set()),
+        (0.8, set()),
+        (1.3, {"drive_speed"}),
+        (0.0, {"drive_speed"}),
+        (-1.0, {"drive_speed", "pressure"}),
+        (60 / math.tau, {"drive_speed", "pressure", "port_level", "stop_ms"}),
+    ],
+)
+def test_a_drive_that_tells_another_speed_than_the_pumps_is_named(
+    told: float, failed: set[str]
+) -> None:
+    drive = {
+        "profile": "cia402", "bus": "can1", "node": 5, "mode": "torque",
+        "pressure_pa_per_unit": 80.0, "speed_rad_s_per_unit": 1e-3, "identity": [1, 2, 3, 4],
+    }  # fmt: skip
+    thesis = controller("gpc")
+    vessel = thesis.vessel.model_copy(
+        update={"devices": DevicesSection.model_validate({"pump": drive})}
+    )
+    config = thesis.model_copy(update={"vessel": vessel})
+    scenario = still_water(config)
+    ship, node = build_ship_side(scenario, 1, scenario.operator), build_commissioning_node(config)
+    bus = with_more(SimulatedBus(), 1, config.bit_rate)
+    queue = bus.queue
+
+    def send(sender: int, frame: Frame, now_ns: int) -> None:
+        if frame.can_id & 0x7FF == SENT_2 + 5 and frame.can_id & STANDARD:
+            speed = round(told * int.from_bytes(frame.data[:4], "little", signed=True))
+            data = speed.to_bytes(4, "little", signed=True) + frame.data[4:]
+            frame = Frame(frame.can_id, data)
+        queue(sender, frame, now_ns)
+
+    bus.queue = send  # type: ignore[method-assign]
+    lockstep = Lockstep([*ship.nodes, node], bus)
+    while node.stage is not Stage.DONE and lockstep.now_ns < 300 * SECOND:
+        lockstep.run_until(lockstep.now_ns + SECOND)
+    assert {check.name for check in node.checks() if not check.passed} == failed
+    (speed,) = (check for check in node.checks() if check.name == "drive_speed")
+    assert speed.measured == pytest.approx(told, rel=0.01, abs=0.001)

@@ -11,6 +11,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import Frame, Mode, OperatorCommand, Station
 from utank_hil.control.interface import PRESSURE, VALVE, DesignPlant
+from utank_hil.dynamics.pump import Pump
 from utank_hil.nodes.commissioning.checks import (
     PRESSED,
     SETTLED_S,
@@ -21,6 +22,7 @@ from utank_hil.nodes.commissioning.checks import (
     judge_valve,
     stopped_ms,
 )
+from utank_hil.nodes.commissioning.drive_speed import SPEED, judge_speed
 from utank_hil.nodes.commissioning.pulses import PulseLaw, PulsePlan, ValveStroke
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.safety.faults import fault_text
@@ -75,7 +77,8 @@ class Stage(Enum):
 class CommissioningNode:
     """Leads through a commissioning; on the bus it is the controller.
 
-    `node` has the law of the pulses in it. `plan` is None without a pump, `stroke` without a valve.
+    `node` has the law of the pulses in it. `plan` and `pump` are None without a pump, `stroke`
+    without a valve.
     `volume_m` is the sum of both levels at which the volume's monitor speaks, `stop_within_ms` the
     time that the pump may take to stop.
     """
@@ -91,6 +94,7 @@ class CommissioningNode:
         *,
         plan: PulsePlan | None,
         stroke: ValveStroke | None,
+        pump: Pump | None,
         volume_m: float,
         stop_within_ms: float,
     ) -> None:
@@ -101,6 +105,7 @@ class CommissioningNode:
         self._plant = plant
         self._plan = plan
         self._stroke = stroke
+        self._pump = pump
         self._volume_m, self._stop_within_ms = volume_m, stop_within_ms
         self._pulses_s = 0.0 if plan is None else plan.duration_s
         self._push_s = self._pulses_s + (0.0 if stroke is None else stroke.duration_s)
@@ -114,6 +119,8 @@ class CommissioningNode:
             sources |= _OF_PAIR
         if stroke is not None:
             sources |= _OF_VALVE
+        if (drive := node.actuators.drive) is not None:
+            sources[SPEED] = lambda _: drive.speed_rad_s
         self._names = tuple(sources)
         self._getters = tuple(sources.values())
         self.stage = Stage.WAITING
@@ -139,6 +146,8 @@ class CommissioningNode:
         if plan is not None and (whole or rows >= begin + plan.period_s / ROW_S):
             pulses = {name: column[begin:end] for name, column in record.items()}
             checks += judge_pulses(self.rest, pulses, self._plant, plan, ROW_S)
+            if SPEED in pulses and self._pump is not None:
+                checks.append(judge_speed(self.rest, pulses, self._plant, plan, self._pump, ROW_S))
         if stroke is not None and (whole or rows >= end + stroke.duration_s / ROW_S - 1):
             there = end + round(stroke.duration_s / ROW_S)
             checks += judge_valve(record["valve_opening"][end:there], stroke, ROW_S)
