@@ -6,6 +6,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
+from firmware_sim.fault_campaign.own_ship import Ratios, ratios, resized
 from firmware_sim.fault_injection.fault import FaultSpan, FaultTime
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.scenario import Scenario
@@ -173,7 +174,8 @@ class Limit(Section):
     #: deviation of a received value from the truth; a lasting deviation of the pump's pressure from
     #: its set-point; or the first roll of this size (`over_roll_rad`).
     counts_from: Annotated[dict[CountsFrom, Positive], Field(default_factory=dict, max_length=1)]
-    roll: Positive = 1.05  #: Largest ratio of the roll variance to that of the passive ship.
+    #: Largest ratio of the roll variance to that of the passive ship; None where it is not judged.
+    roll: Positive | None = 1.05
     #: Time over which the roll is compared, instead of the one for all rows.
     roll_window_s: FaultSpan | None = None
 
@@ -289,7 +291,8 @@ class Campaign(Section):
         """Campaign with another ship in the place of that of the setup `COMMON`.
 
         Left are the rows of setups that change neither its parameters nor its devices, with faults
-        that its nodes can have. Of a device without counters no single frame is missed.
+        that its nodes can have, as large for it as for the first (`own_ship`). Of a device without
+        counters no single frame is missed.
         """
         common = self.setups[COMMON]
         bare = {"redundancy": common.redundancy, "commissioned": common.commissioned}
@@ -299,8 +302,10 @@ class Campaign(Section):
             if setup.model_copy(update=bare) == common
         }
         vessels = {name: setup.equipped.vessel for name, setup in setups.items()}
+        own = setups[COMMON]
+        by = ratios((common.scenario, common.config), (own.scenario, own.config))
         rows = tuple(
-            row
+            _resized(row, by)
             for row in self.rows
             if (vessel := vessels.get(row.fault.setup)) is not None
             and not missing_nodes(vessel, row.fault.inject)
@@ -320,6 +325,23 @@ class Campaign(Section):
     def shown_elsewhere(self, names: Sequence[str]) -> list[Requirement]:
         """Requirements with these names, or all, that tests verify and no row does."""
         return [each for each in self.requirements if each.elsewhere and _begins(each.id, names)]
+
+
+def _resized(row: Row, by: Ratios) -> Row:
+    """A row for another ship; by a pressure that no command takes away it rolls as it may."""
+    inject = tuple(resized(each, by) for each in row.fault.inject)
+    counts_from = {
+        key: value * by.range.get(key, 1.0) for key, value in row.limit.counts_from.items()
+    }
+    limit: dict[str, Any] = {"counts_from": counts_from}
+    if row.fault.hardwired_stop:
+        limit["roll"] = None
+    return row.model_copy(
+        update={
+            "fault": row.fault.model_copy(update={"inject": inject}),
+            "limit": row.limit.model_copy(update=limit),
+        }
+    )
 
 
 def _uncounted(vessel: Vessel, faults: Sequence[AnyFault]) -> bool:

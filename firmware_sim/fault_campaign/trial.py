@@ -79,8 +79,10 @@ class Outcome:
     #: variance, passive_variance: roll variances in rad^2 of the ship and of the passive one.
     variance: float = math.nan
     passive_variance: float = math.nan
-    #: The same without the fault, where control continues over a window shorter than that of
-    #: `--full`; NaN elsewhere. In a lull a sound law may roll the ship more than the passive one.
+    #: The same without the fault. Where control has ended, its pump is off from the fault on: that
+    #: ship rolls on from what the law had it do. Where control continues, over a window shorter
+    #: than that of `--full`: in a lull a sound law may roll the ship more than the passive one. NaN
+    #: elsewhere.
     sound_variance: float = math.nan
     window_s: float = math.nan
     wire: str = ""  #: First frame that the fault changed; empty if none differs.
@@ -167,6 +169,17 @@ class Sea:
                 lambda enabled=enabled: self._passive_roll(longest_s, enabled=enabled),  # type: ignore[misc]
                 self._stopped,
             )
+        self._cut = in_a_copy(lambda: self._cut_roll(longest_s), self._stopped)
+
+    def _cut_roll(self, seconds: float) -> FloatArray:
+        """Roll of the sound ship if its pump is off from the fault on: no stop is sooner."""
+        plant = self._underway.bench.ship.plant
+        plant.drive_pump(0.0, enabled=False)
+        rolls, end_ns = [], self._fault_ns + round(seconds * SECOND_NS)
+        for time_ns in range(self._fault_ns, end_ns, SAMPLE_NS):
+            plant.advance(time_ns)
+            rolls.append(plant.roll_rad)
+        return np.array(rolls)
 
     def _without_fault(self, end_ns: int, roll_end_ns: int) -> tuple[list[Heard], FloatArray]:
         """Frames until a time, and the roll until another or the same."""
@@ -239,9 +252,9 @@ class Sea:
             bench.run(end_ns)
         passive = self._passive_beside(bench, (end_ns - self._fault_ns) / SECOND_NS, stopped)
         passive = passive[start_ns // SAMPLE_NS : end_ns // SAMPLE_NS]
-        sound = self._sound[: len(passive)]
-        compared = not (stopped or row.fault.from_start) and len(sound) == len(passive)
-        compared = compared and window_s < Window().running_s
+        sound = (self._cut if stopped else self._sound)[: len(passive)]
+        compared = not row.fault.from_start and len(sound) == len(passive)
+        compared = compared and (stopped or window_s < Window().running_s)
         wire = ""
         if row.fault.on_bus:
             difference = first_difference(reference, log.frames, watched_ns)

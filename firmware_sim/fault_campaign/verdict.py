@@ -116,7 +116,7 @@ def judged(campaign: Campaign, row: Row, outcomes: Sequence[Outcome]) -> Result:
     without_fault = sum(each.sound_variance for each in sound)
     least, whose = max((passive, "passive"), (without_fault, "sound"))  # NaN is not larger
     ratio = sum(each.variance for each in sound) / least if least else math.nan
-    if not ratio <= row.limit.roll:
+    if row.limit.roll is not None and not ratio <= row.limit.roll:
         problems.append(f"rolls {ratio:.2f} times the {whose} ship's variance")
     return Result(
         row,

@@ -568,12 +568,15 @@ def test_a_drive_of_another_maker_that_misses_frames_is_stopped(row: str, found_
 @pytest.mark.slow
 def test_rows_run_on_another_ship() -> None:
     patti = "configs/scenarios/patti_b.yaml"
-    rows = "F35,F31,motion-zero,motion-silent-of-two"
+    rows = "F35,F31,motion-zero,motion-silent-of-two,panel-replayed,pump-stuck-and,level-spike"
     done = invoke("--scenario", patti, "--seeds", "1", "--json", "--rows", rows)
     found = json.loads(done.stdout)
     assert done.exit_code == 0
     windows = {row["id"]: row["roll_window_s"] for row in found["rows"]}
-    assert windows.keys() == {"not-commissioned", "motion-zero", "motion-silent-of-two"}
+    assert windows.keys() == {
+        "not-commissioned", "motion-zero", "motion-silent-of-two", "panel-replayed",
+        "pump-stuck-and-not-to-be-switched-off", "level-spike",
+    }  # fmt: skip
     assert windows["motion-zero"] == 600.0  # a lightly damped ship rolls on for minutes
     # a lull, in which the law rolls the ship more than the passive tank, with the fault or without
     assert windows["motion-silent-of-two"] == 54.0  # five rolls
@@ -583,6 +586,32 @@ def test_rows_run_on_another_ship() -> None:
     moved = CAMPAIGN.on(ship, "constrained")
     assert set(moved.setups) == {"pump", "redundant", "uncommissioned"}
     assert all(setup.config.vessel.ship == ship.vessel.ship for setup in moved.setups.values())
+
+
+def test_a_fault_is_as_large_for_another_ship_as_for_the_first() -> None:
+    ship = load_config(Path("configs/scenarios/patti_b.yaml"), Scenario)
+    moved = {row.id: row for row in CAMPAIGN.on(ship, "constrained").rows}
+    rows = {row.id: row for row in CAMPAIGN.rows}
+    limits = (CAMPAIGN.setups["pump"].config.limits, ship.controllers["constrained"].limits)
+    for name, key, limit in (
+        ("level-spike", "by", "level_m"),
+        ("level-offset", "by", "level_m"),
+        ("pump-stuck-at-50-kpa", "plus_pa", "pressure_pa"),
+    ):
+        here, there = (getattr(each[name].fault.inject[0], key) for each in (rows, moved))
+        assert there / here == pytest.approx(getattr(limits[1], limit) / getattr(limits[0], limit))
+    assert moved["roll-spike"] == rows["roll-spike"]
+    seen = moved["pump-stuck-at-50-kpa"].limit.counts_from["pressure_pa"]
+    assert seen == pytest.approx(12e3 * limits[1].pressure_pa / limits[0].pressure_pa)
+    # no command takes that pressure away
+    assert moved["pump-presses-in-standby"].limit.roll is None
+    assert rows["pump-presses-in-standby"].limit.roll == 1.3
+    quiet = replace(ship.sensors, roll_noise_rad=ship.sensors.roll_noise_rad / 2)
+    row = {
+        row.id: row
+        for row in CAMPAIGN.on(ship.model_copy(update={"sensors": quiet}), "constrained").rows
+    }["noise-10-fold"]
+    assert row.fault.inject[0].deviation == pytest.approx(0.001)  # type: ignore[union-attr]
 
 
 def test_an_own_ship_with_its_law_is_compared_over_five_rolls() -> None:
