@@ -83,3 +83,20 @@ def test_a_path_is_said_as_short_as_it_holds(
 def test_a_path_elsewhere_has_no_detours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir("/usr")
     assert shown(tmp_path / "scenarios" / ".." / "gpc.yaml") == str(tmp_path / "gpc.yaml")
+
+
+def test_a_list_s_long_words_go_on_below_themselves() -> None:
+    table = new_table("Retuning", "ended in")
+    table.add_column("because")
+    reason = "the waves are known from a longer record, 18 minutes; renewed " * 3
+    table.add_row("law", "RETUNED", reason.replace("; ", ";\n") + "x" * 40)
+    output = io.StringIO()
+    Terminal(file=output, width=60).table(table)
+    lines = output.getvalue().splitlines()
+    begin = next(n for n, line in enumerate(lines) if "because" in line)
+    indent = lines[begin].index("the waves")
+    assert [line[:indent].strip() for line in lines[begin : begin + 4]] == ["because", "", "", ""]
+    assert " ".join(line[indent:] for line in lines[begin:] if line).split() == [
+        *reason.split(), "x" * 40
+    ]  # fmt: skip
+    assert max(map(len, lines)) <= 60

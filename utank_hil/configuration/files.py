@@ -217,6 +217,8 @@ class _Reader:
             above = any(key[: len(upper)] == upper for upper in self.unread)
             open_ended = not key and model.model_config.get("extra") != "forbid"
             noun, wanted = "" if key else _kind(part, dict(_nouns())), getattr(model, "noun", "")
+            if wanted == "controller" and "controllers" in part:  # its model may not be loaded
+                noun = "scenario"
             another = noun and wanted and noun != wanted
             few = len(strange) <= len(own) - len(strange)
             if above or open_ended or not known or (few and not another):

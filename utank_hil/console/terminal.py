@@ -3,6 +3,7 @@
 import os
 import re
 import shlex
+import textwrap
 from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
@@ -123,8 +124,11 @@ class Terminal(Console):
             name, *figures = cells
             self.print(name, style="bold")
             for heading, figure in zip(headings[1:], figures, strict=True):
-                if str(figure):
-                    self.print(f"  {heading:{wide}}  {figure}")
+                left = f"  {heading:{wide}}  "
+                words = " ".join(str(figure).split())
+                for line in textwrap.wrap(words, max(self.width - len(left), 20)):
+                    self.print(left + line)
+                    left = " " * len(left)
         if table.caption:
             self.print(table.caption, style="dim")
         self.print()
