@@ -106,16 +106,7 @@ class ControllerConfig(Section):
                 f"{self.safety.roll_limit_rad:g}, safety.roll_limit_rad: set it lower"
             )
             found.append(("retuning.roll_limit_rad", reason))
-        pump = self.vessel.pump
-        found += controller_warnings(
-            self.vessel.ship,
-            self.vessel.tank,
-            self.law,
-            self.limits,
-            None if pump is None else pump.max_pressure_pa,
-            self.retuning,
-        )
-        return found + self.held_pressure_problems()
+        return [*found, *controller_warnings(self), *self.held_pressure_problems()]
 
     def held_pressure_problems(self) -> list[Problem]:
         """Return what is wrong with a pump that could capsize the ship: no monitor stops a drive.

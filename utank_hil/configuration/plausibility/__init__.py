@@ -6,27 +6,12 @@ figures are ratios to the vessel's own size and period, so that a basin model pa
 container ship. The limits are wide: they find slips and do not judge a design.
 """
 
-from collections.abc import Callable, Iterator
-from functools import partial
 from typing import Final
 
 import numpy as np
 
 from utank_hil.base.parameters import Problem
-from utank_hil.configuration.plausibility.vessel import (
-    Figure,
-    free_surface_nm_rad,
-    holding,
-    of_heights,
-    of_motor,
-    of_pump,
-    of_quickness,
-    of_ship,
-    of_sizes,
-    of_tank,
-    of_valve,
-    of_weight,
-)
+from utank_hil.configuration.plausibility.vessel import free_surface_nm_rad, holding, stages
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.nonlinear import RollModel, righting_range
 from utank_hil.dynamics.pump import Pump
@@ -44,11 +29,10 @@ def vessel_problems(
     ship: RollShip, tank: Tank, pump: Pump | None, valve: Valve | None = None
 ) -> list[Problem]:
     """Return why a vessel is impossible: the first cause, because dependent figures mislead."""
-    for stage in _stages(ship, tank, pump, valve):
-        with np.errstate(all="ignore"):  # Overflowing numbers are refused by their figure.
-            found = [(each.key, each.words) for each in stage() if each.refused]
-        if found:
-            return found
+    with np.errstate(all="ignore"):  # Overflowing numbers are refused by their figure.
+        for figures in stages(ship, tank, pump, valve):
+            if found := [(each.key, each.words) for each in figures if each.refused]:
+                return found
     return tank_problems(ship, tank)
 
 
@@ -58,8 +42,8 @@ def vessel_warnings(
     """Return what is unusual in a vessel without problems."""
     return [
         (each.key, each.words)
-        for stage in _stages(ship, tank, pump, valve)
-        for each in stage()
+        for figures in stages(ship, tank, pump, valve)
+        for each in figures
         if each.warned
     ]
 
@@ -94,20 +78,3 @@ def tank_problems(ship: RollShip, tank: Tank) -> list[Problem]:
         )
         return [("tank", reason)]
     return []
-
-
-def _stages(
-    ship: RollShip, tank: Tank, pump: Pump | None, valve: Valve | None = None
-) -> Iterator[Callable[[], Iterator[Figure]]]:
-    """Return the parts of a vessel in an order in which each is judged with those before it."""
-    yield partial(of_sizes, tank)
-    yield partial(of_heights, tank)
-    yield partial(of_ship, ship, tank)
-    yield partial(of_weight, ship, tank)
-    yield partial(of_tank, ship, tank)
-    if pump is not None:
-        yield partial(of_pump, tank, pump)
-        yield partial(of_motor, pump)
-        yield partial(of_quickness, ship, pump)
-    if valve is not None:
-        yield partial(of_valve, ship, tank, valve)
