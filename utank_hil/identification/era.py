@@ -197,9 +197,6 @@ class ModalParameters:
     frequency_rad_s: FloatArray
     #: shape (k,): damping ratio: 1 for a real pole, negative when unstable.
     damping_ratio: FloatArray
-    #: shape (k, m): mode shapes: complex amplitudes of the outputs, the largest 1; zero if
-    #: unobservable.
-    shapes: ComplexArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -223,7 +220,7 @@ def modal_parameters(system: "StateSpace") -> ModalParameters:
     """Return the modal parameters of a discrete python-control model; ValueError for others."""
     if not system.dt or system.dt is True:
         raise ValueError(f"modes need a discrete model with a sample time, its dt is {system.dt}")
-    return _eigen(np.asarray(system.A), np.asarray(system.C), float(system.dt)).modes
+    return _eigen(np.asarray(system.A), float(system.dt)).modes
 
 
 def modal_confidence(result: OkidResult, order: int) -> ModalConfidence:
@@ -236,7 +233,7 @@ def modal_confidence(result: OkidResult, order: int) -> ModalConfidence:
     """
     found = realize(result.markov, order)
     sample_time_s = result.arx.sample_time_s
-    model, vectors, kept = _eigen(found.a, found.c, sample_time_s)
+    model, vectors, kept = _eigen(found.a, sample_time_s)
     left_vectors: ComplexArray | None
     try:
         left_vectors = np.linalg.inv(vectors).T[:, kept].astype(np.complex128)
@@ -286,7 +283,7 @@ class _Eigen(NamedTuple):
     kept: np.ndarray
 
 
-def _eigen(a: FloatArray, c: FloatArray, sample_time_s: float) -> _Eigen:
+def _eigen(a: FloatArray, sample_time_s: float) -> _Eigen:
     values, vectors = np.linalg.eig(a)
     with np.errstate(divide="ignore", invalid="ignore"):  # The logarithm of 0 is allowed.
         s = np.log(values.astype(np.complex128)) / sample_time_s
@@ -296,14 +293,7 @@ def _eigen(a: FloatArray, c: FloatArray, sample_time_s: float) -> _Eigen:
     oscillating = (np.abs(s) > 0) & np.isfinite(s)
     damping = np.ones(len(s))
     damping[oscillating] = -s[oscillating].real / np.abs(s[oscillating])
-    shapes = (c @ vectors[:, kept]).T.astype(np.complex128)
-    peak = np.take_along_axis(shapes, np.argmax(np.abs(shapes), axis=1)[:, None], axis=1)
-    model = ModalParameters(
-        values[kept].astype(np.complex128),
-        np.abs(s),
-        damping,
-        shapes / np.where(peak == 0, 1.0, peak),
-    )
+    model = ModalParameters(values[kept].astype(np.complex128), np.abs(s), damping)
     return _Eigen(model, vectors, kept)
 
 

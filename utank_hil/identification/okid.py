@@ -84,9 +84,6 @@ class OkidResult:
     markov: FloatArray
     #: shape (K - 1, m, m): observer gain Markov parameters C A^(k-1) K, K being -G of the thesis.
     observer_gain: FloatArray
-    basis: DisturbanceBasis
-    #: shape (d, m): coefficients of the disturbance basis in the ARX equation.
-    disturbance: FloatArray
     residual_covariance: FloatArray  #: shape (m, m): covariance of the one-step prediction errors.
     #: shape (n, n): the regression's Gram matrix, with columns divided by
     #: `column_scale`, in the order of `LagRegression`.
@@ -153,7 +150,7 @@ def okid(
         )
     errors = np.full((len(z), m), np.nan)
     errors[regression.at] = regression.residuals(solution.coefficients) * scale[:m]
-    fitted = _in_units(solution, regression, scale, sample_time_s, basis, errors)
+    fitted = _in_units(solution, regression, scale, sample_time_s, errors)
     with np.errstate(over="ignore", invalid="ignore"):
         markov, observer_gain = markov_parameters(
             fitted.arx, max(_MARKOV_COUNT, 2 * fitted.arx.order + 1)
@@ -171,7 +168,6 @@ def _in_units(
     regression: LagRegression,
     scale: FloatArray,
     sample_time_s: float,
-    basis: DisturbanceBasis,
     errors: FloatArray,
 ) -> OkidResult:
     """Convert a solution to the units of the record, yet without Markov parameters."""
@@ -188,8 +184,6 @@ def _in_units(
         ARX(by_lag[1:, :, :m], by_lag[:, :, m:], sample_time_s),
         markov=np.empty(0),
         observer_gain=np.empty(0),
-        basis=basis,
-        disturbance=coefficients[split:],
         residual_covariance=solution.residual_covariance * np.outer(y_scale, y_scale),
         gram=solution.gram,
         column_scale=column_scale,

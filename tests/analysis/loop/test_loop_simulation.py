@@ -103,7 +103,7 @@ def test_what_is_kept_is_each_fifth_tick_of_all(delay_s):
     every, fifth = (
         simulate_loop(plant, waves, Script(commands), STATES, seed=2, every=step) for step in (1, 5)
     )
-    for name in ("motion", "pressure_pa", "command_pa", "wish_pa"):
+    for name in ("motion", "pressure_pa", "command_pa"):
         np.testing.assert_array_equal(getattr(fifth, name), getattr(every, name)[::5])
     # a command reaches the drive after the delay, and its lag
     reached = np.flatnonzero(every.pressure_pa)[0]

@@ -41,11 +41,9 @@ class LoopRun:
     """Signals of a run, one value per tick that was kept."""
 
     motion: FloatArray  #: shape (n, 4): `STATES`.
-    #: pressure_pa, command_pa, wish_pa: shape (n,): actual pressure, limited command before delay
-    #: and lag, and the controller's unlimited command.
+    #: pressure_pa, command_pa: shape (n,): actual pressure; limited command before delay and lag.
     pressure_pa: FloatArray
     command_pa: FloatArray
-    wish_pa: FloatArray
 
 
 def passive_motion(
@@ -133,7 +131,7 @@ def run_law(
 
     The motion is what the ship gives as truth; see `simulate_loop` for the rest.
     """
-    truth, commands, wishes = run_ticks(
+    truth, commands = run_ticks(
         ship,
         controller,
         [STATES.index(name) for name in measured],
@@ -145,7 +143,7 @@ def run_law(
         every,
     )
     kept = np.array(truth)
-    return LoopRun(kept[:, :-1], kept[:, -1], np.array(commands), np.array(wishes))
+    return LoopRun(kept[:, :-1], kept[:, -1], np.array(commands))
 
 
 def sensed_noise(

@@ -113,8 +113,8 @@ def run_ticks(
     sample_ticks: int,
     ticks: int,
     every: int,
-) -> tuple[list[Signals], list[float], list[float]]:
-    """Run a controller on a ship; return the truth, its limited commands and its wishes.
+) -> tuple[list[Signals], list[float]]:
+    """Run a controller on a ship; return the truth and its limited commands.
 
     They are of each `every`-th tick; commands before delay and lag. `columns` are the places in
     `Signals` of what the controller measures. The order within a tick is that of the controller
@@ -122,7 +122,6 @@ def run_ticks(
     """
     truth: list[Signals] = []
     commands: list[float] = []
-    wishes: list[float] = []
     late = [0.0] * (delay_ticks + 1)
     newest = 0  # place in it
     # ticks until the next of each; compiled, a division takes longer than these
@@ -146,9 +145,8 @@ def run_ticks(
             until_kept = every
             truth.append(ship.truth())
             commands.append(command_pa)
-            wishes.append(wish_pa)
         until_level, until_sample, until_kept = until_level - 1, until_sample - 1, until_kept - 1
         late[newest] = command_pa
         newest = 0 if newest == delay_ticks else newest + 1
         ship.advance(late[newest])
-    return truth, commands, wishes
+    return truth, commands

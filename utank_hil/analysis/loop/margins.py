@@ -167,12 +167,6 @@ def margins(
     )
 
 
-def radius_and_peak(law: LinearLaw, plant: "StateSpace | LinearModel") -> tuple[float, float]:
-    """Closed-loop radius and greatest abs(1 / (1 - L)) with a sampled plant."""
-    radius, _, loop = _loop(law, plant)
-    return radius, float(np.abs(1 / (1 - loop)).max())
-
-
 def loop_response(
     law: LinearLaw, plant: "StateSpace | LinearModel", frequency_rad_s: FloatArray
 ) -> ComplexArray:
@@ -258,10 +252,7 @@ class Robustness:
     """Margins of a law's loop on its own ship and on a grid of variants."""
 
     nominal: Margins  #: On the ship of the design.
-    #: late_radius, late_peak_sensitivity: closed-loop radius and peak sensitivity with
-    #: `EXTRA_DELAY_S` more delay.
-    late_radius: float
-    late_peak_sensitivity: float
+    late_radius: float  #: Closed-loop radius with `EXTRA_DELAY_S` more delay.
     #: Greatest closed-loop radius over `PERIOD_SCALES` of the ship's roll period (by its stiffness)
     #: and `INERTIA_SCALES` of its inertia, `GAINS` of the pump, and `EXTRA_DELAY_S` more delay or
     #: none.
@@ -307,7 +298,7 @@ def robustness(
     delay_s, lag_s = plant.delay_s, plant.lag_s
     models = [pump_model(plant.ship, tank, measured) for tank in plant.tanks]
     late = [
-        radius_and_peak(law, sample(model, law.sample_time_s, delay_s + EXTRA_DELAY_S, lag_s))
+        closed_loop_radius(law, sample(model, law.sample_time_s, delay_s + EXTRA_DELAY_S, lag_s))
         for model in models
     ]
     own = [
@@ -330,8 +321,7 @@ def robustness(
     _, period_scale, inertia_scale, _ = variants[which]
     return Robustness(
         nominal=max(own, key=lambda each: (each.radius >= 1, each.peak_sensitivity)),
-        late_radius=max(radius for radius, _ in late),
-        late_peak_sensitivity=max(peak for _, peak in late),
+        late_radius=max(late),
         worst_radius=float(radii[when, which, gain]),
         worst_period_scale=period_scale,
         worst_inertia_scale=inertia_scale,

@@ -46,9 +46,7 @@ class RollDecay:
     period_s: float  #: Natural period of small roll, 2 pi / w0.
     damping_ratio: float  #: zeta.
     quadratic_per_rad: float  #: b2: quadratic damping per roll inertia.
-    stiffening_per_rad2: float  #: k3.
     heel_rad: float  #: Of the line about which the ship rolls.
-    drift_rad_s: float  #: Slope of that line.
     #: Scatter of this record alone, as of the next two: not the error of the law of two terms.
     period_interval_s: Interval
     ratio_interval: Interval
@@ -216,9 +214,7 @@ def _fit(time: FloatArray, roll: FloatArray, start: FloatArray) -> RollDecay:
         period_s=period,
         damping_ratio=float(p[1]),
         quadratic_per_rad=float(p[2]),
-        stiffening_per_rad2=float(p[3]),
         heel_rad=float(p[4]),
-        drift_rad_s=float(p[5]),
         period_interval_s=(2 * math.pi / slow[1], 2 * math.pi / slow[0]),
         ratio_interval=interval(p[1], unit[1]),
         quadratic_interval_per_rad=interval(p[2], unit[2]),

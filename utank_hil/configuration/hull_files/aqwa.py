@@ -60,7 +60,6 @@ def read_aqwa(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same f
         heading_deg=heading[keep],
         excitation=excitation * phase_at(centre, heading[keep], k),
         hydrostatic=_matrix(blocks["HYDSTIFFNESS"], 1),
-        zero_added_mass=_matrix(blocks["ADDEDMASS_LF"], 2) if "ADDEDMASS_LF" in blocks else None,
         viscous_roll_nms_rad=np.full(count, viscous) if viscous else None,
         reference_m=centre,
         density_kg_m3=density,

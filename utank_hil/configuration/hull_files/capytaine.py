@@ -59,11 +59,7 @@ def hull_of_dataset(path: Path, data: Any) -> HullData:
     numbers = np.all(np.isfinite(added) & np.isfinite(damping), axis=(1, 2))
     proper = (omega > 0) & np.isfinite(omega)
     finite = proper & numbers
-    limits = {
-        name: added[omega == at][0]
-        for name, at in (("zero_added_mass", 0.0), ("infinite_added_mass", np.inf))
-        if np.any(omega == at) and np.all(np.isfinite(added[omega == at]))
-    }
+    limit = added[(omega == np.inf) & np.all(np.isfinite(added), axis=(1, 2))]
     excitation = _excitation(path, data)
     usable = finite & np.all(np.isfinite(excitation), axis=(0, 2))
     lost = int(np.sum(proper & ~usable))
@@ -89,7 +85,7 @@ def hull_of_dataset(path: Path, data: Any) -> HullData:
         density_kg_m3=float(data["rho"]),
         gravity_m_s2=float(data["g"]),
         water_depth_m=float(data["water_depth"]),
-        **limits,
+        infinite_added_mass=limit[0] if len(limit) else None,
         **body,
     )
 

@@ -156,11 +156,7 @@ def read_mss(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same fo
     keep = _sound_rows(added[inside])
     inside = inside[keep]
     notes.append(_NOT_SOUND if keep.start else "")
-    limits = {
-        name: added[first == at][0]
-        for name, at in (("zero_added_mass", 0.0), ("infinite_added_mass", _INFINITE_RAD_S))
-        if np.any(first == at)
-    }
+    limit = added[first == _INFINITE_RAD_S]
     return hull_of(
         path,
         notes,
@@ -173,7 +169,7 @@ def read_mss(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same fo
         hydrostatic=stiff[-1],
         density_kg_m3=density,
         gravity_m_s2=gravity,
-        **limits,
+        infinite_added_mass=limit[0] if len(limit) else None,
         **body,
     )
 

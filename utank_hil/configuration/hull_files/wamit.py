@@ -60,11 +60,6 @@ def read_wamit(path: Path, given: Given) -> HullData:
         first[at(row[0])][:, i, j] = [*row[3:5], 0.0][:2]
     scale = density * unit_m ** (3 + _PAIR)
     omega = np.array(sorted(w for w in first if 0 < w < np.inf))
-    limits = {
-        name: scale * first[w][0]
-        for w, name in ((0.0, "zero_added_mass"), (np.inf, "infinite_added_mass"))
-        if w in first
-    }
     forces = sibling(path, ".3") or sibling(path, ".2")
     if forces is None:
         raise ValueError(f"{path}: the excitation is missing: put the .3 or .2 beside it")
@@ -100,7 +95,7 @@ def read_wamit(path: Path, given: Given) -> HullData:
         density_kg_m3=density,
         gravity_m_s2=gravity,
         water_depth_m=depth,
-        **limits,
+        infinite_added_mass=scale * first[np.inf][0] if np.inf in first else None,
         **body,
     )
 

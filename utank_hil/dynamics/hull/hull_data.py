@@ -63,8 +63,7 @@ class HullData:
     #: shape (3,): Point of the motions and moments, from the origin. Phases always refer to the
     #: origin.
     reference_m: FloatArray = field(default_factory=lambda: np.zeros(3))
-    infinite_added_mass: FloatArray | None = None  #: shape (6, 6): Limits of the added mass.
-    zero_added_mass: FloatArray | None = None  #: shape (6, 6)
+    infinite_added_mass: FloatArray | None = None  #: shape (6, 6): Limit of the added mass.
     #: shape (n,): Linear roll damping beside radiation, where the source has it.
     viscous_roll_nms_rad: FloatArray | None = None
     quadratic_roll_nms2_rad2: FloatArray | None = None  #: shape (n,): Of the square of the rate.
@@ -103,7 +102,6 @@ class HullData:
             "gravity_centre_m": (3,),
             "reference_m": (3,),
             "infinite_added_mass": matrix,
-            "zero_added_mass": matrix,
             "viscous_roll_nms_rad": (n,),
             "quadratic_roll_nms2_rad2": (n,),
         }
@@ -141,7 +139,7 @@ class HullData:
             problems.append(("speed_m_s", f"must be zero or more, got {self.speed_m_s}"))
         matrices = ["hydrostatic"]
         if self.speed_m_s == 0:  # with speed, radiation couples degrees one way
-            matrices += ["added_mass", "damping", "infinite_added_mass", "zero_added_mass"]
+            matrices += ["added_mass", "damping", "infinite_added_mass"]
         for name in matrices:
             value = getattr(self, name)
             if value is not None and (found := _asymmetry(value)) > _MOST_ASYMMETRY:
@@ -169,13 +167,7 @@ class HullData:
         back = inverse_shift(point - self.reference_m)
         moved = {
             name: back.T @ value @ back
-            for name in (
-                "added_mass",
-                "damping",
-                "hydrostatic",
-                "infinite_added_mass",
-                "zero_added_mass",
-            )
+            for name in ("added_mass", "damping", "hydrostatic", "infinite_added_mass")
             if (value := getattr(self, name)) is not None
         }
         return replace(self, **moved, excitation=self.excitation @ back, reference_m=point)
