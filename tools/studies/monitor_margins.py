@@ -8,6 +8,7 @@ gain's margin is its distance from 1 over the distance at which it is found. `fo
 monitors found, and the fault that ended control, which may be none of theirs (a high-level switch).
 """
 
+import math
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -35,10 +36,11 @@ AFTER_S = 60.0
 def shares(monitors: Monitors) -> dict[str, float]:
     """Each statistic of now over its threshold; NaN where it is not known."""
     limits, equation, twin = monitors.thresholds, monitors.equation, monitors.twin
+    watch = monitors.watches[monitors.used]
     return {
-        "drift": abs(monitors.motion.unexplained_rad) / limits.drift_rad,
-        "roll noise": monitors.motion.noise.share,
-        "rate noise": monitors.rate_noise.share,
+        "drift": abs(watch.motion.unexplained_rad) / limits.drift_rad,
+        "roll noise": math.sqrt(watch.motion.noise.power / 6) / limits.roll_noise_rad,
+        "rate noise": math.sqrt(watch.rate_noise.power / 6) / limits.rate_noise_rad_s,
         "volume": abs(monitors.volume.sum_m) / limits.volume_m,
         "signs": equation.doubt,
         "level stuck": (1 - equation.level_gain) / (1 - STUCK_GAIN),

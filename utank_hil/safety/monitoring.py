@@ -22,8 +22,7 @@ from utank_hil.retuning.estimate import ShipFigures
 from utank_hil.safety.monitors.drive import DriveFollowing, Saturation
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.level_stuck import LevelStuck, Volume
-from utank_hil.safety.monitors.motion import MotionPair, MotionWatch, RollAgainstRate, SpikeCount
-from utank_hil.safety.monitors.noise import Noise
+from utank_hil.safety.monitors.motion import MotionPair, MotionWatch, SpikeCount
 from utank_hil.safety.monitors.senders import MEAN_FRAME_BITS, Heard, Senders, Stream
 from utank_hil.safety.monitors.tank_equation import TankEquation
 from utank_hil.safety.monitors.thresholds import MonitorThresholds, SensorFigures, thresholds_of
@@ -167,16 +166,6 @@ class Monitors:
                 if isinstance(found, ModelSummary):
                     tank = found.tank(tank)
         self.twin.take(ship, tank)
-
-    @property
-    def motion(self) -> RollAgainstRate:
-        """Roll against its rate, by the motion sensor in use."""
-        return self.watches[self.used].motion
-
-    @property
-    def rate_noise(self) -> Noise:
-        """Noise of the roll rate of the motion sensor in use."""
-        return self.watches[self.used].rate_noise
 
     def watch(self, receivers: Iterable[Heard], expected: Collection[int]) -> None:
         """Watch the pace of messages; of those `expected`, by identifier, the silence too."""

@@ -21,7 +21,6 @@ def test_power_of_a_residual_follows_with_seven_tenths_of_a_second(
         found = noise.update(residual, step_s)
     power = residual**2 * (1 - (1 - step_s / 0.7) ** steps)
     assert noise.power == pytest.approx(power, abs=1e-12)
-    assert noise.share == pytest.approx(math.sqrt(power) / LIMIT, abs=1e-9)
     assert found is noise.found is (noise.power > LIMIT**2)
 
 
@@ -32,7 +31,6 @@ def test_a_step_longer_than_its_memory_leaves_the_last_residual_alone(step_s: fl
     assert noise.power == 4 * LIMIT**2
     assert not noise.update(-LIMIT, step_s)
     assert noise.power == LIMIT**2
-    assert noise.share == 1.0
 
 
 @pytest.mark.parametrize("jump", [-1e9, -1.01, 1.01, 1e9])

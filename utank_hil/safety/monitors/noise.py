@@ -26,11 +26,6 @@ class Noise:
         self.power = 0.0  #: Averaged square of the residual.
         self.found = False
 
-    @property
-    def share(self) -> float:
-        """Noise over the limit."""
-        return math.sqrt(self.power / self._limit_power)
-
     def update(self, residual: float, elapsed_s: float) -> bool:
         """Take a residual; return whether there is too much noise."""
         residual = within(residual, self._most)
