@@ -336,14 +336,9 @@ def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
     return both
 
 
-_NAMED: Final = {
-    "dbc": ("messages of the file", "MESSAGE"), "eds": ("its PDOs", "TPDO1"),
-}  # fmt: skip
-
-
 def _named(content: dict[str, Any], key: str, names: str) -> dict[str, tuple[str, dict[str, Any]]]:
     """What `messages` names in a file, and what it has otherwise there, by names of the ship's."""
-    what, example = _NAMED[key]
+    what, example = ("its PDOs", "TPDO1") if key == "eds" else ("messages of the file", "MESSAGE")
     given = content.get("messages")
     found: dict[str, tuple[str, dict[str, Any]]] = {}
     for name, each in given.items() if isinstance(given, dict) else ():

@@ -28,6 +28,7 @@ from utank_hil.configuration.device_sections import (
     FieldSection,
     MessageSection,
     ProtectionSection,
+    ScaledSection,
     SignalSection,
     SourceAddress,
     unit_of,
@@ -110,8 +111,8 @@ class DeviceSection(CanopenSection):
     @property
     def protected(self) -> bool:
         """Whether a counter or a checksum is in each message with a value."""
-        counts = [each for each in self.protection.counters if self._bits(each) > 1]
-        guarded = {each.partition(".")[0] for each in counts}
+        counters = {each: self._field(each) for each in self.protection.counters}
+        guarded = {each.partition(".")[0] for each, of in counters.items() if of and of.bits > 1}
         guarded |= {each.message for each in self.protection.crcs}
         return all(
             each.from_.partition(".")[0] in guarded
@@ -142,7 +143,7 @@ class DeviceSection(CanopenSection):
         yield from self._cycle_problems()
         yield from self._signal_problems(kind)
         for place, (key, path) in enumerate(self._paths()):
-            if path.partition(".")[0] not in self.messages or self._field(path) is None:
+            if self._field(path) is None:
                 yield key, f"{path!r} is no signal of messages: write MESSAGE.SIGNAL (no. {place})"
         for crc in self.protection.crcs:
             said = self.messages.get(crc.message)
@@ -258,11 +259,7 @@ class DeviceSection(CanopenSection):
         section = self.messages.get(message)
         return None if section is None else section.signals.get(signal)
 
-    def _bits(self, path: str) -> int:
-        layout = self._field(path)
-        return 0 if layout is None else layout.bits
-
-    def _factor(self, signal: SignalSection, layout: FieldSection) -> float:
+    def _factor(self, signal: ScaledSection, layout: FieldSection) -> float:
         """Value, in the unit of its name, of one unit of the maker's."""
         return UNITS.get(layout.unit, ("", 1.0))[1] if signal.scale is None else signal.scale
 

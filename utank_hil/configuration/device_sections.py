@@ -122,31 +122,31 @@ class MessageSection(_Part):
     """Layouts of its signals."""
 
 
-class SignalSection(_Part):
-    """What one measured value is made of."""
+class ScaledSection(_Part):
+    """How a value follows from a signal, or the other way round."""
 
-    from_: Annotated[str, Field(alias="from")] = ""  #: Signal, as MESSAGE.SIGNAL.
-    source: Literal["measured", "derived"] = "measured"
-    """Measured, or derived as the slope of the roll."""
     sign: Literal[1, -1] = 1  #: -1 turns the value round.
     scale: Annotated[float, Range(least=-1e9, most=1e9)] | None = None
     """In place of the factor of its unit."""
     offset: Annotated[float, Range(least=-1e9, most=1e9)] = 0.0
     """In the unit of the value, before the sign is applied."""
+
+
+class SignalSection(ScaledSection):
+    """What one measured value is made of."""
+
+    from_: Annotated[str, Field(alias="from")] = ""  #: Signal, as MESSAGE.SIGNAL.
+    source: Literal["measured", "derived"] = "measured"
+    """Measured, or derived as the slope of the roll."""
     least: Finite = -1e300  #: Least physical value, in the maker's unit, that is one.
     most: Finite = 1e300
     """Range in the maker's unit, outside of which there is no value, as a broken 4-20 mA wire."""
 
 
-class CommandSection(_Part):
+class CommandSection(ScaledSection):
     """Where a command goes: the signal's value is that of the command, as of `SignalSection`."""
 
     to: str  #: Signal, as MESSAGE.SIGNAL; all commands of a device are in one message.
-    sign: Literal[1, -1] = 1  #: As of the signals that a device sends.
-    scale: Annotated[float, Range(least=-1e9, most=1e9)] | None = None
-    """In place of the factor of its unit."""
-    offset: Annotated[float, Range(least=-1e9, most=1e9)] = 0.0
-    """Added, before the sign is applied."""
 
 
 class ConditionSection(_Part):

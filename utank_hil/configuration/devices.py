@@ -40,7 +40,6 @@ from utank_hil.configuration.device_sections import (
     LEAST_GAIN,
     LEAST_PHASE_DEG,
     NATIVE_DRIVE,
-    UNITS,
     AuthenticationSection,
     CommandSection,
     DriveSection,
@@ -136,8 +135,8 @@ class ValveSection(DeviceSection):
         signals = []
         for command, each in self.commands.items():
             layout = section.signals[each.to.partition(".")[2]]
-            factor = UNITS.get(layout.unit, ("", 1.0))[1] if each.scale is None else each.scale
-            place, field = COMMANDS.index(command), layout.field(section.bytes)
+            factor, field = self._factor(each, layout), layout.field(section.bytes)
+            place = COMMANDS.index(command)
             signals.append(SignalPlan(place, field, factor, each.offset, each.sign, -1e300, 1e300))
         told = next(each for each in plan.messages if each.name == self.told)
         tag = bus << BUS_SHIFT | STANDARD

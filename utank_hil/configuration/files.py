@@ -65,19 +65,19 @@ def load_config(path: Path | str, model: type[ModelT], *, allow_code: bool = Fal
     has every problem found: unreadable files, YAML errors, keys written twice, unknown or missing
     keys and values out of range. The content of an unreadable file is not reported missing.
     """
-    reader = _Reader()
-    content = reader.read(Path(path))
-    if () in reader.unread:
-        raise ConfigError(reader.problems)
-    reader.refuse_strangers(content, model)
-    problems = list(reader.problems)
+    reader = _Reader(path)
+    reader.refuse_strangers(model)
+    problems = reader.problems
     if () in reader.unread:
         raise ConfigError(problems)
     try:
-        loaded = model.model_validate(content, context={ALLOW_CODE: allow_code})
+        loaded = model.model_validate(reader.content, context={ALLOW_CODE: allow_code})
     except ValidationError as error:
-        for item in error.errors():
-            problems += reader.located(item, content, model)
+        problems += [
+            reader.problem(key, reason)
+            for key, reason in problems_in_words(error, reader.content, model)
+            if not reader.lost(key)
+        ]
     except (ArithmeticError, MemoryError, RecursionError) as error:
         why = f"holds a number that overflows, or too many of them: {error}"
         problems.append(ConfigProblem(Path(path), "", why))
@@ -92,8 +92,7 @@ def located(error: ParameterError, path: Path | str, key: str = "") -> ConfigErr
     The problems of `error` are named by their keys in the configuration, which stands in the file
     `path` at `key`, empty for the file as a whole.
     """
-    reader = _Reader()
-    reader.read(Path(path))
+    reader = _Reader(path)
     return ConfigError(
         [reader.problem(_split(key) + _split(name), why) for name, why in error.problems]
     )
@@ -104,8 +103,7 @@ def files_named(path: Path | str) -> dict[Key, Path]:
 
     ConfigError is raised if one of them can't be read.
     """
-    reader = _Reader()
-    reader.read(Path(path))
+    reader = _Reader(path)
     if reader.problems:
         raise ConfigError(reader.problems)
     return {key: file for key, file in reader.origins.items() if key}
@@ -115,7 +113,17 @@ def problems_in_words(
     error: ValidationError, content: Any, model: type[BaseModel]
 ) -> list[tuple[Key, str]]:
     """Describe the problems of assembled content, by the keys within it."""
-    return [found for item in error.errors() for found in _in_words(item, content, model)]
+    problems: list[tuple[Key, str]] = []
+    for item in error.errors():
+        at = _written(item, content)
+        if item["type"] == "union_tag_invalid":
+            at = (*at, "kind")
+        cause = item.get("ctx", {}).get("error")
+        if isinstance(cause, ParameterError):
+            problems += [(at + _split(name), reason) for name, reason in cause.problems]
+        else:
+            problems.append((at, words_for(item, model)))
+    return problems
 
 
 def kind_of(path: Path | str, models: dict[str, type[BaseModel]]) -> str:
@@ -124,11 +132,10 @@ def kind_of(path: Path | str, models: dict[str, type[BaseModel]]) -> str:
     `models` are by the names of the kinds. ConfigError is raised if the file can't be read, or its
     keys decide for none of the kinds.
     """
-    reader = _Reader()
-    content = reader.read(Path(path))
+    reader = _Reader(path)
     if () in reader.unread:
         raise ConfigError(reader.problems)
-    kind = _kind(content, models)
+    kind = _kind(reader.content, models)
     if kind is None:
         known = "; ".join(f"a {kind} has {', '.join(sorted(own))}" for kind, own in _own(models))
         reason = f"has the keys of no {', '.join(models)} alone: {known}"
@@ -162,10 +169,15 @@ def _nouns(base: type[Section] = Section) -> Iterator[tuple[str, type[Section]]]
 class _Reader:
     """Assembles the content of files and remembers where each part was written."""
 
-    def __init__(self) -> None:
+    def __init__(self, path: Path | str) -> None:
         self.problems: list[ConfigProblem] = []
         self.unread: set[Key] = set()  #: Keys of the whole whose files could not be read.
         self.origins: dict[Key, Path] = {}  #: Files by the keys at which their content stands.
+        self.content = self.read(Path(path))
+
+    def lost(self, key: Key) -> bool:
+        """Whether a key stands in a file that could not be read."""
+        return any(key[: len(upper)] == upper for upper in self.unread)
 
     def read(
         self, file: Path, key: Key = (), stack: tuple[Path, ...] = (), namer: Key | None = None
@@ -205,23 +217,24 @@ class _Reader:
         self.origins[key] = file
         return self._resolve(content, key, file, (*stack, resolved))
 
-    def refuse_strangers(self, content: Any, model: type[BaseModel]) -> None:
+    def refuse_strangers(self, model: type[BaseModel]) -> None:
         """Report files of another kind than they are named for."""
         for key, file in sorted(self.origins.items(), key=lambda item: len(item[0])):
-            part = content
+            if self.lost(key):
+                continue
+            part = self.content
             for name in key:
                 part = part[name]
             known = sorted(known_keys(model, key) - {"name", "kind"})
             own = [name for name in part if name not in ("name", "kind")]
             strange = [name for name in own if name not in known and not nearest(name, known)]
-            above = any(key[: len(upper)] == upper for upper in self.unread)
             open_ended = not key and model.model_config.get("extra") != "forbid"
             noun, wanted = "" if key else _kind(part, dict(_nouns())), getattr(model, "noun", "")
             if wanted == "controller" and "controllers" in part:  # its model may not be loaded
                 noun = "scenario"
             another = noun and wanted and noun != wanted
             few = len(strange) <= len(own) - len(strange)
-            if above or open_ended or not known or (few and not another):
+            if open_ended or not known or (few and not another):
                 continue
             why = f"has the keys {', '.join(own)}; a file for this has {', '.join(known)}"
             if key:
@@ -233,14 +246,6 @@ class _Reader:
                     why = f"is a {noun}, and a {wanted} is wanted"
                 self.problems.append(ConfigProblem(file, "", why))
             self.unread.add(key)
-
-    def located(self, error: Any, content: Any, model: type[BaseModel]) -> list[ConfigProblem]:
-        """Return an error of validation as problems at the place where the value was written."""
-        return [
-            self.problem(at, reason)
-            for at, reason in _in_words(error, content, model)
-            if not any(at[: len(key)] == key for key in self.unread)
-        ]
 
     def problem(self, key: Key, reason: str) -> ConfigProblem:
         """Return a problem at the place where the value of a key is written."""
@@ -295,17 +300,6 @@ def _dotted(key: Key) -> str:
 
 def _split(name: str) -> Key:
     return tuple(name.split(".")) if name else ()
-
-
-def _in_words(error: Any, content: Any, model: type[BaseModel]) -> list[tuple[Key, str]]:
-    """Return the keys as written, and the problem of each, of one pydantic error."""
-    at = _written(error, content)
-    if error["type"] == "union_tag_invalid":
-        at = (*at, "kind")
-    cause = error.get("ctx", {}).get("error")
-    if isinstance(cause, ParameterError):
-        return [(at + _split(name), reason) for name, reason in cause.problems]
-    return [(at, words_for(error, model))]
 
 
 def _written(error: Any, content: Any) -> Key:

@@ -80,15 +80,11 @@ def completed(hull: HullData, given: Given) -> HullData:
         size = max(float(np.max(np.abs(own))), 1e-9)
         if np.max(np.abs(own - np.asarray(new[name]))) > _SAME * max(size, 1e-3):
             what = "gyration_m: the inertia" if name == "inertia_kg_m2" else f"{name}: it"
-            raise ValueError(f"{hull.source}: remove {what} is {_said(own)} in the file")
+            figures = np.diag(own) if np.ndim(own) == 2 else np.atleast_1d(own)
+            said = ", ".join(f"{figure:.5g}" for figure in figures)
+            raise ValueError(f"{hull.source}: remove {what} is {said} in the file")
         del new[name]
     return replace(hull, **new)
-
-
-def _said(figure: Any) -> str:
-    """A figure or a point; of a matrix its diagonal."""
-    values = np.diag(figure) if np.ndim(figure) == 2 else np.atleast_1d(figure)
-    return ", ".join(f"{value:.5g}" for value in values)
 
 
 class HullFile(Given):
