@@ -144,12 +144,8 @@ class RollModel:
     ) -> FloatArray:
         """Time derivative of the state, for one state or many.
 
-        Parameters
-        ----------
-        pressure_pa, wave_moment_nm, valve_loss_pa_per_m2_s2, sway_m_s2 : array_like, shape (...)
-            Inputs; the valve loss is the output of `valves`, the sway the lateral acceleration.
-        stopped : bool
-            Whether the level is held, as while the water is pressed against a limit.
+        The inputs have shape (...): the valve loss is the output of `valves`, the sway the lateral
+        acceleration. The level is held if `stopped`, as while the water is pressed against a limit.
         """
         c = self.coefficients
         phi, phi_dot, h, h_dot = np.moveaxis(np.asarray(state, dtype=np.float64), -1, 0)

@@ -79,25 +79,15 @@ _AA3: Final = (
 
 @dataclass(frozen=True, slots=True)
 class HullForm:
-    """Main particulars of a hull, as far as they decide about its roll damping.
+    """Main particulars of a hull, as far as they decide about its roll damping."""
 
-    Parameters
-    ----------
-    length_m, beam_m, draught_m, block_coefficient, midship_coefficient : float
-        Between perpendiculars, at the waterline, mean.
-    axis_below_water_m : float
-        Centre of gravity below the waterline, OG = d - KG; negative above.
-    keel_length_m, keel_breadth_m : float
-        Of one bilge keel; 0 for a bare hull.
-    """
-
-    length_m: float
-    beam_m: float
-    draught_m: float
+    length_m: float  #: Between perpendiculars.
+    beam_m: float  #: At the waterline.
+    draught_m: float  #: Mean.
     block_coefficient: float
     midship_coefficient: float
-    axis_below_water_m: float
-    keel_length_m: float = 0.0
+    axis_below_water_m: float  #: Centre of gravity below the waterline, OG = d - KG.
+    keel_length_m: float = 0.0  #: Of one bilge keel; 0 for a bare hull.
     keel_breadth_m: float = 0.0
 
     @classmethod

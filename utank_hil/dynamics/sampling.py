@@ -155,10 +155,6 @@ def noise_covariance(a: FloatArray, noise: FloatArray, time_s: float) -> FloatAr
     return (covariance + covariance.T) / 2
 
 
-if TYPE_CHECKING:
-    from control import StateSpace
-
-
 def state_space_response(system: "StateSpace | LinearModel", points: ComplexArray) -> ComplexArray:
     """Transfer function C (p I - A)^-1 B + D of a model at complex points s (or z).
 

@@ -130,16 +130,16 @@ class Restoring(NamedTuple):
 
     def moment_nm(self, roll_rad: npt.ArrayLike) -> FloatArray:
         """Restoring moment at the given roll angles."""
-        piece, since = self._locate(roll_rad)
-        return np.sign(roll_rad) * _horner(self.coefficients_nm[piece], since)
-
-    def _locate(self, roll_rad: npt.ArrayLike) -> tuple[npt.NDArray[np.intp], FloatArray]:
-        """Piece of each angle, and the angle from the start of that piece."""
-        heel = np.abs(np.asarray(roll_rad, dtype=np.float64))
-        if math.isinf(self.piece_rad):
-            return np.zeros(heel.shape, dtype=np.intp), heel
-        piece = np.minimum(heel / self.piece_rad, len(self.coefficients_nm) - 1).astype(np.intp)
-        return piece, heel - piece * self.piece_rad
+        since = np.abs(np.asarray(roll_rad, dtype=np.float64))
+        piece = np.zeros(since.shape, dtype=np.intp)
+        if not math.isinf(self.piece_rad):
+            last = len(self.coefficients_nm) - 1
+            piece = np.minimum(since / self.piece_rad, last).astype(np.intp)
+            since = since - piece * self.piece_rad
+        moment = np.zeros_like(since)
+        for power in self.coefficients_nm.T[::-1]:
+            moment = moment * since + power[piece]
+        return np.sign(roll_rad) * moment
 
 
 def restoring(ship: RollShip) -> Restoring:
@@ -164,10 +164,3 @@ def restoring(ship: RollShip) -> Restoring:
     spline = BSpline(knots, solved(triangle, wanted[:, None])[:, 0], 5)
     taylor = [spline(heel[:-1], nu=k) / math.factorial(k) for k in range(6)]
     return Restoring(ship.gz_step_rad, ship.displacement_n * np.stack(taylor, axis=1))
-
-
-def _horner(coefficients: FloatArray, x: FloatArray) -> FloatArray:
-    value = np.zeros_like(x)
-    for k in range(coefficients.shape[-1] - 1, -1, -1):
-        value = value * x + coefficients[..., k]
-    return value

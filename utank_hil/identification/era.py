@@ -22,9 +22,10 @@ gives and `validate` checks.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import svdvals
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
@@ -71,9 +72,11 @@ def era(markov: FloatArray, order: int | None = None, *, sample_time_s: float) -
     order : int or None
         Number of states; None: `order_from_singular_values`.
     """
+    from control import ss  # This import would bring plotting into the process.
+
     markov = _checked(markov)
     found = realize(markov, order)
-    return _state_space(found.a, found.b, found.c, markov[0], sample_time_s)
+    return ss(found.a, found.b, found.c, markov[0], sample_time_s)
 
 
 def hankel_singular_values(markov: FloatArray) -> FloatArray:
@@ -177,14 +180,6 @@ def _checked_order(order: int | None, values: FloatArray) -> int:
     return int(order)
 
 
-def _state_space(
-    a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, sample_time_s: float
-) -> "StateSpace":
-    from control import ss  # This import would bring plotting into the process.
-
-    return ss(a, b, c, d, sample_time_s)
-
-
 _NULL = 1e-12  # Smallest eigenvalue of the Gram matrix, relative to the largest.
 
 
@@ -220,7 +215,7 @@ def modal_parameters(system: "StateSpace") -> ModalParameters:
     """Return the modal parameters of a discrete python-control model; ValueError for others."""
     if not system.dt or system.dt is True:
         raise ValueError(f"modes need a discrete model with a sample time, its dt is {system.dt}")
-    return _eigen(np.asarray(system.A), float(system.dt)).modes
+    return _eigen(np.asarray(system.A), float(system.dt))[0]
 
 
 def modal_confidence(result: OkidResult, order: int) -> ModalConfidence:
@@ -234,16 +229,15 @@ def modal_confidence(result: OkidResult, order: int) -> ModalConfidence:
     found = realize(result.markov, order)
     sample_time_s = result.arx.sample_time_s
     model, vectors, kept = _eigen(found.a, sample_time_s)
-    left_vectors: ComplexArray | None
     try:
         left_vectors = np.linalg.inv(vectors).T[:, kept].astype(np.complex128)
+        if np.isin(model.poles, (0, 1)).any():
+            raise np.linalg.LinAlgError
     except np.linalg.LinAlgError:
-        left_vectors = None
-    if left_vectors is None or (model.poles == 0).any() or (model.poles == 1).any():
         raise IdentificationError(
             f"the model of order {order} has poles that coincide or lie at 0 or 1; their "
             "confidence is not defined, choose another order"
-        )
+        ) from None
     right_vectors = vectors[:, kept]
     rows = len(result.column_scale)
     m = result.arx.outputs
@@ -275,15 +269,10 @@ def _frequency_and_damping_std(s: complex, covariance: FloatArray) -> tuple[floa
     )
 
 
-class _Eigen(NamedTuple):
-    """Modes, all right eigenvectors, and the indices of the modes' eigenvectors."""
-
-    modes: ModalParameters
-    vectors: ComplexArray
-    kept: np.ndarray
-
-
-def _eigen(a: FloatArray, sample_time_s: float) -> _Eigen:
+def _eigen(
+    a: FloatArray, sample_time_s: float
+) -> tuple[ModalParameters, ComplexArray, npt.NDArray[np.intp]]:
+    """Return modes, all right eigenvectors, and the places of the modes' own among them."""
     values, vectors = np.linalg.eig(a)
     with np.errstate(divide="ignore", invalid="ignore"):  # The logarithm of 0 is allowed.
         s = np.log(values.astype(np.complex128)) / sample_time_s
@@ -294,7 +283,7 @@ def _eigen(a: FloatArray, sample_time_s: float) -> _Eigen:
     damping = np.ones(len(s))
     damping[oscillating] = -s[oscillating].real / np.abs(s[oscillating])
     model = ModalParameters(values[kept].astype(np.complex128), np.abs(s), damping)
-    return _Eigen(model, vectors, kept)
+    return model, vectors, kept
 
 
 def _pole_weights(

@@ -89,23 +89,12 @@ def logged_samples(
 ) -> FloatArray:
     """Return rows (mean command since the last sample, outputs...), the retuner's record.
 
+    `columns`, of shape (n,), are those of one run (`telemetry.recording.read_recording`), of which
+    rows may be missing. The outputs `measured` are among roll_rad, roll_rate_rad_s and level_m. The
+    samples, shape (N, 1 + m), are at multiples of the sample time on the time axis of the
+    recording, from `from_s` to `to_s`; missing values are NaN.
+
     ValueError is raised if the recording lacks a column or the part is empty.
-
-    Parameters
-    ----------
-    columns : mapping of str to ndarray, shape (n,)
-        Columns of one run from `telemetry.recording.read_recording`; rows may be missing.
-    measured : tuple of str
-        Outputs, among roll_rad, roll_rate_rad_s and level_m.
-    sample_time_s : float
-        Sample time; samples are at its multiples on the time axis of the recording.
-    from_s, to_s : float, optional
-        Start and end of the part to use.
-
-    Returns
-    -------
-    ndarray, shape (N, 1 + m)
-        Samples; NaN for missing values.
     """
     if "level_m" in measured and "port_level_m" in columns:
         level_m = (columns["starboard_level_m"] - columns["port_level_m"]) / 2

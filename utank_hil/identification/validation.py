@@ -91,9 +91,11 @@ def validate(
     spread = np.std(regression.targets, axis=0)
     whiteness, correlation = _whiteness(np.split(errors, regression.ends), lags)
     independence, crossed = _independence(errors, regression, lags)
+    with np.errstate(over="ignore", invalid="ignore"):
+        simulated = 1 - _rms(regression.targets - _simulated(regression, coefficients)) / spread
     return Validation(
         1 - _rms(errors) / spread,
-        _simulation_fit(regression, coefficients, spread),
+        np.where(np.isnan(simulated), -np.inf, simulated),
         correlation,
         whiteness,
         crossed,
@@ -138,15 +140,6 @@ def _errors(regression: LagRegression, coefficients: FloatArray) -> FloatArray:
                 "signals, or of other units"
             )
     return errors
-
-
-def _simulation_fit(
-    regression: LagRegression, coefficients: FloatArray, spread: FloatArray
-) -> FloatArray:
-    """Return the fit of the simulated response; minus infinity if it overflows."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        fit = 1 - _rms(regression.targets - _simulated(regression, coefficients)) / spread
-    return np.where(np.isnan(fit), -np.inf, fit)
 
 
 def _coefficients(arx: ARX, scale: FloatArray, regression: LagRegression) -> FloatArray:

@@ -149,18 +149,15 @@ def run_law(
 def sensed_noise(
     noise: SensorNoise | None, ticks: int, seed: int, sample_time_s: float
 ) -> tuple[FloatArray, list[int]]:
-    """Noise of `Signals` at the ticks at which a law's loop senses, shape (n, 5), and these."""
+    """Noise of `Signals` at the ticks at which a law's loop senses, shape (n, 5), and these.
+
+    The level's rate is not measured and has none.
+    """
     shown = sensed_at(_ticks("sample_time_s", sample_time_s), ticks)
-    return _noise(noise, ticks, seed)[shown], shown
-
-
-def _noise(noise: SensorNoise | None, ticks: int, seed: int) -> FloatArray:
-    """Noise of `STATES` and pressure; the level's rate is not measured and has none."""
     size = noise or SensorNoise()
     sizes = np.array([size.roll_rad, size.roll_rate_rad_s, size.level_m, 0.0, size.pressure_pa])
-    drawn: FloatArray = np.random.default_rng(seed).standard_normal((ticks, len(sizes)))
-    drawn *= sizes
-    return drawn
+    drawn: FloatArray = np.random.default_rng(seed).standard_normal((ticks, len(sizes)))[shown]
+    return drawn * sizes, shown
 
 
 def _ticks(name: str, time_s: float) -> int:

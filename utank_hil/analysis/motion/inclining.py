@@ -9,6 +9,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import linregress
 from scipy.stats import t as student
 
 from utank_hil.base.arrays import FloatArray
@@ -38,14 +39,9 @@ def inclining(moment_nm: FloatArray, heel_rad: FloatArray, displacement_n: float
         raise ValueError("an inclining test needs five shifts or more, to both sides")
     if np.max(np.abs(heel_rad - np.mean(heel_rad))) > _MOST_HEEL_RAD:
         raise ValueError("an inclining test heels up to 4 degrees: lighter weights")
-    slope = np.tan(heel_rad)
-    spread = moment_nm - moment_nm.mean()
-    size = float(spread @ spread)
-    rise = float(spread @ slope) / size
-    level = float(slope.mean() - rise * moment_nm.mean())
-    rest = slope - level - rise * moment_nm
-    degrees = len(moment_nm) - 2
-    half = float(student.ppf(0.975, degrees)) * math.sqrt(float(rest @ rest) / degrees / size)
+    line = linregress(moment_nm, np.tan(heel_rad))
+    rise = float(line.slope)
+    half = float(student.ppf(0.975, len(moment_nm) - 2) * line.stderr)
     if rise - half <= 0:
         raise ValueError("the heel does not follow the moment: check the signs of both")
     gm_m = 1 / (displacement_n * rise)
@@ -55,4 +51,4 @@ def inclining(moment_nm: FloatArray, heel_rad: FloatArray, displacement_n: float
             f"displacement is {displacement_n / 9.80665e3:.4g} t"
         )
     low, high = (1 / (displacement_n * (rise + sign * half)) for sign in (1, -1))
-    return Inclining(gm_m, (low, high), math.atan(level))
+    return Inclining(gm_m, (low, high), math.atan(line.intercept))

@@ -85,11 +85,8 @@ class HullData:
 
     def _shapes(self) -> dict[str, tuple[int, ...]]:
         """Shape that each array must have."""
-        n, k, m = (
-            np.size(each)
-            for each in (self.frequency_rad_s, self.wave_frequency_rad_s, self.heading_deg)
-        )
-        matrix = (6, 6)
+        n, k = np.size(self.frequency_rad_s), np.size(self.wave_frequency_rad_s)
+        m, matrix = np.size(self.heading_deg), (6, 6)
         return {
             "frequency_rad_s": (n,),
             "added_mass": (n, 6, 6),
@@ -133,7 +130,10 @@ class HullData:
             value = getattr(self, name)
             if value is not None and not value > 0:
                 problems.append((name, f"must be positive, got {value}"))
-        if self.inertia_kg_m2 is not None and not _positive(self.inertia_kg_m2):
+        inertia = self.inertia_kg_m2
+        if inertia is not None and not (
+            np.allclose(inertia, inertia.T, rtol=1e-6) and np.linalg.eigvalsh(inertia)[0] > 0
+        ):
             problems.append(("inertia_kg_m2", "must be symmetric and positive definite"))
         if not self.speed_m_s >= 0:
             problems.append(("speed_m_s", f"must be zero or more, got {self.speed_m_s}"))
@@ -200,12 +200,7 @@ def _asymmetry(matrix: FloatArray) -> float:
     return float(np.median(np.max(np.where(apart > noise, apart / scale, 0.0), axis=(-1, -2))))
 
 
-def _positive(matrix: FloatArray) -> bool:
-    """Whether a matrix is symmetric and positive definite."""
-    return bool(np.allclose(matrix, matrix.T, rtol=1e-6) and np.linalg.eigvalsh(matrix)[0] > 0)
-
-
-_LATERAL = [1, 3, 5]
+LATERAL = np.array([1, 3, 5])  #: Sway, roll and yaw among the six degrees.
 _MIRRORED = np.array([1, -1, 1, -1, 1, -1])
 _MOST_TURN_DEG = 45.0
 """Between headings farther apart than this, forces are not known: seakeeping runs have 10 to 30."""
@@ -276,12 +271,12 @@ def free_roll(hull: HullData) -> FreeRoll:
     omega = math.sqrt(stiffness / (1.3 * ship.mass_matrix[3, 3]))  # hulls add a third in roll
     for _ in range(50):
         added, damping = radiation_at(ship, omega)
-        inertia = (ship.mass_matrix + added)[np.ix_(_LATERAL, _LATERAL)]
+        inertia = (ship.mass_matrix + added)[np.ix_(LATERAL, LATERAL)]
         mode = _mode(inertia)
         before, omega = omega, math.sqrt(stiffness / float(mode @ inertia @ mode))
         if abs(omega - before) < 1e-9 * omega:
             break
-    radiated = float(mode @ damping[np.ix_(_LATERAL, _LATERAL)] @ mode)
+    radiated = float(mode @ damping[np.ix_(LATERAL, LATERAL)] @ mode)
     return FreeRoll(2 * math.pi / omega, omega * radiated / (2 * stiffness), mode)
 
 
@@ -290,12 +285,11 @@ def with_roll_period(hull: HullData, period_s: float) -> HullData:
 
     ValueError is raised as by `free_roll`, and if the added mass alone makes the period longer.
     """
-    stiffness = float(hull.about_gravity_centre().known("hydrostatic")[3, 3])
-    omega = 2 * math.pi / period_s
-    added, _ = radiation_at(hull.about_gravity_centre(), omega)
-    others = hull.about_gravity_centre().mass_matrix + added
+    ship, omega = hull.about_gravity_centre(), 2 * math.pi / period_s
+    stiffness = float(ship.known("hydrostatic")[3, 3])
+    others = ship.mass_matrix + radiation_at(ship, omega)[0]
     others[3, 3] -= hull.known("inertia_kg_m2")[0, 0]
-    lateral = others[np.ix_(_LATERAL, _LATERAL)]
+    lateral = others[np.ix_(LATERAL, LATERAL)]
     mode = _mode(lateral)
     needed = stiffness / omega**2 - float(mode @ lateral @ mode)
     if needed <= 0:

@@ -31,6 +31,7 @@ import numpy.typing as npt
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.parameters import refuse
 from utank_hil.dynamics.hull.hull_data import (
+    LATERAL,
     TO_BODY_AXES,
     HullData,
     excitation_at,
@@ -47,7 +48,6 @@ _START_RATIO = 0.5
 _MOST_STEPS = 200
 
 
-LATERAL = np.array([1, 3, 5])  #: Sway, roll and yaw among the six degrees.
 VERTICAL = np.array([0, 2, 4])  #: Surge, heave and pitch.
 _HEAVE = 2
 _MOST_COUPLING = 0.05
