@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from shipped_designs import GPC_ROLL, LQG_ROLL_RATE_LEVEL
 
 from tools.thesis.capsize import controlled_run
+from tools.thesis.simulate import WaveMoment
 from utank_hil.control.gain import GainLaw, PDDesign
 from utank_hil.control.interface import DesignPlant
 from utank_hil.control.semi_active import (
@@ -19,7 +20,7 @@ from utank_hil.control.semi_active import (
     OnOffValve,
     OnOffValveDesign,
 )
-from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment
+from utank_hil.dynamics import RollModel, RollShip, Tank
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.valves import ValveRange, duct_valve_loss
 

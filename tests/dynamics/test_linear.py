@@ -3,7 +3,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tools.thesis.harmonic import harmonic_response
-from utank_hil.dynamics import RollModel, RollShip, Tank, coupled_model, simulate
+from tools.thesis.simulate import simulate
+from utank_hil.dynamics import RollModel, RollShip, Tank, coupled_model
 from utank_hil.dynamics.linear import coupled_matrices
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)

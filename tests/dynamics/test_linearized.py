@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from tools.thesis.simulate import WaveMoment, simulate
 from utank_hil.analysis.loop.sea_response import at_its_motion, motion_in_sea
 from utank_hil.control import DesignPlant
-from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment, simulate
+from utank_hil.dynamics import RollModel, RollShip, Tank
 from utank_hil.dynamics.tank import IRREGULAR
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
 

@@ -10,7 +10,8 @@ from roll_energy import LEVERS, PATTI, PATTI_TANK, THESIS_SHIP, THESIS_TANK
 
 from tools.thesis.batch import simulate_batch
 from tools.thesis.reference import simulate_reference
-from utank_hil.dynamics import RollModel, WaveMoment, simulate
+from tools.thesis.simulate import WaveMoment, simulate
+from utank_hil.dynamics import RollModel
 
 SHIP = replace(THESIS_SHIP, damping_nms_rad=4.87e7, restoring_odd_nm=(-2e8,))
 TANK = replace(THESIS_TANK, damping_ratio=0.1)

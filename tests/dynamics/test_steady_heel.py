@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tools.thesis.simulate import simulate
 from utank_hil.configuration import Vessel, load_config
-from utank_hil.dynamics import RollModel, simulate
+from utank_hil.dynamics import RollModel
 from utank_hil.dynamics.nonlinear import _at_rest, greatest_held_pa, righting_range, steady_heel
 
 SHIPS = Path("configs/ships")

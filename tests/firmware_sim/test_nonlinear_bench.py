@@ -9,9 +9,9 @@ import pytest
 from firmware_sim.bench import jobs_of
 from firmware_sim.run import RECORD_S, roll_without_tank, run_lockstep
 from firmware_sim.scenario import Scenario
+from tools.thesis.simulate import simulate
 from utank_hil.configuration import load_config
 from utank_hil.dynamics import RollModel
-from utank_hil.dynamics.simulate import simulate
 from utank_hil.dynamics.tank import negligible
 
 PATTI_B = load_config(Path("configs/scenarios/patti_b.yaml"), Scenario)

@@ -7,12 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import prange
 
-from utank_hil.base.arrays import FloatArray
-from utank_hil.dynamics import kernels
-from utank_hil.dynamics.jit import njit
-from utank_hil.dynamics.kernels import advance
-from utank_hil.dynamics.nonlinear import RollModel
-from utank_hil.dynamics.simulate import (
+from tools.thesis.simulate import (
     CALM,
     WaveComponents,
     blank_summary,
@@ -20,6 +15,11 @@ from utank_hil.dynamics.simulate import (
     sea_rows,
     whole_steps,
 )
+from tools.thesis.simulate_kernel import REFRESH, advance
+from utank_hil.base.arrays import FloatArray
+from utank_hil.dynamics import kernels
+from utank_hil.dynamics.jit import njit
+from utank_hil.dynamics.nonlinear import RollModel
 
 
 class BatchResult(NamedTuple):
@@ -64,7 +64,7 @@ def simulate_batch(
     stride = record_every or steps
     samples = -(-steps // stride) if record_every else 0
     history = np.empty((runs, samples, 4))
-    chunk = max(1, round(steps / 50 / (stride * kernels.REFRESH))) * stride * kernels.REFRESH
+    chunk = max(1, round(steps / 50 / (stride * REFRESH))) * stride * REFRESH
     for first in range(0, steps, chunk):  # Parts of the run allow Ctrl-C.
         part = history[:, first // stride : (first + chunk) // stride]
         count = min(chunk, steps - first)

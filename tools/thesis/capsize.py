@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from tools.thesis.batch import simulate_batch
 from tools.thesis.fuzzy_laws import IndirectFuzzy, SmallGainFuzzy
+from tools.thesis.simulate import WaveMoment, whole_steps
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
 from utank_hil.control.fuzzy.adaptive import RobustFuzzy
@@ -24,7 +25,6 @@ from utank_hil.control.interface import Controller, PumpLimits
 from utank_hil.control.limiter import CommandLimiter
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.simulate import WaveMoment, whole_steps
 from utank_hil.dynamics.tank import Tank, negligible
 
 LIMIT_RAD = math.radians(89)  # of the search for equilibria
@@ -180,6 +180,7 @@ def controlled_run(
     the pump has no limits. The run begins upright and at rest unless `initial`, shape (4,), is
     given, and ends at `capsize_rad`. `each_step` takes time, state and command at every sample.
     """
+    from tools.thesis.simulate_kernel import advance
     from utank_hil.dynamics import kernels
 
     hold = whole_steps("sample time", controller.sample_time_s, step_s)
@@ -202,7 +203,7 @@ def controlled_run(
         max_command = max(max_command, abs(command))
         if each_step is not None:
             each_step(k * controller.sample_time_s, state, command)
-        kernels.advance(
+        advance(
             *packed, amplitude, frequency, phase, inputs[0], inputs[1], hold,
             capsize_rad, k * hold, hold, step_s, state, summary, impacts, nowhere, hold,
         )  # fmt: skip

@@ -12,8 +12,9 @@ from tools.thesis.linear_contest import PASSIVE as PASSIVE_TANK
 from tools.thesis.linear_contest import PD, entrants, responses
 from tools.thesis.patti_b import LINEARIZED, NO_TANK, PASSIVE, ROBUST, run_controller
 from tools.thesis.ships import AS_PRINTED, GREATER
+from tools.thesis.simulate import WaveMoment
 from utank_hil.base.arrays import ComplexArray, FloatArray
-from utank_hil.dynamics import RollModel, WaveMoment
+from utank_hil.dynamics import RollModel
 
 START_RAD: Final = math.radians(10)
 DURATION_S: Final = 400.0

@@ -9,9 +9,10 @@ import numpy as np
 from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict, panel_of, peaks
 from tools.thesis.harmonic import HarmonicResponse, harmonic_response
 from tools.thesis.ships import ROLL_RAD_S, first_ship, tuned_ship
+from tools.thesis.simulate import simulate
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.optimal_tank import ship_ratios
-from utank_hil.dynamics import RollModel, simulate
+from utank_hil.dynamics import RollModel
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank

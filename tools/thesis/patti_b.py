@@ -19,10 +19,11 @@ from tools.thesis.capsize import (
     without_tank,
 )
 from tools.thesis.figure import Check, Figure, Table, Verdict
+from tools.thesis.simulate import WaveMoment
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.fuzzy.adaptive import DirectFuzzyController
 from utank_hil.control.interface import Controller
-from utank_hil.dynamics import RollModel, WaveMoment
+from utank_hil.dynamics import RollModel
 
 NO_TANK, PASSIVE, LINEARIZED, _, SMALL_GAIN, ROBUST, _ = LAWS
 WEAK_NM, MIDDLE_NM, PASSIVE_NM, STRONG_NM = PRINTED_NM

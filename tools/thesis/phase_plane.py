@@ -8,8 +8,9 @@ import numpy as np
 
 from tools.thesis.capsize import PATTI_B, equilibria, safe_basin, without_tank
 from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
+from tools.thesis.simulate import simulate
 from utank_hil.base.arrays import FloatArray
-from utank_hil.dynamics import RollModel, simulate
+from utank_hil.dynamics import RollModel
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 C1_M, C3_M, DISPLACEMENT_N = 0.2138, 0.6713, 2.366e6

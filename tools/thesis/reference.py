@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tools.thesis.simulate import Impact, RollRun
 from utank_hil.base.arrays import FloatArray
-from utank_hil.dynamics.nonlinear import INSIDE_M, REST_M_S, Impact, RollModel
-from utank_hil.dynamics.simulate import RollRun
+from utank_hil.dynamics.nonlinear import INSIDE_M, REST_M_S, RollModel
 
 
 @dataclass(frozen=True, slots=True)

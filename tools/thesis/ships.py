@@ -10,8 +10,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from utank_hil.dynamics import GRAVITY_M_S2, RollModel, RollRun, RollShip, Tank, simulate
-from utank_hil.dynamics.simulate import whole_steps
+from tools.thesis.simulate import RollRun, simulate, whole_steps
+from utank_hil.dynamics import GRAVITY_M_S2, RollModel, RollShip, Tank
 
 INERTIA_KG_M2: Final = 1.9275e9
 ROLL_RAD_S: Final = 0.5

@@ -15,10 +15,11 @@ from tools.thesis.ships import (
     stimulate_on_still_water,
     tuned_tank,
 )
+from tools.thesis.simulate import simulate
 from utank_hil.analysis.motion.decay import roll_decay
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.optimal_tank import ship_ratios
-from utank_hil.dynamics import RollModel, simulate
+from utank_hil.dynamics import RollModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 

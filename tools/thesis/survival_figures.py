@@ -25,7 +25,8 @@ from tools.thesis.patti_b import (
     run,
     told,
 )
-from utank_hil.dynamics import RollModel, WaveMoment
+from tools.thesis.simulate import WaveMoment
+from utank_hil.dynamics import RollModel
 
 SHOWN_S: Final = 120.0
 SHOWN_DEG: Final = 40.0

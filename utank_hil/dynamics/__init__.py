@@ -7,8 +7,5 @@ from utank_hil.dynamics.nonlinear import RollModel as RollModel
 from utank_hil.dynamics.sampling import LinearModel as LinearModel
 from utank_hil.dynamics.sampling import sampled_model as sampled_model
 from utank_hil.dynamics.ship import RollShip as RollShip
-from utank_hil.dynamics.simulate import RollRun as RollRun
-from utank_hil.dynamics.simulate import WaveMoment as WaveMoment
-from utank_hil.dynamics.simulate import simulate as simulate
 from utank_hil.dynamics.tank import GRAVITY_M_S2 as GRAVITY_M_S2
 from utank_hil.dynamics.tank import Tank as Tank

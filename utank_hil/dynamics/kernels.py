@@ -1,9 +1,7 @@
 """Compiled fixed-step integration of the nonlinear coupled model; imports numba, so import it late.
 
-The method is the classical Runge-Kutta of order four. The wave moment is a sum of components
-``amplitude cos(frequency t + phase)``. It is advanced by rotating one phasor per component, without
-cosines, and recomputed from the cosines every `REFRESH` steps, so that rounding errors do not
-accumulate. Pump pressure and valve loss are held over whole steps.
+The method is the classical Runge-Kutta of order four. Pump pressure and valve loss are held over
+whole steps.
 
 A step in which the level passes its limit ends at the impact, found by the Illinois method. The
 impulse is applied, and the rest of the step follows.
@@ -11,15 +9,12 @@ impulse is applied, and the rest of the step follows.
 
 import math
 
-import numpy as np
-
 from utank_hil.base import elementary
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics import nonlinear
 from utank_hil.dynamics.jit import njit
 from utank_hil.dynamics.nonlinear import INSIDE_M, REST_M_S, RollCoefficients
 
-REFRESH = 256  # This is a power of two.
 STRIKES_PER_STEP = 8  # The water comes to rest at the stop beyond these.
 # Entries of a ship's summary; the last two are the energy of impacts, and the damping energy in
 # steps with impacts.
@@ -31,7 +26,6 @@ InStep = tuple[float, float, float]  #: Values of a quantity at start, middle an
 InWaves = tuple[InStep, InStep, InStep]
 """Roll moment of the waves, lateral acceleration over g, and the righting moment's change as a
 share."""
-NONE = (0.0, 0.0, 0.0)
 # No kernel reorders or fuses sums (`fastmath`): processors would differ in their last digits.
 sine_cosine = njit(error_model="numpy")(elementary.sine_cosine)
 forces = njit(error_model="numpy", inline="always")(nonlinear.forces)
@@ -241,93 +235,3 @@ def step_with_impacts(
     part, left = _part_of(waves, done, 1.0), 1.0 - done
     x, v, h, w = rk4(c, per_piece, restoring, state, part, pump, valve, left * dt)
     return x, v, math.copysign(min(abs(h), limit), h), w
-
-
-@njit(error_model="numpy")
-def advance(
-    row: FloatArray,
-    per_piece: float,
-    restoring: FloatArray,
-    amplitude: FloatArray,
-    frequency: FloatArray,
-    phase: FloatArray,
-    pressure: FloatArray,
-    valve_loss: FloatArray,
-    hold: int,
-    capsize: float,
-    first: int,
-    steps: int,
-    dt: float,
-    state: FloatArray,
-    summary: FloatArray,
-    impacts: FloatArray,
-    out: FloatArray,
-    stride: int,
-) -> None:
-    """Advance one ship from step `first` by `steps`; updates `state`, `summary`, `impacts`, `out`.
-
-    `row` holds `RollCoefficients`. Each sample of pressure and valve loss is held for `hold` steps,
-    the last one to the end. `out` (k, 4) receives the state before every `stride`-th step. A
-    capsized ship keeps the state in which it passed the angle `capsize`.
-    """
-    c = unpacked(row)
-    waves = len(amplitude)
-    re, im = np.empty(waves), np.empty(waves)
-    half_cos, half_sin = np.empty(waves), np.empty(waves)
-    full_cos, full_sin = np.empty(waves), np.empty(waves)
-    for j in range(waves):
-        half_sin[j], half_cos[j] = sine_cosine(frequency[j] * dt / 2)
-        full_sin[j], full_cos[j] = sine_cosine(frequency[j] * dt)
-    now = (state[0], state[1], state[2], state[3])
-    alive = summary[CAPSIZED_S] == np.inf
-    max_roll, max_level = summary[MAX_ROLL], summary[MAX_LEVEL]
-    start = 0.0
-    # Counters are used, because integer division costs as much as a sine.
-    until_output, row_out = 0, 0
-    sample, held = first // hold, first % hold
-    pump = c.area * pressure[min(sample, len(pressure) - 1)]
-    valve = c.area * valve_loss[min(sample, len(valve_loss) - 1)]
-    for i in range(steps):
-        if until_output == 0:
-            until_output = stride
-            if row_out < out.shape[0]:
-                for k in range(4):
-                    out[row_out, k] = now[k]
-            row_out += 1
-        until_output -= 1
-        if not alive:
-            continue
-        step = first + i
-        if i == 0 or step & (REFRESH - 1) == 0:
-            start = 0.0
-            for j in range(waves):
-                sine, cosine = sine_cosine(frequency[j] * (step * dt) + phase[j])
-                re[j], im[j] = amplitude[j] * cosine, amplitude[j] * sine
-                start += re[j]
-        middle, end = 0.0, 0.0
-        for j in range(waves):
-            middle += re[j] * half_cos[j] - im[j] * half_sin[j]
-            turned = re[j] * full_cos[j] - im[j] * full_sin[j]
-            im[j] = re[j] * full_sin[j] + im[j] * full_cos[j]
-            re[j] = turned
-            end += turned
-        if held == hold:
-            held = 0
-            sample += 1
-            pump = c.area * pressure[min(sample, len(pressure) - 1)]
-            valve = c.area * valve_loss[min(sample, len(valve_loss) - 1)]
-        held += 1
-        in_step = ((start, middle, end), NONE, NONE)
-        after = rk4(c, per_piece, restoring, now, in_step, pump, valve, dt)
-        if abs(after[2]) > c.level_limit:
-            after = step_with_impacts(
-                c, per_piece, restoring, now, in_step, pump, valve, dt, step * dt, impacts, summary
-            )
-        now, start = after, end
-        max_roll, max_level = max(max_roll, abs(now[0])), max(max_level, abs(now[2]))
-        if not abs(now[0]) < capsize:
-            summary[CAPSIZED_S] = (step + 1) * dt
-            alive = False
-    summary[MAX_ROLL], summary[MAX_LEVEL] = max_roll, max_level
-    for k in range(4):
-        state[k] = now[k]

@@ -70,18 +70,6 @@ class RollCoefficients(NamedTuple):
     ship_inertia: float  # I, without water
 
 
-class Impact(NamedTuple):
-    """An impact of the water at a limit of the level."""
-
-    time_s: float
-    level_m: float  #: The limit; positive if starboard is full.
-    speed_m_s: float  #: dh/dt just before the impact.
-    #: Angular impulse of tank and water on the ship: its inertia times the jump of its roll rate.
-    roll_impulse_nms: float
-    #: Impulse of the stop on the water along h (pressure times reservoir area, over time).
-    stop_impulse_ns: float
-
-
 def forces(
     c: RollCoefficients, righting: Any, sin: Any, cos: Any, phi_dot: Any, h: Any, h_dot: Any,
     moment: Any, sway: Any, pump: Any, valve: Any,

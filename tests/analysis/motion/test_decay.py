@@ -8,8 +8,9 @@ import pytest
 from others import others_file
 
 from tools.thesis.capsize import without_tank
+from tools.thesis.simulate import simulate
 from utank_hil.analysis.motion.decay import roll_decay
-from utank_hil.dynamics import RollModel, RollShip, Tank, simulate
+from utank_hil.dynamics import RollModel, RollShip, Tank
 
 TANK = Tank(17.1, 4.88, 17.11, 6.22)
 

@@ -14,8 +14,8 @@ from tools.thesis.capsize import (
     controlled_run,
     largest_survivable_wave,
 )
+from tools.thesis.simulate import WaveMoment, simulate
 from utank_hil.control import CommandLimiter, PassiveController, PumpLimits
-from utank_hil.dynamics import WaveMoment, simulate
 
 WAVE = WaveMoment([5e4], [WAVE_RAD_S], [0.0])
 

@@ -11,7 +11,8 @@ from tools.thesis.capsize import (
     without_tank,
 )
 from tools.thesis.reference import simulate_reference
-from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment, simulate
+from tools.thesis.simulate import WaveMoment, simulate
+from utank_hil.dynamics import RollModel, RollShip, Tank
 
 # Table 4.1
 PATTI = RollShip(1.468e6, 2.366e6 * 0.2138, 3.206e3, 9.882e4, restoring_odd_nm=(-2.366e6 * 0.6713,))

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.dynamics.nonlinear import Impact, RollModel
+from utank_hil.dynamics.nonlinear import RollModel
 
 IMPACTS_KEPT = 10_000  #: Strikes of a run that are kept. Chosen; no study.
 
@@ -44,6 +44,18 @@ class WaveMoment(NamedTuple):
 
 
 CALM = WaveMoment(np.zeros(0), np.zeros(0), np.zeros(0))
+
+
+class Impact(NamedTuple):
+    """An impact of the water at a limit of the level."""
+
+    time_s: float
+    level_m: float  #: The limit; positive if starboard is full.
+    speed_m_s: float  #: dh/dt just before the impact.
+    #: Angular impulse of tank and water on the ship: its inertia times the jump of its roll rate.
+    roll_impulse_nms: float
+    #: Impulse of the stop on the water along h (pressure times reservoir area, over time).
+    stop_impulse_ns: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +103,7 @@ def simulate(
     capsize_rad : float
         Roll angle at which the ship counts as capsized and the run ends.
     """
+    from tools.thesis.simulate_kernel import advance
     from utank_hil.dynamics import kernels
 
     steps = whole_steps("duration_s", duration_s, step_s)
@@ -106,7 +119,7 @@ def simulate(
     summary = blank_summary(1)[0]
     impacts = np.empty((IMPACTS_KEPT, 5))
     pressure, valve_loss = rows_of(pressure_pa)[0], rows_of(valve_loss_pa_per_m2_s2)[0]
-    kernels.advance(
+    advance(
         *model.packed, amplitude[0], frequency[0], phase[0], pressure, valve_loss, hold,
         capsize_rad, 0, steps, step_s, state, summary, impacts, out, record_every,
     )  # fmt: skip
