@@ -9,13 +9,11 @@ from utank_hil.identification.disturbance import (
 )
 from utank_hil.identification.era import ModalConfidence as ModalConfidence
 from utank_hil.identification.era import era as era
-from utank_hil.identification.era import hankel_singular_values as hankel_singular_values
 from utank_hil.identification.era import modal_confidence as modal_confidence
 from utank_hil.identification.era import modal_parameters as modal_parameters
 from utank_hil.identification.era import order_from_singular_values as order_from_singular_values
 from utank_hil.identification.excitation import random_pulses as random_pulses
 from utank_hil.identification.excitation import response_scale as response_scale
-from utank_hil.identification.lag_regression import excitation_order as excitation_order
 from utank_hil.identification.okid import OkidResult as OkidResult
 from utank_hil.identification.okid import markov_parameters as markov_parameters
 from utank_hil.identification.okid import okid as okid

@@ -26,7 +26,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import svdvals
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.identification.okid import OkidResult, markov_gradient
@@ -77,14 +76,6 @@ def era(markov: FloatArray, order: int | None = None, *, sample_time_s: float) -
     markov = _checked(markov)
     found = realize(markov, order)
     return ss(found.a, found.b, found.c, markov[0], sample_time_s)
-
-
-def hankel_singular_values(markov: FloatArray) -> FloatArray:
-    """Return the singular values of the scaled Hankel matrix of `era`, largest first."""
-    scaled, _, _ = _scaled(_checked(markov))
-    half = len(scaled) // 2
-    values: FloatArray = svdvals(_hankel(scaled, 1, half, len(scaled) - 1 - half))
-    return values
 
 
 def order_from_singular_values(values: FloatArray) -> int:

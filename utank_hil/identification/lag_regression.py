@@ -90,37 +90,14 @@ def segment_bounds(z: FloatArray) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
-def excitation_order(u: FloatArray, most: int) -> int:
-    """Order of persistent excitation of an input, to numerical precision.
-
-    This is the rank of the Gram matrix of `most` lagged inputs. A model of n states needs 2 n or
-    more; all coefficients of an ARX model of order p need p + 1. A narrow-band signal has a low
-    order for any number of lines.
-
-    IdentificationError is raised if no segment without gaps has `most` samples.
-
-    Parameters
-    ----------
-    u : array_like, shape (N,) or (N, r)
-        Input; rows that are not finite are gaps.
-    most : int
-        Largest order to test.
-    """
-    signal = np.asarray(u, dtype=np.float64)
-    signal = signal[:, None] if signal.ndim == 1 else signal
-    peak = np.abs(signal[np.isfinite(signal).all(axis=1)]).max(axis=0, initial=0.0)
-    if not peak.any():
-        return 0
-    signal = signal / np.where(peak > 0, peak, 1.0)
-    regression = LagRegression(signal, 0, most - 1, np.empty((0, len(signal))))
-    return input_excitation(regression, regression.matrix.T @ regression.matrix)[0]
-
-
 def input_excitation(regression: LagRegression, gram: FloatArray) -> tuple[int, float]:
     """Return persistent excitation and variance inflation, from a regression's Gram matrix.
 
-    The first is the order. The second is the mean variance of the input coefficients relative to
-    white inputs of the same power, infinite if the order is less than the number of lags.
+    The first is an order: the rank of the Gram matrix of the lagged inputs, to numerical precision,
+    per input. A model of n states needs 2 n or more; all coefficients of an ARX model of order p
+    need p + 1. A narrow-band signal has a low order for any number of lines. The second is the mean
+    variance of the input coefficients relative to white inputs of the same power, infinite if the
+    order is less than the number of lags.
     """
     index = regression.input_rows
     lagged = gram[np.ix_(index, index)]
@@ -205,7 +182,7 @@ class Fit:
     #: shrinkage.
     penalty: FloatArray
     rank: int
-    excitation_order: int  #: See `excitation_order`, for p + 1 lags.
+    excitation_order: int  #: See `input_excitation`, for p + 1 lags.
 
 
 def fit(regression: LagRegression) -> Fit:
