@@ -17,7 +17,7 @@ length L, reservoir area At and still height H (`utank_hil.dynamics.tank`):
 
 import math
 from dataclasses import dataclass, replace
-from typing import Annotated, Final
+from typing import Final
 
 import numpy as np
 
@@ -124,14 +124,6 @@ class TankCost:
     slope_capacity_rad: float  #: Effective wave slope that the usable level holds.
 
 
-@dataclass(frozen=True, slots=True)
-class _Demand:
-    stability_share: Annotated[float, Range(least=LEAST_STABILITY_SHARE, most=MOST_STABILITY_SHARE)]
-
-    def __post_init__(self) -> None:
-        refuse("tank", range_problems(self))
-
-
 def size_tank(
     ship: RollShip, room: TankRoom, stability_share: float = STABILITY_SHARE
 ) -> SizedTank:
@@ -141,7 +133,9 @@ def size_tank(
     ship or room allow no tank of `LEAST_STABILITY_SHARE`, with the reason and a remedy. Raises
     `ValueError` if the share is out of its range or the ship has no displacement.
     """
-    _Demand(stability_share)
+    shares = Range(least=LEAST_STABILITY_SHARE, most=MOST_STABILITY_SHARE)
+    if not shares.holds(stability_share):
+        refuse("tank", [("stability_share", f"{shares.demand}, got {stability_share}")])
     if not ship.displacement_n > 0:
         refuse("ship", [("displacement_n", "is needed to size a tank")])
     gm_m = ship.stiffness_nm_rad / ship.displacement_n

@@ -297,36 +297,26 @@ def robustness(
     """
     delay_s, lag_s = plant.delay_s, plant.lag_s
     models = [pump_model(plant.ship, tank, measured) for tank in plant.tanks]
-    late = [
-        closed_loop_radius(law, sample(model, law.sample_time_s, delay_s + EXTRA_DELAY_S, lag_s))
-        for model in models
-    ]
     own = [
         margins(law, each, delay_s, lag_s, with_delay_margin=with_delay_margin) for each in models
     ]
-    ships = list(ship_variants(plant.ship))
-    variants = [(tank, *each) for tank in plant.tanks for each in ships]
-    systems = [pump_model(ship, tank, measured) for tank, _, _, ship in variants]
-    extra_s = (0.0, EXTRA_DELAY_S)
-    radii = np.array(
-        [
-            [[closed_loop_radius(law, each, gain) for gain in GAINS] for each in plants]
-            for plants in (
-                [sample(system, law.sample_time_s, delay_s + extra, lag_s) for system in systems]
-                for extra in extra_s
-            )
-        ]
-    )
-    when, which, gain = np.unravel_index(int(radii.argmax()), radii.shape)
-    _, period_scale, inertia_scale, _ = variants[which]
+
+    def sampled(model: LinearModel, extra_s: float) -> LinearModel:
+        return sample(model, law.sample_time_s, delay_s + extra_s, lag_s)
+
+    worst = (-math.inf, 1.0, 1.0, 1.0, 0.0)
+    for extra_s in (0.0, EXTRA_DELAY_S):
+        for tank in plant.tanks:
+            for period_scale, inertia_scale, ship in ship_variants(plant.ship):
+                variant = sampled(pump_model(ship, tank, measured), extra_s)
+                for gain in GAINS:
+                    radius = closed_loop_radius(law, variant, gain)
+                    if radius > worst[0]:
+                        worst = radius, period_scale, inertia_scale, gain, extra_s
     return Robustness(
-        nominal=max(own, key=lambda each: (each.radius >= 1, each.peak_sensitivity)),
-        late_radius=max(late),
-        worst_radius=float(radii[when, which, gain]),
-        worst_period_scale=period_scale,
-        worst_inertia_scale=inertia_scale,
-        worst_gain=GAINS[gain],
-        worst_extra_delay_s=extra_s[when],
+        max(own, key=lambda each: (each.radius >= 1, each.peak_sensitivity)),
+        max(closed_loop_radius(law, sampled(each, EXTRA_DELAY_S)) for each in models),
+        *worst,
     )
 
 
