@@ -128,8 +128,7 @@ class MeasuredSpectrum(Section):
         time = utc(time)
         if "file" in info.data:
             spectra = read_spectra(info.data["file"], place=info.data.get("place"))
-            spectrum = spectra.at(time.isoformat())
-            if spectrum.moment(0) == 0:
+            if spectra.at(time.isoformat()).moment(0) == 0:
                 raise ValueError("the spectrum holds no energy: choose another hour")
         return time
 
@@ -139,11 +138,11 @@ class MeasuredSpectrum(Section):
 
     def warnings(self) -> list[Problem]:
         """Warn of rows of the file that are left out."""
-        notes = read_spectra(self.file, place=self.place).notes
-        if not notes:
-            return super().warnings()
-        reason = f"has rows that are left out, {len(notes)}; the first: {notes[0]}"
-        return [*super().warnings(), ("file", reason)]
+        notes, found = read_spectra(self.file, place=self.place).notes, super().warnings()
+        if notes:
+            reason = f"has rows that are left out, {len(notes)}; the first: {notes[0]}"
+            found.append(("file", reason))
+        return found
 
 
 class TabulatedSpectrum(Section):
@@ -214,10 +213,10 @@ def _bands_of(content: Any) -> Any:
     model_keys = {each.name for each in fields(SeaModel)}
     named = {name: value for name, value in content.items() if name not in model_keys}
     spectrum = _SPECTRUM.validate_python(named).spectrum()
-    bands = zip(_BANDS, (spectrum.frequency_hz, spectrum.density), strict=True)
     return {
         **{name: value for name, value in content.items() if name in model_keys},
-        **{name: tuple(values.tolist()) for name, values in bands},
+        "frequency_hz": tuple(spectrum.frequency_hz.tolist()),
+        "density_m2_hz": tuple(spectrum.density.tolist()),
     }
 
 
