@@ -114,16 +114,15 @@ class WrittenShip(RollShip):
         """Return the ship as a `RollShip`, with its errors."""
         hull = self._of_hull()
         displacement_n = self._displacement_n
+        if hull is not None and math.isnan(displacement_n):
+            displacement_n = hull.displacement_n
         stiffness = displacement_n * self.gm_m if self.gives("gm_m") else self.stiffness_nm_rad
-        if hull is not None:
-            if math.isnan(displacement_n):
-                displacement_n = hull.displacement_n
-            if math.isnan(stiffness):
-                gm = self.gives("gm_m")
-                stiffness = displacement_n * self.gm_m if gm else hull.stiffness_nm_rad
         inertia = self.inertia_kg_m2
-        if hull is not None and math.isnan(inertia) and not self.gives("roll_period_s"):
-            inertia = hull.inertia_kg_m2
+        if hull is not None:
+            if math.isnan(stiffness):
+                stiffness = hull.stiffness_nm_rad
+            if math.isnan(inertia) and not self.gives("roll_period_s"):
+                inertia = hull.inertia_kg_m2
         if math.isnan(inertia):
             per_rad_s = self._period_s(stiffness) / (2 * math.pi)
             inertia = stiffness * (per_rad_s * per_rad_s)  # `**` is the C library's pow
@@ -243,12 +242,9 @@ def hull_words(hull: HullFile, written: frozenset[str]) -> list[str]:
     return [words, *(f"ship: {hull.file}: {note}" for note in hull.hull.data.notes)]
 
 
-def in_written_keys(problems: list[Problem], written: Collection[str]) -> list[Problem]:
-    """Return problems by the keys of a vessel at the keys `written` in its ship's file."""
-    return [_in_written_key(name, reason, written) for name, reason in problems]
-
-
-def _in_written_key(name: str, reason: str, written: Collection[str]) -> Problem:
+def in_written_key(problem: Problem, written: Collection[str]) -> Problem:
+    """Return a problem by a key of a vessel at the key that is `written` in its ship's file."""
+    name, reason = problem
     section, _, key = name.partition(".")
     weight = key == "displacement"  # The weight has one of two keys.
     if weight:

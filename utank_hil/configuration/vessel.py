@@ -17,7 +17,7 @@ from utank_hil.configuration.devices import DevicesSection
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.hull_files.reader import HullFile
 from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
-from utank_hil.configuration.ship_keys import ShipFromFile, hull_words, in_written_keys
+from utank_hil.configuration.ship_keys import ShipFromFile, hull_words, in_written_key
 from utank_hil.dynamics import RollModel, Tank
 from utank_hil.dynamics.nonlinear import RightingRange, greatest_held_pa, righting_range
 from utank_hil.dynamics.pump import Pump
@@ -172,7 +172,7 @@ class Vessel(Section):
             problems += [(f"devices.{name}", reason) for name, reason in lacking]
             problems += vessel.devices.pump.pump_problems(vessel.pump)
             problems += vessel.devices.valve.valve_problems(vessel.valve)
-        refuse("", in_written_keys(problems, vessel._written))
+        refuse("", [in_written_key(each, vessel._written) for each in problems])
         return vessel
 
     @property
@@ -185,11 +185,8 @@ class Vessel(Section):
         """Time between two samples of each motion sensor."""
         if self.devices is None:
             return TICK_S, TICK_S
-        first, second = (
-            TICK_S if each.cycle_ms is None else each.cycle_ms * 1e-3
-            for each in (self.devices.motion, self.devices.motion_2)
-        )
-        return first, second
+        first, second = self.devices.motion.cycle_ms, self.devices.motion_2.cycle_ms
+        return 1e-3 * first if first else TICK_S, 1e-3 * second if second else TICK_S
 
     @property
     def hull(self) -> HullFile | None:
@@ -219,7 +216,7 @@ class Vessel(Section):
             if not 0.05 * gm_m <= self.least_gm_m <= gm_m:  # 0.15 m of 3 m to all of it
                 why = f"is {self.least_gm_m:g} m, and the ship's GM {gm_m:.3g} m: both in metres"
                 found.append(("least_gm_m", why))
-        return in_written_keys(found, self._written)
+        return [in_written_key(each, self._written) for each in found]
 
 
 def not_by_default(part: Any) -> dict[str, Any]:
