@@ -128,6 +128,7 @@ def test_commands_are_heard_and_refused_on_loopback(listener: socket.socket) -> 
         message = listener.recv(1500).decode().splitlines(keepends=True)
         assert parse_alf(message).identifier == 10_014
         listener.sendto(b"\xff noise\r\n", hear)
+        listener.sendto(command("A", "10014").encode().replace(b"BN", b"B\xff"), hear)
         listener.sendto(command("A", "10014").encode(), hear)
         outward.look(lost=0)
         assert split(listener.recv(1500).decode())[0] == "U0ARC"

@@ -94,15 +94,17 @@ class Framing:
         return TOKEN + "".join(lines).encode("ascii")
 
     def lines(self, datagram: bytes) -> Iterator[str]:
-        """Yield the sentences of a datagram; those with a damaged header are left out."""
+        """Yield the sentences of a datagram; those with a damaged header or byte are left out."""
         if self._header != datagram.startswith(TOKEN):
             return
         text = datagram.removeprefix(TOKEN).decode("ascii", errors="replace")
         for line in text.splitlines():
             tagged = _LINE.fullmatch(line)
+            if not line.isascii():  # damaged, and a checksum has none of such characters
+                continue
             if tagged is None and not self._header:
                 yield line
-            elif tagged is not None and tagged[1].isascii() and checksum(tagged[1]) == tagged[2]:
+            elif tagged is not None and checksum(tagged[1]) == tagged[2].upper():
                 yield tagged[3]
 
 
