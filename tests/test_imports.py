@@ -16,7 +16,7 @@ from utank_hil.telemetry.frame_log import FrameLog
 
 pytestmark = pytest.mark.slow
 
-READERS = ("asammdf", "pymodbus", "pandas", "sympy")
+READERS = ("asammdf", "pandas", "sympy")
 HEAVY = ("matplotlib", "numba", "rerun", "control", "pyarrow", "firmware_sim", *READERS)
 
 COMMAND = "import utank_hil.cli, utank_hil.commands.run, utank_hil.commands.panel"

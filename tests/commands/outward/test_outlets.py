@@ -2,8 +2,10 @@
 
 import os
 import socket
+import struct
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from datetime import UTC, datetime
 
 import numpy as np
@@ -17,6 +19,7 @@ from utank_hil.canbus.events import AlarmEvent
 from utank_hil.cli import app
 from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.outward import outlets as module
+from utank_hil.commands.outward import registers
 from utank_hil.commands.outward.outlets import Outlet, Outward, read_outlet
 from utank_hil.commands.outward.registers import REGISTERS
 from utank_hil.nodes.signals import SIGNALS
@@ -103,6 +106,56 @@ def test_writes_and_other_addresses_are_refused(
     assert client.read_holding_registers(0, count=9).registers == before
 
 
+def request(pdu: bytes, protocol: int = 0) -> bytes:
+    return struct.pack(">HHHB", 7, protocol, len(pdu) + 1, 1) + pdu
+
+
+READ = request(struct.pack(">BHH", 3, 0, 2))
+WRITE_FILE = b"\x15\x09\x06\x00\x01\x00\x00\x00\x01\x00\x05"
+
+
+@pytest.mark.parametrize(
+    ("sent", "answers"),
+    [
+        (READ * 3, [2 + 4] * 3),  # at once, as by a client that does not wait
+        (request(b"\x2b\x0e\x01\x00") + READ, [2, 2 + 4]),  # identification
+        (request(WRITE_FILE) + READ, [2, 2 + 4]),
+        (request(b"\x03\x00") + READ, [2, 2 + 4]),
+        (request(struct.pack(">BHH", 4, 100, 126)) + READ, [2, 2 + 4]),
+        (b"GET / HTTP/1.1\r\n\r\n", []),
+        (request(b"\x03\x00\x00\x00\x02", protocol=1), []),
+    ],
+)
+def test_a_request_of_any_client_has_its_answer(
+    served: tuple[Outward, ModbusTcpClient, RowWriter], sent: bytes, answers: list[int]
+) -> None:
+    _, client, _ = served
+    with socket.create_connection((client.comm_params.host, client.comm_params.port), 5) as own:
+        own.sendall(sent)
+        own.shutdown(socket.SHUT_WR)
+        with own.makefile("rb") as file:
+            for length in answers:
+                assert struct.unpack(">HHHB", file.read(7)) == (7, 0, length + 1, 1)
+                assert bool(file.read(length)[0] & 0x80) == (length == 2)
+            assert file.read() == b""
+    assert client.read_holding_registers(0, count=2).registers[1] == 0x8000
+
+
+def test_clients_that_have_gone_without_a_word_keep_no_place(
+    served: tuple[Outward, ModbusTcpClient, RowWriter], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, client, _ = served
+    monkeypatch.setattr(registers, "_MOST_CLIENTS", 2)
+    address = client.comm_params.host, client.comm_params.port
+    with ExitStack() as stack:
+        first, *_, last = (
+            stack.enter_context(socket.create_connection(address, 5)) for _ in range(4)
+        )
+        last.sendall(READ)
+        assert len(last.recv(100)) == 13
+        assert first.recv(1) == b""
+
+
 def test_a_port_in_use_is_said_and_the_rest_goes_on(listener: socket.socket) -> None:
     said: list[str] = []
     with socket.create_server(("127.0.0.1", 0)) as other:
@@ -176,6 +229,7 @@ def test_the_announcers_process_shows_alarms(listener: socket.socket) -> None:
         ("modbus://127.0.0.1:0", "from 1 to 65535"),
         ("modbus://127.0.0.1:502?hear=127.0.0.1:5", "of sentences only"),
         ("udp://127.0.0.1:5/x", r"only \?hear"),
+        ("udp://127.0.0.1:5#hear=127.0.0.1:6", r"only \?hear"),
     ],
 )
 def test_a_wrong_address_is_refused_with_the_form(text: str, says: str) -> None:
@@ -188,9 +242,3 @@ def test_the_command_line_says_what_is_wrong() -> None:
     result = CliRunner().invoke(app, options)
     assert result.exit_code == 2
     assert "--outward: 'tcp://x': write" in " ".join(result.stderr.split())
-
-
-def test_without_pymodbus_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "find_spec", lambda _: None)
-    with pytest.raises(ValueError, match=r"pip install 'utank-hil\[outward\]'"):
-        read_outlet("modbus://127.0.0.1:502")

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from importlib.util import find_spec
 from ipaddress import IPv4Address
 from typing import Final
 from urllib.parse import parse_qs, urlsplit
@@ -44,10 +43,9 @@ def read_outlet(text: str) -> Outlet:
         raise ValueError(f"{text!r}: {_FORM}")
     address = _address(text, parts.netloc)
     options = parse_qs(parts.query, keep_blank_values=True)
-    if parts.path or set(options) - ({"hear"} if parts.scheme != "modbus" else set()):
+    allowed = set() if parts.scheme == "modbus" else {"hear"}
+    if parts.path or parts.fragment or set(options) - allowed:
         raise ValueError(f"{text!r}: only ?hear=ADDRESS:PORT may follow, and of sentences only")
-    if parts.scheme == "modbus" and find_spec("pymodbus") is None:
-        raise ValueError(f"{text!r} needs pymodbus: pip install 'utank-hil[outward]'")
     hear = [_address(text, each) for each in options.get("hear", [])]
     return Outlet(parts.scheme, address, hear[-1] if hear else None)
 

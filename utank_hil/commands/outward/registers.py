@@ -1,12 +1,13 @@
 """State and alarms as registers of Modbus TCP, read by function 3 or 4; any other is refused."""
 
 import asyncio
-import logging
 import math
 import threading
+from asyncio import StreamReader, StreamWriter
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from struct import pack, unpack
 from typing import Final
 
 from utank_hil.canbus import AlarmState, Fault, Mode
@@ -14,6 +15,12 @@ from utank_hil.canbus import AlarmState, Fault, Mode
 NOT_AVAILABLE: Final = 0x8000  #: Least of 16 signed bits, which no value has.
 FIRST_ALARM: Final = 100  #: Register of fault code 0.
 _READS: Final = (3, 4)
+_READ_BYTES: Final = 5  #: Of a request to read: function, first register, number.
+_MOST_READ: Final = 125  #: Registers in one answer.
+_ILLEGAL_FUNCTION, _ILLEGAL_ADDRESS, _ILLEGAL_VALUE = 1, 2, 3
+_HEAD_BYTES: Final = 7
+_MOST_BYTES: Final = 254  #: Of device number, function and data.
+_MOST_CLIENTS: Final = 32
 _START_S: Final = 10.0  #: Time in which the server listens, even on a busy machine.
 
 
@@ -73,13 +80,29 @@ def values(state: State) -> dict[int, int]:
     return found
 
 
+def reply(request: bytes, shown: Mapping[int, int]) -> bytes:
+    """Return the answer to a request, both from the function's code on, without device number."""
+    function, problem = request[0], _ILLEGAL_FUNCTION
+    if function in _READS:
+        start, count = unpack(">HH", request[1:]) if len(request) == _READ_BYTES else (0, 0)
+        if not 1 <= count <= _MOST_READ:
+            problem = _ILLEGAL_VALUE
+        elif all(at in shown for at in range(start, start + count)):
+            found = [shown[at] for at in range(start, start + count)]
+            return pack(f">BB{count}H", function, 2 * count, *found)
+        else:
+            problem = _ILLEGAL_ADDRESS
+    return bytes([function | 0x80, problem])
+
+
 class ModbusServer:
     """Serves registers from a thread of its own; OSError if the address can't be listened at."""
 
     def __init__(self, address: tuple[str, int], state: State) -> None:
         self._values = values(state)
+        self._clients: list[StreamWriter] = []
         self._stop: Callable[[], object] = lambda: None
-        self._failure: OSError | RuntimeError | None = None
+        self._failure: OSError | None = None
         self._ready = threading.Event()
         self._thread = threading.Thread(target=self._serve, args=(address,), daemon=True)
         self._thread.start()
@@ -102,39 +125,34 @@ class ModbusServer:
     def _serve(self, address: tuple[str, int]) -> None:
         try:
             asyncio.run(self._served(address))
-        except (OSError, RuntimeError) as error:  # The constructor reports it.
+        except OSError as error:  # The constructor reports it.
             self._failure = error
             self._ready.set()
 
     async def _served(self, address: tuple[str, int]) -> None:
-        from pymodbus.constants import ExcCodes
-        from pymodbus.server import ModbusTcpServer
-        from pymodbus.simulator import DataType, SimData, SimDevice
-
-        async def look(
-            function: int,
-            start: int,
-            at: int,
-            count: int,
-            registers: list[int],
-            _set: list[int] | list[bool] | None,
-        ) -> ExcCodes | None:
-            if function not in _READS:
-                return ExcCodes.ILLEGAL_FUNCTION
-            now = self._values
-            for address in range(at, at + count):
-                registers[address - start] = now[address]
-            return None
-
-        logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)
-        blocks = [
-            SimData(at, values=value, datatype=DataType.REGISTERS)
-            for at, value in self._values.items()
-        ]
-        server = ModbusTcpServer(SimDevice(0, blocks, action=look), address=address)
-        await server.serve_forever(background=True)
-        loop = asyncio.get_running_loop()
-        self._stop = lambda: loop.call_soon_threadsafe(server.serving.set_result, True)
+        loop, stop = asyncio.get_running_loop(), asyncio.Event()
+        server = await asyncio.start_server(self._answer, *address)
+        self._stop = lambda: loop.call_soon_threadsafe(stop.set)
         self._ready.set()
-        await server.serving
+        await stop.wait()
         server.close()
+        for client in self._clients:
+            client.transport.abort()
+
+    async def _answer(self, reader: StreamReader, client: StreamWriter) -> None:
+        """Answer a client until it goes, or sends what is no Modbus."""
+        self._clients.append(client)
+        if len(self._clients) > _MOST_CLIENTS:  # One whose end was not heard must keep no place.
+            self._clients.pop(0).transport.abort()
+        with suppress(OSError, asyncio.IncompleteReadError):
+            while True:
+                head = await reader.readexactly(_HEAD_BYTES)
+                transaction, protocol, length, device = unpack(">HHHB", head)
+                if protocol != 0 or not 2 <= length <= _MOST_BYTES:
+                    break
+                answer = reply(await reader.readexactly(length - 1), self._values)
+                client.write(pack(">HHHB", transaction, 0, len(answer) + 1, device) + answer)
+                await client.drain()
+        if client in self._clients:
+            self._clients.remove(client)
+        client.close()
