@@ -43,42 +43,79 @@ class Transmitter(Generic[T]):
         return _new(Frame, (self.can_id, self._encode(message, counter)))
 
 
-class Receiver(Generic[T]):
-    """Accepts or rejects the frames of one message; a rejected frame does not change the counter.
+class Acceptance:
+    """Judges the frames of one message by their order; a rejected one does not change the counter.
 
     The first valid frame is accepted. After that the counter may skip up to `MAX_LOST` frames,
     counted in `lost`. Any other step is rejected. After `RESYNC_FRAMES` consecutive frames without
     an accepted one between them, the last is accepted: the sender has restarted or the gap was
     long. So a single repeated, delayed or inserted frame never changes the expected counter if it
-    is less than ``16 - MAX_LOST - 1`` frames old; with four bits, an older one looks like the next
-    one. The age of frames is judged elsewhere, since there is no clock here.
+    is less than ``counts - MAX_LOST - 1`` frames old; an older one looks like the next one. The age
+    of frames is judged elsewhere, since there is no clock here.
 
-    `heard` counts frames, accepted or not, `rejected` those that were not, by `Rejection`. `valid`
-    is the state of the stream by a leaky bucket, +1 for a rejected and -1 for an accepted frame:
-    False before the first accepted frame, and from `BUCKET_LIMIT` until the bucket is empty again.
-    `changes` are frames with a new content, which who hears a message that is also sent on a change
-    counts; else 0.
+    `counts` are the values of the counter, 0 without one. `heard` counts frames, accepted or not,
+    `rejected` those that were not, by `Rejection`. `valid` is the state of the stream by a leaky
+    bucket, +1 for a rejected and -1 for an accepted frame: False before the first accepted frame,
+    and from `BUCKET_LIMIT` until the bucket is empty again. `changes` are frames with a new
+    content, which who hears a message that is also sent on a change counts; else 0.
     """
 
-    counts: ClassVar[bool] = True  #: Whether a counter tells a new frame.
-    proved: ClassVar[bool] = True  #: Nothing has to be proved before an order counts.
     __slots__ = (
-        "_bucket", "_candidate", "_decode", "_expected", "_protected", "_run",
+        "_bucket", "_candidate", "_counts", "_expected", "_run",
         "can_id", "changes", "cycle_ns", "heard", "lost", "rejected", "valid",
     )  # fmt: skip
 
-    def __init__(self, codec: Codec[T]) -> None:
-        self.can_id = codec.can_id
-        self.cycle_ns = codec.cycle_ns
+    def __init__(self, can_id: int, cycle_ns: int, counts: int) -> None:
+        self.can_id = can_id
+        self.cycle_ns = cycle_ns
         self.valid = False
         self.heard = self.lost = self.changes = 0
         self.rejected = dict.fromkeys(Rejection, 0)
-        self._decode = codec.decode
-        self._protected = codec.protected
-        self._bucket = 0
-        self._expected = _NO_COUNTER
-        self._candidate = _NO_COUNTER
+        self._counts = counts
+        self._bucket = self._run = 0
+        self._expected = self._candidate = _NO_COUNTER
+
+    def _follows(self, counter: int) -> bool:
+        """Whether a whole frame with this counter is accepted."""
+        counts = self._counts
+        following = (counter + 1) % counts
+        if self._expected != _NO_COUNTER:
+            steps = (following - self._expected) % counts
+            if 0 < steps <= MAX_LOST + 1:
+                self.lost += steps - 1
+            else:
+                self._run = self._run + 1 if counter == self._candidate else 1
+                self._candidate = following
+                if self._run < RESYNC_FRAMES:
+                    return self._reject(Rejection.SEQUENCE if steps else Rejection.REPEATED)
+        self._expected = following
+        return self._drain()
+
+    def _drain(self) -> bool:
         self._run = 0
+        self._bucket = max(self._bucket - 1, 0)
+        if not self._bucket:
+            self.valid = True
+        return True
+
+    def _reject(self, reason: Rejection) -> bool:
+        self.rejected[reason] += 1
+        self._bucket = min(self._bucket + 1, BUCKET_LIMIT)
+        if self._bucket == BUCKET_LIMIT:
+            self.valid = False
+        return False
+
+
+class Receiver(Acceptance, Generic[T]):
+    """Accepts or rejects the frames of one message of the catalogue."""
+
+    counts: ClassVar[bool] = True  #: Whether a counter tells a new frame.
+    proved: ClassVar[bool] = True  #: Nothing has to be proved before an order counts.
+    __slots__ = ("_decode",)
+
+    def __init__(self, codec: Codec[T]) -> None:
+        super().__init__(codec.can_id, codec.cycle_ns, _COUNTER_MASK + 1 if codec.protected else 0)
+        self._decode = codec.decode
 
     @property
     def counter(self) -> int | None:
@@ -102,7 +139,8 @@ class Receiver(Generic[T]):
             if self._bucket:
                 self._drain()
             return message
-        return self._accept_out_of_step(message, counter)
+        accepted = self._follows(counter) if self._counts else self._drain()
+        return message if accepted else None
 
     def intact(self, frame: Frame) -> T | None:
         """Return the message of a whole frame, also out of sequence, as a stop; nothing changes."""
@@ -111,35 +149,3 @@ class Receiver(Generic[T]):
     def changed(self, new: bool) -> None:
         """Count a frame that came because its content is new."""
         self.changes += new
-
-    def _accept_out_of_step(self, message: T, counter: int) -> T | None:
-        following = (counter + 1) & _COUNTER_MASK
-        if not self._protected:
-            self._drain()
-            return message
-        if self._expected != _NO_COUNTER:
-            missing = (counter - self._expected) & _COUNTER_MASK
-            if missing <= MAX_LOST:
-                self.lost += missing
-            else:
-                self._run = self._run + 1 if counter == self._candidate else 1
-                self._candidate = following
-                if self._run < RESYNC_FRAMES:
-                    repeated = missing == _COUNTER_MASK
-                    self._reject(Rejection.REPEATED if repeated else Rejection.SEQUENCE)
-                    return None
-        self._expected = following
-        self._drain()
-        return message
-
-    def _drain(self) -> None:
-        self._run = 0
-        self._bucket = max(self._bucket - 1, 0)
-        if not self._bucket:
-            self.valid = True
-
-    def _reject(self, reason: Rejection) -> None:
-        self.rejected[reason] += 1
-        self._bucket = min(self._bucket + 1, BUCKET_LIMIT)
-        if self._bucket == BUCKET_LIMIT:
-            self.valid = False

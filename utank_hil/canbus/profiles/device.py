@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any, Final, Generic
 
 from utank_hil.base.tick import TICK_NS
-from utank_hil.canbus.endpoints import BUCKET_LIMIT, MAX_LOST, RESYNC_FRAMES, Rejection
+from utank_hil.canbus.endpoints import Acceptance, Rejection
 from utank_hil.canbus.enumerations import Quality, Switch
 from utank_hil.canbus.frame import Frame
 from utank_hil.canbus.messages import SensorTank
@@ -22,11 +22,8 @@ from utank_hil.canbus.profiles.device_plan import (
 from utank_hil.canbus.profiles.field import ConditionPlan, Field, SignalPlan
 
 
-class HeardMessage:
-    """Length, checksum and counter of one message, and how its frames pass them.
-
-    The counts `heard`, `lost`, `rejected` and `valid` are as of `Receiver`.
-    """
+class HeardMessage(Acceptance):
+    """Length, checksum and counter of one message, and how its frames pass them."""
 
     def __init__(
         self,
@@ -36,15 +33,9 @@ class HeardMessage:
         counter: Field | None = None,
         crc: Crc8 | None = None,
     ) -> None:
-        self.can_id, self.cycle_ns, self.length = can_id, cycle_ns, length
-        self.heard = self.lost = 0
-        self.changes = 0  # No device of another maker sends a message on a change.
-        self.rejected = dict.fromkeys(Rejection, 0)
-        self.valid = False
+        super().__init__(can_id, cycle_ns, 0 if counter is None else 1 << counter.bits)
+        self.length = length
         self._counter, self._crc = counter, crc
-        self._counts: Final = 0 if counter is None else 1 << counter.bits
-        self._last = self._candidate = -1
-        self._run = self._bucket = 0
 
     def intact(self, data: bytes) -> bool:
         """Whether a frame is whole; nothing changes."""
@@ -53,34 +44,14 @@ class HeardMessage:
         return self._crc is None or self._crc.of(data) == data[self._crc.byte]
 
     def passes(self, data: bytes) -> bool:
-        """Judge the next frame; a rejected one does not change the counter."""
+        """Judge the next frame."""
         self.heard += 1
         if not self.intact(data):
             whole = len(data) == self.length
             return self._reject(Rejection.CRC if whole else Rejection.LENGTH)
-        if self._counter is not None:
-            counter = self._counter.raw(data) % self._counts  # it may have a sign
-            if self._last >= 0:
-                steps = (counter - self._last) % self._counts
-                if not 0 < steps <= MAX_LOST + 1:
-                    self._run = self._run + 1 if counter == self._candidate else 1
-                    self._candidate = (counter + 1) % self._counts
-                    if self._run < RESYNC_FRAMES:
-                        return self._reject(Rejection.SEQUENCE if steps else Rejection.REPEATED)
-                else:
-                    self.lost += steps - 1
-            self._last, self._run = counter, 0
-        self._bucket = max(self._bucket - 1, 0)
-        if not self._bucket:
-            self.valid = True
-        return True
-
-    def _reject(self, reason: Rejection) -> bool:
-        self.rejected[reason] += 1
-        self._bucket = min(self._bucket + 1, BUCKET_LIMIT)
-        if self._bucket == BUCKET_LIMIT:
-            self.valid = False
-        return False
+        if self._counter is None:
+            return self._drain()
+        return self._follows(self._counter.raw(data) % self._counts)  # it may have a sign
 
 
 SILENT_NS: Final = 1_000_000_000
