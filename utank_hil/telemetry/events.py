@@ -5,7 +5,7 @@ A write takes some twenty microseconds.
 
 import json
 from dataclasses import asdict, replace
-from typing import Any, Final, TypeAlias
+from typing import Final, TypeAlias
 
 import msgspec
 
@@ -15,9 +15,8 @@ from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.ring import RingKind, RingReader, RingWriter
 
 _SLOTS: Final = 64  #: A retuning has four events in four minutes; readers poll every 0.5 s.
-_LONGEST_BYTES: Final = 8192  #: Of an event; a longer text is cut.
-_MOST_BYTES_A_CHARACTER: Final = 6  #: Length of an escaped character in JSON.
-_CUT: Final = _LONGEST_BYTES // (2 * _MOST_BYTES_A_CHARACTER)
+_LONGEST: Final = 1000  #: Characters of an event's reasons, the rest is cut.
+_LONGEST_BYTES: Final = 8192  #: Of an event; an escaped character of JSON takes six.
 Event: TypeAlias = RetuningEvent | AlarmEvent
 _ALARM_WORDS: Final = {
     AlarmState.ACTIVE_UNACKNOWLEDGED: "ALARM",
@@ -51,16 +50,14 @@ class EventWriter(RingWriter):
         super().__init__(RingKind.EVENTS, 1, _LONGEST_BYTES, _SLOTS)
 
     def write_event(self, event: Event, start_ns: int) -> None:
-        """Append one event without blocking; reasons too long for a record are cut.
+        """Append one event without blocking; reasons that are too long are cut.
 
         `start_ns` is the time of the first telemetry row, from which readers count.
         """
-        if isinstance(event, RetuningEvent) and sum(map(len, event.reasons)) > _LONGEST_BYTES:
-            event = _cut(event)  # The event is cut first, because encoding takes long.
-        data = _encoded(event, start_ns)
-        if len(data) > _LONGEST_BYTES and isinstance(event, RetuningEvent):
-            data = _encoded(_cut(event), start_ns)
-        self.write(data)
+        if isinstance(event, RetuningEvent) and sum(map(len, event.reasons)) > _LONGEST:
+            event = replace(event, reasons=("; ".join(event.reasons)[:_LONGEST] + " ...",))
+        content = asdict(event) | {"time_ns": event.time_ns - start_ns, "start_ns": start_ns}
+        self.write(json.dumps(content, ensure_ascii=False).encode(errors="replace"))
 
 
 class EventReader(RingReader):
@@ -76,20 +73,9 @@ class EventReader(RingReader):
         contents = [json.loads(record) for record in self.read()]
         if contents:
             self.start_ns = contents[-1]["start_ns"]
-        return [_decoded(content) for content in contents]
-
-
-def _cut(event: RetuningEvent) -> RetuningEvent:
-    """Return the event with reasons short enough for a record, whatever their characters."""
-    return replace(event, reasons=("; ".join(event.reasons)[:_CUT] + " ...",))
-
-
-def _encoded(event: Event, start_ns: int) -> bytes:
-    content = asdict(event) | {"time_ns": event.time_ns - start_ns, "start_ns": start_ns}
-    return json.dumps(content, ensure_ascii=False).encode(errors="replace")
-
-
-def _decoded(content: dict[str, Any]) -> Event:
-    if "code" in content:
-        return msgspec.convert(content, AlarmEvent)
-    return msgspec.convert(content, RetuningEvent)
+        return [
+            msgspec.convert(content, AlarmEvent)
+            if "code" in content
+            else msgspec.convert(content, RetuningEvent)
+            for content in contents
+        ]

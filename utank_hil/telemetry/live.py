@@ -27,28 +27,21 @@ _FOOTER: Final = (b"FOOT", 64)  #: Mark within the last bytes of a finished file
 
 
 def open_stream(
-    name: str, sink: Sink, columns: Sequence[str], about: Mapping[str, Any] | None
-) -> rr.RecordingStream:
-    """Open a stream of one run, with its layout, to a file or to viewers."""
+    name: str,
+    sink: Sink,
+    columns: Sequence[str],
+    about: Mapping[str, Any] | None,
+    batch_s: float = 0.0,
+) -> tuple[rr.RecordingStream, rerun_log.RunLog]:
+    """Open a stream of one run, with its layout and origin, to a file or to viewers; its log."""
     stream = rr.RecordingStream(rerun_log.APPLICATION, recording_id=name)
     size = scene_size(columns, about)
     layout = make_blueprint(columns_of(columns, about), [rerun_log.LIVE_RUN], size=size)
     stream.set_sinks(sink, default_blueprint=layout)
-    return stream
-
-
-def live_log(
-    stream: rr.RecordingStream,
-    columns: Sequence[str],
-    about: Mapping[str, Any] | None,
-    batch_s: float = 0.0,
-) -> rerun_log.RunLog:
-    """Write the run's origin to its stream and return its log."""
     if about:
         rerun_log.write_about(stream, about)
-    return rerun_log.RunLog(
-        stream, rerun_log.run_paths([rerun_log.LIVE_RUN])[0], columns, about, batch_s
-    )
+    (path,) = rerun_log.run_paths([rerun_log.LIVE_RUN])
+    return stream, rerun_log.RunLog(stream, path, columns, about, batch_s)
 
 
 class RecordingPart(Closing):
@@ -67,8 +60,9 @@ class RecordingPart(Closing):
         self._rows = 0
         self._lost = Counter[str]()
         self._open = True
-        self._recording = open_stream(file.stem, rr.FileSink(file), columns, about)
-        self._log = live_log(self._recording, columns, about, rerun_log.PICTURES_S)
+        self._recording, self._log = open_stream(
+            file.stem, rr.FileSink(file), columns, about, rerun_log.PICTURES_S
+        )
 
     def write(self, rows: FloatArray, events: Sequence[Event] = ()) -> None:
         """Append rows, shape (n, width), and events of retuning and alarms, and flush them."""
@@ -167,14 +161,13 @@ class LiveStream(Closing):
             port = port_of(stack.enter_context(hold_port()))
             self.url = live_url(port)
             sink = rr.GrpcServerSink(LOOPBACK, port, server_memory_limit=MEMORY)
-            stream = open_stream(run.ring, sink, self._ring.columns, run.about)
+            stream, self._log = open_stream(run.ring, sink, self._ring.columns, run.about)
             stack.callback(stream.disconnect)
             try:
                 stream.flush(timeout_sec=_START_S)
             except RuntimeError as error:  # Otherwise viewers would show the other program.
                 again = "start it again: it takes another"
                 raise OSError(f"port {port} of this machine was taken; {again}") from error
-            self._log = live_log(stream, self._ring.columns, run.about)
             self._stack = stack.pop_all()
 
     def send(self) -> bool:

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from importlib.util import find_spec
 from typing import Any, Final
 
@@ -80,7 +80,6 @@ _MODULE: Final = "utank_hil.telemetry.recorder"
 _START_TIMEOUT_S: Final = 30.0
 _STOP_TIMEOUT_S: Final = 30.0
 """Times for Rerun to load, and for the last rows to reach the disk, on a busy machine."""
-_FIELDS: Final = {each.name for each in fields(RecorderReport)}
 _READ_BYTES: Final = 1 << 16  #: Capacity of a pipe.
 
 
@@ -154,10 +153,10 @@ class RecorderProcess(Closing):
         if code != 0:
             reason = self._message("error").get("error", f"exit code {code}")
             return RecorderError(f"the recorder failed: {reason}")
-        report = self._message(*_FIELDS)
-        if report.keys() != _FIELDS or not all(type(each) is int for each in report.values()):
+        report = self._message("rows")
+        if not report:
             return RecorderError("the recorder ended and did not say how it went")
-        return RecorderReport(**report)
+        return msgspec.convert(report, RecorderReport)
 
     def _listen(self) -> bool:
         """Read new messages without waiting; return whether more may come."""

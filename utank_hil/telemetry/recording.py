@@ -21,7 +21,7 @@ from utank_hil.canbus.events import RetuningEvent
 from utank_hil.telemetry import rerun_log
 from utank_hil.telemetry.blueprint import columns_of, make_blueprint
 from utank_hil.telemetry.scene import scene_size
-from utank_hil.telemetry.units import column_of, field_of
+from utank_hil.telemetry.units import column_of
 from utank_hil.telemetry.viewer import TIMELINE, rerun_binary, rerun_environment
 
 _ROWS: Final = f"{rerun_log.ARCHETYPE}:{rerun_log.COMPONENT}"
@@ -44,15 +44,11 @@ def write_recording(
     `ValueError` if there is no run, or a table or a column does not fit. Raises `OSError` if the
     file can't be written; it is then removed.
     """
-    if not runs:
-        raise ValueError("a recording needs at least one run")
     for run, rows in runs.items():
         if rows.ndim != 2 or rows.shape[1] != len(columns):
             raise ValueError(f"run {run!r}: {rows.shape} is not (n, {len(columns)}), the columns")
         if len(rows) == 0:
             raise ValueError(f"run {run!r} has no rows")
-    for column in columns:
-        field_of(column)  # A column that is not in SI units is refused before there is a file.
     time_s = np.concatenate([rows[:, rerun_log.time_index(columns)] for rows in runs.values()])
     shown, size = columns_of(columns, about), scene_size(columns, about)
     span_s, zero = (time_s.min(), time_s.max()), _zero(columns, runs)

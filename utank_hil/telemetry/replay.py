@@ -13,6 +13,7 @@ from utank_hil.canbus import Frame
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
 from utank_hil.control.python_law import PythonDesign
+from utank_hil.nodes.controller import ControllerNode
 from utank_hil.runners import LoopStatistics
 from utank_hil.telemetry.explained_tick import ExplainedTick
 from utank_hil.telemetry.frame_comparison import FrameComparison, ReplayResult
@@ -96,23 +97,29 @@ def replay(
     controller sent in its last tick. `explained` takes the numbers of its tick.
     """
     answers, estimates = RecordedRetuner(), RecordedRetuner()
-    run = _Replay(
+    statistics = LoopStatistics()
+    node = build_controller_node(
         config,
         law,
-        answers if retuner else None,
-        estimates if estimating else None,
-        explained or ExplainedTick(-2),  # that of no tick
+        retuner=answers if retuner else None,
+        estimating=estimates if estimating else None,
+        statistics=statistics,
         commissioned=commissioned,
     )
+    run = _Replay(node, explained or ExplainedTick(-2))  # that of no tick
     for entry in entries:
-        run.take(entry)
-        if entry.kind == Kind.TICK:
+        kind = entry.kind
+        if kind in (Kind.ALIVE, Kind.ANSWER):
+            answers.take(entry.data, alive=kind == Kind.ALIVE)
+        elif kind in (Kind.ESTIMATOR_ALIVE, Kind.ESTIMATE):
+            estimates.take(entry.data, alive=kind == Kind.ESTIMATOR_ALIVE)
+        elif kind == Kind.STARTED:
+            statistics.real_time = bool(entry.data[0])
+        else:
+            run.take(entry)
+        if kind == Kind.TICK:
             run.comparison.retuner("retuner", answers)
             run.comparison.retuner("estimator", estimates)
-        elif entry.kind in (Kind.ALIVE, Kind.ANSWER):
-            answers.take(entry.data, alive=entry.kind == Kind.ALIVE)
-        elif entry.kind in (Kind.ESTIMATOR_ALIVE, Kind.ESTIMATE):
-            estimates.take(entry.data, alive=entry.kind == Kind.ESTIMATOR_ALIVE)
     run.end(open_end=open_end)
     return run.result
 
@@ -120,36 +127,19 @@ def replay(
 class _Replay:
     """A controller that is given the records of a run, one by one."""
 
-    def __init__(
-        self,
-        config: ControllerConfig,
-        law: BuiltLaw,
-        answers: RecordedRetuner | None,
-        estimates: RecordedRetuner | None,
-        explained: ExplainedTick,
-        *,
-        commissioned: bool,
-    ) -> None:
-        self._statistics = LoopStatistics()
-        self._node = build_controller_node(
-            config,
-            law,
-            retuner=answers,
-            estimating=estimates,
-            statistics=self._statistics,
-            commissioned=commissioned,
-        )
+    def __init__(self, node: ControllerNode, explained: ExplainedTick) -> None:
+        self._node = node
         self.result = ReplayResult()
         self.comparison = FrameComparison(self.result)
         self._explained = explained
         self._sent: list[Frame] = []
         self._recorded: list[Frame] = []
         self._waiting = False  # for the recorded frames of a tick
-        panel = self._node.inbox.panel
+        panel = node.inbox.panel
         self._challenge = None if panel is None else panel.plan.authentication
 
     def take(self, entry: Entry) -> None:
-        """Give the controller a record; those of a retuner are not for it."""
+        """Give the controller a record."""
         number, data, kind, time_ns = entry
         if kind == Kind.SENT:
             self._recorded.append(Frame(number, data))
@@ -172,8 +162,6 @@ class _Replay:
             node.other_frames(number)
         elif kind == Kind.LINK_ERROR:
             node.link_error(time_ns, "")
-        elif kind == Kind.STARTED:
-            self._statistics.real_time = bool(data[0])
         elif kind == Kind.LOST:
             self.result.lost_rows += number
 

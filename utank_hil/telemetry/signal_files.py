@@ -11,7 +11,7 @@ from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from utank_hil.base.text_files import (
     since_first,
 )
 from utank_hil.base.whole_file import errors_name, left_whole
-from utank_hil.telemetry.bus_files.log import BusLog, format_of
+from utank_hil.telemetry.bus_files.log import BusLog, source_of
 from utank_hil.telemetry.bus_logs import LoggedController
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
 from utank_hil.telemetry.logged_signals import Columns, signal_parts, signal_table
@@ -104,7 +104,7 @@ def logged_parts(
 
 def is_table(path: Path) -> bool:
     """Whether a file is a table of signals by its name, and no table of frames."""
-    return kind_of(path) in TABLE_SUFFIXES and not (path.exists() and format_of(path))
+    return kind_of(path) in TABLE_SUFFIXES and not (path.exists() and source_of(path))
 
 
 def part_of_entries(
@@ -198,8 +198,10 @@ def even_rows(
         raise TextFileError(f"{path}: {len(kept)} rows between {low:g} and {high:g} s: too few")
     part_s = time_s[kept]
 
-    def refused(row: int, reason: str) -> TextFileError:
-        return TextFileError(f"{path}: {_line(path, kept, row)}{reason}")
+    def refused(index: int, reason: str) -> TextFileError:
+        row = int(kept[index])
+        place = f"line {row + 2}" if kind_of(path) == ".csv" else f"row {row}"
+        return TextFileError(f"{path}: {place}{reason}")
 
     if not np.isfinite(part_s).all():
         row = int(np.flatnonzero(~np.isfinite(part_s))[0])
@@ -246,29 +248,20 @@ def require(path: Path, columns: Mapping[str, FloatArray], *names: str) -> None:
     """Raise TextFileError for a file that lacks columns; a level may be that of both gauges."""
     for name in names:
         both = all(each in columns for each in _LEVEL_OF_GAUGES)
-        if name not in columns and not (name == "level_m" and both):
-            raise _lacks(path, name, columns)
-
-
-def _lacks(path: Path, name: str, columns: Mapping[str, FloatArray]) -> TextFileError:
-    other = {"roll_rad": " or roll_deg", "roll_rate_rad_s": " or roll_rate_deg_s"}.get(name, "")
-    if name == "level_m":
-        other = f", or {' and '.join(_LEVEL_OF_GAUGES)}"
-    if name.endswith("_pa"):
-        other = f" or {name.removesuffix('_pa')}_kpa"
-    unclear = [column for column in columns if name == "time_s" and is_time(column)]
-    if unclear:
-        other = f": name {unclear[0]!r} {name} if it is in seconds"
-    return TextFileError(
-        f"{path}: has no column {name}{other}; in SI units it has {', '.join(columns)}. Name "
-        "columns by what they hold and their unit (docs/how-to/logs.md)"
-    )
-
-
-def _line(path: Path, rows: Any, index: int) -> str:
-    """Return the place of a row: line of a CSV, from 1 with the header, or row of a table."""
-    row = int(rows[index])
-    return f"line {row + 2}" if kind_of(path) == ".csv" else f"row {row}"
+        if name in columns or (name == "level_m" and both):
+            continue
+        other = {"roll_rad": " or roll_deg", "roll_rate_rad_s": " or roll_rate_deg_s"}.get(name, "")
+        if name == "level_m":
+            other = f", or {' and '.join(_LEVEL_OF_GAUGES)}"
+        if name.endswith("_pa"):
+            other = f" or {name.removesuffix('_pa')}_kpa"
+        unclear = [column for column in columns if name == "time_s" and is_time(column)]
+        if unclear:
+            other = f": name {unclear[0]!r} {name} if it is in seconds"
+        raise TextFileError(
+            f"{path}: has no column {name}{other}; in SI units it has {', '.join(columns)}. Name "
+            "columns by what they hold and their unit (docs/how-to/logs.md)"
+        )
 
 
 def _read_parquet(path: Path, note: Callable[[str], None] | None) -> Iterator[_Column]:

@@ -88,6 +88,9 @@ class NotReadableError(ValueError):
     """A line shows that the whole log can't be read; the message says why, and the remedy."""
 
 
+LineParser = Callable[[str], BusFrame | None]
+
+
 class TextLog(FrameSource):
     """Frames of a log of text; BusLogError if no line is one, or the log can't be read.
 
@@ -99,7 +102,7 @@ class TextLog(FrameSource):
 
     _unit = "line"
 
-    def __init__(self, path: Path, parse: Callable[[str], BusFrame | None], counted: bool) -> None:
+    def __init__(self, path: Path, parse: LineParser, counted: bool) -> None:
         super().__init__(path)
         self._parse, self._counted = parse, counted
 

@@ -17,6 +17,7 @@ from utank_hil.telemetry.bus_files.frame import (
     BusFrame,
     BusLogError,
     FrameSource,
+    LineParser,
     TextLog,
 )
 
@@ -150,27 +151,28 @@ class OneClock:
 
 
 READ: Final = "candump, ASC, BLF, MF4, PEAK's .trc and SavvyCAN's .csv"  #: Formats that are read.
-_LOOKS: Final[dict[str, re.Pattern[str]]] = {
-    "savvycan": savvycan.LOOKS,
-    "trc": trc.LOOKS,
-    "candump": candump.LOOKS,
-    "asc": asc.LOOKS,
-}
-_MARKS: Final = {binary.BLF_MARK: "blf", binary.MF4_MARK: "mf4"}
+_BINARY: Final = {binary.BLF_MARK: binary.BlfLog, binary.MF4_MARK: binary.Mf4Log}
+# What a line looks like, a new parser of lines, and whether they are `counted`.
+_TEXT: Final[list[tuple[re.Pattern[str], Callable[[], LineParser], bool]]] = [
+    (savvycan.LOOKS, lambda: savvycan.parse, True),
+    (trc.LOOKS, lambda: trc.TrcParser().parse, True),
+    (candump.LOOKS, lambda: candump.parse, False),
+    (asc.LOOKS, lambda: asc.AscParser().parse, True),
+]
 _LOOKED_AT: Final = 1 << 16  #: Characters at the begin of a file that show its format.
 
 
-def format_of(path: Path) -> str:
-    """Return the format of a log; empty if it looks like none."""
+def source_of(path: Path) -> FrameSource | None:
+    """Return a reader of a log, by its content; None if it looks like none."""
     with open_content(path, LIMIT_BYTES, _ignored) as content:
         mark = content.read(4)
-    if mark in _MARKS:
-        return _MARKS[mark]
+    if mark in _BINARY:
+        return _BINARY[mark](path)
     for line in _begin(path):
-        for name, looks in _LOOKS.items():
+        for looks, parser, counted in _TEXT:
             if looks.match(line):
-                return name
-    return ""
+                return TextLog(path, parser(), counted)
+    return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +192,11 @@ class BusLog:
 
         BusLogError is raised if it is no log, has no such frames, or its times can't be trusted.
         """
-        source = self._source()
+        source = source_of(self.path)
+        if source is None:
+            begin = next(iter(_begin(self.path)), "")
+            what = f"it begins with {begin[:60]!r}" if begin else "it is empty"
+            raise BusLogError(f"{self.path}: is no log of the bus, such as {READ}: {what}")
         others: set[str] = set()
         clock = OneClock(self.path.name, self._of_channel(source, others), lambda: source.place)
         begin_ns, found = None, False
@@ -223,23 +229,6 @@ class BusLog:
                 yield frame
             else:
                 others.add(frame.channel)
-
-    def _source(self) -> FrameSource:
-        name = format_of(self.path)
-        if name == "blf":
-            return binary.BlfLog(self.path)
-        if name == "mf4":
-            return binary.Mf4Log(self.path)
-        if name == "candump":
-            return TextLog(self.path, candump.parse, counted=False)
-        if name == "savvycan":
-            return TextLog(self.path, savvycan.parse, counted=True)
-        if name:
-            parser = asc.AscParser() if name == "asc" else trc.TrcParser()
-            return TextLog(self.path, parser.parse, counted=True)
-        begin = next(iter(_begin(self.path)), "")
-        what = f"it begins with {begin[:60]!r}" if begin else "it is empty"
-        raise BusLogError(f"{self.path}: is no log of the bus, such as {READ}: {what}")
 
 
 def _begin(path: Path) -> list[str]:
