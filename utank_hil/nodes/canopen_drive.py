@@ -8,21 +8,8 @@ from typing import Final, NamedTuple
 from utank_hil.canbus import ControlWord, DriveState, Frame
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.measurements import Measurements
-from utank_hil.canbus.profiles.device import HeardMessage
-from utank_hil.canbus.profiles.drive_plan import (
-    COMMAND_MS,
-    EMERGENCY,
-    HEARTBEAT,
-    RECEIVED_1,
-    SDO_ANSWER,
-    SENT_1,
-    SENT_2,
-    SYNC,
-    DrivePlan,
-    NetworkState,
-    NodeCommand,
-    emergency_words,
-)
+from utank_hil.canbus.profiles import drive_plan as cia
+from utank_hil.canbus.profiles.device import HeardMessage, nobody
 from utank_hil.canbus.profiles.field import Field
 from utank_hil.control.pressure_loop import PressureLoop
 from utank_hil.nodes.canopen_setup import CanopenSetup
@@ -41,7 +28,7 @@ START_NS: Final = 500_000_000  #: For a node to say that it is operational.
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ENABLE: Final = ControlWord.ENABLE_OPERATION
 _ENABLED: Final = DriveState.OPERATION_ENABLED
-_OPERATIONAL: Final = int(NetworkState.OPERATIONAL)
+_OPERATIONAL: Final = int(cia.NetworkState.OPERATIONAL)
 _STATES: Final = {int(state): state for state in DriveState}
 _WARNING: Final = 1 << 7
 _AT_LIMIT: Final = 1 << 11
@@ -64,10 +51,6 @@ class DriveReport(NamedTuple):
     power_w: float
 
 
-def _nobody(report: DriveReport | None, now_ns: int) -> None:
-    """Take what nobody has asked for yet."""
-
-
 class CanopenDrive:
     """One drive: configured, started, commanded, heard.
 
@@ -78,7 +61,7 @@ class CanopenDrive:
 
     def __init__(
         self,
-        plan: DrivePlan,
+        plan: cia.DrivePlan,
         loop: PressureLoop | None = None,
         area_m2: float = 0.0,
         *,
@@ -86,7 +69,7 @@ class CanopenDrive:
     ) -> None:
         self._hears_only = hears_only
         self._plan, self._loop, self._area_m2 = plan, loop, area_m2
-        self.deliver: Callable[[DriveReport | None, int], None] = _nobody
+        self.deliver: Callable[[DriveReport | None, int], None] = nobody
         self.setup = CanopenSetup(plan.bus, plan.node, plan.steps())
         self._tag = tag = plan.bus << BUS_SHIFT | STANDARD
         self._in_nm: bool = plan.mode.torque
@@ -97,25 +80,25 @@ class CanopenDrive:
             plan.echoes_command,
         )
         # with each command: heartbeat and SYNC of the controller
-        self._beat = [Frame(tag | HEARTBEAT + plan.controller_node, bytes((_OPERATIONAL,)))]
-        self._with = self._beat + [Frame(tag | SYNC, b"")] * plan.synchronous
-        self._received = tag | RECEIVED_1 + plan.node
+        self._beat = [Frame(tag | cia.HEARTBEAT + plan.controller_node, bytes((_OPERATIONAL,)))]
+        self._with = self._beat + [Frame(tag | cia.SYNC, b"")] * plan.synchronous
+        self._received = tag | cia.RECEIVED_1 + plan.node
         measured = sum(bits for _, bits in plan.measured) // 8
         scale = plan.speed_rad_s_per_unit
         self._speed = Field(0, 32, measured, signed=True, scale=scale)
         self._torque_field = Field(32, 16, measured, signed=True, scale=1 / plan.units_per_si)
         self._mode_field = Field(48, 8, measured, signed=True)
-        cycle_ns = COMMAND_MS * MILLISECOND_NS
+        cycle_ns = cia.COMMAND_MS * MILLISECOND_NS
         self.watched = tuple(
             HeardMessage(self._tag | cob + plan.node, cycle_ns, sum(b for _, b in entries) // 8)
-            for cob, entries in ((SENT_1, plan.sent), (SENT_2, plan.measured))
+            for cob, entries in ((cia.SENT_1, plan.sent), (cia.SENT_2, plan.measured))
         )
         takers = {
-            SENT_1: self._on_status,
-            SENT_2: self._on_measured,
-            SDO_ANSWER: self._on_answer,
-            HEARTBEAT: self._on_heartbeat,
-            EMERGENCY: self._on_emergency,
+            cia.SENT_1: self._on_status,
+            cia.SENT_2: self._on_measured,
+            cia.SDO_ANSWER: self._on_answer,
+            cia.HEARTBEAT: self._on_heartbeat,
+            cia.EMERGENCY: self._on_emergency,
         }
         self.takes: dict[int, Callable[[Frame, int], None]] = {
             self._tag | cob + plan.node: take for cob, take in takers.items()
@@ -179,12 +162,12 @@ class CanopenDrive:
         self._ignored = self._ignored + 1 if stays else 0
         frames = self.follow(target, word)
         if self._ignored > IGNORED:
-            frames.append(self.setup.order(NodeCommand.STOP))
+            frames.append(self.setup.order(cia.NodeCommand.STOP))
         return frames
 
     def stop(self) -> list[Frame]:
         """Leave the drive braking, and its node stopped."""
-        return [*self.follow(0.0, ControlWord.QUICK_STOP), self.setup.order(NodeCommand.STOP)]
+        return [*self.follow(0.0, ControlWord.QUICK_STOP), self.setup.order(cia.NodeCommand.STOP)]
 
     @property
     def speed_rad_s(self) -> float:
@@ -241,7 +224,7 @@ class CanopenDrive:
             return
         self._echo = echo
         # after SYNC it is a cycle old; else the middle of what its phase can be
-        phase_ns = 0 if len(self._with) > 1 else COMMAND_MS * MILLISECOND_NS // 2
+        phase_ns = 0 if len(self._with) > 1 else cia.COMMAND_MS * MILLISECOND_NS // 2
         for content, sent_ns in reversed(self._sent):
             if content == echo:
                 self.echo_ns = sent_ns - phase_ns
@@ -266,7 +249,7 @@ class CanopenDrive:
         self._beat_ns = now_ns
         state = frame.data[0] & 0x7F
         self._operational = state == _OPERATIONAL
-        if state == NetworkState.BOOT_UP:
+        if state == cia.NetworkState.BOOT_UP:
             self._restart(now_ns)
 
     def _restart(self, now_ns: int) -> None:
@@ -275,6 +258,6 @@ class CanopenDrive:
         self._status = 0
 
     def _on_emergency(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
-        said = emergency_words(frame.data)
+        said = cia.emergency_words(frame.data)
         if said is not None:
             self._emergency = said and f", {said}"

@@ -9,31 +9,14 @@ from typing import Any, Final
 
 from utank_hil.canbus import Frame
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
+from utank_hil.canbus.profiles import drive_plan as cia
 from utank_hil.canbus.profiles.device import SILENT_NS, ProfiledDevice, hear
-from utank_hil.canbus.profiles.drive_plan import (
-    EMERGENCY,
-    HEARTBEAT,
-    NMT,
-    SDO_ANSWER,
-    SDO_REQUEST,
-    Abort,
-    Answer,
-    NetworkState,
-    NodeCommand,
-    Place,
-    Step,
-    abort_words,
-    answer,
-    emergency_words,
-    read_request,
-    write_request,
-)
 
 ANSWER_NS: Final = 300_000_000  #: CiA 301 names no time; servers of drives answer within 50 ms.
 PATIENCE_NS: Final = 300_000_000  #: For a mode to be entered, likewise.
 AGAIN_NS: Final = 2_000_000_000  #: From a refusal, or from silence, to the next try.
 
-_Talk = Generator[tuple[Place, bytes], Answer, None]
+_Talk = Generator[tuple[cia.Place, bytes], cia.Answer, None]
 
 
 class _Refused(Exception):
@@ -43,7 +26,7 @@ class _Refused(Exception):
 class CanopenSetup:
     """The start of one node by its steps: `done`, or the `problem` that it was refused for."""
 
-    def __init__(self, bus: int, node: int, steps: Iterable[Step]) -> None:
+    def __init__(self, bus: int, node: int, steps: Iterable[cia.Step]) -> None:
         self._node, self._steps = node, tuple(steps)
         self._tag = bus << BUS_SHIFT | STANDARD
         self.problem = ""
@@ -54,13 +37,13 @@ class CanopenSetup:
         self.done = False
         self._begin_ns = begin_ns
         self._talk: _Talk | None = None
-        self._request: tuple[Place, bytes] | None = None
+        self._request: tuple[cia.Place, bytes] | None = None
         self._asked_ns: int | None = None
         self._now_ns = begin_ns
 
-    def order(self, command: NodeCommand) -> Frame:
+    def order(self, command: cia.NodeCommand) -> Frame:
         """Network management for this node."""
-        return Frame(self._tag | NMT, bytes((command, self._node)))
+        return Frame(self._tag | cia.NMT, bytes((command, self._node)))
 
     def frames(self, now_ns: int) -> list[Frame]:
         """What is to be sent now: the next request, if the last one is answered or out of time."""
@@ -70,28 +53,28 @@ class CanopenSetup:
         if self._talk is None:
             self._talk = self._conversation()
             self._request = next(self._talk)
-            return [self.order(NodeCommand.PRE_OPERATIONAL)]
+            return [self.order(cia.NodeCommand.PRE_OPERATIONAL)]
         if self._asked_ns is not None:
             if now_ns - self._asked_ns <= ANSWER_NS:
                 return []
             assert self._request is not None
-            self._advance(Answer(self._request[0], abort=Abort.NO_ANSWER_IN_TIME))
+            self._advance(cia.Answer(self._request[0], abort=cia.Abort.NO_ANSWER_IN_TIME))
         if self._request is None:
             if self._talk is None:
                 return []
             self.done, self.problem = True, ""
-            return [self.order(NodeCommand.START)]
+            return [self.order(cia.NodeCommand.START)]
         self._asked_ns = now_ns
-        return [Frame(self._tag | SDO_REQUEST + self._node, self._request[1])]
+        return [Frame(self._tag | cia.SDO_REQUEST + self._node, self._request[1])]
 
     def take(self, data: bytes) -> None:
         """Take what the node's server says; what was not asked for is nothing."""
-        got = answer(data)
+        got = cia.answer(data)
         asked = self._request if self._asked_ns is not None else None
         if got is not None and asked is not None and got.place == asked[0]:
             self._advance(got)
 
-    def _advance(self, got: Answer) -> None:
+    def _advance(self, got: cia.Answer) -> None:
         assert self._talk is not None
         self._asked_ns = self._request = None
         try:
@@ -104,36 +87,37 @@ class CanopenSetup:
 
     def _conversation(self) -> _Talk:
         for number, step in enumerate(self._steps):
-            got = yield step.place, read_request(step.place)
-            if not number and got.abort == Abort.NO_ANSWER_IN_TIME:
+            got = yield step.place, cia.read_request(step.place)
+            if not number and got.abort == cia.Abort.NO_ANSWER_IN_TIME:
                 raise _Refused  # nobody is there: its silence says so
             said = ""
             first_ns = self._now_ns
             while not step.writes and not self._kept(step, got):
                 if got.abort or self._now_ns - first_ns > PATIENCE_NS:
                     break
-                got = yield step.place, read_request(step.place)
+                got = yield step.place, cia.read_request(step.place)
             if step.writes and not self._kept(step, got) and (got.size or step.size):
                 value = (got.value or 0) & ~step.equal_bits | step.value & step.equal_bits
                 size = got.size or step.size
-                written = yield step.place, write_request(step.place, value, size)
-                said = f", and writing it gave {abort_words(written.abort)}" * bool(written.abort)
-                got = yield step.place, read_request(step.place)
+                written = yield step.place, cia.write_request(step.place, value, size)
+                if written.abort:
+                    said = f", and writing it gave {cia.abort_words(written.abort)}"
+                got = yield step.place, cia.read_request(step.place)
             # only its length counts, and a process value need not be readable
             unread = not step.equal_bits and got.value is None
             if step.needed and not unread and not self._kept(step, got):
                 raise _Refused(self._words(step, got) + said + f": {step.remedy}")
 
     @staticmethod
-    def _kept(step: Step, got: Answer) -> bool:
+    def _kept(step: cia.Step, got: cia.Answer) -> bool:
         """Whether an entry has the value, and the length."""
         if got.value is None or (step.size and got.size != step.size):
             return False
         return not (got.value ^ step.value) & step.equal_bits & (1 << 8 * got.size) - 1
 
-    def _words(self, step: Step, got: Answer) -> str:
+    def _words(self, step: cia.Step, got: cia.Answer) -> str:
         if got.value is None:
-            what = f"can't be read ({abort_words(got.abort)})"
+            what = f"can't be read ({cia.abort_words(got.abort)})"
         elif step.size and got.size != step.size:
             what = f"has {got.size} bytes"
         else:
@@ -154,9 +138,9 @@ class SensorSetup:
         self._device, self._node = device, plan.node
         self.setup = CanopenSetup(plan.bus, plan.node, plan.steps)
         tag = (plan.bus << BUS_SHIFT | STANDARD) + plan.node
-        hear(device.takes, tag + SDO_ANSWER, self._take_answer)
-        hear(device.takes, tag + HEARTBEAT, self._take_heartbeat)
-        hear(device.takes, tag + EMERGENCY, self._take_emergency)
+        hear(device.takes, tag + cia.SDO_ANSWER, self._take_answer)
+        hear(device.takes, tag + cia.HEARTBEAT, self._take_heartbeat)
+        hear(device.takes, tag + cia.EMERGENCY, self._take_emergency)
         self._emergency = ""
         device.named = False
         self._done_ns = 0
@@ -183,12 +167,12 @@ class SensorSetup:
         return frames
 
     def _take_emergency(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
-        said = emergency_words(frame.data)
+        said = cia.emergency_words(frame.data)
         self._emergency = self._emergency if said is None else said
 
     def _take_answer(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
         self.setup.take(frame.data)
 
     def _take_heartbeat(self, frame: Frame, now_ns: int) -> None:
-        if frame.data[:1] == bytes((NetworkState.BOOT_UP,)):
+        if frame.data[:1] == bytes((cia.NetworkState.BOOT_UP,)):
             self.setup.restart(now_ns)

@@ -60,7 +60,7 @@ class ProfiledPanel(ProfiledDevice[OperatorCommand]):
         if plan.authentication is not None:
             for can_id in plan.authentication.proof_ids:
                 hear(self.takes, can_id, self._take_proof)
-        self.overhear: Callable[[OperatorCommand], None] = _overhears_nothing
+        self.overhear: Callable[[OperatorCommand], None] = lambda _: None
         self._values[_STOP] = 0.0  # nothing is pressed before it is heard
 
     @property
@@ -126,10 +126,6 @@ def _order(values: Sequence[float]) -> OperatorCommand:
     if mode is Mode.PASSIVE and not passive:
         mode = Mode.STANDBY
     return OperatorCommand(mode, arm, stop, reset, acknowledge)
-
-
-def _overhears_nothing(order: OperatorCommand) -> None:
-    """Take what nobody has asked for yet."""
 
 
 def device_of(plan: DevicePlan[Any], key: bytes = b"") -> ProfiledDevice[Any]:

@@ -198,6 +198,15 @@ class Each(NamedTuple, Generic[_T]):
     rate: _T
 
 
+_SCALES: Final = (
+    ("pressure", "pump pressure, by the command", SCALE),
+    ("port_level", "port level, by the pump pressure", SCALE),
+    ("starboard_level", "starboard level, by the pump pressure", SCALE),
+    ("roll", "roll, by what it does to the water", ROLL_SCALE),
+    ("roll_rate", "roll rate, by the roll", RATE_SCALE),
+)  #: Check, what is judged, and tolerance of each scale.
+
+
 def judge_pulses(
     rest: Record, pulses: Record, plant: DesignPlant, plan: PulsePlan, sample_time_s: float
 ) -> list[Check]:
@@ -212,9 +221,8 @@ def judge_pulses(
 
     roll, rate, pressure = map(filtered, ("roll_rad", "roll_rate_rad_s", "pressure_pa"))
     port, starboard = -filtered("port_level_m"), filtered("starboard_level_m")
-    promised = _filtered(
-        _promised(pulses["command_pa"], plant, sample_time_s), plant, sample_time_s
-    )
+    promised_pa = _promised(pulses["command_pa"], plant, sample_time_s)
+    promised = _filtered(promised_pa, plant, sample_time_s)
     mass, _, stiffness = coupled_matrices(plant.ship, plant.tank)
     water_kg_m = plant.tank.density_kg_m3 * plant.tank.reservoir_area_m2
     push = -(mass[1, 0] * roll[_BEND] + stiffness[1, 0] * roll[_VALUE]) / water_kg_m
@@ -236,7 +244,12 @@ def judge_pulses(
         _mean([float(fit[3]) for fit in good]) if rolls else 0.0,
         _slope(rate[_VALUE], roll[_RATE]) if rolls else 0.0,
     )
-    checks = _scale_checks(scales)
+    checks = [
+        _scale_check(name, what, scale, tolerance, remedy)
+        for (name, what, tolerance), scale, remedy in zip(
+            _SCALES, scales, remedies_of(scales), strict=True
+        )
+    ]
     if "roll_2_rad" in pulses:
         roll_2, rate_2 = filtered("roll_2_rad"), filtered("roll_rate_2_rad_s")
         remedy = "Mount both motion sensors alike: roll is positive starboard down."
@@ -270,25 +283,6 @@ def judge_pulses(
     ]  # fmt: skip
 
 
-def _scale_checks(scales: Each[float]) -> list[Check]:
-    remedies = remedies_of(scales)
-    return [
-        _scale_check(name, what, scale, tolerance, remedy)
-        for (name, what, tolerance), scale, remedy in zip(
-            (
-                ("pressure", "pump pressure, by the command", SCALE),
-                ("port_level", "port level, by the pump pressure", SCALE),
-                ("starboard_level", "starboard level, by the pump pressure", SCALE),
-                ("roll", "roll, by what it does to the water", ROLL_SCALE),
-                ("roll_rate", "roll rate, by the roll", RATE_SCALE),
-            ),
-            scales,
-            remedies,
-            strict=True,
-        )
-    ]
-
-
 def remedies_of(scales: Each[float]) -> Each[str]:
     """What to do about each scale if it is wrong; all of them together say what is reversed.
 
@@ -296,14 +290,8 @@ def remedies_of(scales: Each[float]) -> Each[str]:
     """
     pressure, port, starboard, roll, rate = scales
     if abs(pressure) < NO_PRESSURE:
-        nothing = "Without pressure nothing moves."
-        return Each(
-            "The pump gives no pressure, or its sensor shows none. Check both.",
-            nothing,
-            nothing,
-            nothing,
-            nothing,
-        )
+        no_pump = "The pump gives no pressure, or its sensor shows none. Check both."
+        return Each(no_pump, *["Without pressure nothing moves."] * 4)
     # whoever is compared with a wrong pressure shows the inverse of its scale
     sensor = abs(pressure - 1) > SCALE and all(
         abs(pressure * gauge - 1) <= 2 * SCALE for gauge in (port, starboard)

@@ -20,24 +20,10 @@ from utank_hil.canbus import (
     ValveStatus,
 )
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
+from utank_hil.canbus.profiles import drive_plan as cia
 from utank_hil.canbus.profiles.acting import device_of
 from utank_hil.canbus.profiles.device import SILENT_NS
 from utank_hil.canbus.profiles.device_plan import DevicePlan, MessageEncoder
-from utank_hil.canbus.profiles.drive_plan import (
-    COMMAND_MS,
-    SDO_ANSWER,
-    SDO_REQUEST,
-    SENT_1,
-    SENT_2,
-    SPEED,
-    STATUS_WORD,
-    Answer,
-    DrivePlan,
-    Place,
-    answer,
-    read_request,
-    write_request,
-)
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.valves import Valve
 from utank_hil.nodes.actuators import DriveSequence
@@ -69,16 +55,6 @@ MOVES: Final[dict[type[tuple[Any, ...]], tuple[tuple[str, float, str, str], ...]
 Script = Iterator[list[Frame]]
 Ask = Callable[[str], Callable[[], bool]]
 """Asks a person to do something; what is returned says, each tick, whether it is done."""
-
-
-def flag(name: str, what: str, remedy: str, *, right: bool) -> Check:
-    """A check that is right or not."""
-    return Check(name, what, float(right), 1.0, 0.0, "1", remedy)
-
-
-def _set_up(setup: CanopenSetup) -> Check:
-    why = setup.problem or "It does not answer: look at bus and node."
-    return flag("set_up", "configured by SDO, read back, started", why, right=setup.done)
 
 
 class Trial(ABC):
@@ -121,6 +97,15 @@ class Trial(ABC):
     def _by_hand(self, what: str) -> Script:
         yield from self._wait(PATIENCE_S, self._ask(what))
 
+    def _configure(self, setup: CanopenSetup) -> Script:
+        yield from self._wait(CONFIGURED_S, lambda: setup.done or bool(setup.problem))
+        why = setup.problem or "It does not answer: look at bus and node."
+        self._flag("set_up", "configured by SDO, read back, started", why, right=setup.done)
+
+    def _flag(self, name: str, what: str, remedy: str, *, right: bool) -> None:
+        """Add a check that is right or not."""
+        self.checks.append(Check(name, what, float(right), 1.0, 0.0, "1", remedy))
+
 
 class SensorTrial(Trial):
     """A sensor: its pace, what it says, its signs by hand, its silence."""
@@ -148,9 +133,7 @@ class SensorTrial(Trial):
     def script(self) -> Script:
         """Listen, move by hand, take the plug off, and put it back."""
         if self._setup is not None:
-            setup = self._setup.setup
-            yield from self._wait(CONFIGURED_S, lambda: setup.done or bool(setup.problem))
-            self.checks.append(_set_up(setup))
+            yield from self._configure(self._setup.setup)
         yield from self._wait(BACK_S, lambda: bool(self._heard))
         rejected, lost, self._heard = self._rejected(), self._device.lost, []
         yield from self._wait(self._listen_s)
@@ -162,9 +145,9 @@ class SensorTrial(Trial):
             Check("lost", "measurements lost by the counter",
                   (self._device.lost - lost) / max(len(self._heard), 1), 0.0, LOST_SHARE, "1",
                   "Look at cables, termination and load: utank-hil bus."),
-            flag("name", "the device is who it is to be", "Compare n2k_name, or identity.",
-                 right=self._device.named),
         ]  # fmt: skip
+        remedy = "Compare n2k_name, or identity."
+        self._flag("name", "the device is who it is to be", remedy, right=self._device.named)
         if not self._heard:
             return
         yield from self._moves()
@@ -181,7 +164,7 @@ class SensorTrial(Trial):
         yield from self._wait(BACK_S, lambda: any(self._usable(m) for _, m in self._heard))
         back = any(self._usable(message) for _, message in self._heard)
         remedy = "It has to send by itself after its power is back: save its settings in it."
-        self.checks.append(flag("back", "it measures again by itself", remedy, right=back))
+        self._flag("back", "it measures again by itself", remedy, right=back)
 
     def _moves(self) -> Script:
         for move in MOVES[self._plan.kind]:
@@ -231,7 +214,7 @@ class SensorTrial(Trial):
         elif abs(moved) < least:
             remedy = f"It has to move by {least:.3g} {unit} in the time given; else look at scale."
         words = f"{value} moved by {round(moved, 4) + 0.0:g} {unit}"
-        self.checks.append(flag(f"{value}_sign", words, remedy, right=right and moved >= least))
+        self._flag(f"{value}_sign", words, remedy, right=right and moved >= least)
         if turns:
             turned = math.fsum(
                 (after_ns - before_ns) * 1e-9 * ((before[1] + after[1]) / 2 - rest_rate)
@@ -251,9 +234,7 @@ class SensorTrial(Trial):
 WAY_SHARE: Final = 0.15
 """Of its time from end to end: as VALVE_NOT_FOLLOWING lets it be off."""
 AT_PLACE: Final = 0.1  #: Of its way.
-SILENCE_MS: Final = (
-    100.0  #: For a valve to notice that it is commanded no longer, as the native one.
-)
+SILENCE_MS: Final = 100.0  #: For a valve to notice its last command, as the native one.
 
 
 class ValveTrial(SensorTrial):
@@ -267,7 +248,7 @@ class ValveTrial(SensorTrial):
 
     def _frames(self) -> list[Frame]:
         frames = super()._frames()
-        if not self._speaks or self.now_ns // TICK_NS % (COMMAND_MS * 1_000_000 // TICK_NS):
+        if not self._speaks or self.now_ns // TICK_NS % (cia.COMMAND_MS * 1_000_000 // TICK_NS):
             return frames
         beat = [] if self._plan.beat is None else [self._plan.beat]
         command = self._command.frame((self._told, 1.0, 0.0), self.now_ns)
@@ -275,33 +256,25 @@ class ValveTrial(SensorTrial):
 
     def _moves(self) -> Script:
         yield from self._by_hand("The valve will move: nobody at its spindle")
-        way_ms, fails = 1e3 * self._valve.opening_time_s, self._valve.fail_opening
-        self._speaks = True
+        fails, self._speaks = self._valve.fail_opening, True
         yield from self._wait(2 * self._valve.opening_time_s)
         self._told = 1.0 - fails
-        yield from self._way(
-            "way_ms",
-            "from its fail position to the other end",
-            way_ms,
-            WAY_SHARE * way_ms,
-            "Set opening_time_s of the ship's valve.",
-        )
+        remedy = "Set opening_time_s of the ship's valve."
+        yield from self._way("way_ms", "from its fail position to the other end", 0.0, remedy)
         self._told, self._speaks = fails, False
-        yield from self._way(
-            "silence_ms",
-            "to its fail position, from the last command",
-            way_ms,
-            SILENCE_MS + WAY_SHARE * way_ms,
-            "It must go there by itself: spring, own timeout, 1016h and 1029h.",
-        )
+        what = "to its fail position, from the last command"
+        remedy = "It must go there by itself: spring, own timeout, 1016h and 1029h."
+        yield from self._way("silence_ms", what, SILENCE_MS, remedy)
 
-    def _way(self, name: str, what: str, right_ms: float, off_ms: float, remedy: str) -> Script:
+    def _way(self, name: str, what: str, late_ms: float, remedy: str) -> Script:
         begin_ns, self._heard = self.now_ns, []
+        right_ms = 1e3 * self._valve.opening_time_s
         yield from self._wait(3 * self._valve.opening_time_s + SILENCE_MS * 1e-3)
         away = [now_ns for now_ns, message in self._heard
                 if not abs(message[0] - self._told) < AT_PLACE]  # fmt: skip
         back = bool(self._heard) and abs(self._heard[-1][1][0] - self._told) < AT_PLACE
         took_ms = (max(away, default=begin_ns) - begin_ns) * 1e-6 if back else math.nan
+        off_ms = late_ms + WAY_SHARE * right_ms
         self.checks.append(Check(name, what, took_ms, right_ms, off_ms, "ms", remedy))
 
 
@@ -309,19 +282,19 @@ SHARE: Final = 0.2  #: Of the greatest torque or speed, for a second: it moves t
 TURN_S: Final = 1.0
 CONFIGURED_S: Final = 15.0  #: Some forty entries at 0.3 s each, as slow as a server may be.
 STATE_S: Final = 2.0  #: For a change of state; a drive that charges its capacitors takes one.
-IDENTITY: Final = Place(0x1018, 1)  #: Read-only by CiA 301.
+IDENTITY: Final = cia.Place(0x1018, 1)  #: Read-only by CiA 301.
 _ENABLED: Final = DriveState.OPERATION_ENABLED
 
 
 class DriveTrial(Trial):
     """A drive with its pump in still water; it is left braked, and its node stopped."""
 
-    def __init__(self, plan: DrivePlan, pump: Pump, ask: Ask) -> None:
+    def __init__(self, plan: cia.DrivePlan, pump: Pump, ask: Ask) -> None:
         self._plan, self._drive = plan, CanopenDrive(plan)
         self._target = SHARE * (pump.max_torque_nm if plan.mode.torque else pump.max_speed_rad_s)
         self._word, self._pushes, self._speaks = ControlWord.DISABLE_VOLTAGE, False, True
         self._tag = plan.bus << BUS_SHIFT | STANDARD
-        self._answer: Answer | None = None
+        self._answer: cia.Answer | None = None
         self._state: DriveState | None = None
         self._speed_rad_s = math.nan
         super().__init__(ask)
@@ -333,15 +306,15 @@ class DriveTrial(Trial):
             return
         take(frame, now_ns)
         cob = (frame.can_id ^ self._tag) - self._plan.node
-        if cob == SENT_1:
+        if cob == cia.SENT_1:
             self._state = self._drive.state
-        elif cob == SENT_2:
+        elif cob == cia.SENT_2:
             self._speed_rad_s = self._drive.speed_rad_s
-        elif cob == SDO_ANSWER and (got := answer(frame.data)) is not None:
+        elif cob == cia.SDO_ANSWER and (got := cia.answer(frame.data)) is not None:
             self._answer = got
-            if got.place == STATUS_WORD and got.value is not None:
+            if got.place == cia.STATUS_WORD and got.value is not None:
                 self._state = state_of(got.value)
-            elif got.place == SPEED and got.value is not None:
+            elif got.place == cia.SPEED and got.value is not None:
                 speed = (got.value ^ 1 << 31) - (1 << 31)
                 self._speed_rad_s = speed * self._plan.speed_rad_s_per_unit
 
@@ -350,7 +323,7 @@ class DriveTrial(Trial):
         return self._drive.stop()
 
     def _frames(self) -> list[Frame]:
-        cycle = self.now_ns // TICK_NS % (COMMAND_MS * 1_000_000 // TICK_NS)
+        cycle = self.now_ns // TICK_NS % (cia.COMMAND_MS * 1_000_000 // TICK_NS)
         if self._speaks:
             frames = self._drive.frames(self.now_ns)
             return frames if cycle else frames + self._command()
@@ -358,22 +331,20 @@ class DriveTrial(Trial):
             return []
         # A dead controller sends nothing. SYNC and SDO are no sign of its life; they show how the
         # drive stops, in the state of its node that 1029h chooses, too.
-        place = (SPEED, STATUS_WORD)[self.now_ns // (COMMAND_MS * 1_000_000) % 2]
-        return [*self._command()[1:-1], self._request(read_request(place))]
+        place = (cia.SPEED, cia.STATUS_WORD)[self.now_ns // (cia.COMMAND_MS * 1_000_000) % 2]
+        return [*self._command()[1:-1], self._request(cia.read_request(place))]
 
     def _command(self) -> list[Frame]:
         return self._drive.follow(self._target if self._pushes else 0.0, self._word)
 
     def _request(self, data: bytes) -> Frame:
-        return Frame(self._tag | SDO_REQUEST + self._plan.node, data)
+        return Frame(self._tag | cia.SDO_REQUEST + self._plan.node, data)
 
     def script(self) -> Script:
         """Configure, try what must be refused, turn and stop in two ways."""
-        setup = self._drive.setup
         yield from self._by_hand("The pump will turn: water and ship still, nobody at the shaft")
-        yield from self._wait(CONFIGURED_S, lambda: setup.done or bool(setup.problem))
-        self.checks.append(_set_up(setup))
-        if not setup.done:
+        yield from self._configure(self._drive.setup)
+        if not self._drive.setup.done:
             return
         yield from self._wait(STATE_S, lambda: self._state is DriveState.SWITCH_ON_DISABLED)
         yield from self._refusals()
@@ -384,20 +355,16 @@ class DriveTrial(Trial):
 
     def _refusals(self) -> Script:
         self._word = ControlWord.ENABLE_OPERATION
-        yield from self._wait(10 * COMMAND_MS * 1e-3)
-        self.checks.append(
-            flag("leap", "it is not enabled out of its order of states",
-                 "By CiA 402-2 it goes through ready and switched on: look at its settings.",
-                 right=self._state is not _ENABLED)
-        )  # fmt: skip
+        yield from self._wait(10 * cia.COMMAND_MS * 1e-3)
+        what = "it is not enabled out of its order of states"
+        remedy = "By CiA 402-2 it goes through ready and switched on: look at its settings."
+        self._flag("leap", what, remedy, right=self._state is not _ENABLED)
         self._word, self._answer = ControlWord.DISABLE_VOLTAGE, None
-        yield [self._request(write_request(IDENTITY, 0, 4))]
+        yield [self._request(cia.write_request(IDENTITY, 0, 4))]
         yield from self._wait(STATE_S, lambda: self._answer is not None)
         refused = self._answer is not None and self._answer.abort != 0
         remedy = "1018h must be read-only: anything could pass for this drive."
-        self.checks.append(
-            flag("read_only", "its identity can't be written", remedy, right=refused)
-        )
+        self._flag("read_only", "its identity can't be written", remedy, right=refused)
 
     def _stop(self, name: str, what: str, *, speaks: bool) -> Script:
         sequence = DriveSequence()
@@ -405,10 +372,10 @@ class DriveTrial(Trial):
         end_ns = self.now_ns + round(2 * STATE_S * SECOND_NS)
         while self._state is not _ENABLED and self.now_ns < end_ns:
             self._word = sequence.next_word(self._state, wanted=True)
-            yield from self._wait(2 * COMMAND_MS * 1e-3)
+            yield from self._wait(2 * cia.COMMAND_MS * 1e-3)
         if self._state is not _ENABLED:
             remedy = f"It stays {self._drive.words}: look at supply, enable input and fault."
-            self.checks.append(flag(f"{name}_enabled", "it can be enabled", remedy, right=False))
+            self._flag(f"{name}_enabled", "it can be enabled", remedy, right=False)
             return
         self._pushes = True
         yield from self._wait(TURN_S)
@@ -416,7 +383,7 @@ class DriveTrial(Trial):
         turns = speed_rad_s * self._target > 0
         remedy = "Look at the sign of pressure_pa_per_unit or speed_rad_s_per_unit, and the echo."
         said = f"it turns as commanded, {speed_rad_s:.3g} rad/s"
-        self.checks.append(flag(f"{name}_turns", said, remedy, right=turns))
+        self._flag(f"{name}_turns", said, remedy, right=turns)
         self._pushes, self._word, self._speaks = False, ControlWord.QUICK_STOP, speaks
         shares: list[float] = []
         end_ns = self.now_ns + round(SETTLED_S * SECOND_NS)
@@ -429,6 +396,5 @@ class DriveTrial(Trial):
         )  # fmt: skip
         yield from self._wait(STATE_S / 2)
         remedy = "It must not run on: set 6007h, 605Ah and 605Eh, or take another drive."
-        off = self._state is not _ENABLED
-        self.checks.append(flag(f"{name}_off", "it is off afterwards", remedy, right=off))
+        self._flag(f"{name}_off", "it is off afterwards", remedy, right=self._state is not _ENABLED)
         self._speaks, self._word = True, ControlWord.DISABLE_VOLTAGE
