@@ -175,7 +175,8 @@ def test_an_edge_and_a_held_stop_count_for_four_cycles(late_ms: int, edge: bool)
     line = Line()
     line.say(arm=False, stop=True)
     line.now_ns += late_ms * MS
-    assert line.orders.holds_stop(line.now_ns + 800 * MS) == edge
+    recent = line.orders.recent(line.now_ns + 800 * MS)
+    assert (recent is not None and recent.stop) == edge
     line.say(lost=3, arm=True)
     assert line.orders.take().arm_edge == edge
 

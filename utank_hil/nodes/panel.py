@@ -119,6 +119,11 @@ class OperatorPanel:
         self.attended = self._spoke = True
 
     @property
+    def _found(self) -> Mode | None:
+        """Mode of the controller by its last status."""
+        return None if self.status is None else self.status.mode
+
+    @property
     def in_command(self) -> bool:
         """Whether the controller says that this station has the command."""
         return self.status is not None and self.status.station is self.station
@@ -176,7 +181,7 @@ class OperatorPanel:
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Send the state of the buttons when it is due or has changed."""
-        if self._start_ns is None and self._controller_is_ready():
+        if self._start_ns is None and self._found not in (None, Mode.INIT):
             self._start_ns = now_ns
         if self._start_ns is not None:
             while self._script and self._script[-1].time_s * 1e9 <= now_ns - self._start_ns:
@@ -185,13 +190,16 @@ class OperatorPanel:
             self._take(action, now_ns)
         self._pressed.clear()
         speaks = self.attended or self.stopping
-        if speaks and not self._spoke and self._armed and not self._in_charge(now_ns):
+        in_charge = self._found is Mode.ACTIVE and not self.silent(now_ns)
+        if speaks and not self._spoke and self._armed and not in_charge:
             self._mode, self._armed = Mode.STANDBY, False
         self._spoke = speaks
         if not speaks:
             return ()
+        # PASSIVE that is asked for again comes after STANDBY
+        waits = self._mode is Mode.PASSIVE and now_ns < self._asks_ns
         command = OperatorCommand(
-            mode_request=self._asked(now_ns),
+            mode_request=Mode.STANDBY if waits else self._mode,
             arm=self._armed and now_ns >= self._arms_ns,
             stop=self.stopping,
             reset=now_ns < self._pressed_until_ns[Action.RESET],
@@ -209,11 +217,6 @@ class OperatorPanel:
         self._ticks += 1
         return frames
 
-    def _asked(self, now_ns: int) -> Mode:
-        """The mode to ask for; PASSIVE that is asked for again comes after STANDBY."""
-        waits = self._mode is Mode.PASSIVE and now_ns < self._asks_ns
-        return Mode.STANDBY if waits else self._mode
-
     def _note_alarm(self, alarm: Alarm, code: Fault, now_ns: int) -> None:
         """Keep an alarm, and forget those that the controller no longer repeats."""
         alarms = alarm.alarms or 0
@@ -223,17 +226,6 @@ class OperatorPanel:
         self._alarms = {
             code: kept for code, kept in self._alarms.items() if alarms and kept[1] >= oldest_ns
         }
-
-    def _in_charge(self, now_ns: int) -> bool:
-        """Whether a controller is heard that is in charge."""
-        return (
-            not self.silent(now_ns)
-            and self.status is not None
-            and (self.status.mode is Mode.ACTIVE)
-        )
-
-    def _controller_is_ready(self) -> bool:
-        return self.status is not None and self.status.mode not in (None, Mode.INIT)
 
     def _take(self, action: Action, now_ns: int) -> None:
         if action in _EDGES:
@@ -245,16 +237,15 @@ class OperatorPanel:
         if action is Action.ARM:
             if not self.stopping:
                 # without another rising edge a second press would do nothing after a fault
-                if self._armed and (self.status is None or self.status.mode is not Mode.ACTIVE):
+                if self._armed and self._found is not Mode.ACTIVE:
                     self._arms_ns = now_ns + EDGE_NS
                 self._mode, self._armed = Mode.ACTIVE, True
         elif action in (Action.FORBID, Action.PERMIT):
             self._forbidden = action is Action.FORBID
         elif action in (Action.PASSIVE, Action.DISARM):
             # nor does a wish that is not new bring it back to where it was
-            found = None if self.status is None else self.status.mode
             again = action is Action.PASSIVE and self._mode is Mode.PASSIVE
-            if again and found not in _UNDER_POWER:
+            if again and self._found not in _UNDER_POWER:
                 self._asks_ns = now_ns + EDGE_NS
             self._mode, self._armed = Mode.PASSIVE, False
         elif action in (Action.STANDBY, Action.STOP):
@@ -262,8 +253,7 @@ class OperatorPanel:
 
     def _adopt(self, now_ns: int) -> None:
         """Take over what the controller does: who takes the command is not to change it."""
-        status = None if self.silent(now_ns) else self.status
-        mode = None if status is None else status.mode
+        mode = None if self.silent(now_ns) else self._found
         self._armed = mode is Mode.ACTIVE and not self.stopping
         if self._armed:
             self._mode = Mode.ACTIVE

@@ -114,16 +114,9 @@ class Orders:
         self.last, self.heard_ns = order, now_ns
         self.requested_mode = Mode.STANDBY if asked is None else asked
 
-    def holds_stop(self, now_ns: int) -> bool:
-        """Whether the stop bit is set in the last accepted frame, and that is not long ago."""
-        return self.last is not None and self.last.stop and self._is_fresh(now_ns)
-
-    def forbids_retuning(self, now_ns: int) -> bool:
-        """Whether that frame forbids retuning, likewise."""
-        return self.last is not None and self.last.forbid_retuning and self._is_fresh(now_ns)
-
-    def _is_fresh(self, now_ns: int) -> bool:
-        return now_ns - self.heard_ns <= self._gap_ns
+    def recent(self, now_ns: int) -> OperatorCommand | None:
+        """The last accepted frame, if that is not long ago."""
+        return self.last if now_ns - self.heard_ns <= self._gap_ns else None
 
     def take(self) -> Wishes:
         """Return what was ordered since the last call."""
@@ -151,9 +144,7 @@ class Orders:
         """Return what was ordered of the retuning since the last call, a sample of the law ago."""
         order, last = self._retuning, self.last
         self._retuning = _NOTHING
-        if last is not None and last.forbid_retuning:
-            return order._replace(forbidden=True)
-        return order
+        return order if last is None or not last.forbid_retuning else order._replace(forbidden=True)
 
     def take_accepted(self) -> list[int | None]:
         """Return the codes of the alarms that were accepted since the last call; None for all."""
@@ -221,10 +212,8 @@ class Stations:
     def beat(self, station: Station, beat: Heartbeat, now_ns: int) -> None:
         """Take the heartbeat of a station's panel."""
         self._beats_ns[station] = now_ns
-        self._matches[station] = (
-            beat.catalogue_version,
-            beat.configuration_version,
-        ) == self._versions
+        versions = beat.catalogue_version, beat.configuration_version
+        self._matches[station] = versions == self._versions
 
     def _obey(self, order: OperatorCommand, now_ns: int) -> None:
         """Take an order of a panel of another maker: it is the ship's, well and alive."""
@@ -241,7 +230,8 @@ class Stations:
         """Return what was ordered since the last call; stop and disarm of any station count."""
         wishes = self._leads.take()
         if not self._watches.news:
-            return wishes._replace(stop=True) if self._watches.holds_stop(now_ns) else wishes
+            last = self._watches.recent(now_ns)
+            return wishes if last is None or not last.stop else wishes._replace(stop=True)
         takes_command = self._watches.takes_command and self._may_lead(now_ns)
         lets_go = self._watches.lets_go
         other = self._watches.take()
@@ -269,10 +259,8 @@ class Stations:
 
         Who takes the command does not lift what the other forbids, and can't know of it.
         """
-        order = self._leads.take_retuning()
-        if self._watches.forbids_retuning(now_ns):
-            return order._replace(forbidden=True)
-        return order
+        order, last = self._leads.take_retuning(), self._watches.recent(now_ns)
+        return order if last is None or not last.forbid_retuning else order._replace(forbidden=True)
 
     def take_accepted(self) -> list[int | None]:
         """Return the codes of the alarms accepted at any station since the last call."""

@@ -42,24 +42,20 @@ MOST_OVER_PLAN: Final = 3.0
 """A level so many times the plan's ends the pulses."""
 
 _Get = Callable[[ControllerNode], float]
-_ALWAYS: Final[dict[str, _Get]] = {
+_SINGLE: Final[dict[str, _Get]] = {
     # each sensor by itself, whichever is in use
     "roll_rad": lambda node: node.measured.motions[0].roll_rad,
     "roll_rate_rad_s": lambda node: node.measured.motions[0].roll_rate_rad_s,
     "port_level_m": lambda node: node.measured.port_level_m,
     "starboard_level_m": lambda node: node.measured.starboard_level_m,
     "high_level": lambda node: node.measured.high_level,
-}
-_OF_PUMP: Final[dict[str, _Get]] = {
     "pressure_pa": lambda node: node.measured.pressure_pa,
     "command_pa": lambda node: node.command_pa,
+    "valve_opening": lambda node: node.measured.valve_opening,
 }
-_OF_PAIR: Final[dict[str, _Get]] = {
+_PAIR: Final = _SINGLE | {
     "roll_2_rad": lambda node: node.measured.motions[1].roll_rad,
     "roll_rate_2_rad_s": lambda node: node.measured.motions[1].roll_rate_rad_s,
-}
-_OF_VALVE: Final[dict[str, _Get]] = {
-    "valve_opening": lambda node: node.measured.valve_opening,
 }
 
 
@@ -112,26 +108,14 @@ class CommissioningNode:
         self._moving_s = self._push_s + (0.0 if plan is None else PUSH_S)
         self._pushed: list[float] = []  # pressure of each tick before the stop, and after it
         self._stopping: list[float] = []
-        sources = dict(_ALWAYS)
-        if plan is not None:
-            sources |= _OF_PUMP
-        if len(node.inbox.motions) == 2:
-            sources |= _OF_PAIR
-        if stroke is not None:
-            sources |= _OF_VALVE
+        self._sources = dict(_PAIR if len(node.inbox.motions) == 2 else _SINGLE)
         if (drive := node.actuators.drive) is not None:
-            sources[SPEED] = lambda _: drive.speed_rad_s
-        self._names = tuple(sources)
-        self._getters = tuple(sources.values())
-        self.stage = Stage.WAITING
+            self._sources[SPEED] = lambda _: drive.speed_rad_s
         self.ended = ""  #: Why it ended before its time, in words; else empty.
-        self._since_ns = 0
         #: rest, moved: what was recorded at rest, and from ACTIVE on; empty before.
         self.rest: Record = {}
         self.moved: Record = {}
-        self._rows: list[FloatArray] = []
-        self._sum = np.zeros(len(self._names))
-        self._ticks = 0
+        self._enter(Stage.WAITING, 0)
 
     def checks(self) -> list[Check]:
         """Judge what was recorded; takes tens of milliseconds, so not while the loop runs."""
@@ -206,25 +190,25 @@ class CommissioningNode:
         return "A motion sensor is silent. Check the supply and bus connection of both."
 
     def _note(self, now_ns: int) -> None:
-        self._sum += [get(self.node) for get in self._getters]
+        self._sum += [get(self.node) for get in self._sources.values()]
         self._ticks += 1
         # a loop held up for more than two rows lost the echo of drive or valve, and begins anew
         missing = (now_ns - self._since_ns) // (ROW_TICKS * TICK_NS) - len(self._rows)
         if missing > 0:
             self._rows += [self._sum / self._ticks] * missing
-            self._sum = np.zeros(len(self._names))
-            self._ticks = 0
+            self._begin_row()
+
+    def _begin_row(self) -> None:
+        self._sum, self._ticks = np.zeros(len(self._sources)), 0
 
     def _enter(self, stage: Stage, now_ns: int) -> None:
-        self.stage = stage
-        self._since_ns = now_ns
-        self._rows = []
-        self._sum = np.zeros(len(self._names))
-        self._ticks = 0
+        self.stage, self._since_ns = stage, now_ns
+        self._rows: list[FloatArray] = []
+        self._begin_row()
 
     def _record(self) -> Record:
-        rows = np.array(self._rows).reshape(-1, len(self._names))
-        return dict(zip(self._names, rows.T, strict=True))
+        rows = np.array(self._rows).reshape(-1, len(self._sources))
+        return dict(zip(self._sources, rows.T, strict=True))
 
     def _go_on(self, now_ns: int) -> None:
         mode = self.node.mode
