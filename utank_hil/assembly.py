@@ -307,12 +307,16 @@ def retuner_work(config: ControllerConfig) -> Work | None:
 
     The work may be handed to another process.
     """
-    settings = config.retuning
+    settings, design = config.retuning, config.law
     if config.renews:
-        return _renewal_work(config)
+        from utank_hil.retuning.renewal import RenewalTask, renew  # here: scipy.optimize
+
+        assert isinstance(design, SelfTunedDesign)
+        renewal = RenewalTask(config.plant, sample_time_of(config.plant), design.mean_power_w)
+        return Work(partial(renew, task=renewal), MotionEstimate, 3 * MOST_BANDS)
     if settings is None:
         return None
-    from utank_hil.retuning.redesign import LEAST_GAIN, retune  # here: scipy.optimize
+    from utank_hil.retuning.redesign import LEAST_GAIN, retune
 
     task = retuning_task(config, settings.order, settings.roll_period_range_s)
     task = replace(task, least_gain=LEAST_GAIN)
@@ -320,15 +324,6 @@ def retuner_work(config: ControllerConfig) -> Work | None:
     rows = round(settings.identification_s / predictor.sample_time_s)
     columns = 1 + len(predictor.measured)
     return Work(partial(retune, task=task), FloatArray, rows * columns)
-
-
-def _renewal_work(config: ControllerConfig) -> Work:
-    from utank_hil.retuning.renewal import RenewalTask, renew
-
-    design = config.law
-    assert isinstance(design, SelfTunedDesign)
-    task = RenewalTask(config.plant, sample_time_of(config.plant), design.mean_power_w)
-    return Work(partial(renew, task=task), MotionEstimate, 3 * MOST_BANDS)
 
 
 def estimator_work(config: ControllerConfig) -> Work | None:

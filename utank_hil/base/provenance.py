@@ -8,7 +8,7 @@ import math
 import os
 import platform
 import subprocess
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from datetime import UTC, date, datetime
 from enum import Enum
 from functools import cache
@@ -93,7 +93,8 @@ def describe(
     parts = {"configuration": configuration.model_dump()}
     if scenario is not None:
         parts["scenario_configuration"] = scenario.model_dump()
-    files = sorted({_relative(path, folder): path for path in _paths(parts)}.items())
+    files: dict[str, Path] = {}
+    plain = _plain(parts, folder, files)
     return {
         "program": PROGRAM,
         "version": version(),
@@ -103,8 +104,11 @@ def describe(
         "command": command,
         "options": {name: _given(value) for name, value in options.items()},
         "seed": seed,
-        **_plain(parts, folder),
-        "data": {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files},
+        **plain,
+        "data": {
+            name: hashlib.sha256(path.read_bytes()).hexdigest()
+            for name, path in sorted(files.items())
+        },
     }
 
 
@@ -116,34 +120,24 @@ def _given(value: Any) -> Any:
     return value
 
 
-def _paths(value: Any) -> Iterator[Path]:
-    if isinstance(value, Path):
-        yield value
-    elif isinstance(value, Mapping):
-        for each in value.values():
-            yield from _paths(each)
-    elif isinstance(value, list | tuple):
-        for each in value:
-            yield from _paths(each)
+def _plain(value: Any, folder: Path, files: dict[str, Path]) -> Any:
+    """A value as a file in a folder can hold it, and the `files` in it.
 
-
-def _relative(path: Path, folder: Path) -> str:
-    relative = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
-    return relative if relative.startswith("../") else f"./{relative}"
-
-
-def _plain(value: Any, folder: Path) -> Any:
-    """A value as a file can hold it; keys at infinity are left out, which says the same."""
+    Keys at infinity are left out, which says the same.
+    """
     if isinstance(value, Mapping):
         return {
-            name: _plain(each, folder)
+            name: _plain(each, folder, files)
             for name, each in value.items()
             if not (isinstance(each, float) and math.isinf(each))
         }
     if isinstance(value, list | tuple):
-        return [_plain(each, folder) for each in value]
+        return [_plain(each, folder, files) for each in value]
     if isinstance(value, Path):
-        return _relative(value, folder)
+        relative = Path(os.path.relpath(value.resolve(), folder.resolve())).as_posix()
+        name = relative if relative.startswith("../") else f"./{relative}"
+        files[name] = value
+        return name
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, date):

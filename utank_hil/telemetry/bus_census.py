@@ -135,8 +135,8 @@ class BusCensus:
         return [
             {
                 "id": written(can_id),
-                "message": self._name(can_id),
-                "node": self._node(can_id),
+                "message": self._who(can_id)[1],
+                "node": self._who(can_id)[0],
                 "frames": seen.count,
                 "rate_hz": round(seen.rate_hz, 3),
                 "longest_gap_ms": round(1e3 * seen.gap_s, 1),
@@ -145,24 +145,18 @@ class BusCensus:
             for can_id, seen in sorted(self._seen.items())
         ]
 
-    def _name(self, can_id: int) -> str:
+    def _who(self, can_id: int) -> tuple[str, str]:
+        """Who sends an identifier, and which message it is."""
+        device, name, _ = self._devices.get(can_id, ("", "", False))
         if can_id in self._catalogue.by_id:
-            return str(self._catalogue.by_id[can_id].codec.name)
-        name = self._devices[can_id][1] if can_id in self._devices else ""
+            known = self._catalogue.by_id[can_id]
+            return device or known.source.name, str(known.codec.name)
         if can_id & STANDARD:
-            node = (can_id & ~STANDARD) - 0x700
-            return name or ("CANopen heartbeat" if node in self.states else "")
+            beats = (can_id & ~STANDARD) - 0x700 in self.states
+            return device or f"node {can_id & 0x7F}", name or "CANopen heartbeat" * beats
         group = can_id >> 8 & 0x3FFFF
-        return f"{name} PGN {group if group & 0xFF00 >= 0xF000 else group & 0x3FF00}".lstrip()
-
-    def _node(self, can_id: int) -> str:
-        if can_id in self._devices:
-            return self._devices[can_id][0]
-        if can_id in self._catalogue.by_id:
-            return self._catalogue.by_id[can_id].source.name
-        if can_id & STANDARD:
-            return f"node {can_id & 0x7F}"
-        return f"source {can_id & 0xFF:#04x}"
+        name = f"{name} PGN {group if group & 0xFF00 >= 0xF000 else group & 0x3FF00}".lstrip()
+        return device or f"source {can_id & 0xFF:#04x}", name
 
     def problems(self) -> list[tuple[str, str]]:
         """What is missing, wrong or double, in words; of the ship's file only with a ship."""
@@ -194,7 +188,7 @@ class BusCensus:
     def _message_problems(self, heard: Any) -> list[tuple[str, str]]:
         bare = heard.can_id & (OTHER_BUS - 1)
         device, _, silent = self._devices.get(bare, ("", "", False))
-        what = " ".join(filter(None, (device, self._name(bare), written(bare))))
+        what = " ".join(filter(None, (device, self._who(bare)[1], written(bare))))
         if not heard.heard:
             why = f"; controller or utank-hil conform {device} must configure it before it sends"
             return [("missing", f"{what} was not heard" + (why if silent else ""))]

@@ -5,7 +5,7 @@ holds the records of one write: several at once cost hardly more than one. Each 
 cursor, detects when the writer has overtaken it, and counts the slots it lost. Readers map the
 segment read-only.
 
-Layout, in 8-byte words: header (`_Word`), kind and content as JSON, then the slots: room for some
+Layout, in 8-byte words: header, kind and content as JSON, then the slots: room for some
 bytes and one word that closes the slot, in its upper half how many bytes there are, in its lower
 half their CRC-32. That of write number k is started from k, so that a slot of an earlier lap, or a
 part of one, fails it.
@@ -28,9 +28,10 @@ import mmap
 import os
 import secrets
 import stat
+from array import array
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from enum import IntEnum, StrEnum
+from enum import StrEnum
 from multiprocessing import resource_tracker
 from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
@@ -58,22 +59,11 @@ class RingKind(StrEnum):
     FRAMES = "frames"
 
 
-class _Word(IntEnum):
-    """Index of each header word; the count has a cache line of its own."""
-
-    MAGIC = 0
-    VERSION = 1
-    SLOT_BYTES = 2
-    SLOTS = 3
-    TEXT_BYTES = 4
-    WRITER_PID = 5
-    WRITER_START = 6
-    COUNT = 8
-    CLOSED = 9
-
-
-# A member is read once: in Python 3.11 its class costs eight times as much.
-_COUNT: Final = int(_Word.COUNT)
+# Words of the header: mark, version, bytes of a slot, slots, bytes of the text, pid and start of
+# the writer; the count has a cache line of its own.
+_FIXED_WORDS: Final = 7
+_COUNT: Final = 8
+_CLOSED: Final = 9
 
 
 class RingError(OSError):
@@ -122,13 +112,10 @@ class RingWriter(Closing):
         memory[:size] = bytes(size)  # Otherwise the first write to each page would take longer.
         memory[8 * _HEADER_WORDS : 8 * _HEADER_WORDS + len(text)] = text
         words = memory[:size].cast("q")
-        words[_Word.VERSION] = _VERSION
-        words[_Word.SLOT_BYTES] = slot_bytes
-        words[_Word.SLOTS] = slots
-        words[_Word.TEXT_BYTES] = len(text)
-        words[_Word.WRITER_PID] = os.getpid()
-        words[_Word.WRITER_START] = _process_start(os.getpid()) or 0
-        words[_Word.MAGIC] = _MAGIC  # This is last: from here on readers accept the segment.
+        pid, start = os.getpid(), _process_start(os.getpid()) or 0
+        head = array("q", (_VERSION, slot_bytes, slots, len(text), pid, start))
+        words[1:_FIXED_WORDS] = memoryview(head)
+        words[0] = _MAGIC  # This is last: from here on readers accept the segment.
         self._words = words
         # Views are created once, so that a write allocates nothing permanent.
         self._slots = [memory[at : at + slot_bytes] for at in range(first, size, stride)]
@@ -160,7 +147,7 @@ class RingWriter(Closing):
         """Mark the ring as closed for readers, and unlink the segment; idempotent."""
         if self._shm is None:
             return
-        self._words[_Word.CLOSED] = 1
+        self._words[_CLOSED] = 1
         shm, self._shm = self._shm, None
         del self._words, self._closing  # Mapped memory can be released only without views.
         self._slots.clear()
@@ -188,7 +175,8 @@ class RingReader(Closing):
         finally:
             os.close(descriptor)
         self._words = memoryview(self._map)[: 8 * _HEADER_WORDS].cast("q")
-        magic, version, slot_bytes, slots, text_bytes, pid, start = self._words[:7].tolist()
+        fixed = self._words[:_FIXED_WORDS].tolist()
+        magic, version, slot_bytes, slots, text_bytes, pid, start = fixed
         self._first, self._stride = _first_slot_byte(text_bytes), slot_bytes + 8
         fits = min(slot_bytes, slots, text_bytes) > 0 and slot_bytes % 8 == 0
         if (magic, version) != (_MAGIC, _VERSION) or not (
@@ -235,7 +223,7 @@ class RingReader(Closing):
 
         Check before reading, and stop when this was true and the read returns nothing.
         """
-        return bool(self._words[_Word.CLOSED]) or not self.writer_lives
+        return bool(self._words[_CLOSED]) or not self.writer_lives
 
     @property
     def writer_lives(self) -> bool:

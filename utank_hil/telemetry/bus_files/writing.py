@@ -1,6 +1,6 @@
 """Copies of a log of the bus: candump, ASC and BLF, with every frame's time, kind and length."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterable
 from datetime import UTC, datetime
@@ -8,6 +8,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Any, Final
 
+from utank_hil.base.closing import Closing
 from utank_hil.base.whole_file import left_whole
 from utank_hil.telemetry.bus_files.frame import FD_LENGTHS, BusFrame, FrameKind
 
@@ -46,7 +47,7 @@ def write_frames(path: Path, frames: Iterable[BusFrame], notes: list[str] | None
     return count
 
 
-class _Writer(ABC):
+class _Writer(Closing):
     """Writes one format; `lost` counts what it can't hold."""
 
     def __init__(self, content: Any, lost: Counter[str]) -> None:
@@ -54,11 +55,8 @@ class _Writer(ABC):
         self._channels: dict[str, int] = {}
         self._origin_ns: int | None = None
 
-    def __enter__(self) -> "_Writer":
-        return self
-
-    def __exit__(self, *_: object) -> None:  # noqa: B027, most formats have no end
-        """End the file."""
+    def close(self) -> None:
+        """End the file; most formats have no end."""
 
     @abstractmethod
     def write(self, frame: BusFrame) -> None:
@@ -105,7 +103,7 @@ class _Candump(_Writer):
 
 
 class _Asc(_Writer):
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
         self._content.write("End TriggerBlock\n")
 
     def write(self, frame: BusFrame) -> None:
@@ -152,7 +150,7 @@ class _Blf(_Writer):
         super().__init__(content, lost)
         self._blf = BLFWriter(content)
 
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
         self._blf.stop()
 
     def write(self, frame: BusFrame) -> None:
