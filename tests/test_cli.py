@@ -51,7 +51,7 @@ def commands() -> list[tuple[typer.Typer, tuple[str, ...], str]]:
 
 
 @pytest.mark.parametrize(("application", "words", "name"), commands(), ids=lambda v: str(v)[:20])
-def test_help_of_every_command_has_an_example_that_parses(application, words, name: str) -> None:
+def test_help_of_every_command_has_an_example_that_parses(application, words, name):
     result = invoke(application, *words, "--help")
     assert result.exit_code == 0
     example = re.search(rf"Example: ({re.escape(name)} [^│]*?)(?= {{2}}| In real time|$| ╭|\n)",
@@ -81,7 +81,7 @@ def test_help_of_every_command_has_an_example_that_parses(application, words, na
 )
 @pytest.mark.slow
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
-def test_shipped_controllers_pass_their_check(path: Path) -> None:
+def test_shipped_controllers_pass_their_check(path):
     result = invoke(app, "check", path, "--json")
     assert result.exit_code == 0
     report = json.loads(result.stdout)
@@ -98,7 +98,7 @@ def controller_file(folder: Path, changes: str = "", law: str = "{kind: passive}
     return path
 
 
-def test_check_lists_every_error_with_file_key_and_reason(tmp_path: Path) -> None:
+def test_check_lists_every_error_with_file_key_and_reason(tmp_path):
     ship = tmp_path / "ship.yaml"
     good = (CONFIGS / "ships" / "thesis_first.yaml").read_text()
     painted = good.replace("lag_s: 0.1", "lag_s: 0.1\n  colour: red")
@@ -140,13 +140,13 @@ def test_check_lists_every_error_with_file_key_and_reason(tmp_path: Path) -> Non
         ("bit_rate: '[/oops] [red]'", "[/oops] [red]"),
     ],
 )
-def test_check_refuses_what_can_not_be_meant(tmp_path: Path, changes: str, reason: str) -> None:
+def test_check_refuses_what_can_not_be_meant(tmp_path, changes, reason):
     result = invoke(app, "check", controller_file(tmp_path, changes))
     assert result.exit_code == 2
     assert reason in re.sub(r"\s+", " ", result.stderr)
 
 
-def test_check_of_the_passive_tank_has_no_margins(tmp_path: Path) -> None:
+def test_check_of_the_passive_tank_has_no_margins(tmp_path):
     path = controller_file(tmp_path)
     result = invoke(app, "check", path, "--json")
     assert result.exit_code == 0
@@ -162,7 +162,7 @@ FRAGILE = (
 )
 
 
-def test_law_without_margins_is_refused_unless_the_configuration_accepts_it(tmp_path: Path) -> None:
+def test_law_without_margins_is_refused_unless_the_configuration_accepts_it(tmp_path):
     refused = invoke(app, "check", controller_file(tmp_path, law=FRAGILE), "--json")
     assert refused.exit_code == 1
     report = json.loads(refused.stdout)
@@ -175,7 +175,7 @@ def test_law_without_margins_is_refused_unless_the_configuration_accepts_it(tmp_
     assert "accepted by the configuration" in accepted.stdout
 
 
-def test_controller_without_margins_does_not_run(tmp_path: Path) -> None:
+def test_controller_without_margins_does_not_run(tmp_path):
     path = controller_file(tmp_path, law=FRAGILE)
     result = invoke(app, "run", path, "--bus", "nowhere0")
     assert result.exit_code == 2
@@ -191,7 +191,7 @@ def test_controller_without_margins_does_not_run(tmp_path: Path) -> None:
         (ship_app, (CONFIGS / "scenarios" / "storm.yaml", "--bus", "nowhere0")),
     ],
 )
-def test_missing_interface_is_named_and_has_a_code_of_its_own(application, arguments) -> None:
+def test_missing_interface_is_named_and_has_a_code_of_its_own(application, arguments):
     result = invoke(application, *arguments, *(() if "panel" in arguments else ("--json",)))
     assert result.exit_code == ExitCode.NO_BUS
     assert "nowhere0" in result.stderr
@@ -200,7 +200,7 @@ def test_missing_interface_is_named_and_has_a_code_of_its_own(application, argum
 
 
 @pytest.mark.parametrize("names", ["motor", "sensors,motor", "sensors,drive,panel,truth"])
-def test_unknown_node_to_leave_out_is_refused_with_those_that_there_are(names: str) -> None:
+def test_unknown_node_to_leave_out_is_refused_with_those_that_there_are(names):
     storm = CONFIGS / "scenarios" / "storm.yaml"
     result = invoke(ship_app, storm, "--bus", "nowhere0", "--without", names)
     assert result.exit_code == 2
@@ -221,7 +221,7 @@ def test_unknown_node_to_leave_out_is_refused_with_those_that_there_are(names: s
         ("conquer",),
     ],
 )
-def test_wrong_use_ends_with_code_2_and_an_error(arguments: tuple[str, ...]) -> None:
+def test_wrong_use_ends_with_code_2_and_an_error(arguments):
     result = invoke(app, *arguments)
     assert result.exit_code == 2
     assert isinstance(result.exception, SystemExit)
@@ -263,9 +263,7 @@ def wait_for_workers(process: subprocess.Popen[str], cpu_s: float) -> None:
 
 
 @pytest.mark.evidence
-def test_interrupted_bench_reports_what_it_has_and_leaves_a_readable_recording(
-    tmp_path: Path,
-) -> None:
+def test_interrupted_bench_reports_what_it_has_and_leaves_a_readable_recording(tmp_path):
     with bench_process("--duration", "36000", "--out", str(tmp_path), "--json") as process:
         wait_for_workers(process, 4.0)
         os.killpg(process.pid, signal.SIGINT)
@@ -288,7 +286,7 @@ def test_interrupted_bench_reports_what_it_has_and_leaves_a_readable_recording(
 
 
 @pytest.mark.evidence
-def test_bench_interrupted_at_once_says_so(tmp_path: Path) -> None:
+def test_bench_interrupted_at_once_says_so(tmp_path):
     with bench_process("--duration", "36000", "--out", str(tmp_path / "out")) as process:
         wait_for_workers(process, 0.0)  # as soon as there is one
         os.killpg(process.pid, signal.SIGINT)
@@ -304,7 +302,7 @@ def test_bench_interrupted_at_once_says_so(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("place", ["file", "/proc/nowhere", "taken"])
-def test_bench_that_could_not_write_its_results_does_not_begin(tmp_path: Path, place: str) -> None:
+def test_bench_that_could_not_write_its_results_does_not_begin(tmp_path, place):
     (tmp_path / "file").write_text("mine")
     (tmp_path / "taken" / "bench.png").mkdir(parents=True)
     out = tmp_path / place
@@ -318,9 +316,7 @@ def test_bench_that_could_not_write_its_results_does_not_begin(tmp_path: Path, p
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("one_process")
-def test_bench_whose_results_can_not_be_written_prints_them_all_the_same(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bench_whose_results_can_not_be_written_prints_them_all_the_same(tmp_path, monkeypatch):
     def full(*_arguments: object, **_more: object) -> None:
         raise OSError(28, "No space left on device")
 
@@ -337,7 +333,7 @@ def test_bench_whose_results_can_not_be_written_prints_them_all_the_same(
 
 
 @pytest.mark.parametrize("command", ["design", "identify"])
-def test_other_commands_try_their_folder_first_too(tmp_path: Path, command: str) -> None:
+def test_other_commands_try_their_folder_first_too(tmp_path, command):
     (tmp_path / "out").write_text("mine")
     gpc = CONFIGS / "controllers" / "gpc.yaml"
     words = (
@@ -351,7 +347,7 @@ def test_other_commands_try_their_folder_first_too(tmp_path: Path, command: str)
     assert (tmp_path / "out").read_text() == "mine"
 
 
-def test_bench_refuses_a_controller_without_margins(tmp_path: Path) -> None:
+def test_bench_refuses_a_controller_without_margins(tmp_path):
     controller_file(tmp_path, law=FRAGILE)
     storm = Path("configs/scenarios/storm.yaml").resolve()
     scenario = tmp_path / "scenario.yaml"

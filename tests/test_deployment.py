@@ -66,18 +66,18 @@ def unit(tmp_path: Path) -> Path:
     return path
 
 
-def test_systemd_finds_nothing_wrong_with_the_unit(unit: Path) -> None:
+def test_systemd_finds_nothing_wrong_with_the_unit(unit):
     done = systemd_analyze("verify", "--man=no", unit=unit)
     assert (done.returncode, done.stdout + done.stderr) == (0, "")
 
 
-def test_systemd_finds_what_is_wrong_with_another(unit: Path) -> None:
+def test_systemd_finds_what_is_wrong_with_another(unit):
     unit.write_text(unit.read_text().replace("WatchdogSec=500ms", "WatchdogSecs=soon"))
     done = systemd_analyze("verify", "--man=no", unit=unit)
     assert "WatchdogSecs" in done.stdout + done.stderr
 
 
-def test_exposure_is_what_the_document_says_and_no_more_than_asked_for(unit: Path) -> None:
+def test_exposure_is_what_the_document_says_and_no_more_than_asked_for(unit):
     threshold = f"--threshold={10 * MOST_EXPOSURE:.0f}"
     done = systemd_analyze("security", "--offline=true", "--no-pager", threshold, unit=unit)
     assert done.returncode == 0, done.stdout
@@ -91,7 +91,7 @@ def test_exposure_is_what_the_document_says_and_no_more_than_asked_for(unit: Pat
     ).returncode
 
 
-def test_commands_of_the_unit_are_those_of_the_program() -> None:
+def test_commands_of_the_unit_are_those_of_the_program():
     codes = {}
     for key in ("ExecStartPre", "ExecStart"):
         program, *words = shlex.split(value(key))
@@ -105,7 +105,7 @@ def test_commands_of_the_unit_are_those_of_the_program() -> None:
     assert codes == {"ExecStartPre": ExitCode.OK, "ExecStart": ExitCode.NO_BUS}
 
 
-def test_unit_is_in_step_with_the_program() -> None:
+def test_unit_is_in_step_with_the_program():
     assert value("Type") == "notify"
     assert value("Restart") == "on-failure"
     # stopped by whoever, also with a fault latched
@@ -122,7 +122,7 @@ def test_unit_is_in_step_with_the_program() -> None:
     assert not keys & {"CPUQuota", "BindsTo", "CPUSchedulingPolicy", "RestrictRealtime"}
 
 
-def test_unit_does_what_the_page_says_of_it() -> None:
+def test_unit_does_what_the_page_says_of_it():
     words = shlex.split(value("ExecStart"))
     assert words[words.index("--out") + 1] == f"/var/log/{value('LogsDirectory')}"
     page = " ".join(Path("docs/deployment.md").read_text(encoding="utf-8").split())
@@ -139,7 +139,7 @@ def test_unit_does_what_the_page_says_of_it() -> None:
     assert value("OOMPolicy") == "continue"
 
 
-def test_network_file_has_the_controllers_bit_rate_and_keys_that_networkd_knows() -> None:
+def test_network_file_has_the_controllers_bit_rate_and_keys_that_networkd_knows():
     network, link = DEPLOY / "80-can0.network", DEPLOY / "80-can0.link"
     rate = value("BitRate", network)
     assert int(rate.removesuffix("K")) * 1000 == ControllerConfig.model_fields["bit_rate"].default
@@ -156,7 +156,7 @@ def test_network_file_has_the_controllers_bit_rate_and_keys_that_networkd_knows(
         assert b"CAN.BitRat3" not in known
 
 
-def test_group_of_the_device_is_that_of_the_service() -> None:
+def test_group_of_the_device_is_that_of_the_service():
     rules = (DEPLOY / "90-utank-hil.rules").read_text()
     assert f'GROUP="{value("SupplementaryGroups")}"' in rules
     assert value("SupplementaryGroups") != UNIT.stem  # else DynamicUser could not make its user
@@ -170,8 +170,8 @@ def test_group_of_the_device_is_that_of_the_service() -> None:
     [("law: {kind: gpc", ExitCode.USAGE), ("law: {kind: nothing}", ExitCode.USAGE)],
 )
 def test_what_the_check_refuses_the_run_refuses_with_the_code_that_is_not_tried_again(
-    wrong: str, code: ExitCode, tmp_path: Path
-) -> None:
+    wrong, code, tmp_path
+):
     path = tmp_path / "controller.yaml"
     ship = Path("configs/ships/thesis_first.yaml").resolve()
     path.write_text(f"name: wrong\nvessel: {ship}\n{wrong}\n", encoding="utf-8")
@@ -186,7 +186,7 @@ def instructions() -> list[tuple[str, str]]:
     return [tuple(line.split(maxsplit=1)) for line in lines]  # type: ignore[misc]
 
 
-def test_the_container_file_installs_what_make_wheel_writes() -> None:
+def test_the_container_file_installs_what_make_wheel_writes():
     written = set(re.findall(r"> (dist/\S+)", Path("Makefile").read_text(encoding="utf-8")))
     copied = set()
     for name, arguments in instructions():
@@ -203,7 +203,7 @@ def test_the_container_file_installs_what_make_wheel_writes() -> None:
     assert copied == written | {"dist/utank_hil-*.whl"}
 
 
-def test_the_images_run_commands_that_there_are_on_the_locked_python() -> None:
+def test_the_images_run_commands_that_there_are_on_the_locked_python():
     stages = [a for name, a in instructions() if name == "FROM"]
     base, first = stages[0].split(" AS ")
     assert [each.split(" AS ")[1] for each in stages] == ["ship", "bench"]

@@ -557,9 +557,7 @@ ROWS = [
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: ascii(row.name))
-def test_a_hostile_file_is_refused_in_words(
-    row: Row, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_hostile_file_is_refused_in_words(row, tmp_path, capfd, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = tmp_path / row.name
     if callable(row.content):
@@ -593,14 +591,14 @@ def told(words: list[str]) -> int:
     return int(ended.value.code or 0)
 
 
-def test_a_column_that_a_spreadsheet_would_run_is_text_in_a_copy(tmp_path: Path) -> None:
+def test_a_column_that_a_spreadsheet_would_run_is_text_in_a_copy(tmp_path):
     for name in ("=cmd|' /C calc'!A0", "+1", "-1+1", "@SUM(A1)"):
         (tmp_path / "a.csv").write_text(csv_of(name))
         if told(["export", str(tmp_path / "a.csv"), "--to", str(tmp_path / "to.csv")]) == 0:
             assert (tmp_path / "to.csv").read_text().splitlines()[0] == f"time_s,'{name}"
 
 
-def test_a_terminal_gets_no_signs_that_steer_it(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_terminal_gets_no_signs_that_steer_it(capsys):
     Terminal(width=200).say(f"a{ESCAPE}b\x9b31m\u202e", red="error:")
     said = capsys.readouterr().out
     assert said.strip().isprintable()
@@ -608,7 +606,7 @@ def test_a_terminal_gets_no_signs_that_steer_it(capsys: pytest.CaptureFixture[st
 
 
 @pytest.mark.parametrize("make", [os.mkfifo, linked("/dev/zero"), listening, linked("/etc/passwd")])
-def test_a_name_in_shared_memory_that_is_no_file_is_no_ring(make: Callable[[Path], object]) -> None:
+def test_a_name_in_shared_memory_that_is_no_file_is_no_ring(make):
     path = Path("/dev/shm") / f"utank-hostile-{os.getpid()}"
     make(path)
     try:
@@ -618,9 +616,7 @@ def test_a_name_in_shared_memory_that_is_no_file_is_no_ring(make: Callable[[Path
         path.unlink()
 
 
-def test_what_others_left_in_a_folder_of_recordings_is_passed_over(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_others_left_in_a_folder_of_recordings_is_passed_over(tmp_path, monkeypatch):
     theirs = tmp_path / "theirs"
     sparse(theirs)  # Its size counts for nothing, and it stays.
     (tmp_path / "run-1.rrd").symlink_to(theirs)
@@ -644,7 +640,7 @@ def test_what_others_left_in_a_folder_of_recordings_is_passed_over(
     assert theirs.stat().st_size == 1 << 40
 
 
-def test_a_record_takes_the_place_of_a_link_and_leaves_what_it_leads_to(tmp_path: Path) -> None:
+def test_a_record_takes_the_place_of_a_link_and_leaves_what_it_leads_to(tmp_path):
     theirs, record = tmp_path / "theirs", tmp_path / "a.commissioning.json"
     theirs.write_text("theirs")
     record.symlink_to(theirs)
@@ -653,9 +649,7 @@ def test_a_record_takes_the_place_of_a_link_and_leaves_what_it_leads_to(tmp_path
     assert not record.is_symlink()
 
 
-def test_a_folder_for_results_that_is_a_link_in_a_circle_or_a_socket_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_for_results_that_is_a_link_in_a_circle_or_a_socket_is_refused(tmp_path, capsys):
     (tmp_path / "circle").symlink_to("circle")
     listening(tmp_path / "socket")
     os.mkfifo(tmp_path / "pipe")
@@ -665,14 +659,14 @@ def test_a_folder_for_results_that_is_a_link_in_a_circle_or_a_socket_is_refused(
         assert f"{name}: " in capsys.readouterr().err
 
 
-def test_a_ring_of_another_user_is_not_mapped(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_ring_of_another_user_is_not_mapped(monkeypatch):
     with RingWriter(RingKind.ROWS, 16, 1, 8, {"columns": ["a", "b"]}) as writer:
         monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
         with pytest.raises(OSError, match="of another user"):
             RingReader(writer.name)
 
 
-def test_a_page_shows_names_and_texts_and_runs_none_of_them(tmp_path: Path) -> None:
+def test_a_page_shows_names_and_texts_and_runs_none_of_them(tmp_path):
     from utank_hil.pictures.report_page import write_report_page
 
     evil = "<script>alert(1)</script><img src=x onerror=alert(1)>"

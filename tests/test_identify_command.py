@@ -59,7 +59,7 @@ def accepted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
     return folder, identify(folder / "log.rrd", folder / "out")
 
 
-def test_recording_becomes_a_model_a_picture_and_a_configuration(accepted) -> None:
+def test_recording_becomes_a_model_a_picture_and_a_configuration(accepted):
     folder, result = accepted
     assert result.exit_code == 0, result.output
     assert (folder / "out" / "identification.png").stat().st_size > 10_000
@@ -70,9 +70,7 @@ def test_recording_becomes_a_model_a_picture_and_a_configuration(accepted) -> No
     assert config.vessel.ship.natural_frequency_rad_s == pytest.approx(2 * np.pi / 9.0, rel=0.01)
 
 
-def test_refused_model_leaves_reasons_and_nothing_of_an_earlier_acceptance(
-    accepted, tmp_path: Path
-) -> None:
+def test_refused_model_leaves_reasons_and_nothing_of_an_earlier_acceptance(accepted, tmp_path):
     shutil.copytree(accepted[0] / "out", tmp_path / "out")
     write_recording(tmp_path / "log.rrd", COLUMNS, {"run": _rows(4.0)})
     result = identify(tmp_path / "log.rrd", tmp_path / "out", "--json")
@@ -85,7 +83,7 @@ def test_refused_model_leaves_reasons_and_nothing_of_an_earlier_acceptance(
 
 
 @pytest.mark.evidence
-def test_configuration_that_is_read_is_not_written_over(accepted) -> None:
+def test_configuration_that_is_read_is_not_written_over(accepted):
     folder, _ = accepted
     given = folder / "out" / "identified_controller.yaml"
     content = given.read_text()
@@ -96,7 +94,7 @@ def test_configuration_that_is_read_is_not_written_over(accepted) -> None:
     assert given.read_text() == content
 
 
-def test_tables_hold_what_an_engineer_asks_for(accepted) -> None:
+def test_tables_hold_what_an_engineer_asks_for(accepted):
     _, result = accepted
     words = " ".join(result.stdout.split())
     for part in (
@@ -110,14 +108,14 @@ def test_tables_hold_what_an_engineer_asks_for(accepted) -> None:
 
 
 @pytest.mark.parametrize("value", ["nan", "inf"])
-def test_time_that_is_no_number_is_refused_by_its_option(tmp_path: Path, value: str) -> None:
+def test_time_that_is_no_number_is_refused_by_its_option(tmp_path, value):
     arguments = [str(tmp_path / "log.rrd"), str(CONFIG), "--from", value]
     result = CliRunner().invoke(app, ["identify", *arguments])
     assert result.exit_code == 2
     assert "--from must be a number of seconds" in result.stderr
 
 
-def test_file_that_is_no_recording_is_said_to_be_none(tmp_path: Path) -> None:
+def test_file_that_is_no_recording_is_said_to_be_none(tmp_path):
     (tmp_path / "log.rrd").write_bytes(b"not a recording")
     result = CliRunner().invoke(app, ["identify", str(tmp_path / "log.rrd"), str(CONFIG)])
     assert result.exit_code == 2

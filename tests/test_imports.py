@@ -74,11 +74,11 @@ def loaded_by(source: str) -> str:
     [COMMAND, f"import utank_hil.commands.run\n{CATALOGUE}", LOOP],
     ids=["command line", "run that reads the catalogue first", "loop"],
 )
-def test_controllers_process_loads_nothing_heavy(source: str) -> None:
+def test_controllers_process_loads_nothing_heavy(source):
     assert loaded_by(source) == ""
 
 
-def test_margins_are_judged_without_anything_heavy_because_run_does_it_first() -> None:
+def test_margins_are_judged_without_anything_heavy_because_run_does_it_first():
     source = """
 from pathlib import Path
 from utank_hil.console.admission import admit
@@ -89,12 +89,12 @@ assert admit(load_config(path, ControllerConfig), path).linear is not None
     assert loaded_by(source) == ""
 
 
-def test_an_emulated_ship_loads_no_reader_of_measurements() -> None:
+def test_an_emulated_ship_loads_no_reader_of_measurements():
     source = f"import firmware_sim.cli, firmware_sim.run\n{CATALOGUE}"
     assert not set(READERS) & set(loaded_by(source).split())
 
 
-def test_the_test_can_fail() -> None:
+def test_the_test_can_fail():
     assert loaded_by("import matplotlib") == "matplotlib"
 
 
@@ -164,9 +164,7 @@ PROJECT = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["pro
     ],
     ids=" ".join,
 )
-def test_the_controllers_commands_need_nothing_but_the_dependencies_without_extras(
-    words: tuple[str, ...],
-) -> None:
+def test_the_controllers_commands_need_nothing_but_the_dependencies_without_extras(words):
     done = without_extras("utank_hil", *words)
     assert done.returncode == 0, done.stderr
     loaded = done.stderr.splitlines()[-1].split()
@@ -184,9 +182,7 @@ def test_the_controllers_commands_need_nothing_but_the_dependencies_without_extr
 
 
 @pytest.mark.evidence
-def test_a_recording_that_can_not_be_is_said_with_the_extra_and_the_controller_runs(
-    tmp_path: Path,
-) -> None:
+def test_a_recording_that_can_not_be_is_said_with_the_extra_and_the_controller_runs(tmp_path):
     words = ("run", "configs/controllers/gpc.yaml", "--bus", "any0", "--duration", "0.3")
     done = without_extras("utank_hil", *words, "--out", str(tmp_path))
     assert done.returncode == 0, done.stderr
@@ -206,8 +202,8 @@ def test_a_recording_that_can_not_be_is_said_with_the_extra_and_the_controller_r
     ],
 )
 def test_a_command_whose_extra_is_missing_names_it_and_shows_no_traceback(
-    module: str, words: tuple[str, ...], package: str, tmp_path: Path
-) -> None:
+    module, words, package, tmp_path
+):
     (tmp_path / "x.rrd").touch()
     done = without_extras(module, *(str(tmp_path / w) if w == "x.rrd" else w for w in words))
     assert done.returncode == ExitCode.USAGE
@@ -218,7 +214,7 @@ def test_a_command_whose_extra_is_missing_names_it_and_shows_no_traceback(
     assert "Traceback" not in done.stderr
 
 
-def test_every_extra_is_one_of_the_project_and_holds_its_packages() -> None:
+def test_every_extra_is_one_of_the_project_and_holds_its_packages():
     extras = PROJECT["optional-dependencies"]
     held = {extra: " ".join(packages) for extra, packages in extras.items()}
     for package, extra in EXTRA_OF.items():

@@ -50,7 +50,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("utank_hil/attic.py", "", "every room has its layer"),
     ],
 )
-def test_a_wrong_import_is_found(copy: Path, file: str, line: str, contract: str) -> None:
+def test_a_wrong_import_is_found(copy, file, line, contract):
     path = copy / file
     before = path.read_text(encoding="utf-8") if path.exists() else None
     path.write_text((before or '"""Nothing."""\n') + f"\n{line}\n", encoding="utf-8")

@@ -624,9 +624,7 @@ def placed(reader: Reader, folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", KINDS_OF_FILES)
-def test_a_damaged_file_is_read_or_refused_in_words(
-    name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_damaged_file_is_read_or_refused_in_words(name, tmp_path, capfd):
     reader = KINDS_OF_FILES[name]
     examples = max(1, int(settings.default.max_examples // max(1, reader.cost)))
     with trial(placed(reader, tmp_path), reader.read, capfd, reader.streamed) as begun:
@@ -642,9 +640,7 @@ def test_a_damaged_file_is_read_or_refused_in_words(
 @pytest.mark.evidence
 @pytest.mark.timeout(0)
 @pytest.mark.parametrize("name", KINDS_OF_FILES)
-def test_ten_million_damaged_files_are_read_or_refused_in_words(
-    name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_ten_million_damaged_files_are_read_or_refused_in_words(name, tmp_path, capfd):
     reader = KINDS_OF_FILES[name]
     whole = sum(1 / each.cost for each in KINDS_OF_FILES.values())
     with trial(placed(reader, tmp_path), reader.read, capfd, reader.streamed) as begun:

@@ -126,13 +126,11 @@ def modules() -> list[tuple[Path, tuple[str, ...]]]:
 @pytest.mark.parametrize(
     ("path", "scopes"), modules(), ids=lambda value: value.name if isinstance(value, Path) else ""
 )
-def test_no_sum_or_function_of_a_tick_is_chosen_by_the_processor(
-    path: Path, scopes: tuple[str, ...]
-) -> None:
+def test_no_sum_or_function_of_a_tick_is_chosen_by_the_processor(path, scopes):
     assert not findings(path.read_text(), scopes)
 
 
-def test_each_room_part_and_exception_is_there() -> None:
+def test_each_room_part_and_exception_is_there():
     assert all(any(ROOT.glob(each)) for each in ROOMS)
     # one that needs to be named no more is held to the rule
     assert all(findings((ROOT / name).read_text()) for name in DESIGNS)
@@ -150,7 +148,7 @@ def test_each_room_part_and_exception_is_there() -> None:
      "y = sla.inv(a)", "y = numpy.dot(a, b)", "y = e(x)", "import scipy.linalg",
      "y = special.erf(x)", "y = cmath.exp(x)"],
 )  # fmt: skip
-def test_a_line_that_would_break_it_is_found(line: str) -> None:
+def test_a_line_that_would_break_it_is_found(line):
     imports = (
         "import cmath\nimport math\nimport numpy\nimport numpy as np\nimport numpy.linalg as sla\n"
         "from math import exp as e\nfrom scipy import special\nfrom scipy.linalg import solve\n"

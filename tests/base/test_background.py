@@ -21,12 +21,12 @@ def told_by_a_child(score: Path) -> str:
         return pipe.read()
 
 
-def test_it_runs_later_and_is_the_first_that_is_killed_for_memory() -> None:
+def test_it_runs_later_and_is_the_first_that_is_killed_for_memory():
     own = os.nice(0)
     assert told_by_a_child(background._SCORE).split() == [str(min(own + 5, 19)), "500"]
 
 
-def test_where_there_is_no_score_it_runs_later_all_the_same(tmp_path: Path) -> None:
+def test_where_there_is_no_score_it_runs_later_all_the_same(tmp_path):
     before = Path("/proc/self/oom_score_adj").read_text().strip()
     told = told_by_a_child(tmp_path / "missing" / "score").split()
     assert told == [str(min(os.nice(0) + 5, 19)), before]

@@ -5,7 +5,6 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -33,9 +32,7 @@ print(json.dumps([in_use(), Path(lockstep.__file__).suffix, digests]))
 """
 
 
-def test_the_digest_follows_every_source_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_digest_follows_every_source_file(tmp_path, monkeypatch):
     source = tmp_path / "utank_hil" / "module.py"
     source.parent.mkdir()
     source.write_text("ANSWER = 1\n")
@@ -50,9 +47,7 @@ def test_the_digest_follows_every_source_file(
     assert compiled.source_digest() != before
 
 
-def test_a_library_is_used_only_if_whole_and_of_the_present_source(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_library_is_used_only_if_whole_and_of_the_present_source(tmp_path, monkeypatch):
     monkeypatch.setattr(compiled, "FOLDER", tmp_path / "none")
     assert compiled.current_library() is None
     monkeypatch.setattr(compiled, "FOLDER", tmp_path)
@@ -69,11 +64,8 @@ def test_a_library_is_used_only_if_whole_and_of_the_present_source(
 
 @pytest.mark.parametrize("wanted", ["", "0"])
 def test_a_library_that_does_not_load_leaves_plain_python_with_a_line(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    wanted: str,
-) -> None:
+    tmp_path, monkeypatch, capsys, wanted
+):
     name = compiled.name_of_library(compiled.source_digest(), b"no library")
     (tmp_path / name).write_bytes(b"no library")
     monkeypatch.setattr(compiled, "FOLDER", tmp_path)
@@ -86,7 +78,7 @@ def test_a_library_that_does_not_load_leaves_plain_python_with_a_line(
 
 
 @pytest.mark.parametrize("compiler", ["no-such-compiler", "false"])
-def test_without_a_compiler_that_works_one_line_is_said(compiler: str) -> None:
+def test_without_a_compiler_that_works_one_line_is_said(compiler):
     code = (
         "from pathlib import Path; import tools.compiled as made;"
         f"made.current_library = lambda: None; made.CC = {compiler!r};"
@@ -107,7 +99,7 @@ def test_without_a_compiler_that_works_one_line_is_said(compiler: str) -> None:
     assert not done.stderr
 
 
-def test_no_module_that_is_compiled_has_a_dataclass_that_its_own_init_could_not_fill() -> None:
+def test_no_module_that_is_compiled_has_a_dataclass_that_its_own_init_could_not_fill():
     files = {file for each in PATTERNS for file in compiled.ROOT.glob(each)}
     classes = [
         (file.name, node)
@@ -129,7 +121,7 @@ def test_no_module_that_is_compiled_has_a_dataclass_that_its_own_init_could_not_
 
 @pytest.mark.evidence
 @pytest.mark.timeout(1200)
-def test_a_compiled_run_equals_the_plain_one_and_codecs_pass_their_tests() -> None:
+def test_a_compiled_run_equals_the_plain_one_and_codecs_pass_their_tests():
     def run(compiled: str) -> list[object]:
         environment = {**os.environ, "UTANK_HIL_COMPILED": compiled}
         done = subprocess.run(
@@ -147,7 +139,7 @@ def test_a_compiled_run_equals_the_plain_one_and_codecs_pass_their_tests() -> No
 
 
 @pytest.mark.slow
-def test_the_tick_translates_to_c_without_a_cache_from_before(tmp_path: Path) -> None:
+def test_the_tick_translates_to_c_without_a_cache_from_before(tmp_path):
     translate = (
         "from pathlib import Path; from tools.compiled import c_sources; c_sources(Path('{}'))"
     )

@@ -45,9 +45,7 @@ def pairwise(terms: list[float]) -> float:
 
 
 @given(SEEDS, st.integers(1, 6), SIZES, st.sampled_from("CFS"))
-def test_a_product_with_a_vector_has_the_stated_order(
-    seed: int, rows: int, size: int, memory: str
-) -> None:
+def test_a_product_with_a_vector_has_the_stated_order(seed, rows, size, memory):
     a, x = draw(seed, rows, size), draw(seed + 1, size)
     laid = {"C": a, "F": np.asfortranarray(a), "S": np.repeat(a, 2, axis=1)[:, ::2]}[memory]
     expected = [
@@ -58,9 +56,7 @@ def test_a_product_with_a_vector_has_the_stated_order(
 
 
 @given(SEEDS, st.integers(1, 4), st.integers(0, 40), st.integers(1, 4))
-def test_a_product_with_a_matrix_has_it_for_each_element(
-    seed: int, rows: int, size: int, columns: int
-) -> None:
+def test_a_product_with_a_matrix_has_it_for_each_element(seed, rows, size, columns):
     a, b = draw(seed, rows, size), draw(seed + 1, size, columns)
     found = product(np.asfortranarray(a), b)
     assert found.tolist() == [[float(product(row, column)) for column in b.T] for row in a]
@@ -70,21 +66,21 @@ def test_a_product_with_a_matrix_has_it_for_each_element(
 
 @given(arrays(np.float64, (4, 4), elements=st.floats(-20, 20)))
 @settings(max_examples=20)
-def test_exponential(a: FloatArray) -> None:
+def test_exponential(a):
     with mpmath.workdps(60):  # scipy's is a hundred times less exact where all entries are equal
         exact = np.array(mpmath.expm(mpmath.matrix(a.tolist())).tolist(), dtype=float)
     most = np.exp(np.abs(a).sum(axis=1).max())
     np.testing.assert_allclose(exponential(a), exact, rtol=0, atol=1e-13 * most)
 
 
-def test_exponential_of_a_rotation() -> None:
+def test_exponential_of_a_rotation():
     c, s = math.cos(40.0), math.sin(40.0)
     turned = exponential(np.array([[0.0, 40.0], [-40.0, 0.0]]))
     np.testing.assert_allclose(turned, [[c, s], [-s, c]], atol=2e-14)
 
 
 @pytest.mark.parametrize("condition", [1.0, 1e6, 1e12])
-def test_orthogonal_columns_and_a_triangle(condition: float) -> None:
+def test_orthogonal_columns_and_a_triangle(condition):
     a = draw(3, 60, 19) * np.geomspace(1, condition, 19)
     a[:, 5] = a[:, 4] * (1 + 1e-9 * draw(4, 60))  # nearly dependent
     orthogonal, triangle = orthogonal_triangle(a)

@@ -41,7 +41,7 @@ class Thing:
         refuse("thing", range_problems(self))
 
 
-def test_every_parameter_out_of_its_range_is_named() -> None:
+def test_every_parameter_out_of_its_range_is_named():
     with pytest.raises(ParameterError) as caught:
         Thing(-1.0, -2.0, 1.5, 10, 0.0, (1.0, math.nan), (1.0, 0.0), 0.0, 1.0)
     assert dict(caught.value.problems) == {
@@ -58,7 +58,7 @@ def test_every_parameter_out_of_its_range_is_named() -> None:
     assert str(caught.value).startswith("thing size must be positive and finite, got -1.0; ")
 
 
-def test_error_survives_the_way_from_another_process() -> None:
+def test_error_survives_the_way_from_another_process():
     error = ParameterError("thing", [("size", "must be positive")])
     again = pickle.loads(pickle.dumps(error))
     assert (str(again), again.problems) == (str(error), error.problems)
@@ -78,7 +78,7 @@ def test_error_survives_the_way_from_another_process() -> None:
         ]
     ),
 )
-def test_files_and_code_agree_on_what_a_range_holds(value: float, mark: Range) -> None:
+def test_files_and_code_agree_on_what_a_range_holds(value, mark):
     adapter = TypeAdapter(Annotated[float, mark])
     if mark.holds(value):
         assert adapter.validate_python(value) == value
@@ -87,11 +87,11 @@ def test_files_and_code_agree_on_what_a_range_holds(value: float, mark: Range) -
             adapter.validate_python(value)
 
 
-def test_number_of_hundreds_of_digits_is_in_no_range() -> None:
+def test_number_of_hundreds_of_digits_is_in_no_range():
     assert not Range().holds(10**400)
 
 
-def test_the_last_whole_number_of_a_range_is_in_it() -> None:
+def test_the_last_whole_number_of_a_range_is_in_it():
     most = (1 << 64) - 1
     assert Range(least=0, most=most).holds(most)
     assert not Range(least=0, most=most).holds(most + 1)
@@ -108,7 +108,7 @@ def test_the_last_whole_number_of_a_range_is_in_it() -> None:
         (Range(above=2), "must be above 2 and finite"),
     ],
 )
-def test_demand_says_which_ends_are_allowed(mark: Range, demand: str) -> None:
+def test_demand_says_which_ends_are_allowed(mark, demand):
     assert mark.demand == demand
 
 
@@ -147,7 +147,7 @@ def keys(owner: type) -> list[str]:
     return [field.name for field in fields(owner) if field.init]
 
 
-def test_every_number_of_a_file_has_its_range() -> None:
+def test_every_number_of_a_file_has_its_range():
     owners: set[type] = set()
     for model in (Vessel, ControllerConfig, Scenario):
         sections_in(model, owners)

@@ -62,16 +62,14 @@ def loaded_again(described: object, model: type[BaseModel], folder: Path) -> Bas
 
 
 @pytest.mark.parametrize(("path", "model"), SHIPPED, ids=lambda v: getattr(v, "stem", ""))
-def test_every_shipped_configuration_loads_again_from_what_is_said_of_it(
-    path: Path, model: type[BaseModel], tmp_path: Path
-) -> None:
+def test_every_shipped_configuration_loads_again_from_what_is_said_of_it(path, model, tmp_path):
     ran = load_config(path, model)
     again = loaded_again(content(ran, tmp_path), model, tmp_path)
     assert content(again, tmp_path) == content(ran, tmp_path)
     assert values(again) == values(ran)
 
 
-def test_measured_directions_load_again_too(tmp_path: Path) -> None:
+def test_measured_directions_load_again_too(tmp_path):
     seas = (CONFIGS / "seas").resolve()
     text = (CONFIGS / "scenarios" / "storm.yaml").read_text()
     text = text.replace("../seas", str(seas)).replace("../", f"{CONFIGS.resolve()}/")
@@ -84,7 +82,7 @@ def test_measured_directions_load_again_too(tmp_path: Path) -> None:
     assert again.sea.sea(1).heading_rad.tolist() == ran.sea.sea(1).heading_rad.tolist()
 
 
-def test_data_files_are_named_from_the_results_folder_with_their_hash(tmp_path: Path) -> None:
+def test_data_files_are_named_from_the_results_folder_with_their_hash(tmp_path):
     (tmp_path / "out").mkdir()
     told = describe("x", load_config(CONFIGS / "scenarios" / "storm.yaml", Scenario),
                     tmp_path / "out", options={})  # fmt: skip
@@ -97,7 +95,7 @@ def test_data_files_are_named_from_the_results_folder_with_their_hash(tmp_path: 
     assert digest == done.stdout.split()[0]
 
 
-def test_machine_and_program_are_said_and_nobodys_name(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_machine_and_program_are_said_and_nobodys_name(monkeypatch):
     before = datetime.now(UTC)
     home = Path("/home/somebody/ships/mine.yaml")
     options = {"config": home, "out": Path("out"), "seed": None}
@@ -118,9 +116,7 @@ def test_machine_and_program_are_said_and_nobodys_name(monkeypatch: pytest.Monke
     assert math.isinf(model.tank.headroom_m)
 
 
-def test_commit_is_that_of_the_tree_and_unknown_where_there_is_none(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_commit_is_that_of_the_tree_and_unknown_where_there_is_none(tmp_path, monkeypatch):
     commit.cache_clear()
     head = subprocess.run(["git", "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
     if head.returncode == 0:  # not so in an unpacked archive
@@ -141,7 +137,7 @@ def test_commit_is_that_of_the_tree_and_unknown_where_there_is_none(
 
 
 @pytest.mark.evidence
-def test_a_wheel_brings_its_commit_configurations_and_pages(tmp_path: Path) -> None:
+def test_a_wheel_brings_its_commit_configurations_and_pages(tmp_path):
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--quiet"]
     source = Path(__file__).parents[2]
     copy = tmp_path / "source"
@@ -167,7 +163,7 @@ def test_a_wheel_brings_its_commit_configurations_and_pages(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("application", [app, ship_app], ids=["utank-hil", "firmware-sim"])
-def test_both_commands_have_a_version(application) -> None:
+def test_both_commands_have_a_version(application):
     result = CliRunner().invoke(application, ["--version"])
     assert (result.exit_code, result.stdout) == (0, f"{headline()}\n{kernels(machine())}\n")
     assert re.fullmatch(r"utank-hil \d+\.\d+\.\d+\S*, commit \S+\n.+ libm .+\n", result.stdout)
@@ -175,9 +171,7 @@ def test_both_commands_have_a_version(application) -> None:
 
 @pytest.mark.evidence
 @pytest.mark.usefixtures("one_process")
-def test_figures_picture_and_recording_of_a_bench_hold_the_configuration_that_ran(
-    tmp_path: Path,
-) -> None:
+def test_figures_picture_and_recording_of_a_bench_hold_the_configuration_that_ran(tmp_path):
     words = ["bench", str(ONE_LAW), "--seed", "3", "--duration", "10", "--out", str(tmp_path)]
     result = CliRunner().invoke(app, [*words, "--json"])
     assert result.exit_code == 0, result.output
@@ -194,7 +188,7 @@ def test_figures_picture_and_recording_of_a_bench_hold_the_configuration_that_ra
 
 
 @pytest.mark.slow
-def test_figures_and_picture_of_a_design_hold_ship_and_scenario(tmp_path: Path) -> None:
+def test_figures_and_picture_of_a_design_hold_ship_and_scenario(tmp_path):
     vessel = CONFIGS / "ships" / "patti_b.yaml"
     words = ["design", "tank", str(vessel), "--scenario", str(PATTI_B), "--out", str(tmp_path)]
     result = CliRunner().invoke(app, [*words, "--json"])
@@ -210,7 +204,7 @@ def test_figures_and_picture_of_a_design_hold_ship_and_scenario(tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_recording_of_a_run_holds_where_it_comes_from(tmp_path: Path) -> None:
+def test_recording_of_a_run_holds_where_it_comes_from(tmp_path):
     config = load_config(CONFIGS / "controllers" / "gpc.yaml", ControllerConfig)
     about = describe("run", config, tmp_path, options={})
     recording = RunRecording(tmp_path, about=about)
@@ -220,7 +214,7 @@ def test_recording_of_a_run_holds_where_it_comes_from(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_recording_that_does_not_say_is_refused_with_its_name(tmp_path: Path) -> None:
+def test_recording_that_does_not_say_is_refused_with_its_name(tmp_path):
     recording = RunRecording(tmp_path)
     recording.stop()
     assert recording.summary.file is not None
@@ -228,9 +222,7 @@ def test_recording_that_does_not_say_is_refused_with_its_name(tmp_path: Path) ->
         read_about(Path(recording.summary.file))
 
 
-def test_a_git_at_work_in_the_source_tree_is_not_disturbed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_git_at_work_in_the_source_tree_is_not_disturbed(tmp_path, monkeypatch):
     def git(*words: str) -> None:
         who = ("-c", "user.name=x", "-c", "user.email=x@x")
         subprocess.run(["git", "-C", str(tmp_path), *who, *words], check=True)
@@ -255,7 +247,7 @@ def test_a_git_at_work_in_the_source_tree_is_not_disturbed(
     assert re.fullmatch("v1-1-g[0-9a-f]{12}", commit.__wrapped__())
 
 
-def test_kernels_of_an_older_processor_are_said() -> None:
+def test_kernels_of_an_older_processor_are_said():
     vectors = "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"
     older = {"NPY_DISABLE_CPU_FEATURES": vectors, "OPENBLAS_CORETYPE": "Nehalem"}
     code = (
@@ -271,6 +263,6 @@ def test_kernels_of_an_older_processor_are_said() -> None:
     assert there["blas"].endswith("openblas Nehalem")
 
 
-def test_a_log_that_says_nothing_of_its_machine_is_none_of_another() -> None:
+def test_a_log_that_says_nothing_of_its_machine_is_none_of_another():
     assert kernels({"platform": "Linux", "cpus": 2}) == ""
     assert machine()["libm"] in kernels(machine())

@@ -36,9 +36,7 @@ def read(path: Path) -> str:
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
 @pytest.mark.parametrize("packed", [bytes, gzip.compress])
-def test_line_ends_marks_and_gzip_make_no_difference(
-    tmp_path: Path, end: str, encoding: str, packed: type[bytes]
-) -> None:
+def test_line_ends_marks_and_gzip_make_no_difference(tmp_path, end, encoding, packed):
     path = written(tmp_path, packed(TEXT.replace("\n", end).encode(encoding)))
     assert read(path) == TEXT
     with open_text(path) as text:
@@ -51,20 +49,18 @@ def test_line_ends_marks_and_gzip_make_no_difference(
     ("name", "kind"),
     [("a.LOG", ".log"), ("a.b.Csv.GZ", ".csv"), ("a", ""), ("a.gz", ""), (".log", "")],
 )
-def test_the_kind_of_a_file_is_its_suffix_before_gz(name: str, kind: str) -> None:
+def test_the_kind_of_a_file_is_its_suffix_before_gz(name, kind):
     assert kind_of(Path(name)) == kind
 
 
-def test_members_of_an_archive_and_zeros_after_it_are_read_as_gzip_does(tmp_path: Path) -> None:
+def test_members_of_an_archive_and_zeros_after_it_are_read_as_gzip_does(tmp_path):
     packed = gzip.compress(b"one\n") + gzip.compress(b"two\n") + bytes(512)
     path = written(tmp_path, packed)
     assert read(path) == "one\ntwo\n" == gzip.decompress(packed).decode()
 
 
 @given(content=st.binary(max_size=400), cut=st.integers(0, 200), flip=st.integers(0, 200))
-def test_a_damaged_archive_is_read_up_to_there_and_said_so(
-    tmp_path_factory: pytest.TempPathFactory, content: bytes, cut: int, flip: int
-) -> None:
+def test_a_damaged_archive_is_read_up_to_there_and_said_so(tmp_path_factory, content, cut, flip):
     packed = bytearray(gzip.compress(content, mtime=0))
     cut %= len(packed)
     path = tmp_path_factory.getbasetemp() / "cut.gz"
@@ -84,7 +80,7 @@ def test_a_damaged_archive_is_read_up_to_there_and_said_so(
         assert file.read() == content or said
 
 
-def test_a_small_file_of_great_content_is_refused_with_the_limit(tmp_path: Path) -> None:
+def test_a_small_file_of_great_content_is_refused_with_the_limit(tmp_path):
     path = written(tmp_path, gzip.compress(bytes(1 << 24)))
     assert path.stat().st_size < 20_000
     with (
@@ -99,12 +95,12 @@ def test_a_small_file_of_great_content_is_refused_with_the_limit(tmp_path: Path)
 
 
 @pytest.mark.parametrize("content", [b"\xe9t\xe9\n", b"\xff\xfea", bz2.compress(b"a"), b"\x80"])
-def test_other_encodings_are_refused_with_the_remedy(tmp_path: Path, content: bytes) -> None:
+def test_other_encodings_are_refused_with_the_remedy(tmp_path, content):
     with pytest.raises(TextFileError, match=r"a\.csv: is no text in UTF-8"):
         read(written(tmp_path, content))
 
 
-def test_compressed_content_is_that_of_zlib(tmp_path: Path) -> None:
+def test_compressed_content_is_that_of_zlib(tmp_path):
     content = bytes(range(256)) * 3000
     packer = zlib.compressobj(wbits=31)
     path = written(tmp_path, packer.compress(content) + packer.flush())

@@ -1,6 +1,5 @@
 """Files are there whole or not at all, on a full disk too."""
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, tzinfo
 from pathlib import Path
@@ -35,9 +34,7 @@ def a_page(path: Path) -> None:
 
 
 @pytest.mark.parametrize("write", [a_text, a_recording, a_picture, a_page])
-def test_what_does_not_fit_is_named_and_not_left_in_half(
-    tmp_path: Path, write: Callable[[Path], None]
-) -> None:
+def test_what_does_not_fit_is_named_and_not_left_in_half(tmp_path, write):
     path = tmp_path / "file"
     write(path)
     assert path.stat().st_size > ROOM
@@ -46,7 +43,7 @@ def test_what_does_not_fit_is_named_and_not_left_in_half(
     assert not path.exists()
 
 
-def test_what_is_interrupted_is_not_left_in_half(tmp_path: Path) -> None:
+def test_what_is_interrupted_is_not_left_in_half(tmp_path):
     path = tmp_path / "file"
     with pytest.raises(KeyboardInterrupt), left_whole(path):  # noqa: PT012
         path.write_text("ha")
@@ -54,9 +51,7 @@ def test_what_is_interrupted_is_not_left_in_half(tmp_path: Path) -> None:
     assert not path.exists()
 
 
-def test_a_file_that_must_not_be_written_stays(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_that_must_not_be_written_stays(tmp_path, monkeypatch):
     def refuse(_path: Path, _content: bytes) -> int:
         raise PermissionError(13, "Permission denied")
 
@@ -68,13 +63,13 @@ def test_a_file_that_must_not_be_written_stays(
     assert path.read_text() == "mine"
 
 
-def test_a_full_device_stays_and_is_named() -> None:
+def test_a_full_device_stays_and_is_named():
     with pytest.raises(OSError, match="No space left on device: '/dev/full'"):
         write_whole(Path("/dev/full"), "text")
     assert Path("/dev/full").exists()
 
 
-def test_files_share_the_time_and_are_made(tmp_path: Path) -> None:
+def test_files_share_the_time_and_are_made(tmp_path):
     first, second = claimed_files(tmp_path, "run-{}.rrd", "run-{}.yaml")
     assert first.exists()
     assert second.exists()
@@ -82,9 +77,7 @@ def test_files_share_the_time_and_are_made(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("names", [("a-{}", "b-{}"), ("b-{}", "a-{}")])
-def test_a_link_that_leads_nowhere_is_never_written_through(
-    tmp_path: Path, names: tuple[str, str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_link_that_leads_nowhere_is_never_written_through(tmp_path, names, monkeypatch):
     class Still(datetime):
         @classmethod
         def now(cls, tz: tzinfo | None = None) -> "Still":
@@ -101,18 +94,18 @@ def test_a_link_that_leads_nowhere_is_never_written_through(
     )
 
 
-def test_many_at_once_each_get_their_own(tmp_path: Path) -> None:
+def test_many_at_once_each_get_their_own(tmp_path):
     with ThreadPoolExecutor(8) as pool:
         files = list(pool.map(lambda _: claimed_files(tmp_path, "run-{}.rrd")[0], range(40)))
     assert len(set(files)) == 40
 
 
-def test_name_whose_companion_is_there_is_taken(tmp_path: Path) -> None:
+def test_name_whose_companion_is_there_is_taken(tmp_path):
     _, second = claimed_files(tmp_path, "a-{}", "b-{}")
     _, third = claimed_files(tmp_path, "c-{}", "b-{}")
     assert third != second
 
 
-def test_folder_that_is_not_there_is_an_error(tmp_path: Path) -> None:
+def test_folder_that_is_not_there_is_an_error(tmp_path):
     with pytest.raises(OSError, match="missing"):
         claimed_files(tmp_path / "missing", "run-{}.rrd")

@@ -154,7 +154,7 @@ def combined(draw: st.DrawFn) -> list[dict[str, Any]]:
     ]
 
 
-def test_every_kind_of_fault_is_drawn() -> None:
+def test_every_kind_of_fault_is_drawn():
     known = {get_args(each.model_fields["kind"].annotation)[0] for each in get_args(KINDS)}
     # no native node can be replaced: only a CANopen device has an identity
     assert {*faults_of("SENSOR_MOTION", "sensors"), "replaced"} == known
@@ -171,5 +171,5 @@ def pair(*faults: dict[str, Any]) -> list[dict[str, Any]]:
 @example(pair({"kind": "length", "length": 0}, {"kind": "data_id"}))
 @example([{"kind": "second_panel"}, {"kind": "second_panel"}])
 @given(combined())
-def test_no_combination_of_faults_ends_the_bench(faults: list[dict[str, Any]]) -> None:
+def test_no_combination_of_faults_ends_the_bench(faults):
     assert run(faults).lockstep.now_ns == END_NS

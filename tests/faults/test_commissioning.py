@@ -74,7 +74,7 @@ def failed(node: CommissioningNode) -> dict[str, str]:
 @pytest.mark.parametrize(
     "name", ["gpc", "naval_constrained_gpc", "patti_b_constrained_gpc", "pump_with_valve"]
 )
-def test_every_shipped_ship_passes_with_room_to_spare(name: str) -> None:
+def test_every_shipped_ship_passes_with_room_to_spare(name):
     node = commissioned(controller(name), seed=2)
     assert node.stage is Stage.DONE
     assert not node.ended
@@ -138,12 +138,8 @@ def swapped(record: Record) -> Record:
     ],
 )  # fmt: skip
 def test_a_wrong_sensor_fails_its_own_checks_with_its_remedy(
-    healthy: CommissioningNode,
-    monkeypatch: pytest.MonkeyPatch,
-    wrong: Callable[[Record], Record],
-    names: set[str],
-    word: str,
-) -> None:
+    healthy, monkeypatch, wrong, names, word
+):
     assert not failed(healthy)
     monkeypatch.setattr(healthy, "rest", wrong(dict(healthy.rest)))
     monkeypatch.setattr(healthy, "moved", wrong(dict(healthy.moved)))
@@ -155,9 +151,7 @@ def test_a_wrong_sensor_fails_its_own_checks_with_its_remedy(
 @pytest.mark.evidence("0.6-blockage", "0.0-no pressure")
 @pytest.mark.parametrize(("factor", "word"), [(-1.0, "pushes to port"), (0.6, "blockage"),
                                               (0.0, "no pressure")])  # fmt: skip
-def test_a_pump_that_turns_the_other_way_is_weak_or_stalled_is_named(
-    factor: float, word: str
-) -> None:
+def test_a_pump_that_turns_the_other_way_is_weak_or_stalled_is_named(factor, word):
     def wrong(command: PumpCommand) -> PumpCommand:
         return command._replace(pressure_pa=factor * command.pressure_pa)
 
@@ -167,7 +161,7 @@ def test_a_pump_that_turns_the_other_way_is_weak_or_stalled_is_named(
 
 
 @pytest.mark.evidence
-def test_a_pressure_sensor_that_sends_nothing_but_zero_is_named() -> None:
+def test_a_pressure_sensor_that_sends_nothing_but_zero_is_named():
     def dead(pump: SensorPump) -> SensorPump:
         return pump._replace(pressure_pa=0.0)
 
@@ -175,7 +169,7 @@ def test_a_pressure_sensor_that_sends_nothing_but_zero_is_named() -> None:
     assert "no pressure" in found["pressure"]
 
 
-def test_another_tank_and_another_loading_fail_by_their_periods() -> None:
+def test_another_tank_and_another_loading_fail_by_their_periods():
     vessel = NAVAL.vessel
     shorter = replace(vessel.tank, duct_area_m2=1.4 * vessel.tank.duct_area_m2)
     found = failed(commissioned(NAVAL, nodes=another_ship(NAVAL, vessel.ship, shorter)))
@@ -188,7 +182,7 @@ def test_another_tank_and_another_loading_fail_by_their_periods() -> None:
     assert measured == pytest.approx(truth_s, rel=0.05)
 
 
-def test_a_list_that_gauges_and_motion_sensor_agree_on_is_named_by_the_roll_alone() -> None:
+def test_a_list_that_gauges_and_motion_sensor_agree_on_is_named_by_the_roll_alone():
     vessel = NAVAL.vessel
     heeled = replace(vessel.ship, offset_moment_nm=0.03 * vessel.ship.stiffness_nm_rad)
     node = commissioned(NAVAL, nodes=another_ship(NAVAL, heeled, vessel.tank))
@@ -198,7 +192,7 @@ def test_a_list_that_gauges_and_motion_sensor_agree_on_is_named_by_the_roll_alon
     assert node.node.mode is not Mode.ACTIVE
 
 
-def test_a_ship_that_moves_by_herself_is_not_pushed() -> None:
+def test_a_ship_that_moves_by_herself_is_not_pushed():
     scenario = still_water(NAVAL).model_copy(
         update={"sea": RegularSea(kind="regular", amplitude_m=0.02, period_s=5.6)}
     )
@@ -208,9 +202,7 @@ def test_a_ship_that_moves_by_herself_is_not_pushed() -> None:
     assert not node.moved
 
 
-def test_pulses_stay_within_their_bounds_and_the_pump_ends_at_zero(
-    healthy: CommissioningNode,
-) -> None:
+def test_pulses_stay_within_their_bounds_and_the_pump_ends_at_zero(healthy):
     plan, limits = plan_pulses(NAVAL.plant), NAVAL.limits
     assert plan.pressure_pa <= 0.12 * limits.pressure_pa
     assert plan.level_m <= 0.2 * limits.level_m
@@ -240,7 +232,7 @@ class LeavesTicksOut:
         return () if self._leaves_out(now_ns // TICK_NS) else self._node.tick(now_ns)
 
 
-def test_a_loop_held_up_measures_the_zeros_anew() -> None:
+def test_a_loop_held_up_measures_the_zeros_anew():
     node = build_commissioning_node(NAVAL)
     scenario = still_water(NAVAL)
     ship = build_ship_side(scenario, 1, scenario.operator).nodes
@@ -253,7 +245,7 @@ def test_a_loop_held_up_measures_the_zeros_anew() -> None:
     assert len(node.rest["roll_rad"]) == pytest.approx(REST_S / ROW_S, abs=1)
 
 
-def test_pulses_end_where_the_loop_is_held_up() -> None:
+def test_pulses_end_where_the_loop_is_held_up():
     node = build_commissioning_node(NAVAL)
     scenario = still_water(NAVAL)
     ship = build_ship_side(scenario, 1, scenario.operator).nodes
@@ -266,7 +258,7 @@ def test_pulses_end_where_the_loop_is_held_up() -> None:
 
 
 @pytest.mark.evidence
-def test_ticks_that_the_loop_leaves_out_leave_out_no_check() -> None:
+def test_ticks_that_the_loop_leaves_out_leave_out_no_check():
     config = controller("pump_with_valve")
     node = build_commissioning_node(config)
     scenario = still_water(config)
@@ -286,9 +278,7 @@ def test_ticks_that_the_loop_leaves_out_leave_out_no_check() -> None:
     ("late_ms", "limit_ms", "passes"),
     [(0, 150, True), (200, 150, False), (200, 350, True), (9e9, 350, False)],
 )
-def test_the_time_to_stop_is_measured_and_held_against_the_ships_file(
-    late_ms: float, limit_ms: float, passes: bool
-) -> None:
+def test_the_time_to_stop_is_measured_and_held_against_the_ships_file(late_ms, limit_ms, passes):
     """A drive that goes on with its last pressure for so long before it brakes."""
     vessel = NAVAL.vessel.model_copy(
         update={"devices": DevicesSection.model_validate({"pump": {"stop_within_ms": limit_ms}})}
@@ -323,7 +313,7 @@ def test_the_time_to_stop_is_measured_and_held_against_the_ships_file(
     assert failed(node).keys() == (set() if passes else {"stop_ms"})
 
 
-def test_who_arms_before_the_zeros_are_right_has_to_arm_again() -> None:
+def test_who_arms_before_the_zeros_are_right_has_to_arm_again():
     early = TimedAction(ARM_S - 10.0, Action.ARM)
     again = (TimedAction(ARM_S + 4.0, Action.DISARM), TimedAction(ARM_S + 6.0, Action.ARM))
     scenario = still_water(NAVAL).model_copy(update={"operator": (early, *again)})
@@ -336,7 +326,7 @@ def test_who_arms_before_the_zeros_are_right_has_to_arm_again() -> None:
     assert (node.stage, node.node.mode) == (Stage.MOVING, Mode.ACTIVE)
 
 
-def test_time_that_the_computer_was_up_for_costs_no_memory() -> None:
+def test_time_that_the_computer_was_up_for_costs_no_memory():
     node = build_commissioning_node(NAVAL)
     tracemalloc.start()
     try:
@@ -349,7 +339,7 @@ def test_time_that_the_computer_was_up_for_costs_no_memory() -> None:
     assert peak_bytes < 1_000_000
 
 
-def test_the_operators_stop_ends_it() -> None:
+def test_the_operators_stop_ends_it():
     stop = TimedAction(ARM_S + 8.0, Action.STOP)
     node = commissioned(NAVAL, stop)
     assert node.ended == "Disarmed before the end."
@@ -358,7 +348,7 @@ def test_the_operators_stop_ends_it() -> None:
     assert {check.name for check in node.checks()} >= {"pressure", "port_level"}
 
 
-def test_a_level_far_beyond_the_plan_ends_it() -> None:
+def test_a_level_far_beyond_the_plan_ends_it():
     def far(tank: SensorTank) -> SensorTank:
         return tank._replace(**{name: 4 * getattr(tank, name) for name in LEVELS})
 
@@ -367,7 +357,7 @@ def test_a_level_far_beyond_the_plan_ends_it() -> None:
     assert node.node.command_pa == 0.0
 
 
-def test_a_fault_ends_it_with_its_words() -> None:
+def test_a_fault_ends_it_with_its_words():
     begin_ns = round((ARM_S + 8.0) * SECOND)
 
     def high(tank: SensorTank) -> SensorTank:
@@ -378,7 +368,7 @@ def test_a_fault_ends_it_with_its_words() -> None:
     assert node.node.command_pa == 0.0
 
 
-def test_a_fault_in_the_moment_of_arming_ends_it_before_anything_moved() -> None:
+def test_a_fault_in_the_moment_of_arming_ends_it_before_anything_moved():
     """Not one row of what moved is recorded then."""
     scenario = still_water(NAVAL)
     ship = build_ship_side(scenario, 1, scenario.operator)
@@ -400,7 +390,7 @@ def test_a_fault_in_the_moment_of_arming_ends_it_before_anything_moved() -> None
 
 @pytest.mark.evidence("sensors_2")
 @pytest.mark.parametrize("silent", ["sensors", "sensors_2"])
-def test_a_second_motion_sensor_that_is_not_heard_is_waited_for(silent: str) -> None:
+def test_a_second_motion_sensor_that_is_not_heard_is_waited_for(silent):
     """The controller could do without; its zeros and signs would be those of nothing."""
     config = controller("valve_on_off")
     vessel = config.vessel.model_copy(
@@ -414,7 +404,7 @@ def test_a_second_motion_sensor_that_is_not_heard_is_waited_for(silent: str) -> 
     assert node.checks() == []
 
 
-def test_without_a_signs_meaning_two_faults_at_a_time_are_both_named() -> None:
+def test_without_a_signs_meaning_two_faults_at_a_time_are_both_named():
     remedies = remedies_of(Each(-1.0, 1.0, 1.0, -1.0, 1.0))
     assert "pushes to port" in remedies.pressure
     assert "Turn the motion sensor round" in remedies.roll
@@ -423,7 +413,7 @@ def test_without_a_signs_meaning_two_faults_at_a_time_are_both_named() -> None:
     assert "wrong sign" in remedies.rate
 
 
-def test_arming_is_refused_until_it_was_passed_and_the_bus_and_the_alarm_say_so() -> None:
+def test_arming_is_refused_until_it_was_passed_and_the_bus_and_the_alarm_say_so():
     events: list[AlarmEvent | RetuningEvent] = []
     scenario = still_water(NAVAL)
     ship = build_ship_side(scenario, 1, scenario.operator)
@@ -464,9 +454,7 @@ LEVELS_BY_PUMP = dict.fromkeys(LEVELS, (1 + SCALE) ** 2)
     ],
     ids=["rate too great", "rate too small", "levels", "levels and pressure", "pressure"],
 )
-def test_what_passes_at_the_quay_does_not_trip_at_sea(
-    scaled: dict[type, dict[str, float]],
-) -> None:
+def test_what_passes_at_the_quay_does_not_trip_at_sea(scaled):
     def by(factors: dict[str, float]) -> Callable[[Any], Any]:
         return lambda message: message._replace(
             **{name: factor * getattr(message, name) for name, factor in factors.items()}
@@ -497,9 +485,7 @@ def test_what_passes_at_the_quay_does_not_trip_at_sea(
         (60 / math.tau, {"drive_speed", "pressure", "port_level", "stop_ms"}),
     ],
 )
-def test_a_drive_that_tells_another_speed_than_the_pumps_is_named(
-    told: float, failed: set[str]
-) -> None:
+def test_a_drive_that_tells_another_speed_than_the_pumps_is_named(told, failed):
     drive = {
         "profile": "cia402", "bus": "can1", "node": 5, "mode": "torque",
         "pressure_pa_per_unit": 80.0, "speed_rad_s_per_unit": 1e-3, "identity": [1, 2, 3, 4],

@@ -86,7 +86,7 @@ def counters(frames: Sequence[Frame]) -> list[int]:
     return [(b.data[1] - a.data[1]) & 15 for a, b in pairwise(frames)]
 
 
-def test_without_faults_the_bench_is_the_plain_one() -> None:
+def test_without_faults_the_bench_is_the_plain_one():
     assert len(sound().of(MOTION)) == 50
     assert set(counters(sound().of(MOTION))) == {1}
     assert sound().bench.node.mode is Mode.ACTIVE
@@ -104,7 +104,7 @@ def test_without_faults_the_bench_is_the_plain_one() -> None:
          lambda k, true, first: true + 0.02 * (k % 10 == 0)),
     ],
 )  # fmt: skip
-def test_a_signal_is_wrong_as_stated_in_frames_that_are_intact(fault, expected) -> None:
+def test_a_signal_is_wrong_as_stated_in_frames_that_are_intact(fault, expected):
     bus = Bus({**fault, "message": "SENSOR_MOTION", "signals": ["roll_rad"]})
     true, shown = sound().said(MOTION, "roll_rad"), bus.said(MOTION, "roll_rad")
     for k, (right, wrong) in enumerate(zip(true, shown, strict=True)):
@@ -114,7 +114,7 @@ def test_a_signal_is_wrong_as_stated_in_frames_that_are_intact(fault, expected) 
     assert bus.said(MOTION, "roll_rate_rad_s")[:5] == sound().said(MOTION, "roll_rate_rad_s")[:5]
 
 
-def test_late_swapped_noisy_and_missing_values() -> None:
+def test_late_swapped_noisy_and_missing_values():
     late = Bus({"kind": "late", "message": "SENSOR_MOTION", "signals": ["roll_rad"], "by_s": 0.2})
     assert late.said(MOTION, "roll_rad")[20:25] == late.said(MOTION, "roll_rad")[20:21] + sound(
     ).said(MOTION, "roll_rad")[1:5]  # fmt: skip
@@ -144,7 +144,7 @@ def test_late_swapped_noisy_and_missing_values() -> None:
         ({"kind": "inserted", "back": 3}, {4, 13}, True),
     ],
 )
-def test_frames_are_spoiled_as_stated(fault, steps: set[int], intact: bool) -> None:
+def test_frames_are_spoiled_as_stated(fault, steps, intact):
     frames = Bus({**fault, "message": "SENSOR_MOTION"}).of(MOTION)
     assert set(counters(frames[4:])) == steps
     assert all((MOTION.decode(frame.data) is not None) is intact for frame in frames)
@@ -162,21 +162,21 @@ def test_frames_are_spoiled_as_stated(fault, steps: set[int], intact: bool) -> N
         ({"kind": "gateway", "does": "delays", "message": "SENSOR_MOTION", "by_s": 0.105}, 39),
     ],
 )
-def test_frames_are_lost_doubled_and_delayed(fault, count: int) -> None:
+def test_frames_are_lost_doubled_and_delayed(fault, count):
     assert len(Bus(fault).of(MOTION)) == pytest.approx(count, abs=1)
 
 
-def test_a_gateway_swaps_frames_of_one_identifier() -> None:
+def test_a_gateway_swaps_frames_of_one_identifier():
     swapped = Bus({"kind": "gateway", "does": "swaps", "message": "SENSOR_MOTION"})
     assert set(counters(swapped.of(MOTION))) == {3, 15}
 
 
-def test_wrong_length_is_on_the_wire() -> None:
+def test_wrong_length_is_on_the_wire():
     bus = Bus({"kind": "length", "message": "SENSOR_MOTION", "length": 3})
     assert {len(frame.data) for frame in bus.of(MOTION)} == {3}
 
 
-def test_bit_errors_cost_time_on_the_bus_and_no_frame() -> None:
+def test_bit_errors_cost_time_on_the_bus_and_no_frame():
     bus = Bus({"kind": "bit_errors", "share": 0.1})
     assert len(bus.of(MOTION)) == len(sound().of(MOTION))
     loads = [each.bench.bus.load(round(END_S * SECOND)) for each in (bus, sound())]
@@ -184,7 +184,7 @@ def test_bit_errors_cost_time_on_the_bus_and_no_frame() -> None:
     assert 0 < max(bus.bench.bus.error_counts.values()) < 128
 
 
-def test_broken_transceiver_is_passive_then_off_and_comes_back() -> None:
+def test_broken_transceiver_is_passive_then_off_and_comes_back():
     told: list[str] = []
     bus = Bus()
     bench = bus.bench
@@ -198,7 +198,7 @@ def test_broken_transceiver_is_passive_then_off_and_comes_back() -> None:
     assert min(sent) >= (END_S + 0.5) * SECOND
 
 
-def test_faults_of_a_scenario_are_in_its_runs_but_for_the_passive_one() -> None:
+def test_faults_of_a_scenario_are_in_its_runs_but_for_the_passive_one():
     lost = TypeAdapter(AnyFault).validate_python(
         {"kind": "lost", "message": "SENSOR_MOTION", "at_s": 7.0}
     )
@@ -216,7 +216,7 @@ def test_faults_of_a_scenario_are_in_its_runs_but_for_the_passive_one() -> None:
     }
 
 
-def test_a_bench_without_faults_has_the_frames_of_the_plain_one() -> None:
+def test_a_bench_without_faults_has_the_frames_of_the_plain_one():
     heard: list[tuple[int, str, Frame]] = []
     ship = build_ship_side(storm(), 1, (TimedAction(1.0, Action.ARM),))
     node = build_controller_node(storm().controllers["gpc"], law(), commissioned=True)
@@ -227,7 +227,7 @@ def test_a_bench_without_faults_has_the_frames_of_the_plain_one() -> None:
 
 
 @pytest.mark.parametrize("form", ["extended", "standard", "remote"])
-def test_flood_takes_its_share_of_the_bus(form: str) -> None:
+def test_flood_takes_its_share_of_the_bus(form):
     bus = Bus({"kind": "flood", "identifier": "7FF", "share": 0.5, "format": form})
     at_ns = round(END_S * SECOND)
     busy_s = [each.bench.bus.load(at_ns) * END_S for each in (bus, sound())]
@@ -235,7 +235,7 @@ def test_flood_takes_its_share_of_the_bus(form: str) -> None:
     assert bus.bench.node.inbox.foreign > 100
 
 
-def test_pump_drive_law_and_operator_fail() -> None:
+def test_pump_drive_law_and_operator_fail():
     stalled = Bus({"kind": "pump", "times": 0.0}).bench
     assert stalled.ship.plant.pressure_pa == 0.0 != sound().bench.ship.plant.pressure_pa
     assert not Bus({"kind": "drive", "fault": "OVERCURRENT"}).bench.ship.drive.enabled
@@ -249,7 +249,7 @@ def test_pump_drive_law_and_operator_fail() -> None:
     assert any(other.decode(frame.data).stop for frame in panel.of(other))
 
 
-def test_a_second_panel_comes_and_goes_when_its_fault_says() -> None:
+def test_a_second_panel_comes_and_goes_when_its_fault_says():
     bus = Bus({"kind": "second_panel", "at_s": 0.1, "for_s": 0.25})
     own = CATALOGUE.named("OPERATOR_CMD_2").codec.can_id
     times_s = [time_ns / SECOND for time_ns, _, frame in bus.heard if frame.can_id == own]
@@ -265,9 +265,7 @@ def test_a_second_panel_comes_and_goes_when_its_fault_says() -> None:
         {"kind": "gateway", "does": "loses", "message": "HARDWIRED_INPUTS"},
     ],
 )
-def test_a_fault_of_the_bus_that_needs_a_node_the_ship_has_not_is_refused(
-    fault: dict[str, object],
-) -> None:
+def test_a_fault_of_the_bus_that_needs_a_node_the_ship_has_not_is_refused(fault):
     assert missing_nodes(storm().vessel, [TypeAdapter(AnyFault).validate_python(fault)])
     fine = fault | ({"node": "sensors"} if "node" in fault else {"message": "SENSOR_TANK"})
     assert not missing_nodes(storm().vessel, [TypeAdapter(AnyFault).validate_python(fine)])
@@ -283,7 +281,7 @@ def placed(*faults: dict[str, object], until_s: float, arm_s: float | None = Non
 
 
 @pytest.mark.parametrize("fails_s", [0.1, 2.0], ids=["killed while it fails", "killed before"])
-def test_a_law_fails_in_a_controller_that_was_started_anew(fails_s: float) -> None:
+def test_a_law_fails_in_a_controller_that_was_started_anew(fails_s):
     killed = {"kind": "killed", "at_s": 0.2, "for_s": 0.2}
     failing = {"kind": "law", "fails": "raises", "at_s": fails_s, "for_s": 3.0}
     bench = placed(killed, failing, arm_s=1.5, until_s=2.5)
@@ -291,7 +289,7 @@ def test_a_law_fails_in_a_controller_that_was_started_anew(fails_s: float) -> No
     assert bench.node.fault is Fault.INTERNAL
 
 
-def test_a_law_whose_fault_is_over_when_it_is_started_anew_is_sound() -> None:
+def test_a_law_whose_fault_is_over_when_it_is_started_anew_is_sound():
     killed = {"kind": "killed", "at_s": 0.2, "for_s": 0.2}
     failing = {"kind": "law", "fails": "raises", "at_s": 0.1, "for_s": 0.25}
     bench = placed(killed, failing, arm_s=1.5, until_s=2.5)
@@ -299,7 +297,7 @@ def test_a_law_whose_fault_is_over_when_it_is_started_anew_is_sound() -> None:
     assert bench.node.mode is Mode.ACTIVE
 
 
-def test_a_pump_fails_between_its_own_times_whatever_other_faults_it_has() -> None:
+def test_a_pump_fails_between_its_own_times_whatever_other_faults_it_has():
     first = {"kind": "pump", "plus_pa": 8000.0, "off_too": True, "at_s": 0.2, "for_s": 0.5}
     second = {"kind": "pump", "times": 0.5, "at_s": 1.0}
     bench = placed(first, second, until_s=0.1)
@@ -313,7 +311,7 @@ def test_a_pump_fails_between_its_own_times_whatever_other_faults_it_has() -> No
     assert overlapping.ship.plant.pressure_pa == pytest.approx(8000.0)
 
 
-def test_a_sender_that_is_off_the_bus_comes_back_when_the_fault_at_hand_is_over() -> None:
+def test_a_sender_that_is_off_the_bus_comes_back_when_the_fault_at_hand_is_over():
     errors = {"kind": "bit_errors", "share": 1.0, "node": "sensors", "for_s": 0.3}
     bus = Bus({**errors, "at_s": 0.05}, {**errors, "at_s": 50.0})
     sent_s = [time_ns / SECOND - FAULT_S for time_ns, by, _ in bus.heard if by == "sensors"]
@@ -325,14 +323,14 @@ def test_a_sender_that_is_off_the_bus_comes_back_when_the_fault_at_hand_is_over(
 @pytest.mark.parametrize(
     ("by_s", "period_s", "late_s"), [(0.001, 0.01, 0.01), (0.025, 0.01, 0.03), (0.03, 0.01, 0.03)]
 )
-def test_a_delay_is_never_shorter_than_stated(by_s: float, period_s: float, late_s: float) -> None:
+def test_a_delay_is_never_shorter_than_stated(by_s, period_s, late_s):
     late = Bus({"kind": "late", "message": "SENSOR_MOTION", "signals": ["roll_rad"], "by_s": by_s})
     shift = round(late_s / period_s)
     true, shown = sound().said(MOTION, "roll_rad"), late.said(MOTION, "roll_rad")
     assert shown[: shift + 3] == [true[0]] * shift + true[:3]
 
 
-def test_an_impostor_sends_beside_the_sender() -> None:
+def test_an_impostor_sends_beside_the_sender():
     values = {"mode_request": "STANDBY", "arm": False, "stop": True, "reset": False,
               "acknowledge": False}  # fmt: skip
     bus = Bus({"kind": "impostor", "message": "OPERATOR_CMD", "values": values})
@@ -377,7 +375,7 @@ def test_an_impostor_sends_beside_the_sender() -> None:
          "faults.0.values.quality", "must be 0 to 15"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_named_at_its_key(written, key: str, words: str) -> None:
+def test_what_is_wrong_is_named_at_its_key(written, key, words):
     content = dict(storm()) | {"faults": [written]}  # the rest is checked already
     with pytest.raises(ValidationError) as caught:
         Scenario.model_validate(content)

@@ -15,7 +15,7 @@ HIGHER = NAVAL.model_copy(update={"sea": NAVAL.sea.model_copy(update={"hs_m": 0.
 
 @pytest.mark.evidence
 @pytest.mark.parametrize("seed", [2, 3, 4])
-def test_a_law_that_plans_keeps_its_level_limit_through_gaps_of_the_gauges(seed: int) -> None:
+def test_a_law_that_plans_keeps_its_level_limit_through_gaps_of_the_gauges(seed):
     """With the last level held it took the water to the high-level switches in all three seas."""
     bench = FaultBench(seed, ARMED, "constrained", scenario=HIGHER)
     bench.sensors.spoil = dropped(SensorTank)

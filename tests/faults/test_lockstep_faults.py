@@ -64,7 +64,7 @@ def stays_at_zero_though_the_panel_keeps_its_arm_bit(bench: FaultBench, since_ns
 
 
 @pytest.mark.parametrize("pause_ms", [80, 200, 2000])
-def test_controller_that_hangs_and_goes_on_finds_itself_disarmed(pause_ms: int) -> None:
+def test_controller_that_hangs_and_goes_on_finds_itself_disarmed(pause_ms):
     bench = armed_bench()
     bench.controller.begin_ns = T0
     bench.controller.end_ns = T0 + pause_ms * MS
@@ -74,7 +74,7 @@ def test_controller_that_hangs_and_goes_on_finds_itself_disarmed(pause_ms: int) 
     assert stays_at_zero_though_the_panel_keeps_its_arm_bit(bench, bench.controller.end_ns + TICK)
 
 
-def test_restarted_controller_is_in_standby_and_never_arms_by_itself() -> None:
+def test_restarted_controller_is_in_standby_and_never_arms_by_itself():
     bench = armed_bench()
     bench.controller.begin_ns, bench.controller.end_ns = T0, T0 + 2 * SECOND
     bench.controller.hangs = True
@@ -86,7 +86,7 @@ def test_restarted_controller_is_in_standby_and_never_arms_by_itself() -> None:
     assert {state for t, state in bench.heard.states if t > T0 + SECOND} == {DriveState.FAULT}
 
 
-def test_reset_and_a_new_press_of_arm_bring_it_back() -> None:
+def test_reset_and_a_new_press_of_arm_bring_it_back():
     script = (
         *ARMED,
         TimedAction(8.0, Action.DISARM),
@@ -126,9 +126,7 @@ FAULTS = [
     FAULTS,
     ids=lambda value: value if isinstance(value, str) else getattr(value, "name", None),
 )
-def test_fault_of_one_node_ends_at_zero_in_time_and_stays_there(
-    victim: str, failure: dict, fault: Fault, within_ns: int
-) -> None:
+def test_fault_of_one_node_ends_at_zero_in_time_and_stays_there(victim, failure, fault, within_ns):
     bench = armed_bench()
     node = getattr(bench, victim)
     for name, value in failure.items():
@@ -152,7 +150,7 @@ def test_fault_of_one_node_ends_at_zero_in_time_and_stays_there(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("victim", ["sensors", "drive", "controller", "panel"])
-def test_two_lost_ticks_do_not_disarm(victim: str) -> None:
+def test_two_lost_ticks_do_not_disarm(victim):
     bench = armed_bench()
     node = getattr(bench, victim)
     node.spoil = dropped()
@@ -172,7 +170,7 @@ def roll_without_a_fault_rad() -> float:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("victim", ["sensors", "drive", "controller", "panel"])
-def test_frames_sent_twice_are_taken_once(victim: str) -> None:
+def test_frames_sent_twice_are_taken_once(victim):
     """The second of each is refused as a repetition; what the first said stands.
 
     It lasts so short that nobody takes them for a second sender's.
@@ -185,7 +183,7 @@ def test_frames_sent_twice_are_taken_once(victim: str) -> None:
     assert twice.ship.plant.roll_rad == pytest.approx(roll_without_a_fault_rad(), abs=1e-4)
 
 
-def test_flood_of_the_bus_ends_at_zero_whoever_notices_first() -> None:
+def test_flood_of_the_bus_ends_at_zero_whoever_notices_first():
     """Frames of the highest priority starve all others: nobody hears anybody."""
     bench = armed_bench(extra=[Babbler(0, 2, T0, T0 + 2 * SECOND)])
     bench.run(7)
@@ -198,7 +196,7 @@ def test_flood_of_the_bus_ends_at_zero_whoever_notices_first() -> None:
     assert stays_at_zero_though_the_panel_keeps_its_arm_bit(bench, 9 * SECOND)
 
 
-def test_same_seed_same_trace_byte_for_byte_and_another_seed_another() -> None:
+def test_same_seed_same_trace_byte_for_byte_and_another_seed_another():
     traces = []
     for seed in (3, 3, 4):
         bench = FaultBench(seed=seed)
@@ -214,7 +212,7 @@ def test_same_seed_same_trace_byte_for_byte_and_another_seed_another() -> None:
 @pytest.mark.evidence
 @settings(max_examples=4)
 @given(seed=st.integers(0, 2**31), controller=st.sampled_from(sorted(storm().controllers)))
-def test_drive_never_refuses_a_frame_of_a_fault_free_run(seed: int, controller: str) -> None:
+def test_drive_never_refuses_a_frame_of_a_fault_free_run(seed, controller):
     bench = FaultBench(seed=seed, controller=controller)
     bench.run(15)
     assert bench.mode is Mode.ACTIVE
@@ -248,7 +246,7 @@ failures = st.lists(
 @pytest.mark.slow
 @settings(max_examples=8)  # of 0.2 s each
 @given(script=scripts, failures=failures, seed=st.integers(0, 100))
-def test_invariants_hold_under_paired_faults_and_any_operator(script, failures, seed: int) -> None:
+def test_invariants_hold_under_paired_faults_and_any_operator(script, failures, seed):
     timed = tuple(TimedAction(tenths / 10, action) for tenths, action in script)
     bench = FaultBench(seed=seed, script=(*ARMED, *timed))
     for victim, failure, tenths, length_ticks in failures:

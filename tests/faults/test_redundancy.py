@@ -97,7 +97,7 @@ def motion(change: Callable[[float, float], tuple[float, float]], address: Addre
     return alter
 
 
-def test_in_health_the_first_sensor_is_used_and_nothing_is_degraded() -> None:
+def test_in_health_the_first_sensor_is_used_and_nothing_is_degraded():
     bench = Bench()
     degraded = False
     while bench.lockstep.now_ns < 60 * SECOND:
@@ -109,7 +109,7 @@ def test_in_health_the_first_sensor_is_used_and_nothing_is_degraded() -> None:
 
 
 @pytest.mark.parametrize("first", [True, False])
-def test_one_silent_motion_sensor_leaves_the_other(first: bool) -> None:
+def test_one_silent_motion_sensor_leaves_the_other(first):
     bench = Bench()
     bench.fail("sensors" if first else "sensors_2", dropped(SensorMotion) if first else dropped())
     bench.run(T0_S + 5.0)
@@ -120,7 +120,7 @@ def test_one_silent_motion_sensor_leaves_the_other(first: bool) -> None:
     assert bench.node.motion.roll_rad == pytest.approx(bench.ship.plant.roll_rad, abs=0.01)
 
 
-def test_both_silent_end_it_in_time() -> None:
+def test_both_silent_end_it_in_time():
     bench = Bench()
     bench.fail("sensors", dropped(SensorMotion))
     bench.fail("sensors_2", dropped(), T0 + SECOND)
@@ -167,7 +167,7 @@ WRONG = {
         if (wrong, name) != ("noisy", "sensors_2")
     ],
 )
-def test_where_the_two_disagree_the_pressure_falls_to_zero(wrong: str, name: str) -> None:
+def test_where_the_two_disagree_the_pressure_falls_to_zero(wrong, name):
     """Within the roll that a wrong sensor may do: nobody knows which one is wrong."""
     change = WRONG.get(wrong) or (
         held() if wrong == "both stuck" else lambda roll, rate: (roll + 0.0175, rate)
@@ -182,7 +182,7 @@ def test_where_the_two_disagree_the_pressure_falls_to_zero(wrong: str, name: str
     assert bench.node.command_pa == 0.0
 
 
-def test_gauges_that_are_swapped_are_no_reason_to_change_the_motion_sensor() -> None:
+def test_gauges_that_are_swapped_are_no_reason_to_change_the_motion_sensor():
     bench = Bench()
 
     def swap(tank: SensorTank) -> SensorTank:
@@ -196,7 +196,7 @@ def test_gauges_that_are_swapped_are_no_reason_to_change_the_motion_sensor() -> 
     assert bench.used == 0
 
 
-def test_one_broken_node_cannot_hide_both_gauge_and_switch() -> None:
+def test_one_broken_node_cannot_hide_both_gauge_and_switch():
     def broken(tank: SensorTank) -> SensorTank:
         return SensorTank(0.0, 0.0, Switch.OFF, Switch.OFF, Quality.GOOD)
 
@@ -218,7 +218,7 @@ def test_one_broken_node_cannot_hide_both_gauge_and_switch() -> None:
     assert bench.node.command_pa == 0.0
 
 
-def test_the_hard_wired_stop_ends_it_at_once_and_holds_the_reset() -> None:
+def test_the_hard_wired_stop_ends_it_at_once_and_holds_the_reset():
     bench = Bench()
     hardwired = bench.ship.hardwired
     bench.run(T0_S)
@@ -230,7 +230,7 @@ def test_the_hard_wired_stop_ends_it_at_once_and_holds_the_reset() -> None:
     assert bench.node.command_pa == 0.0
 
 
-def test_a_stop_that_is_let_go_before_the_next_look_is_heard() -> None:
+def test_a_stop_that_is_let_go_before_the_next_look_is_heard():
     node = build_controller_node(config(), commissioned=True)
     transmitter = CATALOGUE.transmitter(HardwiredInputs)
     shut = HardwiredInputs(Switch.OFF, Switch.OFF, Switch.OFF, Quality.GOOD)
@@ -243,9 +243,7 @@ def test_a_stop_that_is_let_go_before_the_next_look_is_heard() -> None:
 
 
 @pytest.mark.parametrize("switch", [Switch.ON, Switch.ERROR, None])
-def test_a_stop_loop_that_is_not_shut_acts_out_of_sequence_and_in_bad_quality(
-    switch: Switch | None,
-) -> None:
+def test_a_stop_loop_that_is_not_shut_acts_out_of_sequence_and_in_bad_quality(switch):
     node = build_controller_node(config(), commissioned=True)
     transmitter = CATALOGUE.transmitter(HardwiredInputs)
     shut = HardwiredInputs(Switch.OFF, Switch.OFF, Switch.OFF, Quality.GOOD)
@@ -263,7 +261,7 @@ def test_a_stop_loop_that_is_not_shut_acts_out_of_sequence_and_in_bad_quality(
     assert not hardwired.stop
 
 
-def test_silent_hard_wired_inputs_end_it_and_are_waited_for() -> None:
+def test_silent_hard_wired_inputs_end_it_and_are_waited_for():
     bench = Bench()
     bench.fail("hardwired", dropped())
     found_s = bench.run_to_fault(T0_S + 1.0) - T0_S
@@ -275,7 +273,7 @@ def test_silent_hard_wired_inputs_end_it_and_are_waited_for() -> None:
     assert (bench.node.mode, bench.node.fault) == (Mode.INIT, Fault.HARDWIRED_SILENT)
 
 
-def test_a_second_motion_sensor_of_another_version_keeps_it_from_arming() -> None:
+def test_a_second_motion_sensor_of_another_version_keeps_it_from_arming():
     bench = Bench()
     node = bench.failing["sensors_2"].node
     node._housekeeping._configuration_version += 1  # type: ignore[attr-defined]
@@ -283,7 +281,7 @@ def test_a_second_motion_sensor_of_another_version_keeps_it_from_arming() -> Non
     assert (bench.node.mode, bench.node.fault) == (Mode.INIT, Fault.VERSION_MISMATCH)
 
 
-def test_a_ship_with_redundancy_is_another_configuration_and_one_without_is_as_before() -> None:
+def test_a_ship_with_redundancy_is_another_configuration_and_one_without_is_as_before():
     without, both = config(Redundancy()).vessel, config().vessel
     assert without.version == storm().vessel.version
     versions = {
@@ -295,7 +293,7 @@ def test_a_ship_with_redundancy_is_another_configuration_and_one_without_is_as_b
 
 
 @pytest.mark.evidence
-def test_commissioning_checks_the_second_sensor_against_the_first() -> None:
+def test_commissioning_checks_the_second_sensor_against_the_first():
     naval = controller("naval_constrained_gpc")
     vessel = naval.vessel.model_copy(update={"redundancy": BOTH})
     naval = naval.model_copy(update={"vessel": vessel})
@@ -325,23 +323,19 @@ def naval_with_both() -> ControllerConfig:
         (lambda roll, rate: (roll, rate + math.radians(0.04)), "roll_rate_2_zero"),
     ],
 )
-def test_commissioning_finds_each_error_of_the_second_sensor(
-    wrong: Callable[[float, float], tuple[float, float]], check: str
-) -> None:
+def test_commissioning_finds_each_error_of_the_second_sensor(wrong, check):
     node = commissioned(naval_with_both(), spoil={"sensors_2": motion(wrong, Address.SENSORS_2)})
     assert [each.name for each in node.checks() if not each.passed] == [check]
 
 
 @pytest.mark.slow
-def test_commissioning_ends_where_the_second_sensor_falls_silent_during_the_pulses() -> None:
+def test_commissioning_ends_where_the_second_sensor_falls_silent_during_the_pulses():
     begin_ns = round((ARM_S + 8.0) * SECOND)
     node = commissioned(naval_with_both(), spoil={"sensors_2": dropped()}, begin_ns=begin_ns)
     assert node.ended.startswith("A motion sensor is silent.")
 
 
-def test_a_sensor_that_falls_silent_in_the_tick_of_active_ends_the_commissioning(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_sensor_that_falls_silent_in_the_tick_of_active_ends_the_commissioning(monkeypatch):
     said = "A motion sensor is silent."
 
     def missing(node: CommissioningNode) -> str:
@@ -355,7 +349,7 @@ def test_a_sensor_that_falls_silent_in_the_tick_of_active_ends_the_commissioning
 @pytest.mark.evidence("-1.0")
 @pytest.mark.slow
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_commissioning_ends_where_the_level_goes_too_far_to_either_side(sign: float) -> None:
+def test_commissioning_ends_where_the_level_goes_too_far_to_either_side(sign):
     far = altered(
         SensorTank,
         lambda tank: tank._replace(port_level_m=-sign * 1.0, starboard_level_m=sign * 1.0),

@@ -111,7 +111,7 @@ IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED, UNDONE = RetuningState
 
 
 @pytest.mark.evidence
-def test_hung_or_dead_retuner_is_noticed_in_time_and_changes_nothing() -> None:
+def test_hung_or_dead_retuner_is_noticed_in_time_and_changes_nothing():
     hung = Voyage(Broken(None)).run(90)
     refusing = Voyage(Broken(Refusal(("no",)))).run(90)
     assert hung.states == [IDENTIFY, DESIGN, REFUSED]
@@ -124,7 +124,7 @@ def test_hung_or_dead_retuner_is_noticed_in_time_and_changes_nothing() -> None:
 
 
 @pytest.mark.evidence
-def test_after_a_refusal_the_law_is_the_one_it_was() -> None:
+def test_after_a_refusal_the_law_is_the_one_it_was():
     # with pulses of no pressure a refused identification leaves no trace at all
     def silent(retuner: Retuner | None) -> Voyage:
         voyage = Voyage(retuner)
@@ -152,7 +152,7 @@ def test_after_a_refusal_the_law_is_the_one_it_was() -> None:
         ),
     ],
 )
-def test_nonsense_that_looks_like_a_law_is_refused(nonsense: Candidate) -> None:
+def test_nonsense_that_looks_like_a_law_is_refused(nonsense):
     # the storm's GPC measures roll alone, so a law for two outputs is one for another ship
     voyage = Voyage(Broken(nonsense)).run(80)
     assert voyage.states == [IDENTIFY, DESIGN, REFUSED]
@@ -161,7 +161,7 @@ def test_nonsense_that_looks_like_a_law_is_refused(nonsense: Candidate) -> None:
 
 @pytest.mark.evidence("on trial")
 @pytest.mark.parametrize("failing", ["on trial", "all"])
-def test_law_that_fails_on_trial_is_never_in_charge_again(failing: str) -> None:
+def test_law_that_fails_on_trial_is_never_in_charge_again(failing):
     script = (*SCRIPT, TimedAction(75.0, Action.DISARM), TimedAction(77.0, Action.RESET),
               TimedAction(80.0, Action.ARM))  # fmt: skip
     voyage = Voyage(Broken(law_of(1e5)), script).run(66)
@@ -182,7 +182,7 @@ def test_law_that_fails_on_trial_is_never_in_charge_again(failing: str) -> None:
     assert np.isfinite(voyage.pressures()).all()
 
 
-def test_law_that_drives_the_roll_up_is_taken_back_within_its_limits() -> None:
+def test_law_that_drives_the_roll_up_is_taken_back_within_its_limits():
     voyage = Voyage(Broken(law_of(-1e6))).run(140)
     assert voyage.states == [IDENTIFY, DESIGN, TRIAL, REFUSED]
     assert "roll rose" in voyage.node.law.events[-1].reasons[0]
@@ -195,7 +195,7 @@ def test_law_that_drives_the_roll_up_is_taken_back_within_its_limits() -> None:
 
 
 @pytest.mark.evidence
-def test_swap_makes_no_step_beyond_the_rate_limit_even_to_the_opposite_law() -> None:
+def test_swap_makes_no_step_beyond_the_rate_limit_even_to_the_opposite_law():
     config = adaptive_config()
     voyage = Voyage(Broken(law_of(-2e5))).run(100)
     assert TRIAL in voyage.states
@@ -204,14 +204,14 @@ def test_swap_makes_no_step_beyond_the_rate_limit_even_to_the_opposite_law() -> 
 
 
 @pytest.mark.evidence
-def test_disarmed_while_identifying_it_ends_at_zero_and_stays_there() -> None:
+def test_disarmed_while_identifying_it_ends_at_zero_and_stays_there():
     script = (*SCRIPT, TimedAction(50.0, Action.STOP))
     voyage = Voyage(Broken(law_of(1e5)), script).run(70)
     assert voyage.states == [IDENTIFY, IDLE]
     assert set(voyage.pressures(50.3)) == {0.0}
 
 
-def test_operator_forbids_and_undoes_over_the_bus() -> None:
+def test_operator_forbids_and_undoes_over_the_bus():
     running = storm().controllers["gpc"].law.law(storm().controllers["gpc"].plant)
     same = replace(law_of(0.0), law=running.law, washout_rad_s=running.corner_rad_s)
     script = (*SCRIPT, TimedAction(70.0, Action.UNDO), TimedAction(80.0, Action.FORBID),
@@ -221,7 +221,7 @@ def test_operator_forbids_and_undoes_over_the_bus() -> None:
     assert voyage.shown == [IDLE, IDENTIFY, DESIGN, TRIAL, UNDONE]
 
 
-def test_without_a_retuner_the_status_says_so() -> None:
+def test_without_a_retuner_the_status_says_so():
     voyage = Voyage(None).run(3)
     assert voyage.shown == [None]
     assert all(isinstance(command, PumpCommand) for _, command in voyage.heard.commands)

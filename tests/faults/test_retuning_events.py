@@ -22,7 +22,7 @@ SETTINGS = RetuningSettings((6.0, 20.0), identification_s=10.0, trial_s=30.0, pu
 
 
 @pytest.mark.slow
-def test_events_are_handed_on_when_they_happen_and_no_event_twice() -> None:
+def test_events_are_handed_on_when_they_happen_and_no_event_twice():
     config = storm().controllers["gpc"].model_copy(update={"retuning": SETTINGS})
     heard: list[tuple[int, RetuningEvent]] = []
     times_s: list[float] = []

@@ -44,11 +44,11 @@ def time_to_find_s(name: str) -> float:
         ("patti_b_constrained_gpc", -0.5, 0.0),  # no monitor is fast enough
     ],
 )
-def test_the_budget_is_what_the_page_says(name: str, least_s: float, most_s: float) -> None:
+def test_the_budget_is_what_the_page_says(name, least_s, most_s):
     assert least_s <= time_to_find_s(name) <= most_s
 
 
-def test_the_rows_that_no_faster_monitor_watches_have_the_limit_of_the_budget() -> None:
+def test_the_rows_that_no_faster_monitor_watches_have_the_limit_of_the_budget():
     campaign = yaml.safe_load((ROOT / "configs/faults/campaign.yaml").read_text())
     limits = {row["id"]: row["limit"].get("found_ms") for row in campaign["rows"] if "limit" in row}
     assert {limits[row] for row in FOUND_BY_BUDGET} == {1e3 * BUDGET_S}

@@ -30,9 +30,7 @@ def scenario() -> Scenario:
 
 @pytest.mark.parametrize("controller", ["pump_with_valve", "on_off"])
 @pytest.mark.parametrize("flipped", [False, True])
-def test_both_signs_wrong_are_told_by_water_that_a_valve_holds_back(
-    controller: str, flipped: bool
-) -> None:
+def test_both_signs_wrong_are_told_by_water_that_a_valve_holds_back(controller, flipped):
     config = scenario().controllers[controller]
     script = (TimedAction(1.0, Action.ARM),)
     bench = FaultyBench(scenario(), config, build_law(config), seed=1, script=script)
@@ -43,7 +41,7 @@ def test_both_signs_wrong_are_told_by_water_that_a_valve_holds_back(
     assert (bench.node.mode is Mode.FAULT, bench.node.fault) == (flipped, told)
 
 
-def test_pump_law_that_is_turned_against_the_ship_is_found_by_her_twin() -> None:
+def test_pump_law_that_is_turned_against_the_ship_is_found_by_her_twin():
     config = scenario().controllers["pump_with_valve"]
     script = (TimedAction(1.0, Action.ARM),)
     bench = FaultyBench(scenario(), config, build_law(config), seed=11, script=script)
@@ -72,9 +70,7 @@ class Shut:
 
 @pytest.mark.evidence
 @pytest.mark.parametrize("pump", [False, True])
-def test_a_valve_that_rolls_the_ship_more_than_an_open_one_is_found_by_her_twin(
-    pump: bool,
-) -> None:
+def test_a_valve_that_rolls_the_ship_more_than_an_open_one_is_found_by_her_twin(pump):
     """In a long swell the shut valve leaves her 1.4 times the roll."""
     config = scenario().controllers["on_off"]
     vessel = config.vessel if pump else config.vessel.model_copy(update={"pump": None})

@@ -70,9 +70,7 @@ def passive() -> np.ndarray:
 @pytest.mark.parametrize(
     ("controller", "one_of"), [*((name, 0) for name in sorted(storm().controllers)), ("gpc", 10)]
 )
-def test_twin_rolls_as_the_passive_ship_does_within_three_percent(
-    controller: str, one_of: int, passive: np.ndarray
-) -> None:
+def test_twin_rolls_as_the_passive_ship_does_within_three_percent(controller, one_of, passive):
     bench, active = recorded(ARMED, controller, one_of)
     assert bench.mode is Mode.ACTIVE
     assert active[60:, 0].std() < 0.9 * passive[60:, 0].std()
@@ -82,7 +80,7 @@ def test_twin_rolls_as_the_passive_ship_does_within_three_percent(
 
 @pytest.mark.evidence("100")
 @pytest.mark.parametrize("one_of", [7, 100])
-def test_sensors_look_sound_whatever_share_of_the_ticks_is_lost(one_of: int) -> None:
+def test_sensors_look_sound_whatever_share_of_the_ticks_is_lost(one_of):
     bench, _ = recorded(ARMED, one_of=one_of, seconds=70)
     assert bench.mode is Mode.ACTIVE, bench.node.fault
     assert not bench.node.safety.situation.found

@@ -26,14 +26,14 @@ from judged_rows import CAMPAIGN, GOOD, ROWS, said, spoken, verdict
         ({"error": "ValueError: x"}, "ValueError"),
     ],
 )
-def test_one_seed_of_two_fails_the_row(change: dict[str, object], words: str) -> None:
+def test_one_seed_of_two_fails_the_row(change, words):
     assert spoken("both-signs-flipped", GOOD, GOOD).passed
     result = spoken("both-signs-flipped", GOOD, replace(GOOD, seed=2, **change))
     assert not result.passed
     assert any(words in problem for problem in result.problems)
 
 
-def test_in_charge_a_fault_may_roll_the_ship_as_the_sound_law_does_in_a_lull() -> None:
+def test_in_charge_a_fault_may_roll_the_ship_as_the_sound_law_does_in_a_lull():
     """Where that is more than the passive ship."""
     calm = replace(GOOD, mode="ACTIVE", found=None, code="NONE", noted=10.0, variance=1.5)
     assert spoken("roll-spike", replace(calm, sound_variance=1.45)).passed
@@ -43,7 +43,7 @@ def test_in_charge_a_fault_may_roll_the_ship_as_the_sound_law_does_in_a_lull() -
     assert not spoken("roll-spike", calm).passed  # of which no sound run is known
 
 
-def test_commands_that_change_faster_than_the_limit_fail_a_ramp() -> None:
+def test_commands_that_change_faster_than_the_limit_fail_a_ramp():
     limit_pa_s = CAMPAIGN.setups["pump"].config.limits.rate_pa_s
     ramp = replace(GOOD, row="motion-silent", found=50.0, zero=240.0, code="MOTION_SILENT")
     assert spoken("motion-silent", replace(ramp, steepest_pa_s=limit_pa_s)).passed
@@ -51,7 +51,7 @@ def test_commands_that_change_faster_than_the_limit_fail_a_ramp() -> None:
     assert [why.partition(" at ")[0] for why in fast.problems] == ["seed 1: commands changed"]
 
 
-def test_each_reaction_asks_for_its_own() -> None:
+def test_each_reaction_asks_for_its_own():
     calm = replace(GOOD, mode="ACTIVE", found=None, code="NONE")
     assert spoken("roll-spike", replace(calm, noted=10.0)).passed
     assert not spoken("roll-spike", replace(calm, noted=10.0, halved=20.0)).passed
@@ -77,12 +77,12 @@ def test_each_reaction_asks_for_its_own() -> None:
     assert not spoken("held-arm-bit", replace(refused, was_active=True)).passed
 
 
-def test_a_fault_that_is_latched_has_a_name_of_the_row() -> None:
+def test_a_fault_that_is_latched_has_a_name_of_the_row():
     other = replace(GOOD, code="OVERRUN", alarm=600.0)
     assert spoken("both-signs-flipped", other).problems == ("seed 1: called OVERRUN",)
 
 
-def test_where_nothing_is_latched_an_alarm_has_the_row_s_name_in_time() -> None:
+def test_where_nothing_is_latched_an_alarm_has_the_row_s_name_in_time():
     halved = replace(GOOD, mode="ACTIVE", found=None, code="NONE", halved=50.0)
     assert spoken("roll-drift-slow", replace(halved, alarm=30100.0)).passed
     late = spoken("roll-drift-slow", replace(halved, alarm=30101.0))
@@ -107,9 +107,7 @@ def test_where_nothing_is_latched_an_alarm_has_the_row_s_name_in_time() -> None:
         ("drive-warns", {"alarms": ()}, "no alarm with its name"),
     ],
 )
-def test_what_the_bus_was_not_told_fails_the_row(
-    row: str, change: dict[str, object], words: str
-) -> None:
+def test_what_the_bus_was_not_told_fails_the_row(row, change, words):
     outcome = {
         "both-signs-flipped": GOOD,
         "level-offset": replace(GOOD, code="SIGNAL_DELAYED", found=31e3, halved=1e3,
@@ -125,28 +123,26 @@ def test_what_the_bus_was_not_told_fails_the_row(
 
 
 @pytest.mark.parametrize(("halved_ms", "passed"), [(799.0, False), (800.0, True), (None, True)])
-def test_what_was_halved_for_less_than_two_cycles_need_not_be_in_a_status(
-    halved_ms: float | None, *, passed: bool
-) -> None:
+def test_what_was_halved_for_less_than_two_cycles_need_not_be_in_a_status(halved_ms, *, passed):
     latched = replace(GOOD, code="VOLUME", found=1000.0, zero=1200.0, halved=halved_ms)
     assert verdict("naval-level-offset", replace(said("naval-level-offset", latched), flags=())
                    ).passed is passed  # fmt: skip
 
 
-def test_where_the_bus_is_full_nothing_is_asked_of_what_was_said() -> None:
+def test_where_the_bus_is_full_nothing_is_asked_of_what_was_said():
     full = replace(GOOD, code="BUS_OVERLOAD", found=800.0, zero=820.0)
     assert verdict("flood-by-known-identifier", full).passed
     assert not verdict("bus-off", replace(full, code="BUS_LOST", found=0.0, zero=50.0)).passed
 
 
 @pytest.mark.parametrize("mode", ["STANDBY", "PASSIVE", "ACTIVE"])
-def test_a_reset_that_was_obeyed_while_the_cause_lasts_fails_the_row(mode: str) -> None:
+def test_a_reset_that_was_obeyed_while_the_cause_lasts_fails_the_row(mode):
     kept = replace(GOOD, row="reset-under-high-level", code="LEVEL_LIMIT", found=10, zero=30)
     assert spoken("reset-under-high-level", kept).passed
     assert not spoken("reset-under-high-level", replace(kept, mode=mode)).passed
 
 
-def test_minutes_later_a_run_may_end_in_the_faults_that_the_row_names() -> None:
+def test_minutes_later_a_run_may_end_in_the_faults_that_the_row_names():
     noisy = replace(GOOD, found=None, halved=50.0, alarm=100.0, code="DRIFT")
     assert spoken("noise-10-fold", noisy).passed
     assert not spoken("noise-10-fold", replace(noisy, code="OVERRUN")).passed
@@ -154,21 +150,21 @@ def test_minutes_later_a_run_may_end_in_the_faults_that_the_row_names() -> None:
     assert not spoken("level-noise", noisy).passed
 
 
-def test_a_ramp_that_comes_before_the_stop_has_the_stops_time() -> None:
+def test_a_ramp_that_comes_before_the_stop_has_the_stops_time():
     ramp = replace(GOOD, code="DRIFT", found=100.0, zero=1200.0)
     assert spoken("both-signs-flipped", ramp).passed
     assert spoken("both-signs-flipped", ramp).zero_limit_ms == 10950.0
     assert spoken("both-signs-flipped", GOOD).zero_limit_ms == 600.0
 
 
-def test_a_fault_that_refuses_arming_is_found() -> None:
+def test_a_fault_that_refuses_arming_is_found():
     refused = replace(GOOD, found=None, zero=0.0, mode="STANDBY", was_active=False)
     assert spoken("both-signs-from-start", refused).passed
     assert not spoken("both-signs-from-start", replace(refused, code="NONE")).passed
     assert not spoken("both-signs-flipped", refused).passed
 
 
-def test_the_worst_seed_counts_and_none_where_one_was_not_found() -> None:
+def test_the_worst_seed_counts_and_none_where_one_was_not_found():
     later = replace(GOOD, seed=2, found=700.0, zero=730.0)
     assert spoken("both-signs-flipped", GOOD, later).found_ms == 700.0
     missed = replace(GOOD, seed=2, found=None)

@@ -29,7 +29,7 @@ def under_pressure(redundancy: Redundancy) -> Bench:
     return bench
 
 
-def test_a_station_that_no_file_declares_takes_no_command_but_can_stop() -> None:
+def test_a_station_that_no_file_declares_takes_no_command_but_can_stop():
     bench = under_pressure(Redundancy())
     bench.second_is(**ORDER)
     assert bench.station is Station.OPERATOR
@@ -39,7 +39,7 @@ def test_a_station_that_no_file_declares_takes_no_command_but_can_stop() -> None
 
 
 @pytest.mark.parametrize("wrong", ["silent", "version"])
-def test_a_station_takes_the_command_only_live_and_of_the_right_version(wrong: str) -> None:
+def test_a_station_takes_the_command_only_live_and_of_the_right_version(wrong):
     bench = under_pressure(SECOND)
     if wrong == "silent":
         bench.second_beats = False
@@ -58,7 +58,7 @@ def test_a_station_takes_the_command_only_live_and_of_the_right_version(wrong: s
     assert bench.node.mode is Mode.ACTIVE
 
 
-def test_disarming_at_the_station_that_lost_the_command_still_disarms() -> None:
+def test_disarming_at_the_station_that_lost_the_command_still_disarms():
     bench = under_pressure(SECOND)
     bench.second_is(**ORDER)
     assert bench.station is Station.OPERATOR_2
@@ -69,7 +69,7 @@ def test_disarming_at_the_station_that_lost_the_command_still_disarms() -> None:
     assert bench.pressure_pa == 0.0
 
 
-def test_a_panel_that_is_not_alive_does_not_arm() -> None:
+def test_a_panel_that_is_not_alive_does_not_arm():
     """Its heartbeat matters at the edge and until ACTIVE, not that it once was there."""
     bench = ControllerBench()
     bench.run(1000)
@@ -81,7 +81,7 @@ def test_a_panel_that_is_not_alive_does_not_arm() -> None:
     assert bench.node.fault is Fault.OPERATOR_SILENT
 
 
-def test_versions_grow_old_under_pressure() -> None:
+def test_versions_grow_old_under_pressure():
     bench = ControllerBench()
     bench.drive_at(10e3)
     bench.silent.add(Heartbeat)
@@ -93,7 +93,7 @@ def test_versions_grow_old_under_pressure() -> None:
 
 
 @pytest.mark.parametrize("declared", [False, True])
-def test_hard_wired_inputs_are_obeyed_whenever_they_are_heard(declared: bool) -> None:
+def test_hard_wired_inputs_are_obeyed_whenever_they_are_heard(declared):
     bench = ControllerBench(redundancy=Redundancy(hardwired_inputs=declared))
     sender = CATALOGUE.transmitter(HardwiredInputs)
     for stop, high, fault in (
@@ -108,14 +108,14 @@ def test_hard_wired_inputs_are_obeyed_whenever_they_are_heard(declared: bool) ->
         assert (bench.node.mode, bench.node.fault, bench.pressure_pa) == (Mode.FAULT, fault, 0.0)
 
 
-def test_the_absence_of_hard_wired_inputs_is_judged_where_they_are_declared() -> None:
+def test_the_absence_of_hard_wired_inputs_is_judged_where_they_are_declared():
     bench = ControllerBench(redundancy=Redundancy(hardwired_inputs=True))
     bench.run(1000)
     assert bench.node.fault is not Fault.NONE
     assert bench.node.mode is Mode.INIT
 
 
-def test_a_drive_whose_faults_were_never_heard_is_not_ready() -> None:
+def test_a_drive_whose_faults_were_never_heard_is_not_ready():
     bench = ControllerBench()
     bench.silent.add(DriveStatus2)
     bench.run(1000)
@@ -125,7 +125,7 @@ def test_a_drive_whose_faults_were_never_heard_is_not_ready() -> None:
     assert bench.node.mode is Mode.STANDBY
 
 
-def test_orders_without_a_panel_s_heartbeat_take_nothing() -> None:
+def test_orders_without_a_panel_s_heartbeat_take_nothing():
     """Two bare frames of a second station took the command under pressure."""
     bench = under_pressure(SECOND)
     bench.second_beats = False

@@ -19,12 +19,12 @@ def longest_silence(late: int, commands: int = 200) -> int:
 
 
 @pytest.mark.parametrize("late", range(18))
-def test_commands_that_all_come_late_are_as_lost_as_those_that_do_not_come(late: int) -> None:
+def test_commands_that_all_come_late_are_as_lost_as_those_that_do_not_come(late):
     in_time = late <= 3 or late >= 16  # four bits of counter
     assert longest_silence(late) == (0 if in_time else 199 - late)
 
 
-def test_an_echo_that_stands_still_does_not_count_whatever_is_sent() -> None:
+def test_an_echo_that_stands_still_does_not_count_whatever_is_sent():
     echo = CommandEcho()
     for command in range(64):
         echo.sent(command % 16)
@@ -32,7 +32,7 @@ def test_an_echo_that_stands_still_does_not_count_whatever_is_sent() -> None:
     assert echo.heard_ns == 3
 
 
-def test_one_that_goes_to_and_fro_counts_only_where_the_commands_are() -> None:
+def test_one_that_goes_to_and_fro_counts_only_where_the_commands_are():
     echo = CommandEcho()
     silent = []
     for command in range(64):
@@ -42,7 +42,7 @@ def test_one_that_goes_to_and_fro_counts_only_where_the_commands_are() -> None:
     assert max(silent) >= 11
 
 
-def test_before_the_first_command_there_is_none() -> None:
+def test_before_the_first_command_there_is_none():
     assert CommandEcho(7).heard_ns == 7
     echo = CommandEcho()
     for counter in range(16):  # of a controller before this one

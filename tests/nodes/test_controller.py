@@ -55,7 +55,7 @@ START_NS = 7_000_000_123
 LEVEL = 20e3  # a pressure away from every limit
 
 
-def test_armed_controller_commands_the_laws_pressure_and_enables_the_drive_in_sequence() -> None:
+def test_armed_controller_commands_the_laws_pressure_and_enables_the_drive_in_sequence():
     bench = ControllerBench(START_NS)
     bench.arm()
     words = [command.control_word for _, command in bench.commands]
@@ -73,7 +73,7 @@ def test_armed_controller_commands_the_laws_pressure_and_enables_the_drive_in_se
     assert bench.status.configuration_version == VERSION
 
 
-def test_law_is_stepped_every_sample_time_with_the_newest_sample_armed_or_not() -> None:
+def test_law_is_stepped_every_sample_time_with_the_newest_sample_armed_or_not():
     bench = ControllerBench(START_NS)
     for index in range(200):
         bench.motion = SensorMotion(index * 1e-3, 0.0, Quality.GOOD)
@@ -86,7 +86,7 @@ def test_law_is_stepped_every_sample_time_with_the_newest_sample_armed_or_not() 
     np.testing.assert_allclose(stepped[:, 1], np.arange(0, 200, 20) * 2e-3, atol=1e-3)
 
 
-def test_lost_ticks_make_one_answer_late_and_do_not_stretch_the_sample_time() -> None:
+def test_lost_ticks_make_one_answer_late_and_do_not_stretch_the_sample_time():
     bench = ControllerBench(START_NS)
     rng = np.random.default_rng(5)
     stepped_ns, lost = [], 0
@@ -106,7 +106,7 @@ def test_lost_ticks_make_one_answer_late_and_do_not_stretch_the_sample_time() ->
     assert np.mean(commands) < 2.5
 
 
-def test_law_is_told_the_mean_of_what_left_before_each_answer() -> None:
+def test_law_is_told_the_mean_of_what_left_before_each_answer():
     bench = ControllerBench(START_NS)
     bench.arm()
     rng = np.random.default_rng(3)
@@ -127,12 +127,12 @@ def test_law_is_told_the_mean_of_what_left_before_each_answer() -> None:
     assert max(abs(told) for told in bench.law.told) > 20e3
 
 
-def test_sample_time_off_the_tick_is_refused() -> None:
+def test_sample_time_off_the_tick_is_refused():
     with pytest.raises(ValueError, match=r"0\.205 s is not a whole number of ticks"):
         ControllerBench(law=ToyLaw(sample_time_s=0.205))
 
 
-def test_no_frame_is_early_and_cycles_are_those_of_the_catalogue() -> None:
+def test_no_frame_is_early_and_cycles_are_those_of_the_catalogue():
     bench = ControllerBench(START_NS)
     bench.run(1000)
     times = [time_ns for time_ns, _ in bench.commands]
@@ -144,7 +144,7 @@ def test_no_frame_is_early_and_cycles_are_those_of_the_catalogue() -> None:
         assert [frame.can_id for frame in bench.sent].count(sender.can_id) == count
 
 
-def test_last_words_are_zero_pressure_and_quick_stop() -> None:
+def test_last_words_are_zero_pressure_and_quick_stop():
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
     bench.hear(bench.node.stop(bench.now_ns + 3 * MS))
@@ -152,7 +152,7 @@ def test_last_words_are_zero_pressure_and_quick_stop() -> None:
     assert bench.word is ControlWord.QUICK_STOP
 
 
-def test_operator_may_go_from_active_to_standby_only_down_the_ramp() -> None:
+def test_operator_may_go_from_active_to_standby_only_down_the_ramp():
     bench = ControllerBench(START_NS)
     bench.drive_at(LIMITS.pressure_pa)
     bench.order_is(mode_request=Mode.STANDBY, arm=False)
@@ -164,7 +164,7 @@ def test_operator_may_go_from_active_to_standby_only_down_the_ramp() -> None:
     assert bench.word is ControlWord.DISABLE_VOLTAGE
 
 
-def test_drive_fault_is_reset_only_on_the_operators_order() -> None:
+def test_drive_fault_is_reset_only_on_the_operators_order():
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
     bench.drive_follows = False
@@ -181,7 +181,7 @@ def test_drive_fault_is_reset_only_on_the_operators_order() -> None:
     assert bench.word is ControlWord.DISABLE_VOLTAGE
 
 
-def test_telemetry_tells_what_was_heard_commanded_and_decided() -> None:
+def test_telemetry_tells_what_was_heard_commanded_and_decided():
     statistics = LoopStatistics(overruns=4)
     statistics.lateness.add(2_000_000)
     statistics.duration.add(300_000)
@@ -209,7 +209,7 @@ def test_telemetry_tells_what_was_heard_commanded_and_decided() -> None:
     np.testing.assert_allclose(np.diff(bench.column("time_s")), 0.01, atol=1e-9)
 
 
-def test_bus_load_is_what_was_heard_and_said_over_the_time_it_took() -> None:
+def test_bus_load_is_what_was_heard_and_said_over_the_time_it_took():
     bench = ControllerBench(START_NS)
     bench.run(2000)
     # sent a second: 100 + 50 + 50 + 50 + 10 + 3 x 10 + 5 by the others, 50 + 3 x 10 by the node
@@ -221,7 +221,7 @@ def test_bus_load_is_what_was_heard_and_said_over_the_time_it_took() -> None:
     assert bench.column("bus_load")[-1] == pytest.approx(heard_and_said * 143 / 250e3, rel=0.02)
 
 
-def test_frames_of_other_kinds_load_the_bus() -> None:
+def test_frames_of_other_kinds_load_the_bus():
     bench = ControllerBench(START_NS)
     port = ToyPort()
     loop = RealTimeLoop([bench.node], port, clock=FakeClock())
@@ -240,9 +240,7 @@ def test_frames_of_other_kinds_load_the_bus() -> None:
     ("statistics", "told"),
     [(None, False), (LoopStatistics(real_time=True), False), (LoopStatistics(), True)],
 )
-def test_status_tells_of_a_loop_without_real_time_scheduling(
-    statistics: LoopStatistics | None, told: bool
-) -> None:
+def test_status_tells_of_a_loop_without_real_time_scheduling(statistics, told):
     bench = ControllerBench(statistics=statistics)
     bench.run(200)
     assert bench.status.not_realtime is told
@@ -252,7 +250,7 @@ ESTIMATED = SIGNALS[SIGNALS.index("significant_height_m") :]
 
 
 @pytest.mark.parametrize("index", range(len(SIGNALS) - len(ESTIMATED)))
-def test_every_signal_but_the_estimates_is_finite_from_the_first_row(index: int) -> None:
+def test_every_signal_but_the_estimates_is_finite_from_the_first_row(index):
     plant = DesignPlant(VESSEL.ship, VESSEL.tank)
     bench = ControllerBench(monitors=Monitors(plant, 0.35, SensorFigures(), 250_000))
     bench.tick()
@@ -262,7 +260,7 @@ def test_every_signal_but_the_estimates_is_finite_from_the_first_row(index: int)
     assert math.isfinite(bench.rows[0][index]) != (untold and not verdict)
 
 
-def test_rows_follow_the_motion_in_every_tick_and_the_estimates_within_100_ms() -> None:
+def test_rows_follow_the_motion_in_every_tick_and_the_estimates_within_100_ms():
     bench = ControllerBench()
     changed_s = []
     for number in range(40):
@@ -277,7 +275,7 @@ def test_rows_follow_the_motion_in_every_tick_and_the_estimates_within_100_ms() 
     np.testing.assert_allclose(np.diff(changed_s), 0.1)
 
 
-def test_until_the_water_obeyed_the_pressure_is_a_quarter() -> None:
+def test_until_the_water_obeyed_the_pressure_is_a_quarter():
     plant = DesignPlant(VESSEL.ship, VESSEL.tank)
     monitors = Monitors(plant, 0.35, SensorFigures(), 250_000)
     bench = ControllerBench(START_NS, monitors=monitors)
@@ -297,7 +295,7 @@ def test_until_the_water_obeyed_the_pressure_is_a_quarter() -> None:
 
 
 @pytest.mark.parametrize("pump", [True, False])
-def test_a_pressure_that_is_held_is_degraded_where_there_is_a_pump(pump: bool) -> None:
+def test_a_pressure_that_is_held_is_degraded_where_there_is_a_pump(pump):
     plant = DesignPlant(VESSEL.ship, VESSEL.tank)
     monitors = Monitors(plant, 0.35, SensorFigures(), 250_000)
     bench = ControllerBench(START_NS, monitors=monitors, pump=pump)
@@ -310,7 +308,7 @@ def test_a_pressure_that_is_held_is_degraded_where_there_is_a_pump(pump: bool) -
     assert bench.status.degraded is pump
 
 
-def test_the_status_says_when_drive_or_command_is_at_a_limit() -> None:
+def test_the_status_says_when_drive_or_command_is_at_a_limit():
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
     bench.law.answer_pa = 2 * LIMITS.pressure_pa
@@ -323,7 +321,7 @@ def test_the_status_says_when_drive_or_command_is_at_a_limit() -> None:
         assert bench.status.saturated is told
 
 
-def test_one_late_tick_is_an_alarm_and_no_more() -> None:
+def test_one_late_tick_is_an_alarm_and_no_more():
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
     bench.run(200)
@@ -336,7 +334,7 @@ def test_one_late_tick_is_an_alarm_and_no_more() -> None:
     assert bench.pressure_pa == LEVEL
 
 
-def test_heartbeat_tells_the_fault() -> None:
+def test_heartbeat_tells_the_fault():
     bench = ControllerBench(START_NS)
     beats = CATALOGUE.receiver(Heartbeat, Address.CONTROLLER)
     bench.drive_at(LEVEL)
@@ -398,9 +396,7 @@ class NotedSamples:
 
 
 @pytest.mark.parametrize("kind", [SensorMotion, SensorTank])
-def test_a_sample_is_fresh_only_if_motion_and_levels_are(
-    kind: type, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_sample_is_fresh_only_if_motion_and_levels_are(kind, monkeypatch):
     estimator: Any = NotedSamples()
     updates = NotedUpdates()
     bench = ControllerBench(START_NS, law=updates, estimator=estimator)
@@ -419,9 +415,7 @@ def test_a_sample_is_fresh_only_if_motion_and_levels_are(
 
 @pytest.mark.parametrize("kind", [SensorMotion, SensorTank])
 @pytest.mark.parametrize(("age_ms", "fresh"), [(40, True), (60, False)])
-def test_a_measurement_is_a_gap_in_the_record_from_50_ms_on(
-    kind: type, age_ms: int, fresh: bool
-) -> None:
+def test_a_measurement_is_a_gap_in_the_record_from_50_ms_on(kind, age_ms, fresh):
     estimator: Any = NotedSamples()
     bench = ControllerBench(START_NS, estimator=estimator)
     bench.run(1010 - age_ms)
@@ -431,15 +425,13 @@ def test_a_measurement_is_a_gap_in_the_record_from_50_ms_on(
     assert estimator.fresh[-1] is fresh
 
 
-def test_the_motion_is_sampled_for_its_record_five_times_a_second() -> None:
+def test_the_motion_is_sampled_for_its_record_five_times_a_second():
     estimator: Any = NotedSamples()
     ControllerBench(START_NS, estimator=estimator).run(2000)
     assert np.diff(estimator.times_ns).tolist() == [200 * MS] * 9
 
 
-def test_retuning_is_engaged_while_the_law_is_in_charge_and_not_on_the_ramp(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_retuning_is_engaged_while_the_law_is_in_charge_and_not_on_the_ramp(monkeypatch):
     noted = NotedUpdates()
     bench = ControllerBench(START_NS, law=noted)
     bench.run(400)
@@ -455,9 +447,7 @@ def test_retuning_is_engaged_while_the_law_is_in_charge_and_not_on_the_ramp(
 
 
 @pytest.mark.parametrize("phase_ms", range(0, 200, 50))
-def test_a_law_is_in_charge_from_the_first_answer_after_arming(
-    phase_ms: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_law_is_in_charge_from_the_first_answer_after_arming(phase_ms, monkeypatch):
     noted = NotedUpdates()
     bench = ControllerBench(START_NS, law=noted)
     bench.run(400 + phase_ms)
@@ -471,8 +461,8 @@ def test_a_law_is_in_charge_from_the_first_answer_after_arming(
 
 @pytest.mark.parametrize("phase_ms", range(0, 200, 10))
 def test_whoever_disarms_and_arms_between_two_answers_is_out_of_charge_for_one(
-    phase_ms: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    phase_ms, monkeypatch
+):
     """A retuning under way has to end, whenever that was."""
     noted = NotedUpdates()
     bench = ControllerBench(START_NS, law=noted)
@@ -490,9 +480,7 @@ def test_whoever_disarms_and_arms_between_two_answers_is_out_of_charge_for_one(
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
-def test_a_law_that_asks_for_anything_gets_the_limit_and_half_of_it_when_degraded(
-    sign: int,
-) -> None:
+def test_a_law_that_asks_for_anything_gets_the_limit_and_half_of_it_when_degraded(sign):
     bench = ControllerBench(START_NS)
     bench.arm()
     bench.law.answer_pa = sign * 1e12
@@ -505,9 +493,7 @@ def test_a_law_that_asks_for_anything_gets_the_limit_and_half_of_it_when_degrade
     assert bench.pressure_pa == sign * LIMITS.pressure_pa / 2
 
 
-def test_degraded_is_what_she_stands_where_half_of_it_could_capsize_her(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_degraded_is_what_she_stands_where_half_of_it_could_capsize_her(monkeypatch):
     monitors = Monitors(DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures(), 250_000)
     monitors.thresholds = replace(monitors.thresholds, degraded_share=0.125)
     monitors.confirmed = True
@@ -522,9 +508,7 @@ def test_degraded_is_what_she_stands_where_half_of_it_could_capsize_her(
         assert bench.node.law.share(bench.node.judgement) == share
 
 
-def test_without_retuning_nothing_excuses_the_ship_from_her_twin(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_without_retuning_nothing_excuses_the_ship_from_her_twin(monkeypatch):
     monitors = Monitors(DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures(), 250_000)
     excused: list[bool] = []
     monkeypatch.setattr(monitors.twin, "excuse", lambda: excused.append(True))
@@ -534,8 +518,8 @@ def test_without_retuning_nothing_excuses_the_ship_from_her_twin(
 
 @pytest.mark.parametrize("excused", [False, True])
 def test_every_law_that_is_not_excused_is_judged_by_the_twin_of_its_own_ship(
-    *, excused: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    *, excused, monkeypatch
+):
     monitors = Monitors(DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures(), 250_000)
     noted = NotedUpdates()
     bench = ControllerBench(START_NS, law=noted, monitors=monitors)
@@ -557,21 +541,21 @@ def monitored() -> ControllerBench:
     return bench
 
 
-def test_a_spike_does_not_reach_the_law() -> None:
+def test_a_spike_does_not_reach_the_law():
     bench = monitored()
     bench.motion = SensorMotion(0.3, 0.0, Quality.GOOD)
     bench.tick()
     assert bench.node.motion.roll_rad == 0.0
 
 
-def test_a_second_sender_of_any_message_is_found() -> None:
+def test_a_second_sender_of_any_message_is_found():
     bench = monitored()
     bench.spoil = lambda kind, frame: (frame,) * (2 if kind is SensorMotion else 1)
     bench.run(1000)
     assert bench.node.fault is Fault.FOREIGN_SENDER
 
 
-def test_a_message_that_is_expected_is_missed() -> None:
+def test_a_message_that_is_expected_is_missed():
     bench = monitored()
     bench.run(1000)
     assert not bench.node.safety.supervisor.degraded
@@ -581,7 +565,7 @@ def test_a_message_that_is_expected_is_missed() -> None:
     assert not bench.node.safety.supervisor.degraded
 
 
-def test_frames_of_other_kinds_fill_the_bus_too() -> None:
+def test_frames_of_other_kinds_fill_the_bus_too():
     bench = monitored()
     for _ in range(200):
         bench.node.other_frames(3)
@@ -591,7 +575,7 @@ def test_frames_of_other_kinds_fill_the_bus_too() -> None:
     assert bench.node.safety.situation.bus_load > 0.15
 
 
-def test_plans_that_were_not_found_and_the_state_of_retuning_are_the_laws() -> None:
+def test_plans_that_were_not_found_and_the_state_of_retuning_are_the_laws():
     assert ControllerBench(law=PlanningLaw()).node.law.fallbacks == 3
     bench = ControllerBench(START_NS)
     assert bench.node.law.fallbacks is None
@@ -605,7 +589,7 @@ def test_plans_that_were_not_found_and_the_state_of_retuning_are_the_laws() -> N
     assert bench.status.retuning is RetuningState.TRIAL
 
 
-def test_without_a_pump_nothing_is_ever_commanded() -> None:
+def test_without_a_pump_nothing_is_ever_commanded():
     bench = ControllerBench(START_NS, pump=False)
     bench.arm()
     bench.law.answer_pa = 30e3
@@ -615,7 +599,7 @@ def test_without_a_pump_nothing_is_ever_commanded() -> None:
     assert not bench.commands
 
 
-def test_events_of_retuning_need_nobody_who_takes_them(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_events_of_retuning_need_nobody_who_takes_them(monkeypatch):
     noted = NotedUpdates()
     bench = ControllerBench(START_NS, law=noted)
     event = RetuningEvent(START_NS, RetuningState.IDLE, ())
@@ -640,7 +624,7 @@ def times_ms(bench: ControllerBench, kind: type, ms: int) -> list[int]:
     return times
 
 
-def test_what_is_estimated_is_said_in_its_cycle_and_only_where_it_is_estimated() -> None:
+def test_what_is_estimated_is_said_in_its_cycle_and_only_where_it_is_estimated():
     plant = DesignPlant(VESSEL.ship, VESSEL.tank)
     monitors = Monitors(plant, 0.35, SensorFigures(), 250_000)
     estimator: Any = NotedSamples()
@@ -656,7 +640,7 @@ def test_what_is_estimated_is_said_in_its_cycle_and_only_where_it_is_estimated()
         assert not times_ms(ControllerBench(START_NS), kind, 3 * cycle_ms)
 
 
-def test_what_is_awaited_is_no_alarm_for_ten_seconds_unless_it_was_there_before() -> None:
+def test_what_is_awaited_is_no_alarm_for_ten_seconds_unless_it_was_there_before():
     bench = ControllerBench(START_NS)
     bench.silent.add(SensorMotion)
     bench.run(9_900)
@@ -672,7 +656,7 @@ def test_what_is_awaited_is_no_alarm_for_ten_seconds_unless_it_was_there_before(
     assert Fault.MOTION_SILENT in bench.node.safety.alarms.codes
 
 
-def test_a_high_level_switch_is_an_alarm_from_the_start_however_short() -> None:
+def test_a_high_level_switch_is_an_alarm_from_the_start_however_short():
     bench = ControllerBench(START_NS)
     bench.silent.add(SensorMotion)
     bench.run(1000)
@@ -686,7 +670,7 @@ def test_a_high_level_switch_is_an_alarm_from_the_start_however_short() -> None:
 
 
 @pytest.mark.parametrize("phase", range(10))
-def test_what_halves_the_pressure_for_a_single_tick_is_an_alarm(phase: int) -> None:
+def test_what_halves_the_pressure_for_a_single_tick_is_an_alarm(phase):
     bench = ControllerBench(START_NS)
     bench.drive_at(20e3)
     bench.run(10 * phase)
@@ -699,7 +683,7 @@ def test_what_halves_the_pressure_for_a_single_tick_is_an_alarm(phase: int) -> N
     assert bench.node.safety.alarms.codes == {Fault.TANK_SILENT}
 
 
-def test_a_refused_reset_is_an_event_and_its_end_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_refused_reset_is_an_event_and_its_end_is_none(monkeypatch):
     refused: list[Fault] = []
     bench = ControllerBench(START_NS)
     bench.arm()
@@ -721,7 +705,7 @@ def test_a_refused_reset_is_an_event_and_its_end_is_none(monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize("every", [1, 4])
-def test_telemetry_has_a_row_of_so_many_ticks(every: int) -> None:
+def test_telemetry_has_a_row_of_so_many_ticks(every):
     statistics = LoopStatistics()
     bench = ControllerBench(START_NS, statistics=statistics, sink_every=every)
     for tick in range(20):

@@ -95,7 +95,7 @@ MOTION_FAULTS = [
 
 
 @pytest.mark.parametrize("fault", MOTION_FAULTS)
-def test_without_good_motion_samples_pressure_is_zero_within_250_ms(fault) -> None:
+def test_without_good_motion_samples_pressure_is_zero_within_250_ms(fault):
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
     bench.motion = SensorMotion(0.02, 0.01, Quality.GOOD)
@@ -138,7 +138,7 @@ def test_without_good_motion_samples_pressure_is_zero_within_250_ms(fault) -> No
          120),
     ],
 )  # fmt: skip
-def test_fault_of_any_partner_ends_at_zero_and_stays_there(change, fault, within_ms) -> None:
+def test_fault_of_any_partner_ends_at_zero_and_stays_there(change, fault, within_ms):
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
     change(bench)
@@ -152,7 +152,7 @@ def test_fault_of_any_partner_ends_at_zero_and_stays_there(change, fault, within
 
 
 @pytest.mark.parametrize("state", [DriveState.FAULT_REACTION_ACTIVE, DriveState.FAULT])
-def test_drive_that_brakes_for_a_fault_or_has_it_is_found_by_its_next_status(state) -> None:
+def test_drive_that_brakes_for_a_fault_or_has_it_is_found_by_its_next_status(state):
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
     bench.drive_follows, bench.drive_state = False, state
@@ -160,7 +160,7 @@ def test_drive_that_brakes_for_a_fault_or_has_it_is_found_by_its_next_status(sta
     assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.DRIVE_FAULT)
 
 
-def test_stale_levels_halve_the_pressure_before_they_stop_it() -> None:
+def test_stale_levels_halve_the_pressure_before_they_stop_it():
     bench = ControllerBench(START_NS)
     bench.drive_at(LIMITS.pressure_pa)
     bench.silent.add(SensorTank)
@@ -179,9 +179,7 @@ def test_stale_levels_halve_the_pressure_before_they_stop_it() -> None:
     ],
 )
 @pytest.mark.parametrize("data", [bytes(8), b""])
-def test_a_second_sender_of_an_own_identifier_stops_until_it_is_silent(
-    own: int, data: bytes
-) -> None:
+def test_a_second_sender_of_an_own_identifier_stops_until_it_is_silent(own, data):
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
     bench.send(Frame(own, data))
@@ -204,7 +202,7 @@ def test_a_second_sender_of_an_own_identifier_stops_until_it_is_silent(
     assert bench.node.mode is Mode.ACTIVE
 
 
-def test_an_own_identifier_before_arming_is_said_to_be_the_reason() -> None:
+def test_an_own_identifier_before_arming_is_said_to_be_the_reason():
     bench = ControllerBench(START_NS)
     bench.run(400)
     bench.send(Frame(CATALOGUE.transmitter(PumpCommand).can_id, b""))
@@ -216,7 +214,7 @@ def test_an_own_identifier_before_arming_is_said_to_be_the_reason() -> None:
 
 
 @pytest.mark.parametrize("off", [0, 1])
-def test_a_panel_of_other_versions_can_not_arm_and_ends_it(off: int) -> None:
+def test_a_panel_of_other_versions_can_not_arm_and_ends_it(off):
     wrong = [CATALOGUE.version, VERSION]
     wrong[off] ^= 1
     bench = ControllerBench(START_NS)
@@ -232,7 +230,7 @@ def test_a_panel_of_other_versions_can_not_arm_and_ends_it(off: int) -> None:
     assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.VERSION_MISMATCH)
 
 
-def test_lost_link_cuts_at_once_and_comes_back_without_arming() -> None:
+def test_lost_link_cuts_at_once_and_comes_back_without_arming():
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
     bench.node.link_error(bench.now_ns, "interface down")
@@ -248,7 +246,7 @@ def test_lost_link_cuts_at_once_and_comes_back_without_arming() -> None:
 
 
 @pytest.mark.parametrize("late_ticks", range(1, 15))
-def test_one_overrun_counts_for_every_tick_that_it_missed(late_ticks: int) -> None:
+def test_one_overrun_counts_for_every_tick_that_it_missed(late_ticks):
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
     # the loop hands over what arrived meanwhile, so nothing is stale
@@ -260,7 +258,7 @@ def test_one_overrun_counts_for_every_tick_that_it_missed(late_ticks: int) -> No
     assert stopped == (late_ticks >= 5)  # up to 60 ms late
 
 
-def test_three_overruns_in_ten_ticks_ramp_down_two_do_not() -> None:
+def test_three_overruns_in_ten_ticks_ramp_down_two_do_not():
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
     for late in (1, 0, 1, 0, 0, 0):
@@ -274,7 +272,7 @@ def test_three_overruns_in_ten_ticks_ramp_down_two_do_not() -> None:
 
 
 @pytest.mark.parametrize("answer_pa", [math.nan, math.inf, -math.inf])
-def test_law_that_fails_stops_the_pump(answer_pa: float) -> None:
+def test_law_that_fails_stops_the_pump(answer_pa):
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
     bench.law.answer_pa = answer_pa
@@ -287,7 +285,7 @@ def test_law_that_fails_stops_the_pump(answer_pa: float) -> None:
     assert bench.pressure_pa == 0.0
 
 
-def test_law_that_raises_stops_the_pump_until_the_operator_resets() -> None:
+def test_law_that_raises_stops_the_pump_until_the_operator_resets():
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
     step = bench.law.step
@@ -341,7 +339,7 @@ STOP_CLASS = {
 
 
 @given(st.lists(st.tuples(events, st.integers(1, 40)), max_size=15))
-def test_pressure_only_while_armed_and_never_faster_than_the_rate_limit(history) -> None:
+def test_pressure_only_while_armed_and_never_faster_than_the_rate_limit(history):
     bench = ControllerBench(START_NS)
     bench.arm()
     bench.law.answer_pa = 40e3
@@ -385,9 +383,7 @@ def test_pressure_only_while_armed_and_never_faster_than_the_rate_limit(history)
             modes.clear()
 
 
-def test_a_law_that_fails_gives_no_pressure_in_that_very_tick(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_law_that_fails_gives_no_pressure_in_that_very_tick(monkeypatch):
     bench = ControllerBench()
     bench.drive_at(20e3)
 
@@ -404,7 +400,7 @@ def test_a_law_that_fails_gives_no_pressure_in_that_very_tick(
     assert bench.node.command_pa == 0.0
 
 
-def test_an_answer_that_was_no_number_once_keeps_nobody_from_arming() -> None:
+def test_an_answer_that_was_no_number_once_keeps_nobody_from_arming():
     bench = ControllerBench()
     bench.law.answer_pa = math.nan
     bench.run(400)
@@ -413,7 +409,7 @@ def test_an_answer_that_was_no_number_once_keeps_nobody_from_arming() -> None:
     assert bench.node.law.error == "its answer is nan Pa"
 
 
-def test_of_several_errors_of_a_law_the_first_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_several_errors_of_a_law_the_first_is_said(monkeypatch):
     bench = ControllerBench()
     bench.law.answer_pa = math.nan
     bench.run(400)
@@ -427,7 +423,7 @@ def test_of_several_errors_of_a_law_the_first_is_said(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.parametrize("answer", [[], [1e3, 2e3]])
-def test_law_that_answers_too_few_or_too_many_commands_stops_the_pump(answer: list[float]) -> None:
+def test_law_that_answers_too_few_or_too_many_commands_stops_the_pump(answer):
     bench = ControllerBench()
     bench.drive_at(LEVEL)
     bench.law.step = lambda y, reference=None: np.array(answer)  # type: ignore[method-assign]

@@ -20,14 +20,14 @@ def led(
 
 
 @pytest.mark.parametrize("state", [*DriveState, None])
-def test_nothing_but_a_wanted_drive_is_led_towards_enabled(state: DriveState | None) -> None:
+def test_nothing_but_a_wanted_drive_is_led_towards_enabled(state):
     word = DriveSequence().next_word(state, wanted=False)
     assert word in (C.DISABLE_VOLTAGE, C.QUICK_STOP)
     # while it drives or brakes; the voltage is taken away when it has stopped
     assert (word is C.QUICK_STOP) == (state in (S.OPERATION_ENABLED, S.QUICK_STOP_ACTIVE))
 
 
-def test_wanted_drive_is_enabled_in_three_words_and_kept_there() -> None:
+def test_wanted_drive_is_enabled_in_three_words_and_kept_there():
     states = DriveStates()
     states.tick()
     assert led(states, DriveSequence(), wanted=True) == [
@@ -35,7 +35,7 @@ def test_wanted_drive_is_enabled_in_three_words_and_kept_there() -> None:
     ]  # fmt: skip
 
 
-def test_unwanted_drive_is_stopped_and_then_switched_off() -> None:
+def test_unwanted_drive_is_stopped_and_then_switched_off():
     states, sequence = DriveStates(), DriveSequence()
     states.tick()
     led(states, sequence, wanted=True)
@@ -44,12 +44,12 @@ def test_unwanted_drive_is_stopped_and_then_switched_off() -> None:
 
 
 @pytest.mark.parametrize("wanted", [True, False])
-def test_unknown_or_faulted_drive_is_never_enabled(wanted: bool) -> None:
+def test_unknown_or_faulted_drive_is_never_enabled(wanted):
     for state in (None, S.FAULT, S.FAULT_REACTION_ACTIVE, S.NOT_READY_TO_SWITCH_ON):
         assert DriveSequence().next_word(state, wanted=wanted) is C.DISABLE_VOLTAGE
 
 
-def test_fault_is_reset_once_and_only_on_request() -> None:
+def test_fault_is_reset_once_and_only_on_request():
     states, sequence = DriveStates(), DriveSequence()
     states.tick()
     led(states, sequence, wanted=True)
@@ -63,7 +63,7 @@ def test_fault_is_reset_once_and_only_on_request() -> None:
     assert set(led(states, sequence, wanted=False)) == {S.FAULT}
 
 
-def test_no_reset_is_sent_while_the_drive_reacts_to_its_fault() -> None:
+def test_no_reset_is_sent_while_the_drive_reacts_to_its_fault():
     sequence = DriveSequence()
     sequence.request_reset()
     for _ in range(3):
@@ -71,7 +71,7 @@ def test_no_reset_is_sent_while_the_drive_reacts_to_its_fault() -> None:
         assert word is C.DISABLE_VOLTAGE
 
 
-def test_reset_requested_of_a_healthy_drive_is_not_saved_for_later() -> None:
+def test_reset_requested_of_a_healthy_drive_is_not_saved_for_later():
     states, sequence = DriveStates(), DriveSequence()
     states.tick()
     sequence.request_reset()
@@ -82,9 +82,7 @@ def test_reset_requested_of_a_healthy_drive_is_not_saved_for_later() -> None:
 
 
 @pytest.mark.parametrize("wanted", [True, False])
-def test_a_drive_that_stays_in_quick_stop_is_switched_off_when_it_had_its_time(
-    wanted: bool,
-) -> None:
+def test_a_drive_that_stays_in_quick_stop_is_switched_off_when_it_had_its_time(wanted):
     states, sequence = DriveStates(), DriveSequence()
     states.tick()
     led(states, sequence, wanted=True)
@@ -103,9 +101,7 @@ def test_a_drive_that_stays_in_quick_stop_is_switched_off_when_it_had_its_time(
         assert states.state is S.QUICK_STOP_ACTIVE
 
 
-def test_a_drive_that_stays_in_operation_on_quick_stop_is_switched_off_when_it_had_its_time() -> (
-    None
-):
+def test_a_drive_that_stays_in_operation_on_quick_stop_is_switched_off_when_it_had_its_time():
     sequence = DriveSequence()
     words = [sequence.next_word(S.OPERATION_ENABLED, wanted=False) for _ in range(QUICK_STOPS + 2)]
     assert words == [C.QUICK_STOP] * QUICK_STOPS + [C.DISABLE_VOLTAGE] * 2
@@ -121,7 +117,7 @@ def test_a_drive_that_stays_in_operation_on_quick_stop_is_switched_off_when_it_h
     assert not sequence.ignored
 
 
-def test_a_drive_that_stayed_on_is_not_obedient_because_it_is_to_be_on_again() -> None:
+def test_a_drive_that_stayed_on_is_not_obedient_because_it_is_to_be_on_again():
     """Else PASSIVE, in which it is enabled, would let the next arming pass."""
     sequence = DriveSequence()
     for _ in range(QUICK_STOPS + DISABLES + 1):
@@ -136,7 +132,7 @@ def test_a_drive_that_stayed_on_is_not_obedient_because_it_is_to_be_on_again() -
 
 
 @pytest.mark.parametrize("every", [2, 3, AT_REST])
-def test_a_drive_that_is_off_only_now_and_then_does_not_obey(every: int) -> None:
+def test_a_drive_that_is_off_only_now_and_then_does_not_obey(every):
     sequence = DriveSequence()
     states = [S.SWITCHED_ON if k % every == 0 else S.OPERATION_ENABLED for k in range(100)]
     words = [sequence.next_word(state, wanted=False) for state in states]
@@ -144,7 +140,7 @@ def test_a_drive_that_is_off_only_now_and_then_does_not_obey(every: int) -> None
     assert words[-1] is C.DISABLE_VOLTAGE
 
 
-def test_a_drive_whose_cause_lasts_gets_an_edge_for_each_request() -> None:
+def test_a_drive_whose_cause_lasts_gets_an_edge_for_each_request():
     sequence = DriveSequence()
     for _ in range(3):
         sequence.request_reset()

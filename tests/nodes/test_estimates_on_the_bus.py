@@ -118,7 +118,7 @@ class Voyage:
         return [event.reasons for event in self.events if isinstance(event, RetuningEvent)]
 
 
-def test_an_estimate_is_shown_wherever_people_look() -> None:
+def test_an_estimate_is_shown_wherever_people_look():
     voyage = Voyage(9.3)
     voyage.run_until(34.0)
     (request,) = voyage.desk.records
@@ -143,9 +143,7 @@ def test_an_estimate_is_shown_wherever_people_look() -> None:
 
 @pytest.mark.evidence("9.0", "None")
 @pytest.mark.parametrize("limit_m", [None, 9.0])
-def test_when_estimates_end_that_is_shown_and_an_alarm_where_they_watch_the_stability(
-    limit_m: float | None,
-) -> None:
+def test_when_estimates_end_that_is_shown_and_an_alarm_where_they_watch_the_stability(limit_m):
     voyage = Voyage(limit_m)
     voyage.run_until(34.0)
     assert not voyage.warned
@@ -166,7 +164,7 @@ def test_when_estimates_end_that_is_shown_and_an_alarm_where_they_watch_the_stab
     assert "the last estimate is 90 s old" in old
 
 
-def test_a_failure_of_the_estimates_is_an_event_once_and_so_is_its_end() -> None:
+def test_a_failure_of_the_estimates_is_an_event_once_and_so_is_its_end():
     chosen = load_config(STORM, Scenario)
     config = chosen.controllers["gpc"]
     config = config.model_copy(update={"sea_estimate": EstimateSettings(every_s=30.0)})
@@ -186,7 +184,7 @@ def test_a_failure_of_the_estimates_is_an_event_once_and_so_is_its_end() -> None
     assert "3.20 m, 9.1 s" in usual.reasons[0]
 
 
-def test_every_estimate_is_handed_to_who_retunes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_estimate_is_handed_to_who_retunes(monkeypatch):
     handed: list[MotionEstimate] = []
     monkeypatch.setattr(AdaptiveController, "note", lambda _, estimate: handed.append(estimate))
     chosen = load_config(STORM.with_name("load_change.yaml"), Scenario)

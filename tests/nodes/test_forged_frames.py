@@ -40,7 +40,7 @@ bursts_of = st.lists(forgeries, min_size=5, max_size=20)
         st.tuples(st.lists(forgeries, min_size=5, max_size=20), st.integers(1, 10)), max_size=5
     )
 )
-def test_whatever_has_the_right_crc_raises_nothing_and_lifts_no_limit(bursts) -> None:
+def test_whatever_has_the_right_crc_raises_nothing_and_lifts_no_limit(bursts):
     bench = ControllerBench()
     plant, limits = Plant(VESSEL.ship, VESSEL.tank, VESSEL.pump, CALM), DriveLimits()
     drive = PumpDrive(plant, limits, CATALOGUE, configuration_version=7)

@@ -27,7 +27,7 @@ class Line:
         return self.heard
 
 
-def test_shut_and_low_stop_nothing() -> None:
+def test_shut_and_low_stop_nothing():
     line = Line()
     assert line.heard.heard_ns < 0
     assert not any((line.heard.take_stop(), line.heard.high_level))
@@ -39,9 +39,7 @@ def test_shut_and_low_stop_nothing() -> None:
 @pytest.mark.parametrize("name", ["port_high", "starboard_high"])
 @pytest.mark.parametrize("switch", NOT_OFF)
 @pytest.mark.parametrize("quality", Quality)
-def test_each_switch_closed_or_broken_is_a_high_level(
-    name: str, switch: Switch, quality: Quality
-) -> None:
+def test_each_switch_closed_or_broken_is_a_high_level(name, switch, quality):
     line = Line()
     assert line.say(**{name: switch}, quality=quality).high_level
     assert not line.say().high_level
@@ -49,7 +47,7 @@ def test_each_switch_closed_or_broken_is_a_high_level(
 
 @pytest.mark.parametrize("switch", NOT_OFF)
 @pytest.mark.parametrize("lost", [0, 9])
-def test_an_open_loop_stops_from_any_intact_frame(switch: Switch, lost: int) -> None:
+def test_an_open_loop_stops_from_any_intact_frame(switch, lost):
     line = Line()
     line.say()
     heard = line.say(lost=lost, stop_loop=switch)
@@ -62,7 +60,7 @@ def test_an_open_loop_stops_from_any_intact_frame(switch: Switch, lost: int) -> 
 
 
 @pytest.mark.parametrize("quality", Quality)
-def test_only_a_healthy_node_says_that_the_loop_is_shut(quality: Quality) -> None:
+def test_only_a_healthy_node_says_that_the_loop_is_shut(quality):
     line = Line()
     line.say(stop_loop=NOT_OFF[0])
     usable = quality in (Quality.GOOD, Quality.DEGRADED)
@@ -71,7 +69,7 @@ def test_only_a_healthy_node_says_that_the_loop_is_shut(quality: Quality) -> Non
     assert heard.heard_ns == (2 if usable else 1)
 
 
-def test_a_damaged_frame_says_nothing() -> None:
+def test_a_damaged_frame_says_nothing():
     line = Line()
     line.say()
     frame = line.sender.frame(SHUT._replace(stop_loop=NOT_OFF[0]))

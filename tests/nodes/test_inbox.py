@@ -139,7 +139,7 @@ class Line:
         }
 
 
-def test_good_frames_are_kept_with_the_time_they_came() -> None:
+def test_good_frames_are_kept_with_the_time_they_came():
     line = Line()
     for message in GOOD.values():
         line.say(message)
@@ -186,7 +186,7 @@ def test_good_frames_are_kept_with_the_time_they_came() -> None:
         SensorPump(0.0, 0.0, None),
     ],
 )
-def test_what_is_no_measurement_changes_nothing(message: tuple[object, ...]) -> None:
+def test_what_is_no_measurement_changes_nothing(message):
     line = Line()
     for good in GOOD.values():
         line.say(good)
@@ -198,16 +198,14 @@ def test_what_is_no_measurement_changes_nothing(message: tuple[object, ...]) -> 
 @pytest.mark.parametrize(
     ("port_m", "starboard_m"), [(-5.3, 5.3), (5.3, -5.3), (2.4, 0.0), (-1.2, -1.2)]
 )
-def test_levels_within_the_margins_of_gauges_and_sloshing_are_measurements(
-    port_m: float, starboard_m: float
-) -> None:
+def test_levels_within_the_margins_of_gauges_and_sloshing_are_measurements(port_m, starboard_m):
     line = Line()
     line.say(SensorTank(port_m, starboard_m, Switch.OFF, Switch.OFF, Quality.GOOD))
     assert line.seen.port_level_m == pytest.approx(port_m)
     assert line.seen.starboard_level_m == pytest.approx(starboard_m)
 
 
-def test_where_no_limit_is_known_any_level_is_a_measurement() -> None:
+def test_where_no_limit_is_known_any_level_is_a_measurement():
     line = Line()
     line.inbox = Inbox(CATALOGUE, VERSION)
     line.say(SensorTank(-9.0, 9.0, Switch.OFF, Switch.OFF, Quality.GOOD))
@@ -215,7 +213,7 @@ def test_where_no_limit_is_known_any_level_is_a_measurement() -> None:
 
 
 @pytest.mark.parametrize("kind", GOOD)
-def test_damaged_repeated_and_foreign_frames_change_nothing(kind: type) -> None:
+def test_damaged_repeated_and_foreign_frames_change_nothing(kind):
     line = Line()
     for good in GOOD.values():
         line.say(good)
@@ -249,7 +247,7 @@ def test_damaged_repeated_and_foreign_frames_change_nothing(kind: type) -> None:
     data=st.binary(min_size=8, max_size=8) | st.binary(max_size=8),
     crc_error=st.integers(1, 255),
 )
-def test_noise_on_the_bus_is_never_a_measurement(can_id: int, data: bytes, crc_error: int) -> None:
+def test_noise_on_the_bus_is_never_a_measurement(can_id, data, crc_error):
     own = can_id & 0xFF == Address.CONTROLLER  # by SAE J1939-21, the sender's address
     line = Line()
     before = line.content()
@@ -265,7 +263,7 @@ def test_noise_on_the_bus_is_never_a_measurement(can_id: int, data: bytes, crc_e
     assert unchanged >= 1 or own
 
 
-def test_switches_count_even_when_the_gauges_are_bad_and_broken_ones_are_closed() -> None:
+def test_switches_count_even_when_the_gauges_are_bad_and_broken_ones_are_closed():
     for port, starboard, closed in (
         (Switch.OFF, Switch.OFF, False),
         (Switch.ON, Switch.OFF, True),
@@ -280,7 +278,7 @@ def test_switches_count_even_when_the_gauges_are_bad_and_broken_ones_are_closed(
 
 
 @pytest.mark.parametrize("kind", [SensorMotion, SensorTank, DriveStatus1])
-def test_every_stream_that_control_stands_on_counts_for_the_protection(kind: type) -> None:
+def test_every_stream_that_control_stands_on_counts_for_the_protection(kind):
     line = Line()
     for message in GOOD.values():
         line.say(message)
@@ -291,7 +289,7 @@ def test_every_stream_that_control_stands_on_counts_for_the_protection(kind: typ
     assert not line.protected
 
 
-def test_versions_match_only_when_drive_and_sensors_both_say_so() -> None:
+def test_versions_match_only_when_drive_and_sensors_both_say_so():
     line = Line()
     assert not line.seen.versions_match
     line.beat(Address.DRIVE, CATALOGUE.version, VERSION)
@@ -305,7 +303,7 @@ def test_versions_match_only_when_drive_and_sensors_both_say_so() -> None:
 
 
 @pytest.mark.parametrize("address", [Address.SENSORS, Address.DRIVE, Address.OPERATOR])
-def test_an_address_that_is_claimed_under_another_name_has_two_holders(address: Address) -> None:
+def test_an_address_that_is_claimed_under_another_name_has_two_holders(address):
     line, claims = Line(), CATALOGUE.transmitter(AddressClaim, address)
     for name, second in ((5, False), (5, False), (6, True)):
         line.hear(claims.frame(AddressClaim(name)))
@@ -316,13 +314,13 @@ def test_an_address_that_is_claimed_under_another_name_has_two_holders(address: 
     assert not line.seen.claimed_twice
 
 
-def test_drive_of_an_unknown_fault_is_not_healthy() -> None:
+def test_drive_of_an_unknown_fault_is_not_healthy():
     line = Line()
     line.say(GOOD[DriveStatus2]._replace(fault=None))  # type: ignore[attr-defined]
     assert line.seen.drive_fault
 
 
-def test_drive_status_without_a_state_is_as_if_it_had_not_come() -> None:
+def test_drive_status_without_a_state_is_as_if_it_had_not_come():
     line, status = Line(), GOOD[DriveStatus1]._replace(power_limited=True)  # type: ignore[attr-defined]
     line.say(status._replace(state=None))
     assert (line.seen.drive_state, line.seen.drive_echo_ns) == (None, NEVER_HEARD_NS)
@@ -334,7 +332,7 @@ def test_drive_status_without_a_state_is_as_if_it_had_not_come() -> None:
     assert (seen.drive_echo_ns, seen.drive_echo) == (heard_ns, 4)
 
 
-def test_a_mode_nobody_asked_for_is_standby() -> None:
+def test_a_mode_nobody_asked_for_is_standby():
     line = Line()
     assert line.seen.requested_mode is Mode.STANDBY
     line.say(OperatorCommand(None, True, False, False, False))
@@ -357,7 +355,7 @@ class Listener:
         return ()
 
 
-def test_emulated_sensors_are_what_a_law_measures() -> None:
+def test_emulated_sensors_are_what_a_law_measures():
     scenario = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
     ship, listener = build_ship_side(scenario, 1, ()), Listener()
     measure, level = measure_of(tuple(TRUE)), LevelObserver(VESSEL.tank, 0.02)
@@ -372,7 +370,7 @@ def test_emulated_sensors_are_what_a_law_measures() -> None:
     assert all(largest[name] > 3 * off for name, (_, off) in TRUE.items())
 
 
-def test_a_measurement_that_does_not_exist_is_refused_with_those_that_do() -> None:
+def test_a_measurement_that_does_not_exist_is_refused_with_those_that_do():
     with pytest.raises(ValueError, match="no measurement 'rol_rad'; there are roll_rad"):
         measure_of(("level_m", "rol_rad"))
 
@@ -386,7 +384,7 @@ def listening(**on_board: bool) -> Line:
     return line
 
 
-def test_new_it_knows_nothing_and_trusts_nothing() -> None:
+def test_new_it_knows_nothing_and_trusts_nothing():
     for inbox in (Inbox(CATALOGUE, VERSION), Inbox(CATALOGUE, VERSION, pump=False, valve=True)):
         seen = inbox.snapshot(0)
         (motion,) = seen.motions
@@ -402,7 +400,7 @@ def test_new_it_knows_nothing_and_trusts_nothing() -> None:
             assert getattr(seen, name) is False, name
 
 
-def test_a_ship_with_a_pump_and_no_valve_hears_and_awaits_the_drive_alone() -> None:
+def test_a_ship_with_a_pump_and_no_valve_hears_and_awaits_the_drive_alone():
     line = listening()
     inbox = line.inbox
     seen = line.seen
@@ -421,7 +419,7 @@ def test_a_ship_with_a_pump_and_no_valve_hears_and_awaits_the_drive_alone() -> N
     assert CATALOGUE.codec(ValveStatus).can_id not in heard
 
 
-def test_without_a_pump_its_drive_is_enabled_never_late_and_not_awaited() -> None:
+def test_without_a_pump_its_drive_is_enabled_never_late_and_not_awaited():
     line = listening(pump=False, valve=True)
     inbox = line.inbox
     century_ns = 100 * 366 * 86_400 * 1_000_000_000
@@ -438,7 +436,7 @@ def test_without_a_pump_its_drive_is_enabled_never_late_and_not_awaited() -> Non
     assert CATALOGUE.codec(DriveStatus1).can_id not in {each.can_id for each in inbox.watched}
 
 
-def test_what_the_valve_says_is_kept_with_the_echo_of_the_last_status() -> None:
+def test_what_the_valve_says_is_kept_with_the_echo_of_the_last_status():
     line = listening(valve=True)
     sender = CATALOGUE.transmitter(ValveStatus)
 
@@ -460,7 +458,7 @@ def test_what_the_valve_says_is_kept_with_the_echo_of_the_last_status() -> None:
 
 
 @pytest.mark.parametrize("limited", ["power_limited", "speed_limited"])
-def test_a_drive_at_its_power_or_speed_is_held_back(limited: str) -> None:
+def test_a_drive_at_its_power_or_speed_is_held_back(limited):
     line, status = Line(), GOOD[DriveStatus1]
     for said in (True, False, True):
         line.say(status._replace(**{limited: said}))  # type: ignore[attr-defined]
@@ -472,14 +470,14 @@ def test_a_drive_at_its_power_or_speed_is_held_back(limited: str) -> None:
 @pytest.mark.parametrize(
     "bit", ["temperature_warning", "voltage_warning", "command_warning", "sensor_warning"]
 )
-def test_a_drive_warns_by_any_bit_until_its_next_status(bit: str) -> None:
+def test_a_drive_warns_by_any_bit_until_its_next_status(bit):
     line, status = Line(), GOOD[DriveStatus2]
     for said in (True, False, True):
         line.say(status._replace(**{bit: said}))  # type: ignore[attr-defined]
         assert line.seen.drive_warns is said
 
 
-def test_the_panel_in_command_is_to_match_and_not_the_other() -> None:
+def test_the_panel_in_command_is_to_match_and_not_the_other():
     line = Line()
     for address, versions, matches in (
         (Address.OPERATOR_2, (CATALOGUE.version, VERSION), False),
@@ -521,8 +519,8 @@ def beat_of(address: Address, catalogue: int, configuration: int) -> Frame:
     ],
 )
 def test_cycles_of_the_levels_are_counted_by_the_counter_and_long_gaps_by_the_time(
-    lost: int, after_ns: int, cycles: int
-) -> None:
+    lost, after_ns, cycles
+):
     line = Line()
     inbox = line.inbox
     for _ in range(2):  # frames lost before are counted once
@@ -540,7 +538,7 @@ def test_cycles_of_the_levels_are_counted_by_the_counter_and_long_gaps_by_the_ti
     assert line.seen.tank_cycles - before == cycles + 1
 
 
-def test_only_what_the_catalogue_does_not_know_is_foreign() -> None:
+def test_only_what_the_catalogue_does_not_know_is_foreign():
     line = Line()
     line.hear(CATALOGUE.transmitter(ValveStatus).frame(
         ValveStatus(*[0.0], *[None] * 4, *[False] * (len(ValveStatus._fields) - 5))
@@ -576,7 +574,7 @@ class RedundantLine(Line):
         return motion.roll_rad, motion.roll_rate_rad_s, motion.heard_ns
 
 
-def test_each_of_two_motion_sensors_is_shown() -> None:
+def test_each_of_two_motion_sensors_is_shown():
     line = RedundantLine()
     line.say(SensorMotion(0.1, -0.05, Quality.GOOD))
     first = line.shown(0)
@@ -602,9 +600,7 @@ SPIKE = SensorMotion(0.6, -0.05, Quality.GOOD)
     ],
 )
 @pytest.mark.parametrize("second", [False, True])
-def test_what_is_no_measurement_changes_neither_of_two_motion_sensors(
-    wrong: SensorMotion, gated: bool, second: bool
-) -> None:
+def test_what_is_no_measurement_changes_neither_of_two_motion_sensors(wrong, gated, second):
     line = RedundantLine(THRESHOLDS if gated else None)
     say = line.say_2 if second else line.say
     say(SensorMotion(0.1, -0.05, Quality.GOOD))
@@ -614,7 +610,7 @@ def test_what_is_no_measurement_changes_neither_of_two_motion_sensors(
     assert line.shown(not second) == (0.0, 0.0, NEVER_HEARD_NS)
 
 
-def test_each_of_two_motion_sensors_has_a_gate_of_its_own() -> None:
+def test_each_of_two_motion_sensors_has_a_gate_of_its_own():
     line = RedundantLine(THRESHOLDS)
     for say in (line.say, line.say_2):
         say(SensorMotion(0.0, -0.05, Quality.GOOD))
@@ -627,7 +623,7 @@ def test_each_of_two_motion_sensors_has_a_gate_of_its_own() -> None:
     assert line.inbox.discarded == 4
 
 
-def test_each_motion_sensor_s_stream_counts_for_its_own_protection() -> None:
+def test_each_motion_sensor_s_stream_counts_for_its_own_protection():
     line = RedundantLine()
     for message in GOOD.values():
         line.say(message)
@@ -639,7 +635,7 @@ def test_each_motion_sensor_s_stream_counts_for_its_own_protection() -> None:
     assert line.protected
 
 
-def test_hard_wired_inputs_are_heard_and_their_stop_acts_out_of_sequence() -> None:
+def test_hard_wired_inputs_are_heard_and_their_stop_acts_out_of_sequence():
     line = RedundantLine()
     hardwired = line.inbox.hardwired
     shut = HardwiredInputs(Switch.OFF, Switch.OFF, Switch.OFF, Quality.GOOD)
@@ -651,7 +647,7 @@ def test_hard_wired_inputs_are_heard_and_their_stop_acts_out_of_sequence() -> No
     assert hardwired.stop
 
 
-def test_redundant_nodes_have_to_match_and_the_second_sensor_may_be_missing() -> None:
+def test_redundant_nodes_have_to_match_and_the_second_sensor_may_be_missing():
     line = RedundantLine()
     for address in (Address.DRIVE, Address.SENSORS):
         line.beat(address, CATALOGUE.version, VERSION)
@@ -675,14 +671,14 @@ def test_redundant_nodes_have_to_match_and_the_second_sensor_may_be_missing() ->
 
 
 @pytest.mark.parametrize("address", [Address.HARDWIRED, Address.SENSORS_2])
-def test_addresses_of_redundant_nodes_are_held_once_too(address: Address) -> None:
+def test_addresses_of_redundant_nodes_are_held_once_too(address):
     line, claims = RedundantLine(), CATALOGUE.transmitter(AddressClaim, address)
     for name, second in ((5, False), (6, True)):
         line.hear(claims.frame(AddressClaim(name)))
         assert line.seen.claimed_twice is second
 
 
-def test_link_is_lost_for_a_command_cycle_after_an_error() -> None:
+def test_link_is_lost_for_a_command_cycle_after_an_error():
     line = Line()
     assert not line.seen.link_lost
     line.inbox.link_error(line.now_ns, 20 * MS)
@@ -690,7 +686,7 @@ def test_link_is_lost_for_a_command_cycle_after_an_error() -> None:
         assert line.inbox.snapshot(line.now_ns + after_ns).link_lost is lost
 
 
-def test_a_second_sender_is_gone_after_ten_seconds() -> None:
+def test_a_second_sender_is_gone_after_ten_seconds():
     line = Line()
     line.hear(Frame(0x18FF7700 | Address.CONTROLLER, bytes(8)))
     for after_ns, conflict in ((0, True), (10_000 * MS, True), (10_000 * MS + 1, False)):

@@ -441,7 +441,7 @@ def printed(cells: Counter[tuple[str, str]]) -> str:
 @pytest.mark.slow
 @pytest.mark.evidence("every-pair")
 @pytest.mark.parametrize("most", [len(PHASES), len(BEGIN_AND_END)], ids=["some", "every-pair"])
-def test_invariants_hold_in_every_phase_under_pairs_of_faults(most: int) -> None:
+def test_invariants_hold_in_every_phase_under_pairs_of_faults(most):
     walk = Walk(SEED)
     try:
         walk.pairs_of_faults(most)
@@ -464,7 +464,7 @@ def test_invariants_hold_in_every_phase_under_pairs_of_faults(most: int) -> None
 
 
 @pytest.mark.parametrize("event", BEGIN_AND_END)
-def test_no_event_of_the_walk_goes_without_effect(event: str) -> None:
+def test_no_event_of_the_walk_goes_without_effect(event):
     """It is named while control lasts, or keeps from arming."""
     named = []
     for phase in ("ACTIVE", "STANDBY"):
@@ -480,7 +480,7 @@ def test_no_event_of_the_walk_goes_without_effect(event: str) -> None:
     assert any(named)
 
 
-def test_the_same_seed_gives_the_same_trace() -> None:
+def test_the_same_seed_gives_the_same_trace():
     def trace(seed: int) -> str:
         walk = Walk(seed)
         for phase in PHASES:

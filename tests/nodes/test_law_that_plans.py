@@ -22,7 +22,7 @@ def watching() -> Monitors:
     return monitors
 
 
-def test_a_law_that_plans_is_told_what_it_may_use() -> None:
+def test_a_law_that_plans_is_told_what_it_may_use():
     law = PlanningLaw()
     bench = ControllerBench(START_NS, law=law)
     bench.silent = {SensorMotion}
@@ -41,7 +41,7 @@ def test_a_law_that_plans_is_told_what_it_may_use() -> None:
     assert law.allowed[-1] == 1.0
 
 
-def test_a_law_that_plans_may_use_as_much_as_it_has_watched_of_four_roll_periods() -> None:
+def test_a_law_that_plans_may_use_as_much_as_it_has_watched_of_four_roll_periods():
     monitors = watching()
     law = PlanningLaw()
     bench = ControllerBench(START_NS, law=law, monitors=monitors)
@@ -69,7 +69,7 @@ def test_a_law_that_plans_may_use_as_much_as_it_has_watched_of_four_roll_periods
 @pytest.mark.parametrize(
     ("silent", "longest_ms"), [(SensorMotion, 40), (SensorTank, 1000)], ids=["motion", "levels"]
 )
-def test_after_a_gap_a_law_that_plans_begins_anew(silent: type, longest_ms: int) -> None:
+def test_after_a_gap_a_law_that_plans_begins_anew(silent, longest_ms):
     monitors = watching()
     law = PlanningLaw()
     bench = ControllerBench(START_NS, law=law, monitors=monitors)
@@ -91,7 +91,7 @@ def test_after_a_gap_a_law_that_plans_begins_anew(silent: type, longest_ms: int)
     assert FIRST < law.allowed[-1] < 0.45
 
 
-def test_a_law_that_plans_begins_anew_after_an_answer_that_is_none() -> None:
+def test_a_law_that_plans_begins_anew_after_an_answer_that_is_none():
     monitors = watching()
     law = PlanningLaw()
     bench = ControllerBench(START_NS, law=law, monitors=monitors)
@@ -103,9 +103,7 @@ def test_a_law_that_plans_begins_anew_after_an_answer_that_is_none() -> None:
     assert law.allowed[-1] == FIRST
 
 
-def test_the_panel_sees_that_a_plan_has_less_pressure_yet(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_panel_sees_that_a_plan_has_less_pressure_yet(monkeypatch):
     monitors = watching()
     monkeypatch.setattr(monitors, "confirmed", True)
     bench = ControllerBench(START_NS, law=PlanningLaw(), monitors=monitors)

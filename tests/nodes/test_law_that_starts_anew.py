@@ -13,13 +13,13 @@ class Learning(ToyLaw):
     starts_anew = True
 
 
-def test_it_is_told_from_others_by_its_mark() -> None:
+def test_it_is_told_from_others_by_its_mark():
     assert isinstance(Learning(0.02), StartsAnew)
     assert not isinstance(ToyLaw(0.02), StartsAnew)
 
 
 @pytest.mark.parametrize("law", [Learning, ToyLaw])
-def test_it_is_reset_when_it_is_armed_again(law: type[ToyLaw]) -> None:
+def test_it_is_reset_when_it_is_armed_again(law):
     bench = ControllerBench(law=law(0.02))
     bench.arm()
     bench.law.calls.clear()
@@ -31,7 +31,7 @@ def test_it_is_reset_when_it_is_armed_again(law: type[ToyLaw]) -> None:
     assert ("reset" in bench.law.calls) is (law is Learning)
 
 
-def test_a_reset_in_charge_takes_nothing_from_it() -> None:
+def test_a_reset_in_charge_takes_nothing_from_it():
     bench = ControllerBench(law=Learning(0.02))
     bench.arm()
     bench.law.calls.clear()

@@ -44,15 +44,13 @@ def always_good(tick: int) -> Quality:
 
 @pytest.mark.evidence("2", "3", "5")
 @pytest.mark.parametrize("one_of", [1, 2, 3, 4, 5, 10])
-def test_lost_frames(one_of: int) -> None:
+def test_lost_frames(one_of):
     error = worst_rate_error(lambda k, frame: () if k % one_of else (frame,), always_good)
     assert error < (0.1 if one_of <= 4 else 0.2)
 
 
 @pytest.mark.parametrize("one_of", [2, 3, 4])
-def test_gauges_that_send_more_slowly_than_their_cycle_with_a_counter_that_is_right(
-    one_of: int,
-) -> None:
+def test_gauges_that_send_more_slowly_than_their_cycle_with_a_counter_that_is_right(one_of):
     codec = CATALOGUE.codec(SensorTank)
     slow = CATALOGUE.transmitter(SensorTank)
 
@@ -65,7 +63,7 @@ def test_gauges_that_send_more_slowly_than_their_cycle_with_a_counter_that_is_ri
 
 
 @pytest.mark.parametrize("bad_of", [2, 3])
-def test_bad_quality(bad_of: int) -> None:
+def test_bad_quality(bad_of):
     error = worst_rate_error(
         lambda k, frame: (frame,), lambda tick: Quality.BAD if tick // 2 % bad_of else Quality.GOOD
     )
@@ -73,7 +71,7 @@ def test_bad_quality(bad_of: int) -> None:
 
 
 @pytest.mark.parametrize("late_of", [2, 3, 7])
-def test_frames_that_come_a_tick_late_or_two_at_once(late_of: int) -> None:
+def test_frames_that_come_a_tick_late_or_two_at_once(late_of):
     held: list[Frame] = []
 
     def change(number: int, frame: Frame) -> Iterable[Frame]:
@@ -88,7 +86,7 @@ def test_frames_that_come_a_tick_late_or_two_at_once(late_of: int) -> None:
 
 
 @pytest.mark.parametrize("missing", [1, 2, 45])
-def test_in_a_gap_a_law_measures_the_level_that_is_predicted(missing: int) -> None:
+def test_in_a_gap_a_law_measures_the_level_that_is_predicted(missing):
     """The last one, held, looks like water that stands still: a plan then brakes what moves."""
     bench = ControllerBench(law=ToyLaw(sample_time_s=TICK_S))
 
@@ -115,7 +113,7 @@ def test_in_a_gap_a_law_measures_the_level_that_is_predicted(missing: int) -> No
     assert bench.law.seen[-1][1] == pytest.approx(level_m, abs=0.02)
 
 
-def test_no_level_is_predicted_from_a_pressure_that_was_measured_long_ago() -> None:
+def test_no_level_is_predicted_from_a_pressure_that_was_measured_long_ago():
     bench = ControllerBench()
     bench.pump = SensorPump(20e3, 0.0, Quality.GOOD)
     bench.run(200)
@@ -130,9 +128,7 @@ def test_no_level_is_predicted_from_a_pressure_that_was_measured_long_ago() -> N
 
 
 @pytest.mark.parametrize(("age_ns", "pressure_pa"), [(100_000_000, 7e3), (100_000_001, 0.0)])
-def test_a_pressure_counts_for_a_tenth_of_a_second(
-    age_ns: int, pressure_pa: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_pressure_counts_for_a_tenth_of_a_second(age_ns, pressure_pa, monkeypatch):
     bench = ControllerBench()
     bench.run(200)
     predicted: list[float] = []

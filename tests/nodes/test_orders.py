@@ -35,7 +35,7 @@ class Line:
 
 
 @pytest.mark.parametrize("lost", range(17))
-def test_stop_and_disarm_are_heard_once_from_any_intact_frame(lost: int) -> None:
+def test_stop_and_disarm_are_heard_once_from_any_intact_frame(lost):
     line = Line()
     line.say()
     line.orders.take()
@@ -51,7 +51,7 @@ def test_stop_and_disarm_are_heard_once_from_any_intact_frame(lost: int) -> None
 
 @pytest.mark.parametrize("mode", [*(mode for mode in Mode if mode is not Mode.ACTIVE), None])
 @pytest.mark.parametrize("lost", [0, 5])
-def test_another_mode_disarms_from_any_intact_frame(lost: int, mode: Mode | None) -> None:
+def test_another_mode_disarms_from_any_intact_frame(lost, mode):
     line = Line()
     line.say()
     assert line.orders.take().armed
@@ -59,7 +59,7 @@ def test_another_mode_disarms_from_any_intact_frame(lost: int, mode: Mode | None
     assert not line.orders.take().armed
 
 
-def test_what_is_pressed_in_the_first_frame_is_no_edge() -> None:
+def test_what_is_pressed_in_the_first_frame_is_no_edge():
     line = Line()
     line.say(arm=True, reset=True, retune=True, undo=True)
     wishes = line.orders.take()
@@ -70,9 +70,7 @@ def test_what_is_pressed_in_the_first_frame_is_no_edge() -> None:
 
 @pytest.mark.parametrize("counters", range(16))
 @pytest.mark.parametrize("claims", [False, True])
-def test_a_panel_that_starts_anew_with_its_bits_set_presses_nothing(
-    counters: int, claims: bool
-) -> None:
+def test_a_panel_that_starts_anew_with_its_bits_set_presses_nothing(counters, claims):
     """However short it was away: within 400 ms its third frame is accepted, out of sequence."""
     line = Line()
     line.say(arm=False, mode_request=Mode.STANDBY)
@@ -111,9 +109,7 @@ def test_a_panel_that_starts_anew_with_its_bits_set_presses_nothing(
         (True, [True, False], False, False),
     ],
 )
-def test_a_frame_in_which_nothing_was_released_yet_takes_no_press_back(
-    before: bool, bits: list[bool], armed: bool, edge: bool
-) -> None:
+def test_a_frame_in_which_nothing_was_released_yet_takes_no_press_back(before, bits, armed, edge):
     line = Line()
     line.say(arm=False)
     line.say(arm=before)
@@ -125,7 +121,7 @@ def test_a_frame_in_which_nothing_was_released_yet_takes_no_press_back(
 
 
 @pytest.mark.parametrize("asked", [Mode.STANDBY, Mode.ACTIVE, None])
-def test_asking_for_passive_is_an_edge(asked: Mode | None) -> None:
+def test_asking_for_passive_is_an_edge(asked):
     line = Line()
     line.say(mode_request=Mode.PASSIVE)
     assert not line.orders.take().passive_edge
@@ -139,7 +135,7 @@ def test_asking_for_passive_is_an_edge(asked: Mode | None) -> None:
     assert not line.orders.take().passive_edge
 
 
-def test_arm_and_stop_hold_from_frame_to_frame() -> None:
+def test_arm_and_stop_hold_from_frame_to_frame():
     line = Line()
     assert line.orders.take_retuning() == RetuningOrder()  # nothing was heard yet
     for bits in ({"arm": False}, {"stop": True}, {}):
@@ -150,14 +146,14 @@ def test_arm_and_stop_hold_from_frame_to_frame() -> None:
             assert wishes.stop == ("stop" in bits)
 
 
-def test_without_the_arm_bit_nothing_is_an_edge_of_it() -> None:
+def test_without_the_arm_bit_nothing_is_an_edge_of_it():
     line = Line()
     line.say(arm=False)
     line.say(arm=False)
     assert not line.orders.take().arm_edge
 
 
-def test_an_alarm_is_accepted_once_a_press() -> None:
+def test_an_alarm_is_accepted_once_a_press():
     line = Line()
     line.say(acknowledge=True, acknowledge_code=7)  # pressed nobody knows when
     assert line.orders.take_accepted() == []
@@ -171,7 +167,7 @@ def test_an_alarm_is_accepted_once_a_press() -> None:
 
 
 @pytest.mark.parametrize(("late_ms", "edge"), [(0, True), (1, False)])
-def test_an_edge_and_a_held_stop_count_for_four_cycles(late_ms: int, edge: bool) -> None:
+def test_an_edge_and_a_held_stop_count_for_four_cycles(late_ms, edge):
     line = Line()
     line.say(arm=False, stop=True)
     line.now_ns += late_ms * MS
@@ -181,14 +177,14 @@ def test_an_edge_and_a_held_stop_count_for_four_cycles(late_ms: int, edge: bool)
     assert line.orders.take().arm_edge == edge
 
 
-def test_a_mode_that_is_none_is_standby() -> None:
+def test_a_mode_that_is_none_is_standby():
     line = Line()
     line.say(mode_request=Mode.ACTIVE)
     line.say(mode_request=None)
     assert line.orders.requested_mode is Mode.STANDBY
 
 
-def test_a_damaged_stop_is_not_heard() -> None:
+def test_a_damaged_stop_is_not_heard():
     line = Line()
     line.say()
     line.say(corrupt=True, stop=True, arm=False)
@@ -197,7 +193,7 @@ def test_a_damaged_stop_is_not_heard() -> None:
     assert not wishes.stop
 
 
-def test_what_is_let_go_between_two_looks_is_heard() -> None:
+def test_what_is_let_go_between_two_looks_is_heard():
     line = Line()
     for pressed in ({"arm": False}, {"stop": True}, {"reset": True}):
         line.say()
@@ -212,9 +208,7 @@ def test_what_is_let_go_between_two_looks_is_heard() -> None:
 
 
 @pytest.mark.parametrize("frames_a_sample", [1, 2, 3, 10])
-def test_every_press_for_the_retuning_is_heard_however_seldom_the_law_looks(
-    frames_a_sample: int,
-) -> None:
+def test_every_press_for_the_retuning_is_heard_however_seldom_the_law_looks(frames_a_sample):
     line = Line()
     line.say()
     assert line.orders.take_retuning() == RetuningOrder()
@@ -230,7 +224,7 @@ def test_every_press_for_the_retuning_is_heard_however_seldom_the_law_looks(
             assert heard == [RetuningOrder(**{name: True}), RetuningOrder()]
 
 
-def test_retuning_stays_forbidden_while_the_button_is_down() -> None:
+def test_retuning_stays_forbidden_while_the_button_is_down():
     line = Line()
     line.say(forbid_retuning=True)
     for _ in range(3):
@@ -240,9 +234,7 @@ def test_retuning_stays_forbidden_while_the_button_is_down() -> None:
 
 
 @given(st.integers(0, 40), st.booleans())
-def test_what_was_pressed_in_a_gap_that_the_counter_does_not_bridge_is_no_edge(
-    lost: int, reset: bool
-) -> None:
+def test_what_was_pressed_in_a_gap_that_the_counter_does_not_bridge_is_no_edge(lost, reset):
     line = Line()
     line.say(arm=False)
     line.orders.take()
@@ -258,7 +250,7 @@ def test_what_was_pressed_in_a_gap_that_the_counter_does_not_bridge_is_no_edge(
 
 @pytest.mark.parametrize("lost", [0, 3, 4, 9, 20])
 @pytest.mark.parametrize("restart", [False, True])
-def test_stop_after_lost_frames_acts_with_the_first_that_arrives(lost: int, restart: bool) -> None:
+def test_stop_after_lost_frames_acts_with_the_first_that_arrives(lost, restart):
     bench = ControllerBench()
     bench.drive_at(40e3)
     bench.spoil = lambda kind, frame: () if kind is OperatorCommand else (frame,)
@@ -274,7 +266,7 @@ def test_stop_after_lost_frames_acts_with_the_first_that_arrives(lost: int, rest
     assert bench.node.mode is Mode.STANDBY
 
 
-def test_disarming_out_of_sequence_ramps_down_and_the_old_arm_bit_does_not_arm_again() -> None:
+def test_disarming_out_of_sequence_ramps_down_and_the_old_arm_bit_does_not_arm_again():
     bench = ControllerBench()
     bench.drive_at(40e3)
     for _ in range(5):
@@ -287,7 +279,7 @@ def test_disarming_out_of_sequence_ramps_down_and_the_old_arm_bit_does_not_arm_a
     assert bench.pressure_pa == 0.0
 
 
-def test_accepted_frames_that_say_something_new_are_counted() -> None:
+def test_accepted_frames_that_say_something_new_are_counted():
     line = Line()
     for said, changes in (({}, 0), ({}, 0), ({"reset": True}, 1), ({"reset": True}, 1), ({}, 2)):
         line.say(**said)  # type: ignore[arg-type]

@@ -49,7 +49,7 @@ class Table:
             self.tick()
 
 
-def test_starts_disarmed_in_standby_and_repeats_every_200_ms() -> None:
+def test_starts_disarmed_in_standby_and_repeats_every_200_ms():
     table = Table()
     table.run(21)
     assert {command for _, command in table.heard} == {
@@ -59,7 +59,7 @@ def test_starts_disarmed_in_standby_and_repeats_every_200_ms() -> None:
 
 
 @pytest.mark.parametrize("ticks", [4, 5])
-def test_change_is_sent_with_the_next_tick(ticks: int) -> None:
+def test_change_is_sent_with_the_next_tick(ticks):
     table = Table()
     table.run(ticks)
     table.panel.press(Action.ARM)
@@ -82,7 +82,7 @@ def test_change_is_sent_with_the_next_tick(ticks: int) -> None:
         (Action.ARM, Mode.ACTIVE, True),
     ],
 )
-def test_buttons_of_an_armed_panel(action: Action, mode: Mode, armed: bool) -> None:
+def test_buttons_of_an_armed_panel(action, mode, armed):
     table = Table()
     table.panel.press(Action.ARM)
     table.tick()
@@ -94,7 +94,7 @@ def test_buttons_of_an_armed_panel(action: Action, mode: Mode, armed: bool) -> N
     assert table.last.reset == (action is Action.RESET)
 
 
-def test_edge_button_is_held_for_half_a_second_and_then_let_go() -> None:
+def test_edge_button_is_held_for_half_a_second_and_then_let_go():
     table = Table()
     table.run(3)
     table.panel.press(Action.RESET)
@@ -109,7 +109,7 @@ def test_edge_button_is_held_for_half_a_second_and_then_let_go() -> None:
 
 
 @pytest.mark.parametrize("mode", [Mode.STANDBY, Mode.FAULT, Mode.INIT])
-def test_stop_is_held_until_the_controller_answers_it(mode: Mode) -> None:
+def test_stop_is_held_until_the_controller_answers_it(mode):
     table = Table()
     table.panel.press(Action.ARM)
     table.run(3)
@@ -128,7 +128,7 @@ def test_stop_is_held_until_the_controller_answers_it(mode: Mode) -> None:
 
 
 @pytest.mark.parametrize(("mode", "ticks"), [(Mode.STANDBY, 5), (Mode.INIT, 5), (Mode.FAULT, 11)])
-def test_stop_is_held_for_half_a_second_though_it_is_answered(mode: Mode, ticks: int) -> None:
+def test_stop_is_held_for_half_a_second_though_it_is_answered(mode, ticks):
     """And as long as the ramp of a fault may take, which a stop cuts."""
     table = Table()
     table.run(1)
@@ -142,7 +142,7 @@ def test_stop_is_held_for_half_a_second_though_it_is_answered(mode: Mode, ticks:
     assert not table.last.stop
 
 
-def test_arm_is_refused_while_stop_is_held() -> None:
+def test_arm_is_refused_while_stop_is_held():
     table = Table()
     table.panel.press(Action.STOP)
     table.run(3)
@@ -157,7 +157,7 @@ def test_arm_is_refused_while_stop_is_held() -> None:
 
 
 @pytest.mark.parametrize("late_ticks", [0, 7])
-def test_script_presses_in_order_from_when_the_controller_is_ready(late_ticks: int) -> None:
+def test_script_presses_in_order_from_when_the_controller_is_ready(late_ticks):
     table = Table(
         [TimedAction(1.05, Action.DISARM), TimedAction(0.0, Action.PASSIVE),
          TimedAction(0.5, Action.ARM)]
@@ -180,7 +180,7 @@ def test_script_presses_in_order_from_when_the_controller_is_ready(late_ticks: i
     ]
 
 
-def test_presses_of_one_time_come_in_the_order_given() -> None:
+def test_presses_of_one_time_come_in_the_order_given():
     for actions, armed in (
         ((Action.PASSIVE, Action.ARM), True),
         ((Action.ARM, Action.PASSIVE), False),
@@ -191,13 +191,13 @@ def test_presses_of_one_time_come_in_the_order_given() -> None:
         assert table.last.arm == armed
 
 
-def test_script_waits_for_ever_for_a_controller_that_is_not_there() -> None:
+def test_script_waits_for_ever_for_a_controller_that_is_not_there():
     table = Table([TimedAction(0.0, Action.ARM)])
     table.run(100)
     assert not table.last.arm
 
 
-def test_controllers_status_is_kept_and_a_damaged_one_is_not() -> None:
+def test_controllers_status_is_kept_and_a_damaged_one_is_not():
     table = Table()
     sender = CATALOGUE.transmitter(ControllerStatus)
     status = ControllerStatus(Mode.ACTIVE, Fault.NONE, True, False, False, False, False, 0.25, 3, 9)
@@ -209,7 +209,7 @@ def test_controllers_status_is_kept_and_a_damaged_one_is_not() -> None:
     assert table.panel.status == status
 
 
-def test_arming_again_after_a_fault_is_another_rising_edge_in_any_two_of_three_frames() -> None:
+def test_arming_again_after_a_fault_is_another_rising_edge_in_any_two_of_three_frames():
     table = Table()
     table.panel.press(Action.ARM)
     for mode in (Mode.STANDBY, Mode.ACTIVE, Mode.FAULT, Mode.STANDBY):
@@ -226,7 +226,7 @@ def test_arming_again_after_a_fault_is_another_rising_edge_in_any_two_of_three_f
     assert table.last == OperatorCommand(Mode.ACTIVE, True, False, False, False)
 
 
-def test_arm_pressed_while_active_does_not_disarm() -> None:
+def test_arm_pressed_while_active_does_not_disarm():
     table = Table()
     for _ in range(2):
         table.panel.press(Action.ARM)
@@ -236,7 +236,7 @@ def test_arm_pressed_while_active_does_not_disarm() -> None:
 
 
 @pytest.mark.parametrize(("age_ms", "arm"), [(300, True), (301, False)])
-def test_who_takes_the_command_adopts_only_a_mode_of_now(age_ms: int, arm: bool) -> None:
+def test_who_takes_the_command_adopts_only_a_mode_of_now(age_ms, arm):
     table = Table()
     table.hear(Mode.ACTIVE)
     table.now_ns += age_ms * MS
@@ -246,7 +246,7 @@ def test_who_takes_the_command_adopts_only_a_mode_of_now(age_ms: int, arm: bool)
 
 
 @pytest.mark.parametrize("found", [Mode.STANDBY, Mode.INIT, Mode.FAULT])
-def test_passive_is_asked_for_again_by_a_change_where_the_controller_has_left_it(found) -> None:
+def test_passive_is_asked_for_again_by_a_change_where_the_controller_has_left_it(found):
     table = Table()
     table.panel.press(Action.PASSIVE)
     table.run(10)

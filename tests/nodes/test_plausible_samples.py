@@ -41,7 +41,7 @@ def taken(motion: MotionSensor, roll_rad: float, rate_rad_s: float, now_ns: int)
 
 
 @pytest.mark.parametrize("way", [-1, 1])
-def test_what_is_near_enough_grows_with_the_time_since_the_last_that_passed(way: int) -> None:
+def test_what_is_near_enough_grows_with_the_time_since_the_last_that_passed(way):
     for moved, after_s, passes in (
         (0.25, 0.0, True), (0.26, 0.0, False),
         (0.74, 1.0, True), (0.76, 1.0, False),
@@ -59,7 +59,7 @@ def test_what_is_near_enough_grows_with_the_time_since_the_last_that_passed(way:
         assert gate.passes((last - 0.24 - 0.5 * since_s) * way, at_ns)
 
 
-def test_each_step_has_to_come_five_times_in_a_row_to_be_taken() -> None:
+def test_each_step_has_to_come_five_times_in_a_row_to_be_taken():
     gate = SpikeGate(0.25, 0.0)
     assert gate.passes(0.0, 0)
     for _ in range(2):
@@ -69,7 +69,7 @@ def test_each_step_has_to_come_five_times_in_a_row_to_be_taken() -> None:
     assert [gate.passes(0.0, 0) for _ in range(5)] == [False] * 4 + [True]
 
 
-def test_roll_and_rate_each_have_their_own_bounds_and_both_see_every_sample() -> None:
+def test_roll_and_rate_each_have_their_own_bounds_and_both_see_every_sample():
     for roll_rad, rate_rad_s, after_ns, discarded in (
         (1.0, 4.0, 0, 0), (1.01, 4.0, 0, 1), (1.0, 4.01, 0, 1), (-1.01, -4.01, 0, 1),
         (2.9, 11.9, S, 0), (3.1, 11.9, S, 1), (2.9, 12.1, S, 1), (3.1, 12.1, S, 1),
@@ -80,7 +80,7 @@ def test_roll_and_rate_each_have_their_own_bounds_and_both_see_every_sample() ->
         assert motion.discarded == motion.sample(0).discarded == discarded
 
 
-def test_levels_each_have_a_gate_and_what_they_discard_is_counted() -> None:
+def test_levels_each_have_a_gate_and_what_they_discard_is_counted():
     for port_m, starboard_m, after_ns, discarded in (
         (16.0, -16.0, 0, 0), (16.5, 0.0, 0, 1), (0.0, 16.5, 0, 1), (17.0, 17.0, 0, 1),
         (47.0, -47.0, S, 0), (49.0, 0.0, S, 1), (0.0, -49.0, S, 1), (49.0, 49.0, S, 1),
@@ -91,7 +91,7 @@ def test_levels_each_have_a_gate_and_what_they_discard_is_counted() -> None:
         assert gates.discarded == discarded
 
 
-def test_one_spike_is_discarded_and_the_next_sample_is_taken() -> None:
+def test_one_spike_is_discarded_and_the_next_sample_is_taken():
     gate = SpikeGate(0.01, 0.5)
     assert gate.passes(0.1, 0)
     assert not gate.passes(0.6, 10 * MS)
@@ -99,9 +99,7 @@ def test_one_spike_is_discarded_and_the_next_sample_is_taken() -> None:
 
 
 @given(st.floats(-1, 1), st.integers(1, 1000), st.floats(0, 1))
-def test_what_moves_no_faster_than_it_can_always_passes(
-    start: float, elapsed_ms: int, share: float
-) -> None:
+def test_what_moves_no_faster_than_it_can_always_passes(start, elapsed_ms, share):
     gate = SpikeGate(0.01, 0.5)
     gate.passes(start, 0)
     move = share * (0.01 + 0.5 * elapsed_ms * 1e-3) * 0.999
@@ -142,14 +140,14 @@ class Slow:
 
 
 @pytest.mark.parametrize("burst", [1, 2, 3])
-def test_a_burst_of_a_slow_sensor_is_no_spike_where_its_stamp_moves_on(burst: int) -> None:
+def test_a_burst_of_a_slow_sensor_is_no_spike_where_its_stamp_moves_on(burst):
     stamped = {"stamps": [{"from": "n.N", "us": 50_000}]}
     assert Slow(stamped).run(burst) == 0
     assert Slow(stamped).run(burst, spike=200) == 1
     assert (Slow({"unchanged_ms": 500}).run(burst) > 0) is (burst > 1)  # nothing says it is new
 
 
-def test_the_time_of_a_sample_is_its_receipt_or_what_its_counter_says() -> None:
+def test_the_time_of_a_sample_is_its_receipt_or_what_its_counter_says():
     source = CATALOGUE.receiver(SensorTank)  # 20 ms
     clock = SampleClock(source)
     times = [clock.time_ns(now_ms * MS) // MS for now_ms in (1000, 1060, 1060, 1060, 1120)]

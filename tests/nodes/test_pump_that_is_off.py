@@ -29,7 +29,7 @@ def bench() -> ControllerBench:
     return table
 
 
-def test_in_standby_it_raises_an_alarm_and_refuses_to_arm_while_it_lasts() -> None:
+def test_in_standby_it_raises_an_alarm_and_refuses_to_arm_while_it_lasts():
     table = bench()
     assert table.node.mode is Mode.STANDBY
     table.pump = PRESSING
@@ -47,7 +47,7 @@ def test_in_standby_it_raises_an_alarm_and_refuses_to_arm_while_it_lasts() -> No
     assert table.node.mode is Mode.ACTIVE
 
 
-def test_it_raises_an_alarm_while_the_controller_still_waits_for_something_else() -> None:
+def test_it_raises_an_alarm_while_the_controller_still_waits_for_something_else():
     table = bench()
     table.silent = {SensorMotion}
     table.run(START_MS)
@@ -58,7 +58,7 @@ def test_it_raises_an_alarm_while_the_controller_still_waits_for_something_else(
     assert CODE in table.node.safety.alarms.codes
 
 
-def test_after_a_fault_it_is_a_second_one_and_keeps_the_first_from_being_reset() -> None:
+def test_after_a_fault_it_is_a_second_one_and_keeps_the_first_from_being_reset():
     table = bench()
     table.order_is(mode_request=Mode.ACTIVE, arm=True)
     table.run(400)
@@ -75,16 +75,14 @@ def test_after_a_fault_it_is_a_second_one_and_keeps_the_first_from_being_reset()
     assert table.node.safety.supervisor.reset_refused_by is CODE
 
 
-def test_a_ship_without_a_pump_has_no_drive_that_stays_on() -> None:
+def test_a_ship_without_a_pump_has_no_drive_that_stays_on():
     table = ControllerBench(pump=False)
     table.run(1500)
     assert Fault.DRIVE_FAULT not in table.node.safety.alarms.codes
 
 
 @pytest.mark.parametrize("state", [DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE])
-def test_a_drive_that_no_quick_stop_takes_out_of_operation_is_told_to_be_off(
-    state: DriveState,
-) -> None:
+def test_a_drive_that_no_quick_stop_takes_out_of_operation_is_told_to_be_off(state):
     table = bench()
     table.drive_follows, table.drive_state = False, state
     table.run(100)

@@ -47,7 +47,7 @@ def active_bench() -> Bench:
     return bench
 
 
-def test_second_station_that_watches_neither_arms_nor_disarms_nor_resets() -> None:
+def test_second_station_that_watches_neither_arms_nor_disarms_nor_resets():
     bench = active_bench()
     bench.run(2000)  # its arm bit is not set all the time
     assert bench.node.mode is Mode.ACTIVE
@@ -61,7 +61,7 @@ def test_second_station_that_watches_neither_arms_nor_disarms_nor_resets() -> No
 
 
 @pytest.mark.parametrize("taken", [False, True])
-def test_stop_counts_from_any_station(taken: bool) -> None:
+def test_stop_counts_from_any_station(taken):
     for first in (False, True):
         bench = active_bench()
         if taken:
@@ -75,7 +75,7 @@ def test_stop_counts_from_any_station(taken: bool) -> None:
         assert bench.node.mode is Mode.STANDBY
 
 
-def test_a_stop_in_command_counts_in_a_tick_in_which_the_other_station_speaks() -> None:
+def test_a_stop_in_command_counts_in_a_tick_in_which_the_other_station_speaks():
     bench = active_bench()
     bench.second_is()
     bench.order_is(stop=True)
@@ -85,7 +85,7 @@ def test_a_stop_in_command_counts_in_a_tick_in_which_the_other_station_speaks() 
     assert bench.node.mode is Mode.STANDBY
 
 
-def test_taking_the_command_resets_nothing() -> None:
+def test_taking_the_command_resets_nothing():
     bench = active_bench()
     bench.order_is(stop=True, reset=True)
     bench.second_is(take_command=True, reset=True)
@@ -95,7 +95,7 @@ def test_taking_the_command_resets_nothing() -> None:
     assert not wishes.arm_edge
 
 
-def test_a_stop_that_is_held_at_the_other_station_keeps_the_one_in_command_from_arming() -> None:
+def test_a_stop_that_is_held_at_the_other_station_keeps_the_one_in_command_from_arming():
     bench = Bench()
     bench.second = IDLE
     bench.run(400)
@@ -114,7 +114,7 @@ def test_a_stop_that_is_held_at_the_other_station_keeps_the_one_in_command_from_
     assert bench.node.mode is Mode.ACTIVE
 
 
-def test_a_station_that_went_silent_with_its_stop_held_stops_nobody_for_ever() -> None:
+def test_a_station_that_went_silent_with_its_stop_held_stops_nobody_for_ever():
     bench = Bench()
     bench.second = IDLE
     bench.run(400)
@@ -126,7 +126,7 @@ def test_a_station_that_went_silent_with_its_stop_held_stops_nobody_for_ever() -
     assert bench.node.mode is Mode.ACTIVE
 
 
-def test_command_is_taken_without_a_bump_and_given_back() -> None:
+def test_command_is_taken_without_a_bump_and_given_back():
     bench = active_bench()
     bench.second_is(arm=True, mode_request=Mode.ACTIVE, take_command=True)
     assert bench.station is Station.OPERATOR_2
@@ -149,7 +149,7 @@ def test_command_is_taken_without_a_bump_and_given_back() -> None:
     assert bench.node.mode is Mode.ACTIVE
 
 
-def test_command_is_taken_without_a_bump_in_the_tick_of_a_frame_of_the_cycle() -> None:
+def test_command_is_taken_without_a_bump_in_the_tick_of_a_frame_of_the_cycle():
     bench = active_bench()
     bench.second_is()
     bench.second_is(take_command=True, mode_request=Mode.ACTIVE, arm=True)
@@ -158,7 +158,7 @@ def test_command_is_taken_without_a_bump_in_the_tick_of_a_frame_of_the_cycle() -
 
 
 @pytest.mark.parametrize("second", [False, True])
-def test_a_panel_that_claims_its_address_arms_by_no_bit_of_its_first_frame(second: bool) -> None:
+def test_a_panel_that_claims_its_address_arms_by_no_bit_of_its_first_frame(second):
     """Its counter may be the next one by chance."""
     bench = Bench()
     bench.second = IDLE
@@ -180,7 +180,7 @@ def test_a_panel_that_claims_its_address_arms_by_no_bit_of_its_first_frame(secon
     assert bench.node.mode is Mode.ACTIVE
 
 
-def test_the_claim_of_one_panel_takes_no_press_from_the_other() -> None:
+def test_the_claim_of_one_panel_takes_no_press_from_the_other():
     bench = Bench()
     bench.second = IDLE
     bench.run(1000)
@@ -190,7 +190,7 @@ def test_the_claim_of_one_panel_takes_no_press_from_the_other() -> None:
     assert bench.node.mode is Mode.ACTIVE
 
 
-def test_taking_the_command_enters_no_passive() -> None:
+def test_taking_the_command_enters_no_passive():
     bench = Bench()
     bench.second = IDLE
     bench.run(1000)
@@ -199,7 +199,7 @@ def test_taking_the_command_enters_no_passive() -> None:
     assert (bench.node.mode, bench.station) == (Mode.STANDBY, Station.OPERATOR_2)
 
 
-def test_taking_the_command_with_the_arm_bit_set_never_arms() -> None:
+def test_taking_the_command_with_the_arm_bit_set_never_arms():
     bench = Bench()
     bench.second = IDLE
     bench.run(400)
@@ -211,14 +211,14 @@ def test_taking_the_command_with_the_arm_bit_set_never_arms() -> None:
 
 
 @pytest.mark.parametrize("asked", [Mode.STANDBY, Mode.ACTIVE])
-def test_a_station_that_takes_the_command_without_the_arm_bit_disarms(asked: Mode) -> None:
+def test_a_station_that_takes_the_command_without_the_arm_bit_disarms(asked):
     bench = active_bench()
     bench.second_is(take_command=True, mode_request=asked)
     bench.tick()
     assert bench.node.mode is Mode.PASSIVE
 
 
-def test_what_the_one_in_command_disarms_stays_so_when_the_other_takes_it_in_that_tick() -> None:
+def test_what_the_one_in_command_disarms_stays_so_when_the_other_takes_it_in_that_tick():
     bench = active_bench()
     bench.order_is(arm=False, mode_request=Mode.STANDBY)
     # it could not know of it
@@ -230,14 +230,14 @@ def test_what_the_one_in_command_disarms_stays_so_when_the_other_takes_it_in_tha
     assert bench.node.mode is Mode.PASSIVE
 
 
-def test_a_take_that_was_held_since_before_its_first_frame_is_none() -> None:
+def test_a_take_that_was_held_since_before_its_first_frame_is_none():
     bench = Bench()
     bench.second = IDLE._replace(take_command=True)
     bench.run(400)
     assert bench.station is Station.OPERATOR
 
 
-def test_retuning_is_forbidden_while_either_station_says_so() -> None:
+def test_retuning_is_forbidden_while_either_station_says_so():
     bench = active_bench()
     stations = bench.node.inbox.stations
 
@@ -264,7 +264,7 @@ def test_retuning_is_forbidden_while_either_station_says_so() -> None:
     assert not forbidden()
 
 
-def test_alarms_are_accepted_at_any_station() -> None:
+def test_alarms_are_accepted_at_any_station():
     bench = active_bench()
     bench.silent.add(type(bench.motion))
     bench.run(500)

@@ -125,7 +125,7 @@ def throttling(valve: Valve = DUCT) -> ValveBench:
     return bench
 
 
-def test_the_valve_is_told_to_follow_only_while_the_law_is_in_charge() -> None:
+def test_the_valve_is_told_to_follow_only_while_the_law_is_in_charge():
     bench = ValveBench()
     valve_law(bench).loss = SHUT
     bench.run(500)
@@ -145,7 +145,7 @@ def test_the_valve_is_told_to_follow_only_while_the_law_is_in_charge() -> None:
 
 
 @pytest.mark.parametrize(("opening", "position"), [(0.3, "open"), (1.0, "shut")])
-def test_an_opening_has_the_loss_that_the_law_asked_for(opening: float, position: str) -> None:
+def test_an_opening_has_the_loss_that_the_law_asked_for(opening, position):
     valve = Valve("duct", 0.5, 0.1, fail_position=position)  # type: ignore[arg-type]
     bench = throttling(valve)
     valve_law(bench).loss = valve.loss(TANK, opening)
@@ -153,7 +153,7 @@ def test_an_opening_has_the_loss_that_the_law_asked_for(opening: float, position
     assert bench.told[-1].opening == pytest.approx(opening, abs=1e-4)
 
 
-def test_the_law_is_told_the_loss_of_the_valve_as_it_stands_and_the_mean_pressure() -> None:
+def test_the_law_is_told_the_loss_of_the_valve_as_it_stands_and_the_mean_pressure():
     bench = throttling()
     told: list[FloatArray] = []
     bench.law.applied = told.append  # type: ignore[method-assign, assignment]
@@ -180,8 +180,8 @@ def test_the_law_is_told_the_loss_of_the_valve_as_it_stands_and_the_mean_pressur
     ],
 )
 def test_a_valve_that_fails_ends_at_its_fail_position_and_at_zero_pressure(
-    fault: Fault, within_ms: float, changes: dict[str, object]
-) -> None:
+    fault, within_ms, changes
+):
     bench = throttling()
     bench.law.answer_pa = 4e3
     bench.run(400)
@@ -194,7 +194,7 @@ def test_a_valve_that_fails_ends_at_its_fail_position_and_at_zero_pressure(
     assert bench.pressure_pa == 0
 
 
-def test_a_valve_that_has_not_been_heard_is_silent_and_not_at_fault() -> None:
+def test_a_valve_that_has_not_been_heard_is_silent_and_not_at_fault():
     bench = ValveBench()
     bench.reports = False
     bench.run(500)
@@ -203,7 +203,7 @@ def test_a_valve_that_has_not_been_heard_is_silent_and_not_at_fault() -> None:
 
 
 @pytest.mark.parametrize("silent", ["motion", "tank"])
-def test_what_ramps_the_pump_down_sends_the_valve_to_its_fail_position_at_once(silent: str) -> None:
+def test_what_ramps_the_pump_down_sends_the_valve_to_its_fail_position_at_once(silent):
     bench = throttling()
     bench.law.answer_pa = 20e3
     bench.run(600)
@@ -218,7 +218,7 @@ def test_what_ramps_the_pump_down_sends_the_valve_to_its_fail_position_at_once(s
     assert bench.pressure_pa != 0  # the pump is still on its ramp
 
 
-def test_without_the_valve_or_with_its_versions_wrong_nothing_is_armed() -> None:
+def test_without_the_valve_or_with_its_versions_wrong_nothing_is_armed():
     bench = ValveBench()
     bench.reports = False
     bench.run(400)
@@ -231,7 +231,7 @@ def test_without_the_valve_or_with_its_versions_wrong_nothing_is_armed() -> None
     bench.arm()
 
 
-def test_a_faulty_valve_refuses_arming_and_is_reset_only_on_the_operator_s_order() -> None:
+def test_a_faulty_valve_refuses_arming_and_is_reset_only_on_the_operator_s_order():
     bench = ValveBench()
     bench.state, bench.fault = ValveState.FAULT, ValveFault.COMMAND_TIMEOUT
     bench.run(400)
@@ -258,7 +258,7 @@ def test_a_faulty_valve_refuses_arming_and_is_reset_only_on_the_operator_s_order
     assert {told.control for told in bench.told[heard:]} == {ValveControl.FAIL_POSITION}
 
 
-def test_armed_again_while_the_valve_is_still_on_its_way_it_is_not_called_stuck() -> None:
+def test_armed_again_while_the_valve_is_still_on_its_way_it_is_not_called_stuck():
     bench = throttling(Valve("duct", opening_time_s=10.0, leakage=0.1))
     bench.run(9000)
     assert bench.opening == pytest.approx(0.0, abs=1e-3)
@@ -271,7 +271,7 @@ def test_armed_again_while_the_valve_is_still_on_its_way_it_is_not_called_stuck(
     assert bench.opening < 0.5
 
 
-def test_a_valve_that_does_not_return_to_its_fail_position_refuses_arming() -> None:
+def test_a_valve_that_does_not_return_to_its_fail_position_refuses_arming():
     bench = throttling()
     bench.moves = False
     bench.order_is(mode_request=Mode.STANDBY, arm=False)
@@ -311,9 +311,7 @@ EVENTS: dict[str, Callable[[ValveBench], object]] = {
 
 @pytest.mark.slow
 @given(st.lists(st.tuples(st.sampled_from(sorted(EVENTS)), st.integers(1, 40)), max_size=25))
-def test_whatever_comes_the_valve_is_told_to_follow_only_while_the_controller_is_active(
-    events: list[tuple[str, int]],
-) -> None:
+def test_whatever_comes_the_valve_is_told_to_follow_only_while_the_controller_is_active(events):
     bench = ValveBench()
     valve_law(bench).loss = SHUT
     bench.arm()
@@ -330,7 +328,7 @@ def test_whatever_comes_the_valve_is_told_to_follow_only_while_the_controller_is
             assert 0 <= bench.told[-1].opening <= 1
 
 
-def test_a_loss_that_is_no_number_ends_in_an_internal_fault() -> None:
+def test_a_loss_that_is_no_number_ends_in_an_internal_fault():
     bench = throttling()
     valve_law(bench).loss = math.nan
     bench.run(220)
@@ -339,7 +337,7 @@ def test_a_loss_that_is_no_number_ends_in_an_internal_fault() -> None:
     assert bench.control is ValveControl.FAIL_POSITION
 
 
-def test_the_last_frames_of_the_controller_send_the_valve_to_its_fail_position() -> None:
+def test_the_last_frames_of_the_controller_send_the_valve_to_its_fail_position():
     bench = throttling()
     bench.hear(list(bench.node.stop(bench.now_ns)))
     assert bench.control is ValveControl.FAIL_POSITION
@@ -347,7 +345,7 @@ def test_the_last_frames_of_the_controller_send_the_valve_to_its_fail_position()
 
 
 @pytest.mark.parametrize("rate_m_s", [-0.4, 0.01, 0.4])
-def test_the_valve_holds_water_back_by_one_implicit_step_of_its_loss(rate_m_s: float) -> None:
+def test_the_valve_holds_water_back_by_one_implicit_step_of_its_loss(rate_m_s):
     bench = throttling()
     commander = bench.node.actuators.valve
     assert commander is not None
@@ -362,9 +360,7 @@ def test_the_valve_holds_water_back_by_one_implicit_step_of_its_loss(rate_m_s: f
     assert abs(taken_pa) > 1.0
 
 
-def test_the_level_is_observed_with_what_the_valve_holds_back(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_level_is_observed_with_what_the_valve_holds_back(monkeypatch):
     bench = ValveBench()
     bench.pump = SensorPump(3e3, 0.0, Quality.GOOD)
     driven: list[float] = []
@@ -374,7 +370,7 @@ def test_the_level_is_observed_with_what_the_valve_holds_back(
     assert set(driven) == {1e3}
 
 
-def test_it_is_said_which_answer_was_no_number_and_of_several_the_first() -> None:
+def test_it_is_said_which_answer_was_no_number_and_of_several_the_first():
     bench = throttling()
     valve_law(bench).answer_pa = math.inf
     bench.run(300)
@@ -385,7 +381,7 @@ def test_it_is_said_which_answer_was_no_number_and_of_several_the_first() -> Non
     assert bench.node.law.error == "its answer is inf Pa"
 
 
-def test_the_monitors_are_told_what_the_valve_holds_back(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_monitors_are_told_what_the_valve_holds_back(monkeypatch):
     bench = ValveBench()
     monitors = Monitors(DesignPlant(VESSEL.ship, TANK), 0.35, SensorFigures(), 250_000)
     held: list[float] = []
@@ -400,7 +396,7 @@ def test_the_monitors_are_told_what_the_valve_holds_back(monkeypatch: pytest.Mon
     assert held[0] > 0.0
 
 
-def test_a_valve_that_is_silent_is_not_one_that_does_not_follow() -> None:
+def test_a_valve_that_is_silent_is_not_one_that_does_not_follow():
     """Where it is by then nobody knows."""
     bench = ValveBench()
     bench.run(1000)
@@ -416,9 +412,7 @@ def test_a_valve_that_is_silent_is_not_one_that_does_not_follow() -> None:
 
 
 @pytest.mark.parametrize("opening", [0.3, 0.6, 1.0])
-def test_a_valve_that_stands_anywhere_when_the_controller_starts_is_no_fault(
-    opening: float,
-) -> None:
+def test_a_valve_that_stands_anywhere_when_the_controller_starts_is_no_fault(opening):
     bench = ValveBench()
     bench.now_ns = bench.start_ns = 1000 * 1_000_000_000  # the clock of the machine
     bench.opening = opening
@@ -443,7 +437,7 @@ def test_a_valve_that_stands_anywhere_when_the_controller_starts_is_no_fault(
     assert off == 0.0 if opening == 1.0 else off > 300
 
 
-def test_with_a_drive_of_another_maker_the_last_frames_stop_both() -> None:
+def test_with_a_drive_of_another_maker_the_last_frames_stop_both():
     bench = throttling()
     stops = Frame(0, bytes((2, 5)))
     actuators = bench.node.actuators

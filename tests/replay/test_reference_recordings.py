@@ -7,7 +7,6 @@ A difference is a change of behaviour. If it is meant, ``python -m tools.referen
 from dataclasses import replace
 from functools import cache
 from itertools import chain, repeat
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +17,6 @@ from tools.reference_recordings.cases import (
     DESIGN_BOUND,
     FAULTS,
     LOGS,
-    Case,
     compare,
     record,
 )
@@ -57,19 +55,19 @@ def statuses(name: str) -> tuple[ControllerStatus, ...]:
 
 
 @pytest.mark.parametrize("name", [case.name for case in CASES])
-def test_every_frame_is_answered_as_recorded(name: str) -> None:
+def test_every_frame_is_answered_as_recorded(name):
     said = compare(LOGS / f"{name}.frames")
     assert not said, f"{said}; {ACCEPT}"
 
 
-def test_the_recordings_are_those_of_the_cases_and_small() -> None:
+def test_the_recordings_are_those_of_the_cases_and_small():
     files = sorted(LOGS.glob("*.frames"))
     assert [file.stem for file in files] == sorted(case.name for case in CASES)
     assert len(files) >= 10
     assert sum(file.stat().st_size for file in files) < MOST_BYTES
 
 
-def test_between_them_they_meet_every_mode_many_faults_and_a_whole_retuning() -> None:
+def test_between_them_they_meet_every_mode_many_faults_and_a_whole_retuning():
     met = [status for case in CASES for status in statuses(case.name)]
     assert {status.mode for status in met} == set(Mode)
     assert {status.fault for status in met} >= {
@@ -83,7 +81,7 @@ def test_between_them_they_meet_every_mode_many_faults_and_a_whole_retuning() ->
     }  # fmt: skip
 
 
-def test_one_bit_of_one_gain_is_named() -> None:
+def test_one_bit_of_one_gain_is_named():
     log = FrameLog(LOGS / "every-mode.frames")
     with recorded_config(log.head) as config:
         law = build_law(config)
@@ -97,7 +95,7 @@ def test_one_bit_of_one_gain_is_named() -> None:
     assert found.deviation < 1e-15
 
 
-def test_a_recorded_law_answers_for_itself_and_today_s_design_is_judged_beside() -> None:
+def test_a_recorded_law_answers_for_itself_and_today_s_design_is_judged_beside():
     """As on a processor whose design is another one: by a thousandth here, which frames show."""
     log = FrameLog(LOGS / "every-mode.frames")
     with recorded_config(log.head) as config:
@@ -125,7 +123,7 @@ def test_a_recorded_law_answers_for_itself_and_today_s_design_is_judged_beside()
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["adaptive_dpc", "self_tuning"])
-def test_a_law_that_may_be_exchanged_begins_as_recorded(name: str) -> None:
+def test_a_law_that_may_be_exchanged_begins_as_recorded(name):
     config = load_config(CONTROLLERS / f"{name}.yaml", ControllerConfig)
     designed = build_law(config)
     values = law_values(designed.controller())
@@ -139,7 +137,7 @@ def test_a_law_that_may_be_exchanged_begins_as_recorded(name: str) -> None:
     }
 
 
-def test_a_design_that_another_weight_changes_is_beyond_the_bound() -> None:
+def test_a_design_that_another_weight_changes_is_beyond_the_bound():
     path = LOGS / "planned.frames"
     with recorded_config(FrameLog(path).head) as config:
         design = config.law
@@ -150,7 +148,7 @@ def test_a_design_that_another_weight_changes_is_beyond_the_bound() -> None:
     assert max(each.deviation for each in law_differences(head, other)) > 10 * DESIGN_BOUND
 
 
-def test_numbers_that_do_not_fit_this_version_s_law_leave_the_one_designed_here() -> None:
+def test_numbers_that_do_not_fit_this_version_s_law_leave_the_one_designed_here():
     log = FrameLog(LOGS / "every-mode.frames")
     with recorded_config(log.head) as config:
         log.head["law"]["gains"] = encoded({"gains": np.zeros((1, 3))})["gains"]
@@ -159,7 +157,7 @@ def test_numbers_that_do_not_fit_this_version_s_law_leave_the_one_designed_here(
     assert "gains is float64 of shape (1, 3) there" in law.why_not_recorded
 
 
-def test_a_changed_limit_is_named_by_tick_signal_and_key() -> None:
+def test_a_changed_limit_is_named_by_tick_signal_and_key():
     path = LOGS / "every-mode.frames"
     with recorded_config(FrameLog(path).head) as config:
         slower = replace(config.limits, rate_pa_s=config.limits.rate_pa_s / 2)
@@ -168,7 +166,7 @@ def test_a_changed_limit_is_named_by_tick_signal_and_key() -> None:
     assert "configuration, limits.rate_pa_s: recorded " in said
 
 
-def test_a_changed_reaction_is_named_by_the_mode_that_differs() -> None:
+def test_a_changed_reaction_is_named_by_the_mode_that_differs():
     path = LOGS / "motion-silent.frames"
     with recorded_config(FrameLog(path).head) as config:
         patient = replace(config.safety, motion_age_ms=1000.0)
@@ -178,7 +176,7 @@ def test_a_changed_reaction_is_named_by_the_mode_that_differs() -> None:
     assert f"configuration, safety.motion_age_ms: {ages}" in said
 
 
-def test_answers_of_the_retuner_are_part_of_the_recording() -> None:
+def test_answers_of_the_retuner_are_part_of_the_recording():
     log = FrameLog(LOGS / "retuned-and-undone.frames")
     entries = (entry for entry in entries_of(log.blocks()) if entry.kind != Kind.ANSWER)
     with recorded_config(log.head) as config:
@@ -188,11 +186,11 @@ def test_answers_of_the_retuner_are_part_of_the_recording() -> None:
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_the_faults_of_every_case_are_such_that_exist(case: Case) -> None:
+def test_the_faults_of_every_case_are_such_that_exist(case):
     assert len(FAULTS.validate_python(case.faults)) == len(case.faults)
 
 
-def test_a_case_gives_the_same_bytes_every_time(tmp_path: Path) -> None:
+def test_a_case_gives_the_same_bytes_every_time(tmp_path):
     (case,) = (case for case in CASES if case.name == "drive-fault")
     first, again = tmp_path / "first", tmp_path / "again"
     for folder in (first, again):
@@ -203,9 +201,7 @@ def test_a_case_gives_the_same_bytes_every_time(tmp_path: Path) -> None:
     ).read_bytes()
 
 
-def test_one_bit_of_one_sensor_frame_is_found_at_its_tick_and_named(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_one_bit_of_one_sensor_frame_is_found_at_its_tick_and_named(monkeypatch):
     log = FrameLog(LOGS / "every-mode.frames")
     entries = list(entries_of(log.blocks()))
     at = [n for n, each in enumerate(entries)

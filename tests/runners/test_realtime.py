@@ -262,7 +262,7 @@ def test_signal_ends_the_loop_and_the_handlers_are_put_back(number):
     assert signal.getsignal(number) is found
 
 
-def test_a_warning_in_the_loop_is_printed_nowhere(capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_warning_in_the_loop_is_printed_nowhere(capfd):
     """A terminal that nobody reads would hold up the tick."""
     node = ToyNode("a")
     node.says = lambda now: warnings.warn("of the loop", stacklevel=1) or ()
@@ -272,7 +272,7 @@ def test_a_warning_in_the_loop_is_printed_nowhere(capfd: pytest.CaptureFixture[s
         warnings.warn("outside", stacklevel=1)
 
 
-def test_a_sighup_that_is_ignored_stays_so_for_nohup() -> None:
+def test_a_sighup_that_is_ignored_stays_so_for_nohup():
     found = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
         with stop_on_signals() as stop:

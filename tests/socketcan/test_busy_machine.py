@@ -40,13 +40,11 @@ def machine_late_by(monkeypatch: pytest.MonkeyPatch):
     ("late_s", "naps", "kept"),
     [(0.0, 1000, True), (0.03, 1000, True), (0.04, 1000, False), (0.03, 50, False)],
 )
-def test_machine_keeps_time_unless_it_takes_long_or_often(
-    machine_late_by, late_s: float, naps: int, kept: bool
-) -> None:
+def test_machine_keeps_time_unless_it_takes_long_or_often(machine_late_by, late_s, naps, kept):
     assert (machine_late_by(late_s, naps).failure() == "") == kept
 
 
-def test_failure_on_a_punctual_machine_is_a_failure_at_once(machine_late_by, tmp_path: Path):
+def test_failure_on_a_punctual_machine_is_a_failure_at_once(machine_late_by, tmp_path):
     def attempt(folder: Path) -> None:
         with judged_by(machine_late_by(0.0).failure):
             assert folder.name == "never"
@@ -56,7 +54,7 @@ def test_failure_on_a_punctual_machine_is_a_failure_at_once(machine_late_by, tmp
     assert busy_machine.RETRIED == []
 
 
-def test_busy_machine_is_tried_again_and_said(machine_late_by, tmp_path: Path) -> None:
+def test_busy_machine_is_tried_again_and_said(machine_late_by, tmp_path):
     def attempt(folder: Path) -> str:
         with judged_by(machine_late_by(0.5).failure):
             assert folder.name == "2", "the ship is not found"
@@ -67,7 +65,7 @@ def test_busy_machine_is_tried_again_and_said(machine_late_by, tmp_path: Path) -
     assert "for 495 ms at a time (30 ms allowed); then: the ship is not" in busy_machine.RETRIED[0]
 
 
-def test_machine_that_stays_busy_is_the_reason_of_the_failure(machine_late_by, tmp_path: Path):
+def test_machine_that_stays_busy_is_the_reason_of_the_failure(machine_late_by, tmp_path):
     def attempt(folder: Path) -> None:
         with judged_by(machine_late_by(0.5).failure):
             raise AssertionError

@@ -77,9 +77,7 @@ def story(folder: Path) -> dict[str, Any]:
     return made
 
 
-def test_a_controller_arms_once_it_was_commissioned(
-    tmp_path_factory: pytest.TempPathFactory,
-) -> None:
+def test_a_controller_arms_once_it_was_commissioned(tmp_path_factory):
     folder = tmp_path_factory.mktemp("quay")
     made = first_that_can_be_judged(story, folder)
     assert made["passed"] is True

@@ -75,9 +75,7 @@ def sail(folder: Path) -> dict[str, set[str]]:
     }
 
 
-def test_devices_on_two_more_interfaces_keep_the_controller_in_charge(
-    tmp_path_factory: pytest.TempPathFactory,
-) -> None:
+def test_devices_on_two_more_interfaces_keep_the_controller_in_charge(tmp_path_factory):
     for name in OTHERS:
         if not can_is_usable(name):
             create_vcan(name)

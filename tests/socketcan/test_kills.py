@@ -138,7 +138,7 @@ def kill_controllers(folder: Path) -> list[Logged]:
         return candump.stop("PUMP_CMD", "DRIVE_STATUS_1", "SENSOR_PUMP", "CTRL_STATUS")
 
 
-def test_a_controller_killed_at_any_instant_leaves_the_pump_at_zero(tmp_path: Path) -> None:
+def test_a_controller_killed_at_any_instant_leaves_the_pump_at_zero(tmp_path):
     log = first_that_can_be_judged(kill_controllers, tmp_path)
     killed = pauses(log, "PUMP_CMD")
     assert len(killed) == KILLS
@@ -179,7 +179,7 @@ def kill_ships(folder: Path) -> list[Logged]:
         return candump.stop("PUMP_CMD", "SENSOR_MOTION")
 
 
-def test_a_ship_killed_at_any_instant_hears_no_pressure_any_more(tmp_path: Path) -> None:
+def test_a_ship_killed_at_any_instant_hears_no_pressure_any_more(tmp_path):
     log = first_that_can_be_judged(kill_ships, tmp_path)
     killed = pauses(log, "SENSOR_MOTION")
     assert len(killed) == KILLS - 1
@@ -191,9 +191,7 @@ def test_a_ship_killed_at_any_instant_hears_no_pressure_any_more(tmp_path: Path)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_under_pressure_ends_with_the_pump_at_zero(
-    number: signal.Signals, tmp_path: Path
-) -> None:
+def test_a_signal_under_pressure_ends_with_the_pump_at_zero(number, tmp_path):
     def signalled(folder: Path) -> list[Logged]:
         with logged(folder) as (candump, watcher, panel), ship(folder / "ship"):
             watcher.wait(lambda w: w.drive is not None)
@@ -208,7 +206,7 @@ def test_a_signal_under_pressure_ends_with_the_pump_at_zero(
     assert log[-1].signals["pressure_pa"] == 0.0
 
 
-def test_a_hundred_flaps_of_the_interface_are_survived_without_arming(tmp_path: Path) -> None:
+def test_a_hundred_flaps_of_the_interface_are_survived_without_arming(tmp_path):
     def flap(folder: Path) -> None:
         draw = random.Random(3)
         with (

@@ -10,5 +10,5 @@ pytestmark = [pytest.mark.socketcan, pytest.mark.evidence, pytest.mark.timeout(9
 
 
 @pytest.mark.parametrize("name", ROWS)
-def test_live_row_is_passed(name: str) -> None:
+def test_live_row_is_passed(name):
     assert run_live(ROWS[name], CHANNEL) == []

@@ -84,13 +84,7 @@ def until_it_ends(
         ("sleeps", {Fault.OVERRUN, Fault.DRIVE_FAULT, Fault.DRIVE_SILENT}, ""),
     ],
 )
-def test_a_law_that_fails_ends_at_zero_pressure(
-    flaw: str,
-    faults: set[Fault],
-    error: str,
-    tmp_path_factory: pytest.TempPathFactory,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_law_that_fails_ends_at_zero_pressure(flaw, faults, error, tmp_path_factory, monkeypatch):
     folder = tmp_path_factory.mktemp(flaw)
     watcher, report = first_that_can_be_judged(
         lambda at: until_it_ends(at, flaw, monkeypatch), folder

@@ -104,7 +104,7 @@ def roll_at(when_s: np.ndarray, run: Run) -> np.ndarray:
     return np.interp(when_s, run.column("time_s"), run.column("true_roll_rad"))
 
 
-def test_both_runs_come_back_with_their_deadlines(bench) -> None:
+def test_both_runs_come_back_with_their_deadlines(bench):
     _, report, recording = bench
     assert report["mode"] == f"real time on {CHANNEL}"
     assert list(recording) == [run["name"] for run in report["runs"]] == ["passive", "gpc"]
@@ -118,7 +118,7 @@ def test_both_runs_come_back_with_their_deadlines(bench) -> None:
         assert 0.1 < run["bus_load"] < 0.4
 
 
-def test_rows_are_on_the_ships_time_and_both_processes_begin_together(bench) -> None:
+def test_rows_are_on_the_ships_time_and_both_processes_begin_together(bench):
     scenario, _, recording = bench
     moment = scenario.wave_moment(scenario.seed)
     for run in recording.values():
@@ -130,7 +130,7 @@ def test_rows_are_on_the_ships_time_and_both_processes_begin_together(bench) -> 
         assert run["time_s"][-1] > DURATION_S - 2.0
 
 
-def test_figures_are_of_one_window_of_the_same_waves(bench) -> None:
+def test_figures_are_of_one_window_of_the_same_waves(bench):
     scenario, report, recording = bench
     start_s, end_s = report["settle_s"], report["end_s"]
     assert start_s == pytest.approx(scenario.settle_s)
@@ -160,7 +160,7 @@ def test_figures_are_of_one_window_of_the_same_waves(bench) -> None:
             assert run["roll_below_passive"] == pytest.approx(below, abs=1e-6)
 
 
-def test_measured_roll_stands_beside_the_true_roll_of_the_same_time(bench) -> None:
+def test_measured_roll_stands_beside_the_true_roll_of_the_same_time(bench):
     _, _, recording = bench
     for run in recording.values():
         heard = run["time_s"] > run["time_s"][0] + 0.5
@@ -172,7 +172,7 @@ def test_measured_roll_stands_beside_the_true_roll_of_the_same_time(bench) -> No
         assert np.median(np.abs(error)) < rate * 0.06 + 3e-4
 
 
-def test_passive_tank_rolls_the_ship_as_in_lockstep(bench) -> None:
+def test_passive_tank_rolls_the_ship_as_in_lockstep(bench):
     scenario, _, recording = bench
     run = recording["passive"]
     expected = roll_at(run["time_s"], lockstep(scenario, 0))
@@ -184,7 +184,7 @@ def test_passive_tank_rolls_the_ship_as_in_lockstep(bench) -> None:
     assert np.sqrt(np.mean(difference**2)) < 0.03 * rms
 
 
-def test_armed_controller_rolls_the_ship_as_in_lockstep(bench) -> None:
+def test_armed_controller_rolls_the_ship_as_in_lockstep(bench):
     scenario, report, recording = bench
     run = recording["gpc"]
     when_s = run["time_s"]
@@ -206,7 +206,7 @@ def test_armed_controller_rolls_the_ship_as_in_lockstep(bench) -> None:
 
 
 @pytest.mark.parametrize("name", ["passive", "gpc"])
-def test_both_runs_are_replayed_bit_for_bit(bench, name: str) -> None:
+def test_both_runs_are_replayed_bit_for_bit(bench, name):
     _, report, _ = bench
     path = Path(report["files"][f"frames of {name}"])
     log = FrameLog(path)

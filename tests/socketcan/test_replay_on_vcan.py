@@ -63,7 +63,7 @@ def wait_for_listener() -> None:
 
 
 @pytest.mark.evidence
-def test_a_run_between_two_processes_is_replayed_bit_for_bit(tmp_path: Path) -> None:
+def test_a_run_between_two_processes_is_replayed_bit_for_bit(tmp_path):
     path = first_that_can_be_judged(driven, tmp_path)
     log = FrameLog(path)
     kinds = {entry.kind for entry in entries_of(log.blocks())}
@@ -77,7 +77,7 @@ def test_a_run_between_two_processes_is_replayed_bit_for_bit(tmp_path: Path) -> 
     assert log.cut == ""
 
 
-def test_canplayer_puts_an_exported_log_on_the_bus_frame_by_frame(tmp_path: Path) -> None:
+def test_canplayer_puts_an_exported_log_on_the_bus_frame_by_frame(tmp_path):
     entries = list(entries_of(FrameLog(KEPT).blocks()))
     first = list(takewhile(lambda entry: entry.time_ns < PLAYED_NS, entries))
     file = tmp_path / "kept.log"

@@ -44,16 +44,16 @@ def command_gaps(story: Story, state: RetuningState) -> FloatArray:
     return np.diff(times)
 
 
-def test_bus_shows_identification_design_trial_and_the_retuned_law(retuned: Story) -> None:
+def test_bus_shows_identification_design_trial_and_the_retuned_law(retuned):
     assert retuned.states == [IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED], retuned.reasons
     assert retuned.reasons["IDENTIFY"] == "ordered by the operator"
 
 
-def test_ship_is_found_over_the_bus(retuned: Story) -> None:
+def test_ship_is_found_over_the_bus(retuned):
     assert_ship_is_found(retuned)
 
 
-def test_pulses_and_the_new_law_reach_the_pump(retuned: Story) -> None:
+def test_pulses_and_the_new_law_reach_the_pump(retuned):
     shown = {(f.time_s, f.signals["retuning"]) for f in retuned.of("CTRL_STATUS")}
     for state in (IDENTIFY, TRIAL, RETUNED):
         times = [time_s for time_s, told in shown if told == state]
@@ -66,11 +66,11 @@ def test_pulses_and_the_new_law_reach_the_pump(retuned: Story) -> None:
         assert max(pressures) > 5e3
 
 
-def test_swap_makes_no_step_and_disturbs_nothing(retuned: Story) -> None:
+def test_swap_makes_no_step_and_disturbs_nothing(retuned):
     assert_nothing_was_disturbed(retuned)
 
 
-def test_refusal_is_shown_with_its_reason_and_the_old_law_goes_on(tmp_path: Path) -> None:
+def test_refusal_is_shown_with_its_reason_and_the_old_law_goes_on(tmp_path):
     def attempt(folder: Path) -> Story:
         # she rolls more than identification is allowed in
         return tell_story(folder, SHORT | {"roll_limit_rad": 0.01}, REFUSED)
@@ -85,7 +85,7 @@ def test_refusal_is_shown_with_its_reason_and_the_old_law_goes_on(tmp_path: Path
 
 
 @pytest.mark.timeout(3600)  # twelve minutes in which no process is held up for 100 ms
-def test_shipped_law_of_order_200_is_retuned_from_500_s_of_data(tmp_path: Path) -> None:
+def test_shipped_law_of_order_200_is_retuned_from_500_s_of_data(tmp_path):
     def attempt(folder: Path) -> Story:
         return tell_story(folder, UNJUDGED, RETUNED, "adaptive_gpc.yaml", 500.0 + 120.0)
 

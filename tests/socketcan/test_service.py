@@ -104,11 +104,11 @@ def sail(system: BootedSystem, folder: Path) -> None:
         assert len(list(LOGS.resolve().glob("run-*.rrd"))) == recordings + 3
 
 
-def test_the_service_never_leaves_a_pump_alone(system: BootedSystem, tmp_path: Path) -> None:
+def test_the_service_never_leaves_a_pump_alone(system, tmp_path):
     first_that_can_be_judged(lambda folder: sail(system, folder), tmp_path)
 
 
-def test_a_wrong_configuration_is_not_started_again(system: BootedSystem, tmp_path: Path) -> None:
+def test_a_wrong_configuration_is_not_started_again(system, tmp_path):
     configure(tmp_path, command_timeout_ms=-1)
     system.run("systemctl", "start", "utank-hil")
     system.wait("ActiveState", "failed")

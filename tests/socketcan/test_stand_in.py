@@ -59,9 +59,7 @@ def arm_with_stand_in(folder: Path) -> tuple[dict[str, object], Candump]:
     return report, candump
 
 
-def test_controller_works_with_sensors_that_know_nothing_of_this_repository(
-    tmp_path: Path,
-) -> None:
+def test_controller_works_with_sensors_that_know_nothing_of_this_repository(tmp_path):
     report, candump = first_that_can_be_judged(arm_with_stand_in, tmp_path)
     log = candump.stop("SENSOR_MOTION", "HEARTBEAT_SENSORS", "PUMP_CMD", "ADDRESS_CLAIM_SENSORS")
     rolls = [frame.signals["roll_rad"] for frame in log if frame.name == "SENSOR_MOTION"]

@@ -136,7 +136,7 @@ def entries(file: Path) -> Iterator[Entry]:
     return entries_of(FrameLog(file).blocks())
 
 
-def test_there_are_ten() -> None:
+def test_there_are_ten():
     names = {case.name for case, _ in RUNS}
     assert len(names) == len(RUNS) == 10
     assert names > SOON
@@ -149,9 +149,7 @@ def test_there_are_ten() -> None:
         for run in RUNS
     ],
 )
-def test_a_run_in_real_time_is_replayed_bit_for_bit(
-    case: Case, told: set[Mode | Fault], processes: ProcessPoolExecutor, tmp_path: Path
-) -> None:
+def test_a_run_in_real_time_is_replayed_bit_for_bit(case, told, processes, tmp_path):
     file = first_that_can_be_judged(lambda to: recorded(case, told, processes, to), tmp_path)
     log = FrameLog(file)
     with recorded_config(log.head) as config:

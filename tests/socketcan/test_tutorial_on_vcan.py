@@ -15,7 +15,7 @@ pytestmark = [pytest.mark.socketcan, pytest.mark.evidence, pytest.mark.timeout(9
 PAGE = Path("docs/tutorial.md").read_text(encoding="utf-8")
 
 
-def test_it_works_on_the_bus(tmp_path: Path) -> None:
+def test_it_works_on_the_bus(tmp_path):
     init, bench = (
         re.findall(rf"^(?:tools/vcan )?utank-hil ({command} .*)$", PAGE, re.M)[-1]
         for command in ("init", "bench patrol/scenario.yaml --realtime --bus")

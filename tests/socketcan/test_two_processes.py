@@ -87,7 +87,7 @@ def tell_story(folder: Path) -> Story:
     return told
 
 
-def test_every_frame_decodes_with_the_dbc_to_values_within_its_ranges(story: Story) -> None:
+def test_every_frame_decodes_with_the_dbc_to_values_within_its_ranges(story):
     names = {frame.name for frame in story.log}
     assert names >= {
         "PUMP_CMD", "DRIVE_STATUS_1", "DRIVE_STATUS_2", "SENSOR_MOTION", "SENSOR_TANK",
@@ -111,7 +111,7 @@ def test_every_frame_decodes_with_the_dbc_to_values_within_its_ranges(story: Sto
     assert (np.abs(steps_rad) < 0.03 + 0.2 * (steps_s - 0.01).clip(0.0)).all()
 
 
-def test_pressure_flows_once_the_controller_is_in_charge(story: Story) -> None:
+def test_pressure_flows_once_the_controller_is_in_charge(story):
     modes = [frame.signals["mode"] for frame in story.of("CTRL_STATUS")]
     assert Mode.ACTIVE in modes
     assert max(abs(frame.signals["pressure_pa"]) for frame in story.of("PUMP_CMD")) > 15e3
@@ -131,7 +131,7 @@ def restart_s(story: Story) -> float:
     return second_s
 
 
-def test_commands_on_the_bus_are_those_in_the_controllers_telemetry(story: Story) -> None:
+def test_commands_on_the_bus_are_those_in_the_controllers_telemetry(story):
     commands = [f for f in story.of("PUMP_CMD") if f.time_s < restart_s(story)]
     on_bus = np.array([frame.signals["pressure_pa"] for frame in commands])
     # a command leaves at every second tick, and every fifth has a row: those of even ticks agree
@@ -150,9 +150,7 @@ def test_commands_on_the_bus_are_those_in_the_controllers_telemetry(story: Story
     assert 0.95 * left - 5 < place < left + 5
 
 
-def test_killed_controllers_drive_is_at_zero_within_100_ms_of_its_last_command(
-    story: Story,
-) -> None:
+def test_killed_controllers_drive_is_at_zero_within_100_ms_of_its_last_command(story):
     last_s = max(f.time_s for f in story.of("PUMP_CMD") if f.time_s < restart_s(story))
     states = [(f.time_s, f.signals["state"]) for f in story.of("DRIVE_STATUS_1")]
     before = [state for time_s, state in states if time_s <= last_s]
@@ -176,7 +174,7 @@ def test_killed_controllers_drive_is_at_zero_within_100_ms_of_its_last_command(
     assert left[0.5] < 2.5e3
 
 
-def test_restarted_controller_waits_in_standby_for_the_operator(story: Story) -> None:
+def test_restarted_controller_waits_in_standby_for_the_operator(story):
     since_s = restart_s(story)
     assert story.of("OPERATOR_CMD")[-1].signals["arm"]  # the panel still holds it
     modes = {f.signals["mode"] for f in story.of("CTRL_STATUS") if f.time_s >= since_s}
@@ -189,7 +187,7 @@ def test_restarted_controller_waits_in_standby_for_the_operator(story: Story) ->
     assert not {signals["control_word"] for signals in commands} & enabling
 
 
-def test_both_end_cleanly_with_the_pump_at_zero_and_readable_recordings(story: Story) -> None:
+def test_both_end_cleanly_with_the_pump_at_zero_and_readable_recordings(story):
     last = story.of("PUMP_CMD")[-1].signals
     assert last["pressure_pa"] == 0.0
     assert last["control_word"] in (ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE)
@@ -207,7 +205,7 @@ def test_both_end_cleanly_with_the_pump_at_zero_and_readable_recordings(story: S
         assert recording["time_s"][-1] > 3.0
 
 
-def test_counters_step_by_one_so_nothing_was_lost(story: Story) -> None:
+def test_counters_step_by_one_so_nothing_was_lost(story):
     for name in ("SENSOR_MOTION", "SENSOR_TANK", "DRIVE_STATUS_1"):
         counters = [int(frame.signals["counter"]) for frame in story.of(name)]
         assert {(b - a) % 16 for a, b in pairwise(counters)} == {1}
@@ -235,9 +233,7 @@ def take_the_link_down(folder: Path) -> tuple[dict[str, object], Path]:
 
 
 @pytest.mark.evidence  # test_port.py takes the link down, too
-def test_interface_that_goes_down_under_an_armed_controller_latches_a_fault(
-    tmp_path: Path,
-) -> None:
+def test_interface_that_goes_down_under_an_armed_controller_latches_a_fault(tmp_path):
     report, file = first_that_can_be_judged(take_the_link_down, tmp_path)
     assert (report["mode"], report["fault"]) == ("FAULT", "BUS_LOST")
     recording = read_recording(file)["live"]

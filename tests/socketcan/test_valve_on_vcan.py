@@ -44,9 +44,7 @@ def kill_the_controller(folder: Path) -> Candump:
     return candump
 
 
-def test_the_valve_follows_and_a_killed_controller_leaves_it_at_its_fail_position(
-    tmp_path: Path,
-) -> None:
+def test_the_valve_follows_and_a_killed_controller_leaves_it_at_its_fail_position(tmp_path):
     candump = first_that_can_be_judged(kill_the_controller, tmp_path)
     log = candump.stop("VALVE_CMD", "VALVE_STATUS")
     told = [frame for frame in log if frame.name == "VALVE_CMD"]

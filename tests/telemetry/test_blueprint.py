@@ -46,7 +46,7 @@ RUNS = ["live"], ["passive", "dpc", "gpc"], ["passive", "a", "b", "c", "d", "e"]
 
 
 @pytest.mark.parametrize("runs", RUNS, ids=len)
-def test_every_column_of_every_run_is_plotted_once_a_range(runs: list[str]) -> None:
+def test_every_column_of_every_run_is_plotted_once_a_range(runs):
     pages = list(make_blueprint(COLUMNS, runs, span_s=(0.0, 60.0)).root_container.contents)
     assert len(pages) == 2 * -(-len(runs) // MOST_SHADES)
     for start in ("At the cursor", "Whole run"):
@@ -62,7 +62,7 @@ def test_every_column_of_every_run_is_plotted_once_a_range(runs: list[str]) -> N
 
 
 @pytest.mark.parametrize("runs", RUNS, ids=len)
-def test_no_plot_has_a_legend_or_too_many_shades_and_titles_name_each(runs: list[str]) -> None:
+def test_no_plot_has_a_legend_or_too_many_shades_and_titles_name_each(runs):
     blueprint = make_blueprint(COLUMNS, runs, span_s=(0.0, 60.0), size=SIZE)
     for plot in plots_of(blueprint.root_container):
         legend: Any = plot.properties["PlotLegend"]
@@ -73,7 +73,7 @@ def test_no_plot_has_a_legend_or_too_many_shades_and_titles_name_each(runs: list
             assert sum(plot.name.count(color) for color in _COLOR_NAMES) == len(lines), plot.name
 
 
-def test_what_is_zero_throughout_is_left_out() -> None:
+def test_what_is_zero_throughout_is_left_out():
     zero = {("a", "overruns"), ("a", "pump_power_w"), ("b", "pump_power_w")}
     page = make_blueprint(COLUMNS, ["a", "b"], zero=zero).root_container.contents[0]
     for path, missing in (("/1/a", {"overruns", "pump_power_kw"}), ("/2/b", {"pump_power_kw"})):
@@ -81,7 +81,7 @@ def test_what_is_zero_throughout_is_left_out() -> None:
         assert sorted(names) == sorted(set(SHOWN) - missing)
 
 
-def test_what_the_ship_has_not_is_not_shown() -> None:
+def test_what_the_ship_has_not_is_not_shown():
     vessel = {"pump": {}, "valve": None}
     about = {"configuration": {"vessel": vessel, "sea_estimate": None}}
     assert set(COLUMNS) - set(columns_of(COLUMNS, about)) == {"valve_opening", *ESTIMATES}
@@ -89,13 +89,13 @@ def test_what_the_ship_has_not_is_not_shown() -> None:
     assert set(ESTIMATES) | {name for part in PARTS.values() for name in part} <= set(SIGNALS)
 
 
-def test_the_live_page_follows_and_a_recording_stands_still() -> None:
+def test_the_live_page_follows_and_a_recording_stands_still():
     live = make_blueprint(COLUMNS, ["live"])
     still = make_blueprint(COLUMNS, ["live"], span_s=(0.0, 60.0))
     assert live.time_panel.play_state == "following"
     assert still.time_panel.play_state == "paused"
 
 
-def test_a_table_without_states_or_loop_signals_has_a_blueprint_too() -> None:
+def test_a_table_without_states_or_loop_signals_has_a_blueprint_too():
     body = make_blueprint(["time_s", "roll_rad"], ["a"], span_s=(0.0, 1.0)).root_container
     assert [view.name for view in views(body)] == ["Roll, °", "Roll, °"]

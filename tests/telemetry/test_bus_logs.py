@@ -55,7 +55,7 @@ def replayed(case: str) -> dict[str, Any]:
     return found
 
 
-def test_01_a_clock_that_steps_back_loses_no_frame(tmp_path: Path) -> None:
+def test_01_a_clock_that_steps_back_loses_no_frame(tmp_path):
     case = "01-candump-clock-steps-back/steps.log"
     said = exported(case, tmp_path / "a.csv")
     assert "line 301: stamps step back by 7199.990560 s" in said
@@ -68,7 +68,7 @@ def test_01_a_clock_that_steps_back_loses_no_frame(tmp_path: Path) -> None:
     assert (np.diff(times) >= 0).all()
 
 
-def test_02_one_stamp_ahead_moves_one_frame(tmp_path: Path) -> None:
+def test_02_one_stamp_ahead_moves_one_frame(tmp_path):
     said = exported("02-candump-one-stamp-ahead/hop.log", tmp_path / "a.csv")
     assert "line 253: 1 stamp is +2.500568 s off" in said
     (found,) = read_signals(tmp_path / "a.csv").values()
@@ -79,7 +79,7 @@ def test_02_one_stamp_ahead_moves_one_frame(tmp_path: Path) -> None:
         assert different.sum() <= 1, name
 
 
-def test_frames_of_a_quiet_bus_keep_their_times() -> None:
+def test_frames_of_a_quiet_bus_keep_their_times():
     stamps_ns = [ms * 1_000_000 for k in range(200) for ms in (75 * k, 75 * k + 25, 75 * k + 37)]
     frames = [BusFrame(each, "can0", 5, False, FrameKind.DATA, b"", 0) for each in stamps_ns]
     clock = OneClock("quiet.log", frames, lambda: "a line")
@@ -87,14 +87,14 @@ def test_frames_of_a_quiet_bus_keep_their_times() -> None:
     assert clock.notes == []
 
 
-def test_03_a_clock_of_1970_that_is_set_ends_at_once(tmp_path: Path) -> None:
+def test_03_a_clock_of_1970_that_is_set_ends_at_once(tmp_path):
     said = exported("03-candump-1970-then-ntp/ntp.log", tmp_path / "a.csv")
     assert "line 61: stamps step ahead by 1759999988.000576 s" in said
     assert len((tmp_path / "a.csv").read_text().splitlines()) == 31
 
 
 @pytest.mark.parametrize("name", ["zero_message", "zero_other"])
-def test_04_an_object_without_size_is_an_error_with_its_place(tmp_path: Path, name: str) -> None:
+def test_04_an_object_without_size_is_an_error_with_its_place(tmp_path, name):
     case = f"04-blf-object-of-size-zero/{name}.blf"
     said = exported(case, tmp_path / "a.csv", code=2)
     assert "is damaged after frame 100" in said
@@ -103,14 +103,14 @@ def test_04_an_object_without_size_is_an_error_with_its_place(tmp_path: Path, na
     assert not list(tmp_path.iterdir())
 
 
-def test_05_relative_stamps_are_added_up() -> None:
+def test_05_relative_stamps_are_added_up():
     (relative,) = read_signals(field_case("05-asc-timestamps-relative/relative.asc")).values()
     (absolute,) = read_signals(field_case("05-asc-timestamps-relative/absolute.asc")).values()
     for name, values in absolute.items():
         np.testing.assert_array_equal(relative[name], values, err_msg=name)
 
 
-def test_06_of_two_buses_one_is_chosen(tmp_path: Path) -> None:
+def test_06_of_two_buses_one_is_chosen(tmp_path):
     case = "06-two-buses-in-one-log/both.log"
     said = exported(case, tmp_path / "a.csv", code=2)
     assert "can0 (465 frames), can1 (462 frames): choose by --channel" in said
@@ -126,7 +126,7 @@ def test_06_of_two_buses_one_is_chosen(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["cut_in_id", "cut_in_data"])
-def test_07_a_cut_log_is_read_up_to_there(tmp_path: Path, name: str) -> None:
+def test_07_a_cut_log_is_read_up_to_there(tmp_path, name):
     case = f"07-log-cut-in-its-last-line/{name}.log"
     said = exported(case, tmp_path / "a.log")
     assert f"{name}.log is cut in line 200; what follows in it is left out" in said
@@ -134,7 +134,7 @@ def test_07_a_cut_log_is_read_up_to_there(tmp_path: Path, name: str) -> None:
     assert (tmp_path / "a.log").read_text().splitlines() == whole
 
 
-def test_17_texts_of_candump_and_asc_are_read_or_their_line_is_named(tmp_path: Path) -> None:
+def test_17_texts_of_candump_and_asc_are_read_or_their_line_is_named(tmp_path):
     folder = "17-candump-as-on-the-screen"
     exported(f"{folder}/screen.log", tmp_path / "screen.log")
     exported(f"{folder}/comment.log", tmp_path / "comment.log")
@@ -147,7 +147,7 @@ def test_17_texts_of_candump_and_asc_are_read_or_their_line_is_named(tmp_path: P
     assert "log with numeric identifiers" in said
 
 
-def test_28_29_a_copy_keeps_times_and_order(tmp_path: Path) -> None:
+def test_28_29_a_copy_keeps_times_and_order(tmp_path):
     for case in (
         "28-bus-logged-before-the-controller-starts/early.log",
         "29-times-of-the-controllers-frames/jitter.log",
@@ -164,7 +164,7 @@ def test_28_29_a_copy_keeps_times_and_order(tmp_path: Path) -> None:
             assert (times[:, 0] == times[:, 1]).all()
 
 
-def test_30_31_a_copy_keeps_every_kind(tmp_path: Path) -> None:
+def test_30_31_a_copy_keeps_every_kind(tmp_path):
     for case in (
         "30-frames-of-other-kinds-go-missing/mixed.log",
         "31-candump-error-frames-become-data/errors.log",
@@ -195,7 +195,7 @@ def test_30_31_a_copy_keeps_every_kind(tmp_path: Path) -> None:
     assert replayed("31-candump-error-frames-become-data/errors.log")["exact"]
 
 
-def test_32_a_head_is_not_needed(tmp_path: Path) -> None:
+def test_32_a_head_is_not_needed(tmp_path):
     folder = "32-asc-without-a-header"
     for name, count in (("whole", 150), ("no_header", 150), ("no_events", 150), ("one_frame", 1)):
         exported(f"{folder}/{name}.asc", tmp_path / f"{name}.log")
@@ -207,12 +207,12 @@ def test_32_a_head_is_not_needed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "name", ["as_recorded.asc", "all_tx.asc", "upper_case.asc", "panel_on_the_same_pc.log"]
 )
-def test_33_identifiers_say_what_the_controller_sent(name: str) -> None:
+def test_33_identifiers_say_what_the_controller_sent(name):
     found = replayed(f"33-asc-in-which-everything-is-transmitted/{name}")
     assert (found["exact"], found["ticks"], found["frames"]) == (True, 76, 71)
 
 
-def test_36_frames_are_read_whatever_their_file_is_called(tmp_path: Path) -> None:
+def test_36_frames_are_read_whatever_their_file_is_called(tmp_path):
     folder = "36-what-a-refusal-says-of-the-file"
     exported(f"{folder}/trace.trc", tmp_path / "trace.log")
     exported(f"{folder}/frames.txt", tmp_path / "frames.log")
@@ -223,14 +223,14 @@ def test_36_frames_are_read_whatever_their_file_is_called(tmp_path: Path) -> Non
     assert replayed(f"{folder}/trace.trc")["exact"]
 
 
-def test_39_raw_length_codes_are_kept(tmp_path: Path) -> None:
+def test_39_raw_length_codes_are_kept(tmp_path):
     exported("39-candump-with-raw-length-codes/len8.log", tmp_path / "a.log")
     original = lines_in(field_case("39-candump-with-raw-length-codes/len8.log"))
     assert lines_in(tmp_path / "a.log") == original
     assert sum(line[2].endswith("_C") for line in original) == 1
 
 
-def test_46_lines_that_are_not_understood_are_counted(tmp_path: Path) -> None:
+def test_46_lines_that_are_not_understood_are_counted(tmp_path):
     said = exported("46-asc-lines-that-vanish/mixed.asc", tmp_path / "a.log")
     assert "59 lines are not understood and left out, the first line 14" in said
     assert "'0x08FF3082' is no identifier" in said
@@ -246,14 +246,14 @@ def test_46_lines_that_are_not_understood_are_counted(tmp_path: Path) -> None:
         ("underscore", "1_780_000_000.103"),
     ],
 )
-def test_47_stamps_that_are_no_times_are_refused(tmp_path: Path, name: str, stamp: str) -> None:
+def test_47_stamps_that_are_no_times_are_refused(tmp_path, name, stamp):
     to = tmp_path / "a.csv"
     said = exported(f"47-candump-stamps-that-are-no-times/{name}.log", to, code=2)
     assert f"{name}.log: line 51: '{stamp}' is no time in seconds" in said
     assert not to.exists()
 
 
-def test_a_part_of_a_log_is_read_by_its_times(tmp_path: Path) -> None:
+def test_a_part_of_a_log_is_read_by_its_times(tmp_path):
     case = "02-candump-one-stamp-ahead/ref.log"
     exported(case, tmp_path / "a.log", "--from", 1, "--until", 2)
     whole, part = lines_in(field_case(case)), lines_in(tmp_path / "a.log")
@@ -263,7 +263,7 @@ def test_a_part_of_a_log_is_read_by_its_times(tmp_path: Path) -> None:
     assert "no frames between --from and --until; the last is at 4.12168 s" in said
 
 
-def test_a_source_that_fails_leaves_what_was_there_before(tmp_path: Path) -> None:
+def test_a_source_that_fails_leaves_what_was_there_before(tmp_path):
     (tmp_path / "a.log").write_text("kept")
     exported("47-candump-stamps-that-are-no-times/nan.log", tmp_path / "b.log", code=2)
     assert not (tmp_path / "b.log").exists()
@@ -281,8 +281,8 @@ def written(folder: Path, name: str, frames: list[BusFrame]) -> Path:
 
 
 def test_a_stranger_with_the_controllers_identifier_is_received_where_marks_can_be_believed(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     log = BusLog(field_case("33-asc-in-which-everything-is-transmitted/as_recorded.asc"))
     frames = list(log.frames())
     own = next(frame for frame in frames if frame.sent and frame.time_ns > 300_000_000)
@@ -294,9 +294,7 @@ def test_a_stranger_with_the_controllers_identifier_is_received_where_marks_can_
     assert result["frames"] == 71
 
 
-def test_stamps_that_stand_still_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_stamps_that_stand_still_are_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("utank_hil.telemetry.bus_logs._MOST", 400)
     text = field_case("02-candump-one-stamp-ahead/ref.log").read_text()
     moving, still = (lines := text.splitlines())[:60], lines[60:] * 2
@@ -308,7 +306,7 @@ def test_stamps_that_stand_still_are_refused(
     assert "still.log: more than 400 frames within one tick of 10 ms" in result.stderr
 
 
-def test_rows_of_a_csv_are_all_there(tmp_path: Path) -> None:
+def test_rows_of_a_csv_are_all_there(tmp_path):
     exported("28-bus-logged-before-the-controller-starts/early.log", tmp_path / "a.csv")
     with (tmp_path / "a.csv").open() as content:
         rows = list(csv.DictReader(content))

@@ -39,17 +39,13 @@ def records(entries: list[tuple[Kind, int, int, bytes]]) -> Records:
 
 
 @given(ENTRIES)
-def test_packed_records_come_back_in_their_order_bit_for_bit(
-    entries: list[tuple[Kind, int, int, bytes]],
-) -> None:
+def test_packed_records_come_back_in_their_order_bit_for_bit(entries):
     before = records(entries)
     assert unpack(pack(before)).tobytes() == before.tobytes()
 
 
 @given(ENTRIES)
-def test_a_ring_hands_out_the_same_records(
-    entries: list[tuple[Kind, int, int, bytes]],
-) -> None:
+def test_a_ring_hands_out_the_same_records(entries):
     data = packed(entries)
     with frame_ring(64) as ring, RingReader(ring.name) as reader:
         if data:
@@ -57,6 +53,6 @@ def test_a_ring_hands_out_the_same_records(
         assert b"".join(reader.read()) == data
 
 
-def test_bytes_that_are_no_records_are_refused() -> None:
+def test_bytes_that_are_no_records_are_refused():
     with pytest.raises(ValueError, match="are not 2 records"):
         unpack(b"\x02\0\0\0" + bytes(45))

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from utank_hil.canbus import AlarmState, Fault, Mode, RetuningState
 from utank_hil.canbus.events import AlarmEvent, ModelSummary, RetuningEvent
-from utank_hil.telemetry.events import Event, EventReader, EventWriter, event_text, warns
+from utank_hil.telemetry.events import EventReader, EventWriter, event_text, warns
 from utank_hil.telemetry.ring import RingError
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
@@ -29,9 +29,7 @@ events = alarms | st.builds(
 
 
 @given(st.lists(events, max_size=20), st.integers(0, 1 << 62))
-def test_events_come_out_as_they_went_in_at_times_since_the_start(
-    told: list[Event], start_ns: int
-) -> None:
+def test_events_come_out_as_they_went_in_at_times_since_the_start(told, start_ns):
     with EventWriter() as writer, EventReader(writer.name) as reader:
         for event in told:
             writer.write_event(event, start_ns)
@@ -43,7 +41,7 @@ def test_events_come_out_as_they_went_in_at_times_since_the_start(
 
 
 @pytest.mark.parametrize("character", ["a", "\x01", "é", "😀", '"', "\ud800"])
-def test_reasons_too_long_for_the_ring_are_cut_and_the_rest_is_told(character: str) -> None:
+def test_reasons_too_long_for_the_ring_are_cut_and_the_rest_is_told(character):
     summary = ModelSummary(*[1 / 3] * 9)
     event = RetuningEvent(1, RetuningState.REFUSED, ("it was this: " + character * 9000,), summary)
     with EventWriter() as writer, EventReader(writer.name) as reader:
@@ -55,7 +53,7 @@ def test_reasons_too_long_for_the_ring_are_cut_and_the_rest_is_told(character: s
     assert (told.time_ns, told.state, told.found) == (1, RetuningState.REFUSED, summary)
 
 
-def test_every_reader_hears_every_event_and_what_was_lost_is_counted() -> None:
+def test_every_reader_hears_every_event_and_what_was_lost_is_counted():
     told = [RetuningEvent(number, RetuningState.IDENTIFY, ()) for number in range(100)]
     with EventWriter() as writer:
         early, late = EventReader(writer.name), EventReader(writer.name)
@@ -73,18 +71,18 @@ def test_every_reader_hears_every_event_and_what_was_lost_is_counted() -> None:
     late.close()
 
 
-def test_writer_that_is_not_there_is_said_to_be_none() -> None:
+def test_writer_that_is_not_there_is_said_to_be_none():
     with pytest.raises(RingError, match="is its writer running"):
         EventReader("utank-no-such-ring")
 
 
-def test_text_of_an_event_is_its_state_and_its_reasons() -> None:
+def test_text_of_an_event_is_its_state_and_its_reasons():
     event = RetuningEvent(0, RetuningState.REFUSED, ("too short", "no pulses"))
     assert event_text(event) == "retuning REFUSED: too short; no pulses"
     assert event_text(RetuningEvent(0, RetuningState.DESIGN, ())) == "retuning DESIGN"
 
 
-def test_alarms_and_refusals_warn_and_the_rest_is_news() -> None:
+def test_alarms_and_refusals_warn_and_the_rest_is_news():
     def alarm(state: AlarmState | None) -> AlarmEvent:
         return AlarmEvent(0, Fault.LEVEL_LIMIT, state, Mode.FAULT)
 

@@ -19,7 +19,7 @@ NEXT_ANSWER = 710
 """The law answers every 0.1 s."""
 
 
-def test_each_stage_is_explained_with_exact_numbers() -> None:
+def test_each_stage_is_explained_with_exact_numbers():
     said = CliRunner().invoke(app, ["replay", str(LOG), "--explain", str(TICK), "--json"])
     assert said.exit_code == 0
     numbers = json.loads(said.output)["explained"]
@@ -38,13 +38,13 @@ def test_each_stage_is_explained_with_exact_numbers() -> None:
     assert all("[" in each["name"] and "," not in each["replayed"] for each in memory)
 
 
-def test_a_tick_that_is_not_there_is_refused() -> None:
+def test_a_tick_that_is_not_there_is_refused():
     said = CliRunner().invoke(app, ["replay", str(LOG), "--explain", "1400"])
     assert said.exit_code == 2
     assert "its ticks are 0 to 1399" in said.output
 
 
-def test_a_changed_sample_of_a_sensor_shows_in_law_and_command() -> None:
+def test_a_changed_sample_of_a_sensor_shows_in_law_and_command():
     log = FrameLog(LOG)
     codec = load_catalogue().codec(SensorMotion)
     explained = ExplainedTick(NEXT_ANSWER)

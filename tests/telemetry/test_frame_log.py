@@ -76,9 +76,7 @@ def sealed(*blocks: tuple[bytes, bytes]) -> bytes:
      zlib.compress(b"[" * 99_999), zlib.compress(b'{"a": 1}')[:-3],
      zlib.compress(bytes(1 << 29), 9)],
 )  # fmt: skip
-def test_a_sealed_head_that_says_nothing_is_refused_by_its_file(
-    tmp_path: Path, head: bytes
-) -> None:
+def test_a_sealed_head_that_says_nothing_is_refused_by_its_file(tmp_path, head):
     path = tmp_path / "theirs.frames"
     path.write_bytes(sealed((b"HEAD", head)))
     with pytest.raises(FrameLogError, match=r"theirs\.frames"):
@@ -91,9 +89,7 @@ def test_a_sealed_head_that_says_nothing_is_refused_by_its_file(
      (b"BUSZ", zlib.compress(b"\x02\0\0\0" + bytes(23))), (b"BUSZ", zlib.compress(b"")),
      (b"BUSZ", zlib.compress(bytes(1 << 29), 9)), (b"ELSE", b"of nobody")],
 )  # fmt: skip
-def test_a_sealed_block_that_holds_no_records_ends_the_log_and_is_said(
-    tmp_path: Path, kind: bytes, payload: bytes
-) -> None:
+def test_a_sealed_block_that_holds_no_records_ends_the_log_and_is_said(tmp_path, kind, payload):
     write_log(tmp_path / "a.frames", 60)
     whole = (tmp_path / "a.frames").read_bytes()
     (tmp_path / "a.frames").write_bytes(whole + sealed((kind, payload))[18:])
@@ -103,14 +99,14 @@ def test_a_sealed_block_that_holds_no_records_ends_the_log_and_is_said(
 
 
 @pytest.mark.parametrize("small", [False, True])
-def test_a_whole_log_gives_back_head_and_records(tmp_path: Path, small: bool) -> None:
+def test_a_whole_log_gives_back_head_and_records(tmp_path, small):
     whole, _ = write_log(tmp_path / "a.frames", 230, small=small)
     records, log = read(tmp_path / "a.frames")
     assert records.tobytes() == whole
     assert (log.head, log.cut, log.first_part) == (HEAD, "", True)
 
 
-def test_cut_at_200_random_bytes_it_lacks_less_than_a_second(tmp_path: Path) -> None:
+def test_cut_at_200_random_bytes_it_lacks_less_than_a_second(tmp_path):
     file = tmp_path / "a.frames"
     whole, sizes = write_log(file, 2000)
     content = file.read_bytes()
@@ -128,9 +124,7 @@ def test_cut_at_200_random_bytes_it_lacks_less_than_a_second(tmp_path: Path) -> 
 
 
 @given(st.data())
-def test_a_flipped_bit_ends_the_reading_before_it(
-    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
-) -> None:
+def test_a_flipped_bit_ends_the_reading_before_it(tmp_path_factory, data):
     file = tmp_path_factory.mktemp("log") / "a.frames"
     whole, sizes = write_log(file, 150)
     content = bytearray(file.read_bytes())
@@ -143,7 +137,7 @@ def test_a_flipped_bit_ends_the_reading_before_it(
     assert log.cut
 
 
-def test_parts_are_read_as_one_log_and_each_has_the_head(tmp_path: Path) -> None:
+def test_parts_are_read_as_one_log_and_each_has_the_head(tmp_path):
     names = ["run-a.frames", "run-a-part002.frames", "run-a-part003.frames"]
     wholes = [write_log(tmp_path / name, 100, seed=seed)[0] for seed, name in enumerate(names)]
     records, _ = read(tmp_path / names[0])
@@ -153,7 +147,7 @@ def test_parts_are_read_as_one_log_and_each_has_the_head(tmp_path: Path) -> None
     assert (middle.head, middle.first_part) == (HEAD, False)
 
 
-def test_nothing_is_read_beyond_a_damaged_part(tmp_path: Path) -> None:
+def test_nothing_is_read_beyond_a_damaged_part(tmp_path):
     """What follows a gap would look as if the controller had answered otherwise."""
     names = ["run-a.frames", "run-a-part002.frames"]
     whole, _ = [write_log(tmp_path / name, 300, seed=seed)[0] for seed, name in enumerate(names)]
@@ -166,7 +160,7 @@ def test_nothing_is_read_beyond_a_damaged_part(tmp_path: Path) -> None:
     assert log.cut.startswith("run-a.frames is damaged")
 
 
-def test_another_file_is_refused_with_its_name(tmp_path: Path) -> None:
+def test_another_file_is_refused_with_its_name(tmp_path):
     for content in (b"", b"time_s,roll_rad\n0,1\n"):
         (tmp_path / "a.frames").write_bytes(content)
         with pytest.raises(FrameLogError, match=r"a\.frames: is no frame log"):
@@ -177,7 +171,7 @@ def test_another_file_is_refused_with_its_name(tmp_path: Path) -> None:
         FrameLog(tmp_path / "b.frames")
 
 
-def test_a_log_that_does_not_fit_is_named_and_goes_on_in_the_next_part(tmp_path: Path) -> None:
+def test_a_log_that_does_not_fit_is_named_and_goes_on_in_the_next_part(tmp_path):
     file = tmp_path / "a.frames"
     with little_room(), pytest.raises(OSError, match=f"File too large: '{file}'"):
         write_log(file, 230)

@@ -56,7 +56,7 @@ def read(file: Path) -> Records:
     return np.concatenate(list(log.blocks()))
 
 
-def test_every_record_reaches_the_log_beside_the_recording(tmp_path: Path) -> None:
+def test_every_record_reaches_the_log_beside_the_recording(tmp_path):
     file = tmp_path / "run-a.rrd"
     with RowWriter(SIGNALS) as ring, frame_ring(8192) as frames:
         data = feed(frames, range(50))  # before the recorder is there
@@ -71,7 +71,7 @@ def test_every_record_reaches_the_log_beside_the_recording(tmp_path: Path) -> No
     assert read(file.with_suffix(".frames")).tobytes() == data
 
 
-def test_a_log_goes_on_in_the_next_part_where_the_last_ended(tmp_path: Path) -> None:
+def test_a_log_goes_on_in_the_next_part_where_the_last_ended(tmp_path):
     file = tmp_path / "run-a.rrd"
     with frame_ring(8192) as frames:
         data = feed(frames, range(10))
@@ -83,7 +83,7 @@ def test_a_log_goes_on_in_the_next_part_where_the_last_ended(tmp_path: Path) -> 
     assert read(file.with_suffix(".frames")).tobytes() == data
 
 
-def test_a_killed_recorder_leaves_all_but_the_last_second(tmp_path: Path) -> None:
+def test_a_killed_recorder_leaves_all_but_the_last_second(tmp_path):
     file = tmp_path / "run-a.rrd"
     with RowWriter(SIGNALS) as ring, frame_ring(8192) as frames:
         recorder = RecorderProcess(
@@ -103,7 +103,7 @@ def test_a_killed_recorder_leaves_all_but_the_last_second(tmp_path: Path) -> Non
     assert left["time_ns"][-1] > (number - 150) * TICK_NS  # half a second more for the machine
 
 
-def test_rows_that_came_too_fast_are_counted_where_they_are_missing(tmp_path: Path) -> None:
+def test_rows_that_came_too_fast_are_counted_where_they_are_missing(tmp_path):
     with frame_ring(64) as frames:
         feed(frames, range(10))
         recording = FrameRecording(frames.name, tmp_path / "a.rrd", HEAD)
@@ -123,7 +123,7 @@ def test_rows_that_came_too_fast_are_counted_where_they_are_missing(tmp_path: Pa
     assert records["time_ns"][second - 1] == 109 * TICK_NS
 
 
-def test_without_rerun_there_is_the_frame_log_and_nothing_else(tmp_path: Path) -> None:
+def test_without_rerun_there_is_the_frame_log_and_nothing_else(tmp_path):
     file = tmp_path / "run-a.rrd"
     with RowWriter(SIGNALS) as ring, frame_ring(8192) as frames:
         data = feed(frames, range(20))

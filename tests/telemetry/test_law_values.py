@@ -28,12 +28,12 @@ def dpc() -> dict[str, np.ndarray]:
     return law_values(build_law(config).controller())
 
 
-def test_gains_of_a_predictive_law_are_among_its_numbers(dpc: dict[str, np.ndarray]) -> None:
+def test_gains_of_a_predictive_law_are_among_its_numbers(dpc):
     assert dpc["gains"].shape == (1, 274)  # 92 commands, 182 outputs
     assert dpc["sample_time_s"] == 0.2
 
 
-def test_numbers_survive_json_bit_for_bit(dpc: dict[str, np.ndarray]) -> None:
+def test_numbers_survive_json_bit_for_bit(dpc):
     again = decoded(json.loads(json.dumps(encoded(dpc))))
     assert differences(dpc, again) == []
     assert {name: value.tobytes() for name, value in again.items()} == {
@@ -42,9 +42,7 @@ def test_numbers_survive_json_bit_for_bit(dpc: dict[str, np.ndarray]) -> None:
 
 
 @pytest.mark.parametrize("bit", [0, 31, 63])
-def test_one_bit_of_one_gain_is_named_with_both_values(
-    dpc: dict[str, np.ndarray], bit: int
-) -> None:
+def test_one_bit_of_one_gain_is_named_with_both_values(dpc, bit):
     gains = dpc["gains"].copy()
     gains.view(np.uint64)[0, 17] ^= np.uint64(1) << np.uint64(bit)
     (found,) = differences(dpc, dpc | {"gains": gains})
@@ -56,7 +54,7 @@ def test_one_bit_of_one_gain_is_named_with_both_values(
     assert found.deviation == abs(gains[0, 17] - dpc["gains"][0, 17]) / largest
 
 
-def test_numbers_that_only_one_side_has_are_named(dpc: dict[str, np.ndarray]) -> None:
+def test_numbers_that_only_one_side_has_are_named(dpc):
     fewer = {name: value for name, value in dpc.items() if name != "gains"}
     (found,) = differences(dpc, fewer)
     assert str(found) == "gains: recorded float64 of shape (1, 274), designed here missing"
@@ -87,7 +85,7 @@ def answers_of(controller: Controller, measured: int) -> list[bytes]:
     ["constrained_gpc", "dpc", "feedback_linearization", "fuzzy_robust", "gpc", "lqg", "pd",
      "pump_with_valve", "valve_clipped", "valve_on_off"],
 )  # fmt: skip
-def test_a_law_of_every_kind_takes_recorded_numbers_and_answers_as_recorded(name: str) -> None:
+def test_a_law_of_every_kind_takes_recorded_numbers_and_answers_as_recorded(name):
     law = build_law(shipped(name))
     before = law_values(law.controller())
     kept = {each: value.copy() for each, value in before.items()}
@@ -105,7 +103,7 @@ def test_a_law_of_every_kind_takes_recorded_numbers_and_answers_as_recorded(name
         assert changed != plain
 
 
-def test_numbers_of_another_law_are_not_taken(dpc: dict[str, np.ndarray]) -> None:
+def test_numbers_of_another_law_are_not_taken(dpc):
     gpc = build_law(shipped("gpc")).controller()
     with pytest.raises(LawValuesError, match=r"gains is float64 of shape \(1, 274\) there and"):
         restored(gpc, dpc)
@@ -113,7 +111,7 @@ def test_numbers_of_another_law_are_not_taken(dpc: dict[str, np.ndarray]) -> Non
         restored(gpc, law_values(gpc) | {"more": np.zeros(3)})
 
 
-def test_a_law_that_holds_itself_has_its_numbers_once() -> None:
+def test_a_law_that_holds_itself_has_its_numbers_once():
     class Ring:
         def __init__(self) -> None:
             self.gain = 2.5

@@ -73,7 +73,7 @@ def saved(url: str, file: Path, seconds: float = 20.0) -> Iterator[dict[str, np.
         viewer.wait()
 
 
-def test_a_run_is_found_by_its_ring_and_says_what_it_is() -> None:
+def test_a_run_is_found_by_its_ring_and_says_what_it_is():
     assert here() == []
     with RowWriter(SIGNALS, about=ABOUT) as ring, EventWriter() as events, RowWriter(["x"]):
         (run,) = here()
@@ -82,7 +82,7 @@ def test_a_run_is_found_by_its_ring_and_says_what_it_is() -> None:
     assert here() == []
 
 
-def test_a_killed_run_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_killed_run_is_none(tmp_path, monkeypatch):
     code = (
         "import time; from utank_hil.telemetry.ring import RowWriter;"
         "from utank_hil.nodes.signals import SIGNALS;"
@@ -103,7 +103,7 @@ def test_a_killed_run_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert live_runs() == []
 
 
-def test_of_several_runs_one_is_chosen_by_its_number(capsys: pytest.CaptureFixture[str]) -> None:
+def test_of_several_runs_one_is_chosen_by_its_number(capsys):
     runs = [LiveRun(f"ring-{pid}", None, pid, ABOUT) for pid in (11, 12)]
     assert _chosen(runs, 12) is runs[1]
     assert _chosen(runs[:1], None) is runs[0]
@@ -118,7 +118,7 @@ def test_of_several_runs_one_is_chosen_by_its_number(capsys: pytest.CaptureFixtu
 
 
 @pytest.mark.slow
-def test_a_late_viewer_has_data_layout_events_and_what_comes(tmp_path: Path) -> None:
+def test_a_late_viewer_has_data_layout_events_and_what_comes(tmp_path):
     event = RetuningEvent(2_000_000_000, RetuningState.REFUSED, ("too short",))
     with RowWriter(SIGNALS, about=ABOUT) as ring, EventWriter() as events:
         for row in rows(0, 300):

@@ -7,7 +7,7 @@ from firmware_sim.truth import MemoryLog
 
 
 @given(promised=st.integers(0, 60), offered=st.integers(0, 90))
-def test_rows_are_kept_up_to_the_promised_length(promised: int, offered: int) -> None:
+def test_rows_are_kept_up_to_the_promised_length(promised, offered):
     log = MemoryLog(2, promised)
     row = np.zeros(2)
     for index in range(offered):
@@ -17,7 +17,7 @@ def test_rows_are_kept_up_to_the_promised_length(promised: int, offered: int) ->
     np.testing.assert_array_equal(log.rows, expected.reshape(-1, 2))
 
 
-def test_rows_are_copied_and_of_the_tables_width() -> None:
+def test_rows_are_copied_and_of_the_tables_width():
     log = MemoryLog(3, 2)
     row = np.ones(3)
     log.write(row)

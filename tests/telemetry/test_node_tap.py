@@ -88,7 +88,7 @@ def drive(node: Any) -> list[list[Frame]]:
     return sent
 
 
-def test_the_node_meets_the_same_with_a_tap_and_all_of_it_is_written_down() -> None:
+def test_the_node_meets_the_same_with_a_tap_and_all_of_it_is_written_down():
     bare, tapped = Node(), Node()
     chunks: list[tuple[bytes, int]] = []
     assert drive(NodeTap(tapped, lambda data, now_ns: chunks.append((data, now_ns)))) == drive(bare)  # type: ignore[arg-type]
@@ -113,7 +113,7 @@ def test_the_node_meets_the_same_with_a_tap_and_all_of_it_is_written_down() -> N
     ]
 
 
-def test_records_of_several_ticks_are_handed_on_together_and_the_rest_at_the_end() -> None:
+def test_records_of_several_ticks_are_handed_on_together_and_the_rest_at_the_end():
     def written(every: int) -> list[tuple[bytes, int]]:
         chunks: list[tuple[bytes, int]] = []
         drive(NodeTap(Node(), lambda data, now_ns: chunks.append((data, now_ns)), (), every))  # type: ignore[arg-type]
@@ -127,7 +127,7 @@ def test_records_of_several_ticks_are_handed_on_together_and_the_rest_at_the_end
 
 
 @pytest.mark.parametrize("reply", [None, Refusal(("no", "too short")), CANDIDATE])
-def test_answers_of_the_retuner_come_back_bit_for_bit_in_their_tick(reply: Answer | None) -> None:
+def test_answers_of_the_retuner_come_back_bit_for_bit_in_their_tick(reply):
     asked = Retuner(reply)
     tap = RetunerTap(asked)
     tap.submit(4, np.zeros((2, 2)), 0)
@@ -154,7 +154,7 @@ def test_answers_of_the_retuner_come_back_bit_for_bit_in_their_tick(reply: Answe
         assert answer_bytes(first) == answer_bytes(reply)
 
 
-def test_a_question_that_was_not_asked_then_is_found() -> None:
+def test_a_question_that_was_not_asked_then_is_found():
     retuner = RecordedRetuner()
     assert not retuner.alive
     assert retuner.astray == "asked whether the retuner lives"
@@ -163,7 +163,7 @@ def test_a_question_that_was_not_asked_then_is_found() -> None:
     assert retuner.answer(1, 0) is None  # gone with its tick
 
 
-def test_bursts_of_any_length_leave_no_memory_behind() -> None:
+def test_bursts_of_any_length_leave_no_memory_behind():
     """A packing for each number of records took 186 MiB in the end."""
     lengths: list[int] = []
     tap = NodeTap(Node(), lambda data, _: lengths.append(len(data) // LAYOUT.size))  # type: ignore[arg-type]
@@ -183,7 +183,7 @@ def test_bursts_of_any_length_leave_no_memory_behind() -> None:
     assert grown < 200_000
 
 
-def test_frames_before_a_tick_that_raises_are_not_lost() -> None:
+def test_frames_before_a_tick_that_raises_are_not_lost():
     class Failing(Node):
         def tick(self, now_ns: int) -> Iterable[Frame]:
             raise ZeroDivisionError

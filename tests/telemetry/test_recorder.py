@@ -92,7 +92,7 @@ def any_recorded(file: Path) -> bool:
         return False
 
 
-def test_every_row_reaches_the_file_and_the_footer_is_written(tmp_path: Path) -> None:
+def test_every_row_reaches_the_file_and_the_footer_is_written(tmp_path):
     rows = table(500)
     file = tmp_path / "run.rrd"
     with RowWriter(SIGNALS) as ring:
@@ -108,7 +108,7 @@ def test_every_row_reaches_the_file_and_the_footer_is_written(tmp_path: Path) ->
 
 
 @pytest.mark.evidence
-def test_recorder_ends_by_itself_when_the_ring_is_closed(tmp_path: Path) -> None:
+def test_recorder_ends_by_itself_when_the_ring_is_closed(tmp_path):
     with RowWriter(SIGNALS) as ring:
         recorder = RecorderProcess(RecordingTask(ring.name, str(tmp_path / "run.rrd")))
         feed(ring, table(10))
@@ -117,7 +117,7 @@ def test_recorder_ends_by_itself_when_the_ring_is_closed(tmp_path: Path) -> None
 
 
 @pytest.mark.evidence
-def test_killed_recorder_leaves_all_but_the_last_second(tmp_path: Path) -> None:
+def test_killed_recorder_leaves_all_but_the_last_second(tmp_path):
     file = tmp_path / "run.rrd"
     rows = table(200)
     with RowWriter(SIGNALS) as ring:
@@ -143,9 +143,7 @@ def disk(monkeypatch: pytest.MonkeyPatch) -> dict[str, bytes]:
     return files
 
 
-def test_a_power_cut_leaves_all_but_the_half_second_of_the_last_batch(
-    tmp_path: Path, disk: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_power_cut_leaves_all_but_the_half_second_of_the_last_batch(tmp_path, disk, monkeypatch):
     """What is left is what was brought to the disk; the recorder's sleep is the clock."""
     cuts: list[tuple[int, dict[str, bytes]]] = []
     rows, written = table(2000), 0
@@ -175,16 +173,14 @@ def test_a_power_cut_leaves_all_but_the_half_second_of_the_last_batch(
     assert left(disk) == (written, written)
 
 
-def test_a_power_cut_leaves_all_of_a_file_that_was_finished(
-    tmp_path: Path, disk: dict[str, bytes]
-) -> None:
+def test_a_power_cut_leaves_all_of_a_file_that_was_finished(tmp_path, disk):
     with RecordingPart(tmp_path / "run.rrd", SIGNALS) as part:
         part.write(table(300))
     (tmp_path / "left.rrd").write_bytes(disk["run.rrd"])
     np.testing.assert_allclose(recorded(tmp_path / "left.rrd"), table(300), rtol=4e-16)
 
 
-def test_it_gives_way_to_the_loop_and_is_out_of_reach_of_ctrl_c(tmp_path: Path) -> None:
+def test_it_gives_way_to_the_loop_and_is_out_of_reach_of_ctrl_c(tmp_path):
     with (
         RowWriter(SIGNALS) as ring,
         RecorderProcess(RecordingTask(ring.name, str(tmp_path / "run.rrd"))) as recorder,
@@ -204,9 +200,7 @@ def open_files() -> int:
     ("kills", "lost_s"),
     [(3, 5.0), pytest.param(200, 1.0, marks=[pytest.mark.evidence, pytest.mark.timeout(3600)])],
 )
-def test_killed_at_any_instant_it_leaves_what_can_be_read(
-    kills: int, lost_s: float, tmp_path: Path
-) -> None:
+def test_killed_at_any_instant_it_leaves_what_can_be_read(kills, lost_s, tmp_path):
     draw, rows = random.Random(1), table(100_000)
     missing_s, descriptors = [], []
     for number in range(kills):
@@ -244,7 +238,7 @@ def write_next(ring: RowWriter, rows: np.ndarray, times_s: list[float]) -> None:
     time.sleep(0.002)
 
 
-def test_a_stopped_recorder_costs_rows_counts_them_and_holds_up_nobody(tmp_path: Path) -> None:
+def test_a_stopped_recorder_costs_rows_counts_them_and_holds_up_nobody(tmp_path):
     file = tmp_path / "run.rrd"
     rows = table(300)
     with RowWriter(SIGNALS, slots=64) as ring:
@@ -263,7 +257,7 @@ def test_a_stopped_recorder_costs_rows_counts_them_and_holds_up_nobody(tmp_path:
 
 
 @pytest.mark.evidence
-def test_lost_events_are_noted_in_the_recording(tmp_path: Path) -> None:
+def test_lost_events_are_noted_in_the_recording(tmp_path):
     file = tmp_path / "run.rrd"
     with EventWriter() as events, RowWriter(SIGNALS) as ring:
         recorder = RecorderProcess(RecordingTask(ring.name, str(file), events=events.name))
@@ -278,7 +272,7 @@ def test_lost_events_are_noted_in_the_recording(tmp_path: Path) -> None:
     assert lost + sum("ordered" in text for text in texts) == 1000 > lost > 0
 
 
-def test_events_are_recorded_with_their_time_and_reasons(tmp_path: Path) -> None:
+def test_events_are_recorded_with_their_time_and_reasons(tmp_path):
     file = tmp_path / "run.rrd"
     began = RetuningEvent(5_000_000_000, RetuningState.IDENTIFY, ("ordered by the operator",))
     refused = RetuningEvent(7_500_000_000, RetuningState.REFUSED, ("too short", "or too long"))
@@ -294,9 +288,7 @@ def test_events_are_recorded_with_their_time_and_reasons(tmp_path: Path) -> None
     ]
 
 
-def test_a_recorder_ends_with_a_killed_controller_and_keeps_its_last_words(
-    tmp_path: Path,
-) -> None:
+def test_a_recorder_ends_with_a_killed_controller_and_keeps_its_last_words(tmp_path):
     file = tmp_path / "run.rrd"
     code = f"""
 import os, signal, sys
@@ -329,7 +321,7 @@ os.kill(os.getpid(), signal.SIGKILL)
 
 @pytest.mark.evidence("1", "15")
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_it_ends_on_a_signal_with_all_rows(tmp_path: Path, stop: signal.Signals) -> None:
+def test_it_ends_on_a_signal_with_all_rows(tmp_path, stop):
     file = tmp_path / "run.rrd"
     command = [sys.executable, "-W", "error", "-m", "utank_hil.telemetry.recorder"]
     with RowWriter(SIGNALS) as ring:
@@ -345,9 +337,7 @@ def test_it_ends_on_a_signal_with_all_rows(tmp_path: Path, stop: signal.Signals)
 
 
 @pytest.mark.evidence
-def test_recorder_whose_starter_is_gone_ends_without_a_complaint(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_recorder_whose_starter_is_gone_ends_without_a_complaint(tmp_path, capfd):
     file = tmp_path / "run.rrd"
     with RowWriter(SIGNALS) as ring:
         recorder = RecorderProcess(RecordingTask(ring.name, str(file)))
@@ -377,8 +367,8 @@ os.write(1, b'{"ready": 1}\\n' + bytes.fromhex(sys.argv[1]))
     ],
 )
 def test_what_a_dead_recorder_left_on_its_output_ends_no_controller(
-    output: bytes, end: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    output, end, tmp_path, monkeypatch
+):
     """The loop asks it why it has ended."""
     popen = subprocess.Popen
 
@@ -395,9 +385,7 @@ def test_what_a_dead_recorder_left_on_its_output_ends_no_controller(
 
 
 @pytest.mark.timeout(20)
-def test_a_pipe_that_a_dead_recorders_child_holds_open_holds_nobody_up(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_pipe_that_a_dead_recorders_child_holds_open_holds_nobody_up(tmp_path, monkeypatch):
     popen = subprocess.Popen
     code = """
 import os, time
@@ -420,7 +408,7 @@ if os.fork() == 0:
             os.killpg(recorder.pid, signal.SIGKILL)
 
 
-def test_reason_of_a_failure_is_told_where_standard_error_takes_nothing(tmp_path: Path) -> None:
+def test_reason_of_a_failure_is_told_where_standard_error_takes_nothing(tmp_path):
     state = RecorderState(RecordingTask("utank-none", str(tmp_path / "run.rrd"))).as_input()
     command = [sys.executable, "-m", "utank_hil.telemetry.recorder"]
     with open("/dev/full", "w") as full:
@@ -430,7 +418,7 @@ def test_reason_of_a_failure_is_told_where_standard_error_takes_nothing(tmp_path
 
 
 @pytest.mark.evidence
-def test_a_full_disk_ends_the_recorder_and_leaves_what_was_written(tmp_path: Path) -> None:
+def test_a_full_disk_ends_the_recorder_and_leaves_what_was_written(tmp_path):
     file = tmp_path / "run.rrd"
     limit = 400_000  # the layout takes most of it
     command = [sys.executable, "-X", "dev", "-m", "utank_hil.telemetry.recorder"]
@@ -458,9 +446,7 @@ def test_a_full_disk_ends_the_recorder_and_leaves_what_was_written(tmp_path: Pat
 
 @pytest.mark.evidence("3000")
 @pytest.mark.parametrize("rows", [300, 3000])
-def test_file_that_lacks_its_end_or_its_rows_is_a_failure_with_its_reason(
-    tmp_path: Path, rows: int
-) -> None:
+def test_file_that_lacks_its_end_or_its_rows_is_a_failure_with_its_reason(tmp_path, rows):
     """As on a full disk: with few rows only the footer does not fit, and Rerun says nothing."""
     file = tmp_path / "run.rrd"
     with RowWriter(SIGNALS) as ring:
@@ -482,9 +468,7 @@ def test_file_that_lacks_its_end_or_its_rows_is_a_failure_with_its_reason(
 
 
 @pytest.mark.evidence
-def test_where_it_may_go_on_in_another_file_it_does_so_when_there_is_room_again(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_where_it_may_go_on_in_another_file_it_does_so_when_there_is_room_again(tmp_path, capfd):
     file = tmp_path / "run-a.rrd"
 
     def limit(words: str) -> None:
@@ -516,9 +500,7 @@ def test_where_it_may_go_on_in_another_file_it_does_so_when_there_is_room_again(
 
 
 @pytest.mark.evidence
-def test_where_nobody_writes_any_more_no_further_file_is_tried(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_where_nobody_writes_any_more_no_further_file_is_tried(tmp_path, capfd):
     """Else it would go on for ever: a folder that is gone does not come back."""
     folder = tmp_path / "log"
     folder.mkdir()
@@ -537,7 +519,7 @@ def test_where_nobody_writes_any_more_no_further_file_is_tried(
         recorder.stop()
 
 
-def test_failures_to_start_are_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_failures_to_start_are_reported(tmp_path, capfd):
     with pytest.raises(RecorderError, match=r"did not start: .* is its writer running"):
         RecorderProcess(RecordingTask("utank-no-such-ring", str(tmp_path / "run.rrd")))
     assert "is its writer running" in capfd.readouterr().err

@@ -1,7 +1,5 @@
 """Recordings: what is written comes back, whatever happened to the file's end."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
@@ -22,7 +20,7 @@ def random_run(rows: int, seed: int) -> np.ndarray:
     return values
 
 
-def test_runs_come_back_under_their_names(tmp_path: Path) -> None:
+def test_runs_come_back_under_their_names(tmp_path):
     runs = {
         "passive": random_run(20_000, 1),
         "dpc": random_run(9000, 2),
@@ -40,12 +38,12 @@ def test_runs_come_back_under_their_names(tmp_path: Path) -> None:
             np.testing.assert_allclose(back[run][column], rows[:, i], rtol=4e-16)
 
 
-def test_the_blueprint_is_in_the_file(tmp_path: Path) -> None:
+def test_the_blueprint_is_in_the_file(tmp_path):
     write_recording(tmp_path / "a.rrd", COLUMNS, {"passive": random_run(10, 0)})
     assert len(RrdReader(tmp_path / "a.rrd").blueprints()) == 1
 
 
-def test_states_are_logged_when_they_change(tmp_path: Path) -> None:
+def test_states_are_logged_when_they_change(tmp_path):
     rows = np.zeros((5, 3))
     rows[:, 0] = np.arange(5.0)
     rows[:, 1] = [1, 2, 2, 4, 9]
@@ -70,7 +68,7 @@ def test_states_are_logged_when_they_change(tmp_path: Path) -> None:
     assert log.column("time").to_numpy().astype(np.int64).tolist() == times_ns.tolist()
 
 
-def test_events_of_a_run_are_in_its_own_log(tmp_path: Path) -> None:
+def test_events_of_a_run_are_in_its_own_log(tmp_path):
     rows = np.zeros((5, 2))
     rows[:, 0] = np.arange(5.0)
     event = RetuningEvent(2_000_000_000, RetuningState.REFUSED, ("too short",))
@@ -87,7 +85,7 @@ def test_events_of_a_run_are_in_its_own_log(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_recording_cut_anywhere_gives_back_the_rows_before_the_cut(tmp_path: Path) -> None:
+def test_a_recording_cut_anywhere_gives_back_the_rows_before_the_cut(tmp_path):
     rows = random_run(40_000, 4)
     whole, cut = tmp_path / "whole.rrd", tmp_path / "cut.rrd"
     write_recording(whole, COLUMNS, {"passive": rows})
@@ -104,9 +102,7 @@ def test_a_recording_cut_anywhere_gives_back_the_rows_before_the_cut(tmp_path: P
 @pytest.mark.evidence("1000")
 @pytest.mark.slow
 @pytest.mark.parametrize("missing", [1000, 100_000])
-def test_a_recording_with_a_hole_gives_back_the_rows_before_it_with_a_warning(
-    tmp_path: Path, missing: int
-) -> None:
+def test_a_recording_with_a_hole_gives_back_the_rows_before_it_with_a_warning(tmp_path, missing):
     rows = random_run(40_000, 4)
     file = tmp_path / "run.rrd"
     write_recording(file, COLUMNS, {"passive": rows})
@@ -123,9 +119,7 @@ def test_a_recording_with_a_hole_gives_back_the_rows_before_it_with_a_warning(
 
 
 @pytest.mark.slow
-def test_a_recording_with_zeros_in_it_gives_back_the_rows_around_them_with_a_warning(
-    tmp_path: Path,
-) -> None:
+def test_a_recording_with_zeros_in_it_gives_back_the_rows_around_them_with_a_warning(tmp_path):
     rows = random_run(40_000, 4)
     file = tmp_path / "run.rrd"
     write_recording(file, COLUMNS, {"passive": rows})
@@ -144,7 +138,7 @@ def test_a_recording_with_zeros_in_it_gives_back_the_rows_around_them_with_a_war
 
 
 @pytest.mark.evidence
-def test_an_hour_of_three_runs_takes_little_more_room_than_its_numbers(tmp_path: Path) -> None:
+def test_an_hour_of_three_runs_takes_little_more_room_than_its_numbers(tmp_path):
     runs = {name: random_run(72_000, i) for i, name in enumerate(("passive", "dpc", "gpc"))}
     for rows in runs.values():
         rows[:, COLUMNS.index("retuning")] = 0  # whose changes are kept in words
@@ -153,14 +147,14 @@ def test_an_hour_of_three_runs_takes_little_more_room_than_its_numbers(tmp_path:
     assert file.stat().st_size < 1.1 * sum(rows.nbytes for rows in runs.values())
 
 
-def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
+def test_what_is_no_recording_is_refused(tmp_path):
     file = tmp_path / "a.rrd"
     file.write_bytes(b"not a recording at all")
     with pytest.raises(ValueError, match=r"a\.rrd"):
         read_recording(file)
 
 
-def test_tables_that_do_not_fit_are_refused(tmp_path: Path) -> None:
+def test_tables_that_do_not_fit_are_refused(tmp_path):
     file = tmp_path / "a.rrd"
     with pytest.raises(ValueError, match="at least one run"):
         write_recording(file, COLUMNS, {})

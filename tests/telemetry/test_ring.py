@@ -92,7 +92,7 @@ TestBroadcastModel = BroadcastModel.TestCase
 TestBroadcastModel.settings = settings(stateful_step_count=30)
 
 
-def test_reader_drains_a_ring_after_its_writer_closed_it() -> None:
+def test_reader_drains_a_ring_after_its_writer_closed_it():
     writer = RowWriter(["a", "b", "c"])
     with RowReader(writer.name) as reader:
         writer.write(np.array([1.0, np.nan, -np.inf]))
@@ -102,14 +102,14 @@ def test_reader_drains_a_ring_after_its_writer_closed_it() -> None:
         np.testing.assert_array_equal(reader.read_rows(), [[1.0, np.nan, -np.inf]])
 
 
-def test_rows_read_stay_valid_after_both_ends_are_closed() -> None:
+def test_rows_read_stay_valid_after_both_ends_are_closed():
     with RowWriter(["a"]) as writer, RowReader(writer.name) as reader:
         writer.write(np.array([7.0]))
         rows = reader.read_rows()
     np.testing.assert_array_equal(rows, [[7.0]])
 
 
-def test_a_half_written_row_is_held_back_then_counted_as_lost() -> None:
+def test_a_half_written_row_is_held_back_then_counted_as_lost():
     with RowWriter(["a", "b"], slots=4) as writer, RowReader(writer.name) as reader:
         for row in rows_from(0, 3, 2):
             writer.write(row)
@@ -126,7 +126,7 @@ def test_a_half_written_row_is_held_back_then_counted_as_lost() -> None:
         assert reader.lost == 1
 
 
-def test_a_row_of_the_previous_lap_is_not_taken_for_a_new_one() -> None:
+def test_a_row_of_the_previous_lap_is_not_taken_for_a_new_one():
     with RowWriter(["a"], slots=2) as writer, RowReader(writer.name) as reader:
         for value in (1.0, 2.0):
             writer.write(np.array([value]))
@@ -140,7 +140,7 @@ def test_a_row_of_the_previous_lap_is_not_taken_for_a_new_one() -> None:
         assert len(reader.read_rows()) == 0
 
 
-def test_a_reader_cannot_write() -> None:
+def test_a_reader_cannot_write():
     with RowWriter(["a"]) as writer, RowReader(writer.name) as reader:
         with pytest.raises(TypeError, match="read-only"):
             reader._words[0] = 0
@@ -148,7 +148,7 @@ def test_a_reader_cannot_write() -> None:
             reader._map[0] = 0
 
 
-def test_a_stalled_reader_does_not_hold_up_the_writer() -> None:
+def test_a_stalled_reader_does_not_hold_up_the_writer():
     with RowWriter(["a"], slots=8) as writer, RowReader(writer.name) as reader:
         for row in rows_from(0, 1000, 1):
             writer.write(row)
@@ -157,14 +157,14 @@ def test_a_stalled_reader_does_not_hold_up_the_writer() -> None:
 
 
 @pytest.mark.parametrize("row", [np.zeros(2), np.zeros(4), np.zeros(0)])
-def test_a_row_of_another_width_is_refused(row: np.ndarray) -> None:
+def test_a_row_of_another_width_is_refused(row):
     with RowWriter(["a", "b", "c"]) as writer:
         with pytest.raises(ValueError, match="of 24 bytes each"):
             writer.write(row)
         assert writer.count == 0
 
 
-def test_a_closed_ring_takes_no_rows() -> None:
+def test_a_closed_ring_takes_no_rows():
     writer = RowWriter(["a"])
     writer.close()
     writer.close()
@@ -172,7 +172,7 @@ def test_a_closed_ring_takes_no_rows() -> None:
         writer.write(np.zeros(1))
 
 
-def test_bad_arguments_are_refused() -> None:
+def test_bad_arguments_are_refused():
     with pytest.raises(ValueError, match="different names"):
         RowWriter(["a", "a"])
     with pytest.raises(ValueError, match="columns"):
@@ -181,7 +181,7 @@ def test_bad_arguments_are_refused() -> None:
         RowWriter(["a"], slots=1)
 
 
-def test_a_missing_ring_and_a_foreign_segment_are_refused() -> None:
+def test_a_missing_ring_and_a_foreign_segment_are_refused():
     with pytest.raises(RingError, match="is its writer running"):
         RowReader(f"utank-{os.getpid()}-none")
     foreign = SHM / f"utank-{os.getpid()}-foreign"
@@ -194,7 +194,7 @@ def test_a_missing_ring_and_a_foreign_segment_are_refused() -> None:
 
 
 @pytest.mark.parametrize("word", [2, 3, 4, None])
-def test_a_damaged_segment_is_refused_and_stops_no_writer(word: int | None) -> None:
+def test_a_damaged_segment_is_refused_and_stops_no_writer(word):
     with RowWriter(["a", "b"]) as whole:
         content = bytearray((SHM / whole.name).read_bytes())
     if word is None:
@@ -227,9 +227,7 @@ def saying(text: bytes) -> bytes:
     ],
     ids=lambda text: repr(text[:40]),
 )
-def test_a_segment_that_says_odd_things_of_itself_is_refused_and_stops_no_writer(
-    text: bytes,
-) -> None:
+def test_a_segment_that_says_odd_things_of_itself_is_refused_and_stops_no_writer(text):
     """Any user may put a file there."""
     odd = SHM / f"utank-{os.getpid()}-odd"
     odd.write_bytes(saying(text))
@@ -241,7 +239,7 @@ def test_a_segment_that_says_odd_things_of_itself_is_refused_and_stops_no_writer
         odd.unlink()
 
 
-def test_what_others_own_or_may_write_to_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_others_own_or_may_write_to_is_left_alone(monkeypatch):
     """It may change while it is looked at: a file that is cut short ends its reader (SIGBUS)."""
     name = f"utank-{os.getpid()}-of-another"
     with RowWriter(["a"]) as ring:
@@ -268,7 +266,7 @@ def test_what_others_own_or_may_write_to_is_left_alone(monkeypatch: pytest.Monke
         (SHM / name).unlink(missing_ok=True)
 
 
-def test_a_link_is_not_followed(tmp_path: Path) -> None:
+def test_a_link_is_not_followed(tmp_path):
     """To open a device may already do something."""
     link = SHM / f"utank-{os.getpid()}-link"
     link.symlink_to(tmp_path / "pipe")
@@ -282,7 +280,7 @@ def test_a_link_is_not_followed(tmp_path: Path) -> None:
 
 
 @pytest.mark.timeout(20)
-def test_a_pipe_of_somebody_else_holds_nobody_up() -> None:
+def test_a_pipe_of_somebody_else_holds_nobody_up():
     pipe = SHM / f"utank-{os.getpid()}-pipe"
     os.mkfifo(pipe)
     with pytest.raises(RingError, match="no telemetry ring"):
@@ -337,7 +335,7 @@ def wait_for(condition: Callable[[], bool], seconds: float = 10.0) -> None:
 
 
 @pytest.mark.slow
-def test_no_torn_row_from_a_writer_at_full_speed() -> None:
+def test_no_torn_row_from_a_writer_at_full_speed():
     seen = 0
     last = -1.0
     with python(WRITE_FOR_EVER) as (process, name), RowReader(name) as reader:
@@ -359,7 +357,7 @@ def test_no_torn_row_from_a_writer_at_full_speed() -> None:
     wait_for(lambda: not (SHM / name).exists())
 
 
-def test_a_killed_writer_is_noticed_even_as_a_zombie_and_its_segment_is_removed() -> None:
+def test_a_killed_writer_is_noticed_even_as_a_zombie_and_its_segment_is_removed():
     with python(WRITE_FOR_EVER) as (process, name), RowReader(name) as reader:
         begin(process)
         wait_for(lambda: len(reader.read_rows()) > 0)
@@ -369,7 +367,7 @@ def test_a_killed_writer_is_noticed_even_as_a_zombie_and_its_segment_is_removed(
         wait_for(lambda: not (SHM / name).exists())
 
 
-def test_segments_of_dead_writers_are_removed_by_the_next_whoever_it_is() -> None:
+def test_segments_of_dead_writers_are_removed_by_the_next_whoever_it_is():
     untracked = "from multiprocessing import resource_tracker\n" + WRITE_FOR_EVER.replace(
         "print(", "resource_tracker.unregister('/' + writer.name, 'shared_memory'); print("
     )
@@ -389,9 +387,7 @@ def test_segments_of_dead_writers_are_removed_by_the_next_whoever_it_is() -> Non
         foreign.unlink()
 
 
-def test_a_ring_that_is_being_closed_is_not_removed_by_another_that_begins(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_ring_that_is_being_closed_is_not_removed_by_another_that_begins(monkeypatch):
     """Two controllers, or two benches: one begins between the other's last word and its unlink."""
     ring = RowWriter(["a"])
     close = SharedMemory.close
@@ -407,7 +403,7 @@ def test_a_ring_that_is_being_closed_is_not_removed_by_another_that_begins(
     assert not (SHM / ring.name).exists()
 
 
-def test_a_ring_whose_segment_was_removed_meanwhile_closes_quietly() -> None:
+def test_a_ring_whose_segment_was_removed_meanwhile_closes_quietly():
     """systemd-logind removes those of a user who logs out, whatever still runs (RemoveIPC)."""
     code = """
 import os
@@ -421,7 +417,7 @@ with RowWriter(["a"]) as writer:
 
 
 @pytest.mark.slow
-def test_a_reader_process_that_exits_does_not_take_the_ring_with_it() -> None:
+def test_a_reader_process_that_exits_does_not_take_the_ring_with_it():
     code = """
 import sys
 from utank_hil.telemetry.ring import RowReader
@@ -435,9 +431,7 @@ assert reader.read_rows().shape == (1, 1)
         assert (SHM / writer.name).exists()
 
 
-def test_ring_without_room_is_refused_instead_of_killing_its_writer_later(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_ring_without_room_is_refused_instead_of_killing_its_writer_later(monkeypatch):
     def full(descriptor: int, offset: int, size: int) -> None:
         raise OSError(28, "No space left on device")
 

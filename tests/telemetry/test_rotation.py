@@ -42,7 +42,7 @@ def names(count: int, suffix: str) -> list[str]:
 
 
 @pytest.mark.slow
-def test_no_row_event_or_frame_is_lost_or_twice_between_files(tmp_path: Path) -> None:
+def test_no_row_event_or_frame_is_lost_or_twice_between_files(tmp_path):
     oldest = tmp_path / "run-0.rrd"
     oldest.write_bytes(bytes(2_000_000))
     head, records = {"x": 1}, b""
@@ -102,7 +102,7 @@ def texts(file: Path) -> list[str]:
 
 
 @pytest.mark.evidence
-def test_a_stop_between_two_files_loses_no_row_of_a_ring_that_is_gone(tmp_path: Path) -> None:
+def test_a_stop_between_two_files_loses_no_row_of_a_ring_that_is_gone(tmp_path):
     """When the signal comes, the process is a program that has not set anything up yet."""
     with RowWriter(SIGNALS) as ring:
         recorder = RecorderProcess(
@@ -121,7 +121,7 @@ def test_a_stop_between_two_files_loses_no_row_of_a_ring_that_is_gone(tmp_path: 
     sizes=st.lists(st.integers(980, 1020), min_size=8, max_size=8),
     keep_bytes=st.integers(2200, 5000),
 )
-def test_the_parts_of_a_recording_stay_within_the_bound(sizes: list[int], keep_bytes: int) -> None:
+def test_the_parts_of_a_recording_stay_within_the_bound(sizes, keep_bytes):
     with TemporaryDirectory() as folder:
         file = Path(folder) / "run-a.rrd"
         for number, size in enumerate(sizes, 1):
@@ -139,9 +139,7 @@ def test_the_parts_of_a_recording_stay_within_the_bound(sizes: list[int], keep_b
     sizes=st.lists(st.integers(0, 500), max_size=8),
     keep_bytes=st.integers(0, 2000),
 )
-def test_what_is_removed_is_the_oldest_and_no_more_than_needed(
-    tmp_path: Path, sizes: list[int], keep_bytes: int
-) -> None:
+def test_what_is_removed_is_the_oldest_and_no_more_than_needed(tmp_path, sizes, keep_bytes):
     for path in tmp_path.iterdir():
         path.unlink()
     files = []
@@ -163,7 +161,7 @@ def test_what_is_removed_is_the_oldest_and_no_more_than_needed(
         assert total + sizes[len(removed) - 1] > keep_bytes
 
 
-def test_a_clock_that_was_set_back_does_not_cost_the_run_its_own_parts(tmp_path: Path) -> None:
+def test_a_clock_that_was_set_back_does_not_cost_the_run_its_own_parts(tmp_path):
     """As at a start without a battery behind the clock: the new files look the oldest."""
     file, before = tmp_path / "run-20000101T000000Z.rrd", tmp_path / "run-20261101T000000Z.rrd"
     for path, time_s in ((before, 2e9), (file, 1e9), (part_of(file, 2), 1e9 + 3600)):
@@ -173,9 +171,7 @@ def test_a_clock_that_was_set_back_does_not_cost_the_run_its_own_parts(tmp_path:
     assert remove_oldest(part_of(file, 3), 1500) == [file]
 
 
-def test_runs_of_a_computer_without_a_clock_are_removed_in_their_order(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_runs_of_a_computer_without_a_clock_are_removed_in_their_order(tmp_path, monkeypatch):
     """Each start begins in the year 2000; one run has had the time from the network."""
     starts = [2e9, 1e9, 1e9 + 5, 2.1e9, 1e9 + 1]
     for number, start_s in enumerate(starts):
@@ -189,7 +185,7 @@ def test_runs_of_a_computer_without_a_clock_are_removed_in_their_order(
     assert [int(path.stem[4]) for path in removed] == [9, 9, 8, 8, 7, 7, 6, 6]
 
 
-def test_a_file_that_somebody_else_removes_meanwhile_ends_no_recording(tmp_path: Path) -> None:
+def test_a_file_that_somebody_else_removes_meanwhile_ends_no_recording(tmp_path):
     """A link to nowhere is as such a file: it has a name, and nothing is known of it."""
     (tmp_path / "run-1.rrd").symlink_to(tmp_path / "gone")
     old = tmp_path / "run-2.rrd"

@@ -1,7 +1,6 @@
 """The rolling section: geometry against sines and cosines, and what reaches the recording."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +18,7 @@ VESSEL = {
 ABOUT = {"configuration": {"vessel": VESSEL}}
 
 
-def test_water_stands_at_its_levels_in_the_reservoirs() -> None:
+def test_water_stands_at_its_levels_in_the_reservoirs():
     strips = SIZE.water(np.array([0.0, -1.0]), np.array([0.0, 1.0]))
     still = SIZE.lz_m - SIZE.height_m
     half_line = np.diff(strips[0, :2, 0, 0])[0] / 2
@@ -32,7 +31,7 @@ def test_water_stands_at_its_levels_in_the_reservoirs() -> None:
     np.testing.assert_allclose(strips[..., 0, 1], SIZE.lz_m)
 
 
-def test_the_picture_holds_hull_and_limits_at_large_rolls() -> None:
+def test_the_picture_holds_hull_and_limits_at_large_rolls():
     low, high = SIZE.height_range_m
     cosine, sine = math.cos(0.15), math.sin(0.15)
     for points in (SIZE.hull(), SIZE.limits().reshape(-1, 2)):
@@ -41,7 +40,7 @@ def test_the_picture_holds_hull_and_limits_at_large_rolls() -> None:
         assert low < at[:, 1].min() < at[:, 1].max() < high
 
 
-def test_without_the_ship_or_a_signal_there_is_no_scene() -> None:
+def test_without_the_ship_or_a_signal_there_is_no_scene():
     assert scene_size(SIGNALS, ABOUT) == SIZE
     assert scene_size(SIGNALS, None) is None
     assert scene_size(SIGNALS, {"configuration": {}}) is None
@@ -60,7 +59,7 @@ def _rows(seconds: float) -> np.ndarray:
 
 
 @pytest.mark.slow
-def test_a_recording_has_pictures_in_time_and_words_on_a_change(tmp_path: Path) -> None:
+def test_a_recording_has_pictures_in_time_and_words_on_a_change(tmp_path):
     rows = _rows(20.0)
     rows[round(7.03 / 0.05) :, SIGNALS.index("fault")] = Fault.LEVEL_LIMIT
     file = tmp_path / "a.rrd"
@@ -96,7 +95,7 @@ def test_a_recording_has_pictures_in_time_and_words_on_a_change(tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_a_recording_opens_at_its_fault_or_else_at_most_roll(tmp_path: Path) -> None:
+def test_a_recording_opens_at_its_fault_or_else_at_most_roll(tmp_path):
     rows = _rows(20.0)
     calm, faulty = tmp_path / "calm.rrd", tmp_path / "faulty.rrd"
     write_recording(calm, SIGNALS, {"run": rows})

@@ -28,7 +28,7 @@ def read(folder: Path, text: str) -> dict[str, np.ndarray]:
     return read_signals(written(folder, text))["theirs"]
 
 
-def test_units_are_read_from_the_names(tmp_path: Path) -> None:
+def test_units_are_read_from_the_names(tmp_path):
     found = read(
         tmp_path,
         "time_s,roll_deg,pressure_command_kpa,port_level_mm,speed_rad_s,pressure_actual_bar\n"
@@ -45,7 +45,7 @@ def test_units_are_read_from_the_names(tmp_path: Path) -> None:
     np.testing.assert_allclose(found["pressure_actual_pa"], [5e4, -5e4])
 
 
-def test_a_name_of_a_column_that_is_no_text_is_refused_with_the_file(tmp_path: Path) -> None:
+def test_a_name_of_a_column_that_is_no_text_is_refused_with_the_file(tmp_path):
     file = tmp_path / "a.parquet"
     parquet.write_table(pyarrow.table({"roll_rad": [0.0]}), file, store_schema=False)
     file.write_bytes(file.read_bytes().replace(b"roll_rad", b"roll_\xf2ad"))
@@ -53,9 +53,7 @@ def test_a_name_of_a_column_that_is_no_text_is_refused_with_the_file(tmp_path: P
         read_signals(file)
 
 
-def test_a_table_of_too_many_values_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_table_of_too_many_values_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("utank_hil.base.text_files.VALUES_LIMIT", 100)
     text = "time_s,roll_rad\n" + "1,2\n" * 50
     assert len(read(tmp_path, text)["roll_rad"]) == 50
@@ -64,7 +62,7 @@ def test_a_table_of_too_many_values_is_refused(
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
-def test_any_usual_separator_and_a_byte_order_mark_are_read(tmp_path: Path, separator: str) -> None:
+def test_any_usual_separator_and_a_byte_order_mark_are_read(tmp_path, separator):
     text = "\ufefftime_s,roll_rad\n0,1\n0.5,2\n\n".replace(",", separator)
     found = read(tmp_path, text)
     np.testing.assert_array_equal(found["time_s"], [0, 0.5])
@@ -94,13 +92,13 @@ def test_any_usual_separator_and_a_byte_order_mark_are_read(tmp_path: Path, sepa
         ("\n", "line 1 must name the columns"),
     ],
 )
-def test_a_wrong_table_is_an_error_with_its_line(tmp_path: Path, text: str, said: str) -> None:
+def test_a_wrong_table_is_an_error_with_its_line(tmp_path, text, said):
     with pytest.raises(TextFileError, match=r"theirs\.csv: ") as error:
         read(tmp_path, text)
     assert said in str(error.value)
 
 
-def test_times_are_read_as_dates_and_in_milliseconds(tmp_path: Path) -> None:
+def test_times_are_read_as_dates_and_in_milliseconds(tmp_path):
     dates = "Time,a_m\n2026-05-01T00:00:00Z,1\n2026-05-01T02:00:00.25+02:00,2\n"
     np.testing.assert_allclose(read(tmp_path, dates)["time_s"], [0, 0.25], atol=1e-6)
     found = read(tmp_path, "time_ms,a_m,\n200,1,\n400,NaN,\n")
@@ -108,14 +106,14 @@ def test_times_are_read_as_dates_and_in_milliseconds(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found["a_m"], [1, np.nan])
 
 
-def test_a_time_without_a_unit_is_named_with_its_remedy(tmp_path: Path) -> None:
+def test_a_time_without_a_unit_is_named_with_its_remedy(tmp_path):
     columns = read(tmp_path, "Time,a_m\n0,1\n1,2\n")
     with pytest.raises(TextFileError, match="name 'Time' time_s if it is in seconds"):
         require(PATH, columns, "time_s")
 
 
 @given(st.text(alphabet='time_sdegro,;\t\n\r"0159.eE+-_ \ufeff', max_size=80))
-def test_any_text_is_a_table_or_a_clear_error(tmp_path_factory, text: str) -> None:
+def test_any_text_is_a_table_or_a_clear_error(tmp_path_factory, text):
     file = tmp_path_factory.getbasetemp() / "any.csv"
     file.write_text(text, encoding="utf-8", newline="")
     try:
@@ -126,7 +124,7 @@ def test_any_text_is_a_table_or_a_clear_error(tmp_path_factory, text: str) -> No
         assert len({len(values) for values in columns.values()}) == 1
 
 
-def test_parquet_is_read_with_decimals_truth_and_dates(tmp_path: Path) -> None:
+def test_parquet_is_read_with_decimals_truth_and_dates(tmp_path):
     content = {
         "time_s": [datetime(2026, 5, 1), datetime(2026, 5, 1, 0, 0, 0, 100_000)],
         "pressure_command_kpa": [Decimal("0.742"), None],
@@ -146,7 +144,7 @@ def test_parquet_is_read_with_decimals_truth_and_dates(tmp_path: Path) -> None:
         read_signals(file)
 
 
-def test_a_damaged_parquet_file_is_named(tmp_path: Path) -> None:
+def test_a_damaged_parquet_file_is_named(tmp_path):
     file = tmp_path / "theirs.parquet"
     steps = np.arange(4000.0) // 7
     parquet.write_table(pyarrow.table({"time_s": steps}), file, use_dictionary=False)
@@ -170,7 +168,7 @@ def test_a_damaged_parquet_file_is_named(tmp_path: Path) -> None:
         ("38-fields-that-are-no-numbers/fields.csv", "line 3, level_m: '1_5' is no number"),
     ],
 )
-def test_tables_that_people_had_trouble_with(case: str, said: str) -> None:
+def test_tables_that_people_had_trouble_with(case, said):
     path = field_case(case)
     if said:
         with pytest.raises(TextFileError, match=said):
@@ -181,7 +179,7 @@ def test_tables_that_people_had_trouble_with(case: str, said: str) -> None:
         assert np.median(np.diff(columns["time_s"])) == pytest.approx(0.2 if "csv" in case else 0.1)
 
 
-def test_a_missing_column_is_named_with_what_there_is() -> None:
+def test_a_missing_column_is_named_with_what_there_is():
     columns = {"time_s": np.zeros(3), "roll_grad": np.zeros(3)}
     with pytest.raises(TextFileError, match="no column roll_rad or roll_deg; in SI units it has"):
         require(PATH, columns, "roll_rad")
@@ -204,9 +202,7 @@ def table(time_s: np.ndarray) -> dict[str, np.ndarray]:
     jitter=st.floats(0, 0.2),
     seed=st.integers(0, 99),
 )
-def test_even_times_are_put_on_the_grid_of_the_samples(
-    begin_s: float, per_sample: int, count: int, jitter: float, seed: int
-) -> None:
+def test_even_times_are_put_on_the_grid_of_the_samples(begin_s, per_sample, count, jitter, seed):
     step_s = 0.2 / per_sample
     # one in the middle alone, so that the mean rate stays what it is
     off = np.zeros(count)
@@ -216,12 +212,12 @@ def test_even_times_are_put_on_the_grid_of_the_samples(
     np.testing.assert_array_equal(found["roll_rad"], np.arange(count))
 
 
-def test_times_rounded_to_milliseconds_are_even_all_the_same() -> None:
+def test_times_rounded_to_milliseconds_are_even_all_the_same():
     found = even_rows(PATH, table(np.round(np.arange(400) / 60, 3)), 0.2)
     np.testing.assert_allclose(found["time_s"], np.arange(400) / 60)
 
 
-def test_a_part_is_taken_and_its_lines_are_those_of_the_file() -> None:
+def test_a_part_is_taken_and_its_lines_are_those_of_the_file():
     time_s = np.arange(100) * 0.1
     found = even_rows(PATH, table(time_s), 0.2, 2.0, 5.0)
     np.testing.assert_array_equal(found["roll_rad"], np.arange(20, 51))
@@ -246,9 +242,7 @@ def test_a_part_is_taken_and_its_lines_are_those_of_the_file() -> None:
         (np.array([0.0, 0.1]), "2 rows between"),
     ],
 )
-def test_uneven_times_are_refused_with_the_line_and_the_remedy(
-    time_s: np.ndarray, said: str
-) -> None:
+def test_uneven_times_are_refused_with_the_line_and_the_remedy(time_s, said):
     with pytest.raises(TextFileError, match=r"theirs\.csv: ") as error:
         even_rows(PATH, table(time_s), 0.2)
     assert said in str(error.value)

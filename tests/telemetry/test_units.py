@@ -12,7 +12,7 @@ STEMS = st.from_regex(r"[a-z]{1,8}(_[a-z]{3,8}){0,2}", fullmatch=True)
 
 
 @given(stem=STEMS, suffix=st.sampled_from([unit.suffix for unit in UNITS]))
-def test_a_recorded_name_leads_back_to_its_column(stem: str, suffix: str) -> None:
+def test_a_recorded_name_leads_back_to_its_column(stem, suffix):
     column = stem + suffix
     try:
         field = field_of(column)
@@ -35,19 +35,19 @@ def test_a_recorded_name_leads_back_to_its_column(stem: str, suffix: str) -> Non
         ("overruns", "overruns", 3.0, 3.0),
     ],
 )
-def test_people_get_the_units_they_read(column: str, name: str, value: float, shown: float) -> None:
+def test_people_get_the_units_they_read(column, name, value, shown):
     field = field_of(column)
     assert field.name == name
     assert value * field.unit.scale == pytest.approx(shown, rel=1e-15)
 
 
-def test_all_signals_have_names_of_their_own() -> None:
+def test_all_signals_have_names_of_their_own():
     assert len({field_of(column).name for column in SIGNALS}) == len(SIGNALS)
 
 
 @pytest.mark.parametrize(
     "column", ["roll_deg", "pressure_kpa", "tick_duration_ms", "bus_load_percent"]
 )
-def test_columns_that_are_not_si_are_refused(column: str) -> None:
+def test_columns_that_are_not_si_are_refused(column):
     with pytest.raises(ValueError, match=column):
         field_of(column)

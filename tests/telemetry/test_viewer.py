@@ -26,9 +26,7 @@ def fetch(url: str, seconds: float = 20.0) -> bytes:
 
 
 @pytest.mark.slow
-def test_without_a_display_the_viewer_is_a_page_on_loopback(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_display_the_viewer_is_a_page_on_loopback(tmp_path, monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     file = tmp_path / "a.rrd"
@@ -46,7 +44,7 @@ def test_without_a_display_the_viewer_is_a_page_on_loopback(
     assert process.poll() is not None
 
 
-def test_a_port_that_is_held_is_for_a_server_of_ours_only() -> None:
+def test_a_port_that_is_held_is_for_a_server_of_ours_only():
     with hold_port() as held, socket.socket() as other:
         with pytest.raises(OSError, match="in use"):
             other.bind(held.getsockname())
@@ -54,6 +52,6 @@ def test_a_port_that_is_held_is_for_a_server_of_ours_only() -> None:
             assert port_of(server) == port_of(held)
 
 
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
+def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"no\.rrd"):
         open_viewer(tmp_path / "no.rrd")

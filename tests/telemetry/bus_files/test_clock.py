@@ -35,7 +35,7 @@ def on_one_clock(times_s: np.ndarray) -> tuple[np.ndarray, list[str]]:
 EVEN = np.arange(400) * 0.005
 
 
-def test_a_log_in_order_is_left_as_it_is() -> None:
+def test_a_log_in_order_is_left_as_it_is():
     for times in (EVEN, EVEN * 1000, np.arange(9) * 3600.0, np.zeros(5)):
         found, notes = on_one_clock(times)
         np.testing.assert_allclose(found, times, atol=1e-9)
@@ -43,7 +43,7 @@ def test_a_log_in_order_is_left_as_it_is() -> None:
 
 
 @given(at=st.integers(20, 350), step_s=st.sampled_from([-7200.0, -0.5, 2 * DAY_S, 1.7e9, -DAY_S]))
-def test_a_step_is_said_with_its_place_and_times_go_on(at: int, step_s: float) -> None:
+def test_a_step_is_said_with_its_place_and_times_go_on(at, step_s):
     times = EVEN.copy() + 10.0
     times[at:] += step_s
     found, (note,) = on_one_clock(times)
@@ -60,7 +60,7 @@ def test_a_step_is_said_with_its_place_and_times_go_on(at: int, step_s: float) -
     count=st.integers(1, 16),
     off_s=st.sampled_from([2.5, -2.5, 0.2, 9e6, -1e4]),
 )
-def test_a_few_stray_stamps_are_taken_as_the_one_before(at: int, count: int, off_s: float) -> None:
+def test_a_few_stray_stamps_are_taken_as_the_one_before(at, count, off_s):
     times = EVEN.copy()
     times[at : at + count] += off_s
     found, (note,) = on_one_clock(times)
@@ -71,7 +71,7 @@ def test_a_few_stray_stamps_are_taken_as_the_one_before(at: int, count: int, off
     np.testing.assert_allclose(found, expected, atol=1e-6)
 
 
-def test_silence_is_kept_and_said() -> None:
+def test_silence_is_kept_and_said():
     times = EVEN.copy()
     times[100:] += 60.0
     found, (note,) = on_one_clock(times)
@@ -79,7 +79,7 @@ def test_silence_is_kept_and_said() -> None:
     assert "line 101: no frame for 60.005000 s, the longest of 1 such gaps" in note
 
 
-def test_frames_of_a_second_channel_that_come_in_late_are_kept_as_they_are() -> None:
+def test_frames_of_a_second_channel_that_come_in_late_are_kept_as_they_are():
     times = EVEN.copy()
     times[50:53] -= 0.2
     found, notes = on_one_clock(times)
@@ -87,7 +87,7 @@ def test_frames_of_a_second_channel_that_come_in_late_are_kept_as_they_are() -> 
     assert notes == []
 
 
-def test_differences_and_times_without_order_are_refused() -> None:
+def test_differences_and_times_without_order_are_refused():
     rng = np.random.default_rng(1)
     with pytest.raises(BusLogError, match=r"they count from the frame before \(candump -td\)"):
         on_one_clock(rng.uniform(0.0, 0.009, 400))

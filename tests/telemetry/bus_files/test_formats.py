@@ -52,9 +52,7 @@ def read(folder: Path, text: str | bytes, name: str = "a.log") -> tuple[list[Bus
         (" (1.5)  can0  123   [0]", (D, 0x123, False, "", 0, None)),
     ],
 )  # fmt: skip
-def test_lines_of_candump(
-    tmp_path: Path, line: str, expected: tuple[FrameKind, int, bool, str, int, bool | None]
-) -> None:
+def test_lines_of_candump(tmp_path, line, expected):
     ((frame,), notes) = read(tmp_path, f"# comment\n\n{line}\r\n")
     kind, number, extended, data, code, sent = expected
     assert notes == []
@@ -77,9 +75,7 @@ def test_lines_of_candump(
         ("garbage", "is no frame as candump writes it"),
     ],
 )
-def test_a_line_that_is_not_understood_is_counted_with_its_reason(
-    tmp_path: Path, line: str, why: str
-) -> None:
+def test_a_line_that_is_not_understood_is_counted_with_its_reason(tmp_path, line, why):
     frames, (note,) = read(tmp_path, f"(1.5) can0 123#01\n{line}\n(1.7) can0 123#02\n")
     assert len(frames) == 2
     assert "a.log: 1 line is not understood and left out, the first line 2" in note
@@ -99,9 +95,7 @@ def test_a_line_that_is_not_understood_is_counted_with_its_reason(
         ("x" * 70_000, "is no log of the bus"),
     ],
 )
-def test_a_log_that_can_not_be_read_is_refused_with_its_line(
-    tmp_path: Path, text: str, why: str
-) -> None:
+def test_a_log_that_can_not_be_read_is_refused_with_its_line(tmp_path, text, why):
     with pytest.raises(BusLogError, match=why.replace("(", r"\(")):
         read(tmp_path, text)
 
@@ -121,9 +115,7 @@ def test_a_log_that_can_not_be_read_is_refused_with_its_line(
         ("-0.5 1 122 Rx d 1 0C", (D, 0x122, False, "0c", 1, False)),
     ],
 )  # fmt: skip
-def test_lines_of_asc(
-    tmp_path: Path, line: str, expected: tuple[FrameKind, int, bool, str, int, bool | None]
-) -> None:
+def test_lines_of_asc(tmp_path, line, expected):
     start = "   0.000000 CANFD   Start of measurement\n"
     ((frame,), notes) = read(tmp_path, f"{ASC}{start}   {line}\nEnd TriggerBlock\n", "a.asc")
     kind, number, extended, data, code, sent = expected
@@ -132,7 +124,7 @@ def test_lines_of_asc(
     assert (frame.data.hex(), frame.code, frame.sent) == (data, code, sent)
 
 
-def test_asc_of_base_ten(tmp_path: Path) -> None:
+def test_asc_of_base_ten(tmp_path):
     head = "base dec  timestamps absolute\nno internal events logged\n"
     ((frame,), _) = read(tmp_path, f"{head} 0.5 1 291x Rx d 3 16 255 0\n")
     assert (frame.number, frame.data) == (291, bytes([16, 255, 0]))
@@ -140,7 +132,7 @@ def test_asc_of_base_ten(tmp_path: Path) -> None:
     assert (len(frames), "is cut in line 4" in notes[0]) == (1, True)
 
 
-def test_savvycan(tmp_path: Path) -> None:
+def test_savvycan(tmp_path):
     head = "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n"
     text = f"{head}973,0000013B,false,Rx,0,2,00,4C\n2009,18FF0080,true,Tx,1,1,0A,\n"
     frames, notes = read(tmp_path, text, "a.csv")
@@ -152,7 +144,7 @@ def test_savvycan(tmp_path: Path) -> None:
     assert (frame.time_ns, frame.sent) == (-1769872318259854000, None)
 
 
-def test_ends_that_are_damaged_are_read_up_to_there_and_said(tmp_path: Path) -> None:
+def test_ends_that_are_damaged_are_read_up_to_there_and_said(tmp_path):
     whole = "".join(f"({1 + i / 100:.6f}) can0 123#0102030405060708\n" for i in range(50))
     for end in ("(1.600000) can0 123#01020304", "(1.6", "\0" * 100_000, "(1.600000) can0 123#0"):
         frames, (note,) = read(tmp_path, whole + end)
@@ -165,7 +157,7 @@ def test_ends_that_are_damaged_are_read_up_to_there_and_said(tmp_path: Path) -> 
     assert "a.log.gz is cut near byte" in notes[0]
 
 
-def test_a_bomb_is_refused(tmp_path: Path) -> None:
+def test_a_bomb_is_refused(tmp_path):
     bomb = gzip.compress(b"(1.0) can0 123#" + b"0" * 5_000_000)
     with pytest.raises(TextFileError, match="line 1 has more than 65536 characters"):
         read(tmp_path, bomb)
@@ -191,9 +183,7 @@ def blf_message(time: int, flags: int = 2, size: int = 48) -> bytes:
     )
 
 
-def test_objects_of_blf_continue_in_the_next_container_and_count_in_two_units(
-    tmp_path: Path,
-) -> None:
+def test_objects_of_blf_continue_in_the_next_container_and_count_in_two_units(tmp_path):
     content = blf_message(1_000_000) + blf_message(200, flags=1) + blf_message(3_000_000)
     for cut in (10, 48, 60, 100, 140):
         frames, notes = read(tmp_path, blf(content[:cut], content[cut:]), "a.blf")
@@ -204,9 +194,7 @@ def test_objects_of_blf_continue_in_the_next_container_and_count_in_two_units(
     assert theirs == pytest.approx([0.001, 0.002, 0.003])
 
 
-def test_a_cut_blf_is_read_up_to_there_and_a_damaged_one_is_an_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_cut_blf_is_read_up_to_there_and_a_damaged_one_is_an_error(tmp_path, monkeypatch):
     whole = blf(blf_message(1), blf_message(2))
     frames, (note,) = read(tmp_path, whole[:-9], "a.blf")
     assert len(frames) == 1
@@ -258,10 +246,8 @@ FRAMES = st.lists(
 @settings(max_examples=12)
 @given(steps=FRAMES, begin_us=st.sampled_from([0, 2_501_000, 1_780_000_000_000_123]))
 def test_a_copy_is_the_same_to_a_microsecond_and_others_read_the_same(
-    tmp_path_factory: pytest.TempPathFactory,
-    steps: list[tuple[int, BusFrame]],
-    begin_us: int,
-) -> None:
+    tmp_path_factory, steps, begin_us
+):
     folder = tmp_path_factory.getbasetemp()
     times_ns = np.cumsum([begin_us, *(step for step, _ in steps[1:])]) * 1000
     frames = [f._replace(time_ns=int(t)) for t, (_, f) in zip(times_ns, steps, strict=True)]
@@ -301,7 +287,7 @@ def test_a_copy_is_the_same_to_a_microsecond_and_others_read_the_same(
             assert message.is_rx != original.sent
 
 
-def test_channels_of_like_names_stay_apart(tmp_path: Path) -> None:
+def test_channels_of_like_names_stay_apart(tmp_path):
     names = ["can1", "can11", "can0", "vcan1", "11", "1"]
     frames = [BusFrame(number, name, 5, False, D, b"", 0) for number, name in enumerate(names)]
     for suffix, theirs in (("asc", can.ASCReader), ("blf", can.BLFReader)):
@@ -311,7 +297,7 @@ def test_channels_of_like_names_stay_apart(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", ["mf4", "trc"])
-def test_files_of_others_are_read_as_they_read_them(tmp_path: Path, suffix: str) -> None:
+def test_files_of_others_are_read_as_they_read_them(tmp_path, suffix):
     pytest.importorskip("asammdf")
     from importlib import reload
 
@@ -376,8 +362,8 @@ SEEDS = [
     ),
 )  # fmt: skip
 def test_damaged_files_give_frames_notes_or_an_error_and_nothing_else(
-    tmp_path_factory: pytest.TempPathFactory, seed: bytes, edits: list[tuple[int, str, bytes]]
-) -> None:
+    tmp_path_factory, seed, edits
+):
     content = bytearray(seed)
     for place, how, data in edits:
         place %= max(1, len(content))

@@ -57,14 +57,7 @@ def frames_of(name: str) -> list[BusFrame]:
         ("candump-fast-cr.txt", {(D, True): 23}, 352_000_000, 1_502_000_000, 0, {"vcan0"}),
     ],
 )  # fmt: skip
-def test_frames_are_those_that_others_count(
-    name: str,
-    kinds: dict[tuple[FrameKind, bool], int],
-    first_ns: int,
-    last_ns: int,
-    sent: int,
-    channels: set[str],
-) -> None:
+def test_frames_are_those_that_others_count(name, kinds, first_ns, last_ns, sent, channels):
     notes: list[str] = []
     frames = list(BusLog(others_file(f"logs/{name}")).frames(notes))
     assert notes == []
@@ -74,7 +67,7 @@ def test_frames_are_those_that_others_count(
     assert {frame.channel for frame in frames} == channels
 
 
-def test_lengths_and_bytes_are_those_that_stand_there() -> None:
+def test_lengths_and_bytes_are_those_that_stand_there():
     sizes = Counter(len(frame.data) for frame in frames_of("issue_1256.asc"))
     assert sizes == {8: 344, 4: 954, 3: 79, 1: 80}
     raw = frames_of("issue_1299.asc")[2]
@@ -101,7 +94,7 @@ def test_lengths_and_bytes_are_those_that_stand_there() -> None:
         ("README.md", "is no log of the bus, such as candump"),
     ],
 )
-def test_what_is_no_log_with_times_is_refused_with_its_reason(name: str, said: str) -> None:
+def test_what_is_no_log_with_times_is_refused_with_its_reason(name, said):
     with pytest.raises(BusLogError, match=said) as refusal:
         frames_of(name)
     assert Path(str(refusal.value).partition(": ")[0]).name == name

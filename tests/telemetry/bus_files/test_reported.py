@@ -50,9 +50,7 @@ def frame(time_ns: int, **other: object) -> BusFrame:
          "   0.000000 Start der Messung\n", [594680.670773, 594680.670873, 594680.670895], ""),
     ],
 )  # fmt: skip
-def test_times_of_others(
-    tmp_path: Path, report: str, head: str, stamps: list[float], said: str
-) -> None:
+def test_times_of_others(tmp_path, report, head, stamps, said):
     lines = (f"   {stamp:.6f} 1 301 Rx d 2 63 55\n" for stamp in stamps)
     frames, notes = read(tmp_path, head + "".join(lines))
     assert len(frames) == len(stamps), report
@@ -74,9 +72,7 @@ def test_times_of_others(
     ],
 )
 @pytest.mark.parametrize("suffix", [".log", ".asc", ".blf"])
-def test_where_a_frame_came_from(
-    tmp_path: Path, report: str, channels: list[str], kind: FrameKind, suffix: str
-) -> None:
+def test_where_a_frame_came_from(tmp_path, report, channels, kind, suffix):
     extended = kind is FrameKind.ERROR
     frames = [
         frame(10**9 + i * 10**6, channel=each, kind=kind, number=4, extended=extended)
@@ -107,9 +103,7 @@ def test_where_a_frame_came_from(
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("suffix", [".log", ".asc", ".blf"])
-def test_a_copy_is_what_was_copied(
-    tmp_path: Path, report: str, frames: list[BusFrame], suffix: str
-) -> None:
+def test_a_copy_is_what_was_copied(tmp_path, report, frames, suffix):
     again = copied(tmp_path, frames, f"a{suffix}")
     assert [each[2:] for each in again] == [each[2:] for each in frames], report
     times = np.array([(a.time_ns, b.time_ns) for a, b in zip(again, frames, strict=True)])
@@ -133,9 +127,7 @@ def test_a_copy_is_what_was_copied(
         ("python-can 1595", ["-0.5 1 122 Rx d 1 0C", "0.1 1 122 Rx d 1 0C"], 2, ""),
     ],
 )  # fmt: skip
-def test_what_is_not_understood_is_said(
-    tmp_path: Path, report: str, lines: list[str], count: int, said: str
-) -> None:
+def test_what_is_not_understood_is_said(tmp_path, report, lines, count, said):
     frames, notes = read(tmp_path, HEAD + "".join(f"   {line}\n" for line in lines))
     assert len(frames) == count, report
     assert said in notes
@@ -151,7 +143,7 @@ def test_what_is_not_understood_is_said(
         ("smarter_csv 219", "utf-16", "\r\n"),
     ],
 )
-def test_texts_of_others(tmp_path: Path, report: str, encoding: str, end: str) -> None:
+def test_texts_of_others(tmp_path, report, encoding, end):
     text = end.join(["time_s,roll_rad", "0,1", "0.1,2", ""])
     (tmp_path / "a.csv").write_bytes(text.encode(encoding))
     (found,) = read_signals(tmp_path / "a.csv").values()
@@ -160,7 +152,7 @@ def test_texts_of_others(tmp_path: Path, report: str, encoding: str, end: str) -
 
 
 @pytest.mark.parametrize("report", ["SavvyCAN 472", "SavvyCAN 685", "rusefi 8380"])
-def test_ends_that_are_cut(tmp_path: Path, report: str) -> None:
+def test_ends_that_are_cut(tmp_path, report):
     """A last line without its end, half a line, and half a compressed file."""
     lines = [f"({i / 10 + 1:.6f}) can0 301#63550000000000{i:02X} R\n" for i in range(40)]
     if report == "SavvyCAN 472":
