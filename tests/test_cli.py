@@ -278,7 +278,7 @@ def test_interrupted_bench_reports_what_it_has_and_leaves_a_readable_recording(t
     run = [each["name"] for each in report["runs"]]
     assert run[0] == "passive"
     assert sorted(run + report["not_run"]) == [
-        *("constrained", "dpc", "gpc", "lqg", "passive", "pd"),
+        *("constrained", "dpc", "gpc", "lqg", "passive", "pd")
     ]
     recording = read_recording(tmp_path / "bench.rrd")
     assert list(recording) == run

@@ -489,10 +489,7 @@ OTHERS: dict[str, tuple[Callable[[Path], Any], float]] = {
     "decay/kvlcc2_21337.csv": (read_signals, 11),
 }
 MUTATION = st.tuples(
-    st.sampled_from(KINDS),
-    st.integers(0, 1 << 20),
-    st.integers(1, 400),
-    st.integers(0, 1 << 16),
+    st.sampled_from(KINDS), st.integers(0, 1 << 20), st.integers(1, 400), st.integers(0, 1 << 16)
 )
 
 

@@ -261,11 +261,7 @@ def build_commissioning_node(
     built = BuiltLaw(lambda: law, ("roll_rad",), closes_loop=False, commands=commands)
     # a monitor would end the pulses at what they are there to show, before they can say which it is
     node = build_controller_node(
-        config,
-        built,
-        statistics=statistics,
-        event_sink=event_sink,
-        monitored=False,
+        config, built, statistics=statistics, event_sink=event_sink, monitored=False
     )
     return CommissioningNode(
         node,

@@ -84,16 +84,7 @@ def test_without_a_compiler_that_works_one_line_is_said(compiler):
         f"made.current_library = lambda: None; made.CC = {compiler!r};"
         "made.build = lambda: made._run([]) if made.CC == 'false' else 1 / 0; made.main()"
     )
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            code,
-        ],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert len(done.stdout.splitlines()) == 1
     assert "plain Python runs" in done.stdout
     assert not done.stderr

@@ -156,11 +156,7 @@ def test_messages_of_every_node_need_the_node():
     ("message", "first", "second"),
     [
         (SensorMotion(0.1, 0.0, None), Address.SENSORS, Address.SENSORS_2),
-        (
-            OperatorCommand(None, False, True, False, False),
-            Address.OPERATOR,
-            Address.OPERATOR_2,
-        ),
+        (OperatorCommand(None, False, True, False, False), Address.OPERATOR, Address.OPERATOR_2),
     ],
 )
 def test_messages_of_a_second_node_have_an_identifier_and_data_ids_of_their_own(

@@ -35,13 +35,7 @@ from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.drive_plan import SENT_2
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.commissioning.checks import RATE_SCALE, SCALE, Each, remedies_of
-from utank_hil.nodes.commissioning.node import (
-    PUSH_S,
-    REST_S,
-    ROW_S,
-    CommissioningNode,
-    Stage,
-)
+from utank_hil.nodes.commissioning.node import PUSH_S, REST_S, ROW_S, CommissioningNode, Stage
 from utank_hil.nodes.commissioning.pulses import plan_pulses
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.nodes.redundancy import Redundancy

@@ -80,11 +80,7 @@ def problems_of(text: str) -> list[str]:
         ("arm_s: 1.0", "arm_s: 1.0e+300", "arm_s"),
         ("followed_s: 92", "followed_s: 1.0e+300", "rows.69.fault.followed_s"),
         ("for_s: 0.7}]", "for_s: 0.7, at_s: 43}]", "rows.61.fault.inject.9.at_s"),
-        (
-            "roll: 1.5, roll_window_s: 600",
-            "roll_window_s: 1.0e+300",
-            "rows.58.limit.roll_window_s",
-        ),
+        ("roll: 1.5, roll_window_s: 600", "roll_window_s: 1.0e+300", "rows.58.limit.roll_window_s"),
     ],
 )
 def test_what_is_wrong_in_a_campaign_is_named(old: str, new: str, key: str) -> None:

@@ -14,14 +14,7 @@ from utank_hil.configuration import ControllerConfig
 from utank_hil.control import PredictiveLaw
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.panel import Action, TimedAction
-from utank_hil.retuning import (
-    Answer,
-    Candidate,
-    ModelSummary,
-    Refusal,
-    Retuner,
-    RetuningSettings,
-)
+from utank_hil.retuning import Answer, Candidate, ModelSummary, Refusal, Retuner, RetuningSettings
 from utank_hil.runners import Lockstep
 
 pytestmark = pytest.mark.slow
@@ -58,9 +51,7 @@ def law_of(gain: float) -> Candidate:
     gains = np.zeros((2, 1, 1))
     gains[0] = gain
     return Candidate(
-        PredictiveLaw(np.zeros((2, 1, 1)), gains, np.zeros((1, 1, 1)), 0.2),
-        0.0,
-        SUMMARY,
+        PredictiveLaw(np.zeros((2, 1, 1)), gains, np.zeros((1, 1, 1)), 0.2), 0.0, SUMMARY
     )
 
 

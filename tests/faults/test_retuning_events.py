@@ -7,12 +7,7 @@ from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node
 from utank_hil.canbus import RetuningState
 from utank_hil.nodes.panel import Action, TimedAction
-from utank_hil.retuning import (
-    Refusal,
-    RetuningEvent,
-    RetuningSettings,
-    SimulatedRetuner,
-)
+from utank_hil.retuning import Refusal, RetuningEvent, RetuningSettings, SimulatedRetuner
 from utank_hil.runners import Lockstep
 from utank_hil.telemetry.events import EventReader, EventWriter
 

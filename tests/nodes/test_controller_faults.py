@@ -2,13 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from controller_bench import (
-    CATALOGUE,
-    LIMITS,
-    MS,
-    VERSION,
-    ControllerBench,
-)
+from controller_bench import CATALOGUE, LIMITS, MS, VERSION, ControllerBench
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -10,14 +10,7 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node
 from utank_hil.base.arrays import FloatArray
-from utank_hil.canbus import (
-    Fault,
-    Frame,
-    SeaEstimate,
-    ShipEstimate,
-    Verdict,
-    load_catalogue,
-)
+from utank_hil.canbus import Fault, Frame, SeaEstimate, ShipEstimate, Verdict, load_catalogue
 from utank_hil.canbus.events import AlarmEvent
 from utank_hil.configuration import load_config
 from utank_hil.nodes.signals import SIGNALS

@@ -106,15 +106,7 @@ class Line:
 
     def content(self) -> dict[str, object]:
         """Everything that the inbox keeps but counts of frames and cycles."""
-        counts = {
-            "receiver",
-            "rejected",
-            "frames",
-            "foreign",
-            "_lost",
-            "_counted",
-            "_due_ns",
-        }
+        counts = {"receiver", "rejected", "frames", "foreign", "_lost", "_counted", "_due_ns"}
         parts = (
             self.inbox,
             self.inbox._levels,

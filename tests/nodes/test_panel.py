@@ -4,13 +4,7 @@ from itertools import pairwise
 import pytest
 from controller_bench import CATALOGUE
 
-from utank_hil.canbus import (
-    ControllerStatus,
-    Fault,
-    Frame,
-    Mode,
-    OperatorCommand,
-)
+from utank_hil.canbus import ControllerStatus, Fault, Frame, Mode, OperatorCommand
 from utank_hil.nodes.panel import Action, OperatorPanel, TimedAction
 
 MS = 1_000_000
@@ -173,11 +167,7 @@ def test_script_presses_in_order_from_when_the_controller_is_ready(late_ticks):
         (time_ms - ready_ms, command.mode_request, command.arm)
         for time_ms, command in changes
         if command.mode_request is not Mode.STANDBY
-    ] == [
-        (0, Mode.PASSIVE, False),
-        (500, Mode.ACTIVE, True),
-        (1100, Mode.PASSIVE, False),
-    ]
+    ] == [(0, Mode.PASSIVE, False), (500, Mode.ACTIVE, True), (1100, Mode.PASSIVE, False)]
 
 
 def test_presses_of_one_time_come_in_the_order_given():

@@ -158,10 +158,7 @@ def test_a_controller_killed_at_any_instant_leaves_the_pump_at_zero(tmp_path):
 
 def kill_ships(folder: Path) -> list[Logged]:
     draw = random.Random(2)
-    with (
-        logged(folder) as (candump, watcher, panel),
-        controller(folder / "controller") as one,
-    ):
+    with logged(folder) as (candump, watcher, panel), controller(folder / "controller") as one:
         for number in range(KILLS):
             # a seed of its own: the same samples once more are a replay, which is found
             with ship(folder / f"ship{number}", number) as running_one:

@@ -18,13 +18,7 @@ import cantools
 import yaml
 from busy_machine import Timekeeping, judged_by
 
-from utank_hil.canbus import (
-    ControllerStatus,
-    DriveStatus1,
-    Mode,
-    PortError,
-    load_catalogue,
-)
+from utank_hil.canbus import ControllerStatus, DriveStatus1, Mode, PortError, load_catalogue
 from utank_hil.canbus.socketcan import SocketCanPort
 from utank_hil.console.exit_codes import ExitCode
 
@@ -229,10 +223,7 @@ class Program:
         self._process.send_signal(number)
 
     def end(
-        self,
-        *codes: ExitCode,
-        interrupt: bool = True,
-        timeout_s: float = 60.0,
+        self, *codes: ExitCode, interrupt: bool = True, timeout_s: float = 60.0
     ) -> tuple[dict[str, object], str]:
         """Interrupt it as Ctrl-C does, or wait for it; what it printed as JSON, and its notes.
 

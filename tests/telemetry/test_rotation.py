@@ -135,10 +135,7 @@ def test_the_parts_of_a_recording_stay_within_the_bound(sizes, keep_bytes):
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    sizes=st.lists(st.integers(0, 500), max_size=8),
-    keep_bytes=st.integers(0, 2000),
-)
+@given(sizes=st.lists(st.integers(0, 500), max_size=8), keep_bytes=st.integers(0, 2000))
 def test_what_is_removed_is_the_oldest_and_no_more_than_needed(tmp_path, sizes, keep_bytes):
     for path in tmp_path.iterdir():
         path.unlink()

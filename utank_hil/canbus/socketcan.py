@@ -45,10 +45,7 @@ _CHECK_BUS: Final = "check wiring, termination and bit rate"
 
 
 def open_bus(
-    name: str,
-    filters: list[can.typechecking.CanFilter] | None = None,
-    *,
-    listens: bool = False,
+    name: str, filters: list[can.typechecking.CanFilter] | None = None, *, listens: bool = False
 ) -> can.BusABC:
     """A SocketCAN interface, or a serial adapter; that `listens` without acknowledging.
 

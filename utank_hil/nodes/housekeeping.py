@@ -3,14 +3,7 @@
 import math
 
 from utank_hil.base.tick import Schedule
-from utank_hil.canbus import (
-    Address,
-    AddressClaim,
-    Catalogue,
-    Frame,
-    Heartbeat,
-    NodeState,
-)
+from utank_hil.canbus import Address, AddressClaim, Catalogue, Frame, Heartbeat, NodeState
 
 NANOSECONDS = 1e-9
 

@@ -157,10 +157,7 @@ def _arms(order: OperatorCommand) -> bool:
     return order.arm and order.mode_request is _ACTIVE
 
 
-ADDRESSES: Final = {
-    Station.OPERATOR: Address.OPERATOR,
-    Station.OPERATOR_2: Address.OPERATOR_2,
-}
+ADDRESSES: Final = {Station.OPERATOR: Address.OPERATOR, Station.OPERATOR_2: Address.OPERATOR_2}
 LIVE_NS: Final = 600_000_000
 """A station whose heartbeat is older takes no command: six of its cycles."""
 

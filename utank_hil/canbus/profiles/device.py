@@ -11,14 +11,7 @@ from utank_hil.canbus.endpoints import Acceptance, Rejection
 from utank_hil.canbus.enumerations import Quality, Switch
 from utank_hil.canbus.frame import Frame
 from utank_hil.canbus.messages import SensorTank
-from utank_hil.canbus.profiles.device_plan import (
-    FIELDS,
-    SLOPE_S,
-    Crc8,
-    DevicePlan,
-    MessagePlan,
-    T,
-)
+from utank_hil.canbus.profiles.device_plan import FIELDS, SLOPE_S, Crc8, DevicePlan, MessagePlan, T
 from utank_hil.canbus.profiles.field import ConditionPlan, Field, SignalPlan
 
 
