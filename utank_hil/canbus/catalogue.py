@@ -14,7 +14,6 @@ from utank_hil.canbus.messages import DBC_NAMES
 
 if TYPE_CHECKING:
     from cantools.database.can.message import Message as DbcMessage
-    from cantools.database.can.signal import Signal as DbcSignal
 
 T = TypeVar("T", bound=tuple[Any, ...])
 DBC_PATH: Final = Path(__file__).with_name("utank.dbc")
@@ -117,22 +116,18 @@ def read_data_ids(message: "DbcMessage") -> bytes | None:
 
 
 def _compile(message: "DbcMessage", kind: type[T]) -> Codec[T]:
+    signals = []
+    for name, hint in get_type_hints(kind).items():
+        dbc, what = message.get_signal_by_name(name), field_kind(hint)
+        number = float if what is float else int
+        limits = number(dbc.minimum or 0), number(dbc.maximum or 0)
+        scaling = float(dbc.scale), float(dbc.offset)
+        signals.append(Signal(name, what, dbc.start, dbc.length, *scaling, *limits))
     return compile_codec(
         kind,
-        [
-            _signal(message.get_signal_by_name(name), hint)
-            for name, hint in get_type_hints(kind).items()
-        ],
+        signals,
         name=message.name,
         can_id=message.frame_id,
         cycle_ns=(message.cycle_time or 0) * 1_000_000,
         data_ids=read_data_ids(message),
     )
-
-
-def _signal(signal: "DbcSignal", hint: Any) -> Signal:
-    kind = field_kind(hint)
-    number = float if kind is float else int
-    scale, offset = float(signal.scale), float(signal.offset)
-    least, most = number(signal.minimum or 0), number(signal.maximum or 0)
-    return Signal(signal.name, kind, signal.start, signal.length, scale, offset, least, most)

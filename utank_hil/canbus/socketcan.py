@@ -193,13 +193,11 @@ class SocketCanPort:
         """Count an error frame; the error that it stands for, None if it only warns."""
         self.error_frames += 1
         classes = message.arbitration_id
-        for error_class, meaning in _ERROR_CLASSES.items():
-            if classes & error_class:
-                return self._port_error(meaning, _CHECK_BUS)
         detail = message.data[1] if classes & _CONTROLLER_PROBLEM and len(message.data) > 1 else 0
-        for bit, meaning in _CONTROLLER_PROBLEMS.items():
-            if detail & bit:
-                return self._port_error(meaning, _CHECK_BUS)
+        for bits, meanings in ((classes, _ERROR_CLASSES), (detail, _CONTROLLER_PROBLEMS)):
+            for bit, meaning in meanings.items():
+                if bits & bit:
+                    return self._port_error(meaning, _CHECK_BUS)
         return None
 
     def _failure(self, error: can.CanError | OSError) -> PortError:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from importlib.util import find_spec
 from typing import Any, Final
@@ -153,10 +154,10 @@ class RecorderProcess(Closing):
         if code != 0:
             reason = self._message("error").get("error", f"exit code {code}")
             return RecorderError(f"the recorder failed: {reason}")
-        report = self._message("rows")
-        if not report:
-            return RecorderError("the recorder ended and did not say how it went")
-        return msgspec.convert(report, RecorderReport)
+        with suppress(msgspec.ValidationError):
+            if report := self._message("rows"):
+                return msgspec.convert(report, RecorderReport)
+        return RecorderError("the recorder ended and did not say how it went")
 
     def _listen(self) -> bool:
         """Read new messages without waiting; return whether more may come."""

@@ -41,8 +41,8 @@ def write_recording(
     The columns are in SI units, `time_s` among them. `runs` has the rows of each, shape (n,
     columns), by name; the first is the reference. `events` are those of retuning, `time_ns` on the
     clock of `time_s`; `about` is the origin of the runs (`utank_hil.base.provenance`). Raises
-    `ValueError` if there is no run, or a table or a column does not fit. Raises `OSError` if the
-    file can't be written; it is then removed.
+    `ValueError` if a table or a column does not fit. Raises `OSError` if the file can't be
+    written; it is then removed.
     """
     for run, rows in runs.items():
         if rows.ndim != 2 or rows.shape[1] != len(columns):
@@ -51,7 +51,13 @@ def write_recording(
             raise ValueError(f"run {run!r} has no rows")
     time_s = np.concatenate([rows[:, rerun_log.time_index(columns)] for rows in runs.values()])
     shown, size = columns_of(columns, about), scene_size(columns, about)
-    span_s, zero = (time_s.min(), time_s.max()), _zero(columns, runs)
+    zero = {
+        (run, column)
+        for run, rows in runs.items()
+        for column, values in zip(columns, rows.T, strict=True)
+        if not np.nan_to_num(values).any()
+    }  # Signals that are zero, or unknown, throughout.
+    span_s = time_s.min(), time_s.max()
     blueprint = make_blueprint(shown, list(runs), span_s, size, zero)
     recording = rr.RecordingStream(rerun_log.APPLICATION, recording_id=path.stem)
     memory = recording.memory_recording()  # Rerun's writer of files waits forever on a full disk.
@@ -69,16 +75,6 @@ def write_recording(
         log.write_events((events or {}).get(run, ()))
         log.close()
     write_whole(path, memory.drain_as_bytes())
-
-
-def _zero(columns: Sequence[str], runs: Mapping[str, FloatArray]) -> set[tuple[str, str]]:
-    """Return run and column of the signals that are zero, or unknown, throughout."""
-    return {
-        (run, column)
-        for run, rows in runs.items()
-        for column, seen in zip(columns, (np.nan_to_num(rows) != 0).any(axis=0), strict=True)
-        if not seen
-    }
 
 
 def read_recording(path: Path) -> dict[str, dict[str, FloatArray]]:
@@ -99,14 +95,13 @@ def read_recording(path: Path) -> dict[str, dict[str, FloatArray]]:
         blocks.setdefault(rerun_log.run_of(chunk.entity_path), []).append(block)
     if not blocks:
         raise ValueError(f"{path}: no telemetry in this recording")
-    return {run: _in_order(parts) for run, parts in blocks.items()}
-
-
-def _in_order(parts: list[dict[str, FloatArray]]) -> dict[str, FloatArray]:
-    """Return blocks of rows in order of time; repair of a cut file may exchange them."""
-    table = {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
-    order = np.argsort(table[rerun_log.TIME_COLUMN], kind="stable")
-    return {column: values[order] for column, values in table.items()}
+    found = {}
+    for run, parts in blocks.items():
+        table = {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
+        # Repair of a cut file may exchange blocks.
+        order = np.argsort(table[rerun_log.TIME_COLUMN], kind="stable")
+        found[run] = {column: values[order] for column, values in table.items()}
+    return found
 
 
 def read_about(path: Path) -> dict[str, Any]:

@@ -195,7 +195,7 @@ class Mf4Log(FrameSource):
 
         # Its own writes to standard error, and where the machine is slow to standard output.
         mdf_v4.MDF4.__del__ = _close_what_is_open  # type: ignore[method-assign]
-        vars(mdf_v4)["print"] = _say_nothing
+        vars(mdf_v4)["print"] = lambda *_, **__: None
         said = _Said()
         log = logging.getLogger("asammdf")
         log.handlers, log.propagate = [said], False
@@ -234,10 +234,6 @@ class _Said(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Take a record."""
         self.first = self.first or record.getMessage().partition("\n")[0]
-
-
-def _say_nothing(*_: object, **__: object) -> None:
-    """Take the place of `print` in a library."""
 
 
 def _close_what_is_open(file: Any) -> None:

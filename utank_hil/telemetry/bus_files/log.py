@@ -164,7 +164,8 @@ _LOOKED_AT: Final = 1 << 16  #: Characters at the begin of a file that show its 
 
 def source_of(path: Path) -> FrameSource | None:
     """Return a reader of a log, by its content; None if it looks like none."""
-    with open_content(path, LIMIT_BYTES, _ignored) as content:
+    # A cut is ignored here: the reading itself reports it.
+    with open_content(path, LIMIT_BYTES, lambda _: None) as content:
         mark = content.read(4)
     if mark in _BINARY:
         return _BINARY[mark](path)
@@ -232,9 +233,5 @@ class BusLog:
 
 
 def _begin(path: Path) -> list[str]:
-    with open_text(path, LIMIT_BYTES, _ignored, errors="replace") as text:
+    with open_text(path, LIMIT_BYTES, lambda _: None, errors="replace") as text:
         return [line for line in text.read(_LOOKED_AT).splitlines() if line.strip()]
-
-
-def _ignored(_: str) -> None:
-    """Take the place of a cut, which the reading itself reports."""
