@@ -172,11 +172,7 @@ def build_controller_node(
     """
     law = law or build_law(config)
     vessel, tank, catalogue = config.vessel, config.vessel.tank, load_catalogue()
-    exchange: LawExchange | None = None
-    if retuner is not None and config.retuning is not None:
-        exchange = _adaptive(config, law, retuner)
-    elif retuner is not None and config.renews:
-        exchange = _renewing(config, law, retuner)
+    exchange = None if retuner is None else _exchange(config, law, retuner)
     estimator = None
     if estimating is not None and config.sea_estimate is not None:
         estimator = Estimator(config.sea_estimate, estimating, vessel.ship, tank, vessel.least_gm_m)
@@ -353,31 +349,17 @@ def retuner_process(config: ControllerConfig) -> Iterator[tuple[Desk | None, Des
         yield retuner, estimating
 
 
-def _adaptive(config: ControllerConfig, law: BuiltLaw, retuner: Retuner) -> AdaptiveController:
-    """A controller that begins with `law` and retunes itself."""
-    settings, design, ship = config.retuning, config.law, config.vessel.ship
-    assert settings is not None
-    assert isinstance(design, PredictiveDesign)
-    assert law.linear is not None
-    return AdaptiveController(
-        law.linear,
-        law.controller(),
-        ShipFigures.of(ship),
-        design.predictor.measured.index("roll_rad"),
-        settings,
-        make_pulses(settings, config.plant, law.linear.sample_time_s),
-        retuner,
-    )
-
-
-def _renewing(config: ControllerConfig, law: BuiltLaw, retuner: Retuner) -> RenewingController:
-    """A controller that begins with `law` and has it renewed."""
+def _exchange(config: ControllerConfig, law: BuiltLaw, retuner: Retuner) -> LawExchange | None:
+    """A controller that begins with `law` and has it retuned or renewed, as configured."""
+    settings = config.retuning
+    if settings is None and not config.renews:
+        return None
+    ship, roll = ShipFigures.of(config.vessel.ship), law.measured.index("roll_rad")
+    if settings is not None:
+        assert law.linear is not None
+        pulses = make_pulses(settings, config.plant, law.linear.sample_time_s)
+        return AdaptiveController(
+            law.linear, law.controller(), ship, roll, settings, pulses, retuner
+        )
     assert isinstance(law.linear, ConstrainedLaw)
-    return RenewingController(
-        law.linear,
-        law.controller(),
-        ShipFigures.of(config.vessel.ship),
-        law.measured.index("roll_rad"),
-        config.limits,
-        retuner,
-    )
+    return RenewingController(law.linear, law.controller(), ship, roll, config.limits, retuner)

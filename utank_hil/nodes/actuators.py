@@ -333,20 +333,19 @@ class Actuators:
         """The next commands of what is on board."""
         word = self._sequence.next_word(measured.drive_state, wanted=judgement.drive_wanted)
         self._now_ns = measured.now_ns
-        frames = self._valve_frames(
-            faulted=measured.valve_fault, follow=judgement.demand is _CONTROL
-        )
         if self.drive is None:
-            return self._pump_frames(word) + frames
-        return self.drive.command(self.command_pa, word, measured, self._rate_m_s) + frames
+            frames = self._pump_frames(word)
+        else:
+            frames = self.drive.command(self.command_pa, word, measured, self._rate_m_s)
+        return frames + self._valve_frames(measured.valve_fault, judgement.demand is _CONTROL)
 
     def stop(self) -> list[Frame]:
         """Leave the pump at zero, the valve at its fail position."""
         self.command_pa = 0.0
-        frames = self._valve_frames(faulted=False, follow=False)
-        if self.drive is None:
-            return self._pump_frames(ControlWord.QUICK_STOP) + frames
-        return self.drive.stop() + frames
+        stops = (
+            self._pump_frames(ControlWord.QUICK_STOP) if self.drive is None else self.drive.stop()
+        )
+        return stops + self._valve_frames(faulted=False, follow=False)
 
     def _pump_frames(self, word: ControlWord) -> list[Frame]:
         if not self.pump:
@@ -355,7 +354,7 @@ class Actuators:
         self._echo.sent(self._commands.counter)
         return [command]
 
-    def _valve_frames(self, *, faulted: bool, follow: bool) -> list[Frame]:
+    def _valve_frames(self, faulted: bool, follow: bool) -> list[Frame]:
         if self.valve is None:
             return []
         return self.valve.frames(self._now_ns, faulted=faulted, follow=follow)

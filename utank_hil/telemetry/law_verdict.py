@@ -35,21 +35,6 @@ class LawVerdict:
         return max((each.deviation for each in self.differences), default=0.0)
 
 
-def law_verdict(
-    recorded: BuiltLaw,
-    designed: BuiltLaw,
-    config: ControllerConfig,
-    why_not_recorded: str,
-    differences: list[ValueDifference],
-) -> LawVerdict:
-    """Compare what both laws do, if the recorded one answered and the other one differs."""
-    loops = None
-    if differences and not why_not_recorded:
-        one, other = loop_figures(recorded, config), loop_figures(designed, config)
-        loops = None if one is None or other is None else (one, other)
-    return LawVerdict(why_not_recorded, differences, loops)
-
-
 def loop_figures(law: BuiltLaw, config: ControllerConfig) -> LoopFigures | None:
     """Return what the loop of a law of the pump does; None if it has none or can't be judged."""
     # here: a replay with equal laws needs none of it

@@ -18,7 +18,7 @@ from utank_hil.runners import LoopStatistics
 from utank_hil.telemetry.explained_tick import ExplainedTick
 from utank_hil.telemetry.frame_comparison import FrameComparison, ReplayResult
 from utank_hil.telemetry.frame_log import LAYOUT, FrameLog, Kind, Records
-from utank_hil.telemetry.law_verdict import LawVerdict, law_verdict
+from utank_hil.telemetry.law_verdict import LawVerdict, loop_figures
 from utank_hil.telemetry.recorded_retuner import RecordedRetuner
 from utank_hil.telemetry.replay_head import causes, law_differences, recorded_law
 
@@ -75,7 +75,11 @@ def replay_log(
         explained=explained,
     )
     apart = law_differences(log.head, designed)
-    verdict = law_verdict(law, designed, config, why_not, apart)
+    loops = None
+    if apart and not why_not:
+        recorded, here = loop_figures(law, config), loop_figures(designed, config)
+        loops = None if recorded is None or here is None else (recorded, here)
+    verdict = LawVerdict(why_not, apart, loops)
     return ReplayedLog(result, causes(log.head, config, folder), verdict)
 
 
