@@ -214,10 +214,7 @@ class ForeignValve(ValveNode):
         assert plan.command is not None
         self._plan, self._command = plan, plan.command
         self._server = CanopenSensor(plan) if plan.steps else None
-        self._heard = HeardMessage(
-            self._command.can_ids[0], self._command.cycle_ns, self._command.length,
-            self._command.counter, self._command.crc,
-        )  # fmt: skip
+        self._heard = HeardMessage(self._command)
         super().__init__(plant, tank, valve, catalogue, configuration_version=0)
         frames = ForeignFrames(plan, self._statuses, catalogue.codec(ValveStatus))
         #: What it sends, by the identifier of the message that it stands for.

@@ -430,7 +430,7 @@ def test_a_derived_rate_reaches_over_no_silence():
 def test_the_checksum_is_the_published_one(content, flip):
     crc = Crc8(byte=7)
     data = content + bytes([crc.of(content + bytes(1))])
-    message = HeardMessage(1, 10 * MS, 8, crc=crc)
+    message = HeardMessage(MessagePlan("m", (1,), 8, 10 * MS, crc=crc))
     assert message.passes(data)
     spoilt = data[:7] + bytes([data[7] ^ flip])
     assert message.passes(spoilt) is (flip == 0)
@@ -450,7 +450,9 @@ def test_the_checksum_of_the_check_string():
     ],
 )
 def test_a_counter_must_move_on(counters, accepted):
-    message = HeardMessage(1, 10 * MS, 1, counter=Field(0, 4 if 9 in counters else 2, 1))
+    message = HeardMessage(
+        MessagePlan("m", (1,), 1, 10 * MS, counter=Field(0, 4 if 9 in counters else 2, 1))
+    )
     assert sum(message.passes(bytes([each])) for each in counters) == accepted
 
 
@@ -503,7 +505,7 @@ def test_a_real_number_is_cut_to_what_its_bits_hold(bits):
 
 
 def test_counter_and_stamp_may_have_a_sign():
-    message = HeardMessage(1, 10 * MS, 1, counter=Field(0, 4, 1, signed=True))
+    message = HeardMessage(MessagePlan("m", (1,), 1, 10 * MS, counter=Field(0, 4, 1, signed=True)))
     accepted = [message.passes(bytes((each % 16,))) for each in (6, 7, 8, 9, 9, 14, 15, 0, 1)]
     assert accepted == [True, True, True, True, False, False, False, True, True]
     stamp = Stamp(Field(0, 16, 2, signed=True), 1000.0, 40)

@@ -9,7 +9,8 @@ from utank_hil.canbus import ControlWord, DriveState, Frame
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.measurements import Measurements
 from utank_hil.canbus.profiles import drive_plan as cia
-from utank_hil.canbus.profiles.device import HeardMessage, nobody
+from utank_hil.canbus.profiles.device import HeardMessage, Take, nobody
+from utank_hil.canbus.profiles.device_plan import MessagePlan
 from utank_hil.canbus.profiles.field import Field
 from utank_hil.control.pressure_loop import PressureLoop
 from utank_hil.nodes.canopen_setup import CanopenSetup
@@ -71,7 +72,7 @@ class CanopenDrive:
         self._plan, self._loop, self._area_m2 = plan, loop, area_m2
         self.deliver: Callable[[DriveReport | None, int], None] = nobody
         self.setup = CanopenSetup(plan.bus, plan.node, plan.steps())
-        self._tag = tag = plan.bus << BUS_SHIFT | STANDARD
+        tag = plan.bus << BUS_SHIFT | STANDARD
         self._in_nm: bool = plan.mode.torque
         self._late_ns: int = LATE_BEATS * plan.heartbeat_ms * MILLISECOND_NS
         self._bits, self._per_si, self._marked = (
@@ -83,25 +84,21 @@ class CanopenDrive:
         self._beat = [Frame(tag | cia.HEARTBEAT + plan.controller_node, bytes((_OPERATIONAL,)))]
         self._with = self._beat + [Frame(tag | cia.SYNC, b"")] * plan.synchronous
         self._received = tag | cia.RECEIVED_1 + plan.node
-        measured = sum(bits for _, bits in plan.measured) // 8
+        sent, measured = (sum(b for _, b in each) // 8 for each in (plan.sent, plan.measured))
         scale = plan.speed_rad_s_per_unit
         self._speed = Field(0, 32, measured, signed=True, scale=scale)
         self._torque_field = Field(32, 16, measured, signed=True, scale=1 / plan.units_per_si)
         self._mode_field = Field(48, 8, measured, signed=True)
         cycle_ns = cia.COMMAND_MS * MILLISECOND_NS
         self.watched = tuple(
-            HeardMessage(self._tag | cob + plan.node, cycle_ns, sum(b for _, b in entries) // 8)
-            for cob, entries in ((cia.SENT_1, plan.sent), (cia.SENT_2, plan.measured))
+            HeardMessage(MessagePlan("", (tag | cob + plan.node,), length, cycle_ns))
+            for cob, length in ((cia.SENT_1, sent), (cia.SENT_2, measured))
         )
-        takers = {
-            cia.SENT_1: self._on_status,
-            cia.SENT_2: self._on_measured,
-            cia.SDO_ANSWER: self._on_answer,
-            cia.HEARTBEAT: self._on_heartbeat,
-            cia.EMERGENCY: self._on_emergency,
-        }
-        self.takes: dict[int, Callable[[Frame, int], None]] = {
-            self._tag | cob + plan.node: take for cob, take in takers.items()
+        self.takes: dict[int, Take] = {
+            tag | cia.SENT_1 + plan.node: self._on_status,
+            tag | cia.SENT_2 + plan.node: self._on_measured,
+            tag | cia.HEARTBEAT + plan.node: self._on_heartbeat,
+            **self.setup.takes,
         }
         self._sent: deque[tuple[int, int]] = deque(maxlen=KEPT)
         self._count = 0
@@ -113,7 +110,7 @@ class CanopenDrive:
         self._mode: int = plan.mode.number
         self._mode_shown = self._mode
         self._status = self._ignored = 0
-        self._emergency = self._told = ""
+        self._told = ""
 
     @property
     def words(self) -> str:
@@ -123,7 +120,7 @@ class CanopenDrive:
         said = f"node {self._plan.node}: status word {self._status:#06x}"
         if self._mode_shown != self._plan.mode.number:
             said += f", mode {self._mode_shown} and not {self._plan.mode.number}"
-        return said + self._emergency
+        return f"{said}, {self.setup.emergency}" if self.setup.emergency else said
 
     def frames(self, now_ns: int) -> list[Frame]:
         """What the drive's configuration needs in this tick, usually nothing."""
@@ -137,7 +134,7 @@ class CanopenDrive:
             return []
         frames = setup.frames(now_ns)
         if setup.done:
-            self._started_ns, self._emergency = now_ns, ""
+            self._started_ns, setup.emergency = now_ns, ""
         if setup.problem != self._told:
             self._told = setup.problem
             self.deliver(None, now_ns)
@@ -240,9 +237,6 @@ class CanopenDrive:
             self._torque = self._torque_field.value(data)
         self._mode_shown = self._mode_field.raw(data)
 
-    def _on_answer(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
-        self.setup.take(frame.data)
-
     def _on_heartbeat(self, frame: Frame, now_ns: int) -> None:
         if len(frame.data) != 1:
             return
@@ -256,8 +250,3 @@ class CanopenDrive:
         """Configure it anew; what it said before, as that it runs, says nothing of now."""
         self.setup.restart(now_ns)
         self._status = 0
-
-    def _on_emergency(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
-        said = cia.emergency_words(frame.data)
-        if said is not None:
-            self._emergency = said and f", {said}"

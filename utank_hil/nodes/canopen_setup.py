@@ -10,7 +10,7 @@ from typing import Any, Final
 from utank_hil.canbus import Frame
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.profiles import drive_plan as cia
-from utank_hil.canbus.profiles.device import SILENT_NS, ProfiledDevice, hear
+from utank_hil.canbus.profiles.device import SILENT_NS, ProfiledDevice, Take, hear
 
 ANSWER_NS: Final = 300_000_000  #: CiA 301 names no time; servers of drives answer within 50 ms.
 PATIENCE_NS: Final = 300_000_000  #: For a mode to be entered, likewise.
@@ -24,12 +24,20 @@ class _Refused(Exception):
 
 
 class CanopenSetup:
-    """The start of one node by its steps: `done`, or the `problem` that it was refused for."""
+    """The start of one node by its steps: `done`, or the `problem` that it was refused for.
+
+    `takes` has, by identifier, what takes its answers, and its emergencies, of which `emergency`
+    is the last.
+    """
 
     def __init__(self, bus: int, node: int, steps: Iterable[cia.Step]) -> None:
         self._node, self._steps = node, tuple(steps)
         self._tag = bus << BUS_SHIFT | STANDARD
-        self.problem = ""
+        self.problem = self.emergency = ""
+        self.takes: dict[int, Take] = {
+            self._tag | cia.SDO_ANSWER + node: self._take_answer,
+            self._tag | cia.EMERGENCY + node: self._take_emergency,
+        }
         self.restart(0)
 
     def restart(self, begin_ns: int) -> None:
@@ -67,9 +75,13 @@ class CanopenSetup:
         self._asked_ns = now_ns
         return [Frame(self._tag | cia.SDO_REQUEST + self._node, self._request[1])]
 
-    def take(self, data: bytes) -> None:
+    def _take_emergency(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
+        said = cia.emergency_words(frame.data)
+        self.emergency = self.emergency if said is None else said
+
+    def _take_answer(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
         """Take what the node's server says; what was not asked for is nothing."""
-        got = cia.answer(data)
+        got = cia.answer(frame.data)
         asked = self._request if self._asked_ns is not None else None
         if got is not None and asked is not None and got.place == asked[0]:
             self._advance(got)
@@ -137,18 +149,17 @@ class SensorSetup:
         assert plan.node is not None
         self._device, self._node = device, plan.node
         self.setup = CanopenSetup(plan.bus, plan.node, plan.steps)
-        tag = (plan.bus << BUS_SHIFT | STANDARD) + plan.node
-        hear(device.takes, tag + cia.SDO_ANSWER, self._take_answer)
-        hear(device.takes, tag + cia.HEARTBEAT, self._take_heartbeat)
-        hear(device.takes, tag + cia.EMERGENCY, self._take_emergency)
-        self._emergency = ""
+        beat = plan.bus << BUS_SHIFT | STANDARD | cia.HEARTBEAT + plan.node
+        for can_id, take in (*self.setup.takes.items(), (beat, self._take_heartbeat)):
+            hear(device.takes, can_id, take)
         device.named = False
         self._done_ns = 0
 
     @property
     def words(self) -> str:
         """What is wrong with the sensor, by its own words; else empty."""
-        return self.setup.problem or (self._emergency and f"node {self._node}: {self._emergency}")
+        emergency = self.setup.emergency
+        return self.setup.problem or (emergency and f"node {self._node}: {emergency}")
 
     @property
     def kind(self) -> type[tuple[Any, ...]]:
@@ -165,13 +176,6 @@ class SensorSetup:
             self._done_ns = now_ns
         self._device.named = setup.done
         return frames
-
-    def _take_emergency(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
-        said = cia.emergency_words(frame.data)
-        self._emergency = self._emergency if said is None else said
-
-    def _take_answer(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
-        self.setup.take(frame.data)
 
     def _take_heartbeat(self, frame: Frame, now_ns: int) -> None:
         if frame.data[:1] == bytes((cia.NetworkState.BOOT_UP,)):

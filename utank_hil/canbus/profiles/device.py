@@ -18,17 +18,12 @@ from utank_hil.canbus.profiles.field import ConditionPlan, Field, SignalPlan
 class HeardMessage(Acceptance):
     """Length, checksum and counter of one message, and how its frames pass them."""
 
-    def __init__(
-        self,
-        can_id: int,
-        cycle_ns: int,
-        length: int,
-        counter: Field | None = None,
-        crc: Crc8 | None = None,
-    ) -> None:
-        super().__init__(can_id, cycle_ns, 0 if counter is None else 1 << counter.bits)
-        self.length = length
-        self._counter, self._crc = counter, crc
+    def __init__(self, plan: MessagePlan) -> None:
+        counts = 0 if plan.counter is None else 1 << plan.counter.bits
+        super().__init__(plan.can_ids[0], plan.cycle_ns, counts)
+        self.length: int = plan.length
+        self._counter: Field | None = plan.counter
+        self._crc: Crc8 | None = plan.crc
 
     def intact(self, data: bytes) -> bool:
         """Whether a frame is whole; nothing changes."""
@@ -129,7 +124,7 @@ class MessageHeard(HeardMessage):
     """One message of a device: its protection, what it says, and when it said it."""
 
     def __init__(self, plan: MessagePlan, late_ms: float, bit: int) -> None:
-        super().__init__(plan.can_ids[0], plan.cycle_ns, plan.length, plan.counter, plan.crc)
+        super().__init__(plan)
         self.signals: tuple[SignalPlan, ...] = plan.signals
         self.conditions: tuple[ConditionPlan, ...] = plan.conditions
         self._only: ConditionPlan | None = plan.only
