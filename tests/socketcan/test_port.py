@@ -75,7 +75,7 @@ def test_standard_and_remote_frames_are_counted_and_left_out(ports, raw_bus):
     raw_bus.send(can.Message(arbitration_id=FRAME.can_id, is_remote_frame=True, dlc=8))
     raw_bus.send(can.Message(arbitration_id=FRAME.can_id, data=FRAME.data))
     assert list(ports[0].receive()) == [FRAME]
-    assert (ports[0].standard_frames, ports[0].remote_frames) == (1, 1)
+    assert ports[0].others == 2
 
 
 def test_bus_off_is_a_port_error(ports, raw_bus):

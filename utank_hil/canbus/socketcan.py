@@ -84,8 +84,7 @@ class SocketCanPort:
     ) -> None:
         self.channel = channel
         self._standard, self._receive_only = standard, receive_only
-        #: Received frames that are not a `Frame`.
-        self.error_frames = self.standard_frames = self.remote_frames = 0
+        self.others = 0  #: Received frames of all other kinds.
         self._filters: list[can.typechecking.CanFilter] | None = None
         if can_ids is not None:
             self._filters = [
@@ -133,11 +132,6 @@ class SocketCanPort:
             raise self._port_error("interface down", _REMEDIES[errno.ENETDOWN])
         return frames
 
-    @property
-    def others(self) -> int:
-        """Frames of all other kinds."""
-        return self.error_frames + self.standard_frames + self.remote_frames
-
     def _read(self) -> list[Frame]:
         """Frames; the first error that came with them is pending."""
         bus = self._open_bus()
@@ -155,16 +149,11 @@ class SocketCanPort:
             if message.is_error_frame:
                 problem = self._problem(message)
                 self._pending = self._pending or problem
-            elif message.is_remote_frame:
-                self.remote_frames += 1
-            elif not message.is_extended_id:
-                if self._standard:
-                    can_id = message.arbitration_id | STANDARD
-                    frames.append(Frame(can_id, bytes(message.data)))
-                else:
-                    self.standard_frames += 1
+            elif message.is_remote_frame or not (message.is_extended_id or self._standard):
+                self.others += 1
             else:
-                frames.append(Frame(message.arbitration_id, bytes(message.data)))
+                can_id = message.arbitration_id | (0 if message.is_extended_id else STANDARD)
+                frames.append(Frame(can_id, bytes(message.data)))
         return frames
 
     def close(self) -> None:
@@ -191,7 +180,7 @@ class SocketCanPort:
 
     def _problem(self, message: can.Message) -> PortError | None:
         """Count an error frame; the error that it stands for, None if it only warns."""
-        self.error_frames += 1
+        self.others += 1
         classes = message.arbitration_id
         detail = message.data[1] if classes & _CONTROLLER_PROBLEM and len(message.data) > 1 else 0
         for bits, meanings in ((classes, _ERROR_CLASSES), (detail, _CONTROLLER_PROBLEMS)):
