@@ -3,14 +3,13 @@
 import io
 import os
 import shutil
-from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, Locator, Page, sync_playwright
+from playwright.sync_api import Page, sync_playwright
 
 OPTIONS = (
     "--no-sandbox",  # which needs a kernel that lets a user do so, or another user than root
@@ -71,18 +70,18 @@ class Opened:
     asked: list[str] = field(default_factory=list)
     complaints: list[str] = field(default_factory=list)
 
-    def cut(self, *, scrolls: bool = True) -> list[str]:
+    def cut(self, *, scrolls=True):
         """Words that are cut; where `scrolls`, what is in a part that scrolls is not."""
         found: list[str] = self.page.evaluate(CUT, scrolls)
         return found
 
     @property
-    def too_wide(self) -> int:
+    def too_wide(self):
         """Pixels by which the page scrolls sideways."""
         return int(self.page.evaluate("document.documentElement.scrollWidth - innerWidth"))
 
     @property
-    def outside(self) -> list[str]:
+    def outside(self):
         """Addresses beyond this machine."""
         return [
             address for address in self.asked
@@ -91,7 +90,7 @@ class Opened:
 
 
 @contextmanager
-def launched() -> Iterator[Browser]:
+def launched():
     """Chromium; without it the test is skipped, in continuous integration it fails."""
     program = shutil.which("chromium") or shutil.which("chromium-browser")
     if program is None:
@@ -105,7 +104,7 @@ def launched() -> Iterator[Browser]:
 
 
 @contextmanager
-def opened(browser: Browser, url: str, width: int, height: int = 900) -> Iterator[Opened]:
+def opened(browser, url, width, height=900):
     """A page in a window of its own."""
     page = browser.new_page(viewport={"width": width, "height": height})
     page.set_default_timeout(PATIENCE_MS)
@@ -123,13 +122,13 @@ def opened(browser: Browser, url: str, width: int, height: int = 900) -> Iterato
         page.close()
 
 
-def pixels(shown: Page | Locator) -> np.ndarray:
+def pixels(shown):
     """What is seen of a page or a part, shape (rows, columns, 3), 0 to 255."""
     with Image.open(io.BytesIO(shown.screenshot())) as image:
         return np.asarray(image.convert("RGB")).astype(int)
 
 
-def of_color(image: np.ndarray, color: str | Sequence[int], slack: int = 24) -> np.ndarray:
+def of_color(image, color, slack=24):
     """Which pixels have a colour."""
     if isinstance(color, str):
         color = [int(color[place : place + 2], 16) for place in (1, 3, 5)]

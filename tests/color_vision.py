@@ -1,12 +1,9 @@
 """Colours as they are seen in grey, and by people who lack red or green cones."""
 
-from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
 from matplotlib.colors import to_rgb
-
-from utank_hil.base.arrays import FloatArray
 
 # full protanopia and deuteranopia, on linear RGB: Machado, Oliveira, Fernandes 2009, table 1
 _LACKING = (
@@ -29,7 +26,7 @@ LEAST_DIFFERENCE = 8.0
 """In CIE L*a*b*: two is just seen with the colours side by side, and a line is thin."""
 
 
-def difference(one: object, other: object, *, grey: bool) -> float:
+def difference(one, other, *, grey):
     """How far apart two colours are to who lacks cones, the worse of both; or in grey."""
     return min(
         float(np.linalg.norm(_lab(one, seen) - _lab(other, seen)))
@@ -37,7 +34,7 @@ def difference(one: object, other: object, *, grey: bool) -> float:
     )
 
 
-def alike(strokes: Sequence[tuple[object, object]], *, grey: bool) -> list[tuple[int, int]]:
+def alike(strokes, *, grey):
     """Pairs of strokes (colour, and what else it is told by) that are not told apart."""
     return [
         (i, j)
@@ -46,7 +43,7 @@ def alike(strokes: Sequence[tuple[object, object]], *, grey: bool) -> list[tuple
     ]
 
 
-def _lab(color: object, seen: FloatArray) -> FloatArray:
+def _lab(color, seen):
     """CIE L*a*b* of a colour after a change of its linear RGB."""
     rgb = np.array(to_rgb(color))
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)

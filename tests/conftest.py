@@ -3,8 +3,6 @@
 import os
 import signal
 import threading
-from collections.abc import Iterator, Mapping
-from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
@@ -19,8 +17,7 @@ from utank_hil.pictures import style
 from utank_hil.runners import process_priority
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from playwright.sync_api import Browser
+    pass
 
 # machines are shared: an example that takes long says nothing about the code
 settings.register_profile("search", deadline=None, print_blob=True, max_examples=200)
@@ -31,17 +28,17 @@ settings.load_profile("same")
 
 
 @pytest.hookimpl(tryfirst=True)  # before `-m` chooses
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(items):
     """Give a marker `evidence` that names parameters to these alone."""
     for item in items:
         own = item.own_markers
         for mark in [each for each in own if each.name == "evidence" and each.args]:
-            if item.callspec.id not in mark.args:  # type: ignore[attr-defined]  # of a Function
+            if item.callspec.id not in mark.args:  # of a Function
                 own.remove(mark)
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _signals_reach_the_processes_of_tests() -> None:
+def _signals_reach_the_processes_of_tests():
     """Ignored signals, as under `nohup`, are inherited; a handler that does nothing is not."""
     for number in (signal.SIGINT, signal.SIGHUP):
         if signal.getsignal(number) is signal.SIG_IGN:
@@ -49,11 +46,11 @@ def _signals_reach_the_processes_of_tests() -> None:
 
 
 @pytest.fixture(autouse=True)
-def _every_picture_is_legible(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def _every_picture_is_legible(monkeypatch):
     """Look at each picture that is drawn, whichever test has it drawn (`legible`)."""
     save, found = style.save_figure, []
 
-    def looked_at(figure: "Figure", path: Path, metadata: Mapping[str, str]) -> None:
+    def looked_at(figure, path, metadata):
         save(figure, path, metadata)
         from legible import flaws
 
@@ -65,7 +62,7 @@ def _every_picture_is_legible(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]
 
 
 @pytest.fixture(scope="module")
-def browser() -> "Iterator[Browser]":
+def browser():
     """Headless Chromium (`browsing`)."""
     from browsing import launched
 
@@ -74,7 +71,7 @@ def browser() -> "Iterator[Browser]":
 
 
 @pytest.fixture
-def one_process() -> Iterator[None]:
+def one_process():
     """Run benches and campaigns in this process (`one_process.py`)."""
     from one_process import in_one_process
 
@@ -86,14 +83,14 @@ _MCL_ONFAULT = 0x4
 
 
 @pytest.fixture(autouse=True, scope="module")
-def _a_loop_runs_where_other_tests_ran() -> Iterator[None]:
+def _a_loop_runs_where_other_tests_ran():
     """Let the loop run in a process where other tests have left threads and address space.
 
     It locks the memory that is in use. All that is mapped would stay in memory for good: gigabytes.
     """
     left = set(threading.enumerate()) - {threading.current_thread()}
 
-    def begun_since() -> list[threading.Thread]:
+    def begun_since():
         return [thread for thread in threading.enumerate() if thread not in left]
 
     seen = SimpleNamespace(enumerate=begun_since, current_thread=threading.current_thread)

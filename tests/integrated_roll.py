@@ -1,24 +1,13 @@
 """Roll of a ship without her tank by an adaptive integration, to compare with."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.sea import Harmonics
 
-
-def integrated_roll(
-    ship: RollShip,
-    moment: Harmonics,
-    time_s: np.ndarray,
-    start_s: float = 0.0,
-    start: Sequence[float] = (0.0, 0.0),
-) -> np.ndarray:
+def integrated_roll(ship, moment, time_s, start_s=0.0, start=(0.0, 0.0)):
     """Angle and rate by an adaptive Runge-Kutta method, wave by wave from its cosine."""
 
-    def rates(t: float, x: np.ndarray) -> list[float]:
+    def rates(t, x):
         k = float(moment.amplitude @ np.cos(moment.frequency_rad_s * t + moment.phase_rad))
         k += ship.wind_moment_nm + ship.offset_moment_nm
         acceleration = k - ship.damping_nms_rad * x[1] - ship.stiffness_nm_rad * x[0]

@@ -3,19 +3,13 @@
 `conftest` has every picture that a test draws looked at.
 """
 
-from collections.abc import Iterator
 from itertools import combinations, pairwise
 
 import numpy as np
 from color_vision import alike
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
 from matplotlib.legend import Legend
-from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
@@ -29,7 +23,7 @@ LEAST_LINE = 1.0
 """Width in points of a line whose colour must be seen: a thinner one is mixed with its ground."""
 
 
-def flaws(figure: Figure) -> list[str]:
+def flaws(figure):
     """Texts cut, too small, on one another; legends on data; curves not seen or not told apart."""
     image = drawn(figure)
     engine = figure.get_layout_engine()
@@ -60,7 +54,7 @@ def flaws(figure: Figure) -> list[str]:
     return found
 
 
-def drawn(figure: Figure) -> np.ndarray:
+def drawn(figure):
     """The picture's pixels, shape (rows, columns, 3), 0 to 1."""
     canvas = figure.canvas
     assert isinstance(canvas, FigureCanvasAgg)
@@ -68,7 +62,7 @@ def drawn(figure: Figure) -> np.ndarray:
     return np.asarray(canvas.buffer_rgba())[..., :3] / 255
 
 
-def _texts(figure: Figure) -> list[tuple[str, Bbox]]:
+def _texts(figure):
     """Words and boxes of what is written, but for tick labels."""
     ticks = {
         label
@@ -85,7 +79,7 @@ def _texts(figure: Figure) -> list[tuple[str, Bbox]]:
     ]  # fmt: skip
 
 
-def _hidden_offset(text: Text, figure: Figure) -> bool:
+def _hidden_offset(text, figure):
     """Whether it belongs to axes that are not drawn."""
     return any(
         text in axes.findobj(Text) and not (axes.get_visible() and axes.axison)
@@ -94,7 +88,7 @@ def _hidden_offset(text: Text, figure: Figure) -> bool:
     )  # fmt: skip
 
 
-def _tick_labels(axis: Axis) -> list[Text]:
+def _tick_labels(axis):
     """The labels that are drawn, in order."""
     low, high = sorted(axis.get_view_interval())
     return [
@@ -104,7 +98,7 @@ def _tick_labels(axis: Axis) -> list[Text]:
     ]
 
 
-def _inside(box: Bbox, figure: Figure) -> bool:
+def _inside(box, figure):
     return bool(
         box.x0 >= -SLACK_PX
         and box.y0 >= -SLACK_PX
@@ -113,18 +107,18 @@ def _inside(box: Bbox, figure: Figure) -> bool:
     )
 
 
-def _common(one: Bbox, other: Bbox) -> bool:
+def _common(one, other):
     common = Bbox.intersection(one, other)
     return common is not None and min(common.width, common.height) > SLACK_PX
 
 
-def _data(axes: Axes) -> list[Artist]:
+def _data(axes):
     """What is drawn of numbers; a tint of the ground is none."""
     artists = [*axes.lines, *axes.patches, *axes.collections, *axes.images]
     return [artist for artist in artists if (artist.get_alpha() or 1.0) > TINT]
 
 
-def _not_seen(figure: Figure, image: np.ndarray) -> Iterator[str]:
+def _not_seen(figure, image):
     """Curves without a pixel of their colour within their axes."""
     for axes in figure.axes:
         part = _cut_out(image, axes.get_window_extent())
@@ -143,7 +137,7 @@ def _not_seen(figure: Figure, image: np.ndarray) -> Iterator[str]:
                 yield f"{line.get_label()} in {axes.get_title(loc='left') or axes.get_ylabel()}"
 
 
-def _alike(figure: Figure) -> Iterator[str]:
+def _alike(figure):
     """Named curves of one plot that differ in colour alone, and not enough for grey."""
     for axes in figure.axes:
         lines = [line for line in axes.lines if not str(line.get_label()).startswith("_")]
@@ -153,18 +147,18 @@ def _alike(figure: Figure) -> Iterator[str]:
                 yield f"{lines[i].get_label()} and {lines[j].get_label()}"
 
 
-def _dashes(line: Line2D) -> tuple[object, ...]:
+def _dashes(line):
     """Strokes and gaps of a line; none of one that has no line."""
     offset, strokes = line._unscaled_dash_pattern
     return line.get_linestyle(), offset, *(strokes or ())
 
 
-def _same(one: Line2D, other: Line2D) -> bool:
+def _same(one, other):
     first, second = (np.asarray(line.get_xydata(), dtype=float) for line in (one, other))
     return first.shape == second.shape and np.allclose(first, second, rtol=1e-3, equal_nan=True)
 
 
-def _covered(figure: Figure) -> Iterator[int]:
+def _covered(figure):
     """Pixels of data below each legend."""
     legends = [each for each in figure.findobj(Legend) if each.get_visible()]
     boxes = [legend.get_window_extent() for legend in legends]
@@ -181,12 +175,12 @@ def _covered(figure: Figure) -> Iterator[int]:
         yield int((differs > COLOR_SLACK).sum())
 
 
-def _show(artists: list[Artist], *, visible: bool) -> None:
+def _show(artists, *, visible):
     for artist in artists:
         artist.set_visible(visible)
 
 
-def _cut_out(image: np.ndarray, box: Bbox) -> np.ndarray:
+def _cut_out(image, box):
     """The pixels within a box, whose rows count from below."""
     left, right = max(round(box.x0), 0), round(box.x1) + 1
     top, bottom = max(len(image) - round(box.y1) - 1, 0), max(len(image) - round(box.y0), 1)

@@ -2,7 +2,6 @@
 
 import resource
 import sys
-from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
@@ -10,7 +9,7 @@ ROOM: Final = 1024
 
 
 @contextmanager
-def little_room() -> Iterator[None]:
+def little_room():
     """No file can grow beyond `ROOM` bytes in here."""
     limits, none = resource.getrlimit(resource.RLIMIT_FSIZE), sys.dont_write_bytecode
     sys.dont_write_bytecode = True  # Python keeps what it wrote of it, and can't read it again

@@ -1,6 +1,5 @@
 """Benches and campaigns in this process: a new one takes seconds to import all."""
 
-from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager, nullcontext
 from types import SimpleNamespace
@@ -12,7 +11,7 @@ from firmware_sim.campaign import driver
 from firmware_sim.fault_campaign import runner
 
 
-def _submit(function: Callable[..., object], *arguments: object) -> Future[object]:
+def _submit(function, *arguments):
     future = Future[object]()
     try:
         future.set_result(function(*arguments))
@@ -22,12 +21,12 @@ def _submit(function: Callable[..., object], *arguments: object) -> Future[objec
 
 
 @contextmanager
-def in_one_process() -> Iterator[None]:
+def in_one_process():
     """What is submitted to a pool is done at once."""
     with pytest.MonkeyPatch.context() as patch:
         for module in (bench, driver, runner):
 
-            def pool(_: int, common: object, module=module) -> nullcontext[SimpleNamespace]:
+            def pool(_, common, module=module):
                 patch.setattr(module, "shared", lambda: common, raising=False)
                 return nullcontext(SimpleNamespace(submit=_submit))
 

@@ -8,7 +8,7 @@ import pytest
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
-def others_file(name: str) -> Path:
+def others_file(name):
     """Return a file or folder of `shared/data` beside the checkout, such as ``hulls/box.1``.
 
     Where the folder is absent the test is skipped; in continuous integration it fails.
@@ -21,6 +21,6 @@ def others_file(name: str) -> Path:
     return path
 
 
-def field_case(name: str) -> Path:
+def field_case(name):
     """Return a file of the cases that other people reported, by its folder and name."""
     return others_file(f"field-cases/{name}")

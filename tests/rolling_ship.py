@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from utank_hil.base.arrays import FloatArray
 from utank_hil.control import DesignPlant
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.sampling import transition_and_step
-from utank_hil.sea import EffectiveSlope, Sea, Spectrum
+from utank_hil.sea import EffectiveSlope, Sea
 
 SAMPLE_TIME_S = 0.2
 SUBSTEPS = 4
@@ -19,14 +18,14 @@ PLANT = DesignPlant(SHIP, TANK)
 NOISE = (2e-4, 5e-4, 3.5e-3)
 
 
-def loaded(period_s: float, inertia: float = 1.0) -> RollShip:
+def loaded(period_s, inertia=1.0):
     """The ship with another inertia and roll period."""
     inertia_kg_m2 = SHIP.inertia_kg_m2 * inertia
     stiffness = inertia_kg_m2 * (2 * np.pi / period_s) ** 2
     return replace(SHIP, inertia_kg_m2=inertia_kg_m2, stiffness_nm_rad=stiffness)
 
 
-def wave_moment_nm(spectrum: Spectrum, duration_s: float, seed: int) -> FloatArray:
+def wave_moment_nm(spectrum, duration_s, seed):
     """Moment of a beam sea on the configured ship, at each of the steps of `motion_in`."""
     sea = Sea.irregular(spectrum, seed)
     slope = EffectiveSlope(0.5).moment(sea.omega_rad_s, sea.heading_rad, SHIP.stiffness_nm_rad)
@@ -38,13 +37,7 @@ def wave_moment_nm(spectrum: Spectrum, duration_s: float, seed: int) -> FloatArr
     return moment
 
 
-def motion_in(
-    moment_nm: FloatArray,
-    ship: RollShip = SHIP,
-    most_pa: float = 30e3,
-    seed: int = 1,
-    noise: tuple[float, float, float] = NOISE,
-) -> FloatArray:
+def motion_in(moment_nm, ship=SHIP, most_pa=30000.0, seed=1, noise=NOISE):
     """Roll, rate and level at each sample, with sensor noise; the pump swings against the rate.
 
     It gives all it has whichever way the ship rolls, like a law that is far beyond its limits, and

@@ -7,7 +7,7 @@ from utank_hil.configuration import ControllerConfig, load_config
 _CONTROLLERS = Path(__file__).parents[1] / "configs" / "controllers"
 
 
-def _design(name: str):
+def _design(name):
     return load_config(_CONTROLLERS / f"{name}.yaml", ControllerConfig).law
 
 

@@ -26,16 +26,16 @@ RESULTS = ("out/bench.rrd", "out/gpc.frames", "out/run.rrd")
 PLAIN = {"TERM": "dumb", "COLUMNS": "200", "NO_COLOR": "1"}
 
 
-def invoke(application: typer.Typer, *arguments: object):
+def invoke(application, *arguments):
     return CliRunner(env=PLAIN).invoke(application, [str(argument) for argument in arguments])
 
 
-def said(result) -> str:
+def said(result):
     """Text without the lines and boxes that the help is framed in."""
     return re.sub(r"[\s│]+", " ", result.output)
 
 
-def commands() -> list[tuple[typer.Typer, tuple[str, ...], str]]:
+def commands():
     words = []
     for name, point in entry_points().items():
         loaded = point.load()
@@ -91,7 +91,7 @@ def test_shipped_controllers_pass_their_check(path):
         assert report["robustness"]["nominal"]["peak_sensitivity"] <= 2.0
 
 
-def controller_file(folder: Path, changes: str = "", law: str = "{kind: passive}") -> Path:
+def controller_file(folder, changes="", law="{kind: passive}"):
     path = folder / "controller.yaml"
     vessel = CONFIGS / "ships" / "thesis_first.yaml"
     path.write_text(f"name: test\nvessel: {vessel}\nlaw: {law}\n{changes}", encoding="utf-8")
@@ -232,7 +232,7 @@ STORM_ALL = CONFIGS / "scenarios" / "storm_all.yaml"
 """Several laws, none of which takes long to design."""
 
 
-def bench_process(*arguments: str) -> subprocess.Popen[str]:
+def bench_process(*arguments):
     """The command in a process group of its own, as a terminal would start it."""
     return subprocess.Popen(
         [BIN / "utank-hil", "bench", STORM_ALL, *arguments],
@@ -243,7 +243,7 @@ def bench_process(*arguments: str) -> subprocess.Popen[str]:
     )
 
 
-def wait_for_workers(process: subprocess.Popen[str], cpu_s: float) -> None:
+def wait_for_workers(process, cpu_s):
     """Wait until the bench's processes have computed for so long."""
     deadline = time.monotonic() + 120
     tasks = Path(f"/proc/{process.pid}/task/{process.pid}/children")
@@ -317,7 +317,7 @@ def test_bench_that_could_not_write_its_results_does_not_begin(tmp_path, place):
 @pytest.mark.slow
 @pytest.mark.usefixtures("one_process")
 def test_bench_whose_results_can_not_be_written_prints_them_all_the_same(tmp_path, monkeypatch):
-    def full(*_arguments: object, **_more: object) -> None:
+    def full(*_arguments, **_more):
         raise OSError(28, "No space left on device")
 
     for name in ("_draw", "_record"):

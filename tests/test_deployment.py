@@ -26,7 +26,7 @@ MOST_EXPOSURE = 2.0
 NETWORKD = Path("/usr/lib/systemd/systemd-networkd")
 
 
-def entries(path: Path) -> list[tuple[str, str, str]]:
+def entries(path):
     """Section, key and value of each line."""
     found, section = [], ""
     for line in path.read_text(encoding="utf-8").splitlines():
@@ -38,12 +38,12 @@ def entries(path: Path) -> list[tuple[str, str, str]]:
     return found
 
 
-def value(key: str, path: Path = UNIT) -> str:
+def value(key, path=UNIT):
     (found,) = [value for _, name, value in entries(path) if name == key]
     return found
 
 
-def systemd_analyze(*words: str, unit: Path) -> subprocess.CompletedProcess[str]:
+def systemd_analyze(*words, unit):
     """Run it, or skip where there is none; where CI runs, it must be there."""
     program = shutil.which("systemd-analyze")
     if program is None:
@@ -57,7 +57,7 @@ def systemd_analyze(*words: str, unit: Path) -> subprocess.CompletedProcess[str]
 
 
 @pytest.fixture
-def unit(tmp_path: Path) -> Path:
+def unit(tmp_path):
     """The unit with a program that is there."""
     path = tmp_path / UNIT.name
     path.write_text(
@@ -179,11 +179,11 @@ def test_what_the_check_refuses_the_run_refuses_with_the_code_that_is_not_tried_
     assert CliRunner().invoke(app, ["run", str(path), "--bus", "nowhere0"]).exit_code == code
 
 
-def instructions() -> list[tuple[str, str]]:
+def instructions():
     """Instruction and arguments of each line of the container file, continuations joined."""
     text = (DEPLOY / "Containerfile").read_text(encoding="utf-8").replace("\\\n", " ")
     lines = [line for line in text.splitlines() if line and not line.startswith("#")]
-    return [tuple(line.split(maxsplit=1)) for line in lines]  # type: ignore[misc]
+    return [tuple(line.split(maxsplit=1)) for line in lines]
 
 
 def test_the_container_file_installs_what_make_wheel_writes():

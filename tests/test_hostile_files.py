@@ -43,10 +43,10 @@ MOST_S, MOST_MB, GIB = 20, 700, 1 << 30
 class Canary:
     """What leaves a mark when it is unpickled."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder):
         self.mark = str(folder / "ran")
 
-    def __reduce__(self) -> Any:
+    def __reduce__(self):
         return os.mkdir, (self.mark,)
 
 
@@ -66,14 +66,14 @@ FRAMES = ("export", "{}", "--to", "{folder}/to.log")
 REPLAY = ("replay", "{}")
 
 
-def controller(law: str) -> str:
+def controller(law):
     return f"name: A\n{SHIP}law:\n  {law}\n"
 
 
-def law_of(make: Callable[[Path], object], suffix: str) -> Callable[[Path], object]:
+def law_of(make, suffix):
     """Return what makes a controller's file whose law is a data file."""
 
-    def made(path: Path) -> None:
+    def made(path):
         file = path.with_name(f"law{suffix}")
         make(file)
         law = f"kind: state_space\n  system: ./{file.name}\n  measured: [roll_rad]"
@@ -82,16 +82,16 @@ def law_of(make: Callable[[Path], object], suffix: str) -> Callable[[Path], obje
     return made
 
 
-def law(content: "str | bytes", suffix: str = ".json") -> Callable[[Path], object]:
+def law(content, suffix=".json"):
     content = content.encode() if isinstance(content, str) else content
     return law_of(lambda path: path.write_bytes(content), suffix)
 
 
-def linked(to: str) -> Callable[[Path], object]:
+def linked(to):
     return lambda path: path.symlink_to(to)
 
 
-def listening(path: Path) -> None:
+def listening(path):
     with socket.socket(socket.AF_UNIX) as own:
         here = os.getcwd()
         os.chdir(path.parent)  # A path may be longer than a socket's name.
@@ -101,8 +101,8 @@ def listening(path: Path) -> None:
             os.chdir(here)
 
 
-def zipped(**parts: "str | bytes") -> Callable[[Path], object]:
-    def make(path: Path) -> None:
+def zipped(**parts):
+    def make(path):
         with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
             for name, content in parts.items():
                 archive.writestr(name, content)
@@ -110,13 +110,13 @@ def zipped(**parts: "str | bytes") -> Callable[[Path], object]:
     return make
 
 
-def bomb(path: Path) -> None:
+def bomb(path):
     """Write gzip of a GB and more, without a line feed in it, in a MB."""
     member = gzip.compress(b"0" * (1 << 26))
     path.write_bytes(member * 17)
 
 
-def parquet_bomb(path: Path) -> None:
+def parquet_bomb(path):
     """Write 100 million numbers that are all the same."""
     table = pyarrow.table({"time_s": np.zeros(1_000_000)})
     with parquet.ParquetWriter(path, table.schema, compression="zstd") as writer:
@@ -124,7 +124,7 @@ def parquet_bomb(path: Path) -> None:
             writer.write_table(table)
 
 
-def wide_text(path: Path) -> None:
+def wide_text(path):
     """Write a text of a MB, once, that 5000 rows have."""
     places = pyarrow.array(np.zeros(5000, dtype=np.int32))
     text = pyarrow.DictionaryArray.from_arrays(places, pyarrow.array(["x" * 1_000_000]))
@@ -132,7 +132,7 @@ def wide_text(path: Path) -> None:
     parquet.write_table(pyarrow.table(columns), path, store_schema=False)
 
 
-def npz_bomb(path: Path) -> None:
+def npz_bomb(path):
     head = io.BytesIO()
     np.lib.format.write_array_header_1_0(
         head, {"descr": "<f8", "fortran_order": False, "shape": (GIB // 8,)}
@@ -146,16 +146,16 @@ def npz_bomb(path: Path) -> None:
             part.write(bytes(1 << 24))
 
 
-def object_npz(path: Path) -> None:
+def object_npz(path):
     np.savez(path, A=np.array([Canary(path.parent)], dtype=object), B=[1.0], C=[1.0], D=[1.0])
 
 
-def pickled(path: Path) -> None:
+def pickled(path):
     path.write_bytes(pickle.dumps({"A": Canary(path.parent)}))
 
 
-def mat(**variables: Any) -> Callable[[Path], object]:
-    def make(path: Path) -> None:
+def mat(**variables):
+    def make(path):
         from scipy.io import savemat
 
         savemat(path, variables)
@@ -163,10 +163,10 @@ def mat(**variables: Any) -> Callable[[Path], object]:
     return make
 
 
-def mat_class(number: int) -> Callable[[Path], object]:
+def mat_class(number):
     """Write a MAT file whose variable A is of another class, as 16 of a function's handle."""
 
-    def make(path: Path) -> None:
+    def make(path):
         mat(**LAW)(path)
         content = bytearray(path.read_bytes())
         content[144] = number
@@ -175,7 +175,7 @@ def mat_class(number: int) -> Callable[[Path], object]:
     return make
 
 
-def mat_bomb(path: Path) -> None:
+def mat_bomb(path):
     """Write a MATLAB file of 400 kB whose matrix A has 400 MB."""
     mat(A=np.zeros(1))(path)
     size = 400 << 20
@@ -188,16 +188,16 @@ def mat_bomb(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:128] + struct.pack("<LL", 15, len(packed)) + packed)
 
 
-def wide_mat(path: Path) -> None:
+def wide_mat(path):
     from scipy.sparse import csc_array
 
     mat(**(LAW | {"A": csc_array((1 << 30, 2))}))(path)
 
 
-def mat_73(what: str) -> Callable[[Path], object]:
+def mat_73(what):
     """Return what writes a file of MATLAB 7.3 whose matrix A is hostile."""
 
-    def make(path: Path) -> None:
+    def make(path):
         import h5py
 
         with h5py.File(path, "w", userblock_size=512) as file:
@@ -229,15 +229,15 @@ def mat_73(what: str) -> Callable[[Path], object]:
     return make
 
 
-def sparse(path: Path) -> None:
+def sparse(path):
     with path.open("wb") as file:
         file.truncate(1 << 40)
 
 
-def fmu(**parts: "str | bytes") -> Callable[[Path], object]:
+def fmu(**parts):
     """Return what makes a scenario whose ship is an FMU with further, or other, parts."""
 
-    def make(path: Path) -> None:
+    def make(path):
         unit = path.with_name("ship.fmu")
         made_fmu(unit)
         with zipfile.ZipFile(unit) as archive:
@@ -260,8 +260,8 @@ ALLOWED = (*CHECK, "--allow-code")
 XML = "modelDescription.xml"
 
 
-def frame_log(**head: Any) -> Callable[[Path], object]:
-    def make(path: Path) -> None:
+def frame_log(**head):
+    def make(path):
         about = {"configuration": {"name": "A"}, "data": {}}
         content = {"about": about, "files": {}, "law": {}, "packages": {}, "catalogue": 1} | head
         FrameLogWriter(path, content).close()
@@ -269,7 +269,7 @@ def frame_log(**head: Any) -> Callable[[Path], object]:
     return make
 
 
-def block(kind: bytes, payload: bytes, length: int | None = None) -> bytes:
+def block(kind, payload, length=None):
     size = len(payload) if length is None else length
     return struct.pack("<4sII", kind, size, zlib.crc32(payload, zlib.crc32(kind))) + payload
 
@@ -278,10 +278,10 @@ MARK = b"UTANKHIL frames 1\n"
 HEAD_BOMB = MARK + block(b"HEAD", zlib.compress(bytes(GIB)))
 
 
-def device(content: Callable[[Path], object] | bytes, key: str) -> Callable[[Path], object]:
+def device(content, key):
     """Return what makes a ship's file whose motion sensor is described by a DBC or EDS."""
 
-    def make(path: Path) -> None:
+    def make(path):
         file = path.with_name(f"a.{key}")
         if isinstance(content, bytes):
             file.write_bytes(content)
@@ -294,14 +294,14 @@ def device(content: Callable[[Path], object] | bytes, key: str) -> Callable[[Pat
     return make
 
 
-def ring_of(*words: int) -> bytes:
+def ring_of(*words):
     return struct.pack("<16q", *words, *[0] * (16 - len(words))) + bytes(4096)
 
 
 RING = int.from_bytes(b"UTNKRING", "little")
 
 
-def csv_of(name: str) -> str:
+def csv_of(name):
     return f"time_s,{name}\n0,1\n0.1,2\n0.2,3\n"
 
 
@@ -584,7 +584,7 @@ def test_a_hostile_file_is_refused_in_words(row, tmp_path, capfd, monkeypatch):
     assert status_mb("VmHWM") - before_mb < MOST_MB
 
 
-def told(words: list[str]) -> int:
+def told(words):
     """Run a command as `main` does and return its exit code."""
     with pytest.raises(SystemExit) as ended, failures_named():
         app(words)
@@ -627,7 +627,7 @@ def test_what_others_left_in_a_folder_of_recordings_is_passed_over(tmp_path, mon
         (tmp_path / f"run-{number}.rrd").write_bytes(bytes(1000))
     unlink = Path.unlink
 
-    def refused(path: Path, missing_ok: bool = False) -> None:
+    def refused(path, missing_ok=False):
         if path.name == "run-5.rrd":
             raise PermissionError(errno.EPERM, "of another user", str(path))
         unlink(path, missing_ok)

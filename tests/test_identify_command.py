@@ -6,10 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import Result
 from typer.testing import CliRunner
 
-from utank_hil.base.arrays import FloatArray
 from utank_hil.cli import app
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import pump_model
@@ -24,7 +22,7 @@ CONFIG = Path("configs/controllers/adaptive_dpc.yaml")
 COLUMNS = ("time_s", "roll_rad", "port_level_m", "starboard_level_m", "pressure_command_pa")
 
 
-def _rows(period_s: float, duration_s: float = 300.0) -> FloatArray:
+def _rows(period_s, duration_s=300.0):
     """20 Hz telemetry of a ship pushed by pulses in still water."""
     config = load_config(CONFIG, ControllerConfig)
     configured, tank = config.vessel.ship, config.vessel.tank
@@ -44,7 +42,7 @@ def _rows(period_s: float, duration_s: float = 300.0) -> FloatArray:
     return np.column_stack([time_s, seen[:, 0], -seen[:, 1], seen[:, 1], command])
 
 
-def identify(log: Path, folder: Path, *more: str) -> Result:
+def identify(log, folder, *more):
     arguments = ["identify", str(log), str(CONFIG), "--out", str(folder), "--order", "60", *more]
     result = CliRunner().invoke(app, arguments)
     assert result.exception is None or isinstance(result.exception, SystemExit)
@@ -52,7 +50,7 @@ def identify(log: Path, folder: Path, *more: str) -> Result:
 
 
 @pytest.fixture(scope="module")
-def accepted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
+def accepted(tmp_path_factory):
     """Folder of a model that was accepted, `out` in it with the results, and what was printed."""
     folder = tmp_path_factory.mktemp("accepted")
     write_recording(folder / "log.rrd", COLUMNS, {"run": _rows(9.0)})

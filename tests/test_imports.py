@@ -5,7 +5,6 @@ import re
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -56,7 +55,7 @@ print(*loaded)
 """
 
 
-def loaded_by(source: str) -> str:
+def loaded_by(source):
     """Heavy packages that a new interpreter holds after running `source`."""
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", source + CHECK.format(heavy=HEAVY)],
@@ -127,7 +126,7 @@ finally:
 """
 
 
-def without_extras(module: str, *words: str) -> subprocess.CompletedProcess[str]:
+def without_extras(module, *words):
     """A command where only the dependencies of `run` are installed; prints what it has loaded."""
     source = WITHOUT_EXTRAS.format(missing=set(EXTRA_OF), module=module, words=["x", *words])
     return subprocess.run(
@@ -135,7 +134,7 @@ def without_extras(module: str, *words: str) -> subprocess.CompletedProcess[str]
     )
 
 
-def dependencies(names: Iterable[str]) -> set[str]:
+def dependencies(names):
     """The distributions that some need, with what those need, without any extras."""
     found: set[str] = set()
     waiting = list(names)

@@ -14,7 +14,7 @@ LINT = Path(sys.executable).with_name("lint-imports")
 
 
 @pytest.fixture(scope="module")
-def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def copy(tmp_path_factory):
     folder = tmp_path_factory.mktemp("copy")
     for package in ("utank_hil", "firmware_sim"):
         shutil.copytree(

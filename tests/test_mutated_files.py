@@ -23,7 +23,7 @@ import traceback
 import warnings
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import contextmanager
 from importlib import reload
 from pathlib import Path
@@ -96,17 +96,17 @@ class Reader(NamedTuple):
     streamed: bool = False  #: What is read is a list, and `notes` say what is left out.
 
 
-def frames(path: Path) -> tuple[list[Any], list[str]]:
+def frames(path):
     notes: list[str] = []
     return list(BusLog(path).frames(notes)), notes
 
 
-def records(path: Path) -> tuple[list[Any], list[str]]:
+def records(path):
     notes: list[str] = []
     return [tuple(each) for each in entries_of(FrameLog(path).blocks(notes.append))], notes
 
 
-def ring(path: Path) -> object:
+def ring(path):
     shared = Path("/dev/shm") / f"utank-mutated-{os.getpid()}"
     shutil.copyfile(path, shared)
     try:
@@ -118,13 +118,13 @@ def ring(path: Path) -> object:
         shared.unlink()
 
 
-def commissioned(path: Path) -> object:
+def commissioned(path):
     why = why_not_commissioned(load_config(CONTROLLER, ControllerConfig), "can0", CONTROLLER, path)
     assert not why or path.name in why
     return why
 
 
-def fmu(path: Path) -> object:
+def fmu(path):
     pressure = {"file": str(path), "variables": dict.fromkeys(FMU_VARIABLES, "p")}
     try:
         return FmuFile.model_validate(pressure, context={ALLOW_CODE: True})
@@ -134,7 +134,7 @@ def fmu(path: Path) -> object:
         return error  # It was read, and lacks a variable.
 
 
-def wrapped(path: Path, name: str, content: bytes, read: Callable[[Path], Any]) -> Any:
+def wrapped(path, name, content, read):
     """Read a content in the container in which readers find it; errors name that."""
     whole = path.parent / name
     whole.write_bytes(content)
@@ -147,18 +147,18 @@ def wrapped(path: Path, name: str, content: bytes, read: Callable[[Path], Any]) 
         whole.unlink()
 
 
-def described(path: Path) -> object:
+def described(path):
     with zipfile.ZipFile(path.with_name("a.fmu"), "w") as archive:
         archive.writestr("modelDescription.xml", path.read_bytes())
     return wrapped(path, "a.fmu", path.with_name("a.fmu").read_bytes(), fmu)
 
 
-def objects(path: Path) -> object:
+def objects(path):
     return wrapped(path, "a.blf", blf(path.read_bytes()), frames)
 
 
-def replayable(path: Path) -> object:
-    def read(log: Path) -> object:
+def replayable(path):
+    def read(log):
         head = FrameLog(log).head
         try:
             with recorded_config(head) as config:
@@ -171,19 +171,19 @@ def replayable(path: Path) -> object:
     return wrapped(path, "a.frames", b"UTANKHIL frames 1\n" + size + body, read)
 
 
-def made_head(path: Path) -> None:
+def made_head(path):
     log = FrameLog(ROOT / "tests" / "replay" / "motion-silent.frames")
     path.write_text(json.dumps(log.head))
 
 
-def made_objects(path: Path) -> None:
+def made_objects(path):
     path.write_bytes(b"".join(blf_message(1_000_000 * i) for i in range(20)))
 
 
-def of_a_test(find: Callable[..., Any], *names: str) -> Callable[[Path], object]:
+def of_a_test(find, *names):
     """Return what reads a test's record and evaluates it, as `identify` does."""
 
-    def read(path: Path) -> object:
+    def read(path):
         (run,) = read_signals(path).values()
         require(path, run, *names)
         try:
@@ -194,26 +194,26 @@ def of_a_test(find: Callable[..., Any], *names: str) -> Callable[[Path], object]
     return read
 
 
-def made_decay(path: Path) -> None:
+def made_decay(path):
     time_s = np.arange(0.0, 60.0, 0.2)
     roll_rad = 0.2 * np.exp(-0.03 * time_s) * np.cos(0.9 * time_s)
     roll_decay(time_s, roll_rad)  # It is compiled here.
     write_signals(path, [{"time_s": time_s, "roll_rad": roll_rad}])
 
 
-def made_inclining(path: Path) -> None:
+def made_inclining(path):
     moment_nm = np.array([0.0, 1e5, 2e5, 0.0, -1e5, -2e5, 0.0])
     write_signals(path, [{"moment_nm": moment_nm, "heel_rad": moment_nm * 1e-7 + 1e-4}])
 
 
-def nemoh_results(path: Path) -> object:
+def nemoh_results(path):
     try:
         return read_hull(path.parents[1] / "Nemoh.cal")
     except ValueError as error:  # What fails in the whole is of the main file.
         raise ValueError(f"{path.name}: {error}") from error
 
 
-def candump(lines: int = 12) -> bytes:
+def candump(lines=12):
     rows = (
         f"({1e9 + i / 50:.6f}) can0 08FF1080#0102030405060{i % 10:X}0{i % 8} R\n"
         for i in range(lines)
@@ -221,7 +221,7 @@ def candump(lines: int = 12) -> bytes:
     return "".join(rows).encode()
 
 
-def made_log(path: Path) -> None:
+def made_log(path):
     """Write a log in any format that has a writer."""
     if path.suffix == ".frames":
         shutil.copyfile(ROOT / "tests" / "replay" / "drive-fault.frames", path)
@@ -239,13 +239,13 @@ def made_log(path: Path) -> None:
             )
 
 
-def made_savvycan(path: Path) -> None:
+def made_savvycan(path):
     head = "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n"
     rows = (f"{20000 * i},08FF1080,true,Rx,0,2,00,{i:02X},\n" for i in range(40))
     path.write_text(head + "".join(rows))
 
 
-def made_ndbc(path: Path) -> None:
+def made_ndbc(path):
     hz = np.arange(0.03, 0.4, 0.01)
     head = "#YY  MM DD hh mm " + " ".join(f"{each:.4f}" for each in hz)
     rows = [
@@ -254,13 +254,13 @@ def made_ndbc(path: Path) -> None:
     path.write_text("\n".join([head, *rows, ""]))
 
 
-def made_netcdf(path: Path) -> None:
+def made_netcdf(path):
     from sea.test_directional import written
 
     shutil.move(written(path.parent), path)
 
 
-def made_moments(path: Path) -> None:
+def made_moments(path):
     rows = (f"{w / 10},{b},{w * b}e3,{w}\n" for w in range(3, 9) for b in range(0, 181, 30))
     path.write_text("omega_rad_s,heading_deg,moment_nm_per_m,phase_deg\n" + "".join(rows))
 
@@ -274,7 +274,7 @@ LAW = {
 }
 
 
-def made_law(path: Path) -> None:
+def made_law(path):
     if path.suffix == ".json":
         path.write_text(json.dumps(LAW))
     elif path.suffix == ".npz":
@@ -291,13 +291,13 @@ def made_law(path: Path) -> None:
         savemat(path, LAW, do_compression=path.name == "packed.mat")
 
 
-def made_signals(path: Path) -> None:
+def made_signals(path):
     time_s = np.arange(300) * 0.1
     names = ("roll_rad", "roll_rate_rad_s", "level_m", "pressure_command_pa")
     write_signals(path, [{"time_s": time_s} | {name: np.sin(time_s + 0.1) for name in names}])
 
 
-def made_rrd(path: Path) -> None:
+def made_rrd(path):
     from utank_hil.telemetry.recording import write_recording
 
     rows = np.random.default_rng(1).normal(size=(50, 2))
@@ -305,7 +305,7 @@ def made_rrd(path: Path) -> None:
     write_recording(path, ["time_s", "roll_rad"], {"a": rows}, about={"version": "1"})
 
 
-def made_ring(path: Path) -> None:
+def made_ring(path):
     from utank_hil.telemetry.ring import RingKind
 
     with RingWriter(RingKind.ROWS, 16, 1, 8, {"columns": ["a", "b"]}) as writer:
@@ -314,7 +314,7 @@ def made_ring(path: Path) -> None:
         shutil.copyfile(Path("/dev/shm") / writer.name, path)
 
 
-def made_fmu(path: Path) -> None:
+def made_fmu(path):
     text = (
         '<?xml version="1.0" encoding="UTF-8"?><fmiModelDescription fmiVersion="2.0" modelName="a" '
         'guid="b"><CoSimulation modelIdentifier="a"/><ModelVariables><ScalarVariable name="p" '
@@ -325,15 +325,15 @@ def made_fmu(path: Path) -> None:
         archive.writestr("modelDescription.xml", text)
 
 
-def made_record(path: Path) -> None:
+def made_record(path):
     record = {"commissioned_for": {"ship": {"a": 1}}, "passed": True, "ended": "", "bus": "can0"}
     path.write_text(json.dumps(record | {"date": "2026", "checks": [{"verdict": "pass"}]}))
 
 
-def copied(name: str) -> Callable[[Path], object]:
+def copied(name):
     """Return what copies a file of this project, its names of others made absolute."""
 
-    def make(path: Path) -> None:
+    def make(path):
         file = ROOT / name
         text = file.read_text(encoding="utf-8")
         if file.suffix == ".yaml":
@@ -345,23 +345,23 @@ def copied(name: str) -> Callable[[Path], object]:
     return make
 
 
-def configured(model: Any) -> Callable[[Path], object]:
+def configured(model):
     return lambda path: load_config(path, model)
 
 
-def made_description(path: Path) -> None:
+def made_description(path):
     made_fmu(path)
     with zipfile.ZipFile(path) as archive:
         content = archive.read("modelDescription.xml")
     path.write_bytes(content)
 
 
-def made_sea(path: Path) -> None:
+def made_sea(path):
     rows = (f"{hz / 50},{hz % 7 / 2}\n" for hz in range(2, 20))
     path.write_text("frequency_hz,density_m2_hz\n" + "".join(rows))
 
 
-def section(model: Any, path: Path, **content: Any) -> Any:
+def section(model, path, **content):
     """Return a section that names a file; the configuration says which key that is."""
     try:
         return model(**content)
@@ -369,19 +369,19 @@ def section(model: Any, path: Path, **content: Any) -> Any:
         raise ValueError(f"{path.name}: {error.errors()[0]['msg']}") from error
 
 
-def tabulated(path: Path) -> object:
+def tabulated(path):
     return section(TabulatedSpectrum, path, kind="tabulated", file=path)
 
 
-def dbc(path: Path) -> object:
+def dbc(path):
     return _dbc_layouts.__wrapped__(str(path))  # Not what was kept of the whole file.
 
 
-def drawn(path: Path) -> object:
+def drawn(path):
     return section(Draws, path, samples=3, table=path).samples_drawn()
 
 
-def made_campaign(path: Path) -> None:
+def made_campaign(path):
     """Write the folder of a campaign with one case of two runs."""
     about = {
         "keys": ["a"], "configuration": {"simulation": "linear"}, "machine": {}, "options": {},
@@ -390,18 +390,18 @@ def made_campaign(path: Path) -> None:
     loaded = SimpleNamespace(path=CONTROLLER, cases=[SimpleNamespace(
         name="a", index=0, waves="w", parameters={"a": 1.5})])  # fmt: skip
     store = Store(path.parent)
-    store.begin(loaded, about, resume=True)  # type: ignore[arg-type]  # what it takes of a study
+    store.begin(loaded, about, resume=True)  # what it takes of a study
     row = {"case": "a", "status": "ok", "reason": "", "mark": "", "wall_s": 1.0}
     store.write([row | {"run": run} | dict.fromkeys(METRICS, 0.5) for run in ("passive", "b")])
 
 
-def made_events(path: Path) -> None:
+def made_events(path):
     event = {"event": "alarm", "time_s": 1.0, "fault": "A", "state": "b", "happened": ""}
     event |= {"remedy": ""}
     path.write_text("".join(json.dumps(event | {"time_s": i}) + "\n" for i in range(9)))
 
 
-def alarms(path: Path) -> object:
+def alarms(path):
     return _alarms(path.with_name("run-a.rrd"))
 
 
@@ -493,7 +493,7 @@ MUTATION = st.tuples(
 )
 
 
-def mutated(content: bytes, mutations: list[tuple[str, int, int, int]]) -> bytes:
+def mutated(content, mutations):
     """Return a content with these mutations; places are in parts of 2^20 of its length."""
     for kind, part, size, value in mutations:
         at = part * len(content) >> 20
@@ -517,10 +517,10 @@ def mutated(content: bytes, mutations: list[tuple[str, int, int, int]]) -> bytes
 
 
 @contextmanager
-def within(seconds: int, what: str) -> Iterator[None]:
+def within(seconds, what):
     """Fail where it takes longer, in this process and what it waits for."""
 
-    def late(*_: object) -> None:
+    def late(*_):
         pytest.fail(f"{what}: not done after {seconds} s")
 
     before = signal.signal(signal.SIGALRM, late)
@@ -532,11 +532,11 @@ def within(seconds: int, what: str) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def status_mb(key: str) -> int:
+def status_mb(key):
     return int(re.search(rf"{key}:\s+(\d+)", Path("/proc/self/status").read_text())[1]) >> 10
 
 
-def attempt(path: Path, read: Callable[[Path], Any]) -> Any:
+def attempt(path, read):
     """Return the result of a reader; None for an error in the project's words, checked here."""
     result, words, place = None, path.name, str(ROOT)
     try:
@@ -557,13 +557,13 @@ def attempt(path: Path, read: Callable[[Path], Any]) -> Any:
 class Trial:
     """Reads a file, then its mutations."""
 
-    def __init__(self, path: Path, read: Callable[[Path], Any], streamed: bool) -> None:
+    def __init__(self, path, read, streamed):
         self.path, self.read, self.streamed = path, read, streamed
         self.whole = path.read_bytes()
         self.first = attempt(path, read)
         assert self.first is not None, f"{path} can't be read"
 
-    def one(self, mutations: list[tuple[str, int, int, int]]) -> None:
+    def one(self, mutations):
         content = mutated(self.whole, mutations)
         self.path.write_bytes(content)
         result = attempt(self.path, self.read)
@@ -575,7 +575,7 @@ class Trial:
 
 
 @contextmanager
-def trial(path: Path, read: Callable[[Path], Any], capfd: Any, streamed: bool) -> Iterator[Trial]:
+def trial(path, read, capfd, streamed):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # The commands print none of a library's.
         begun = Trial(path, read, streamed)
@@ -588,9 +588,7 @@ def trial(path: Path, read: Callable[[Path], Any], capfd: Any, streamed: bool) -
     assert not [line for line in said if "newer than the local Rerun" not in line]
 
 
-def _nothing_lost(
-    path: Path, read: Callable[[Path], Any], first: list[Any], result: Any, same: int, whole: bytes
-) -> None:
+def _nothing_lost(path, read, first, result, same, whole):
     """What stands before the first damaged byte is found; what is not, is said."""
     path.write_bytes(whole[: whole.rfind(b"\n", 0, same) + 1 if path.suffix != ".frames" else same])
     intact = attempt(path, read)
@@ -605,7 +603,7 @@ KINDS_OF_FILES = {each.name: each for each in READERS} | {
 }
 
 
-def placed(reader: Reader, folder: Path) -> Path:
+def placed(reader, folder):
     """Make the file of a reader in a folder, or copy that of others with what it needs."""
     path = folder / Path(reader.name).name
     if reader.name not in OTHERS:
@@ -628,7 +626,7 @@ def test_a_damaged_file_is_read_or_refused_in_words(name, tmp_path, capfd):
 
         @settings(max_examples=examples, phases=(Phase.generate, Phase.shrink))
         @given(st.lists(MUTATION, min_size=1, max_size=3))
-        def holds(mutations: list[tuple[str, int, int, int]]) -> None:
+        def holds(mutations):
             begun.one(mutations)
 
         holds()

@@ -59,20 +59,20 @@ BANNED = (
 )
 
 
-def findings(source: str, scopes: tuple[str, ...] = ()) -> list[str]:
+def findings(source, scopes=()):
     """What a module, or its functions and classes of these names, lets the processor choose."""
     tree = ast.parse(source)
     imported = dict(pair for node in ast.walk(tree) for pair in _imported(node))
     found = []
 
-    def look(node: ast.AST, scope: str) -> None:
+    def look(node, scope):
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             scope = f"{scope}.{node.name}".lstrip(".")
         wanted = not scopes or any(f"{scope}.".startswith(f"{each}.") for each in scopes)
         if wanted and not (scope and UNUSED.match(scope)):
             said = _said(node, imported)
             if said:
-                found.append(f"{node.lineno}: {said}")  # type: ignore[attr-defined]
+                found.append(f"{node.lineno}: {said}")
         for child in ast.iter_child_nodes(node):
             look(child, scope)
 
@@ -80,7 +80,7 @@ def findings(source: str, scopes: tuple[str, ...] = ()) -> list[str]:
     return found
 
 
-def _imported(node: ast.AST) -> list[tuple[str, str]]:
+def _imported(node):
     """Names that an import binds, and what they are."""
     if isinstance(node, ast.Import):
         return [(each.asname or each.name.split(".")[0], each.name if each.asname else
@@ -90,7 +90,7 @@ def _imported(node: ast.AST) -> list[tuple[str, str]]:
     return []
 
 
-def _said(node: ast.AST, imported: dict[str, str]) -> str:
+def _said(node, imported):
     if isinstance(node, ast.BinOp | ast.AugAssign):
         if isinstance(node.op, ast.MatMult):
             return "@ is the linear-algebra library's"
@@ -109,7 +109,7 @@ def _said(node: ast.AST, imported: dict[str, str]) -> str:
     return ", ".join(filter(None, (_banned(name) for _, name in _imported(node))))
 
 
-def _banned(name: str) -> str:
+def _banned(name):
     parts = name.split(".")
     if name == "scipy.interpolate.BSpline":  # its own C loops; docs/architecture.md names it
         return ""
@@ -117,7 +117,7 @@ def _banned(name: str) -> str:
     return name if heads & BANNED else ""
 
 
-def modules() -> list[tuple[Path, tuple[str, ...]]]:
+def modules():
     others = {ROOT / name for name in (*DESIGNS, *PARTS)}
     whole = sorted({path for each in ROOMS for path in ROOT.glob(each)} - others)
     return [(path, ()) for path in whole] + [(ROOT / name, part) for name, part in PARTS.items()]

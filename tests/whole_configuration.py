@@ -1,15 +1,12 @@
 """A configuration with all the files it names."""
 
-from pathlib import Path
-from typing import Any
-
 from utank_hil.configuration.yaml_text import parse_yaml
 
 
-def whole(path: Path) -> Any:
+def whole(path):
     """Content of a file with that of the files it names, so that any part can be changed."""
 
-    def resolved(value: Any) -> Any:
+    def resolved(value):
         if isinstance(value, dict):
             return {key: resolved(item) for key, item in value.items()}
         if isinstance(value, list):

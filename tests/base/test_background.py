@@ -6,12 +6,12 @@ from pathlib import Path
 from utank_hil.base import background
 
 
-def told_by_a_child(score: Path) -> str:
+def told_by_a_child(score):
     """Niceness and score of a process that has given way."""
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
-        background._SCORE = score  # type: ignore[misc]
+        background._SCORE = score
         background.give_way(5)
         os.write(writing, f"{os.nice(0)} {Path('/proc/self/oom_score_adj').read_text()}".encode())
         os._exit(0)

@@ -113,7 +113,7 @@ def test_no_module_that_is_compiled_has_a_dataclass_that_its_own_init_could_not_
 @pytest.mark.evidence
 @pytest.mark.timeout(1200)
 def test_a_compiled_run_equals_the_plain_one_and_codecs_pass_their_tests():
-    def run(compiled: str) -> list[object]:
+    def run(compiled):
         environment = {**os.environ, "UTANK_HIL_COMPILED": compiled}
         done = subprocess.run(
             [sys.executable, "-c", RUN], env=environment, capture_output=True, text=True, check=True

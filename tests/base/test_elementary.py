@@ -16,19 +16,19 @@ from utank_hil.dynamics.jit import njit
 mpmath.mp.dps = 50
 
 
-def sine(x: float) -> float:
+def sine(x):
     return elementary.sine_cosine(x)[0]
 
 
-def cosine(x: float) -> float:
+def cosine(x):
     return elementary.sine_cosine(x)[1]
 
 
-def arctan2(x: float) -> float:
+def arctan2(x):
     return elementary.arctan2(x, 1.7 - x)
 
 
-def ulps(found: float, exact: mpmath.mpf) -> float:
+def ulps(found, exact):
     return abs(float((found - exact) / math.ulp(float(exact))))
 
 

@@ -9,19 +9,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from utank_hil.base.arrays import FloatArray
 from utank_hil.base.ordered_sums import exponential, orthogonal_triangle, product, solved
 
 SIZES = st.integers(0, 300)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def draw(seed: int, *shape: int) -> FloatArray:
+def draw(seed, *shape):
     numbers = np.random.default_rng(seed)
     return numbers.standard_normal(shape) * 10.0 ** numbers.integers(-8, 8, shape)
 
 
-def pairwise(terms: list[float]) -> float:
+def pairwise(terms):
     """The order that the module states, written out."""
     n = len(terms)
     if n < 8:

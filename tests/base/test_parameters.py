@@ -3,9 +3,8 @@
 import math
 import pickle
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, get_args, get_origin, get_type_hints
 
 import pytest
 from hypothesis import given
@@ -37,7 +36,7 @@ class Thing:
     every: Positive | None = None
     gain: Annotated[float, Range(above=0, below=1)] = 0.5
 
-    def __post_init__(self) -> None:
+    def __post_init__(self):
         refuse("thing", range_problems(self))
 
 
@@ -112,14 +111,14 @@ def test_demand_says_which_ends_are_allowed(mark, demand):
     assert mark.demand == demand
 
 
-def parts(hint: Any) -> Iterator[Any]:
+def parts(hint):
     """An annotation and everything in it."""
     yield hint
     for inner in get_args(hint):
         yield from parts(inner)
 
 
-def sections_in(model: type, found: set[type]) -> set[type]:
+def sections_in(model, found):
     """A section of a configuration file and all that it may hold."""
     found.add(model)
     hints = list(get_type_hints(model).values())
@@ -131,7 +130,7 @@ def sections_in(model: type, found: set[type]) -> set[type]:
     return found
 
 
-def bare_numbers(hint: Any) -> bool:
+def bare_numbers(hint):
     """Whether an annotation has a number in it without a range."""
     if get_origin(hint) is Annotated and any(
         isinstance(mark, Range) or getattr(mark, "metadata", ()) for mark in get_args(hint)
@@ -140,7 +139,7 @@ def bare_numbers(hint: Any) -> bool:
     return hint in (int, float) or any(map(bare_numbers, get_args(hint)))
 
 
-def keys(owner: type) -> list[str]:
+def keys(owner):
     """What a file may write in a section."""
     if issubclass(owner, BaseModel):
         return list(owner.model_fields)

@@ -40,11 +40,11 @@ SHIPPED = [
 ]
 
 
-def content(model: BaseModel, folder: Path) -> dict[str, object]:
+def content(model, folder):
     return describe("test", model, folder, options={})["configuration"]
 
 
-def values(part: object) -> object:
+def values(part):
     """What a configuration says, to be compared: not by which keys or path the file said it."""
     if isinstance(part, BaseModel):
         return {name: values(getattr(part, name)) for name in type(part).model_fields}
@@ -55,7 +55,7 @@ def values(part: object) -> object:
     return part.resolve() if isinstance(part, Path) else part
 
 
-def loaded_again(described: object, model: type[BaseModel], folder: Path) -> BaseModel:
+def loaded_again(described, model, folder):
     path = folder / "again.yaml"
     path.write_text(json.dumps(described, allow_nan=False), encoding="utf-8")
     return load_config(path, model)
@@ -223,7 +223,7 @@ def test_recording_that_does_not_say_is_refused_with_its_name(tmp_path):
 
 
 def test_a_git_at_work_in_the_source_tree_is_not_disturbed(tmp_path, monkeypatch):
-    def git(*words: str) -> None:
+    def git(*words):
         who = ("-c", "user.name=x", "-c", "user.email=x@x")
         subprocess.run(["git", "-C", str(tmp_path), *who, *words], check=True)
 

@@ -22,13 +22,13 @@ from utank_hil.base.text_files import (
 TEXT = "time_s,Süd\n1,2\n3,4\n"
 
 
-def written(folder: Path, content: bytes, name: str = "a.csv") -> Path:
+def written(folder, content, name="a.csv"):
     path = folder / name
     path.write_bytes(content)
     return path
 
 
-def read(path: Path) -> str:
+def read(path):
     with open_text(path) as text:
         return text.read()
 

@@ -1,7 +1,7 @@
 """Files are there whole or not at all, on a full disk too."""
 
 from concurrent.futures import ThreadPoolExecutor
-from datetime import datetime, tzinfo
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -15,21 +15,21 @@ from utank_hil.pictures.style import picture
 from utank_hil.telemetry.recording import write_recording
 
 
-def a_text(path: Path) -> None:
+def a_text(path):
     write_whole(path, "0123456789" * ROOM)
 
 
-def a_recording(path: Path) -> None:
+def a_recording(path):
     rows = np.random.default_rng(1).standard_normal((2000, 2))
     write_recording(path, ["time_s", "roll_rad"], {"passive": rows})
 
 
-def a_picture(path: Path) -> None:
+def a_picture(path):
     with picture(path, "Noise", (4.0, 3.0)) as figure:
         figure.add_subplot().plot(np.random.default_rng(1).standard_normal(500))
 
 
-def a_page(path: Path) -> None:
+def a_page(path):
     write_report_page(path, "Storm", "seed 1", [], [])
 
 
@@ -52,7 +52,7 @@ def test_what_is_interrupted_is_not_left_in_half(tmp_path):
 
 
 def test_a_file_that_must_not_be_written_stays(tmp_path, monkeypatch):
-    def refuse(_path: Path, _content: bytes) -> int:
+    def refuse(_path, _content):
         raise PermissionError(13, "Permission denied")
 
     path = tmp_path / "page.html"
@@ -80,7 +80,7 @@ def test_files_share_the_time_and_are_made(tmp_path):
 def test_a_link_that_leads_nowhere_is_never_written_through(tmp_path, names, monkeypatch):
     class Still(datetime):
         @classmethod
-        def now(cls, tz: tzinfo | None = None) -> "Still":
+        def now(cls, tz=None):
             return cls(2026, 1, 2, 3, 4, 5, tzinfo=tz)
 
     monkeypatch.setattr(whole_file, "datetime", Still)

@@ -18,7 +18,7 @@ DATABASE.add_dbc_file(DBC_PATH)
 Case = tuple[type[Any], Address, Message]
 
 
-def _cases() -> list[Case]:
+def _cases():
     kinds = {name: kind for kind, name in DBC_NAMES.items()}
     return [
         (kinds.get(dbc.name) or kinds[common_name(dbc.name, sender)], Address[sender], dbc)
@@ -33,7 +33,7 @@ PROTECTED = [case for case in CASES if case[0] is not AddressClaim]
 PROTECTED_IDS = [dbc.name for _, _, dbc in PROTECTED]
 
 
-def messages(case: Case, *, wild: bool = False) -> st.SearchStrategy[Any]:
+def messages(case, *, wild=False):
     """Messages of a type, every value within its range or not available; `wild` ignores ranges."""
     kind, _, dbc = case
     fields = []

@@ -16,7 +16,7 @@ from pathlib import Path
 class Hub:
     """Adapters by the names of their ports."""
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, count):
         self._ends = [os.openpty() for _ in range(count)]
         for controller, port in self._ends:
             tty.setraw(port)
@@ -29,18 +29,18 @@ class Hub:
             self._selector.register(controller, selectors.EVENT_READ, number)
         self._thread = threading.Thread(target=self._run, daemon=True)
 
-    def __enter__(self) -> "Hub":
+    def __enter__(self):
         self._thread.start()
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *_):
         self._over = True
         self._thread.join()
         for each in self._ends:
             for end in each:
                 os.close(end)
 
-    def say(self, number: int, text: bytes) -> None:
+    def say(self, number, text):
         """Hand a text to who has opened a port, whole; lines that nobody reads are lost."""
         behind = self._behind[number]
         if len(behind) > 1 << 16:
@@ -50,16 +50,16 @@ class Hub:
             waiting = waiting[os.write(self._ends[number][0], waiting) :]
         self._behind[number] = waiting
 
-    def _is_open(self, number: int) -> bool:
+    def _is_open(self, number):
         states = [each for each in self.told[number] if each in ("O", "L", "C")]
         return states[-1:] not in ([], ["C"])
 
-    def _run(self) -> None:
+    def _run(self):
         while not self._over:
             for key, _ in self._selector.select(0.02):
                 self._take(key.data, os.read(key.fd, 65536))
 
-    def _take(self, number: int, data: bytes) -> None:
+    def _take(self, number, data):
         *lines, self._rest[number] = (self._rest[number] + data).split(b"\r")
         for line in lines:
             kind = line[:1]

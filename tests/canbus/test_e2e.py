@@ -15,7 +15,7 @@ ID_LISTS = st.binary(min_size=16, max_size=16)
 FRAMES = st.binary(min_size=8, max_size=8)
 
 
-def table_crc(data: bytes, ids: bytes) -> int:
+def table_crc(data, ids):
     """The CRC by four look-ups, as the generated codecs do it."""
     words = [int.from_bytes(data[i : i + 2], "little") for i in (2, 4, 6)]
     crc = first_byte_table(ids)[data[1]]

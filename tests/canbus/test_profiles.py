@@ -54,7 +54,7 @@ class Ellipse:
         data = message.encode(rest, strict=False)
         give(self.found, STANDARD | number, data, now_ns)
 
-    def cycle(self, now_ns, *, roll=0.1, rate=-0.02, stamp=None, solution=0x14, gyros=0x223):
+    def cycle(self, now_ns, *, roll=0.1, rate=-0.02, stamp=None, solution=20, gyros=547):
         stamp = now_ns // 1000 if stamp is None else stamp
         self.send(0x102, {"SOLUTION": solution}, now_ns)
         self.send(0x120, {"TIME_STAMP": stamp % 2**32, "STATUS": gyros}, now_ns)

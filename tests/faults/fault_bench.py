@@ -1,10 +1,9 @@
 """The whole bench in lockstep, with nodes that fail between two times, and a listener."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import ShipSide, build_ship_side
@@ -13,13 +12,12 @@ from utank_hil.canbus import (
     DriveState,
     DriveStatus1,
     Frame,
-    Mode,
     OperatorCommand,
     PumpCommand,
     SensorMotion,
     load_catalogue,
 )
-from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.configuration import load_config
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.runners import Lockstep, Node
@@ -34,12 +32,12 @@ Fault = Callable[[Frame], Iterable[Frame]]
 
 
 @cache
-def storm() -> Scenario:
+def storm():
     """The shipped storm."""
     return load_config(Path("configs/scenarios/storm.yaml"), Scenario)
 
 
-def controller_config(name: str = "gpc") -> ControllerConfig:
+def controller_config(name="gpc"):
     """One of its controllers."""
     return storm().controllers[name]
 
@@ -62,18 +60,18 @@ class Failing:
     _held: list[list[Frame]] = field(default_factory=list)
 
     @property
-    def name(self) -> str:
+    def name(self):
         return self.node.name
 
     @property
-    def period_ns(self) -> int:
+    def period_ns(self):
         return self.node.period_ns
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame, now_ns):
         if not (self.hangs and self.begin_ns <= now_ns < self.end_ns):
             self.node.receive(frame, now_ns)
 
-    def tick(self, now_ns: int) -> Iterable[Frame]:
+    def tick(self, now_ns):
         if now_ns >= self.end_ns and self.restarted is not None:
             self.node, self.restarted = self.restarted(), None
         active = self.begin_ns <= now_ns < self.end_ns
@@ -88,17 +86,17 @@ class Failing:
         return frames
 
 
-def dropped(*messages: type) -> Fault:
+def dropped(*messages):
     """Loses messages; all of the node's if none is named."""
     ids = {CATALOGUE.receiver(message).can_id for message in messages}
     return lambda frame: () if not ids or frame.can_id in ids else (frame,)
 
 
-def corrupted(*messages: type, byte: int = 3) -> Fault:
+def corrupted(*messages, byte=3):
     """Flips bits of messages."""
     ids = {CATALOGUE.receiver(message).can_id for message in messages}
 
-    def corrupt(frame: Frame) -> Iterable[Frame]:
+    def corrupt(frame):
         if ids and frame.can_id not in ids:
             return (frame,)
         data = bytearray(frame.data)
@@ -108,12 +106,12 @@ def corrupted(*messages: type, byte: int = 3) -> Fault:
     return corrupt
 
 
-def frozen(*messages: type) -> Fault:
+def frozen(*messages):
     """Sends the first frame of the fault over and over."""
     ids = {CATALOGUE.receiver(message).can_id for message in messages}
     first: dict[int, Frame] = {}
 
-    def freeze(frame: Frame) -> Iterable[Frame]:
+    def freeze(frame):
         if ids and frame.can_id not in ids:
             return (frame,)
         return (first.setdefault(frame.can_id, frame),)
@@ -121,16 +119,16 @@ def frozen(*messages: type) -> Fault:
     return freeze
 
 
-def doubled(frame: Frame) -> Iterable[Frame]:
+def doubled(frame):
     """Sends every frame twice."""
     return (frame, frame)
 
 
-def altered(kind: type[Any], change: Callable[[Any], Any], counter_step: int = 1) -> Fault:
+def altered(kind, change, counter_step=1):
     """Changes what messages of a kind say, rightly protected; their counter runs in steps."""
     receiver, transmitter = CATALOGUE.receiver(kind), CATALOGUE.transmitter(kind)
 
-    def alter(frame: Frame) -> Iterable[Frame]:
+    def alter(frame):
         if frame.can_id != receiver.can_id:
             return (frame,)
         message = receiver.accept(frame)
@@ -151,10 +149,10 @@ class Babbler:
     name: str = "babbler"
     period_ns: int = MS
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame, now_ns):
         pass
 
-    def tick(self, now_ns: int) -> Iterable[Frame]:
+    def tick(self, now_ns):
         if self.begin_ns <= now_ns < self.end_ns:
             return [Frame(self.can_id, bytes(8))] * self.per_tick
         return ()
@@ -163,7 +161,7 @@ class Babbler:
 class Listener:
     """Every frame on the bus with its time; what it meant, decoded apart from the nodes."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.frames: list[tuple[int, str, Frame]] = []
         self.commands: list[tuple[int, PumpCommand]] = []
         self.states: list[tuple[int, DriveState | None]] = []
@@ -174,7 +172,7 @@ class Listener:
             for message in (PumpCommand, DriveStatus1, OperatorCommand, SensorMotion)
         }
 
-    def __call__(self, time_ns: int, sender: str, frame: Frame) -> None:
+    def __call__(self, time_ns, sender, frame):
         self.frames.append((time_ns, sender, frame))
         receiver, kind = self._decode.get(frame.can_id, (None, None))
         message = None if receiver is None else receiver.accept(frame)
@@ -187,7 +185,7 @@ class Listener:
         elif kind is SensorMotion and message is not None:
             self.motion_ns.append(time_ns)
 
-    def bytes(self) -> bytes:
+    def bytes(self):
         """The whole trace."""
         return b"".join(
             b"%d %s %x %s\n" % (time_ns, sender.encode(), frame.can_id, frame.data.hex().encode())
@@ -201,14 +199,7 @@ class FaultBench:
     The controller is one of the scenario, by default the storm; `extra` nodes are on the bus, too.
     """
 
-    def __init__(
-        self,
-        seed: int = 1,
-        script: tuple[TimedAction, ...] = ARMED,
-        controller: str = "gpc",
-        extra: Sequence[Node] = (),
-        scenario: Scenario | None = None,
-    ) -> None:
+    def __init__(self, seed=1, script=ARMED, controller="gpc", extra=(), scenario=None):
         scenario = storm() if scenario is None else scenario
         self.config = scenario.controllers[controller]
         self.ship: ShipSide = build_ship_side(scenario, seed, script)
@@ -220,39 +211,39 @@ class FaultBench:
         self.heard = Listener()
         self.lockstep = Lockstep([*nodes.values(), self.controller, *extra], trace=self.heard)
 
-    def run(self, until_s: float) -> None:
+    def run(self, until_s):
         """Run to a time."""
         self.lockstep.run_until(round(until_s * SECOND))
 
-    def restarted_controller(self) -> ControllerNode:
+    def restarted_controller(self):
         """A new controller, as after a restart of its process."""
         return build_controller_node(self.config, commissioned=True)
 
     @property
-    def node(self) -> ControllerNode:
+    def node(self):
         """The controller that runs at present."""
         assert isinstance(self.controller.node, ControllerNode)
         return self.controller.node
 
     @property
-    def mode(self) -> Mode:
+    def mode(self):
         return self.node.mode
 
-    def commands(self, begin_ns: int, end_ns: int = 1 << 62) -> list[tuple[int, PumpCommand]]:
+    def commands(self, begin_ns, end_ns=1 << 62):
         """Pump commands of the controller seen on the bus in a time."""
         return [item for item in self.heard.commands if begin_ns <= item[0] < end_ns]
 
-    def zero_ns(self, after_ns: int) -> int:
+    def zero_ns(self, after_ns):
         """When the commanded pressure reached zero for good, the last command with pressure."""
         nonzero = [t for t, command in self.heard.commands if command.pressure_pa != 0.0]
         return max([after_ns, *nonzero])
 
-    def pressure_at_zero_since(self, begin_ns: int) -> bool:
+    def pressure_at_zero_since(self, begin_ns):
         """Whether commands came since a time, and all of them asked for nothing."""
         pressures = {command.pressure_pa for _, command in self.commands(begin_ns)}
         return pressures == {0.0}
 
-    def left_enabled_ns(self, after_ns: int) -> int:
+    def left_enabled_ns(self, after_ns):
         """When the drive first said that it is no longer in operation enabled."""
         return next(
             time_ns

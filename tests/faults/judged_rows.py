@@ -5,7 +5,7 @@ from pathlib import Path
 
 from firmware_sim.fault_campaign.campaign import Campaign
 from firmware_sim.fault_campaign.trial import FLAGS, Outcome
-from firmware_sim.fault_campaign.verdict import Result, judged
+from firmware_sim.fault_campaign.verdict import judged
 from utank_hil.configuration import load_config
 
 CAMPAIGN = load_config(Path("configs/faults/campaign.yaml"), Campaign)
@@ -18,11 +18,11 @@ GOOD = Outcome(
 )  # fmt: skip
 
 
-def verdict(row: str, *outcomes: Outcome) -> Result:
+def verdict(row, *outcomes):
     return judged(CAMPAIGN, ROWS[row], outcomes)
 
 
-def said(row: str, outcome: Outcome) -> Outcome:
+def said(row, outcome):
     """What a controller with this outcome says on the bus."""
     expect = ROWS[row].expect
     alarms = [outcome.code] if outcome.found is not None else []
@@ -34,5 +34,5 @@ def said(row: str, outcome: Outcome) -> Outcome:
     return replace(outcome, status=status, alarms=(*alarms, *also), flags=flags)
 
 
-def spoken(row: str, *outcomes: Outcome) -> Result:
+def spoken(row, *outcomes):
     return verdict(row, *(said(row, each) for each in outcomes))

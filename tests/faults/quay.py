@@ -1,9 +1,8 @@
 """A ship at the quay in lockstep, with a commissioning in the place of her controller."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
-from fault_bench import SECOND, Failing, Fault
+from fault_bench import SECOND, Failing
 
 from firmware_sim.drive import PumpDrive
 from firmware_sim.plant import Plant
@@ -13,20 +12,18 @@ from firmware_sim.ship_side import HardwiredNode, build_ship_side
 from utank_hil.assembly import build_commissioning_node
 from utank_hil.canbus import load_catalogue
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
-from utank_hil.nodes.commissioning.node import REST_S, CommissioningNode, Stage
+from utank_hil.nodes.commissioning.node import REST_S, Stage
 from utank_hil.nodes.panel import Action, OperatorPanel, TimedAction
-from utank_hil.runners import Lockstep, Node
+from utank_hil.runners import Lockstep
 
 ARM_S = REST_S + 2.0
 
 
-def controller(name: str) -> ControllerConfig:
+def controller(name):
     return load_config(Path(f"configs/controllers/{name}.yaml"), ControllerConfig)
 
 
-def still_water(config: ControllerConfig, *more: TimedAction) -> Scenario:
+def still_water(config, *more):
     """Her ship on still water, with an operator who arms when the zeros are known."""
     return Scenario.model_validate(
         {
@@ -41,15 +38,7 @@ def still_water(config: ControllerConfig, *more: TimedAction) -> Scenario:
     )
 
 
-def commissioned(
-    config: ControllerConfig,
-    *more: TimedAction,
-    spoil: Mapping[str, Fault] | None = None,
-    begin_ns: int = 0,
-    seed: int = 1,
-    nodes: tuple[Node, ...] | None = None,
-    end_s: int = 300,
-) -> CommissioningNode:
+def commissioned(config, *more, spoil=None, begin_ns=0, seed=1, nodes=None, end_s=300):
     """Commission a ship, with what becomes of the frames of some nodes."""
     node = build_commissioning_node(config)
     scenario = still_water(config, *more)
@@ -66,7 +55,7 @@ def commissioned(
     return node
 
 
-def another_ship(config: ControllerConfig, ship: RollShip, tank: Tank) -> tuple[Node, ...]:
+def another_ship(config, ship, tank):
     """Nodes of a ship that is not as her file says."""
     scenario, catalogue = still_water(config), load_catalogue()
     plant = Plant(ship, tank, config.vessel.pump, scenario.waves(1), linear=False)

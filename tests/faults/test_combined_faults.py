@@ -16,8 +16,7 @@ from firmware_sim.scenario import Scenario
 from utank_hil.assembly import build_law
 from utank_hil.canbus import DriveFault, load_catalogue
 from utank_hil.canbus.codec import field_kind
-from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.control import BuiltLaw
+from utank_hil.configuration import load_config
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.nodes.redundancy import Redundancy
 
@@ -31,7 +30,7 @@ Strategy = st.SearchStrategy[Any]
 
 
 @cache
-def ship() -> tuple[Scenario, ControllerConfig, BuiltLaw]:
+def ship():
     """With every node that there is: pump, valve, second motion sensor, hard-wired inputs."""
     scenario = load_config(Path("configs/scenarios/semi_active.yaml"), Scenario)
     config = scenario.controllers["pump_with_valve"]
@@ -41,7 +40,7 @@ def ship() -> tuple[Scenario, ControllerConfig, BuiltLaw]:
     return scenario.model_copy(update={"vessel": vessel}), config, build_law(config)
 
 
-def run(faults: list[dict[str, Any]]) -> FaultyBench:
+def run(faults):
     """A few tenths of a second with faults."""
     scenario, config, law = ship()
     script = (TimedAction(0.1, Action.ARM),)
@@ -63,7 +62,7 @@ WHEN: Final = {
 }
 
 
-def values_of(hint: Any, most: int) -> Strategy:
+def values_of(hint, most):
     """What a signal may be written as, sensible or not."""
     kind = field_kind(hint)
     if kind is bool:
@@ -75,7 +74,7 @@ def values_of(hint: Any, most: int) -> Strategy:
     return st.none() | st.integers(0, most) | st.sampled_from(list(kind.__members__))
 
 
-def faults_of(message: str, node: str) -> dict[str, dict[str, Strategy]]:
+def faults_of(message, node):
     """Keys of every kind of fault that the message, or the node, can have."""
     kind, _, codec = CATALOGUE.named(message)
     hints = get_type_hints(kind)
@@ -144,7 +143,7 @@ def faults_of(message: str, node: str) -> dict[str, dict[str, Strategy]]:
 
 
 @st.composite
-def combined(draw: st.DrawFn) -> list[dict[str, Any]]:
+def combined(draw):
     """Two or three faults of one message and the node that sends it."""
     message = draw(st.sampled_from(sent_by_nodes()))
     kinds = faults_of(message, NODE_OF[CATALOGUE.named(message).source])
@@ -160,7 +159,7 @@ def test_every_kind_of_fault_is_drawn():
     assert {*faults_of("SENSOR_MOTION", "sensors"), "replaced"} == known
 
 
-def pair(*faults: dict[str, Any]) -> list[dict[str, Any]]:
+def pair(*faults):
     """Of the motion message, from the start."""
     return [{"message": "SENSOR_MOTION", **fault} for fault in faults]
 

@@ -2,10 +2,9 @@
 
 import math
 import tracemalloc
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import count
-from typing import Any
 
 import numpy as np
 import pytest
@@ -35,7 +34,7 @@ from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.drive_plan import SENT_2
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.commissioning.checks import RATE_SCALE, SCALE, Each, remedies_of
-from utank_hil.nodes.commissioning.node import PUSH_S, REST_S, ROW_S, CommissioningNode, Stage
+from utank_hil.nodes.commissioning.node import PUSH_S, REST_S, ROW_S, Stage
 from utank_hil.nodes.commissioning.pulses import plan_pulses
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.nodes.redundancy import Redundancy
@@ -55,11 +54,11 @@ Record = dict[str, FloatArray]
 
 
 @pytest.fixture(scope="module")
-def healthy() -> CommissioningNode:
+def healthy():
     return commissioned(NAVAL)
 
 
-def failed(node: CommissioningNode) -> dict[str, str]:
+def failed(node):
     """Checks that failed, with their remedies."""
     return {check.name: check.remedy for check in node.checks() if not check.passed}
 
@@ -78,17 +77,17 @@ def test_every_shipped_ship_passes_with_room_to_spare(name):
         assert abs(check.measured - check.expected) <= 0.5 * check.tolerance, check
 
 
-def scaled(names: tuple[str, ...], factor: float) -> Callable[[Record], Record]:
+def scaled(names, factor):
     return lambda record: {
         name: factor * column if name in names else column for name, column in record.items()
     }
 
 
-def shifted(name: str, offset: float) -> Callable[[Record], Record]:
+def shifted(name, offset):
     return lambda record: {**record, name: record[name] + offset}
 
 
-def swapped(record: Record) -> Record:
+def swapped(record):
     port, starboard = (record[name] for name in LEVELS)
     return {**record, "port_level_m": starboard, "starboard_level_m": port}
 
@@ -146,7 +145,7 @@ def test_a_wrong_sensor_fails_its_own_checks_with_its_remedy(
 @pytest.mark.parametrize(("factor", "word"), [(-1.0, "pushes to port"), (0.6, "blockage"),
                                               (0.0, "no pressure")])  # fmt: skip
 def test_a_pump_that_turns_the_other_way_is_weak_or_stalled_is_named(factor, word):
-    def wrong(command: PumpCommand) -> PumpCommand:
+    def wrong(command):
         return command._replace(pressure_pa=factor * command.pressure_pa)
 
     found = failed(commissioned(NAVAL, spoil={"controller": altered(PumpCommand, wrong)}))
@@ -156,7 +155,7 @@ def test_a_pump_that_turns_the_other_way_is_weak_or_stalled_is_named(factor, wor
 
 @pytest.mark.evidence
 def test_a_pressure_sensor_that_sends_nothing_but_zero_is_named():
-    def dead(pump: SensorPump) -> SensorPump:
+    def dead(pump):
         return pump._replace(pressure_pa=0.0)
 
     found = failed(commissioned(NAVAL, spoil={"sensors": altered(SensorPump, dead)}))
@@ -216,13 +215,13 @@ class LeavesTicksOut:
 
     name = "controller"
 
-    def __init__(self, node: CommissioningNode, leaves_out: Callable[[int], bool]) -> None:
+    def __init__(self, node, leaves_out):
         self.period_ns = node.period_ns
         self.receive = node.receive
         self._node = node
         self._leaves_out = leaves_out
 
-    def tick(self, now_ns: int) -> Iterable[Frame]:
+    def tick(self, now_ns):
         return () if self._leaves_out(now_ns // TICK_NS) else self._node.tick(now_ns)
 
 
@@ -283,19 +282,19 @@ def test_the_time_to_stop_is_measured_and_held_against_the_ships_file(late_ms, l
     plant, asked = ship.plant, 0.0
     held: list[float] = []
 
-    def drive(setpoint_pa: float, *, enabled: bool) -> None:
+    def drive(setpoint_pa, *, enabled):
         nonlocal asked
         asked = setpoint_pa
         held.clear()
         type(plant).drive_pump(plant, setpoint_pa, enabled=enabled)
 
-    def brake() -> None:
+    def brake():
         held.append(asked)
         if len(held) * TICK_NS * 1e-6 > late_ms:
             type(plant).drive_pump(plant, 0.0, enabled=True)
             plant._state[kernel.REFERENCE] = 0.0
 
-    plant.drive_pump, plant.brake_pump = drive, brake  # type: ignore[method-assign]
+    plant.drive_pump, plant.brake_pump = drive, brake
     node = commissioned(config, nodes=ship.nodes)
     assert (node.stage, node.ended) == (Stage.DONE, "")
     (stop,) = (check for check in node.checks() if check.name == "stop_ms")
@@ -343,7 +342,7 @@ def test_the_operators_stop_ends_it():
 
 
 def test_a_level_far_beyond_the_plan_ends_it():
-    def far(tank: SensorTank) -> SensorTank:
+    def far(tank):
         return tank._replace(**{name: 4 * getattr(tank, name) for name in LEVELS})
 
     node = commissioned(NAVAL, spoil={"sensors": altered(SensorTank, far)})
@@ -354,7 +353,7 @@ def test_a_level_far_beyond_the_plan_ends_it():
 def test_a_fault_ends_it_with_its_words():
     begin_ns = round((ARM_S + 8.0) * SECOND)
 
-    def high(tank: SensorTank) -> SensorTank:
+    def high(tank):
         return tank._replace(port_high=Switch.ON)
 
     node = commissioned(NAVAL, spoil={"sensors": altered(SensorTank, high)}, begin_ns=begin_ns)
@@ -370,13 +369,13 @@ def test_a_fault_in_the_moment_of_arming_ends_it_before_anything_moved():
     assert drive is not None
     tick, enabled = drive.tick, count()
 
-    def tripping(now_ns: int) -> Iterable[Frame]:
+    def tripping(now_ns):
         # as soon as the controller has heard that it is enabled
         if drive._states.state is DriveState.OPERATION_ENABLED and next(enabled) == 2:
             drive.fail(DriveFault.STALL)
         return tick(now_ns)
 
-    drive.tick = tripping  # type: ignore[method-assign]
+    drive.tick = tripping
     node = commissioned(NAVAL, nodes=tuple(ship.nodes))
     assert node.stage is Stage.DONE
     assert node.ended.startswith("DRIVE_FAULT")
@@ -449,14 +448,14 @@ LEVELS_BY_PUMP = dict.fromkeys(LEVELS, (1 + SCALE) ** 2)
     ids=["rate too great", "rate too small", "levels", "levels and pressure", "pressure"],
 )
 def test_what_passes_at_the_quay_does_not_trip_at_sea(scaled):
-    def by(factors: dict[str, float]) -> Callable[[Any], Any]:
+    def by(factors):
         return lambda message: message._replace(
             **{name: factor * getattr(message, name) for name, factor in factors.items()}
         )
 
     spoilt = [altered(kind, by(factors)) for kind, factors in scaled.items()]
 
-    def spoil(frame: Frame) -> Iterable[Frame]:
+    def spoil(frame):
         frames: Iterable[Frame] = (frame,)
         for each in spoilt:
             frames = [changed for one in frames for changed in each(one)]
@@ -494,14 +493,14 @@ def test_a_drive_that_tells_another_speed_than_the_pumps_is_named(told, failed):
     bus = with_more(SimulatedBus(), 1, config.bit_rate)
     queue = bus.queue
 
-    def send(sender: int, frame: Frame, now_ns: int) -> None:
+    def send(sender, frame, now_ns):
         if frame.can_id & 0x7FF == SENT_2 + 5 and frame.can_id & STANDARD:
             speed = round(told * int.from_bytes(frame.data[:4], "little", signed=True))
             data = speed.to_bytes(4, "little", signed=True) + frame.data[4:]
             frame = Frame(frame.can_id, data)
         queue(sender, frame, now_ns)
 
-    bus.queue = send  # type: ignore[method-assign]
+    bus.queue = send
     lockstep = Lockstep([*ship.nodes, node], bus)
     while node.stage is not Stage.DONE and lockstep.now_ns < 300 * SECOND:
         lockstep.run_until(lockstep.now_ns + SECOND)

@@ -1,7 +1,6 @@
 """Each kind of fault does on the bus what it says, and nothing else."""
 
 import math
-from collections.abc import Sequence
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -26,7 +25,6 @@ from utank_hil.canbus import (
     SensorTank,
     load_catalogue,
 )
-from utank_hil.canbus.codec import Codec
 from utank_hil.configuration import load_config
 from utank_hil.configuration.files import problems_in_words
 from utank_hil.nodes.panel import Action, TimedAction
@@ -42,7 +40,7 @@ END_S = 2.5
 
 
 @cache
-def storm() -> Scenario:
+def storm():
     return load_config(Path("configs/scenarios/storm.yaml"), Scenario)
 
 
@@ -54,7 +52,7 @@ def law():
 class Bus:
     """A bench with faults at `FAULT_S`, and all that was on its bus."""
 
-    def __init__(self, *faults: dict[str, object]) -> None:
+    def __init__(self, *faults):
         self.heard: list[tuple[int, str, Frame]] = []
         self.bench = FaultyBench(
             storm(), storm().controllers["gpc"], law(), seed=1,
@@ -64,7 +62,7 @@ class Bus:
         self.bench.place([TypeAdapter(AnyFault).validate_python(each) for each in faults])
         self.bench.run(round(END_S * SECOND))
 
-    def of(self, codec: Codec, *, before: bool = False) -> list[Frame]:
+    def of(self, codec, *, before=False):
         """Frames of a message since the fault, or before it."""
         return [
             frame
@@ -72,17 +70,17 @@ class Bus:
             if frame.can_id == codec.can_id and (time_ns < FAULT_S * SECOND) is before
         ]
 
-    def said(self, codec: Codec, signal: str) -> list[float]:
+    def said(self, codec, signal):
         """Values of a signal since the fault."""
         return [getattr(codec.decode(frame.data), signal) for frame in self.of(codec)]
 
 
 @cache
-def sound() -> Bus:
+def sound():
     return Bus()
 
 
-def counters(frames: Sequence[Frame]) -> list[int]:
+def counters(frames):
     return [(b.data[1] - a.data[1]) & 15 for a, b in pairwise(frames)]
 
 
@@ -188,7 +186,7 @@ def test_broken_transceiver_is_passive_then_off_and_comes_back():
     told: list[str] = []
     bus = Bus()
     bench = bus.bench
-    bench.nodes["controller"].link_error = lambda _, why: told.append(why)  # type: ignore[method-assign]
+    bench.nodes["controller"].link_error = lambda _, why: told.append(why)
     bench.place([TypeAdapter(AnyFault).validate_python(
         {"kind": "bit_errors", "share": 1.0, "node": "controller", "for_s": 0.5})])  # fmt: skip
     bench.run(round((END_S + 0.6) * SECOND))
@@ -271,7 +269,7 @@ def test_a_fault_of_the_bus_that_needs_a_node_the_ship_has_not_is_refused(fault)
     assert not missing_nodes(storm().vessel, [TypeAdapter(AnyFault).validate_python(fine)])
 
 
-def placed(*faults: dict[str, object], until_s: float, arm_s: float | None = None) -> FaultyBench:
+def placed(*faults, until_s, arm_s=None):
     """A bench with faults from the start."""
     script = () if arm_s is None else (TimedAction(arm_s, Action.ARM),)
     bench = FaultyBench(storm(), storm().controllers["gpc"], law(), seed=1, script=script)

@@ -40,7 +40,7 @@ CYCLE = 20 * MS
 LIMITS = storm().controllers["gpc"].limits
 
 
-def armed_bench(**options) -> FaultBench:
+def armed_bench(**options):
     bench = FaultBench(**options)
     bench.run(T0 / SECOND)
     assert bench.mode is Mode.ACTIVE
@@ -48,7 +48,7 @@ def armed_bench(**options) -> FaultBench:
     return bench
 
 
-def rate_limit_holds(bench: FaultBench) -> bool:
+def rate_limit_holds(bench):
     """Every step between two commands is a permitted one for its time, or ends at zero."""
     return all(
         after.pressure_pa == 0.0
@@ -58,7 +58,7 @@ def rate_limit_holds(bench: FaultBench) -> bool:
     )
 
 
-def stays_at_zero_though_the_panel_keeps_its_arm_bit(bench: FaultBench, since_ns: int) -> bool:
+def stays_at_zero_though_the_panel_keeps_its_arm_bit(bench, since_ns):
     assert bench.heard.orders[-1][1].arm
     return all(command.pressure_pa == 0.0 for _, command in bench.commands(since_ns))
 
@@ -162,7 +162,7 @@ def test_two_lost_ticks_do_not_disarm(victim):
 
 
 @cache
-def roll_without_a_fault_rad() -> float:
+def roll_without_a_fault_rad():
     bench = armed_bench()
     bench.run(8)
     return bench.ship.plant.roll_rad

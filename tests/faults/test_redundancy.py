@@ -2,20 +2,17 @@
 
 import math
 import random
-from collections.abc import Callable
 from functools import cache
 
 import pytest
 from fault_bench import ARMED, MS, SECOND, Failing, altered, dropped, storm
 from quay import ARM_S, commissioned, controller
 
-from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import ShipSide, build_ship_side
 from utank_hil.assembly import build_controller_node
 from utank_hil.canbus import (
     Address,
     Fault,
-    Frame,
     HardwiredInputs,
     Mode,
     Quality,
@@ -24,7 +21,6 @@ from utank_hil.canbus import (
     Switch,
     load_catalogue,
 )
-from utank_hil.configuration import ControllerConfig
 from utank_hil.nodes.commissioning.node import CommissioningNode, Stage
 from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.runners import Lockstep
@@ -37,14 +33,14 @@ BOTH = Redundancy(second_motion_sensor=True, hardwired_inputs=True)
 
 
 @cache
-def config(redundancy: Redundancy = BOTH, name: str = "gpc") -> ControllerConfig:
+def config(redundancy=BOTH, name="gpc"):
     given = storm().controllers[name]
     vessel = given.vessel.model_copy(update={"redundancy": redundancy})
     return given.model_copy(update={"vessel": vessel})
 
 
 @cache
-def scenario(redundancy: Redundancy = BOTH) -> Scenario:
+def scenario(redundancy=BOTH):
     controllers = {"gpc": config(redundancy)}
     return storm().model_copy(
         update={"vessel": controllers["gpc"].vessel, "controllers": controllers}
@@ -54,7 +50,7 @@ def scenario(redundancy: Redundancy = BOTH) -> Scenario:
 class Bench:
     """The storm with the ship's redundant nodes, each behind a `Failing`."""
 
-    def __init__(self, redundancy: Redundancy = BOTH) -> None:
+    def __init__(self, redundancy=BOTH):
         self.ship: ShipSide = build_ship_side(scenario(redundancy), 1, ARMED)
         self.node = build_controller_node(config(redundancy), commissioned=True)
         self.failing = {node.name: Failing(node) for node in (*self.ship.nodes, self.node)}
@@ -62,18 +58,18 @@ class Bench:
         self.degraded: set[Fault] = set()
 
     @property
-    def used(self) -> int:
+    def used(self):
         """Place of the motion sensor in use."""
         return self.node.safety._motion
 
-    def fail(self, name: str, spoil: Callable[[Frame], object], begin_ns: int = T0) -> None:
+    def fail(self, name, spoil, begin_ns=T0):
         self.failing[name].begin_ns = begin_ns
-        self.failing[name].spoil = spoil  # type: ignore[assignment]
+        self.failing[name].spoil = spoil
 
-    def run(self, until_s: float) -> None:
+    def run(self, until_s):
         self.lockstep.run_until(round(until_s * SECOND))
 
-    def run_to_fault(self, until_s: float) -> float:
+    def run_to_fault(self, until_s):
         """Run to FAULT; when it was."""
         while self.node.mode is not Mode.FAULT and self.lockstep.now_ns < until_s * SECOND:
             self.lockstep.run_until(self.lockstep.now_ns + 10 * MS)
@@ -81,12 +77,12 @@ class Bench:
         return self.lockstep.now_ns * 1e-9
 
 
-def motion(change: Callable[[float, float], tuple[float, float]], address: Address | None = None):
+def motion(change, address=None):
     """What a motion sensor sends instead of roll and rate."""
     receiver = CATALOGUE.receiver(SensorMotion, address)
     transmitter = CATALOGUE.transmitter(SensorMotion, address)
 
-    def alter(frame: Frame) -> tuple[Frame]:
+    def alter(frame):
         if frame.can_id != receiver.can_id:
             return (frame,)
         message = receiver.accept(frame)
@@ -131,15 +127,15 @@ def test_both_silent_end_it_in_time():
     assert bench.node.command_pa == 0.0
 
 
-def noisy(times: float) -> Callable[[float, float], tuple[float, float]]:
+def noisy(times):
     draw = random.Random(1).gauss
     return lambda roll, rate: (roll + draw(0, times * 2e-4), rate + draw(0, times * 5e-4))
 
 
-def held() -> Callable[[float, float], tuple[float, float]]:
+def held():
     kept: list[tuple[float, float]] = []
 
-    def change(roll: float, rate: float) -> tuple[float, float]:
+    def change(roll, rate):
         kept.append((roll, rate))
         return kept[0]
 
@@ -185,7 +181,7 @@ def test_where_the_two_disagree_the_pressure_falls_to_zero(wrong, name):
 def test_gauges_that_are_swapped_are_no_reason_to_change_the_motion_sensor():
     bench = Bench()
 
-    def swap(tank: SensorTank) -> SensorTank:
+    def swap(tank):
         return tank._replace(
             port_level_m=tank.starboard_level_m, starboard_level_m=tank.port_level_m
         )
@@ -197,7 +193,7 @@ def test_gauges_that_are_swapped_are_no_reason_to_change_the_motion_sensor():
 
 
 def test_one_broken_node_cannot_hide_both_gauge_and_switch():
-    def broken(tank: SensorTank) -> SensorTank:
+    def broken(tank):
         return SensorTank(0.0, 0.0, Switch.OFF, Switch.OFF, Quality.GOOD)
 
     bench = Bench()
@@ -276,7 +272,7 @@ def test_silent_hard_wired_inputs_end_it_and_are_waited_for():
 def test_a_second_motion_sensor_of_another_version_keeps_it_from_arming():
     bench = Bench()
     node = bench.failing["sensors_2"].node
-    node._housekeeping._configuration_version += 1  # type: ignore[attr-defined]
+    node._housekeeping._configuration_version += 1
     bench.run(3.0)
     assert (bench.node.mode, bench.node.fault) == (Mode.INIT, Fault.VERSION_MISMATCH)
 
@@ -307,7 +303,7 @@ def test_commissioning_checks_the_second_sensor_against_the_first():
     assert [check.name for check in node.checks() if not check.passed] == ["roll_2"]
 
 
-def naval_with_both() -> ControllerConfig:
+def naval_with_both():
     naval = controller("naval_constrained_gpc")
     vessel = naval.vessel.model_copy(update={"redundancy": BOTH})
     return naval.model_copy(update={"vessel": vessel})
@@ -338,7 +334,7 @@ def test_commissioning_ends_where_the_second_sensor_falls_silent_during_the_puls
 def test_a_sensor_that_falls_silent_in_the_tick_of_active_ends_the_commissioning(monkeypatch):
     said = "A motion sensor is silent."
 
-    def missing(node: CommissioningNode) -> str:
+    def missing(node):
         return said if node.node.mode is Mode.ACTIVE else ""
 
     monkeypatch.setattr(CommissioningNode, "missing", property(missing))

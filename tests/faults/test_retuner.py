@@ -8,13 +8,11 @@ from fault_bench import CATALOGUE, SECOND, Listener, storm
 
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node
-from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import ControllerStatus, Fault, Mode, PumpCommand, RetuningState
-from utank_hil.configuration import ControllerConfig
 from utank_hil.control import PredictiveLaw
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.panel import Action, TimedAction
-from utank_hil.retuning import Answer, Candidate, ModelSummary, Refusal, Retuner, RetuningSettings
+from utank_hil.retuning import Answer, Candidate, ModelSummary, Refusal, RetuningSettings
 from utank_hil.runners import Lockstep
 
 pytestmark = pytest.mark.slow
@@ -35,18 +33,18 @@ class Broken:
     alive: bool = True
     submitted: list[int] = field(default_factory=list)
 
-    def submit(self, number: int, record: FloatArray, now_ns: int) -> None:
+    def submit(self, number, record, now_ns):
         self.submitted.append(number)
 
-    def answer(self, number: int, now_ns: int) -> Answer | None:
+    def answer(self, number, now_ns):
         return self.reply
 
 
-def adaptive_config() -> ControllerConfig:
+def adaptive_config():
     return storm().controllers["gpc"].model_copy(update={"retuning": SETTINGS})
 
 
-def law_of(gain: float) -> Candidate:
+def law_of(gain):
     """Pressure in proportion to the roll, `gain` Pa/rad: a negative one drives the roll up."""
     gains = np.zeros((2, 1, 1))
     gains[0] = gain
@@ -58,7 +56,7 @@ def law_of(gain: float) -> Candidate:
 class Voyage:
     """The storm with a retuner."""
 
-    def __init__(self, retuner: Retuner | None, script: tuple[TimedAction, ...] = SCRIPT) -> None:
+    def __init__(self, retuner, script=SCRIPT):
         self.config = adaptive_config()
         ship = build_ship_side(storm(), 1, script)
         self.node: ControllerNode = build_controller_node(
@@ -70,23 +68,23 @@ class Voyage:
         self.drive = ship.drive
         self._lockstep = Lockstep([*ship.nodes, self.node], trace=self._trace)
 
-    def _trace(self, time_ns: int, sender: str, frame) -> None:
+    def _trace(self, time_ns, sender, frame):
         self.heard(time_ns, sender, frame)
         if frame.can_id == self._status.can_id:
             status = self._status.accept(frame)
             assert status is not None
             self.statuses.append((time_ns, status))
 
-    def run(self, until_s: float) -> "Voyage":
+    def run(self, until_s):
         self._lockstep.run_until(round(until_s * SECOND))
         return self
 
     @property
-    def states(self) -> list[RetuningState]:
+    def states(self):
         return [event.state for event in self.node.law.events]
 
     @property
-    def shown(self) -> list[RetuningState | None]:
+    def shown(self):
         """States of retuning on the bus, each once in a row."""
         seen: list[RetuningState | None] = []
         for _, status in self.statuses:
@@ -94,7 +92,7 @@ class Voyage:
                 seen.append(status.retuning)
         return seen
 
-    def pressures(self, begin_s: float = 0.0) -> FloatArray:
+    def pressures(self, begin_s=0.0):
         return np.array([c.pressure_pa for t, c in self.heard.commands if t >= begin_s * SECOND])
 
 
@@ -117,7 +115,7 @@ def test_hung_or_dead_retuner_is_noticed_in_time_and_changes_nothing():
 @pytest.mark.evidence
 def test_after_a_refusal_the_law_is_the_one_it_was():
     # with pulses of no pressure a refused identification leaves no trace at all
-    def silent(retuner: Retuner | None) -> Voyage:
+    def silent(retuner):
         voyage = Voyage(retuner)
         if retuner is not None:
             adaptive = voyage.node.law.law
@@ -160,12 +158,12 @@ def test_law_that_fails_on_trial_is_never_in_charge_again(failing):
     assert adaptive.state is TRIAL
     configured, bad = adaptive.laws.accepted, adaptive.laws.on_trial
     good = configured.controller.step
-    bad.controller.step = nan = lambda y, reference=None: np.full(1, np.nan)  # type: ignore[method-assign]
+    bad.controller.step = nan = lambda y, reference=None: np.full(1, np.nan)
     if failing == "all":
-        configured.controller.step = nan  # type: ignore[method-assign]
+        configured.controller.step = nan
         voyage.run(70)
         assert voyage.node.fault is Fault.INTERNAL
-        configured.controller.step = good  # type: ignore[method-assign]
+        configured.controller.step = good
     voyage.run(100)
     assert voyage.states == [IDENTIFY, DESIGN, TRIAL, REFUSED]
     assert adaptive.laws.active is configured

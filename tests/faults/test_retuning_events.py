@@ -24,7 +24,7 @@ def test_events_are_handed_on_when_they_happen_and_no_event_twice():
     retuner = SimulatedRetuner(lambda _record: Refusal(("no [good]", "too short")), 3.0)
     with EventWriter() as writer, EventReader(writer.name) as reader:
 
-        def tell(event: RetuningEvent, start_ns: int) -> None:
+        def tell(event, start_ns):
             assert start_ns == node.start_ns
             heard.append((len(times_s), event))  # place of the row that this tick is to write
             writer.write_event(event, start_ns)

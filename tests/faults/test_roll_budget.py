@@ -18,7 +18,7 @@ FOUND_BY_BUDGET = {"rate-stuck", "roll-stuck", "motion-stuck", "one-gauge-stuck"
                    "naval-roll-sign-flipped", "naval-levels-stuck"}  # fmt: skip
 
 
-def time_to_find_s(name: str) -> float:
+def time_to_find_s(name):
     """After which pressure at its limit, in the worst phase, has spent the budget."""
     config = load_config(ROOT / f"configs/controllers/{name}.yaml", ControllerConfig)
     a, b = state_matrices(config.vessel.ship, config.vessel.tank)

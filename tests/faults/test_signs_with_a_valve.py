@@ -12,10 +12,8 @@ from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.scenario import Scenario
 from utank_hil.assembly import build_law
-from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Fault, Mode
 from utank_hil.configuration import load_config
-from utank_hil.control import BuiltLaw
 from utank_hil.nodes.panel import Action, TimedAction
 
 SECOND = 1_000_000_000
@@ -24,7 +22,7 @@ OPPOSITE = {"kind": "law", "fails": "opposite"}
 
 
 @cache
-def scenario() -> Scenario:
+def scenario():
     return load_config(Path("configs/scenarios/semi_active.yaml"), Scenario)
 
 
@@ -53,18 +51,18 @@ def test_pump_law_that_is_turned_against_the_ship_is_found_by_her_twin():
 class Shut:
     """Keeps the valve shut."""
 
-    def __init__(self, law: BuiltLaw) -> None:
+    def __init__(self, law):
         self._law = law.controller()
         self.sample_time_s = self._law.sample_time_s
 
-    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+    def step(self, y, reference=None):
         self._law.step(y, reference)
         return np.array([1e12])
 
-    def applied(self, u: FloatArray) -> None:
+    def applied(self, u):
         self._law.applied(u)
 
-    def reset(self) -> None:
+    def reset(self):
         self._law.reset()
 
 

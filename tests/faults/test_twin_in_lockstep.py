@@ -1,7 +1,6 @@
 """The twin in the storm beside the passive ship's own run in the same waves."""
 
 import math
-from collections.abc import Iterable
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ from fault_bench import ARMED, SECOND, FaultBench, storm
 
 from utank_hil.canbus import Frame, Mode
 from utank_hil.nodes.panel import Action, TimedAction
-from utank_hil.runners import Node
 
 pytestmark = pytest.mark.slow
 
@@ -19,15 +17,15 @@ SECONDS = 200
 class LosesTicks:
     """A node whose loop is late now and then: it hears what came with the next tick."""
 
-    def __init__(self, node: Node, one_of: int) -> None:
+    def __init__(self, node, one_of):
         self.node, self.name, self.period_ns = node, node.name, node.period_ns
         self._one_of, self._ticks = one_of, 0
         self._waiting: list[Frame] = []
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame, now_ns):
         self._waiting.append(frame)
 
-    def tick(self, now_ns: int) -> Iterable[Frame]:
+    def tick(self, now_ns):
         self._ticks += 1
         if now_ns > 2 * SECOND and self._ticks % self._one_of == 0:
             return ()
@@ -37,9 +35,7 @@ class LosesTicks:
         return self.node.tick(now_ns)
 
 
-def recorded(
-    script, controller: str = "gpc", one_of: int = 0, seconds: int = SECONDS
-) -> tuple[FaultBench, np.ndarray]:
+def recorded(script, controller="gpc", one_of=0, seconds=SECONDS):
     """A run and its ship's and twin's roll, once a second; shape (n, 2)."""
     bench = FaultBench(script=script, controller=controller)
     node = bench.node
@@ -54,7 +50,7 @@ def recorded(
 
 
 @pytest.fixture(scope="module")
-def passive() -> np.ndarray:
+def passive():
     """The passive ship's roll and her twin's."""
     bench, passive = recorded((TimedAction(1.0, Action.PASSIVE),))
     assert bench.mode is Mode.PASSIVE

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -35,14 +34,12 @@ from utank_hil.canbus import (
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.control import CommandLimiter, PumpLimits
 from utank_hil.control.interface import PRESSURE
-from utank_hil.nodes.actuators import Actuators, ValveCommander
+from utank_hil.nodes.actuators import Actuators
 from utank_hil.nodes.controller import ControllerNode, ControllerSettings
-from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
-from utank_hil.nodes.running_law import Measure, RunningLaw
+from utank_hil.nodes.redundancy import NO_REDUNDANCY
+from utank_hil.nodes.running_law import RunningLaw
 from utank_hil.nodes.signals import SIGNALS, Telemetry
-from utank_hil.retuning import Estimator
 from utank_hil.safety.judge import Safety
-from utank_hil.safety.monitoring import Monitors
 from utank_hil.safety.safety_limits import SafetyLimits
 
 CATALOGUE = load_catalogue()
@@ -67,16 +64,16 @@ class ToyLaw:
     told: list[float] = field(default_factory=list)
     calls: list[str] = field(default_factory=list)
 
-    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+    def step(self, y, reference=None):
         self.calls.append("step")
         self.seen.append(y)
         return np.array([self.answer_pa])
 
-    def applied(self, u: FloatArray) -> None:
+    def applied(self, u):
         self.calls.append("applied")
         self.told.append(float(u[0]))
 
-    def reset(self) -> None:
+    def reset(self):
         self.calls.append("reset")
 
 
@@ -85,7 +82,7 @@ class PlanningLaw(ToyLaw):
     fallbacks: int = 3
     allowed: list[float] = field(default_factory=list)
 
-    def allow(self, share: float) -> None:
+    def allow(self, share):
         self.allowed.append(share)
 
 
@@ -99,18 +96,18 @@ class ControllerBench:
 
     def __init__(
         self,
-        start_ns: int = 0,
-        law: ToyLaw | None = None,
+        start_ns=0,
+        law=None,
         *,
-        measure: Measure | None = None,
-        commands: tuple[str, ...] = (PRESSURE,),
-        monitors: Monitors | None = None,
-        pump: bool = True,
-        valve: ValveCommander | None = None,
-        estimator: Estimator | None = None,
-        redundancy: Redundancy = NO_REDUNDANCY,
-        **telemetry: Any,
-    ) -> None:
+        measure=None,
+        commands=(PRESSURE,),
+        monitors=None,
+        pump=True,
+        valve=None,
+        estimator=None,
+        redundancy=NO_REDUNDANCY,
+        **telemetry,
+    ):
         self.law = ToyLaw() if law is None else law
         self.rows: list[FloatArray] = []
         limits = SafetyLimits()
@@ -158,47 +155,47 @@ class ControllerBench:
         self.sent: list[Frame] = []
 
     @property
-    def ms(self) -> float:
+    def ms(self):
         """Time since the start in milliseconds."""
         return (self.now_ns - self.start_ns) / MS
 
     @property
-    def pressure_pa(self) -> float:
+    def pressure_pa(self):
         """Pressure of the last command."""
         return self.commands[-1][1].pressure_pa
 
     @property
-    def word(self) -> ControlWord | None:
+    def word(self):
         """Control word of the last command."""
         return self.commands[-1][1].control_word
 
-    def column(self, name: str) -> FloatArray:
+    def column(self, name):
         """One column of the telemetry."""
         return np.array(self.rows)[:, SIGNALS.index(name)]
 
-    def order_is(self, **changes: object) -> None:
+    def order_is(self, **changes):
         """Change what the panel sends from now on; it sends at once on a change."""
-        self.order = self.order._replace(**changes)  # type: ignore[arg-type]
+        self.order = self.order._replace(**changes)
         self._send(OperatorCommand, self.order)
 
-    def restart_panel(self) -> None:
+    def restart_panel(self):
         """The panel's counter begins anew."""
         self._senders[OperatorCommand] = CATALOGUE.transmitter(OperatorCommand)
 
-    def send(self, frame: Frame) -> None:
+    def send(self, frame):
         """Let the node hear one frame, now."""
         self.node.receive(frame, self.now_ns)
 
-    def encode(self, message: tuple[object, ...]) -> Frame:
+    def encode(self, message):
         """The next frame of a message."""
-        return self._senders[type(message)].frame(message)  # type: ignore[arg-type]
+        return self._senders[type(message)].frame(message)
 
-    def _send(self, kind: type, message: tuple[object, ...]) -> None:
+    def _send(self, kind, message):
         if kind not in self.silent:
-            for frame in self.spoil(kind, self._senders[kind].frame(message)):  # type: ignore[arg-type]
+            for frame in self.spoil(kind, self._senders[kind].frame(message)):
                 self.send(frame)
 
-    def tick(self, late_ticks: int = 0) -> None:
+    def tick(self, late_ticks=0):
         """Send what is due, tick the node, and listen; `late_ticks` grid points are left out."""
         self.now_ns += late_ticks * TICK_NS
         index = self._tick_index
@@ -234,7 +231,7 @@ class ControllerBench:
         self._tick_index += 1
         self.now_ns += TICK_NS
 
-    def hear(self, frames: Iterable[Frame]) -> None:
+    def hear(self, frames):
         """Take the node's frames as the drive and the panel would."""
         for frame in frames:
             self.sent.append(frame)
@@ -250,19 +247,19 @@ class ControllerBench:
             elif frame.can_id == self._statuses.can_id:
                 self.status = self._statuses.accept(frame)
 
-    def run(self, milliseconds: float) -> None:
+    def run(self, milliseconds):
         """Tick for so long."""
         for _ in range(round(milliseconds * MS / TICK_NS)):
             self.tick()
 
-    def arm(self) -> None:
+    def arm(self):
         """Have the operator arm the controller."""
         self.run(400)
         self.order_is(mode_request=Mode.ACTIVE, arm=True)
         self.run(200)
         assert self.node.mode is Mode.ACTIVE
 
-    def drive_at(self, pressure_pa: float) -> None:
+    def drive_at(self, pressure_pa):
         """Have an armed controller command a pressure."""
         self.arm()
         self.law.answer_pa = pressure_pa

@@ -22,7 +22,7 @@ SECOND = Redundancy(second_station=True)
 ORDER = {"arm": True, "mode_request": Mode.ACTIVE, "take_command": True}
 
 
-def under_pressure(redundancy: Redundancy) -> Bench:
+def under_pressure(redundancy):
     bench = Bench(redundancy)
     bench.second = IDLE
     bench.drive_at(20e3)

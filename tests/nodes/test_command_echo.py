@@ -6,7 +6,7 @@ from utank_hil.nodes.actuators import CommandEcho
 from utank_hil.nodes.plausibility import NEVER_HEARD_NS
 
 
-def longest_silence(late: int, commands: int = 200) -> int:
+def longest_silence(late, commands=200):
     """Most commands from one echo that counts to the next, where each comes so many late."""
     echo = CommandEcho()
     longest = 0

@@ -32,7 +32,6 @@ from utank_hil.canbus import (
     NodeState,
     PassiveTwin,
     Quality,
-    RetuningOrder,
     RetuningState,
     SeaEstimate,
     SensorMotion,
@@ -226,7 +225,7 @@ def test_frames_of_other_kinds_load_the_bus():
     port = ToyPort()
     loop = RealTimeLoop([bench.node], port, clock=FakeClock())
 
-    def stop() -> bool:
+    def stop():
         port.others += 16  # 1600 a second
         port.receive_fails = loop.statistics.ticks % 2 == 1  # counted all the same
         return loop.statistics.ticks > 250
@@ -303,7 +302,7 @@ def test_a_pressure_that_is_held_is_degraded_where_there_is_a_pump(pump):
     assert bench.status is not None
     assert bench.status.degraded is False  # nothing is commanded
     bench.node.safety.supervisor.demand = Demand.CONTROL
-    bench.node.safety.supervisor.update = lambda seen, standing: None  # type: ignore[method-assign]
+    bench.node.safety.supervisor.update = lambda seen, standing: None
     bench.run(200)
     assert bench.status.degraded is pump
 
@@ -354,24 +353,16 @@ class NotedUpdates(ToyLaw):
     excused = False
     events: tuple[RetuningEvent, ...] = ()
 
-    def __init__(self) -> None:
+    def __init__(self):
         super().__init__()
         self.fresh: list[bool] = []
         self.engaged: list[bool] = []
         self.laws = SimpleNamespace(active=SimpleNamespace(found=None))
 
-    def take_events(self) -> list[RetuningEvent]:
+    def take_events(self):
         return []
 
-    def update(
-        self,
-        now_ns: int,
-        order: RetuningOrder,
-        *,
-        engaged: bool,
-        fresh: bool,
-        passive_roll_rad: float,
-    ) -> None:
+    def update(self, now_ns, order, *, engaged, fresh, passive_roll_rad):
         self.fresh.append(fresh)
         self.engaged.append(engaged)
 
@@ -381,17 +372,15 @@ class NotedSamples:
 
     figures = EstimateFigures()
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.times_ns: list[int] = []
         self.fresh: list[bool] = []
 
-    def sample(
-        self, now_ns: int, pressure_pa: float, motion: tuple[float, ...], *, fresh: bool
-    ) -> None:
+    def sample(self, now_ns, pressure_pa, motion, *, fresh):
         self.times_ns.append(now_ns)
         self.fresh.append(fresh)
 
-    def take_news(self) -> tuple[str, ...]:
+    def take_news(self):
         return ()
 
 
@@ -533,7 +522,7 @@ def test_every_law_that_is_not_excused_is_judged_by_the_twin_of_its_own_ship(
     assert bool(excuses) is excused
 
 
-def monitored() -> ControllerBench:
+def monitored():
     """An armed controller with monitors, whose law asks for nothing."""
     plant = DesignPlant(VESSEL.ship, VESSEL.tank)
     bench = ControllerBench(START_NS, monitors=Monitors(plant, 0.35, SensorFigures(), 250_000))
@@ -614,7 +603,7 @@ def test_events_of_retuning_need_nobody_who_takes_them(monkeypatch):
     assert event in heard
 
 
-def times_ms(bench: ControllerBench, kind: type, ms: int) -> list[int]:
+def times_ms(bench, kind, ms):
     """When the node sends a message, over so many ms."""
     can_id, times = CATALOGUE.codec(kind).can_id, []
     for tick in range(ms // 10):

@@ -33,40 +33,40 @@ LEVEL = 20e3  # a pressure away from every limit
 
 
 # What takes the motion sensor's samples away; each must look like silence.
-def _nan(bench: ControllerBench) -> None:
+def _nan(bench):
     bench.motion = SensorMotion(math.nan, 0.0, Quality.GOOD)
 
 
-def _rate_nan(bench: ControllerBench) -> None:
+def _rate_nan(bench):
     bench.motion = SensorMotion(0.0, math.nan, Quality.GOOD)
 
 
-def _bad_quality(bench: ControllerBench) -> None:
+def _bad_quality(bench):
     bench.motion = bench.motion._replace(quality=Quality.BAD)
 
 
-def _no_quality(bench: ControllerBench) -> None:
+def _no_quality(bench):
     bench.motion = bench.motion._replace(quality=None)
 
 
-def _silence(bench: ControllerBench) -> None:
+def _silence(bench):
     bench.silent.add(SensorMotion)
 
 
-def _wrong_identifier(bench: ControllerBench) -> None:
+def _wrong_identifier(bench):
     bench.spoil = lambda kind, frame: (
         (frame._replace(can_id=frame.can_id + 0x100),) if kind is SensorMotion else (frame,)
     )
 
 
-def _standing_counter(bench: ControllerBench) -> None:
+def _standing_counter(bench):
     first = bench.encode(bench.motion)
     bench.send(first)
     bench.spoil = lambda kind, frame: (first,) if kind is SensorMotion else (frame,)
 
 
-def _flipped_bit(bench: ControllerBench) -> None:
-    def flip(kind: type, frame: Frame) -> tuple[Frame, ...]:
+def _flipped_bit(bench):
+    def flip(kind, frame):
         if kind is not SensorMotion:
             return (frame,)
         data = bytearray(frame.data)
@@ -76,7 +76,7 @@ def _flipped_bit(bench: ControllerBench) -> None:
     bench.spoil = flip
 
 
-def _short(bench: ControllerBench) -> None:
+def _short(bench):
     bench.spoil = lambda kind, frame: (
         (Frame(frame.can_id, frame.data[:6]),) if kind is SensorMotion else (frame,)
     )
@@ -284,15 +284,15 @@ def test_law_that_raises_stops_the_pump_until_the_operator_resets():
     bench.drive_at(LEVEL)
     step = bench.law.step
 
-    def fail(*_: object) -> np.ndarray:
+    def fail(*_):
         raise ZeroDivisionError("of what")
 
-    bench.law.step = fail  # type: ignore[method-assign]
+    bench.law.step = fail
     bench.run(240)
     assert bench.node.fault is Fault.INTERNAL
     assert bench.node.law.error == "ZeroDivisionError: of what"
     assert bench.pressure_pa == 0.0
-    bench.law.step = step  # type: ignore[method-assign]
+    bench.law.step = step
     bench.order_is(mode_request=Mode.STANDBY, arm=False)
     bench.run(1000)  # the law answers again, which nobody trusts
     assert bench.node.mode is Mode.FAULT
@@ -381,7 +381,7 @@ def test_a_law_that_fails_gives_no_pressure_in_that_very_tick(monkeypatch):
     bench = ControllerBench()
     bench.drive_at(20e3)
 
-    def fail(*_: object) -> None:
+    def fail(*_):
         raise ZeroDivisionError("of what")
 
     monkeypatch.setattr(bench.law, "step", fail)
@@ -408,7 +408,7 @@ def test_of_several_errors_of_a_law_the_first_is_said(monkeypatch):
     bench.law.answer_pa = math.nan
     bench.run(400)
 
-    def fail(*_: object) -> None:
+    def fail(*_):
         raise ZeroDivisionError("of what")
 
     monkeypatch.setattr(bench.law, "step", fail)
@@ -420,7 +420,7 @@ def test_of_several_errors_of_a_law_the_first_is_said(monkeypatch):
 def test_law_that_answers_too_few_or_too_many_commands_stops_the_pump(answer):
     bench = ControllerBench()
     bench.drive_at(LEVEL)
-    bench.law.step = lambda y, reference=None: np.array(answer)  # type: ignore[method-assign]
+    bench.law.step = lambda y, reference=None: np.array(answer)
     bench.run(300)
     assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.INTERNAL)
     assert bench.pressure_pa == 0.0

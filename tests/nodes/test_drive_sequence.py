@@ -7,9 +7,7 @@ from utank_hil.nodes.actuators import AT_REST, DISABLES, QUICK_STOPS, RESETS, Dr
 S, C = DriveState, ControlWord
 
 
-def led(
-    states: DriveStates, sequence: DriveSequence, *, wanted: bool, cycles: int = 6
-) -> list[DriveState]:
+def led(states, sequence, *, wanted, cycles=6):
     """States of a drive that hears each word and reports before the next."""
     passed = [states.state]
     for _ in range(cycles):

@@ -10,7 +10,7 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node
 from utank_hil.base.arrays import FloatArray
-from utank_hil.canbus import Fault, Frame, SeaEstimate, ShipEstimate, Verdict, load_catalogue
+from utank_hil.canbus import Fault, SeaEstimate, ShipEstimate, Verdict, load_catalogue
 from utank_hil.canbus.events import AlarmEvent
 from utank_hil.configuration import load_config
 from utank_hil.nodes.signals import SIGNALS
@@ -41,10 +41,10 @@ class Desk:
     replies: tuple[Answer, ...] = (FOUND,)
     records: list[FloatArray] = field(default_factory=list)
 
-    def submit(self, number: int, record: FloatArray, now_ns: int) -> None:
+    def submit(self, number, record, now_ns):
         self.records.append(record)
 
-    def answer(self, number: int, now_ns: int) -> Answer | None:
+    def answer(self, number, now_ns):
         return self.replies[min(number, len(self.replies)) - 1]
 
 
@@ -53,26 +53,26 @@ class Listener:
 
     name, period_ns = "listener", 1_000_000_000
 
-    def __init__(self) -> None:
+    def __init__(self):
         catalogue = load_catalogue()
         self._receivers = [catalogue.receiver(SeaEstimate), catalogue.receiver(ShipEstimate)]
         self.heard: list[SeaEstimate | ShipEstimate] = []
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame, now_ns):
         for receiver in self._receivers:
             if frame.can_id == receiver.can_id:
                 message = receiver.accept(frame)
                 assert message is not None
                 self.heard.append(message)
 
-    def tick(self, now_ns: int) -> tuple[Frame, ...]:
+    def tick(self, now_ns):
         return ()
 
 
 class Voyage:
     """The storm with a ship whose GM is watched, and all that is said of her."""
 
-    def __init__(self, limit_m: float | None) -> None:
+    def __init__(self, limit_m):
         chosen = load_config(STORM, Scenario)
         config = chosen.controllers["gpc"]
         ship = replace(config.vessel.ship, displacement_n=1e8)
@@ -94,20 +94,20 @@ class Voyage:
         ship_side = build_ship_side(chosen, 1, chosen.operator)
         self._lockstep = Lockstep([*ship_side.nodes, node, listener])
 
-    def run_until(self, time_s: float) -> None:
+    def run_until(self, time_s):
         self._lockstep.run_until(round(time_s * 1e9))
 
     @property
-    def shown(self) -> dict[str, float]:
+    def shown(self):
         return dict(zip(SIGNALS, self.rows[-1], strict=True))
 
     @property
-    def warned(self) -> bool:
+    def warned(self):
         alarms = [event.code for event in self.events if isinstance(event, AlarmEvent)]
         return Fault.STABILITY_LOW in alarms
 
     @property
-    def said(self) -> list[tuple[str, ...]]:
+    def said(self):
         return [event.reasons for event in self.events if isinstance(event, RetuningEvent)]
 
 

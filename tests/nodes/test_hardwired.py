@@ -11,15 +11,15 @@ NOT_OFF = [switch for switch in Switch if switch is not Switch.OFF]
 
 
 class Line:
-    def __init__(self) -> None:
+    def __init__(self):
         self.sender = CATALOGUE.transmitter(HardwiredInputs)
         self.heard = HardwiredHeard(CATALOGUE.receiver(HardwiredInputs))
         self.now_ns = 0
 
-    def say(self, *, lost: int = 0, **changes: object) -> HardwiredHeard:
+    def say(self, *, lost=0, **changes):
         """Send frames of which the last arrives."""
         for _ in range(lost + 1):
-            frame = self.sender.frame(SHUT._replace(**changes))  # type: ignore[arg-type]
+            frame = self.sender.frame(SHUT._replace(**changes))
             self.now_ns += 1
         inputs = self.heard.accept(frame)
         if inputs is not None:

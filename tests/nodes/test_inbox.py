@@ -1,5 +1,5 @@
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from enum import Enum
 from pathlib import Path
 
@@ -43,7 +43,7 @@ from utank_hil.nodes.inbox import Inbox
 from utank_hil.nodes.plausibility import NEVER_HEARD_NS
 from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.runners import Lockstep
-from utank_hil.safety.monitors.thresholds import MonitorThresholds, SensorFigures, thresholds_of
+from utank_hil.safety.monitors.thresholds import SensorFigures, thresholds_of
 
 NAN = math.nan
 LEVEL_LIMIT_M = 4.88
@@ -73,38 +73,38 @@ TRUE = {
 class Line:
     """An inbox and everybody who sends to it."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.inbox = Inbox(CATALOGUE, VERSION, LEVEL_LIMIT_M)
         self.senders = {kind: CATALOGUE.transmitter(kind) for kind in GOOD}
         self.now_ns = 1000
 
-    def frame(self, message: tuple[object, ...]) -> Frame:
-        return self.senders[type(message)].frame(message)  # type: ignore[arg-type]
+    def frame(self, message):
+        return self.senders[type(message)].frame(message)
 
-    def say(self, message: tuple[object, ...]) -> None:
+    def say(self, message):
         self.hear(self.frame(message))
 
-    def hear(self, frame: Frame) -> None:
+    def hear(self, frame):
         self.now_ns += 10
         self.inbox.receive(frame, self.now_ns)
 
-    def beat(self, address: Address, catalogue: int, configuration: int) -> None:
+    def beat(self, address, catalogue, configuration):
         beat = Heartbeat(
             NodeState.OPERATIONAL, ResetCause.POWER_ON, 0.0, catalogue, configuration, NAN, NAN
         )
         self.hear(CATALOGUE.transmitter(Heartbeat, address).frame(beat))
 
     @property
-    def seen(self) -> Measurements:
+    def seen(self):
         return self.inbox.snapshot(self.now_ns)
 
     @property
-    def protected(self) -> bool:
+    def protected(self):
         """Whether all that control stands on arrives intact, with the first motion sensor."""
         seen = self.seen
         return seen.protection_valid and seen.motions[0].valid
 
-    def content(self) -> dict[str, object]:
+    def content(self):
         """Everything that the inbox keeps but counts of frames and cycles."""
         counts = {"receiver", "rejected", "frames", "foreign", "_lost", "_counted", "_due_ns"}
         parts = (
@@ -308,12 +308,12 @@ def test_an_address_that_is_claimed_under_another_name_has_two_holders(address):
 
 def test_drive_of_an_unknown_fault_is_not_healthy():
     line = Line()
-    line.say(GOOD[DriveStatus2]._replace(fault=None))  # type: ignore[attr-defined]
+    line.say(GOOD[DriveStatus2]._replace(fault=None))
     assert line.seen.drive_fault
 
 
 def test_drive_status_without_a_state_is_as_if_it_had_not_come():
-    line, status = Line(), GOOD[DriveStatus1]._replace(power_limited=True)  # type: ignore[attr-defined]
+    line, status = Line(), GOOD[DriveStatus1]._replace(power_limited=True)
     line.say(status._replace(state=None))
     assert (line.seen.drive_state, line.seen.drive_echo_ns) == (None, NEVER_HEARD_NS)
     line.say(status)
@@ -337,13 +337,13 @@ class Listener:
     name = "listener"
     period_ns = TICK_NS
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.inbox = Inbox(CATALOGUE, VERSION)
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame, now_ns):
         self.inbox.receive(frame, now_ns)
 
-    def tick(self, now_ns: int) -> Iterable[Frame]:
+    def tick(self, now_ns):
         return ()
 
 
@@ -370,7 +370,7 @@ def test_a_measurement_that_does_not_exist_is_refused_with_those_that_do():
 CYCLE_NS = CATALOGUE.codec(SensorTank).cycle_ns
 
 
-def listening(**on_board: bool) -> Line:
+def listening(**on_board):
     line = Line()
     line.inbox = Inbox(CATALOGUE, VERSION, LEVEL_LIMIT_M, **on_board)
     return line
@@ -432,7 +432,7 @@ def test_what_the_valve_says_is_kept_with_the_echo_of_the_last_status():
     line = listening(valve=True)
     sender = CATALOGUE.transmitter(ValveStatus)
 
-    def say(opening: float, echo: int | None) -> Measurements:
+    def say(opening, echo):
         flags = [False] * (len(ValveStatus._fields) - 5)
         status = ValveStatus(opening, ValveState.FOLLOWING, ValveFault.NONE, echo, None, *flags)
         line.hear(sender.frame(status))
@@ -453,9 +453,9 @@ def test_what_the_valve_says_is_kept_with_the_echo_of_the_last_status():
 def test_a_drive_at_its_power_or_speed_is_held_back(limited):
     line, status = Line(), GOOD[DriveStatus1]
     for said in (True, False, True):
-        line.say(status._replace(**{limited: said}))  # type: ignore[attr-defined]
+        line.say(status._replace(**{limited: said}))
         assert line.seen.drive_held_back is said
-    line.say(status._replace(pressure_limited=True, rate_limited=True))  # type: ignore[attr-defined]
+    line.say(status._replace(pressure_limited=True, rate_limited=True))
     assert not line.seen.drive_held_back
 
 
@@ -465,7 +465,7 @@ def test_a_drive_at_its_power_or_speed_is_held_back(limited):
 def test_a_drive_warns_by_any_bit_until_its_next_status(bit):
     line, status = Line(), GOOD[DriveStatus2]
     for said in (True, False, True):
-        line.say(status._replace(**{bit: said}))  # type: ignore[attr-defined]
+        line.say(status._replace(**{bit: said}))
         assert line.seen.drive_warns is said
 
 
@@ -486,7 +486,7 @@ BEATS = {address: CATALOGUE.transmitter(Heartbeat, address)
          for address in (Address.OPERATOR, Address.OPERATOR_2)}  # fmt: skip
 
 
-def beat_of(address: Address, catalogue: int, configuration: int) -> Frame:
+def beat_of(address, catalogue, configuration):
     return BEATS[address].frame(
         Heartbeat(
             NodeState.OPERATIONAL, ResetCause.POWER_ON, 0.0, catalogue, configuration, NAN, NAN
@@ -550,7 +550,7 @@ BOTH = Redundancy(second_motion_sensor=True, hardwired_inputs=True)
 class RedundantLine(Line):
     """Two motion sensors and hard-wired inputs beside the rest."""
 
-    def __init__(self, thresholds: MonitorThresholds | None = None) -> None:
+    def __init__(self, thresholds=None):
         super().__init__()
         self.inbox = Inbox(
             CATALOGUE, VERSION, LEVEL_LIMIT_M, thresholds=thresholds, redundancy=BOTH
@@ -558,10 +558,10 @@ class RedundantLine(Line):
         self.second = CATALOGUE.transmitter(SensorMotion, Address.SENSORS_2)
         self.hardwired = CATALOGUE.transmitter(HardwiredInputs)
 
-    def say_2(self, motion: SensorMotion) -> None:
+    def say_2(self, motion):
         self.hear(self.second.frame(motion))
 
-    def shown(self, place: int) -> tuple[float, float, int]:
+    def shown(self, place):
         motion = self.seen.motions[place]
         return motion.roll_rad, motion.roll_rate_rad_s, motion.heard_ns
 

@@ -11,7 +11,7 @@ import hashlib
 import math
 import random
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -37,11 +37,10 @@ from utank_hil.canbus import (
     SensorTank,
     Switch,
 )
-from utank_hil.canbus.measurements import Measurements
 from utank_hil.safety import judging
 from utank_hil.safety.faults import FAULTS, Condition, Reaction
 from utank_hil.safety.safety_limits import SafetyLimits
-from utank_hil.safety.situation import Demand, Judgement, OwnState, Situation, ValveReport
+from utank_hil.safety.situation import Demand, ValveReport
 from utank_hil.safety.supervisor import DISARMED_ZERO_WITHIN_MS
 
 SEED = 1
@@ -53,7 +52,7 @@ PLANT: Any = SimpleNamespace(
 )  # fmt: skip
 
 
-def conditions_of(reaction: Reaction) -> list[Condition]:
+def conditions_of(reaction):
     return [each for row in FAULTS for each in row.conditions if each.reaction is reaction]
 
 
@@ -63,7 +62,7 @@ STOPPING, RAMPING = conditions_of(Reaction.STOP), conditions_of(Reaction.RAMP)
 class Table(ControllerBench):
     """The bench with a drive of its own mind; every tick is judged."""
 
-    def __init__(self, draw: random.Random) -> None:
+    def __init__(self, draw):
         super().__init__(start_ns=5_000_000_007)
         self.drive = PumpDrive(PLANT, DriveLimits(), CATALOGUE, configuration_version=VERSION)
         self.drive_follows = False  # of the bench: the drive says itself what it does
@@ -83,10 +82,10 @@ class Table(ControllerBench):
         safety = self.node.safety
         judge, update = safety.judge, safety.supervisor.update
 
-        def judged(measured: Measurements, own: OwnState) -> Judgement:
+        def judged(measured, own):
             return judge(replace(measured, **self.measured), replace(own, **self.own))
 
-        def updated(situation: Situation, standing: int) -> None:
+        def updated(situation, standing):
             if self.found or self.spare_age_ms:
                 situation = replace(
                     situation, found=self.found, motion_spare_age_ms=self.spare_age_ms
@@ -95,15 +94,15 @@ class Table(ControllerBench):
             safety.situation = situation
             update(situation, standing)
 
-        safety.judge = judged  # type: ignore[method-assign]
-        safety.supervisor.update = updated  # type: ignore[method-assign]
+        safety.judge = judged
+        safety.supervisor.update = updated
         self.began: Counter[Condition] = Counter()
 
-    def order_is(self, **changes: object) -> None:
+    def order_is(self, **changes):
         self._arms += bool(changes.get("arm")) and not self.order.arm
         super().order_is(**changes)
 
-    def hear(self, frames: Iterable[Frame]) -> None:
+    def hear(self, frames):
         frames = list(frames)
         super().hear(frames)
         for frame in frames:
@@ -113,7 +112,7 @@ class Table(ControllerBench):
         self.drive.tick(self.now_ns)
         self.drive_state = self.drive._states.state
 
-    def tick(self, late_ticks: int = 0) -> None:
+    def tick(self, late_ticks=0):
         for act in self.each_tick.values():
             act()
         before_pa, mode = self.node.command_pa, self.node.mode
@@ -121,7 +120,7 @@ class Table(ControllerBench):
         super().tick(late_ticks)
         self._judge(before_pa, mode)
 
-    def _judge(self, before_pa: float, mode_before: Mode) -> None:
+    def _judge(self, before_pa, mode_before):
         node, seen = self.node, self.node.safety.situation
         self.named |= node.safety.alarms.codes | {node.fault}
         pressure_pa, mode = node.command_pa, node.mode
@@ -154,7 +153,7 @@ class Table(ControllerBench):
         # 4: the drive's own limiter never has to refuse
         assert self.drive.refused == 0
 
-    def _judge_ramp(self, mode: Mode, mode_before: Mode, now_ns: int) -> None:
+    def _judge_ramp(self, mode, mode_before, now_ns):
         if mode in (Mode.PASSIVE, Mode.FAULT) and mode_before is Mode.ACTIVE:
             within_ms = DISARMED_ZERO_WITHIN_MS if mode is Mode.PASSIVE else 1000
             self._zero_by_ns = now_ns + within_ms * MS
@@ -169,7 +168,7 @@ class Table(ControllerBench):
             assert self.node.command_pa == 0.0
 
     @property
-    def phase(self) -> str:
+    def phase(self):
         """Mode, and what is under way in it."""
         supervisor = self.node.safety.supervisor
         if supervisor.arming:
@@ -180,67 +179,65 @@ class Table(ControllerBench):
         return supervisor.mode.name + (" RAMP" if moving else "")
 
 
-def silent(kind: type) -> tuple[Callable[[Table], None], Callable[[Table], None]]:
+def silent(kind):
     return lambda table: table.silent.add(kind), lambda table: table.silent.discard(kind)
 
 
-def every_tick(
-    name: str, act: Callable[[Table], None]
-) -> tuple[Callable[[Table], None], Callable[[Table], None]]:
+def every_tick(name, act):
     return (
         lambda table: table.each_tick.__setitem__(name, lambda: act(table)),
         lambda table: table.each_tick.pop(name, None) and None,
     )
 
 
-def field(**values: object) -> tuple[Callable[[Table], None], Callable[[Table], None]]:
+def field(**values):
     """Attributes of the bench, and what they are when all is well."""
     well = {name: getattr(Table(random.Random(0)), name) for name in values}
 
-    def put(table: Table, what: dict[str, Any]) -> None:
+    def put(table, what):
         for name, value in what.items():
             setattr(table, name, value)
 
     return lambda table: put(table, values), lambda table: put(table, well)
 
 
-def judged(part: str, **values: object) -> tuple[Callable[[Table], None], Callable[[Table], None]]:
+def judged(part, **values):
     """What is judged and nothing on this bench says: in the `part` measured or own."""
 
-    def begin(table: Table) -> None:
+    def begin(table):
         getattr(table, part).update(values)
 
-    def end(table: Table) -> None:
+    def end(table):
         for name in values:
             getattr(table, part).pop(name, None)
 
     return begin, end
 
 
-def found(reaction: Reaction) -> tuple[Callable[[Table], None], Callable[[Table], None]]:
+def found(reaction):
     """What the monitors find that has a reaction: one of it after the other."""
     known = [each for each in conditions_of(reaction) if each.findings]
 
-    def begin(table: Table) -> None:
+    def begin(table):
         its = min(known, key=table.began.__getitem__)
         table.began[its] += 1
         table.found |= table._draw.choice(list(its.findings)).value
 
-    def end(table: Table) -> None:
+    def end(table):
         table.found = 0
 
     return begin, end
 
 
-def spoilt(kind: type) -> tuple[Callable[[Table], None], Callable[[Table], None]]:
-    def flip(of: type, frame: Frame) -> tuple[Frame, ...]:
+def spoilt(kind):
+    def flip(of, frame):
         data = bytes([frame.data[0] ^ 0x41]) + frame.data[1:]
         return (Frame(frame.can_id, data) if of is kind else frame,)
 
-    def begin(table: Table) -> None:
+    def begin(table):
         table.spoil = flip
 
-    def end(table: Table) -> None:
+    def end(table):
         table.spoil = lambda of, frame: (frame,)
 
     return begin, end
@@ -299,7 +296,7 @@ ORDERS: dict[str, Callable[[Table], None]] = {
 }
 
 
-def restore(table: Table) -> None:
+def restore(table):
     """End every fault and let go of every button, in STANDBY."""
     conflict, flood = "own" in table.each_tick, "flood" in table.each_tick
     for _, end in BEGIN_AND_END.values():
@@ -321,33 +318,33 @@ def restore(table: Table) -> None:
     raise AssertionError(f"no STANDBY: {table.node.mode} {table.node.fault}")
 
 
-def under_pressure(table: Table) -> None:
+def under_pressure(table):
     table.law.answer_pa = math.copysign(40e3, table.law.answer_pa)
     ORDERS["arm"](table)
     table.run(260)
     assert table.node.mode is Mode.ACTIVE, (table.node.mode, table.node.fault)
 
 
-def ramping(table: Table) -> None:
+def ramping(table):
     under_pressure(table)
     ORDERS["disarm"](table)
     table.tick()
 
 
-def fault_ramping(table: Table) -> None:
+def fault_ramping(table):
     under_pressure(table)
     table.motion = SensorMotion(0.4, 0.0, Quality.GOOD)
     table.tick()
     table.motion = SensorMotion(0.0, 0.0, Quality.GOOD)
 
 
-def faulted(table: Table) -> None:
+def faulted(table):
     under_pressure(table)
     table.node.link_error(table.now_ns, "down")
     table.tick()
 
 
-def resetting(table: Table) -> None:
+def resetting(table):
     faulted(table)
     BEGIN_AND_END["high level"][0](table)
     table.run(40)
@@ -355,18 +352,18 @@ def resetting(table: Table) -> None:
     table.tick()
 
 
-def arming(table: Table) -> None:
+def arming(table):
     table.deaf = True
     ORDERS["arm"](table)
     table.tick()
 
 
-def passive(table: Table) -> None:
+def passive(table):
     table.order_is(mode_request=Mode.PASSIVE, arm=False)
     table.run(60)
 
 
-def waiting(table: Table) -> None:
+def waiting(table):
     BEGIN_AND_END["versions"][0](table)
     table.run(110)
 
@@ -387,14 +384,14 @@ PHASES: dict[str, Callable[[Table], None]] = {
 class Walk:
     """Goes through phases, faults and orders, and counts what it met."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed):
         self.draw = random.Random(seed)
         self.table = Table(self.draw)
         self.table.run(400)
         self.cells: Counter[tuple[str, str]] = Counter()
         self.pairs: Counter[tuple[str, str]] = Counter()
 
-    def go(self, phase: str, events: tuple[str, ...]) -> None:
+    def go(self, phase, events):
         """Reach a phase, let events begin one after the other, and end all."""
         table, draw = self.table, self.draw
         restore(table)
@@ -411,7 +408,7 @@ class Walk:
         self.pairs[events[0], events[-1]] += 1
         table.run(10 * draw.randint(0, 10))
 
-    def pairs_of_faults(self, most: int) -> None:
+    def pairs_of_faults(self, most):
         """Faults after every fault, so many of them, the first in one phase after the other."""
         faults, phases = list(BEGIN_AND_END), list(PHASES)
         pairs = [(first, then) for first in faults for then in faults if first != then]
@@ -430,7 +427,7 @@ class Walk:
                 self.go(phase, (order, self.draw.choice(list(ORDERS))))
 
 
-def printed(cells: Counter[tuple[str, str]]) -> str:
+def printed(cells):
     lines = [f"{'':24}" + "".join(f"{phase:>14}" for phase in PHASES)]
     for event in (*BEGIN_AND_END, *ORDERS):
         counts = "".join(f"{cells[phase, event]:14}" for phase in PHASES)
@@ -481,7 +478,7 @@ def test_no_event_of_the_walk_goes_without_effect(event):
 
 
 def test_the_same_seed_gives_the_same_trace():
-    def trace(seed: int) -> str:
+    def trace(seed):
         walk = Walk(seed)
         for phase in PHASES:
             walk.go(phase, (walk.draw.choice(list(BEGIN_AND_END)), "reset"))

@@ -16,7 +16,7 @@ FIRST = 0.25
 """Share of the pressure that may be used before the water is seen to respond."""
 
 
-def watching() -> Monitors:
+def watching():
     monitors = Monitors(DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures(), 250_000)
     assert monitors.thresholds.unconfirmed_share == FIRST
     return monitors

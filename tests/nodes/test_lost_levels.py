@@ -1,7 +1,6 @@
 """The level's rate is right whatever share of the tank's frames is lost, repeated or bad."""
 
 import math
-from collections.abc import Callable, Iterable
 from dataclasses import replace
 from itertools import count
 
@@ -15,9 +14,7 @@ RATE_M_S = 0.5
 FREQUENCY_RAD_S = 0.6
 
 
-def worst_rate_error(
-    change: Callable[[int, Frame], Iterable[Frame]], quality: Callable[[int], Quality]
-) -> float:
+def worst_rate_error(change, quality):
     """Largest error of the rate, as a share of its amplitude, over the last half of 40 s."""
     bench = ControllerBench()
     numbers, ticks = count(), count()
@@ -38,7 +35,7 @@ def worst_rate_error(
     raise AssertionError
 
 
-def always_good(tick: int) -> Quality:
+def always_good(tick):
     return Quality.GOOD
 
 
@@ -54,7 +51,7 @@ def test_gauges_that_send_more_slowly_than_their_cycle_with_a_counter_that_is_ri
     codec = CATALOGUE.codec(SensorTank)
     slow = CATALOGUE.transmitter(SensorTank)
 
-    def thinned(k: int, frame: Frame) -> Iterable[Frame]:
+    def thinned(k, frame):
         message = codec.decode(frame.data)
         assert message is not None
         return () if k % one_of else (slow.frame(message),)
@@ -74,7 +71,7 @@ def test_bad_quality(bad_of):
 def test_frames_that_come_a_tick_late_or_two_at_once(late_of):
     held: list[Frame] = []
 
-    def change(number: int, frame: Frame) -> Iterable[Frame]:
+    def change(number, frame):
         held.append(frame)
         if number % late_of == 1:
             return ()
@@ -90,7 +87,7 @@ def test_in_a_gap_a_law_measures_the_level_that_is_predicted(missing):
     """The last one, held, looks like water that stands still: a plan then brakes what moves."""
     bench = ControllerBench(law=ToyLaw(sample_time_s=TICK_S))
 
-    def swing() -> float:
+    def swing():
         angle = FREQUENCY_RAD_S * bench.now_ns * 1e-9
         level_m = RATE_M_S / FREQUENCY_RAD_S * math.sin(angle)
         bench.tank = SensorTank(-level_m, level_m, Switch.OFF, Switch.OFF, Quality.GOOD)

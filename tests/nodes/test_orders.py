@@ -12,22 +12,22 @@ from utank_hil.nodes.stations import Orders
 QUIET = OperatorCommand(Mode.ACTIVE, True, False, False, False)
 
 
-def corrupted(frame: Frame) -> Frame:
+def corrupted(frame):
     return Frame(frame.can_id, frame.data[:-1] + bytes((frame.data[-1] ^ 1,)))
 
 
 class Line:
     """A panel's transmitter and the orders that hear it."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.sender = CATALOGUE.transmitter(OperatorCommand)
         self.orders = Orders(CATALOGUE.receiver(OperatorCommand))
         self.now_ns = 0
 
-    def say(self, *, lost: int = 0, corrupt: bool = False, **changes: object) -> None:
+    def say(self, *, lost=0, corrupt=False, **changes):
         """Send frames of which the last arrives, 200 ms apart."""
         for _ in range(lost + 1):
-            frame = self.sender.frame(QUIET._replace(**changes))  # type: ignore[arg-type]
+            frame = self.sender.frame(QUIET._replace(**changes))
             self.now_ns += 200 * MS
         order = self.orders.accept(corrupted(frame) if corrupt else frame)
         if order is not None:
@@ -282,7 +282,7 @@ def test_disarming_out_of_sequence_ramps_down_and_the_old_arm_bit_does_not_arm_a
 def test_accepted_frames_that_say_something_new_are_counted():
     line = Line()
     for said, changes in (({}, 0), ({}, 0), ({"reset": True}, 1), ({"reset": True}, 1), ({}, 2)):
-        line.say(**said)  # type: ignore[arg-type]
+        line.say(**said)
         assert line.orders.receiver.changes == changes
     line.say(stop=True, corrupt=True)
     assert line.orders.receiver.changes == 2

@@ -1,4 +1,3 @@
-from collections.abc import Iterable
 from itertools import pairwise
 
 import pytest
@@ -14,7 +13,7 @@ START_NS = 11_000_000_007
 class Table:
     """A panel and a listener."""
 
-    def __init__(self, script: Iterable[TimedAction] = ()) -> None:
+    def __init__(self, script=()):
         self.panel = OperatorPanel(CATALOGUE, configuration_version=9, script=script)
         self._receiver = CATALOGUE.receiver(OperatorCommand)
         self._controller = CATALOGUE.transmitter(ControllerStatus)
@@ -22,15 +21,15 @@ class Table:
         self.heard: list[tuple[float, OperatorCommand]] = []
 
     @property
-    def last(self) -> OperatorCommand:
+    def last(self):
         return self.heard[-1][1]
 
-    def hear(self, mode: Mode) -> None:
+    def hear(self, mode):
         """A status of the controller."""
         status = ControllerStatus(mode, Fault.NONE, *(False,) * 5, 0.25, 3, 9)
         self.panel.receive(self._controller.frame(status), self.now_ns)
 
-    def tick(self) -> None:
+    def tick(self):
         for frame in self.panel.tick(self.now_ns):
             if frame.can_id == self._receiver.can_id:
                 command = self._receiver.accept(frame)
@@ -38,7 +37,7 @@ class Table:
                 self.heard.append(((self.now_ns - START_NS) / MS, command))
         self.now_ns += self.panel.period_ns
 
-    def run(self, ticks: int) -> None:
+    def run(self, ticks):
         for _ in range(ticks):
             self.tick()
 

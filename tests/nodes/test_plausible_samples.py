@@ -16,7 +16,7 @@ from utank_hil.canbus.profiles.device import ProfiledDevice
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.control import DesignPlant
 from utank_hil.nodes.plausibility import LevelGates, MotionSensor, SampleClock, SpikeGate
-from utank_hil.safety.monitors.thresholds import MonitorThresholds, SensorFigures, thresholds_of
+from utank_hil.safety.monitors.thresholds import SensorFigures, thresholds_of
 
 MS, S = 1_000_000, 1_000_000_000
 APART = replace(
@@ -27,13 +27,13 @@ APART = replace(
 )  # fmt: skip
 
 
-def sensor(thresholds: MonitorThresholds = APART) -> MotionSensor:
+def sensor(thresholds=APART):
     receiver = CATALOGUE.receiver(SensorMotion)
     receiver.cycle_ns = 0  # time of receipt alone
     return MotionSensor(receiver, thresholds)
 
 
-def taken(motion: MotionSensor, roll_rad: float, rate_rad_s: float, now_ns: int) -> bool:
+def taken(motion, roll_rad, rate_rad_s, now_ns):
     """Whether a sample is taken."""
     before = motion.discarded
     motion.take(SensorMotion(roll_rad, rate_rad_s, Quality.GOOD), now_ns)
@@ -109,7 +109,7 @@ def test_what_moves_no_faster_than_it_can_always_passes(start, elapsed_ms, share
 class Slow:
     """A sensor of 20 Hz on a ship that rolls by 0.3 rad at 10 s; samples come in bursts."""
 
-    def __init__(self, protection: dict[str, object]) -> None:
+    def __init__(self, protection):
         layout = {"start": 0, "bits": 32, "real": True, "unit": "rad"}
         rate = {"start": 32, "bits": 32, "real": True, "unit": "rad/s"}
         signals = {"R": layout, "W": rate}
@@ -127,7 +127,7 @@ class Slow:
         )
         self.device.deliver = self.sensor.take
 
-    def run(self, burst: int, spike: int = -1) -> int:
+    def run(self, burst, spike=-1):
         for k in range(400):
             now_ns = -(-k // burst) * burst * 50 * MS
             turn = 2 * math.pi / 10 * 0.05 * k

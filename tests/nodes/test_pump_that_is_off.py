@@ -22,7 +22,7 @@ CODE = Fault.DRIVE_NOT_FOLLOWING
 START_MS = 12_000  # what is awaited at the start is no alarm before
 
 
-def bench() -> ControllerBench:
+def bench():
     plant = DesignPlant(VESSEL.ship, VESSEL.tank)
     table = ControllerBench(monitors=Monitors(plant, 0.35, SensorFigures(), 250_000))
     table.run(400)

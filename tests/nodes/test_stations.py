@@ -13,14 +13,14 @@ IDLE = OperatorCommand(Mode.STANDBY, False, False, False, False)
 class Bench(ControllerBench):
     """A controller with a second panel."""
 
-    def __init__(self, redundancy: Redundancy = SECOND) -> None:
+    def __init__(self, redundancy=SECOND):
         super().__init__(redundancy=redundancy)
         self.second_beats, self.second_versions = True, self.versions
         self.second: OperatorCommand | None = None
         self._second = CATALOGUE.transmitter(OperatorCommand, Address.OPERATOR_2)
         self._second_beats = CATALOGUE.transmitter(Heartbeat, Address.OPERATOR_2)
 
-    def tick(self, late_ticks: int = 0) -> None:
+    def tick(self, late_ticks=0):
         if self._tick_index % 20 == 0 and self.second is not None:
             self.second_is()
             nan = float("nan")
@@ -29,17 +29,17 @@ class Bench(ControllerBench):
                 self.send(self._second_beats.frame(beat))
         super().tick(late_ticks)
 
-    def second_is(self, **changes: object) -> None:
-        self.second = (self.second or IDLE)._replace(**changes)  # type: ignore[arg-type]
+    def second_is(self, **changes):
+        self.second = (self.second or IDLE)._replace(**changes)
         self.send(self._second.frame(self.second))
 
     @property
-    def station(self) -> Station | None:
+    def station(self):
         self.run(100)
         return self.status.station
 
 
-def active_bench() -> Bench:
+def active_bench():
     bench = Bench()
     bench.second = IDLE
     bench.drive_at(20e3)
@@ -241,7 +241,7 @@ def test_retuning_is_forbidden_while_either_station_says_so():
     bench = active_bench()
     stations = bench.node.inbox.stations
 
-    def forbidden() -> bool:
+    def forbidden():
         bench.run(300)
         return stations.take_retuning(bench.now_ns).forbidden
 

@@ -51,14 +51,14 @@ class ToyValveLaw(ToyLaw):
 
     loss: float = 0.0
 
-    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+    def step(self, y, reference=None):
         return np.array([self.loss, *super().step(y, reference)])
 
 
 class ValveBench(ControllerBench):
     """A controller with a valve that does as it is told, unless a test says otherwise."""
 
-    def __init__(self, valve: Valve = DUCT) -> None:
+    def __init__(self, valve=DUCT):
         self.valve = valve
         self.opening = valve.fail_opening
         self.state: ValveState | None = ValveState.FAIL_POSITION
@@ -76,10 +76,10 @@ class ValveBench(ControllerBench):
         self._echo: int | None = None
 
     @property
-    def control(self) -> ValveControl | None:
+    def control(self):
         return self.told[-1].control
 
-    def tick(self, late_ticks: int = 0) -> None:
+    def tick(self, late_ticks=0):
         if self.beats and self._tick_index % 10 == 0:
             self.send(self._valve_beat.frame(Heartbeat(None, None, 0.0, *self.versions, 0.0, 0.0)))
         if self.told and self.moves:
@@ -91,13 +91,13 @@ class ValveBench(ControllerBench):
             self._report()
         super().tick(late_ticks)
 
-    def _report(self) -> None:
+    def _report(self):
         status = ValveStatus(
             self.opening, self.state, self.fault, self._echo, FailPosition.OPEN, *(False,) * 3
         )
         self.send(self._valve_status.frame(status))
 
-    def hear(self, frames: list[Frame]) -> None:  # type: ignore[override]
+    def hear(self, frames):
         super().hear(frames)
         for frame in frames:
             if frame.can_id == self._valve_commands.can_id:
@@ -111,12 +111,12 @@ class ValveBench(ControllerBench):
                     self.state = ValveState.FOLLOWING if following else ValveState.FAIL_POSITION
 
 
-def valve_law(bench: ValveBench) -> ToyValveLaw:
+def valve_law(bench):
     assert isinstance(bench.law, ToyValveLaw)
     return bench.law
 
 
-def throttling(valve: Valve = DUCT) -> ValveBench:
+def throttling(valve=DUCT):
     """A bench whose armed controller holds the valve shut."""
     bench = ValveBench(valve)
     bench.arm()
@@ -146,7 +146,7 @@ def test_the_valve_is_told_to_follow_only_while_the_law_is_in_charge():
 
 @pytest.mark.parametrize(("opening", "position"), [(0.3, "open"), (1.0, "shut")])
 def test_an_opening_has_the_loss_that_the_law_asked_for(opening, position):
-    valve = Valve("duct", 0.5, 0.1, fail_position=position)  # type: ignore[arg-type]
+    valve = Valve("duct", 0.5, 0.1, fail_position=position)
     bench = throttling(valve)
     valve_law(bench).loss = valve.loss(TANK, opening)
     bench.run(400)
@@ -156,7 +156,7 @@ def test_an_opening_has_the_loss_that_the_law_asked_for(opening, position):
 def test_the_law_is_told_the_loss_of_the_valve_as_it_stands_and_the_mean_pressure():
     bench = throttling()
     told: list[FloatArray] = []
-    bench.law.applied = told.append  # type: ignore[method-assign, assignment]
+    bench.law.applied = told.append
     bench.run(400)
     assert told[-1] == pytest.approx([SHUT, 0.0])
     bench.law.answer_pa = 4e3

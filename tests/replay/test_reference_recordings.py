@@ -46,7 +46,7 @@ MOST_BYTES = 600_000
 
 
 @cache
-def statuses(name: str) -> tuple[ControllerStatus, ...]:
+def statuses(name):
     """What the controller said of itself in a recording."""
     entries = entries_of(FrameLog(LOGS / f"{name}.frames").blocks())
     sent = (STATUS.decode(data) for number, data, kind, _ in entries

@@ -16,16 +16,16 @@ queued = st.lists(
 ).map(lambda rows: sorted(rows, key=lambda row: row[0]))
 
 
-def length_ns(sent: Frame) -> int:
+def length_ns(sent):
     return frame_bits(sent) * BIT_NS
 
 
-def carry(rows: list[tuple[int, int, int]]) -> list[tuple[int, int, int, int]]:
+def carry(rows):
     """Put the rows on a bus; return (queued at, begun at, identifier, row) as they go over it."""
     bus = SimulatedBus(bit_rate=250_000)
     arrived = []
 
-    def advance(until_ns: int) -> None:
+    def advance(until_ns):
         for end_ns, _, sent in bus.carry_until(until_ns):
             row = int.from_bytes(sent.data, "little")
             begun_ns = end_ns + 3 * BIT_NS - length_ns(sent)

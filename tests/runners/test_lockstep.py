@@ -1,6 +1,5 @@
 import random
 import zlib
-from collections.abc import Iterable
 
 import pytest
 from hypothesis import given
@@ -14,15 +13,15 @@ from utank_hil.runners import Lockstep, NodeError, SimulatedBus, frame_bits
 class RandomNode(ToyNode):
     """Sends at random, and a digest of what it heard: disorder shows in its frames."""
 
-    def __init__(self, name: str, period_ns: int, seed: int) -> None:
+    def __init__(self, name, period_ns, seed):
         super().__init__(name, period_ns)
         self.random = random.Random(seed)
         self.digest = 0
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame, now_ns):
         self.digest = zlib.crc32(repr((frame, now_ns)).encode(), self.digest)
 
-    def tick(self, now_ns: int) -> Iterable[Frame]:
+    def tick(self, now_ns):
         return [
             Frame(
                 self.random.randrange(2**29),
@@ -32,7 +31,7 @@ class RandomNode(ToyNode):
         ]
 
 
-def random_run(seed: int, until_ns: Iterable[int]) -> tuple[bytes, Lockstep]:
+def random_run(seed, until_ns):
     chooser = random.Random(seed)
     nodes = [
         RandomNode(f"node {i}", chooser.choice([1, 2, 5, 7, 10]) * MS, chooser.randrange(2**32))
@@ -88,8 +87,8 @@ def test_slices_may_end_exactly_at_ticks_and_ends_of_frames():
 def test_nodes_tick_at_their_own_period_in_the_order_given():
     order: list[tuple[int, str]] = []
 
-    def node(name: str, period_ns: int) -> ToyNode:
-        def says(now_ns: int) -> Iterable[Frame]:
+    def node(name, period_ns):
+        def says(now_ns):
             order.append((now_ns, name))
             return ()
 
@@ -150,7 +149,7 @@ def test_trace_sees_every_frame_with_its_sender():
     assert rows == [(length_ns, "talker", sent), (10 * MS + length_ns, "talker", sent)]
 
 
-def broken(_: object, __: object = None) -> Iterable[Frame]:
+def broken(_, __=None):
     raise KeyError("no such gain")
 
 

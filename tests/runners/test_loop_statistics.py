@@ -10,7 +10,7 @@ from utank_hil.runners import Histogram, LoopStatistics
 durations = st.lists(st.integers(0, 100) | st.integers(0, 2**36 - 1), min_size=1, max_size=200)
 
 
-def histogram_of(values: list[int]) -> Histogram:
+def histogram_of(values):
     histogram = Histogram()
     for value in values:
         histogram.add(value)

@@ -45,7 +45,7 @@ if os.geteuid() == 0:
 """
 
 
-def run(script: str):
+def run(script):
     done = subprocess.run(
         [sys.executable, "-c", STATE + script], capture_output=True, text=True, check=False
     )

@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from toy_nodes import MS, START_NS, FakeClock, SelectiveNode, ToyNode, ToyPort, frame
 
-from utank_hil.canbus.frame import Frame
 from utank_hil.runners import (
     LoopStatistics,
     MonotonicClock,
@@ -24,19 +23,19 @@ from utank_hil.runners import (
 class Observer(ToyNode):
     """A node with both optional methods."""
 
-    def __init__(self, name: str, last: Frame | None = None) -> None:
+    def __init__(self, name, last=None):
         super().__init__(name)
         self.errors: list[tuple[int, str]] = []
         self.last = last
 
-    def link_error(self, now_ns: int, reason: str) -> None:
+    def link_error(self, now_ns, reason):
         self.errors.append((now_ns, reason))
 
-    def stop(self, now_ns: int) -> list[Frame]:
+    def stop(self, now_ns):
         return [] if self.last is None else [self.last]
 
 
-def elapsed(node: ToyNode) -> list[float]:
+def elapsed(node):
     """When the node ticked, in ms since the start."""
     return [(now_ns - START_NS) / MS for now_ns in node.ticked]
 

@@ -14,7 +14,7 @@ frames = st.builds(
 )
 
 
-def crc_15(bits: str) -> str:
+def crc_15(bits):
     """CRC by polynomial long division of the bit string, as the standard words it."""
     polynomial = "1100010110011001"  # x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1
     rest = [int(bit) for bit in bits + 15 * "0"]
@@ -25,7 +25,7 @@ def crc_15(bits: str) -> str:
     return "".join(map(str, rest[-15:]))
 
 
-def on_the_wire(frame: Frame) -> str:
+def on_the_wire(frame):
     """Every bit of the frame as ISO 11898-1 writes it out, from start of frame to intermission."""
     identifier = f"{frame.can_id:029b}"
     head = "0" + identifier[:11] + "1" + "1" + identifier[11:] + "0" + "00"
@@ -41,7 +41,7 @@ def on_the_wire(frame: Frame) -> str:
     return stuffed + "1" + "01" + "1111111" + "111"
 
 
-def destuffed(wire: str) -> str:
+def destuffed(wire):
     """What a receiver makes of the stuffed part: it drops the bit after five equal ones."""
     plain, run, skip = "", "", False
     for bit in wire:

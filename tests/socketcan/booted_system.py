@@ -45,7 +45,7 @@ exec env -i container=emulated PATH=/usr/bin:/usr/sbin {SYSTEMD} --unit=ship.tar
 """
 
 
-def needed_here() -> None:
+def needed_here():
     """Skip where such a system can't be booted; where CI runs, it must be possible."""
     missing = ""
     if "User Mode Linux" not in Path("/proc/cpuinfo").read_text(encoding="utf-8"):
@@ -62,7 +62,7 @@ def needed_here() -> None:
 class BootedSystem:
     """systemd as the first process of a system of its own; closed, all of it is gone."""
 
-    def __init__(self, channel: str) -> None:
+    def __init__(self, channel):
         _make_root(channel)
         self._init = subprocess.Popen(
             ["unshare", "--pid", "--fork", "--kill-child", "--mount", "sh", "-c", _FIRST],
@@ -75,7 +75,7 @@ class BootedSystem:
             assert time.monotonic() < deadline, "systemd has not come up"
             time.sleep(0.3)
 
-    def run(self, *command: str, succeeds: bool = False) -> str:
+    def run(self, *command, succeeds=False):
         """What a command prints that is run on it."""
         children = Path(f"/proc/{self._init.pid}/task/{self._init.pid}/children")
         first = children.read_text(encoding="utf-8").split()
@@ -86,30 +86,30 @@ class BootedSystem:
             [*inside, *command], check=succeeds, capture_output=True, text=True, timeout=200
         ).stdout.strip()
 
-    def shown(self, name: str) -> str:
+    def shown(self, name):
         """One of `systemctl show` of the service."""
         return self.run("systemctl", "show", SERVICE, "--value", "--property", name)
 
     @property
-    def journal(self) -> str:
+    def journal(self):
         """What the service has said, and systemd of it."""
         return self.run("journalctl", "--no-pager", "--unit", SERVICE, "--output", "cat")
 
-    def wait(self, name: str, value: str, timeout_s: float = 180.0) -> None:
+    def wait(self, name, value, timeout_s=180.0):
         """Until a property has a value."""
         deadline = time.monotonic() + timeout_s
         while (found := self.shown(name)) != value:
             assert time.monotonic() < deadline, f"{name} is {found}\n{self.journal}"
             time.sleep(0.1)
 
-    def close(self) -> None:
+    def close(self):
         """End it with all that runs on it."""
         self._init.kill()
         self._init.wait(30)
         subprocess.run(["umount", "--recursive", ROOT], check=True)
 
 
-def _make_root(channel: str) -> None:
+def _make_root(channel):
     """The directory that the system sees as its root."""
     subprocess.run(["mount", "-t", "tmpfs", "tmpfs", ROOT], check=True)
     for name in ("before", "dev", "proc", "run", "sys", "tmp", "var/log", "etc/systemd/system"):

@@ -5,9 +5,7 @@ fails there while the machine held processes up says nothing about them.
 """
 
 import time
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TypeVar
 
 import pytest
@@ -25,7 +23,7 @@ class TooBusyError(Exception):
     """The machine did not keep time, so what was seen can't be judged."""
 
 
-def lost(share: float, longest_s: float) -> str:
+def lost(share, longest_s):
     """What the machine did that it must not; empty if it kept time.
 
     `share` is that of the time for which it held processes up, `longest_s` how long at a time.
@@ -41,14 +39,14 @@ def lost(share: float, longest_s: float) -> str:
 class Timekeeping:
     """How late the machine wakes a process that sleeps and does nothing else."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.begin_anew()
 
-    def begin_anew(self) -> None:
+    def begin_anew(self):
         """Forget what was: programs that start take the processor from one another."""
         self._slept_s = self._lost_s = self._longest_s = 0.0
 
-    def nap(self) -> None:
+    def nap(self):
         """Sleep for a moment, and note how much later it ends."""
         begin_s = time.monotonic()
         time.sleep(NAP_S)
@@ -59,13 +57,13 @@ class Timekeeping:
             self._lost_s += late_s
             self._longest_s = max(self._longest_s, late_s)
 
-    def failure(self) -> str:
+    def failure(self):
         """What the machine did that it must not since the beginning; empty if it kept time."""
         return lost(self._lost_s / max(self._slept_s, NAP_S), self._longest_s)
 
 
 @contextmanager
-def judged_by(failure: Callable[[], str]) -> Iterator[None]:
+def judged_by(failure):
     """Let what is asserted inside fail only where the machine kept time.
 
     `failure` says what the machine did that it must not, empty if it kept time; if it did not,
@@ -80,7 +78,7 @@ def judged_by(failure: Callable[[], str]) -> Iterator[None]:
         raise TooBusyError(f"{late}; then: {str(error).partition(chr(10))[0]}") from error
 
 
-def first_that_can_be_judged(attempt: Callable[[Path], T], folder: Path) -> T:
+def first_that_can_be_judged(attempt, folder):
     """What the first attempt gives that the machine was not too busy for.
 
     `attempt` does what is judged, in a folder of its own inside `folder`; it raises `TooBusyError`.

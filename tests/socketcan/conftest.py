@@ -1,9 +1,8 @@
 """Say at the end when a test on the emulated kernel had to be tried again."""
 
-import pytest
 from busy_machine import RETRIED
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+def pytest_terminal_summary(terminalreporter):
     for line in RETRIED:
         terminalreporter.write_line(f"machine too busy to judge, {line}")

@@ -8,7 +8,6 @@ command timeout stops the pump: then it is tried again.
 from contextlib import closing
 from dataclasses import dataclass, field
 from itertools import groupby, pairwise
-from pathlib import Path
 
 import pytest
 import yaml
@@ -16,8 +15,6 @@ from two_processes import (
     CONFIGS,
     Candump,
     Logged,
-    Program,
-    Watcher,
     patient_controller,
     run_controller,
     run_ship,
@@ -39,7 +36,7 @@ READ = ("CTRL_STATUS", "PUMP_CMD", "DRIVE_STATUS_1", "SENSOR_PUMP")
 IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED = list(RetuningState)[:6]
 
 
-def controller_file(folder: Path, shipped: str, changes: dict[str, float]) -> Path:
+def controller_file(folder, shipped, changes):
     """A shipped adaptive controller with changes, and thresholds for a busy machine."""
     content = yaml.safe_load(patient_controller(folder, 100.0).read_text())
     adaptive = yaml.safe_load((CONFIGS / "controllers" / shipped).read_text())
@@ -50,7 +47,7 @@ def controller_file(folder: Path, shipped: str, changes: dict[str, float]) -> Pa
     return path
 
 
-def scenario_file(folder: Path, controller: Path) -> Path:
+def scenario_file(folder, controller):
     """The adaptive scenario: the ship rolls in 7.5 s instead of 12.57 s; retuned at once."""
     content = yaml.safe_load((CONFIGS / "scenarios" / "adaptive.yaml").read_text())
     content["vessel"] = str(CONFIGS / "ships" / "thesis_first.yaml")
@@ -72,23 +69,23 @@ class Story:
     controller: dict[str, object]
     ship: dict[str, object]
 
-    def of(self, name: str) -> list[Logged]:
+    def of(self, name):
         return [frame for frame in self.log if frame.name == name]
 
     @property
-    def states(self) -> list[RetuningState]:
+    def states(self):
         """Of retuning in CTRL_STATUS, each once in a row."""
         told = (RetuningState(int(frame.signals["retuning"])) for frame in self.of("CTRL_STATUS"))
         return [state for state, _ in groupby(told)]
 
     @property
-    def reasons(self) -> dict[str, str]:
+    def reasons(self):
         events = self.controller["retuning"]
         assert isinstance(events, list)
         return {event["state"]: "; ".join(event["reasons"]) for event in events}
 
 
-def both_speak(watcher: Watcher, *programs: Program) -> bool:
+def both_speak(watcher, *programs):
     """Whether both are on the bus; one that has ended says why."""
     for program in programs:
         if program.code is not None:
@@ -96,19 +93,15 @@ def both_speak(watcher: Watcher, *programs: Program) -> bool:
     return watcher.drive is not None and watcher.mode not in (None, Mode.INIT)
 
 
-def ended(watcher: Watcher) -> bool:
+def ended(watcher):
     """Whether the retuning has."""
     assert watcher.mode is Mode.ACTIVE, f"controller {watcher.status}, drive {watcher.drive}"
     return watcher.status is not None and watcher.status.retuning in (RETUNED, REFUSED)
 
 
 def tell_story(
-    folder: Path,
-    changes: dict[str, float],
-    last: RetuningState,
-    shipped: str = "adaptive_dpc.yaml",
-    takes_s: float = IDENTIFICATION_S + TRIAL_S,
-) -> Story:
+    folder, changes, last, shipped="adaptive_dpc.yaml", takes_s=IDENTIFICATION_S + TRIAL_S
+):
     """Order a retuning and wait for how it ends."""
     controller_config = controller_file(folder, shipped, changes)
     scenario = scenario_file(folder, controller_config)
@@ -131,7 +124,7 @@ def tell_story(
     return story
 
 
-def assert_ship_is_found(story: Story, within: float = 0.15) -> None:
+def assert_ship_is_found(story, within=0.15):
     """The roll period: in lockstep 7.51 s; here a late tick is a sample at the wrong time."""
     found = story.reasons["TRIAL"]
     print(found)
@@ -139,13 +132,13 @@ def assert_ship_is_found(story: Story, within: float = 0.15) -> None:
     assert period_s == pytest.approx(SHIP_PERIOD_S, rel=within)  # configured: 12.57 s
 
 
-def in_charge(story: Story) -> list[Logged]:
+def in_charge(story):
     """The commands from the first that enabled the drive to the last before the programs ended."""
     active = [f.time_s for f in story.of("CTRL_STATUS") if f.signals["mode"] == Mode.ACTIVE]
     return [f for f in story.of("PUMP_CMD") if active[0] <= f.time_s <= active[-1]]
 
 
-def assert_nothing_was_disturbed(story: Story) -> None:
+def assert_nothing_was_disturbed(story):
     """Commands in steps within the rate limit, the drive enabled throughout, nothing unsent."""
     limits = PumpLimits()
     commands = in_charge(story)

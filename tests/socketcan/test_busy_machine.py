@@ -1,7 +1,5 @@
 """What fails is tried again where the machine did not keep time, and fails at once where it did."""
 
-from pathlib import Path
-
 import busy_machine
 import pytest
 from busy_machine import ATTEMPTS, Timekeeping, first_that_can_be_judged, judged_by
@@ -10,19 +8,19 @@ from busy_machine import ATTEMPTS, Timekeeping, first_that_can_be_judged, judged
 class Clock:
     """Time that passes by itself, and more of it with each nap."""
 
-    def __init__(self, late_s: float) -> None:
+    def __init__(self, late_s):
         self.now_s, self.late_s = 0.0, late_s
 
-    def monotonic(self) -> float:
+    def monotonic(self):
         return self.now_s
 
-    def sleep(self, seconds: float) -> None:
+    def sleep(self, seconds):
         self.now_s += seconds + self.late_s
 
 
 @pytest.fixture
-def machine_late_by(monkeypatch: pytest.MonkeyPatch):
-    def make(late_s: float, after_naps: int = 1000) -> Timekeeping:
+def machine_late_by(monkeypatch):
+    def make(late_s, after_naps=1000):
         clock = Clock(0.0)
         monkeypatch.setattr(busy_machine, "time", clock)
         machine = Timekeeping()
@@ -45,7 +43,7 @@ def test_machine_keeps_time_unless_it_takes_long_or_often(machine_late_by, late_
 
 
 def test_failure_on_a_punctual_machine_is_a_failure_at_once(machine_late_by, tmp_path):
-    def attempt(folder: Path) -> None:
+    def attempt(folder):
         with judged_by(machine_late_by(0.0).failure):
             assert folder.name == "never"
 
@@ -55,7 +53,7 @@ def test_failure_on_a_punctual_machine_is_a_failure_at_once(machine_late_by, tmp
 
 
 def test_busy_machine_is_tried_again_and_said(machine_late_by, tmp_path):
-    def attempt(folder: Path) -> str:
+    def attempt(folder):
         with judged_by(machine_late_by(0.5).failure):
             assert folder.name == "2", "the ship is not found"
         return folder.name
@@ -66,7 +64,7 @@ def test_busy_machine_is_tried_again_and_said(machine_late_by, tmp_path):
 
 
 def test_machine_that_stays_busy_is_the_reason_of_the_failure(machine_late_by, tmp_path):
-    def attempt(folder: Path) -> None:
+    def attempt(folder):
         with judged_by(machine_late_by(0.5).failure):
             raise AssertionError
 

@@ -2,8 +2,6 @@
 
 import json
 from contextlib import closing
-from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -24,7 +22,7 @@ from utank_hil.console.exit_codes import ExitCode
 pytestmark = [pytest.mark.socketcan, pytest.mark.evidence, pytest.mark.timeout(900)]
 
 
-def still_water(folder: Path, controller: Path, arm_s: float) -> Path:
+def still_water(folder, controller, arm_s):
     """The first ship at the quay, with an operator who arms at a time."""
     path = folder / "quay.yaml"
     content = {
@@ -40,7 +38,7 @@ def still_water(folder: Path, controller: Path, arm_s: float) -> Path:
     return path
 
 
-def run_until(folder: Path, controller: Path, record: Path, mode: Mode, fault: Fault) -> str:
+def run_until(folder, controller, record, mode, fault):
     """Have an operator arm under `run`, until mode and fault are there; what it said."""
     with (
         watched() as watcher,
@@ -53,7 +51,7 @@ def run_until(folder: Path, controller: Path, record: Path, mode: Mode, fault: F
         return run.end()[1]
 
 
-def commission(folder: Path, controller: Path, record: Path) -> dict[str, Any]:
+def commission(folder, controller, record):
     words = ("utank-hil", "commission", controller, "--bus", CHANNEL, "--json")
     with (
         watched() as watcher,
@@ -67,7 +65,7 @@ def commission(folder: Path, controller: Path, record: Path) -> dict[str, Any]:
         return made
 
 
-def story(folder: Path) -> dict[str, Any]:
+def story(folder):
     controller, record = patient_controller(folder, 100.0), folder / "record.json"
     said = run_until(folder, controller, record, Mode.STANDBY, Fault.NOT_COMMISSIONED)
     assert "there is no record of a commissioning" in said

@@ -2,7 +2,6 @@
 
 import subprocess
 from contextlib import ExitStack, closing
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +21,7 @@ ENOUGH_S = 10.0
 OTHERS = ("vcan1", "vcan2")
 
 
-def scenario_file(folder: Path) -> Path:
+def scenario_file(folder):
     """The storm, with the shipped ship of devices on two more interfaces."""
     ship = yaml.safe_load((CONFIGS / "ships" / "thesis_first_devices.yaml").read_text())
     devices = ship["devices"]
@@ -44,7 +43,7 @@ def scenario_file(folder: Path) -> Path:
     return path
 
 
-def sail(folder: Path) -> dict[str, set[str]]:
+def sail(folder):
     """Identifiers by interface; the controller was in charge from arming to the end."""
     with ExitStack() as stack:
         for name in (CHANNEL, *OTHERS):

@@ -9,7 +9,6 @@ import random
 import signal
 import subprocess
 import time
-from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -21,9 +20,6 @@ from two_processes import (
     CHANNEL,
     CONFIGS,
     Candump,
-    Logged,
-    Program,
-    Watcher,
     link_down,
     patient_controller,
     run_controller,
@@ -50,50 +46,50 @@ ZERO_WITHIN_S = 0.25
 class Panel:
     """`utank-hil panel` with actions piped in."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self._process = subprocess.Popen(
             [BIN / "utank-hil", "panel", CONFIGS / "ships/thesis_first.yaml", "--bus", CHANNEL],
             stdin=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
         )  # fmt: skip
 
-    def press(self, *actions: str) -> None:
+    def press(self, *actions):
         assert self._process.stdin is not None
         for action in actions:
             self._process.stdin.write(f"{action}\n")
             self._process.stdin.flush()
             time.sleep(0.7)  # longer than a button stays pressed
 
-    def close(self) -> None:
+    def close(self):
         self._process.stdin.close()
         self._process.kill()
         self._process.wait(30)
 
 
 @contextmanager
-def operated() -> Iterator[tuple[Watcher, Panel]]:
+def operated():
     """Someone who watches, and a panel."""
     with closing(Panel()) as panel, watched() as watcher:
         yield watcher, panel
 
 
 @contextmanager
-def logged(folder: Path) -> Iterator[tuple[Candump, Watcher, Panel]]:
+def logged(folder):
     """The same, and a log."""
     with closing(Candump(folder)) as candump, operated() as (watcher, panel):
         yield candump, watcher, panel
 
 
-def ship(folder: Path, seed: int = 1) -> closing[Program]:
+def ship(folder, seed=1):
     folder.mkdir(exist_ok=True)
     return run_ship(folder, STORM, "--without", "panel", "--seed", seed, duration_s=7200)
 
 
-def controller(folder: Path) -> closing[Program]:
+def controller(folder):
     folder.mkdir(exist_ok=True)
     return run_controller(folder, patient_controller(folder, 100.0), "--out", folder / "out")
 
 
-def arm(watcher: Watcher, panel: Panel) -> None:
+def arm(watcher, panel):
     """Ask for pressure as an operator does, and wait for it; before that there was none."""
     watcher.wait(lambda w: w.mode in (Mode.STANDBY, Mode.FAULT))
     panel.press("standby")
@@ -109,13 +105,13 @@ def arm(watcher: Watcher, panel: Panel) -> None:
     watcher.wait_in_charge(PRESSURE_PA)
 
 
-def pauses(log: list[Logged], name: str) -> list[tuple[float, float]]:
+def pauses(log, name):
     """Ends and beginnings of a message's stream around each pause of over a second."""
     times = [frame.time_s for frame in log if frame.name == name]
     return [(a, b) for a, b in pairwise(times) if b - a > 1.0]
 
 
-def kill_controllers(folder: Path) -> list[Logged]:
+def kill_controllers(folder):
     draw = random.Random(1)
     with logged(folder) as (candump, watcher, panel), ship(folder / "ship"):
         watcher.wait(lambda w: w.drive is not None)
@@ -156,7 +152,7 @@ def test_a_controller_killed_at_any_instant_leaves_the_pump_at_zero(tmp_path):
     assert max(waits_s) <= ZERO_WITHIN_S
 
 
-def kill_ships(folder: Path) -> list[Logged]:
+def kill_ships(folder):
     draw = random.Random(2)
     with logged(folder) as (candump, watcher, panel), controller(folder / "controller") as one:
         for number in range(KILLS):
@@ -189,7 +185,7 @@ def test_a_ship_killed_at_any_instant_hears_no_pressure_any_more(tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_under_pressure_ends_with_the_pump_at_zero(number, tmp_path):
-    def signalled(folder: Path) -> list[Logged]:
+    def signalled(folder):
         with logged(folder) as (candump, watcher, panel), ship(folder / "ship"):
             watcher.wait(lambda w: w.drive is not None)
             with controller(folder / "controller") as one:
@@ -199,12 +195,12 @@ def test_a_signal_under_pressure_ends_with_the_pump_at_zero(number, tmp_path):
             return candump.stop("PUMP_CMD")
 
     log = first_that_can_be_judged(signalled, tmp_path)
-    assert max(abs(frame.signals["pressure_pa"]) for frame in log) >= PRESSURE_PA  # type: ignore[arg-type]
+    assert max(abs(frame.signals["pressure_pa"]) for frame in log) >= PRESSURE_PA
     assert log[-1].signals["pressure_pa"] == 0.0
 
 
 def test_a_hundred_flaps_of_the_interface_are_survived_without_arming(tmp_path):
-    def flap(folder: Path) -> None:
+    def flap(folder):
         draw = random.Random(3)
         with (
             operated() as (watcher, panel),

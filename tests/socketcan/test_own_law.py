@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 from busy_machine import first_that_can_be_judged
-from two_processes import Watcher, patient_controller, run_controller, run_ship, watched
+from two_processes import patient_controller, run_controller, run_ship, watched
 
 from utank_hil.canbus import DriveState, Fault, Mode
 from utank_hil.console.exit_codes import ExitCode
@@ -44,7 +44,7 @@ class Law:
 FROM_PA = 500.0
 
 
-def controller_of(folder: Path, flaw: str) -> Path:
+def controller_of(folder, flaw):
     (folder / "own_flawed_law.py").write_text(SOURCE, encoding="utf-8")
     path = patient_controller(folder, 100.0)
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
@@ -58,9 +58,7 @@ def controller_of(folder: Path, flaw: str) -> Path:
     return path
 
 
-def until_it_ends(
-    folder: Path, flaw: str, monkeypatch: pytest.MonkeyPatch
-) -> tuple[Watcher, dict[str, object]]:
+def until_it_ends(folder, flaw, monkeypatch):
     """In charge until the law fails; the bus at the end, and the controller's report."""
     config = controller_of(folder, flaw)
     monkeypatch.setenv("PYTHONPATH", str(folder))

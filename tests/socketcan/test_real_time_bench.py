@@ -10,7 +10,7 @@ from busy_machine import first_that_can_be_judged, judged_by, lost
 from two_processes import CHANNEL, CONFIGS, Program, patient_controller
 
 from firmware_sim.bench import jobs_of
-from firmware_sim.run import RECORD_S, Run, run_lockstep
+from firmware_sim.run import RECORD_S, run_lockstep
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis.loop.sea_response import roll_without_tank
 from utank_hil.canbus import Mode
@@ -31,7 +31,7 @@ HELD_UP_S = 0.3
 QUIET_SHARE = 0.1
 
 
-def scenario_file(folder: Path) -> Path:
+def scenario_file(folder):
     """The storm with one controller, armed soon."""
     content = yaml.safe_load((CONFIGS / "scenarios" / "storm.yaml").read_text())
     content["vessel"] = str(CONFIGS / "ships" / "thesis_first.yaml")
@@ -44,7 +44,7 @@ def scenario_file(folder: Path) -> Path:
     return path
 
 
-def active(run: dict[str, np.ndarray]) -> slice:
+def active(run):
     """The rows from arming until the controller was no longer in charge, or was held up.
 
     Where the machine stops both processes for long, the pump holds its pressure meanwhile: that is
@@ -57,13 +57,13 @@ def active(run: dict[str, np.ndarray]) -> slice:
     return slice(begin, begin + int(end[0]) + int(in_charge[begin + end[0]]))
 
 
-def lost_share(report: dict) -> float:
+def lost_share(report):
     """Share of the last run's ticks that the machine left out."""
     loop = report["runs"][-1]["loop"]
     return loop["skipped"] / (loop["ticks"] + loop["skipped"])
 
 
-def attempt(folder: Path) -> Bench:
+def attempt(folder):
     """Bench on the bus.
 
     A process that the machine holds up for longer than the drive's command timeout is a dead one
@@ -89,18 +89,18 @@ def attempt(folder: Path) -> Bench:
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
+def bench(tmp_path_factory):
     """Scenario, report and recording."""
     return first_that_can_be_judged(attempt, tmp_path_factory.mktemp("bench"))
 
 
-def lockstep(scenario: Scenario, index: int, arm_s: float = 0.5) -> Run:
+def lockstep(scenario, index, arm_s=0.5):
     script = (TimedAction(arm_s, Action.ARM),)
     changed = scenario.model_copy(update={"operator": script})
     return run_lockstep(jobs_of(changed, scenario.seed, 2 * DURATION_S)[index])
 
 
-def roll_at(when_s: np.ndarray, run: Run) -> np.ndarray:
+def roll_at(when_s, run):
     return np.interp(when_s, run.column("time_s"), run.column("true_roll_rad"))
 
 

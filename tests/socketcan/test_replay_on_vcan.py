@@ -35,7 +35,7 @@ LISTENERS = Path("/proc/net/can/rcvlist_all")
 PLAYED_NS = 2_500_000_000
 
 
-def driven(folder: Path) -> Path:
+def driven(folder):
     """The frame log of a run in which the pump was driven, and then the interface was down."""
     with (
         watched() as watcher,
@@ -54,7 +54,7 @@ def driven(folder: Path) -> Path:
     return Path(recording["frames"])
 
 
-def wait_for_listener() -> None:
+def wait_for_listener():
     """Wait until candump's socket takes every frame."""
     deadline = time.monotonic() + 30.0
     while not re.search(rf"{CHANNEL}.*\braw\b", LISTENERS.read_text()):

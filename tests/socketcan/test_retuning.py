@@ -1,7 +1,5 @@
 """A controller that retunes itself on a real SocketCAN interface."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from busy_machine import first_that_can_be_judged
@@ -14,15 +12,11 @@ from retuning_story import (
     SHORT,
     TRIAL,
     UNJUDGED,
-    Story,
     assert_nothing_was_disturbed,
     assert_ship_is_found,
     in_charge,
     tell_story,
 )
-
-from utank_hil.base.arrays import FloatArray
-from utank_hil.canbus import RetuningState
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.evidence, pytest.mark.timeout(1800)]
 
@@ -30,14 +24,14 @@ LATE_S = 0.035  # from one command to the next: more than a tick missed
 
 
 @pytest.fixture(scope="module")
-def retuned(tmp_path_factory: pytest.TempPathFactory) -> Story:
-    def attempt(folder: Path) -> Story:
+def retuned(tmp_path_factory):
+    def attempt(folder):
         return tell_story(folder, SHORT, RETUNED)
 
     return first_that_can_be_judged(attempt, tmp_path_factory.mktemp("retuned"))
 
 
-def command_gaps(story: Story, state: RetuningState) -> FloatArray:
+def command_gaps(story, state):
     """Seconds from command to command while the bus showed a state of retuning."""
     told = [f.time_s for f in story.of("CTRL_STATUS") if f.signals["retuning"] == state]
     times = [f.time_s for f in story.of("PUMP_CMD") if told[0] <= f.time_s <= told[-1]]
@@ -71,7 +65,7 @@ def test_swap_makes_no_step_and_disturbs_nothing(retuned):
 
 
 def test_refusal_is_shown_with_its_reason_and_the_old_law_goes_on(tmp_path):
-    def attempt(folder: Path) -> Story:
+    def attempt(folder):
         # she rolls more than identification is allowed in
         return tell_story(folder, SHORT | {"roll_limit_rad": 0.01}, REFUSED)
 
@@ -86,7 +80,7 @@ def test_refusal_is_shown_with_its_reason_and_the_old_law_goes_on(tmp_path):
 
 @pytest.mark.timeout(3600)  # twelve minutes in which no process is held up for 100 ms
 def test_shipped_law_of_order_200_is_retuned_from_500_s_of_data(tmp_path):
-    def attempt(folder: Path) -> Story:
+    def attempt(folder):
         return tell_story(folder, UNJUDGED, RETUNED, "adaptive_gpc.yaml", 500.0 + 120.0)
 
     story = first_that_can_be_judged(attempt, tmp_path)

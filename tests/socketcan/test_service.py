@@ -1,7 +1,6 @@
 """The service of deploy/ on a booted systemd: starts, is watched, starts again, never arms."""
 
 import time
-from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -9,15 +8,7 @@ import pytest
 import yaml
 from booted_system import ETC, LOGS, BootedSystem, needed_here
 from busy_machine import first_that_can_be_judged
-from two_processes import (
-    CHANNEL,
-    CONFIGS,
-    Watcher,
-    link_down,
-    patient_controller,
-    run_ship,
-    watched,
-)
+from two_processes import CHANNEL, CONFIGS, link_down, patient_controller, run_ship, watched
 
 from utank_hil.canbus import DriveState, Fault, Mode
 from utank_hil.runners.process_priority import PRIORITY
@@ -31,13 +22,13 @@ SCHED_FIFO = "1"  # field 41 of /proc/PID/stat
 
 
 @pytest.fixture
-def system() -> Iterator[BootedSystem]:
+def system():
     needed_here()
     with closing(BootedSystem(CHANNEL)) as booted:
         yield booted
 
 
-def configure(folder: Path, **changed: object) -> None:
+def configure(folder, **changed):
     """Put a controller's file, and its ship's, where the unit looks for them."""
     content = yaml.safe_load(patient_controller(folder, 100.0).read_text())
     (ETC / "ship.yaml").write_bytes((CONFIGS / "ships/thesis_first.yaml").read_bytes())
@@ -45,7 +36,7 @@ def configure(folder: Path, **changed: object) -> None:
     (ETC / "controller.yaml").write_text(yaml.safe_dump(content))
 
 
-def is_confined(system: BootedSystem) -> None:
+def is_confined(system):
     """Its process has what the unit leaves it, and real time."""
     pid = system.shown("MainPID")
     lines = system.run("cat", f"/proc/{pid}/status").splitlines()
@@ -57,7 +48,7 @@ def is_confined(system: BootedSystem) -> None:
     assert (fields[37], fields[38]) == (str(PRIORITY), SCHED_FIFO)
 
 
-def starts_again_in_standby(system: BootedSystem, watcher: Watcher, starts: int) -> None:
+def starts_again_in_standby(system, watcher, starts):
     """By itself; the ship's panel still holds the arm bit, and nothing is armed."""
     system.wait("NRestarts", str(starts))
     system.wait("SubState", "running")
@@ -69,7 +60,7 @@ def starts_again_in_standby(system: BootedSystem, watcher: Watcher, starts: int)
     assert watcher.drive.state is not DriveState.OPERATION_ENABLED
 
 
-def sail(system: BootedSystem, folder: Path) -> None:
+def sail(system, folder):
     """A service that hangs under pressure, is killed, loses the interface, and is stopped."""
     configure(folder)
     system.run("systemctl", "stop", "utank-hil")  # of an attempt that could not be judged

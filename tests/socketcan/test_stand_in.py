@@ -20,7 +20,7 @@ PAGE = Path("docs/how-to/hardware.md")
 PRESSURE_PA = 2e3
 
 
-def commands(folder: Path) -> dict[str, list[str]]:
+def commands(folder):
     """The three commands of the page by program, for a machine that is busy."""
     block = re.search(r"^```sh\n(.*?)^```$", PAGE.read_text(), re.M | re.S)
     assert block
@@ -33,7 +33,7 @@ def commands(folder: Path) -> dict[str, list[str]]:
     return found
 
 
-def arm_with_stand_in(folder: Path) -> tuple[dict[str, object], Candump]:
+def arm_with_stand_in(folder):
     """Until the pump works; the ship's report and the log."""
     said = commands(folder)
     with closing(Candump(folder)) as candump:

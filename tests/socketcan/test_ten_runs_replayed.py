@@ -5,12 +5,10 @@ a busy one excuses no difference; only that a run did not meet what it is for.
 """
 
 import time
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from multiprocessing.synchronize import Barrier
-from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import pytest
 from busy_machine import first_that_can_be_judged, judged_by, lost
@@ -27,7 +25,7 @@ from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.nodes.panel import Action
 from utank_hil.runners import RealTimeLoop, heard_by
 from utank_hil.telemetry.frame_log import FrameLog, Kind
-from utank_hil.telemetry.replay import Entry, entries_of, replay_log
+from utank_hil.telemetry.replay import entries_of, replay_log
 from utank_hil.telemetry.replay_head import recorded_config
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
@@ -38,7 +36,7 @@ ARM: Final = ((0.3, Action.ARM),)
 AGAIN: Final = ((3.5, Action.RESET), (4.0, Action.DISARM), (4.3, Action.ARM))
 
 
-def _fault(kind: str, message: str, at_s: float, for_s: float, **keys: Any) -> dict[str, Any]:
+def _fault(kind, message, at_s, for_s, **keys):
     return {"kind": kind, "message": message, "at_s": at_s, "for_s": for_s, **keys}
 
 
@@ -76,19 +74,19 @@ class Together:
 
     both: Barrier
 
-    def stopped(self, done_s: float) -> bool:
+    def stopped(self, done_s):
         return False
 
-    def begin_ns(self) -> int:
+    def begin_ns(self):
         self.both.wait(READY_S)
         return time.monotonic_ns()
 
 
-def prepare(both: Barrier) -> None:
+def prepare(both):
     Together.both = both
 
 
-def run_ship(case: Case) -> None:
+def run_ship(case):
     plant = build_ship_side(scenario_of(case), 0, ()).plant
     for now_ns in (0, TICK_NS):
         plant.advance(now_ns)  # its compiled code is loaded
@@ -101,14 +99,14 @@ def run_ship(case: Case) -> None:
 
 
 @pytest.fixture(scope="module")
-def processes() -> Iterator[ProcessPoolExecutor]:
+def processes():
     """Two that have imported all: in a user-mode kernel that takes longer than a run."""
     context = get_context("fork")
     with ProcessPoolExecutor(2, context, prepare, (context.Barrier(2),)) as pool:
         yield pool
 
 
-def recorded(case: Case, told: set[Mode | Fault], processes: ProcessPoolExecutor, to: Path) -> Path:
+def recorded(case, told, processes, to):
     """The frame log of a run in which the controller told all that."""
     patient = load_config(patient_controller(to, 100.0), ControllerConfig)
     names = ("safety", "command_timeout_ms")
@@ -132,7 +130,7 @@ def recorded(case: Case, told: set[Mode | Fault], processes: ProcessPoolExecutor
     return file
 
 
-def entries(file: Path) -> Iterator[Entry]:
+def entries(file):
     return entries_of(FrameLog(file).blocks())
 
 

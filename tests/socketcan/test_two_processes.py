@@ -13,7 +13,6 @@ from busy_machine import first_that_can_be_judged
 from two_processes import (
     Candump,
     Logged,
-    Program,
     link_down,
     patient_controller,
     run_controller,
@@ -33,11 +32,11 @@ TIMEOUT_S = 0.05
 COMMAND_S = 0.02  # from one pump command to the next
 
 
-def controller_into(folder: Path, out: Path) -> closing[Program]:
+def controller_into(folder, out):
     return run_controller(folder, patient_controller(folder), "--out", out)
 
 
-def only_recording(folder: Path) -> Path:
+def only_recording(folder):
     """The recording of the one run that was recorded there."""
     (file,) = folder.glob("run-*.rrd")
     return file
@@ -53,16 +52,16 @@ class Story:
     statuses_after_restart: int = 0
     killed_states: set[DriveState | None] = field(default_factory=set)
 
-    def of(self, name: str) -> list[Logged]:
+    def of(self, name):
         return [frame for frame in self.log if frame.name == name]
 
 
 @pytest.fixture(scope="module")
-def story(tmp_path_factory: pytest.TempPathFactory) -> Story:
+def story(tmp_path_factory):
     return first_that_can_be_judged(tell_story, tmp_path_factory.mktemp("story"))
 
 
-def tell_story(folder: Path) -> Story:
+def tell_story(folder):
     """Arm, drive for a while, kill the controller, restart it, end both."""
     told = Story()
     again = folder / "again"
@@ -122,7 +121,7 @@ def test_pressure_flows_once_the_controller_is_in_charge(story):
             assert frame.signals["pressure_pa"] == 0.0
 
 
-def restart_s(story: Story) -> float:
+def restart_s(story):
     """When the second controller first spoke, after the longest pause between two commands."""
     assert len(story.of("ADDRESS_CLAIM_CONTROLLER")) == 2
     times = [frame.time_s for frame in story.of("PUMP_CMD")]
@@ -211,7 +210,7 @@ def test_counters_step_by_one_so_nothing_was_lost(story):
         assert {(b - a) % 16 for a, b in pairwise(counters)} == {1}
 
 
-def take_the_link_down(folder: Path) -> tuple[dict[str, object], Path]:
+def take_the_link_down(folder):
     """Interface down for half a second under an armed controller; its report and recording."""
     with (
         watched() as watcher,

@@ -2,7 +2,6 @@
 
 import signal
 from contextlib import closing
-from pathlib import Path
 
 import pytest
 from busy_machine import first_that_can_be_judged
@@ -23,7 +22,7 @@ pytestmark = [pytest.mark.socketcan, pytest.mark.evidence, pytest.mark.timeout(9
 TIMEOUT_S = 0.1
 
 
-def kill_the_controller(folder: Path) -> Candump:
+def kill_the_controller(folder):
     """Arm the on-off law, let it work, kill it; the log."""
     config = patient_controller(folder, 1e3 * TIMEOUT_S, "valve_on_off", "thesis_first_valve")
     scenario = CONFIGS / "scenarios" / "semi_active.yaml"

@@ -9,7 +9,6 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -37,7 +36,7 @@ _GET_FLAGS, _SET_FLAGS, _UP = 0x8913, 0x8914, 0x1  # ioctl of <linux/sockios.h>,
 
 
 @contextmanager
-def link_down() -> Iterator[None]:
+def link_down():
     """The interface is down, and up again however that ends."""
     _set_link(up=False)
     try:
@@ -46,7 +45,7 @@ def link_down() -> Iterator[None]:
         _set_link(up=True)
 
 
-def _set_link(*, up: bool) -> None:
+def _set_link(*, up):
     """Take the interface up or down without starting a process, which would make ticks late."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as channel:
         request = struct.pack("16sH14x", CHANNEL.encode(), 0)
@@ -55,12 +54,7 @@ def _set_link(*, up: bool) -> None:
         fcntl.ioctl(channel, _SET_FLAGS, struct.pack("16sH14x", CHANNEL.encode(), flags))
 
 
-def patient_controller(
-    folder: Path,
-    command_timeout_ms: float = 50.0,
-    controller: str = "gpc",
-    ship: str = "thesis_first",
-) -> Path:
+def patient_controller(folder, command_timeout_ms=50.0, controller="gpc", ship="thesis_first"):
     """A shipped controller with thresholds for a busy machine: function is judged, not timing.
 
     A user-mode kernel shares its one processor with whatever the machine does besides; its ticks
@@ -95,21 +89,21 @@ class Logged(NamedTuple):
 class Candump:
     """candump on the bus from now on, its log in a file."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder):
         self._file = folder / "candump.log"
         self._output = self._file.open("wb")
         # a buffer of many seconds: what a busy machine keeps it from reading is not lost to the log
         log = ["candump", "-L", "-r", str(LOG_BUFFER_BYTES), CHANNEL]
         self._process = subprocess.Popen(log, stdout=self._output)
 
-    def close(self) -> None:
+    def close(self):
         """End it; idempotent."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGINT)  # on which it writes out what it holds
             self._process.wait(30)
             self._output.close()
 
-    def stop(self, *names: str) -> list[Logged]:
+    def stop(self, *names):
         """End it and read its log: all messages, or those of these names.
 
         A process in a user-mode kernel that grows beyond 250 MB is killed (docs/vcan.md): of many
@@ -136,7 +130,7 @@ class Candump:
 class Watcher:
     """What controller and drive say of themselves at present."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         catalogue = load_catalogue()
         self._controller = catalogue.receiver(ControllerStatus)
         self._drive = catalogue.receiver(DriveStatus1)
@@ -146,10 +140,10 @@ class Watcher:
         self.statuses = 0
         self.machine = Timekeeping()
 
-    def close(self) -> None:
+    def close(self):
         self._port.close()
 
-    def look(self) -> None:
+    def look(self):
         """Hear what came since the last look."""
         try:
             frames = self._port.receive()
@@ -162,7 +156,7 @@ class Watcher:
             else:
                 self.drive = self._drive.accept(frame) or self.drive
 
-    def wait(self, until: Callable[["Watcher"], bool], timeout_s: float = START_S) -> None:
+    def wait(self, until, timeout_s=START_S):
         """Look until something is so."""
         deadline = time.monotonic() + timeout_s
         while not until(self):
@@ -171,16 +165,16 @@ class Watcher:
             self.look()
 
     @property
-    def mode(self) -> Mode | None:
+    def mode(self):
         """Mode of the controller."""
         return None if self.status is None else self.status.mode
 
-    def wait_in_charge(self, pressure_pa: float = 0.0) -> None:
+    def wait_in_charge(self, pressure_pa=0.0):
         """Look until the controller is active and the pump gives so much pressure."""
         self.wait(lambda watcher: watcher.mode is not None)
         self.machine.begin_anew()
 
-        def done(watcher: Watcher) -> bool:
+        def done(watcher):
             drive = watcher.drive
             assert watcher.mode is not Mode.FAULT, f"controller {watcher.status}, drive {drive}"
             driven = drive is not None and abs(drive.pressure_pa) >= pressure_pa
@@ -188,14 +182,14 @@ class Watcher:
 
         self.wait(done)
 
-    def watch(self, seconds: float) -> None:
+    def watch(self, seconds):
         """Look for so long."""
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
             self.machine.nap()
             self.look()
 
-    def forget(self) -> None:
+    def forget(self):
         """Believe nothing that was said before."""
         self.look()
         self.status = self.drive = None
@@ -205,7 +199,7 @@ class Watcher:
 class Program:
     """One of our commands, running."""
 
-    def __init__(self, folder: Path, *command: object) -> None:
+    def __init__(self, folder, *command):
         self._errors = (folder / f"{command[0]}.err").open("w+")
         self._output = (folder / f"{command[0]}.out").open("w+")
         self._process = subprocess.Popen(
@@ -215,16 +209,14 @@ class Program:
         )
 
     @property
-    def code(self) -> int | None:
+    def code(self):
         """Exit code, None while it runs."""
         return self._process.poll()
 
-    def signal(self, number: int) -> None:
+    def signal(self, number):
         self._process.send_signal(number)
 
-    def end(
-        self, *codes: ExitCode, interrupt: bool = True, timeout_s: float = 60.0
-    ) -> tuple[dict[str, object], str]:
+    def end(self, *codes, interrupt=True, timeout_s=60.0):
         """Interrupt it as Ctrl-C does, or wait for it; what it printed as JSON, and its notes.
 
         It must end with one of `codes`, without any with OK.
@@ -239,7 +231,7 @@ class Program:
         assert "Traceback" not in errors
         return json.loads(output), errors
 
-    def close(self) -> None:
+    def close(self):
         if self._process.poll() is None:
             self._process.kill()
             self._process.wait(30)
@@ -248,20 +240,18 @@ class Program:
 
 
 @contextmanager
-def watched() -> Iterator[Watcher]:
+def watched():
     """Someone who watches; what is asserted meanwhile fails only where the machine kept time."""
     with closing(Watcher()) as watcher, judged_by(watcher.machine.failure):
         yield watcher
 
 
-def run_ship(
-    folder: Path, scenario: Path, *words: object, duration_s: int = 1200
-) -> closing[Program]:
+def run_ship(folder, scenario, *words, duration_s=1200):
     """The ship's side, for the time of a test at most."""
     words = ("firmware-sim", scenario, "--bus", CHANNEL, "--duration", duration_s, *words)
     return closing(Program(folder, *words, "--json"))
 
 
-def run_controller(folder: Path, config: Path, *words: object) -> closing[Program]:
+def run_controller(folder, config, *words):
     """The controller, for the time of a test at most."""
     return closing(Program(folder, "utank-hil", "run", config, "--bus", CHANNEL, *words, "--json"))

@@ -1,6 +1,5 @@
 """The blueprint: every column is to be seen, once a page, and mode and fault as a lane."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -24,7 +23,7 @@ COLUMNS = (*SIGNALS, "true_roll_rad", "wave_moment_nm")
 SHOWN = sorted(field_of(c).name for c in COLUMNS if c not in ("time_s", "mode", "fault"))
 
 
-def views(part: rrb.Container | rrb.View) -> Iterator[rrb.View]:
+def views(part):
     if isinstance(part, rrb.View):
         yield part
     else:
@@ -32,13 +31,13 @@ def views(part: rrb.Container | rrb.View) -> Iterator[rrb.View]:
             yield from views(child)
 
 
-def plotted(view: rrb.View, path: str) -> list[str]:
+def plotted(view, path):
     """Names of the fields a plot draws of a run."""
     lines: Any = dict(view.visualizer_overrides).get(path, [])
     return [mapping.selector.removeprefix(".") for line in lines for mapping in line.mappings]
 
 
-def plots_of(page: rrb.Container) -> list[rrb.TimeSeriesView]:
+def plots_of(page):
     return [view for view in views(page) if isinstance(view, rrb.TimeSeriesView)]
 
 

@@ -47,7 +47,7 @@ def traffic(found, seconds=3):
     return heard, run.bus.load(seconds * SECOND_NS)
 
 
-def census(messages, vessel=None, bit_rate=250_000):
+def census(messages, vessel=None, bit_rate=250000):
     found = BusCensus(bit_rate, vessel)
     for message in messages:
         found.take(message)

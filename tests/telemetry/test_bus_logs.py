@@ -5,14 +5,13 @@ import json
 import re
 from collections import Counter
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
 import can
 import numpy as np
 import pytest
 from others import field_case
-from typer.testing import CliRunner, Result
+from typer.testing import CliRunner
 
 from utank_hil.commands.export import export
 from utank_hil.commands.replay import replay
@@ -27,13 +26,13 @@ LINE = re.compile(r"\((\d+)\.(\d{6})\) (\S+) (\S+?)( [RT])?")
 """A line of candump, read by nothing of ours."""
 
 
-def invoke(command: Any, *words: object) -> Result:
+def invoke(command, *words):
     app = new_app()
     app.command()(command)
     return CliRunner(env=WIDE).invoke(app, [str(word) for word in words])
 
 
-def exported(case: str, to: Path, *words: object, code: int = 0) -> str:
+def exported(case, to, *words, code=0):
     """Export a case and return what was said."""
     result = invoke(export, field_case(case), "--to", to, *words)
     assert result.exit_code == code, (result.stderr, result.exception)
@@ -41,14 +40,14 @@ def exported(case: str, to: Path, *words: object, code: int = 0) -> str:
     return result.stderr
 
 
-def lines_in(file: Path) -> list[tuple[int, str, str]]:
+def lines_in(file):
     """Return microseconds, channel and frame of each line of candump."""
     found = [LINE.fullmatch(line) for line in file.read_text().splitlines()]
     assert all(found)
     return [(int(m[1] + m[2]), m[3], m[4]) for m in found if m]
 
 
-def replayed(case: str) -> dict[str, Any]:
+def replayed(case):
     result = invoke(replay, field_case(case), "--config", GPC, "--json")
     assert result.exit_code in (0, 1), result.stderr
     found: dict[str, Any] = json.loads(result.stdout)
@@ -273,7 +272,7 @@ def test_a_source_that_fails_leaves_what_was_there_before(tmp_path):
     assert (tmp_path / "a.log").read_text() == "kept"
 
 
-def written(folder: Path, name: str, frames: list[BusFrame]) -> Path:
+def written(folder, name, frames):
     from utank_hil.telemetry.bus_files.writing import write_frames
 
     write_frames(folder / name, frames)

@@ -10,7 +10,6 @@ from utank_hil.telemetry.frame_log import (
     PAYLOAD_BYTES,
     RECORD,
     Kind,
-    Records,
     frame_ring,
     pack,
     unpack,
@@ -28,13 +27,13 @@ ENTRIES = st.lists(
 )
 
 
-def packed(entries: list[tuple[Kind, int, int, bytes]]) -> bytes:
+def packed(entries):
     return b"".join(
         LAYOUT.pack(number, data, kind, time_ns) for kind, number, time_ns, data in entries
     )
 
 
-def records(entries: list[tuple[Kind, int, int, bytes]]) -> Records:
+def records(entries):
     return np.frombuffer(packed(entries), dtype=RECORD)
 
 

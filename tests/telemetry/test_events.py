@@ -83,7 +83,7 @@ def test_text_of_an_event_is_its_state_and_its_reasons():
 
 
 def test_alarms_and_refusals_warn_and_the_rest_is_news():
-    def alarm(state: AlarmState | None) -> AlarmEvent:
+    def alarm(state):
         return AlarmEvent(0, Fault.LEVEL_LIMIT, state, Mode.FAULT)
 
     assert [state for state in (*AlarmState, None) if warns(alarm(state))] == [

@@ -3,7 +3,6 @@
 import random
 import struct
 import zlib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +18,6 @@ from utank_hil.telemetry.frame_log import (
     FrameLogError,
     FrameLogWriter,
     Kind,
-    Records,
 )
 
 TICK_NS = 10_000_000
@@ -27,7 +25,7 @@ SECOND_NS = 1_000_000_000
 HEAD = {"about": {"version": "1"}, "law": [1.5, 2.5]}
 
 
-def tick(number: int, source: random.Random) -> bytes:
+def tick(number, source):
     """What a tick has: some noisy frames, the tick, an answer."""
     time_ns = number * TICK_NS
     frames = [
@@ -38,9 +36,7 @@ def tick(number: int, source: random.Random) -> bytes:
     return b"".join([*frames, LAYOUT.pack(0, b"", Kind.TICK, time_ns), sent])
 
 
-def write_log(
-    file: Path, ticks: int, *, small: bool = False, seed: int = 1
-) -> tuple[bytes, list[tuple[int, int]]]:
+def write_log(file, ticks, *, small=False, seed=1):
     """Write a log; all its records, and (size of the file, time in ns) after each tick."""
     source = random.Random(seed)
     whole, sizes = b"", []
@@ -55,13 +51,13 @@ def write_log(
     return whole, sizes
 
 
-def read(path: Path) -> tuple[Records, FrameLog]:
+def read(path):
     log = FrameLog(path)
     blocks = list(log.blocks())
     return np.concatenate(blocks) if blocks else np.empty(0, dtype=RECORD), log
 
 
-def sealed(*blocks: tuple[bytes, bytes]) -> bytes:
+def sealed(*blocks):
     """A log of these blocks, each with the right checksum."""
     parts = [b"UTANKHIL frames 1\n"]
     for kind, payload in blocks:

@@ -5,7 +5,6 @@ import subprocess
 import sys
 import time
 from itertools import count
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,11 +16,10 @@ from utank_hil.telemetry.frame_log import (
     FrameLog,
     FrameRecording,
     Kind,
-    Records,
     frame_ring,
 )
 from utank_hil.telemetry.recorder_process import RecorderProcess, RecorderState, RecordingTask
-from utank_hil.telemetry.ring import RingWriter, RowWriter
+from utank_hil.telemetry.ring import RowWriter
 from utank_hil.telemetry.rotation import part_of
 
 pytestmark = pytest.mark.slow
@@ -36,21 +34,21 @@ _main()
 """
 
 
-def tick(number: int) -> bytes:
+def tick(number):
     """A tick with as many frames as can't be in one slot."""
     time_ns = number * TICK_NS
     frame = LAYOUT.pack(number, number.to_bytes(8, "little"), Kind.RECEIVED, time_ns)
     return frame * 40 + LAYOUT.pack(0, b"", Kind.TICK, time_ns)
 
 
-def feed(ring: RingWriter, numbers: range) -> bytes:
+def feed(ring, numbers):
     data = b"".join(map(tick, numbers))
     for number in numbers:
         ring.write(tick(number))
     return data
 
 
-def read(file: Path) -> Records:
+def read(file):
     log = FrameLog(file)
     assert log.head == HEAD
     return np.concatenate(list(log.blocks()))

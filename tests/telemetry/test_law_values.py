@@ -8,10 +8,8 @@ import pytest
 
 from utank_hil.assembly import build_law
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.control import Controller
 from utank_hil.telemetry.law_values import (
     LawValuesError,
-    Values,
     decoded,
     differences,
     encoded,
@@ -23,7 +21,7 @@ CONTROLLERS = Path("configs/controllers")
 
 
 @pytest.fixture(scope="module")
-def dpc() -> dict[str, np.ndarray]:
+def dpc():
     config = load_config(CONTROLLERS / "dpc.yaml", ControllerConfig)
     return law_values(build_law(config).controller())
 
@@ -60,11 +58,11 @@ def test_numbers_that_only_one_side_has_are_named(dpc):
     assert str(found) == "gains: recorded float64 of shape (1, 274), designed here missing"
 
 
-def shipped(name: str) -> ControllerConfig:
+def shipped(name):
     return load_config(CONTROLLERS / f"{name}.yaml", ControllerConfig)
 
 
-def like_another_processor_s(values: Values) -> Values:
+def like_another_processor_s(values):
     """The same law but for rounding: gains and models that differ from the eighth digit on."""
     other = {}
     for name, value in values.items():
@@ -74,7 +72,7 @@ def like_another_processor_s(values: Values) -> Values:
     return other
 
 
-def answers_of(controller: Controller, measured: int) -> list[bytes]:
+def answers_of(controller, measured):
     """What a controller commands for a swell that takes a planning law to its limits."""
     swing = 0.3 * np.sin(0.12 * np.arange(300))[:, None] * np.cos(np.arange(measured))
     return [controller.step(y).tobytes() for y in swing]
@@ -113,7 +111,7 @@ def test_numbers_of_another_law_are_not_taken(dpc):
 
 def test_a_law_that_holds_itself_has_its_numbers_once():
     class Ring:
-        def __init__(self) -> None:
+        def __init__(self):
             self.gain = 2.5
             self.itself = self
 

@@ -5,7 +5,6 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -37,19 +36,19 @@ ABOUT = {
 }
 
 
-def here() -> list[LiveRun]:
+def here():
     """The runs of this process: others may go on on the machine."""
     return [run for run in live_runs() if run.pid == os.getpid()]
 
 
-def rows(first: int, count: int) -> np.ndarray:
+def rows(first, count):
     values = np.zeros((count, len(SIGNALS)))
     values[:, SIGNALS.index("time_s")] = np.arange(first, first + count) / 100
     values[:, SIGNALS.index("roll_rad")] = np.sin(values[:, 0])
     return values
 
 
-def listening(port: int | None) -> set[str]:
+def listening(port):
     """Hexadecimal addresses on which somebody listens at a port, from the kernel's own table."""
     tables = (Path(f"/proc/net/{name}").read_text().splitlines()[1:] for name in ("tcp", "tcp6"))
     ends = [line.split() for table in tables for line in table]
@@ -57,7 +56,7 @@ def listening(port: int | None) -> set[str]:
     return {host for host, number in found if int(number, 16) == port}
 
 
-def saved(url: str, file: Path, seconds: float = 20.0) -> Iterator[dict[str, np.ndarray]]:
+def saved(url, file, seconds=20.0):
     """What a viewer that connects now has got, again and again."""
     viewer = subprocess.Popen([rerun_binary(), url, "--save", str(file)], env=rerun_environment())
     try:

@@ -1,7 +1,6 @@
 """A tap changes nothing on the way, and writes down all of it in its order."""
 
 import tracemalloc
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
@@ -9,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Frame
 from utank_hil.control import PredictiveLaw
 from utank_hil.retuning import Answer, Candidate, ModelSummary, Refusal
@@ -38,23 +36,23 @@ class Node:
     )
     calls: list[tuple[Any, ...]] = field(default_factory=list)
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame, now_ns):
         self.calls.append(("receive", frame, now_ns))
 
-    def other_frames(self, count: int) -> None:
+    def other_frames(self, count):
         self.calls.append(("other_frames", count))
 
-    def link_error(self, now_ns: int, reason: str) -> None:
+    def link_error(self, now_ns, reason):
         self.calls.append(("link_error", now_ns, reason))
 
-    def tick(self, now_ns: int) -> Iterable[Frame]:
+    def tick(self, now_ns):
         self.calls.append(("tick", now_ns))
         self.last_ns = now_ns
         if self.retuner is not None:
             self.calls.append((self.retuner.alive, self.retuner.answer(1, now_ns)))
         return (Frame(0x100 + len(self.calls), b"\x01\x02"),)
 
-    def stop(self, now_ns: int) -> Iterable[Frame]:
+    def stop(self, now_ns):
         self.calls.append(("stop", now_ns))
         return (Frame(0x1FFFFFFF, b""),)
 
@@ -67,15 +65,15 @@ class Retuner:
     alive: bool = True
     submitted: int = 0
 
-    def submit(self, number: int, record: FloatArray, now_ns: int) -> None:
+    def submit(self, number, record, now_ns):
         self.submitted = number
 
-    def answer(self, number: int, now_ns: int) -> Answer | None:
+    def answer(self, number, now_ns):
         reply, self.reply = self.reply, None
         return reply
 
 
-def drive(node: Any) -> list[list[Frame]]:
+def drive(node):
     """What a runner does with a node."""
     sent = []
     node.receive(Frame(0x0CFF3182, b"12345678"), 5)
@@ -91,7 +89,7 @@ def drive(node: Any) -> list[list[Frame]]:
 def test_the_node_meets_the_same_with_a_tap_and_all_of_it_is_written_down():
     bare, tapped = Node(), Node()
     chunks: list[tuple[bytes, int]] = []
-    assert drive(NodeTap(tapped, lambda data, now_ns: chunks.append((data, now_ns)))) == drive(bare)  # type: ignore[arg-type]
+    assert drive(NodeTap(tapped, lambda data, now_ns: chunks.append((data, now_ns)))) == drive(bare)
     assert tapped.calls == bare.calls
     assert [now_ns for _, now_ns in chunks] == [TICK, 3 * TICK, 4 * TICK]  # one write a tick
     found = [
@@ -114,9 +112,9 @@ def test_the_node_meets_the_same_with_a_tap_and_all_of_it_is_written_down():
 
 
 def test_records_of_several_ticks_are_handed_on_together_and_the_rest_at_the_end():
-    def written(every: int) -> list[tuple[bytes, int]]:
+    def written(every):
         chunks: list[tuple[bytes, int]] = []
-        drive(NodeTap(Node(), lambda data, now_ns: chunks.append((data, now_ns)), (), every))  # type: ignore[arg-type]
+        drive(NodeTap(Node(), lambda data, now_ns: chunks.append((data, now_ns)), (), every))
         return chunks
 
     (_, stopped_ns), *_ = chunks = written(5)
@@ -133,7 +131,7 @@ def test_answers_of_the_retuner_come_back_bit_for_bit_in_their_tick(reply):
     tap.submit(4, np.zeros((2, 2)), 0)
     assert asked.submitted == 4
     chunks: list[bytes] = []
-    node = NodeTap(Node(tap), lambda data, _: chunks.append(data), [tap])  # type: ignore[arg-type]
+    node = NodeTap(Node(tap), lambda data, _: chunks.append(data), [tap])
     node.tick(TICK)
     node.tick(2 * TICK)
     again = RecordedRetuner()
@@ -166,7 +164,7 @@ def test_a_question_that_was_not_asked_then_is_found():
 def test_bursts_of_any_length_leave_no_memory_behind():
     """A packing for each number of records took 186 MiB in the end."""
     lengths: list[int] = []
-    tap = NodeTap(Node(), lambda data, _: lengths.append(len(data) // LAYOUT.size))  # type: ignore[arg-type]
+    tap = NodeTap(Node(), lambda data, _: lengths.append(len(data) // LAYOUT.size))
     tap.tick(TICK)
     tracemalloc.start()
     try:
@@ -175,7 +173,7 @@ def test_bursts_of_any_length_leave_no_memory_behind():
             for _ in range(count):
                 tap.receive(Frame(7, b"x"), TICK)
             tap.tick(TICK)
-            tap._node.calls.clear()  # type: ignore[attr-defined]
+            tap._node.calls.clear()
         grown = tracemalloc.get_traced_memory()[0] - before
     finally:
         tracemalloc.stop()
@@ -185,11 +183,11 @@ def test_bursts_of_any_length_leave_no_memory_behind():
 
 def test_frames_before_a_tick_that_raises_are_not_lost():
     class Failing(Node):
-        def tick(self, now_ns: int) -> Iterable[Frame]:
+        def tick(self, now_ns):
             raise ZeroDivisionError
 
     chunks: list[bytes] = []
-    tap = NodeTap(Failing(), lambda data, _: chunks.append(data))  # type: ignore[arg-type]
+    tap = NodeTap(Failing(), lambda data, _: chunks.append(data))
     tap.receive(Frame(7, b"x"), TICK)
     with pytest.raises(ZeroDivisionError):
         tap.tick(TICK)

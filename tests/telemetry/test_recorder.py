@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,7 +37,7 @@ from utank_hil.telemetry.ring import RowWriter
 pytestmark = pytest.mark.slow
 
 
-def table(rows: int) -> np.ndarray:
+def table(rows):
     """Rows of 10 ms that tell their number in every column."""
     number = np.arange(rows)
     values = number[:, None] * np.linspace(1, 2, len(SIGNALS))
@@ -48,19 +47,19 @@ def table(rows: int) -> np.ndarray:
     return values
 
 
-def feed(ring: RowWriter, rows: np.ndarray) -> None:
+def feed(ring, rows):
     for row in rows:
         ring.write(row)
 
 
-def wait_for(condition: Callable[[], bool], seconds: float = 20.0) -> None:
+def wait_for(condition, seconds=20.0):
     deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline
         time.sleep(0.02)
 
 
-def recorded(file: Path) -> np.ndarray:
+def recorded(file):
     run = read_recording(file)["live"]
     return np.stack([run[column] for column in SIGNALS], axis=1)
 
@@ -72,7 +71,7 @@ class Line:
     text: str
 
 
-def text_log(file: Path) -> list[Line]:
+def text_log(file):
     """Lines of the text log, in the order of their times; those without one at the end."""
     lines = []
     for chunk in RrdReader(file).stream().filter(components=["TextLog:text", "TextLog:level"]):
@@ -85,7 +84,7 @@ def text_log(file: Path) -> list[Line]:
     return sorted(lines, key=lambda line: line.time_ns)
 
 
-def any_recorded(file: Path) -> bool:
+def any_recorded(file):
     try:
         return len(recorded(file)) > 0
     except ValueError:
@@ -131,11 +130,11 @@ def test_killed_recorder_leaves_all_but_the_last_second(tmp_path):
 
 
 @pytest.fixture
-def disk(monkeypatch: pytest.MonkeyPatch) -> dict[str, bytes]:
+def disk(monkeypatch):
     """Files by name, as they were brought to the disk."""
     files: dict[str, bytes] = {}
 
-    def fsync(descriptor: int) -> None:
+    def fsync(descriptor):
         file = Path(os.readlink(f"/proc/self/fd/{descriptor}"))
         files[file.name] = file.read_bytes()
 
@@ -148,7 +147,7 @@ def test_a_power_cut_leaves_all_but_the_half_second_of_the_last_batch(tmp_path, 
     cuts: list[tuple[int, dict[str, bytes]]] = []
     rows, written = table(2000), 0
 
-    def sleep(_: object, seconds: float) -> object:
+    def sleep(_, seconds):
         nonlocal written
         for number in range(written, written + round(100 * seconds)):
             ring.write(rows[number])
@@ -157,7 +156,7 @@ def test_a_power_cut_leaves_all_but_the_half_second_of_the_last_batch(tmp_path, 
         cuts.append((written, dict(disk)))
         return None if written < 200 else signal.SIGTERM
 
-    def left(kept: dict[str, bytes]) -> tuple[int, int]:
+    def left(kept):
         for name, content in kept.items():
             (tmp_path / "left" / name).write_bytes(content)
         records = sum(map(len, FrameLog(tmp_path / "left" / "run.frames").blocks()))
@@ -190,7 +189,7 @@ def test_it_gives_way_to_the_loop_and_is_out_of_reach_of_ctrl_c(tmp_path):
         assert os.getsid(recorder.pid) == recorder.pid
 
 
-def open_files() -> int:
+def open_files():
     gc.collect()
     return len(os.listdir("/proc/self/fd"))
 
@@ -232,7 +231,7 @@ def test_killed_at_any_instant_it_leaves_what_can_be_read(kills, lost_s, tmp_pat
     wait_for(lambda: open_files() <= descriptors[0])  # some are closed a little later
 
 
-def write_next(ring: RowWriter, rows: np.ndarray, times_s: list[float]) -> None:
+def write_next(ring, rows, times_s):
     ring.write(rows[len(times_s)])
     times_s.append(time.monotonic())
     time.sleep(0.002)
@@ -372,9 +371,9 @@ def test_what_a_dead_recorder_left_on_its_output_ends_no_controller(
     """The loop asks it why it has ended."""
     popen = subprocess.Popen
 
-    def stray(command: list[str], **options: object) -> object:
+    def stray(command, **options):
         code = STRAY + end.lstrip("; ")
-        return popen([sys.executable, "-c", code, output.hex()], **options)  # type: ignore[call-overload]
+        return popen([sys.executable, "-c", code, output.hex()], **options)
 
     monkeypatch.setattr(subprocess, "Popen", stray)
     with RowWriter(SIGNALS) as ring:
@@ -471,10 +470,10 @@ def test_file_that_lacks_its_end_or_its_rows_is_a_failure_with_its_reason(tmp_pa
 def test_where_it_may_go_on_in_another_file_it_does_so_when_there_is_room_again(tmp_path, capfd):
     file = tmp_path / "run-a.rrd"
 
-    def limit(words: str) -> None:
+    def limit(words):
         subprocess.run(["prlimit", f"--pid={recorder.pid}", f"--fsize={words}"], check=True)
 
-    def failed() -> bool:
+    def failed():
         complaint.append(capfd.readouterr().err)
         return "tried again every 10 s" in "".join(complaint)
 

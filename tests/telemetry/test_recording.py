@@ -12,7 +12,7 @@ from utank_hil.telemetry.recording import read_recording, write_recording
 COLUMNS = (*SIGNALS, "true_roll_rad", "wave_moment_nm")
 
 
-def random_run(rows: int, seed: int) -> np.ndarray:
+def random_run(rows, seed):
     values = np.random.default_rng(seed).standard_normal((rows, len(COLUMNS)))
     values[:, 0] = np.arange(rows) / 20
     values[:, COLUMNS.index("mode")] = np.arange(rows) * 5 // rows

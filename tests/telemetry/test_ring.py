@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
 from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 
@@ -29,12 +28,12 @@ SHM = Path("/dev/shm")
 
 
 @pytest.fixture(autouse=True)
-def no_segment_left_behind() -> Iterator[None]:
+def no_segment_left_behind():
     yield
     assert not list(SHM.glob(f"utank-{os.getpid()}-*"))
 
 
-def rows_from(first: int, count: int, width: int) -> np.ndarray:
+def rows_from(first, count, width):
     """Rows that carry their own number in every value."""
     return np.arange(first, first + count, dtype=float)[:, None] * np.arange(1, width + 1)
 
@@ -45,7 +44,7 @@ class BroadcastModel(RuleBasedStateMachine):
     CAPACITY = 5
     ROWS = 2
 
-    def __init__(self) -> None:
+    def __init__(self):
         super().__init__()
         self.writer = RingWriter(RingKind.FRAMES, 16, self.ROWS, self.CAPACITY)
         self.written: list[np.ndarray] = []  # by slot
@@ -55,20 +54,20 @@ class BroadcastModel(RuleBasedStateMachine):
         self.attach()
 
     @rule(values=st.lists(st.tuples(st.floats(), st.floats()), min_size=1, max_size=8))
-    def write(self, values: list[tuple[float, float]]) -> None:
+    def write(self, values):
         rows = np.array(values)
         self.writer.write(rows)
         self.written += [rows[at : at + self.ROWS] for at in range(0, len(rows), self.ROWS)]
 
     @rule()
-    def attach(self) -> None:
+    def attach(self):
         if len(self.readers) < 2:
             self.readers.append(RingReader(self.writer.name))
             self.cursors.append(max(0, len(self.written) - self.CAPACITY))
             self.lost.append(0)
 
     @rule(which=st.integers(0, 1))
-    def read(self, which: int) -> None:
+    def read(self, which):
         which = which % len(self.readers)
         oldest = max(self.cursors[which], len(self.written) - self.CAPACITY)
         self.lost[which] += oldest - self.cursors[which]
@@ -77,11 +76,11 @@ class BroadcastModel(RuleBasedStateMachine):
         assert got == [rows.tobytes() for rows in self.written[oldest:]]
 
     @invariant()
-    def losses_are_counted(self) -> None:
+    def losses_are_counted(self):
         assert [reader.lost for reader in self.readers] == self.lost
         assert self.writer.count == len(self.written)
 
-    def teardown(self) -> None:
+    def teardown(self):
         self.writer.close()
         assert all(reader.ended for reader in self.readers)
         for reader in self.readers:
@@ -209,7 +208,7 @@ def test_a_damaged_segment_is_refused_and_stops_no_writer(word):
     damaged.unlink()
 
 
-def saying(text: bytes) -> bytes:
+def saying(text):
     """A segment that is whole, except for what it says of its content."""
     with RowWriter(["a"]) as whole:
         content = (SHM / whole.name).read_bytes()
@@ -306,7 +305,7 @@ while True:
 
 
 @contextlib.contextmanager
-def python(code: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+def python(code):
     """A process that prints the name of its ring first, and that name."""
     process = subprocess.Popen(
         [sys.executable, "-c", code],
@@ -322,12 +321,12 @@ def python(code: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
         process.communicate()
 
 
-def begin(process: subprocess.Popen[str]) -> None:
+def begin(process):
     process.stdin.write("\n")
     process.stdin.flush()
 
 
-def wait_for(condition: Callable[[], bool], seconds: float = 10.0) -> None:
+def wait_for(condition, seconds=10.0):
     deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline
@@ -392,7 +391,7 @@ def test_a_ring_that_is_being_closed_is_not_removed_by_another_that_begins(monke
     ring = RowWriter(["a"])
     close = SharedMemory.close
 
-    def meanwhile(segment: SharedMemory) -> None:
+    def meanwhile(segment):
         monkeypatch.undo()
         RowWriter(["b"]).close()
         assert (SHM / ring.name).exists()
@@ -432,7 +431,7 @@ assert reader.read_rows().shape == (1, 1)
 
 
 def test_ring_without_room_is_refused_instead_of_killing_its_writer_later(monkeypatch):
-    def full(descriptor: int, offset: int, size: int) -> None:
+    def full(descriptor, offset, size):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "posix_fallocate", full)

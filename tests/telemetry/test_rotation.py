@@ -26,18 +26,18 @@ TIME = SIGNALS.index("time_s")
 EVENT_EVERY = 4  # rows: the ring's 64 last while a busy machine starts the recorder
 
 
-def rows(first: int, count: int) -> np.ndarray:
+def rows(first, count):
     """Rows of 10 ms."""
     values = np.zeros((count, len(SIGNALS)))
     values[:, TIME] = np.arange(first, first + count) / 100
     return values
 
 
-def times(file: Path) -> np.ndarray:
+def times(file):
     return read_recording(file)["live"]["time_s"]
 
 
-def names(count: int, suffix: str) -> list[str]:
+def names(count, suffix):
     return ["run-a" + suffix] + [f"run-a-part{n:03d}{suffix}" for n in range(2, count + 1)]
 
 
@@ -94,7 +94,7 @@ def test_no_row_event_or_frame_is_lost_or_twice_between_files(tmp_path):
     )
 
 
-def texts(file: Path) -> list[str]:
+def texts(file):
     """Lines of the text log."""
     chunks = RrdReader(file).stream().filter(components="TextLog:text").to_chunks()
     found = [chunk.to_record_batch().column("TextLog:text").flatten() for chunk in chunks]

@@ -50,7 +50,7 @@ def test_without_the_ship_or_a_signal_there_is_no_scene():
     assert found.pressure_pa == 0.0
 
 
-def _rows(seconds: float) -> np.ndarray:
+def _rows(seconds):
     rows = np.zeros((round(seconds / 0.05), len(SIGNALS)))
     rows[:, SIGNALS.index("time_s")] = time_s = 0.05 * np.arange(len(rows))
     rows[:, SIGNALS.index("roll_rad")] = 0.1 * np.exp(-time_s / 50) * np.sin(time_s)

@@ -18,13 +18,13 @@ from utank_hil.telemetry.signal_files import even_rows, read_signals, require
 PATH = Path("theirs.csv")
 
 
-def written(folder: Path, text: str) -> Path:
+def written(folder, text):
     file = folder / "theirs.csv"
     file.write_text(text)
     return file
 
 
-def read(folder: Path, text: str) -> dict[str, np.ndarray]:
+def read(folder, text):
     return read_signals(written(folder, text))["theirs"]
 
 
@@ -191,7 +191,7 @@ def test_a_missing_column_is_named_with_what_there_is():
     require(PATH, columns | gauges, "time_s", "level_m")
 
 
-def table(time_s: np.ndarray) -> dict[str, np.ndarray]:
+def table(time_s):
     return {"time_s": time_s, "roll_rad": np.arange(len(time_s), dtype=float)}
 
 

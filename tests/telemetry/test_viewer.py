@@ -13,7 +13,7 @@ from utank_hil.telemetry.recording import write_recording
 from utank_hil.telemetry.viewer import hold_port, open_viewer, port_of
 
 
-def fetch(url: str, seconds: float = 20.0) -> bytes:
+def fetch(url, seconds=20.0):
     deadline = time.monotonic() + seconds
     while True:
         try:

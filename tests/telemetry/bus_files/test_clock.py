@@ -1,7 +1,5 @@
 """Times of a log: steps, stray stamps and silences are found, said, and mended where one way is."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,7 +11,7 @@ from utank_hil.telemetry.bus_files.log import OneClock
 DAY_S = 86_400
 
 
-def on_one_clock(times_s: np.ndarray) -> tuple[np.ndarray, list[str]]:
+def on_one_clock(times_s):
     """Return times in s on one clock, and the notes."""
     frames = [
         BusFrame(round(float(t) * 1e9), "can0", number, True, FrameKind.DATA, b"", 0)
@@ -21,7 +19,7 @@ def on_one_clock(times_s: np.ndarray) -> tuple[np.ndarray, list[str]]:
     ]
     read: list[int] = []
 
-    def source() -> Iterator[BusFrame]:
+    def source():
         for number, frame in enumerate(frames, start=1):
             read.append(number)
             yield frame

@@ -7,7 +7,6 @@ cantools 817; SavvyCAN 571, 795, 1068.
 import gzip
 import struct
 import zlib
-from pathlib import Path
 
 import can
 import numpy as np
@@ -25,7 +24,7 @@ D, F, R, E = FrameKind.DATA, FrameKind.FD, FrameKind.REMOTE, FrameKind.ERROR
 ASC = "date Mon Dec 6 11:21:13 am 2021\nbase hex  timestamps absolute\n"
 
 
-def read(folder: Path, text: str | bytes, name: str = "a.log") -> tuple[list[BusFrame], list[str]]:
+def read(folder, text, name="a.log"):
     """Return frames and notes of a log."""
     path, notes = folder / name, []
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
@@ -163,7 +162,7 @@ def test_a_bomb_is_refused(tmp_path):
         read(tmp_path, bomb)
 
 
-def blf(*containers: bytes) -> bytes:
+def blf(*containers):
     """Return a BLF file of containers' contents."""
     head = struct.pack("<4sL136x", b"LOGG", 144)
     objects = []
@@ -175,7 +174,7 @@ def blf(*containers: bytes) -> bytes:
     return head + b"".join(objects)
 
 
-def blf_message(time: int, flags: int = 2, size: int = 48) -> bytes:
+def blf_message(time, flags=2, size=48):
     return (
         struct.pack("<4sHHLL", b"LOBJ", 32, 1, size, 1)
         + struct.pack("<LHHQ", flags, 0, 0, time)

@@ -6,14 +6,14 @@ from pathlib import Path
 import pytest
 from others import others_file
 
-from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError, FrameKind
+from utank_hil.telemetry.bus_files.frame import BusLogError, FrameKind
 from utank_hil.telemetry.bus_files.log import BusLog
 
 D, F, R, E = FrameKind.DATA, FrameKind.FD, FrameKind.REMOTE, FrameKind.ERROR
 CHANNELS_5 = {"1", "2", "3", "4", "5"}
 
 
-def frames_of(name: str) -> list[BusFrame]:
+def frames_of(name):
     return list(BusLog(others_file(f"logs/{name}")).frames())
 
 

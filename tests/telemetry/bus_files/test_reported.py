@@ -3,8 +3,6 @@
 Each name is that of a public report on GitHub; docs/how-to/logs.md lists them.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -16,19 +14,19 @@ from utank_hil.telemetry.signal_files import read_signals
 HEAD = "date Mon Dec 6 11:21:13 am 2021\nbase hex  timestamps absolute\n"
 
 
-def read(folder: Path, text: str, name: str = "a.asc") -> tuple[list[BusFrame], str]:
+def read(folder, text, name="a.asc"):
     """Return frames and notes of a log."""
     path, notes = folder / name, []
     path.write_text(text)
     return list(BusLog(path).frames(notes)), "; ".join(notes)
 
 
-def copied(folder: Path, frames: list[BusFrame], name: str) -> list[BusFrame]:
+def copied(folder, frames, name):
     write_frames(folder / name, frames)
     return list(BusLog(folder / name).frames())
 
 
-def frame(time_ns: int, **other: object) -> BusFrame:
+def frame(time_ns, **other):
     plain = BusFrame(time_ns, "can0", 0x301, False, FrameKind.DATA, b"\x63\x55", 2, False)
     return plain._replace(**other)
 
