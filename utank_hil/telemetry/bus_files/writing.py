@@ -34,7 +34,7 @@ def write_frames(path: Path, frames: Iterable[BusFrame], notes: list[str] | None
     with (
         left_whole(path),
         path.open(mode, encoding=encoding) as content,
-        writers[suffix](content, lost) as copy,
+        writers[suffix](content, lost, first[0].time_ns if first else 0) as copy,
     ):
         for frame in chain(first, waiting):
             if frame.extended or frame.number < 1 << 11 or frame.kind is FrameKind.ERROR:
@@ -48,12 +48,12 @@ def write_frames(path: Path, frames: Iterable[BusFrame], notes: list[str] | None
 
 
 class _Writer(Closing):
-    """Writes one format; `lost` counts what it can't hold."""
+    """Writes one format; `lost` counts what it can't hold, `first_ns` is the first time."""
 
-    def __init__(self, content: Any, lost: Counter[str]) -> None:
+    def __init__(self, content: Any, lost: Counter[str], first_ns: int) -> None:
         self._content, self._lost = content, lost
         self._channels: dict[str, int] = {}
-        self._origin_ns: int | None = None
+        self._origin_ns = min(0, first_ns)
 
     def close(self) -> None:
         """End the file; most formats have no end."""
@@ -63,7 +63,7 @@ class _Writer(Closing):
         """Write one frame."""
 
     def _microseconds(self, time_ns: int) -> int:
-        time_us = (time_ns - (self._origin_ns or 0) + 500) // 1000
+        time_us = (time_ns - self._origin_ns + 500) // 1000
         if time_us < 0:
             self._lost["stamps are before the log's start and written as that"] += 1
         return max(0, time_us)
@@ -83,8 +83,6 @@ class _Writer(Closing):
 class _Candump(_Writer):
     def write(self, frame: BusFrame) -> None:
         time_ns, channel, number, extended, kind, data, code, sent, speed = frame
-        if self._origin_ns is None:
-            self._origin_ns = min(0, time_ns)
         seconds, microseconds = divmod(self._microseconds(time_ns), 1_000_000)
         text = data.hex().upper()
         if kind is FrameKind.REMOTE:
@@ -103,13 +101,24 @@ class _Candump(_Writer):
 
 
 class _Asc(_Writer):
+    """Its head has the day where the times have it."""
+
+    def __init__(self, content: Any, lost: Counter[str], first_ns: int) -> None:
+        super().__init__(content, lost, first_ns)
+        if first_ns >= _WALL_CLOCK_NS:
+            self._origin_ns = first_ns // 1_000_000 * 1_000_000
+        begin = datetime.fromtimestamp((self._origin_ns // 1_000_000) * 1e-3, UTC)
+        day = f"{begin:%a %b %d %H:%M:%S}.{begin.microsecond // 1000:03d} {begin:%Y}"
+        content.write(
+            f"date {day}\nbase hex  timestamps absolute\ninternal events logged\n"
+            f"Begin Triggerblock {day}\n 0.000000 Start of measurement\n"
+        )
+
     def close(self) -> None:
         self._content.write("End TriggerBlock\n")
 
     def write(self, frame: BusFrame) -> None:
         time_ns, channel, number, extended, kind, data, code, sent, speed = frame
-        if self._origin_ns is None:
-            self._begin(time_ns)
         seconds, microseconds = divmod(self._microseconds(time_ns), 1_000_000)
         stamp, bus = f"{seconds:4d}.{microseconds:06d}", self._number(channel)
         name, way = f"{number:X}{'x' if extended else ''}", "Tx" if sent else "Rx"
@@ -131,24 +140,15 @@ class _Asc(_Writer):
             line = f"{bus}  {name:<15} {way}   d {code:X} {text}"
         self._content.write(f"{stamp} {line}\n")
 
-    def _begin(self, time_ns: int) -> None:
-        """Write the head; it has the day where the times have it."""
-        known = time_ns >= _WALL_CLOCK_NS
-        self._origin_ns = time_ns // 1_000_000 * 1_000_000 if known else min(0, time_ns)
-        begin = datetime.fromtimestamp((self._origin_ns // 1_000_000) * 1e-3, UTC)
-        day = f"{begin:%a %b %d %H:%M:%S}.{begin.microsecond // 1000:03d} {begin:%Y}"
-        self._content.write(
-            f"date {day}\nbase hex  timestamps absolute\ninternal events logged\n"
-            f"Begin Triggerblock {day}\n 0.000000 Start of measurement\n"
-        )
-
 
 class _Blf(_Writer):
-    def __init__(self, content: Any, lost: Counter[str]) -> None:
+    def __init__(self, content: Any, lost: Counter[str], first_ns: int) -> None:
         from can import BLFWriter
 
-        super().__init__(content, lost)
+        super().__init__(content, lost, first_ns)
         self._blf = BLFWriter(content)
+        known = first_ns >= _WALL_CLOCK_NS
+        self._blf.start_timestamp = float(first_ns // 10**9 - 1) if known else 0.0
 
     def close(self) -> None:
         self._blf.stop()
@@ -157,10 +157,6 @@ class _Blf(_Writer):
         from can import Message
 
         time_ns, channel, number, extended, kind, data, code, sent, speed = frame
-        if self._origin_ns is None:
-            known = time_ns >= _WALL_CLOCK_NS
-            self._origin_ns = min(0, time_ns)
-            self._blf.start_timestamp = float(time_ns // 10**9 - 1) if known else 0.0
         is_fd = kind is FrameKind.FD
         self._blf.on_message_received(
             Message(
