@@ -109,8 +109,6 @@ class _Board:
 
 
 class _Watch:
-    """View of the board for one run."""
-
     def __init__(self, board: _Board, index: int) -> None:
         self._board = board
         self._done_s = board.done_s[index]
@@ -223,7 +221,6 @@ def run_in_turn(
 def _result(
     jobs: list[Job], runs: list[Run], mode: str, interrupted: bool, started: float
 ) -> BenchResult:
-    """Return the result of a bench that began at the monotonic time `started`."""
     scenario, seed = jobs[0].scenario, jobs[0].seed
     done = tuple(run for run in runs if len(run.rows))
     settle_s, end_s = window_s(done, scenario.settle_s)

@@ -99,7 +99,6 @@ class CanopenPumpDrive(CanopenNode):
 
     @property
     def _powered(self) -> bool:
-        """Whether no wire cuts its power: without it the motor has no torque."""
         return not self._plant.power_cut
 
     def fail(self, fault: DriveFault) -> None:

@@ -24,27 +24,13 @@ with quietly_interruptible():
             load_compiled_code,
         )
         from firmware_sim.truth import TRUTH, MemoryLog, TruthRecorder
-        from utank_hil.analysis.motion.statistics import (
-            PumpStatistics,
-            RollStatistics,
-            pump_statistics,
-            roll_statistics,
-        )
-        from utank_hil.base.arrays import FloatArray
+        from utank_hil.analysis.motion.statistics import pump_statistics, roll_statistics
         from utank_hil.canbus.frame import Port
         from utank_hil.canbus.ports import open_buses
         from utank_hil.canbus.profiles.device_plan import ForeignDevices
         from utank_hil.canbus.socketcan import SocketCanPort
-        from utank_hil.console.common import (
-            AllowCode,
-            Duration,
-            Json,
-            Version,
-            fail,
-            load,
-            new_app,
-            print_json,
-        )
+        from utank_hil.console import common
+        from utank_hil.console.common import fail
         from utank_hil.console.exit_codes import ExitCode
         from utank_hil.console.terminal import Terminal, notes, timing_table
         from utank_hil.runners import (
@@ -56,17 +42,15 @@ with quietly_interruptible():
             stop_on_signals,
         )
 
-app = new_app("Ship emulator, sensors, pump drive and operator panel on a CAN bus.")
+app = common.new_app("Ship emulator, sensors, pump drive and operator panel on a CAN bus.")
 
 
 @app.command()
 def firmware_sim(
     scenario: Annotated[Path, typer.Argument(help="Scenario file.")],
     bus: Annotated[str, typer.Option(help="CAN interface, for example can0 or vcan0.")],
-    seed: Annotated[
-        int | None, typer.Option(min=0, help="Of waves and noise, instead of the scenario's.")
-    ] = None,
-    duration: Duration = None,
+    seed: common.Seed = None,
+    duration: common.Duration = None,
     without: Annotated[
         str,
         typer.Option(
@@ -75,9 +59,9 @@ def firmware_sim(
             f"{', '.join(NODE_NAMES)}.",
         ),
     ] = "",
-    json_: Json = False,
-    allow_code: AllowCode = False,
-    version: Version = False,  # noqa: ARG001, ends the command when it is read
+    json_: common.Json = False,
+    allow_code: common.AllowCode = False,
+    version: common.Version = False,  # noqa: ARG001, ends the command when it is read
 ) -> None:
     """Emulate ship, tank, sensors, pump drive and operator of a scenario until Ctrl-C.
 
@@ -87,7 +71,7 @@ def firmware_sim(
 
     **Example:** firmware-sim configs/scenarios/storm.yaml --bus vcan0 --without panel
     """
-    loaded = load(scenario, Scenario, allow_code=True)  # laws are not built from it
+    loaded = common.load(scenario, Scenario, allow_code=True)  # laws are not built from it
     if loaded.fmu is not None and not allow_code:
         fail(f"{scenario}: fmu.file: runs native code: allow it by --allow-code if you trust it")
     if loaded.faults:
@@ -112,7 +96,11 @@ def firmware_sim(
     )
     if len(log.rows) == 0:
         fail("ended before the first sample", ExitCode.INTERRUPTED)
-    roll, pump = _figures(log.rows)
+    roll_rad, level_m, pressure_pa, power_w = (
+        log.rows[:, TRUTH.index(f"true_{name}")]
+        for name in ("roll_rad", "level_m", "pressure_pa", "shaft_power_w")
+    )
+    roll, pump = roll_statistics(roll_rad), pump_statistics(pressure_pa, power_w, level_m)
     external = next(
         (n for n in nodes if isinstance(n, ExternalNode) and n.name == EXTERNAL_DRIVE), None
     )
@@ -125,7 +113,7 @@ def firmware_sim(
             "reported_pressure_share": external and external.reported_share,
             "loop": statistics.summary(),
         }
-        print_json(summary)
+        common.print_json(summary)
         return
     console = Terminal()
     console.table(timing_table({"ship": statistics}))
@@ -169,15 +157,6 @@ def _run(
             RealTimeLoop(nodes, port, statistics=statistics).run(stop, round(length_s * SECOND_NS))
     finally:
         port.close()
-
-
-def _figures(rows: FloatArray) -> tuple[RollStatistics, PumpStatistics]:
-    """Statistics of the truth rows, with columns `TRUTH`."""
-    roll_rad, level_m, pressure_pa, power_w = (
-        rows[:, TRUTH.index(f"true_{name}")]
-        for name in ("roll_rad", "level_m", "pressure_pa", "shaft_power_w")
-    )
-    return roll_statistics(roll_rad), pump_statistics(pressure_pa, power_w, level_m)
 
 
 def main() -> None:

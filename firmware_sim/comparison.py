@@ -115,8 +115,7 @@ _FIGURES: Final = {
     "level_rms_m": ("true_level_m", "level_m", "starboard_level_m"),
     "pressure_rms_pa": ("true_pressure_pa", "pressure_actual_pa"),
     "power_mean_w": ("true_shaft_power_w", "pump_power_w"),
-}
-"""Figures of a record, each with its candidate columns; the first one in both records is used."""
+}  #: Figures of a record, each with its candidate columns; the first one in both records is used.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -213,7 +212,6 @@ def _records_compared(first: Record, second: Record) -> list[Comparison]:
 
 
 def _capsized(*records: tuple[Path, str, Columns]) -> list[str]:
-    """Remarks on runs, by name and file, in which the ship capsized."""
     return [
         f"run {run} of {path}"
         for path, run, columns in records
@@ -222,7 +220,6 @@ def _capsized(*records: tuple[Path, str, Columns]) -> list[str]:
 
 
 def _in_charge(run: str, one: Columns, two: Columns) -> list[str]:
-    """Remark where the law was in charge for longer in one record than in the other."""
     if "mode" not in one or "mode" not in two:
         return []
     first, second = (float(np.mean(each["mode"] == Mode.ACTIVE)) for each in (one, two))

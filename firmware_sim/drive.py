@@ -110,8 +110,7 @@ STOPPED_SHARE = 0.02
 """Share of the drive's pressure limit below which the pump counts as stopped. Chosen; no study."""
 LONGEST_STOP_NS = 500_000_000
 """Time after which a motor that has not removed the pressure is switched off. Chosen; no study."""
-WARNED_MESSAGES = 2
-"""Number of DRIVE_STATUS_2 messages that report one rejected command."""
+WARNED_MESSAGES = 2  #: Number of DRIVE_STATUS_2 messages that report one rejected command.
 _STOP_WORDS = (ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE, ControlWord.SHUTDOWN, None)
 """Control words that stop the drive; None, an unknown word, disables the voltage."""
 # half a bus step of the set-point: a command at the limit may have been rounded up by it
@@ -277,7 +276,6 @@ class PumpDrive:
             self._states.trip(fault)
 
     def _stopped(self, now_ns: int) -> bool:
-        """Whether a stop has removed the pressure, or has used up its time."""
         share = abs(self._plant.pressure_pa) / self._limits.pressure_pa
         return share < STOPPED_SHARE or now_ns - self._moving_ns > LONGEST_STOP_NS
 

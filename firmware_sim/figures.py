@@ -39,8 +39,7 @@ _OF_BENCH: Final = (
 _OF_RUN: Final = (
     *("name", "end_s", "strikes", "max_strike_impulse_nms", "pump_speed_rad_s", "energy_j"),
     *("bus_load", "refused_commands", "fallbacks", "law_error"),
-)
-"""Figures that the bench and the run share."""
+)  #: Figures that the bench and the run share.
 
 _ORDERS: Final = {
     Action.ARM: Mode.ACTIVE,

@@ -39,8 +39,7 @@ UNITS: Final = {
     "Pa.s2/m2": 'kg="1" m="-3"',
     "N.m": 'kg="1" m="2" s="-2"',
     "W": 'kg="1" m="2" s="-3"',
-}
-"""Units with their exponents of SI base units."""
+}  #: Units with their exponents of SI base units.
 INPUTS: Final = {
     "setpoint_pa": ("Pa", "Pressure commanded; positive raises the starboard level"),
     "valve_loss_pa_s2_m2": ("Pa.s2/m2", "Loss of the valve per square of the level's rate"),
@@ -108,7 +107,6 @@ def _compiled(sources: dict[str, str]) -> bytes:
 
 
 def _data(plant: Plant, *, has_pump: bool) -> str:
-    """Return the numbers of a plant as C, in hexadecimals that keep each bit."""
     equations = plant.equations
     *coefficients, pieces_per_rad = equations.row.tolist()
     phasors, rotations = (

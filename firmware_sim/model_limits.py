@@ -94,8 +94,7 @@ MODEL_LIMITS: Final[tuple[tuple[str, Callable[[BenchResult], Iterator[str]]], ..
     ),
     ("steeper sea than there is: waves are linear and do not break", _sea),
     ("pump beyond its speed: blades neither cavitate nor burst", _pump),
-)
-"""All limits, in the order of their report."""
+)  #: All limits, in the order of their report.
 
 
 def passed_limits(result: BenchResult) -> list[str]:

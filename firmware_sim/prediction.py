@@ -216,7 +216,6 @@ def _passive(scenario: Scenario, seed: int, count: int) -> tuple[FloatArray, flo
 
 
 def _active(scenario: Scenario, plant: DesignPlant, law: BuiltLaw, seed: int, count: int) -> _Run:
-    """Run with the law armed from the start."""
     controller, ticks = law.controller(), count * ROW_TICKS
     noise, _ = sensed_noise(noise_of(scenario), ticks, seed, controller.sample_time_s)
     ship, area_m2 = plant_of(scenario, seed), plant.tank.reservoir_area_m2

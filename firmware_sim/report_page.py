@@ -22,9 +22,15 @@ from utank_hil.configuration import Vessel
 from utank_hil.console.common import why
 from utank_hil.console.ship_report import power_words, ship_line
 from utank_hil.pictures import BenchBar, BenchCurve, draw_bench
-from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
+from utank_hil.pictures.report_page import (
+    ReportPicture,
+    ReportSection,
+    ReportTable,
+    Verdict,
+    write_report_page,
+)
 from utank_hil.pictures.style import COLORS, NO_TANK
-from utank_hil.reports.page import Report, about_section, printed, write_report
+from utank_hil.reports.page import Report, about_section, printed
 from utank_hil.telemetry.recording import write_recording
 
 PICTURE, RECORDING, FIGURES, PAGE = "bench.png", "bench.rrd", "bench.json", "report.html"
@@ -69,7 +75,7 @@ def bench_page(found: BenchFigures, about: Mapping[str, Any], picture: bytes | N
         f"{found.mode}, seed {found.seed}, {found.settle_s:g} s to "
         f"{found.end_s:g} s of the same waves for each run. {about['date']}."
     )
-    return Report(f"{found.scenario}: bench", below, _verdict(found, few), sections)
+    return Report(f"{found.scenario}: bench", below, [_verdict(found, few)], sections)
 
 
 def _verdict(found: BenchFigures, few: str) -> Verdict:
@@ -145,8 +151,7 @@ def _deadlines(found: BenchFigures) -> ReportSection:
     return ReportSection("Deadlines", tables=[ReportTable(headings, rows)])
 
 
-_FLAGS: Final = {"real_time": "realtime"}
-"""Options whose names differ from their parameters."""
+_FLAGS: Final = {"real_time": "realtime"}  #: Options whose names differ from their parameters.
 
 REPORT_FILES: Final = (PICTURE, RECORDING, FIGURES, PAGE)
 
@@ -168,7 +173,7 @@ def write_files(
 
     def write_page(path: Path) -> None:
         picture = files["picture"].read_bytes() if "picture" in files else None
-        write_report(bench_page(found, about, picture), path)
+        write_report_page(path, *bench_page(found, about, picture))
 
     writers: tuple[tuple[str, str, Callable[[Path], None]], ...] = (
         ("picture", PICTURE, partial(_draw, result, found, about)),
@@ -212,7 +217,6 @@ def _draw(result: BenchResult, found: BenchFigures, about: Mapping[str, Any], pa
 
 
 def _bare_curve(result: BenchResult) -> BenchCurve:
-    """The ship without a tank, until it capsizes."""
     time_s = RECORD_S * np.arange(len(result.without_tank_rad), dtype=np.float64)
     upright = time_s < result.without_tank_capsized_s
     none = np.full(int(upright.sum()), np.nan)

@@ -159,8 +159,7 @@ _RETUNING: Final = (
     "tank damping ratio\nfound / true",
     "\nended in",
     "\nbecause",
-)
-"""Headings; those of figures that no run has are left out."""
+)  #: Headings; those of figures that no run has are left out.
 
 
 def _retuning_cells(retuning: RetuningFigures) -> tuple[str, ...]:

@@ -299,7 +299,6 @@ def run_controller(job: Job, channel: str, meeting: Meeting) -> ControllerRun:
 
 
 def _ship_of(job: Job) -> tuple[ShipSide, TruthRecorder, MemoryLog]:
-    """Ship's side of a run, the recorder of its truth, and the rows of that."""
     load_compiled_code(job.scenario, job.seed)
     ship = build_ship_side(job.scenario, job.seed, job.script, job.controller)
     log = job.log_of(TRUTH)

@@ -48,8 +48,7 @@ SAILED: Final = (
     "displacement_n",
     "offset_moment_nm",
     "wind_moment_nm",
-)
-"""Parameters of the ship that may differ from the vessel's; the last two heel it."""
+)  #: Parameters of the ship that may differ from the vessel's; the last two heel it.
 
 SWAY: Final = "sway_of_slope"  #: Another one, which does not change under way.
 
@@ -78,8 +77,7 @@ class ScenarioContent(Section):
     """Limits of the drive; those not given follow from the vessel's pump."""
     controllers: Annotated[
         dict[str, ControllerConfig], Field(default_factory=dict, max_length=MOST_CONTROLLERS)
-    ]
-    """Controllers to be run, at least one; optional where the vessel has no pump."""
+    ]  #: Controllers to be run, at least one; optional where the vessel has no pump.
     guard: bool = False
     """Whether a guard hears the frames and may cut the drive's power (docs/safety.md)."""
     operator: tuple[TimedAction, ...] = ()

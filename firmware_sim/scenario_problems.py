@@ -113,7 +113,6 @@ def _of_plant(scenario: ScenarioContent, key: str, *plants: str) -> list[Problem
 
 
 def _hull_problems(scenario: ScenarioContent) -> list[Problem]:
-    """Reasons why the plant can't be that of the hull."""
     if scenario.hull is None or scenario.plant not in OF_HULL:
         return _of_plant(scenario, "hull", *OF_HULL)
     problems = []
@@ -130,7 +129,6 @@ def _hull_problems(scenario: ScenarioContent) -> list[Problem]:
 
 
 def _weather_problems(scenario: ScenarioContent) -> list[Problem]:
-    """Reasons why gusts, or turns, can't act on the ship."""
     problems, ship = [], {**asdict(scenario.vessel.ship), **scenario.actual_ship}
     if scenario.gusts is not None and ship["wind_moment_nm"] == 0:
         reason = "needs a steady wind: give actual_ship.wind_moment_nm, the moment of its mean"
@@ -148,7 +146,6 @@ def _weather_problems(scenario: ScenarioContent) -> list[Problem]:
 
 
 def _fmu_problems(scenario: ScenarioContent) -> list[Problem]:
-    """Reasons why the plant can't be that of the FMU."""
     if scenario.fmu is None or scenario.plant != "fmu":
         return _of_plant(scenario, "fmu", "fmu")
     problems = [

@@ -326,5 +326,4 @@ class RegularSea(_AnySea):
 ScenarioSea = Annotated[
     MeasuredSea | TabulatedSea | JonswapSea | IttcSea | PiersonMoskowitzSea | RegularSea,
     Field(discriminator="kind"),
-]
-"""Section ``sea`` of a scenario."""
+]  #: Section ``sea`` of a scenario.

@@ -187,7 +187,6 @@ class SensorNode:
                 server.swap()
 
     def _publish(self, transmitter: Transmitter[_M], measure: Callable[[], _M]) -> None:
-        """Send the result of `measure` once in the message's cycle."""
         ticks = transmitter.cycle_ns // self.period_ns
         self._messages.append((ticks, transmitter.frame, measure))
 

@@ -373,13 +373,11 @@ seed: 1
 
 
 def _with_hull(ship: str) -> str:
-    """File of the vessel with the hull's data."""
     remark = "a usual form, see docs/dynamics.md; better: utank-hil hull MESH"
     return ship.replace("\n# Room:", f"\n  hull: ./{HULL}  # {remark}\n# Room:", 1)
 
 
 def _swaying(scenario: str) -> str:
-    """File of the scenario with a ship that sways, rolls and yaws by its hull."""
     lines = [line for line in scenario.splitlines() if "effective_slope" not in line]
     return "\n".join([*lines, "plant: sway_roll_yaw  # waves act by the hull's data", ""])
 

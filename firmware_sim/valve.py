@@ -79,7 +79,6 @@ class ValveNode:
         plant.set_valve_loss(valve.loss(tank, self.opening))
 
     def _start(self) -> None:
-        """Initialise as after power-on, at the present position."""
         self._commands = self._catalogue.receiver(ValveCommand)
         self._statuses = self._catalogue.transmitter(ValveStatus)
         self._status_ticks = self._statuses.cycle_ns // TICK_NS
@@ -171,7 +170,6 @@ class ValveNode:
         return frames
 
     def _move(self, target: float, now_ns: int) -> None:
-        """Move towards the target, and detect a stuck valve."""
         before = self.opening
         if not self.stuck:
             step = min(max(target - before, -self._most_step), self._most_step)

@@ -105,8 +105,7 @@ def spectra_on_the_way(
     return known
 
 
-TURN_S: Final = 10.0
-"""Time in which a ship comes into a turn, and out of it. Chosen; no study."""
+TURN_S: Final = 10.0  #: Time in which a ship comes into a turn, and out of it. Chosen; no study.
 
 
 def turning(

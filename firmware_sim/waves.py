@@ -145,7 +145,6 @@ class PassingWaves:
         self._amplitude = after
 
     def _heading_rad(self, time_s: float) -> tuple[FloatArray, FloatArray]:
-        """Amplitude in m and heading to the ship of each component."""
         amplitude_m, heading_rad = self._sea.at(time_s)
         return amplitude_m, heading_rad - self._turn_rad(time_s)
 
@@ -154,7 +153,6 @@ class PassingWaves:
         return encounter_frequency(self._sea.omega_rad_s, heading_rad, self._speed_m_s(time_s))
 
     def _amplitudes(self, time_s: float) -> ComplexArray:
-        """Amplitudes of each force, shape (k, N)."""
         amplitude_m, heading_rad = self._heading_rad(time_s)
         omega_rad_s = self._sea.omega_rad_s
         rows = [amplitude_m * response(omega_rad_s, heading_rad) for response in self._responses]

@@ -72,7 +72,6 @@ _KINDS: Final[dict[str, type[Spaced | Counted | Hours]]] = {
 
 
 def _listed(written: Any) -> Any:
-    """Return a list unchanged, and a range as the list of its values."""
     if not isinstance(written, dict):
         return written
     for key, kind in _KINDS.items():

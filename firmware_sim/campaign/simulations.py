@@ -88,7 +88,6 @@ def _on_the_bus(scenario: Scenario, seed: int, laws: Laws) -> list[Row]:
 
 
 def _judged(scenario: Scenario, records: list[_Record]) -> list[Row]:
-    """Yield the rows of a fast simulation, judged over the scenario's window."""
     window = slice(round(scenario.settle_s / RECORD_S), None)
     rows: list[Row] = []
     rolls: dict[str, float] = {}

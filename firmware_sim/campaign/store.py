@@ -34,8 +34,7 @@ METRICS: Final = {
     "power_peak_w": "greatest power drawn",
     "strikes": "how often the water struck a limit of its level",
     "active_share": "share of the time in which the controller was in charge",
-}
-"""Meaning of each metric's column over the scenario's window; NaN where it does not apply."""
+}  #: Meaning of each metric's column over the scenario's window; NaN where it does not apply.
 
 LEAVES_OUT: Final = {
     "bus": (),
@@ -47,8 +46,7 @@ LEAVES_OUT: Final = {
         "was designed for, and its power is that into the water",
         "errors of the sensors but white noise",
     ),
-}
-"""Effects that each kind of simulation leaves out."""
+}  #: Effects that each kind of simulation leaves out.
 
 
 STUDY, ABOUT, CASES, ROWS = "study.yaml", "study.json", "cases.parquet", "rows"

@@ -158,7 +158,6 @@ def _with(place: Any, path: list[str], value: Any, depth: int = 0) -> Any:
 
 
 def _refuse_stranger(place: Content, path: list[str]) -> None:
-    """Refuse a key that the schema does not allow; a missing allowed section may be created."""
     *above, name = path
     known = known_keys(Scenario, above)
     if name in known:
@@ -358,7 +357,6 @@ def _override_of(values: Iterable[str], dotted: str) -> str | None:
 
 
 def _place(study: Study, key: str) -> str:
-    """Place in a study's file where the value of a key is written."""
     for name, keys in _sections(study):
         if key in keys:
             return f"{name}.{key}"
@@ -377,7 +375,6 @@ def _sections(study: Study) -> Iterator[tuple[str, Iterable[str]]]:
 
 
 def _at_override(path: Path, study: Study, values: Content, reason: str) -> ConfigProblem:
-    """Problem of the first override that cannot be applied."""
     so_far = {}
     for key, value in values.items():
         so_far[key] = value

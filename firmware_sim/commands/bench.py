@@ -18,6 +18,8 @@ from utank_hil.console.common import (
     AllowCode,
     Duration,
     Json,
+    Out,
+    Seed,
     fail,
     load,
     prepare_out,
@@ -64,11 +66,9 @@ def bench(
             help="SocketCAN interface for real time; without it all nodes share one process."
         ),
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option(min=0, help="Of waves and noise, instead of the scenario's.")
-    ] = None,
+    seed: Seed = None,
     duration: Duration = None,
-    out: Annotated[Path, typer.Option(help="Folder for picture, recording and figures.")] = OUT,
+    out: Out = OUT,
     frames: Annotated[
         bool,
         typer.Option("--frames", help="Keep each run's frame log there, for replay and export."),
@@ -135,15 +135,12 @@ def _write_fmu(path: Path, scenario: "Scenario", fmu: Path, seed: int) -> None:
 
     try:
         write_fmu(scenario, fmu, seed)
-    except ValueError as error:
-        fail(f"{path}: {error}")
-    except OSError as error:
-        fail(error)
+    except (OSError, ValueError) as error:
+        fail(f"{path}: {error}" if isinstance(error, ValueError) else error)
     notes.say(f"{shown(fmu)}: FMI 2 for co-simulation, with its source")
 
 
 def _refuse_faults(path: Path, scenario: "Scenario", *, real_time: bool, frames: bool) -> None:
-    """End with exit code 2 where the scenario's faults can't be had as asked."""
     if real_time and scenario.faults:
         fail(f"{path}: faults: are for simulated time: leave --realtime out, or the faults")
     for number, fault in enumerate(scenario.faults if frames else ()):
@@ -157,7 +154,6 @@ def _refuse_faults(path: Path, scenario: "Scenario", *, real_time: bool, frames:
 def _run(
     scenario: "Scenario", options: "BenchOptions", laws: Mapping[str, BuiltLaw]
 ) -> "BenchResult":
-    """Run the bench with a progress bar for each run."""
     from firmware_sim.bench import run_bench
 
     length_s = scenario.duration_s if options.duration_s is None else options.duration_s
@@ -220,7 +216,6 @@ def _run_next(found: "BenchFigures", scenario: Path) -> list[Command]:
 def _about(
     scenario: "Scenario", options: "BenchOptions", out: Path, given: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Provenance of the results: the scenario with the options applied."""
     changes: dict[str, float] = {}
     if options.seed is not None:
         changes["seed"] = options.seed

@@ -90,7 +90,6 @@ def _about(loaded: "LoadedStudy", folder: Path, given: dict[str, Any]) -> dict[s
 
 
 def _run(loaded: "LoadedStudy", store: Any, workers: int) -> bool:
-    """Compute the missing cases with a progress bar; return whether it was interrupted."""
     from firmware_sim.campaign.driver import Count, Driver
     from firmware_sim.campaign.simulations import OtherCodeError
 

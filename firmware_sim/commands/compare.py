@@ -42,8 +42,7 @@ def compare(
     except (CompareError, ValueError) as error:
         fail(error)
     if json_:
-        content = {"reference": str(reference), "comparisons": [asdict(each) for each in found]}
-        print_json(content)
+        print_json({"reference": str(reference), "comparisons": [asdict(each) for each in found]})
         return
     console = Terminal()
     for source in dict.fromkeys(each.source for each in found):
@@ -54,7 +53,6 @@ def compare(
 
 
 def _recording(place: Path) -> Path:
-    """Recording of a run, for a file or a folder."""
     from firmware_sim.report_page import RECORDING
 
     file = place / RECORDING if place.is_dir() else place
@@ -81,18 +79,14 @@ def _table(reference: Path, found: list["Comparison"]) -> Table:
 
 
 def _cells(name: str, figure: "Difference") -> list[str]:
-    scale, unit = _unit(name)
+    words, _, unit = name.rpartition("_")
+    scale, said = _SCALES.get(unit, (1.0, ""))
     width = "" if figure.half_width is None else f" ± {scale * figure.half_width:.3g}"
-    share = f"{figure.difference / figure.reference:+.1%}" if figure.reference else ""
     return [
-        f"{name.rsplit('_', 1)[0] if unit else name} {unit}".strip(),
+        f"{words} {said}" if said else name,
         f"{scale * figure.reference:.4g}",
         f"{scale * figure.value:.4g}",
         f"{scale * figure.difference:+.3g}{width}",
-        share,
+        f"{figure.difference / figure.reference:+.1%}" if figure.reference else "",
         str(figure.count) if figure.paired else "none",
     ]
-
-
-def _unit(name: str) -> tuple[float, str]:
-    return _SCALES.get(name.rsplit("_", 1)[-1], (1.0, ""))

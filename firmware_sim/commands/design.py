@@ -16,7 +16,7 @@ from firmware_sim.scenario import Scenario
 from utank_hil.base.provenance import describe
 from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import Vessel
-from utank_hil.console.common import OUT, Json, fail, load, new_app, prepare_out, print_json
+from utank_hil.console.common import OUT, Json, Out, fail, load, new_app, prepare_out, print_json
 from utank_hil.console.ship_report import order_words
 from utank_hil.console.terminal import Terminal, new_table, notes
 from utank_hil.dynamics.tank import Tank
@@ -38,13 +38,14 @@ SeaOption = Annotated[
         help="Scenario whose sea counts.", show_default="scenario.yaml beside, or a shipped one"
     ),
 ]
+Ship = Annotated[Path, typer.Argument(help="Ship, tank and pump: a file of configs/ships.")]
 
 
 def tank(
     context: typer.Context,
-    vessel: Annotated[Path, typer.Argument(help="Ship, tank and pump: a file of configs/ships.")],
+    vessel: Ship,
     scenario: SeaOption = None,
-    out: Annotated[Path, typer.Option(help="Folder for pictures and figures.")] = OUT,
+    out: Out = OUT,
     json_: Json = False,
 ) -> None:
     """Say what a tank costs the ship and what it does in a sea, beside the best passive one.
@@ -93,23 +94,17 @@ def tank(
     # a scenario of `init` begins with the ship's name
     title = name if name.startswith(loaded.name) else f"{loaded.name}: {name}"
     about = describe("design tank", loaded, out, options=context.params, scenario=chosen)
-    files = {"picture": out / PICTURE, "figures": out / FIGURES}
     drawn = {
         each.period_scale: [roll.mean if roll else math.nan for roll in rolls(each.expected)]
         for each in loadings
     }
-    draw_tank(roll_curves(plant, waves, law), drawn, files["picture"], title, about)
-    figures |= about | {
-        "scenario": name,
-        **{key: _figures(loaded, each, found[key]) for key, each in tanks.items()},
-        "loading": [
-            {"period_scale": each.period_scale, **each.expected.as_json()} for each in loadings
-        ],
-        "files": {key: str(file) for key, file in files.items()},
-    }
-    write_whole(files["figures"], json.dumps(figures, indent=2) + "\n")
+    draw_tank(roll_curves(plant, waves, law), drawn, out / PICTURE, title, about)
+    figures |= about | {key: _figures(loaded, each, found[key]) for key, each in tanks.items()}
+    figures["loading"] = [
+        {"period_scale": each.period_scale, **each.expected.as_json()} for each in loadings
+    ]
+    files = _keep(figures | {"scenario": name}, out / PICTURE, out / FIGURES, json_=json_)
     if json_:
-        print_json(figures)
         return
     console.table(_table(loaded, tanks, found, interval_words(found["present"], name)))
     if loaded.pump is not None and law is None:
@@ -119,6 +114,15 @@ def tank(
     if loadings:
         console.table(loading_table(loadings))
     console.files(files)
+
+
+def _keep(figures: dict[str, Any], picture: Path, file: Path, *, json_: bool) -> dict[str, Path]:
+    files = {"picture": picture, "figures": file}
+    figures["files"] = {key: str(path) for key, path in files.items()}
+    write_whole(file, json.dumps(figures, indent=2) + "\n")
+    if json_:
+        print_json(figures)
+    return files
 
 
 def filling(
@@ -132,7 +136,7 @@ def filling(
     displacement: Annotated[
         list[float] | None, typer.Option(help="Displacement in t; may be given again.")
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for picture and figures.")] = OUT,
+    out: Out = OUT,
     json_: Json = False,
 ) -> None:
     """Say how far to fill the tank, by displacement and GM: the still level that rolls her least.
@@ -167,18 +171,15 @@ def filling(
         fail(f"{vessel}: {error}")
     out = prepare_out(out, ("filling.png", "filling.json"))
     about = describe("design filling", loaded, out, options=context.params, scenario=chosen)
-    files = {"picture": out / "filling.png", "figures": out / "filling.json"}
-    draw_filling(found, files["picture"], f"{loaded.name}: filling for {chosen.name}", about)
-    rows = [asdict(each) for each in found]
-    figures = about | {"vessel": loaded.name, "scenario": chosen.name, "fillings": rows}
-    figures |= {"files": {key: str(file) for key, file in files.items()}}
-    write_whole(files["figures"], json.dumps(figures, indent=2) + "\n")
-    if json_:
-        print_json(figures)
-        return
-    console = Terminal()
-    console.table(filling_table(found, loaded.tank.height_m, chosen.name))
-    console.files(files)
+    title = f"{loaded.name}: filling for {chosen.name}"
+    draw_filling(found, out / "filling.png", title, about)
+    figures = about | {"vessel": loaded.name, "scenario": chosen.name}
+    figures["fillings"] = [asdict(each) for each in found]
+    files = _keep(figures, out / "filling.png", out / "filling.json", json_=json_)
+    if not json_:
+        console = Terminal()
+        console.table(filling_table(found, loaded.tank.height_m, chosen.name))
+        console.files(files)
 
 
 def _sea(path: Path, vessel: Vessel) -> "tuple[Scenario, Harmonics]":
@@ -194,9 +195,8 @@ def _sea(path: Path, vessel: Vessel) -> "tuple[Scenario, Harmonics]":
         if scenario.hull is not None or scenario.fmu is not None:
             fail(f"{path}: plant: {scenario.plant} is {scenario.vessel.name}, not {vessel.name}; "
                  "name a scenario with plant: roll")  # fmt: skip
-        others: dict[str, Any] = {"actual_ship": {}, "voyage": (), "gusts": None}
-        others |= {"vessel": vessel, "controllers": {}}
-        scenario = scenario.model_copy(update=others)
+        others = {"vessel": vessel, "controllers": {}, "actual_ship": {}, "voyage": ()}
+        scenario = scenario.model_copy(update=others | {"gusts": None})
     waves = pooled_wave_moment(scenario)
     try:
         expected_sea(vessel.ship, waves)
@@ -206,12 +206,10 @@ def _sea(path: Path, vessel: Vessel) -> "tuple[Scenario, Harmonics]":
 
 
 def _plant(vessel: Vessel) -> "DesignPlant":
-    """Plant for the design of a law, with the vessel's level limit and lag."""
     from utank_hil.control import DesignPlant, PumpLimits
 
-    limits, lag_s = PumpLimits(**vessel.default_limits), 0.0
-    if vessel.pump is not None:
-        lag_s = vessel.pump.lag_s
+    limits, pump = PumpLimits(**vessel.default_limits), vessel.pump
+    lag_s = 0.0 if pump is None else pump.lag_s
     return DesignPlant(vessel.ship, vessel.tank, lag_s=lag_s, limits=limits)
 
 
@@ -255,7 +253,6 @@ def _figures(vessel: Vessel, tank: Tank, found: "Expected | None") -> dict[str, 
 def _table(
     vessel: Vessel, tanks: dict[str, Tank], found: dict[str, "Expected"], caption: str = ""
 ) -> Table:
-    """Table of the present tank beside the best passive one."""
     from firmware_sim.tank_report import cost_rows, figure_rows, roll_rows
     from utank_hil.analysis.tank_sizing import moving, tank_cost
     from utank_hil.control.optimal_tank import tank_figures

@@ -1,8 +1,6 @@
 """``utank-hil faults``: injects every fault of the table and checks that it is found in time."""
 
-import json
 import math
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +11,7 @@ from rich.progress import MofNCompleteColumn
 
 from utank_hil.base.provenance import describe
 from utank_hil.base.shipped import CONFIGS
-from utank_hil.console.common import KILLED, Json, fail, load
+from utank_hil.console.common import KILLED, Json, fail, load, print_json
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, progress_bar
 
@@ -61,9 +59,8 @@ def faults(
     from firmware_sim.fault_campaign.verdict import as_json, judged
     from utank_hil.runners import stop_on_signals
 
-    loaded = whole = load(campaign, Campaign)
-    if scenario is not None:
-        loaded = _on(whole, scenario)
+    whole = load(campaign, Campaign)
+    loaded = whole if scenario is None else _on(whole, scenario)
     names = [name.strip() for name in rows.split(",") if name.strip()]
     chosen = loaded.chosen(names)
     window = Window() if full else Window(60.0, 20.0) if scenario is None else _window(loaded)
@@ -83,24 +80,23 @@ def faults(
         )
         interrupted = stopped()
     partly = [row.id for row in chosen if len(outcomes[row.id]) < seeds]
-    killed = bool(partly) and not interrupted
     results = [judged(loaded, row, outcomes[row.id]) for row in chosen if row.id not in partly]
     not_run = {
         each.id: f"{each.fault}: shown by {each.elsewhere}"
         for each in loaded.shown_elsewhere(names)
     }
-    kept = {row.id for row in loaded.rows}
     not_run |= {
         row.id: f"needs a ship, nodes and counters as of setup {row.fault.setup}"
         for row in whole.chosen(names)
-        if row.id not in kept
+        if row not in loaded.rows
     }
     not_run |= {row.id: "takes long: --full or --rows" for row in too_long}
+    killed = bool(partly) and not interrupted
     not_run |= dict.fromkeys(partly, KILLED if killed else INTERRUPTED)
     options = {"seeds": seeds, "full": full, "rows": names, "scenario": str(scenario or "")}
     about = describe("faults", loaded, Path(), options=options, seed=1)
     if json_:
-        sys.stdout.write(json.dumps(as_json(results, not_run, about)) + "\n")
+        print_json(as_json(results, not_run, about))
     else:
         _print(results)
         failed = sum(not result.passed for result in results)
@@ -118,7 +114,6 @@ def faults(
 
 
 def _on(campaign: "Campaign", path: Path) -> "Campaign":
-    """The campaign on the ship of a scenario."""
     from firmware_sim.fault_campaign.campaign import COMMON
     from firmware_sim.scenario import Scenario
 
@@ -141,7 +136,6 @@ def _window(campaign: "Campaign") -> "Window":
 
 
 def _refuse_names(campaign: "Campaign", names: Sequence[str], chosen: Sequence["Row"]) -> None:
-    """End with exit code 2 if a name is that of no row, or nothing is left to run."""
     for name in names:
         if not (campaign.chosen([name]) or campaign.shown_elsewhere([name])):
             fail(f"--rows: no row or requirement begins with {name}")

@@ -8,7 +8,7 @@ import typer
 
 from utank_hil.base.parameters import ParameterError
 from utank_hil.console.common import Json, fail, print_json
-from utank_hil.console.terminal import Terminal, new_table, notes, say_note, shown
+from utank_hil.console.terminal import Terminal, notes, rows_table, say_note, shown
 
 if TYPE_CHECKING:
     from utank_hil.dynamics.hull.hull_data import HullData
@@ -96,15 +96,13 @@ def hull(
     if json_:
         print_json({"file": str(out), "panels": 2 * side.nb_faces, **figures})
         return
-    table = new_table(shown(mesh), "")
-    table.show_header = False
-    for name, value in figures.items():
-        words, _, unit = name.rpartition("_")
-        table.add_row(words.replace("_", " "), f"{value:.4g} {unit.replace('ratio', '')}")
+    rows = (
+        (words.replace("_", " "), f"{value:.4g} {unit.replace('ratio', '')}")
+        for name, value in figures.items()
+        for words, _, unit in (name.rpartition("_"),)
+    )
     console = Terminal()
-    console.table(table)
-    console.say(f"written: {shown(out)}")
-    console.say(f"In the ship's file: ship: {{hull: ./{out.name}}}")
+    console.table(rows_table(shown(mesh), rows))
 
 
 def hull_figures(hull: "HullData") -> dict[str, float]:

@@ -1,9 +1,11 @@
 """``utank-hil init``: a starter project for a user's ship."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 from rich.table import Table
@@ -15,12 +17,11 @@ from utank_hil.base.whole_file import write_whole
 from utank_hil.console.common import Json, fail, load, prepare_out, print_json
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.ship_report import order_words
-from utank_hil.console.terminal import Terminal, new_table, notes, shown
+from utank_hil.console.terminal import Terminal, notes, rows_table, shown
 
 if TYPE_CHECKING:
     from firmware_sim.prediction import Expected
     from firmware_sim.starter import StarterProject
-    from utank_hil.analysis.tank_sizing import SizedTank
 
 _OPTIONS = {
     "stability_share": "gm-loss",
@@ -31,8 +32,7 @@ _OPTIONS = {
     "tank.height_m": "tank-height",
     "tank.lz_m": "duct-below-cg",
     "duct_below_cg_m": "duct-below-cg",
-}
-"""Options whose names differ from the parameters they set."""
+}  #: Options whose names differ from the parameters they set.
 _UNITS = ("_m", "_t", "_s")
 
 WORTH_IT: Final = 0.15
@@ -135,18 +135,14 @@ def init(
         "length_m": tank_length,
         "duct_below_cg_m": duct_below_cg,
     }
-    try:
-        ship_name = name or folder.resolve().name.replace("_", " ")
+    ship_name = name or folder.resolve().name.replace("_", " ")
+    with _at_options():
         ship = StarterShip(
             ship_name, length, beam, displacement, gm, roll_period, draught, roll_damping
         )
         usual = TankRoom.in_hull(length, beam)
-    except ParameterError as error:
-        _fail_at(error)
-    try:
+    with _at_options("tank-"):
         room = replace(usual, **{key: of for key, of in given.items() if of is not None})
-    except ParameterError as error:
-        _fail_at(error, "tank-")
     if room.breadth_m > beam:
         fail(f"--tank-breadth: is {room.breadth_m:g} m, and the ship's beam {beam:g} m")
     for option, value in (("hs", hs), ("tp", tp)):
@@ -158,16 +154,14 @@ def init(
             fail("--hull: needs --draught")
         loading = Loading(gm, roll_period_s=ship.period_s, displacement_t=displacement)
         try:
-            with notes.busy(f"{ship_name}: computing the hull"):
+            with _at_options(), notes.busy(f"{ship_name}: computing the hull"):
                 data, found = usual_hull(ship.form, loading)
-            slope = found.effective_slope
-            ship = replace(ship, radiated_ratio=found.radiation_ratio)
-        except ParameterError as error:
-            _fail_at(error)
+                slope = found.effective_slope
+                ship = replace(ship, radiated_ratio=found.radiation_ratio)
         except (MeshError, ValueError) as error:
             fail(f"--hull: the usual hull of these dimensions {error}")
     try:
-        with notes.busy(f"{ship_name}: sizing tank and pump, designing a law"):
+        with _at_options(), notes.busy(f"{ship_name}: sizing tank and pump, designing a law"):
             project = make_starter(ship, room, gm_loss, hs, tp, slope)
     except (TankImpossibleError, NoLawError) as error:
         if json_:
@@ -176,8 +170,6 @@ def init(
         raise typer.Exit(ExitCode.REFUSED) from None
     except CalmSeaError as error:
         fail(f"--tp: {error}")
-    except ParameterError as error:
-        _fail_at(error)
     prepare_out(folder, ())  # written last: a refusal leaves no files behind
     files = {file: folder / file for file in FILES}
     for file, path in files.items():
@@ -193,9 +185,8 @@ def init(
     if json_:
         figures = {"possible": True, "little_help": little, **_as_json(project)}
         figures["expected"] = expected.as_json()
-        print_json(
-            {**figures, "files": {Path(file).stem: str(path) for file, path in files.items()}}
-        )
+        figures["files"] = {Path(file).stem: str(path) for file, path in files.items()}
+        print_json(figures)
         return
     console = Terminal()
     console.table(_table(project, expected))
@@ -208,7 +199,6 @@ def init(
 
 
 def _little_help(project: "StarterProject", found: "Expected") -> str | None:
-    """Warning where the tank reduces roll by little; None where it does not."""
     if found.active_rad is None or found.without_tank_rad is None:
         return None  # a ship that capsizes has no roll to compare with
     less = 1 - found.active_rad.mean / found.without_tank_rad.mean
@@ -222,12 +212,15 @@ def _little_help(project: "StarterProject", found: "Expected") -> str | None:
     )
 
 
-def _fail_at(error: ParameterError, prefix: str = "") -> NoReturn:
-    """Name the invalid options and exit with code 2."""
-    for name, reason in error.problems:
-        place = f"--{_OPTIONS[name]}" if name in _OPTIONS else _place(name, prefix)
-        notes.say(f"{place}: {reason}", red="error:")
-    raise typer.Exit(ExitCode.USAGE)
+@contextmanager
+def _at_options(prefix: str = "") -> Iterator[None]:
+    try:
+        yield
+    except ParameterError as error:
+        for name, reason in error.problems:
+            place = f"--{_OPTIONS[name]}" if name in _OPTIONS else _place(name, prefix)
+            notes.say(f"{place}: {reason}", red="error:")
+        raise typer.Exit(ExitCode.USAGE) from None
 
 
 def _place(name: str, prefix: str) -> str:
@@ -269,19 +262,14 @@ def _as_json(project: "StarterProject") -> dict[str, Any]:
 
 def _table(project: "StarterProject", expected: "Expected") -> Table:
     sized, demand, law = project.sized, project.demand, project.law
-    sea = f"{project.sea['hs_m']:g} m, {project.sea['tp_s']:g} s"
-    caption = interval_words(expected, f"a sea of {sea}")
-    table = new_table(project.vessel.name, "", caption=caption)
-    table.show_header = False
-    ship, tank = project.vessel.ship, project.vessel.tank
+    ship, tank, duct_m = project.vessel.ship, project.vessel.tank, project.sized.duct_height_m
+    heights = (duct_m, duct_m + tank.height_m, duct_m + tank.height_m + tank.headroom_m)
+    along = f"{sized.reservoir_length_m:.2f} m along"
     rows = [
         ("roll period", f"{2 * math.pi / ship.natural_frequency_rad_s:.2f} s"),
         ("tank sized by", sized.bound_by),
-        (
-            "reservoirs, each",
-            f"{sized.reservoir_length_m:.2f} m along, {sized.reservoir_breadth_m:.2f} m across",
-        ),
-        ("duct, still water, roof at", _heights(sized)),
+        ("reservoirs, each", f"{along}, {sized.reservoir_breadth_m:.2f} m across"),
+        ("duct, still water, roof at", ", ".join(f"{each:.2f}" for each in heights) + " m"),
         *cost_rows(tank_cost(ship, tank)),
         ("pump moves the water by", f"{demand.level_m:.2f} m"),
         ("pump: net head, flow, shaft, duty", order_words(project.vessel)),
@@ -289,12 +277,5 @@ def _table(project: "StarterProject", expected: "Expected") -> Table:
         ("peak sensitivity, 2 at most", f"{law.robustness.nominal.peak_sensitivity:.2f}"),
         *roll_rows(expected),
     ]
-    for text, value in rows:
-        table.add_row(text, value)
-    return table
-
-
-def _heights(sized: "SizedTank") -> str:
-    tank, duct_m = sized.tank, sized.duct_height_m
-    heights = (duct_m, duct_m + tank.height_m, duct_m + tank.height_m + tank.headroom_m)
-    return ", ".join(f"{height:.2f}" for height in heights) + " m"
+    sea = f"a sea of {project.sea['hs_m']:g} m, {project.sea['tp_s']:g} s"
+    return rows_table(project.vessel.name, rows, caption=interval_words(expected, sea))

@@ -32,8 +32,7 @@ from utank_hil.retuning import SimulatedRetuner
 T = TypeVar("T")
 
 SECOND_NS: Final = 1_000_000_000
-SAMPLE_TICKS: Final = 5
-"""Ticks between samples of a passive ship's roll: 50 ms."""
+SAMPLE_TICKS: Final = 5  #: Ticks between samples of a passive ship's roll: 50 ms.
 SAMPLE_NS: Final = SAMPLE_TICKS * TICK_NS
 _LOOK_S: Final = 0.1  # Interval in s at which Ctrl-C is checked while a copy works.
 REARMED_S: Final = 20.0
@@ -218,7 +217,6 @@ class Sea:
         return in_a_copy(lambda: self._outcome(row, reference), self._stopped)
 
     def _operated(self, row: Row) -> list[Heard]:
-        """Bus log without the row's faults, but with the operator's actions."""
         underway = self._start() if row.fault.from_start else self._underway
         bench = underway.bench
         bench.join([Watch(bench, row)])
@@ -294,7 +292,6 @@ class Sea:
         return share * limits.pressure_pa, round(ramp_s * SECOND_NS) + COMMANDS_NS
 
     def _stopped_at(self, bench: FaultyBench) -> bool:
-        """Whether nothing controls the water any more."""
         return not self._pump_enabled(bench) and bench.node.mode is not Mode.ACTIVE
 
     def _pump_enabled(self, bench: FaultyBench) -> bool:
@@ -329,7 +326,6 @@ def _said(log: BusLog, start_ns: int) -> dict[str, Any]:
 
 
 def _words(there: Heard | None, here: Heard | None, start_ns: int) -> str:
-    """Readable description of the first difference between two logs of the bus."""
 
     def frame(heard: Heard | None) -> str:
         if heard is None:

@@ -46,8 +46,7 @@ _TIME_OF: Final[dict[Asked, str]] = {
     "alarm": "alarm",
     "note": "noted",
     "drive": "zero",
-}
-"""Field of `Times` with the start of each reaction."""
+}  #: Field of `Times` with the start of each reaction.
 _GO_ON: Final = ("halve", "alarm", "note", "none")  # Reactions after which control continues.
 
 
@@ -164,7 +163,6 @@ def _zero_limit_ms(row: Row, outcome: Outcome) -> float | None:
 
 
 def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
-    """Yield the problems of one sea."""
     yield from _late(row, outcome)
     yield from _unsaid(row, outcome)
     yield from _ended_wrongly(row, outcome)
@@ -181,7 +179,6 @@ def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
 
 
 def _late(row: Row, outcome: Outcome) -> Iterator[str]:
-    """Yield reactions that were late or missing."""
     limit = row.limit
     found_ms = _reaction_ms(row, outcome)
     if row.expect.reaction not in ("none", "refuse"):
@@ -226,7 +223,6 @@ def _ended_wrongly(row: Row, outcome: Outcome) -> Iterator[str]:
 
 
 def _named_in_time(row: Row, outcome: Outcome) -> bool:
-    """Whether an alarm had one of the row's names by the time of detection, or its deadline."""
     if outcome.alarm is None:
         return False
     latest_ms = max(row.limit.found_ms or 0.0, _reaction_ms(row, outcome) or 0.0) + ALARM_MS
@@ -234,7 +230,6 @@ def _named_in_time(row: Row, outcome: Outcome) -> bool:
 
 
 def _unsaid(row: Row, outcome: Outcome) -> Iterator[str]:
-    """Yield missing or wrong information on the bus."""
     expect = row.expect
     if expect.unheard:
         return
@@ -296,6 +291,5 @@ def table(results: Sequence[Result]) -> Table:
 
 
 def _over(time_ms: float | None, limit_ms: float | None) -> str:
-    """A time above its limit."""
     found = "" if time_ms is None else f"{time_ms:.0f}"
     return found if limit_ms is None else f"{found}\n≤{limit_ms:.0f}"

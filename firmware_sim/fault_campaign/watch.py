@@ -206,7 +206,6 @@ class Watch:
         return ()
 
     def _look_at_difference(self, now_ns: int) -> None:
-        """Update the time since which the deviation in `counts_from` exists."""
         for name, limit in self._counts_from.items():
             if self._apart(name) <= limit:
                 # the pressure may cross its set-point briefly; a lasting deviation was to be found

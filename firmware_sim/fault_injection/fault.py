@@ -27,8 +27,7 @@ NODE_OF: Final = {
     Address.SENSORS_2: "sensors_2",
     Address.HARDWIRED: "hardwired",
     Address.CONTROLLER: "controller",
-}
-"""Name of the emulated node at an address."""
+}  #: Name of the emulated node at an address.
 
 
 def _choice(of: str, choices: list[str], name: str) -> str:

@@ -24,8 +24,7 @@ TICK_MS: Final = TICK_NS / 1e6
 PRESSURE_PA: Final = 8.0
 ROLL_RAD: Final = 1e-4
 RATE_RAD_S: Final = 3.125e-5
-LEVEL_M: Final = 1e-3
-"""Units of the frames."""
+LEVEL_M: Final = 1e-3  #: Units of the frames.
 MOST_RATE: Final = 32000
 LEVEL_SHARE: Final = 0.97
 """Of the level at which a reservoir is full or empty; the shipped switches close at 0.943."""
@@ -39,8 +38,7 @@ STREAMS: Final[tuple[tuple[type[tuple[Any, ...]], Address], ...]] = (
     (OperatorCommand, Address.OPERATOR),
     (OperatorCommand, Address.OPERATOR_2),
     (HardwiredInputs, Address.HARDWIRED),
-)
-"""Messages in the order of the enumeration in guard.h."""
+)  #: Messages in the order of the enumeration in guard.h.
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,8 +48,7 @@ WINDOW: Final = 30
 PERSIST: Final = 10
 HEEL_TICKS: Final = 6000
 HEEL_SCALE: Final = 4096
-NO_TORQUE: Final = (0x00, 0x40, 0x21, 0x23, 0x08)
-"""CiA 402 states."""
+NO_TORQUE: Final = (0x00, 0x40, 0x21, 0x23, 0x08)  #: CiA 402 states.
 
 
 class Stream(IntEnum):

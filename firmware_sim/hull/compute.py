@@ -159,7 +159,6 @@ def _lid(side: Any) -> Any:
 
 
 def _frequencies(mesh: Any) -> FloatArray:
-    """Return frequencies up to what the panels can follow."""
     unit = math.sqrt(GRAVITY_M_S2 / float(np.ptp(mesh.vertices[:, 1])))
     largest_m = float(mesh.faces_radiuses.max())
     top = math.sqrt(2 * math.pi * GRAVITY_M_S2 / (_PANELS_A_WAVE * largest_m))

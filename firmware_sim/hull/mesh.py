@@ -28,8 +28,7 @@ Panels = npt.NDArray[np.int64]
 
 FORMATS: Final = "WAMIT .gdf, HAMS .pnl, NEMOH .mar, HydroStar .hst; with meshio .stl, .obj, .ply"
 _BY_MESHIO: Final = (".stl", ".obj", ".ply")
-_LENGTHS_M: Final = (3.0, 600.0)
-"""Lengths of hulls: a model's, and more than the longest ship's."""
+_LENGTHS_M: Final = (3.0, 600.0)  #: Lengths of hulls: a model's, and more than the longest ship's.
 _UNITS: Final = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048, "km": 1e3}
 _TOLERANCE: Final = 1e-5  #: Distance per length up to which points are one, or lie in a plane.
 _UNEQUAL: Final = 0.01  #: Greatest difference of the two sides, as a share.
@@ -105,7 +104,6 @@ def _refuse_size(points_m: FloatArray) -> None:
 
 
 def _wetted(mesh: Any) -> tuple[Any, list[str]]:
-    """Return the side to port below z = 0, closed and with its normals out."""
     import capytaine as cpt
 
     notes = []
@@ -215,7 +213,6 @@ def form_mesh(form: HullForm) -> Any:
 
 
 def _form_numbers(form: HullForm) -> tuple[float, float]:
-    """Return the power n of the waterline and the fall a of the sections."""
     prismatic = form.block_coefficient / form.midship_coefficient
     waterline = min((1 + 2 * form.block_coefficient) / 3, 0.99)  # Schneekluth and Bertram 1998
     n = waterline / (1 - waterline)

@@ -23,7 +23,6 @@ from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict, write_report_page
 from utank_hil.reports import recording as of_recording
-from utank_hil.reports.page import write_report
 from utank_hil.telemetry.recording import write_recording
 
 pytestmark = pytest.mark.slow
@@ -31,7 +30,7 @@ pytestmark = pytest.mark.slow
 
 def write_page(recording: Path, page: Path) -> Path:
     """What the command does."""
-    return write_report(of_recording.recording_report(recording), page)
+    return write_report_page(page, *of_recording.recording_report(recording))
 
 
 ACTIVE_FROM_S, FAULT_FROM_S, END_S = 20.0, 200.0, 240.0

@@ -276,4 +276,4 @@ def test_the_page_of_a_short_window_carries_its_interval() -> None:
     about = describe("bench", result.scenario, Path.cwd(), options={}, seed=1)
     page = bench_page(figures(result), about, None)
     # 80 s of a ship of 0.5 rad/s: 1.96 / 2 / sqrt(0.1 * 0.5 * 80)
-    assert "uncertain by ±49% (95 %)" in " ".join(page.verdict.lines)
+    assert "uncertain by ±49% (95 %)" in " ".join(page.verdicts[0].lines)

@@ -40,8 +40,8 @@ def exit_codes() -> Iterator[str]:
 def registers() -> Iterator[str]:
     """The table of docs/how-to/outward.md."""
     yield "| register | holds |\n|---|---|\n"
-    for at, each in enumerate(REGISTERS):
-        yield f"| {at} | {each.meaning} |\n"
+    for at, meaning in enumerate(REGISTERS):
+        yield f"| {at} | {meaning} |\n"
     yield (
         f"| {FIRST_ALARM} + code | alarm of the fault with this code ([safety.md](../safety.md)): "
         "0 not in the list, 1 active, 2 active and acknowledged, 3 cause gone, not acknowledged |\n"

@@ -12,6 +12,7 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from datetime import UTC, datetime
+from io import FileIO
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
@@ -37,29 +38,19 @@ _START_S, _END_S, _PRINTED_S = 30.0, 10.0, 5.0
 """Times for the process to start, to end, and to print the last lines, on a busy machine."""
 
 
-class EventLog:
-    """A log of one JSON object a line for each event, synced at once, in monotonic time and UTC."""
+def log_event(file: FileIO, event: Event, start_ns: int) -> None:
+    """Append an event to a log of one JSON object a line, synced at once.
 
-    def __init__(self, file: Path) -> None:
-        self._file = file.open("ab", buffering=0)  # A write that did not fit is not repeated.
-
-    def write(self, event: Event, start_ns: int) -> None:
-        """Append an event, with times from `start_ns` on this machine's monotonic clock.
-
-        OSError is raised if there is no room; then no part of the event is left.
-        """
-        line = {
-            "utc": _utc(event, start_ns).isoformat(timespec="milliseconds"),
-            "monotonic_ns": start_ns + event.time_ns,
-            "time_s": event.time_ns * 1e-9,
-            **_content(event),
-        }
-        data = (json.dumps(line, ensure_ascii=False) + "\n").encode(errors="replace")
-        append_whole(self._file, data)
-
-    def close(self) -> None:
-        """Close the file; idempotent."""
-        self._file.close()
+    Times are from `start_ns` on this machine's monotonic clock, and in UTC. `file` is unbuffered.
+    OSError is raised if there is no room; then no part of the event is left.
+    """
+    line = {
+        "utc": _utc(event, start_ns).isoformat(timespec="milliseconds"),
+        "monotonic_ns": start_ns + event.time_ns,
+        "time_s": event.time_ns * 1e-9,
+        **_content(event),
+    }
+    append_whole(file, (json.dumps(line, ensure_ascii=False) + "\n").encode(errors="replace"))
 
 
 def _utc(event: Event, start_ns: int) -> datetime:
@@ -171,11 +162,10 @@ def announce(
         stack.callback(lines.close, _PRINTED_S)
         if log is not None:
             try:
-                events = EventLog(log)
+                # unbuffered: a write that did not fit is not repeated
+                events = stack.enter_context(log.open("ab", buffering=0))
             except OSError as error:
                 lines.say(f"no log of events: {error}")
-            else:
-                stack.callback(events.close)
         outward = None
         if outlets:
             outward = stack.enter_context(Outward(outlets, reader.writer_pid, lines.say))
@@ -191,7 +181,7 @@ def announce(
             for event in reader.read_events():
                 try:
                     if events is not None:
-                        events.write(event, reader.start_ns)
+                        log_event(events, event, reader.start_ns)
                 except OSError as error:  # A full disk does not end it.
                     lines.say(f"an event was not logged: {error}")
                 if isinstance(event, RetuningEvent):  # The run prints alarms itself, at once.

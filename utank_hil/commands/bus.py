@@ -84,11 +84,10 @@ def _heard(interface: str, seconds: float) -> Iterator[BusFrame]:
     from utank_hil.canbus.socketcan import open_bus
 
     listening = open_bus(interface, listens=True)
+    listening_ends = time.monotonic() + seconds
     try:
-        end_s = time.monotonic() + seconds
-        while (left_s := end_s - time.monotonic()) > 0:
-            message = listening.recv(left_s)
-            if message is not None:
+        while (left_s := listening_ends - time.monotonic()) > 0:
+            if (message := listening.recv(left_s)) is not None:
                 yield of_message(message, interface)
     finally:
         listening.shutdown()

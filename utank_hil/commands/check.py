@@ -18,17 +18,10 @@ from utank_hil.base.finite import finite
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.configuration.files import ConfigError, files_named, kind_of
 from utank_hil.configuration.vessel import Vessel
+from utank_hil.console import ship_report
 from utank_hil.console.admission import judge_law
 from utank_hil.console.common import AllowCode, Json, fail, load, print_json, warnings_of
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.ship_report import (
-    devices_json,
-    print_devices,
-    print_ship,
-    ship_figures,
-    ship_json,
-    ship_line,
-)
 from utank_hil.console.terminal import Command, Terminal, new_table, run_command
 from utank_hil.control import BuiltLaw
 from utank_hil.control.constrained.design import ConstrainedDesign
@@ -57,8 +50,8 @@ def controller_json(judged: JudgedLaw) -> dict[str, Any]:
     return {
         "name": config.name,
         "vessel": config.vessel.name,
-        "ship": ship_figures(config.vessel),
-        "devices": devices_json(config.vessel.devices),
+        "ship": ship_report.ship_figures(config.vessel),
+        "devices": ship_report.devices_json(config.vessel.devices),
         "configuration_version": config.vessel.version,
         "law": config.law.kind,
         "at_rest": _at_rest(judged.law),
@@ -79,7 +72,7 @@ def collection_json(collection: Any, judged: Judged) -> dict[str, Any]:
     return {
         "name": collection.name,
         "vessel": vessel.name,
-        "ship": ship_figures(vessel),
+        "ship": ship_report.ship_figures(vessel),
         "figures": collection.figures(),
         "configuration_version": vessel.version,
         "controllers": controllers,
@@ -91,10 +84,9 @@ def print_controller(judged: JudgedLaw) -> None:
     """Print a controller's margins."""
     config, report = judged.config, judged.robustness
     console = Terminal()
-    names = f"{config.name} for {config.vessel.name}"
-    console.say(f"{names}: the configuration is valid.")
-    console.say(ship_line(config.vessel))
-    print_devices(console, config.vessel.devices)
+    console.say(f"{config.name} for {config.vessel.name}: the configuration is valid.")
+    console.say(ship_report.ship_line(config.vessel))
+    ship_report.print_devices(console, config.vessel.devices)
     if report is None:
         if judged.law.unjudged:
             _print_verdict(console, judged)
@@ -103,16 +95,18 @@ def print_controller(judged: JudgedLaw) -> None:
         return
     margin = report.nominal
     table = new_table(MARGINS, "value", "required")
-    table.add_row("peak sensitivity", f"{margin.peak_sensitivity:.2f}", "2 or less")
-    table.add_row("  at", f"{margin.peak_frequency_rad_s:.2f} rad/s", "")
-    table.add_row("pump gain factor", _gain(margin), "")
-    table.add_row("phase margin", _phase(margin), "")
-    table.add_row("delay margin", _delay(judged.law, margin), "over 20 ms")
-    table.add_row("disk margin", f"{margin.disk_margin:.2f}", "")
-    table.add_row("greatest loop gain", f"{margin.peak_loop_gain:.3g}", "")
-    table.add_row(
-        "largest eigenvalue of the grid", radius_words(report.worst_radius), "less than 1"
-    )
+    worst = radius_words(report.worst_radius)
+    for row in (
+        ("peak sensitivity", f"{margin.peak_sensitivity:.2f}", "2 or less"),
+        ("  at", f"{margin.peak_frequency_rad_s:.2f} rad/s", ""),
+        ("pump gain factor", _gain(margin), ""),
+        ("phase margin", _phase(margin), ""),
+        ("delay margin", _delay(judged.law, margin), "over 20 ms"),
+        ("disk margin", f"{margin.disk_margin:.2f}", ""),
+        ("greatest loop gain", f"{margin.peak_loop_gain:.3g}", ""),
+        ("largest eigenvalue of the grid", worst, "less than 1"),
+    ):
+        table.add_row(*row)
     table.caption = (
         "grid: roll period 0.7 to 1.3, or inertia 0.8 to 1.25;\n"
         "pump gain 0.8 to 1.2, 0 or 20 ms more delay"
@@ -137,17 +131,15 @@ def _print_verdict(console: Terminal, judged: JudgedLaw) -> None:
 
 
 def _print_remedy(console: Terminal, judged: JudgedLaw, whose: str = "") -> None:
-    found = remedy(judged)
-    if found is not None:
+    if (found := remedy(judged)) is not None:
         console.say(found, yellow=f"remedy{whose}:")
 
 
 def print_collection(kind: str, collection: Any, judged: Judged) -> None:
     """Print the margins of all controllers of a file."""
     console = Terminal()
-    names = f"{collection.name}, {collection.vessel.name}"
-    console.say(f"{names}: the {kind} is valid.")
-    console.say(ship_line(collection.vessel))
+    console.say(f"{collection.name}, {collection.vessel.name}: the {kind} is valid.")
+    console.say(ship_report.ship_line(collection.vessel))
     for line in collection.meaning():
         console.say(line)
     if not judged:  # A passive tank has no law.
@@ -158,14 +150,13 @@ def print_collection(kind: str, collection: Any, judged: Judged) -> None:
     )  # fmt: skip
     table.add_column("", no_wrap=True)
     for each, one in judged.items():
-        verdict = _verdict(one)
-        if one.robustness is None:
-            table.add_row(each, *5 * ("",), verdict)
-            continue
-        margin = one.robustness.nominal
-        peak, radius = f"{margin.peak_sensitivity:.2f}", radius_words(one.robustness.worst_radius)
-        figures = peak, _gain(margin), _phase(margin), _delay(one.law, margin), radius
-        table.add_row(each, *figures, verdict)
+        figures = ("",) * 5
+        if one.robustness is not None:
+            margin, worst = one.robustness.nominal, radius_words(one.robustness.worst_radius)
+            delay = _delay(one.law, margin)
+            peak = f"{margin.peak_sensitivity:.2f}"
+            figures = peak, _gain(margin), _phase(margin), delay, worst
+        table.add_row(each, *figures, _verdict(one))
     console.table(table)
     for each, one in judged.items():
         for remark in () if one.robustness is None else _remarks(one, one.robustness):
@@ -242,8 +233,7 @@ def remedy(judged: JudgedLaw) -> str | None:
     refused for its margins.
     """
     design, plant, report = judged.config.law, judged.config.design_plant, judged.robustness
-    refused = report is not None and report.failures() and judged.step_s <= MOST_STEP_S
-    if not refused or report is None:
+    if report is None or not report.failures() or judged.step_s > MOST_STEP_S:
         return None
     if not isinstance(design, Design):
         return _automatic(design, plant)
@@ -328,17 +318,17 @@ def check(
         fail(error)
     if kind == "ship":
         loaded = ship = load(config, Vessel)
-        content, pumped = ship_json(ship), {"": ship}
+        content, pumped = ship_report.ship_json(ship), {"": ship}
         if not json_:
-            print_ship(ship)
+            ship_report.print_ship(ship)
     elif kind in collections:
-        collection = load(config, collections[kind], allow_code=allow_code)
+        loaded = collection = load(config, collections[kind], allow_code=allow_code)
+        keys = {name: f"controllers.{name}" for name in collection.controllers}
+        pumped = {f"{key}.": collection.controllers[name] for name, key in keys.items()}
         judged = {
-            name: judge_law(each, config, f"controllers.{name}")
-            for name, each in collection.controllers.items()
+            name: judge_law(collection.controllers[name], config, key) for name, key in keys.items()
         }
-        pumped = {f"controllers.{name}.": each for name, each in collection.controllers.items()}
-        loaded, content = collection, collection_json(collection, judged)
+        content = collection_json(collection, judged)
         if not json_:
             print_collection(kind, collection, judged)
     else:
@@ -370,12 +360,9 @@ def check(
 
 
 def _bench_of(controller: Path) -> list[Command]:
-    """The bench of the scenario beside a controller, as `init` writes it, if it names it."""
     scenario = controller.parent / "scenario.yaml"
     try:
-        named = files_named(scenario).values()
+        named = [each.resolve() for each in files_named(scenario).values()]
     except ConfigError:
         return []
-    return (
-        [("bench", scenario)] if controller.resolve() in (each.resolve() for each in named) else []
-    )
+    return [("bench", scenario)] if controller.resolve() in named else []

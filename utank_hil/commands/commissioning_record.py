@@ -15,8 +15,9 @@ from pydantic import BaseModel
 from utank_hil.base.finite import finite
 from utank_hil.base.provenance import PROGRAM, commit, version
 from utank_hil.base.text_files import refuse_device
+from utank_hil.base.whole_file import left_whole
 from utank_hil.canbus import load_catalogue
-from utank_hil.configuration import ControllerConfig
+from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.nodes.commissioning.checks import Check
 
 SUFFIX: Final = ".commissioning.json"
@@ -42,6 +43,20 @@ def commissioned_for(config: ControllerConfig) -> dict[str, Any]:
     }
 
 
+def made_with(vessel: Vessel, file: Path, bus: str) -> dict[str, Any]:
+    """Return what each record begins with: program, time, ship, its file, and the interface."""
+    return {
+        "program": PROGRAM,
+        "version": version(),
+        "commit": commit(),
+        "date": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
+        "vessel": vessel.name,
+        "file": file.name,
+        "bus": bus,
+        "configuration_version": vessel.version,
+    }
+
+
 def make_record(
     config: ControllerConfig, file: Path, bus: str, checks: list[Check], ended: str
 ) -> dict[str, Any]:
@@ -50,15 +65,8 @@ def make_record(
     `bus` is the interface on which it was done; `ended` says why it ended early, if it did.
     """
     return {
-        "program": PROGRAM,
-        "version": version(),
-        "commit": commit(),
-        "date": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
+        **made_with(config.vessel, file, bus),
         "controller": config.name,
-        "vessel": config.vessel.name,
-        "file": file.name,
-        "bus": bus,
-        "configuration_version": config.vessel.version,
         "commissioned_for": commissioned_for(config),
         "passed": not ended and bool(checks) and all(check.passed for check in checks),
         "ended": ended,
@@ -98,19 +106,18 @@ def why_not_replaceable(path: Path) -> str:
 
 def write_record(path: Path, record: dict[str, Any]) -> None:
     """Write a record atomically: at any time the old or the new one is complete."""
-    with tempfile.NamedTemporaryFile(
-        "w", dir=path.parent, prefix=path.name, delete=False, encoding="utf-8"
-    ) as file:
-        try:
-            json.dump(finite(record), file, indent=1, allow_nan=False)
-            file.write("\n")
-            file.flush()
-            os.fsync(file.fileno())
-            os.chmod(file.name, 0o644)
-            os.replace(file.name, path)
-        except BaseException:
-            os.unlink(file.name)
-            raise
+    with (
+        tempfile.NamedTemporaryFile(
+            "w", dir=path.parent, prefix=path.name, delete=False, encoding="utf-8"
+        ) as file,
+        left_whole(Path(file.name)),
+    ):
+        json.dump(finite(record), file, indent=1, allow_nan=False)
+        file.write("\n")
+        file.flush()
+        os.fsync(file.fileno())
+        os.chmod(file.name, 0o644)
+        os.replace(file.name, path)
     _sync(path.parent)
 
 

@@ -5,18 +5,16 @@ import select
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from utank_hil.assembly import key_of
-from utank_hil.base.provenance import PROGRAM, version
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import PortError
 from utank_hil.commands.commission import print_checks
-from utank_hil.commands.commissioning_record import listed, write_record
+from utank_hil.commands.commissioning_record import listed, made_with, write_record
 from utank_hil.configuration.devices import ROLES
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.console.common import Bus, Json, fail, load, print_json, why_not_writable
@@ -76,15 +74,9 @@ def conform(
         fail("ended before all was checked; there is no record", ExitCode.INTERRUPTED)
     passed, checks = all(each.passed for each in trial.checks), listed(trial.checks)
     made = {
-        "program": PROGRAM,
-        "version": version(),
-        "date": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
+        **made_with(vessel, ship, channel),
         "device": device,
         "profile": getattr(vessel.devices, device).profile,
-        "vessel": vessel.name,
-        "file": ship.name,
-        "bus": channel,
-        "configuration_version": vessel.version,
         "passed": passed,
         "checks": checks,
     }

@@ -88,7 +88,6 @@ def export(
 def _frames(
     recording: Path, channel: str | None, from_s: float | None, to_s: float | None, said: list[str]
 ) -> Iterator[BusFrame]:
-    """Yield the frames of a recording; `said` gets what was not read as it stands."""
     suffix = recording.suffix.lower()
     if suffix == SUFFIX:
         entries = entries_of(FrameLog(recording).blocks(said.append))

@@ -77,11 +77,8 @@ def _vessel_content(vessel: Vessel) -> dict[str, Any]:
     )
     for key in ("ship", "tank", "pump", "valve", "redundancy"):
         part = getattr(vessel, key)
-        if part is None or part == NO_REDUNDANCY:
-            continue
-        content[key] = {
-            field.name: getattr(part, field.name)
-            for field in dataclasses.fields(part)
-            if getattr(part, field.name) != field.default
-        }
+        if part is not None and part != NO_REDUNDANCY:
+            values = {each.name: getattr(part, each.name) for each in dataclasses.fields(part)}
+            usual = {each.name: each.default for each in dataclasses.fields(part)}
+            content[key] = {name: of for name, of in values.items() if of != usual[name]}
     return content

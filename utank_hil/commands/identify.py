@@ -6,6 +6,7 @@ Its first word is a file, or one of the tests of `identify_test`.
 import dataclasses
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -37,10 +38,9 @@ QUANTILE: Final = 1.96  #: Number of standard deviations to either side of a 95 
 
 def realized_modes(found: Identification) -> ModalConfidence | None:
     """Return the modes of the model without physics; None if it has none with deviations."""
-    try:
+    with suppress(IdentificationError, ValueError):
         return modal_confidence(found.okid, STATES)
-    except (IdentificationError, ValueError):
-        return None
+    return None
 
 
 def figures(
@@ -121,23 +121,21 @@ def _waves(found: Identification) -> str:
 def _ship_table(found: Identification, task: RetuningTask) -> Table:
     fit = found.fit
     table = new_table("Ship and tank", "configured", "identified", "change", "± 95 %")
-    before = task.plant
+    before, after = task.plant.ship, fit.ship
     inertia, stiffness, damping, tank = fit.deviation.tolist()
+    before_s, after_s = (2 * math.pi / x.natural_frequency_rad_s for x in (before, after))
     rows = (
-        ("roll period, s", 2 * math.pi / before.ship.natural_frequency_rad_s,
-         2 * math.pi / fit.ship.natural_frequency_rad_s, fit.period_deviation),
-        ("inertia, t m²", before.ship.inertia_kg_m2 / 1e3, fit.ship.inertia_kg_m2 / 1e3, inertia),
-        ("stiffness, MN m/rad", before.ship.stiffness_nm_rad / 1e6,
-         fit.ship.stiffness_nm_rad / 1e6, stiffness),
-        ("damping, MN m s/rad", before.ship.damping_nms_rad / 1e6, fit.ship.damping_nms_rad / 1e6,
-         damping),
-        ("tank damping ratio", before.tank.damping_ratio, fit.tank.damping_ratio, tank),
-    )  # fmt: skip
-    for name, configured, identified, deviation in rows:
+        ("roll period, s", 1.0, before_s, after_s, fit.period_deviation),
+        ("inertia, t m²", 1e3, before.inertia_kg_m2, after.inertia_kg_m2, inertia),
+        ("stiffness, MN m/rad", 1e6, before.stiffness_nm_rad, after.stiffness_nm_rad, stiffness),
+        ("damping, MN m s/rad", 1e6, before.damping_nms_rad, after.damping_nms_rad, damping),
+        ("tank damping ratio", 1.0, task.plant.tank.damping_ratio, fit.tank.damping_ratio, tank),
+    )
+    for name, unit, configured, identified, deviation in rows:
         table.add_row(
             name,
-            f"{configured:.4g}",
-            f"{identified:.4g}",
+            f"{configured / unit:.4g}",
+            f"{identified / unit:.4g}",
             f"{identified / configured - 1:+.1%}" if configured else "",
             f"{QUANTILE * deviation:.2%}",
         )
@@ -162,20 +160,19 @@ def _mode_table(found: Identification, task: RetuningTask) -> Table:
     fitted = _modes(found.fit.ship, found.fit.tank)
     realized = realized_modes(found)
     for number, ((w0, z0), (w1, z1)) in enumerate(zip(configured, fitted, strict=True), start=1):
-        free = [("", ""), ("", "")]
+        free = ["", "", "", ""]
         if realized is not None:
             modes = realized.modes
             swinging = np.where(modes.damping_ratio < 1, modes.frequency_rad_s, np.inf)
             k = int(np.argmin(abs(swinging - w1)))
             free = [
-                (f"{value:.4f}", f"{QUANTILE * deviation:.4f}")
-                for value, deviation in (
-                    (float(modes.frequency_rad_s[k]), float(realized.frequency_std_rad_s[k])),
-                    (float(modes.damping_ratio[k]), float(realized.damping_ratio_std[k])),
-                )
+                f"{modes.frequency_rad_s[k]:.4f}",
+                f"{QUANTILE * realized.frequency_std_rad_s[k]:.4f}",
+                f"{modes.damping_ratio[k]:.4f}",
+                f"{QUANTILE * realized.damping_ratio_std[k]:.4f}",
             ]
-        table.add_row(f"{number}: frequency, rad/s", f"{w0:.4f}", f"{w1:.4f}", *free[0])
-        table.add_row("   damping ratio", f"{z0:.4f}", f"{z1:.4f}", *free[1])
+        table.add_row(f"{number}: frequency, rad/s", f"{w0:.4f}", f"{w1:.4f}", *free[:2])
+        table.add_row("   damping ratio", f"{z0:.4f}", f"{z1:.4f}", *free[2:])
     table.caption = "without physics: nearest mode of OKID and ERA, ± if the errors are white"
     return table
 
@@ -237,7 +234,7 @@ def identify_log(
     order: Annotated[
         int | None, typer.Option(min=2, help="Of the ARX model, instead of the configuration's.")
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for picture and configuration.")] = common.OUT,
+    out: common.Out = common.OUT,
     json_: common.Json = False,
 ) -> None:
     """Identify ship and tank from a recording, validate, and write a configuration for them.

@@ -15,7 +15,7 @@ from utank_hil.analysis.motion.inclining import inclining
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.provenance import describe
 from utank_hil.configuration import Vessel
-from utank_hil.console.common import OUT, From, Json, To, fail, load, prepare_out, print_json
+from utank_hil.console.common import OUT, From, Json, Out, To, fail, load, prepare_out, print_json
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, new_table, notes
 from utank_hil.dynamics.tank import GRAVITY_M_S2
@@ -31,7 +31,7 @@ def decay(
     ] = None,
     from_s: From = None,
     to_s: To = None,
-    out: Annotated[Path, typer.Option(help="Folder for the picture.")] = OUT,
+    out: Out = OUT,
     json_: Json = False,
 ) -> None:
     """Find roll period and damping in a free decay, with intervals of 95 %.
@@ -56,9 +56,9 @@ def decay(
     except ValueError as error:
         refuse(f"{record}: {error}; --from and --to choose a part", json_)
     out = prepare_out(out, (PICTURE,))
-    about: dict[str, Any] = {}
-    if vessel is not None:
-        about = describe("identify decay", vessel, out, options=context.params)
+    about = (
+        {} if vessel is None else describe("identify decay", vessel, out, options=context.params)
+    )
     path = draw_decay(found, out / PICTURE, record.name, about)
     keys, warnings = ship_keys(found, vessel), list(found.warnings)
     if vessel is not None:
@@ -66,15 +66,15 @@ def decay(
         if not PERIOD_SCALES[0] <= found.period_s / own_s <= PERIOD_SCALES[-1]:
             reason = "is this the record of a model, or of another ship or loading?"
             warnings.append(f"{vessel.name} rolls in {own_s:.3g} s: {reason}")
-    if json_:
-        plain = {
-            name: value.tolist() if isinstance(value, np.ndarray) else value
-            for name, value in asdict(found).items()
-            if name not in ("time_s", "roll_rad", "fit_rad")
-        }
-        print_json(about | plain | {"ship": keys, "warnings": warnings, "picture": str(path)})
+    if not json_:
+        _print_decay(Terminal(), found, keys, warnings, vessel, path)
         return
-    _print_decay(Terminal(), found, keys, warnings, vessel, path)
+    plain = {
+        name: value.tolist() if isinstance(value, np.ndarray) else value
+        for name, value in asdict(found).items()
+        if name not in ("time_s", "roll_rad", "fit_rad")
+    }
+    print_json(about | plain | {"ship": keys, "warnings": warnings, "picture": str(path)})
 
 
 def ship_keys(found: RollDecay, vessel: Vessel | None) -> dict[str, float]:

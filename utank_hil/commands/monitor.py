@@ -70,13 +70,11 @@ def watch(
             if not viewer.failed:
                 return
             if viewer.url is not None:
-                again = (
-                    f"utank-hil monitor {source}" if isinstance(source, Path) else "another start"
-                )
-                fail(
-                    "the viewer failed; what it says is above; "
-                    f"if a port was in use, {again} takes another"
-                )
+                again = "another start"
+                if isinstance(source, Path):
+                    again = f"utank-hil monitor {source}"
+                said = f"if a port was in use, {again} takes another"
+                fail(f"the viewer failed; what it says is above; {said}")
             notes.say(
                 "the reason is above; a graphics driver for any machine: "
                 "apt-get install mesa-vulkan-drivers",

@@ -16,7 +16,7 @@ from utank_hil.canbus import AlarmState, ControllerStatus, Fault, Mode, Station,
 from utank_hil.canbus.ports import open_port
 from utank_hil.canbus.socketcan import SocketCanPort
 from utank_hil.commands.lines import printed_lines
-from utank_hil.commands.web_panel.desk import Desk, Instruments
+from utank_hil.commands.web_panel.desk import LASTING, Desk, Instruments
 from utank_hil.commands.web_panel.server import ServerProcess
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.console.common import Bus, Duration, fail, load, why
@@ -42,7 +42,6 @@ _READ_BYTES: Final = 4096  #: Of a terminal's line.
 _STOP: Final = Action.STOP.value
 _LONGEST_LINE: Final = 256  #: Longer than any word.
 _WORDS: Final = (*(action.value for action in Action), "help", "quit")
-_LASTING: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.ACTIVE_ACKNOWLEDGED)
 _UNACCEPTED: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.RECTIFIED_UNACKNOWLEDGED)
 
 
@@ -125,15 +124,10 @@ class Keyboard:
         self._reset_ns = None
         status = self._node.status
         if status is not None and status.mode is Mode.FAULT and not self._silent:
-            lasting = [
-                alarm.code.name
-                for alarm in self._node.alarms
-                if alarm.code is not None and alarm.state in _LASTING
-            ]
-            self._say(f"reset REFUSED while this lasts: {', '.join(lasting)}")
+            there = [a.code.name for a in self._node.alarms if a.code and a.state in LASTING]
+            self._say(f"reset REFUSED while this lasts: {', '.join(there)}")
 
     def _obey(self, word: str) -> bool:
-        """Execute a line; return whether to leave."""
         if not word:
             if self._terminal:
                 self._press(Action.STOP)
@@ -160,14 +154,14 @@ class Keyboard:
                 self._reset_ns = self._now_ns
 
     def _show(self, now_ns: int) -> None:
-        node = self._node
+        node, status = self._node, self._node.status
         if self._began_ns is None:
             self._began_ns = now_ns
         self._silent = node.silent(now_ns)
-        if node.status is not None or now_ns - self._began_ns > SILENT_NS:
+        if status is not None or now_ns - self._began_ns > SILENT_NS:
             said = "controller: SILENT"
-            if node.status is not None and not self._silent:
-                said = _status_text(node.status, node.station)
+            if status is not None and not self._silent:
+                said = _status_text(status, node.station)
             if said != self._shown:
                 self._say(said)
                 self._shown = said
@@ -265,7 +259,6 @@ def panel(
 
 
 def _server(listen: str) -> ServerProcess:
-    """Start the page's server, or end with the reason why there is none."""
     host, _, port = listen.rpartition(":")
     if not (host and port.isdecimal() and int(port) < 1 << 16) or host in ("0.0.0.0", "*"):
         fail(f"--listen {listen}: name one address of this machine and a port, as {LISTEN}")

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import asdict
+from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -148,9 +149,9 @@ def _as_json(
         "ticks": result.ticks,
         "frames": result.frames,
         "different_frames": dict(result.different),
-        "first_difference": None if result.first is None else asdict(result.first),
+        "first_difference": result.first and asdict(result.first),
         "causes": why,
-        "law": None if law is None else _law_as_json(law),
+        "law": law and _law_as_json(law),
         "damaged_frames": [{"tick": tick, "message": message} for tick, message in result.damaged],
         "damaged": result.damaged_frames,
         "cut": cut,
@@ -159,17 +160,13 @@ def _as_json(
 
 
 def _print_numbers(console: Terminal, numbers: list[Number]) -> None:
-    stage = ""
-    for number in numbers:
-        if number.stage != stage:
-            stage = number.stage
-            console.say("", green=f"{stage}:")
-        if number.recorded in ("", number.replayed):
-            console.say(f"  {number.name} = {number.replayed}")
-        else:
-            console.say(
-                f"recorded {number.recorded}, replayed {number.replayed}", red=f"  {number.name}:"
-            )
+    for stage, those in groupby(numbers, key=lambda number: number.stage):
+        console.say("", green=f"{stage}:")
+        for name, recorded, replayed in ((n.name, n.recorded, n.replayed) for n in those):
+            if recorded in ("", replayed):
+                console.say(f"  {name} = {replayed}")
+            else:
+                console.say(f"recorded {recorded}, replayed {replayed}", red=f"  {name}:")
 
 
 _LOOP: Final = (
@@ -202,10 +199,7 @@ def _law_as_json(law: LawVerdict) -> dict[str, Any]:
         "why_not": law.why_not_recorded,
         "same_design": not law.differences,
         "loops": law.loops and finite([each._asdict() for each in law.loops]),
-        "differences": [
-            asdict(each) | {"deviation": each.deviation if math.isfinite(each.deviation) else None}
-            for each in law.differences
-        ],
+        "differences": finite([asdict(each) for each in law.differences]),
     }
 
 

@@ -1,7 +1,7 @@
 """``utank-hil report``: a run on board as one page that can be sent."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -23,7 +23,7 @@ def report(
 
     **Example:** utank-hil report out/run.rrd
     """
-    from utank_hil.reports.page import write_report
+    from utank_hil.pictures.report_page import write_report_page
     from utank_hil.reports.recording import recording_report
 
     if recording.is_dir():
@@ -32,11 +32,10 @@ def report(
         fail(f"{recording}: is no recording; name one of `utank-hil run` (.rrd)")
     try:
         page = out or recording.with_suffix(".html")
-        written = write_report(recording_report(recording), page)
+        written = write_report_page(page, *recording_report(recording))
     except (OSError, ValueError) as error:
         fail(error)
     if json_:
-        result: dict[str, Any] = {"page": str(written), "bytes": written.stat().st_size}
-        print_json(result)
+        print_json({"page": str(written), "bytes": written.stat().st_size})
     else:
         notes.say(f"report: {shown(written)}")

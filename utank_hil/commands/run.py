@@ -41,7 +41,6 @@ from utank_hil.console.terminal import Terminal, notes, shown, timing_table
 from utank_hil.control import BuiltLaw
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.signals import ROW_TICKS
-from utank_hil.retuning import Desk
 from utank_hil.runners import (
     LoopStatistics,
     Node,
@@ -129,7 +128,7 @@ def run(
         notes.say(refused, yellow="arming will be refused:")
     statistics = LoopStatistics()
     with _refusals_named(), ExitStack() as stack:
-        manager = _service_manager(stack)
+        manager = stack.enter_context(ServiceManager())
         try:
             port = open_port(bus, loaded.vessel.foreign)
         except OSError as error:
@@ -140,7 +139,10 @@ def run(
         announcer, recording = _outputs(
             stack, context, loaded, law, config, out, keep, outlets, commissioned=not refused
         )
-        retuner, estimating = _desks(stack, loaded)
+        desks_of = stack.enter_context(retuner_process(loaded))
+        if any(desk is not None and not desk.alive for desk in desks_of):
+            text = "nothing will be retuned or estimated"
+            notes.say(text, red="the retuner did not start:")
         alarms = stack.enter_context(printed_lines())
 
         def announce(event: Event, start_ns: int) -> None:
@@ -149,7 +151,7 @@ def run(
             if announcer is not None:
                 announcer.write(event, start_ns)
 
-        desks = Tapped(retuner, estimating, wanted=recording.keeps_records)
+        desks = Tapped(*desks_of, wanted=recording.keeps_records)
         node = build_controller_node(
             loaded,
             law,
@@ -214,10 +216,7 @@ def _in_real_time(name: str, manager: ServiceManager) -> Iterator[None]:
         for line in scheduling:
             notes.say(line)
         notes.say(f"{name}; Ctrl-C ends it.")
-        try:
-            manager.ready(name)
-        except OSError as error:
-            common.fail(f"NOTIFY_SOCKET: the manager does not answer: {error}", ExitCode.SYSTEM)
+        manager.ready(name)
         try:
             yield
         finally:
@@ -238,23 +237,13 @@ def _refusals_named() -> Iterator[None]:
         common.fail(error, ExitCode.SYSTEM)
 
 
-def _service_manager(stack: ExitStack) -> ServiceManager:
-    try:
-        return stack.enter_context(ServiceManager())
-    except OSError as error:
-        common.fail(
-            f"NOTIFY_SOCKET: the service manager can't be reached: {error}", ExitCode.SYSTEM
-        )
-
-
 def _log(folder: Path) -> Path | None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (log,) = claimed_files(folder.resolve(), LOG_NAME)
+        return claimed_files(folder.resolve(), LOG_NAME)[0]
     except OSError as error:
         notes.say(str(error), red="no log of events:")
         return None
-    return log
 
 
 def _outputs(
@@ -319,13 +308,6 @@ def _say_failures(
         alarms.say(f"events are not logged any longer: {failure}")
 
 
-def _desks(stack: ExitStack, loaded: ControllerConfig) -> tuple[Desk | None, Desk | None]:
-    desks = stack.enter_context(retuner_process(loaded))
-    if any(desk is not None and not desk.alive for desk in desks):
-        notes.say("nothing will be retuned or estimated", red="the retuner did not start:")
-    return desks
-
-
 def _as_json(
     node: ControllerNode,
     statistics: LoopStatistics,
@@ -364,10 +346,11 @@ def _print_summary(
         console.say(node.law.error, red="the law failed:")
     if node.law.fallbacks:
         console.say(f"{node.law.fallbacks} plans were not found in time; the one before went on")
-    if recording is not None:
-        _tell(console, recording)
-        if recording.file is not None and recording.error is None:
-            console.lead_on(("report", Path(recording.file)))
+    if recording is None:
+        return
+    _tell(console, recording)
+    if recording.file is not None and recording.error is None:
+        console.lead_on(("report", Path(recording.file)))
 
 
 def _tell(console: Terminal, recording: RecordingSummary) -> None:

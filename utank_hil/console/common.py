@@ -77,6 +77,10 @@ Duration = Annotated[
     # a float without a limit may be infinite
     typer.Option("--duration", min=0.1, max=1e9, metavar="SECONDS", help="Length of a run."),
 ]
+Seed = Annotated[
+    int | None, typer.Option(min=0, help="Of waves and noise, instead of the scenario's.")
+]
+Out = Annotated[Path, typer.Option(help="Folder for the results.")]
 
 
 def print_json(content: Mapping[str, Any]) -> None:
@@ -216,8 +220,7 @@ EXTRA_OF: Final = {
     "capytaine": "hulls",
     "cryptography": "keys",
     "fmpy": "models",
-    **dict.fromkeys(("clarabel", "control", "jinja2"), "bench"),
-    **dict.fromkeys(("matplotlib", "numba"), "bench"),
+    **dict.fromkeys(("clarabel", "control", "jinja2", "matplotlib", "numba"), "bench"),
     **dict.fromkeys(("pyarrow", "rerun", "rerun_cli"), "viewer"),
 }  #: Packages that are not needed to run the controller, and the extra that installs each.
 KILLED: Final = "a process of this command was killed: too little memory?"
@@ -239,20 +242,18 @@ def failures_named() -> Iterator[None]:
         sys.stdout.reconfigure(errors="replace")
     try:
         yield
+        return
     except ModuleNotFoundError as error:
         name = (error.name or "").partition(".")[0]
         if name not in EXTRA_OF:
             raise
-        notes.say(
-            f"this needs {name}, which is not installed: pip install 'utank-hil[{EXTRA_OF[name]}]'",
-            red="error:",
-        )
-        raise SystemExit(ExitCode.USAGE) from None
+        install = f"pip install 'utank-hil[{EXTRA_OF[name]}]'"
+        reason, code = f"this needs {name}, which is not installed: {install}", ExitCode.USAGE
     except BrokenExecutor:
-        notes.say(KILLED, red="error:")
-        raise SystemExit(ExitCode.SYSTEM) from None
+        reason, code = KILLED, ExitCode.SYSTEM
     except OSError as error:
         if error.filename is None and error.errno != errno.ENOSPC:
             raise
-        notes.say(why(error), red="error:")
-        raise SystemExit(ExitCode.USAGE) from None
+        reason, code = why(error), ExitCode.USAGE
+    notes.say(reason, red="error:")
+    raise SystemExit(code)

@@ -11,7 +11,7 @@ from utank_hil.configuration.device_section import DeviceSection
 from utank_hil.configuration.device_sections import unit_of
 from utank_hil.configuration.devices import UNGUARDED, DevicesSection, PanelSection, ValveSection
 from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
-from utank_hil.console.terminal import Terminal, new_table
+from utank_hil.console.terminal import Terminal, new_table, rows_table
 from utank_hil.control.optimal_tank import tank_figures
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.nonlinear import RollModel, steady_heel, upright
@@ -83,14 +83,13 @@ def ship_figures(vessel: Vessel) -> dict[str, Any]:
 
 def _valve_figures(vessel: Vessel) -> dict[str, float | None]:
     """Damping ratio that the valve adds to the water at half the greatest level."""
-    if vessel.valve is None:
-        return {"valve_damping_open": None, "valve_damping_shut": None}
-    tank, losses = vessel.tank, vessel.valve.range(vessel.tank)
-    half_m = tank.level_limit_m / 2
-    return {
-        "valve_damping_open": added_damping_ratio(tank, losses.open_loss, half_m),
-        "valve_damping_shut": added_damping_ratio(tank, losses.shut_loss, half_m),
-    }
+    added: dict[str, float | None] = dict.fromkeys(("valve_damping_open", "valve_damping_shut"))
+    if vessel.valve is not None:
+        losses = vessel.valve.range(vessel.tank)
+        for name, loss in zip(added, (losses.open_loss, losses.shut_loss), strict=True):
+            half_m = vessel.tank.level_limit_m / 2
+            added[name] = added_damping_ratio(vessel.tank, loss, half_m)
+    return added
 
 
 def _pump_figures(vessel: Vessel) -> dict[str, Any]:
@@ -110,21 +109,18 @@ def _pump_figures(vessel: Vessel) -> dict[str, Any]:
 def _pump_rows(vessel: Vessel, figures: dict[str, Any]) -> list[tuple[str, str]]:
     if vessel.pump is None:
         return [("pump", "none")]
+    heel_rad = figures["pump_heel_rad"]
+    held = "capsizes the ship" if heel_rad is None else f"{math.degrees(heel_rad):.2f}°"
     return [
         ("pump's greatest pressure", f"{vessel.pump.max_pressure_pa / 1e3:.1f} kPa"),
         ("  in metres of water", f"{figures['pump_head_m']:.2f} m"),
-        *_held(figures["pump_heel_rad"], figures["pump_heel_at_the_end"]),
+        ("heel that it holds", held),
+        ("  a reservoir is then", "full or empty" if figures["pump_heel_at_the_end"] else ""),
         ("flow that `init` sizes a pump for", f"{three_digits(figures['pump_flow_m3_s'])} m³/s"),
         ("power of pressure and flow, without losses", power_words(figures["pump_power_asked_w"])),
         ("power to hold the pressure in still water", power_words(figures["pump_power_held_w"])),
         ("power of the motor", power_words(figures["pump_power_w"])),
     ]
-
-
-def _held(heel_rad: float | None, at_the_end: bool | None) -> list[tuple[str, str]]:
-    held = "capsizes the ship" if heel_rad is None else f"{math.degrees(heel_rad):.2f}°"
-    end = [("  a reservoir is then", "full or empty")] if at_the_end else []
-    return [("heel that it holds", held), *end]
 
 
 def _valve_rows(vessel: Vessel, figures: dict[str, Any]) -> list[tuple[str, str]]:
@@ -159,10 +155,8 @@ def print_ship(vessel: Vessel) -> None:
     console = Terminal()
     console.say(f"{vessel.name}: the ship is valid.")
     console.table(table)
-    rest = new_table(None, "")
-    rest.show_header = False
     share, gm_m, taken = (figures[name] for name in ("water_share", "gm_m", "stability_taken"))
-    for text, value in (
+    rows = (
         ("metacentric height GM", "no displacement" if gm_m is None else f"{gm_m:.2f} m"),
         ("water in the tank", tonnes(figures["water_kg"])),
         ("  of the displacement", "" if share is None else f"{share:.2%}"),
@@ -174,10 +168,8 @@ def print_ship(vessel: Vessel) -> None:
         ("level at which a reservoir is full or empty", f"{figures['level_limit_m']:.2f} m"),
         *_valve_rows(vessel, figures),
         *_pump_rows(vessel, figures),
-    ):
-        if value:
-            rest.add_row(text, value)
-    console.table(rest)
+    )
+    console.table(rows_table(None, (row for row in rows if row[1])))
     print_devices(console, vessel.devices)
     for assumption in vessel.assumptions:
         console.say(f"Assumed: {assumption}.")

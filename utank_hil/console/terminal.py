@@ -58,6 +58,17 @@ def new_table(
     return table
 
 
+def rows_table(
+    title: str | None, rows: Iterable[tuple[str, str]], *, caption: str | None = None
+) -> Table:
+    """A table of names and their values, without headings."""
+    table = new_table(title, "", caption=caption)
+    table.show_header = False
+    for name, value in rows:
+        table.add_row(name, value)
+    return table
+
+
 class Terminal(Console):
     """Rich's console without its markup: names and paths are the user's, brackets and all."""
 

@@ -56,13 +56,9 @@ def draw_filling(
         loads = dict.fromkeys(each.displacement_t for each in found)
         for load_t, color, dash in zip(loads, cycle(COLORS), cycle(DASHES)):
             here = [each for each in found if each.displacement_t == load_t]
-            gm_m, label = [each.gm_m for each in here], f"{load_t:.5g} t"
-            style: dict[str, Any] = {
-                "color": color,
-                "linestyle": dash,
-                "marker": "o",
-                "label": label,
-            }
+            gm_m = [each.gm_m for each in here]
+            style: dict[str, Any] = {"color": color, "linestyle": dash, "marker": "o"}
+            style["label"] = f"{load_t:.5g} t"
             levels.plot(gm_m, [each.level_m for each in here], **style)
             rolls.plot(gm_m, [100 * each.passive_below_no_tank for each in here], **style)
         levels.set(xlabel="GM, solid (m)", ylabel="Still level above the duct (m)")

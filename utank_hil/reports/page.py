@@ -1,21 +1,20 @@
 """What reports of runs share: their parts, and the page that they are written to."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import yaml
 from rich.table import Table
 
-from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict, write_report_page
+from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict
 
 
 class Report(NamedTuple):
-    """The report of a run: heading, the line below it, what is said first of all, and the rest."""
+    """The report of a run as `write_report_page` takes it."""
 
     title: str
-    below: str
-    verdict: Verdict
+    about: str
+    verdicts: Sequence[Verdict]
     sections: Sequence[ReportSection]
 
 
@@ -47,8 +46,3 @@ def about_section(about: Mapping[str, Any], configuration: Any) -> ReportSection
         tables=[ReportTable(["", ""], rows, text=True)],
         listings={"The whole configuration": listing},
     )
-
-
-def write_report(report: Report, page: Path) -> Path:
-    """Write a report over a page; raises `OSError` if it can't be written."""
-    return write_report_page(page, report.title, report.below, [report.verdict], report.sections)

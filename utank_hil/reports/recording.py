@@ -61,8 +61,8 @@ def recording_report(file: Path) -> Report:
         ReportSection("Roll, level and pressure", pictures=[_histories(rows, file.stem)]),
         ReportSection("Modes", tables=[_modes(rows)]),
         _alarm_section(alarms, unread, file),
+        _deadlines(rows),
     ]
-    sections.append(_deadlines(rows))
     if about is not None:
         try:
             sections.append(about_section(about, about["configuration"]))
@@ -70,7 +70,7 @@ def recording_report(file: Path) -> Report:
             raise ValueError(f"{file}: has no {error}: it is of another version") from error
     title = (about or {}).get("configuration", {}).get("name", name)
     below = f"Recording {file.name}, {duration_s:.0f} s" + (f", {about['date']}." if about else ".")
-    return Report(f"{title}: run", below, _verdict(rows, alarms), sections)
+    return Report(f"{title}: run", below, [_verdict(rows, alarms)], sections)
 
 
 def _verdict(rows: dict[str, FloatArray], alarms: list[_Event]) -> Verdict:
@@ -142,7 +142,6 @@ def _modes(rows: dict[str, FloatArray]) -> ReportTable:
 
 
 def _alarms(file: Path) -> tuple[list[_Event], int]:
-    """Events of the run's log, if there is one, and the number of its lines that are none."""
     log, found, unread = _log_of(file), [], 0
     if log.exists():
         with open_text(log, errors="replace") as text:
@@ -155,7 +154,6 @@ def _alarms(file: Path) -> tuple[list[_Event], int]:
 
 
 def _log_of(file: Path) -> Path:
-    """The log of a run, by the name of its recording or of a part of it."""
     whole, _ = whole_of(file)
     return whole.with_name(whole.name.replace(RUN, LOG, 1)).with_suffix(".jsonl")
 

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import reduce
+from itertools import chain
 from operator import xor
 from typing import Final
 
@@ -176,32 +177,17 @@ class Alerts:
         parts = [entries[at : at + _ENTRIES] for at in range(0, len(entries) or 1, _ENTRIES)]
         self._list = (self._list + 1) % 100
         return [
-            sentence(
-                "ALC",
-                (
-                    f"{len(parts):02}",
-                    f"{number:02}",
-                    f"{self._list:02}",
-                    str(len(part)),
-                    *(field for entry in part for field in entry),
-                ),
-            )
+            sentence("ALC", (f"{len(parts):02}", f"{number:02}", f"{self._list:02}",
+                             str(len(part)), *chain.from_iterable(part)))
             for number, part in enumerate(parts, 1)
-        ]
+        ]  # fmt: skip
 
     def answer(self, line: str, utc: datetime) -> list[list[str]]:
         """Return the answer to a command that is for this equipment; none to anything else."""
-        asked = alert_command(line)
-        if asked is None:
-            return []
-        manufacturer, identifier, instance, command = asked
+        manufacturer, identifier, instance, command = alert_command(line) or ("", "", "", "")
         code = next((c for c in Fault if identifier == str(FIRST_IDENTIFIER + c)), None)
-        if (
-            manufacturer
-            or code is None
-            or instance not in ("", _INSTANCE)
-            or command not in tuple("AQOS")
-        ):
+        known = instance in ("", _INSTANCE) and command in tuple("AQOS")
+        if manufacturer or code is None or not known:
             return []
         if command == "Q" and code in self._alerts:
             return [self._alf(code)]

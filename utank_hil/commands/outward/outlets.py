@@ -179,7 +179,6 @@ class Outward(Closing):
 
 
 def _rows_of(pid: int) -> RowReader | None:
-    """Return the telemetry of a process; None if it has none yet."""
     for name in ring_names():
         try:
             with RingReader(name) as ring:

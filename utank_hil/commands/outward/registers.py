@@ -34,15 +34,7 @@ class State:
     complete: bool  #: Whether no event of the alarm list was lost.
 
 
-@dataclass(frozen=True, slots=True)
-class Register:
-    """One register: its meaning in words, and its value."""
-
-    meaning: str
-    value: Callable[[State], int]
-
-
-def _signal(name: str, unit: float) -> Callable[[State], int]:
+def _signal(name: str, unit: float = 1.0) -> Callable[[State], int]:
     def value(state: State) -> int:
         shown = state.row.get(name, math.nan) / unit
         return round(max(-32767.0, min(32767.0, shown))) if math.isfinite(shown) else NOT_AVAILABLE
@@ -54,26 +46,24 @@ def _waiting(state: State) -> int:
     return sum(each is not AlarmState.ACTIVE_ACKNOWLEDGED for each in state.alarms.values())
 
 
-_MODES: Final = ", ".join(f"{mode.value} {mode.name}" for mode in Mode)
-REGISTERS: Final = (
-    Register(
-        "life counter: one more for each look (0.5 s) with news of the controller, 65535 then 0",
-        lambda state: state.life,
+REGISTERS: Final[Mapping[str, Callable[[State], int]]] = {
+    "life counter: one more for each look (0.5 s) with news of the controller, 65535 then 0": (
+        lambda state: state.life
     ),
-    Register(f"mode: {_MODES}", _signal("mode", 1.0)),
-    Register("roll, 0.01°, starboard down positive", _signal("roll_rad", math.radians(0.01))),
-    Register("pressure commanded, 10 Pa", _signal("pressure_command_pa", 10.0)),
-    Register("pressure measured, 10 Pa", _signal("pressure_actual_pa", 10.0)),
-    Register("code of the latched fault; in INIT of what is awaited", _signal("fault", 1.0)),
-    Register("alarms in the list", lambda state: len(state.alarms)),
-    Register("of these not acknowledged", _waiting),
-    Register("1: the alarm list is complete; 0: changes were lost", lambda state: state.complete),
-)
+    f"mode: {', '.join(f'{mode.value} {mode.name}' for mode in Mode)}": _signal("mode"),
+    "roll, 0.01°, starboard down positive": _signal("roll_rad", math.radians(0.01)),
+    "pressure commanded, 10 Pa": _signal("pressure_command_pa", 10.0),
+    "pressure measured, 10 Pa": _signal("pressure_actual_pa", 10.0),
+    "code of the latched fault; in INIT of what is awaited": _signal("fault"),
+    "alarms in the list": lambda state: len(state.alarms),
+    "of these not acknowledged": _waiting,
+    "1: the alarm list is complete; 0: changes were lost": lambda state: state.complete,
+}  #: Value of each register by its meaning, from address 0 on.
 
 
 def values(state: State) -> dict[int, int]:
     """Return the value of each register by its address, 16 bits each."""
-    found = {at: int(each.value(state)) & 0xFFFF for at, each in enumerate(REGISTERS)}
+    found = {at: int(each(state)) & 0xFFFF for at, each in enumerate(REGISTERS.values())}
     for code in range(max(Fault) + 1):
         alarm = state.alarms.get(Fault(code)) if code in set(Fault) else None
         found[FIRST_ALARM + code] = 0 if alarm is None else alarm + 1

@@ -31,6 +31,7 @@ for now."""
 _ESTIMATE_MS: Final = 5000.0  #: The same of the ship's estimate, which comes once a second.
 _HEEL_S: Final = 60.0  #: Time over which roll is averaged to heel, as for HEEL_LIMIT.
 _SENT: Final = (PumpCommand, PassiveTwin, ShipEstimate)
+LASTING: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.ACTIVE_ACKNOWLEDGED)
 
 
 class Instruments:
@@ -87,6 +88,8 @@ class Instruments:
         command = self._latest(PumpCommand, now_ns)
         pump, tank_ms = vessel.pump, measured.tank_age_ms
         drive_ms = measured.drive_age_ms if pump else math.inf
+        given_ms = measured.pump_age_ms if pump else math.inf
+        most_w = pump.max_power_w if pump else math.inf
         return {
             "roll_deg": math.degrees(_fresh(motion.roll_rad, motion.age_ms)),
             "heel_deg": math.degrees(self._heel_rad),
@@ -97,15 +100,9 @@ class Instruments:
             "starboard_m": _fresh(measured.starboard_level_m, tank_ms),
             "high_level": measured.high_level,
             "asked_kpa": command.pressure_pa * 1e-3 if command and pump else math.nan,
-            "given_kpa": _fresh(
-                measured.pressure_pa * 1e-3, measured.pump_age_ms if pump else math.inf
-            ),
+            "given_kpa": _fresh(measured.pressure_pa * 1e-3, given_ms),
             "power_kw": _fresh(measured.power_w * 1e-3, drive_ms),
-            "load": _fresh(abs(measured.power_w) / pump.max_power_w, drive_ms)
-            if pump
-            else math.nan,
-            "pump_limited": measured.drive_held_back,
-            "drive": measured.drive_state.name if measured.drive_state and pump else None,
+            "load": _fresh(abs(measured.power_w) / most_w, drive_ms),
             "valve": measured.valve_opening if vessel.valve else math.nan,
             "gm_m": ship.gm_m if ship and known else math.nan,
             "roll_period_s": ship.roll_period_s if ship and known else math.nan,
@@ -209,7 +206,6 @@ class Desk:
         self._say(f"page: {line}")
 
     def _show(self, now_ns: int) -> None:
-        """Send the state; a server that is behind gets the next one."""
         self._number += 1
         try:
             self._link.send(json.dumps(finite(self.state(now_ns)), allow_nan=False).encode())
@@ -244,8 +240,7 @@ class Desk:
             "alarms": [
                 {
                     "code": alarm.code.name,
-                    "lasts": alarm.state
-                    in (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.ACTIVE_ACKNOWLEDGED),
+                    "lasts": alarm.state in LASTING,
                     "accepted": alarm.state is AlarmState.ACTIVE_ACKNOWLEDGED,
                     "words": fault_words(alarm.code),
                     "age_s": alarm.age_s,

@@ -68,9 +68,7 @@ class PageServer(ThreadingHTTPServer):
         host, port = listening.getsockname()[:2]
         self.hosts = {f"{host}:{port}", f"localhost:{port}"}
         self.token = token
-        self.files = {
-            name: (Path(__file__).with_name(file or name)) for name, file in FILES.items()
-        }
+        self.files = {name: Path(__file__).with_name(file or name) for name, file in FILES.items()}
         self._link = link
         self._changed = threading.Condition()
         self._state = b""
