@@ -8,23 +8,7 @@ from firmware_sim.drive import DriveStates
 from utank_hil.base.elementary import exp
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import ControlWord, DriveFault, DriveState, Frame
-from utank_hil.canbus.profiles.drive_plan import (
-    CONTROL_WORD,
-    MODE,
-    MODE_SHOWN,
-    MODES,
-    MODES_SUPPORTED,
-    PROFILE,
-    RECEIVED_1,
-    SENT_1,
-    SENT_2,
-    SPEED,
-    STATUS_WORD,
-    TORQUE,
-    DrivePlan,
-    NetworkState,
-    Place,
-)
+from utank_hil.canbus.profiles import drive_plan
 from utank_hil.dynamics.pump import Pump, pump_load, pump_pressure, pump_speed
 
 if TYPE_CHECKING:
@@ -38,7 +22,7 @@ STEPS: Final = 2  #: Of the rotor in a tick: its load is integrated implicitly.
 HEARTBEAT_LOST: Final = 0x8130  #: Emergency code by CiA 301.
 INTERNAL_ERROR: Final = 0x6100
 _VOLTAGE, _REMOTE, _AT_LIMIT = 1 << 4, 1 << 9, 1 << 11
-_MODE_BITS: Final = sum({1 << each.number - 1 for each in MODES.values()})
+_MODE_BITS: Final = sum({1 << each.number - 1 for each in drive_plan.MODES.values()})
 
 
 class CanopenPumpDrive(CanopenNode):
@@ -50,7 +34,7 @@ class CanopenPumpDrive(CanopenNode):
     name = "drive"
     period_ns = TICK_NS
 
-    def __init__(self, plant: "Plant", pump: Pump, plan: DrivePlan) -> None:
+    def __init__(self, plant: "Plant", pump: Pump, plan: drive_plan.DrivePlan) -> None:
         self._plant, self._pump, self._c, self._plan = plant, pump, pump.coefficients, plan
         self._per_nm = self._per_rad_s = plan.units_per_si
         if plan.mode.torque:
@@ -58,30 +42,30 @@ class CanopenPumpDrive(CanopenNode):
         else:  # per mille of the greatest
             self._per_nm = 1000 / pump.max_torque_nm
         entries = {
-            CONTROL_WORD: Entry(0, 2, writable=True),
-            STATUS_WORD: Entry(0, 2),
-            MODE: Entry(0, 1, writable=True),
-            MODE_SHOWN: Entry(0, 1),
-            MODES_SUPPORTED: Entry(_MODE_BITS, 4),
-            SPEED: Entry(0, 4),
-            TORQUE: Entry(0, 2),
-            Place(0x6007): Entry(1, 2, writable=True),
-            Place(0x605A): Entry(2, 2, writable=True),
-            Place(0x605E): Entry(2, 2, writable=True),
-            Place(0x1018): Entry(4, 1),
+            drive_plan.CONTROL_WORD: Entry(0, 2, writable=True),
+            drive_plan.STATUS_WORD: Entry(0, 2),
+            drive_plan.MODE: Entry(0, 1, writable=True),
+            drive_plan.MODE_SHOWN: Entry(0, 1),
+            drive_plan.MODES_SUPPORTED: Entry(_MODE_BITS, 4),
+            drive_plan.SPEED: Entry(0, 4),
+            drive_plan.TORQUE: Entry(0, 2),
+            drive_plan.Place(0x6007): Entry(1, 2, writable=True),
+            drive_plan.Place(0x605A): Entry(2, 2, writable=True),
+            drive_plan.Place(0x605E): Entry(2, 2, writable=True),
+            drive_plan.Place(0x1018): Entry(4, 1),
         }
-        for mode in MODES.values():
+        for mode in drive_plan.MODES.values():
             entries[mode.target] = Entry(0, mode.bits // 8, writable=True)
             entries[mode.demand] = Entry(0, mode.bits // 8)
         for subindex in range(1, 5):
             given = plan.identity[subindex - 1] if subindex <= len(plan.identity) else None
-            entries[Place(0x1018, subindex)] = Entry(given or 0, 4)
+            entries[drive_plan.Place(0x1018, subindex)] = Entry(given or 0, 4)
         for place, _ in plan.require:
             entries.setdefault(place, Entry(0, 4, writable=True))
-        cobs = {0x1400: RECEIVED_1, 0x1800: SENT_1, 0x1801: SENT_2}
+        cobs = {0x1400: drive_plan.RECEIVED_1, 0x1800: drive_plan.SENT_1, 0x1801: drive_plan.SENT_2}
         pdos = {index: cob + plan.node for index, cob in cobs.items()}
         super().__init__(plan.node, plan.bus, entries, pdos)
-        entries[Place(0x1000)].value = 2 << 16 | PROFILE  # servo drive
+        entries[drive_plan.Place(0x1000)].value = 2 << 16 | drive_plan.PROFILE  # servo drive
         self._states = DriveStates()
         self._speed_rad_s = self._torque_nm = self._own_pa = 0.0
         self._limited = self._connected = False
@@ -112,7 +96,7 @@ class CanopenPumpDrive(CanopenNode):
     def taken(self, now_ns: int) -> None:  # noqa: ARG002
         """Follow the control word."""
         faulted = self._states.state is DriveState.FAULT
-        self._states.command(control_word(self.entries[CONTROL_WORD].value))
+        self._states.command(control_word(self.entries[drive_plan.CONTROL_WORD].value))
         if faulted and self._states.state is not DriveState.FAULT:
             self.emergency(0)
 
@@ -122,10 +106,10 @@ class CanopenPumpDrive(CanopenNode):
         plant.advance(now_ns)
         if plant.power_cut:
             states.command(ControlWord.DISABLE_VOLTAGE)
-        entries[MODE_SHOWN].value = entries[MODE].value
+        entries[drive_plan.MODE_SHOWN].value = entries[drive_plan.MODE].value
         stopped = abs(plant.pressure_pa) < STOPPED_SHARE * self._pump.max_pressure_pa
         states.tick(stopped=stopped)
-        connected = self.state is NetworkState.OPERATIONAL and not self.lost_controller
+        connected = self.state is drive_plan.NetworkState.OPERATIONAL and not self.lost_controller
         if self._connected and not connected and self.enabled:
             self._abort_connection()
         self._connected = connected
@@ -139,7 +123,7 @@ class CanopenPumpDrive(CanopenNode):
 
     def _abort_connection(self) -> None:
         """React as 6007h says."""
-        code = self.entries[Place(0x6007)].value
+        code = self.entries[drive_plan.Place(0x6007)].value
         if code == 1:
             self._states.trip(DriveFault.COMMAND_TIMEOUT)
         elif code in (2, 3):
@@ -150,7 +134,14 @@ class CanopenPumpDrive(CanopenNode):
     def _turn(self) -> float:
         """Turn the rotor for a tick; return the pressure."""
         c, flow_m3_s, step_s = self._c, self._plant.flow_m3_s, TICK_S / STEPS
-        mode = next((m for m in MODES.values() if m.number == self.entries[MODE].value), None)
+        mode = next(
+            (
+                m
+                for m in drive_plan.MODES.values()
+                if m.number == self.entries[drive_plan.MODE].value
+            ),
+            None,
+        )
         aim, target = None, 0.0
         if self._states.stopping:  # its ramp ends where the water turns the rotor
             aim = pump_speed(0.0, flow_m3_s, c)
@@ -180,13 +171,13 @@ class CanopenPumpDrive(CanopenNode):
     def _show(self) -> None:
         entries = self.entries
         if not self.enabled:
-            for mode in MODES.values():
+            for mode in drive_plan.MODES.values():
                 entries[mode.demand].value = 0
         bits = _REMOTE | _VOLTAGE * self._powered | _AT_LIMIT * self._limited
-        entries[STATUS_WORD].value = self._states.state | bits
+        entries[drive_plan.STATUS_WORD].value = self._states.state | bits
         for place, value in (
-            (SPEED, self._speed_rad_s * self._per_rad_s),
-            (TORQUE, self._torque_nm * self._per_nm),
+            (drive_plan.SPEED, self._speed_rad_s * self._per_rad_s),
+            (drive_plan.TORQUE, self._torque_nm * self._per_nm),
         ):
             entries[place].value = math.floor(value + 0.5) & (1 << 8 * entries[place].size) - 1
 

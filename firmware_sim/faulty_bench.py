@@ -3,13 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from firmware_sim.fault_injection.bench_parts import (
-    Bench,
-    BreakableLaw,
-    FaultyBus,
-    FaultyNode,
-    LawFailures,
-)
+from firmware_sim.fault_injection import bench_parts
 from firmware_sim.fault_injection.kinds import AnyFault, place_all
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import ShipSide, build_ship_side
@@ -61,20 +55,20 @@ class FaultyBench:
         self._retuner, self._estimating = retuner, estimating
         self._commissioned = commissioned
         self.ship: ShipSide = build_ship_side(scenario, seed, script, config)
-        self._law_failures = LawFailures()
+        self._law_failures = bench_parts.LawFailures()
         self._tapped = tapped
-        self._controller = FaultyNode(self._new_controller())
+        self._controller = bench_parts.FaultyNode(self._new_controller())
         #: Sensors, drive, valve, panel and controller, as far as the ship has them.
-        self.nodes = {node.name: FaultyNode(node) for node in self.ship.nodes}
+        self.nodes = {node.name: bench_parts.FaultyNode(node) for node in self.ship.nodes}
         self.nodes["controller"] = self._controller
-        self.bus = FaultyBus(config.bit_rate, seed)
+        self.bus = bench_parts.FaultyBus(config.bit_rate, seed)
         more = len(config.vessel.foreign.buses) - 1
         joined = with_more(self.bus, more, config.bit_rate)
         self.lockstep = Lockstep(list(self.nodes.values()), joined, trace)
 
     def _new_controller(self) -> Node:
         def controller() -> Controller:
-            return BreakableLaw(self._law.controller(), self._law_failures)
+            return bench_parts.BreakableLaw(self._law.controller(), self._law_failures)
 
         # a self-tuning controller exchanges its laws: a fault of one would not follow
         law = self._law if self._retuner else replace(self._law, controller=controller)
@@ -99,7 +93,7 @@ class FaultyBench:
 
     def place(self, faults: Sequence[AnyFault]) -> None:
         """Place faults, whose times count from now."""
-        bench = Bench(
+        bench = bench_parts.Bench(
             self.nodes,
             self.ship.plant,
             self.ship.drive,

@@ -126,7 +126,7 @@ class FmuPlant(Plant):
         super().__init__(ship, tank, pump, waves)
         self._fmu = RunningFmu(fmu)
         self._keep(self._fmu.outputs())
-        self._values = self._state.tolist()
+        self._show()
 
     def _tick(self, phasors: ComplexArray, rotations: ComplexArray) -> None:
         state, area_m2 = self._state, self._area_m2

@@ -73,18 +73,6 @@ class Loading:
     expected: Expected
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Run:
-    """Records every `RECORD_S`, of equal shape (n,); `capsized_s` as of the plant."""
-
-    roll_rad: FloatArray
-    level_m: FloatArray
-    flow_m3_s: FloatArray
-    pressure_pa: FloatArray
-    power_w: FloatArray
-    capsized_s: float
-
-
 class PlantInLoop:
     """A plant as `run_ticks` moves it, with noise for its sensors, shape (n, 5)."""
 
@@ -163,11 +151,11 @@ def predict(scenario: Scenario, plant: DesignPlant, law: BuiltLaw | None) -> Exp
     if law is None:
         return found
     runs = {seed: _active(scenario, plant, law, seed, count) for seed in SEEDS}
-    active = rms(lambda seed: (runs[seed].roll_rad, runs[seed].capsized_s))
+    active = rms(lambda seed: (runs[seed][0]["roll_rad"], runs[seed][1]))
     if active is None:
         return found
     level, flow, pressure, power = (
-        np.concatenate([getattr(run, name)[settle:] for run in runs.values()])
+        np.concatenate([record[name][settle:] for record, _ in runs.values()])
         for name in ("level_m", "flow_m3_s", "pressure_pa", "power_w")
     )
     return replace(
@@ -215,15 +203,19 @@ def _passive(scenario: Scenario, seed: int, count: int) -> tuple[FloatArray, flo
     return roll, plant.capsized_s
 
 
-def _active(scenario: Scenario, plant: DesignPlant, law: BuiltLaw, seed: int, count: int) -> _Run:
+def _active(
+    scenario: Scenario, plant: DesignPlant, law: BuiltLaw, seed: int, count: int
+) -> tuple[dict[str, FloatArray], float]:
+    """Run with the law armed from the start; return records every `RECORD_S` and `capsized_s`."""
     controller, ticks = law.controller(), count * ROW_TICKS
     noise, _ = sensed_noise(noise_of(scenario), ticks, seed, controller.sample_time_s)
     ship, area_m2 = plant_of(scenario, seed), plant.tank.reservoir_area_m2
     loop = PlantInLoop(ship, area_m2, noise)
     run = run_law(loop, plant, controller, law.measured, ticks, ROW_TICKS)
     roll, _, level, rate = run.motion.T
-    power_w = np.array(loop.power_w)
-    return _Run(roll, level, area_m2 * rate, run.pressure_pa, power_w, ship.capsized_s)
+    record = {"roll_rad": roll, "level_m": level, "flow_m3_s": area_m2 * rate}
+    record |= {"pressure_pa": run.pressure_pa, "power_w": np.array(loop.power_w)}
+    return record, ship.capsized_s
 
 
 def noise_of(scenario: Scenario) -> SensorNoise:

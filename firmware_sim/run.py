@@ -18,6 +18,7 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_content import PASSIVE
 from firmware_sim.ship_side import ShipSide, bare_plant, build_ship_side, load_compiled_code
 from firmware_sim.truth import TRUTH, MemoryLog, TruthRecorder
+from utank_hil import runners
 from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.provenance import describe
@@ -31,16 +32,6 @@ from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.panel import TimedAction
 from utank_hil.nodes.signals import ROW_TICKS, SIGNALS
 from utank_hil.retuning import RetuningEvent, SimulatedRetuner
-from utank_hil.runners import (
-    Lockstep,
-    LoopStatistics,
-    MonotonicClock,
-    Node,
-    RealTimeLoop,
-    SimulatedBus,
-    heard_by,
-    real_time_scheduling,
-)
 from utank_hil.runners.lockstep import with_more
 from utank_hil.telemetry.frame_log import BlockSink, FrameLogWriter
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
@@ -102,7 +93,7 @@ class Run:
     max_strike_impulse_nms: float = 0.0
     pump_speed_rad_s: float = 0.0  #: Greatest speed of the pump's rotor.
     #: Timing statistics of the controller's loop; None in simulated time.
-    loop: LoopStatistics | None = None
+    loop: runners.LoopStatistics | None = None
     retuning: tuple[RetuningEvent, ...] = ()  #: Events of the controller's retuning.
     fallbacks: int | None = None
     law_error: str = ""
@@ -136,7 +127,7 @@ class ControllerRun(NamedTuple):
 
     rows: FloatArray
     start_ns: int
-    loop: LoopStatistics | None
+    loop: runners.LoopStatistics | None
     retuning: tuple[RetuningEvent, ...] = ()
     fallbacks: int | None = None
     law_error: str = ""
@@ -172,7 +163,7 @@ def ship_run(ship: ShipSide, truth: TruthRecorder, log: MemoryLog) -> ShipRun:
 
 
 def controller_run(
-    node: ControllerNode, log: MemoryLog, loop: LoopStatistics | None = None
+    node: ControllerNode, log: MemoryLog, loop: runners.LoopStatistics | None = None
 ) -> ControllerRun:
     """Controller's half of a run that ended."""
     law = node.law
@@ -183,7 +174,7 @@ def controller_of(
     job: Job,
     desks: Tapped,
     sink: Callable[[FloatArray], None],
-    statistics: LoopStatistics | None = None,
+    statistics: runners.LoopStatistics | None = None,
 ) -> ControllerNode:
     """Controller of a run, whose telemetry goes to `sink`."""
     return build_controller_node(
@@ -235,8 +226,8 @@ def run_lockstep(job: Job, watch: Watch | None = None) -> Run:
             ship = build_ship_side(job.scenario, job.seed, job.script, job.controller)
             controller = controller_of(job, desks, log.write)
             bit_rate, buses = job.controller.bit_rate, job.controller.vessel.foreign.buses
-            bus = with_more(SimulatedBus(bit_rate=bit_rate), len(buses) - 1, bit_rate)
-            lockstep = Lockstep([*ship.nodes, tapped(controller)], bus)
+            bus = with_more(runners.SimulatedBus(bit_rate=bit_rate), len(buses) - 1, bit_rate)
+            lockstep = runners.Lockstep([*ship.nodes, tapped(controller)], bus)
         truth = TruthRecorder(ship.plant, truth_log, RECORD_NS)
         lockstep.join([truth])
         end_ns = job.ticks * TICK_NS
@@ -275,7 +266,7 @@ class Meeting(Watch, Protocol):
 def run_in_one_process(job: Job, watch: Watch | None = None) -> Run:
     """Run with all nodes in one loop, without a bus."""
     ship, truth, truth_log = _ship_of(job)
-    statistics = LoopStatistics()
+    statistics = runners.LoopStatistics()
     with _real_time_controller(job, statistics) as (controller, log, node):
         _run_loop(job, [*ship.nodes, node, truth], None, statistics, watch)
     its = controller_run(controller, log, statistics)
@@ -285,14 +276,14 @@ def run_in_one_process(job: Job, watch: Watch | None = None) -> Run:
 def run_ship(job: Job, channel: str, meeting: Meeting) -> ShipRun:
     """Run the ship's side on a SocketCAN interface."""
     ship, truth, truth_log = _ship_of(job)
-    nodes: list[Node] = [*ship.nodes, truth]
-    _run_loop(job, nodes, channel, LoopStatistics(), meeting, meeting.begin_ns)
+    nodes: list[runners.Node] = [*ship.nodes, truth]
+    _run_loop(job, nodes, channel, runners.LoopStatistics(), meeting, meeting.begin_ns)
     return ship_run(ship, truth, truth_log)
 
 
 def run_controller(job: Job, channel: str, meeting: Meeting) -> ControllerRun:
     """Run the controller's side on a SocketCAN interface."""
-    statistics = LoopStatistics()
+    statistics = runners.LoopStatistics()
     with _real_time_controller(job, statistics) as (controller, log, node):
         _run_loop(job, [node], channel, statistics, meeting, meeting.begin_ns)
     return controller_run(controller, log, statistics)
@@ -307,8 +298,8 @@ def _ship_of(job: Job) -> tuple[ShipSide, TruthRecorder, MemoryLog]:
 
 @contextmanager
 def _real_time_controller(
-    job: Job, statistics: LoopStatistics
-) -> Iterator[tuple[ControllerNode, MemoryLog, Node]]:
+    job: Job, statistics: runners.LoopStatistics
+) -> Iterator[tuple[ControllerNode, MemoryLog, runners.Node]]:
     """Yield the controller, its rows, and the node that is put on the bus."""
     with retuner_process(job.controller) as (retuner, estimating):
         desks = Tapped(retuner, estimating, wanted=job.frames is not None)
@@ -330,9 +321,9 @@ def _real_time_controller(
 
 def _run_loop(
     job: Job,
-    nodes: list[Node],
+    nodes: list[runners.Node],
     channel: str | None,
-    statistics: LoopStatistics,
+    statistics: runners.LoopStatistics,
     watch: Watch | None,
     begin_ns: Callable[[], int] | None = None,
 ) -> None:
@@ -341,17 +332,17 @@ def _run_loop(
     if channel is not None and foreign.any:
         port = open_buses(channel, foreign, sends=True)
     elif channel is not None:
-        port = SocketCanPort(channel, heard_by(nodes))
-    loop = RealTimeLoop(nodes, port, statistics=statistics)
+        port = SocketCanPort(channel, runners.heard_by(nodes))
+    loop = runners.RealTimeLoop(nodes, port, statistics=statistics)
 
     def stop() -> bool:
         done_s = (statistics.ticks + statistics.skipped) * TICK_S
         return watch is not None and watch.stopped(done_s)
 
     try:
-        with real_time_scheduling():
+        with runners.real_time_scheduling():
             if begin_ns is not None:  # called last: from here on nothing is loaded or built
-                MonotonicClock().sleep_until(begin_ns())
+                runners.MonotonicClock().sleep_until(begin_ns())
             loop.run(stop, job.ticks * TICK_NS)
     finally:
         if port is not None:

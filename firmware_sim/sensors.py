@@ -66,6 +66,8 @@ class ForeignFrames:
                     f"emulated, only whole multiples of {TICK_NS / 1e6:g} ms"
                 )
         self.plan = plan
+        self.server = CanopenSensor(plan) if plan.steps else None
+        self.hears = frozenset[int]() if self.server is None else self.server.hears
         #: Faults of what it measures: they spoil its message as the catalogue's node would send it.
         self.spoiled: list[Any] = []
         self._native, self._codec = native, codec
@@ -76,6 +78,25 @@ class ForeignFrames:
             for each in plan.messages
             if not plan.steps or each.can_ids[0] != own | plan.bus << BUS_SHIFT
         ]
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Take what is asked of a CANopen node."""
+        if self.server is not None:
+            self.server.receive(frame, now_ns)
+
+    def swap(self) -> None:
+        """Put another CANopen node of the same kind in its place."""
+        if self.server is not None:
+            self.server.swap()
+
+    def tick(self, now_ns: int) -> list[Frame]:
+        """What a CANopen node sends by itself."""
+        return [] if self.server is None else self.server.tick(now_ns)
+
+    @property
+    def measures(self) -> bool:
+        """Whether it sends what it measures."""
+        return self.server is None or self.server.measures
 
     def frames(self, message: tuple[Any, ...], now_ns: int, tick: int) -> list[Frame]:
         """The frames that are due in this tick."""
@@ -155,9 +176,7 @@ class SensorNode:
         self._messages: list[tuple[int, Callable[[Any], Frame], Callable[[], Any]]] = []
         # the noise is drawn in this order: append a new message at the end
         motion = catalogue.transmitter(SensorMotion, address)
-        self._foreign: list[
-            tuple[ForeignFrames, Callable[[], tuple[Any, ...]], CanopenSensor | None]
-        ] = []
+        self._foreign: list[tuple[ForeignFrames, Callable[[], tuple[Any, ...]]]] = []
         self._send(motion, self._measure_motion, foreign.motions[second])
         if not second:
             self._send(catalogue.transmitter(SensorTank), self._measure_tank, foreign.levels)
@@ -171,30 +190,23 @@ class SensorNode:
     ) -> None:
         """Send what is measured as the node of the catalogue, or as the device of a plan."""
         if plan is None:
-            self._publish(transmitter, measure)
+            ticks = transmitter.cycle_ns // self.period_ns
+            self._messages.append((ticks, transmitter.frame, measure))
             return
-        server = CanopenSensor(plan) if plan.steps else None
-        if server is not None:
-            self.hears |= server.hears
         codec = self._catalogue.codec(plan.kind, Address(transmitter.can_id & 0xFF))
         device = self.devices[codec.can_id] = ForeignFrames(plan, transmitter, codec)
-        self._foreign.append((device, measure, server))
+        self.hears |= device.hears
+        self._foreign.append((device, measure))
 
     def swap(self) -> None:
         """Put other CANopen sensors of the same kind in the place of its own."""
-        for _, _, server in self._foreign:
-            if server is not None:
-                server.swap()
-
-    def _publish(self, transmitter: Transmitter[_M], measure: Callable[[], _M]) -> None:
-        ticks = transmitter.cycle_ns // self.period_ns
-        self._messages.append((ticks, transmitter.frame, measure))
+        for device, _ in self._foreign:
+            device.swap()
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take what is asked of a CANopen sensor."""
-        for _, _, server in self._foreign:
-            if server is not None:
-                server.receive(frame, now_ns)
+        for device, _ in self._foreign:
+            device.receive(frame, now_ns)
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Measure, and send the messages that are due."""
@@ -205,10 +217,9 @@ class SensorNode:
         for ticks, frame, measure in self._messages:
             if self._ticks % ticks == 0:
                 frames.append(frame(measure()))
-        for device, measured, server in self._foreign:
-            if server is not None:
-                frames += server.tick(now_ns)
-            if server is None or server.measures:
+        for device, measured in self._foreign:
+            frames += device.tick(now_ns)
+            if device.measures:
                 frames += device.frames(measured(), now_ns, self._ticks)
         if self._messages:  # else no node of the catalogue is on board
             frames.extend(self._housekeeping.frames(now_ns))

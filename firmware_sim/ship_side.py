@@ -11,10 +11,9 @@ from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final
 
 from firmware_sim.canopen_drive import CanopenPumpDrive
-from firmware_sim.canopen_node import CanopenSensor
 from firmware_sim.drive import PumpDrive
 from firmware_sim.guard.parameters import guard_parameters
 from firmware_sim.guard.reference import GuardNode
@@ -31,7 +30,6 @@ from utank_hil.canbus import (
     HardwiredInputs,
     OperatorCommand,
     Quality,
-    Receiver,
     Switch,
     ValveStatus,
     load_catalogue,
@@ -56,7 +54,10 @@ EXTERNAL_DRIVE: Final = "external drive"
 
 
 class ExternalNode:
-    """Node that hands a signal of the hardware's reports on to the plant; None without a report."""
+    """Node that hands what the hardware reports on to the plant; None without a report.
+
+    `read` gives the value in a frame of the identifier, NaN if there is none.
+    """
 
     period_ns = TICK_NS
 
@@ -64,13 +65,13 @@ class ExternalNode:
         self,
         name: str,
         plant: Plant,
-        receiver: "Receiver[Any] | ReportedTorque",
-        signal: str,
+        can_id: int,
+        read: Callable[[Frame], float],
         act: Callable[[float | None], None],
     ) -> None:
         self.name = name
-        self._plant, self._receiver, self._signal, self._act = plant, receiver, signal, act
-        self.hears = frozenset([receiver.can_id])  # see `Selective`
+        self._plant, self._can_id, self._read, self._act = plant, can_id, read, act
+        self.hears = frozenset([can_id])  # see `Selective`
         self._value = math.nan
         self._reported_ns = -STALE_NS - 1
         self._ticks = self._fresh_ticks = 0
@@ -82,10 +83,7 @@ class ExternalNode:
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Store the report."""
-        if frame.can_id != self._receiver.can_id:
-            return
-        status = self._receiver.accept(frame)
-        if status is not None and math.isfinite(value := getattr(status, self._signal)):
+        if frame.can_id == self._can_id and math.isfinite(value := self._read(frame)):
             self._value, self._reported_ns = value, now_ns
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
@@ -98,30 +96,18 @@ class ExternalNode:
         return ()
 
 
-class TorqueReport(NamedTuple):
-    """What a drive's torque is on the water."""
-
-    pressure_pa: float
-
-
-class ReportedTorque:
-    """Takes the torque 6077h of a CiA 402 drive as `Receiver` takes DRIVE_STATUS_1.
+def _torque_report(plan: DrivePlan, pump: Pump) -> tuple[int, Callable[[Frame], float]]:
+    """Return identifier and reader of the torque 6077h of a CiA 402 drive, as pressure.
 
     ValueError is raised if the drive is led by its speed: the unit of its torque is not known then.
     """
-
-    def __init__(self, plan: DrivePlan, pump: Pump) -> None:
-        if not plan.mode.torque:
-            raise ValueError("devices.pump: without the emulated drive a torque mode is needed")
-        self.can_id = plan.bus << BUS_SHIFT | STANDARD | SENT_2 + plan.node
-        self._length = sum(bits for _, bits in plan.measured) // 8
-        per_unit = 1 / (plan.units_per_si * pump.pitch_m * pump.duct_area_m2)
-        self._field = Field(32, 16, self._length, signed=True, scale=per_unit)
-
-    def accept(self, frame: Frame) -> TorqueReport | None:
-        """The report in a frame; None if it is none."""
-        whole = len(frame.data) == self._length
-        return TorqueReport(self._field.value(frame.data)) if whole else None
+    if not plan.mode.torque:
+        raise ValueError("devices.pump: without the emulated drive a torque mode is needed")
+    length = sum(bits for _, bits in plan.measured) // 8
+    per_unit = 1 / (plan.units_per_si * pump.pitch_m * pump.duct_area_m2)
+    field = Field(32, 16, length, signed=True, scale=per_unit)
+    can_id = plan.bus << BUS_SHIFT | STANDARD | SENT_2 + plan.node
+    return can_id, lambda frame: field.value(frame.data) if len(frame.data) == length else math.nan
 
 
 def external_drive(plant: Plant, vessel: Vessel | None = None) -> ExternalNode:
@@ -136,10 +122,15 @@ def external_drive(plant: Plant, vessel: Vessel | None = None) -> ExternalNode:
         else:
             plant.impose_pressure(pressure_pa)
 
-    receiver: Receiver[Any] | ReportedTorque = load_catalogue().receiver(DriveStatus1)
     if vessel is not None and vessel.foreign.pump is not None and vessel.pump is not None:
-        receiver = ReportedTorque(vessel.foreign.pump, vessel.pump)
-    return ExternalNode(EXTERNAL_DRIVE, plant, receiver, "pressure_pa", act)
+        can_id, read = _torque_report(vessel.foreign.pump, vessel.pump)
+        return ExternalNode(EXTERNAL_DRIVE, plant, can_id, read, act)
+    receiver = load_catalogue().receiver(DriveStatus1)
+    accept = receiver.accept
+    return ExternalNode(
+        EXTERNAL_DRIVE, plant, receiver.can_id,
+        lambda frame: getattr(accept(frame), "pressure_pa", math.nan), act,
+    )  # fmt: skip
 
 
 def external_valve(plant: Plant, tank: Tank, valve: Valve) -> ExternalNode:
@@ -149,7 +140,11 @@ def external_valve(plant: Plant, tank: Tank, valve: Valve) -> ExternalNode:
         plant.set_valve_loss(valve.loss(tank, valve.fail_opening if opening is None else opening))
 
     receiver = load_catalogue().receiver(ValveStatus)
-    return ExternalNode("external valve", plant, receiver, "opening", act)
+    accept = receiver.accept
+    return ExternalNode(
+        "external valve", plant, receiver.can_id,
+        lambda frame: getattr(accept(frame), "opening", math.nan), act,
+    )  # fmt: skip
 
 
 class HardwiredNode:
@@ -213,12 +208,11 @@ class ForeignPanel(OperatorPanel):
         script: Iterable[TimedAction] = (),
     ) -> None:
         super().__init__(catalogue, configuration_version=0, script=script, period_ns=TICK_NS)
-        self._server = CanopenSensor(plan) if plan.steps else None
-        if self._server is not None:
-            self.hears |= self._server.hears
         self._frames = ForeignFrames(plan, self._sender, catalogue.codec(OperatorCommand))
+        self.hears |= self._frames.hears
         #: What it sends, by the identifier of the message that it stands for.
         self.devices = {self._sender.can_id: self._frames}
+        self.swap = self._frames.swap
         self._proves = plan.authentication
         self._challenge = b""
         if self._proves is not None:
@@ -230,21 +224,13 @@ class ForeignPanel(OperatorPanel):
         super().receive(frame, now_ns)
         if self._proves is not None and frame.can_id == self._proves.challenge_id:
             self._challenge = frame.data
-        if self._server is not None:
-            self._server.receive(frame, now_ns)
-
-    def swap(self) -> None:
-        """Put another panel of the same kind in its place."""
-        if self._server is not None:
-            self._server.swap()
+        self._frames.receive(frame, now_ns)
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Send what is pressed, and that it lives."""
         super().tick(now_ns)
-        server, frames = self._server, list[Frame]()
-        if server is not None:
-            frames += server.tick(now_ns)
-        if self._sent is not None and self._spoke and (server is None or server.measures):
+        frames = self._frames.tick(now_ns)
+        if self._sent is not None and self._spoke and self._frames.measures:
             orders = self._frames.frames(self._sent, now_ns, self._ticks)
             frames += orders
             if self._proves is not None and self._sent.arm and self._challenge and orders:

@@ -10,24 +10,9 @@ from pydantic import BaseModel, ValidationError
 
 from firmware_sim.pooled_waves import pooled_wave_moment
 from firmware_sim.scenario import Scenario
+from utank_hil.analysis import tank_sizing
 from utank_hil.analysis.loop.self_tuning import SelfTuned, SelfTunedDesign
 from utank_hil.analysis.tank_response import expected_sea
-from utank_hil.analysis.tank_sizing import (
-    DUCT_LOSS,
-    LOADINGS,
-    PUMP_SLOPE_RAD,
-    STABILITY_SHARE,
-    PumpDemand,
-    SizedTank,
-    TankRoom,
-    pump_demand,
-    pump_level_m,
-    size_pump,
-    size_tank,
-    stability_taken,
-    usable_level_m,
-    with_duct_loss,
-)
 from utank_hil.base.parameters import (
     ParameterError,
     Positive,
@@ -177,8 +162,8 @@ class StarterProject:
     """Project that can be checked and run on the bench."""
 
     vessel: Vessel
-    sized: SizedTank
-    demand: PumpDemand
+    sized: tank_sizing.SizedTank
+    demand: tank_sizing.PumpDemand
     law: SelfTuned
     sea: dict[str, Any]
     texts: dict[str, str]  #: Contents of `FILES`.
@@ -208,8 +193,8 @@ def starter_sea(
 
 def make_starter(
     ship: StarterShip,
-    room: TankRoom,
-    stability_share: float = STABILITY_SHARE,
+    room: tank_sizing.TankRoom,
+    stability_share: float = tank_sizing.STABILITY_SHARE,
     hs_m: float | None = None,
     tp_s: float | None = None,
     effective_slope: float | None = None,
@@ -228,14 +213,14 @@ def make_starter(
         damping_ratio=ship.damping[0],
     )
     bare = written.ship()
-    sized = size_tank(bare, room, stability_share)
-    sized = replace(sized, tank=with_duct_loss(bare, sized.tank))
-    demand = pump_demand(bare, sized.tank, pump_level_m(bare, sized.tank))
-    pump = size_pump(sized.tank, demand)
+    sized = tank_sizing.size_tank(bare, room, stability_share)
+    sized = replace(sized, tank=tank_sizing.with_duct_loss(bare, sized.tank))
+    demand = tank_sizing.pump_demand(bare, sized.tank, tank_sizing.pump_level_m(bare, sized.tank))
+    pump = tank_sizing.size_pump(sized.tank, demand)
     texts = {SHIP: ship_file(ship, written, room, sized, demand, pump)}
     # from here on with the rounded numbers of the files
     vessel = _valid(Vessel, yaml.safe_load(texts[SHIP]))
-    usable_m = float(f"{usable_level_m(vessel.ship, vessel.tank):.3g}")
+    usable_m = float(f"{tank_sizing.usable_level_m(vessel.ship, vessel.tank):.3g}")
     limits = {}
     if usable_m < (1 - _LEAST_LEVEL_CHANGE) * vessel.default_limits["level_m"]:
         limits["level_m"] = usable_m
@@ -277,21 +262,21 @@ def number(value: float) -> str:
 def ship_file(
     ship: StarterShip,
     written: WrittenShip,
-    room: TankRoom,
-    sized: SizedTank,
-    demand: PumpDemand,
+    room: tank_sizing.TankRoom,
+    sized: tank_sizing.SizedTank,
+    demand: tank_sizing.PumpDemand,
     pump: Pump,
 ) -> str:
     """File of the vessel: ship, tank and pump."""
     tank, bare = sized.tank, written.ship()
     water_t = tank.water_kg / 1e3
-    share, taken = water_t / ship.displacement_t, stability_taken(bare, tank)
+    share, taken = water_t / ship.displacement_t, tank_sizing.stability_taken(bare, tank)
     damping_ratio, where_from = ship.damping
     period = "as given"
     if ship.roll_period_s is None:
         period = "weather criterion's formula (IS Code 2008, A 2.3.4): measure it"
     length_m, breadth_m = sized.reservoir_length_m, sized.reservoir_breadth_m
-    slope_deg = math.degrees(PUMP_SLOPE_RAD)
+    slope_deg = math.degrees(tank_sizing.PUMP_SLOPE_RAD)
     rate_m_s = tank.natural_frequency_rad_s * demand.level_m
     swinging = tank.linearized(rate_m_s).damping_ratio
     pressure_kpa, flow = demand.pressure_pa / 1e3, demand.flow_m3_s
@@ -318,12 +303,12 @@ tank:
   duct_area_m2: {number(tank.duct_area_m2)}
   lz_m: {number(tank.lz_m)}  # duct below the centre of gravity
   damping_ratio: {number(tank.damping_ratio)}  # friction in small motions: a guess
-  # inlet and outlet have {DUCT_LOSS:g}, a throttle the rest: with it the damping ratio
+  # inlet and outlet have {tank_sizing.DUCT_LOSS:g}, a throttle the rest: with it the damping ratio
   # is {swinging:.2g} at {demand.level_m:.2f} m, and less in less motion
   quadratic_loss: {number(tank.quadratic_loss)}
   headroom_m: {number(tank.headroom_m)}  # roof above the still water
 # Moves the water by {demand.level_m:.2f} m, which holds a wave slope of {slope_deg:.1f} degrees,
-# at {LOADINGS[0]:g} to {LOADINGS[-1]:g} of the roll period:
+# at {tank_sizing.LOADINGS[0]:g} to {tank_sizing.LOADINGS[-1]:g} of the roll period:
 # {pressure_kpa:.1f} kPa, {flow:.2f} m3/s, {demand.duct_speed_m_s:.1f} m/s in the duct.
 pump:
   max_pressure_pa: {number(pump.max_pressure_pa)}

@@ -8,7 +8,6 @@ valve nor one after a fault reset follows commands by itself.
 from collections.abc import Iterable
 from typing import Final
 
-from firmware_sim.canopen_node import CanopenSensor
 from firmware_sim.plant import Plant
 from firmware_sim.sensors import ForeignFrames
 from utank_hil.base.tick import TICK_NS, TICK_S
@@ -211,25 +210,20 @@ class ForeignValve(ValveNode):
     ) -> None:
         assert plan.command is not None
         self._plan, self._command = plan, plan.command
-        self._server = CanopenSensor(plan) if plan.steps else None
         self._heard = HeardMessage(self._command)
         super().__init__(plant, tank, valve, catalogue, configuration_version=0)
-        frames = ForeignFrames(plan, self._statuses, catalogue.codec(ValveStatus))
+        self._frames = ForeignFrames(plan, self._statuses, catalogue.codec(ValveStatus))
         #: What it sends, by the identifier of the message that it stands for.
-        self.devices = {self._statuses.can_id: frames}
-        self._frames = frames
-        self.hears = frozenset(self._command.can_ids)
-        if self._server is not None:
-            self.hears |= self._server.hears
+        self.devices = {self._statuses.can_id: self._frames}
+        self.hears = self._frames.hears.union(self._command.can_ids)
+        self.swap = self._frames.swap
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take a command that is whole and in order."""
-        server = self._server
         if not self.powered:
             return
-        if server is not None:
-            server.receive(frame, now_ns)
-        if frame.can_id not in self._command.can_ids or (server and not server.measures):
+        self._frames.receive(frame, now_ns)
+        if frame.can_id not in self._command.can_ids or not self._frames.measures:
             return
         if not self._heard.passes(frame.data):
             self.refused += 1
@@ -242,24 +236,19 @@ class ForeignValve(ValveNode):
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Move, and send where it stands."""
         self._plant.advance(now_ns)
-        server, frames = self._server, list[Frame]()
+        server, frames = self._frames.server, list[Frame]()
         if not self.powered:
             self._start()
             if server is not None:
                 server.state = NetworkState.BOOT_UP
-        elif server is not None:
-            frames = server.tick(now_ns)
+        else:
+            frames = self._frames.tick(now_ns)
         late = now_ns - self._accepted_ns > round(LONGEST_TIMEOUT_S / NANOSECONDS)
-        deaf = server is not None and (server.lost_controller or not server.measures)
-        if late or deaf:
+        deaf = server is not None and server.lost_controller
+        if late or deaf or not self._frames.measures:
             self._state = ValveState.FAIL_POSITION
         self._move(self._asked if self.following else self._valve.fail_opening, now_ns)
-        if self.powered and (server is None or server.measures):
+        if self.powered and self._frames.measures:
             frames += self._frames.frames(self._status(), now_ns, self._ticks)
         self._ticks += 1
         return frames
-
-    def swap(self) -> None:
-        """Put another valve of the same kind in its place."""
-        if self._server is not None:
-            self._server.swap()

@@ -1,7 +1,7 @@
 """Forces of the waves as rotating phasors, one for each component."""
 
 from collections.abc import Callable, Sequence
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 
@@ -29,22 +29,6 @@ def _product(a: ComplexArray, b: ComplexArray) -> ComplexArray:
     result = np.empty(real.shape, dtype=np.complex128)
     result.real, result.imag = real, a.real * b.imag + a.imag * b.real
     return result
-
-
-class Waves(Protocol):
-    """Wave components at the ship: phasors of shape (k, N), one row for each force."""
-
-    def begin(self) -> tuple[ComplexArray, ComplexArray]:
-        """Phasors `AHEAD_TICKS` before the start, and their rotation per tick.
-
-        The caller rotates the phasors in place, tick by tick.
-        """
-
-    def at(self, tick: int) -> tuple[ComplexArray, ComplexArray]:
-        """Phasors `AHEAD_TICKS` after a tick, as the caller rotated them, and their rotation.
-
-        It must be called for each tick from 0 on.
-        """
 
 
 def beside(forces: Sequence[Harmonics], other: Harmonics, row: int) -> list[Harmonics]:
@@ -160,3 +144,9 @@ class PassingWaves:
         size = sizes(amplitude)
         least = _LEAST * np.maximum(size.max(axis=1, keepdims=True), 1.0)
         return np.where(size > least, amplitude, least)
+
+
+Waves = SteadyWaves | PassingWaves
+"""Wave components at the ship: phasors of shape (k, N), one row for each force, that the caller
+rotates in place, tick by tick. `begin` gives those `AHEAD_TICKS` before the start, `at` those
+`AHEAD_TICKS` after a tick, and their rotation; it must be called for each tick from 0 on."""

@@ -142,35 +142,31 @@ def _number(value: float | None) -> float:
 
 def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
     """Simulate linear ship and tank with law, limiter, level observer and sensor noise."""
-    _refuse_valve(scenario)
     ship, tank = scenario.ship_at(0.0), scenario.vessel.tank
-    changes = scenario.voyage or len(scenario.sea.spectra) > 1
-    if changes or (scenario.actual_ship and scenario.actual_from_s > 0):
-        raise ValueError("simulation: linear keeps ship, course and sea: take bus")
-    if ship.heeling_moment_nm:
-        raise ValueError("simulation: linear knows no steady heel: take bus")
-    if ship.sway_of_slope or scenario.hull:
-        raise ValueError("simulation: linear knows no sway: take bus")
-    if scenario.righting_in_waves:
-        raise ValueError("simulation: linear has one righting moment: take bus")
-    if scenario.fmu:
-        raise ValueError("simulation: linear knows no ship of an FMU: take bus")
+    later = scenario.actual_ship and scenario.actual_from_s > 0
+    changes = later or scenario.voyage or len(scenario.sea.spectra) > 1
+    for wrong, why in (
+        (scenario.vessel.valve, "vessel.valve is moved by simulation: bus alone: take that"),
+        (changes, "simulation: linear keeps ship, course and sea: take bus"),
+        (ship.heeling_moment_nm, "simulation: linear knows no steady heel: take bus"),
+        (ship.sway_of_slope or scenario.hull, "simulation: linear knows no sway: take bus"),
+        (scenario.righting_in_waves, "simulation: linear has one righting moment: take bus"),
+        (scenario.fmu, "simulation: linear knows no ship of an FMU: take bus"),
+    ):
+        if wrong:
+            raise ValueError(why)
     moment = scenario.wave_moment(seed)
     count = round(scenario.duration_s / RECORD_S)
     at_rest = np.zeros(count)
-    yield _Record(
-        NO_TANK,
-        sea_response.roll_without_tank(ship, moment, RECORD_S, count),
-        at_rest,
-        at_rest,
-        at_rest,
-    )
+    bare = sea_response.roll_without_tank(ship, moment, RECORD_S, count)
+    yield _Record(NO_TANK, bare, at_rest, at_rest, at_rest)
     passive = passive_motion(ship, tank, moment, RECORD_S, count + 1)
     in_ticks = between(passive, RECORD_S, ROW_TICKS)
     yield _Record(PASSIVE, passive[:-1, 0], passive[:-1, _LEVEL], at_rest, at_rest)
     for name, controller in scenario.controllers.items():
-        law = _pump_law(name, laws[name])
-        plant = controller.plant
+        law, plant = laws[name], controller.plant
+        if law.commands != (PRESSURE,):
+            raise ValueError(f"controllers.{name} moves a valve: take simulation: bus")
         run = simulate_loop(
             DesignPlant(ship, tank, plant.delay_s, plant.lag_s, plant.limits),
             in_ticks,
@@ -183,17 +179,6 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
         motion, pressure_pa = run.motion, run.pressure_pa
         power_w = pressure_pa * tank.reservoir_area_m2 * motion[:, _LEVEL_RATE]
         yield _Record(name, motion[:, 0], motion[:, _LEVEL], pressure_pa, power_w)
-
-
-def _refuse_valve(scenario: Scenario) -> None:
-    if scenario.vessel.valve is not None:
-        raise ValueError("vessel.valve is moved by simulation: bus alone: take that")
-
-
-def _pump_law(name: str, law: BuiltLaw) -> BuiltLaw:
-    if law.commands != (PRESSURE,):
-        raise ValueError(f"controllers.{name} moves a valve: take simulation: bus")
-    return law
 
 
 OK: Final = "ok"

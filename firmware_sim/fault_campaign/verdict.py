@@ -20,19 +20,12 @@ CUT_MS: Final = 100.0
 """Latest zero pressure in ms after a fault that always stops: a ramp instead would take longer."""
 RAMP_ZERO_MS: Final = 1040.0
 """Latest zero pressure in ms after a ramp began: 1 s, a command cycle and a tick of the drive."""
-STOPS: Final = {
-    row.code.name
-    for row in FAULTS
-    if any(condition.reaction is Reaction.STOP for condition in row.conditions)
+_REACTIONS: Final = {
+    row.code.name: [condition.reaction for condition in row.conditions] for row in FAULTS
 }
-HALVES: Final = {
-    row.code.name for row in FAULTS if any(c.reaction is Reaction.HALVE for c in row.conditions)
-}
-ONLY_STOPS: Final = {
-    row.code.name
-    for row in FAULTS
-    if all(condition.reaction is Reaction.STOP for condition in row.conditions)
-}
+STOPS: Final = {name for name, those in _REACTIONS.items() if Reaction.STOP in those}
+HALVES: Final = {name for name, those in _REACTIONS.items() if Reaction.HALVE in those}
+ONLY_STOPS: Final = {name for name, those in _REACTIONS.items() if {*those} <= {Reaction.STOP}}
 RATE_SHARE: Final = 1.001
 """Share of the rate limit that commands may reach, with the limiter's rounding."""
 STATUS_MS: Final = 200.0

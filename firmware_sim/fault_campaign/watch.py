@@ -6,25 +6,17 @@ from itertools import pairwise, zip_longest
 
 from firmware_sim.fault_campaign.campaign import Row
 from firmware_sim.faulty_bench import FaultyBench
+from utank_hil import canbus
 from utank_hil.base.tick import TICK_NS
-from utank_hil.canbus import (
-    Alarm,
-    ControllerStatus,
-    Fault,
-    Frame,
-    Mode,
-    PumpCommand,
-    load_catalogue,
-)
 from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.safety.situation import Demand
 
 Heard = tuple[int, int, bytes]  #: Time in ns, identifier and data of a frame on the bus.
 
-_COMMANDS = load_catalogue().codec(PumpCommand)
-_STATUS = load_catalogue().codec(ControllerStatus)
-_ALARMS = load_catalogue().codec(Alarm)
+_COMMANDS = canbus.load_catalogue().codec(canbus.PumpCommand)
+_STATUS = canbus.load_catalogue().codec(canbus.ControllerStatus)
+_ALARMS = canbus.load_catalogue().codec(canbus.Alarm)
 ROUNDING_PA = 8.0
 """Resolution of the pressure in PUMP_CMD: each of two commands is rounded by half of it."""
 JITTER_S = 0.002  #: Extra delay of a command in s on a loaded bus of 250 kbit/s: four frames.
@@ -39,10 +31,10 @@ class BusLog:
         self.frames: list[Heard] = []
         #: Time, pressure, and whether the pressure was to be cut.
         self.commands: list[tuple[int, float, bool]] = []
-        self.shown: list[tuple[int, ControllerStatus]] = []
-        self.told: list[tuple[int, Fault]] = []  #: Faults sent in ALARM.
+        self.shown: list[tuple[int, canbus.ControllerStatus]] = []
+        self.told: list[tuple[int, canbus.Fault]] = []  #: Faults sent in ALARM.
 
-    def __call__(self, time_ns: int, sender: str, frame: Frame) -> None:
+    def __call__(self, time_ns: int, sender: str, frame: canbus.Frame) -> None:
         """Record a frame."""
         self.frames.append((time_ns, frame.can_id, frame.data))
         if sender != "controller" or len(frame.data) != FRAME_BYTES:
@@ -128,7 +120,7 @@ class Watch:
         limit = row.limit
         self._within_ns = math.inf if limit.found_ms is None else limit.found_ms * 1e6
         self._counts_from = limit.counts_from
-        self._codes = {Fault[name] for name in row.expect.codes}
+        self._codes = {canbus.Fault[name] for name in row.expect.codes}
         self._script = sorted(row.fault.operator, key=lambda timed: timed.time_s)
         self._degraded_most = degraded_most
         self._degraded_ns: int | None = None
@@ -139,19 +131,19 @@ class Watch:
         #: halved the pressure ("halved"), rejected, missed or discarded a frame ("noted"), or
         #: raised one of the row's alarms ("alarm").
         self.first_ns: dict[str, int] = {}
-        if bench.node.mode is Mode.ACTIVE:
+        if bench.node.mode is canbus.Mode.ACTIVE:
             self.first_ns["active"] = now_ns
         #: First time at which the condition of `Limit.counts_from` held; for the pressure, at which
         #: it held until detection, or for the row's deadline.
         self.over_ns: int | None = None
         #: Last time at which the drive's set-point was not zero, or the valve followed.
         self.pressed_ns = now_ns - TICK_NS
-        self.code = Fault.NONE  #: First latched fault; while there is none, the fault shown.
+        self.code = canbus.Fault.NONE  #: First latched fault; while there is none, the fault shown.
         self.armed_again = self._waited = False
         self.beyond_share_pa = 0.0  #: Largest excess of the drive's set-point over `degraded_most`.
         self.rolls = Moments()
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame: canbus.Frame, now_ns: int) -> None:
         """Ignore the frame."""
 
     def _count(self) -> int:
@@ -173,7 +165,7 @@ class Watch:
         source = node.motion if name in node.motion.__slots__ else node.measured
         return abs(float(getattr(source, name)) - float(getattr(plant, name)))
 
-    def tick(self, now_ns: int) -> Iterable[Frame]:
+    def tick(self, now_ns: int) -> Iterable[canbus.Frame]:
         """Observe one tick."""
         if self._start_ns is None:
             self._start_ns = now_ns
@@ -182,17 +174,17 @@ class Watch:
             ship.panel.press(self._script.pop(0).action)
         supervisor = node.safety.supervisor
         mode = supervisor.mode
-        if mode is Mode.FAULT and "found" not in first_ns:
+        if mode is canbus.Mode.FAULT and "found" not in first_ns:
             first_ns["found"], self.code = now_ns, supervisor.fault
-        elif mode is Mode.ACTIVE:
+        elif mode is canbus.Mode.ACTIVE:
             self.armed_again |= "found" in first_ns
             first_ns.setdefault("active", now_ns)
             if supervisor.degraded:
                 first_ns.setdefault("halved", now_ns)
-        self._look_at_share(now_ns, degraded=mode is Mode.ACTIVE and supervisor.degraded)
-        if "found" not in first_ns and (node.fault is not Fault.NONE or self._waited):
+        self._look_at_share(now_ns, degraded=mode is canbus.Mode.ACTIVE and supervisor.degraded)
+        if "found" not in first_ns and (node.fault is not canbus.Fault.NONE or self._waited):
             self.code = node.fault
-        self._waited = mode is Mode.INIT  # a fault that delayed INIT and is over is no fault
+        self._waited = mode is canbus.Mode.INIT  # a fault that delayed INIT and is over is no fault
         if "noted" not in first_ns and self._count() > self._noted:
             first_ns["noted"] = now_ns
         if now_ns % (10 * TICK_NS) == 0 and node.safety.alarms.codes & self._codes:

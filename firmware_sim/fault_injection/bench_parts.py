@@ -11,15 +11,21 @@ import random
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
-from typing import Any, Final, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.canbus import DriveFault, Frame
+from utank_hil.canbus import Frame
 from utank_hil.control.interface import Controller
 from utank_hil.runners import Node, SimulatedBus
 from utank_hil.runners.node import LinkObserver, Selective
+
+if TYPE_CHECKING:  # compiled: a scenario is read without them
+    from firmware_sim.canopen_drive import CanopenPumpDrive
+    from firmware_sim.drive import PumpDrive
+    from firmware_sim.plant import Plant
+    from firmware_sim.valve import ValveNode
 
 NEVER_NS: Final = 1 << 62  #: Time beyond the end of every run.
 
@@ -289,35 +295,14 @@ class BreakableLaw:
         return getattr(self._law, name)
 
 
-class Pumped(Protocol):
-    """Plant whose pump can be made to fail."""
-
-    broken_pump: Callable[[float], float] | None
-    presses_off: bool
-
-
-class Trips(Protocol):
-    """Drive that can be made to fail."""
-
-    def fail(self, fault: DriveFault) -> None:
-        """Enter the fault state; without a fault, switch off."""
-
-
-class Sticks(Protocol):
-    """Valve that can be made to fail."""
-
-    stuck: bool
-    powered: bool
-
-
 @dataclass(slots=True)
 class Bench:
     """Parts of a bench in which faults are placed."""
 
     nodes: dict[str, FaultyNode]
-    plant: Pumped
-    drive: Trips | None
-    valve: Sticks | None
+    plant: "Plant"
+    drive: "PumpDrive | CanopenPumpDrive | None"
+    valve: "ValveNode | None"
     version: int
     bus: FaultyBus | None = None  #: Simulated bus; None on a real one.
     #: Failures of the running controller's law; None if the controller is another process.

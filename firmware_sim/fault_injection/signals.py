@@ -9,15 +9,8 @@ from typing import Annotated, Any, Literal, get_type_hints
 
 from pydantic import Field, model_validator
 
+from firmware_sim.fault_injection import fault
 from firmware_sim.fault_injection.bench_parts import Spoil
-from firmware_sim.fault_injection.fault import (
-    FaultSpan,
-    MessageFault,
-    intact,
-    one_in,
-    signal_problems,
-    whole_cycles,
-)
 from utank_hil.base.parameters import Finite, Positive, refuse
 from utank_hil.canbus import Frame
 from utank_hil.canbus.catalogue import NamedMessage
@@ -27,14 +20,14 @@ Change = Callable[[Sequence[Any], float], Sequence[Any]]
 """Function of the true values and the time in s since the fault that gives the faulty values."""
 
 
-class SignalFault(MessageFault):
+class SignalFault(fault.MessageFault):
     """Fault of some signals of a message."""
 
     signals: Annotated[tuple[str, ...], Field(min_length=1)]
 
     @model_validator(mode="after")
     def _known_numbers(self) -> "SignalFault":
-        problems = signal_problems(self.named, self.signals)
+        problems = fault.signal_problems(self.named, self.signals)
         hints = get_type_hints(self.named.kind)
         problems += [
             (f"signals.{place}", f"is no measured quantity (got {name!r})")
@@ -73,7 +66,7 @@ def _altered(named: NamedMessage, change: Callable[[Any, float], Any]) -> Spoil:
     codec = named.codec
 
     def alter(frame: Frame, since_s: float) -> Iterable[Frame]:
-        message = intact(named, frame)
+        message = fault.intact(named, frame)
         if message is None:
             return (frame,)
         data = codec.encode(change(message, since_s), frame.data[1] & 15)
@@ -150,7 +143,7 @@ class Spikes(SignalFault):
     every: Annotated[int, Field(ge=2)]
 
     def _change(self, seed: int) -> Change:  # noqa: ARG002
-        strikes = one_in(self.every)
+        strikes = fault.one_in(self.every)
         return lambda values, _: [value + self.by for value in values] if strikes() else values
 
 
@@ -177,10 +170,10 @@ class Late(SignalFault):
     """The signals are delayed."""
 
     kind: Literal["late"]
-    by_s: FaultSpan  #: Delay, rounded up to whole cycles of the message.
+    by_s: fault.FaultSpan  #: Delay, rounded up to whole cycles of the message.
 
     def _change(self, seed: int) -> Change:  # noqa: ARG002
-        cycles = whole_cycles(self.by_s, self.named.codec.cycle_ns)
+        cycles = fault.whole_cycles(self.by_s, self.named.codec.cycle_ns)
         line: deque[Sequence[Any]] = deque(maxlen=cycles + 1)
 
         def delay(values: Sequence[Any], _: float) -> Sequence[Any]:
@@ -212,7 +205,7 @@ def value_of(hint: Any, written: float | bool | str | None) -> Any:
     return int(written)
 
 
-class Value(MessageFault):
+class Value(fault.MessageFault):
     """The signals have fixed values; an empty value means "not available"."""
 
     kind: Literal["value"]
@@ -227,7 +220,7 @@ class Value(MessageFault):
     def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         hints = get_type_hints(self.named.kind)
         values = {name: value_of(hints[name], written) for name, written in self.values.items()}
-        speaks = one_in(self.every)
+        speaks = fault.one_in(self.every)
         return _altered(
             self.named, lambda message, _: message._replace(**values) if speaks() else message
         )
@@ -235,7 +228,7 @@ class Value(MessageFault):
 
 def value_problems(named: Any, values: dict[str, Any]) -> list[tuple[str, str]]:
     """Problems of the values configured for a message."""
-    problems = signal_problems(named, values)
+    problems = fault.signal_problems(named, values)
     hints = get_type_hints(named.kind)
     for name, written in values.items():
         try:

@@ -4,18 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, Final
 
+from utank_hil import canbus
 from utank_hil.base.tick import TICK_NS
-from utank_hil.canbus import (
-    Address,
-    DriveStatus1,
-    HardwiredInputs,
-    OperatorCommand,
-    PumpCommand,
-    SensorMotion,
-    SensorPump,
-    SensorTank,
-    load_catalogue,
-)
 from utank_hil.configuration import ControllerConfig
 from utank_hil.configuration.devices import UNGUARDED
 from utank_hil.safety.monitors.thresholds import thresholds_of
@@ -28,16 +18,16 @@ LEVEL_M: Final = 1e-3  #: Units of the frames.
 MOST_RATE: Final = 32000
 LEVEL_SHARE: Final = 0.97
 """Of the level at which a reservoir is full or empty; the shipped switches close at 0.943."""
-STREAMS: Final[tuple[tuple[type[tuple[Any, ...]], Address], ...]] = (
-    (PumpCommand, Address.CONTROLLER),
-    (DriveStatus1, Address.DRIVE),
-    (SensorMotion, Address.SENSORS),
-    (SensorMotion, Address.SENSORS_2),
-    (SensorTank, Address.SENSORS),
-    (SensorPump, Address.SENSORS),
-    (OperatorCommand, Address.OPERATOR),
-    (OperatorCommand, Address.OPERATOR_2),
-    (HardwiredInputs, Address.HARDWIRED),
+STREAMS: Final[tuple[tuple[type[tuple[Any, ...]], canbus.Address], ...]] = (
+    (canbus.PumpCommand, canbus.Address.CONTROLLER),
+    (canbus.DriveStatus1, canbus.Address.DRIVE),
+    (canbus.SensorMotion, canbus.Address.SENSORS),
+    (canbus.SensorMotion, canbus.Address.SENSORS_2),
+    (canbus.SensorTank, canbus.Address.SENSORS),
+    (canbus.SensorPump, canbus.Address.SENSORS),
+    (canbus.OperatorCommand, canbus.Address.OPERATOR),
+    (canbus.OperatorCommand, canbus.Address.OPERATOR_2),
+    (canbus.HardwiredInputs, canbus.Address.HARDWIRED),
 )  #: Messages in the order of the enumeration in guard.h.
 
 
@@ -106,7 +96,7 @@ def guard_parameters(config: ControllerConfig) -> GuardParameters:
         safety.hardwired_age_ms + 150 if vessel.redundancy.hardwired_inputs else 0.0,
     )
     thresholds = thresholds_of(config.plant, safety.roll_limit_rad, config.sensors)
-    catalogue, messages = load_catalogue(), []
+    catalogue, messages = canbus.load_catalogue(), []
     for (kind, source), patience in zip(STREAMS, patience_ms, strict=True):
         codec = catalogue.codec(kind, source)
         assert codec.data_ids is not None  # the catalogue has checked it

@@ -20,13 +20,7 @@ from utank_hil.configuration.vessel import Vessel
 from utank_hil.console.common import Bus, Json, fail, load, print_json, why_not_writable
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, notes, shown
-from utank_hil.nodes.commissioning.conformance import (
-    Ask,
-    DriveTrial,
-    SensorTrial,
-    Trial,
-    ValveTrial,
-)
+from utank_hil.nodes.commissioning import conformance
 from utank_hil.runners import RealTimeLoop, stop_on_signals
 
 
@@ -92,8 +86,8 @@ def conform(
 
 
 def trial_of(
-    vessel: Vessel, device: str, file: Path, ask: Ask, seconds: float
-) -> tuple[Trial, bool]:
+    vessel: Vessel, device: str, file: Path, ask: conformance.Ask, seconds: float
+) -> tuple[conformance.Trial, bool]:
     """The trial of a device on the first interface, and whether nothing may be sent there."""
     devices = vessel.devices
     names = (*ROLES, "pump")
@@ -103,18 +97,18 @@ def trial_of(
         fail(f"{file}: devices.{device} is native: utank-hil commission checks it")
     if device == "pump":
         assert vessel.pump is not None  # else the file would have been refused
-        return DriveTrial(devices.pump.plan(0, vessel.pump), vessel.pump, ask), False
+        return conformance.DriveTrial(devices.pump.plan(0, vessel.pump), vessel.pump, ask), False
     section = devices.devices()[device]
     silent = section.bus in devices.receive_only
     plan = section.plan(ROLES[device], device, 0, silent=silent)
     if device == "valve":
         assert vessel.valve is not None  # likewise
-        return ValveTrial(plan, vessel.valve, ask, seconds), silent
+        return conformance.ValveTrial(plan, vessel.valve, ask, seconds), silent
     key = key_of(vessel.foreign) if device == "panel" else b""
-    return SensorTrial(plan, ask, seconds, key), silent
+    return conformance.SensorTrial(plan, ask, seconds, key), silent
 
 
-def asks(hand_s: float | None) -> Ask:
+def asks(hand_s: float | None) -> conformance.Ask:
     """Ask on the terminal; a step is done at Enter, or after so many seconds."""
 
     def ask(what: str) -> Callable[[], bool]:

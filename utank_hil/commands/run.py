@@ -10,20 +10,10 @@ from typing import Annotated, Any, Final
 
 import typer
 
+from utank_hil import canbus
 from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.base.provenance import describe
 from utank_hil.base.whole_file import claimed_files
-from utank_hil.canbus import (
-    Address,
-    ControllerStatus,
-    Fault,
-    Heartbeat,
-    Mode,
-    Port,
-    PortError,
-    PumpCommand,
-    load_catalogue,
-)
 from utank_hil.canbus.events import AlarmEvent
 from utank_hil.canbus.ports import BusPorts, open_port, why_other_bit_rate
 from utank_hil.commands.announcer import LOG_NAME, Announcer
@@ -175,7 +165,7 @@ def run(
             return stop()
 
         with _in_real_time(f"{loaded.name} on {bus}", manager):
-            with suppress(PortError):  # The loop meets the error too, and its node reacts.
+            with suppress(canbus.PortError):  # The loop meets the error too, and its node reacts.
                 port.receive()  # Old frames must not look new.
             length_ns = None if duration is None else round(duration * 1e9)
             RealTimeLoop([on_bus], port, statistics=statistics).run(ended, length_ns)
@@ -192,14 +182,16 @@ def run(
     raise typer.Exit(_code(node))
 
 
-def _refuse_beside_another(port: Port, bus: str) -> None:
+def _refuse_beside_another(port: canbus.Port, bus: str) -> None:
     """Listen before talking: a second controller would take the drive out of operation."""
-    catalogue = load_catalogue()
-    sent = {catalogue.codec(message).can_id for message in (ControllerStatus, PumpCommand)}
-    sent.add(catalogue.receiver(Heartbeat, Address.CONTROLLER).can_id)
+    catalogue = canbus.load_catalogue()
+    sent = {
+        catalogue.codec(message).can_id for message in (canbus.ControllerStatus, canbus.PumpCommand)
+    }
+    sent.add(catalogue.receiver(canbus.Heartbeat, canbus.Address.CONTROLLER).can_id)
     until_s = time.monotonic() + LISTEN_S
     while time.monotonic() < until_s:
-        with suppress(PortError):  # The loop meets it, too.
+        with suppress(canbus.PortError):  # The loop meets it, too.
             for frame in port.receive():
                 if frame.can_id in sent:
                     common.fail(
@@ -298,7 +290,7 @@ def _outputs(
 
 
 def _say_failures(
-    alarms: Lines, port: Port, recording: RunRecording, announcer: Announcer | None
+    alarms: Lines, port: canbus.Port, recording: RunRecording, announcer: Announcer | None
 ) -> None:
     for error in port.take_errors() if isinstance(port, BusPorts) else ():
         alarms.say(f"a sensor's bus fails: {error}")
@@ -328,9 +320,9 @@ def _as_json(
 
 
 def _code(node: ControllerNode) -> ExitCode:
-    if node.measured.link_lost or node.fault is Fault.BUS_LOST:
+    if node.measured.link_lost or node.fault is canbus.Fault.BUS_LOST:
         return ExitCode.BUS_LOST
-    return ExitCode.FAULT if node.mode is Mode.FAULT else ExitCode.OK
+    return ExitCode.FAULT if node.mode is canbus.Mode.FAULT else ExitCode.OK
 
 
 def _print_summary(
@@ -340,7 +332,9 @@ def _print_summary(
     console.table(timing_table({name: statistics}))
     for event in node.law.events:
         console.say(f"{(event.time_ns - node.start_ns) * 1e-9:8.1f} s {event_text(event)}")
-    what = "waiting for" if node.mode is Mode.INIT else "fault"  # INIT waits; that is no fault
+    what = (
+        "waiting for" if node.mode is canbus.Mode.INIT else "fault"
+    )  # INIT waits; that is no fault
     console.say(f"ended in {node.mode.name}, {what} {fault_text(node.fault)}")
     if node.law.error:
         console.say(node.law.error, red="the law failed:")

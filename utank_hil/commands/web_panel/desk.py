@@ -7,19 +7,9 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
+from utank_hil import canbus
 from utank_hil.base.finite import finite
 from utank_hil.base.tick import TICK_NS
-from utank_hil.canbus import (
-    AlarmState,
-    Catalogue,
-    Frame,
-    PassiveTwin,
-    PumpCommand,
-    Quality,
-    Receiver,
-    ShipEstimate,
-    Verdict,
-)
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.nodes.inbox import Inbox
 from utank_hil.nodes.panel import Action, OperatorPanel
@@ -30,8 +20,8 @@ STALE_MS: Final = 500.0
 for now."""
 _ESTIMATE_MS: Final = 5000.0  #: The same of the ship's estimate, which comes once a second.
 _HEEL_S: Final = 60.0  #: Time over which roll is averaged to heel, as for HEEL_LIMIT.
-_SENT: Final = (PumpCommand, PassiveTwin, ShipEstimate)
-LASTING: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.ACTIVE_ACKNOWLEDGED)
+_SENT: Final = (canbus.PumpCommand, canbus.PassiveTwin, canbus.ShipEstimate)
+LASTING: Final = (canbus.AlarmState.ACTIVE_UNACKNOWLEDGED, canbus.AlarmState.ACTIVE_ACKNOWLEDGED)
 
 
 class Instruments:
@@ -40,7 +30,7 @@ class Instruments:
     name = "instruments"
     period_ns = 2 * TICK_NS
 
-    def __init__(self, catalogue: Catalogue, vessel: Vessel) -> None:
+    def __init__(self, catalogue: canbus.Catalogue, vessel: Vessel) -> None:
         self._vessel = vessel
         self._inbox = Inbox(
             catalogue,
@@ -51,12 +41,12 @@ class Instruments:
             foreign=vessel.foreign,
         )
         receivers = [catalogue.receiver(kind) for kind in _SENT]
-        self._receivers: dict[int, Receiver[Any]] = {each.can_id: each for each in receivers}
+        self._receivers: dict[int, canbus.Receiver[Any]] = {each.can_id: each for each in receivers}
         self._sent: dict[type[Any], tuple[Any, int]] = {}
         self._heel_rad = math.nan
         self._heeled_s = 0.0
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame: canbus.Frame, now_ns: int) -> None:
         """Take what sensors, drive, valve and controller send."""
         receiver = self._receivers.get(frame.can_id)
         if receiver is None:
@@ -64,7 +54,7 @@ class Instruments:
         elif (message := receiver.accept(frame)) is not None:
             self._sent[type(message)] = message, now_ns
 
-    def tick(self, now_ns: int) -> Sequence[Frame]:
+    def tick(self, now_ns: int) -> Sequence[canbus.Frame]:
         """Average the roll."""
         motion = self._inbox.motions[0].sample(now_ns)
         if motion.age_ms > STALE_MS:
@@ -81,11 +71,11 @@ class Instruments:
         """What is measured now; NaN for what is not, or is too old."""
         measured, vessel = self._inbox.snapshot(now_ns), self._vessel
         motion = min(measured.motions, key=lambda each: each.age_ms)
-        twin = self._latest(PassiveTwin, now_ns)
-        usable = twin is not None and twin.quality is Quality.GOOD
-        ship = self._latest(ShipEstimate, now_ns, _ESTIMATE_MS)
-        known = ship is not None and ship.verdict is Verdict.GOOD
-        command = self._latest(PumpCommand, now_ns)
+        twin = self._latest(canbus.PassiveTwin, now_ns)
+        usable = twin is not None and twin.quality is canbus.Quality.GOOD
+        ship = self._latest(canbus.ShipEstimate, now_ns, _ESTIMATE_MS)
+        known = ship is not None and ship.verdict is canbus.Verdict.GOOD
+        command = self._latest(canbus.PumpCommand, now_ns)
         pump, tank_ms = vessel.pump, measured.tank_age_ms
         drive_ms = measured.drive_age_ms if pump else math.inf
         given_ms = measured.pump_age_ms if pump else math.inf
@@ -241,7 +231,7 @@ class Desk:
                 {
                     "code": alarm.code.name,
                     "lasts": alarm.state in LASTING,
-                    "accepted": alarm.state is AlarmState.ACTIVE_ACKNOWLEDGED,
+                    "accepted": alarm.state is canbus.AlarmState.ACTIVE_ACKNOWLEDGED,
                     "words": fault_words(alarm.code),
                     "age_s": alarm.age_s,
                     "times": alarm.times_raised,
