@@ -20,8 +20,10 @@ from utank_hil.console.common import (
     Json,
     Out,
     Seed,
+    argument,
     fail,
     load,
+    option,
     prepare_out,
     print_json,
     why,
@@ -51,33 +53,23 @@ REAL_TIME_S = 120.0  #: Default length of a run in real time. Chosen; no study.
 
 def bench(
     context: typer.Context,
-    scenario: Annotated[
-        Path, typer.Argument(help="Scenario file.", show_default="the measured storm")
-    ] = STORM,
+    scenario: Annotated[Path, argument("Scenario file.", default="the measured storm")] = STORM,
     real_time: Annotated[
-        bool,
-        typer.Option(
-            "--realtime/--lockstep", help="Real time, or simulated time as fast as it goes."
-        ),
+        bool, option("Real time, or simulated time as fast as it goes.", "--realtime/--lockstep")
     ] = False,
     bus: Annotated[
         str | None,
-        typer.Option(
-            help="SocketCAN interface for real time; without it all nodes share one process."
-        ),
+        option("SocketCAN interface for real time; without it all nodes share one process."),
     ] = None,
     seed: Seed = None,
     duration: Duration = None,
     out: Out = OUT,
     frames: Annotated[
-        bool,
-        typer.Option("--frames", help="Keep each run's frame log there, for replay and export."),
+        bool, option("Keep each run's frame log there, for replay and export.", "--frames")
     ] = False,
     fmu: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="Run nothing: write the emulated ship as FMU for other programs."
-        ),
+        option("Run nothing: write the emulated ship as FMU for other programs.", metavar="FILE"),
     ] = None,
     json_: Json = False,
     allow_code: AllowCode = False,

@@ -4,10 +4,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from utank_hil.base.parameters import ParameterError
-from utank_hil.console.common import Json, fail, print_json
+from utank_hil.console.common import Json, argument, fail, option, print_json
 from utank_hil.console.terminal import Terminal, notes, rows_table, say_note, shown
 
 if TYPE_CHECKING:
@@ -19,47 +17,32 @@ _POSITIVE = {"min": 1e-6, "max": 1e9}
 def hull(
     mesh: Annotated[
         Path,
-        typer.Argument(
-            help="Panels of the hull, x forward, z up: WAMIT .gdf, HAMS .pnl, NEMOH .mar, "
+        argument(
+            "Panels of the hull, x forward, z up: WAMIT .gdf, HAMS .pnl, NEMOH .mar, "
             "HydroStar .hst; with meshio .stl, .obj, .ply. Whole, or one side of y = 0."
         ),
     ],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="The netCDF file to write.")] = Path(
-        "hull.nc"
-    ),
-    gm: Annotated[
-        float | None, typer.Option(**_POSITIVE, help="Metacentric height, m; or --gravity.")
-    ] = None,
-    gravity: Annotated[
-        float | None, typer.Option(help="Centre of gravity above the waterline, m.")
-    ] = None,
+    out: Annotated[Path, option("The netCDF file to write.", metavar="FILE")] = Path("hull.nc"),
+    gm: Annotated[float | None, option("Metacentric height, m; or --gravity.", **_POSITIVE)] = None,
+    gravity: Annotated[float | None, option("Centre of gravity above the waterline, m.")] = None,
     roll_period: Annotated[
-        float | None, typer.Option(**_POSITIVE, help="Of the free roll, s; or --gyration.")
+        float | None, option("Of the free roll, s; or --gyration.", **_POSITIVE)
     ] = None,
-    gyration: Annotated[
-        float | None, typer.Option(**_POSITIVE, help="Radius of gyration in roll, m.")
-    ] = None,
+    gyration: Annotated[float | None, option("Radius of gyration in roll, m.", **_POSITIVE)] = None,
     draught: Annotated[
         float | None,
-        typer.Option(
+        option(
+            "Depth of the lowest point, m.",
+            default="the waterline is z = 0 of the file",
             **_POSITIVE,
-            help="Depth of the lowest point, m.",
-            show_default="the waterline is z = 0 of the file",
         ),
     ] = None,
-    trim: Annotated[
-        float, typer.Option(min=-20, max=20, help="Bow down, about midship, degrees.")
-    ] = 0.0,
-    scale: Annotated[
-        float, typer.Option(**_POSITIVE, help="Unit of the file in m, 0.001 for mm.")
-    ] = 1.0,
+    trim: Annotated[float, option("Bow down, about midship, degrees.", min=-20, max=20)] = 0.0,
+    scale: Annotated[float, option("Unit of the file in m, 0.001 for mm.", **_POSITIVE)] = 1.0,
     displacement: Annotated[
-        float | None,
-        typer.Option(**_POSITIVE, help="In t, to check that of the mesh."),
+        float | None, option("In t, to check that of the mesh.", **_POSITIVE)
     ] = None,
-    density: Annotated[
-        float, typer.Option(min=900, max=1100, help="Of the water, kg/m3.")
-    ] = 1025.0,
+    density: Annotated[float, option("Of the water, kg/m3.", min=900, max=1100)] = 1025.0,
     json_: Json = False,
 ) -> None:
     """Compute what waves do to a hull, for `ship: {hull: FILE}`.

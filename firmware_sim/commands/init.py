@@ -14,7 +14,7 @@ from firmware_sim.tank_report import cost_rows, interval_words, roll_rows
 from utank_hil.analysis.tank_sizing import tank_cost
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.whole_file import write_whole
-from utank_hil.console.common import Json, fail, load, prepare_out, print_json
+from utank_hil.console.common import Json, argument, fail, load, option, prepare_out, print_json
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.ship_report import order_words
 from utank_hil.console.terminal import Terminal, notes, rows_table, shown
@@ -40,70 +40,53 @@ WORTH_IT: Final = 0.15
 
 
 def init(
-    length: Annotated[float, typer.Option(help="Of the ship at the waterline, m.")],
-    beam: Annotated[float, typer.Option(help="At the waterline, m.")],
-    displacement: Annotated[float, typer.Option(help="Without the tank's water, t.")],
-    gm: Annotated[float, typer.Option(help="Metacentric height without the tank's water, m.")],
-    folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Where to write.")] = Path(
-        "my_ship"
-    ),
+    length: Annotated[float, option("Of the ship at the waterline, m.")],
+    beam: Annotated[float, option("At the waterline, m.")],
+    displacement: Annotated[float, option("Without the tank's water, t.")],
+    gm: Annotated[float, option("Metacentric height without the tank's water, m.")],
+    folder: Annotated[Path, argument("Where to write.", metavar="[DIR]")] = Path("my_ship"),
     roll_period: Annotated[
         float | None,
-        typer.Option(
-            help="Natural roll period without the tank's water, s.",
-            show_default="weather criterion's formula, with --draught",
+        option(
+            "Natural roll period without the tank's water, s.",
+            default="weather criterion's formula, with --draught",
         ),
     ] = None,
-    draught: Annotated[float | None, typer.Option(help="Mean moulded draught, m.")] = None,
+    draught: Annotated[float | None, option("Mean moulded draught, m.")] = None,
     roll_damping: Annotated[
         float | None,
-        typer.Option(
-            help="Damping ratio of the roll.",
-            show_default="Ikeda's method, with --draught; else 0.05",
-        ),
+        option("Damping ratio of the roll.", default="Ikeda's method, with --draught; else 0.05"),
     ] = None,
     tank_breadth: Annotated[
-        float | None,
-        typer.Option(help="Room across the ship, m.", show_default="0.9 of the beam"),
+        float | None, option("Room across the ship, m.", default="0.9 of the beam")
     ] = None,
     tank_height: Annotated[
-        float | None,
-        typer.Option(help="From duct to roof, m.", show_default="0.4 of the beam"),
+        float | None, option("From duct to roof, m.", default="0.4 of the beam")
     ] = None,
     tank_length: Annotated[
-        float | None,
-        typer.Option(help="Room along the ship, m.", show_default="0.08 of the length"),
+        float | None, option("Room along the ship, m.", default="0.08 of the length")
     ] = None,
     duct_below_cg: Annotated[
         float | None,
-        typer.Option(
-            help="Duct below the centre of gravity, m; negative above.",
-            show_default="0.1 of the beam",
-        ),
+        option("Duct below the centre of gravity, m; negative above.", default="0.1 of the beam"),
     ] = None,
     gm_loss: Annotated[
-        float, typer.Option(help="Share of GM that the free surface may take, 0.03 to 0.25.")
+        float, option("Share of GM that the free surface may take, 0.03 to 0.25.")
     ] = 0.15,
     hs: Annotated[
         float | None,
-        typer.Option(
-            help="Significant wave height of the scenario, m.",
-            show_default="by length and wave slope",
-        ),
+        option("Significant wave height of the scenario, m.", default="by length and wave slope"),
     ] = None,
     tp: Annotated[
-        float | None,
-        typer.Option(help="Peak period of its sea, s.", show_default="near the roll period"),
+        float | None, option("Peak period of its sea, s.", default="near the roll period")
     ] = None,
-    name: Annotated[
-        str | None, typer.Option(help="Of the ship.", show_default="the folder's")
-    ] = None,
+    name: Annotated[str | None, option("Of the ship.", default="the folder's")] = None,
     hull: Annotated[
         bool,
-        typer.Option(
-            "--hull",
-            help="Compute what waves do to a usual hull of these dimensions, so that the ship "
+        option(
+            "Compute what waves do to a usual hull of these dimensions, so that the ship "
             "sways, too; needs --draught and the extra hulls.",
+            "--hull",
         ),
     ] = False,
     json_: Json = False,
@@ -145,9 +128,9 @@ def init(
         room = replace(usual, **{key: of for key, of in given.items() if of is not None})
     if room.breadth_m > beam:
         fail(f"--tank-breadth: is {room.breadth_m:g} m, and the ship's beam {beam:g} m")
-    for option, value in (("hs", hs), ("tp", tp)):
+    for which, value in (("hs", hs), ("tp", tp)):
         if value is not None and not 0 < value < math.inf:
-            fail(f"--{option}: must be positive and finite, got {value}")
+            fail(f"--{which}: must be positive and finite, got {value}")
     data, slope = None, None
     if hull:
         if draught is None:

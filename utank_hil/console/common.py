@@ -34,6 +34,16 @@ _CLAIMS: Final[dict[tuple[int, int], int]] = {}
 """Open descriptors of the folders that this process has claimed, by device and inode."""
 
 
+def option(words: str, *flags: str, default: str | bool = True, **how: Any) -> Any:
+    """An option by its help; `default` says in words what holds without it."""
+    return typer.Option(*flags, help=words, show_default=default, **how)
+
+
+def argument(words: str, *, default: str | bool = True, **how: Any) -> Any:
+    """An argument, likewise."""
+    return typer.Argument(help=words, show_default=default, **how)
+
+
 def _print_version(wanted: bool) -> None:
     if wanted:
         from utank_hil.base.provenance import kernels, machine
@@ -43,15 +53,12 @@ def _print_version(wanted: bool) -> None:
 
 
 Json = Annotated[
-    bool, typer.Option("--json", help="Print one JSON object on standard output and nothing else.")
+    bool, option("Print one JSON object on standard output and nothing else.", "--json")
 ]
 Version = Annotated[
-    bool,
-    typer.Option(
-        "--version", is_eager=True, callback=_print_version, help="Print the version and end."
-    ),
+    bool, option("Print the version and end.", "--version", is_eager=True, callback=_print_version)
 ]
-Config = Annotated[Path, typer.Argument(help="Controller configuration.")]
+Config = Annotated[Path, argument("Controller configuration.")]
 
 
 def _named(bus: str) -> str:
@@ -60,27 +67,23 @@ def _named(bus: str) -> str:
     return bus
 
 
-Bus = Annotated[
-    str, typer.Option("--bus", help="CAN interface, for example can0.", callback=_named)
-]
-Run = Annotated[str | None, typer.Option(help="Run of a recording; without it the last one.")]
+Bus = Annotated[str, option("CAN interface, for example can0.", "--bus", callback=_named)]
+Run = Annotated[str | None, option("Run of a recording; without it the last one.")]
 From = Annotated[float | None, typer.Option("--from", metavar="SECONDS")]
 To = Annotated[float | None, typer.Option("--to", metavar="SECONDS")]
 Channel = Annotated[
-    str | None, typer.Option(metavar="NAME", help="Bus to read of a log with several, as it says.")
+    str | None, option("Bus to read of a log with several, as it says.", metavar="NAME")
 ]
 AllowCode = Annotated[
-    bool, typer.Option("--allow-code", help="Run code that the file names as a law or ship.")
+    bool, option("Run code that the file names as a law or ship.", "--allow-code")
 ]
 Duration = Annotated[
     float | None,
     # a float without a limit may be infinite
     typer.Option("--duration", min=0.1, max=1e9, metavar="SECONDS", help="Length of a run."),
 ]
-Seed = Annotated[
-    int | None, typer.Option(min=0, help="Of waves and noise, instead of the scenario's.")
-]
-Out = Annotated[Path, typer.Option(help="Folder for the results.")]
+Seed = Annotated[int | None, option("Of waves and noise, instead of the scenario's.", min=0)]
+Out = Annotated[Path, option("Folder for the results.")]
 
 
 def print_json(content: Mapping[str, Any]) -> None:
