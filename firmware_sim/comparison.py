@@ -1,7 +1,6 @@
 """Differences of means of recordings, by batch: paired or independent."""
 
 import json
-from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,23 +69,6 @@ def _difference(
     first, second = float(np.mean(reference)), float(np.mean(values))
     count = min(len(reference), len(values))
     return Difference(first, second, second - first, half_width, count, paired)
-
-
-def same_runs(reference: Sequence[str], other: Sequence[str], source: str) -> list[str]:
-    """Names that both have; raise `CompareError` if there are none."""
-    common = [name for name in reference if name in other]
-    if not common:
-        raise CompareError(
-            f"{source}: has the runs {', '.join(other)}; the reference has {', '.join(reference)}: "
-            "none of one name"
-        )
-    return common
-
-
-def differing(reference: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[str, ...]:
-    """Difference in code, which is not the subject of the comparison."""
-    here, there = reference.get("code"), other.get("code")
-    return () if here == there else (f"different versions of the program: {here} and {there}",)
 
 
 BATCH_PERIODS: Final = 40
@@ -178,11 +160,18 @@ def _records_compared(first: Record, second: Record) -> list[Comparison]:
     if len(first.runs) == len(second.runs) == 1:  # a log has no names of runs
         pairs = [(next(iter(first.runs)), next(iter(second.runs)))]
     else:
-        common = same_runs(list(first.runs), list(second.runs), str(second.path))
-        pairs = [(run, run) for run in common]
+        pairs = [(run, run) for run in first.runs if run in second.runs]
+        if not pairs:
+            has, wanted = (", ".join(each.runs) for each in (second, first))
+            raise CompareError(
+                f"{second.path}: has the runs {has}; the reference has {wanted}: none of one name"
+            )
     for run, other in pairs:
         one, two = first.columns(run), second.columns(other)
-        remarks = list(differing(first.about, second.about))
+        remarks = []
+        codes = first.about.get("code"), second.about.get("code")
+        if codes[0] != codes[1]:
+            remarks.append(f"different versions of the program: {codes[0]} and {codes[1]}")
         capsized = _capsized((first.path, run, one), (second.path, other, two))
         if capsized:
             remarks.append(f"not compared: the ship capsized in {' and '.join(capsized)}")
@@ -229,9 +218,8 @@ def _in_charge(run: str, one: Columns, two: Columns) -> list[str]:
 
 
 def _at_same_times(one: Columns, two: Columns) -> bool:
-    count = min(len(one["time_s"]), len(two["time_s"]))
-    longest = max(len(one["time_s"]), len(two["time_s"]))
-    return count == longest and bool(np.abs(one["time_s"] - two["time_s"]).max(initial=0) < 1e-3)
+    ones_s, twos_s = one["time_s"], two["time_s"]
+    return len(ones_s) == len(twos_s) and bool(np.abs(ones_s - twos_s).max(initial=0) < 1e-3)
 
 
 def _known(

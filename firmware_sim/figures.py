@@ -166,7 +166,10 @@ def run_figures(result: BenchResult) -> tuple[RunFigures, ...]:
     """Figures of each run, ranked."""
     compared = [run for run in result.runs if result.compares(run)]
     marks = {run.name: mark_of(result, run) for run in result.runs}
-    rolls = {run.name: roll_statistics(_roll(result, run)) for run in compared}
+    rolls = {
+        run.name: roll_statistics(run.column("true_roll_rad")[_window(result, run)])
+        for run in compared
+    }
     order = sorted((name for name in rolls if marks[name] is None), key=lambda n: rolls[n].rms_rad)
     passive = rolls[PASSIVE] if PASSIVE in order else None
     afloat = result.without_tank_capsized_s >= result.end_s
@@ -222,19 +225,20 @@ def mark_of(result: BenchResult, run: Run) -> Mark | None:
     if fault != Fault.NONE:
         words = fault_text(Fault(fault))
         return Mark("fault", f"the controller ended in {Mode(mode).name}, fault {words}")
-    reference = run.name == PASSIVE
-    wanted = _ORDERS[passive_script(result.scenario.vessel)[0].action] if reference else Mode.ACTIVE
+    wanted = Mode.ACTIVE
+    if run.name == PASSIVE:
+        wanted = _ORDERS[passive_script(result.scenario.vessel)[0].action]
     ordered = _window(result, run) & (_orders(result, run) == wanted)
     if not ordered.any():
         return Mark("idle", f"no order to go to {wanted.name} before the end of the window")
     share = float((run.column("mode")[ordered] == wanted).mean())
-    if share < LEAST_IN_CHARGE:
-        return Mark(
-            "idle",
-            f"the controller was in {wanted.name} for {share:.1%} of the time that the operator "
-            f"wanted it there; {LEAST_IN_CHARGE:.0%} are asked for",
-        )
-    return None
+    if share >= LEAST_IN_CHARGE:
+        return None
+    return Mark(
+        "idle",
+        f"the controller was in {wanted.name} for {share:.1%} of the time that the operator "
+        f"wanted it there; {LEAST_IN_CHARGE:.0%} are asked for",
+    )
 
 
 def _orders(result: BenchResult, run: Run) -> npt.NDArray[np.int64]:
@@ -283,10 +287,6 @@ def _exit_code(result: BenchResult, marks: Mapping[str, Mark | None]) -> ExitCod
 
 def _bare_roll(result: BenchResult) -> FloatArray:
     return result.without_tank_rad[round(result.settle_s / RECORD_S) :]
-
-
-def _roll(result: BenchResult, run: Run) -> FloatArray:
-    return run.column("true_roll_rad")[_window(result, run)]
 
 
 def _window(result: BenchResult, run: Run) -> npt.NDArray[np.bool_]:

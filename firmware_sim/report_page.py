@@ -17,6 +17,7 @@ from firmware_sim.report_tables import few_rolls, in_one_unit, roll_interval, ta
 from firmware_sim.retuning_figures import events_on_ships_time
 from firmware_sim.run import COLUMNS, RECORD_S
 from firmware_sim.scenario_content import PASSIVE
+from firmware_sim.tank_report import less
 from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import Vessel
 from utank_hil.console.common import why
@@ -87,18 +88,14 @@ def _verdict(found: BenchFigures, few: str) -> Verdict:
         assert best.pump is not None
         line = f"{best.name} rolls {math.degrees(best.roll.rms_rad):.2f}° RMS"
         if best.roll_below_passive is not None:
-            line += f", {_less(best.roll_below_passive)} than the passive tank"
+            line += f", {less(best.roll_below_passive)} than the passive tank"
         if best.roll_below_no_tank is not None:
-            line += f" and {_less(best.roll_below_no_tank)} than no tank"
+            line += f" and {less(best.roll_below_no_tank)} than no tank"
         power = power_words(best.pump.power_mean_w)
         lines.append(f"{line}, for {power} of shaft power on average.")
     lines += [few] if few else []
     lines += found.wrong or ["No run failed, and no limit of the model was passed."]
     return Verdict(lines, good=not found.wrong)
-
-
-def _less(share: float) -> str:
-    return f"{abs(share):.0%} {'less' if share >= 0 else 'more'}"
 
 
 def sea_words(sea: Mapping[str, Any]) -> str:
@@ -204,23 +201,20 @@ def _draw(result: BenchResult, found: BenchFigures, about: Mapping[str, Any], pa
         )
         for run, judged in zip(result.runs, found.runs, strict=True)
     ]
+    time_s = RECORD_S * np.arange(len(result.without_tank_rad), dtype=np.float64)
+    upright = time_s < result.without_tank_capsized_s
+    none = np.full(int(upright.sum()), np.nan)
+    bare_rad = result.without_tank_rad[upright]
     draw_bench(
         curves,
         path,
         title=f"{found.scenario}, seed {found.seed}, {found.mode}",
         about=about,
-        bare=_bare_curve(result),
+        bare=BenchCurve(BARE, time_s[upright], bare_rad, none, none),
         bars=[_bare_bar(found), *map(bar_of, found.runs, COLORS)],
         wrong=found.wrong,
         interval=roll_interval(found, result.scenario.vessel.ship.natural_frequency_rad_s),
     )
-
-
-def _bare_curve(result: BenchResult) -> BenchCurve:
-    time_s = RECORD_S * np.arange(len(result.without_tank_rad), dtype=np.float64)
-    upright = time_s < result.without_tank_capsized_s
-    none = np.full(int(upright.sum()), np.nan)
-    return BenchCurve(BARE, time_s[upright], result.without_tank_rad[upright], none, none)
 
 
 def _bare_bar(found: BenchFigures) -> BenchBar:

@@ -49,19 +49,13 @@ def tables(found: BenchFigures) -> list[RichTable]:
 
 def motion_table(found: BenchFigures) -> RichTable:
     """Table of the roll; runs that do not count are at its end."""
-    table = new_table(
-        f"{found.scenario} · {found.mode} · seed {found.seed}",
-        "roll\nRMS °",
-        "signif.\n°",
-        "max.\n°",
-        "below\nno tank",
-        "below\npassive",
-        "in\ncharge",
-        "water\nstrikes",
-    )
-    table.caption = (
-        f"{found.settle_s:g} s to {found.end_s:g} s of the same waves; strikes of the whole run"
-    )
+    figures = (
+        "roll\nRMS °", "signif.\n°", "max.\n°", "below\nno tank", "below\npassive",
+        "in\ncharge", "water\nstrikes",
+    )  # fmt: skip
+    span = f"{found.settle_s:g} s to {found.end_s:g} s of the same waves"
+    title = f"{found.scenario} · {found.mode} · seed {found.seed}"
+    table = new_table(title, *figures, caption=f"{span}; strikes of the whole run")
     bare = found.no_tank
     counting = [run for run in found.compared if run.ranked]
     capsized = bare.capsized_s is not None and bare.capsized_s < found.end_s
@@ -101,13 +95,9 @@ def pump_table(found: BenchFigures) -> RichTable:
             ("power\npeak", "power_peak_w", "W"),
         )
     ]
-    table = new_table(
-        "Pump",
-        *(f"{heading} {unit}" for heading, unit, _ in columns),
-        "level\npeak m",
-        "flow peak\nm³/s",
-    )
-    table.caption = "peaks of values every 50 ms; power that\nthe shaft draws, not what flows back"
+    headings = (f"{heading} {unit}" for heading, unit, _ in columns)
+    caption = "peaks of values every 50 ms; power that\nthe shaft draws, not what flows back"
+    table = new_table("Pump", *headings, "level\npeak m", "flow peak\nm³/s", caption=caption)
     for index, (run, pump) in enumerate(pumps):
         table.add_row(
             run.name,
@@ -150,16 +140,11 @@ def retuning_table(found: BenchFigures) -> RichTable:
 
 
 _RETUNING: Final = (
-    "retuned\nat s",
-    "roll RMS\nbefore °",
-    "roll RMS\nafter °",
-    "\nless",
-    "roll period s\nfound ± / true",
-    "ship damping MN m s\nfound / true",
-    "tank damping ratio\nfound / true",
-    "\nended in",
-    "\nbecause",
-)  #: Headings; those of figures that no run has are left out.
+    "retuned\nat s", "roll RMS\nbefore °", "roll RMS\nafter °", "\nless",
+    "roll period s\nfound ± / true", "ship damping MN m s\nfound / true",
+    "tank damping ratio\nfound / true", "\nended in", "\nbecause",
+)  # fmt: skip
+"""Headings; those of figures that no run has are left out."""
 
 
 def _retuning_cells(retuning: RetuningFigures) -> tuple[str, ...]:

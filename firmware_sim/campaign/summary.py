@@ -62,12 +62,10 @@ def groups_of(results: Results) -> list[Group]:
 def figure(values: Sequence[float]) -> Figure:
     """Mean and confidence interval of values; NaN values are left out."""
     known = [value for value in values if not math.isnan(value)]
-    if not known:
-        return {"mean": None, "half_width": None, "cases": 0}
-    if len(known) == 1:
-        return {"mean": known[0], "half_width": None, "cases": 1}
-    found = mean_interval(known)
-    return {"mean": found.mean, "half_width": found.half_width, "cases": len(known)}
+    mean, half_width = known[0] if known else None, None
+    if len(known) > 1:
+        mean, half_width = mean_interval(known)
+    return {"mean": mean, "half_width": half_width, "cases": len(known)}
 
 
 def summary(results: Results) -> list[dict[str, Any]]:

@@ -13,18 +13,22 @@ from rich.table import Table
 from firmware_sim.commands.bench import STORM
 from firmware_sim.pooled_waves import pooled_wave_moment
 from firmware_sim.scenario import Scenario
+from utank_hil.analysis.tank_filling import fillings
+from utank_hil.analysis.tank_response import expected_sea, roll_curves
+from utank_hil.analysis.tank_sizing import moving, tank_cost, with_duct_loss
 from utank_hil.base.provenance import describe
 from utank_hil.base.whole_file import write_whole
-from utank_hil.configuration import Vessel
+from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.console.common import OUT, Json, Out, fail, load, new_app, prepare_out, print_json
 from utank_hil.console.ship_report import order_words
 from utank_hil.console.terminal import Terminal, new_table, notes
+from utank_hil.control import BuiltLaw, DesignPlant, PumpLimits
+from utank_hil.control.optimal_tank import best_passive_tank, tank_figures
 from utank_hil.dynamics.tank import Tank
+from utank_hil.sea import Harmonics
 
 if TYPE_CHECKING:
     from firmware_sim.prediction import Expected
-    from utank_hil.control import BuiltLaw, DesignPlant
-    from utank_hil.sea import Harmonics
 
 
 PICTURE, FIGURES = "tank.png", "tank.json"
@@ -59,9 +63,6 @@ def tank(
     """
     from firmware_sim.prediction import other_loadings, predict
     from firmware_sim.tank_report import interval_words, loading_table, rolls
-    from utank_hil.analysis.tank_response import roll_curves
-    from utank_hil.analysis.tank_sizing import with_duct_loss
-    from utank_hil.control.optimal_tank import best_passive_tank
     from utank_hil.pictures.tank import draw_tank
 
     loaded = load(vessel, Vessel)
@@ -148,7 +149,6 @@ def filling(
     **Example:** utank-hil design filling VESSEL --gm 0.8 --gm 1.2 --displacement 14500
     """
     from firmware_sim.tank_report import filling_table
-    from utank_hil.analysis.tank_filling import fillings
     from utank_hil.pictures.tank import draw_filling
 
     loaded = load(vessel, Vessel)
@@ -188,7 +188,6 @@ def _sea(path: Path, vessel: Vessel) -> "tuple[Scenario, Harmonics]":
     One of another ship gives its sea alone.
     """
     from utank_hil.analysis.loop.sea_response import CalmSeaError
-    from utank_hil.analysis.tank_response import expected_sea
 
     scenario = load(path, Scenario, allow_code=True)  # laws are not built from it
     if scenario.vessel.version != vessel.version:
@@ -205,8 +204,7 @@ def _sea(path: Path, vessel: Vessel) -> "tuple[Scenario, Harmonics]":
     return scenario, waves
 
 
-def _plant(vessel: Vessel) -> "DesignPlant":
-    from utank_hil.control import DesignPlant, PumpLimits
+def _plant(vessel: Vessel) -> DesignPlant:
 
     limits, pump = PumpLimits(**vessel.default_limits), vessel.pump
     lag_s = 0.0 if pump is None else pump.lag_s
@@ -214,12 +212,10 @@ def _plant(vessel: Vessel) -> "DesignPlant":
 
 
 def _bench(
-    scenario: Scenario, vessel: Vessel, tank: Tank, waves: "Harmonics"
+    scenario: Scenario, vessel: Vessel, tank: Tank, waves: Harmonics
 ) -> "tuple[Scenario, DesignPlant, BuiltLaw | None]":
     """Scenario with a tank, its plant, and the self-tuned law for it, if there is one."""
     from utank_hil.analysis.loop.self_tuning import NoLawError, SelfTunedDesign
-    from utank_hil.analysis.tank_response import expected_sea
-    from utank_hil.configuration import ControllerConfig
 
     vessel = vessel.model_copy(update={"tank": tank})
     scenario = scenario.model_copy(update={"vessel": vessel})
@@ -240,8 +236,6 @@ def _bench(
 
 
 def _figures(vessel: Vessel, tank: Tank, found: "Expected | None") -> dict[str, Any]:
-    from utank_hil.analysis.tank_sizing import moving, tank_cost
-    from utank_hil.control.optimal_tank import tank_figures
 
     return {
         **asdict(tank_figures(vessel.ship, moving(vessel.ship, tank))),
@@ -254,8 +248,6 @@ def _table(
     vessel: Vessel, tanks: dict[str, Tank], found: dict[str, "Expected"], caption: str = ""
 ) -> Table:
     from firmware_sim.tank_report import cost_rows, figure_rows, roll_rows
-    from utank_hil.analysis.tank_sizing import moving, tank_cost
-    from utank_hil.control.optimal_tank import tank_figures
 
     table = new_table(f"Tank of {vessel.name}", *tanks, caption=caption)
     columns = []

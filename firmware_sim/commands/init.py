@@ -5,23 +5,25 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any, Final
 
 import typer
 from rich.table import Table
 
+from firmware_sim.prediction import Expected, predict
+from firmware_sim.scenario import Scenario
+from firmware_sim.starter import FILES, HULL, SCENARIO, StarterProject, StarterShip, make_starter
 from firmware_sim.tank_report import cost_rows, interval_words, roll_rows
-from utank_hil.analysis.tank_sizing import tank_cost
+from utank_hil.analysis.loop.sea_response import CalmSeaError
+from utank_hil.analysis.loop.self_tuning import NoLawError
+from utank_hil.analysis.tank_sizing import TankImpossibleError, TankRoom, tank_cost
+from utank_hil.assembly import build_law
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.whole_file import write_whole
 from utank_hil.console.common import Json, argument, fail, load, option, prepare_out, print_json
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.ship_report import order_words
 from utank_hil.console.terminal import Terminal, notes, rows_table, shown
-
-if TYPE_CHECKING:
-    from firmware_sim.prediction import Expected
-    from firmware_sim.starter import StarterProject
 
 _OPTIONS = {
     "stability_share": "gm-loss",
@@ -101,13 +103,6 @@ def init(
     """
     from firmware_sim.hull.compute import Loading, usual_hull, write_hull
     from firmware_sim.hull.mesh import MeshError
-    from firmware_sim.prediction import predict
-    from firmware_sim.scenario import Scenario
-    from firmware_sim.starter import FILES, HULL, SCENARIO, StarterShip, make_starter
-    from utank_hil.analysis.loop.sea_response import CalmSeaError
-    from utank_hil.analysis.loop.self_tuning import NoLawError
-    from utank_hil.analysis.tank_sizing import TankImpossibleError, TankRoom
-    from utank_hil.assembly import build_law
 
     for path in (folder / file for file in (*FILES, *([HULL] * hull))):
         if path.exists():
@@ -181,7 +176,7 @@ def init(
     console.lead_on(*((command, files[file]) for command, file in steps))
 
 
-def _little_help(project: "StarterProject", found: "Expected") -> str | None:
+def _little_help(project: StarterProject, found: Expected) -> str | None:
     if found.active_rad is None or found.without_tank_rad is None:
         return None  # a ship that capsizes has no roll to compare with
     less = 1 - found.active_rad.mean / found.without_tank_rad.mean
@@ -216,7 +211,7 @@ def _place(name: str, prefix: str) -> str:
     return f"--{prefix}{option.replace('_', '-')}"
 
 
-def _as_json(project: "StarterProject") -> dict[str, Any]:
+def _as_json(project: StarterProject) -> dict[str, Any]:
     vessel, sized, law, pump = project.vessel, project.sized, project.law, project.vessel.pump
     assert pump is not None
     return {
@@ -243,7 +238,7 @@ def _as_json(project: "StarterProject") -> dict[str, Any]:
     }
 
 
-def _table(project: "StarterProject", expected: "Expected") -> Table:
+def _table(project: StarterProject, expected: Expected) -> Table:
     sized, demand, law = project.sized, project.demand, project.law
     ship, tank, duct_m = project.vessel.ship, project.vessel.tank, project.sized.duct_height_m
     heights = (duct_m, duct_m + tank.height_m, duct_m + tank.height_m + tank.headroom_m)

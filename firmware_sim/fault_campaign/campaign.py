@@ -239,16 +239,11 @@ class Campaign(Section):
     @model_validator(mode="after")
     def _consistent(self) -> "Campaign":
         known = [requirement.id for requirement in self.requirements]
-        ids = [row.id for row in self.rows]
         problems = [
-            (f"rows.{place}.id", "is there twice")
+            (f"{section}.{place}.id", "is there twice")
+            for section, ids in (("rows", [row.id for row in self.rows]), ("requirements", known))
             for place, name in enumerate(ids)
             if ids.count(name) > 1
-        ]
-        problems += [
-            (f"requirements.{place}.id", "is there twice")
-            for place, name in enumerate(known)
-            if known.count(name) > 1
         ]
         problems += [
             (f"rows.{place}.meets", f"{name} is no requirement")

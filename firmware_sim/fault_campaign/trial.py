@@ -245,7 +245,7 @@ class Sea:
         if stopped:  # nothing acts on the ship any more: it is integrated alone
             for time_ns in range(alone_ns, end_ns, TICK_NS):
                 bench.ship.plant.advance(time_ns)
-                watch.rolls.add(bench.ship.plant.roll_rad)
+                watch.rolls.append(bench.ship.plant.roll_rad)
         else:
             bench.run(end_ns)
         passive = self._passive_beside(bench, (end_ns - self._fault_ns) / SECOND_NS, stopped)
@@ -269,7 +269,7 @@ class Sea:
             beyond_share_pa=watch.beyond_share_pa,
             refused=refused,
             steepest_pa_s=steepest_pa_s,
-            variance=watch.rolls.variance,
+            variance=float(np.var(watch.rolls)),
             passive_variance=float(passive.var()),
             sound_variance=float(sound.var()) if compared else math.nan,
             window_s=window_s,

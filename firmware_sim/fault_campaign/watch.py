@@ -82,26 +82,6 @@ def first_difference(
     return None
 
 
-class Moments:
-    """Running variance of a roll."""
-
-    def __init__(self) -> None:
-        self._sum = self._square = 0.0
-        self._count = 0
-
-    def add(self, roll_rad: float) -> None:
-        """Add a sample."""
-        self._sum += roll_rad
-        self._square += roll_rad * roll_rad
-        self._count += 1
-
-    @property
-    def variance(self) -> float:
-        """Variance in rad^2."""
-        mean = self._sum / self._count
-        return self._square / self._count - mean * mean
-
-
 class Watch:
     """Observer of controller, drive and ship in each tick, after all of them.
 
@@ -141,7 +121,7 @@ class Watch:
         self.code = canbus.Fault.NONE  #: First latched fault; while there is none, the fault shown.
         self.armed_again = self._waited = False
         self.beyond_share_pa = 0.0  #: Largest excess of the drive's set-point over `degraded_most`.
-        self.rolls = Moments()
+        self.rolls: list[float] = []  #: Roll in each tick.
 
     def receive(self, frame: canbus.Frame, now_ns: int) -> None:
         """Ignore the frame."""
@@ -194,7 +174,7 @@ class Watch:
         ):
             self.pressed_ns = now_ns
         self._look_at_difference(now_ns)
-        self.rolls.add(ship.plant.roll_rad)
+        self.rolls.append(ship.plant.roll_rad)
         return ()
 
     def _look_at_difference(self, now_ns: int) -> None:

@@ -5,7 +5,7 @@ from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from enum import IntEnum
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import Annotated, Any, ClassVar, Literal, get_type_hints
 
 from pydantic import Field, model_validator
 
@@ -24,6 +24,7 @@ class SignalFault(fault.MessageFault):
     """Fault of some signals of a message."""
 
     signals: Annotated[tuple[str, ...], Field(min_length=1)]
+    measured: ClassVar[bool] = True  #: Whether the signals must be physical quantities.
 
     @model_validator(mode="after")
     def _known_numbers(self) -> "SignalFault":
@@ -32,15 +33,10 @@ class SignalFault(fault.MessageFault):
         problems += [
             (f"signals.{place}", f"is no measured quantity (got {name!r})")
             for place, name in enumerate(self.signals)
-            if not problems and self._measured and hints[name] is not float
+            if not problems and self.measured and hints[name] is not float
         ]
         refuse("", problems)
         return self
-
-    @property
-    def _measured(self) -> bool:
-        """Whether the signals must be physical quantities."""
-        return True
 
     @abstractmethod
     def _change(self, seed: int) -> Change:
@@ -78,11 +74,8 @@ def _altered(named: NamedMessage, change: Callable[[Any, float], Any]) -> Spoil:
 class Stuck(SignalFault):
     """The signals keep their values from the start of the fault."""
 
+    measured = False
     kind: Literal["stuck"]
-
-    @property
-    def _measured(self) -> bool:
-        return False
 
     def _change(self, seed: int) -> Change:  # noqa: ARG002
         held: list[Sequence[Any]] = []
