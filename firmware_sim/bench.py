@@ -131,10 +131,7 @@ def _call(function: Callable[..., Any], index: int, *arguments: object) -> Any:
 
 
 def jobs_of(
-    scenario: Scenario,
-    seed: int,
-    duration_s: float,
-    laws: Mapping[str, BuiltLaw] | None = None,
+    scenario: Scenario, seed: int, duration_s: float, laws: Mapping[str, BuiltLaw] | None = None
 ) -> list[Job]:
     """Return the job of the passive tank, then one for each controller."""
     laws = laws or {name: build_law(each) for name, each in scenario.controllers.items()}

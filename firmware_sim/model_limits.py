@@ -88,10 +88,7 @@ MODEL_LIMITS: Final[tuple[tuple[str, Callable[[BenchResult], Iterator[str]]], ..
             result, MOST_LINEAR_ROLL_RAD if result.scenario.plant == "linear" else math.inf
         ),
     ),
-    (
-        "level at the tank's end: a strike is one impulse, without sloshing or trapped air",
-        _level,
-    ),
+    ("level at the tank's end: a strike is one impulse, without sloshing or trapped air", _level),
     ("steeper sea than there is: waves are linear and do not break", _sea),
     ("pump beyond its speed: blades neither cavitate nor burst", _pump),
 )  #: All limits, in the order of their report.

@@ -3,20 +3,9 @@
 from pydantic import model_validator
 
 from firmware_sim.scenario_content import PASSIVE, ScenarioContent
-from firmware_sim.scenario_problems import (
-    controller_problems,
-    part_problems,
-    whole_problems,
-)
-from firmware_sim.voyage import (
-    unusual_loadings,
-    unusual_sea,
-    unusual_waypoints,
-)
-from utank_hil.base.parameters import (
-    Problem,
-    refuse,
-)
+from firmware_sim.scenario_problems import controller_problems, part_problems, whole_problems
+from firmware_sim.voyage import unusual_loadings, unusual_sea, unusual_waypoints
+from utank_hil.base.parameters import Problem, refuse
 from utank_hil.configuration.devices import UNGUARDED
 
 

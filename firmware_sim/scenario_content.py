@@ -12,20 +12,10 @@ from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.fmu_file import FmuFile
 from firmware_sim.scenario_sea import ScenarioSea
 from firmware_sim.scenario_sections import DriveLimits, RightingInWaves, SensorErrors
-from firmware_sim.voyage import (
-    Waypoint,
-    ship_on_the_way,
-    spectra_on_the_way,
-    track,
-    turning,
-)
+from firmware_sim.voyage import Waypoint, ship_on_the_way, spectra_on_the_way, track, turning
 from firmware_sim.waves import PassingWaves, Response, SteadyWaves, Waves, beside
 from firmware_sim.wind import Gusts
-from utank_hil.base.parameters import (
-    Finite,
-    NotNegative,
-    Range,
-)
+from utank_hil.base.parameters import Finite, NotNegative, Range
 from utank_hil.configuration import ControllerConfig, Section, Vessel
 from utank_hil.configuration.hull_files.reader import HullFile
 from utank_hil.dynamics.hull.lateral import LateralHull

@@ -61,11 +61,7 @@ def foreign_role(vessel: Vessel, fault: AnyFault) -> str:
 
 def part_problems(scenario: ScenarioContent) -> list[Problem]:
     """Problems of the sections by themselves."""
-    return [
-        *_weather_problems(scenario),
-        *_hull_problems(scenario),
-        *_fmu_problems(scenario),
-    ]
+    return [*_weather_problems(scenario), *_hull_problems(scenario), *_fmu_problems(scenario)]
 
 
 def whole_problems(scenario: ScenarioContent) -> list[Problem]:

@@ -158,12 +158,7 @@ class HardwiredNode:
     hears: frozenset[int] = frozenset()
 
     def __init__(
-        self,
-        plant: Plant,
-        high_level_m: float,
-        catalogue: Catalogue,
-        *,
-        configuration_version: int,
+        self, plant: Plant, high_level_m: float, catalogue: Catalogue, *, configuration_version: int
     ) -> None:
         self._plant = plant
         self._high_level_m = high_level_m
@@ -393,13 +388,5 @@ def build_ship_side(
         controller = controller or next(iter(scenario.controllers.values()))
         guard = GuardNode(guard_parameters(controller), plant)
     return ShipSide(
-        vessel,
-        plant,
-        sensors(seed=seed + 1),
-        drive,
-        panel,
-        valve,
-        second_motion,
-        hardwired,
-        guard,
+        vessel, plant, sensors(seed=seed + 1), drive, panel, valve, second_motion, hardwired, guard
     )

@@ -15,12 +15,7 @@ from utank_hil.control.optimal_tank import TankFigures
 
 Rows = list[tuple[str, str]]
 
-_NEEDS = (
-    "pressure RMS, at most",
-    "level, flow at most",
-    "shaft power mean",
-    "  at most",
-)
+_NEEDS = ("pressure RMS, at most", "level, flow at most", "shaft power mean", "  at most")
 
 
 def cost_rows(cost: TankCost) -> Rows:

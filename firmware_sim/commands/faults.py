@@ -38,8 +38,7 @@ def faults(
         typer.Option(help="Your ship in the place of the first, with its first controller."),
     ] = None,
     full: Annotated[
-        bool,
-        typer.Option(help="Compare the roll over 600 s, as is asked for: ten times the work."),
+        bool, typer.Option(help="Compare the roll over 600 s, as is asked for: ten times the work.")
     ] = False,
     json_: Json = False,
 ) -> None:
