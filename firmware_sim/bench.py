@@ -191,7 +191,9 @@ def run_bench(
         interrupted = stopped()
     if not runs or len(runs[0].rows) == 0:
         raise InterruptedError("ended before the first sample")
-    return replace(_result(jobs, runs, _mode(options), interrupted, started), killed=killed)
+    mode = "real time" if options.real_time else LOCKSTEP
+    mode += f" on {options.channel}" if options.channel is not None else ""
+    return replace(_result(jobs, runs, mode, interrupted, started), killed=killed)
 
 
 def _refuse_what_can_not_be_sent(jobs: Iterable[Job]) -> None:
@@ -295,9 +297,3 @@ def _run_all(
                 ]
             )
             yield join(job.name, ship, controller)
-
-
-def _mode(options: BenchOptions) -> str:
-    if not options.real_time:
-        return LOCKSTEP
-    return "real time" if options.channel is None else f"real time on {options.channel}"

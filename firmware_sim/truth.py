@@ -39,17 +39,6 @@ TRUTH: Final = (
 )
 
 
-def true_values(plant: Plant) -> tuple[float, ...]:
-    """State of the plant: columns `TRUTH` without the time."""
-    return (
-        plant.roll_rad,
-        plant.level_m,
-        plant.pressure_pa,
-        plant.pump_power_w,
-        plant.wave_moment_nm,
-    )
-
-
 class TruthRecorder:
     """Recorder of the plant on a fixed time grid: a node without frames."""
 
@@ -73,7 +62,10 @@ class TruthRecorder:
             self.start_ns = now_ns
         plant = self._plant
         plant.advance(now_ns)
-        self._row[:] = ((now_ns - self.start_ns) * 1e-9, *true_values(plant))
+        self._row[:] = (
+            (now_ns - self.start_ns) * 1e-9, plant.roll_rad, plant.level_m, plant.pressure_pa,
+            plant.pump_power_w, plant.wave_moment_nm,
+        )  # fmt: skip
         self._log.write(self._row)
         self.pump_speed_rad_s = max(self.pump_speed_rad_s, abs(plant.pump_speed_rad_s))
         return ()

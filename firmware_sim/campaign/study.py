@@ -357,21 +357,14 @@ def _override_of(values: Iterable[str], dotted: str) -> str | None:
 
 
 def _place(study: Study, key: str) -> str:
-    for name, keys in _sections(study):
-        if key in keys:
-            return f"{name}.{key}"
-    return key
-
-
-def _sections(study: Study) -> Iterator[tuple[str, Iterable[str]]]:
-    yield "set", study.set
-    yield "grid", study.grid
+    """Place in a study's file where the value of a key is written."""
+    places: dict[str, Iterable[str]] = {"set": study.set, "grid": study.grid}
     if study.random is not None:
-        yield "random.keys", study.random.keys
+        places["random.keys"] = study.random.keys
         if study.random.table is not None:
-            yield "random.table", study.random.samples_drawn()[0]
-    for index, each in enumerate(study.cases):
-        yield f"cases.{index}", each
+            places["random.table"] = study.random.samples_drawn()[0]
+    places |= {f"cases.{index}": each for index, each in enumerate(study.cases)}
+    return next((f"{name}.{key}" for name, keys in places.items() if key in keys), key)
 
 
 def _at_override(path: Path, study: Study, values: Content, reason: str) -> ConfigProblem:

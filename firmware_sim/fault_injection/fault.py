@@ -2,7 +2,6 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from functools import partial
 from itertools import count
 from typing import Annotated, Any, ClassVar, Final
 
@@ -30,12 +29,18 @@ NODE_OF: Final = {
 }  #: Name of the emulated node at an address.
 
 
-def _choice(of: str, choices: list[str], name: str) -> str:
-    if name in choices:
+def _one_of(what: str, names: Callable[[], list[str]]) -> AfterValidator:
+    """Return the validator of a name that must be one of some."""
+
+    def known(name: str) -> str:
+        choices = names()
+        if name not in choices:
+            near = nearest(name, choices)
+            hint = f"did you mean {near}?" if near else f"there are {', '.join(choices)}"
+            raise ValueError(f"is no {what}; {hint}")
         return name
-    near = nearest(name, choices)
-    hint = f"; did you mean {near}?" if near else f"; there are {', '.join(choices)}"
-    raise ValueError(f"is no {of}{hint}")
+
+    return AfterValidator(known)
 
 
 def sent_by_nodes() -> list[str]:
@@ -43,18 +48,13 @@ def sent_by_nodes() -> list[str]:
     return [each.codec.name for each in load_catalogue().messages if each.source in NODE_OF]
 
 
-MessageName = Annotated[
-    str, AfterValidator(lambda name: _choice("message of an emulated node", sent_by_nodes(), name))
-]
-AnyMessageName = Annotated[
-    str,
-    AfterValidator(
-        lambda name: _choice(
-            "message", [each.codec.name for each in load_catalogue().messages], name
-        )
-    ),
-]
-NodeName = Annotated[str, AfterValidator(partial(_choice, "node", list(NODE_OF.values())))]
+def _all_messages() -> list[str]:
+    return [each.codec.name for each in load_catalogue().messages]
+
+
+MessageName = Annotated[str, _one_of("message of an emulated node", sent_by_nodes)]
+AnyMessageName = Annotated[str, _one_of("message", _all_messages)]
+NodeName = Annotated[str, _one_of("node", lambda: list(NODE_OF.values()))]
 
 
 FaultTime = Annotated[float, Range(least=0, most=LONGEST_FAULT_S)]

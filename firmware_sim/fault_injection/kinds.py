@@ -28,10 +28,8 @@ AnyFault = Annotated[
     | frames.Corrupted
     | frames.WrongDataId
     | frames.WrongLength
-    | nodes.Hangs
+    | nodes.Silenced
     | nodes.Killed
-    | nodes.Mute
-    | nodes.Deaf
     | nodes.LostIdentifier
     | nodes.Replaced
     | nodes.Link

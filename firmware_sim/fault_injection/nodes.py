@@ -24,18 +24,25 @@ class NodeFault(Fault):
         return (self.node,)
 
 
-class Hangs(NodeFault):
-    """The node neither receives nor sends; afterwards it continues where it was."""
+class Silenced(NodeFault):
+    """The node neither receives nor sends, sends nothing, or receives nothing.
 
-    kind: Literal["hangs"]
+    One that hangs continues where it was.
+    """
+
+    kind: Literal["hangs", "mute", "deaf"]
 
     @property
     def beyond_commands(self) -> bool:
         """Whether the node is the drive, which keeps its last pressure while it hangs."""
-        return self.node == "drive"
+        return self.kind == "hangs" and self.node == "drive"
 
     def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        bench.nodes[self.node].hangs.append(span)
+        node = bench.nodes[self.node]
+        if self.kind == "mute":
+            node.spoiled.append(Spoiled(span, lambda *_: ()))
+        else:
+            (node.hangs if self.kind == "hangs" else node.deaf).append(span)
 
 
 class Killed(Fault):
@@ -50,24 +57,6 @@ class Killed(Fault):
         node.hangs.append(span)
         assert bench.restart is not None
         node.at(span.end_ns, bench.restart)
-
-
-class Mute(NodeFault):
-    """The node sends nothing."""
-
-    kind: Literal["mute"]
-
-    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        bench.nodes[self.node].spoiled.append(Spoiled(span, lambda *_: ()))
-
-
-class Deaf(NodeFault):
-    """The node receives nothing."""
-
-    kind: Literal["deaf"]
-
-    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        bench.nodes[self.node].deaf.append(span)
 
 
 class LostIdentifier(NodeFault):

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from firmware_sim.fault_injection.nodes import Hangs, Pump
+from firmware_sim.fault_injection.nodes import Pump, Silenced
 from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.guard.reference import Reason
 from firmware_sim.scenario import Scenario
@@ -42,7 +42,7 @@ def test_it_lets_a_healthy_controller_be() -> None:
     [
         *(Pump(kind="pump", times=0, plus_pa=pa, off_too=True) for pa in (5e3, 20e3)),
         Pump(kind="pump", times=-1.0, off_too=True),
-        Hangs(kind="hangs", node="drive"),
+        Silenced(kind="hangs", node="drive"),
     ],
 )
 def test_patti_b_stays_below_her_roll_limit_whatever_the_drive_does(fault: Any) -> None:
