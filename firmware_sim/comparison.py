@@ -43,32 +43,23 @@ class Comparison:
     remarks: tuple[str, ...] = ()  #: Remarks on the validity of the comparison.
 
 
-def paired(reference: FloatArray, values: FloatArray) -> Difference:
-    """Difference of values paired by index, shape (n,)."""
-    width = mean_interval(values - reference).half_width if len(values) > 1 else None
-    return _difference(reference, values, width, paired=True)
+def difference(reference: FloatArray, values: FloatArray, *, paired: bool) -> Difference:
+    """Difference of the means of values paired by index, or of independent ones (Welch).
 
+    Shapes are (n,) and (m,), and equal if paired.
+    """
+    count, width = min(len(reference), len(values)), None
+    if count > 1 and np.ptp(reference) == 0 == np.ptp(values):
+        width = 0.0
+    elif count > 1 and paired:
+        width = mean_interval(values - reference).half_width
+    elif count > 1:
+        from scipy.stats import ttest_ind
 
-def independent(reference: FloatArray, values: FloatArray) -> Difference:
-    """Difference of the means of independent values, shapes (n,) and (m,): Welch's interval."""
-    count = min(len(reference), len(values))
-    if count < 2:
-        return _difference(reference, values, None, paired=False)
-    from scipy.stats import ttest_ind
-
-    if np.ptp(reference) == 0 == np.ptp(values):
-        return _difference(reference, values, 0.0, paired=False)
-    interval = ttest_ind(values, reference, equal_var=False).confidence_interval(0.95)
-    width = float(interval.high - interval.low) / 2
-    return _difference(reference, values, width, paired=False)
-
-
-def _difference(
-    reference: FloatArray, values: FloatArray, half_width: float | None, *, paired: bool
-) -> Difference:
+        interval = ttest_ind(values, reference, equal_var=False).confidence_interval(0.95)
+        width = float(interval.high - interval.low) / 2
     first, second = float(np.mean(reference)), float(np.mean(values))
-    count = min(len(reference), len(values))
-    return Difference(first, second, second - first, half_width, count, paired)
+    return Difference(first, second, second - first, width, count, paired)
 
 
 BATCH_PERIODS: Final = 40
@@ -188,7 +179,7 @@ def _records_compared(first: Record, second: Record) -> list[Comparison]:
         for name, columns in _FIGURES.items():
             known = _known(one, two, columns)
             if known is not None:
-                figures[name] = _figure(*_without_gaps(*known, same), name, counts, paired_=same)
+                figures[name] = _figure(*_without_gaps(*known, same), name, counts, paired=same)
         if not figures:
             raise CompareError(
                 f"{second.path}: run {other} has no column of which it and run {run} of "
@@ -243,7 +234,7 @@ def _without_gaps(one: FloatArray, two: FloatArray, same: bool) -> tuple[FloatAr
 
 
 def _figure(
-    one: FloatArray, two: FloatArray, name: str, counts: list[int], *, paired_: bool
+    one: FloatArray, two: FloatArray, name: str, counts: list[int], *, paired: bool
 ) -> Difference:
     enough = min(counts) >= LEAST_BATCHES
     if name == "power_mean_w":
@@ -252,7 +243,7 @@ def _figure(
     values = [
         means(each, count if enough else 1) for each, count in zip((one, two), counts, strict=True)
     ]
-    return paired(*values) if paired_ else independent(*values)
+    return difference(*values, paired=paired)
 
 
 def batch_count(run: Columns) -> int:

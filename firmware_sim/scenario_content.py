@@ -44,6 +44,7 @@ SWAY: Final = "sway_of_slope"  #: Another one, which does not change under way.
 
 OF_HULL: Final = ("sway_roll_yaw", "six_degrees")  # plants whose ship is `hull`
 
+REALISATIONS: Final = 16  #: In one sum: a lightly damped ship needs a fine spectrum. Chosen.
 LONGEST_S: Final = 86_400.0  #: Longest run in s, a day: its rows are kept in memory.
 
 _GUSTS: Final = 1 << 32  # Beyond the seeds that other draws count up from a scenario's.
@@ -223,6 +224,15 @@ class ScenarioContent(Section):
         if self.hull is not None:
             return self._hull_forces(seed)[1]
         return self.sea.roll_moment(self.sea.sea(seed), self.vessel.ship.stiffness_nm_rad)
+
+    def pooled_wave_moment(self) -> Harmonics:
+        """Wave moment for linear predictions: many realisations, each with an equal share."""
+        seas = [self.wave_moment(seed) for seed in range(REALISATIONS)]
+        return Harmonics(
+            np.concatenate([sea.amplitude for sea in seas]) / math.sqrt(REALISATIONS),
+            np.concatenate([sea.frequency_rad_s for sea in seas]),
+            np.concatenate([sea.phase_rad for sea in seas]),
+        )
 
     def _hull_forces(self, seed: int) -> list[Harmonics]:
         """Forces of the initial sea in the order of `LateralHull.forces`."""

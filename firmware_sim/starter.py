@@ -8,7 +8,6 @@ from typing import Annotated, Any, Final, TypeVar
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from firmware_sim.pooled_waves import pooled_wave_moment
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis import tank_sizing
 from utank_hil.analysis.loop.self_tuning import SelfTuned, SelfTunedDesign
@@ -232,7 +231,7 @@ def make_starter(
     texts[SCENARIO] = scenario_file(ship.name, sea)
     parts = {"vessel": vessel, "controllers": {"self_tuned": config}}
     scenario = _valid(Scenario, yaml.safe_load(texts[SCENARIO]) | parts)
-    expected_sea(vessel.ship, pooled_wave_moment(scenario))  # it rolls the ship
+    expected_sea(vessel.ship, scenario.pooled_wave_moment())  # it rolls the ship
     assert isinstance(config.law, SelfTunedDesign)
     law = config.law.tuned(config.design_plant)
     texts[README] = readme(ship.name)

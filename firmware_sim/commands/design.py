@@ -11,7 +11,6 @@ from pydantic import BaseModel
 from rich.table import Table
 
 from firmware_sim.commands.bench import STORM
-from firmware_sim.pooled_waves import pooled_wave_moment
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis.tank_filling import fillings
 from utank_hil.analysis.tank_response import expected_sea, roll_curves
@@ -196,7 +195,7 @@ def _sea(path: Path, vessel: Vessel) -> "tuple[Scenario, Harmonics]":
                  "name a scenario with plant: roll")  # fmt: skip
         others = {"vessel": vessel, "controllers": {}, "actual_ship": {}, "voyage": ()}
         scenario = scenario.model_copy(update=others | {"gusts": None})
-    waves = pooled_wave_moment(scenario)
+    waves = scenario.pooled_wave_moment()
     try:
         expected_sea(vessel.ship, waves)
     except CalmSeaError as error:

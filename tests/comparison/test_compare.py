@@ -11,7 +11,7 @@ from scipy.stats import ttest_ind
 from typer.testing import CliRunner
 
 from firmware_sim.commands.compare import compare
-from firmware_sim.comparison import batch_count, independent, paired
+from firmware_sim.comparison import batch_count, difference
 from utank_hil.analysis.motion.statistics import batch_means, rms_batches
 from utank_hil.canbus.enumerations import Mode
 from utank_hil.console.common import new_app
@@ -67,8 +67,8 @@ def test_interval_of_an_hour_holds_the_true_difference_about_as_often_as_it_says
     for seed in range(count):
         light, heavy = (waves(seed, 3600.0, 2, ratio) for ratio in ratios)
         batches = batch_count({"roll_rad": light})
-        difference = paired(rms_batches(heavy, batches), rms_batches(light, batches))
-        held += abs(difference.difference - true) <= difference.half_width
+        found = difference(rms_batches(heavy, batches), rms_batches(light, batches), paired=True)
+        held += abs(found.difference - true) <= found.half_width
     assert 0.91 <= held / count <= 0.98
 
 
@@ -81,11 +81,11 @@ def test_long_record_has_longer_batches_and_a_short_one_keeps_six():
 
 def test_independent_means_have_welch_s_interval():
     one, two = np.array([1.0, 2.0, 4.0]), np.array([2.0, 3.0, 3.0, 6.0])
-    difference = independent(one, two)
+    found = difference(one, two, paired=False)
     expected = ttest_ind(two, one, equal_var=False).confidence_interval(0.95)
-    assert difference.difference == pytest.approx((expected.low + expected.high) / 2)
-    assert difference.half_width == pytest.approx((expected.high - expected.low) / 2)
-    assert not difference.paired
+    assert found.difference == pytest.approx((expected.low + expected.high) / 2)
+    assert found.half_width == pytest.approx((expected.high - expected.low) / 2)
+    assert not found.paired
 
 
 def test_recordings_of_the_same_waves_are_paired_piece_by_piece(tmp_path: Path):
@@ -105,7 +105,8 @@ def test_recordings_of_the_same_waves_are_paired_piece_by_piece(tmp_path: Path):
     rms = math.sqrt(np.mean(roll**2))
     assert figure["reference"] == pytest.approx(rms, rel=0.05)  # a rest of a batch is left out
     assert figure["difference"] == pytest.approx(-0.2 * figure["reference"], rel=1e-3)
-    single = paired(*(rms_batches(each, figure["count"]) for each in (0 * roll, roll)))
+    batches = (rms_batches(each, figure["count"]) for each in (0 * roll, roll))
+    single = difference(*batches, paired=True)
     assert figure["half_width"] == pytest.approx(0.2 * single.half_width, rel=1e-2)
     assert not apart["figures"]["roll_rms_rad"]["paired"]
     assert apart["figures"]["roll_rms_rad"]["half_width"] > figure["half_width"]
