@@ -5,6 +5,7 @@ from utank_hil.console.interruptible import quietly_interruptible
 with quietly_interruptible():
     import math
     from dataclasses import asdict
+    from functools import partial
     from pathlib import Path
     from typing import Annotated
 
@@ -14,7 +15,7 @@ with quietly_interruptible():
     from utank_hil.console.common import failures_named
 
     with failures_named():
-        from firmware_sim.run import RECORD_NS, RECORD_S, SECOND_NS
+        from firmware_sim.run import RECORD_NS, RECORD_S, SECOND_NS, ship_port
         from firmware_sim.scenario import Scenario
         from firmware_sim.ship_side import (
             EXTERNAL_DRIVE,
@@ -25,21 +26,14 @@ with quietly_interruptible():
         )
         from firmware_sim.truth import TRUTH, MemoryLog, TruthRecorder
         from utank_hil.analysis.motion.statistics import pump_statistics, roll_statistics
-        from utank_hil.canbus.frame import Port
-        from utank_hil.canbus.ports import open_buses
-        from utank_hil.canbus.profiles.device_plan import ForeignDevices
-        from utank_hil.canbus.socketcan import SocketCanPort
         from utank_hil.console import common
         from utank_hil.console.common import fail
         from utank_hil.console.exit_codes import ExitCode
-        from utank_hil.console.terminal import Terminal, notes, timing_table
+        from utank_hil.console.loops import opened, scheduled
+        from utank_hil.console.terminal import Terminal, timing_table
         from utank_hil.runners import (
             LoopStatistics,
-            Node,
             RealTimeLoop,
-            heard_by,
-            real_time_scheduling,
-            stop_on_signals,
         )
 
 app = common.new_app("Ship emulator, sensors, pump drive and operator panel on a CAN bus.")
@@ -86,14 +80,13 @@ def firmware_sim(
     except ValueError as error:
         fail(f"--without: {error}")
     statistics = LoopStatistics()
-    _run(
-        [*nodes, TruthRecorder(ship.plant, log, RECORD_NS)],
-        bus,
-        loaded.name,
-        length_s,
-        statistics,
-        loaded.vessel.foreign,
-    )
+    emulated = ", ".join(node.name for node in nodes if node.name in NODE_NAMES)
+    emulated = emulated or "no node, nothing is sent"
+    words = f"{loaded.name} on {bus}, emulated: {emulated}; Ctrl-C ends it."
+    nodes.append(TruthRecorder(ship.plant, log, RECORD_NS))
+    port_of = partial(ship_port, bus, nodes, loaded.vessel.foreign)
+    with opened(port_of) as (port, stop), scheduled(words):
+        RealTimeLoop(nodes, port, statistics=statistics).run(stop, round(length_s * SECOND_NS))
     if len(log.rows) == 0:
         fail("ended before the first sample", ExitCode.INTERRUPTED)
     roll_rad, level_m, pressure_pa, power_w = (
@@ -127,36 +120,6 @@ def firmware_sim(
         f"{math.degrees(roll.maximum_rad):.2f}°; "
         f"pressure RMS {pump.pressure_rms_pa / 1e3:.1f} kPa; {drive}"
     )
-
-
-def _run(
-    nodes: list[Node],
-    bus: str,
-    name: str,
-    length_s: float,
-    statistics: LoopStatistics,
-    foreign: ForeignDevices,
-) -> None:
-    port: Port
-    try:
-        if foreign.any:
-            port = open_buses(bus, foreign, sends=True)
-        else:
-            port = SocketCanPort(bus, heard_by(nodes))
-    except OSError as error:
-        fail(error, ExitCode.NO_BUS)
-    try:
-        with stop_on_signals() as stop, real_time_scheduling() as scheduling:
-            for line in scheduling:
-                notes.say(line)
-            emulated = ", ".join(node.name for node in nodes if node.name in NODE_NAMES)
-            notes.say(
-                f"{name} on {bus}, emulated: {emulated or 'no node, nothing is sent'}; "
-                "Ctrl-C ends it."
-            )
-            RealTimeLoop(nodes, port, statistics=statistics).run(stop, round(length_s * SECOND_NS))
-    finally:
-        port.close()
 
 
 def main() -> None:

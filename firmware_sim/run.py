@@ -25,6 +25,7 @@ from utank_hil.base.provenance import describe
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus.frame import Port
 from utank_hil.canbus.ports import open_buses
+from utank_hil.canbus.profiles.device_plan import ForeignDevices
 from utank_hil.canbus.socketcan import SocketCanPort
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
@@ -319,6 +320,13 @@ def _real_time_controller(
             yield controller, log, tapped(controller)
 
 
+def ship_port(channel: str, nodes: list[runners.Node], foreign: ForeignDevices) -> Port:
+    """Port for nodes of a ship with these devices, which hears no more than they do."""
+    if foreign.any:
+        return open_buses(channel, foreign, sends=True)
+    return SocketCanPort(channel, runners.heard_by(nodes))
+
+
 def _run_loop(
     job: Job,
     nodes: list[runners.Node],
@@ -327,12 +335,8 @@ def _run_loop(
     watch: Watch | None,
     begin_ns: Callable[[], int] | None = None,
 ) -> None:
-    port: Port | None = None
     foreign = job.controller.vessel.foreign
-    if channel is not None and foreign.any:
-        port = open_buses(channel, foreign, sends=True)
-    elif channel is not None:
-        port = SocketCanPort(channel, runners.heard_by(nodes))
+    port = None if channel is None else ship_port(channel, nodes, foreign)
     loop = runners.RealTimeLoop(nodes, port, statistics=statistics)
 
     def stop() -> bool:

@@ -60,7 +60,7 @@ def test_the_loop_is_handed_no_frame_that_came_before_it_began(
     for module in (run, commission):
         monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", BusyBus)
         monkeypatch.setattr(module, "RealTimeLoop", FirstLook)
-        monkeypatch.setattr(module, "real_time_scheduling", slow_scheduling)
+        monkeypatch.setattr("utank_hil.console.loops.real_time_scheduling", slow_scheduling)
     words = ["--record", str(tmp_path / "record.json")]
     CliRunner().invoke(app, [name, str(GPC), "--bus", "any0", *words])
     assert FirstLook.heard == [[]]

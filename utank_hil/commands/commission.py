@@ -24,9 +24,10 @@ from utank_hil.commands.lines import Lines, printed_lines
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.console.common import Bus, Config, Json, fail, load, print_json, why_not_writable
 from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.loops import opened, scheduled
 from utank_hil.console.terminal import Terminal, notes, shown
 from utank_hil.nodes.commissioning.node import CommissioningNode, Stage
-from utank_hil.runners import LoopStatistics, RealTimeLoop, real_time_scheduling, stop_on_signals
+from utank_hil.runners import LoopStatistics, RealTimeLoop
 from utank_hil.safety.faults import fault_text
 
 SAY_TICKS: Final = 500  #: Ticks between two lines about one stage.
@@ -64,12 +65,8 @@ def commission(
         fail(f"{reason}; choose another place with --record")
     statistics = LoopStatistics()
     with ExitStack() as stack:
-        try:
-            port = open_port(channel, loaded.vessel.foreign)
-        except OSError as error:
-            fail(error, ExitCode.NO_BUS)
-        stack.callback(port.close)
-        stop = stack.enter_context(stop_on_signals())
+        bus = opened(lambda: open_port(channel, loaded.vessel.foreign))
+        port, stop = stack.enter_context(bus)
         lines = stack.enter_context(printed_lines())
 
         def tell(event: RetuningEvent | AlarmEvent, start_ns: int) -> None:
@@ -89,9 +86,7 @@ def commission(
             f"{loaded.name} on {channel}: about {node.duration_s:.0f} s; Ctrl-C ends it, and then "
             "nothing is recorded; once pump and valve move, an older record is void."
         )
-        with real_time_scheduling() as scheduling:
-            for line in scheduling:
-                notes.say(line)
+        with scheduled():
             with suppress(PortError):  # The loop meets the error too, and its node reacts.
                 port.receive()  # Old frames must not look new.
             RealTimeLoop([node], port, statistics=statistics).run(lambda: guide.look() or stop())

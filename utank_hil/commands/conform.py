@@ -4,7 +4,6 @@ import math
 import select
 import sys
 from collections.abc import Callable
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -12,16 +11,16 @@ import typer
 
 from utank_hil.assembly import key_of
 from utank_hil.base.tick import TICK_S
-from utank_hil.canbus import PortError
 from utank_hil.commands.commission import print_checks
 from utank_hil.commands.commissioning_record import listed, made_with, write_record
 from utank_hil.configuration.devices import ROLES
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.console.common import Bus, Json, fail, load, print_json, why_not_writable
 from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.loops import opened
 from utank_hil.console.terminal import Terminal, notes, shown
 from utank_hil.nodes.commissioning import conformance
-from utank_hil.runners import RealTimeLoop, stop_on_signals
+from utank_hil.runners import RealTimeLoop
 
 
 def conform(
@@ -56,13 +55,7 @@ def conform(
     if reason := why_not_writable(path.parent, (path.name,)):
         fail(f"{reason}; choose another place with --record")
     trial, silent = trial_of(vessel, device, ship, asks(hand_s), seconds)
-    with ExitStack() as stack:
-        try:
-            port = SocketCanPort(channel, standard=True, receive_only=silent)
-        except PortError as error:
-            fail(error, ExitCode.NO_BUS)
-        stack.callback(port.close)
-        stop = stack.enter_context(stop_on_signals())
+    with opened(lambda: SocketCanPort(channel, standard=True, receive_only=silent)) as (port, stop):
         RealTimeLoop([trial], port).run(lambda: trial.done or stop())
     if not trial.done:
         fail("ended before all was checked; there is no record", ExitCode.INTERRUPTED)

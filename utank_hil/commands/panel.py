@@ -12,7 +12,15 @@ from typing import Annotated, Final
 import typer
 
 from utank_hil.base.tick import TICK_NS
-from utank_hil.canbus import AlarmState, ControllerStatus, Fault, Mode, Station, load_catalogue
+from utank_hil.canbus import (
+    AlarmState,
+    ControllerStatus,
+    Fault,
+    Mode,
+    Port,
+    Station,
+    load_catalogue,
+)
 from utank_hil.canbus.ports import open_port
 from utank_hil.canbus.socketcan import SocketCanPort
 from utank_hil.commands.lines import printed_lines
@@ -21,8 +29,9 @@ from utank_hil.commands.web_panel.server import ServerProcess
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.console.common import Bus, Duration, fail, load, why
 from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.loops import opened
 from utank_hil.nodes.panel import SILENT_NS, Action, OperatorPanel
-from utank_hil.runners import Node, RealTimeLoop, stop_on_signals
+from utank_hil.runners import Node, RealTimeLoop
 from utank_hil.safety.faults import fault_text
 
 ANSWER_NS: Final = 1_000_000_000
@@ -230,14 +239,13 @@ def panel(
     nodes: list[Node] = [node]
     with ExitStack() as stack:
         server = stack.enter_context(closing(_server(listen))) if web else None
-        try:
-            heard = open_port(bus, loaded.foreign) if web else SocketCanPort(bus, node.hears)
-        except OSError as error:
-            fail(error, ExitCode.NO_BUS)
-        stack.enter_context(closing(heard))
+
+        def port_of() -> Port:
+            return open_port(bus, loaded.foreign) if web else SocketCanPort(bus, node.hears)
+
+        heard, signalled = stack.enter_context(opened(port_of))
         # A blocked terminal must not delay a stop.
         lines = stack.enter_context(printed_lines())
-        signalled = stack.enter_context(stop_on_signals())
         lines.say(HELP)
         descriptor = os.open(os.devnull, os.O_RDONLY) if sys.stdin is None else sys.stdin.fileno()
         keyboard = Keyboard(node, descriptor, lines.say, terminal=os.isatty(descriptor))

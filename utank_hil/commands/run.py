@@ -27,6 +27,7 @@ from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.console import common
 from utank_hil.console.admission import admit
 from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.loops import opened, scheduled
 from utank_hil.console.terminal import Terminal, notes, shown, timing_table
 from utank_hil.control import BuiltLaw
 from utank_hil.nodes.controller import ControllerNode
@@ -35,8 +36,6 @@ from utank_hil.runners import (
     LoopStatistics,
     Node,
     RealTimeLoop,
-    real_time_scheduling,
-    stop_on_signals,
 )
 from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.events import Event, event_text
@@ -119,12 +118,7 @@ def run(
     statistics = LoopStatistics()
     with _refusals_named(), ExitStack() as stack:
         manager = stack.enter_context(ServiceManager())
-        try:
-            port = open_port(bus, loaded.vessel.foreign)
-        except OSError as error:
-            common.fail(error, ExitCode.NO_BUS)
-        stack.callback(port.close)
-        stop = stack.enter_context(stop_on_signals())
+        port, stop = stack.enter_context(opened(lambda: open_port(bus, loaded.vessel.foreign)))
         _refuse_beside_another(port, bus)
         announcer, recording = _outputs(
             stack, context, loaded, law, config, out, keep, outlets, commissioned=not refused
@@ -204,10 +198,7 @@ def _refuse_beside_another(port: canbus.Port, bus: str) -> None:
 
 @contextmanager
 def _in_real_time(name: str, manager: ServiceManager) -> Iterator[None]:
-    with real_time_scheduling() as scheduling:
-        for line in scheduling:
-            notes.say(line)
-        notes.say(f"{name}; Ctrl-C ends it.")
+    with scheduled(f"{name}; Ctrl-C ends it."):
         manager.ready(name)
         try:
             yield

@@ -1,0 +1,33 @@
+"""What commands that run a loop share: the bus, and how the loop is scheduled."""
+
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from typing import TypeVar
+
+from utank_hil.canbus import Port
+from utank_hil.console.common import fail
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.terminal import notes
+from utank_hil.runners import real_time_scheduling, stop_on_signals
+
+PortT = TypeVar("PortT", bound=Port)
+
+
+@contextmanager
+def opened(opens: Callable[[], PortT]) -> Iterator[tuple[PortT, Callable[[], bool]]]:
+    """Yield a port, and what says whether to stop; the command ends if the bus can't be had."""
+    try:
+        port = opens()
+    except OSError as error:
+        fail(error, ExitCode.NO_BUS)
+    with closing(port), stop_on_signals() as stop:
+        yield port, stop
+
+
+@contextmanager
+def scheduled(words: str = "") -> Iterator[None]:
+    """Schedule a loop, say how far that succeeded, and what runs."""
+    with real_time_scheduling() as scheduling:
+        for line in (*scheduling, *filter(None, [words])):
+            notes.say(line)
+        yield
