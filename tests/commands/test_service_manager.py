@@ -198,7 +198,7 @@ def test_ready_is_told_when_nothing_but_the_loop_is_left_to_begin(
 
     before = (
         *("open_port", "RunRecording", "retuner_process", "printed_lines"),
-        *("build_controller_node", "real_time_scheduling"),
+        *("build_controller_node", "scheduled"),
     )
     monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", QuietBus)
     for step in before:

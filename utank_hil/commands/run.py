@@ -117,7 +117,11 @@ def run(
         notes.say(refused, yellow="arming will be refused:")
     statistics = LoopStatistics()
     with _refusals_named(), ExitStack() as stack:
-        manager = stack.enter_context(ServiceManager())
+        try:
+            manager = stack.enter_context(ServiceManager())
+        except OSError as error:
+            what = "the service manager can't be reached"
+            common.fail(f"NOTIFY_SOCKET: {what}: {error}", ExitCode.SYSTEM)
         port, stop = stack.enter_context(opened(lambda: open_port(bus, loaded.vessel.foreign)))
         _refuse_beside_another(port, bus)
         announcer, recording = _outputs(
@@ -199,7 +203,10 @@ def _refuse_beside_another(port: canbus.Port, bus: str) -> None:
 @contextmanager
 def _in_real_time(name: str, manager: ServiceManager) -> Iterator[None]:
     with scheduled(f"{name}; Ctrl-C ends it."):
-        manager.ready(name)
+        try:
+            manager.ready(name)
+        except OSError as error:
+            common.fail(f"NOTIFY_SOCKET: the manager does not answer: {error}", ExitCode.SYSTEM)
         try:
             yield
         finally:

@@ -3,7 +3,7 @@
 import contextlib
 import os
 import socket
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Final
 
 from utank_hil.base.closing import Closing
@@ -28,19 +28,14 @@ class ServiceManager(Closing):
             return
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
         self._socket.setblocking(False)
-        with self._errors_say("the service manager can't be reached"):
+        try:
             self._socket.connect(address.replace("@", "\0", 1) if address[0] == "@" else address)
+        except OSError:
+            self.close()
+            raise
         watchdog_ns = 1000 * int(environment.get("WATCHDOG_USEC", "0"))
         if watchdog_ns:
             self._every_ticks = max(1, watchdog_ns // (_FEEDS * TICK_NS))
-
-    @contextlib.contextmanager
-    def _errors_say(self, what: str) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            self.close()
-            raise OSError(error.errno, f"{what}: {error}", "NOTIFY_SOCKET") from error
 
     def ready(self, status: str) -> None:
         """Report that the loop begins; from here on the watchdog waits for ticks.
@@ -51,8 +46,7 @@ class ServiceManager(Closing):
         if self._socket is not None:
             self._socket.settimeout(READY_S)
             words = " ".join(status.split())  # Each line is an assignment.
-            with self._errors_say("the manager does not answer"):
-                self._socket.send(f"READY=1\nSTATUS={words}".encode(errors="replace"))
+            self._socket.send(f"READY=1\nSTATUS={words}".encode(errors="replace"))
             self._socket.setblocking(False)
 
     def progress(self, ticks: int) -> None:
