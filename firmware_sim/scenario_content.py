@@ -68,7 +68,8 @@ class ScenarioContent(Section):
     """Limits of the drive; those not given follow from the vessel's pump."""
     controllers: Annotated[
         dict[str, ControllerConfig], Field(default_factory=dict, max_length=MOST_CONTROLLERS)
-    ]  #: Controllers to be run, at least one; optional where the vessel has no pump.
+    ]
+    """Controllers to be run, at least one; optional where the vessel has no pump."""
     guard: bool = False
     """Whether a guard hears the frames and may cut the drive's power (docs/safety.md)."""
     operator: tuple[TimedAction, ...] = ()

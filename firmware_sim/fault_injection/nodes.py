@@ -25,9 +25,9 @@ class NodeFault(Fault):
 
 
 class Silenced(NodeFault):
-    """The node neither receives nor sends, sends nothing, or receives nothing.
+    """The node neither receives nor sends (hangs), or sends nothing (mute), or hears nothing (deaf).
 
-    One that hangs continues where it was.
+    One that hung goes on where it was.
     """
 
     kind: Literal["hangs", "mute", "deaf"]
