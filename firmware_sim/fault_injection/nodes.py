@@ -25,7 +25,7 @@ class NodeFault(Fault):
 
 
 class Silenced(NodeFault):
-    """The node neither receives nor sends (hangs), or sends nothing (mute), or hears nothing (deaf).
+    """The node neither receives nor sends (hangs), sends nothing (mute), or hears nothing (deaf).
 
     One that hung goes on where it was.
     """
