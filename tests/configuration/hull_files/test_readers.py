@@ -39,6 +39,48 @@ def test_wamit_moves_the_ship_as_wamit_itself_did():
     assert hull.hydrostatic[3, 3] == pytest.approx(0.77917e6 * 1025 * 9.81, rel=1e-4)
 
 
+MASS = """1025
+0.788631 0 1
+1
+1 0 0 0 1 0
+0 1 0 -1 0 0.788631
+0 0 1 0 -0.788631 0
+0 -1 0 265.69 0 0
+1 0 -0.788631 0 2916 0
+0 0.788631 0 0 0 2916"""
+
+
+@pytest.mark.parametrize(
+    ("place", "old", "new"),
+    [
+        ("-1 0.00 0.00 -2.00 0.00", "-1.00\n16.3", "1.00\n16.3"),
+        ("-1 0.00 0.00 -2.00 0.00", "-1.00\n16.3 0.00 0.00\n0.00 54.0 0.00\n0.00 0.00 54.0", MASS),
+        ("-1 0.00 0.00 0.00 0.00", "-1.00\n16.3 0.00 0.00\n0.00 54.0 0.00\n0.00 0.00 54.0",
+         "0.00\n0 0 0\n0 0 0\n0 0 0"),
+    ],
+)  # fmt: skip
+def test_the_centre_of_gravity_in_wamit_is_above_the_bodys_own_origin(tmp_path, place, old, new):
+    for file in hulls("wamit-fpso").iterdir():
+        shutil.copyfile(file, tmp_path / file.name)
+    for name, before, after in (("pot", "-1 0.00 0.00 0.00 0.00", place), ("frc", old, new)):
+        text = (tmp_path / f"fpso.{name}").read_text()
+        assert before in text
+        (tmp_path / f"fpso.{name}").write_text(text.replace(before, after))
+    form_2 = "1025" in new
+    (tmp_path / "fpso.cfg").write_text(f"IALTFRC={1 + form_2}\n")
+    given = Given(density_kg_m3=1025.0) if form_2 else FPSO
+    hull, known = read_hull(tmp_path / "fpso.1", given), read_hull(hulls("wamit-fpso/fpso.1"), FPSO)
+    if form_2:
+        np.testing.assert_allclose(hull.mass_kg, 1.0)
+    np.testing.assert_allclose(hull.gravity_centre_m[2], known.gravity_centre_m[2])
+    if place.count("2"):
+        per_mass = [each.inertia_kg_m2[0, 0] / each.mass_kg for each in (hull, known)]
+        assert per_mass[0] == pytest.approx(per_mass[1])
+    else:  # radii of zero: the centre of the run is no ship's, but the weight's part has it
+        c_44 = known.hydrostatic[3, 3] + known.mass_kg * known.gravity_m_s2
+        assert hull.hydrostatic[3, 3] == pytest.approx(c_44)
+
+
 def test_shipx_moves_the_ship_as_veres_itself_did():
     """With the tanks and the roll damping of the run, which are no part of the hull, put back."""
     hull = read_hull(hulls("shipx-supply/input.re7"))
@@ -191,6 +233,12 @@ def test_another_folder_layout_of_nemoh_3_is_the_same(tmp_path):
         ("wamit-cylinder/cyl.1", "cyl.1", " -1.000000E+00     1     1 ", " -1.0  0  1 ", "mode 0"),
         ("wamit-cylinder/cyl.1", "cyl.3", "     1  3.07", "     7  3.07", "cyl.3: mode 7"),
         ("wamit-cylinder/cyl.1", "cyl.hst", "     1     3 ", "     1     0 ", "cyl.hst: mode 0"),
+        ("wamit-cylinder/cyl.1", "cyl.1", "\n -1.000000E+00     1     3 ",
+         "\n -1.0 1 3 0.0\n -1.0 1 3 ",
+         "has rows twice"),
+        ("wamit-cylinder/cyl.1", "cyl.1", "\n  2.991979E-01     6     6 ", "\n .2 6 6 ", "is cut"),
+        ("wamit-cylinder/cyl.1", "cyl.3", "2.991979E-01  0.000000E+00     6", "0.2 0 6", "is cut"),
+        ("nemoh3-cylinder/Nemoh.cal", "results/ExcitationForce.tec", "beta", "b", "has no beta"),
         ("aqwa-cylinder/cylinder.AH1", "cylinder.AH1", "  1  3  50 ", "  1  3  inf ", "AH1"),
         ("nemoh3-cylinder/Nemoh.cal", "Nemoh.cal", "\n1\t\t\t\t! Number of", "\ninf ! Number of",
          "Nemoh.cal"),

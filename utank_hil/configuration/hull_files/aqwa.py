@@ -12,6 +12,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.configuration.hull_files.parts import (
     Given,
     floats,
+    half_turn,
     hull_of,
     phase_at,
     rigid_body,
@@ -27,7 +28,7 @@ def read_aqwa(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same f
     bodies, directions, count = (int(each) for each in head[:3])
     if bodies != 1:
         raise ValueError(f"{path}: has {bodies} bodies: one hull is wanted")
-    heading = np.array(head[3 : 3 + directions])
+    heading, keep = np.unique(half_turn(np.array(head[3 : 3 + directions])), return_index=True)
     omega = np.array(head[3 + directions : 3 + directions + count])
     for name in ("GENERAL", "COG", "MASS", "HYDSTIFFNESS", "ADDEDMASS", "DAMPING", "FORCERAO"):
         if name not in blocks:
@@ -39,7 +40,6 @@ def read_aqwa(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same f
     force = np.array(blocks["FORCERAO"], dtype=object).reshape(directions, count, 2)
     size = np.array([[row[3:9] for row in each] for each in force[..., 0]], dtype=np.float64)
     lag = np.array(force[..., 1].tolist(), dtype=np.float64)[..., -6:]
-    keep = heading > -180  # -180 is 180 again
     excitation = size[keep] * np.exp(-1j * np.radians(lag[keep]))
     k = wave_number(omega, depth, gravity)
     body: dict[str, Any] = rigid_body(_matrix(blocks["MASS"], 1))
@@ -57,8 +57,8 @@ def read_aqwa(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same f
         added_mass=_matrices(blocks["ADDEDMASS"], count),
         damping=_matrices(blocks["DAMPING"], count),
         wave_frequency_rad_s=omega,
-        heading_deg=heading[keep],
-        excitation=excitation * phase_at(centre, heading[keep], k),
+        heading_deg=heading,
+        excitation=excitation * phase_at(centre, heading, k),
         hydrostatic=_matrix(blocks["HYDSTIFFNESS"], 1),
         viscous_roll_nms_rad=np.full(count, viscous) if viscous else None,
         reference_m=centre,

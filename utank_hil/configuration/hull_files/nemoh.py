@@ -38,7 +38,10 @@ def read_nemoh(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same 
     # a zone holds one moving degree; its columns are the forces
     pairs = np.array([zone[:, 1:13].reshape(-1, 6, 2) for _, zone in radiation])
     waves = _zones(_find(path, "ExcitationForce.tec"))
-    heading = np.array([float(_BETA.search(title).group(1)) for title, _ in waves])  # type: ignore[union-attr]
+    titles = [_BETA.search(title) for title, _ in waves]
+    heading = np.array([float(found.group(1)) for found in titles if found])
+    if len(heading) != len(waves):
+        raise ValueError(f"{path}: ExcitationForce.tec has a zone whose title has no beta")
     order = np.argsort(heading)
     polar = np.array([zone[:, 1:13].reshape(-1, 6, 2) for _, zone in waves])[order]
     return hull_of(

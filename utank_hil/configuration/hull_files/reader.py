@@ -57,8 +57,7 @@ def read_hull(path: Path, given: Given | None = None) -> HullData:
 def completed(hull: HullData, given: Given) -> HullData:
     """Return a hull with what a user knows besides, where it lacks that.
 
-    Restoring follows a centre of gravity that the file did not have. `ValueError` is raised where
-    the hull has another figure.
+    `ValueError` is raised where the hull has another figure.
     """
     mass = hull.mass_kg if given.mass_kg is None else given.mass_kg
     inertia = None

@@ -9,11 +9,13 @@ The ``.hst`` has the weight's part in it. Form 1 of the ``.frc`` has the radii o
 body's origin.
 """
 
+import math
 import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from utank_hil.configuration.hull_files.parts import (
     GRAVITY_M_S2,
@@ -35,18 +37,20 @@ _PAIR = _TURNS[:, None] + _TURNS
 def read_wamit(path: Path, given: Given) -> HullData:
     """Read the files beside a ``.1``."""
     rows = table(path, 4)
+    _refuse_gaps(path, [row[:1] for row in rows])
     config = text(found) if (found := sibling(path, ".cfg")) else ""
     by_frequency = _option(config, "IPEROUT")
     if by_frequency not in (1, 2):
         raise ValueError(f"{path}: first column is a wave number (IPEROUT {by_frequency}): use 1")
     unit_m, gravity = _unit_and_gravity(path)
+    place, depth = _place(path)
     body: dict[str, Any] = {}
+    lift_kgm = 0.0
     density = given.density_kg_m3
     if force := sibling(path, ".frc"):
-        density, body = _body(force, _option(config, "IALTFRC"), given)
+        density, body, lift_kgm = _body(force, _option(config, "IALTFRC"), given, place)
     if density is None:
         raise ValueError(f"{path}: density_kg_m3 is missing: WAMIT's numbers are non-dimensional")
-    place, depth = _place(path)
 
     def at(first: float) -> float:
         """Return the frequency of a first column: of a period, -1 is zero and 0 infinity."""
@@ -64,6 +68,7 @@ def read_wamit(path: Path, given: Given) -> HullData:
     if forces is None:
         raise ValueError(f"{path}: the excitation is missing: put the .3 or .2 beside it")
     force_rows = np.array([[at(row[0]), *row[1:7]] for row in table(forces, 7)])
+    _refuse_gaps(forces, force_rows[:, :2])
     waves, headings = np.unique(force_rows[:, 0]), np.unique(force_rows[:, 1])
     excitation = np.zeros((len(headings), len(waves), 6), dtype=np.complex128)
     where = (
@@ -78,6 +83,7 @@ def read_wamit(path: Path, given: Given) -> HullData:
         for row in table(stiff, 3):
             hydrostatic[mode(stiff, row[0]), mode(stiff, row[1])] = row[2]
         hydrostatic = hydrostatic * density * gravity * unit_m ** (2.0 + _PAIR)
+        hydrostatic[[3, 4], [3, 4]] -= lift_kgm * gravity
     return hull_of(
         path,
         [
@@ -100,6 +106,18 @@ def read_wamit(path: Path, given: Given) -> HullData:
     )
 
 
+def _refuse_gaps(path: Path, begin: npt.ArrayLike) -> None:
+    """Refuse rows that are not as many for each value of their first columns, shape (n, m)."""
+    groups, counts = np.unique(np.asarray(begin), axis=0, return_counts=True)
+    usual = int(np.median(counts))
+    odd = groups[counts != usual]
+    if len(odd) or len(groups) != math.prod(len(np.unique(column)) for column in groups.T):
+        where = f", not after {', '.join(f'{each:g}' for each in odd[0])}" if len(odd) else ""
+        raise ValueError(
+            f"{path}: has {usual} rows after most{where}: it is cut, or has rows twice"
+        )
+
+
 def _option(config: str, name: str) -> int:
     found = re.search(rf"(?im)^\s*{name}\s*=\s*(\d+)", config)
     return int(found.group(1)) if found else 1
@@ -115,23 +133,32 @@ def _unit_and_gravity(path: Path) -> tuple[float, float]:
     return numbers[0], numbers[1]
 
 
-def _body(path: Path, form: int, given: Given) -> tuple[float | None, dict[str, Any]]:
-    """Return density, mass, centre and inertia of the ``.frc``, as far as it has them."""
+def _body(
+    path: Path, form: int, given: Given, place: list[float]
+) -> tuple[float | None, dict[str, Any], float]:
+    """Return density, and mass, centre and inertia of the ``.frc``, as far as it has them.
+
+    To that comes the mass times the height of the given centre above that of the ``.hst``.
+    """
     lines = [floats(line) for line in text(path).splitlines()[1:]]
     lines = [line for line in lines if line][1:]  # without the options
+    origin = np.array(place)
     if form == 2:
-        body = rigid_body(np.array(lines[3:9])[:, :6]) if lines[2][0] else {}
-        return lines[0][0], body | {"gravity_centre_m": lines[1][:3]}
+        body = rigid_body(np.array(lines[3:9])[:, :6], origin) if lines[2][0] else {}
+        return lines[0][0], body | {"gravity_centre_m": lines[1][:3] + origin}, 0.0
     z_m, about_origin = lines[0][0], np.array([line[:3] for line in lines[1:4]])
-    if given.mass_kg is None or given.gravity_centre_m is None or not np.any(about_origin):
-        return given.density_kg_m3, {}
-    centre = np.array([*given.gravity_centre_m[:2], z_m])
+    if given.mass_kg is None or given.gravity_centre_m is None:
+        return given.density_kg_m3, {}, 0.0
+    centre = np.array(given.gravity_centre_m) - origin
+    if not np.any(about_origin):  # of a run without motions, whose centre is any
+        return given.density_kg_m3, {}, given.mass_kg * (centre[2] - z_m)
+    centre[2] = z_m
     inertia = given.mass_kg * (
         about_origin * np.abs(about_origin)
         - (centre @ centre * np.eye(3) - np.outer(centre, centre))
     )
-    body = {"mass_kg": given.mass_kg, "gravity_centre_m": centre, "inertia_kg_m2": inertia}
-    return given.density_kg_m3, body
+    body = {"mass_kg": given.mass_kg, "gravity_centre_m": centre + origin, "inertia_kg_m2": inertia}
+    return given.density_kg_m3, body, 0.0
 
 
 def _place(path: Path) -> tuple[list[float], float]:
