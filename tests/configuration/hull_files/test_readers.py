@@ -309,5 +309,13 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
         read_hull(tmp_path / "hull.nc")
 
 
+def test_two_bodies_of_capytaine_are_refused_in_words(tmp_path):
+    xarray = pytest.importorskip("xarray")
+    one = xarray.open_dataset(hulls("capytaine-cylinder/cylinder_hydrodynamics.nc"))
+    xarray.concat([one, one], "radiating_dof", data_vars="minimal").to_netcdf(tmp_path / "two.nc")
+    with pytest.raises(ValueError, match="of one body"):
+        read_hull(tmp_path / "two.nc")
+
+
 def test_viscous_damping_of_a_strip_theory_file_is_read():
     assert roll_resonance(read_hull(hulls("shipx-supply/input.re7"))).viscous_ratio > 5e-4

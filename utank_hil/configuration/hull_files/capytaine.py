@@ -37,13 +37,11 @@ def hull_of_dataset(path: Path, data: Any) -> HullData:
     if lacking:
         raise ValueError(f"{path}: {', '.join(lacking)} missing: is it a dataset of Capytaine?")
     for axis in ("radiating_dof", "influenced_dof"):
-        data[axis] = [str(name).lower().rpartition("__")[2] for name in data[axis].values]
-    try:
-        data = data.sel(radiating_dof=list(DEGREES), influenced_dof=list(DEGREES))
-    except (KeyError, ValueError) as error:
-        raise ValueError(
-            f"{path}: must have the degrees {', '.join(DEGREES)} of one body"
-        ) from error
+        names = [str(name).lower().rpartition("__")[2] for name in data[axis].values]
+        if any(names.count(each) != 1 for each in DEGREES):
+            raise ValueError(f"{path}: must have the degrees {', '.join(DEGREES)} of one body")
+        data[axis] = names
+    data = data.sel(radiating_dof=list(DEGREES), influenced_dof=list(DEGREES))
     speed = float(data["forward_speed"]) if "forward_speed" in data else 0.0
     if speed != 0:
         raise ValueError(
