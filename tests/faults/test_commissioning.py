@@ -366,7 +366,6 @@ def test_a_fault_in_the_moment_of_arming_ends_it_before_anything_moved():
     scenario = still_water(NAVAL)
     ship = build_ship_side(scenario, 1, scenario.operator)
     drive = ship.drive
-    assert drive is not None
     tick, enabled = drive.tick, count()
 
     def tripping(now_ns):

@@ -32,7 +32,7 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.configuration import Vessel, load_config
-from utank_hil.control import CommandLimiter, PumpLimits
+from utank_hil.control import CommandLimiter, DesignPlant, PumpLimits
 from utank_hil.control.interface import PRESSURE
 from utank_hil.nodes.actuators import Actuators
 from utank_hil.nodes.controller import ControllerNode, ControllerSettings
@@ -40,6 +40,8 @@ from utank_hil.nodes.redundancy import NO_REDUNDANCY
 from utank_hil.nodes.running_law import RunningLaw
 from utank_hil.nodes.signals import SIGNALS, Telemetry
 from utank_hil.safety.judge import Safety
+from utank_hil.safety.monitoring import Monitors
+from utank_hil.safety.monitors.thresholds import SensorFigures
 from utank_hil.safety.safety_limits import SafetyLimits
 
 CATALOGUE = load_catalogue()
@@ -47,6 +49,12 @@ VESSEL = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)
 VERSION = VESSEL.version
 LIMITS = PumpLimits()
 MS = 1_000_000
+
+
+def new_monitors(vessel=VESSEL):
+    return Monitors(DesignPlant(vessel.ship, vessel.tank), 0.35, SensorFigures(), 250_000)
+
+
 _FOLLOWED = {
     ControlWord.SHUTDOWN: DriveState.READY_TO_SWITCH_ON,
     ControlWord.SWITCH_ON: DriveState.SWITCHED_ON,

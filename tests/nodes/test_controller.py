@@ -15,6 +15,7 @@ from controller_bench import (
     ControllerBench,
     PlanningLaw,
     ToyLaw,
+    new_monitors,
 )
 from toy_nodes import FakeClock, ToyPort
 
@@ -40,14 +41,11 @@ from utank_hil.canbus import (
     ShipEstimate,
     Switch,
 )
-from utank_hil.control import DesignPlant
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import EstimateFigures, RetuningEvent
 from utank_hil.retuning.law_exchange import LawExchange
 from utank_hil.runners import RealTimeLoop
 from utank_hil.runners.statistics import LoopStatistics
-from utank_hil.safety.monitoring import Monitors
-from utank_hil.safety.monitors.thresholds import SensorFigures
 from utank_hil.safety.situation import Demand
 
 START_NS = 7_000_000_123
@@ -250,8 +248,7 @@ ESTIMATED = SIGNALS[SIGNALS.index("significant_height_m") :]
 
 @pytest.mark.parametrize("index", range(len(SIGNALS) - len(ESTIMATED)))
 def test_every_signal_but_the_estimates_is_finite_from_the_first_row(index):
-    plant = DesignPlant(VESSEL.ship, VESSEL.tank)
-    bench = ControllerBench(monitors=Monitors(plant, 0.35, SensorFigures(), 250_000))
+    bench = ControllerBench(monitors=new_monitors())
     bench.tick()
     # waves and ship are not told yet
     untold = SIGNALS.index("significant_height_m") <= index <= SIGNALS.index("ship_age_s")
@@ -275,8 +272,7 @@ def test_rows_follow_the_motion_in_every_tick_and_the_estimates_within_100_ms():
 
 
 def test_until_the_water_obeyed_the_pressure_is_a_quarter():
-    plant = DesignPlant(VESSEL.ship, VESSEL.tank)
-    monitors = Monitors(plant, 0.35, SensorFigures(), 250_000)
+    monitors = new_monitors()
     bench = ControllerBench(START_NS, monitors=monitors)
     bench.arm()
     assert not monitors.confirmed
@@ -295,11 +291,9 @@ def test_until_the_water_obeyed_the_pressure_is_a_quarter():
 
 @pytest.mark.parametrize("pump", [True, False])
 def test_a_pressure_that_is_held_is_degraded_where_there_is_a_pump(pump):
-    plant = DesignPlant(VESSEL.ship, VESSEL.tank)
-    monitors = Monitors(plant, 0.35, SensorFigures(), 250_000)
+    monitors = new_monitors()
     bench = ControllerBench(START_NS, monitors=monitors, pump=pump)
     bench.run(500)
-    assert bench.status is not None
     assert bench.status.degraded is False  # nothing is commanded
     bench.node.safety.supervisor.demand = Demand.CONTROL
     bench.node.safety.supervisor.update = lambda seen, standing: None
@@ -483,7 +477,7 @@ def test_a_law_that_asks_for_anything_gets_the_limit_and_half_of_it_when_degrade
 
 
 def test_degraded_is_what_she_stands_where_half_of_it_could_capsize_her(monkeypatch):
-    monitors = Monitors(DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures(), 250_000)
+    monitors = new_monitors()
     monitors.thresholds = replace(monitors.thresholds, degraded_share=0.125)
     monitors.confirmed = True
     monkeypatch.setattr(monitors, "update", lambda *_: 0)
@@ -498,7 +492,7 @@ def test_degraded_is_what_she_stands_where_half_of_it_could_capsize_her(monkeypa
 
 
 def test_without_retuning_nothing_excuses_the_ship_from_her_twin(monkeypatch):
-    monitors = Monitors(DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures(), 250_000)
+    monitors = new_monitors()
     excused: list[bool] = []
     monkeypatch.setattr(monitors.twin, "excuse", lambda: excused.append(True))
     ControllerBench(START_NS, monitors=monitors).run(300)
@@ -509,7 +503,7 @@ def test_without_retuning_nothing_excuses_the_ship_from_her_twin(monkeypatch):
 def test_every_law_that_is_not_excused_is_judged_by_the_twin_of_its_own_ship(
     *, excused, monkeypatch
 ):
-    monitors = Monitors(DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures(), 250_000)
+    monitors = new_monitors()
     noted = NotedUpdates()
     bench = ControllerBench(START_NS, law=noted, monitors=monitors)
     followed, excuses = [], []
@@ -524,8 +518,7 @@ def test_every_law_that_is_not_excused_is_judged_by_the_twin_of_its_own_ship(
 
 def monitored():
     """An armed controller with monitors, whose law asks for nothing."""
-    plant = DesignPlant(VESSEL.ship, VESSEL.tank)
-    bench = ControllerBench(START_NS, monitors=Monitors(plant, 0.35, SensorFigures(), 250_000))
+    bench = ControllerBench(START_NS, monitors=new_monitors())
     bench.arm()
     return bench
 
@@ -574,7 +567,6 @@ def test_plans_that_were_not_found_and_the_state_of_retuning_are_the_laws():
     noted.state = RetuningState.TRIAL
     assert bench.node.retuning_state is RetuningState.TRIAL
     bench.run(200)
-    assert bench.status is not None
     assert bench.status.retuning is RetuningState.TRIAL
 
 
@@ -614,8 +606,7 @@ def times_ms(bench, kind, ms):
 
 
 def test_what_is_estimated_is_said_in_its_cycle_and_only_where_it_is_estimated():
-    plant = DesignPlant(VESSEL.ship, VESSEL.tank)
-    monitors = Monitors(plant, 0.35, SensorFigures(), 250_000)
+    monitors = new_monitors()
     estimator: Any = NotedSamples()
     for kind, more in (
         (SeaEstimate, {"estimator": estimator}),

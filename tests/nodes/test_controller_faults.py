@@ -32,60 +32,39 @@ START_NS = 7_000_000_123
 LEVEL = 20e3  # a pressure away from every limit
 
 
-# What takes the motion sensor's samples away; each must look like silence.
-def _nan(bench):
-    bench.motion = SensorMotion(math.nan, 0.0, Quality.GOOD)
+def motion(**changes):
+    return lambda bench: setattr(bench, "motion", bench.motion._replace(**changes))
 
 
-def _rate_nan(bench):
-    bench.motion = SensorMotion(0.0, math.nan, Quality.GOOD)
-
-
-def _bad_quality(bench):
-    bench.motion = bench.motion._replace(quality=Quality.BAD)
-
-
-def _no_quality(bench):
-    bench.motion = bench.motion._replace(quality=None)
-
-
-def _silence(bench):
-    bench.silent.add(SensorMotion)
-
-
-def _wrong_identifier(bench):
-    bench.spoil = lambda kind, frame: (
-        (frame._replace(can_id=frame.can_id + 0x100),) if kind is SensorMotion else (frame,)
+def spoilt(change):
+    """Each frame of the motion sensor is as `change` leaves it."""
+    return lambda bench: setattr(
+        bench, "spoil", lambda kind, frame: (change(frame) if kind is SensorMotion else frame,)
     )
 
 
-def _standing_counter(bench):
+def stand(bench):
     first = bench.encode(bench.motion)
     bench.send(first)
-    bench.spoil = lambda kind, frame: (first,) if kind is SensorMotion else (frame,)
+    spoilt(lambda _: first)(bench)
 
 
-def _flipped_bit(bench):
-    def flip(kind, frame):
-        if kind is not SensorMotion:
-            return (frame,)
-        data = bytearray(frame.data)
-        data[3] ^= 0x10
-        return (Frame(frame.can_id, bytes(data)),)
-
-    bench.spoil = flip
+def flipped(frame):
+    return Frame(frame.can_id, frame.data[:3] + bytes([frame.data[3] ^ 0x10]) + frame.data[4:])
 
 
-def _short(bench):
-    bench.spoil = lambda kind, frame: (
-        (Frame(frame.can_id, frame.data[:6]),) if kind is SensorMotion else (frame,)
-    )
-
-
-MOTION_FAULTS = [
-    _nan, _rate_nan, _bad_quality, _no_quality, _silence, _wrong_identifier, _standing_counter,
-    _flipped_bit, _short,
-]  # fmt: skip
+# What takes the motion sensor's samples away; each must look like silence.
+MOTION_FAULTS = {
+    "no roll": motion(roll_rad=math.nan),
+    "no rate": motion(roll_rate_rad_s=math.nan),
+    "bad quality": motion(quality=Quality.BAD),
+    "no quality": motion(quality=None),
+    "silence": lambda bench: bench.silent.add(SensorMotion),
+    "wrong identifier": spoilt(lambda frame: frame._replace(can_id=frame.can_id + 0x100)),
+    "standing counter": stand,
+    "flipped bit": spoilt(flipped),
+    "short": spoilt(lambda frame: Frame(frame.can_id, frame.data[:6])),
+}
 
 
 @pytest.mark.parametrize("fault", MOTION_FAULTS)
@@ -96,10 +75,10 @@ def test_without_good_motion_samples_pressure_is_zero_within_250_ms(fault):
     bench.run(100)
     rows = len(bench.rows)
     last_good_ns = bench.now_ns - TICK_NS
-    fault(bench)
+    MOTION_FAULTS[fault](bench)
     bench.run(2000)
     # five repeated frames are there before the sample is too old
-    repeated = fault is _standing_counter
+    repeated = fault == "standing counter"
     assert bench.node.fault is (Fault.PROTECTION if repeated else Fault.MOTION_SILENT)
     zero_ns = next(t for t, c in bench.commands if t > last_good_ns and c.pressure_pa == 0.0)
     assert zero_ns - last_good_ns <= 250 * MS

@@ -1,7 +1,7 @@
 """A pump that presses while nothing commands it, in every mode in which its drive is off."""
 
 import pytest
-from controller_bench import VESSEL, ControllerBench
+from controller_bench import ControllerBench, new_monitors
 
 from utank_hil.canbus import (
     ControlWord,
@@ -13,9 +13,6 @@ from utank_hil.canbus import (
     SensorMotion,
     SensorPump,
 )
-from utank_hil.control import DesignPlant
-from utank_hil.safety.monitoring import Monitors
-from utank_hil.safety.monitors.thresholds import SensorFigures
 
 PRESSING = SensorPump(9e3, 0.0, Quality.GOOD)
 CODE = Fault.DRIVE_NOT_FOLLOWING
@@ -23,8 +20,7 @@ START_MS = 12_000  # what is awaited at the start is no alarm before
 
 
 def bench():
-    plant = DesignPlant(VESSEL.ship, VESSEL.tank)
-    table = ControllerBench(monitors=Monitors(plant, 0.35, SensorFigures(), 250_000))
+    table = ControllerBench(monitors=new_monitors())
     table.run(400)
     return table
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from controller_bench import CATALOGUE, ControllerBench, ToyLaw
+from controller_bench import CATALOGUE, ControllerBench, ToyLaw, new_monitors
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -32,12 +32,9 @@ from utank_hil.canbus import (
     ValveStatus,
 )
 from utank_hil.configuration import Vessel, load_config
-from utank_hil.control import DesignPlant
 from utank_hil.control.interface import PRESSURE, VALVE
 from utank_hil.dynamics.valves import Valve
 from utank_hil.nodes.actuators import ValveCommander
-from utank_hil.safety.monitoring import Monitors
-from utank_hil.safety.monitors.thresholds import SensorFigures
 
 VESSEL = load_config(Path("configs/ships/thesis_first_valve.yaml"), Vessel)
 TANK = VESSEL.tank
@@ -111,23 +108,18 @@ class ValveBench(ControllerBench):
                     self.state = ValveState.FOLLOWING if following else ValveState.FAIL_POSITION
 
 
-def valve_law(bench):
-    assert isinstance(bench.law, ToyValveLaw)
-    return bench.law
-
-
 def throttling(valve=DUCT):
     """A bench whose armed controller holds the valve shut."""
     bench = ValveBench(valve)
     bench.arm()
-    valve_law(bench).loss = SHUT
+    bench.law.loss = SHUT
     bench.run(1000)
     return bench
 
 
 def test_the_valve_is_told_to_follow_only_while_the_law_is_in_charge():
     bench = ValveBench()
-    valve_law(bench).loss = SHUT
+    bench.law.loss = SHUT
     bench.run(500)
     assert {(told.opening, told.control) for told in bench.told} == {
         (1.0, ValveControl.FAIL_POSITION)
@@ -148,7 +140,7 @@ def test_the_valve_is_told_to_follow_only_while_the_law_is_in_charge():
 def test_an_opening_has_the_loss_that_the_law_asked_for(opening, position):
     valve = Valve("duct", 0.5, 0.1, fail_position=position)
     bench = throttling(valve)
-    valve_law(bench).loss = valve.loss(TANK, opening)
+    bench.law.loss = valve.loss(TANK, opening)
     bench.run(400)
     assert bench.told[-1].opening == pytest.approx(opening, abs=1e-4)
 
@@ -264,7 +256,7 @@ def test_armed_again_while_the_valve_is_still_on_its_way_it_is_not_called_stuck(
     assert bench.opening == pytest.approx(0.0, abs=1e-3)
     bench.order_is(mode_request=Mode.STANDBY, arm=False)
     bench.run(2000)
-    valve_law(bench).loss = 0.0
+    bench.law.loss = 0.0
     bench.order_is(mode_request=Mode.ACTIVE, arm=True)
     bench.run(1000)
     assert bench.node.mode is Mode.ACTIVE
@@ -313,7 +305,7 @@ EVENTS: dict[str, Callable[[ValveBench], object]] = {
 @given(st.lists(st.tuples(st.sampled_from(sorted(EVENTS)), st.integers(1, 40)), max_size=25))
 def test_whatever_comes_the_valve_is_told_to_follow_only_while_the_controller_is_active(events):
     bench = ValveBench()
-    valve_law(bench).loss = SHUT
+    bench.law.loss = SHUT
     bench.arm()
     not_active_ticks = 0
     for event, ticks in events:
@@ -330,7 +322,7 @@ def test_whatever_comes_the_valve_is_told_to_follow_only_while_the_controller_is
 
 def test_a_loss_that_is_no_number_ends_in_an_internal_fault():
     bench = throttling()
-    valve_law(bench).loss = math.nan
+    bench.law.loss = math.nan
     bench.run(220)
     assert bench.node.fault is Fault.INTERNAL
     assert bench.node.law.error == "its answer is a valve loss of nan"
@@ -372,18 +364,18 @@ def test_the_level_is_observed_with_what_the_valve_holds_back(monkeypatch):
 
 def test_it_is_said_which_answer_was_no_number_and_of_several_the_first():
     bench = throttling()
-    valve_law(bench).answer_pa = math.inf
+    bench.law.answer_pa = math.inf
     bench.run(300)
     assert bench.node.fault is Fault.INTERNAL
     assert bench.node.law.error == "its answer is inf Pa"
-    valve_law(bench).answer_pa, valve_law(bench).loss = 0.0, math.nan
+    bench.law.answer_pa, bench.law.loss = 0.0, math.nan
     bench.run(300)
     assert bench.node.law.error == "its answer is inf Pa"
 
 
 def test_the_monitors_are_told_what_the_valve_holds_back(monkeypatch):
     bench = ValveBench()
-    monitors = Monitors(DesignPlant(VESSEL.ship, TANK), 0.35, SensorFigures(), 250_000)
+    monitors = new_monitors(VESSEL)
     held: list[float] = []
     monkeypatch.setattr(monitors, "update", lambda _, own, __: held.append(own.held_pa) or 0)
     bench.node.safety.monitors = monitors
@@ -401,7 +393,6 @@ def test_a_valve_that_is_silent_is_not_one_that_does_not_follow():
     bench = ValveBench()
     bench.run(1000)
     valve, measured = bench.node.actuators.valve, bench.node.measured
-    assert valve is not None
     valve._told = 0.0  # as if it had been commanded to shut
     for late_ms in range(10, 2000, 10):
         report = valve.observe(

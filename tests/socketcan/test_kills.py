@@ -53,7 +53,6 @@ class Panel:
         )  # fmt: skip
 
     def press(self, *actions):
-        assert self._process.stdin is not None
         for action in actions:
             self._process.stdin.write(f"{action}\n")
             self._process.stdin.flush()
