@@ -71,16 +71,11 @@ def _after_header(can_id: int, length: int) -> tuple[int, int, Row, int]:
         raise ValueError(f"can_id {can_id:#x}: not a 29-bit identifier")
     if length > 8:
         raise ValueError(f"frame {can_id:#x}: {length} data bytes, a CAN frame holds 8")
-    if can_id & STANDARD:  # RTR, IDE and r0 follow the identifier, all dominant
-        return _after_bits_of(
-            (can_id & LONGEST_STANDARD_ID) << 7 | length, _SHORT_HEADER_BITS, length
-        )
-    # SRR and IDE are recessive; start of frame, RTR, r1 and r0 are not
-    header = can_id >> 18 << 27 | 0b11 << 25 | (can_id & 0x3FFFF) << 7 | length
-    return _after_bits_of(header, _HEADER_BITS, length)
-
-
-def _after_bits_of(header: int, bits: int, length: int) -> tuple[int, int, Row, int]:
+    # RTR, IDE and r0 follow an identifier of 11 bits, all dominant
+    header, bits = (can_id & LONGEST_STANDARD_ID) << 7 | length, _SHORT_HEADER_BITS
+    if not can_id & STANDARD:  # SRR and IDE are recessive; start of frame, RTR, r1 and r0 are not
+        header = can_id >> 18 << 27 | 0b11 << 25 | (can_id & 0x3FFFF) << 7 | length
+        bits = _HEADER_BITS
     state, stuffed = _after_bits(0, header, bits)
     plain = bits + 8 * length + _CRC_BITS + _AFTER_CRC_BITS
     crc = _crc(0, header, bits)
