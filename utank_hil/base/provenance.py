@@ -149,11 +149,13 @@ def _plain(value: Any, folder: Path, files: dict[str, Path]) -> Any:
 def machine() -> dict[str, Any]:
     """Platform, processor, and the kernels that libraries chose for it, ready for `json.dumps`."""
     found: Any = np.show_config(mode="dicts")
+    lines = _lines("/proc/cpuinfo")
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return {
         "platform": platform.platform(),
         "python": platform.python_version(),
         "cpus": os.cpu_count(),
-        "processor": _processor(),
+        "processor": names[0] if names else platform.processor() or platform.machine(),
         "numpy": " ".join(found["SIMD Extensions"].get("found", [])) or "baseline",
         "blas": f"{found['Build Dependencies']['blas']['name']} {_blas_core()}".strip(),
         "libm": " ".join(platform.libc_ver()).strip() or "unknown",
@@ -165,12 +167,6 @@ def kernels(of: dict[str, Any]) -> str:
     if "processor" not in of:
         return ""
     return f"{of['processor']}, numpy {of['numpy']}, {of['blas']}, libm {of['libm']}"
-
-
-def _processor() -> str:
-    lines = _lines("/proc/cpuinfo")
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or platform.machine()
 
 
 def _blas_core() -> str:

@@ -23,7 +23,8 @@ from utank_hil.telemetry.viewer import LOOPBACK, hold_port, live_url, port_of
 Sink: TypeAlias = rr.FileSink | rr.GrpcServerSink
 _FLUSH_TIMEOUT_S: Final = 5.0  #: Time to reach the disk; without it Rerun waits on a full one.
 _RESERVED_BYTES: Final = 1 << 18  #: Space for the beginning of a recording, mostly its blueprint.
-_FOOTER: Final = (b"FOOT", 64)  #: Mark within the last bytes of a finished file.
+_FOOTER: Final = b"FOOT"  #: Mark within the last `_FOOTER_BYTES` of a finished file.
+_FOOTER_BYTES: Final = 64
 
 
 def open_stream(
@@ -94,19 +95,14 @@ class RecordingPart(Closing):
         self._log.close()
         self.flush()
         self._recording.disconnect()  # This writes the footer and reports no error.
-        if not _is_finished(self._file):
+        with self._file.open("rb") as content:
+            content.seek(-_FOOTER_BYTES, os.SEEK_END)
+            finished = _FOOTER in content.read()
+        if not finished:
             raise RuntimeError(
                 f"its {self._rows} rows are written, but not the end of {self._file.name}: is the "
                 "disk full?"
             )
-
-
-def _is_finished(file: Path) -> bool:
-    mark, length = _FOOTER
-    with file.open("rb") as content:
-        content.seek(0, os.SEEK_END)
-        content.seek(max(0, content.tell() - length))
-        return mark in content.read()
 
 
 MEMORY: Final = "64MiB"  #: History for late viewers, which bounds the memory of the stream.

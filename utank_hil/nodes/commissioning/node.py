@@ -233,14 +233,15 @@ class CommissioningNode:
 
     def _move(self, time_s: float, now_ns: int) -> None:
         """Command what is due, and end when all is done or something is wrong."""
-        node, plan = self.node, self._plan
+        node, plan, rest = self.node, self._plan, self.rest
+        at_rest_m = float(rest["starboard_level_m"].mean() - rest["port_level_m"].mean()) / 2
         if node.mode is not Mode.ACTIVE:
             self.ended = (
                 fault_text(node.fault) if node.mode is Mode.FAULT else "Disarmed before the end."
             )
         elif self.missing:
             self.ended = self.missing
-        elif plan is not None and self._level_m() > MOST_OVER_PLAN * plan.level_m:
+        elif plan and abs(node.measured.level_m - at_rest_m) > MOST_OVER_PLAN * plan.level_m:
             self.ended = (
                 f"The level went {MOST_OVER_PLAN:g} times as far as planned. Check the gauges' "
                 "scaling, the pump's limits and the ship's file."
@@ -265,9 +266,3 @@ class CommissioningNode:
                     else self._stroke.loss_at(time_s - self._pulses_s),
                 }
             )
-
-    def _level_m(self) -> float:
-        """How far the level is from where it was at rest."""
-        rest = self.rest
-        at_rest_m = float(rest["starboard_level_m"].mean() - rest["port_level_m"].mean()) / 2
-        return abs(self.node.measured.level_m - at_rest_m)
