@@ -4,13 +4,13 @@ from pathlib import Path
 
 import yaml
 
-from firmware_sim.campaign.study import LoadedStudy, load_study
+from firmware_sim.campaign.study import load_study
 
 CONFIGS = Path("configs").resolve()
 SHORT = {"duration_s": 30.0, "settle_s": 10.0}
 
 
-def written(folder: Path, **keys: object) -> Path:
+def written(folder, **keys):
     """A study file of the storm with GPC alone."""
     scenario = {"scenario": str(CONFIGS / "scenarios" / "storm.yaml"), "simulation": "linear"}
     controllers = {"gpc": str(CONFIGS / "controllers" / "gpc.yaml")}
@@ -21,6 +21,6 @@ def written(folder: Path, **keys: object) -> Path:
     return path
 
 
-def small(folder: Path, **keys: object) -> LoadedStudy:
+def small(folder, **keys):
     """The same, loaded."""
     return load_study(written(folder, **keys))

@@ -14,10 +14,10 @@ from one_process import in_one_process
 from rich.console import Console
 from rich.measure import Measurement
 from studies import small, written
-from typer.testing import CliRunner, Result
+from typer.testing import CliRunner
 
-from firmware_sim.campaign.driver import Count, Driver, batch_of
-from firmware_sim.campaign.simulations import LOST, OK, Batch, Row, run_batch
+from firmware_sim.campaign.driver import Driver, batch_of
+from firmware_sim.campaign.simulations import LOST, OK, run_batch
 from firmware_sim.campaign.store import Store, read_results
 from firmware_sim.campaign.tables import pairs_table, runs_table
 from firmware_sim.commands.campaign import campaign
@@ -27,18 +27,18 @@ from utank_hil.console.exit_codes import ExitCode
 pytestmark = pytest.mark.slow
 
 
-def without_times(rows: list[dict[str, object]]) -> list[dict[str, object]]:
+def without_times(rows):
     return [{key: value for key, value in row.items() if key != "wall_s"} for row in rows]
 
 
 @pytest.mark.evidence
-def test_workers_that_are_killed_and_an_interruption_change_no_bit(tmp_path: Path):
+def test_workers_that_are_killed_and_an_interruption_change_no_bit(tmp_path):
     loaded = small(tmp_path, grid={"seed": {"first": 1, "count": 16}})
     store = Store(tmp_path / "out")
     store.begin(loaded, {"keys": loaded.keys}, resume=False)
     killed: list[int] = []
 
-    def kill(count: Count) -> None:
+    def kill(count):
         if count.done > 3 and not killed:
             killed.append(multiprocessing.active_children()[0].pid or 0)
             os.kill(killed[0], signal.SIGKILL)
@@ -65,14 +65,14 @@ def test_workers_that_are_killed_and_an_interruption_change_no_bit(tmp_path: Pat
         ]  # as text, which is exact, and in which nan equals nan
 
 
-def _killed_by_the_second(batch: Batch) -> list[Row]:
+def _killed_by_the_second(batch):
     if "2" in [str(seed) for _, seed, _ in batch.cases]:
         os.kill(os.getpid(), signal.SIGKILL)
     return run_batch(batch)
 
 
 @pytest.mark.evidence
-def test_a_case_that_kills_each_process_is_lost_alone(tmp_path: Path):
+def test_a_case_that_kills_each_process_is_lost_alone(tmp_path):
     loaded = small(tmp_path, grid={"seed": [1, 2, 3, 4]})
     store = Store(tmp_path / "out")
     store.begin(loaded, {"keys": loaded.keys}, resume=False)
@@ -83,12 +83,12 @@ def test_a_case_that_kills_each_process_is_lost_alone(tmp_path: Path):
 
 
 @pytest.fixture
-def run(tmp_path: Path):
+def run(tmp_path):
     """Run the command in this process."""
     app = new_app()
     app.command()(campaign)
 
-    def invoke(*arguments: object) -> Result:
+    def invoke(*arguments):
         out = ("--out", str(tmp_path / "out"))
         with in_one_process():
             return CliRunner().invoke(app, [*map(str, arguments), *out])
@@ -96,7 +96,7 @@ def run(tmp_path: Path):
     return invoke
 
 
-def test_command_resumes_counts_failures_and_compares_in_the_same_waves(run, tmp_path: Path):
+def test_command_resumes_counts_failures_and_compares_in_the_same_waves(run, tmp_path):
     grid = {"seed": {"first": 1, "count": 3}, "sea.heading_deg": [90.0, 60.0, 0.0]}
     path = written(tmp_path, grid=grid)
     first = run(path, "--json")
@@ -132,7 +132,7 @@ def test_command_resumes_counts_failures_and_compares_in_the_same_waves(run, tmp
     assert sorted((out / "rows").iterdir()) == rows
 
 
-def test_share_of_no_roll_is_no_figure(run, tmp_path: Path):
+def test_share_of_no_roll_is_no_figure(run, tmp_path):
     calm = {"kind": "jonswap", "hs_m": 1e-5, "tp_s": 9.0, "effective_slope": {"coefficient": 0.5}}
     done = run(written(tmp_path, set={"sea": calm}, grid={"seed": [1, 2]}), "--json")
     (group,) = json.loads(done.stdout)["groups"]
@@ -144,7 +144,7 @@ def test_share_of_no_roll_is_no_figure(run, tmp_path: Path):
     assert cells[2:4] == [["2"], [""]]
 
 
-def test_groups_of_the_same_waves_are_compared_with_the_first(run, tmp_path: Path):
+def test_groups_of_the_same_waves_are_compared_with_the_first(run, tmp_path):
     pressures = [5e4, 1.5e4]
     grid = {"seed": {"first": 1, "count": 3}, "controllers.*.limits.pressure_pa": pressures}
     found = json.loads(run(written(tmp_path, grid=grid), "--json").stdout)["groups"]
@@ -157,12 +157,10 @@ def test_groups_of_the_same_waves_are_compared_with_the_first(run, tmp_path: Pat
 
 
 @pytest.mark.evidence
-def test_interrupted_campaign_says_so_keeps_what_there_is_and_goes_on(
-    run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_interrupted_campaign_says_so_keeps_what_there_is_and_goes_on(run, tmp_path, monkeypatch):
     path, whole = written(tmp_path, grid={"seed": [1, 2]}), Driver.run
 
-    def interrupted(driver: Driver, workers: int) -> None:
+    def interrupted(driver, workers):
         whole(driver, workers)
         raise KeyboardInterrupt
 
@@ -178,7 +176,7 @@ def test_interrupted_campaign_says_so_keeps_what_there_is_and_goes_on(
     assert json.loads(again.stdout)["interrupted"] is False
 
 
-def test_wrong_study_ends_before_anything_is_computed(run, tmp_path: Path):
+def test_wrong_study_ends_before_anything_is_computed(run, tmp_path):
     path = written(tmp_path, grid={"sea.headin_deg": [90.0]})
     done = run(path)
     assert done.exit_code == 2
@@ -195,7 +193,7 @@ def test_entry_point_is_the_command():
     assert yaml.safe_load(Path("configs/studies/storm_seeds.yaml").read_text())["name"]
 
 
-def test_a_campaign_over_one_key_is_a_table_of_80_columns() -> None:
+def test_a_campaign_over_one_key_is_a_table_of_80_columns():
     """Narrower than a terminal it is a list, in which nothing can be compared."""
     one = {"mean": 0.09, "half_width": 0.05, "cases": 3}
     figures = {

@@ -3,7 +3,6 @@
 import json
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from studies import CONFIGS, small
@@ -19,7 +18,7 @@ pytestmark = pytest.mark.slow
 CALM_SEA = {"sea": {"kind": "jonswap", "hs_m": 0.5, "tp_s": 11.0}}
 
 
-def computed(folder: Path, simulation: str, **values: object) -> dict[str, dict[str, float]]:
+def computed(folder, simulation, **values):
     """Rows of a case by run."""
     found = small(folder, set=values)
     content = changed(found.study.scenario, found.cases[0].values)
@@ -28,7 +27,7 @@ def computed(folder: Path, simulation: str, **values: object) -> dict[str, dict[
     return {str(row["run"]): row for row in rows_of(simulation, scenario, 3, laws)}
 
 
-def test_linear_simulation_and_bus_agree_where_motions_are_small(tmp_path: Path):
+def test_linear_simulation_and_bus_agree_where_motions_are_small(tmp_path):
     # two programs: closed form and sampled model here, Runge-Kutta steps of the plant there; on the
     # bus the law has a quarter of its pressure until the water was seen to obey it
     long = {"duration_s": 150.0, "settle_s": 60.0, "sensors.roll_noise_rad": 0.0}
@@ -47,7 +46,7 @@ def test_linear_simulation_and_bus_agree_where_motions_are_small(tmp_path: Path)
     )
 
 
-def test_shares_are_of_the_rolls_and_a_ship_that_capsized_counts_for_none(tmp_path: Path):
+def test_shares_are_of_the_rolls_and_a_ship_that_capsized_counts_for_none(tmp_path):
     values = {"duration_s": 60.0, "settle_s": 5.0}
     rows = computed(tmp_path, "linear", **values)
     shares = {run: 1 - row["roll_rms_rad"] / rows["passive"]["roll_rms_rad"]
@@ -80,7 +79,7 @@ def test_shares_are_of_the_rolls_and_a_ship_that_capsized_counts_for_none(tmp_pa
         ("linear", {"sea.heading_deg": 0.0}, "gives no roll moment"),
     ],
 )
-def test_case_that_can_not_be_computed_says_why(tmp_path: Path, simulation, values, reason):
+def test_case_that_can_not_be_computed_says_why(tmp_path, simulation, values, reason):
     found = small(tmp_path, simulation=simulation)
     batch = batch_of(found, found.cases)
     ((name, seed, written),) = batch.cases
@@ -93,7 +92,7 @@ def test_case_that_can_not_be_computed_says_why(tmp_path: Path, simulation, valu
     assert {row["status"] for row in right} == {"ok"}
 
 
-def test_vessel_with_a_valve_needs_the_bus(tmp_path: Path):
+def test_vessel_with_a_valve_needs_the_bus(tmp_path):
     scenario = str(CONFIGS / "scenarios" / "semi_active.yaml")
     controllers = {"valve": str(CONFIGS / "controllers" / "valve_on_off.yaml")}
     found = small(tmp_path, scenario=scenario, set={"controllers": controllers})
@@ -101,7 +100,7 @@ def test_vessel_with_a_valve_needs_the_bus(tmp_path: Path):
     assert "take that" in row["reason"]
 
 
-def test_worker_of_other_code_ends_the_campaign(tmp_path: Path, monkeypatch):
+def test_worker_of_other_code_ends_the_campaign(tmp_path, monkeypatch):
     found = small(tmp_path)
     batch = batch_of(found, found.cases)
     monkeypatch.setattr("firmware_sim.campaign.simulations.code_digest", lambda: "older")

@@ -1,7 +1,5 @@
 """The folder of a campaign: rows once each, whatever was written twice or cut short."""
 
-from pathlib import Path
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -12,7 +10,7 @@ from firmware_sim.campaign.simulations import FAILED, LOST, OK, failed_row
 from firmware_sim.campaign.store import Store, StoreError, read_results
 
 
-def rows(case: str, roll: float = 1.0) -> list[dict[str, object]]:
+def rows(case, roll=1.0):
     ended = {"case": case, "status": OK, "reason": "", "mark": "", "wall_s": 0.1}
     return [{**ended, "run": run, "roll_rms_rad": roll} for run in ("passive", "gpc")]
 
@@ -34,7 +32,7 @@ def test_rows_are_unique_however_often_cases_were_written(tmp_path_factory, part
     assert len(list((store.folder / "rows").iterdir())) <= 1
 
 
-def test_lost_case_is_not_done_and_gives_way_to_its_rows(tmp_path: Path):
+def test_lost_case_is_not_done_and_gives_way_to_its_rows(tmp_path):
     store = Store(tmp_path)
     (tmp_path / "rows").mkdir()
     store.write([failed_row("c1", LOST, "died"), failed_row("c2", FAILED, "wrong key")])
@@ -44,7 +42,7 @@ def test_lost_case_is_not_done_and_gives_way_to_its_rows(tmp_path: Path):
     assert store.rows()["run"].to_pylist().count("") == 1
 
 
-def test_part_that_was_cut_short_is_not_read(tmp_path: Path):
+def test_part_that_was_cut_short_is_not_read(tmp_path):
     loaded, store = small(tmp_path), Store(tmp_path / "out")
     about = {"keys": loaded.keys}
     store.begin(loaded, about, resume=False)
@@ -69,7 +67,7 @@ def test_results_are_not_overwritten_unasked_and_those_of_other_cases_are_left_a
     assert (tmp_path / "out" / "study.yaml").read_bytes() == loaded.path.read_bytes()
 
 
-def test_rows_that_do_not_fit_are_named_and_those_before_stay(tmp_path: Path):
+def test_rows_that_do_not_fit_are_named_and_those_before_stay(tmp_path):
     store = Store(tmp_path)
     (tmp_path / "rows").mkdir()
     store.write(rows("c1"))

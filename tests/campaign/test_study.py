@@ -1,7 +1,5 @@
 """Studies: which cases they make, what they are named, and what is said of a wrong one."""
 
-from pathlib import Path
-
 import pytest
 from studies import CONFIGS, small, written
 
@@ -16,11 +14,11 @@ NDBC = CONFIGS / "seas" / "ndbc_41010_2019-02_spectral_density.txt"
 
 
 @pytest.mark.parametrize("path", sorted((CONFIGS / "studies").glob("*.yaml")), ids=lambda p: p.stem)
-def test_shipped_studies_are_valid(path: Path):
+def test_shipped_studies_are_valid(path):
     assert load_study(path).cases
 
 
-def test_every_value_meets_every_other_and_seeds_make_no_group(tmp_path: Path):
+def test_every_value_meets_every_other_and_seeds_make_no_group(tmp_path):
     pressures = [20e3, 30e3, 40e3]
     found = small(
         tmp_path,
@@ -35,13 +33,13 @@ def test_every_value_meets_every_other_and_seeds_make_no_group(tmp_path: Path):
     assert len({case.waves for case in found.cases}) == 2 * 4
 
 
-def test_entries_of_cases_may_have_keys_of_their_own(tmp_path: Path):
+def test_entries_of_cases_may_have_keys_of_their_own(tmp_path):
     found = small(tmp_path, cases=[{}, {"plant": "linear"}, {"sea.speed_m_s": 3.0}])
     assert found.keys == ("plant", "sea.speed_m_s")
     assert [case.group for case in found.cases] == [("", ""), ("linear", ""), ("", 3.0)]
 
 
-def test_ranges_are_spaced_counted_and_the_hours_of_a_file(tmp_path: Path):
+def test_ranges_are_spaced_counted_and_the_hours_of_a_file(tmp_path):
     spaced = small(tmp_path, grid={"sea.heading_deg": {"low": 30, "high": 150, "count": 5}})
     assert [case.parameters["sea.heading_deg"] for case in spaced.cases] == [30, 60, 90, 120, 150]
     hours = {"hours_of": str(NDBC), "since": "2019-02-10T00:00", "until": "2019-02-10T06:00"}
@@ -53,7 +51,7 @@ def test_ranges_are_spaced_counted_and_the_hours_of_a_file(tmp_path: Path):
     assert len(everything.cases) == len(load_ndbc(NDBC).time)
 
 
-def test_file_is_put_in_place_and_named_by_its_stem(tmp_path: Path):
+def test_file_is_put_in_place_and_named_by_its_stem(tmp_path):
     laws = [str(CONFIGS / "controllers" / f"{name}.yaml") for name in ("gpc", "lqg")]
     found = small(tmp_path, grid={"controllers.gpc": laws})
     assert [case.group for case in found.cases] == [("gpc",), ("lqg",)]
@@ -64,9 +62,7 @@ def test_file_is_put_in_place_and_named_by_its_stem(tmp_path: Path):
     assert [law.kind for law in kinds] == ["gpc", "lqg"]
 
 
-def test_key_of_the_vessel_is_believed_by_the_controllers_and_the_actual_ship_is_not(
-    tmp_path: Path,
-):
+def test_key_of_the_vessel_is_believed_by_the_controllers_and_the_actual_ship_is_not(tmp_path):
     inertia = 2.0e9
     for key, believed in (("vessel.ship", inertia), ("actual_ship", 1.9275e9)):
         found = small(tmp_path, set={f"{key}.inertia_kg_m2": inertia})
@@ -89,7 +85,7 @@ def test_key_of_the_vessel_is_believed_by_the_controllers_and_the_actual_ship_is
         ("grid", "sea.hs_m", [3.0], "is not a known key"),
     ],
 )
-def test_wrong_key_is_told_with_file_place_and_remedy(tmp_path: Path, section, key, value, said):
+def test_wrong_key_is_told_with_file_place_and_remedy(tmp_path, section, key, value, said):
     path = written(tmp_path, **{section: {key: value}})
     with pytest.raises(ConfigError) as refused:
         load_study(path)
@@ -107,12 +103,12 @@ def test_wrong_key_is_told_with_file_place_and_remedy(tmp_path: Path, section, k
         ({"grid": {"seed": {"first": 1, "count": 1e7}}}, "grid.seed"),
     ],
 )
-def test_wrong_study_is_told_at_its_key(tmp_path: Path, keys, said):
+def test_wrong_study_is_told_at_its_key(tmp_path, keys, said):
     with pytest.raises(ConfigError, match=said):
         small(tmp_path, **keys)
 
 
-def test_draws_are_the_same_for_the_same_seed_whatever_else_is_drawn(tmp_path: Path):
+def test_draws_are_the_same_for_the_same_seed_whatever_else_is_drawn(tmp_path):
     table = tmp_path / "climate.csv"
     table.write_text("# a comment\nsea.hs_m,sea.tp_s,weight\n2,8,3\n4,10.5,1\n5,11,0\n")
     heading = {"low": 0.0, "high": 180.0}
@@ -129,9 +125,7 @@ def test_draws_are_the_same_for_the_same_seed_whatever_else_is_drawn(tmp_path: P
     assert 0 <= min(each["sea.heading_deg"] for each in both) < 5
 
 
-def test_name_is_of_configuration_seed_code_and_the_data_behind_a_path(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_name_is_of_configuration_seed_code_and_the_data_behind_a_path(tmp_path, monkeypatch):
     data = tmp_path / "sea.txt"
     data.write_text("calm")
     content = {"sea": {"file": str(data)}, "seed": 1}

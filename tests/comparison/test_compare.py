@@ -3,7 +3,6 @@
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,15 +22,13 @@ COLUMNS = ("time_s", "roll_rad", "starboard_level_m", "port_level_m", "pressure_
            "pump_power_w")  # fmt: skip
 
 
-def found(*arguments: object) -> dict[str, object]:
+def found(*arguments):
     done = CliRunner().invoke(APP, [*map(str, arguments), "--json"])
     assert done.exit_code == 0, done.output
     return json.loads(done.stdout)
 
 
-def waves(
-    seed: int, seconds: float = 3600.0, rate_hz: int = 20, damping_ratio: float = 0.05
-) -> np.ndarray:
+def waves(seed, seconds=3600.0, rate_hz=20, damping_ratio=0.05):
     """Roll of a lightly damped ship (12.6 s) under white noise, stationary."""
     count = round(rate_hz * (seconds + 1200))
     omega = np.fft.rfftfreq(count, 1 / rate_hz) * 2 * np.pi
@@ -40,7 +37,7 @@ def waves(
     return np.fft.irfft(noise * gain)[600 * rate_hz : -600 * rate_hz] * 1e-2
 
 
-def recorded(path: Path, roll: np.ndarray, **about: object) -> Path:
+def recorded(path, roll, **about):
     time_s = np.arange(len(roll)) / 20
     other = np.zeros((len(roll), len(COLUMNS) - 2))
     write_recording(path, COLUMNS, {"run": np.column_stack([time_s, roll, other])}, about=about)
@@ -88,8 +85,8 @@ def test_independent_means_have_welch_s_interval():
     assert not found.paired
 
 
-def test_recordings_of_the_same_waves_are_paired_piece_by_piece(tmp_path: Path):
-    def about_it(file: str, width_m: float) -> dict[str, Any]:
+def test_recordings_of_the_same_waves_are_paired_piece_by_piece(tmp_path):
+    def about_it(file, width_m):
         scenario = {"sea": {"file": file}, "vessel": {"tank": {"duct_width_m": width_m}}}
         return {"configuration": scenario, "seed": 1, "data": {file: "1234"}}
 
@@ -113,7 +110,7 @@ def test_recordings_of_the_same_waves_are_paired_piece_by_piece(tmp_path: Path):
     assert "not the same waves" in apart["remarks"][0]
 
 
-def test_recording_and_somebody_s_table_are_compared_by_the_columns_that_both_have(tmp_path: Path):
+def test_recording_and_somebody_s_table_are_compared_by_the_columns_that_both_have(tmp_path):
     roll = waves(3, 1800.0)
     first = recorded(tmp_path / "a.rrd", roll)
     table = tmp_path / "measured.csv"
@@ -129,7 +126,7 @@ def test_recording_and_somebody_s_table_are_compared_by_the_columns_that_both_ha
     assert "has no column roll_rad or roll_deg" in done.stderr
 
 
-def test_gaps_are_left_out_if_they_are_few(tmp_path: Path):
+def test_gaps_are_left_out_if_they_are_few(tmp_path):
     roll = waves(5, 1800.0)
     first, second = roll.copy(), 0.5 * roll
     first[:100] = np.nan  # the sensor starts after the log
@@ -154,7 +151,7 @@ def test_gaps_are_left_out_if_they_are_few(tmp_path: Path):
     assert "know 90% of the values" in done.stderr
 
 
-def test_capsized_ship_has_no_figures_and_a_law_that_lost_the_pump_is_named(tmp_path: Path):
+def test_capsized_ship_has_no_figures_and_a_law_that_lost_the_pump_is_named(tmp_path):
     names, roll = ("time_s", "roll_rad", "true_roll_rad", "mode"), waves(5, 600.0)
     active = np.full(len(roll), Mode.ACTIVE)
     columns = np.column_stack([np.arange(len(roll)) / 20, roll, roll, active])
@@ -174,12 +171,12 @@ def test_capsized_ship_has_no_figures_and_a_law_that_lost_the_pump_is_named(tmp_
     assert said in done.stdout
 
 
-def test_record_without_a_known_roll_raises_no_warning(tmp_path: Path, recwarn):
+def test_record_without_a_known_roll_raises_no_warning(tmp_path, recwarn):
     assert batch_count({"roll_rad": np.full(100, np.nan)}) == 0
     assert not recwarn.list
 
 
-def test_table_of_a_bench_fits_eighty_columns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_table_of_a_bench_fits_eighty_columns(tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.chdir(tmp_path)
     for n in (1, 2):
@@ -189,7 +186,7 @@ def test_table_of_a_bench_fits_eighty_columns(tmp_path: Path, monkeypatch: pytes
     assert "± half width of its 95 % interval" in done.stdout
 
 
-def test_record_that_is_too_short_has_no_interval(tmp_path: Path):
+def test_record_that_is_too_short_has_no_interval(tmp_path):
     short = [recorded(tmp_path / f"{n}.rrd", waves(n, 300.0)) for n in (1, 2)]
     (each,) = found(*short)["comparisons"]
     assert each["figures"]["roll_rms_rad"]["half_width"] is None
@@ -199,7 +196,7 @@ def test_record_that_is_too_short_has_no_interval(tmp_path: Path):
     assert "±" not in done.stdout
 
 
-def test_what_can_not_be_compared_is_said(tmp_path: Path):
+def test_what_can_not_be_compared_is_said(tmp_path):
     empty = tmp_path / "empty"
     empty.mkdir()
     (tmp_path / "no.rrd").write_text("nothing")

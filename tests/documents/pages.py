@@ -28,7 +28,7 @@ class Block:
     text: str
 
 
-def blocks(text: str) -> list[Block]:
+def blocks(text):
     """All fenced blocks of a page, in order."""
     found = []
     for match in _BLOCK.finditer(text):
@@ -39,7 +39,7 @@ def blocks(text: str) -> list[Block]:
     return found
 
 
-def run_python(page: Path, block: Block) -> None:
+def run_python(page, block):
     """Run a block in a namespace of its own; errors name the page's line."""
     code = compile("\n" * block.line + block.text, str(page), "exec")
     exec(code, {"__name__": "__main__"})

@@ -9,7 +9,6 @@ import re
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from pages import HOW_TO, ROOT, blocks
@@ -25,12 +24,12 @@ ALSO = ("catalogue", "codec", "e2e")
 """Tests of the bus, beside those that a page changes."""
 
 
-def lines_of(hunk: str, signs: str) -> str:
+def lines_of(hunk, signs):
     """The lines of a change with one of these signs, without it and the last line's end."""
     return "\n".join(line[1:] for line in hunk.splitlines() if line[:1] in signs)
 
 
-def apply(folder: Path, page: str) -> None:
+def apply(folder, page):
     """Make a page's changes; each must have one place where it fits."""
     for block in blocks(page):
         if block.language != "diff":
@@ -48,7 +47,7 @@ def apply(folder: Path, page: str) -> None:
         file.write_text(text, encoding="utf-8")
 
 
-def run(folder: Path, *arguments: str) -> None:
+def run(folder, *arguments):
     """Run a module of the copy, or one that tests it."""
     environment = os.environ | {"PYTHONPATH": str(folder)}
     done = subprocess.run(
@@ -58,7 +57,7 @@ def run(folder: Path, *arguments: str) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def contents(folder: Path) -> dict[str, bytes]:
+def contents(folder):
     """The files that are not made by running."""
     return {
         str(path.relative_to(folder)): path.read_bytes()
@@ -69,7 +68,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture(scope="module", params=CHANGING, ids=lambda page: page.stem)
-def walked(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def walked(request, tmp_path_factory):
     """A copy of the repository after the last step of a page."""
     folder = tmp_path_factory.mktemp(request.param.stem)
     for name in COPIED:
@@ -80,26 +79,26 @@ def walked(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     return folder
 
 
-def rows(walked: Path) -> list[str]:
+def rows(walked):
     """The files in the table of the page that was walked."""
     (page,) = (page for page in CHANGING if walked.name.startswith(page.stem))
     return ROW.findall(page.read_text(encoding="utf-8"))
 
 
-def changed(walked: Path) -> set[str]:
+def changed(walked):
     """The files that the page has changed so far."""
     before, after = contents(ROOT), contents(walked)
     return {name for name in before.keys() | after.keys() if before.get(name) != after.get(name)}
 
 
-def test_the_files_of_the_page_are_those_that_change(walked: Path) -> None:
+def test_the_files_of_the_page_are_those_that_change(walked):
     generated = {str(page.relative_to(ROOT)) for page in (*TABLES, *WHOLE)}
     assert changed(walked) == set(rows(walked)) - generated
     assert len(rows(walked)) <= 7
 
 
 @pytest.mark.evidence
-def test_the_change_passes_its_tests_and_those_of_the_bus(walked: Path) -> None:
+def test_the_change_passes_its_tests_and_those_of_the_bus(walked):
     run(walked, "tools.documents.write")
     also = {"docs/configuration.md"}  # whenever a key is new
     assert changed(walked) - also == set(rows(walked)) - also

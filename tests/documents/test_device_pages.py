@@ -1,7 +1,6 @@
 """The pages for makers of devices: their frames and limits, computed apart from the product."""
 
 import re
-from collections.abc import Sequence
 from pathlib import Path
 
 import cantools
@@ -35,15 +34,15 @@ CATALOGUE = load_catalogue()
 LIMITS = SafetyLimits()
 
 
-def text(page: str) -> str:
+def text(page):
     return (PAGES / f"{page}.md").read_text(encoding="utf-8")
 
 
-def hexes(words: str) -> list[int]:
+def hexes(words):
     return [int(each, 16) for each in re.findall(r"0x([0-9A-F]{2})\b", words)]
 
 
-def registers(data: Sequence[int]) -> list[int]:
+def registers(data):
     """The CRC's register after each byte, as the page words it."""
     register, found = 0xFF, []
     for byte in data:
@@ -56,19 +55,19 @@ def registers(data: Sequence[int]) -> list[int]:
     return found
 
 
-def data_id(name: str, counter: int) -> int:
+def data_id(name, counter):
     dbc = DATABASE.get_message_by_name(name).dbc
     return bytes.fromhex(str(dbc.attributes["DataIDs"].value))[counter]
 
 
-def encoded(name: str, counter: int, **signals: float) -> bytes:
+def encoded(name, counter, **signals):
     message = DATABASE.get_message_by_name(name)
     raw = {"crc": 0, "counter": counter, **signals}
     rest = message.encode(raw, strict=False)[1:]
     return bytes([registers([*rest, data_id(name, counter)])[-1] ^ 0xFF]) + rest
 
 
-def test_the_worked_frame_is_that_of_the_message_byte_by_byte() -> None:
+def test_the_worked_frame_is_that_of_the_message_byte_by_byte():
     page = text("device")
     table = page.partition("| byte | value | is |")[2].partition("The CRC is")[0]
     shown = bytes(
@@ -78,7 +77,7 @@ def test_the_worked_frame_is_that_of_the_message_byte_by_byte() -> None:
     )
     assert shown == encoded("SENSOR_MOTION", 5, roll_rad=0.1, roll_rate_rad_s=-0.05, quality=0)
     taken, after = (
-        hexes(re.search(rf"^\| {start}.*$", page, re.M)[0])  # type: ignore[index]
+        hexes(re.search(rf"^\| {start}.*$", page, re.M)[0])
         for start in ("byte taken in", "register after it")
     )
     assert taken == [*shown[1:], data_id("SENSOR_MOTION", 5)]
@@ -139,14 +138,7 @@ def test_the_worked_frame_is_that_of_the_message_byte_by_byte() -> None:
         ),
     ],
 )
-def test_frames_of_the_other_pages_are_right(
-    page: str,
-    name: str,
-    counter: int,
-    signals: dict[str, float],
-    kind: type,
-    content: dict[str, object],
-) -> None:
+def test_frames_of_the_other_pages_are_right(page, name, counter, signals, kind, content):
     row = re.search(rf"^\| {name} \| (0x.*)$", text(page), re.M)
     shown = bytes(hexes(row[1]))
     assert shown == encoded(name, counter, **signals)
@@ -179,7 +171,7 @@ FRAMES: dict[str, dict[str, float]] = {
 
 
 @pytest.mark.parametrize("name", FRAMES)
-def test_frames_to_test_an_encoder_with_are_right(name: str) -> None:
+def test_frames_to_test_an_encoder_with_are_right(name):
     row = re.search(
         rf"^\| {name} \| .* \| (\d+) \| 0x(..) \| ([0-9A-F ]+) \|$", text("device"), re.M
     )
@@ -190,7 +182,7 @@ def test_frames_to_test_an_encoder_with_are_right(name: str) -> None:
     assert int(row[2], 16) == data_id(name, counter)
 
 
-def test_cycles_of_the_pages_are_the_catalogues() -> None:
+def test_cycles_of_the_pages_are_the_catalogues():
     found = []
     for page in ("sensor", "drive", "panel"):
         found += re.findall(r"^\| ([A-Z_0-9]+)(?:, \w+)? \| (\d+) ms", text(page), re.M)
@@ -227,20 +219,18 @@ def test_cycles_of_the_pages_are_the_catalogues() -> None:
         ("panel", "take it back for 500 ms", EDGE_NS / 1e6),
     ],
 )
-def test_limits_of_the_pages_are_those_that_are_judged(
-    page: str, words: str, limit_ms: float
-) -> None:
+def test_limits_of_the_pages_are_those_that_are_judged(page, words, limit_ms):
     assert words in text(page)
     number, unit = re.findall(r"([\d.]+) (ms|s)\b", words)[0]
     assert float(number) * (1000 if unit == "s" else 1) == limit_ms
 
 
-def test_keyboard_panel_keeps_the_time_from_button_to_frame() -> None:
+def test_keyboard_panel_keeps_the_time_from_button_to_frame():
     assert "From the button to the frame: 50 ms at most." in text("panel")
     assert 2 * LOOK_NS <= 50_000_000
 
 
-def test_addresses_and_fault_codes_exist() -> None:
+def test_addresses_and_fault_codes_exist():
     addresses = {f"0x{address:02X}" for address in Address}
     sentence = text("device").partition("Addresses are fixed: ")[2].partition(".")[0]
     assert {f"0x{each:02X}" for each in hexes(sentence)} == addresses

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "control.md").read_text()
 
 
-def test_pump_of_the_fishing_boat_is_that_of_her_file() -> None:
+def test_pump_of_the_fishing_boat_is_that_of_her_file():
     text = " ".join((ROOT / "docs" / "dynamics.md").read_text().split())
     pattern = r"is the similar one of ([\d.]+) m² for (\d+) kPa: (\d+) rad/s and ([\d.]+) kW"
     found = re.search(pattern, text)
@@ -29,8 +29,8 @@ def test_pump_of_the_fishing_boat_is_that_of_her_file() -> None:
 
 
 @pytest.mark.slow
-def test_height_and_period_alone_pass_with_the_weight_that_the_page_names() -> None:
-    weight = float(re.search(r"`pressure_weight_rad2: ([\d.e-]+)`: with", PAGE)[1])  # type: ignore[index]
+def test_height_and_period_alone_pass_with_the_weight_that_the_page_names():
+    weight = float(re.search(r"`pressure_weight_rad2: ([\d.e-]+)`: with", PAGE)[1])
     hour = measured_hour(STORM_HOUR)
     config = expecting(shipped("constrained_gpc"), jonswap(hour.hs_m, hour.tp_s))
     assert isinstance(config.law, ConstrainedDesign)

@@ -28,12 +28,12 @@ COMMANDS = [
 APPS = {"firmware-sim": ship_app, "utank-hil": app}
 
 
-def test_the_page_has_commands() -> None:
+def test_the_page_has_commands():
     assert len(COMMANDS) == 5
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_command_of_the_page_gets_as_far_as_the_bus(command: str) -> None:
+def test_a_command_of_the_page_gets_as_far_as_the_bus(command):
     program, *words = shlex.split(re.sub(r"--bus \w+", "--bus nowhere0", command))
     for word in words:
         if word.startswith(("configs/", "docs/")):
@@ -47,7 +47,7 @@ def test_a_command_of_the_page_gets_as_far_as_the_bus(command: str) -> None:
     assert "nowhere0: not found" in result.stderr
 
 
-def test_the_version_in_the_page_is_that_of_the_ship_and_the_faults_exist() -> None:
+def test_the_version_in_the_page_is_that_of_the_ship_and_the_faults_exist():
     version = load_config("configs/ships/thesis_first.yaml", Vessel).version
     assert f"--configuration {version}\n" in TEXT
     table = TEXT.partition("| fault shown | cause |")[2].split("## ")[0]
@@ -56,12 +56,12 @@ def test_the_version_in_the_page_is_that_of_the_ship_and_the_faults_exist() -> N
     assert set(names) <= set(Fault.__members__)
 
 
-def test_links_of_the_page_lead_somewhere() -> None:
+def test_links_of_the_page_lead_somewhere():
     for link in re.findall(r"\]\(([^)#]+)", TEXT):
         assert (PAGE.parent / link).is_file(), link
 
 
-def test_the_stand_in_s_frames_are_accepted() -> None:
+def test_the_stand_in_s_frames_are_accepted():
     script = runpy.run_path("docs/how-to/sensors.py")
     catalogue, database = load_catalogue(), cantools.database.load_file(script["DBC"])
     assert script["catalogue_version"]() == catalogue.version

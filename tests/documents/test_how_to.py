@@ -13,7 +13,6 @@ import re
 import shlex
 import shutil
 import subprocess
-from pathlib import Path
 
 import pytest
 from pages import HOW_TO, ROOT, Block, blocks, run_python
@@ -25,7 +24,7 @@ from utank_hil.cli import app as utank_hil
 COMMANDS = {"utank-hil": utank_hil, "firmware-sim": firmware_sim}
 
 
-def commands(block: Block) -> list[list[str]]:
+def commands(block):
     """The commands of a block that can be run here; none if one of them can't."""
     if block.language != "sh":
         return []
@@ -35,7 +34,7 @@ def commands(block: Block) -> list[list[str]]:
     return found if here else []
 
 
-def walk(page: Path, folder: Path, *, slow: bool) -> None:
+def walk(page, folder, *, slow):
     """Take the steps of a page in a folder, which is the current one."""
     for block in blocks(page.read_text(encoding="utf-8")):
         where = f"{page.name}:{block.line}"
@@ -59,7 +58,7 @@ def walk(page: Path, folder: Path, *, slow: bool) -> None:
                 assert result.exit_code == (int(expected[1]) if expected else 0), said
 
 
-def has_slow_steps(page: Path) -> bool:
+def has_slow_steps(page):
     return any("slow" in block.note.split() for block in blocks(page.read_text(encoding="utf-8")))
 
 
@@ -75,9 +74,7 @@ def has_slow_steps(page: Path) -> bool:
         ),
     ],
 )
-def test_the_steps_of_a_page_work(
-    page: Path, slow: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_steps_of_a_page_work(page, slow, tmp_path, monkeypatch):
     shutil.copytree(ROOT / "configs", tmp_path / "configs")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
@@ -94,9 +91,7 @@ def test_the_steps_of_a_page_work(
     ],
     ids=["missing file", "wrong file", "wrong snippet", "wrong quotation"],
 )
-def test_a_wrong_step_is_found(
-    text: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_wrong_step_is_found(text, why, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     page = tmp_path / "page.md"
     page.write_text(text, encoding="utf-8")
@@ -104,7 +99,7 @@ def test_a_wrong_step_is_found(
         walk(page, tmp_path, slow=True)
 
 
-def test_what_is_a_file_and_what_is_run() -> None:
+def test_what_is_a_file_and_what_is_run():
     (page,) = (each for each in HOW_TO if each.stem == "ship")
     found = blocks(page.read_text(encoding="utf-8"))
     assert [each.file for each in found if each.file] == [

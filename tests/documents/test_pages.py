@@ -3,7 +3,6 @@
 import ast
 import pkgutil
 import re
-from pathlib import Path
 
 import pytest
 from pages import DOCUMENTS, HOW_TO, PAGES, ROOT, blocks
@@ -14,7 +13,7 @@ ROOMS = ["utank_hil", *(each.parent.name for each in (ROOT / "utank_hil").glob("
 MOST_COLUMNS = 100
 
 
-def written(page: Path) -> list[tuple[int, str]]:
+def written(page):
     """Numbered lines of a page that somebody wrote: no tables, fenced blocks, generated parts."""
     fenced = generated = False
     lines = []
@@ -28,19 +27,19 @@ def written(page: Path) -> list[tuple[int, str]]:
     return lines
 
 
-def found(path: str) -> Path | None:
+def found(path):
     """The file of a path as documents write it: from the root, or within a package."""
     return next((folder / path for folder in FOLDERS if (folder / path).exists()), None)
 
 
-def names_of(file: Path) -> set[str]:
+def names_of(file):
     """Names of a module: ``thing``, ``Class``, ``Class.member``; of other files, all words."""
     text = file.read_text(encoding="utf-8")
     if file.suffix != ".py":
         return set(re.findall(r"[\w.]*\w", text))
     names = set()
 
-    def collect(body: list[ast.stmt], owner: str) -> None:
+    def collect(body, owner):
         for node in body:
             if isinstance(node, ast.ClassDef | ast.FunctionDef):
                 names.add(owner + node.name)
@@ -58,7 +57,7 @@ def names_of(file: Path) -> set[str]:
     return names | {name.replace(".__init__.self.", ".") for name in names}
 
 
-def is_name(dotted: str) -> bool:
+def is_name(dotted):
     """Whether a dotted name, from a room or in full, can be imported."""
     for full in (f"utank_hil.{dotted}", dotted):
         try:
@@ -69,7 +68,7 @@ def is_name(dotted: str) -> bool:
     return False
 
 
-def missing(names: list[str], path: str) -> list[str]:
+def missing(names, path):
     """Those of `names` that the file has not; the path itself if there is no such file."""
     file = found(path)
     return [path] if file is None else [name for name in names if name not in names_of(file)]
@@ -87,25 +86,25 @@ MEANT = [
 
 
 @pytest.mark.parametrize("page", [*PAGES, *HOW_TO], ids=lambda page: page.stem)
-def test_a_page_has_three_parts(page: Path) -> None:
+def test_a_page_has_three_parts(page):
     if page.stem not in ("README", "api", "configuration", "glossary", "index", "results"):
         headings = re.findall(r"^## (.*)$", page.read_text(encoding="utf-8"), re.M)
         assert headings[:3] == PARTS
 
 
 @pytest.mark.parametrize("page", DOCUMENTS, ids=lambda page: page.stem)
-def test_lines_are_short_but_in_tables(page: Path) -> None:
+def test_lines_are_short_but_in_tables(page):
     assert [number for number, line in written(page) if len(line) > MOST_COLUMNS] == []
 
 
 @pytest.mark.parametrize("page", DOCUMENTS, ids=lambda page: page.stem)
-def test_links_lead_to_files(page: Path) -> None:
+def test_links_lead_to_files(page):
     links = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
     assert [link for link in links if not (page.parent / link).exists()] == []
 
 
 @pytest.mark.parametrize("page", DOCUMENTS, ids=lambda page: page.stem)
-def test_files_and_names_on_a_page_exist(page: Path) -> None:
+def test_files_and_names_on_a_page_exist(page):
     text = page.read_text(encoding="utf-8")
     made = {block.file for block in blocks(text)}
     made |= set(re.findall(r"^--- (\S+)$", text, re.M))  # by the changes that a page shows
@@ -124,17 +123,17 @@ def test_files_and_names_on_a_page_exist(page: Path) -> None:
     assert [name for name in names if not is_name(name)] == []
 
 
-def test_the_table_of_places_is_right() -> None:
+def test_the_table_of_places_is_right():
     assert len(WHERE) > 25
     assert [missing([name], path) for path, name in WHERE if missing([name], path)] == []
 
 
-def test_the_glossary_s_places_are_right() -> None:
+def test_the_glossary_s_places_are_right():
     assert len(MEANT) > 40
     assert [missing(names, path) for names, path in MEANT if missing(names, path)] == []
 
 
-def test_a_wrong_place_is_found() -> None:
+def test_a_wrong_place_is_found():
     limiter = "control/limiter.py"
     assert missing(["CommandLimiter._barrier_pa"], limiter) == []
     assert missing(["PumpLimits.level_m"], "control/interface.py") == []

@@ -2,12 +2,10 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from browsing import A4_PX, DESK, PHONE, WIDE, of_color, opened, pixels
 from pages import ROOT
-from playwright.sync_api import Browser
 
 from utank_hil.pictures.style import COLORS
 
@@ -20,7 +18,7 @@ LEAST_SHARE = 0.5
 
 
 @pytest.fixture(scope="module")
-def site() -> Path:
+def site():
     """The folder of pages that `make site` writes; written anew if a page or the style is newer."""
     folder, made = ROOT / "out" / "site", ROOT / ".cache" / "site" / "environment.pickle"
     sources = [*ROOT.glob("*.md"), *(file for file in (ROOT / "docs").rglob("*") if file.is_file())]
@@ -34,9 +32,7 @@ def site() -> Path:
 
 @pytest.mark.evidence
 @pytest.mark.parametrize("name", PAGES)
-def test_nothing_of_a_page_is_cut_and_it_asks_for_nothing(
-    browser: Browser, site: Path, name: str
-) -> None:
+def test_nothing_of_a_page_is_cut_and_it_asks_for_nothing(browser, site, name):
     with opened(browser, (site / f"{name}.html").as_uri(), DESK) as seen:
         seen.page.wait_for_load_state("load")
         for width in (DESK, WIDE, PHONE):
@@ -55,7 +51,7 @@ def test_nothing_of_a_page_is_cut_and_it_asks_for_nothing(
 
 
 @pytest.mark.evidence
-def test_a_phone_breaks_names_in_tables_at_blanks_alone(browser: Browser, site: Path) -> None:
+def test_a_phone_breaks_names_in_tables_at_blanks_alone(browser, site):
     with opened(browser, (site / "README.html").as_uri(), PHONE) as seen:
         seen.page.wait_for_load_state("load")
         names = seen.page.locator("td code")
@@ -68,7 +64,7 @@ def test_a_phone_breaks_names_in_tables_at_blanks_alone(browser: Browser, site: 
 
 
 @pytest.mark.evidence
-def test_the_gallery_shows_its_curves(browser: Browser, site: Path) -> None:
+def test_the_gallery_shows_its_curves(browser, site):
     with opened(browser, (site / "thesis.html").as_uri(), DESK) as seen:
         seen.page.wait_for_load_state("load")
         pictures = seen.page.locator("article img").all()

@@ -4,12 +4,11 @@ Those of the how-to pages are run by `test_how_to`, among the files that the pag
 """
 
 import re
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from pages import DOCUMENTS, HOW_TO, ROOT, Block, blocks, run_python
+from pages import DOCUMENTS, HOW_TO, ROOT, blocks, run_python
 
 pytestmark = pytest.mark.slow
 
@@ -29,15 +28,13 @@ SNIPPETS = [
         if page not in HOW_TO
     ],
 )
-def test_snippet_runs_as_typed(
-    page: Path, block: Block, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_snippet_runs_as_typed(page, block, tmp_path, monkeypatch):
     (tmp_path / "configs").symlink_to(ROOT / "configs")
     monkeypatch.chdir(tmp_path)
     run_python(page, block)
 
 
-def test_the_loop_of_the_readme_is_stable_and_rolls_less_than_the_passive_tank() -> None:
+def test_the_loop_of_the_readme_is_stable_and_rolls_less_than_the_passive_tank():
     """Ten minutes of it, from its roll of one degree; a law that acts too late diverges in two."""
     (block,) = (block for page, block in SNIPPETS if page.name == "README.md")
     begun: dict[str, Any] = {}
@@ -55,7 +52,7 @@ def test_the_loop_of_the_readme_is_stable_and_rolls_less_than_the_passive_tank()
     assert abs(begun["y"][0]) < np.radians(0.5)  # what its own minute ends with
 
 
-def test_no_snippet_is_overlooked() -> None:
+def test_no_snippet_is_overlooked():
     fences = sum(
         bool(re.match(r"\s*```+\s*py", line))
         for page in DOCUMENTS
@@ -64,7 +61,7 @@ def test_no_snippet_is_overlooked() -> None:
     assert fences == len(SNIPPETS) > 5
 
 
-def test_a_wrong_snippet_fails_at_its_line(tmp_path: Path) -> None:
+def test_a_wrong_snippet_fails_at_its_line(tmp_path):
     page = tmp_path / "wrong.md"
     page.write_text("text\n\n```python\nx = 1\nprint(y)\n```\n")
     (block,) = blocks(page.read_text())

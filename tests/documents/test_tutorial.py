@@ -4,7 +4,6 @@ import json
 import math
 import re
 import shutil
-from pathlib import Path
 
 import pytest
 from pages import ROOT, blocks
@@ -22,29 +21,29 @@ class ClosedAtOnce:
     url = None
     failed = False
 
-    def __init__(self, source: Path | str, at_s: float | None = None) -> None:
+    def __init__(self, source, at_s=None):
         shown.append((str(source), at_s))
 
-    def __enter__(self) -> "ClosedAtOnce":
+    def __enter__(self):
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *_):
         pass
 
-    def wait(self, longest_s: float) -> bool:
+    def wait(self, longest_s):
         return True
 
 
 shown: list[tuple[str, float | None]] = []
 
 
-def table_rows(text: str) -> dict[str, float]:
+def table_rows(text):
     """Roll by run, of a table as it is printed."""
     return {name: float(roll) for name, roll in re.findall(r"│ ([\w ]+?) +│ +([\d.]+) │", text)}
 
 
 @pytest.mark.slow
-def test_its_quick_commands_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_its_quick_commands_work(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     walk(PAGE, tmp_path, slow=False)
     assert (tmp_path / "patrol" / "narrow").is_dir()
@@ -52,7 +51,7 @@ def test_its_quick_commands_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.evidence
 @pytest.mark.timeout(900)
-def test_its_commands_give_its_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_its_commands_give_its_figures(tmp_path, monkeypatch):
     shutil.copytree(ROOT / "configs", tmp_path / "configs")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(viewer, "open_viewer", ClosedAtOnce)
@@ -76,7 +75,7 @@ def test_its_commands_give_its_figures(tmp_path: Path, monkeypatch: pytest.Monke
     assert "a signal that stands still" in (tmp_path / "patrol/faulty/report.html").read_text()
 
 
-def test_no_command_of_it_is_left_out() -> None:
+def test_no_command_of_it_is_left_out():
     """Those that are not walked are of `make`, which has them, or need a bus or two terminals."""
     made = re.findall(r"^make (\w+)$", PAGE.read_text(encoding="utf-8"), re.M)
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")

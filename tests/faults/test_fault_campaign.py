@@ -5,7 +5,6 @@ import math
 import os
 import signal
 import time
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -21,22 +20,19 @@ from typer.testing import CliRunner
 
 from firmware_sim.commands import faults as commands
 from firmware_sim.fault_campaign import runner
-from firmware_sim.fault_campaign.campaign import Campaign, Limit, Row, Trial
+from firmware_sim.fault_campaign.campaign import Campaign, Limit, Row
 from firmware_sim.fault_campaign.runner import run_rows
-from firmware_sim.fault_campaign.trial import Outcome, Sea, Window, in_a_copy, times_of
-from firmware_sim.fault_campaign.verdict import Result, judged
-from firmware_sim.fault_campaign.watch import BusLog, Heard, Watch, first_difference
-from firmware_sim.faulty_bench import FaultyBench
+from firmware_sim.fault_campaign.trial import Sea, Window, in_a_copy, times_of
+from firmware_sim.fault_campaign.verdict import judged
+from firmware_sim.fault_campaign.watch import BusLog, Watch, first_difference
 from firmware_sim.scenario import Scenario
 from utank_hil.assembly import build_law
 from utank_hil.canbus import Fault, Mode
-from utank_hil.canbus.measurements import Measurements
 from utank_hil.configuration import ConfigError, load_config
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.configuration.files import problems_in_words
 from utank_hil.console.common import KILLED
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.control import BuiltLaw
 from utank_hil.control.limiter import CommandLimiter
 from utank_hil.nodes.running_law import RunningLaw
 from utank_hil.safety.faults import FAULTS
@@ -46,7 +42,7 @@ from utank_hil.safety.supervisor import Supervisor
 commands_load = commands.load
 
 
-def test_what_a_requirement_says_shows_it_is_there() -> None:
+def test_what_a_requirement_says_shows_it_is_there():
     for each in CAMPAIGN.requirements:
         for place in each.elsewhere.split(", "):
             assert not place or Path(place.strip("`")).exists()
@@ -55,7 +51,7 @@ def test_what_a_requirement_says_shows_it_is_there() -> None:
 TEXT = Path("configs/faults/campaign.yaml").read_text()
 
 
-def problems_of(text: str) -> list[str]:
+def problems_of(text):
     """Keys of what is wrong in a campaign with other text, its setups left as they are."""
     content = yaml.load(text, yaml.CSafeLoader) | {"setups": CAMPAIGN.setups}
     with pytest.raises(ValidationError) as caught:
@@ -83,12 +79,12 @@ def problems_of(text: str) -> list[str]:
         ("roll: 1.5, roll_window_s: 600", "roll_window_s: 1.0e+300", "rows.58.limit.roll_window_s"),
     ],
 )
-def test_what_is_wrong_in_a_campaign_is_named(old: str, new: str, key: str) -> None:
+def test_what_is_wrong_in_a_campaign_is_named(old, new, key):
     assert old in TEXT
     assert any(problem.startswith(key) for problem in problems_of(TEXT.replace(old, new)))
 
 
-def test_a_controller_that_the_scenario_lacks_is_named_in_its_file(tmp_path: Path) -> None:
+def test_a_controller_that_the_scenario_lacks_is_named_in_its_file(tmp_path):
     """The one wrong campaign that is read as a command reads it, scenarios and all."""
     scenarios = Path("configs/scenarios").resolve()
     text = TEXT.replace("controller: on_off", "controller: off")
@@ -99,7 +95,7 @@ def test_a_controller_that_the_scenario_lacks_is_named_in_its_file(tmp_path: Pat
     assert [each.key for each in caught.value.problems] == ["setups.valve.controller"]
 
 
-def test_any_hundred_seas_have_each_phase_of_a_second_and_any_five_each_of_50_ms() -> None:
+def test_any_hundred_seas_have_each_phase_of_a_second_and_any_five_each_of_50_ms():
     ticks = [round(100 * CAMPAIGN.fault_at_s(seed)) for seed in range(1, 301)]
     for first in range(200):
         assert len({tick % 100 for tick in ticks[first : first + 100]}) == 100
@@ -119,16 +115,12 @@ def test_any_hundred_seas_have_each_phase_of_a_second_and_any_five_each_of_50_ms
         ("rate-stuck", 1.0, 41.0, None, None),
     ],
 )
-def test_from_when_a_row_counts(
-    row: str, active_s: float, over_s: float | None, found_s: float | None, found_ms: float | None
-) -> None:
+def test_from_when_a_row_counts(row, active_s, over_s, found_s, found_ms):
     first_s = {"active": active_s, "found": found_s}
     assert times(row, first_s, over_s, 40.0).get("found") == found_ms
 
 
-def times(
-    row: str, first_s: Mapping[str, float | None], over_s: float | None, pressed_s: float
-) -> dict[str, float]:
+def times(row, first_s, over_s, pressed_s):
     """Times of a row whose fault began at 40 s."""
     first_ns = {name: round(each * 1e9) for name, each in first_s.items() if each is not None}
     over_ns = None if over_s is None else round(over_s * 1e9)
@@ -136,7 +128,7 @@ def times(
     return times_of(ROWS[row], cast(Any, watch), BusLog(), 40_000_000_000)
 
 
-def test_what_is_found_before_it_counts_has_no_more_time_to_zero() -> None:
+def test_what_is_found_before_it_counts_has_no_more_time_to_zero():
     found = times("rate-stuck", {"active": 1.0, "found": 41.0}, 51.0, 43.0)
     assert (found["found"], found["zero"]) == (0.0, 2010.0)
 
@@ -144,7 +136,7 @@ def test_what_is_found_before_it_counts_has_no_more_time_to_zero() -> None:
 @pytest.mark.evidence("motion-silent")
 @pytest.mark.slow
 @pytest.mark.parametrize("row", ["motion-silent", "tank-silent"])
-def test_a_ramp_that_is_a_cut_is_not_passed(row: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_ramp_that_is_a_cut_is_not_passed(row, monkeypatch):
     assert verdict(row, outcome_of(ROWS[row])).passed
     monkeypatch.setattr(CommandLimiter, "ramp_to_zero", CommandLimiter.cut)
     problems = verdict(row, outcome_of(ROWS[row])).problems
@@ -152,7 +144,7 @@ def test_a_ramp_that_is_a_cut_is_not_passed(row: str, monkeypatch: pytest.Monkey
 
 
 @pytest.mark.slow
-def test_what_the_operator_does_is_not_taken_for_the_fault() -> None:
+def test_what_the_operator_does_is_not_taken_for_the_fault():
     accepts = {"time_s": 0.1, "action": "accept"}
     beyond = {"kind": "lost", "message": "SENSOR_MOTION", "at_s": 3.999, "for_s": 0.0005}
     assert outcome_of(row_of("none", inject=(beyond,), operator=(accepts,))).wire == ""
@@ -162,21 +154,21 @@ def test_what_the_operator_does_is_not_taken_for_the_fault() -> None:
 @pytest.mark.evidence("3")
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 3])
-def test_a_fault_that_changes_nothing_is_not_on_the_bus(seed: int) -> None:
+def test_a_fault_that_changes_nothing_is_not_on_the_bus(seed):
     """Whatever the phase of the messages' cycles in which it begins."""
     rare = {"kind": "bit_errors", "share": 1e-12}
     outcome = outcome_of(row_of("none", inject=(rare,)), seed=seed)
     assert outcome.wire == ""
 
 
-def row_of(reaction: str, **fault: object) -> Row:
+def row_of(reaction, **fault):
     """A row that asks for a reaction to what is done."""
     return Row.model_validate(
         {"id": "row", "meets": ("F01",), "fault": fault, "expect": {"reaction": reaction}}
     )
 
 
-def begun(sea: Sea, row: Row) -> tuple[FaultyBench, list[Heard]]:
+def begun(sea, row):
     """A bench with the faults of a row in it, and the log of its bus."""
     underway = sea._start() if row.fault.from_start else sea._underway
     bench = underway.bench
@@ -185,13 +177,13 @@ def begun(sea: Sea, row: Row) -> tuple[FaultyBench, list[Heard]]:
     return bench, underway.log.frames
 
 
-def frames(sea: Sea, row: Row, seconds: float) -> list[Heard]:
+def frames(sea, row, seconds):
     bench, log = begun(sea, row)
     bench.run(bench.lockstep.now_ns + round(seconds * 1e9))
     return log
 
 
-def differs(sea: Sea, row: Row, whole: list[Heard], seconds: float) -> bool:
+def differs(sea, row, whole, seconds):
     """Whether the bus of a row differs from another's, second by second up to where it does."""
     bench, log = begun(sea, row)
     for _ in range(math.ceil(seconds)):
@@ -210,7 +202,7 @@ def differs(sea: Sea, row: Row, whole: list[Heard], seconds: float) -> bool:
         if len(row.fault.inject) > 1
     ],
 )
-def test_of_a_row_with_several_faults_each_is_on_the_bus(name: str) -> None:
+def test_of_a_row_with_several_faults_each_is_on_the_bus(name):
     """A row that needs them all could otherwise pass with one of them."""
     row = ROWS[name]
     sea = sea_of(row.fault.setup, 1, False)
@@ -228,12 +220,12 @@ def test_of_a_row_with_several_faults_each_is_on_the_bus(name: str) -> None:
         assert seen, f"without fault {index} nothing is different"
 
 
-def _after(seconds: float, mode: Mode) -> Callable[[Supervisor, Measurements, int], None]:
+def _after(seconds, mode):
     """What a supervisor does in FAULT that leaves it by itself."""
     since: dict[int, int] = {}
     sound = Supervisor._while_faulted
 
-    def while_faulted(self: Supervisor, seen: Measurements, now_ns: int) -> None:
+    def while_faulted(self, seen, now_ns):
         sound(self, seen, now_ns)
         if now_ns - since.setdefault(id(self), now_ns) >= seconds * 1e9:
             self.mode = mode
@@ -255,16 +247,14 @@ def _after(seconds: float, mode: Mode) -> Callable[[Supervisor, Measurements, in
         (DriveFollowing, "update", lambda *_, **__: 0, "pump-stalled", "was not found"),
     ],
 )
-def test_a_controller_that_is_broken_passes_no_row(
-    owner: type, name: str, broken: object, row: str, words: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_controller_that_is_broken_passes_no_row(owner, name, broken, row, words, monkeypatch):
     monkeypatch.setattr(owner, name, broken)
     outcome = outcome_of(ROWS[row], patient=True)
     assert any(words in why for why in verdict(row, outcome).problems)
 
 
 @pytest.mark.slow
-def test_a_pump_that_was_wrong_for_long_was_to_be_found_then() -> None:
+def test_a_pump_that_was_wrong_for_long_was_to_be_found_then():
     """The count does not begin anew with each time that the command crosses the pressure."""
     bench: Any = SimpleNamespace(
         node=SimpleNamespace(
@@ -298,7 +288,7 @@ def test_a_pump_that_was_wrong_for_long_was_to_be_found_then() -> None:
 
 
 @pytest.mark.slow
-def test_what_the_drive_refuses_is_counted() -> None:
+def test_what_the_drive_refuses_is_counted():
     beyond = {
         "kind": "value",
         "message": "PUMP_CMD",
@@ -310,7 +300,7 @@ def test_what_the_drive_refuses_is_counted() -> None:
 
 
 @pytest.mark.slow
-def test_who_arms_by_himself_once_the_bus_is_no_longer_followed_is_found_all_the_same() -> None:
+def test_who_arms_by_himself_once_the_bus_is_no_longer_followed_is_found_all_the_same():
     pressed = ((3.0, "disarm"), (4.0, "reset"), (6.0, "arm"))
     row = row_of(
         "ramp",
@@ -323,7 +313,7 @@ def test_who_arms_by_himself_once_the_bus_is_no_longer_followed_is_found_all_the
 
 
 @pytest.mark.slow
-def test_where_nobody_arms_nothing_is_found() -> None:
+def test_where_nobody_arms_nothing_is_found():
     fault = {"kind": "value", "message": "OPERATOR_CMD", "values": {"arm": False}}
     row = row_of("stop", inject=(fault,), from_start=True)
     outcome = outcome_of(row)
@@ -331,7 +321,7 @@ def test_where_nobody_arms_nothing_is_found() -> None:
     assert "seed 1: was not found" in judged(CAMPAIGN, row, [outcome]).problems
 
 
-def test_first_difference_of_two_logs() -> None:
+def test_first_difference_of_two_logs():
     log = [(1, 2, b"a"), (3, 2, b"b")]
     assert first_difference(log, log, 10) is None
     assert first_difference(log, [log[0], (3, 2, b"c")], 10) == (log[1], (3, 2, b"c"))
@@ -339,7 +329,7 @@ def test_first_difference_of_two_logs() -> None:
     assert first_difference(log, log[:1], 3) is None  # as far as both were followed
 
 
-def test_a_copy_of_the_process_hands_back_what_it_did_and_changes_nothing() -> None:
+def test_a_copy_of_the_process_hands_back_what_it_did_and_changes_nothing():
     kept: list[int] = []
     assert in_a_copy(lambda: kept.append(1) or len(kept)) == 1
     assert not kept
@@ -350,7 +340,7 @@ def test_a_copy_of_the_process_hands_back_what_it_did_and_changes_nothing() -> N
 
 
 @pytest.mark.evidence
-def test_a_stopped_ship_alone_rolls_as_she_does_on_the_bench() -> None:
+def test_a_stopped_ship_alone_rolls_as_she_does_on_the_bench():
     row = ROWS["motion-silent"]
     alone, bench = (
         outcome_of(row.model_copy(update={"fault": trial(row, followed_s=followed_s)}))
@@ -359,12 +349,12 @@ def test_a_stopped_ship_alone_rolls_as_she_does_on_the_bench() -> None:
     assert alone.variance == pytest.approx(bench.variance, rel=1e-9)
 
 
-def trial(row: Row, **changes: object) -> Trial:
+def trial(row, **changes):
     return row.fault.model_copy(update=changes)
 
 
 @cache
-def sea_of(setup: str, seed: int, patient: bool) -> Sea:
+def sea_of(setup, seed, patient):
     """A ship under way: what is done to it is done to copies."""
     whole = CAMPAIGN.setups[setup]
     law = law_of(setup)
@@ -372,17 +362,17 @@ def sea_of(setup: str, seed: int, patient: bool) -> Sea:
 
 
 @cache
-def law_of(setup: str) -> BuiltLaw:
+def law_of(setup):
     return build_law(CAMPAIGN.setups[setup].config)
 
 
-def outcome_of(row: Row, *, seed: int = 1, patient: bool = False) -> Outcome:
+def outcome_of(row, *, seed=1, patient=False):
     sea = sea_of(row.fault.setup, seed, patient)
     sea.prepare([row])
     return sea.outcome(row)
 
 
-def quick_rows() -> list[Row]:
+def quick_rows():
     """Rows of a few seconds that are the first of a requirement, or of a fault's name."""
     seen: set[str] = set()
     rows = []
@@ -395,7 +385,7 @@ def quick_rows() -> list[Row]:
     return rows
 
 
-def results_of(rows: Sequence[Row], window: Window) -> dict[str, Result]:
+def results_of(rows, window):
     # each task begins with a passive ship's ten minutes
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(runner, "ROWS_A_TASK", 100)
@@ -404,11 +394,11 @@ def results_of(rows: Sequence[Row], window: Window) -> dict[str, Result]:
 
 
 @pytest.fixture(scope="module")
-def results() -> dict[str, Result]:
+def results():
     return results_of([row for row in CAMPAIGN.rows if not row.long], Window(60.0, 20.0))
 
 
-def assert_all_passed(results: Mapping[str, Result]) -> None:
+def assert_all_passed(results):
     failed = {name: each.problems for name, each in results.items() if not each.passed}
     # the mean of several seas is asked for, and one of them need not be
     assert all(why.startswith("rolls 1.") for why in failed.pop("both-signs-from-start", ()))
@@ -419,19 +409,17 @@ def assert_all_passed(results: Mapping[str, Result]) -> None:
 
 
 @pytest.mark.slow
-def test_quick_rows_are_passed_in_one_sea() -> None:
+def test_quick_rows_are_passed_in_one_sea():
     assert_all_passed(results_of(quick_rows(), Window(20.0, 8.0)))
 
 
 @pytest.mark.evidence
-def test_every_row_is_passed_in_one_sea_and_its_fault_was_on_the_bus(
-    results: dict[str, Result],
-) -> None:
+def test_every_row_is_passed_in_one_sea_and_its_fault_was_on_the_bus(results):
     assert_all_passed(results)
 
 
 @pytest.mark.evidence
-def test_every_fault_of_the_table_was_the_name_of_one(results: dict[str, Result]) -> None:
+def test_every_fault_of_the_table_was_the_name_of_one(results):
     named = {code for each in results.values() for code in each.codes}
     named |= {
         each.row.expect.codes[0]
@@ -444,7 +432,7 @@ def test_every_fault_of_the_table_was_the_name_of_one(results: dict[str, Result]
 
 @pytest.mark.evidence
 @pytest.mark.usefixtures("one_process")
-def test_the_same_rows_again_give_the_same_to_the_last_digit(results: dict[str, Result]) -> None:
+def test_the_same_rows_again_give_the_same_to_the_last_digit(results):
     names = ("noise-10-fold", "flood-80-percent", "gateway-loses-5-percent", "rate-stuck")
     again = run_rows(
         CAMPAIGN, [ROWS[name] for name in names], [1], Window(60.0, 20.0), lambda _: None,
@@ -455,16 +443,16 @@ def test_the_same_rows_again_give_the_same_to_the_last_digit(results: dict[str, 
 
 
 @pytest.fixture(autouse=True)
-def read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def read_once(monkeypatch):
     """The fault table is read once for all commands; other campaigns are read by each."""
 
-    def load(path: Path, kind: type[Campaign]) -> Campaign:
+    def load(path, kind):
         return CAMPAIGN if path == commands.CAMPAIGN else commands_load(path, kind)
 
     monkeypatch.setattr(commands, "load", load)
 
 
-def invoke(*arguments: str):
+def invoke(*arguments):
     app = typer.Typer()
     app.command()(commands.faults)
     return CliRunner().invoke(app, arguments)
@@ -472,7 +460,7 @@ def invoke(*arguments: str):
 
 @pytest.mark.evidence
 @pytest.mark.usefixtures("one_process")
-def test_command_prints_one_object() -> None:
+def test_command_prints_one_object():
     done = invoke("--rows", "roll-spike,F26", "--seeds", "1", "--json")
     assert done.exit_code == ExitCode.OK, done.output
     told = json.loads(done.stdout)
@@ -485,9 +473,7 @@ def test_command_prints_one_object() -> None:
 
 
 @pytest.mark.parametrize(("found_ms", "late"), [(500.0, False), (1e6, True)])
-def test_a_row_that_fails_is_told_by_the_exit_code(
-    found_ms: float, late: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_row_that_fails_is_told_by_the_exit_code(found_ms, late, monkeypatch):
     outcome = replace(GOOD, found=found_ms)
     monkeypatch.setattr(runner, "run_rows", lambda *_, **__: {GOOD.row: [outcome]})
     done = invoke("--rows", GOOD.row, "--seeds", "1")
@@ -500,11 +486,9 @@ def test_a_row_that_fails_is_told_by_the_exit_code(
     [(True, ExitCode.INTERRUPTED, "interrupted"), (False, ExitCode.SYSTEM, KILLED)],
 )
 def test_a_campaign_that_ends_early_judges_no_row_that_lacks_a_sea_and_says_why(
-    signalled: bool, code: ExitCode, why: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def run_rows(
-        _: Campaign, rows: Sequence[Row], seeds: Sequence[int], *__: object, **___: object
-    ) -> dict[str, list[Outcome]]:
+    signalled, code, why, monkeypatch
+):
+    def run_rows(_, rows, seeds, *__, **___):
         if signalled:
             os.kill(os.getpid(), signal.SIGINT)
         whole = [replace(GOOD, seed=seed) for seed in seeds]
@@ -522,12 +506,10 @@ def test_a_campaign_that_ends_early_judges_no_row_that_lacks_a_sea_and_says_why(
     ("arguments", "run"),
     [([], False), (["--full"], True), (["--seeds", "20"], False), (["--rows", "gm-"], True)],
 )
-def test_rows_that_take_long_are_left_out_unless_they_are_asked_for(
-    monkeypatch: pytest.MonkeyPatch, arguments: list[str], run: bool
-) -> None:
+def test_rows_that_take_long_are_left_out_unless_they_are_asked_for(monkeypatch, arguments, run):
     asked: list[Row] = []
 
-    def rows_of(_: Campaign, rows: list[Row], *args: object, **named: object) -> dict[str, list]:
+    def rows_of(_, rows, *args, **named):
         asked.extend(rows)
         return {row.id: [] for row in rows}
 
@@ -544,7 +526,7 @@ def test_rows_that_take_long_are_left_out_unless_they_are_asked_for(
                                                   (["--rows", "F12,motoin"], "motoin"),
                                                   (["--rows", "F27"], "tests show all of them"),
                                                   (["none.yaml"], "none.yaml")])  # fmt: skip
-def test_wrong_arguments_are_refused(arguments: list[str], words: str) -> None:
+def test_wrong_arguments_are_refused(arguments, words):
     done = invoke(*arguments)
     assert done.exit_code == ExitCode.USAGE
     assert words in done.output
@@ -554,7 +536,7 @@ def test_wrong_arguments_are_refused(arguments: list[str], words: str) -> None:
     ("row", "found_ms"),
     [("canopen-four-of-five-commands-lost", 100), ("canopen-heartbeat-lost", 180)],
 )
-def test_a_drive_of_another_maker_that_misses_frames_is_stopped(row: str, found_ms: float) -> None:
+def test_a_drive_of_another_maker_that_misses_frames_is_stopped(row, found_ms):
     assert ROWS[row].limit.found_ms == found_ms
     outcome = outcome_of(ROWS[row], patient=True)
     assert outcome.code == "DRIVE_SILENT"
@@ -562,7 +544,7 @@ def test_a_drive_of_another_maker_that_misses_frames_is_stopped(row: str, found_
 
 
 @pytest.mark.slow
-def test_rows_run_on_another_ship() -> None:
+def test_rows_run_on_another_ship():
     patti = "configs/scenarios/patti_b.yaml"
     rows = "F35,F31,motion-zero,motion-silent-of-two,panel-replayed,pump-stuck-and,level-spike"
     done = invoke("--scenario", patti, "--seeds", "1", "--json", "--rows", rows)
@@ -584,7 +566,7 @@ def test_rows_run_on_another_ship() -> None:
     assert all(setup.config.vessel.ship == ship.vessel.ship for setup in moved.setups.values())
 
 
-def test_a_fault_is_as_large_for_another_ship_as_for_the_first() -> None:
+def test_a_fault_is_as_large_for_another_ship_as_for_the_first():
     ship = load_config(Path("configs/scenarios/patti_b.yaml"), Scenario)
     moved = {row.id: row for row in CAMPAIGN.on(ship, "constrained").rows}
     rows = {row.id: row for row in CAMPAIGN.rows}
@@ -607,10 +589,10 @@ def test_a_fault_is_as_large_for_another_ship_as_for_the_first() -> None:
         row.id: row
         for row in CAMPAIGN.on(ship.model_copy(update={"sensors": quiet}), "constrained").rows
     }["noise-10-fold"]
-    assert row.fault.inject[0].deviation == pytest.approx(0.001)  # type: ignore[union-attr]
+    assert row.fault.inject[0].deviation == pytest.approx(0.001)
 
 
-def test_an_own_ship_with_its_law_is_compared_over_five_rolls() -> None:
+def test_an_own_ship_with_its_law_is_compared_over_five_rolls():
     setup = CAMPAIGN.setups["pump"]
     ship = setup.scenario.vessel.ship
     assert commands._window(CAMPAIGN) == Window(600.0, 63.0)  # of 12.6 s
@@ -623,7 +605,7 @@ def test_an_own_ship_with_its_law_is_compared_over_five_rolls() -> None:
         assert commands._window(own) == Window(600.0, window_s)
 
 
-def test_of_a_device_without_counters_no_row_asks_for_what_only_they_show() -> None:
+def test_of_a_device_without_counters_no_row_asks_for_what_only_they_show():
     storm = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
     bought = {"profile": "sbg_ellipse", "accept_unprotected": True}
     drive = {"profile": "cia402", "node": 5, "mode": "torque", "pressure_pa_per_unit": 80.0,
@@ -638,7 +620,7 @@ def test_of_a_device_without_counters_no_row_asks_for_what_only_they_show() -> N
     assert dropped <= kept - left
 
 
-def test_a_scenario_can_not_spoil_what_a_device_does_not_send() -> None:
+def test_a_scenario_can_not_spoil_what_a_device_does_not_send():
     storm = load_config(Path("configs/scenarios/storm.yaml"), Scenario).model_dump(mode="json")
     bought = {"profile": "sbg_ellipse", "accept_unprotected": True}
     storm["vessel"]["devices"] = DevicesSection(motion=bought).model_dump(mode="json")

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import matplotlib.image
 import numpy as np
@@ -19,7 +18,7 @@ BLUE = np.array([0x00, 0x72, 0xB2]) / 255
 YELLOW_BAND = np.array([0xF0, 0xE4, 0x42]) / 255 * 0.35 + 0.65
 
 
-def curve(name: str, seconds: float, amplitude_rad: float, peak_s: float) -> BenchCurve:
+def curve(name, seconds, amplitude_rad, peak_s):
     """A roll with one sample twice as high as the others."""
     time_s = np.arange(0.0, seconds, 0.2)
     roll = amplitude_rad * np.sin(0.5 * time_s)
@@ -27,16 +26,16 @@ def curve(name: str, seconds: float, amplitude_rad: float, peak_s: float) -> Ben
     return BenchCurve(name, time_s, roll, 10 * roll, 1e5 * roll)
 
 
-def pixels(image: np.ndarray, color: np.ndarray) -> np.ndarray:
+def pixels(image, color):
     close: np.ndarray = np.abs(image[..., :3] - color).max(axis=-1) < 0.02
     return close
 
 
-def read(path: Path) -> np.ndarray:
+def read(path):
     return np.asarray(matplotlib.image.imread(path))
 
 
-def test_the_zoom_is_around_the_largest_roll_of_the_first_run(tmp_path: Path) -> None:
+def test_the_zoom_is_around_the_largest_roll_of_the_first_run(tmp_path):
     centres = []
     for peak_s in (300.0, 1500.0):
         curves = [curve("passive", 1800.0, 0.1, peak_s), curve("active", 1800.0, 0.05, 700.0)]
@@ -48,7 +47,7 @@ def test_the_zoom_is_around_the_largest_roll_of_the_first_run(tmp_path: Path) ->
     assert centres[1] - centres[0] == pytest.approx(1200 / 1800 * panel, rel=0.05)
 
 
-def test_a_short_run_needs_no_zoom(tmp_path: Path) -> None:
+def test_a_short_run_needs_no_zoom(tmp_path):
     long, short = (
         read(draw_bench([curve("passive", seconds, 0.1, 50.0)], tmp_path / "a.png", "A run"))
         for seconds in (400.0, 100.0)
@@ -58,7 +57,7 @@ def test_a_short_run_needs_no_zoom(tmp_path: Path) -> None:
     assert short.shape[1] < long.shape[1]
 
 
-def test_the_ship_without_a_tank_is_drawn_and_arming_and_fault_are_marked(tmp_path: Path) -> None:
+def test_the_ship_without_a_tank_is_drawn_and_arming_and_fault_are_marked(tmp_path):
     passive, active = curve("passive", 300.0, 0.1, 50.0), curve("active", 300.0, 0.05, 50.0)
     plain = read(draw_bench([passive, active], tmp_path / "a.png", "A run"))
     empty = np.full_like(passive.time_s, np.nan)
@@ -81,7 +80,7 @@ def test_the_ship_without_a_tank_is_drawn_and_arming_and_fault_are_marked(tmp_pa
 
 
 @pytest.mark.evidence
-def test_what_retuning_did_is_a_lane_and_the_zoom_is_around_its_trial(tmp_path: Path) -> None:
+def test_what_retuning_did_is_a_lane_and_the_zoom_is_around_its_trial(tmp_path):
     curves = [curve("passive", 1800.0, 0.1, 300.0), curve("active", 1800.0, 0.05, 700.0)]
     plain = read(draw_bench(curves, tmp_path / "a.png", "A storm"))
     centres = []
@@ -106,13 +105,13 @@ def test_what_retuning_did_is_a_lane_and_the_zoom_is_around_its_trial(tmp_path: 
     assert centres[1] - centres[0] == pytest.approx(300.0 * a_second, rel=0.05)
 
 
-def test_more_runs_than_colours_are_refused(tmp_path: Path) -> None:
+def test_more_runs_than_colours_are_refused(tmp_path):
     for number in (0, len(COLORS) + 1):
         with pytest.raises(ValueError, match=f"got {number}"):
             draw_bench([curve("a", 10.0, 0.1, 5.0)] * number, tmp_path / "a.png", "None")
 
 
-def test_the_controller_process_can_import_the_ring_without_rerun_or_matplotlib() -> None:
+def test_the_controller_process_can_import_the_ring_without_rerun_or_matplotlib():
     code = """
 import sys
 import utank_hil.telemetry.recorder, utank_hil.telemetry.ring, utank_hil.telemetry.viewer

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 pytestmark = pytest.mark.slow
 
 
-def sound() -> Figure:
+def sound():
     figure = Figure(figsize=(6.0, 4.0), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
@@ -20,11 +20,11 @@ def sound() -> Figure:
     return figure
 
 
-def test_a_sound_picture_has_none() -> None:
+def test_a_sound_picture_has_none():
     assert flaws(sound()) == []
 
 
-def test_each_flaw_is_found() -> None:
+def test_each_flaw_is_found():
     cut, overlapping, covered, ticks, hidden, small, grey = (sound() for _ in range(7))
     cut.text(0.98, 0.5, "a long word")
     overlapping.text(0.5, 0.52, "one")

@@ -8,11 +8,11 @@ from utank_hil.telemetry.blueprint import _PALETTE, MOST_SHADES, run_color
 from utank_hil.telemetry.scene import HULL, LIMIT, PUMP, SEA, TWIN, WATER
 
 
-def shade(color: tuple[int, int, int]) -> tuple[float, ...]:
+def shade(color):
     return tuple(part / 255 for part in color)
 
 
-def test_differences_are_those_of_the_colour_space() -> None:
+def test_differences_are_those_of_the_colour_space():
     for grey in (False, True):
         assert difference("black", "white", grey=grey) == pytest.approx(100.0, abs=0.01)
         assert difference("#777777", "#777777", grey=grey) == 0
@@ -25,11 +25,11 @@ def test_differences_are_those_of_the_colour_space() -> None:
 
 
 @pytest.mark.parametrize("grey", [False, True])
-def test_the_runs_of_a_picture_are_told_apart(grey: bool) -> None:
+def test_the_runs_of_a_picture_are_told_apart(grey):
     assert alike(list(zip(COLORS, DASHES, strict=True)), grey=grey) == []
 
 
-def test_the_runs_and_signals_of_a_viewers_plot_are_told_apart() -> None:
+def test_the_runs_and_signals_of_a_viewers_plot_are_told_apart():
     assert (
         alike([(shade(run_color(number)), "") for number in range(MOST_SHADES)], grey=False) == []
     )
@@ -37,7 +37,7 @@ def test_the_runs_and_signals_of_a_viewers_plot_are_told_apart() -> None:
     assert alike([(shade(color), "") for color in signals], grey=False) == []
 
 
-def test_the_parts_of_the_ships_section_are_told_apart() -> None:
+def test_the_parts_of_the_ships_section_are_told_apart():
     for one, other in ((WATER, HULL), (WATER, PUMP), (WATER, LIMIT), (HULL, TWIN), (SEA, WATER)):
         assert difference(shade(one), shade(other), grey=False) >= LEAST_DIFFERENCE
     for other in (WATER, HULL):  # the arrow is as wide as the water that it lies in

@@ -2,8 +2,7 @@
 
 import importlib
 import json
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pytest
 
@@ -16,19 +15,17 @@ class Ended(NamedTuple):
     errors: str
 
     @property
-    def found(self) -> Any:
+    def found(self):
         """The one JSON object of its standard output."""
         assert self.code == 0, self.errors
         return json.loads(self.output)
 
 
 @pytest.fixture
-def tool(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Callable[..., Ended]:
+def tool(monkeypatch, capsys):
     """Call as ``tool("studies.share_of_possible", "--seeds", "2")``."""
 
-    def run(name: str, *arguments: str) -> Ended:
+    def run(name, *arguments):
         module = importlib.import_module(f"tools.{name}")
         monkeypatch.setattr("sys.argv", [name, *arguments])
         try:

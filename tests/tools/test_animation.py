@@ -22,14 +22,14 @@ ABOUT = {"configuration": {"vessel": VESSEL}}
 SHIPPED = Path("docs/pictures/watch.gif").resolve()
 
 
-def pixels(frame: Image.Image, color: tuple[int, int, int]) -> np.ndarray:
+def pixels(frame, color):
     """Columns and rows of the pixels of a colour, shape (2, n)."""
     near = np.abs(np.asarray(frame.convert("RGB")).astype(int) - color).max(axis=-1) < 40
     rows, columns = np.nonzero(near)
     return np.array([columns, rows])
 
 
-def tilt_rad(points: np.ndarray) -> float:
+def tilt_rad(points):
     """Slope of the upper edge of some pixels, downwards to the right."""
     columns = np.unique(points[0])
     columns = columns[len(columns) // 4 : -len(columns) // 4]  # of the deck, not of the sides
@@ -37,9 +37,7 @@ def tilt_rad(points: np.ndarray) -> float:
     return float(np.arctan(np.polyfit(columns, tops, 1)[0]))
 
 
-def test_the_ship_is_drawn_at_her_roll_with_water_and_pump(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_ship_is_drawn_at_her_roll_with_water_and_pump(tmp_path, monkeypatch):
     monkeypatch.setattr(animation, "FRAMES_A_SECOND", 1)
     time_s = np.arange(0.0, 30.0, 0.05)
     rows = np.zeros((len(time_s), len(SIGNALS)))
@@ -68,7 +66,7 @@ def test_the_ship_is_drawn_at_her_roll_with_water_and_pump(
             assert len(pixels(drawn, PUMP)[0]) > 200
 
 
-def test_what_can_not_be_drawn_is_named(tmp_path: Path) -> None:
+def test_what_can_not_be_drawn_is_named(tmp_path):
     rows = np.zeros((3, len(SIGNALS)))
     rows[:, SIGNALS.index("time_s")] = range(3)
     file = tmp_path / "a.rrd"
@@ -80,7 +78,7 @@ def test_what_can_not_be_drawn_is_named(tmp_path: Path) -> None:
         animate(file, tmp_path / "a.gif", [])
 
 
-def test_the_animation_of_the_readme_is_small_and_ten_seconds_long() -> None:
+def test_the_animation_of_the_readme_is_small_and_ten_seconds_long():
     assert SHIPPED.stat().st_size < 1e6
     with Image.open(SHIPPED) as drawn:
         assert drawn.n_frames * drawn.info["duration"] == 10_000

@@ -12,13 +12,13 @@ from tools.evidence import PARTS, Part, PartError, main, read, run
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     """A folder of records of its own."""
     monkeypatch.setattr(evidence, "FOLDER", tmp_path)
     return tmp_path
 
 
-def test_every_study_and_benchmark_is_a_part_and_every_part_is_of_a_module_that_is_there() -> None:
+def test_every_study_and_benchmark_is_a_part_and_every_part_is_of_a_module_that_is_there():
     commands = " ".join(part.command for part in PARTS.values())
     for pattern in ("studies/*", "benchmarks/*"):
         for file in Path("tools").glob(f"{pattern}.py"):
@@ -31,7 +31,7 @@ def test_every_study_and_benchmark_is_a_part_and_every_part_is_of_a_module_that_
             assert place.with_suffix(".py").is_file() or (place / "__main__.py").is_file()
 
 
-def test_a_record_says_what_was_run_where_and_when(folder: Path) -> None:
+def test_a_record_says_what_was_run_where_and_when(folder):
     run("toy", Part("python -c 'print([3])'", 1))
     kept = read("toy")
     assert (kept["result"], kept["version"]) == ([3], version("utank-hil"))
@@ -41,9 +41,7 @@ def test_a_record_says_what_was_run_where_and_when(folder: Path) -> None:
     assert read("words")["result"] == ["no object"]
 
 
-def test_a_part_that_fails_keeps_the_record_that_was_there(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_part_that_fails_keeps_the_record_that_was_there(folder, tmp_path, monkeypatch):
     run("toy", Part("python -c 'print(3)'", 1))
     monkeypatch.setattr(evidence, "ROOT", tmp_path)
     with pytest.raises(PartError, match="exit code 2"):
@@ -52,9 +50,7 @@ def test_a_part_that_fails_keeps_the_record_that_was_there(
     assert (tmp_path / ".cache/evidence/toy.out").read_text() == "4\n"
 
 
-def test_only_what_this_release_has_not_is_run_and_what_is_named(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_only_what_this_release_has_not_is_run_and_what_is_named(folder, monkeypatch, capsys):
     parts = {name: Part(f"python -c 'print(\"{name}\")'", 1) for name in ("a", "b")}
     monkeypatch.setattr(evidence, "PARTS", parts)
     (folder / "a.json").write_text(json.dumps({"version": "0.0.1", "date": "2026-01-01"}))

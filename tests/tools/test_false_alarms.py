@@ -1,6 +1,4 @@
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from tools.studies.false_alarms import by_monitor, hours, judged, rate_per_hour,
 from tools.studies.monitor_margins import margins
 
 
-def test_rate_is_the_tail_of_what_the_hours_were_drawn_from() -> None:
+def test_rate_is_the_tail_of_what_the_hours_were_drawn_from():
     draw = np.random.default_rng(1)
     for place, scale in ((0.5, 0.08), (0.8, 0.05)):
         expected = gumbel_r.sf(1.0, place, scale)
@@ -27,7 +25,7 @@ def test_rate_is_the_tail_of_what_the_hours_were_drawn_from() -> None:
     assert rate_per_hour([float("nan")] * 50) == 0.0
 
 
-def test_an_hour_that_another_monitor_ended_is_not_in_the_fit() -> None:
+def test_an_hour_that_another_monitor_ended_is_not_in_the_fit():
     draw = np.random.default_rng(2)
     whole = gumbel_r.rvs(0.6, 0.05, size=50, random_state=draw).tolist()
     runs = [{"largest": {"drift": each}, "found_s": {}} for each in whole]
@@ -47,7 +45,7 @@ def test_an_hour_that_another_monitor_ended_is_not_in_the_fit() -> None:
 
 
 @pytest.mark.evidence
-def test_every_shipped_law_sails_every_sea() -> None:
+def test_every_shipped_law_sails_every_sea():
     for file in (ROOT / "configs/controllers").glob("*.yaml"):
         seas = dict(hours(file.stem))
         assert list(seas)[:3] == ["calm", "ordinary", "storm"]
@@ -57,11 +55,11 @@ def test_every_shipped_law_sails_every_sea() -> None:
 
 
 def test_hours_that_were_sailed_are_kept_and_retuning_is_ordered_in_every_second(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    tmp_path, monkeypatch
+):
     ordered = []
 
-    def margins(scenario: Any, name: str, seed: int, seconds: float) -> dict[str, Any]:
+    def margins(scenario, name, seed, seconds):
         ordered.append((seed, any(act.action.name == "RETUNE" for act in scenario.operator)))
         return {"largest": {"drift": 0.1 * seed}, "found_s": {"DRIFT": 3.0} if seed == 2 else {}}
 
@@ -84,7 +82,7 @@ def test_hours_that_were_sailed_are_kept_and_retuning_is_ordered_in_every_second
 
 
 @pytest.mark.evidence
-def test_what_ends_control_is_found_though_no_monitor_finds_it() -> None:
+def test_what_ends_control_is_found_though_no_monitor_finds_it():
     scenario = dict(hours("gpc"))["storm"]
     low = replace(scenario.sensors, high_level_m=0.5)
     found_s = margins(scenario.model_copy(update={"sensors": low}), "gpc", 1, 60.0)["found_s"]
@@ -93,7 +91,7 @@ def test_what_ends_control_is_found_though_no_monitor_finds_it() -> None:
     assert margins(scenario, "gpc", 1, 60.0)["found_s"] == {}
 
 
-def test_monitors_are_judged_over_all_hours_of_the_sound_laws() -> None:
+def test_monitors_are_judged_over_all_hours_of_the_sound_laws():
     rows = [
         {
             "law": law,

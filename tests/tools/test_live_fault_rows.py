@@ -12,16 +12,11 @@ FAULT_S = 100.0
 OFF = DriveState.FAULT
 
 
-def every(cycle_s: float, begin_s: float, end_s: float) -> list[float]:
+def every(cycle_s, begin_s, end_s):
     return [begin_s + index * cycle_s for index in range(round((end_s - begin_s) / cycle_s))]
 
 
-def log_of(
-    commands: list[float] | None = None,
-    motions: list[float] | None = None,
-    off_s: float = 1e9,
-    faulted_s: float = 1e9,
-) -> LiveLog:
+def log_of(commands=None, motions=None, off_s=1000000000.0, faulted_s=1000000000.0):
     """A log from 99 s to 103 s."""
     return LiveLog(
         every(0.02, 99.0, 103.0) if commands is None else commands,
@@ -31,12 +26,12 @@ def log_of(
     )
 
 
-def told(log: LiveLog, **changed: object) -> LiveTimes:
+def told(log, **changed):
     chosen = {"silences": "commands", "judged": "zero", **changed}
-    return times_of(log, FAULT_S, 103.0, **chosen)  # type: ignore[arg-type]
+    return times_of(log, FAULT_S, 103.0, **chosen)
 
 
-def test_times_count_from_the_last_frame_of_who_was_silenced() -> None:
+def test_times_count_from_the_last_frame_of_who_was_silenced():
     sent = every(0.02, 99.0, 100.0)
     log = log_of(sent, off_s=100.071)
     assert told(log).zero_ms == pytest.approx(100.08e3 - 99.98e3, abs=0.1)
@@ -46,13 +41,13 @@ def test_times_count_from_the_last_frame_of_who_was_silenced() -> None:
     assert told(late).zero_ms == pytest.approx(78.0, abs=0.1)
 
 
-def test_times_count_from_the_signal_where_nobody_is_silenced() -> None:
+def test_times_count_from_the_signal_where_nobody_is_silenced():
     times = told(log_of(off_s=100.25, faulted_s=100.1), silences=None)
     assert times.zero_ms == pytest.approx(260.0, abs=0.1)
     assert times.found_ms == pytest.approx(100.0, abs=0.1)
 
 
-def test_what_was_off_before_the_fault_does_not_count() -> None:
+def test_what_was_off_before_the_fault_does_not_count():
     log = log_of()
     log.states.insert(0, (99.5, OFF))
     log.modes.insert(0, (99.5, Mode.FAULT))
@@ -60,7 +55,7 @@ def test_what_was_off_before_the_fault_does_not_count() -> None:
 
 
 @pytest.mark.parametrize("judged", ["found", "zero"])
-def test_a_process_that_was_held_up_shows_in_its_frames(judged: str) -> None:
+def test_a_process_that_was_held_up_shows_in_its_frames(judged):
     motions = [t for t in every(0.01, 99.0, 103.0) if not 100.02 < t < 100.2]
     log = log_of(motions=motions, off_s=100.21, faulted_s=100.3)
     assert told(log, judged=judged).held_up_ms == pytest.approx(170.0, abs=0.2)
@@ -78,15 +73,15 @@ class Bench:
 
     starts: list["Bench"]
 
-    def __init__(self, *_: object) -> None:
+    def __init__(self, *_):
         self.start, self.log, self.code = 1, log_of(), None
         self.controller = self.ship = SimpleNamespace(poll=lambda: self.code)
         self.starts.append(self)
 
-    def close(self) -> None:
+    def close(self):
         pass
 
-    def wait_in_charge(self) -> None:
+    def wait_in_charge(self):
         if len(self.starts) < rows.STARTS:
             raise LiveError("OVERRUN before there was a fault")
 
@@ -94,16 +89,14 @@ class Bench:
 @pytest.mark.parametrize(
     ("missing_s", "code", "starts"), [(0.2, None, 3), (0.0, None, 1), (0.2, 1, 1)]
 )
-def test_only_a_start_that_the_machine_spoilt_is_made_again(
-    missing_s: float, code: int | None, starts: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_only_a_start_that_the_machine_spoilt_is_made_again(missing_s, code, starts, monkeypatch):
     """A program that ends, or a fault that has another cause, fails the row."""
     made: list[Bench] = []
 
     class Spoilt(Bench):
         starts = made
 
-        def __init__(self, *_: object) -> None:
+        def __init__(self, *_):
             super().__init__()
             self.code = code
             if missing_s:
@@ -130,15 +123,10 @@ def test_only_a_start_that_the_machine_spoilt_is_made_again(
         ([(["after 130 ms"], 40.0)] * 4, False, 3),
     ],
 )
-def test_only_what_the_machine_spoilt_is_tried_again(
-    monkeypatch: pytest.MonkeyPatch,
-    attempts: list[tuple[list[str], float]],
-    passed: bool,
-    tried: int,
-) -> None:
+def test_only_what_the_machine_spoilt_is_tried_again(monkeypatch, attempts, passed, tried):
     waiting = list(attempts)
 
-    def attempt(row: rows.LiveRow, bus: str) -> tuple[list[str], float]:
+    def attempt(row, bus):
         problems, held_up_ms = waiting.pop(0)
         return [*problems], held_up_ms
 

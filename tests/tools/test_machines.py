@@ -1,8 +1,6 @@
 """The comparison of machines runs what is kept, and sees another bit."""
 
 import json
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
@@ -11,14 +9,12 @@ from utank_hil.telemetry.law_values import decoded, encoded
 
 
 @pytest.fixture
-def kept(
-    tool: Callable[..., object], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> Callable[[], tuple[int, str]]:
+def kept(tool, monkeypatch, tmp_path):
     """Run 8 s of a scenario; exit code and the table's row. The first call makes kept.json."""
     monkeypatch.setattr(machines, "LOGS", tmp_path)  # the recordings have their own tests
     words = (str(tmp_path / "kept.json"), "--seconds", "8", "--only", "semi_active/")
 
-    def run() -> tuple[int, str]:
+    def run():
         ended = tool("machines", *words)
         return ended.code, ended.output
 
@@ -26,9 +22,7 @@ def kept(
     return run
 
 
-def test_the_same_machine_is_equal_and_another_law_is_not(
-    kept: Callable[[], tuple[int, str]], tmp_path: Path
-) -> None:
+def test_the_same_machine_is_equal_and_another_law_is_not(kept, tmp_path):
     code, row = kept()
     assert (code, row.split("|")[-4:-1]) == (0, [" 0 and 5 ", " none ", " 0e+00 "])
     file = tmp_path / "kept.json"
@@ -45,15 +39,13 @@ def test_the_same_machine_is_equal_and_another_law_is_not(
     )  # fmt: skip
 
 
-def test_each_setting_is_a_process_of_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_each_setting_is_a_process_of_its_own(tmp_path, monkeypatch, capfd):
     asked = []
 
     class Done:
         returncode = 0
 
-    def run(words: list[str], env: dict[str, str], check: bool) -> Done:
+    def run(words, env, check):
         asked.append((words[-1], env.get("OPENBLAS_CORETYPE"), env.get("UTANK_HIL_COMPILED")))
         return Done()
 

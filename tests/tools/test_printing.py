@@ -2,8 +2,6 @@ import argparse
 import json
 import math
 
-import pytest
-
 from tools.printing import show
 
 FIGURES = {
@@ -14,15 +12,15 @@ FIGURES = {
 }
 
 
-def test_json_is_one_object_of_finite_numbers(capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_is_one_object_of_finite_numbers(capsys):
     show(FIGURES, argparse.Namespace(json=True))
     found = json.loads(capsys.readouterr().out)
     assert found["laws"]["dpc"]["roll"] is None
-    assert found["laws"]["gpc"] == FIGURES["laws"]["gpc"]  # type: ignore[index]
+    assert found["laws"]["gpc"] == FIGURES["laws"]["gpc"]
     assert found["runs"] == FIGURES["runs"]
 
 
-def test_tables_hold_every_figure_of_the_json(capsys: pytest.CaptureFixture[str]) -> None:
+def test_tables_hold_every_figure_of_the_json(capsys):
     show(FIGURES, argparse.Namespace(json=False))
     printed = capsys.readouterr().out
     for part in (

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 from importlib.metadata import version
-from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
@@ -34,7 +33,7 @@ list(build_controller_node(config).tick(0))
 
 
 @pytest.mark.evidence
-def test_with_the_listed_parts_alone_a_controller_runs() -> None:
+def test_with_the_listed_parts_alone_a_controller_runs():
     made = sbom()
     assert (made["bomFormat"], made["metadata"]["component"]["name"]) == ("CycloneDX", "utank-hil")
     listed = {part["name"].lower(): part for part in made["components"]}
@@ -52,7 +51,7 @@ def test_with_the_listed_parts_alone_a_controller_runs() -> None:
     assert listed["numpy"]["bom-ref"] in graph[listed["scipy"]["bom-ref"]]
 
 
-def test_without_one_of_them_it_does_not() -> None:
+def test_without_one_of_them_it_does_not():
     listed = closure(frozenset()).keys() - {"annotated-types"}  # which a part of a part needs
     done = subprocess.run(
         [sys.executable, "-c", CONTROLLER, *listed], check=False, timeout=120, capture_output=True
@@ -60,21 +59,19 @@ def test_without_one_of_them_it_does_not() -> None:
     assert b"ModuleNotFoundError" in done.stderr
 
 
-def test_an_extra_brings_its_parts_and_only_its_own() -> None:
+def test_an_extra_brings_its_parts_and_only_its_own():
     parts = closure(frozenset({"viewer"}))
     assert "rerun-sdk" in parts
     assert "matplotlib" not in parts
 
 
-def test_a_part_that_the_lock_lacks_is_named() -> None:
+def test_a_part_that_the_lock_lacks_is_named():
     assert "numpy==" in locked({"numpy"})
     with pytest.raises(SystemExit, match="lacks numppy, skippy"):
         locked({"numpy", "numppy", "skippy"})
 
 
-def test_the_lock_of_a_ships_pc_has_the_listed_parts_with_hashes_and_pip_takes_it(
-    tmp_path: Path,
-) -> None:
+def test_the_lock_of_a_ships_pc_has_the_listed_parts_with_hashes_and_pip_takes_it(tmp_path):
     command = [sys.executable, "-m", "tools.sbom", "--extra", "viewer", "--lock"]
     text = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
     entries = [entry for entry in text.splitlines() if not entry.startswith(" ")]

@@ -25,7 +25,7 @@ WAVES = passive_motion(SHIP, TANK, MOMENT, 0.2, SAMPLES + 1)
 LAG_S = 0.1
 
 
-def lagged() -> LinearModel:
+def lagged():
     pump = pump_model(SHIP, TANK, STATES)
     a = np.block([[pump.A, pump.B], [np.zeros((1, 4)), np.full((1, 1), -1 / LAG_S)]])
     b = np.append(np.zeros(4), 1 / LAG_S)[:, None]

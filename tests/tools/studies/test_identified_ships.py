@@ -17,24 +17,22 @@ from tools.studies.identified_ships import (
     table,
 )
 from tools.studies.published_identification import published
-from utank_hil.base.arrays import FloatArray
-from utank_hil.control import DesignPlant
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def record() -> ShipRecord:
+def record():
     """Waves of 3 m and 8 s."""
     return record_of(1)
 
 
-def test_pulses_roll_the_ship_five_per_cent_more_at_most(record: ShipRecord) -> None:
+def test_pulses_roll_the_ship_five_per_cent_more_at_most(record):
     assert record.sea == "3 m 8 s"
     assert 1.0 < record.added_roll < 1.05
 
 
-def test_motion_and_pulses_find_the_same_ship(record: ShipRecord) -> None:
+def test_motion_and_pulses_find_the_same_ship(record):
     seen = motion_estimate(record, slice(len(record.motion) - record.first, None))
     rows = {
         "motion": by_motion(record, seen),
@@ -49,7 +47,7 @@ def test_motion_and_pulses_find_the_same_ship(record: ShipRecord) -> None:
     assert made["OKID"]["accepted"] == 1
 
 
-def _still(plant: DesignPlant, u: FloatArray) -> FloatArray:
+def _still(plant, u):
     """Roll and level in still water."""
     model = plant.sampled(("roll_rad", "level_m"), SAMPLE_TIME_S)
     state, y = np.zeros(len(model.A)), np.empty((len(u), 2))
@@ -59,7 +57,7 @@ def _still(plant: DesignPlant, u: FloatArray) -> FloatArray:
     return y
 
 
-def test_published_methods_are_right_where_there_are_no_waves() -> None:
+def test_published_methods_are_right_where_there_are_no_waves():
     plant, draw = shipped().plant, np.random.default_rng(3)
     u = 1e4 * np.repeat(draw.choice([-1.0, 1.0], 400), 5)
     y = _still(plant, u)

@@ -1,5 +1,4 @@
 import json
-from pathlib import Path
 
 import pytest
 import typer
@@ -9,16 +8,14 @@ from tools.thesis.__main__ import reproduce
 
 
 @pytest.fixture
-def application() -> typer.Typer:
+def application():
     made = typer.Typer()
     made.command()(reproduce)
     return made
 
 
 @pytest.mark.evidence
-def test_chosen_figures_are_drawn_listed_and_put_on_one_page(
-    application: typer.Typer, tmp_path: Path
-) -> None:
+def test_chosen_figures_are_drawn_listed_and_put_on_one_page(application, tmp_path):
     done = CliRunner().invoke(application, ["2.7", "2.1", "--out", str(tmp_path), "--json"])
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
@@ -39,7 +36,7 @@ def test_chosen_figures_are_drawn_listed_and_put_on_one_page(
 
 
 @pytest.mark.evidence
-def test_the_table_has_a_line_for_each_figure(application: typer.Typer, tmp_path: Path) -> None:
+def test_the_table_has_a_line_for_each_figure(application, tmp_path):
     done = CliRunner(env={"COLUMNS": "160"}).invoke(
         application, ["2.7", "2.2", "--out", str(tmp_path)]
     )
@@ -49,7 +46,7 @@ def test_the_table_has_a_line_for_each_figure(application: typer.Typer, tmp_path
     assert "gallery.html" in done.stdout
 
 
-def test_list_makes_nothing(application: typer.Typer, tmp_path: Path) -> None:
+def test_list_makes_nothing(application, tmp_path):
     out = tmp_path / "not made"
     done = CliRunner().invoke(application, ["--list", "--out", str(out)])
     assert done.exit_code == 0
@@ -61,9 +58,7 @@ def test_list_makes_nothing(application: typer.Typer, tmp_path: Path) -> None:
     assert not out.exists()
 
 
-def test_unknown_figures_and_bad_folders_are_refused(
-    application: typer.Typer, tmp_path: Path
-) -> None:
+def test_unknown_figures_and_bad_folders_are_refused(application, tmp_path):
     unknown = CliRunner().invoke(application, ["2.99"])
     assert unknown.exit_code == 2
     assert "no figure '2.99'; --list shows all of them" in unknown.stderr

@@ -17,7 +17,7 @@ from tools.thesis.ships import GREATER
 from utank_hil.control.optimal_tank import ship_ratios
 
 
-def amplitude(record: np.ndarray, step_s: float, wave_rad_s: float) -> float:
+def amplitude(record, step_s, wave_rad_s):
     """First harmonic over the last whole wave periods."""
     period = 2 * np.pi / wave_rad_s
     count = round(3 * period / step_s)
@@ -26,7 +26,7 @@ def amplitude(record: np.ndarray, step_s: float, wave_rad_s: float) -> float:
 
 
 @pytest.mark.parametrize("name", [PASSIVE, "PD", "LQR", "GPC (roll)", "DPC (roll, level)"])
-def test_a_long_run_in_a_regular_wave_has_the_amplitude_of_sampled_data_theory(name: str) -> None:
+def test_a_long_run_in_a_regular_wave_has_the_amplitude_of_sampled_data_theory(name):
     ship, tank = GREATER
     law = entrants(ship, tank).get(name)
     w = 0.6
@@ -39,7 +39,7 @@ def test_a_long_run_in_a_regular_wave_has_the_amplitude_of_sampled_data_theory(n
     )
 
 
-def test_the_retuned_law_s_run_has_the_amplitude_of_the_law_for_the_true_ship() -> None:
+def test_the_retuned_law_s_run_has_the_amplitude_of_the_law_for_the_true_ship():
     ship, tank = GREATER
     adaptation = dpc_both(50)
     found = voyage(ship, tank, adaptation, OWN_WAVE)
@@ -50,7 +50,7 @@ def test_the_retuned_law_s_run_has_the_amplitude_of_the_law_for_the_true_ship() 
     assert found.after_rad == pytest.approx(OWN_WAVE.slope_rad * exact, rel=0.01)
 
 
-def test_a_tuned_pump_works_against_friction_alone() -> None:
+def test_a_tuned_pump_works_against_friction_alone():
     ship, tank = pump_power.first_ship(4.87e7, 0.1)
     tuned = pump_power.tuned_tank(ship, tank)
     _, _, pump_nm = pump_power._per_angle(ship, tuned)
@@ -61,14 +61,14 @@ def test_a_tuned_pump_works_against_friction_alone() -> None:
 
 
 @pytest.mark.parametrize("ratio", [0.01, 0.03])
-def test_damping_of_a_linear_decay_is_its_own(ratio: float) -> None:
+def test_damping_of_a_linear_decay_is_its_own(ratio):
     w = PATTI_B.ship.natural_frequency_rad_s
     time = np.arange(0.0, 600.0, 0.02)
     roll = math.degrees(START_RAD) * np.exp(-ratio * w * time) * np.cos(w * time)
     assert _damping(time, roll) == pytest.approx(ratio, rel=0.1)  # peaks come twice a cycle
 
 
-def test_an_exponential_settles_when_its_wave_mean_does() -> None:
+def test_an_exponential_settles_when_its_wave_mean_does():
     time = np.arange(0.0, 200.0, 0.02)
     constant = 20.0
     settled = _settled_s(time, 1 - np.exp(-time / constant))

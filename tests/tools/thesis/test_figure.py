@@ -15,12 +15,12 @@ from tools.thesis.figure import Curve, Panel, Row, Verdict, peaks, printed_text
         (4.0, None, None),
     ],
 )
-def test_deviation_is_relative_and_zero_within_a_printed_range(printed, ours, deviation) -> None:
+def test_deviation_is_relative_and_zero_within_a_printed_range(printed, ours, deviation):
     found = Row("", "", printed, ours, "").deviation
     assert found == (deviation if deviation is None else pytest.approx(deviation))
 
 
-def test_more_curves_than_can_be_told_apart_are_refused() -> None:
+def test_more_curves_than_can_be_told_apart_are_refused():
     curve = Curve("", np.zeros(2), np.zeros(2))
     assert Panel("", "", "", (curve,) * 4)
     for curves in ((), (curve,) * 5):
@@ -28,12 +28,12 @@ def test_more_curves_than_can_be_told_apart_are_refused() -> None:
             Panel("", "", "", curves)
 
 
-def test_peaks_are_inner_maxima() -> None:
+def test_peaks_are_inner_maxima():
     assert peaks([0, 1, 0, 2, 2, 1]) == 2
     assert peaks([0, 1, 2]) == 0
 
 
-def test_texts() -> None:
+def test_texts():
     assert printed_text(Row("", "", (0.02, 0.04), None, "")) == "0.02 to 0.04"
     assert printed_text(Row("", "", (10.0, np.inf), None, "")) == "10 or more"
     assert printed_text(Row("", "", (0.0, 1.3), None, "")) == "less than 1.3"

@@ -1,7 +1,5 @@
 """Figures of the source as drawn: legends off the data, nothing cut."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from matplotlib.figure import Figure as Canvas
@@ -14,12 +12,12 @@ LONG = tuple(Curve(f"a law with a name of {n} words", X, np.sin(X / (n + 1))) fo
 
 
 @pytest.fixture
-def canvas(monkeypatch: pytest.MonkeyPatch) -> list[Canvas]:
+def canvas(monkeypatch):
     """The figures that were saved."""
     saved: list[Canvas] = []
     save = Canvas.savefig
 
-    def keep(self: Canvas, *arguments, **options) -> None:
+    def keep(self, *arguments, **options):
         saved.append(self)
         save(self, *arguments, **options)
 
@@ -30,9 +28,7 @@ def canvas(monkeypatch: pytest.MonkeyPatch) -> list[Canvas]:
 @pytest.mark.evidence("1-1", "2-1", "2-2", "3-1", "3-2")
 @pytest.mark.parametrize("columns", [1, 2])
 @pytest.mark.parametrize("panels", [1, 2, 3])
-def test_legends_stand_off_the_data_and_no_text_is_cut(
-    columns: int, panels: int, canvas: list[Canvas], tmp_path: Path
-) -> None:
+def test_legends_stand_off_the_data_and_no_text_is_cut(columns, panels, canvas, tmp_path):
     panel = Panel("A title", "Time (s)", "Roll (°)", LONG, span=(0.0, 9.0), span_label="before")
     path = tmp_path / "x.png"
     draw_figure(Figure("", "", (panel,) * panels, columns=columns), path, "9.9  A figure")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tools.thesis.figure import Figure, Verdict, as_json
+from tools.thesis.figure import Verdict, as_json
 from tools.thesis.registry import ENTRIES, UnknownFigureError, chosen
 
 SIGNS = {Verdict.HOLDS: "+", Verdict.PARTLY: "~", Verdict.FAILS: "-", Verdict.OPEN: "?"}
@@ -54,17 +54,17 @@ LONG = {
 }
 
 
-def made(key: str) -> Figure:
+def made(key):
     (entry,) = chosen([key])
     assert entry.make is not None
     return entry.make()
 
 
-def signs(figure: Figure) -> str:
+def signs(figure):
     return "".join(SIGNS[check.verdict] for check in figure.checks)
 
 
-def judge(key: str, expected: str) -> Figure:
+def judge(key, expected):
     figure = made(key)
     assert signs(figure) == expected
     assert all(check.statement and check.measured for check in figure.checks)
@@ -75,33 +75,33 @@ def judge(key: str, expected: str) -> Figure:
 
 @pytest.mark.evidence
 @pytest.mark.parametrize("key", FAST)
-def test_a_figure_has_its_verdicts_and_a_reason_for_each_deviation(key: str) -> None:
+def test_a_figure_has_its_verdicts_and_a_reason_for_each_deviation(key):
     judge(key, FAST[key])
 
 
 @pytest.mark.evidence
 @pytest.mark.parametrize("key", LONG)
-def test_so_have_the_figures_that_take_long(key: str) -> None:
+def test_so_have_the_figures_that_take_long(key):
     judge(key, LONG[key])
 
 
 @pytest.mark.evidence
 @pytest.mark.parametrize("key", [*FAST, *LONG])
-def test_a_figure_is_the_same_each_time(key: str) -> None:
+def test_a_figure_is_the_same_each_time(key):
     assert as_json(made(key)) == as_json(made(key))
 
 
-def test_every_figure_has_its_verdicts() -> None:
+def test_every_figure_has_its_verdicts():
     assert {*FAST, *LONG} == {entry.key for entry in ENTRIES if entry.make}
 
 
-def test_keys_are_unique_and_what_has_nothing_to_compute_is_named() -> None:
+def test_keys_are_unique_and_what_has_nothing_to_compute_is_named():
     assert len({entry.key for entry in ENTRIES}) == len(ENTRIES)
     assert all((entry.make is None) == bool(entry.word) for entry in ENTRIES)
     assert all(entry.title for entry in ENTRIES)
 
 
-def test_no_figure_of_chapters_2_to_4_is_missing() -> None:
+def test_no_figure_of_chapters_2_to_4_is_missing():
     last = {2: 8, 3: 15, 4: 16}
     numbered = [f"{chapter}.{n}" for chapter in last for n in range(1, last[chapter] + 1)]
     keys = [entry.key for entry in ENTRIES]
@@ -119,7 +119,7 @@ def test_no_figure_of_chapters_2_to_4_is_missing() -> None:
     assert set(keys) - set(numbered) == named
 
 
-def test_chosen_figures_come_in_the_source_s_order() -> None:
+def test_chosen_figures_come_in_the_source_s_order():
     assert [entry.key for entry in chosen(["2.7", "2.3"])] == ["2.3", "2.7"]
     assert chosen([]) == ENTRIES
     with pytest.raises(UnknownFigureError, match=r"'9\.9'.*--list.*2\.1"):

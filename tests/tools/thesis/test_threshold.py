@@ -4,12 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tools.thesis.capsize import (
-    capsize_threshold,
-    equilibria,
-    safe_basin,
-    without_tank,
-)
+from tools.thesis.capsize import capsize_threshold, equilibria, safe_basin, without_tank
 from tools.thesis.reference import simulate_reference
 from tools.thesis.simulate import WaveMoment, simulate
 from utank_hil.dynamics import RollModel, RollShip, Tank
