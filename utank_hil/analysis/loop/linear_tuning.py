@@ -26,7 +26,7 @@ from typing import Final, Literal, NamedTuple, TypeVar, get_args
 import numpy as np
 
 from utank_hil.analysis.loop.loop_simulation import SensorNoise
-from utank_hil.analysis.loop.margins import Robustness, closed_loop_response, robustness
+from utank_hil.analysis.loop.margins import closed_loop_response, robustness
 from utank_hil.analysis.loop.sea_response import SlopeDensity, moment_of, motion_in_sea
 from utank_hil.analysis.loop.self_tuning import (
     NoLawError,
@@ -86,15 +86,6 @@ _SWEEPS: Final = 3  # Limit on passes over the factors with one step size. Chose
 _MOST_DAMPING: Final = 1.0  # Limit on the damping of the predictor's waves: critical damping.
 _SLOPE: Final = 1.46
 """Significant slope of the sea assumed for the scaled law, over the passive roll's RMS."""
-
-
-@dataclass(frozen=True, slots=True)
-class TunedLaw:
-    """Parameters of a law that has the required margins."""
-
-    design: LinearDesign
-    robustness: Robustness
-    cost: float = math.nan  #: Predicted cost, over that with the passive tank; if it was asked for.
 
 
 def varied(design: Design) -> str:
@@ -164,7 +155,7 @@ def first_law(
     slope_rad: float,
     peak_rad_s: float,
     kind: LinearKind = "lqg",
-) -> TunedLaw:
+) -> LinearDesign:
     """Find the law of `scaled_law` with the greatest weights at which it has the required margins.
 
     Raises `NoLawError` if no weights do.
@@ -173,38 +164,41 @@ def first_law(
     failures: tuple[str, ...] = ()
     for trial in range(MOST_TRIALS):
         asked = scaled(design, STEP**-trial)
-        judged = _judged(asked, plant)
-        failures = judged.failures()
+        failures = _failures(asked, plant)
         if not failures:
-            return TunedLaw(asked, judged)
+            return asked
     raise NoLawError(
         f"no {kind.upper()} law will do on this ship; the gentlest one is {failures[0]}"
     )
 
 
-def _judged(design: LinearDesign, plant: DesignPlant) -> Robustness:
-    return robustness(design.law(plant), plant, design.predictor.measured, with_delay_margin=False)
+def _failures(design: LinearDesign, plant: DesignPlant) -> tuple[str, ...]:
+    law, measured = design.law(plant), design.predictor.measured
+    return robustness(law, plant, measured, with_delay_margin=False).failures()
 
 
-def auto_tuned(kind: LinearKind, plant: DesignPlant, sea: SlopeDensity) -> TunedLaw:
+def auto_tuned(
+    kind: LinearKind, plant: DesignPlant, sea: SlopeDensity
+) -> tuple[float, LinearDesign]:
     """Find the law of a kind with all margins that costs least of those tried.
 
-    Raises `NoLawError` if no law has the margins, or the sea does not roll the ship.
+    Returns the predicted cost, over that with the passive tank, and the law. Raises `NoLawError` if
+    no law has the margins, or the sea does not roll the ship.
     """
     search = _Search(kind, plant, sea)
     best, factors = search.start, [1.0] * len(_STEPS)
     for size in range(_SIZES):
         for _ in range(_SWEEPS):
-            before = best.cost
+            before = best
             for which, first in enumerate(_STEPS):
                 for step in (first ** (0.5**size), first ** -(0.5**size)):
                     tried = [*factors]
                     tried[which] *= step
-                    better = search.better(tried, best.cost)
+                    better = search.better(tried, best[0])
                     if better is not None:
                         best, factors = better, tried
                         break
-            if best.cost == before:
+            if best is before:
                 break
     return best
 
@@ -223,7 +217,7 @@ class AutoDesign:
 
         Raises `NoLawError` as `auto_tuned`.
         """
-        return auto_tuned(self.kind, plant, self.sea or unknown_sea(plant.ship)).design
+        return auto_tuned(self.kind, plant, self.sea or unknown_sea(plant.ship))[1]
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Design the law for a plant."""
@@ -248,24 +242,20 @@ class _Search:
         mean_rad_s = float(energy @ w / energy.sum())
         peaks = mean_rad_s, math.sqrt(mean_rad_s * plant.ship.natural_frequency_rad_s)
         first = [first_law(plant, _SLOPE * self._passive_rad, peak, kind=kind) for peak in peaks]
-        self.start = min(
-            (replace(each, cost=self._cost(each.design)) for each in first),
-            key=lambda each: each.cost,
-        )
+        #: Cost, and the cheapest law that is only scaled.
+        self.start = min(((self._cost(each), each) for each in first), key=lambda each: each[0])
 
-    def better(self, factors: list[float], cost: float) -> TunedLaw | None:
-        """The law with these factors if it has all margins and costs less than `cost`."""
-        design = _varied(self.start.design, self._least_std, *factors)
+    def better(self, factors: list[float], cost: float) -> tuple[float, LinearDesign] | None:
+        """The cost and law with these factors if it has all margins and costs less than `cost`."""
+        design = _varied(self.start[1], self._least_std, *factors)
         if design is None:
             return None
         try:
             found = self._cost(design)
-            if not found < cost:
-                return None
-            judged = _judged(design, self._plant)
+            good = found < cost and not _failures(design, self._plant)
         except (ValueError, ArithmeticError):  # LinAlgError is a ValueError
             return None
-        return None if judged.failures() else TunedLaw(design, judged, found)
+        return (found, design) if good else None
 
     def _cost(self, design: LinearDesign) -> float:
         plant, limits = self._plant, self._plant.limits
