@@ -195,28 +195,21 @@ def _data_lines(path: Path, quantity: str) -> tuple[list[DataLine], list[ValueEr
     header: tuple[int, tuple[float, ...]] | None = None  # time columns and frequencies
     with open_text(path) as text:
         for number, line in lines_of(path, text):
-            if not line.strip():
-                continue
-            if line.lstrip().startswith(("#", "YY")):
-                written = QUANTITY.search(line)
-                if written:
-                    _check_quantity(path, f"line {number}", written[1], quantity)
-                    named = True
-                header = _header(path, number, line) or header
-                continue
+            titled = line.lstrip().startswith(("#", "YY"))
+            written = QUANTITY.search(line) if titled else None
+            if written:
+                _check_quantity(path, f"line {number}", written[1], quantity)
+                named = True
             try:
-                if "(" in line:
-                    row = _pairs(path, number, line)
-                elif header is None:
-                    reason = "no header line with frequencies stands before the data"
-                    remedy = "if it is not NDBC's, make a table of it, kind: tabulated"
-                    raise _error(path, number, f"{reason}; {remedy}")
-                else:
-                    row = _columns(path, number, line.split(), *header)
+                if titled:
+                    header = _header(line) or header
+                elif line.strip():
+                    found = _pairs(line) if "(" in line else _columns(line, header)
+                    rows.append(DataLine(number, *found, named))
             except ValueError as error:
-                problems.append(error)
-            else:
-                rows.append(row._replace(named=named))
+                problems.append(_error(path, number, str(error)))
+                if titled:
+                    raise problems[-1] from error
     return rows, problems
 
 
@@ -229,62 +222,62 @@ def _check_quantity(path: Path, place: str, found: str, wanted: str) -> None:
         )
 
 
-def _header(path: Path, number: int, line: str) -> tuple[int, tuple[float, ...]] | None:
+def _header(line: str) -> tuple[int, tuple[float, ...]] | None:
     """Return number of time columns and frequencies; None for a line without frequencies."""
     words = line.replace("#", " ").split()
     names = [word for word in words if not word[0].isdigit() and word[0] != "."]
     if len(names) == len(words) or "(" in line:
         return None
     if words[: len(names)] != names or len(names) not in (4, 5):
-        raise _error(path, number, "header must be year, month, day, hour, minute, frequencies")
-    frequencies = tuple(_number(path, number, word) for word in words[len(names) :])
-    return len(names), _checked(path, number, frequencies)
+        raise ValueError("header must be year, month, day, hour, minute, frequencies")
+    return len(names), _checked(tuple(_number(word) for word in words[len(names) :]))
 
 
-def _columns(
-    path: Path, number: int, words: list[str], time_columns: int, frequency: tuple[float, ...]
-) -> DataLine:
+_Values = tuple[np.datetime64, tuple[float, ...], tuple[float, ...]]
+"""Time, frequencies and values of a line."""
+
+
+def _columns(line: str, header: tuple[int, tuple[float, ...]] | None) -> _Values:
+    if header is None:
+        reason = "no header line with frequencies stands before the data"
+        raise ValueError(f"{reason}; if it is not NDBC's, make a table of it, kind: tabulated")
+    words, (time_columns, frequency) = line.split(), header
     if len(words) != time_columns + len(frequency):
         found = len(words) - time_columns
-        raise _error(path, number, f"{found} values for {len(frequency)} frequencies in the header")
-    values = tuple(_number(path, number, word) for word in words[time_columns:])
-    return DataLine(number, _time(path, number, words[:time_columns]), frequency, values)
+        raise ValueError(f"{found} values for {len(frequency)} frequencies in the header")
+    values = tuple(_number(word) for word in words[time_columns:])
+    return _time(words[:time_columns]), frequency, values
 
 
-def _pairs(path: Path, number: int, line: str) -> DataLine:
+def _pairs(line: str) -> _Values:
     lead = PAIR.sub("", line).split()  # The lead is time and separation frequency.
     if len(lead) not in (5, 6):
-        raise _error(
-            path, number, "not of the form: year month day hour minute density (frequency)"
-        )
-    pairs = PAIR.findall(line)
-    frequencies = (_number(path, number, frequency) for _, frequency in pairs)
-    exact = tuple(ROUNDED_HZ.get(frequency, frequency) for frequency in frequencies)
-    values = tuple(_number(path, number, value) for value, _ in pairs)
-    return DataLine(number, _time(path, number, lead[:5]), _checked(path, number, exact), values)
+        raise ValueError("not of the form: year month day hour minute density (frequency)")
+    pairs = [(_number(value), _number(frequency)) for value, frequency in PAIR.findall(line)]
+    exact = tuple(ROUNDED_HZ.get(frequency, frequency) for _, frequency in pairs)
+    return _time(lead[:5]), _checked(exact), tuple(value for value, _ in pairs)
 
 
-def _checked(path: Path, number: int, frequencies: tuple[float, ...]) -> tuple[float, ...]:
-    steps = np.diff((0.0, *frequencies))
-    if len(frequencies) < 2 or not np.all(steps > 0):
-        raise _error(path, number, "frequencies must be two or more, positive and increasing")
+def _checked(frequencies: tuple[float, ...]) -> tuple[float, ...]:
+    if len(frequencies) < 2 or not np.all(np.diff((0.0, *frequencies)) > 0):
+        raise ValueError("frequencies must be two or more, positive and increasing")
     return frequencies
 
 
-def _time(path: Path, number: int, words: list[str]) -> np.datetime64:
+def _time(words: list[str]) -> np.datetime64:
     try:
         year, *rest = (int(word) for word in words)
         moment = datetime(year + 1900 if year < 100 else year, *rest)  # type: ignore[arg-type]  # 3 or 4 integers
     except ValueError as error:
-        raise _error(path, number, f"bad time {' '.join(words)!r}: {error}") from None
+        raise ValueError(f"bad time {' '.join(words)!r}: {error}") from None
     return np.datetime64(moment, "s")
 
 
-def _number(path: Path, number: int, word: str) -> float:
+def _number(word: str) -> float:
     if word == "MM":
         return math.nan
     if not NUMBER.fullmatch(word) or math.isinf(float(word)):
-        raise _error(path, number, f"{word!r} is not a finite number")
+        raise ValueError(f"{word!r} is not a finite number")
     return float(word)
 
 
