@@ -118,7 +118,7 @@ def test_levels_without_switches_say_by_themselves_that_they_are_high():
     [
         (1, 0.0, 0, True),
         (2, 10.0, 0, False),
-        (2, 10.0, int(Finding.SENSORS_DISAGREE), True),
+        (2, 10.0, Finding.SENSORS_DISAGREE, True),
         (2, 500.0, 0, True),
     ],
 )

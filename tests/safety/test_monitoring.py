@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from controller_bench import CATALOGUE, VERSION
 from controller_bench import VESSEL as SHIPPED
-from monitors.moving_ship import MovingShip
+from monitors.moving_ship import FINDINGS, MovingShip
 
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import DriveState, Frame, Quality, SensorMotion, SensorTank, Switch
@@ -158,7 +158,7 @@ def test_gap_of_the_motion_sensor_is_no_drift() -> None:
     assert not table.tick(1.0) & ~Finding.SPIKES
 
 
-def moved(table: Table, ship: MovingShip, seconds: float, **seen: object) -> set[Finding]:
+def moved(table: Table, ship: MovingShip, seconds: float, **seen: object) -> set[int]:
     """What is found of a ship in motion, her inbox filled by hand."""
     found = 0
     for _ in range(round(seconds / TICK_S)):
@@ -172,7 +172,7 @@ def moved(table: Table, ship: MovingShip, seconds: float, **seen: object) -> set
         }  # fmt: skip
         stale = {name: age(time_s) for name, age in seen.items() if callable(age)}
         found |= table.tick(command_pa=pressure_pa, **stale)
-    return set(Finding(found))
+    return {bit for bit in FINDINGS if bit & found}
 
 
 ROLLING = MovingShip(math.radians(2.0), 5e3, noise=False)
@@ -204,7 +204,7 @@ class Reversed(MovingShip):
     [((-1, -1), Finding.WATER_SIGN), ((1, -1), Finding.DRIFT_LASTS)],
 )
 def test_water_that_was_seen_to_disobey_has_to_obey_anew(
-    signs: tuple[int, int], found: Finding
+    signs: tuple[int, int], found: int
 ) -> None:
     table = Table()
     moved(table, ROLLING, 30.0)

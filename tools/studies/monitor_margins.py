@@ -70,9 +70,9 @@ class Onlooker:
         for name, share in shares(self._monitors).items():
             if share > self.largest.setdefault(name, 0.0):
                 self.largest[name] = share
-        if self._monitors.found:
-            for finding in Finding(self._monitors.found):
-                self.found_s.setdefault(str(finding.name), now_ns / SECOND_NS)
+        for name, bit in vars(Finding).items():
+            if name.isupper() and bit & self._monitors.found:
+                self.found_s.setdefault(name, now_ns / SECOND_NS)
         if self._node.mode is Mode.FAULT:
             self.found_s.setdefault(self._node.fault.name, now_ns / SECOND_NS)
         return ()

@@ -18,7 +18,6 @@ if TYPE_CHECKING:  # who prints the words of a fault needs no ship
     from utank_hil.safety.safety_limits import SafetyLimits
     from utank_hil.safety.situation import Situation
 
-_NONE: Final = Finding(0)
 ROLL_CALM_S: Final = 10
 """Half the roll period of a ship that rolls slowly: from one greatest roll to the next."""
 
@@ -54,8 +53,7 @@ class Condition:
     #: Place in the order in which the controller waits, in INIT, for conditions to go; None if it
     #: is ready all the same.
     awaited: int | None = None
-    #: Findings of the monitors, any of which is this condition.
-    findings: Finding = _NONE
+    findings: int = 0  #: Bits of `Finding`, any of which is this condition.
     #: With `Reaction.STOP`, whether it ends PASSIVE, too, where the drive is enabled.
     ends_passive: bool = False
     #: Whether it counts only where the drive is to be in operation enabled.
@@ -78,14 +76,13 @@ def _row(code: Fault, happened: str, remedy: str, *conditions: Condition) -> Fau
 
 
 def _found(
-    reaction: Reaction, limit: str, findings: Finding, *, ends_passive: bool = False
+    reaction: Reaction, limit: str, findings: int, *, ends_passive: bool = False
 ) -> Condition:
     """What the monitors find."""
-    mask = int(findings)  # `&` with a member takes thirty times as long in Python 3.11
     return Condition(
         reaction,
         limit,
-        lambda seen, _: seen.found & mask != 0,
+        lambda seen, _: seen.found & findings != 0,
         findings=findings,
         ends_passive=ends_passive,
     )

@@ -40,7 +40,6 @@ _ALL_LATE: Final = 0x3FF  #: The last ten ticks.
 _INIT: Final = Mode.INIT
 _ACTIVE: Final = Mode.ACTIVE
 _NO_FAULT: Final = Fault.NONE
-_DISAGREE: Final = int(Finding.SENSORS_DISAGREE)
 
 
 class Lateness:
@@ -184,7 +183,7 @@ class Safety:
         if not self._unprotected:
             return False
         spare_age_ms = self.situation.motion_spare_age_ms
-        agrees = len(self.situation.measured.motions) == 2 and not found & _DISAGREE
+        agrees = len(self.situation.measured.motions) == 2 and not found & Finding.SENSORS_DISAGREE
         return not (agrees and spare_age_ms <= self.supervisor.limits.motion_spare_age_ms)
 
     def _leave_silent_sensor(self, measured: Measurements) -> None:

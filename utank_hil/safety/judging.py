@@ -22,7 +22,7 @@ _STATES: Final = tuple(
     if not condition.findings
 )
 _FINDINGS: Final = tuple(
-    (1 << place, int(condition.findings))
+    (1 << place, condition.findings)
     for place, (_, condition) in enumerate(CONDITIONS)
     if condition.findings
 )

@@ -57,13 +57,7 @@ MOST_DAMPING_RATIO: Final = 1.0
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _DRIVE_ENABLED: Final = DriveState.OPERATION_ENABLED
-_NOISE: Final = int(Finding.NOISE)
-_SPIKES: Final = int(Finding.SPIKES)
-_AMPLIFIED: Final = int(Finding.ROLL_AMPLIFIED)
-_WATER_SIGN: Final = int(Finding.WATER_SIGN)
-_DRIFT_LASTS: Final = int(Finding.DRIFT_LASTS)
-_UNWATCHED: Final = int(Finding.UNWATCHED)
-_UNWATCHED_LONG: Final = int(Finding.UNWATCHED | Finding.UNWATCHED_LONG)
+_UNWATCHED_LONG: Final = Finding.UNWATCHED | Finding.UNWATCHED_LONG
 
 # places of the looks in `Monitors._looks`, and in which tick of a round each is due
 _MOTION, _DRIVE, _TWIN, _WATER, _LEVELS, _BUS = range(6)
@@ -112,7 +106,7 @@ class Monitors:
         self._followed: ModelSummary | ShipFigures | None = None
         # what a valve that is nearly shut holds back is uncertain: only a wrong sign counts then
         self._water_free = plant.valve is None
-        self._counts_of_water = ~0 if self._water_free else _WATER_SIGN
+        self._counts_of_water = ~0 if self._water_free else Finding.WATER_SIGN
         self._compares = compares
         #: What is judged of each motion sensor by itself.
         self.watches = tuple(
@@ -268,7 +262,7 @@ class Monitors:
             pressure_pa,
             counts=motion.age_ms <= STALE_MS,  # gaps hide no law that loses
         )
-        return _AMPLIFIED if twin.amplified and self._compares else 0
+        return Finding.ROLL_AMPLIFIED if twin.amplified and self._compares else 0
 
     def _look_at_water(self, measured: Measurements, own: OwnState) -> int:
         now_ns = measured.now_ns
@@ -295,7 +289,7 @@ class Monitors:
                 self._level_found = self._level_stuck.update(
                     motion.roll_rad, level_m, pressure_pa, slope_push
                 )
-        if self._water_found or self.watches[self.used].found & _DRIFT_LASTS:
+        if self._water_found or self.watches[self.used].found & Finding.DRIFT_LASTS:
             self._wrong_ns = now_ns
             self.confirmed = False
         elif self.equation.obeyed and now_ns - self._wrong_ns > self._doubted_ns:
@@ -316,7 +310,7 @@ class Monitors:
             self.confirmed = False
         if not unwatched:
             return 0
-        return _UNWATCHED_LONG if self._unwatched_s > longest_s else _UNWATCHED
+        return _UNWATCHED_LONG if self._unwatched_s > longest_s else Finding.UNWATCHED
 
     def _look_at_levels(self, measured: Measurements, own: OwnState) -> int:  # noqa: ARG002
         if measured.tank_age_ms > STALE_MS:
@@ -330,9 +324,9 @@ class Monitors:
         found |= self._saturation.update(
             own.command_pa, drive_limited=measured.drive_held_back, elapsed_s=LONG_S
         )
-        noisy = self._found_by[_LEVELS] & _NOISE
+        noisy = self._found_by[_LEVELS] & Finding.NOISE
         if self._spikes.update(measured.levels_discarded, LONG_S) and not noisy:
-            found |= _SPIKES
+            found |= Finding.SPIKES
         return found
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.thresholds import MonitorThresholds, SensorFigures, thresholds_of
 
 CONFIG = load_config(Path("configs/controllers/gpc.yaml"), ControllerConfig)
@@ -16,6 +17,7 @@ SHIP = replace(CONFIG.vessel.ship, sway_of_slope=0.0)
 THRESHOLDS: MonitorThresholds = thresholds_of(
     CONFIG.plant, CONFIG.safety.roll_limit_rad, SensorFigures()
 )
+FINDINGS = [bit for name, bit in vars(Finding).items() if name.isupper()]
 
 
 class MovingShip:

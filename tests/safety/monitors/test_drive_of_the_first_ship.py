@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from moving_ship import CONFIG, THRESHOLDS
+from moving_ship import CONFIG, FINDINGS, THRESHOLDS
 
 from utank_hil.safety.monitors.drive import DriveFollowing
 from utank_hil.safety.monitors.finding import Finding
@@ -15,14 +15,14 @@ LAG_S = CONFIG.vessel.pump.lag_s
 
 def drive_findings(
     actual, seconds: float = 30.0, limited: bool = False, along_m_s: float = 0.0
-) -> dict[Finding, float]:
+) -> dict[int, float]:
     """When a drive that makes `actual(time, pressure)` of the right pressure is found out.
 
     The water flows at `along_m_s` the way of the command.
     """
     monitor = DriveFollowing(LAG_S, THRESHOLDS, STEP_S)
     right = 0.0
-    first: dict[Finding, float] = {}
+    first: dict[int, float] = {}
     for k in range(round(seconds / STEP_S)):
         t = k * STEP_S
         command = 30e3 * math.sin(0.6 * t)
@@ -33,7 +33,7 @@ def drive_findings(
         found = monitor.update(
             command, actual(t, right), 0.0, rate_m_s, enabled=True, limited=limited
         )
-        for finding in Finding if found else ():
+        for finding in FINDINGS:
             if found & finding:
                 first.setdefault(finding, t)
     return first
@@ -76,12 +76,12 @@ def off_findings(pressure_pa, level_m=0.0, seconds: float = 3.0, limited: bool =
     monitor = DriveFollowing(LAG_S, THRESHOLDS, STEP_S)
     for _ in range(60):
         assert not monitor.update(40e3, 40e3, 0.0, 0.0, enabled=True, limited=False)
-    first: dict[Finding, float] = {}
+    first: dict[int, float] = {}
     for k in range(1, round(seconds / STEP_S)):
         t = k * STEP_S
         off = {"enabled": False, "limited": limited}
         found = monitor.update(0.0, pressure_pa(t), level_m, 0.0, **off)
-        for finding in Finding if found else ():
+        for finding in FINDINGS:
             if found & finding:
                 first.setdefault(finding, t)
     return first

@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from moving_ship import THRESHOLDS, MovingShip
+from moving_ship import FINDINGS, THRESHOLDS, MovingShip
 
 from utank_hil.nodes.commissioning.checks import RATE_ZERO_DEG_S
 from utank_hil.safety.monitors.finding import Finding
@@ -11,17 +11,17 @@ STEP_S = 0.05
 FAULT_S = 120.0
 
 
-def found_after(fault, until_s: float = 60.0, roll_deg: float = 0.5) -> dict[Finding, float]:
+def found_after(fault, until_s: float = 60.0, roll_deg: float = 0.5) -> dict[int, float]:
     """When each finding came first, after a fault that changes (roll, turned)."""
     ship, monitor = MovingShip(math.radians(roll_deg)), RollAgainstRate(THRESHOLDS)
-    first: dict[Finding, float] = {}
+    first: dict[int, float] = {}
     for k in range(round((FAULT_S + until_s) / STEP_S)):
         t = k * STEP_S
         sample = [ship.roll_rad(t), ship.turned_rad(t, STEP_S)]
         if t >= FAULT_S:
             sample = fault(t - FAULT_S, *sample)
         found = monitor.update(*sample, STEP_S)
-        for finding in Finding if found else ():
+        for finding in FINDINGS:
             if found & finding:
                 first.setdefault(finding, t - FAULT_S)
     return first

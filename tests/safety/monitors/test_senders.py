@@ -25,7 +25,7 @@ def first_found(
     lost: float,
     cycle_ms: int = 10,
     seconds: float = 5.0,
-    what: Finding = Finding.SECOND_SENDER | Finding.NODE_SILENT,
+    what: int = Finding.SECOND_SENDER | Finding.NODE_SILENT,
 ) -> float | None:
     """When a stream is found that hears and loses so many frames every ten cycles."""
     counted = Counted(cycle_ms * 1_000_000)

@@ -34,7 +34,7 @@ def equation_of(
     *,
     valve: bool = False,
     held: float = 0.0,
-) -> tuple[TankEquation, Finding]:
+) -> tuple[TankEquation, int]:
     """After a minute in which roll and pump push the water by `x` and `p` times their gains.
 
     Pushes are phasors at W, in m^2/s^2, as root mean squares behind the filters. A valve holds
@@ -48,7 +48,7 @@ def equation_of(
         turn = math.sqrt(2) * cmath.exp(1j * W * k * STEP_S)
         roll_rad, level_m, pressure_pa = ((each * turn).real for each in phasors)
         found = equation.update(roll_rad, level_m, pressure_pa, held_pa=held * pressure_pa)
-    return equation, Finding(found)
+    return equation, found
 
 
 @pytest.mark.parametrize(

@@ -24,11 +24,6 @@ HELD_S: Final = 10.0
 STILL_SHARE: Final = 0.9
 """Of the degraded pressure: once found, less than that ends it, as no more is left then."""
 
-_LAGS: Final = int(Finding.DRIVE_LAGS)
-_LOST: Final = int(Finding.DRIVE_LOST)
-_PUMP_SIGN: Final = int(Finding.PUMP_SIGN)
-_SATURATED: Final = int(Finding.SATURATED)
-
 
 class DriveFollowing:
     """The pressure against a model of the drive: the command, later by a step, through its lag.
@@ -113,10 +108,10 @@ class DriveFollowing:
         else:
             self._behind_s = 0.0
             return 0
-        found = _PUMP_SIGN if self._reversed_s > REVERSED_S else 0
+        found = Finding.PUMP_SIGN if self._reversed_s > REVERSED_S else 0
         if self._behind_s > LOST_S:
-            return found | _LAGS | _LOST
-        return found | _LAGS if self._behind_s > LAGS_S else found
+            return found | Finding.DRIVE_LAGS | Finding.DRIVE_LOST
+        return found | Finding.DRIVE_LAGS if self._behind_s > LAGS_S else found
 
 
 class Saturation:
@@ -145,4 +140,4 @@ class Saturation:
         self._side = side
         self._limited_s = self._limited_s + elapsed_s if drive_limited else 0.0
         self._found = self._held_s > HELD_S or self._limited_s > HELD_S
-        return _SATURATED if self._found else 0
+        return Finding.SATURATED if self._found else 0

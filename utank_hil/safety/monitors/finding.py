@@ -1,31 +1,31 @@
 """What a monitor may find: one bit each, so that a tick hands all of them on as one number."""
 
-from enum import IntFlag, auto
+from typing import Final
 
 
-class Finding(IntFlag):
-    """One bit a finding."""
+class Finding:
+    """One bit a finding: plain numbers, since members of an enumeration take a tick too long."""
 
-    ROLL_STUCK = auto()
-    LEVEL_STUCK = auto()
-    DRIFT = auto()
-    DRIFT_LASTS = auto()
-    WATER_SIGN = auto()
-    PUMP_SIGN = auto()
-    MOTION_LATE = auto()
-    NOISE = auto()
-    SPIKES = auto()
-    VOLUME = auto()
-    VOLUME_LASTS = auto()
-    DRIVE_LAGS = auto()
-    DRIVE_LOST = auto()
-    SATURATED = auto()
-    SECOND_SENDER = auto()
-    NODE_SILENT = auto()
-    FLOOD = auto()
-    ROLL_AMPLIFIED = auto()
-    SENSORS_DISAGREE = auto()
-    DAMAGED = auto()
-    FRAMES_LOST = auto()
-    UNWATCHED = auto()
-    UNWATCHED_LONG = auto()
+    ROLL_STUCK: Final = 1 << 0
+    LEVEL_STUCK: Final = 1 << 1
+    DRIFT: Final = 1 << 2
+    DRIFT_LASTS: Final = 1 << 3
+    WATER_SIGN: Final = 1 << 4
+    PUMP_SIGN: Final = 1 << 5
+    MOTION_LATE: Final = 1 << 6
+    NOISE: Final = 1 << 7
+    SPIKES: Final = 1 << 8
+    VOLUME: Final = 1 << 9
+    VOLUME_LASTS: Final = 1 << 10
+    DRIVE_LAGS: Final = 1 << 11
+    DRIVE_LOST: Final = 1 << 12
+    SATURATED: Final = 1 << 13
+    SECOND_SENDER: Final = 1 << 14
+    NODE_SILENT: Final = 1 << 15
+    FLOOD: Final = 1 << 16
+    ROLL_AMPLIFIED: Final = 1 << 17
+    SENSORS_DISAGREE: Final = 1 << 18
+    DAMAGED: Final = 1 << 19
+    FRAMES_LOST: Final = 1 << 20
+    UNWATCHED: Final = 1 << 21
+    UNWATCHED_LONG: Final = 1 << 22

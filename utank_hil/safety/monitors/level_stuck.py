@@ -23,10 +23,6 @@ LASTS_S: Final = 30.0
 LARGE: Final = 3.0
 """So many times the threshold: no longer a drift to live with."""
 
-_VOLUME: Final = int(Finding.VOLUME)
-_VOLUME_LASTS: Final = int(Finding.VOLUME_LASTS)
-_NOISE: Final = int(Finding.NOISE)
-
 
 class Volume:
     """Sum of both levels, which mirror one another, and the gauges' noise in it."""
@@ -43,19 +39,18 @@ class Volume:
             self.sum_m = port_m + starboard_m
         beside_m = port_m + starboard_m - self.sum_m
         self.sum_m += beside_m * (elapsed_s / SMOOTH_S)
-        found = _NOISE if self._noise.update(beside_m, elapsed_s) else 0
+        found = Finding.NOISE if self._noise.update(beside_m, elapsed_s) else 0
         over = abs(self.sum_m)
         if over <= self._limit_m:
             self._over_s = 0.0
             return found
         self._over_s += elapsed_s
         if self._over_s > LASTS_S or over > LARGE * self._limit_m:
-            found |= _VOLUME_LASTS
-        return found | _VOLUME
+            found |= Finding.VOLUME_LASTS
+        return found | Finding.VOLUME
 
 
 BANDS: Final = 16.0  #: Movement of the water that counts, in bands. Chosen; no study.
-_LEVEL_STUCK: Final = int(Finding.LEVEL_STUCK)
 
 
 class LevelStuck:
@@ -113,4 +108,4 @@ class LevelStuck:
         self._swayed_m = swayed_m = swayed_m + rate_m_s * self._period_s
         other_m, most_m = moved_m - self._most_sway * swayed_m, BANDS * self._band_m
         stuck = min(moved_m, other_m) > most_m or max(moved_m, other_m) < -most_m
-        return _LEVEL_STUCK if stuck else 0
+        return Finding.LEVEL_STUCK if stuck else 0

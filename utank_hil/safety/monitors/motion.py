@@ -34,10 +34,6 @@ FORGET_S: Final = 60.0
 TRIAL_S: Final = 30.0
 """So long the two agree, from no bias on, before a sensor whose bias was forgotten is right."""
 
-_DRIFT: Final = int(Finding.DRIFT)
-_DRIFT_LASTS: Final = int(Finding.DRIFT_LASTS)
-_NOISE: Final = int(Finding.NOISE)
-
 
 class RollAgainstRate:
     """Compares the roll with its integrated rate.
@@ -93,21 +89,21 @@ class RollAgainstRate:
         summed_rad = within(keep * (self.unexplained_rad + left_rad), MOST_DRIFT * limit_rad)
         self.unexplained_rad = summed_rad
         self._smooth_rad += (summed_rad - self._smooth_rad) * min(elapsed_s / SMOOTH_S, 1.0)
-        found = _NOISE if noisy else 0
+        found = Finding.NOISE if noisy else 0
         if abs(summed_rad) <= limit_rad:
             if abs(summed_rad) < 0.5 * limit_rad:
                 self._over_s = 0.0
             if self._trial_s > 0.0:
                 self._trial_s -= elapsed_s
-                found |= _DRIFT | _DRIFT_LASTS
+                found |= Finding.DRIFT | Finding.DRIFT_LASTS
             return found
         self._over_s += elapsed_s
-        found |= _DRIFT
+        found |= Finding.DRIFT
         if self._trial_s > 0.0:
             self._trial_s = TRIAL_S
-            found |= _DRIFT_LASTS
+            found |= Finding.DRIFT_LASTS
         if self._over_s > DRIFT_LASTS_S or abs(self._smooth_rad) > LARGE_DRIFT * limit_rad:
-            found |= _DRIFT_LASTS
+            found |= Finding.DRIFT_LASTS
         return found
 
     def _forget(self) -> None:
@@ -122,8 +118,6 @@ MOUNTED_RAD: Final = math.radians(0.5)
 NOISES: Final = 3.0
 APART_S: Final = 0.3
 """A spike is gone by then; a wrong sign passes through zero for a shorter time with each roll."""
-
-_DISAGREE: Final = int(Finding.SENSORS_DISAGREE)
 
 
 class MotionPair:
@@ -155,7 +149,7 @@ class MotionPair:
             or abs(self._rate_rad_s) > self._rate_limit_rad_s
         )
         self._over_s = self._over_s + self._period_s if over else 0.0
-        return _DISAGREE if self._over_s >= APART_S else 0
+        return Finding.SENSORS_DISAGREE if self._over_s >= APART_S else 0
 
 
 class SpikeCount:
@@ -185,8 +179,6 @@ digit, and without any a roll of five digits at w0 stays within one at a crest f
 repeats for less than a second."""
 SLOW_CYCLE_S: Final = 0.02
 """Of a slower sensor not every look finds a new sample, nor two looks the same number of them."""
-_SPIKES: Final = int(Finding.SPIKES)
-_ROLL_STUCK: Final = int(Finding.ROLL_STUCK)
 
 
 class MotionWatch:
@@ -243,9 +235,9 @@ class MotionWatch:
             return
         found = self._look(sample, turned_rad, elapsed_s)
         # the largest samples of noise are discarded, too
-        if self._spikes.update(sample.discarded, elapsed_s) and not found & _NOISE:
-            found |= _SPIKES
-        self.found = found | _ROLL_STUCK if self._repeated_s > self._dead_s else found
+        if self._spikes.update(sample.discarded, elapsed_s) and not found & Finding.NOISE:
+            found |= Finding.SPIKES
+        self.found = found | Finding.ROLL_STUCK if self._repeated_s > self._dead_s else found
 
     def _look(self, sample: MotionSample, turned_rad: float, elapsed_s: float) -> int:
         """Roll against rate, and the noise of both; of a slow sensor each sample counts once."""
@@ -255,9 +247,9 @@ class MotionWatch:
         else:
             since_s = (sample.heard_ns - self._bent_ns) * 1e-9
             if since_s <= 0:
-                return self.found & ~_SPIKES
+                return self.found & ~Finding.SPIKES
             self._bent_ns = sample.heard_ns
             elapsed_s = since_s
             found = self.motion.update(sample.roll_rad, turned_rad, since_s, even=False)
             bend = self._rate_bend.update_after(sample.roll_rate_rad_s, since_s)
-        return found | _NOISE if self.rate_noise.update(bend, elapsed_s) else found
+        return found | Finding.NOISE if self.rate_noise.update(bend, elapsed_s) else found

@@ -44,11 +44,6 @@ DAMAGED_FRAMES: Final = 3
 """With a wrong CRC or data ID within `DAMAGED_S`."""
 DAMAGED_S: Final = 1.0
 
-_SECOND: Final = int(Finding.SECOND_SENDER)
-_SILENT: Final = int(Finding.NODE_SILENT)
-_FLOOD: Final = int(Finding.FLOOD)
-_LOST: Final = int(Finding.FRAMES_LOST)
-_DAMAGED: Final = int(Finding.DAMAGED)
 _CRC: Final = Rejection.CRC
 
 
@@ -125,10 +120,10 @@ class Stream:
             self._gap = 0.0
         self._heard_before = heard > 0
         self._missing = missing = min(max(missing, 0.0), MOST_LOST + 1.0)
-        found = _SECOND if excess > MOST_FRAMES else 0
+        found = Finding.SECOND_SENDER if excess > MOST_FRAMES else 0
         if missing > MOST_LOST or self._slow_s > SLOW_S:
-            found |= _LOST
-        return found | _SILENT if self._silent_s > self._silent_limit_s else found
+            found |= Finding.FRAMES_LOST
+        return found | Finding.NODE_SILENT if self._silent_s > self._silent_limit_s else found
 
     def _on_change(self, elapsed_s: float) -> float:
         """Frames since the last call that may come on top of the cycle's."""
@@ -176,11 +171,11 @@ class Senders:
         self._elapsed_before_s = elapsed_s
         before, self._found_before = self._found_before, found
         if self._now_s - self._damaged_s[0] <= DAMAGED_S:
-            found |= _DAMAGED
+            found |= Finding.DAMAGED
         excess = self._excess + foreign - self._foreign - self._foreign_per_s * elapsed_s
         self._foreign = foreign
         self._excess = excess = min(max(excess, 0.0), 2 * FOREIGN_FRAMES)
-        return found | before | _FLOOD if excess > FOREIGN_FRAMES else found | before
+        return found | before | Finding.FLOOD if excess > FOREIGN_FRAMES else found | before
 
 
 LOAD_LOOK_NS: Final = 10 * TICK_NS

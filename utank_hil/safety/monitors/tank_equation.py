@@ -87,12 +87,6 @@ HELD_SHARE: Final = 0.3
 FULL_SHARE: Final = 0.9
 """Of the tank's height: beyond, roof and bottom push too."""
 
-_WATER_SIGN: Final = int(Finding.WATER_SIGN)
-_PUMP_SIGN: Final = int(Finding.PUMP_SIGN)
-_LEVEL_STUCK: Final = int(Finding.LEVEL_STUCK)
-_LATE: Final = int(Finding.MOTION_LATE)
-_ROLL_STUCK: Final = int(Finding.ROLL_STUCK)
-
 
 def roll_push_at_natural_frequency(ship: RollShip, tank: Tank) -> float:
     """Push on the water per roll that swings at w0, in m^2/(s^2 rad): x / phi."""
@@ -336,12 +330,13 @@ class TankEquation:
         held = LEAST_SHARE * LEAST_SHARE * pp + HELD_SHARE * HELD_SHARE * self._vv
         enough_x = xx > self._least_xx and xx > held
         steady = self._samples > self._late_samples
-        enough_p, enough_both = self._least_pp, self._least_xx + self._least_pp
+        enough_p = pp > self._least_pp and pp > self._pump_share * xx
+        enough_both = both > self._least_xx + self._least_pp
         cases = (
-            (self._reversed, xx, enough_x, _WATER_SIGN),
-            (self._pump_reversed, pp, pp > enough_p and pp > self._pump_share * xx, _PUMP_SIGN),
-            (self._swapped, both, both > enough_both, _WATER_SIGN),
-            (self._quarter_late, xx, enough_x and steady, _LATE),
+            (self._reversed, xx, enough_x, Finding.WATER_SIGN),
+            (self._pump_reversed, pp, enough_p, Finding.PUMP_SIGN),
+            (self._swapped, both, enough_both, Finding.WATER_SIGN),
+            (self._quarter_late, xx, enough_x and steady, Finding.MOTION_LATE),
         )
         judged = [
             (case.least(most_sway, zero), power, case.uu, finding)
@@ -356,29 +351,30 @@ class TankEquation:
         for other, power, uu, finding in judged:
             least_uu = most_uu if self._band is None else min(uu, most_uu)
             doubt = filled * self._excess(sound, other, power, least_uu)
-            if moves and doubt > 1 and other <= (1.0 if finding == _LATE else self._clearly) * best:
+            clearly = 1.0 if finding == Finding.MOTION_LATE else self._clearly
+            if moves and doubt > 1 and other <= clearly * best:
                 found |= finding
             if not self.doubt >= doubt:
                 self.doubt = doubt
-            if finding == _WATER_SIGN and self._excess(other, sound, power, uu) > 1:
+            if finding == Finding.WATER_SIGN and self._excess(other, sound, power, uu) > 1:
                 self.obeyed = True
-        if both > enough_both:
+        if enough_both:
             feigned = zero * abs(self._push_sum) + spread * math.sqrt(both)
             feigned += max(most_sway * self._slope_both, 0.0)
             self.level_gain = gain = (self._level_both + feigned) / both
-            if gain < STUCK_GAIN and not found & _WATER_SIGN:
-                found |= _LEVEL_STUCK
+            if gain < STUCK_GAIN and not found & Finding.WATER_SIGN:
+                found |= Finding.LEVEL_STUCK
         if self._still > self._still_samples:
             most = math.sqrt(self._most_unmoved) + spread
             if sound > most * most:
-                found |= _ROLL_STUCK
+                found |= Finding.ROLL_STUCK
         dd = self._dd
         if dd > self._least_dd and steady:
             feigned = zero * abs(self._d) + self._spread * math.sqrt(self._late_uu * dd)
             feigned -= min(most_sway * self._slope_lead, 0.0)
             self.late_s = late_s = (self._lead - feigned) / dd
             if late_s > self._late_limit_s:
-                found |= _LATE
+                found |= Finding.MOTION_LATE
         return found
 
     def _excess(self, worse: float, better: float, power: float, uu: float) -> float:
