@@ -3,7 +3,7 @@
 No CAN, clocks or files: arrays in, models out.
 """
 
-from utank_hil.identification.disturbance import DisturbanceBasis as DisturbanceBasis
+from utank_hil.identification.disturbance import disturbance_basis as disturbance_basis
 from utank_hil.identification.disturbance import (
     find_disturbance_frequencies as find_disturbance_frequencies,
 )

@@ -6,7 +6,6 @@ amplitude and phase are fitted with the model.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -22,47 +21,37 @@ _STEPS_A_CYCLE = 4  # Trial frequencies per DFT bin (one cycle over the record).
 _EVIDENCE = 30.0  # Smallest F statistic of a line; noise reaches 6, an irregular sea 20.
 
 
-@dataclass(frozen=True, slots=True)
-class DisturbanceBasis:
-    """Sine and cosine, and polynomial functions of time."""
+def disturbance_basis(
+    samples: int,
+    sample_time_s: float,
+    frequencies_rad_s: Sequence[float] = (),
+    polynomial_degree: int | None = None,
+) -> FloatArray:
+    """Functions of time at t = 0, dt, ...; shape (d, samples), no value above 1 in magnitude.
 
-    frequencies_rad_s: Sequence[float] = ()  #: Frequencies, with a sine and a cosine each.
-    #: Degree of Legendre polynomials over the record: 0 for an offset (a steady heel, the bias of a
-    #: sensor), 1 for a drift as well; None for no offset.
-    polynomial_degree: int | None = None
-
-    def __post_init__(self) -> None:
-        values = self.frequencies_rad_s
-        if not all(math.isfinite(v) for v in values) or len(set(values)) != len(values):
-            raise ValueError(
-                f"disturbance frequencies_rad_s must be finite and distinct, got {values}"
-            )
-        if not all(w > 0 for w in self.frequencies_rad_s):
-            raise ValueError(
-                f"disturbance frequencies must be positive, got {self.frequencies_rad_s}; "
-                "an offset is polynomial_degree=0"
-            )
-        if self.polynomial_degree is not None and self.polynomial_degree < 0:
-            raise ValueError(
-                f"disturbance polynomial_degree must be 0 or more, got {self.polynomial_degree}"
-            )
-
-    @property
-    def size(self) -> int:
-        """Number d of functions."""
-        degree = -1 if self.polynomial_degree is None else self.polynomial_degree
-        return 2 * len(self.frequencies_rad_s) + degree + 1
-
-    def evaluate(self, samples: int, sample_time_s: float) -> FloatArray:
-        """Evaluate at t = 0, dt, ...; shape (d, samples), no value above 1 in magnitude."""
-        time_s = np.arange(samples) * sample_time_s
-        rows: list[FloatArray] = []
-        for frequency in self.frequencies_rad_s:
-            rows += [np.sin(frequency * time_s), np.cos(frequency * time_s)]
-        if self.polynomial_degree is not None:
-            span = np.linspace(-1.0, 1.0, samples)
-            rows += list(np.polynomial.legendre.legvander(span, self.polynomial_degree).T)
-        return np.array(rows).reshape(len(rows), samples)
+    They are a sine and a cosine of each frequency, and with a degree Legendre polynomials over the
+    record: up to 0 for an offset (a steady heel, the bias of a sensor), up to 1 for a drift as
+    well. ValueError is raised if the frequencies are not distinct and positive, or the degree is
+    negative.
+    """
+    values = list(frequencies_rad_s)
+    if not all(math.isfinite(w) for w in values) or len(set(values)) != len(values):
+        raise ValueError(f"disturbance frequencies_rad_s must be finite and distinct, got {values}")
+    if not all(w > 0 for w in values):
+        raise ValueError(
+            f"disturbance frequencies must be positive, got {values}; an offset is "
+            "polynomial_degree=0"
+        )
+    if polynomial_degree is not None and polynomial_degree < 0:
+        raise ValueError(
+            f"disturbance polynomial_degree must be 0 or more, got {polynomial_degree}"
+        )
+    time_s = np.arange(samples) * sample_time_s
+    rows = [shape(w * time_s) for w in values for shape in (np.sin, np.cos)]
+    if polynomial_degree is not None:
+        span = np.linspace(-1.0, 1.0, samples)
+        rows += list(np.polynomial.legendre.legvander(span, polynomial_degree).T)
+    return np.array(rows).reshape(len(rows), samples)
 
 
 def find_disturbance_frequencies(
@@ -133,7 +122,7 @@ class _Search:
     """Evidence for one more line in addition to known ones."""
 
     def __init__(self, z: FloatArray, m: int, lines: list[float], sample_time_s: float) -> None:
-        known = DisturbanceBasis(lines).evaluate(len(z), sample_time_s)
+        known = disturbance_basis(len(z), sample_time_s, lines)
         regression = LagRegression(z, m, _ORDER, known)
         self._matrix = regression.matrix
         ridge = _RIDGE * regression.rows * np.eye(regression.columns)

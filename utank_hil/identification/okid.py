@@ -14,7 +14,7 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
-from utank_hil.identification.disturbance import DisturbanceBasis
+from utank_hil.identification.disturbance import disturbance_basis
 from utank_hil.identification.lag_regression import Fit, LagRegression, fit
 from utank_hil.identification.record import IdentificationError, channel_scale, stacked_record
 
@@ -137,10 +137,11 @@ def okid(
         raise ValueError(f"sample_time_s must be positive, got {sample_time_s}")
     if int(order) != order or order < 1:
         raise ValueError(f"order must be a positive integer, got {order}")
-    basis = DisturbanceBasis(tuple(disturbance_frequencies_rad_s), disturbance_polynomial_degree)
     z, m = stacked_record(u, y)
     scale = channel_scale(z, m)
-    functions = basis.evaluate(len(z), sample_time_s)
+    functions = disturbance_basis(
+        len(z), sample_time_s, disturbance_frequencies_rad_s, disturbance_polynomial_degree
+    )
     regression = LagRegression(z / scale, m, int(order), functions)
     solution = fit(regression)
     if solution.excitation_order < min(_LEAST_EXCITATION, order + 1):

@@ -14,7 +14,7 @@ from scipy.special import chdtrc
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
-from utank_hil.identification.disturbance import DisturbanceBasis
+from utank_hil.identification.disturbance import disturbance_basis
 from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.record import IdentificationError, channel_scale, stacked_record
 
@@ -78,15 +78,16 @@ def validate(
             f"{z.shape[1] - m}"
         )
     scale = channel_scale(z, m)
-    basis = DisturbanceBasis(tuple(disturbance_frequencies_rad_s), disturbance_polynomial_degree)
-    functions = basis.evaluate(len(z), arx.sample_time_s)
+    functions = disturbance_basis(
+        len(z), arx.sample_time_s, disturbance_frequencies_rad_s, disturbance_polynomial_degree
+    )
     regression = LagRegression(z / scale, m, max(arx.order, int(lags)), functions)
     _refuse_unusable(regression, lags)
     coefficients = _coefficients(arx, scale, regression)
     errors = _errors(regression, coefficients)
-    if basis.size:
-        known = regression.matrix[:, -basis.size :]
-        coefficients[-basis.size :] = np.linalg.lstsq(known, errors, rcond=None)[0]
+    if size := len(functions):
+        known = regression.matrix[:, -size:]
+        coefficients[-size:] = np.linalg.lstsq(known, errors, rcond=None)[0]
         errors = _errors(regression, coefficients)
     spread = np.std(regression.targets, axis=0)
     whiteness, correlation = _whiteness(np.split(errors, regression.ends), lags)

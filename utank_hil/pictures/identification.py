@@ -11,7 +11,7 @@ from utank_hil.analysis.motion.decay import RollDecay
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control import DesignPlant
 from utank_hil.dynamics.sampling import state_space_response
-from utank_hil.identification import DisturbanceBasis
+from utank_hil.identification import disturbance_basis
 from utank_hil.pictures.style import BELOW, COLORS, DASHES, WIDEST_IN, picture
 from utank_hil.retuning.redesign import Identification, RetuningTask
 from utank_hil.retuning.settings import estimation_samples
@@ -38,7 +38,7 @@ def draw_identification(
     split = estimation_samples(len(record))
     shown = slice(split, min(len(record), split + arx.order + round(SHOWN_S / step_s)))
     here = np.nan_to_num(record[shown])
-    basis = DisturbanceBasis(found.wave_frequencies_rad_s, 0).evaluate(len(here), step_s)
+    basis = disturbance_basis(len(here), step_s, found.wave_frequencies_rad_s, 0)
     predicted = arx.predict(here[:, :1], here[:, 1:])[arx.order :, roll]
     waves, measured_roll = basis[:, arx.order :].T, here[arx.order :, roll + 1]
     predicted = predicted + waves @ np.linalg.lstsq(waves, measured_roll - predicted, rcond=None)[0]

@@ -9,7 +9,6 @@ from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL, LQG_ROLL_RATE_LEVEL
 from utank_hil.analysis.loop import impulse_response
 from utank_hil.analysis.loop.impulse_response import (
     NoImpulseResponse,
-    NotDecaying,
     impulse_response_law,
     realize,
 )
@@ -163,7 +162,7 @@ def test_a_long_memory_is_followed_to_its_end():
     ids=["integrator", "unstable", "explodes"],
 )
 def test_a_law_that_does_not_forget_is_refused(function, peak):
-    with pytest.raises(NotDecaying, match=peak):
+    with pytest.raises(NoImpulseResponse, match=peak):
         probe(function, most_samples=2000)
 
 

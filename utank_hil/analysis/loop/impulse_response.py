@@ -57,10 +57,6 @@ class NoImpulseResponse(ValueError):
     """The impulse response of a law cannot be determined; the message gives the reason."""
 
 
-class NotDecaying(NoImpulseResponse):
-    """The response does not decay: the law has an integrator, is unstable, or adapts."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class ImpulseResponseLaw:
     """The linear law that has a controller's impulse response; a `LinearLaw`."""
@@ -111,10 +107,10 @@ def impulse_response_law(
 
     `make_controller` makes a controller at rest that measures `measured`, in this order; `sizes`
     are those of the impulse in each measurement. A response must decay within `most_samples` steps;
-    `budget_s` limits the time of all steps. Raises `NotDecaying` if a response has not decayed to
-    1e-9 of its peak in `most_samples`. Raises `NoImpulseResponse` if a step raises, its command is
-    not an array of finite numbers, the steps take too long, or no model of `MOST_STATES` states has
-    the response.
+    `budget_s` limits the time of all steps. Raises `NoImpulseResponse` if a response has not
+    decayed to 1e-9 of its peak in `most_samples` (the law integrates, is unstable, or adapts), a
+    step raises, its command is not an array of finite numbers, the steps take too long, or no model
+    of `MOST_STATES` states has the response.
     """
     until_s = time.monotonic() + budget_s
     columns, linear = [], True
@@ -213,7 +209,7 @@ def _slope(
         if len(slopes) >= 1.5 * loud + _LEAST_QUIET:
             break
         if len(slopes) == most_samples or height > _BEYOND:
-            raise NotDecaying(
+            raise NoImpulseResponse(
                 f"the answer to an impulse of {size:g} in {name} does not decay: it peaks at "
                 f"{peak * size:.3g} and is {height * size:.3g} after {len(slopes)} steps; a law "
                 "that integrates, learns or is unstable by itself has no impulse response"
