@@ -1,6 +1,7 @@
 """An emulated CANopen node: object dictionary, network management, SDO server, PDOs, heartbeats."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 from utank_hil.canbus import Frame
@@ -36,13 +37,13 @@ _STATES: dict[int, NetworkState] = {
 }
 
 
+@dataclass(slots=True)
 class Entry:
     """One entry: its value without sign, its bytes, and whether it may be written."""
 
-    __slots__ = ("size", "value", "writable")
-
-    def __init__(self, value: int, size: int, *, writable: bool = False) -> None:
-        self.value, self.size, self.writable = value, size, writable
+    value: int
+    size: int
+    writable: bool = False
 
     @property
     def signed(self) -> int:

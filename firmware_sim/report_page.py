@@ -22,14 +22,7 @@ from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import Vessel
 from utank_hil.console.common import why
 from utank_hil.console.ship_report import power_words, ship_line
-from utank_hil.pictures import BenchBar, BenchCurve, draw_bench
-from utank_hil.pictures.report_page import (
-    ReportPicture,
-    ReportSection,
-    ReportTable,
-    Verdict,
-    write_report_page,
-)
+from utank_hil.pictures import BenchBar, BenchCurve, draw_bench, report_page
 from utank_hil.pictures.style import COLORS, NO_TANK
 from utank_hil.reports.page import Report, about_section, printed
 from utank_hil.telemetry.recording import write_recording
@@ -63,10 +56,10 @@ def bench_page(found: BenchFigures, about: Mapping[str, Any], picture: bytes | N
     few = few_rolls(found, vessel.ship.natural_frequency_rad_s)
     says = "Roll and power of each run, and roll, level and pressure over time"
     sections = [
-        ReportSection("What was run", _what_was_run(found, about, vessel)),
-        ReportSection(
+        report_page.ReportSection("What was run", _what_was_run(found, about, vessel)),
+        report_page.ReportSection(
             "Roll and cost",
-            pictures=[] if picture is None else [ReportPicture(picture, says)],
+            pictures=[] if picture is None else [report_page.ReportPicture(picture, says)],
             tables=[printed(table) for table in tables(found)],
         ),
         _deadlines(found),
@@ -79,7 +72,7 @@ def bench_page(found: BenchFigures, about: Mapping[str, Any], picture: bytes | N
     return Report(f"{found.scenario}: bench", below, [_verdict(found, few)], sections)
 
 
-def _verdict(found: BenchFigures, few: str) -> Verdict:
+def _verdict(found: BenchFigures, few: str) -> report_page.Verdict:
     ranked = [run for run in found.runs if run.ranked and run.name != PASSIVE]
     lines = []
     if ranked:
@@ -95,7 +88,7 @@ def _verdict(found: BenchFigures, few: str) -> Verdict:
         lines.append(f"{line}, for {power} of shaft power on average.")
     lines += [few] if few else []
     lines += found.wrong or ["No run failed, and no limit of the model was passed."]
-    return Verdict(lines, good=not found.wrong)
+    return report_page.Verdict(lines, good=not found.wrong)
 
 
 def sea_words(sea: Mapping[str, Any]) -> str:
@@ -135,17 +128,17 @@ def again(about: Mapping[str, Any]) -> str:
     return shlex.join(filter(None, words))
 
 
-def _deadlines(found: BenchFigures) -> ReportSection:
+def _deadlines(found: BenchFigures) -> report_page.ReportSection:
     loops = {run.name: run.loop for run in found.runs if run.loop}
     if not loops:
-        return ReportSection("Deadlines", ["Simulated time: there are none."])
+        return report_page.ReportSection("Deadlines", ["Simulated time: there are none."])
     keys = [key for key, value in next(iter(loops.values())).items() if not isinstance(value, dict)]
     rows = [
         [name, *(f"{loop[key]:.4g}" if loop[key] is not None else "" for key in keys)]
         for name, loop in loops.items()
     ]
     headings = ["", *(key.replace("_", " ") for key in keys)]
-    return ReportSection("Deadlines", tables=[ReportTable(headings, rows)])
+    return report_page.ReportSection("Deadlines", tables=[report_page.ReportTable(headings, rows)])
 
 
 _FLAGS: Final = {"real_time": "realtime"}  #: Options whose names differ from their parameters.
@@ -170,7 +163,7 @@ def write_files(
 
     def write_page(path: Path) -> None:
         picture = files["picture"].read_bytes() if "picture" in files else None
-        write_report_page(path, *bench_page(found, about, picture))
+        report_page.write_report_page(path, *bench_page(found, about, picture))
 
     writers: tuple[tuple[str, str, Callable[[Path], None]], ...] = (
         ("picture", PICTURE, partial(_draw, result, found, about)),

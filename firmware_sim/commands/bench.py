@@ -12,6 +12,7 @@ from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import describe
 from utank_hil.base.shipped import CONFIGS
 from utank_hil.configuration.files import files_named
+from utank_hil.console import terminal
 from utank_hil.console.admission import admit
 from utank_hil.console.common import (
     OUT,
@@ -29,15 +30,6 @@ from utank_hil.console.common import (
     why,
 )
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import (
-    Command,
-    Terminal,
-    notes,
-    progress_bar,
-    run_command,
-    shown,
-    timing_table,
-)
 from utank_hil.control import BuiltLaw
 from utank_hil.runners.node import ModelError
 from utank_hil.telemetry.ring import RingError
@@ -116,7 +108,7 @@ def bench(
     else:
         _print(result, found, files)
         following = (("monitor", out), *_run_next(found, scenario))
-        Terminal().lead_on(*following, allow_code=allow_code)
+        terminal.Terminal().lead_on(*following, allow_code=allow_code)
     if failures:
         fail("; ".join(failures))
     raise typer.Exit(found.exit_code)
@@ -129,7 +121,7 @@ def _write_fmu(path: Path, scenario: "Scenario", fmu: Path, seed: int) -> None:
         write_fmu(scenario, fmu, seed)
     except (OSError, ValueError) as error:
         fail(f"{path}: {error}" if isinstance(error, ValueError) else error)
-    notes.say(f"{shown(fmu)}: FMI 2 for co-simulation, with its source")
+    terminal.notes.say(f"{terminal.shown(fmu)}: FMI 2 for co-simulation, with its source")
 
 
 def _refuse_faults(path: Path, scenario: "Scenario", *, real_time: bool, frames: bool) -> None:
@@ -149,7 +141,9 @@ def _run(
     from firmware_sim.bench import run_bench
 
     length_s = scenario.duration_s if options.duration_s is None else options.duration_s
-    with progress_bar(TaskProgressColumn(), "{task.completed:.0f} of {task.total:.0f} s") as bar:
+    with terminal.progress_bar(
+        TaskProgressColumn(), "{task.completed:.0f} of {task.total:.0f} s"
+    ) as bar:
         tasks = {
             name: bar.add_task(f"{name:>10}", total=length_s)
             for name in ("passive", *scenario.controllers)
@@ -172,7 +166,7 @@ def _run(
 def _print(result: "BenchResult", found: "BenchFigures", files: Mapping[str, Path]) -> None:
     from firmware_sim.report_tables import few_rolls, tables
 
-    console = Terminal()
+    console = terminal.Terminal()
     for table in tables(found):
         console.table(table)
     if few := few_rolls(found, result.scenario.vessel.ship.natural_frequency_rad_s):
@@ -183,7 +177,7 @@ def _print(result: "BenchResult", found: "BenchFigures", files: Mapping[str, Pat
         console.say(yellow=limit)
     loops = {run.name: run.loop for run in result.runs if run.loop is not None}
     if loops:
-        console.table(timing_table(loops))
+        console.table(terminal.timing_table(loops))
     else:
         count = f"{len(result.runs)} runs" if len(result.runs) > 1 else "one run"
         simulated_s = sum(run.end_s for run in result.runs)
@@ -195,14 +189,14 @@ def _print(result: "BenchResult", found: "BenchFigures", files: Mapping[str, Pat
     console.files(files)
 
 
-def _run_next(found: "BenchFigures", scenario: Path) -> list[Command]:
+def _run_next(found: "BenchFigures", scenario: Path) -> list[terminal.Command]:
     """Return the command that runs the best law of a sound bench, if a file of its own holds it."""
     if found.endings:
         return []
     files = files_named(scenario)
     ranked = sorted((run.rank, run.name) for run in found.runs if run.rank is not None)
     named = [files[key] for _, name in ranked if (key := ("controllers", name)) in files]
-    return run_command(named[0]) if named else []
+    return terminal.run_command(named[0]) if named else []
 
 
 def _about(

@@ -8,9 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
-from dataclasses import dataclass
-from multiprocessing.sharedctypes import Synchronized
-from typing import Any, Final
+from typing import Final
 
 from firmware_sim.fault_campaign.campaign import Campaign, Row
 from firmware_sim.fault_campaign.trial import Outcome, Sea, Window
@@ -25,27 +23,19 @@ ROWS_A_TASK: Final = 30
 Progress = Callable[[int], None]  #: Callback that takes the number of completed trials.
 
 
-@dataclass(frozen=True, slots=True)
-class _Shared:
-    campaign: Campaign
-    window: Window
-    done: "Synchronized[int]"
-    stop: Any  # plain value without a lock
-
-
 _laws: dict[str, BuiltLaw] = {}
 
 
 def _do(setup_name: str, seed: int, rows: list[Row], first: bool) -> list[Outcome]:
     """Run rows of one setup in one sea, in a process of the pool."""
-    ours: _Shared = shared()
-    setup = ours.campaign.setups[setup_name]
+    campaign, window, done, stop = shared()
+    setup = campaign.setups[setup_name]
     if setup_name not in _laws:
         _laws[setup_name] = build_law(setup.config)
     sea = Sea(
-        ours.campaign, setup, _laws[setup_name], seed, ours.window,
+        campaign, setup, _laws[setup_name], seed, window,
         patient=first,
-        stopped=lambda: bool(ours.stop.value),
+        stopped=lambda: bool(stop.value),
     )  # fmt: skip
     outcomes = []
     with suppress(InterruptedError):
@@ -55,8 +45,8 @@ def _do(setup_name: str, seed: int, rows: list[Row], first: bool) -> list[Outcom
                 outcomes.append(sea.outcome(row))
             except RuntimeError as error:
                 outcomes.append(Outcome(row.id, seed, error=str(error).strip().splitlines()[-1]))
-            with ours.done.get_lock():
-                ours.done.value += 1
+            with done.get_lock():
+                done.value += 1
     return outcomes
 
 
@@ -80,7 +70,7 @@ def run_rows(
         by_setup[row.fault.setup].append(row)
     futures: list[Future[list[Outcome]]] = []
     outcomes: list[Outcome] = []
-    common = _Shared(campaign, window, done, stop)
+    common = campaign, window, done, stop
     with suppress(BrokenProcessPool), WorkerPool(len(os.sched_getaffinity(0)), common) as pool:
         for seed in seeds:
             for setup, its in by_setup.items():

@@ -11,7 +11,7 @@ import select
 import signal
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Final, TypeVar, cast, get_args
 
 import numpy as np
@@ -88,15 +88,6 @@ class Outcome:
     error: str = ""
 
 
-@dataclass(slots=True)
-class Underway:
-    """Ship under way, up to the fault."""
-
-    bench: FaultyBench
-    log: BusLog
-    reference: list[Heard] = field(default_factory=list)
-
-
 class Sea:
     """All rows of one setup in the waves of one seed.
 
@@ -121,12 +112,14 @@ class Sea:
         self._patient = patient
         self._fault_s = campaign.fault_at_s(seed)
         self._fault_ns = round(self._fault_s * SECOND_NS)
+        #: Ship under way, up to the fault, and the log of its bus.
         self._underway = self._start()
-        self._underway.bench.run(self._fault_ns)
+        self._underway[0].run(self._fault_ns)
+        self._reference: list[Heard] = []
         self._passive: dict[bool, FloatArray] = {}
         self._sound: FloatArray = np.zeros(0)
 
-    def _start(self) -> Underway:
+    def _start(self) -> tuple[FaultyBench, BusLog]:
         log, config = BusLog(), self._setup.config
         work = estimator_work(config)
         bench = FaultyBench(
@@ -140,20 +133,20 @@ class Sea:
             commissioned=self._setup.commissioned,
         )
         log.node = bench.node
-        return Underway(bench, log)
+        return bench, log
 
     def prepare(self, rows: list[Row]) -> None:
         """Simulate the references of the rows: the bus without a fault, and the passive ship."""
         followed_s = max((row.fault.followed_s for row in rows if row.fault.on_bus), default=0.0)
         end_ns = self._fault_ns + round(followed_s * SECOND_NS)
-        log = self._underway.log
+        _, log = self._underway
         running_s = self._window.running_s
         running_ns = round(running_s * SECOND_NS) if running_s < Window().running_s else 0
         frames, self._sound = in_a_copy(
             lambda: self._without_fault(end_ns, self._fault_ns + running_ns), self._stopped
         )
         log.frames += frames
-        self._underway.reference, log.frames = (
+        self._reference, log.frames = (
             log.frames,
             [each for each in log.frames if each[0] < self._fault_ns],
         )
@@ -172,7 +165,7 @@ class Sea:
 
     def _cut_roll(self, seconds: float) -> FloatArray:
         """Roll of the sound ship if its pump is off from the fault on: no stop is sooner."""
-        plant = self._underway.bench.ship.plant
+        plant = self._underway[0].ship.plant
         plant.drive_pump(0.0, enabled=False)
         rolls, end_ns = [], self._fault_ns + round(seconds * SECOND_NS)
         for time_ns in range(self._fault_ns, end_ns, SAMPLE_NS):
@@ -182,7 +175,8 @@ class Sea:
 
     def _without_fault(self, end_ns: int, roll_end_ns: int) -> tuple[list[Heard], FloatArray]:
         """Frames until a time, and the roll until another or the same."""
-        bench, frames = self._underway.bench, self._underway.log.frames
+        bench, log = self._underway
+        frames = log.frames
         known, rolls = len(frames), []
         for time_ns in range(self._fault_ns, max(end_ns, roll_end_ns), SAMPLE_NS):
             bench.run(time_ns + SAMPLE_NS)
@@ -211,21 +205,19 @@ class Sea:
 
     def outcome(self, row: Row) -> Outcome:
         """Run a row in a copy of this process."""
-        reference = self._underway.reference
+        reference = self._reference
         if row.fault.operator and row.fault.inject:
             reference = in_a_copy(lambda: self._operated(row), self._stopped)
         return in_a_copy(lambda: self._outcome(row, reference), self._stopped)
 
     def _operated(self, row: Row) -> list[Heard]:
-        underway = self._start() if row.fault.from_start else self._underway
-        bench = underway.bench
+        bench, log = self._start() if row.fault.from_start else self._underway
         bench.join([Watch(bench, row)])
         bench.run(bench.lockstep.now_ns + round(row.fault.followed_s * SECOND_NS))
-        return underway.log.frames
+        return log.frames
 
     def _outcome(self, row: Row, reference: list[Heard]) -> Outcome:
-        underway = self._start() if row.fault.from_start else self._underway
-        bench, log = underway.bench, underway.log
+        bench, log = self._start() if row.fault.from_start else self._underway
         start_ns, refused = bench.lockstep.now_ns, bench.ship.refused_commands
         watch = Watch(bench, row, self._degraded_most(bench))
         bench.place(row.fault.inject)

@@ -170,11 +170,10 @@ def row_of(reaction, **fault):
 
 def begun(sea, row):
     """A bench with the faults of a row in it, and the log of its bus."""
-    underway = sea._start() if row.fault.from_start else sea._underway
-    bench = underway.bench
+    bench, log = sea._start() if row.fault.from_start else sea._underway
     bench.place(row.fault.inject)
     bench.join([Watch(bench, row)])
-    return bench, underway.log.frames
+    return bench, log.frames
 
 
 def frames(sea, row, seconds):

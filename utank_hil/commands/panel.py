@@ -11,16 +11,8 @@ from typing import Annotated, Final
 
 import typer
 
+from utank_hil import canbus
 from utank_hil.base.tick import TICK_NS
-from utank_hil.canbus import (
-    AlarmState,
-    ControllerStatus,
-    Fault,
-    Mode,
-    Port,
-    Station,
-    load_catalogue,
-)
 from utank_hil.canbus.ports import open_port
 from utank_hil.canbus.socketcan import SocketCanPort
 from utank_hil.commands.lines import printed_lines
@@ -51,7 +43,10 @@ _READ_BYTES: Final = 4096  #: Of a terminal's line.
 _STOP: Final = Action.STOP.value
 _LONGEST_LINE: Final = 256  #: Longer than any word.
 _WORDS: Final = (*(action.value for action in Action), "help", "quit")
-_UNACCEPTED: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.RECTIFIED_UNACKNOWLEDGED)
+_UNACCEPTED: Final = (
+    canbus.AlarmState.ACTIVE_UNACKNOWLEDGED,
+    canbus.AlarmState.RECTIFIED_UNACKNOWLEDGED,
+)
 
 
 class Keyboard:
@@ -77,7 +72,7 @@ class Keyboard:
         self._leave_ns: int | None = None
         self._now_ns = 0
         self._reset_ns: int | None = None
-        self._alarms: dict[Fault | None, AlarmState | None] = {}
+        self._alarms: dict[canbus.Fault | None, canbus.AlarmState | None] = {}
 
     def look(self, now_ns: int, *, signalled: bool = False) -> bool:
         """Execute new lines and show changes; return whether to leave.
@@ -132,7 +127,7 @@ class Keyboard:
             return
         self._reset_ns = None
         status = self._node.status
-        if status is not None and status.mode is Mode.FAULT and not self._silent:
+        if status is not None and status.mode is canbus.Mode.FAULT and not self._silent:
             there = [a.code.name for a in self._node.alarms if a.code and a.state in LASTING]
             self._say(f"reset REFUSED while this lasts: {', '.join(there)}")
 
@@ -177,7 +172,7 @@ class Keyboard:
         alarms = {alarm.code: alarm.state for alarm in node.alarms}
         for code, state in alarms.items():
             if code is not None and state in _UNACCEPTED and self._alarms.get(code) is not state:
-                there = state is AlarmState.ACTIVE_UNACKNOWLEDGED
+                there = state is canbus.AlarmState.ACTIVE_UNACKNOWLEDGED
                 bell = "\a" if self._terminal and there else ""
                 what = "ALARM" if there else "alarm, its cause gone,"
                 self._say(f"{bell}{what} {fault_text(code)} accept?")
@@ -187,7 +182,7 @@ class Keyboard:
         self._alarms = alarms
 
 
-def _status_text(status: ControllerStatus, own: Station) -> str:
+def _status_text(status: canbus.ControllerStatus, own: canbus.Station) -> str:
     parts = [f"controller: {'unknown mode' if status.mode is None else status.mode.name}"]
     if status.fault:
         parts.append(fault_text(status.fault))
@@ -231,8 +226,8 @@ def panel(
     **Example:** utank-hil panel configs/ships/thesis_first.yaml --bus can0 --web
     """
     loaded = load(vessel, Vessel)
-    catalogue = load_catalogue()
-    station = Station.OPERATOR_2 if second else Station.OPERATOR
+    catalogue = canbus.load_catalogue()
+    station = canbus.Station.OPERATOR_2 if second else canbus.Station.OPERATOR
     node = OperatorPanel(
         catalogue, configuration_version=loaded.version, station=station, period_ns=LOOK_NS
     )
@@ -240,7 +235,7 @@ def panel(
     with ExitStack() as stack:
         server = stack.enter_context(closing(_server(listen))) if web else None
 
-        def port_of() -> Port:
+        def port_of() -> canbus.Port:
             return open_port(bus, loaded.foreign) if web else SocketCanPort(bus, node.hears)
 
         heard, signalled = stack.enter_context(opened(port_of))

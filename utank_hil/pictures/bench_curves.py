@@ -11,16 +11,7 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Mode, RetuningState
-from utank_hil.pictures.style import (
-    BELOW,
-    COLORS,
-    DASHES,
-    HIGHLIGHT,
-    NO_TANK,
-    WIDEST_IN,
-    WRONG,
-    picture,
-)
+from utank_hil.pictures import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -90,8 +81,10 @@ def draw_bench(
     the relative half-width of each roll RMS. Raises `ValueError` without curves, or for more than
     there are colours.
     """
-    if not 1 <= len(curves) <= len(COLORS):
-        raise ValueError(f"can draw 1 to {len(COLORS)} runs in one picture, got {len(curves)}")
+    if not 1 <= len(curves) <= len(style.COLORS):
+        raise ValueError(
+            f"can draw 1 to {len(style.COLORS)} runs in one picture, got {len(curves)}"
+        )
     whole = (float(curves[0].time_s[0]), float(curves[0].time_s[-1]))
     centre_s, zoomed = _centre(curves)
     zoom = _around(centre_s, whole)
@@ -101,14 +94,14 @@ def draw_bench(
     curves_in = 6.6 + (0.6 + lane if retuning else 0.0)
     bars_in = 0.8 + 0.32 * len(bars) if bars else 0.0
     lines = [line for each in wrong for line in wrap(each, 120)]
-    size_in = (WIDEST_IN if len(spans) > 1 else 9.0, curves_in + bars_in + 0.24 * len(lines))
-    with picture(path, title, size_in, about) as whole_figure:
+    size_in = (style.WIDEST_IN if len(spans) > 1 else 9.0, curves_in + bars_in + 0.24 * len(lines))
+    with style.picture(path, title, size_in, about) as whole_figure:
         figure: Figure | SubFigure = whole_figure
         if bars:
             heights = [bars_in + 0.24 * len(lines), curves_in]
             top, figure = whole_figure.subfigures(2, 1, squeeze=False, height_ratios=heights)[:, 0]
             if lines:
-                top.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=10, color=WRONG)
+                top.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=10, color=style.WRONG)
             _draw_bars(top, bars, "" if interval is None else f", each ±{interval:.0%} (95 %)")
         shape, ratios = (3 + retuning, len(spans)), [2.0, 2.0, 2.0, lane][: 3 + retuning]
         axes = figure.subplots(*shape, sharex="col", squeeze=False, height_ratios=ratios)
@@ -117,7 +110,9 @@ def draw_bench(
         if len(spans) > 1:
             unit_s, _ = _time_unit(whole)
             for axis in axes[:3, 0]:
-                axis.axvspan(zoom[0] / unit_s, zoom[1] / unit_s, color=HIGHLIGHT, alpha=0.35, lw=0)
+                axis.axvspan(
+                    zoom[0] / unit_s, zoom[1] / unit_s, color=style.HIGHLIGHT, alpha=0.35, lw=0
+                )
             part_s = (whole[1] - whole[0]) / WINDOWS
             part = f"Whole run: greatest in each {part_s:.{0 if part_s >= 2 else 1}f} s"
             axes[0, 0].set_title(part, loc="left", fontsize=10)
@@ -130,7 +125,7 @@ def draw_bench(
         drawn = [*([] if bare is None else [bare]), *curves]
         names = [bar.name for bar in bars[-len(drawn) :]] or [curve.label for curve in drawn]
         handles = axes[0, -1].get_lines()[: len(drawn)]
-        whole_figure.legend(handles, names, **BELOW | {"ncols": len(drawn)})
+        whole_figure.legend(handles, names, **style.BELOW | {"ncols": len(drawn)})
     return path
 
 
@@ -188,9 +183,9 @@ def _draw_column(
     as_they_were: bool,
 ) -> None:
     unit_s, unit = _time_unit(span_s)
-    without = [] if bare is None else [(bare, NO_TANK, "-")]
+    without = [] if bare is None else [(bare, style.NO_TANK, "-")]
     plots = axes[: len(_LABELS)]
-    for curve, color, dashes in (*without, *zip(curves, COLORS, DASHES, strict=False)):
+    for curve, color, dashes in (*without, *zip(curves, style.COLORS, style.DASHES, strict=False)):
         shown = (curve.time_s >= span_s[0]) & (curve.time_s <= span_s[1])
         time = curve.time_s[shown] / unit_s
         values = (np.rad2deg(curve.roll_rad), curve.level_m, curve.pressure_pa / 1e3)
@@ -213,7 +208,7 @@ def _mark(
     """Mark when each run was first armed, and when it ended in a fault; words stand once."""
     unit_s, _ = _time_unit(span_s)
     said: set[tuple[str, int]] = set()
-    for curve, color in zip(curves, COLORS, strict=False):
+    for curve, color in zip(curves, style.COLORS, strict=False):
         for word, mode in _MARKS if curve.mode is not None else ():
             at_s = next(iter(curve.time_s[curve.mode == mode]), math.inf)
             if not span_s[0] <= at_s <= span_s[1]:
@@ -236,7 +231,7 @@ def _greatest(time: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArr
 def _draw_lanes(axis: "Axes", curves: Sequence[BenchCurve], span_s: tuple[float, float]) -> None:
     unit_s, _ = _time_unit(span_s)
     place = 0
-    for curve, color in zip(curves, COLORS, strict=False):
+    for curve, color in zip(curves, style.COLORS, strict=False):
         if curve.retuning is None:
             continue
         starts = np.flatnonzero(np.diff(curve.retuning, prepend=np.nan))
