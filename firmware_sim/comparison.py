@@ -163,13 +163,19 @@ def _records_compared(first: Record, second: Record) -> list[Comparison]:
         codes = first.about.get("code"), second.about.get("code")
         if codes[0] != codes[1]:
             remarks.append(f"different versions of the program: {codes[0]} and {codes[1]}")
-        capsized = _capsized((first.path, run, one), (second.path, other, two))
+        capsized = [
+            f"run {name} of {path}"
+            for path, name, each in ((first.path, run, one), (second.path, other, two))
+            if np.nanmax(np.abs(each.get("true_roll_rad", 0.0)), initial=0.0) >= CAPSIZE_RAD
+        ]
         if capsized:
             remarks.append(f"not compared: the ship capsized in {' and '.join(capsized)}")
             found.append(Comparison(str(second.path), run, {}, tuple(remarks)))
             continue
         remarks += _in_charge(run, one, two)
-        same = together and _at_same_times(one, two)
+        times = one["time_s"], two["time_s"]
+        same = together and len(times[0]) == len(times[1])
+        same = same and bool(np.abs(times[0] - times[1]).max(initial=0) < 1e-3)
         if not same:
             remarks.append("not the same waves at the same times: not paired")
         counts = [batch_count(each) for each in (one, two)]
@@ -191,14 +197,6 @@ def _records_compared(first: Record, second: Record) -> list[Comparison]:
     return found
 
 
-def _capsized(*records: tuple[Path, str, Columns]) -> list[str]:
-    return [
-        f"run {run} of {path}"
-        for path, run, columns in records
-        if np.nanmax(np.abs(columns.get("true_roll_rad", 0.0)), initial=0.0) >= CAPSIZE_RAD
-    ]
-
-
 def _in_charge(run: str, one: Columns, two: Columns) -> list[str]:
     if "mode" not in one or "mode" not in two:
         return []
@@ -206,11 +204,6 @@ def _in_charge(run: str, one: Columns, two: Columns) -> list[str]:
     if abs(first - second) <= CHARGE_ALIKE:
         return []
     return [f"run {run}: in charge for {first:.0%} of the time in the first, {second:.0%} in this"]
-
-
-def _at_same_times(one: Columns, two: Columns) -> bool:
-    ones_s, twos_s = one["time_s"], two["time_s"]
-    return len(ones_s) == len(twos_s) and bool(np.abs(ones_s - twos_s).max(initial=0) < 1e-3)
 
 
 def _known(

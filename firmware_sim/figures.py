@@ -142,11 +142,14 @@ class BenchFigures:
 def figures(result: BenchResult) -> BenchFigures:
     """Compute the figures of a bench."""
     marks = {run.name: mark_of(result, run) for run in result.runs}
+    code = ExitCode.NOT_RANKED if any(marks.values()) or result.not_run else ExitCode.OK
+    if result.interrupted or result.killed:
+        code = ExitCode.INTERRUPTED if result.interrupted else ExitCode.SYSTEM
     return BenchFigures(
         **{name: getattr(result, name) for name in _OF_BENCH},
         scenario=result.scenario.name,
         hs_m=result.scenario.figures()["hs_m"],
-        exit_code=int(_exit_code(result, marks)),
+        exit_code=int(code),
         endings=tuple(_endings(result, marks)),
         limits_passed=tuple(passed_limits(result)),
         no_tank=bare_figures(result),
@@ -174,12 +177,13 @@ def run_figures(result: BenchResult) -> tuple[RunFigures, ...]:
     passive = rolls[PASSIVE] if PASSIVE in order else None
     afloat = result.without_tank_capsized_s >= result.end_s
     bare = roll_statistics(_bare_roll(result)) if afloat else None
-    found = []
+    area_m2, found = result.scenario.vessel.tank.reservoir_area_m2, []
     for run in result.runs:
         counts, window = run.name in order, _window(result, run)
         judged: dict[str, Any] = {name: getattr(run, name) for name in _OF_RUN}
         if run.name in rolls:
             roll = rolls[run.name]
+            rates_m_s = np.diff(run.column("true_level_m")[window]) / RECORD_S
             judged |= {
                 "rank": order.index(run.name) + 1 if counts else None,
                 "roll": roll,
@@ -190,7 +194,7 @@ def run_figures(result: BenchResult) -> tuple[RunFigures, ...]:
                     run.column("true_shaft_power_w")[window],
                     run.column("true_level_m")[window],
                 ),
-                "flow_peak_m3_s": _flow_peak_m3_s(result, run, window),
+                "flow_peak_m3_s": area_m2 * float(np.abs(rates_m_s).max(initial=0.0)),
                 "mode": Mode(int(run.column("mode")[-1])).name,
                 "fault": Fault(int(run.column("fault")[-1])).name,
                 "active_share": float((run.column("mode")[window] == Mode.ACTIVE).mean()),
@@ -277,26 +281,12 @@ def _endings(result: BenchResult, marks: Mapping[str, Mark | None]) -> list[str]
     return said
 
 
-def _exit_code(result: BenchResult, marks: Mapping[str, Mark | None]) -> ExitCode:
-    if result.interrupted:
-        return ExitCode.INTERRUPTED
-    if result.killed:
-        return ExitCode.SYSTEM
-    return ExitCode.NOT_RANKED if any(marks.values()) or result.not_run else ExitCode.OK
-
-
 def _bare_roll(result: BenchResult) -> FloatArray:
     return result.without_tank_rad[round(result.settle_s / RECORD_S) :]
 
 
 def _window(result: BenchResult, run: Run) -> npt.NDArray[np.bool_]:
     return run.between(result.settle_s, result.end_s)
-
-
-def _flow_peak_m3_s(result: BenchResult, run: Run, window: npt.NDArray[np.bool_]) -> float:
-    rates_m_s = np.diff(run.column("true_level_m")[window]) / RECORD_S
-    area_m2 = result.scenario.vessel.tank.reservoir_area_m2
-    return area_m2 * float(np.abs(rates_m_s).max(initial=0.0))
 
 
 def _share_below(roll: RollStatistics, reference: RollStatistics | None) -> float | None:

@@ -178,19 +178,16 @@ def other_loadings(
     """
     if scenario.hull is not None or scenario.fmu is not None:
         return ()
-    return tuple(
-        Loading(scale, own if scale == 1 else predict(_loaded(scenario, scale), plant, law))
-        for scale in PERIOD_SCALES
-    )
-
-
-def _loaded(scenario: Scenario, scale: float) -> Scenario:
-    ship = of_period(scenario.vessel.ship, scale)
-    vessel = scenario.vessel.model_copy(update={"ship": ship})
-    actual = dict(scenario.actual_ship)
-    if "stiffness_nm_rad" in actual:
-        actual["stiffness_nm_rad"] /= scale * scale
-    return scenario.model_copy(update={"vessel": vessel, "actual_ship": actual})
+    found = []
+    for scale in PERIOD_SCALES:
+        ship = of_period(scenario.vessel.ship, scale)
+        actual = dict(scenario.actual_ship)
+        if "stiffness_nm_rad" in actual:
+            actual["stiffness_nm_rad"] /= scale * scale
+        vessel = scenario.vessel.model_copy(update={"ship": ship})
+        loaded = scenario.model_copy(update={"vessel": vessel, "actual_ship": actual})
+        found.append(Loading(scale, own if scale == 1 else predict(loaded, plant, law)))
+    return tuple(found)
 
 
 def _passive(scenario: Scenario, seed: int, count: int) -> tuple[FloatArray, float]:

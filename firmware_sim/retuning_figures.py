@@ -79,6 +79,7 @@ def retuning_figures(run: Run, scenario: Scenario, settle_s: float) -> RetuningF
     found_by = next((event for event in reversed(events) if event.found), events[-1])
     looked_ns = max((e.time_ns for e in begun if e.time_ns <= found_by.time_ns), default=0)
     last = events[events.index(begun[-1]) :] if begun else events
+    ship = scenario.ship_at(looked_ns * 1e-9)
     return RetuningFigures(
         attempts=len(begun),
         retuned_at_s=retuned_at_s,
@@ -86,7 +87,11 @@ def retuning_figures(run: Run, scenario: Scenario, settle_s: float) -> RetuningF
         roll_after_rad=after,
         roll_after_below_before=None if not before or after is None else 1 - after / before,
         found=found_by.found,
-        truth=_truth(scenario, looked_ns * 1e-9),
+        truth=ShipInFigures(
+            2 * math.pi / ship.natural_frequency_rad_s,
+            ship.damping_nms_rad,
+            scenario.vessel.tank.damping_ratio,
+        ),
         state=RetuningState(int(state[-1])).name,
         reasons=tuple(
             reason
@@ -127,15 +132,6 @@ def _spans(time_s: FloatArray, here: npt.NDArray[np.bool_]) -> list[tuple[float,
         (float(time_s[start]), float(time_s[stop - 1]) + RECORD_S)
         for start, stop in edges.reshape(-1, 2)
     ]
-
-
-def _truth(scenario: Scenario, time_s: float) -> ShipInFigures:
-    ship = scenario.ship_at(time_s)
-    return ShipInFigures(
-        2 * math.pi / ship.natural_frequency_rad_s,
-        ship.damping_nms_rad,
-        scenario.vessel.tank.damping_ratio,
-    )
 
 
 def _rms(run: Run, start_s: float, end_s: float) -> float | None:

@@ -236,7 +236,12 @@ def make_starter(
     law = config.law.tuned(config.design_plant)
     texts[README] = readme(ship.name)
     if effective_slope is not None:
-        texts |= {SHIP: _with_hull(texts[SHIP]), SCENARIO: _swaying(texts[SCENARIO])}
+        remark = "a usual form, see docs/dynamics.md; better: utank-hil hull MESH"
+        hull = f"\n  hull: ./{HULL}  # {remark}\n# Room:"
+        texts[SHIP] = texts[SHIP].replace("\n# Room:", hull, 1)
+        lines = [line for line in texts[SCENARIO].splitlines() if "effective_slope" not in line]
+        plant = "plant: sway_roll_yaw  # waves act by the hull's data"
+        texts[SCENARIO] = "\n".join([*lines, plant, ""])
     return StarterProject(vessel, sized, demand, law, sea, texts)
 
 
@@ -354,16 +359,6 @@ duration_s: 900
 settle_s: 60
 seed: 1
 """
-
-
-def _with_hull(ship: str) -> str:
-    remark = "a usual form, see docs/dynamics.md; better: utank-hil hull MESH"
-    return ship.replace("\n# Room:", f"\n  hull: ./{HULL}  # {remark}\n# Room:", 1)
-
-
-def _swaying(scenario: str) -> str:
-    lines = [line for line in scenario.splitlines() if "effective_slope" not in line]
-    return "\n".join([*lines, "plant: sway_roll_yaw  # waves act by the hull's data", ""])
 
 
 def readme(name: str) -> str:

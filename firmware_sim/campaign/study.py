@@ -119,8 +119,9 @@ def changed(content: Content, values: Mapping[str, Any]) -> Content:
 def _paths(content: Content, path: list[str]) -> Iterator[list[str]]:
     """Yield the paths that a key with ``*`` matches."""
     if _EVERY in path:
-        at = path.index(_EVERY)
-        names = _inside(content, path[:at])
+        at, names = path.index(_EVERY), content
+        for part in path[:at]:
+            names = names[int(part)] if isinstance(names, list) else names.get(part, {})
         if not isinstance(names, dict) or not names:
             raise OverrideError(f"stands for nothing: {'.'.join(path[:at])} has no names")
         for name in names:
@@ -132,12 +133,6 @@ def _paths(content: Content, path: list[str]) -> Iterator[list[str]]:
             if isinstance(controller, dict) and controller.get(_VESSEL) == vessel:
                 yield ["controllers", name, *path]
     yield path
-
-
-def _inside(content: Any, path: list[str]) -> Any:
-    for part in path:
-        content = content[int(part)] if isinstance(content, list) else content.get(part, {})
-    return content
 
 
 def _with(place: Any, path: list[str], value: Any, depth: int = 0) -> Any:

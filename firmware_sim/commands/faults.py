@@ -16,7 +16,7 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, progress_bar
 
 if TYPE_CHECKING:
-    from firmware_sim.fault_campaign.campaign import Campaign, Row
+    from firmware_sim.fault_campaign.campaign import Campaign
     from firmware_sim.fault_campaign.trial import Window
     from firmware_sim.fault_campaign.verdict import Result
 
@@ -65,7 +65,11 @@ def faults(
     window = Window() if full else Window(60.0, 20.0) if scenario is None else _window(loaded)
     too_long = [row for row in chosen if row.long and not (full or names)]
     chosen = [row for row in chosen if row not in too_long]
-    _refuse_names(whole, names, chosen)
+    for name in names:
+        if not (whole.chosen([name]) or whole.shown_elsewhere([name])):
+            fail(f"--rows: no row or requirement begins with {name}")
+    if names and not chosen:
+        fail("--rows: nothing to run: tests show all of them, or the ship has none of these nodes")
     began = time.monotonic()
     with progress_bar(MofNCompleteColumn()) as bar, stop_on_signals() as stopped:
         task = bar.add_task("faults", total=len(chosen) * seeds)
@@ -132,14 +136,6 @@ def _window(campaign: "Campaign") -> "Window":
     ship = campaign.setups[COMMON].scenario.vessel.ship
     rolls_s = ROLLS_IN_CHARGE * 2 * math.pi / ship.natural_frequency_rad_s
     return Window(600.0, max(20.0, round(rolls_s)))
-
-
-def _refuse_names(campaign: "Campaign", names: Sequence[str], chosen: Sequence["Row"]) -> None:
-    for name in names:
-        if not (campaign.chosen([name]) or campaign.shown_elsewhere([name])):
-            fail(f"--rows: no row or requirement begins with {name}")
-    if names and not chosen:
-        fail("--rows: nothing to run: tests show all of them, or the ship has none of these nodes")
 
 
 def _print(results: Sequence["Result"]) -> None:

@@ -97,7 +97,11 @@ def print_report(
     console.table(_ship_table(found, task))
     console.table(_mode_table(found, task))
     console.table(_check_table(found, task))
-    console.say(_waves(found))
+    waves = "no regular one found; an irregular sea is in the model of the errors."
+    if found.wave_frequencies_rad_s:
+        named = (f"{w:.4f} rad/s ({2 * math.pi / w:.2f} s)" for w in found.wave_frequencies_rad_s)
+        waves = f"regular, {', '.join(named)}, taken out."
+    console.say(f"Waves: {waves}")
     if isinstance(answer, Candidate):
         console.say(
             f"peak sensitivity {answer.summary.peak_sensitivity:.2f}; in the recorded waves "
@@ -108,14 +112,6 @@ def print_report(
         for reason in answer.reasons:
             console.say(reason, red="refused:")
     console.files(files)
-
-
-def _waves(found: Identification) -> str:
-    waves = found.wave_frequencies_rad_s
-    if not waves:
-        return "Waves: no regular one found; an irregular sea is in the model of the errors."
-    named = (f"{w:.4f} rad/s ({2 * math.pi / w:.2f} s)" for w in waves)
-    return f"Waves: regular, {', '.join(named)}, taken out."
 
 
 def _ship_table(found: Identification, task: RetuningTask) -> Table:
@@ -254,7 +250,14 @@ def identify_log(
         if value is not None and not math.isfinite(value):
             common.fail(f"{option} must be a number of seconds, got {value}")
     loaded = common.load(config, ControllerConfig, allow_code=True)  # Code is refused, not run.
-    task = _task(config, loaded, order)
+    settings = loaded.retuning
+    if order is None:
+        order = 120 if settings is None else settings.order
+    period_range_s = ANY_PERIOD_S if settings is None else settings.roll_period_range_s
+    try:
+        task = retuning_task(loaded, order, period_range_s)
+    except ValueError as error:
+        common.fail(f"{config}: {error}")
     content = read_controller(config)
     out = common.prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
     measured = task.design.predictor.measured
@@ -292,17 +295,6 @@ def identify_log(
         print_report(Terminal(), found, task, answer, files)
     if not isinstance(answer, Candidate):
         raise typer.Exit(ExitCode.REFUSED)
-
-
-def _task(file: Path, config: ControllerConfig, order: int | None) -> RetuningTask:
-    settings = config.retuning
-    if order is None:
-        order = 120 if settings is None else settings.order
-    period_range_s = ANY_PERIOD_S if settings is None else settings.roll_period_range_s
-    try:
-        return retuning_task(config, order, period_range_s)
-    except ValueError as error:
-        common.fail(f"{file}: {error}")
 
 
 class _LogUnlessNamed(TyperGroup):

@@ -41,12 +41,26 @@ def monitor(
 
     **Example:** utank-hil monitor out
     """
-    if source is None or source.isdecimal():
-        _attach(None if source is None else int(source))
-    elif source.startswith(LIVE):
+    from utank_hil.telemetry.live import LiveStream, live_runs
+    from utank_hil.telemetry.recording import highlight_s
+
+    if source is not None and source.startswith(LIVE):
         watch(source)
-    else:
-        _open(Path(source))
+        return
+    try:
+        if source is None or source.isdecimal():
+            os.nice(_NICENESS)  # A loop may run on this machine.
+            with LiveStream(
+                _chosen(live_runs(), None if source is None else int(source))
+            ) as stream:
+                watch(stream.url, send=stream.send)
+            return
+        file = Path(source) / "bench.rrd" if Path(source).is_dir() else Path(source)
+        if not file.is_file():
+            fail(f"{file}: is not there; give a recording, a bench's folder, or {LIVE}...")
+        watch(file, highlight_s(file))
+    except (OSError, ValueError) as error:
+        fail(error)
 
 
 def watch(
@@ -95,30 +109,6 @@ def _said(viewer: "Viewer", at_s: float | None) -> "Viewer":
             # Rerun 0.41 moves the cursor of a page neither by its address nor by a layout.
             notes.say(f"Something happens at {at_s:.1f} s: type it into the field at the bottom.")
     return viewer
-
-
-def _open(file: Path) -> None:
-    from utank_hil.telemetry.recording import highlight_s
-
-    file = file / "bench.rrd" if file.is_dir() else file
-    if not file.is_file():
-        fail(f"{file}: is not there; give a recording, a bench's folder, or {LIVE}...")
-    try:
-        at_s = highlight_s(file)
-    except ValueError as error:
-        fail(error)
-    watch(file, at_s)
-
-
-def _attach(pid: int | None) -> None:
-    from utank_hil.telemetry.live import LiveStream, live_runs
-
-    os.nice(_NICENESS)  # A loop may run on this machine.
-    try:
-        with LiveStream(_chosen(live_runs(), pid)) as stream:
-            watch(stream.url, send=stream.send)
-    except OSError as error:
-        fail(error)
 
 
 def _chosen(runs: "list[LiveRun]", pid: int | None) -> "LiveRun":

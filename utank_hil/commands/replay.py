@@ -3,7 +3,6 @@
 import json
 import math
 import sys
-from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import asdict
 from itertools import groupby
@@ -64,7 +63,7 @@ def replay(
 
     **Example:** utank-hil replay out/gpc.frames --explain 6000
     """
-    cut = elsewhere = ""
+    cut, elsewhere, here = "", "", kernels(machine())
     explained = None if explain is None else ExplainedTick(explain)
     named = None if config is None else load(config, ControllerConfig, allow_code=allow_code)
     try:
@@ -83,7 +82,8 @@ def replay(
                 result, why, law = replay_log(
                     recording, chosen, log.parent, as_recorded=named is None, explained=explained
                 )
-            cut, elsewhere = recording.cut, _other_machine(recording.head)
+            cut, there = recording.cut, kernels(recording.head["about"].get("machine", {}))
+            elsewhere = "" if there == here else there
     except (OSError, ValueError) as error:
         fail(f"{log}: {error}" if isinstance(error, ParameterError | ReplayHeadError) else error)
     if not result.ticks:
@@ -101,7 +101,7 @@ def replay(
     else:
         console = Terminal()
         if elsewhere:
-            console.say(f"{elsewhere}; here {kernels(machine())}", yellow="another machine's log:")
+            console.say(f"{elsewhere}; here {here}", yellow="another machine's log:")
         _print(console, result, why, cut, law)
         _print_numbers(console, numbers)
     raise typer.Exit(ExitCode.OK if result.exact else ExitCode.REFUSED)
@@ -133,12 +133,6 @@ def _replay_bus_log(
         "the log is one of the bus: when the controller was handed each frame is a guess, and "
         "answers of a retuner are not in it"
     ]
-
-
-def _other_machine(head: Mapping[str, Any]) -> str:
-    """Processor and kernels with which a log was recorded, if they are not those of here."""
-    there = kernels(head["about"].get("machine", {}))
-    return "" if there == kernels(machine()) else there
 
 
 def _as_json(
