@@ -108,11 +108,10 @@ class CanopenNode:
                 self._say(SDO_ANSWER + self.node, self._serve(data))
         elif cob > HEARTBEAT:
             self._beat_ns[cob - HEARTBEAT] = now_ns
-        elif self.state is NetworkState.OPERATIONAL and self._is_command(cob):
+        elif self.state is NetworkState.OPERATIONAL and (
+            0x1400 in self._pdos and cob == self.entries[Place(0x1400, 1)].value
+        ):  # a PDO that is disabled has another identifier
             self._take_pdo(data, now_ns)
-
-    def _is_command(self, cob: int) -> bool:  # a PDO that is disabled has another identifier
-        return 0x1400 in self._pdos and cob == self.entries[Place(0x1400, 1)].value
 
     def tick(self, now_ns: int) -> list[Frame]:
         """What is due: heartbeat, PDOs by event timer, and all that was said since."""

@@ -55,12 +55,10 @@ class RunningFmu:
         self._inputs = {name: each for name, each in ours.items() if name in INPUTS}
         self._outputs = {name: each for name, each in ours.items() if name not in INPUTS}
         self._read_references = [reference for reference, _ in self._outputs.values()]
-        self._begin({known[name].valueReference: x for name, x in section.parameters.items()})
-
-    def _begin(self, parameters: dict[int, float]) -> None:
-        if parameters:
-            self._call("its parameters", self._set, list(parameters), list(parameters.values()))
-        if self._description.fmiVersion == "2.0":
+        given = {known[name].valueReference: x for name, x in section.parameters.items()}
+        if given:
+            self._call("its parameters", self._set, list(given), list(given.values()))
+        if second:
             self._call("its setup", self._fmu.setupExperiment)
         self._call("its initialisation", self._fmu.enterInitializationMode)
         self._call("its initialisation", self._fmu.exitInitializationMode)

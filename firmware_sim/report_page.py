@@ -55,8 +55,17 @@ def bench_page(found: BenchFigures, about: Mapping[str, Any], picture: bytes | N
     vessel = Vessel.model_validate(about["configuration"]["vessel"])
     few = few_rolls(found, vessel.ship.natural_frequency_rad_s)
     says = "Roll and power of each run, and roll, level and pressure over time"
+    names = [run.name for run in found.runs if run.name != PASSIVE]
+    sea = about["configuration"]["sea"]
+    height = "" if "hs_m" in sea else f", significant height {found.hs_m:.2f} m at the start"
+    run = [
+        f"Ship: {vessel.name}. {ship_line(vessel)}",
+        f"Sea: {sea_words(sea)}{height}.",
+        f"Runs: {', '.join(['without a tank', 'with the passive tank', *names])}.",
+        f"Again: {again(about)}",
+    ]
     sections = [
-        report_page.ReportSection("What was run", _what_was_run(found, about, vessel)),
+        report_page.ReportSection("What was run", run),
         report_page.ReportSection(
             "Roll and cost",
             pictures=[] if picture is None else [report_page.ReportPicture(picture, says)],
@@ -101,18 +110,6 @@ def sea_words(sea: Mapping[str, Any]) -> str:
     if sea.get("speed_m_s"):
         words.append(f"speed {sea['speed_m_s']:g} m/s")
     return ", ".join(words)
-
-
-def _what_was_run(found: BenchFigures, about: Mapping[str, Any], vessel: Vessel) -> list[str]:
-    names = [run.name for run in found.runs if run.name != PASSIVE]
-    sea = about["configuration"]["sea"]
-    height = "" if "hs_m" in sea else f", significant height {found.hs_m:.2f} m at the start"
-    return [
-        f"Ship: {vessel.name}. {ship_line(vessel)}",
-        f"Sea: {sea_words(sea)}{height}.",
-        f"Runs: {', '.join(['without a tank', 'with the passive tank', *names])}.",
-        f"Again: {again(about)}",
-    ]
 
 
 def again(about: Mapping[str, Any]) -> str:
@@ -198,23 +195,20 @@ def _draw(result: BenchResult, found: BenchFigures, about: Mapping[str, Any], pa
     upright = time_s < result.without_tank_capsized_s
     none = np.full(int(upright.sum()), np.nan)
     bare_rad = result.without_tank_rad[upright]
+    bare = found.no_tank
+    bar = BenchBar(BARE, NO_TANK, bare.rms_rad, _degrees(bare.rms_rad), None, "")
+    if bare.capsized_s is not None and bare.capsized_s < found.end_s:
+        bar = BenchBar(BARE, NO_TANK, None, "capsized", None, "")
     draw_bench(
         curves,
         path,
         title=f"{found.scenario}, seed {found.seed}, {found.mode}",
         about=about,
         bare=BenchCurve(BARE, time_s[upright], bare_rad, none, none),
-        bars=[_bare_bar(found), *map(bar_of, found.runs, COLORS)],
+        bars=[bar, *map(bar_of, found.runs, COLORS)],
         wrong=found.wrong,
         interval=roll_interval(found, result.scenario.vessel.ship.natural_frequency_rad_s),
     )
-
-
-def _bare_bar(found: BenchFigures) -> BenchBar:
-    bare = found.no_tank
-    if bare.capsized_s is not None and bare.capsized_s < found.end_s:
-        return BenchBar(BARE, NO_TANK, None, "capsized", None, "")
-    return BenchBar(BARE, NO_TANK, bare.rms_rad, _degrees(bare.rms_rad), None, "")
 
 
 def bar_of(run: RunFigures, color: str) -> BenchBar:

@@ -113,9 +113,14 @@ def _run(group: Group, run: str, cases: Mapping[str, dict[str, Any]]) -> dict[st
 def _paired(group: Group) -> list[dict[str, Any]]:
     """Roll RMS of each run against those before it, paired by case and so by waves."""
     runs = [run for run in group.runs if run != NO_TANK]
+    counted = [{row["run"]: row for row in rows if not row["mark"]} for rows in group.rows]
     pairs = []
     for against, run in itertools.combinations(runs, 2):
-        both = [(rows[against][ROLL], rows[run][ROLL]) for rows in _counted(group, against, run)]
+        both = [
+            (rows[against][ROLL], rows[run][ROLL])
+            for rows in counted
+            if run in rows and against in rows
+        ]
         if both:
             pairs.append({"run": run, "against": against, **_pair(both)})
     return pairs
@@ -141,9 +146,3 @@ def _pair(both: list[tuple[float, float]]) -> dict[str, Figure]:
         "roll_rms_difference_rad": figure([one - other for other, one in both]),
         "share_below": figure([1 - one / other for other, one in both if other >= LEAST_ROLL_RAD]),
     }
-
-
-def _counted(group: Group, *runs: str) -> list[Mapping[str, Mapping[str, float]]]:
-    """Rows by run of the cases in which all given runs count."""
-    by_run = ({row["run"]: row for row in rows if not row["mark"]} for rows in group.rows)
-    return [rows for rows in by_run if all(run in rows for run in runs)]

@@ -35,10 +35,15 @@ def compare(
     cases compares what it varies itself (utank-hil campaign).
     """
     from firmware_sim.comparison import CompareError, compare_records
+    from firmware_sim.report_page import RECORDING
 
-    first, *rest = (_recording(place) for place in (reference, *others))
+    files = [place / RECORDING if place.is_dir() else place for place in (reference, *others)]
+    for place, file in zip((reference, *others), files, strict=True):
+        if not file.is_file():
+            wanted = RECORDING if place.is_dir() else "such file"
+            fail(f"{place}: there is no {wanted}; name a folder of `bench`, or a file")
     try:
-        found = compare_records(first, rest)
+        found = compare_records(files[0], files[1:])
     except (CompareError, ValueError) as error:
         fail(error)
     if json_:
@@ -50,16 +55,6 @@ def compare(
         console.table(_table(reference, of_source))
         for remark in dict.fromkeys(remark for each in of_source for remark in each.remarks):
             console.say(yellow=remark)
-
-
-def _recording(place: Path) -> Path:
-    from firmware_sim.report_page import RECORDING
-
-    file = place / RECORDING if place.is_dir() else place
-    if not file.is_file():
-        wanted = RECORDING if place.is_dir() else "such file"
-        fail(f"{place}: there is no {wanted}; name a folder of `bench`, or a file")
-    return file
 
 
 def _table(reference: Path, found: list["Comparison"]) -> Table:

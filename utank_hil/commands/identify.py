@@ -49,6 +49,17 @@ def figures(
     """Return all results for ``--json``; deviations are relative standard deviations."""
     fit, validation = found.fit, found.validation
     modes = realized_modes(found)
+    columns = (
+        {}
+        if modes is None
+        else {
+            "frequency_rad_s": modes.modes.frequency_rad_s,
+            "frequency_std_rad_s": modes.frequency_std_rad_s,
+            "damping_ratio": modes.modes.damping_ratio,
+            "damping_ratio_std": modes.damping_ratio_std,
+        }
+    )
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     return {
         "accepted": isinstance(answer, Candidate),
         "reasons": [] if isinstance(answer, Candidate) else list(answer.reasons),
@@ -69,21 +80,10 @@ def figures(
         "whiteness_probability": validation.whiteness_probability.tolist(),
         "input_correlation": abs(validation.input_correlation).max(axis=(0, 2)).tolist(),
         "independence_probability": validation.independence_probability.ravel().tolist(),
-        "modes": [] if modes is None else _mode_figures(modes),
+        "modes": [dict(zip(columns, row, strict=True)) for row in rows],
         "law": dataclasses.asdict(answer.summary) if isinstance(answer, Candidate) else None,
         "files": {name: str(path) for name, path in files.items()},
     }
-
-
-def _mode_figures(found: ModalConfidence) -> list[dict[str, float]]:
-    columns = {
-        "frequency_rad_s": found.modes.frequency_rad_s,
-        "frequency_std_rad_s": found.frequency_std_rad_s,
-        "damping_ratio": found.modes.damping_ratio,
-        "damping_ratio_std": found.damping_ratio_std,
-    }
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
 def print_report(

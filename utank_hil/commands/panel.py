@@ -87,7 +87,11 @@ class Keyboard:
             if self._obey(line) and self._leave_ns is None:
                 self._leave_ns = now_ns + LEAVE_NS
         if was_open and not self._open:
-            self._end(now_ns)
+            if self._terminal:  # without input a panel must not stay armed
+                self._press(Action.STOP)
+                self._leave_ns = self._leave_ns or now_ns + LEAVE_NS
+            elif self._leave_ns is None:
+                self._say("the input has ended; what was asked for stays, Ctrl-C leaves")
         if signalled and self._leave_ns is None:
             self._leave_ns = now_ns + LEAVE_NS
         self._tell_of_reset(now_ns)
@@ -113,13 +117,6 @@ class Keyboard:
         if begun and not self._open:
             lines.append(begun)
         return [line.decode(errors="replace").strip().lower() for line in lines]
-
-    def _end(self, now_ns: int) -> None:
-        if self._terminal:  # without input a panel must not stay armed
-            self._press(Action.STOP)
-            self._leave_ns = self._leave_ns or now_ns + LEAVE_NS
-        elif self._leave_ns is None:
-            self._say("the input has ended; what was asked for stays, Ctrl-C leaves")
 
     def _tell_of_reset(self, now_ns: int) -> None:
         """Report that a reset was refused: the controller is still in FAULT."""

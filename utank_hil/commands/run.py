@@ -19,7 +19,7 @@ from utank_hil.canbus.ports import BusPorts, open_port, why_other_bit_rate
 from utank_hil.commands.announcer import LOG_NAME, Announcer
 from utank_hil.commands.commissioning_record import why_not_commissioned
 from utank_hil.commands.identified import IdentifiedShips, read_controller
-from utank_hil.commands.lines import Lines, printed_lines
+from utank_hil.commands.lines import printed_lines
 from utank_hil.commands.outward.outlets import Outlet, read_outlet
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.commands.service_manager import ServiceManager
@@ -159,7 +159,12 @@ def run(
             ticks = statistics.ticks
             manager.progress(ticks)
             if ticks % LOOK_TICKS == 0:
-                _say_failures(alarms, port, recording, announcer)
+                for error in port.take_errors() if isinstance(port, BusPorts) else ():
+                    alarms.say(f"a sensor's bus fails: {error}")
+                if failure := recording.failure():
+                    alarms.say(f"not recorded any longer: {failure}")
+                if announcer is not None and (failure := announcer.failure()):
+                    alarms.say(f"events are not logged any longer: {failure}")
             return stop()
 
         with _in_real_time(f"{loaded.name} on {bus}", manager):
@@ -285,17 +290,6 @@ def _outputs(
     if recording.summary.error is not None:
         notes.say(recording.summary.error, red="no recording:")
     return announcer, recording
-
-
-def _say_failures(
-    alarms: Lines, port: canbus.Port, recording: RunRecording, announcer: Announcer | None
-) -> None:
-    for error in port.take_errors() if isinstance(port, BusPorts) else ():
-        alarms.say(f"a sensor's bus fails: {error}")
-    if failure := recording.failure():
-        alarms.say(f"not recorded any longer: {failure}")
-    if announcer is not None and (failure := announcer.failure()):
-        alarms.say(f"events are not logged any longer: {failure}")
 
 
 def _as_json(

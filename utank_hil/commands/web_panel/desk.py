@@ -188,9 +188,7 @@ class Desk:
             refusal = f"{button} came too late"
         if not refusal:
             self._node.press(action)
-        self._tell(refusal or action.value)
-
-    def _tell(self, line: str) -> None:
+        line = refusal or action.value
         self._count += 1
         self._said.append(line)
         self._say(f"page: {line}")
