@@ -45,11 +45,9 @@ class FmuVariable(Section):
     the factor of the unit that the FMU declares, else 1."""
 
 
-def _named(content: Any) -> Any:
-    return {"name": content} if isinstance(content, str) else content
-
-
-_Variable = Annotated[FmuVariable, BeforeValidator(_named)]
+_Variable = Annotated[
+    FmuVariable, BeforeValidator(lambda said: {"name": said} if isinstance(said, str) else said)
+]
 
 
 class FmuVariables(Section):

@@ -209,7 +209,4 @@ def _about(
         settle_s = min(scenario.settle_s, options.duration_s / 2)
         changes |= {"duration_s": options.duration_s, "settle_s": settle_s}
     ran = scenario.model_copy(update=changes)
-    try:
-        return describe("bench", ran, out, options=given, seed=ran.seed)
-    except OSError as error:
-        fail(error)
+    return describe("bench", ran, out, options=given, seed=ran.seed)

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from firmware_sim.fault_campaign.own_ship import Ratios, ratios, resized
-from firmware_sim.fault_injection.fault import FaultSpan, FaultTime
+from firmware_sim.fault_injection.fault import FaultSpan, FaultTime, one_of
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_problems import foreign_role, missing_nodes
@@ -27,14 +27,9 @@ _PHASES: Final = 100  # Number of ticks in a second, the slowest message cycle.
 _PHASE_STRIDE: Final = 37  # Ticks from one seed's fault to the next one's: coprime to 100 and to 5.
 
 
-def _fault_name(name: str) -> str:
-    if name not in Fault.__members__:
-        raise ValueError("is no fault of utank_hil/safety/faults.py")
-    return name
-
-
-FaultName = Annotated[str, AfterValidator(_fault_name)]
-
+FaultName = Annotated[
+    str, one_of("fault of utank_hil/safety/faults.py", lambda: list(Fault.__members__))
+]
 CountsFrom = Literal["roll_rad", "roll_rate_rad_s", "level_m", "pressure_pa", "over_roll_rad"]
 StatusFlag = Literal["degraded", "saturated"]
 Reaction = Literal["stop", "ramp", "halve", "alarm", "note", "none", "refuse", "drive"]

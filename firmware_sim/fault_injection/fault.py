@@ -29,7 +29,7 @@ NODE_OF: Final = {
 }  #: Name of the emulated node at an address.
 
 
-def _one_of(what: str, names: Callable[[], list[str]]) -> AfterValidator:
+def one_of(what: str, names: Callable[[], list[str]]) -> AfterValidator:
     """Return the validator of a name that must be one of some."""
 
     def known(name: str) -> str:
@@ -52,9 +52,9 @@ def _all_messages() -> list[str]:
     return [each.codec.name for each in load_catalogue().messages]
 
 
-MessageName = Annotated[str, _one_of("message of an emulated node", sent_by_nodes)]
-AnyMessageName = Annotated[str, _one_of("message", _all_messages)]
-NodeName = Annotated[str, _one_of("node", lambda: list(NODE_OF.values()))]
+MessageName = Annotated[str, one_of("message of an emulated node", sent_by_nodes)]
+AnyMessageName = Annotated[str, one_of("message", _all_messages)]
+NodeName = Annotated[str, one_of("node", lambda: list(NODE_OF.values()))]
 
 
 FaultTime = Annotated[float, Range(least=0, most=LONGEST_FAULT_S)]

@@ -2,10 +2,8 @@
 
 from typing import Annotated, Literal
 
-from pydantic import field_validator
-
 from firmware_sim.fault_injection.bench_parts import Bench, Span, Spoiled
-from firmware_sim.fault_injection.fault import Fault, NodeName
+from firmware_sim.fault_injection.fault import Fault, NodeName, one_of
 from utank_hil.base.elementary import exp
 from utank_hil.base.parameters import Finite, NotNegative, Range
 from utank_hil.base.tick import TICK_S
@@ -153,14 +151,8 @@ class Drive(Fault):
 
     needs = ("drive",)
     kind: Literal["drive"]
-    fault: str  #: Name of the fault in DRIVE_STATUS_2.
-
-    @field_validator("fault")
-    @classmethod
-    def _known(cls, name: str) -> str:
-        if name not in DriveFault.__members__:
-            raise ValueError(f"must be one of {', '.join(DriveFault.__members__)}")
-        return name
+    #: Name of the fault in DRIVE_STATUS_2.
+    fault: Annotated[str, one_of("fault of a drive", lambda: list(DriveFault.__members__))]
 
     def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         drive = bench.drive

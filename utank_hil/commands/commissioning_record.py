@@ -163,7 +163,8 @@ def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: P
     changed = _differences(finite(record.commissioned_for), stands_for)
     if changed:
         return f"{path}: since {record.date} these changed: {', '.join(changed)}; {remedy}"
-    if not record.whole:
+    each_passed = [check.verdict == "pass" for check in record.checks]
+    if not (record.passed and each_passed and all(each_passed)) or record.ended:
         return f"{path}: the commissioning of {record.date} was not passed; {remedy}"
     if record.bus != bus:
         return f"{path}: was made on {record.bus}, and this is other hardware; {remedy}"
@@ -181,12 +182,6 @@ class _Record(BaseModel):
     date: str
     bus: str
     checks: list[_Verdict]
-
-    @property
-    def whole(self) -> bool:
-        """Whether it was passed, by each of its checks."""
-        passed = [check.verdict == "pass" for check in self.checks]
-        return self.passed and not self.ended and bool(passed) and all(passed)
 
 
 def _differences(before: Any, now: Any, key: str = "") -> list[str]:
