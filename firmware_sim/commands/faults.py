@@ -88,10 +88,11 @@ def faults(
         each.id: f"{each.fault}: shown by {each.elsewhere}"
         for each in loaded.shown_elsewhere(names)
     }
+    kept = {row.id for row in loaded.rows}
     not_run |= {
         row.id: f"needs a ship, nodes and counters as of setup {row.fault.setup}"
         for row in whole.chosen(names)
-        if row not in loaded.rows
+        if row.id not in kept
     }
     not_run |= {row.id: "takes long: --full or --rows" for row in too_long}
     killed = bool(partly) and not interrupted
