@@ -1,6 +1,7 @@
 """Directional spectra of wave models and buoys: heights, directions, and the sea drawn of them."""
 
 import gzip
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +55,43 @@ def test_height_direction_and_missing_hours_are_those_of_the_file(tmp_path: Path
     assert spectrum.hs_m == pytest.approx(2.5, rel=1e-3)
     assert spectrum.tp_s == pytest.approx(10.0)
     np.testing.assert_allclose(spectrum.direction_from_deg, 200.0, atol=0.1)
+
+
+def changed(folder: Path, change: Callable[[xarray.Dataset], xarray.Dataset]) -> Path:
+    """Write the first spectrum of `written`, changed."""
+    content = xarray.load_dataset(written(folder)).isel(time=[0])
+    path = folder / "changed.nc"
+    change(content).to_netcdf(path, engine="h5netcdf")
+    return path
+
+
+@pytest.mark.parametrize("mean_deg", [200.0, 0.0])
+def test_a_sector_of_directions_has_its_own_energy_alone(tmp_path: Path, mean_deg: float) -> None:
+    whole = load_directional(written(tmp_path, mean_deg)).at("2026-03-01T00:00")
+    content = xarray.load_dataset(tmp_path / "spectra.nc").isel(time=[0])
+    apart = (content.direction - mean_deg) % 360 - 180  # it says where waves go
+    sector = content.isel(direction=np.flatnonzero(abs(apart) < 16))
+    sector.to_netcdf(tmp_path / "sector.nc", engine="h5netcdf")
+    found = load_directional(tmp_path / "sector.nc")[0]
+    share = float((sector.efth.sum() / content.efth.sum()).item())
+    assert found.hs_m == pytest.approx(whole.hs_m * share**0.5, rel=1e-3)
+    assert found.spread is not None
+    assert found.direction_from_deg is not None
+    band = np.zeros(2, dtype=np.intp)
+    ends = found.spread.offset_rad(found.direction_from_deg, band, np.array([1e-6, 1 - 1e-6]))
+    assert np.all(abs(np.degrees(ends)) < 21)
+
+
+def test_a_band_without_values_is_no_calm(tmp_path: Path) -> None:
+    path = changed(tmp_path, lambda content: content.where(abs(content.frequency - 0.1) > 1e-6))
+    with pytest.raises(ValueError, match=r"has no value at .*: choose another time"):
+        load_directional(path)[0]
+
+
+def test_one_direction_is_no_spread(tmp_path: Path) -> None:
+    path = changed(tmp_path, lambda content: content.isel(direction=[3, 4]))
+    with pytest.raises(ValueError, match="has 2 directions: a sector has three or more"):
+        load_directional(path)
 
 
 def test_a_place_is_chosen_by_latitude_and_longitude(tmp_path: Path) -> None:

@@ -256,11 +256,19 @@ def _spectra(
     notes: list[str],
 ) -> MeasuredSpectra:
     """Return spectra with mean direction and spread, of densities in m2/Hz/degree."""
+    if len(direction_deg) < 3:
+        raise ValueError(f"{path}: has {len(direction_deg)} directions: a sector has three or more")
     order = np.argsort(direction_deg)
-    direction_deg = direction_deg[order].astype(float)
+    direction_deg, density = direction_deg[order].astype(float), density[:, :, order]
+    gap_deg = np.diff(direction_deg, append=direction_deg[0] + 360)
+    usual_deg, last = np.median(gap_deg), int(np.argmax(gap_deg))
+    if gap_deg[last] > 2 * usual_deg:  # Beyond a sector there is no energy.
+        ends = direction_deg[last] + usual_deg, direction_deg[last] + gap_deg[last] - usual_deg
+        direction_deg = np.insert(direction_deg, last + 1, ends)
+        density = np.insert(density, [last + 1] * 2, 0.0, axis=2)
     width_deg = (np.roll(direction_deg, -1) - np.roll(direction_deg, 1)) % 360 / 2
-    energy = np.nan_to_num(density[:, :, order]) * width_deg
-    total = np.maximum(energy.sum(axis=2), 0.0)
+    energy = np.nan_to_num(density) * width_deg
+    total = np.where(np.isnan(density).any(axis=2), np.nan, np.maximum(energy.sum(axis=2), 0.0))
     # A spread made of four Fourier coefficients is below 0 in places.
     energy = np.maximum(energy, 0.0)
     mean_deg = np.degrees(np.angle(energy @ np.exp(1j * np.radians(direction_deg)))) % 360
