@@ -125,6 +125,8 @@ SWING = np.arange(0, 120, 0.1)
     [
         (lambda: (SWING[:200], 0.1 * np.exp(-SWING[:200] / 80) * np.cos(0.5 * SWING[:200])),
          "two swings or more"),
+        (lambda: (SWING[:280], 0.1 * np.exp(-SWING[:280] / 80) * np.cos(0.5 * SWING[:280])),
+         r"needs 2\.5 swings, .* has 2\.2"),
         (lambda: (SWING[::40], 0.1 * np.exp(-SWING[::40] / 80) * np.cos(0.5 * SWING[::40])),
          "20 samples a swing|at least 20 samples"),
         (lambda: (SWING, 0.1 * np.cos(0.5 * SWING + 0.4) + 1e-3 * np.cos(0.37 * SWING)),

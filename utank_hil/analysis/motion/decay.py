@@ -25,6 +25,7 @@ from utank_hil.base.arrays import FloatArray
 
 Interval = tuple[float, float]
 _LEAST_SWINGS: Final = 2.0
+_BLOCK: Final = 4  #: Half swings in a block.
 _LEAST_SAMPLES: Final = 20.0
 """Samples a swing with which a model test gives the same damping as with fifty."""
 _MOST_RESIDUAL: Final = 0.1
@@ -177,7 +178,12 @@ def _fit(time: FloatArray, roll: FloatArray, start: FloatArray) -> RollDecay:
     rest = roll - fit
     swing = np.abs(fit - p[4] - p[5] * (time - time[0]))
     period = 2 * math.pi / p[0]
-    parts = max(1, int((time[-1] - time[0]) / (0.5 * period)))
+    parts = int((time[-1] - time[0]) / (0.5 * period))
+    if parts <= _BLOCK:
+        raise ValueError(
+            f"a decay test needs {(_BLOCK + 1) / 2} swings, whose scatter gives the intervals, has "
+            f"{(time[-1] - time[0]) / period:.1f}: use more of the record"
+        )
     block = np.minimum(((time - time[0]) / (0.5 * period)).astype(int), parts - 1)
     peaks = np.array([np.max(swing[block == n]) for n in range(parts) if np.any(block == n)])
     share = float(np.sqrt(np.mean(rest**2)) / np.max(peaks))
@@ -189,7 +195,7 @@ def _fit(time: FloatArray, roll: FloatArray, start: FloatArray) -> RollDecay:
     amplitude = np.array([np.min(peaks), 0.0, np.max(peaks)])
     amplitude[1] = (amplitude[0] + amplitude[2]) / 2
     equivalent = p[1] + _EQUAL_WORK * p[2] * amplitude
-    deviation = _deviation(by, rest, block // 4)
+    deviation = _deviation(by, rest, block // _BLOCK)
 
     def interval(value: float, gradient: FloatArray) -> Interval:
         half = float(np.linalg.norm(deviation @ gradient))
