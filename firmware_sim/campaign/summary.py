@@ -72,7 +72,11 @@ def summary(results: Results) -> list[dict[str, Any]]:
     """Figures of every group, ready for JSON."""
     groups = groups_of(results)
     cases = {case["case"]: case for case in results.cases}
-    waves = {name: case["waves"] for name, case in cases.items()}
+    own = {"case", "index", *results.keys}
+    pairs = {
+        name: tuple(value for key, value in case.items() if key not in own)
+        for name, case in cases.items()
+    }  # Cases of two groups that differ in the keys of groups alone.
     return [
         {
             "parameters": group.parameters,
@@ -82,7 +86,7 @@ def summary(results: Results) -> list[dict[str, Any]]:
             "lost": group.lost,
             "runs": {run: _run(group, run, cases) for run in group.runs},
             "paired": _paired(group),
-            "beside_first": [] if group is groups[0] else _beside(groups[0], group, waves),
+            "beside_first": [] if group is groups[0] else _beside(groups[0], group, pairs),
         }
         for group in groups
     ]
@@ -126,12 +130,14 @@ def _paired(group: Group) -> list[dict[str, Any]]:
     return pairs
 
 
-def _beside(first: Group, group: Group, waves: Mapping[str, str]) -> list[dict[str, Any]]:
+def _beside(
+    first: Group, group: Group, pairs_of: Mapping[str, tuple[Any, ...]]
+) -> list[dict[str, Any]]:
     """Roll RMS of each run against the same run of the first group, in the same waves."""
     pairs = []
     for run in group.runs:
         there, here = (
-            {waves[row["case"]]: row[ROLL] for row in each.of_run(run) if not row["mark"]}
+            {pairs_of[row["case"]]: row[ROLL] for row in each.of_run(run) if not row["mark"]}
             for each in (first, group)
         )
         both = [(there[name], roll) for name, roll in here.items() if name in there]

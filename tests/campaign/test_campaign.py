@@ -18,7 +18,8 @@ from typer.testing import CliRunner
 
 from firmware_sim.campaign.driver import Driver, batch_of
 from firmware_sim.campaign.simulations import LOST, OK, run_batch
-from firmware_sim.campaign.store import Store, read_results
+from firmware_sim.campaign.store import METRICS, Results, Store, read_results
+from firmware_sim.campaign.summary import summary
 from firmware_sim.campaign.tables import pairs_table, runs_table
 from firmware_sim.commands.campaign import campaign
 from utank_hil.console.common import new_app
@@ -154,6 +155,22 @@ def test_groups_of_the_same_waves_are_compared_with_the_first(run, tmp_path):
     assert gpc["share_below"]["cases"] == 3
     for same in (bare, passive):
         assert same["roll_rms_difference_rad"] == {"mean": 0.0, "half_width": 0.0, "cases": 3}
+
+
+def test_draws_in_the_same_waves_are_paired_each_with_its_own():
+    """Two groups of three draws of a ship in one sea; in the second the last has no result."""
+    draws = [(group, draw) for group in (1.0, 2.0) for draw in (10.0, 20.0, 30.0)]
+    figures = dict.fromkeys(METRICS, 0.0) | {"run": "gpc", "mark": "", "status": "ok"}
+    cases = [
+        {"case": f"{group}{draw}", "index": n, "waves": "a", "limit": group, "gm": draw}
+        for n, (group, draw) in enumerate(draws)
+    ]
+    rows = {
+        f"{group}{draw}": [figures | {"case": f"{group}{draw}", "roll_rms_rad": group + draw}]
+        for group, draw in draws[:-1]
+    }
+    (pair,) = summary(Results({}, ("limit",), cases, rows))[1]["beside_first"]
+    assert pair["roll_rms_difference_rad"] == {"mean": 1.0, "half_width": 0.0, "cases": 2}
 
 
 @pytest.mark.evidence
