@@ -5,11 +5,11 @@ import pytest
 from rolling_ship import SHIP, TANK
 
 from utank_hil.control.optimal_tank import best_passive_tank, tank_figures
-from utank_hil.dynamics import Tank, coupled_model
+from utank_hil.dynamics import coupled_model
 from utank_hil.dynamics.linear import coupled_matrices
 
 
-def peak(tank: Tank) -> float:
+def peak(tank):
     """Greatest roll per static roll K / k_phiphi, from the coupled model itself."""
     roll = np.abs(coupled_model(SHIP, tank)(1j * np.linspace(0.3, 0.8, 5001))[0, 1])
     return float(roll.max() * coupled_matrices(SHIP, tank)[2][0, 0])

@@ -21,7 +21,7 @@ WAVES = Sea.irregular(jonswap(1.5, 9.5), seed=1).roll_moment(
 )
 
 
-def test_the_expected_sea_has_the_slope_of_the_waves() -> None:
+def test_the_expected_sea_has_the_slope_of_the_waves():
     w = np.linspace(0.01, 4 * SHIP.natural_frequency_rad_s, 20_000)
     density = expected_sea(SHIP, WAVES).slope_density(w)
     kept = WAVES.frequency_rad_s < w[-1]
@@ -30,14 +30,14 @@ def test_the_expected_sea_has_the_slope_of_the_waves() -> None:
     assert w[density.argmax()] == pytest.approx(2 * math.pi / 9.5, rel=0.06)
 
 
-def test_waves_too_short_to_roll_the_ship_are_refused() -> None:
+def test_waves_too_short_to_roll_the_ship_are_refused():
     ripples = Harmonics(np.ones(1), np.full(1, 1.5), np.zeros(1))
     assert 2 < 1.5 / SHIP.natural_frequency_rad_s < 4
     with pytest.raises(CalmSeaError, match="does not roll the ship"):
         expected_sea(SHIP, ripples)
 
 
-def test_curves_are_those_of_the_dimensionless_response() -> None:
+def test_curves_are_those_of_the_dimensionless_response():
     curves = roll_curves(PLANT, WAVES, None)
     tank = at_work(PLANT, WAVES).tank
     ratios, own_rad_s = ship_ratios(SHIP, tank)

@@ -23,14 +23,14 @@ from utank_hil.analysis.tank_sizing import (
     usable_level_m,
     with_duct_loss,
 )
-from utank_hil.dynamics import RollShip, Tank, coupled_model
+from utank_hil.dynamics import RollShip, coupled_model
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.pump import AT_REST, pump_speed, pump_step
 
 G = 9.80665
 
 
-def ship_of(displacement_t: float, gm_m: float, period_s: float) -> RollShip:
+def ship_of(displacement_t, gm_m, period_s):
     stiffness = 1e3 * displacement_t * G * gm_m
     inertia = stiffness * (period_s / (2 * math.pi)) ** 2
     damping = 0.1 * math.sqrt(inertia * stiffness)
@@ -42,7 +42,7 @@ ROOM = TankRoom.in_hull(63, 9.5)
 
 
 @st.composite
-def hulls(draw: st.DrawFn) -> tuple[RollShip, TankRoom]:
+def hulls(draw):
     """Ships from boats to carriers: slender to beamy, tender to stiff."""
     beam_m = draw(st.floats(5, 50))
     length_m = beam_m * draw(st.floats(3, 8))
@@ -56,7 +56,7 @@ def hulls(draw: st.DrawFn) -> tuple[RollShip, TankRoom]:
 @pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(hull=hulls(), wanted=st.floats(0.04, 0.25))
-def test_tank_fits_its_room_and_its_ship(hull: tuple[RollShip, TankRoom], wanted: float) -> None:
+def test_tank_fits_its_room_and_its_ship(hull, wanted):
     ship, room = hull
     gm_m = ship.stiffness_nm_rad / ship.displacement_n
     sized = None
@@ -96,14 +96,14 @@ def test_tank_fits_its_room_and_its_ship(hull: tuple[RollShip, TankRoom], wanted
 @pytest.mark.slow
 @settings(max_examples=4, deadline=None)
 @given(hull=hulls())
-def test_water_is_tuned_to_the_ship(hull: tuple[RollShip, TankRoom]) -> None:
+def test_water_is_tuned_to_the_ship(hull):
     ship, room = hull
     try:
         tank = size_tank(ship, room).tank
     except TankImpossibleError:
         return
 
-    def peak(other: Tank) -> float:
+    def peak(other):
         frequencies = ship.natural_frequency_rad_s * np.linspace(0.5, 1.6, 800)
         return float(np.abs(coupled_model(ship, other)(1j * frequencies)[0, 1]).max())
 
@@ -115,12 +115,12 @@ def test_water_is_tuned_to_the_ship(hull: tuple[RollShip, TankRoom]) -> None:
     assert tank.natural_frequency_rad_s == pytest.approx(ship.natural_frequency_rad_s, rel=0.15)
 
 
-def test_ship_without_stability_to_spare_is_told_so() -> None:
+def test_ship_without_stability_to_spare_is_told_so():
     with pytest.raises(TankImpossibleError, match=r"GM of 0\.15 m can spare nothing"):
         size_tank(ship_of(1900, 0.152, 20), ROOM)
 
 
-def test_ship_with_little_stability_to_spare_keeps_what_she_must() -> None:
+def test_ship_with_little_stability_to_spare_keeps_what_she_must():
     ship = ship_of(1900, 0.165, 22)
     sized = size_tank(ship, ROOM)
     gm_left_m = 0.165 * (1 - stability_taken(ship, sized.tank))
@@ -128,23 +128,23 @@ def test_ship_with_little_stability_to_spare_keeps_what_she_must() -> None:
     assert "GM: 0.15 m must be left" in sized.bound_by
 
 
-def test_room_that_is_too_small_is_told() -> None:
+def test_room_that_is_too_small_is_told():
     with pytest.raises(TankImpossibleError, match=r"room's length, 0\.5 m, lets a tank take"):
         size_tank(PATROL, dataclasses.replace(ROOM, length_m=0.5))
 
 
 @pytest.mark.parametrize("share", [0.02, 0.3, math.nan])
-def test_share_beyond_all_use_is_refused(share: float) -> None:
+def test_share_beyond_all_use_is_refused(share):
     with pytest.raises(ValueError, match=r"stability_share must be 0\.03 to 0\.25"):
         size_tank(PATROL, ROOM, share)
 
 
-def test_displacement_is_needed() -> None:
+def test_displacement_is_needed():
     with pytest.raises(ValueError, match="displacement_n is needed"):
         size_tank(dataclasses.replace(PATROL, displacement_n=0.0), ROOM)
 
 
-def test_level_of_the_pump_lists_the_ship_by_the_slope() -> None:
+def test_level_of_the_pump_lists_the_ship_by_the_slope():
     tank = size_tank(PATROL, ROOM).tank
     level_m = pump_level_m(PATROL, tank)
     assert level_m < usable_level_m(PATROL, tank)
@@ -153,7 +153,7 @@ def test_level_of_the_pump_lists_the_ship_by_the_slope() -> None:
     assert moment / PATROL.stiffness_nm_rad == pytest.approx(PUMP_SLOPE_RAD)
 
 
-def test_slow_ship_may_not_move_her_water_faster_than_the_first_ship_does() -> None:
+def test_slow_ship_may_not_move_her_water_faster_than_the_first_ship_does():
     slow = ship_of(42000, 1.2, 21)
     tank = size_tank(slow, TankRoom.in_hull(200, 32)).tank
     level_m = usable_level_m(slow, tank)
@@ -164,7 +164,7 @@ def test_slow_ship_may_not_move_her_water_faster_than_the_first_ship_does() -> N
 
 @pytest.mark.evidence("0.85", "1.15")
 @pytest.mark.parametrize("scale", [0.85, 1.0, 1.15])
-def test_sized_pump_moves_the_water_as_said(scale: float) -> None:
+def test_sized_pump_moves_the_water_as_said(scale):
     """The pump's own equations and the water's, stepped together in a ship held still."""
     tank = size_tank(PATROL, ROOM).tank
     demand = pump_demand(PATROL, tank, pump_level_m(PATROL, tank))
@@ -192,7 +192,7 @@ def test_sized_pump_moves_the_water_as_said(scale: float) -> None:
         assert np.mean(powers[-last:]) == pytest.approx(demand.mean_power_w, rel=0.3)
 
 
-def test_pump_has_the_power_for_pressure_and_flow_at_once() -> None:
+def test_pump_has_the_power_for_pressure_and_flow_at_once():
     tank = size_tank(PATROL, ROOM).tank
     demand = pump_demand(PATROL, tank, pump_level_m(PATROL, tank))
     pump = size_pump(tank, demand)
@@ -206,7 +206,7 @@ def test_pump_has_the_power_for_pressure_and_flow_at_once() -> None:
     assert shaft_w <= pump.max_power_w
 
 
-def test_duct_s_loss_is_the_wanted_damping_at_the_pump_s_level() -> None:
+def test_duct_s_loss_is_the_wanted_damping_at_the_pump_s_level():
     tank = size_tank(PATROL, TankRoom.in_hull(63, 9.5)).tank
     for wanted in (0.6, 0.05):  # with a throttle, and the least that a duct has
         found = with_duct_loss(PATROL, dataclasses.replace(tank, damping_ratio=wanted))

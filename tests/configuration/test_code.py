@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -19,7 +18,7 @@ SHIP = str(CONFIGS / "ships" / "thesis_first.yaml")
 VALVE = str(CONFIGS / "ships" / "thesis_first_valve.yaml")
 
 
-def a_law(folder: Path) -> dict[str, Any]:
+def a_law(folder):
     """A law of a module that leaves a mark when it is imported."""
     (folder / "mark_of_code.py").write_text(
         "from pathlib import Path\n"
@@ -34,13 +33,13 @@ def a_law(folder: Path) -> dict[str, Any]:
     return {"kind": "python", "factory": "./mark_of_code.py:Law", "measured": ["roll_rad"]}
 
 
-def written(folder: Path, **keys: Any) -> Path:
+def written(folder, **keys):
     path = folder / "controller.yaml"
     path.write_text(yaml.safe_dump({"name": "A", "vessel": SHIP, **keys}))
     return path
 
 
-def the_storm(folder: Path, controller: Path) -> Path:
+def the_storm(folder, controller):
     content = yaml.safe_load((CONFIGS / "scenarios" / "storm.yaml").read_text())
     content |= {"vessel": SHIP, "controllers": {"own": str(controller)}}
     content["sea"] = {"kind": "jonswap", "hs_m": 2.0, "tp_s": 9.0}
@@ -49,14 +48,12 @@ def the_storm(folder: Path, controller: Path) -> Path:
     return path
 
 
-def said(*words: object) -> tuple[int, str]:
+def said(*words):
     done = CliRunner(env={"COLUMNS": "300"}).invoke(app, [str(word) for word in words])
     return done.exit_code, done.stderr
 
 
-def test_code_that_nobody_allows_is_refused_and_nothing_of_it_is_imported(
-    tmp_path: Path,
-) -> None:
+def test_code_that_nobody_allows_is_refused_and_nothing_of_it_is_imported(tmp_path):
     controller = written(tmp_path, law=a_law(tmp_path))
     scenario = the_storm(tmp_path, controller)
     for words in (
@@ -73,9 +70,7 @@ def test_code_that_nobody_allows_is_refused_and_nothing_of_it_is_imported(
 
 
 @pytest.mark.parametrize("kind", ["valve_clipped", "pump_with_valve"])
-def test_code_within_another_law_is_refused_even_where_code_is_allowed(
-    tmp_path: Path, kind: str
-) -> None:
+def test_code_within_another_law_is_refused_even_where_code_is_allowed(tmp_path, kind):
     law = {"kind": kind, "pump": a_law(tmp_path)}
     controller = written(tmp_path, vessel=VALVE, law=law)
     code, stderr = said("check", controller, "--allow-code")
@@ -84,14 +79,14 @@ def test_code_within_another_law_is_refused_even_where_code_is_allowed(
     assert not (tmp_path / "ran").exists()
 
 
-def test_code_that_is_allowed_is_run(tmp_path: Path) -> None:
+def test_code_that_is_allowed_is_run(tmp_path):
     controller = written(tmp_path, law=a_law(tmp_path), accept_low_margins=True)
     assert said("check", controller, "--allow-code")[0] == ExitCode.OK
     assert build_law(load_config(controller, ControllerConfig, allow_code=True))
     assert (tmp_path / "ran").exists()
 
 
-def test_a_study_brings_in_no_code(tmp_path: Path) -> None:
+def test_a_study_brings_in_no_code(tmp_path):
     controller = written(tmp_path, law={"kind": "passive"})
     study = tmp_path / "study.yaml"
     content = {

@@ -2,7 +2,6 @@
 
 import copy
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ MODELS = {"ships": Vessel, "controllers": ControllerConfig, "scenarios": Scenari
 FOREIGN_WORDS = ("Input ", "valid ", "tag", "dictionary", "instance", "unable to", "Field ")
 
 
-def places(content: Any, key: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any, ...], Any]]:
+def places(content, key=()):
     """Keys and values of all that stands in a content."""
     items = (
         content.items() if isinstance(content, dict)
@@ -43,7 +42,7 @@ NUMBERS = [
 ]
 
 
-def with_value(path: Path, key: tuple[Any, ...], value: Any) -> Any:
+def with_value(path, key, value):
     """A shipped configuration with one value put in the place of another."""
     content = copy.deepcopy(SHIPPED[path])
     place = content
@@ -53,7 +52,7 @@ def with_value(path: Path, key: tuple[Any, ...], value: Any) -> Any:
     return content
 
 
-def refused(folder: Path, text: str, model: type[Any]) -> dict[str, str]:
+def refused(folder, text, model):
     """Reason by key of all that is wrong with a file."""
     file = folder / "changed.yaml"
     file.write_text(text, encoding="utf-8")
@@ -70,7 +69,7 @@ def refused(folder: Path, text: str, model: type[Any]) -> dict[str, str]:
         [True, False, "yes please", "9,5", [1.0, []], {"a": 1.0}, math.nan, math.inf]
     ),
 )
-def test_no_number_is_taken_from_what_is_none(tmp_path: Path, place: Any, value: Any) -> None:
+def test_no_number_is_taken_from_what_is_none(tmp_path, place, value):
     path, key = place
     text = yaml.safe_dump(with_value(path, key, value))
     found = refused(tmp_path, text, MODELS[path.parent.name])
@@ -87,9 +86,7 @@ def test_no_number_is_taken_from_what_is_none(tmp_path: Path, place: Any, value:
          10**400, 2.5, "", ["roll_rad"], 1e300]
     ),
 )  # fmt: skip
-def test_whatever_stands_anywhere_the_words_are_the_project_s_own(
-    tmp_path: Path, place: Any, value: Any
-) -> None:
+def test_whatever_stands_anywhere_the_words_are_the_project_s_own(tmp_path, place, value):
     path, key, _ = place
     file = tmp_path / "changed.yaml"
     file.write_text(yaml.safe_dump(with_value(path, key, value)))
@@ -132,15 +129,13 @@ tank:
         (f"'{1000 * 'x'}'", "must be a number, got 'xxxxxxxxxx"),
     ],
 )
-def test_what_is_no_number_is_told_with_the_remedy(
-    tmp_path: Path, written: str, words: str
-) -> None:
+def test_what_is_no_number_is_told_with_the_remedy(tmp_path, written, words):
     reasons = refused(tmp_path, SHIP.replace("17.1\n", f"{written}\n"), Vessel)
     assert words in reasons["tank.width_m"]
     assert len(reasons["tank.width_m"]) < 200
 
 
-def test_numbers_are_decimal(tmp_path: Path) -> None:
+def test_numbers_are_decimal(tmp_path):
     text = "a: 1e7\nb: 010\nc: 5.\nd: .5\ne: -1E-3\nf: -.inf\ng: +4\n"
     values = {"a": 1e7, "b": 10, "c": 5.0, "d": 0.5, "e": -1e-3, "f": -math.inf, "g": 4}
     assert parse_yaml(text) == (values, [])
@@ -149,7 +144,7 @@ def test_numbers_are_decimal(tmp_path: Path) -> None:
 PD = SHIPPED[CONFIGS / "controllers" / "pd.yaml"]
 
 
-def scenario(**changes: Any) -> str:
+def scenario(**changes):
     """The storm with keys changed."""
     path = CONFIGS / "scenarios" / "storm.yaml"
     return yaml.safe_dump({**SHIPPED[path], **changes})
@@ -176,13 +171,11 @@ def scenario(**changes: Any) -> str:
         ({"durations": 5}, "durations", "is not a known key; did you mean duration_s?"),
     ],
 )  # fmt: skip
-def test_what_is_no_choice_list_or_text_is_told(
-    tmp_path: Path, changes: dict[str, Any], key: str, words: str
-) -> None:
+def test_what_is_no_choice_list_or_text_is_told(tmp_path, changes, key, words):
     assert words in refused(tmp_path, scenario(**changes), Scenario)[key]
 
 
-def test_key_that_only_looks_alike_is_not_suggested(tmp_path: Path) -> None:
+def test_key_that_only_looks_alike_is_not_suggested(tmp_path):
     text = SHIP.replace("ship:\n", "ship:\n  loss_m: 0.9\n")
     assert refused(tmp_path, text, Vessel)["ship.loss_m"] == "is not a known key"
 
@@ -203,8 +196,8 @@ def test_key_that_only_looks_alike_is_not_suggested(tmp_path: Path) -> None:
     ],
 )
 def test_file_of_another_kind_is_named_at_the_key_that_names_it(
-    tmp_path: Path, shipped: str, key: str, named: str, has: str, model: type[Any]
-) -> None:
+    tmp_path, shipped, key, named, has, model
+):
     content = SHIPPED[CONFIGS / shipped]
     file = CONFIGS / "ships" / named
     value: Any = str(file)
@@ -217,7 +210,7 @@ def test_file_of_another_kind_is_named_at_the_key_that_names_it(
     assert "; a file for this has " in reasons[key]
 
 
-def test_file_of_another_kind_is_refused_in_one_line() -> None:
+def test_file_of_another_kind_is_refused_in_one_line():
     with pytest.raises(ConfigError) as caught:
         load_config(CONFIGS / "ships" / "patti_b.yaml", ControllerConfig)
     (problem,) = caught.value.problems
@@ -225,7 +218,7 @@ def test_file_of_another_kind_is_refused_in_one_line() -> None:
     assert problem.reason == "is a ship, and a controller is wanted"
 
 
-def test_a_file_that_its_reader_names_is_not_named_twice(tmp_path: Path) -> None:
+def test_a_file_that_its_reader_names_is_not_named_twice(tmp_path):
     waves = tmp_path / "waves.txt"
     waves.write_text("none\n")
     reason = refused(tmp_path, f"sea: {{kind: measured, file: {waves}}}\n", Scenario)["sea.file"]

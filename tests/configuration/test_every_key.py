@@ -5,9 +5,8 @@ do not fit each other, either may be wrong.
 """
 
 import copy
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import pytest
 import yaml
@@ -65,7 +64,7 @@ NOT_TOLD: Final = {
 }  # fmt: skip
 
 
-def quantities(content: Any, at: Place = ()) -> Iterator[Place]:
+def quantities(content, at=()):
     """Places of the numbers of a file that are neither zero nor tuning; a list is one."""
     items = content.items() if isinstance(content, dict) else ()
     if isinstance(content, list) and content and isinstance(content[0], dict):
@@ -79,7 +78,7 @@ def quantities(content: Any, at: Place = ()) -> Iterator[Place]:
             yield from quantities(value, (*at, key))
 
 
-def scaled(content: Any, at: Place, factor: float) -> Any:
+def scaled(content, at, factor):
     changed = copy.deepcopy(content)
     part = changed
     for key in at[:-1]:
@@ -89,7 +88,7 @@ def scaled(content: Any, at: Place, factor: float) -> Any:
     return changed
 
 
-def with_paths(content: Any, folder: Path) -> Any:
+def with_paths(content, folder):
     if isinstance(content, dict):
         return {key: with_paths(value, folder) for key, value in content.items()}
     if isinstance(content, str) and (folder / content).is_file():
@@ -97,7 +96,7 @@ def with_paths(content: Any, folder: Path) -> Any:
     return content
 
 
-def told(folder: Path, content: Any, model: type[Any]) -> dict[str, str]:
+def told(folder, content, model):
     file = folder / "changed.yaml"
     file.write_text(yaml.safe_dump(content))
     try:
@@ -106,7 +105,7 @@ def told(folder: Path, content: Any, model: type[Any]) -> dict[str, str]:
         return {problem.key: problem.reason for problem in error.problems}
 
 
-def unnamed(folder: Path, stem: str, content: Any, model: type[Any]) -> list[str]:
+def unnamed(folder, stem, content, model):
     """Changes of a quantity that no refusal or warning names."""
     usual, found = told(folder, content, model), []
     for at in quantities(content):
@@ -127,7 +126,7 @@ def unnamed(folder: Path, stem: str, content: Any, model: type[Any]) -> list[str
 
 
 @pytest.mark.parametrize("ship", [*sorted(CONFIGS.glob("ships/*.yaml")), None], ids=str)
-def test_no_quantity_of_a_ship_passes_by_a_factor(tmp_path: Path, ship: Path | None) -> None:
+def test_no_quantity_of_a_ship_passes_by_a_factor(tmp_path, ship):
     stem = "init" if ship is None else ship.stem
     content = INIT_SHIP if ship is None else parse_yaml(ship.read_text())[0]
     assert unnamed(tmp_path, stem, content, Vessel) == []
@@ -157,7 +156,7 @@ def test_no_quantity_of_a_ship_passes_by_a_factor(tmp_path: Path, ship: Path | N
     [*CONFIGS.glob("controllers/*.yaml"), *CONFIGS.glob("scenarios/*.yaml")],
     ids=lambda path: path.stem,
 )
-def test_no_quantity_of_a_law_or_sea_passes_by_a_factor(tmp_path: Path, file: Path) -> None:
+def test_no_quantity_of_a_law_or_sea_passes_by_a_factor(tmp_path, file):
     content = with_paths(parse_yaml(file.read_text())[0], file.parent)
     if "controllers" in content:  # one of them is enough: the sea is judged
         name, controller = next(iter(content["controllers"].items()))

@@ -12,7 +12,7 @@ from utank_hil.configuration.controller import MOST_PRESSURE_PA
 from utank_hil.control import PumpLimits
 
 
-def with_limit(pressure_pa: float) -> ControllerConfig:
+def with_limit(pressure_pa):
     """A shipped controller with a pump of 400 kPa."""
     config = load_config(Path("configs/controllers/gpc.yaml"), ControllerConfig)
     assert config.vessel.pump is not None
@@ -24,7 +24,7 @@ def with_limit(pressure_pa: float) -> ControllerConfig:
     return ControllerConfig.model_validate({**fields, "vessel": vessel, "limits": limits})
 
 
-def test_the_constant_is_the_largest_pressure_that_pump_cmd_can_say() -> None:
+def test_the_constant_is_the_largest_pressure_that_pump_cmd_can_say():
     codec = load_catalogue().codec(PumpCommand)
     asked = (MOST_PRESSURE_PA - 8.0, MOST_PRESSURE_PA, MOST_PRESSURE_PA + 800.0)
     said = []
@@ -35,7 +35,7 @@ def test_the_constant_is_the_largest_pressure_that_pump_cmd_can_say() -> None:
     assert said == pytest.approx([asked[0], asked[1], asked[1]], abs=4.0)
 
 
-def test_a_limit_that_the_bus_can_say_is_taken_and_a_larger_one_is_not() -> None:
+def test_a_limit_that_the_bus_can_say_is_taken_and_a_larger_one_is_not():
     assert with_limit(MOST_PRESSURE_PA).limits.pressure_pa == MOST_PRESSURE_PA
     with pytest.raises(ValidationError, match="PUMP_CMD can ask for 250000 at most: set it to 25"):
         with_limit(MOST_PRESSURE_PA + 1.0)

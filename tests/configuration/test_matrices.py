@@ -23,7 +23,7 @@ SHIP = Path("configs/ships/thesis_first.yaml").resolve()
 LAW = {"A": [[0.5, 0.1], [0.0, 0.2]], "B": [[1.0], [2.0]], "C": [[1e4, 2e4]], "D": [[3e4]]}
 
 
-def configured(folder: Path, system: object, measured: str = "[roll_rad]") -> ControllerConfig:
+def configured(folder, system, measured="[roll_rad]"):
     path = folder / "law.yaml"
     path.write_text(
         f"name: m\nvessel: {SHIP}\n"
@@ -33,7 +33,7 @@ def configured(folder: Path, system: object, measured: str = "[roll_rad]") -> Co
     return load_config(path, ControllerConfig)
 
 
-def written(folder: Path, suffix: str, content: dict[str, object]) -> str:
+def written(folder, suffix, content):
     path = folder / f"law{suffix}"
     if suffix == ".json":
         path.write_text(json.dumps(content), encoding="utf-8")
@@ -44,7 +44,7 @@ def written(folder: Path, suffix: str, content: dict[str, object]) -> str:
     return f"./{path.name}"
 
 
-def answers(config: ControllerConfig, outputs: int = 1) -> np.ndarray:
+def answers(config, outputs=1):
     controller = build_law(config).controller()
     samples = np.random.default_rng(1).standard_normal((5, outputs))
     return np.array([controller.step(y)[0] for y in samples])
@@ -53,7 +53,7 @@ def answers(config: ControllerConfig, outputs: int = 1) -> np.ndarray:
 @pytest.mark.parametrize(
     ("suffix", "period"), [(".json", "sample_time_s"), (".npz", "dt"), (".mat", "Ts")]
 )
-def test_every_kind_of_file_holds_the_same_law(tmp_path: Path, suffix: str, period: str) -> None:
+def test_every_kind_of_file_holds_the_same_law(tmp_path, suffix, period):
     inline = answers(configured(tmp_path, {**LAW, "sample_time_s": 0.1}))
     assert inline[0] == 3e4 * np.random.default_rng(1).standard_normal()
     system = written(tmp_path, suffix, {**LAW, period: 0.1})
@@ -61,7 +61,7 @@ def test_every_kind_of_file_holds_the_same_law(tmp_path: Path, suffix: str, peri
 
 
 @pytest.mark.parametrize("order", [0, 1, 3])
-def test_a_law_of_python_control_goes_through_json_as_it_is(tmp_path: Path, order: int) -> None:
+def test_a_law_of_python_control_goes_through_json_as_it_is(tmp_path, order):
     sampled = control.sample_system(control.tf([2e4, 1e4], [0.2, 1.3, 2.0, 1.0]), 0.1)
     law = control.ss(sampled) if order == 3 else control.ss(order * 0.5, 1.0, 2e4, 3e4, 0.1)
     law = law if order else control.ss([], [], [], [[3e4]], 0.1)
@@ -74,14 +74,14 @@ def test_a_law_of_python_control_goes_through_json_as_it_is(tmp_path: Path, orde
 
 
 @pytest.mark.parametrize("dt", [0, True, None])
-def test_a_law_of_python_control_without_a_time_is_refused(tmp_path: Path, dt: object) -> None:
+def test_a_law_of_python_control_without_a_time_is_refused(tmp_path, dt):
     law = control.ss([[0.5]], [[1.0]], [[2.0]], [[3.0]], dt)
     content = {name: getattr(law, name).tolist() for name in "ABCD"} | {"dt": law.dt}
     with pytest.raises(ConfigError, match=r"law\.system: law\.json: dt "):
         configured(tmp_path, written(tmp_path, ".json", content))
 
 
-def test_a_law_without_states_has_d_alone(tmp_path: Path) -> None:
+def test_a_law_without_states_has_d_alone(tmp_path):
     static = {"A": np.zeros((0, 0)), "B": np.zeros((0, 2)), "C": np.zeros((1, 0)), "dt": 0.1}
     system = written(tmp_path, ".npz", {**static, "D": [[1.0, -2.0]]})
     config = configured(tmp_path, system, "[roll_rad, level_m]")
@@ -89,7 +89,7 @@ def test_a_law_without_states_has_d_alone(tmp_path: Path) -> None:
     np.testing.assert_allclose(answers(config, 2), samples @ [1.0, -2.0])
 
 
-def test_a_static_law_may_be_json(tmp_path: Path) -> None:
+def test_a_static_law_may_be_json(tmp_path):
     static = {"A": [], "B": [], "C": [[]], "D": [[2.0]], "dt": 0.1}
     config = configured(tmp_path, written(tmp_path, ".json", static))
     np.testing.assert_allclose(
@@ -125,7 +125,7 @@ def test_a_static_law_may_be_json(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_is_wrong_is_said_at_its_key(tmp_path: Path, suffix, content, message) -> None:
+def test_what_is_wrong_is_said_at_its_key(tmp_path, suffix, content, message):
     with pytest.raises(ConfigError) as caught:
         configured(tmp_path, written(tmp_path, suffix, content))
     assert message in str(caught.value)
@@ -143,7 +143,7 @@ def test_what_is_wrong_is_said_at_its_key(tmp_path: Path, suffix, content, messa
         ("", "", "can't be read"),
     ],
 )
-def test_a_file_that_is_none_is_said(tmp_path: Path, name: str, text: str, message: str) -> None:
+def test_a_file_that_is_none_is_said(tmp_path, name, text, message):
     if name:
         (tmp_path / name).write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match=r"law\.system") as caught:
@@ -151,7 +151,7 @@ def test_a_file_that_is_none_is_said(tmp_path: Path, name: str, text: str, messa
     assert message in str(caught.value)
 
 
-def test_it_measures_as_many_outputs_as_d_has_columns(tmp_path: Path) -> None:
+def test_it_measures_as_many_outputs_as_d_has_columns(tmp_path):
     with pytest.raises(ConfigError, match=r"law.measured: must name 1 outputs"):
         configured(tmp_path, {**LAW, "sample_time_s": 0.1}, "[roll_rad, level_m]")
 
@@ -166,19 +166,19 @@ def test_it_measures_as_many_outputs_as_d_has_columns(tmp_path: Path) -> None:
     ],
     ids=["structure", "complex without imaginary part", "sparse", "whole number"],
 )
-def test_matrices_are_read_as_matlab_has_them(tmp_path: Path, content) -> None:
+def test_matrices_are_read_as_matlab_has_them(tmp_path, content):
     savemat(tmp_path / "law.MAT", content)
     found = read_system(tmp_path / "law.MAT")
     assert [list(map(list, found[name])) for name in "ABCD"] == list(LAW.values())
 
 
-def test_a_vector_is_a_column_for_b_and_a_row_for_c(tmp_path: Path) -> None:
+def test_a_vector_is_a_column_for_b_and_a_row_for_c(tmp_path):
     vectors = {**LAW, "B": [1.0, 2.0], "C": [1e4, 2e4], "D": 3e4, "dt": 0.1}
     found = read_system(tmp_path / written(tmp_path, ".json", vectors))
     assert [list(map(list, found[name])) for name in "ABCD"] == list(LAW.values())
 
 
-def matlab_73(path: Path, content: dict[str, object]) -> None:
+def matlab_73(path, content):
     """Write matrices as MATLAB's `save -v7.3` does: HDF5, transposed, sparse ones in columns."""
     with h5py.File(path, "w", userblock_size=512) as file:
         struct = file.create_group("sys")
@@ -201,7 +201,7 @@ def matlab_73(path: Path, content: dict[str, object]) -> None:
         file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(508) + b"\x00\x02IM")
 
 
-def test_files_of_matlab_7_3_are_read(tmp_path: Path) -> None:
+def test_files_of_matlab_7_3_are_read(tmp_path):
     matlab_73(tmp_path / "law.mat", {**LAW, "Ts": 0.1})
     found = read_system(tmp_path / "law.mat")
     assert [list(map(list, found[name])) for name in "ABCD"] == list(LAW.values())
@@ -216,7 +216,7 @@ def test_files_of_matlab_7_3_are_read(tmp_path: Path) -> None:
         )
     )
 )
-def test_matrices_are_read_to_the_bit(tmp_path_factory, pair) -> None:
+def test_matrices_are_read_to_the_bit(tmp_path_factory, pair):
     a, b = pair
     content = {"A": a, "B": b, "C": b[:, :1].T, "D": b[:1], "dt": 0.1}
     folder = tmp_path_factory.mktemp("law")
@@ -243,7 +243,7 @@ def test_matrices_are_read_to_the_bit(tmp_path_factory, pair) -> None:
         ("16-mat-as-matlab-has-it/column.json", ""),
     ],
 )
-def test_cases_from_the_field(file: str, message: str) -> None:
+def test_cases_from_the_field(file, message):
     path = field_case(file)
     if message:
         with pytest.raises(ValueError, match=message):

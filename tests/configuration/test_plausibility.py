@@ -2,7 +2,6 @@
 
 import copy
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -21,7 +20,7 @@ STORM = {
 FIRST = "thesis_first"
 
 
-def told(folder: Path, content: Any, model: type[Any]) -> tuple[dict[str, str], dict[str, str]]:
+def told(folder, content, model):
     """Refusals and warnings of a file, by key."""
     file = folder / "changed.yaml"
     file.write_text(yaml.safe_dump(content))
@@ -31,7 +30,7 @@ def told(folder: Path, content: Any, model: type[Any]) -> tuple[dict[str, str], 
         return {problem.key: problem.reason for problem in error.problems}, {}
 
 
-def vessel(ship: str, **changes: Any) -> Any:
+def vessel(ship, **changes):
     """A shipped ship with keys (``__`` for the dot) changed; a function changes what is there."""
     content = copy.deepcopy(SHIPS[ship])
     for key, value in changes.items():
@@ -40,11 +39,11 @@ def vessel(ship: str, **changes: Any) -> Any:
     return content
 
 
-def thousandth(value: float) -> float:
+def thousandth(value):
     return value / 1000
 
 
-def thousandfold(value: float) -> float:
+def thousandfold(value):
     return value * 1000
 
 
@@ -99,9 +98,7 @@ def thousandfold(value: float) -> float:
          "is 11 m2, and the tank's duct has 1.13 m2: the propeller fills the duct"),
     ],
 )  # fmt: skip
-def test_what_can_not_be_is_refused_at_its_key_with_the_remedy(
-    tmp_path: Path, ship: str, changes: dict[str, Any], key: str, words: str
-) -> None:
+def test_what_can_not_be_is_refused_at_its_key_with_the_remedy(tmp_path, ship, changes, key, words):
     refused, _ = told(tmp_path, vessel(ship, **changes), Vessel)
     assert set(refused) == {key}
     assert words in refused[key]
@@ -121,9 +118,7 @@ def test_what_can_not_be_is_refused_at_its_key_with_the_remedy(
         ({"pump__duct_area_m2": 15.0}, "pump.duct_area_m2", "make both the same"),
     ],
 )  # fmt: skip
-def test_what_is_unusual_is_warned_of(
-    tmp_path: Path, changes: dict[str, Any], key: str, words: str
-) -> None:
+def test_what_is_unusual_is_warned_of(tmp_path, changes, key, words):
     refused, warned = told(tmp_path, vessel(FIRST, **changes), Vessel)
     assert refused == {}
     assert words in warned[key]
@@ -139,9 +134,7 @@ def test_what_is_unusual_is_warned_of(
         ({"roll_period_s": 12.6, "damping_ratio": 3.0}, "ship.damping_ratio"),
     ],
 )
-def test_what_can_not_be_is_refused_at_the_key_that_is_written(
-    tmp_path: Path, hull: dict[str, float], key: str
-) -> None:
+def test_what_can_not_be_is_refused_at_the_key_that_is_written(tmp_path, hull, key):
     content = vessel(FIRST)
     content["ship"] = {"displacement_t": 41e3, "gm_m": 1.2, **hull}
     refused, _ = told(tmp_path, content, Vessel)
@@ -149,7 +142,7 @@ def test_what_can_not_be_is_refused_at_the_key_that_is_written(
 
 
 @pytest.mark.parametrize("ship", SHIPS)
-def test_shipped_vessels_are_plausible(tmp_path: Path, ship: str) -> None:
+def test_shipped_vessels_are_plausible(tmp_path, ship):
     """But for the fishing boat's tank, which does take half of her stability."""
     refused, warned = told(tmp_path, vessel(ship), Vessel)
     assert refused == {}
@@ -167,9 +160,7 @@ def test_shipped_vessels_are_plausible(tmp_path: Path, ship: str) -> None:
     ],
 )
 @pytest.mark.parametrize("ship", SHIPS)
-def test_slip_by_a_thousand_never_passes_without_a_word(
-    tmp_path: Path, ship: str, section: str, key: str
-) -> None:
+def test_slip_by_a_thousand_never_passes_without_a_word(tmp_path, ship, section, key):
     """Too small a rotor and too fast a rise do no harm; nor does a motor that is too strong."""
     _, usual = told(tmp_path, vessel(ship), Vessel)
     changes = [thousandfold, thousandth]
@@ -182,11 +173,11 @@ def test_slip_by_a_thousand_never_passes_without_a_word(
         assert set(refused) | (set(warned) - set(usual)), (ship, section, key, change)
 
 
-def jonswap(hs_m: float, tp_s: float, **more: Any) -> dict[str, Any]:
+def jonswap(hs_m, tp_s, **more):
     return {"kind": "jonswap", "hs_m": hs_m, "tp_s": tp_s, **more}
 
 
-def regular(**more: Any) -> dict[str, Any]:
+def regular(**more):
     return {"kind": "regular", "amplitude_m": 1.0, "period_s": 10.0, **more}
 
 
@@ -206,9 +197,7 @@ def regular(**more: Any) -> dict[str, Any]:
          "takes all of the waves' moment"),
     ],
 )  # fmt: skip
-def test_sea_that_can_not_be_or_does_nothing_is_refused(
-    tmp_path: Path, sea: dict[str, Any], key: str, words: str
-) -> None:
+def test_sea_that_can_not_be_or_does_nothing_is_refused(tmp_path, sea, key, words):
     refused, _ = told(tmp_path, {**STORM, "sea": sea}, Scenario)
     assert words in refused[key]
 
@@ -220,18 +209,14 @@ def test_sea_that_can_not_be_or_does_nothing_is_refused(
         (jonswap(3, 10, speed_m_s=22), "sea.speed_m_s", "is 43 knots"),
     ],
 )
-def test_unusual_sea_is_warned_of(
-    tmp_path: Path, sea: dict[str, Any], key: str, words: str
-) -> None:
+def test_unusual_sea_is_warned_of(tmp_path, sea, key, words):
     refused, warned = told(tmp_path, {**STORM, "sea": sea}, Scenario)
     assert refused == {}
     assert words in warned[key]
 
 
 @pytest.mark.parametrize(("scale", "refused"), [(1.0, False), (1e-3, True), (1e3, True)])
-def test_moment_table_in_other_units_is_refused(
-    tmp_path: Path, scale: float, *, refused: bool
-) -> None:
+def test_moment_table_in_other_units_is_refused(tmp_path, scale, *, refused):
     full = 4.81875e8 / 9.80665  # stiffness times k / omega^2
     rows = [
         f"{omega},{heading},{scale * full * omega**2 * (heading == 90)},90"
@@ -256,14 +241,12 @@ def test_moment_table_in_other_units_is_refused(
         STORM["sea"] | {"file": str(CONFIGS / "seas/ndbc_41010_2019-02_spectral_density.txt")},
     ],
 )
-def test_seas_that_can_be_pass(tmp_path: Path, sea: dict[str, Any]) -> None:
+def test_seas_that_can_be_pass(tmp_path, sea):
     assert told(tmp_path, {**STORM, "sea": sea}, Scenario) == ({}, {})
 
 
 @pytest.mark.parametrize(("section", "watched"), [({}, False), ({"sea_estimate": {}}, True)])
-def test_limit_of_the_stability_that_nothing_watches_is_warned_of(
-    tmp_path: Path, section: dict[str, Any], watched: bool
-) -> None:
+def test_limit_of_the_stability_that_nothing_watches_is_warned_of(tmp_path, section, watched):
     ship = copy.deepcopy(SHIPS[FIRST])
     ship["ship"].pop("displacement_n", None)
     ship["ship"]["displacement_t"] = 14500
@@ -275,14 +258,14 @@ def test_limit_of_the_stability_that_nothing_watches_is_warned_of(
     assert ("vessel.least_gm_m" not in warned) == watched
 
 
-def controller(name: str, **changes: Any) -> Any:
+def controller(name, **changes):
     """A shipped controller with sections changed."""
     content = parse_yaml((CONFIGS / "controllers" / f"{name}.yaml").read_text())[0]
     vessel = (CONFIGS / "controllers" / content["vessel"]).resolve()
     return {**content, "vessel": str(vessel), **changes}
 
 
-def test_roll_and_heel_are_limited_while_she_still_rights_herself(tmp_path: Path) -> None:
+def test_roll_and_heel_are_limited_while_she_still_rights_herself(tmp_path):
     """Patti-B with her water: her righting moment is greatest at 10.9 degrees, gone at 19.0."""
     limits = {}
     for name in ("patti_b_constrained_gpc", "gpc"):
@@ -296,7 +279,7 @@ def test_roll_and_heel_are_limited_while_she_still_rights_herself(tmp_path: Path
     assert (safety.roll_limit_rad, safety.heel_limit_rad) == (0.33, 0.2)
 
 
-def test_a_roll_limit_at_which_she_no_longer_rights_herself_is_refused(tmp_path: Path) -> None:
+def test_a_roll_limit_at_which_she_no_longer_rights_herself_is_refused(tmp_path):
     wrong = controller("patti_b_constrained_gpc", safety={"roll_limit_rad": 0.34})
     refused, _ = told(tmp_path, wrong, ControllerConfig)
     assert list(refused) == ["safety.roll_limit_rad"]
@@ -305,9 +288,7 @@ def test_a_roll_limit_at_which_she_no_longer_rights_herself_is_refused(tmp_path:
 
 
 @pytest.mark.parametrize(("pressure_pa", "warned"), [(20e3, True), (4.5e3, True), (4.2e3, False)])
-def test_a_pump_that_could_capsize_her_is_warned_of(
-    tmp_path: Path, pressure_pa: float, warned: bool
-) -> None:
+def test_a_pump_that_could_capsize_her_is_warned_of(tmp_path, pressure_pa, warned):
     limits = {"pressure_pa": pressure_pa, "level_m": 1.64, "brake_share": 1.0, "sharpness": 4.0}
     without_a_cut = {key: value for key, value in SHIPS["patti_b"].items() if key != "redundancy"}
     law = controller("patti_b_self_tuning", limits=limits) | {"vessel": without_a_cut}
@@ -321,7 +302,7 @@ def test_a_pump_that_could_capsize_her_is_warned_of(
         )
 
 
-def test_without_a_pump_none_is_warned_of(tmp_path: Path) -> None:
+def test_without_a_pump_none_is_warned_of(tmp_path):
     ship = vessel("patti_b")
     del ship["pump"]
     (tmp_path / "ship.yaml").write_text(yaml.safe_dump(ship))
@@ -331,7 +312,7 @@ def test_without_a_pump_none_is_warned_of(tmp_path: Path) -> None:
     assert "limits.pressure_pa" not in warnings
 
 
-def test_a_ship_that_hardly_rights_herself_is_refused_in_words(tmp_path: Path) -> None:
+def test_a_ship_that_hardly_rights_herself_is_refused_in_words(tmp_path):
     ship = vessel("patti_b", ship__restoring_odd_nm=[-1.6e9])
     (tmp_path / "ship.yaml").write_text(yaml.safe_dump(ship))
     refused, _ = told(
@@ -342,9 +323,7 @@ def test_a_ship_that_hardly_rights_herself_is_refused_in_words(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(("roll_rad", "warned"), [(0.19, True), (0.18, False)])
-def test_a_retuning_that_ends_after_control_has_is_warned_of(
-    tmp_path: Path, roll_rad: float, warned: bool
-) -> None:
+def test_a_retuning_that_ends_after_control_has_is_warned_of(tmp_path, roll_rad, warned):
     safety, retuning = (
         {"roll_limit_rad": 0.19},
         {"roll_limit_rad": roll_rad, "roll_period_range_s": [9, 16]},

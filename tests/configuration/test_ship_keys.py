@@ -1,7 +1,6 @@
 """Ship and pump in the keys that a naval architect has."""
 
 import math
-from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -17,7 +16,7 @@ HULL = "beam_m: 10, draught_m: 3.2, length_m: 60"
 PUMP = "{max_pressure_pa: 20.0e+3}"
 
 
-def vessel_file(folder: Path, ship: str = SHIP, pump: str | None = PUMP) -> Path:
+def vessel_file(folder, ship=SHIP, pump=PUMP):
     path = folder / "vessel.yaml"
     tank = "{width_m: 8.0, height_m: 1.6, reservoir_area_m2: 6.0, duct_area_m2: 1.2}"
     lines = ["name: boat", f"ship: {ship}", f"tank: {tank}"]
@@ -27,11 +26,11 @@ def vessel_file(folder: Path, ship: str = SHIP, pump: str | None = PUMP) -> Path
     return path
 
 
-def vessel(folder: Path, ship: str = SHIP, pump: str | None = PUMP) -> Vessel:
+def vessel(folder, ship=SHIP, pump=PUMP):
     return load_config(vessel_file(folder, ship, pump), Vessel)
 
 
-def problems(folder: Path, ship: str = SHIP, pump: str | None = PUMP) -> dict[str, str]:
+def problems(folder, ship=SHIP, pump=PUMP):
     with pytest.raises(ConfigError) as caught:
         vessel(folder, ship, pump)
     return {problem.key: problem.reason for problem in caught.value.problems}
@@ -44,8 +43,8 @@ def problems(folder: Path, ship: str = SHIP, pump: str | None = PUMP) -> dict[st
     damping_ratio=st.floats(0.001, 0.5),
 )
 def test_ship_has_the_period_stability_and_damping_it_was_given(
-    displacement_t: float, gm_m: float, roll_period_s: float, damping_ratio: float
-) -> None:
+    displacement_t, gm_m, roll_period_s, damping_ratio
+):
     ship = WrittenShip(
         displacement_t=displacement_t,
         gm_m=gm_m,
@@ -64,7 +63,7 @@ def test_ship_has_the_period_stability_and_damping_it_was_given(
     assert math.exp(-decay * 2 * math.pi / frequency) == pytest.approx(left)
 
 
-def test_a_quantity_may_be_given_by_either_key(tmp_path: Path) -> None:
+def test_a_quantity_may_be_given_by_either_key(tmp_path):
     whole = vessel(tmp_path)
     own = whole.ship
     mixed = (
@@ -76,12 +75,12 @@ def test_a_quantity_may_be_given_by_either_key(tmp_path: Path) -> None:
     assert vessel(tmp_path, plain).ship == RollShip(3e7, own.stiffness_nm_rad)
 
 
-def test_period_of_the_weather_criterion() -> None:
+def test_period_of_the_weather_criterion():
     # by hand: C = 0.373 + 0.023 * 3.125 - 0.043 * 0.6 = 0.419075, T = 2 C 10 / 0.948683
     assert weather_criterion_period_s(10, 3.2, 60, 0.9) == pytest.approx(8.8349, abs=5e-4)
 
 
-def test_period_by_formula_is_said(tmp_path: Path) -> None:
+def test_period_by_formula_is_said(tmp_path):
     assert vessel(tmp_path).assumptions == ()
     found = vessel(tmp_path, f"{{displacement_t: 1900, gm_m: 0.9, {HULL}}}")
     assert 2 * math.pi / found.ship.natural_frequency_rad_s == pytest.approx(8.8349, abs=5e-4)
@@ -100,9 +99,7 @@ def test_period_by_formula_is_said(tmp_path: Path) -> None:
         ("damping_ratio", "damping_nms_rad"),
     ],
 )
-def test_a_quantity_given_twice_is_refused_by_both_names(
-    tmp_path: Path, own: str, other: str
-) -> None:
+def test_a_quantity_given_twice_is_refused_by_both_names(tmp_path, own, other):
     found = problems(tmp_path, SHIP.replace("}", f", {other}: 1.0e+7}}"))
     assert found == {f"ship.{own}": f"and {other} give the same quantity: remove one of them"}
 
@@ -131,9 +128,7 @@ def test_a_quantity_given_twice_is_refused_by_both_names(
         ("{displacment_t: 1, gm_m: 1}", {"displacment_t": "did you mean displacement_t?"}),
     ],
 )
-def test_what_is_missing_or_wrong_is_said_in_the_keys_of_the_file(
-    tmp_path: Path, ship: str, expected: dict[str, str]
-) -> None:
+def test_what_is_missing_or_wrong_is_said_in_the_keys_of_the_file(tmp_path, ship, expected):
     found = problems(tmp_path, ship)
     assert found.keys() == {f"ship.{key}" for key in expected}
     for key, reason in expected.items():
@@ -157,19 +152,17 @@ def test_what_is_missing_or_wrong_is_said_in_the_keys_of_the_file(
         (("0.05", "5.0"), "damping_ratio", "10 % is 0.10"),
     ],
 )
-def test_a_slip_is_told_at_the_key_that_was_written(
-    tmp_path: Path, change: tuple[str, str], key: str, reason: str
-) -> None:
+def test_a_slip_is_told_at_the_key_that_was_written(tmp_path, change, key, reason):
     assert reason in problems(tmp_path, SHIP.replace(*change))[f"ship.{key}"]
 
 
-def test_an_unusual_figure_is_told_at_the_key_that_was_written(tmp_path: Path) -> None:
+def test_an_unusual_figure_is_told_at_the_key_that_was_written(tmp_path):
     (found,) = vessel(tmp_path, SHIP.replace("0.05", "0.4")).warnings()[:1]
     assert found[0] == "ship.damping_ratio"
     assert "10 % is 0.10" in found[1]
 
 
-def test_righting_levers_go_with_the_displacement_in_tonnes(tmp_path: Path) -> None:
+def test_righting_levers_go_with_the_displacement_in_tonnes(tmp_path):
     levers = ", gz_step_rad: 0.1745, gz_m: [0.0, 0.16, 0.34, 0.5]}"
     ship = vessel(tmp_path, SHIP.replace("}", levers)).ship
     assert ship.displacement_n == pytest.approx(1900e3 * 9.80665)
@@ -178,15 +171,13 @@ def test_righting_levers_go_with_the_displacement_in_tonnes(tmp_path: Path) -> N
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=25)
 @given(pressure_pa=st.floats(2e3, 1e5), area_m2=st.floats(0.4, 3))
-def test_pump_follows_from_its_pressure_and_the_duct(
-    tmp_path: Path, pressure_pa: float, area_m2: float
-) -> None:
+def test_pump_follows_from_its_pressure_and_the_duct(tmp_path, pressure_pa, area_m2):
     given_both = f"{{max_pressure_pa: {pressure_pa!r}, duct_area_m2: {area_m2!r}}}"
     found = vessel(tmp_path, pump=given_both)
     assert found.pump == Pump.for_duct(area_m2, pressure_pa)
 
 
-def test_pump_fills_the_tanks_duct_and_keeps_what_is_given(tmp_path: Path) -> None:
+def test_pump_fills_the_tanks_duct_and_keeps_what_is_given(tmp_path):
     similar = Pump.for_duct(1.2, 20e3)
     assert vessel(tmp_path).pump == similar
     own = vessel(tmp_path, pump="{max_pressure_pa: 20.0e+3, max_power_w: 9.0e+4}").pump
@@ -202,15 +193,13 @@ def test_pump_fills_the_tanks_duct_and_keeps_what_is_given(tmp_path: Path) -> No
         ("{max_pressure_pa: 1.0e+4, radus_m: 1}", "radus_m", "did you mean radius_m?"),
     ],
 )
-def test_pump_in_few_keys_is_checked_at_its_own_keys(
-    tmp_path: Path, pump: str, key: str, reason: str
-) -> None:
+def test_pump_in_few_keys_is_checked_at_its_own_keys(tmp_path, pump, key, reason):
     found = problems(tmp_path, pump=pump)
     assert found.keys() == {f"pump.{key}"}
     assert reason in found[f"pump.{key}"]
 
 
-def test_a_law_needs_a_pump(tmp_path: Path) -> None:
+def test_a_law_needs_a_pump(tmp_path):
     vessel_file(tmp_path, pump=None)
     controller = tmp_path / "controller.yaml"
     controller.write_text("name: c\nvessel: vessel.yaml\nlaw: {kind: pd}\n")
@@ -220,5 +209,5 @@ def test_a_law_needs_a_pump(tmp_path: Path) -> None:
     assert load_config(controller, ControllerConfig).vessel.pump is None
 
 
-def test_vessels_with_and_without_pump_are_different_ones(tmp_path: Path) -> None:
+def test_vessels_with_and_without_pump_are_different_ones(tmp_path):
     assert vessel(tmp_path).version != vessel(tmp_path, pump=None).version

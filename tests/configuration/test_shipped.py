@@ -32,18 +32,18 @@ SECOND_NS = 1_000_000_000
 
 
 @pytest.mark.parametrize("path", sorted((CONFIGS / "ships").glob("*.yaml")), ids=lambda p: p.stem)
-def test_ship_loads(path: Path) -> None:
+def test_ship_loads(path):
     assert load_config(path, Vessel).ship.natural_frequency_rad_s > 0
 
 
 @pytest.mark.parametrize(
     "path", sorted((CONFIGS / "scenarios").glob("*.yaml")), ids=lambda p: p.stem
 )
-def test_scenario_loads(path: Path) -> None:
+def test_scenario_loads(path):
     assert load_config(path, Scenario).controllers
 
 
-def test_drive_and_high_level_switch_follow_from_the_vessel_unless_written() -> None:
+def test_drive_and_high_level_switch_follow_from_the_vessel_unless_written():
     first = load_config(CONFIGS / "scenarios" / "storm.yaml", Scenario)
     assert first.drive == DriveLimits()
     assert first.sensors == SensorErrors()
@@ -69,7 +69,7 @@ def test_drive_and_high_level_switch_follow_from_the_vessel_unless_written() -> 
 )
 @pytest.mark.slow
 @pytest.mark.parametrize("path", CONTROLLERS, ids=lambda p: p.stem)
-def test_controller_arms_and_acts_on_the_bus_within_the_drives_limits(path: Path) -> None:
+def test_controller_arms_and_acts_on_the_bus_within_the_drives_limits(path):
     config = load_config(path, ControllerConfig)
     scenario = load_config(CONFIGS / "scenarios" / SEA_OF[config.vessel.name], Scenario)
     assert scenario.vessel == config.vessel
@@ -90,7 +90,7 @@ def test_controller_arms_and_acts_on_the_bus_within_the_drives_limits(path: Path
 
 @pytest.mark.evidence
 @pytest.mark.parametrize(("ship", "seed"), [("patti_b", 53), ("naval_vessel", 51)])
-def test_self_tuning_law_keeps_roll_and_level_after_it_was_armed(ship: str, seed: int) -> None:
+def test_self_tuning_law_keeps_roll_and_level_after_it_was_armed(ship, seed):
     # these seeds ended in HEEL_LIMIT at 17 degrees, and in LEVEL_LIMIT
     scenario = load_config(CONFIGS / "scenarios" / f"{ship}.yaml", Scenario)
     config = scenario.controllers["self-tuning"]
@@ -107,7 +107,7 @@ def test_self_tuning_law_keeps_roll_and_level_after_it_was_armed(ship: str, seed
     assert most_rad[1] < 1.1 * most_rad[0]
 
 
-def roll_rms_rad(scenario: Scenario, config: ControllerConfig | None, duration_s: int) -> float:
+def roll_rms_rad(scenario, config, duration_s):
     """Measured roll, the first minute left out, with a controller or with the tank alone."""
     controller = config or next(iter(scenario.controllers.values()))
     script = passive_script(scenario.vessel) if config is None else scenario.operator
@@ -128,9 +128,7 @@ def roll_rms_rad(scenario: Scenario, config: ControllerConfig | None, duration_s
     ("name", "below", "seconds"),
     [("naval_vessel", 0.15, 180), ("patti_b", 0.2, 180), ("semi_active", 0.15, 240)],
 )
-def test_controller_of_each_other_ship_rolls_less_than_her_passive_tank(
-    name: str, below: float, seconds: int
-) -> None:
+def test_controller_of_each_other_ship_rolls_less_than_her_passive_tank(name, below, seconds):
     scenario = load_config(CONFIGS / "scenarios" / f"{name}.yaml", Scenario)
     passive = roll_rms_rad(scenario, None, seconds)
     for config in scenario.controllers.values():
@@ -138,7 +136,7 @@ def test_controller_of_each_other_ship_rolls_less_than_her_passive_tank(
 
 
 @pytest.mark.parametrize("inputs", [2, 3, 4])
-def test_fuzzy_law_measures_what_it_has_ranges_for(inputs: int) -> None:
+def test_fuzzy_law_measures_what_it_has_ranges_for(inputs):
     config = load_config(CONFIGS / "controllers" / "fuzzy_robust.yaml", ControllerConfig)
     assert isinstance(config.law, RobustFuzzy)
     built = replace(config.law, ranges=config.law.ranges[:inputs]).build(config.plant)

@@ -11,7 +11,6 @@ import yaml
 from firmware_sim.scenario_sea import ScenarioSea
 from utank_hil.configuration import ConfigError, ControllerConfig, Section, load_config
 from utank_hil.control.constrained.design import ConstrainedDesign
-from utank_hil.control.sea_model import SeaModel
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 DENSITY = CONFIGS / "seas" / "ndbc_41010_2019-02_spectral_density.txt"
@@ -24,12 +23,12 @@ KINDS: dict[str, dict[str, Any]] = {
 }
 
 
-def tabulated(folder: Path, text: str) -> dict[str, Any]:
+def tabulated(folder, text):
     (folder / "sea.csv").write_text(text)
     return {"kind": "tabulated", "file": "./sea.csv"}
 
 
-def test_a_sea_is_read_from_a_table_of_frequency_and_density(tmp_path: Path) -> None:
+def test_a_sea_is_read_from_a_table_of_frequency_and_density(tmp_path):
     sea = tabulated(tmp_path, "frequency_hz;density_m2_hz\n0.08;1.5\n0.10;4\n0.12;2\n")
     assert loaded(tmp_path, sea).spectrum.density.tolist() == [1.5, 4, 2]
     (tmp_path / "scenario.yaml").write_text(yaml.safe_dump({"sea": sea}))
@@ -48,13 +47,13 @@ def test_a_sea_is_read_from_a_table_of_frequency_and_density(tmp_path: Path) -> 
         ("frequency_hz,density_m2_hz\n0.1,\n0.2,1\n", "density must be finite and zero"),
     ],
 )
-def test_a_table_that_holds_no_sea_is_refused(tmp_path: Path, text: str, said: str) -> None:
+def test_a_table_that_holds_no_sea_is_refused(tmp_path, text, said):
     (tmp_path / "scenario.yaml").write_text(yaml.safe_dump({"sea": tabulated(tmp_path, text)}))
     with pytest.raises(ConfigError, match=said):
         load_config(tmp_path / "scenario.yaml", Holder)
 
 
-def test_rows_that_are_left_out_are_a_warning_and_a_new_file_is_read_anew(tmp_path: Path) -> None:
+def test_rows_that_are_left_out_are_a_warning_and_a_new_file_is_read_anew(tmp_path):
     file = tmp_path / "sea.txt"
     head = "#YY  MM DD hh mm .05 .10\n2020 01 01 01 00 1 2\n"
     file.write_text(head + "2020 01 01 02 00 1\n")
@@ -72,7 +71,7 @@ class Holder(Section):
     sea: ScenarioSea
 
 
-def loaded(folder: Path, sea: dict[str, Any]) -> SeaModel:
+def loaded(folder, sea):
     """The sea of a constrained law that names it so."""
     path = CONFIGS / "controllers" / "constrained_gpc.yaml"
     content = yaml.safe_load(path.read_text())
@@ -86,7 +85,7 @@ def loaded(folder: Path, sea: dict[str, Any]) -> SeaModel:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_law_s_sea_is_the_scenario_s_of_the_same_keys(tmp_path: Path, kind: str) -> None:
+def test_a_law_s_sea_is_the_scenario_s_of_the_same_keys(tmp_path, kind):
     model = loaded(tmp_path, {**KINDS[kind], "effective_slope": 0.7, "order": 6})
     path = tmp_path / "scenario.yaml"
     path.write_text(yaml.safe_dump({"sea": KINDS[kind]}))
@@ -98,9 +97,7 @@ def test_a_law_s_sea_is_the_scenario_s_of_the_same_keys(tmp_path: Path, kind: st
     assert (model.effective_slope, model.order, model.floor) == (0.7, 6, 1.3e-3)
 
 
-def test_the_hour_by_file_and_time_is_the_hour_that_the_shipped_law_writes_out(
-    tmp_path: Path,
-) -> None:
+def test_the_hour_by_file_and_time_is_the_hour_that_the_shipped_law_writes_out(tmp_path):
     shipped = load_config(CONFIGS / "controllers" / "constrained_gpc.yaml", ControllerConfig).law
     assert isinstance(shipped, ConstrainedDesign)
     assert loaded(tmp_path, MEASURED) == shipped.sea
@@ -120,9 +117,7 @@ def test_the_hour_by_file_and_time_is_the_hour_that_the_shipped_law_writes_out(
         ({**MEASURED, "time": "2019-02-10T05:45"}, "law.sea.time", "the nearest is of"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_key(
-    tmp_path: Path, sea: dict[str, Any], key: str, reason: str
-) -> None:
+def test_what_is_wrong_is_told_with_its_key(tmp_path, sea, key, reason):
     with pytest.raises(ConfigError) as caught:
         loaded(tmp_path, sea)
     found = {problem.key: problem.reason for problem in caught.value.problems}

@@ -10,7 +10,7 @@ from utank_hil.configuration import ConfigError, Vessel, load_config
 SHIPS = Path("configs/ships")
 
 
-def ship(folder: Path, **valve: object) -> Path:
+def ship(folder, **valve):
     """The shipped ship with a valve, with keys of it changed or, with None, left out."""
     content = yaml.safe_load((SHIPS / "thesis_first_valve.yaml").read_text(encoding="utf-8"))
     changed = content["valve"] | valve
@@ -33,16 +33,14 @@ def ship(folder: Path, **valve: object) -> Path:
         ({"leak": 0.1}, "valve.leak: is not a known key"),
     ],
 )
-def test_a_wrong_valve_is_told_at_its_key(
-    tmp_path: Path, changes: dict[str, object], problem: str
-) -> None:
+def test_a_wrong_valve_is_told_at_its_key(tmp_path, changes, problem):
     with pytest.raises(ConfigError) as caught:
         load_config(ship(tmp_path, **changes), Vessel)
     (line,) = str(caught.value).splitlines()
     assert problem in line
 
 
-def test_the_nodes_compare_the_valve_too(tmp_path: Path) -> None:
+def test_the_nodes_compare_the_valve_too(tmp_path):
     vessel = load_config(ship(tmp_path), Vessel)
     assert load_config(ship(tmp_path, opening_time_s=0.6), Vessel).version != vessel.version
     assert vessel.model_copy(update={"valve": None}).version != vessel.version

@@ -2,10 +2,8 @@
 
 import math
 
-from utank_hil.dynamics.pump import PumpCoefficients
 
-
-def pump_losses(speed: float, flow: float, c: PumpCoefficients) -> float:
+def pump_losses(speed, flow, c):
     """Shaft power minus hydraulic power in W: slip and blade friction, never negative."""
     u = flow / c.area
     rn = c.radius * speed

@@ -98,11 +98,7 @@ class Motion:
         (phi, theta), (dphi, dtheta, dpsi) = angles[:, :2].T, dot.T
         ddphi, ddtheta, ddpsi = ddot.T
         s, c, st, ct = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-        rate = stack(
-            dphi - st * dpsi,
-            c * dtheta + s * ct * dpsi,
-            -s * dtheta + c * ct * dpsi,
-        )
+        rate = stack(dphi - st * dpsi, c * dtheta + s * ct * dpsi, -s * dtheta + c * ct * dpsi)
         rate_dot = stack(
             ddphi - st * ddpsi - ct * dtheta * dpsi,
             c * ddtheta
@@ -144,10 +140,7 @@ class Motion:
         flow = (h_dot[:, None] * speeds)[..., None] * tangents
         v = velocity[:, None, :] + apply(turn, np.cross(rate[:, None, :], r) + flow)
         arm = position[:, None, :] - self.at(0.0)[0][:, None, :] + apply(turn, r)
-        return (
-            np.einsum("nk,nki->ni", dm, v),
-            np.einsum("nk,nki->ni", dm, np.cross(arm, v)),
-        )
+        return (np.einsum("nk,nki->ni", dm, v), np.einsum("nk,nki->ni", dm, np.cross(arm, v)))
 
     def paths(self, tank, t):
         """Earth-fixed positions at time t of the particles that are at the nodes at time zero."""

@@ -2,7 +2,6 @@
 
 import importlib
 import sys
-from pathlib import Path
 
 import pytest
 from numba.core.caching import CacheImpl
@@ -11,14 +10,12 @@ from utank_hil.dynamics import jit
 from utank_hil.dynamics.jit import njit
 
 
-def twice(number: float) -> float:
+def twice(number):
     return 2 * number
 
 
 @pytest.mark.parametrize("kept", [True, False])
-def test_what_can_not_be_kept_is_compiled_all_the_same(
-    monkeypatch: pytest.MonkeyPatch, *, kept: bool
-) -> None:
+def test_what_can_not_be_kept_is_compiled_all_the_same(monkeypatch, *, kept):
     if not kept:  # as in an installation that is not to be written, of a user without a home
         monkeypatch.setattr(CacheImpl, "_locator_classes", [])
     compiled = njit()(twice)
@@ -26,9 +23,7 @@ def test_what_can_not_be_kept_is_compiled_all_the_same(
     assert (compiled.stats.cache_path is not None) is kept
 
 
-def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     head = "from utank_hil.dynamics.jit import njit\n"
     (tmp_path / "calling.py").write_text(

@@ -25,7 +25,7 @@ from utank_hil.sea import Harmonics
 TANK = Tank(8.0, 2.5, 2.0, 0.7, lx_m=3.0, lz_m=-0.5, damping_ratio=0.1, density_kg_m3=1025.0)
 
 
-def linear_response(model: LateralModel, omega: float, force: np.ndarray) -> np.ndarray:
+def linear_response(model, omega, force):
     """Motions in the frequency domain of the data, shape (4,) or (7,).
 
     They are sway, roll, yaw and level, then surge, heave and pitch if the force has their rows.
@@ -65,14 +65,14 @@ def linear_response(model: LateralModel, omega: float, force: np.ndarray) -> np.
 
 
 @cache
-def hull() -> LateralHull:
+def hull():
     """A Wigley hull of 60 x 12 x 4 m, whole, by Capytaine."""
     file = Path(__file__).parent / "data" / "wigley.nc"
     return LateralHull(read_hull(file, Given(gyration_m=(4.56, 15.0, 15.0))))
 
 
 @cache
-def ship() -> RollShip:
+def ship():
     stiffness = hull().stiffness_nm_rad
     inertia = 1.15 * float(hull().rigid_mass[1, 1])
     viscous = 2 * 0.03 * math.sqrt(stiffness * inertia)
@@ -80,7 +80,7 @@ def ship() -> RollShip:
 
 
 @pytest.mark.parametrize("six", [False, True])
-def test_ship_and_water_move_by_the_exact_wrench(six: bool) -> None:
+def test_ship_and_water_move_by_the_exact_wrench(six):
     rough = replace(
         ship(), quadratic_damping_nms2_rad2=2e6, offset_moment_nm=1e5, wind_moment_nm=2e5,
         restoring_odd_nm=(-1e7,),
@@ -126,12 +126,12 @@ def test_ship_and_water_move_by_the_exact_wrench(six: bool) -> None:
             assert own * down == pytest.approx(buoyed, abs=1e-9 * abs(own * down))
 
 
-def test_memory_of_surge_heave_and_pitch_is_the_radiation_of_the_data_to_one_percent() -> None:
+def test_memory_of_surge_heave_and_pitch_is_the_radiation_of_the_data_to_one_percent():
     assert hull().vertical_radiation.error < 0.01
 
 
 @pytest.mark.parametrize("limit", [True, False])
-def test_memory_is_the_radiation_of_the_data_to_one_percent(limit: bool) -> None:
+def test_memory_is_the_radiation_of_the_data_to_one_percent(limit):
     data, found = hull().about_g, hull().radiation
     if not limit:  # the fit finds it
         lateral = np.ix_([1, 3, 5], [1, 3, 5])
@@ -160,8 +160,8 @@ def test_memory_is_the_radiation_of_the_data_to_one_percent(limit: bool) -> None
     [(60.0, 0.8, False), (135.0, 0.5, True), (135.0, 1.1, True), (20.0, 0.8, True)],
 )
 def test_plant_in_a_regular_wave_is_the_frequency_domain_of_the_data_to_one_percent(
-    heading_deg: float, omega: float, six: bool
-) -> None:
+    heading_deg, omega, six
+):
     """Added mass and damping of the file, not of the fit; interpolated between its frequencies."""
     model = LateralModel(hull(), ship(), TANK, six)
     heading = np.array([math.radians(heading_deg)])
@@ -189,7 +189,7 @@ def test_plant_in_a_regular_wave_is_the_frequency_domain_of_the_data_to_one_perc
         assert abs((real + 1j * imaginary)[-1] / tank - 1) < 0.01
 
 
-def test_long_wave_carries_the_ship_and_its_water_along() -> None:
+def test_long_wave_carries_the_ship_and_its_water_along():
     model, omega = LateralModel(hull(), ship(), TANK), 0.2
     force = hull().forces(np.array([omega]), np.array([math.pi / 2]))[:, 0]
     sway, roll, _, level = linear_response(model, omega, force)
@@ -200,7 +200,7 @@ def test_long_wave_carries_the_ship_and_its_water_along() -> None:
 
 
 @pytest.mark.parametrize("six", [False, True])
-def test_energy_adds_up_with_strikes(six: bool) -> None:
+def test_energy_adds_up_with_strikes(six):
     tank = replace(TANK, quadratic_loss=2.0, headroom_m=0.6, restitution=0.2)
     heavy = replace(ship(), quadratic_damping_nms2_rad2=3e6, wind_moment_nm=3e5)
     model = LateralModel(hull(), heavy, tank, six)
@@ -236,14 +236,14 @@ def test_energy_adds_up_with_strikes(six: bool) -> None:
     assert work_j == pytest.approx(stored_j, abs=1e-5 * plant.losses_j)
 
 
-def test_ship_that_is_not_the_hull_s_is_refused() -> None:
+def test_ship_that_is_not_the_hull_s_is_refused():
     with pytest.raises(ValueError, match=r"stiffness_nm_rad is .* make them agree"):
         LateralModel(hull(), replace(ship(), stiffness_nm_rad=1e7), TANK)
     with pytest.raises(ValueError, match=r"damping_nms_rad is .* less than what waves .* raise it"):
         LateralModel(hull(), replace(ship(), damping_nms_rad=1.0), TANK)
 
 
-def test_hull_whose_sides_differ_is_refused_in_six_degrees() -> None:
+def test_hull_whose_sides_differ_is_refused_in_six_degrees():
     data = hull().data
     added = np.array(data.added_mass)
     added[:, 2, 3] = added[:, 3, 2] = 0.2 * np.sqrt(added[:, 2, 2] * added[:, 3, 3])

@@ -17,7 +17,7 @@ SHIP = RollShip(1.9275e9, 4.81875e8, 2e7, quadratic_damping_nms2_rad2=8e8)
 
 
 @pytest.mark.parametrize(("level_m", "ratio"), [(0.5, 0.021), (2.0, 0.085)])
-def test_loss_of_the_first_ship_s_duct_is_that_of_a_swing(level_m: float, ratio: float) -> None:
+def test_loss_of_the_first_ship_s_duct_is_that_of_a_swing(level_m, ratio):
     rate = TANK.natural_frequency_rad_s * level_m
     found = TANK.linearized(rate)
     assert found.damping_ratio == pytest.approx(ratio, abs=5e-4)
@@ -28,7 +28,7 @@ def test_loss_of_the_first_ship_s_duct_is_that_of_a_swing(level_m: float, ratio:
     assert found.loss_pa_per_m_s * np.trapezoid(speed**2, angle) == pytest.approx(work, rel=1e-6)
 
 
-def test_an_irregular_motion_loses_as_much_by_the_linear_losses() -> None:
+def test_an_irregular_motion_loses_as_much_by_the_linear_losses():
     rate = np.random.default_rng(1).normal(size=1_000_000) * 0.3
     lost = TANK.quadratic_loss_pa_per_m2_s2 * np.mean(np.abs(rate) ** 3)
     found = TANK.linearized(0.3, IRREGULAR).loss_pa_per_m_s
@@ -40,7 +40,7 @@ def test_an_irregular_motion_loses_as_much_by_the_linear_losses() -> None:
 
 
 @pytest.mark.parametrize("hs_m", [1.2, 4.7])
-def test_motion_in_a_sea_is_that_of_the_nonlinear_equations(hs_m: float) -> None:
+def test_motion_in_a_sea_is_that_of_the_nonlinear_equations(hs_m):
     sea = Sea.irregular(jonswap(hs_m, 12.0), seed=1, components=100)
     waves = sea.roll_moment(SHIP.stiffness_nm_rad, EffectiveSlope(0.7))
     plant = DesignPlant(SHIP, TANK)

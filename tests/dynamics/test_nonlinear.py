@@ -2,15 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from roll_energy import (
-    LEVERS,
-    PATTI,
-    PATTI_TANK,
-    THESIS_SHIP,
-    THESIS_TANK,
-    bounded_starts,
-    energy,
-)
+from roll_energy import LEVERS, PATTI, PATTI_TANK, THESIS_SHIP, THESIS_TANK, bounded_starts, energy
 from scipy.integrate import simpson
 
 from tools.thesis.reference import after_impact, simulate_reference
@@ -54,11 +46,7 @@ def test_energy_is_constant_to_1e_9_over_1000_s(name):
 def test_friction_and_strikes_never_raise_the_energy(restitution):
     ship = replace(PATTI, damping_nms_rad=3e3, quadratic_damping_nms2_rad2=1e5)
     tank = replace(
-        PATTI_TANK,
-        damping_ratio=0.05,
-        quadratic_loss=1.0,
-        headroom_m=0.4,
-        restitution=restitution,
+        PATTI_TANK, damping_ratio=0.05, quadratic_loss=1.0, headroom_m=0.4, restitution=restitution
     )
     start = (0.35, 0.0, -0.35, 0.0)
     run = simulate_reference(RollModel(ship, tank), 60.0, start, tolerance=1e-11)

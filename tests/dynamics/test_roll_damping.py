@@ -5,10 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from utank_hil.dynamics.roll_damping import (
-    HullForm,
-    estimated_roll_damping,
-)
+from utank_hil.dynamics.roll_damping import HullForm, estimated_roll_damping
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 PATROL = HullForm(63, 15, 5, 0.70, 0.95, -1.2, 20, 0.30)
@@ -31,14 +28,14 @@ authors' formulas, rounded to a thousandth there; gravity 9.81."""
 
 
 @pytest.mark.parametrize(("hull", "roll", "expected"), ORACLE)
-def test_parts_are_those_of_another_computation(hull, roll, expected) -> None:
+def test_parts_are_those_of_another_computation(hull, roll, expected):
     amplitude, omega = math.radians(roll[0]), roll[1] * math.sqrt(GRAVITY_M_S2 / 9.81)
     found = estimated_roll_damping(hull, amplitude, omega)
     parts = (found.friction, found.wave, found.eddy, found.keels, found.total)
     assert [1e3 * part for part in parts] == pytest.approx(expected, abs=6e-4)
 
 
-def test_a_tanker_outside_the_ranges_is_estimated_at_their_end() -> None:
+def test_a_tanker_outside_the_ranges_is_estimated_at_their_end():
     # the bare KVLCC2, 1:68, at 9 degrees: 1.62e-3 measured; the formula beyond its range 2.99e-3
     tanker = HullForm(320 / 68, 58 / 68, 20.8 / 68, 0.8098, 0.998, (20.8 - 18.6) / 68)
     frequency = 2 * math.pi / 2.5532
@@ -50,7 +47,7 @@ def test_a_tanker_outside_the_ranges_is_estimated_at_their_end() -> None:
     assert PATROL.outside(2 * math.pi / 10) == []
 
 
-def test_usual_form_of_a_tanker_has_its_coefficients_and_centre_of_gravity() -> None:
+def test_usual_form_of_a_tanker_has_its_coefficients_and_centre_of_gravity():
     usual = HullForm.usual(320, 58, 20.8, 1.025 * 312_600, 5.73)
     assert usual.block_coefficient == pytest.approx(0.8098, rel=1e-3)
     assert usual.midship_coefficient == pytest.approx(0.998, abs=0.01)

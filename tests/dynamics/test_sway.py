@@ -15,9 +15,7 @@ UNIT = st.floats(-1, 1)
 
 
 @given(UNIT, UNIT, UNIT, UNIT, UNIT, UNIT, st.sampled_from([0, 1]))
-def test_sway_moves_ship_and_water_by_the_exact_wrench(
-    roll: float, rate: float, level: float, speed: float, sway: float, push: float, which: int
-) -> None:
+def test_sway_moves_ship_and_water_by_the_exact_wrench(roll, rate, level, speed, sway, push, which):
     ship, tank = ((THESIS_SHIP, THESIS_TANK), (PATTI, PATTI_TANK))[which]
     level, sway_m_s2, pressure_pa = 0.9 * level * tank.height_m, 4.0 * sway, 3e4 * push
     model = RollModel(ship, tank)
@@ -39,7 +37,7 @@ def test_sway_moves_ship_and_water_by_the_exact_wrench(
 
 
 @pytest.mark.parametrize("slope_rad", [0.02, 0.3])
-def test_water_in_a_ship_that_lies_along_a_long_wave_is_at_rest(slope_rad: float) -> None:
+def test_water_in_a_ship_that_lies_along_a_long_wave_is_at_rest(slope_rad):
     model = RollModel(THESIS_SHIP, THESIS_TANK)
     held_nm = float(model.restoring.moment_nm(slope_rad))
     along = model.derivative(

@@ -10,14 +10,14 @@ from utank_hil.dynamics.sampling import LinearModel, state_space_response
 RANDOM = np.random.default_rng(5)
 
 
-def chain(states: int) -> LinearModel:
+def chain(states):
     """A delay of so many samples: z^-states, and besides it a feed-through of two."""
     b, c = np.zeros((states, 1)), np.zeros((2, states))
     b[0, 0] = c[0, -1] = 1.0
     return LinearModel(np.eye(states, k=-1), b, c, np.array([[0.0], [2.0]]), 0.1)
 
 
-def test_a_delay_is_a_power_of_z() -> None:
+def test_a_delay_is_a_power_of_z():
     z = np.exp(1j * RANDOM.uniform(0, np.pi, 50))
     found = state_space_response(chain(7), z)
     assert found.shape == (50, 2, 1)
@@ -26,7 +26,7 @@ def test_a_delay_is_a_power_of_z() -> None:
 
 
 @pytest.mark.slow
-def test_memory_does_not_grow_with_points_times_the_square_of_the_order() -> None:
+def test_memory_does_not_grow_with_points_times_the_square_of_the_order():
     z = np.exp(1j * RANDOM.uniform(0, np.pi, 1000))
     model = chain(120)
     tracemalloc.start()

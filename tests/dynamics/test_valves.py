@@ -26,21 +26,21 @@ each = pytest.mark.parametrize("valve", [DUCT, AIR], ids=["duct", "air"])
 
 @each
 @given(st.floats(0, 1))
-def test_the_opening_for_a_loss_has_that_loss(valve: Valve, opening: float) -> None:
+def test_the_opening_for_a_loss_has_that_loss(valve, opening):
     loss = valve.loss(TANK, opening)
     assert valve.loss(TANK, valve.opening(TANK, loss)) == pytest.approx(loss, rel=1e-9, abs=1e-9)
 
 
 @each
 @given(st.floats(0, 1e12))
-def test_any_loss_gives_an_opening_of_the_valve(valve: Valve, loss: float) -> None:
+def test_any_loss_gives_an_opening_of_the_valve(valve, loss):
     opening = valve.opening(TANK, loss)
     least, greatest = valve.range(TANK).open_loss, valve.range(TANK).shut_loss
     expected = min(max(loss, least), greatest)
     assert valve.loss(TANK, opening) == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
-def test_ends_of_the_way_are_open_and_the_leakage() -> None:
+def test_ends_of_the_way_are_open_and_the_leakage():
     assert DUCT.loss(TANK, 1.0) == 0
     assert DUCT.loss(TANK, 0.0) == duct_valve_loss(TANK, 0.1)
     assert AIR.loss(TANK, 1.0) == air_valve_loss(TANK, 0.4, 1.0)
@@ -49,7 +49,7 @@ def test_ends_of_the_way_are_open_and_the_leakage() -> None:
     assert replace(DUCT, fail_position="shut").fail_opening == 0.0
 
 
-def test_added_damping_takes_the_energy_that_the_quadratic_loss_takes() -> None:
+def test_added_damping_takes_the_energy_that_the_quadratic_loss_takes():
     loss, level_m = 2e4, 0.7
     omega = TANK.natural_frequency_rad_s
     linear = (
@@ -73,7 +73,7 @@ def test_added_damping_takes_the_energy_that_the_quadratic_loss_takes() -> None:
         ({"kind": "air", "pipe_area_m2": -1.0}, "pipe_area_m2 must be positive"),
     ],
 )
-def test_a_valve_that_can_not_be_is_refused_by_name(changes: dict, message: str) -> None:
+def test_a_valve_that_can_not_be_is_refused_by_name(changes, message):
     with pytest.raises(ValueError, match=message):
         replace(DUCT, **changes)
 
@@ -82,7 +82,7 @@ def test_a_valve_that_can_not_be_is_refused_by_name(changes: dict, message: str)
     ("valve", "key"),
     [(replace(DUCT, leakage=1e-3), "leakage"), (replace(AIR, pipe_area_m2=1e-3), "pipe_area_m2")],
 )
-def test_a_valve_as_good_as_closed_does_not_suit_the_tank(valve: Valve, key: str) -> None:
+def test_a_valve_as_good_as_closed_does_not_suit_the_tank(valve, key):
     assert valve_problems(TANK, DUCT) == valve_problems(TANK, AIR) == []
     ((name, reason),) = valve_problems(TANK, valve)
     assert name == key

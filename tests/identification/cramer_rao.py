@@ -1,13 +1,13 @@
 """What the best unbiased estimator of the ship's modes could do."""
 
 import numpy as np
-from roll_plant import SAMPLE_TIME_S, Plant
+from roll_plant import SAMPLE_TIME_S
 from scipy.signal import lfilter, ss2tf
 
 from utank_hil.base.arrays import FloatArray
 
 
-def cramer_rao(truth: Plant, u: FloatArray, noise: FloatArray) -> FloatArray:
+def cramer_rao(truth, u, noise):
     """Least standard deviations of frequencies and damping ratios, any unbiased estimator.
 
     For a common denominator of order 4 and two free numerators, white noise on each output.
@@ -25,7 +25,7 @@ def cramer_rao(truth: Plant, u: FloatArray, noise: FloatArray) -> FloatArray:
     size = np.sqrt(np.diag(information))
     covariance = np.linalg.inv(information / np.outer(size, size)) / np.outer(size, size)
 
-    def values(coefficients: FloatArray) -> FloatArray:
+    def values(coefficients):
         s = np.log(np.roots(np.concatenate([[1.0], coefficients]))) / SAMPLE_TIME_S
         s = s[s.imag > 0]
         s = s[np.argsort(np.abs(s))]

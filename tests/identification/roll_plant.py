@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import control
 import numpy as np
 
-from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.interface import PumpLimits
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 from utank_hil.identification import random_pulses
@@ -26,7 +26,7 @@ class Plant:
     b: FloatArray
     c: FloatArray
 
-    def respond(self, pressure_pa: FloatArray, moment_nm: FloatArray) -> FloatArray:
+    def respond(self, pressure_pa, moment_nm):
         """Roll and level, shape (N, 2), from rest."""
         state = np.zeros(len(self.a))
         y = np.empty((len(pressure_pa), len(self.c)))
@@ -35,7 +35,7 @@ class Plant:
             state = self.a @ state + self.b @ inputs
         return y
 
-    def markov(self, count: int) -> FloatArray:
+    def markov(self, count):
         """Markov parameters from the pressure, shape (count, 2, 1), by definition."""
         values = [np.zeros((len(self.c), 1))]
         power = self.b[:, :1]
@@ -44,18 +44,18 @@ class Plant:
             power = self.a @ power
         return np.array(values)
 
-    def poles_rad_s(self) -> ComplexArray:
+    def poles_rad_s(self):
         """Poles in the upper half plane, by rising frequency."""
         poles = np.log(np.linalg.eigvals(self.a)) / SAMPLE_TIME_S
         upper = poles[poles.imag > 0]
         return upper[np.argsort(np.abs(upper))]
 
-    def state_space(self) -> control.StateSpace:
+    def state_space(self):
         """From the pressure only."""
         return control.ss(self.a, self.b[:, :1], self.c, np.zeros((2, 1)), SAMPLE_TIME_S)
 
 
-def plant(period_s: float = 2 * np.pi / 0.5) -> Plant:
+def plant(period_s=2 * np.pi / 0.5):
     """Ship of a roll period, with her tank."""
     stiffness = INERTIA_KG_M2 * (2 * np.pi / period_s) ** 2
     full = coupled_model(RollShip(INERTIA_KG_M2, stiffness, 4.87e7), TANK)
@@ -63,17 +63,17 @@ def plant(period_s: float = 2 * np.pi / 0.5) -> Plant:
     return Plant(np.asarray(sampled.A), np.asarray(sampled.B), np.asarray(sampled.C))
 
 
-def pulses(seed: int, limits: PumpLimits = FAST_PUMP, duration_s: float = 500.0) -> FloatArray:
+def pulses(seed, limits=FAST_PUMP, duration_s=500.0):
     return random_pulses(duration_s, limits, seed, sample_time_s=SAMPLE_TIME_S)
 
 
-def noisy(y: FloatArray, level: float, seed: int) -> FloatArray:
+def noisy(y, level, seed):
     """With white noise of a part of each output's spread."""
     noise = np.random.default_rng(seed).standard_normal(y.shape)
     return y + level * np.std(y, axis=0) * noise
 
 
-def jonswap_moment(samples: int, seed: int, moment_nm: float = 2e7) -> FloatArray:
+def jonswap_moment(samples, seed, moment_nm=2e7):
     """Irregular wave moment of a given root mean square, peak period 9 s."""
     rng = np.random.default_rng(seed)
     omega = np.linspace(0.25, 2.0, 400)
@@ -87,7 +87,7 @@ def jonswap_moment(samples: int, seed: int, moment_nm: float = 2e7) -> FloatArra
     return moment_nm * waves / np.sqrt(np.sum(shape) / 2)
 
 
-def frequency_response(system: control.StateSpace, omega: FloatArray = BAND_RAD_S) -> ComplexArray:
+def frequency_response(system, omega=BAND_RAD_S):
     """Shape (len(omega), m, r), from the matrices."""
     a, b, c, d = (np.asarray(part) for part in (system.A, system.B, system.C, system.D))
     return np.array(
@@ -98,7 +98,7 @@ def frequency_response(system: control.StateSpace, omega: FloatArray = BAND_RAD_
     )
 
 
-def response_error(system: control.StateSpace, truth: Plant) -> FloatArray:
+def response_error(system, truth):
     """Relative error of the frequency response over the band, of each output."""
     right = frequency_response(truth.state_space())
     wrong = frequency_response(system) - right

@@ -29,7 +29,7 @@ LIMITS = ModelLimits((8.0, 20.0))
 NAN = float("nan")
 
 
-def test_good_model_meets_no_objection() -> None:
+def test_good_model_meets_no_objection():
     assert model_objections(GOOD, FIT, LIMITS) == ()
 
 
@@ -47,14 +47,12 @@ def test_good_model_meets_no_objection() -> None:
         (GOOD, replace(FIT, dispersion=50.0), "no ship explains"),
     ],
 )
-def test_each_shortcoming_is_objected_to_by_name(
-    validation: Validation, fit: ShipFit, word: str
-) -> None:
+def test_each_shortcoming_is_objected_to_by_name(validation, fit, word):
     (objection,) = model_objections(validation, fit, LIMITS)
     assert word in objection
 
 
-def test_all_shortcomings_are_listed() -> None:
+def test_all_shortcomings_are_listed():
     bad = replace(GOOD, one_step_fit=np.array([0.1, 0.1]))
     objections = model_objections(bad, replace(FIT, period_deviation=1.0), LIMITS)
     assert len(objections) == 2

@@ -11,7 +11,6 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ARX
 from utank_hil.identification import (
     IdentificationError,
-    OkidResult,
     era,
     find_disturbance_frequencies,
     modal_confidence,
@@ -27,7 +26,7 @@ Record = tuple[FloatArray, FloatArray]
 
 
 @st.composite
-def ship_records(draw: st.DrawFn) -> Record:
+def ship_records(draw):
     """A ship's record in any units, with any noise."""
     samples = draw(st.integers(1, 400))
     seed = draw(st.integers(0, 20))
@@ -40,7 +39,7 @@ def ship_records(draw: st.DrawFn) -> Record:
 
 
 @st.composite
-def number_records(draw: st.DrawFn) -> Record:
+def number_records(draw):
     """Any finite numbers, most of them equal."""
     samples = draw(st.integers(1, 60))
     shapes = (samples, draw(st.integers(1, 2))), (samples, draw(st.integers(1, 2)))
@@ -49,7 +48,7 @@ def number_records(draw: st.DrawFn) -> Record:
 
 
 @st.composite
-def spoiled(draw: st.DrawFn) -> Record:
+def spoiled(draw):
     """A record as broken sensors, full actuators and bad lines leave it."""
     u, y = draw(ship_records() | number_records())
     u, y = u.copy(), y.copy()
@@ -72,11 +71,11 @@ def spoiled(draw: st.DrawFn) -> Record:
     return u, y
 
 
-def says_why(refusal: ValueError) -> None:
+def says_why(refusal):
     assert len(str(refusal).split()) > 5
 
 
-def model_of(u: FloatArray, y: FloatArray, order: int) -> OkidResult | None:
+def model_of(u, y, order):
     """The model, None for a refusal."""
     try:
         return okid(u, y, order, sample_time_s=0.2)
@@ -86,7 +85,7 @@ def model_of(u: FloatArray, y: FloatArray, order: int) -> OkidResult | None:
 
 
 @given(spoiled(), st.integers(1, 30))
-def test_okid_ends_in_a_finite_model_or_a_refusal(record: Record, order: int) -> None:
+def test_okid_ends_in_a_finite_model_or_a_refusal(record, order):
     result = model_of(*record, order)
     if result is not None:
         assert np.isfinite(result.markov).all()
@@ -96,7 +95,7 @@ def test_okid_ends_in_a_finite_model_or_a_refusal(record: Record, order: int) ->
 
 @given(spoiled(), st.integers(1, 12), st.integers(1, 40))
 @example((np.array([0.0, 0, 0, 1, 0, 1e-295, 0])[:, None], np.eye(7)[:, 5:6]), 1, 1)
-def test_validation_ends_in_figures_or_a_refusal(record: Record, order: int, lags: int) -> None:
+def test_validation_ends_in_figures_or_a_refusal(record, order, lags):
     u, y = record
     half = len(u) // 2
     result = model_of(u[:half], y[:half], order)
@@ -117,7 +116,7 @@ def test_validation_ends_in_figures_or_a_refusal(record: Record, order: int, lag
 
 
 @given(spoiled(), st.integers(3, 20))
-def test_what_follows_okid_takes_every_model_it_makes(record: Record, order: int) -> None:
+def test_what_follows_okid_takes_every_model_it_makes(record, order):
     result = model_of(*record, order)
     if result is None:
         return
@@ -140,7 +139,7 @@ def test_what_follows_okid_takes_every_model_it_makes(record: Record, order: int
         fill=FINITE,
     )
 )
-def test_era_ends_in_a_finite_model_or_a_refusal(markov: FloatArray) -> None:
+def test_era_ends_in_a_finite_model_or_a_refusal(markov):
     try:
         system = era(markov, sample_time_s=0.2)
     except ValueError as refusal:  # an IdentificationError is one
@@ -151,7 +150,7 @@ def test_era_ends_in_a_finite_model_or_a_refusal(markov: FloatArray) -> None:
 
 
 @given(spoiled())
-def test_waves_are_looked_for_in_any_record(record: Record) -> None:
+def test_waves_are_looked_for_in_any_record(record):
     try:
         lines = find_disturbance_frequencies(*record, sample_time_s=0.2)
     except IdentificationError as refusal:

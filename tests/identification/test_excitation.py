@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from roll_plant import SAMPLE_TIME_S, plant
 
-from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ARX
 from utank_hil.control.interface import PumpLimits
 from utank_hil.identification import random_pulses, response_scale
@@ -25,8 +24,8 @@ pulses = partial(random_pulses, sample_time_s=SAMPLE_TIME_S)
     seed=st.integers(0, 99),
 )
 def test_pressure_and_rate_are_kept_and_both_ends_are_zero(
-    duration_s: float, pressure_pa: float, seconds_to_full: float, seed: int
-) -> None:
+    duration_s, pressure_pa, seconds_to_full, seed
+):
     limits = PumpLimits(pressure_pa=pressure_pa, rate_pa_s=pressure_pa / seconds_to_full)
     pressure = pulses(duration_s, limits, seed)
     assert len(pressure) == round(duration_s / SAMPLE_TIME_S)
@@ -37,25 +36,25 @@ def test_pressure_and_rate_are_kept_and_both_ends_are_zero(
     assert np.array_equal(pressure, pulses(duration_s, limits, seed))
 
 
-def test_another_seed_gives_another_signal_of_useful_size() -> None:
+def test_another_seed_gives_another_signal_of_useful_size():
     one, other = (pulses(500.0, LIMITS, seed) for seed in (1, 2))
     assert not np.array_equal(one, other)
     assert np.std(one) > 0.15 * LIMITS.pressure_pa
 
 
-def excitation_order(u: FloatArray, most: int) -> int:
+def excitation_order(u, most):
     signal = u.reshape(len(u), -1)
     regression = LagRegression(signal, 0, most - 1, np.empty((0, len(u))))
     return input_excitation(regression, regression.matrix.T @ regression.matrix)[0]
 
 
-def test_random_pulses_excite_every_coefficient_of_the_thesis_models() -> None:
+def test_random_pulses_excite_every_coefficient_of_the_thesis_models():
     assert (
         excitation_order(random_pulses(500.0, LIMITS, 1, sample_time_s=SAMPLE_TIME_S), 201) == 201
     )
 
 
-def test_order_of_excitation_counts_sines_twice_and_a_constant_once() -> None:
+def test_order_of_excitation_counts_sines_twice_and_a_constant_once():
     time_s = np.arange(1000) * SAMPLE_TIME_S
     one, two = np.sin(1.0 * time_s), np.sin(3.0 * time_s)
     assert excitation_order(np.ones(1000), 10) == 1
@@ -67,13 +66,13 @@ def test_order_of_excitation_counts_sines_twice_and_a_constant_once() -> None:
     assert excitation_order(np.random.default_rng(0).standard_normal((500, 2)), 10) == 10
 
 
-def test_narrow_band_is_seen_for_what_it_is() -> None:
+def test_narrow_band_is_seen_for_what_it_is():
     angle = np.outer(np.arange(2500) * SAMPLE_TIME_S, np.linspace(0.4, 0.6, 15))
     narrow = np.cos(angle + np.arange(15) ** 2).sum(axis=1)
     assert 8 <= excitation_order(narrow, 201) < 40
 
 
-def test_scale_keeps_level_and_added_roll_within_their_limits() -> None:
+def test_scale_keeps_level_and_added_roll_within_their_limits():
     truth = plant()
     model = ARX.from_state_space(truth.state_space(), 4)
     pressure = random_pulses(500.0, LIMITS, 1, sample_time_s=SAMPLE_TIME_S)
@@ -88,7 +87,7 @@ def test_scale_keeps_level_and_added_roll_within_their_limits() -> None:
     assert response_scale(0 * pressure, model, response) == 1.0
 
 
-def test_bad_requests_are_refused() -> None:
+def test_bad_requests_are_refused():
     with pytest.raises(ValueError, match="do not last one sample"):
         random_pulses(0.05, LIMITS, 1, sample_time_s=SAMPLE_TIME_S)
     with pytest.raises(ValueError, match="hold_s must rise"):

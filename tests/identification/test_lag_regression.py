@@ -6,12 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from roll_plant import SLOW_PUMP, noisy, plant, pulses
 
-from utank_hil.base.arrays import FloatArray
 from utank_hil.identification import IdentificationError
 from utank_hil.identification.lag_regression import LagRegression, fit, segment_bounds
 
 
-def test_rows_of_the_matrix_are_the_arx_equation() -> None:
+def test_rows_of_the_matrix_are_the_arx_equation():
     # y(k) = a1 y(k-1) + a2 y(k-2) + b0 u(k) + b1 u(k-1) + b2 u(k-2) + c psi(k), spelt out
     rng = np.random.default_rng(3)
     u, psi, y = rng.standard_normal(30), rng.standard_normal(30), np.zeros(30)
@@ -23,7 +22,7 @@ def test_rows_of_the_matrix_are_the_arx_equation() -> None:
     assert regression.input_rows.tolist() == [0, 2, 4]
 
 
-def test_windows_never_span_a_gap() -> None:
+def test_windows_never_span_a_gap():
     z = np.ones((10, 2))
     z[4] = np.nan
     assert segment_bounds(z) == [(0, 4), (5, 10)]
@@ -33,26 +32,26 @@ def test_windows_never_span_a_gap() -> None:
     assert np.isfinite(regression.matrix).all()
 
 
-def test_record_without_a_long_enough_stretch_is_refused() -> None:
+def test_record_without_a_long_enough_stretch_is_refused():
     z = np.ones((10, 2))
     z[::3] = np.nan
     with pytest.raises(IdentificationError, match="longer than the order"):
         LagRegression(z, 1, 3, np.empty((0, 10)))
 
 
-def test_a_record_that_takes_too_much_memory_is_refused() -> None:
+def test_a_record_that_takes_too_much_memory_is_refused():
     z = np.zeros((100_000, 3))  # Six hours at five samples a second.
     with pytest.raises(IdentificationError, match="a part of 33057 samples at most"):
         LagRegression(z, 2, 120, np.empty((0, len(z))))
 
 
-def _regression(u: FloatArray, y: FloatArray, order: int) -> LagRegression:
+def _regression(u, y, order):
     z = np.column_stack([y, u])
     z = z / np.sqrt(np.mean(z**2, axis=0))
     return LagRegression(z, y.shape[1], order, np.empty((0, len(z))))
 
 
-def test_noisy_data_give_the_least_squares_solution() -> None:
+def test_noisy_data_give_the_least_squares_solution():
     u = pulses(1)
     y = noisy(plant().respond(u, np.zeros_like(u)), 0.01, 2)
     regression = _regression(u, y, 120)
@@ -66,7 +65,7 @@ def test_noisy_data_give_the_least_squares_solution() -> None:
     assert not found.penalty.any()
 
 
-def test_data_without_noise_give_the_minimum_norm_solution() -> None:
+def test_data_without_noise_give_the_minimum_norm_solution():
     u = pulses(1)
     regression = _regression(u, plant().respond(u, np.zeros_like(u)), 60)
     matrix, targets = regression.matrix, regression.targets
@@ -77,7 +76,7 @@ def test_data_without_noise_give_the_minimum_norm_solution() -> None:
     assert np.sqrt(np.trace(found.residual_covariance)) < 1e-13
 
 
-def test_slow_pump_shrinks_the_input_coefficients_and_predicts_as_well() -> None:
+def test_slow_pump_shrinks_the_input_coefficients_and_predicts_as_well():
     u = pulses(1, SLOW_PUMP)
     clean = plant().respond(u, np.zeros_like(u))
     regression = _regression(u, noisy(clean, 0.01, 2), 120)
@@ -95,7 +94,7 @@ def test_slow_pump_shrinks_the_input_coefficients_and_predicts_as_well() -> None
     assert np.std(fresh[0]) < 1.05 * np.std(fresh[1])
 
 
-def test_shrinkage_is_the_bayesian_posterior_mean() -> None:
+def test_shrinkage_is_the_bayesian_posterior_mean():
     # with the penalty given, the coefficients solve a ridge regression on the inputs alone
     u = pulses(1, SLOW_PUMP)
     regression = _regression(u, noisy(plant().respond(u, 0 * u), 0.01, 2), 40)
@@ -110,7 +109,7 @@ def test_shrinkage_is_the_bayesian_posterior_mean() -> None:
         np.testing.assert_allclose(found.coefficients[:, j], expected, atol=1e-8)
 
 
-def test_two_outputs_that_tell_the_same_end_in_finite_coefficients() -> None:
+def test_two_outputs_that_tell_the_same_end_in_finite_coefficients():
     u = pulses(1, SLOW_PUMP)
     y = noisy(plant().respond(u, 0 * u)[:, :1], 0.01, 2)
     regression = _regression(u, np.hstack([y, y]), 30)
@@ -121,7 +120,7 @@ def test_two_outputs_that_tell_the_same_end_in_finite_coefficients() -> None:
 
 
 @given(st.integers(0, 2**31))
-def test_random_problems_agree_with_lstsq(seed: int) -> None:
+def test_random_problems_agree_with_lstsq(seed):
     rng = np.random.default_rng(seed)
     outputs, inputs, order = (int(v) for v in rng.integers(1, [3, 3, 6]))
     z = rng.standard_normal((200, outputs + inputs)) @ rng.standard_normal((outputs + inputs,) * 2)
@@ -136,7 +135,7 @@ def test_random_problems_agree_with_lstsq(seed: int) -> None:
     )
 
 
-def test_more_coefficients_than_rows_are_refused() -> None:
+def test_more_coefficients_than_rows_are_refused():
     rng = np.random.default_rng(0)
     regression = LagRegression(rng.standard_normal((60, 2)), 1, 25, np.empty((0, 60)))
     with pytest.raises(IdentificationError, match="35 usable rows cannot determine 51"):

@@ -3,22 +3,14 @@ is identified from 200 s to 700 s with random pulses under a regular beam sea.""
 
 import numpy as np
 import pytest
-from roll_plant import (
-    SAMPLE_TIME_S,
-    SLOW_PUMP,
-    jonswap_moment,
-    noisy,
-    plant,
-    pulses,
-)
+from roll_plant import SAMPLE_TIME_S, SLOW_PUMP, jonswap_moment, noisy, plant, pulses
 
-from utank_hil.base.arrays import FloatArray
 from utank_hil.identification import find_disturbance_frequencies, modal_confidence, okid
 
 pytestmark = pytest.mark.slow
 
 
-def _sea(kind: str, samples: int) -> FloatArray:
+def _sea(kind, samples):
     time_s = 200.0 + np.arange(samples) * SAMPLE_TIME_S
     if kind == "regular":
         return 2e7 * np.cos(0.8 * time_s + 0.7)
@@ -33,9 +25,7 @@ def _sea(kind: str, samples: int) -> FloatArray:
         (2, 120, "irregular", 0.06, 0.02),
     ],
 )
-def test_ship_is_found_again_after_loading(
-    outputs: int, order: int, sea: str, frequency_error: float, damping_error: float
-) -> None:
+def test_ship_is_found_again_after_loading(outputs, order, sea, frequency_error, damping_error):
     truth, u = plant(period_s=7.5), pulses(4, SLOW_PUMP)
     y = noisy(truth.respond(u, _sea(sea, len(u))), 0.01, 6)[:, :outputs]
     waves = find_disturbance_frequencies(u, y, sample_time_s=SAMPLE_TIME_S, most=1)

@@ -9,7 +9,7 @@ STEP_S = 0.05
 COUNT = 400
 
 
-def _columns(start_s: float = 0.0) -> dict[str, np.ndarray]:
+def _columns(start_s=0.0):
     time_s = start_s + STEP_S * np.arange(COUNT)
     rng = np.random.default_rng(1)
     return {
@@ -21,7 +21,7 @@ def _columns(start_s: float = 0.0) -> dict[str, np.ndarray]:
     }
 
 
-def test_sample_is_the_output_then_and_the_mean_command_since_the_one_before() -> None:
+def test_sample_is_the_output_then_and_the_mean_command_since_the_one_before():
     columns = _columns()
     record = logged_samples(columns, ("roll_rad", "level_m"), 0.2)
     assert record.shape == (100, 3)
@@ -32,7 +32,7 @@ def test_sample_is_the_output_then_and_the_mean_command_since_the_one_before() -
 
 
 @given(st.floats(0.0, 19.0), st.floats(0.0, 25.0))
-def test_part_of_a_recording_is_that_part_of_the_whole(from_s: float, length_s: float) -> None:
+def test_part_of_a_recording_is_that_part_of_the_whole(from_s, length_s):
     whole = logged_samples(_columns(), ("roll_rad",), 0.2)
     try:
         part = logged_samples(_columns(), ("roll_rad",), 0.2, from_s, from_s + length_s)
@@ -44,7 +44,7 @@ def test_part_of_a_recording_is_that_part_of_the_whole(from_s: float, length_s: 
     assert same.all()
 
 
-def test_rows_that_were_lost_are_gaps() -> None:
+def test_rows_that_were_lost_are_gaps():
     columns = _columns()
     kept = np.ones(COUNT, dtype=bool)
     kept[100:141] = False
@@ -64,6 +64,6 @@ def test_rows_that_were_lost_are_gaps() -> None:
         (("roll_rad",), (5.0, 4.0), "nothing between"),
     ],
 )
-def test_what_is_not_in_the_recording_is_named(measured, part, word: str) -> None:
+def test_what_is_not_in_the_recording_is_named(measured, part, word):
     with pytest.raises(ValueError, match=word):
         logged_samples(_columns(), measured, 0.2, *part)

@@ -9,7 +9,7 @@ from utank_hil.identification import markov_parameters
 from utank_hil.identification.okid import markov_gradient
 
 
-def _arx(seed: int) -> ARX:
+def _arx(seed):
     rng = np.random.default_rng(seed)
     p, m, r = (int(v) for v in rng.integers(1, [6, 4, 4]))
     return ARX(
@@ -18,7 +18,7 @@ def _arx(seed: int) -> ARX:
 
 
 @given(st.integers(0, 2**31), st.integers(1, 40))
-def test_markov_parameters_are_the_pulse_response(seed: int, count: int) -> None:
+def test_markov_parameters_are_the_pulse_response(seed, count):
     arx = _arx(seed)
     markov, observer_gain = markov_parameters(arx, count)
     for j in range(arx.inputs):
@@ -32,7 +32,7 @@ def test_markov_parameters_are_the_pulse_response(seed: int, count: int) -> None
 
 
 @given(st.integers(0, 2**31))
-def test_gradient_is_the_finite_difference(seed: int) -> None:
+def test_gradient_is_the_finite_difference(seed):
     arx = _arx(seed)
     rng = np.random.default_rng(seed)
     markov, _ = markov_parameters(arx, 25)

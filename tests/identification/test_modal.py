@@ -8,11 +8,9 @@ import pytest
 from cramer_rao import cramer_rao
 from hypothesis import given
 from hypothesis import strategies as st
-from roll_plant import FAST_PUMP, SLOW_PUMP, Plant, noisy, plant, pulses
+from roll_plant import FAST_PUMP, SLOW_PUMP, noisy, plant, pulses
 
-from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ARX
-from utank_hil.control.interface import PumpLimits
 from utank_hil.identification import (
     IdentificationError,
     era,
@@ -28,12 +26,12 @@ pytestmark = pytest.mark.slow
 NOISE = 0.02
 
 
-def _true_modes(truth: Plant) -> FloatArray:
+def _true_modes(truth):
     poles = truth.poles_rad_s()
     return np.concatenate([np.abs(poles), -poles.real / np.abs(poles)])
 
 
-def test_modes_of_the_true_model() -> None:
+def test_modes_of_the_true_model():
     truth = plant()
     found = modal_parameters(truth.state_space())
     np.testing.assert_allclose(
@@ -41,21 +39,21 @@ def test_modes_of_the_true_model() -> None:
     )
 
 
-def test_modes_ask_for_a_discrete_model() -> None:
+def test_modes_ask_for_a_discrete_model():
     system = plant().state_space()
     system.dt = 0
     with pytest.raises(ValueError, match="discrete"):
         modal_parameters(system)
 
 
-def test_integrators_dead_poles_and_modes_that_no_output_shows_have_figures_all_the_same() -> None:
+def test_integrators_dead_poles_and_modes_that_no_output_shows_have_figures_all_the_same():
     a = np.diag([1.0, 0.5, 0.0])
     found = modal_parameters(control.ss(a, np.ones((3, 1)), [[1.0, 0.0, 1.0]], [[0.0]], 0.2))
     assert found.frequency_rad_s.tolist() == [0.0, pytest.approx(5 * np.log(2)), np.inf]
     assert found.damping_ratio.tolist() == [1.0, 1.0, 1.0]
 
 
-def test_confidence_is_refused_where_poles_do_not_move_to_first_order() -> None:
+def test_confidence_is_refused_where_poles_do_not_move_to_first_order():
     u = pulses(1)
     result = okid(u, noisy(plant().respond(u, 0 * u), 0.01, 1)[:, :1], 10, sample_time_s=0.2)
     markov = np.zeros_like(result.markov)
@@ -66,8 +64,8 @@ def test_confidence_is_refused_where_poles_do_not_move_to_first_order() -> None:
 
 @given(st.floats(-2.0, -0.01), st.floats(0.1, 2.0), st.floats(-1, 1), st.floats(-1, 1))
 def test_deviations_of_frequency_and_damping_follow_a_pole_that_moves(
-    real: float, imaginary: float, to_real: float, to_imaginary: float
-) -> None:
+    real, imaginary, to_real, to_imaginary
+):
     pole, move = complex(real, imaginary), np.array([to_real, to_imaginary])
     found = _frequency_and_damping_std(pole, np.outer(move, move))
     step = 1e-6
@@ -79,7 +77,7 @@ def test_deviations_of_frequency_and_damping_follow_a_pole_that_moves(
 
 @pytest.mark.evidence
 @pytest.mark.parametrize("limits", [FAST_PUMP, SLOW_PUMP])
-def test_delta_method_is_the_spread_of_redrawn_coefficients(limits: PumpLimits) -> None:
+def test_delta_method_is_the_spread_of_redrawn_coefficients(limits):
     # draws from the coefficients' own distribution, each through recursion and ERA
     u, truth = pulses(1, limits), plant()
     result = okid(u, noisy(truth.respond(u, 0 * u), NOISE, 1), 25, sample_time_s=0.2)
@@ -111,7 +109,7 @@ def test_delta_method_is_the_spread_of_redrawn_coefficients(limits: PumpLimits) 
     np.testing.assert_allclose(expected, spread, rtol=0.3)
 
 
-def test_data_without_noise_leave_no_doubt() -> None:
+def test_data_without_noise_leave_no_doubt():
     u = pulses(1)
     stated = modal_confidence(okid(u, plant().respond(u, 0 * u), 60, sample_time_s=0.2), 4)
     assert stated.frequency_std_rad_s.max() < 1e-10
@@ -122,7 +120,7 @@ def test_data_without_noise_leave_no_doubt() -> None:
 
 @pytest.mark.evidence
 @pytest.mark.parametrize("runs", [25, pytest.param(120, marks=pytest.mark.evidence)])
-def test_bias_variance_and_coverage_against_the_cramer_rao_bound(runs: int) -> None:
+def test_bias_variance_and_coverage_against_the_cramer_rao_bound(runs):
     truth, u = plant(), pulses(1)
     clean = truth.respond(u, 0 * u)
     right = _true_modes(truth)

@@ -2,26 +2,17 @@
 
 import numpy as np
 import pytest
-from rolling_ship import (
-    PLANT,
-    SAMPLE_TIME_S,
-    SHIP,
-    SUBSTEPS,
-    loaded,
-    motion_in,
-    wave_moment_nm,
-)
+from rolling_ship import PLANT, SAMPLE_TIME_S, SHIP, SUBSTEPS, loaded, motion_in, wave_moment_nm
 from scipy.signal import welch
 
-from utank_hil.base.arrays import FloatArray
-from utank_hil.identification.motion_fit import KNOWN_SPREAD, MotionFit, fit_motion
+from utank_hil.identification.motion_fit import KNOWN_SPREAD, fit_motion
 from utank_hil.sea import jonswap
 
 SETTLED = 500
 SEA = jonswap(3.0, 9.5)
 
 
-def fitted(moment_nm: FloatArray, motion: FloatArray, **options: object) -> tuple[MotionFit, float]:
+def fitted(moment_nm, motion, **options):
     """The fit, and the root mean square of the true moment within its band, by Welch's method."""
     found = fit_motion(motion[SETTLED:], PLANT, SAMPLE_TIME_S, **options)  # type: ignore[arg-type]
     frequency, density = welch(

@@ -1,7 +1,6 @@
 """OKID: exact on exact data, right under waves, clear when it cannot be."""
 
 import inspect
-from collections.abc import Callable
 
 import control
 import numpy as np
@@ -18,7 +17,6 @@ from roll_plant import (
     response_error,
 )
 
-from utank_hil.base.arrays import FloatArray
 from utank_hil.identification import (
     IdentificationError,
     OkidResult,
@@ -30,16 +28,16 @@ from utank_hil.identification import (
 WAVE_RAD_S = 0.6
 
 
-def _wave(samples: int, phase: float = 1.0, omega: float = WAVE_RAD_S) -> FloatArray:
+def _wave(samples, phase=1.0, omega=WAVE_RAD_S):
     return 2e7 * np.cos(omega * np.arange(samples) * SAMPLE_TIME_S + phase)
 
 
-def _relative(found: FloatArray, true: FloatArray) -> float:
+def _relative(found, true):
     return float(np.max(np.abs(found - true).max(axis=(0, 2)) / np.abs(true).max(axis=(0, 2))))
 
 
 @pytest.mark.parametrize(("order", "outputs"), [(2, 2), (30, 2), (120, 2), (200, 1)])
-def test_exact_data_give_markov_parameters_poles_and_zeros(order: int, outputs: int) -> None:
+def test_exact_data_give_markov_parameters_poles_and_zeros(order, outputs):
     u, truth = pulses(1), plant()
     y = truth.respond(u, np.zeros_like(u))[:, :outputs]
     result = okid(u, y, order, sample_time_s=SAMPLE_TIME_S)
@@ -61,7 +59,7 @@ def test_exact_data_give_markov_parameters_poles_and_zeros(order: int, outputs: 
 
 
 @pytest.mark.parametrize("order", [30, 120])
-def test_wave_of_known_frequency_and_unknown_phase_leaves_the_model_exact(order: int) -> None:
+def test_wave_of_known_frequency_and_unknown_phase_leaves_the_model_exact(order):
     u, truth = pulses(1), plant()
     y = truth.respond(u, _wave(len(u)))
     result = okid(
@@ -71,7 +69,7 @@ def test_wave_of_known_frequency_and_unknown_phase_leaves_the_model_exact(order:
     assert response_error(era(result.markov, 4, sample_time_s=SAMPLE_TIME_S), truth).max() < 1e-8
 
 
-def test_wave_of_unknown_frequency_and_phase_gives_the_same_model() -> None:
+def test_wave_of_unknown_frequency_and_phase_gives_the_same_model():
     u, truth = pulses(1), plant()
     calm = noisy(truth.respond(u, np.zeros_like(u)), 0.01, 2)
     y = calm + truth.respond(np.zeros_like(u), _wave(len(u), 2.0, 0.6173))
@@ -89,7 +87,7 @@ def test_wave_of_unknown_frequency_and_phase_gives_the_same_model() -> None:
     assert response_error(rough, truth).max() < 0.005
 
 
-def test_without_its_basis_a_low_order_is_ruined_by_a_wave_and_a_high_one_is_not() -> None:
+def test_without_its_basis_a_low_order_is_ruined_by_a_wave_and_a_high_one_is_not():
     u, truth = pulses(1), plant()
     y = noisy(truth.respond(u, _wave(len(u))), 0.01, 2)
     error = {
@@ -102,7 +100,7 @@ def test_without_its_basis_a_low_order_is_ruined_by_a_wave_and_a_high_one_is_not
     assert error[120] < 0.01
 
 
-def test_offset_and_drift_are_taken_out_by_their_basis() -> None:
+def test_offset_and_drift_are_taken_out_by_their_basis():
     u, truth = pulses(1), plant()
     time_s = np.arange(len(u)) * SAMPLE_TIME_S
     still = truth.respond(u, np.zeros_like(u))
@@ -112,7 +110,7 @@ def test_offset_and_drift_are_taken_out_by_their_basis() -> None:
     assert _relative(found.markov, markov) < 1e-8
 
 
-def test_arx_predicts_the_record_and_markov_parameters_are_its_pulse_response() -> None:
+def test_arx_predicts_the_record_and_markov_parameters_are_its_pulse_response():
     u = pulses(1)
     y = noisy(plant().respond(u, np.zeros_like(u)), 0.01, 2)
     result = okid(u, y, 20, sample_time_s=SAMPLE_TIME_S)
@@ -126,7 +124,7 @@ def test_arx_predicts_the_record_and_markov_parameters_are_its_pulse_response() 
     )
 
 
-def test_observer_of_the_identified_model_predicts_like_the_arx_model() -> None:
+def test_observer_of_the_identified_model_predicts_like_the_arx_model():
     u, truth = pulses(1), plant()
     y = noisy(truth.respond(u, np.zeros_like(u)), 0.01, 2)
     result = okid(u, y, 40, sample_time_s=SAMPLE_TIME_S)
@@ -146,7 +144,7 @@ def test_observer_of_the_identified_model_predicts_like_the_arx_model() -> None:
     assert response_error(system, truth).max() < 0.01
 
 
-def test_two_inputs_are_told_apart() -> None:
+def test_two_inputs_are_told_apart():
     u, moment = pulses(1), 4e2 * pulses(2)
     y = plant().respond(u, moment)
     result = okid(np.column_stack([u, moment]), y, 10, sample_time_s=SAMPLE_TIME_S)
@@ -156,7 +154,7 @@ def test_two_inputs_are_told_apart() -> None:
     np.testing.assert_allclose(found, frequency_response(both), rtol=1e-8)
 
 
-def test_units_of_the_record_do_not_matter() -> None:
+def test_units_of_the_record_do_not_matter():
     u = pulses(1)
     y = noisy(plant().respond(u, np.zeros_like(u)), 0.01, 2)
     pascals = okid(u, y, 20, sample_time_s=SAMPLE_TIME_S).markov
@@ -164,7 +162,7 @@ def test_units_of_the_record_do_not_matter() -> None:
     np.testing.assert_allclose(other / [[57.3e5], [100e5]], pascals, rtol=1e-6, atol=1e-20)
 
 
-def test_gaps_are_left_out_and_time_goes_on_through_them() -> None:
+def test_gaps_are_left_out_and_time_goes_on_through_them():
     u, truth = pulses(1), plant()
     y = truth.respond(u, _wave(len(u)))
     y[500:530] = np.nan
@@ -175,7 +173,7 @@ def test_gaps_are_left_out_and_time_goes_on_through_them() -> None:
     assert result.rows == 2500 - 30 - (30 + 30) - (1 + 30) - (1 + 30)
 
 
-def test_excitation_order_is_reported() -> None:
+def test_excitation_order_is_reported():
     time_s = np.arange(2500) * SAMPLE_TIME_S
     u = 1e4 * (np.sin(0.5 * time_s) + np.sin(2.0 * time_s) + np.sin(5.0 * time_s))
     assert okid(u, plant().respond(u, 0 * u), 20, sample_time_s=SAMPLE_TIME_S).excitation_order == 6
@@ -187,12 +185,12 @@ def test_excitation_order_is_reported() -> None:
     )
 
 
-def _refused(reason: str, u: FloatArray, y: FloatArray, order: int = 20) -> None:
+def _refused(reason, u, y, order=20):
     with pytest.raises(IdentificationError, match=reason):
         okid(u, y, order, sample_time_s=SAMPLE_TIME_S)
 
 
-def test_records_that_tell_nothing_are_refused_with_the_reason() -> None:
+def test_records_that_tell_nothing_are_refused_with_the_reason():
     u = pulses(1)
     y = noisy(plant().respond(u, np.zeros_like(u)), 0.01, 2)
     time_s = np.arange(len(u)) * SAMPLE_TIME_S
@@ -222,7 +220,7 @@ def test_records_that_tell_nothing_are_refused_with_the_reason() -> None:
         ({"disturbance_polynomial_degree": -1}, "0 or more"),
     ],
 )
-def test_bad_arguments_are_named(arguments: dict[str, object], message: str) -> None:
+def test_bad_arguments_are_named(arguments, message):
     with pytest.raises(ValueError, match=message):
         okid(
             pulses(1),
@@ -232,14 +230,14 @@ def test_bad_arguments_are_named(arguments: dict[str, object], message: str) -> 
 
 
 @pytest.mark.parametrize("function", [okid, era, find_disturbance_frequencies])
-def test_no_sample_time_is_assumed(function: Callable[..., object]) -> None:
+def test_no_sample_time_is_assumed(function):
     parameter = inspect.signature(function).parameters["sample_time_s"]
     assert parameter.default is inspect.Parameter.empty
 
 
 @pytest.mark.parametrize("step", [1e-3, 1e-2, 0.1, 0.5])
 @pytest.mark.parametrize("noise", [0.0, 0.02])
-def test_coarse_steps_of_a_sensor_are_not_taken_for_clipping(step: float, noise: float) -> None:
+def test_coarse_steps_of_a_sensor_are_not_taken_for_clipping(step, noise):
     # a regular wave holds its peak for longest, and of the same height again and again
     time_s = np.arange(2500) * SAMPLE_TIME_S
     for period_s in (10.0, 10.47, 12.0):
@@ -249,7 +247,7 @@ def test_coarse_steps_of_a_sensor_are_not_taken_for_clipping(step: float, noise:
         assert okid(u, step * np.round(y / step), 4, sample_time_s=SAMPLE_TIME_S).rows == 2496
 
 
-def test_what_a_clipped_sensor_does_to_a_model_is_refused_before_it_matters() -> None:
+def test_what_a_clipped_sensor_does_to_a_model_is_refused_before_it_matters():
     u, truth = pulses(1), plant()
     y = noisy(truth.respond(u, np.zeros_like(u)), 0.01, 2)
     for part in np.linspace(0.5, 1.0, 26):
@@ -264,14 +262,14 @@ def test_what_a_clipped_sensor_does_to_a_model_is_refused_before_it_matters() ->
         )
 
 
-def test_records_of_the_wrong_shape_are_refused() -> None:
+def test_records_of_the_wrong_shape_are_refused():
     with pytest.raises(ValueError, match="y has 10 samples and u has 9"):
         okid(np.zeros(9), np.zeros(10), sample_time_s=SAMPLE_TIME_S)
     with pytest.raises(ValueError, match="u must have shape"):
         okid(np.zeros((10, 2, 2)), np.zeros(10), sample_time_s=SAMPLE_TIME_S)
 
 
-def _broken(seed: int) -> tuple[FloatArray, FloatArray, int]:
+def _broken(seed):
     """A record with everything that happens to records: stuck, clipped, holed, huge, tiny."""
     rng = np.random.default_rng(seed)
     samples = int(rng.integers(1, 400))
@@ -294,7 +292,7 @@ def _broken(seed: int) -> tuple[FloatArray, FloatArray, int]:
 
 @pytest.mark.slow
 @given(st.integers(0, 2**31))
-def test_any_record_ends_in_a_finite_model_or_a_refusal(seed: int) -> None:
+def test_any_record_ends_in_a_finite_model_or_a_refusal(seed):
     u, y, order = _broken(seed)
     try:
         result: OkidResult = okid(u, y, order, sample_time_s=SAMPLE_TIME_S)
@@ -305,7 +303,7 @@ def test_any_record_ends_in_a_finite_model_or_a_refusal(seed: int) -> None:
     assert np.isfinite(result.residual_covariance).all()
 
 
-def test_fast_sample_of_the_band_holds_the_resonance() -> None:
+def test_fast_sample_of_the_band_holds_the_resonance():
     # the tests above measure errors over this band: it must hold both modes
     frequencies = np.abs(plant().poles_rad_s())
     assert BAND_RAD_S[0] < frequencies.min() < frequencies.max() < BAND_RAD_S[-1]

@@ -5,13 +5,12 @@ import numpy as np
 import pytest
 from roll_plant import INERTIA_KG_M2, SAMPLE_TIME_S, SLOW_PUMP, TANK, jonswap_moment, noisy, pulses
 
-from utank_hil.base.arrays import FloatArray
 from utank_hil.control import DesignPlant, pump_model
-from utank_hil.dynamics import RollShip, Tank
+from utank_hil.dynamics import RollShip
 from utank_hil.dynamics.linear import coupled_model
 from utank_hil.dynamics.sampling import sample
 from utank_hil.identification import find_disturbance_frequencies, okid
-from utank_hil.identification.ship_fit import ShipFit, fit_ship
+from utank_hil.identification.ship_fit import fit_ship
 
 CONFIGURED = RollShip(INERTIA_KG_M2, INERTIA_KG_M2 * 0.25, 4.8e7)
 MEASURED = ("roll_rad", "level_m")
@@ -19,7 +18,7 @@ DELAY_S, LAG_S = 0.05, 0.1
 NUMBERS = ("inertia_kg_m2", "stiffness_nm_rad", "damping_nms_rad")
 
 
-def ship_of(period_s: float, inertia: float = 1.0, damping: float = 1.0) -> RollShip:
+def ship_of(period_s, inertia=1.0, damping=1.0):
     inertia_kg_m2 = inertia * CONFIGURED.inertia_kg_m2
     return RollShip(
         inertia_kg_m2,
@@ -28,7 +27,7 @@ def ship_of(period_s: float, inertia: float = 1.0, damping: float = 1.0) -> Roll
     )
 
 
-def respond(ship: RollShip, tank: Tank, u: FloatArray, moment_nm: FloatArray) -> FloatArray:
+def respond(ship, tank, u, moment_nm):
     """Roll and level: the pump through delay and lag, the wave straight from its samples."""
     pump = sample(pump_model(ship, tank, MEASURED), SAMPLE_TIME_S, DELAY_S, LAG_S)
     whole = coupled_model(ship, tank)[list(MEASURED), ["wave_moment_nm"]]
@@ -43,19 +42,19 @@ def respond(ship: RollShip, tank: Tank, u: FloatArray, moment_nm: FloatArray) ->
     return y
 
 
-def fitted(u: FloatArray, y: FloatArray, outputs: int, order: int, tank: Tank = TANK) -> ShipFit:
+def fitted(u, y, outputs, order, tank=TANK):
     result = okid(
         u, y[:, :outputs], order, disturbance_polynomial_degree=0, sample_time_s=SAMPLE_TIME_S
     )
     return fit_ship(result, u, DesignPlant(CONFIGURED, tank, DELAY_S, LAG_S), MEASURED[:outputs])
 
 
-def period_s(fit: ShipFit) -> float:
+def period_s(fit):
     return 2 * np.pi / fit.ship.natural_frequency_rad_s
 
 
 @pytest.mark.parametrize(("outputs", "order"), [(2, 30), (1, 60)])
-def test_without_waves_every_number_of_ship_and_tank_comes_back(outputs: int, order: int) -> None:
+def test_without_waves_every_number_of_ship_and_tank_comes_back(outputs, order):
     u = pulses(1, SLOW_PUMP)
     ship, tank = ship_of(8.5, 1.1, 1.4), replace(TANK, damping_ratio=0.12)
     y = noisy(respond(ship, tank, u, np.zeros(len(u))), 1e-3, 2)
@@ -69,9 +68,7 @@ def test_without_waves_every_number_of_ship_and_tank_comes_back(outputs: int, or
 @pytest.mark.slow
 @pytest.mark.parametrize(("true_s", "inertia"), [(14.7, 1.1), (12.6, 1.0), (10.1, 0.9)])
 @pytest.mark.parametrize(("outputs", "order"), [(2, 120), (1, 200)])
-def test_in_a_storm_the_roll_period_is_found_within_a_tenth(
-    true_s: float, inertia: float, outputs: int, order: int
-) -> None:
+def test_in_a_storm_the_roll_period_is_found_within_a_tenth(true_s, inertia, outputs, order):
     u = pulses(3, SLOW_PUMP)
     y = respond(ship_of(true_s, inertia), TANK, u, jonswap_moment(len(u), 5, 2.5e7))
     fit = fitted(u, noisy(y, 5e-3, 6), outputs, order)
@@ -81,7 +78,7 @@ def test_in_a_storm_the_roll_period_is_found_within_a_tenth(
 
 @pytest.mark.evidence
 @pytest.mark.parametrize(("outputs", "order"), [(1, 120), (2, 120)])
-def test_stated_deviations_are_the_errors_over_seas(outputs: int, order: int) -> None:
+def test_stated_deviations_are_the_errors_over_seas(outputs, order):
     errors = []  # of inertia, stiffness, both dampings and period, each over its deviation
     for seed in range(1, 21):
         u, ship = pulses(seed, SLOW_PUMP), ship_of(12.6)
@@ -109,9 +106,7 @@ def test_stated_deviations_are_the_errors_over_seas(outputs: int, order: int) ->
 
 
 @pytest.mark.parametrize(("outputs", "order"), [(2, 120), (1, 120)])
-def test_way_that_is_not_quite_as_configured_is_not_laid_to_the_ship(
-    outputs: int, order: int
-) -> None:
+def test_way_that_is_not_quite_as_configured_is_not_laid_to_the_ship(outputs, order):
     # a gauge 25 ms and a motion sensor 10 ms sooner than 50 and 100 ms have it, as on the bus
     ship, u = ship_of(7.5), pulses(1, SLOW_PUMP)
     y = np.empty((len(u), 2))
@@ -130,9 +125,7 @@ def test_way_that_is_not_quite_as_configured_is_not_laid_to_the_ship(
 
 
 @pytest.mark.parametrize(("outputs", "order"), [(2, 60), (1, 120)])
-def test_what_a_law_answers_to_the_waves_tells_nothing_of_the_ship(
-    outputs: int, order: int
-) -> None:
+def test_what_a_law_answers_to_the_waves_tells_nothing_of_the_ship(outputs, order):
     u, plant = pulses(3, SLOW_PUMP), DesignPlant(CONFIGURED, TANK, DELAY_S, LAG_S)
     y = noisy(respond(ship_of(12.6), TANK, u, jonswap_moment(len(u), 5, 2.5e7)), 5e-3, 6)
     result = okid(u, y[:, :outputs], order, sample_time_s=SAMPLE_TIME_S)
@@ -144,7 +137,7 @@ def test_what_a_law_answers_to_the_waves_tells_nothing_of_the_ship(
     assert beside.period_deviation == pytest.approx(alone.period_deviation, rel=0.2)
 
 
-def test_what_the_record_does_not_show_stays_as_configured() -> None:
+def test_what_the_record_does_not_show_stays_as_configured():
     u = pulses(1, SLOW_PUMP) * 1e-4  # pulses that drown in the waves
     y = respond(ship_of(8.5), TANK, u, jonswap_moment(len(u), 5, 2.5e7))
     fit = fitted(u, noisy(y, 0.05, 2), 1, 40)
@@ -152,7 +145,7 @@ def test_what_the_record_does_not_show_stays_as_configured() -> None:
     assert fit.period_deviation > 0.1
 
 
-def test_outputs_that_do_not_fit_the_model_are_refused() -> None:
+def test_outputs_that_do_not_fit_the_model_are_refused():
     u = pulses(1, SLOW_PUMP)
     y = respond(CONFIGURED, TANK, u, np.zeros(len(u)))
     result = okid(u, noisy(y, 1e-3, 2), 10, sample_time_s=SAMPLE_TIME_S)

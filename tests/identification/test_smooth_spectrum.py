@@ -29,15 +29,15 @@ def test_likelihood_of_one_estimate_is_its_integral(monkeypatch):
     monkeypatch.setattr(smooth_spectrum, "_LEVEL_SPREAD", 0.5)
     spread = np.hypot(2.0, 0.5)
 
-    def likelihood(estimate: float, noise: float) -> float:
-        def integrand(log_density: float) -> float:
+    def likelihood(estimate, noise):
+        def integrand(log_density):
             total = np.exp(log_density) + noise
             prior = norm.pdf(log_density, np.log(0.1 * estimate), spread)
             return float(total**-40 * np.exp(-40 * estimate / total) * prior)
 
         return float(np.log(quad(integrand, -8, 8, points=[np.log(estimate)])[0]))
 
-    def found(estimate: float, noise: float) -> float:
+    def found(estimate, noise):
         spectrum = SmoothSpectrum(np.array([1.0]), 40)
         return spectrum.find(np.array([estimate]), np.array([noise])).log_likelihood
 

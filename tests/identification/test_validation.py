@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from roll_plant import SAMPLE_TIME_S, noisy, plant, pulses
 
-from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ARX
 from utank_hil.identification import IdentificationError, okid, validate
 
 
-def _arx_record(seed: int, samples: int = 4000) -> tuple[ARX, FloatArray, FloatArray]:
+def _arx_record(seed, samples=4000):
     """A record whose one-step errors are white by construction."""
     rng = np.random.default_rng(seed)
     model = ARX(
@@ -30,7 +29,7 @@ def _arx_record(seed: int, samples: int = 4000) -> tuple[ARX, FloatArray, FloatA
     return model, u, y
 
 
-def test_true_model_has_white_errors_apart_from_the_input() -> None:
+def test_true_model_has_white_errors_apart_from_the_input():
     result = validate(*_arx_record(1))
     assert np.all(result.whiteness_probability > 0.01)
     assert np.all(result.independence_probability > 0.01)
@@ -42,7 +41,7 @@ def test_true_model_has_white_errors_apart_from_the_input() -> None:
 
 
 @pytest.mark.slow
-def test_probabilities_of_the_true_model_are_uniform() -> None:
+def test_probabilities_of_the_true_model_are_uniform():
     results = [validate(*_arx_record(seed, 1000), lags=10) for seed in range(60)]
     for values in (
         np.array([r.whiteness_probability for r in results]).ravel(),
@@ -52,7 +51,7 @@ def test_probabilities_of_the_true_model_are_uniform() -> None:
         assert np.mean(values < 0.1) < 0.2
 
 
-def test_fit_is_that_of_the_prediction_by_the_model_itself() -> None:
+def test_fit_is_that_of_the_prediction_by_the_model_itself():
     model, u, y = _arx_record(1)
     result = validate(model, u, y)
     errors = (y - model.predict(u[:, None], y))[25:]
@@ -64,7 +63,7 @@ def test_fit_is_that_of_the_prediction_by_the_model_itself() -> None:
     )
 
 
-def test_wrong_input_path_goes_with_the_input_and_low_order_is_not_white() -> None:
+def test_wrong_input_path_goes_with_the_input_and_low_order_is_not_white():
     model, u, y = _arx_record(1)
     wrong = validate(ARX(model.alpha, model.beta * 1.2, 0.2), u, y)
     assert np.all(wrong.independence_probability < 1e-6)
@@ -72,7 +71,7 @@ def test_wrong_input_path_goes_with_the_input_and_low_order_is_not_white() -> No
     assert low.whiteness_probability.min() < 1e-6
 
 
-def test_free_run_of_an_exact_model_is_exact_through_gaps_and_waves() -> None:
+def test_free_run_of_an_exact_model_is_exact_through_gaps_and_waves():
     truth, u = plant(), pulses(1)
     wave = 2e7 * np.cos(0.6 * np.arange(len(u)) * SAMPLE_TIME_S)
     y = truth.respond(u, wave)
@@ -84,7 +83,7 @@ def test_free_run_of_an_exact_model_is_exact_through_gaps_and_waves() -> None:
     assert validate(model, u, y).simulation_fit.max() < 0.9
 
 
-def test_held_out_record_of_the_ship_is_predicted() -> None:
+def test_held_out_record_of_the_ship_is_predicted():
     truth, u, v = plant(), pulses(1), pulses(2)
     model = okid(u, noisy(truth.respond(u, 0 * u), 0.01, 1), 60, sample_time_s=SAMPLE_TIME_S).arx
     result = validate(model, v, noisy(truth.respond(v, 0 * v), 0.01, 2))
@@ -92,7 +91,7 @@ def test_held_out_record_of_the_ship_is_predicted() -> None:
     assert result.simulation_fit.min() > 0.985
 
 
-def test_offset_beside_which_a_model_was_identified_is_no_error_of_it() -> None:
+def test_offset_beside_which_a_model_was_identified_is_no_error_of_it():
     model, u, y = _arx_record(3)
     upright = validate(model, u, y, disturbance_polynomial_degree=0)
     for heel in (5.0, -500.0):
@@ -104,7 +103,7 @@ def test_offset_beside_which_a_model_was_identified_is_no_error_of_it() -> None:
         assert blind.one_step_fit.max() < upright.one_step_fit.min()
 
 
-def test_record_that_does_not_fit_is_refused() -> None:
+def test_record_that_does_not_fit_is_refused():
     model, u, y = _arx_record(1)
     with pytest.raises(ValueError, match="2 outputs and 1 inputs, the record 1 and 1"):
         validate(model, u, y[:, 0])
@@ -123,14 +122,14 @@ def test_record_that_does_not_fit_is_refused() -> None:
         validate(ARX(1e300 * model.alpha, model.beta, 0.2), u, y)
 
 
-def test_free_run_of_an_unstable_model_is_no_fit_at_all() -> None:
+def test_free_run_of_an_unstable_model_is_no_fit_at_all():
     model, u, y = _arx_record(1)
     result = validate(ARX(1.9 * model.alpha, model.beta, 0.2), u, y)
     assert (result.simulation_fit == -np.inf).all()
     assert np.isfinite(result.one_step_fit).all()
 
 
-def test_units_of_the_record_do_not_matter() -> None:
+def test_units_of_the_record_do_not_matter():
     model, u, y = _arx_record(1)
     scale = np.array([1e-30, 1e30])
     other = ARX(

@@ -11,7 +11,6 @@ from utank_hil.canbus.enumerations import DriveState, Mode
 from utank_hil.canbus.measurements import Measurements, MotionSample
 from utank_hil.safety import judging
 from utank_hil.safety.situation import OwnState, Situation, ValveReport
-from utank_hil.safety.supervisor import Supervisor
 
 MEASURED = Measurements(
     armed=False, stop=False, arm_edge=False, reset_edge=False, passive_edge=False, now_ns=0,
@@ -38,7 +37,7 @@ _OF_VALVE = {f"valve_{each.name}": each.name for each in fields(ValveReport)}
 _PARTS = tuple({each.name for each in fields(part)} for part in (Situation, OwnState, Measurements))
 
 
-def situation(now_ns: int = 0, **changes: Any) -> Situation:
+def situation(now_ns=0, **changes):
     """All well, but for the changes."""
     parts: tuple[dict[str, Any], ...] = ({}, {}, {"now_ns": now_ns})
     motion: dict[str, Any] = {}
@@ -63,7 +62,7 @@ def situation(now_ns: int = 0, **changes: Any) -> Situation:
     )
 
 
-def look(supervisor: Supervisor, now_ns: int, **changes: Any) -> None:
+def look(supervisor, now_ns, **changes):
     """One tick of a supervisor, which keeps its own timers."""
     seen = situation(now_ns, **changes)
     if "drive_out_ms" in changes:

@@ -1,7 +1,5 @@
 """An alarm stays until it was accepted and its cause has gone; nothing silences it otherwise."""
 
-from collections.abc import Iterable
-
 import pytest
 from controller_bench import CATALOGUE, MS, ControllerBench
 from hypothesis import given
@@ -13,7 +11,6 @@ from utank_hil.canbus import (
     DriveFault,
     DriveStatus1,
     Fault,
-    Frame,
     Mode,
     SensorMotion,
     Switch,
@@ -29,25 +26,25 @@ ACTIVE, ACCEPTED, RECTIFIED, NORMAL = AlarmState
 class Table:
     """An alarm list that is looked at ten times a second."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.list = AlarmList()
         self.now_ns = 0
 
-    def run(self, seconds: float, *active: Fault, gravity: Gravity = Gravity.NOTHING) -> None:
+    def run(self, seconds, *active, gravity=Gravity.NOTHING):
         for _ in range(round(10 * seconds)):
             self.list.update(dict.fromkeys(active, gravity), Mode.STANDBY, self.now_ns)
             self.list.next_message(self.now_ns)
             self.now_ns += SECOND_NS // 10
 
-    def accept(self, code: Fault | None = None) -> None:
+    def accept(self, code=None):
         self.list.accept(code, Mode.STANDBY, self.now_ns)
 
     @property
-    def states(self) -> list[AlarmState]:
+    def states(self):
         return [event.state for event in self.list.take_events() if event.state is not None]
 
     @property
-    def shown(self) -> list[tuple[Fault | None, AlarmState | None]]:
+    def shown(self):
         first = self.list.next_message(self.now_ns)
         assert first.alarms is not None
         rest = [self.list.next_message(self.now_ns) for _ in range(first.alarms - 1)]
@@ -56,7 +53,7 @@ class Table:
         return [(message.code, message.state) for message in messages]
 
 
-def test_accepted_first_it_goes_with_its_cause() -> None:
+def test_accepted_first_it_goes_with_its_cause():
     table = Table()
     table.run(1, HIGH)
     assert table.list.unaccepted
@@ -71,7 +68,7 @@ def test_accepted_first_it_goes_with_its_cause() -> None:
     assert table.states == [ACTIVE, ACCEPTED, NORMAL]
 
 
-def test_gone_first_it_stays_until_it_is_accepted() -> None:
+def test_gone_first_it_stays_until_it_is_accepted():
     table = Table()
     table.run(1, HIGH)
     table.run(3600)
@@ -82,7 +79,7 @@ def test_gone_first_it_stays_until_it_is_accepted() -> None:
     assert table.states == [ACTIVE, RECTIFIED, NORMAL]
 
 
-def test_a_cause_that_comes_back_alarms_again() -> None:
+def test_a_cause_that_comes_back_alarms_again():
     table = Table()
     for _ in range(3):
         table.run(1, HIGH)
@@ -96,7 +93,7 @@ def test_a_cause_that_comes_back_alarms_again() -> None:
     assert table.list.next_message(table.now_ns).times_raised == 1
 
 
-def test_a_cause_that_comes_with_each_roll_alarms_once() -> None:
+def test_a_cause_that_comes_with_each_roll_alarms_once():
     table = Table()
     for _ in range(100):
         table.run(1, HIGH)
@@ -104,7 +101,7 @@ def test_a_cause_that_comes_with_each_roll_alarms_once() -> None:
     assert table.states == [ACTIVE]
 
 
-def test_a_second_fault_alarms_though_the_first_is_accepted_the_urgent_one_first() -> None:
+def test_a_second_fault_alarms_though_the_first_is_accepted_the_urgent_one_first():
     table = Table()
     table.run(1, SILENT)
     table.accept()
@@ -128,9 +125,7 @@ steps = st.lists(
 
 
 @given(steps)
-def test_no_alarm_leaves_the_list_unaccepted_or_with_its_cause(
-    history: list[tuple[set[Fault], Fault | str | None, int]],
-) -> None:
+def test_no_alarm_leaves_the_list_unaccepted_or_with_its_cause(history):
     table = Table()
     waiting: set[Fault | None] = set()
     for active, accepted, ticks in history:
@@ -154,20 +149,20 @@ def test_no_alarm_leaves_the_list_unaccepted_or_with_its_cause(
     assert table.shown == [(Fault.NONE, NORMAL)]
 
 
-def alarms_in(frames: Iterable[Frame]) -> list[Alarm]:
+def alarms_in(frames):
     receiver = CATALOGUE.receiver(Alarm)
     heard = [receiver.accept(frame) for frame in frames if frame.can_id == receiver.can_id]
     return [alarm for alarm in heard if alarm is not None]
 
 
-def codes(bench: ControllerBench) -> set[Fault | None]:
+def codes(bench):
     """Alarms that the node sends within half a second."""
     before = len(bench.sent)
     bench.run(500)
     return {alarm.code for alarm in alarms_in(bench.sent[before:])}
 
 
-def test_a_quiet_start_alarms_of_nothing_and_a_long_wait_of_what_is_missing() -> None:
+def test_a_quiet_start_alarms_of_nothing_and_a_long_wait_of_what_is_missing():
     bench = ControllerBench()
     bench.run(2000)
     assert codes(bench) == {Fault.NONE}
@@ -179,7 +174,7 @@ def test_a_quiet_start_alarms_of_nothing_and_a_long_wait_of_what_is_missing() ->
     assert codes(bench) == {Fault.TANK_SILENT}
 
 
-def test_while_it_waits_for_one_thing_what_is_dangerous_alarms_all_the_same() -> None:
+def test_while_it_waits_for_one_thing_what_is_dangerous_alarms_all_the_same():
     bench = ControllerBench()
     bench.silent.add(SensorMotion)
     bench.run(10_500)
@@ -191,14 +186,14 @@ def test_while_it_waits_for_one_thing_what_is_dangerous_alarms_all_the_same() ->
     assert codes(bench) == {Fault.MOTION_SILENT, HIGH, Fault.DRIVE_FAULT}
 
 
-def test_of_several_things_that_are_awaited_one_alarms() -> None:
+def test_of_several_things_that_are_awaited_one_alarms():
     bench = ControllerBench()
     bench.silent = {SensorMotion, DriveStatus1}
     bench.run(10_500)
     assert codes(bench) == {Fault.MOTION_SILENT}
 
 
-def test_alarm_of_a_fault_outlives_its_reset_until_it_is_accepted() -> None:
+def test_alarm_of_a_fault_outlives_its_reset_until_it_is_accepted():
     bench = ControllerBench()
     bench.drive_at(20e3)
     bench.tank = bench.tank._replace(port_high=Switch.ON)
@@ -220,7 +215,7 @@ def test_alarm_of_a_fault_outlives_its_reset_until_it_is_accepted() -> None:
     assert codes(bench) == {Fault.NONE}
 
 
-def test_a_warning_of_the_drive_alarms_within_two_messages_and_changes_no_command() -> None:
+def test_a_warning_of_the_drive_alarms_within_two_messages_and_changes_no_command():
     bench = ControllerBench()
     bench.drive_at(20e3)
     bench.drive_warns = True
@@ -236,7 +231,7 @@ def test_a_warning_of_the_drive_alarms_within_two_messages_and_changes_no_comman
 
 
 @pytest.mark.parametrize("second", [HIGH, SILENT])
-def test_second_fault_while_the_first_is_latched_alarms_again(second: Fault) -> None:
+def test_second_fault_while_the_first_is_latched_alarms_again(second):
     bench = ControllerBench()
     bench.drive_at(20e3)
     bench.drive_fault = DriveFault.STALL
@@ -254,7 +249,7 @@ def test_second_fault_while_the_first_is_latched_alarms_again(second: Fault) -> 
     assert codes(bench) == {Fault.DRIVE_FAULT, second}
 
 
-def test_refused_arming_and_refused_reset_are_told_with_their_reasons() -> None:
+def test_refused_arming_and_refused_reset_are_told_with_their_reasons():
     told: list[AlarmEvent] = []
     bench = ControllerBench()
     bench.node.telemetry._event_sink = lambda event, _: told.append(event)  # type: ignore[arg-type]
@@ -278,7 +273,7 @@ def test_refused_arming_and_refused_reset_are_told_with_their_reasons() -> None:
     ]
 
 
-def test_accepting_counts_for_what_was_sent() -> None:
+def test_accepting_counts_for_what_was_sent():
     table = Table()
     table.list.update({HIGH: Gravity.ENDS}, Mode.STANDBY, 0)
     table.accept()
@@ -308,7 +303,7 @@ def test_what_is_graver_than_what_was_accepted_alarms_again_and_what_is_less_gra
     assert table.states == [ACTIVE]
 
 
-def test_how_often_it_was_raised_counts_since_it_was_accepted() -> None:
+def test_how_often_it_was_raised_counts_since_it_was_accepted():
     table = Table()
     for raised in (1, 2):
         table.list.raise_anew(HIGH, Mode.FAULT, 0)
@@ -321,11 +316,11 @@ def test_how_often_it_was_raised_counts_since_it_was_accepted() -> None:
 class Told(ControllerBench):
     """With the alarms that the node tells of."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.told: list[AlarmEvent] = []
         super().__init__(event_sink=lambda event, _: self.told.append(event))
 
-    def accept(self) -> None:
+    def accept(self):
         self.order_is(acknowledge=True)
         self.run(200)
         assert not self.node.safety.alarms.unaccepted
@@ -333,7 +328,7 @@ class Told(ControllerBench):
         self.told.clear()
 
 
-def test_what_is_raised_in_the_tick_of_an_acceptance_is_not_accepted() -> None:
+def test_what_is_raised_in_the_tick_of_an_acceptance_is_not_accepted():
     bench = Told()
     bench.drive_warns = True
     bench.run(810)
@@ -350,7 +345,7 @@ def test_what_is_raised_in_the_tick_of_an_acceptance_is_not_accepted() -> None:
 
 
 @pytest.mark.parametrize("mode", [Mode.STANDBY, Mode.PASSIVE])
-def test_a_late_tick_that_was_accepted_hides_no_stall_of_the_loop(mode: Mode) -> None:
+def test_a_late_tick_that_was_accepted_hides_no_stall_of_the_loop(mode):
     bench = Told()
     bench.order_is(mode_request=mode)
     bench.run(1000)
@@ -364,9 +359,7 @@ def test_a_late_tick_that_was_accepted_hides_no_stall_of_the_loop(mode: Mode) ->
 
 @pytest.mark.parametrize("mode", [Mode.STANDBY, Mode.PASSIVE])
 @pytest.mark.parametrize("phase_ms", range(0, 100, 20))
-def test_a_bus_that_was_off_for_a_moment_alarms_and_the_drive_stays_off(
-    mode: Mode, phase_ms: int
-) -> None:
+def test_a_bus_that_was_off_for_a_moment_alarms_and_the_drive_stays_off(mode, phase_ms):
     bench = Told()
     bench.run(1000)
     bench.order_is(mode_request=mode)
@@ -379,7 +372,7 @@ def test_a_bus_that_was_off_for_a_moment_alarms_and_the_drive_stays_off(
     assert not bench.node.safety.supervisor.drive_wanted
 
 
-def test_a_second_trip_by_the_same_fault_alarms_though_the_first_is_accepted() -> None:
+def test_a_second_trip_by_the_same_fault_alarms_though_the_first_is_accepted():
     bench = Told()
     bench.drive_at(10e3)
     bench.drive_fault = DriveFault.STALL
@@ -398,7 +391,7 @@ def test_a_second_trip_by_the_same_fault_alarms_though_the_first_is_accepted() -
     ]
 
 
-def halved_and_accepted() -> Told:
+def halved_and_accepted():
     """In charge with half the pressure, without gauges, whose alarm is accepted."""
     bench = Told()
     bench.drive_at(10e3)
@@ -408,14 +401,14 @@ def halved_and_accepted() -> Told:
     return bench
 
 
-def test_what_halved_the_pressure_and_was_accepted_alarms_again_when_it_ends_control() -> None:
+def test_what_halved_the_pressure_and_was_accepted_alarms_again_when_it_ends_control():
     bench = halved_and_accepted()
     bench.run(1000)
     assert (bench.node.mode, bench.status.alarm) == (Mode.FAULT, True)
     assert [(e.code, e.state, e.mode) for e in bench.told] == [(SILENT, ACTIVE, Mode.FAULT)]
 
 
-def test_what_halved_the_pressure_and_was_accepted_alarms_again_when_it_keeps_from_arming() -> None:
+def test_what_halved_the_pressure_and_was_accepted_alarms_again_when_it_keeps_from_arming():
     bench = halved_and_accepted()
     bench.silent.clear()
     bench.order_is(mode_request=Mode.STANDBY, arm=False)
@@ -426,7 +419,7 @@ def test_what_halved_the_pressure_and_was_accepted_alarms_again_when_it_keeps_fr
     assert [(e.code, e.state, e.mode) for e in bench.told] == [(SILENT, ACTIVE, Mode.INIT)]
 
 
-def test_once_it_was_ready_a_second_thing_alarms_in_init_without_a_quiet_time() -> None:
+def test_once_it_was_ready_a_second_thing_alarms_in_init_without_a_quiet_time():
     bench = Told()
     bench.run(1000)
     assert bench.node.mode is Mode.STANDBY
@@ -438,7 +431,7 @@ def test_once_it_was_ready_a_second_thing_alarms_in_init_without_a_quiet_time() 
     assert [event.code for event in bench.told] == [SILENT, Fault.DRIVE_WARNING]
 
 
-def test_the_alarm_of_a_refused_arming_goes_and_hides_no_later_one() -> None:
+def test_the_alarm_of_a_refused_arming_goes_and_hides_no_later_one():
     bench = Told()
     bench.tank = bench.tank._replace(port_high=Switch.ON)
     bench.run(400)
@@ -463,7 +456,7 @@ def test_the_alarm_of_a_refused_arming_goes_and_hides_no_later_one() -> None:
 
 @pytest.mark.parametrize("mode", [Mode.STANDBY, Mode.PASSIVE, Mode.FAULT])
 @pytest.mark.parametrize("phase_ms", range(0, 100, 10))
-def test_a_switch_that_closes_between_two_statuses_alarms(mode: Mode, phase_ms: int) -> None:
+def test_a_switch_that_closes_between_two_statuses_alarms(mode, phase_ms):
     bench = Told()
     if mode is Mode.FAULT:
         bench.drive_at(10e3)
@@ -484,7 +477,7 @@ def test_a_switch_that_closes_between_two_statuses_alarms(mode: Mode, phase_ms: 
     assert [event.state for event in bench.told] == [ACTIVE, RECTIFIED]
 
 
-def test_what_is_latched_and_reset_between_two_statuses_alarms() -> None:
+def test_what_is_latched_and_reset_between_two_statuses_alarms():
     bench = Told()
     bench.drive_at(10e3)
     while bench.ms % 100 != 10:
@@ -500,7 +493,7 @@ def test_what_is_latched_and_reset_between_two_statuses_alarms() -> None:
     assert [(e.code, e.state, e.mode) for e in bench.told] == [(HIGH, ACTIVE, Mode.FAULT)]
 
 
-def test_what_refused_an_arming_is_an_alarm_as_long_as_it_would_refuse_another() -> None:
+def test_what_refused_an_arming_is_an_alarm_as_long_as_it_would_refuse_another():
     bench = Told()
     bench.node.commissioned = False
     bench.run(400)

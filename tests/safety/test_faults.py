@@ -14,7 +14,7 @@ RESERVED = {
 }  # fmt: skip
 
 
-def test_each_code_of_the_dbc_has_one_row_or_is_reserved_and_each_row_has_a_code() -> None:
+def test_each_code_of_the_dbc_has_one_row_or_is_reserved_and_each_row_has_a_code():
     database = Database()
     database.add_dbc_file(DBC_PATH)
     signal = database.get_message_by_name("CTRL_STATUS").get_signal_by_name("fault")
@@ -26,7 +26,7 @@ def test_each_code_of_the_dbc_has_one_row_or_is_reserved_and_each_row_has_a_code
     assert len(rows) + len(RESERVED) == len(codes)
 
 
-def test_people_read_what_happened_and_what_to_do() -> None:
+def test_people_read_what_happened_and_what_to_do():
     for row in FAULTS:
         assert fault_text(row.code) == f"{row.code.name}: {row.happened} {row.remedy}"
         assert row.happened.endswith(".")

@@ -16,7 +16,7 @@ MS = 1_000_000
 
 
 @pytest.mark.parametrize("begins", range(0, 100, 7))
-def test_load_of_the_bus_is_that_of_the_last_second_whenever_a_flood_begins(begins: int) -> None:
+def test_load_of_the_bus_is_that_of_the_last_second_whenever_a_flood_begins(begins):
     load, frames, now_ns = BusLoad(250_000), 0, 0
     for _ in range(300 + begins):
         now_ns += TICK_NS
@@ -29,7 +29,7 @@ def test_load_of_the_bus_is_that_of_the_last_second_whenever_a_flood_begins(begi
         assert share >= 0.858 * min(tick - 9, 100) / 100 - 1e-9
 
 
-def test_a_late_tick_counts_for_ten_ticks() -> None:
+def test_a_late_tick_counts_for_ten_ticks():
     lateness, now_ns = Lateness(), TICK_NS
     lateness.update(now_ns)
     now_ns += 2 * TICK_NS
@@ -44,29 +44,29 @@ def test_a_late_tick_counts_for_ten_ticks() -> None:
 class Table:
     """A safety without monitors, and one motion sensor."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.safety = Safety(SafetyLimits(), 250_000)
         self.now_ns = 0
         self.sample = MotionSample(heard_ns=-(1 << 62))
 
     @property
-    def heel_rad(self) -> float:
+    def heel_rad(self):
         return self.safety.situation.heel_rad
 
-    def tick(self) -> None:
+    def tick(self):
         self.now_ns += TICK_NS
         age_ms = (self.now_ns - self.sample.heard_ns) / MS
         motions = (replace(self.sample, age_ms=age_ms),)
         self.safety.judge(replace(MEASURED, now_ns=self.now_ns, motions=motions), OWN)
 
-    def measure(self, roll_rad: float, seconds: float = TICK_S) -> None:
+    def measure(self, roll_rad, seconds=TICK_S):
         for _ in range(round(seconds / TICK_S)):
             self.sample = MotionSample(roll_rad, heard_ns=self.now_ns)
             self.tick()
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_heel_is_the_low_pass_of_the_roll_over_a_minute_with_its_sign(sign: float) -> None:
+def test_heel_is_the_low_pass_of_the_roll_over_a_minute_with_its_sign(sign):
     table = Table()
     table.measure(0.0, 60.0)
     table.measure(sign * 0.1, 60.0)
@@ -90,7 +90,7 @@ def test_in_the_first_minute_heel_is_the_mean_of_what_was_measured_and_of_ten_se
     assert roll_rad - table.heel_rad == pytest.approx(1.0 - TICK_S / 60.0)
 
 
-def test_a_roll_that_is_not_measured_any_more_is_no_heel() -> None:
+def test_a_roll_that_is_not_measured_any_more_is_no_heel():
     table = Table()
     table.measure(0.0, 60.0)
     table.measure(0.2)
@@ -109,9 +109,7 @@ def test_a_roll_that_is_not_measured_any_more_is_no_heel() -> None:
     ("first_ms", "second_ms", "used"),
     [(25.0, 0.0, 0), (26.0, 0.0, 1), (26.0, 25.0, 1), (26.0, 26.0, 0), (1e9, 1e9, 0)],
 )
-def test_a_motion_sensor_that_is_silent_is_left_for_one_that_is_not(
-    first_ms: float, second_ms: float, used: int
-) -> None:
+def test_a_motion_sensor_that_is_silent_is_left_for_one_that_is_not(first_ms, second_ms, used):
     safety = Safety(SafetyLimits(), 250_000)
     motions = MotionSample(0.1, age_ms=first_ms), MotionSample(0.2, age_ms=second_ms)
     judgement = safety.judge(replace(MEASURED, motions=motions), OWN)
@@ -120,7 +118,7 @@ def test_a_motion_sensor_that_is_silent_is_left_for_one_that_is_not(
     assert safety.situation.motion_spare_age_ms == motions[1 - used].age_ms
 
 
-def test_the_second_motion_sensor_is_left_for_the_first_one_that_is_back() -> None:
+def test_the_second_motion_sensor_is_left_for_the_first_one_that_is_back():
     safety, used = Safety(SafetyLimits(), 250_000), []
     for first_ms, second_ms in ((1e9, 0.0), (0.0, 0.0), (0.0, 1e9), (0.0, 0.0)):
         motions = MotionSample(0.1, age_ms=first_ms), MotionSample(0.2, age_ms=second_ms)

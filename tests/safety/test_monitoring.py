@@ -1,7 +1,6 @@
 """All monitors behind the controller node, fed by hand."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,6 @@ from monitors.moving_ship import FINDINGS, MovingShip
 
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import DriveState, Frame, Quality, SensorMotion, SensorTank, Switch
-from utank_hil.canbus.measurements import Measurements
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.control import DesignPlant
 from utank_hil.dynamics.ship import RollShip
@@ -33,7 +31,7 @@ OF_MOTION = ("roll_rad", "roll_rate_rad_s", "heard_ns")
 class Table:
     """Monitors and inbox without a node; `values` stand in for what was received."""
 
-    def __init__(self, start_ns: int = 0) -> None:
+    def __init__(self, start_ns=0):
         plant = DesignPlant(VESSEL.ship, VESSEL.tank)
         self.monitors = Monitors(plant, 0.35, SensorFigures(), 250_000)
         self.inbox = Inbox(CATALOGUE, VERSION, thresholds=self.monitors.thresholds)
@@ -42,7 +40,7 @@ class Table:
         self._motion = CATALOGUE.transmitter(SensorMotion)
         self._tank = CATALOGUE.transmitter(SensorTank)
 
-    def measured(self, motion_age_ms: float = 0.0, **changes: Any) -> Measurements:
+    def measured(self, motion_age_ms=0.0, **changes):
         """What is measured, everything just now."""
         values = {"tank_age_ms": 0.0, "pump_age_ms": 0.0, **self.values, **changes}
         motion = {name: values.pop(name) for name in OF_MOTION if name in values}
@@ -52,10 +50,10 @@ class Table:
         return replace(seen, level_m=(seen.starboard_level_m - seen.port_level_m) / 2)
 
     @property
-    def roll_rad(self) -> float:
+    def roll_rad(self):
         return self.measured().motions[0].roll_rad
 
-    def tick(self, seconds: float = TICK_S, command_pa: float = 0.0, **changes: Any) -> int:
+    def tick(self, seconds=TICK_S, command_pa=0.0, **changes):
         found = 0
         for _ in range(round(seconds / TICK_S)):
             self.now_ns += TICK_NS
@@ -63,20 +61,18 @@ class Table:
             found = self.monitors.update(measured, OwnState(command_pa=command_pa))
         return found
 
-    def say_roll(self, roll_rad: float, rate_rad_s: float = 0.0) -> None:
+    def say_roll(self, roll_rad, rate_rad_s=0.0):
         frame = self._motion.frame(SensorMotion(roll_rad, rate_rad_s, Quality.GOOD))
         self.inbox.receive(frame, self.now_ns)
 
-    def say_levels(self, port_m: float, starboard_m: float) -> None:
+    def say_levels(self, port_m, starboard_m):
         levels = SensorTank(port_m, starboard_m, Switch.OFF, Switch.OFF, Quality.GOOD)
         self.inbox.receive(self._tank.frame(levels), self.now_ns)
 
 
 @pytest.mark.parametrize("start_ns", [0, 2 * 10**9, 10**13])
 @pytest.mark.parametrize("before", [0, 1, 500])
-def test_neither_the_clock_before_the_start_nor_frames_of_then_are_judged(
-    start_ns: int, before: int
-) -> None:
+def test_neither_the_clock_before_the_start_nor_frames_of_then_are_judged(start_ns, before):
     table = Table(start_ns)
     table.monitors.watch(table.inbox.watched, ())
     for _ in range(before):
@@ -88,7 +84,7 @@ def test_neither_the_clock_before_the_start_nor_frames_of_then_are_judged(
             table.say_levels(0.0, 0.0)
 
 
-def test_spike_of_the_roll_never_reaches_the_law() -> None:
+def test_spike_of_the_roll_never_reaches_the_law():
     table = Table()
     for roll_rad in (0.01, 0.51, 0.011):
         table.say_roll(roll_rad)
@@ -96,7 +92,7 @@ def test_spike_of_the_roll_never_reaches_the_law() -> None:
         assert table.roll_rad == pytest.approx(0.01, abs=2e-3)
 
 
-def test_spike_of_a_level_never_reaches_the_law_but_its_switch_does() -> None:
+def test_spike_of_a_level_never_reaches_the_law_but_its_switch_does():
     table = Table()
     table.say_levels(0.0, 0.0)
     table.tick()
@@ -106,7 +102,7 @@ def test_spike_of_a_level_never_reaches_the_law_but_its_switch_does() -> None:
     assert table.measured().high_level
 
 
-def noisy_table(times: float) -> tuple[Table, int, int]:
+def noisy_table(times):
     """Noise of the motion sensor over its figure; all that was found, and samples discarded."""
     table, random, found = Table(), np.random.default_rng(1), 0
     for k in range(1500):
@@ -117,7 +113,7 @@ def noisy_table(times: float) -> tuple[Table, int, int]:
     return table, found, table.inbox.discarded
 
 
-def test_samples_that_noise_has_discarded_are_no_spikes() -> None:
+def test_samples_that_noise_has_discarded_are_no_spikes():
     _, found, discarded = noisy_table(12.0)
     assert discarded > 10  # without the noise these would be too many
     assert found & Finding.NOISE
@@ -125,7 +121,7 @@ def test_samples_that_noise_has_discarded_are_no_spikes() -> None:
     assert not noisy_table(1.0)[1] & (Finding.NOISE | Finding.SPIKES)
 
 
-def test_five_spikes_in_a_second_are_found() -> None:
+def test_five_spikes_in_a_second_are_found():
     table = Table()
     table.say_roll(0.0)
     for _ in range(5):
@@ -137,7 +133,7 @@ def test_five_spikes_in_a_second_are_found() -> None:
 
 
 @pytest.mark.parametrize("start_ns", [0, 10**13])
-def test_a_first_sample_that_waited_in_the_queue_is_no_drift(start_ns: int) -> None:
+def test_a_first_sample_that_waited_in_the_queue_is_no_drift(start_ns):
     table = Table(start_ns)
     roll_rad, found = 0.04, 0
     for tick in range(100):
@@ -149,7 +145,7 @@ def test_a_first_sample_that_waited_in_the_queue_is_no_drift(start_ns: int) -> N
     assert found == 0
 
 
-def test_gap_of_the_motion_sensor_is_no_drift() -> None:
+def test_gap_of_the_motion_sensor_is_no_drift():
     table = Table()
     table.say_roll(0.0)
     table.tick(1.0)
@@ -158,7 +154,7 @@ def test_gap_of_the_motion_sensor_is_no_drift() -> None:
     assert not table.tick(1.0) & ~Finding.SPIKES
 
 
-def moved(table: Table, ship: MovingShip, seconds: float, **seen: object) -> set[int]:
+def moved(table, ship, seconds, **seen):
     """What is found of a ship in motion, her inbox filled by hand."""
     found = 0
     for _ in range(round(seconds / TICK_S)):
@@ -179,7 +175,7 @@ ROLLING = MovingShip(math.radians(2.0), 5e3, noise=False)
 T = 10.7
 
 
-def gap(length_s: float, every_s: float = 4.0) -> Callable[[float], float]:
+def gap(length_s, every_s=4.0):
     """Age in ms of a sensor that is silent for so long each time."""
     return lambda time_s: max(1000 * (length_s - (-time_s) % every_s), 0.0)
 
@@ -187,25 +183,22 @@ def gap(length_s: float, every_s: float = 4.0) -> Callable[[float], float]:
 class Reversed(MovingShip):
     """Whose motion sensor has both signs, or that of the rate, wrong."""
 
-    def __init__(self, roll: float, rate: float) -> None:
+    def __init__(self, roll, rate):
         super().__init__(math.radians(2.0), 5e3, noise=False)
         self._signs = roll, rate
 
-    def roll_rad(self, t: float) -> float:
+    def roll_rad(self, t):
         return self._signs[0] * super().roll_rad(t)
 
-    def rate_rad_s(self, t: float) -> float:
+    def rate_rad_s(self, t):
         return self._signs[1] * super().rate_rad_s(t)
 
 
 @pytest.mark.evidence("signs0-16")
 @pytest.mark.parametrize(
-    ("signs", "found"),
-    [((-1, -1), Finding.WATER_SIGN), ((1, -1), Finding.DRIFT_LASTS)],
+    ("signs", "found"), [((-1, -1), Finding.WATER_SIGN), ((1, -1), Finding.DRIFT_LASTS)]
 )
-def test_water_that_was_seen_to_disobey_has_to_obey_anew(
-    signs: tuple[int, int], found: int
-) -> None:
+def test_water_that_was_seen_to_disobey_has_to_obey_anew(signs, found):
     table = Table()
     moved(table, ROLLING, 30.0)
     assert table.monitors.confirmed
@@ -220,16 +213,16 @@ def test_water_that_was_seen_to_disobey_has_to_obey_anew(
 class Fading(MovingShip):
     """Comes to rest slowly."""
 
-    def __init__(self, since_s: float) -> None:
+    def __init__(self, since_s):
         super().__init__(math.radians(2.0), 5e3, noise=False)
         self._since_s = since_s
 
-    def _at(self, phasor: complex, time_s: float, noise: float) -> float:
+    def _at(self, phasor, time_s, noise):
         return super()._at(phasor, time_s, noise) * math.exp((self._since_s - time_s) / 40.0)
 
 
 @pytest.mark.evidence
-def test_the_water_has_to_obey_before_it_counts_as_watched() -> None:
+def test_the_water_has_to_obey_before_it_counts_as_watched():
     table = Table()
     moved(table, ROLLING, 5.0)
     assert not table.monitors.confirmed  # the filters have not settled
@@ -254,7 +247,7 @@ def test_the_water_has_to_obey_before_it_counts_as_watched() -> None:
 )
 @pytest.mark.parametrize("age", ["motion_age_ms", "tank_age_ms", "pump_age_ms"])
 @pytest.mark.parametrize("length_s", [0.15, 0.3, 0.45])
-def test_short_gaps_keep_nothing_from_being_judged(age: str, length_s: float) -> None:
+def test_short_gaps_keep_nothing_from_being_judged(age, length_s):
     table = Table()
     assert not moved(table, ROLLING, 60.0, **{age: gap(length_s)})
     assert table.monitors.confirmed
@@ -264,7 +257,7 @@ def test_short_gaps_keep_nothing_from_being_judged(age: str, length_s: float) ->
 
 
 @pytest.mark.parametrize("age", ["motion_age_ms", "tank_age_ms", "pump_age_ms"])
-def test_long_gaps_that_keep_the_water_from_being_judged_are_found(age: str) -> None:
+def test_long_gaps_that_keep_the_water_from_being_judged_are_found(age):
     table = Table()
     moved(table, ROLLING, 12.0)
     assert table.monitors.confirmed
@@ -282,7 +275,7 @@ def test_long_gaps_that_keep_the_water_from_being_judged_are_found(age: str) -> 
 
 
 @pytest.mark.parametrize("every_s", [0.3, 0.9])
-def test_measurements_that_are_never_fresh_at_once_are_found_as_gaps(every_s: float) -> None:
+def test_measurements_that_are_never_fresh_at_once_are_found_as_gaps(every_s):
     table = Table()
     moved(table, ROLLING, 12.0)
     assert table.monitors.confirmed
@@ -298,7 +291,7 @@ def test_measurements_that_are_never_fresh_at_once_are_found_as_gaps(every_s: fl
     assert Finding.UNWATCHED_LONG in moved(table, ROLLING, 0.4 * T, **turns)
 
 
-def test_a_sensor_that_is_silent_for_good_is_not_a_gap() -> None:
+def test_a_sensor_that_is_silent_for_good_is_not_a_gap():
     table = Table()
     moved(table, ROLLING, 12.0)
     found = moved(table, ROLLING, 5 * T, tank_age_ms=lambda time_s: 1000 * (time_s - 12.0))
@@ -307,9 +300,7 @@ def test_a_sensor_that_is_silent_for_good_is_not_a_gap() -> None:
 
 @pytest.mark.parametrize("silent_s", [5.0, 60.0])
 @pytest.mark.parametrize("before_s", [0.02, 12.0])
-def test_sensors_that_come_or_come_back_after_a_silence_were_no_gap(
-    before_s: float, silent_s: float
-) -> None:
+def test_sensors_that_come_or_come_back_after_a_silence_were_no_gap(before_s, silent_s):
     table = Table()
     moved(table, ROLLING, before_s)
     known = table.monitors.confirmed
@@ -322,7 +313,7 @@ def test_sensors_that_come_or_come_back_after_a_silence_were_no_gap(
     assert table.monitors.confirmed
 
 
-def test_the_equation_of_a_small_model_runs_at_its_pace() -> None:
+def test_the_equation_of_a_small_model_runs_at_its_pace():
     tank = replace(VESSEL.tank, width_m=0.57, height_m=0.163, lz_m=0.061)
     assert tank.natural_frequency_rad_s > math.pi
     monitors = Monitors(DesignPlant(VESSEL.ship, tank), 0.35, SensorFigures(), 250_000)
@@ -335,7 +326,7 @@ def test_the_equation_of_a_small_model_runs_at_its_pace() -> None:
 
 
 @pytest.mark.parametrize("late_ticks", [1, 2, 4])
-def test_late_ticks_keep_nothing_from_being_judged(late_ticks: int) -> None:
+def test_late_ticks_keep_nothing_from_being_judged(late_ticks):
     table = Table()
     for _ in range(8):
         assert not moved(table, ROLLING, 2.0)
@@ -345,7 +336,7 @@ def test_late_ticks_keep_nothing_from_being_judged(late_ticks: int) -> None:
 
 @pytest.mark.parametrize("phase", range(5))
 @pytest.mark.parametrize("lost", [1, 3])
-def test_samples_that_are_lost_while_she_rolls_fast_are_no_drift(lost: int, phase: int) -> None:
+def test_samples_that_are_lost_while_she_rolls_fast_are_no_drift(lost, phase):
     """Rate and roll are those of the last sample: the roll has not moved since, nor turned."""
     table = Table()
     found = 0
@@ -359,7 +350,7 @@ def test_samples_that_are_lost_while_she_rolls_fast_are_no_drift(lost: int, phas
     assert not found & (Finding.DRIFT | Finding.NOISE)
 
 
-def test_everything_is_looked_at_in_a_round() -> None:
+def test_everything_is_looked_at_in_a_round():
     """Something wrong for each group is found within one round of ticks or the next."""
     table = Table()
     table.say_levels(0.5, 0.5)
@@ -371,7 +362,7 @@ def test_everything_is_looked_at_in_a_round() -> None:
         assert found & finding
 
 
-def test_the_levels_are_looked_at_every_50_ms() -> None:
+def test_the_levels_are_looked_at_every_50_ms():
     """Seven looks in the memory of their noise were too few: some noise was found after 2 s."""
     table, level_m = Table(), 0.05
     table.say_levels(0.0, 0.0)
@@ -385,7 +376,7 @@ def test_the_levels_are_looked_at_every_50_ms() -> None:
         assert table.monitors.volume.sum_m == pytest.approx(sum_m * (1 - 0.05 / 2.0))
 
 
-def test_frames_of_no_node_are_counted_and_those_of_the_catalogue_are_not() -> None:
+def test_frames_of_no_node_are_counted_and_those_of_the_catalogue_are_not():
     table = Table()
     foreign = min(set(range(100)) - CATALOGUE.can_ids)
     for can_id in (*CATALOGUE.can_ids, foreign):
@@ -393,7 +384,7 @@ def test_frames_of_no_node_are_counted_and_those_of_the_catalogue_are_not() -> N
     assert table.inbox.foreign == 1
 
 
-def test_twin_of_a_pump_at_rest_rolls_as_the_ship_does() -> None:
+def test_twin_of_a_pump_at_rest_rolls_as_the_ship_does():
     table = Table()
     for k in range(6000):
         table.values["roll_rad"] = 0.05 * np.sin(0.6 * TICK_S * k)
@@ -404,9 +395,7 @@ def test_twin_of_a_pump_at_rest_rolls_as_the_ship_does() -> None:
 
 
 @pytest.mark.parametrize(("share", "taken"), [(0.7, True), (0.6, False)])
-def test_a_ship_that_her_tank_would_capsize_leaves_the_configured_twin(
-    share: float, taken: bool
-) -> None:
+def test_a_ship_that_her_tank_would_capsize_leaves_the_configured_twin(share, taken):
     """Patti-B's free surface takes 0.64 of her stiffness."""
     patti = load_config(Path("configs/ships/patti_b.yaml"), Vessel)
     plant = DesignPlant(patti.ship, patti.tank)
@@ -414,18 +403,14 @@ def test_a_ship_that_her_tank_would_capsize_leaves_the_configured_twin(
     given: list[RollShip] = []
     monitors.twin.take = lambda ship, tank: given.append(ship)  # type: ignore[method-assign]
     ship = patti.ship.with_figures(
-        patti.ship.inertia_kg_m2,
-        share * patti.ship.stiffness_nm_rad,
-        patti.ship.damping_nms_rad,
+        patti.ship.inertia_kg_m2, share * patti.ship.stiffness_nm_rad, patti.ship.damping_nms_rad
     )
     monitors.follow(ShipFigures.of(ship))
     assert given == [ship if taken else patti.ship]
 
 
 @pytest.mark.parametrize("command_pa", [0.0, 5e3])
-def test_twin_of_a_pump_whose_pressure_sensor_is_silent_takes_the_command(
-    command_pa: float,
-) -> None:
+def test_twin_of_a_pump_whose_pressure_sensor_is_silent_takes_the_command(command_pa):
     """The last pressure measured stays in the inbox."""
     heard, silent = Table(), Table()
     for k in range(3000):
@@ -437,7 +422,7 @@ def test_twin_of_a_pump_whose_pressure_sensor_is_silent_takes_the_command(
     assert silent.monitors.twin.rms_rad == heard.monitors.twin.rms_rad
 
 
-def test_a_roll_that_is_not_measured_any_more_is_not_compared() -> None:
+def test_a_roll_that_is_not_measured_any_more_is_not_compared():
     """What was compared before is kept: gaps now and then hide no law that loses."""
     table = Table()
     twin = table.monitors.twin
@@ -453,7 +438,7 @@ def test_a_roll_that_is_not_measured_any_more_is_not_compared() -> None:
     assert math.isfinite(twin.share)
 
 
-def found_of(**changes: float) -> ModelSummary:
+def found_of(**changes):
     ship, tank = VESSEL.ship, VESSEL.tank
     found = ModelSummary(
         roll_period_s=10.0,
@@ -469,7 +454,7 @@ def found_of(**changes: float) -> ModelSummary:
     return replace(found, **changes)
 
 
-def test_twin_is_the_ship_that_the_law_in_charge_was_designed_for() -> None:
+def test_twin_is_the_ship_that_the_law_in_charge_was_designed_for():
     table, taken = Table(), []
     twin = table.monitors.twin
     twin.take = lambda ship, tank: taken.append((ship, tank))  # type: ignore[method-assign]
@@ -501,7 +486,7 @@ def test_twin_is_the_ship_that_the_law_in_charge_was_designed_for() -> None:
         {"tank_damping_ratio": float("nan")},
     ],
 )
-def test_a_ship_that_can_not_be_hers_leaves_the_configured_twin(nonsense: dict[str, float]) -> None:
+def test_a_ship_that_can_not_be_hers_leaves_the_configured_twin(nonsense):
     table, taken = Table(), []
     table.monitors.twin.take = lambda *pair: taken.append(pair)  # type: ignore[method-assign]
     table.monitors.follow(found_of(**nonsense))

@@ -1,7 +1,6 @@
 """The twin beside ships that were integrated without it."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,8 +10,6 @@ import scipy.signal
 
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.dynamics.linear import coupled_matrices
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
 from utank_hil.safety.passive_twin import (
     AMPLIFIED,
     DECAY_PERIODS,
@@ -27,7 +24,7 @@ PATTI = load_config(Path("configs/ships/patti_b.yaml"), Vessel)
 LEAST_RAD = math.radians(0.5)
 
 
-def motion(ship: RollShip, tank: Tank, moment_nm, pressure_pa, seconds: float):
+def motion(ship, tank, moment_nm, pressure_pa, seconds):
     """Roll, rate, level and its rate at every step, by fourth-order Runge-Kutta; shape (n, 4)."""
     mass, damping, stiffness = coupled_matrices(ship, tank)
     inverse = np.linalg.inv(mass)
@@ -63,9 +60,7 @@ def motion(ship: RollShip, tank: Tank, moment_nm, pressure_pa, seconds: float):
     [(FIRST, 2e7, 30e3), (PATTI, 8e3, 2e3)],
     ids=["linear", "quadratic damping and softening"],
 )
-def test_twin_rolls_as_the_passive_ship_in_the_same_waves(
-    vessel: Vessel, moment_nm: float, pressure_pa: float
-) -> None:
+def test_twin_rolls_as_the_passive_ship_in_the_same_waves(vessel, moment_nm, pressure_pa):
     ship = vessel.ship
     tank = replace(vessel.tank, quadratic_loss=0.5)
 
@@ -87,13 +82,7 @@ def test_twin_rolls_as_the_passive_ship_in_the_same_waves(
     assert np.abs(np.array(rolls) - passive[:, 0]).max() < 0.03 * scale
 
 
-def rolled(
-    own: float,
-    twin_too: float,
-    seconds: float,
-    excused: bool = False,
-    doubt: Callable[[float], bool] = lambda _: False,
-) -> list[tuple[float, bool]]:
+def rolled(own, twin_too, seconds, excused=False, doubt=lambda _: False):
     """Judgements over time of a ship that the pump rolls `own` and the waves `twin_too`."""
     ship, tank = FIRST.ship, FIRST.tank
     twin = PassiveTwin(ship, tank, STEP_S, LEAST_RAD)
@@ -118,14 +107,14 @@ def rolled(
 PERIOD_S = 2 * math.pi / FIRST.tank.natural_frequency_rad_s
 
 
-def test_law_that_rolls_the_ship_is_found_and_not_before_a_period() -> None:
+def test_law_that_rolls_the_ship_is_found_and_not_before_a_period():
     judged = rolled(0.1, 0.02, 40 * PERIOD_S)
     first = next(t for t, amplified in judged if amplified)
     assert LASTS_PERIODS * PERIOD_S <= first <= 12 * PERIOD_S
     assert judged[-1][1]
 
 
-def test_a_ratio_that_the_first_waves_may_give_counts_only_once_more_is_remembered() -> None:
+def test_a_ratio_that_the_first_waves_may_give_counts_only_once_more_is_remembered():
     little, much = (
         next(t for t, amplified in rolled(own_rad, 0.1, 40 * PERIOD_S) if amplified)
         for own_rad in (0.13, 0.3)  # 1.45 and 2.9 times the twin's roll in the end
@@ -134,25 +123,25 @@ def test_a_ratio_that_the_first_waves_may_give_counts_only_once_more_is_remember
     assert much < 8 * PERIOD_S
 
 
-def test_a_roll_that_is_in_doubt_now_and_then_hides_no_law_that_loses() -> None:
+def test_a_roll_that_is_in_doubt_now_and_then_hides_no_law_that_loses():
     judged = rolled(0.1, 0.02, 40 * PERIOD_S, doubt=lambda t: t % 10.0 < 5.0)
     first = next(t for t, amplified in judged if amplified)
     assert first <= 24 * PERIOD_S  # twice as long
     assert not any(amplified for t, amplified in judged if t % 10.0 < 5.0 and t < first)
 
 
-def test_a_roll_in_doubt_is_neither_judged_nor_remembered() -> None:
+def test_a_roll_in_doubt_is_neither_judged_nor_remembered():
     judged = rolled(0.1, 0.02, 40 * PERIOD_S, doubt=lambda t: t > 3 * PERIOD_S)
     assert not any(amplified for _, amplified in judged)
 
 
-def test_little_roll_waves_alone_and_roll_on_purpose_are_not_judged() -> None:
+def test_little_roll_waves_alone_and_roll_on_purpose_are_not_judged():
     assert not any(amplified for _, amplified in rolled(0.005, 0.0, 20 * PERIOD_S))
     assert not any(amplified for _, amplified in rolled(0.0, 0.1, 20 * PERIOD_S))
     assert not any(amplified for _, amplified in rolled(0.1, 0.0, 20 * PERIOD_S, excused=True))
 
 
-def test_loss_of_an_open_valve_slows_the_water_of_the_twin() -> None:
+def test_loss_of_an_open_valve_slows_the_water_of_the_twin():
     made = []
     for open_loss in (0.0, 50e3):
         twin = PassiveTwin(FIRST.ship, FIRST.tank, STEP_S, LEAST_RAD, open_loss)
@@ -164,7 +153,7 @@ def test_loss_of_an_open_valve_slows_the_water_of_the_twin() -> None:
     assert made[1] < 0.9 * made[0]
 
 
-def gz_table(points: int) -> RollShip:
+def gz_table(points):
     """Patti-B with her softening curve as a table of righting levers."""
     step_rad, displacement_n = math.radians(10.0), 2.366e6
     angle_rad = step_rad * np.arange(points)
@@ -177,9 +166,7 @@ def gz_table(points: int) -> RollShip:
 
 @pytest.mark.parametrize("ship", [PATTI.ship, gz_table(5), gz_table(8)], ids=["odd", "5", "8"])
 @pytest.mark.parametrize("pressure_pa", [3.3e3, -10e3, 20e3])
-def test_twin_that_capsizes_by_a_pressure_that_is_not_hers_begins_anew(
-    ship: RollShip, pressure_pa: float
-) -> None:
+def test_twin_that_capsizes_by_a_pressure_that_is_not_hers_begins_anew(ship, pressure_pa):
     twin = PassiveTwin(ship, PATTI.tank, STEP_S, LEAST_RAD)
     period_s = 2 * math.pi / PATTI.tank.natural_frequency_rad_s
     capsized = 0
@@ -195,7 +182,7 @@ def test_twin_that_capsizes_by_a_pressure_that_is_not_hers_begins_anew(
     assert twin.share == pytest.approx(1 / AMPLIFIED, rel=0.05)
 
 
-def made_by_pump(t: np.ndarray, phasor_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def made_by_pump(t, phasor_rad):
     """Pressure whose steady roll at 0.6 rad/s is `phasor_rad`, and the roll that it makes."""
     ship, tank, w = FIRST.ship, FIRST.tank, 0.6
     mass, damping, stiffness = coupled_matrices(ship, tank)
@@ -210,7 +197,7 @@ def made_by_pump(t: np.ndarray, phasor_rad: np.ndarray) -> tuple[np.ndarray, np.
     return pressure_pa, roll_rad
 
 
-def test_sound_law_is_kept_through_a_lull_and_given_up_if_it_goes_on() -> None:
+def test_sound_law_is_kept_through_a_lull_and_given_up_if_it_goes_on():
     begins_s, ends_s = 30 * PERIOD_S, 41 * PERIOD_S
     t = np.arange(0.0, 60 * PERIOD_S, STEP_S)
     # the pump halves the roll of the waves; in the lull it doubles them
@@ -225,7 +212,7 @@ def test_sound_law_is_kept_through_a_lull_and_given_up_if_it_goes_on() -> None:
     assert patient < ends_s < t[np.argmax(amplified)] < begins_s + 17 * PERIOD_S
 
 
-def test_a_law_that_halves_the_roll_is_kept_through_minutes_of_a_lull() -> None:
+def test_a_law_that_halves_the_roll_is_kept_through_minutes_of_a_lull():
     """As GPC on the day of the storm: over the first limit, its record below the passive roll."""
     begins_s = 60 * PERIOD_S
     t = np.arange(0.0, 75 * PERIOD_S, STEP_S)
@@ -241,7 +228,7 @@ def test_a_law_that_halves_the_roll_is_kept_through_minutes_of_a_lull() -> None:
 
 
 @pytest.mark.parametrize("room", [1.0, 1.1])
-def test_room_is_a_factor_on_the_ratios_at_which_a_law_has_lost(room: float) -> None:
+def test_room_is_a_factor_on_the_ratios_at_which_a_law_has_lost(room):
     t = np.arange(0.0, 60 * PERIOD_S, STEP_S)
     amplified = {}
     for more in (1.2, 1.3, 1.4):
@@ -254,7 +241,7 @@ def test_room_is_a_factor_on_the_ratios_at_which_a_law_has_lost(room: float) -> 
     assert amplified == {1.2: False, 1.3: room < 1.04, 1.4: True}
 
 
-def test_roll_that_was_made_on_purpose_is_forgotten_and_a_bad_law_after_it_is_found() -> None:
+def test_roll_that_was_made_on_purpose_is_forgotten_and_a_bad_law_after_it_is_found():
     ends_s, bad_s = 20 * PERIOD_S, 45 * PERIOD_S
     t = np.arange(0.0, 60 * PERIOD_S, STEP_S)
     waves_rad = 0.015 * np.sin(0.6 * t)
@@ -269,9 +256,7 @@ def test_roll_that_was_made_on_purpose_is_forgotten_and_a_bad_law_after_it_is_fo
 
 
 @pytest.mark.parametrize("after_periods", [-0.5, 0.0, 0.5, 1.0, 1.5, 2.0])
-def test_sound_law_is_kept_through_a_lull_after_roll_that_was_made_on_purpose(
-    after_periods: float,
-) -> None:
+def test_sound_law_is_kept_through_a_lull_after_roll_that_was_made_on_purpose(after_periods):
     """Of all that it did nothing but the lull is remembered."""
     ends_s, begins_s = 20 * PERIOD_S, (20 + DECAY_PERIODS + after_periods) * PERIOD_S
     t = np.arange(0.0, 40 * PERIOD_S, STEP_S)
@@ -288,7 +273,7 @@ def test_sound_law_is_kept_through_a_lull_after_roll_that_was_made_on_purpose(
     assert twin.share < 0.6  # it is judged
 
 
-def test_share_is_1_where_the_law_has_lost_and_unknown_where_nothing_is_judged() -> None:
+def test_share_is_1_where_the_law_has_lost_and_unknown_where_nothing_is_judged():
     t = np.arange(0.0, 40 * PERIOD_S, STEP_S)
     pressure_pa, made_rad = made_by_pump(t, np.full(len(t), 0.04))
     twin = PassiveTwin(FIRST.ship, FIRST.tank, STEP_S, LEAST_RAD)
@@ -304,7 +289,7 @@ def test_share_is_1_where_the_law_has_lost_and_unknown_where_nothing_is_judged()
     assert math.isnan(twin.share)
 
 
-def test_mean_squares_are_those_of_some_roll_periods() -> None:
+def test_mean_squares_are_those_of_some_roll_periods():
     twin = PassiveTwin(FIRST.ship, FIRST.tank, STEP_S, LEAST_RAD)
     for k in range(round(5 * MEMORY_PERIODS * PERIOD_S / STEP_S)):
         twin.update(0.1 + 0.05 * math.sin(0.6 * k * STEP_S), 0.0, 0.0, 0.0)
@@ -320,7 +305,7 @@ LOADED = replace(
 
 
 @pytest.mark.evidence
-def test_twin_of_a_loaded_ship_takes_over_without_a_bump_and_rolls_as_she_does() -> None:
+def test_twin_of_a_loaded_ship_takes_over_without_a_bump_and_rolls_as_she_does():
     def waves(t):
         return 2e7 * (math.sin(0.55 * t) + 0.7 * math.sin(0.8 * t + 1))
 

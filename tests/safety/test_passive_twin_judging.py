@@ -24,9 +24,7 @@ SHARE = 1 / (6 * UPDATES)
 RECORD_SHARE = 1 / (36 * UPDATES)
 
 
-def twin_of(
-    powers: tuple[float, float], record: tuple[float, float], least_rad: float = 0.01
-) -> PassiveTwin:
+def twin_of(powers, record, least_rad=0.01):
     """A twin that remembers these mean squares of the ship's roll and its own, in rad^2."""
     twin = PassiveTwin(FIRST.ship, FIRST.tank, STEP_S, least_rad)
     assert (twin.roll_rad, twin.amplified) == (0.0, False)
@@ -36,7 +34,7 @@ def twin_of(
     return twin
 
 
-def judged(twin: PassiveTwin, times: int) -> list[bool]:
+def judged(twin, times):
     """Judgements of mean squares that stay as they are."""
     found = []
     for _ in range(times):
@@ -46,9 +44,7 @@ def judged(twin: PassiveTwin, times: int) -> list[bool]:
 
 
 @pytest.mark.parametrize("mean_rad", [-0.2, 0.0, 0.3])
-def test_mean_squares_are_of_six_periods_and_of_36_about_the_mean_of_six(
-    mean_rad: float,
-) -> None:
+def test_mean_squares_are_of_six_periods_and_of_36_about_the_mean_of_six(mean_rad):
     twin = PassiveTwin(FIRST.ship, FIRST.tank, STEP_S, 0.01)
     mean = power = record = 0.0
     for k in range(8 * UPDATES):
@@ -70,8 +66,8 @@ def test_mean_squares_are_of_six_periods_and_of_36_about_the_mean_of_six(
     [(1.26, 1.11, True), (1.24, 1.11, False), (1.26, 1.09, False), (1.24, 1.09, False)],
 )
 def test_a_law_has_lost_by_a_quarter_over_six_periods_and_a_tenth_over_36(
-    ratio: float, record_ratio: float, found: bool
-) -> None:
+    ratio, record_ratio, found
+):
     twin = twin_of(((0.1 * ratio) ** 2, 0.01), ((0.1 * record_ratio) ** 2, 0.01))
     assert twin.share == pytest.approx(min(ratio / 1.25, record_ratio / 1.1))
     # longer than a quarter of a period
@@ -79,15 +75,13 @@ def test_a_law_has_lost_by_a_quarter_over_six_periods_and_a_tenth_over_36(
 
 
 @pytest.mark.parametrize(("ratio", "found"), [(1.61, True), (1.59, False)])
-def test_over_six_periods_a_law_loses_by_sixty_percent_whatever_its_record(
-    ratio: float, found: bool
-) -> None:
+def test_over_six_periods_a_law_loses_by_sixty_percent_whatever_its_record(ratio, found):
     twin = twin_of(((0.1 * ratio) ** 2, 0.01), (0.002, 0.01))
     assert twin.share == pytest.approx(ratio / 1.6)
     assert judged(twin, 18) == [False] * 15 + [found] * 3
 
 
-def test_once_found_it_is_over_at_a_twentieth_whatever_the_record() -> None:
+def test_once_found_it_is_over_at_a_twentieth_whatever_the_record():
     twin = twin_of((0.0256, 0.01), (0.0256, 0.01))
     assert judged(twin, 18)[-1]
     twin._record_power = 0.0
@@ -100,7 +94,7 @@ def test_once_found_it_is_over_at_a_twentieth_whatever_the_record() -> None:
     assert judged(twin, 18) == [False] * 15 + [True] * 3
 
 
-def test_at_the_start_twice_as_much_is_left_alone_and_less_from_period_to_period() -> None:
+def test_at_the_start_twice_as_much_is_left_alone_and_less_from_period_to_period():
     twin = twin_of((0.01, 0.01), (0.01, 0.01))
     twin._forget()
     assert (twin.ship_rms_rad, twin.rms_rad, twin._record_power) == (0.0, 0.0, 0.0)
@@ -115,7 +109,7 @@ def test_at_the_start_twice_as_much_is_left_alone_and_less_from_period_to_period
     assert found.index(True) + 200 == first_s + 15
 
 
-def test_little_roll_is_not_judged() -> None:
+def test_little_roll_is_not_judged():
     for least_rad, found in ((0.0999, True), (0.1, False), (0.12, False)):
         twin = twin_of((0.1**2, 0.05**2), (0.1**2, 0.05**2), least_rad)
         assert math.isnan(twin.share) is not found
@@ -123,7 +117,7 @@ def test_little_roll_is_not_judged() -> None:
     assert math.isnan(twin_of((0.01, 0.0), (0.01, 0.0)).share)
 
 
-def test_roll_on_purpose_is_forgotten_after_six_periods_and_judged_after_two_more() -> None:
+def test_roll_on_purpose_is_forgotten_after_six_periods_and_judged_after_two_more():
     twin = twin_of((0.04, 0.01), (0.04, 0.01))
     assert judged(twin, 20)[-1]
     twin.excuse()
@@ -151,7 +145,7 @@ TABLE = replace(
 )
 
 
-def test_righting_moment_is_that_of_the_ship_piece_by_piece_and_beyond() -> None:
+def test_righting_moment_is_that_of_the_ship_piece_by_piece_and_beyond():
     """Beyond the angle of vanishing stability, too, where it capsizes her."""
     softening = replace(FIRST.ship, restoring_odd_nm=(-3e9,))
     assert restoring(softening).moment_nm(0.9) < 0
@@ -165,13 +159,13 @@ def test_righting_moment_is_that_of_the_ship_piece_by_piece_and_beyond() -> None
 
 @given(st.floats(-0.5, 0.5), st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-0.3, 0.3))
 def test_the_moment_beside_the_linear_one_is_the_ships_less_the_twins(
-    roll_rad: float, rate_rad_s: float, made_rad: float, made_rad_s: float
-) -> None:
+    roll_rad, rate_rad_s, made_rad, made_rad_s
+):
     for ship in (replace(TABLE, quadratic_damping_nms2_rad2=3e9), TABLE):
         twin = PassiveTwin(ship, FIRST.tank, STEP_S, 0.01)
         twin._made[:2] = made_rad, made_rad_s
 
-        def beside(roll: float, rate: float, ship=ship) -> float:
+        def beside(roll, rate, ship=ship):
             damping_nm = ship.quadratic_damping_nms2_rad2 * abs(rate) * rate
             righting_nm = float(restoring(ship).moment_nm(roll))
             return -damping_nm - righting_nm + ship.stiffness_nm_rad * roll
@@ -188,9 +182,7 @@ def test_the_moment_beside_the_linear_one_is_the_ships_less_the_twins(
     [{}, {"quadratic_damping_nms2_rad2": 2e10}, {"restoring_odd_nm": (-1e9,)}],
     ids=["linear", "quadratic damping", "softening"],
 )
-def test_what_the_pump_has_made_obeys_the_equations_of_ship_and_tank(
-    way: int, changes: dict[str, object]
-) -> None:
+def test_what_the_pump_has_made_obeys_the_equations_of_ship_and_tank(way, changes):
     """Beside an ordinary solver, for a ship held at a heel in a steady flow of her water."""
     ship, tank = replace(FIRST.ship, **changes), replace(FIRST.tank, quadratic_loss=2.0)
     roll_rad, rate_rad_s, level_rate_m_s, pressure_pa = 0.2 * way, 0.15, 0.6 * way, 30e3

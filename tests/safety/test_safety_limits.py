@@ -35,7 +35,7 @@ LIMITS = {
 }
 
 
-def test_thresholds_are_those_of_the_safety_manual() -> None:
+def test_thresholds_are_those_of_the_safety_manual():
     assert dataclasses.asdict(SafetyLimits()) == {
         name: default for name, (default, _) in LIMITS.items()
     }
@@ -43,7 +43,7 @@ def test_thresholds_are_those_of_the_safety_manual() -> None:
 
 
 @pytest.mark.parametrize("name", LIMITS)
-def test_no_threshold_is_beyond_what_switches_a_protection_off(name: str) -> None:
+def test_no_threshold_is_beyond_what_switches_a_protection_off(name):
     most = LIMITS[name][1]
     least = 1 if name == "overruns_in_ten" else most * 1e-6
     for value in (least, most):
@@ -58,9 +58,7 @@ def test_no_threshold_is_beyond_what_switches_a_protection_off(name: str) -> Non
     ("name", "most"),
     [("roll_noise_rad", 2e-3), ("roll_rate_noise_rad_s", 1e-2), ("level_noise_m", 0.05)],
 )
-def test_no_noise_is_so_great_that_the_monitors_are_as_good_as_switched_off(
-    name: str, most: float
-) -> None:
+def test_no_noise_is_so_great_that_the_monitors_are_as_good_as_switched_off(name, most):
     """Degrees in the place of radians: a wrong sign of the rate took a minute to be found."""
     assert getattr(SensorFigures(**{name: most}), name) == most
     for value in (0, math.nextafter(most, math.inf), math.nan):

@@ -1,5 +1,4 @@
 import math
-from collections.abc import Callable
 from itertools import product
 
 import pytest
@@ -10,27 +9,27 @@ from situations import look, situation
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.safety import judging
-from utank_hil.safety.faults import FAULTS, Condition, Reaction
+from utank_hil.safety.faults import FAULTS, Reaction
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.safety_limits import SafetyLimits
-from utank_hil.safety.situation import MILLISECOND_NS, Demand, OwnState, Situation
+from utank_hil.safety.situation import MILLISECOND_NS, Demand, OwnState
 from utank_hil.safety.supervisor import Supervisor
 
 
 class Bench:
     """A supervisor with its own clock."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.supervisor = Supervisor(SafetyLimits())
         self.now_ns = 0
 
-    def tick(self, **changes: object) -> Supervisor:
+    def tick(self, **changes):
         look(self.supervisor, self.now_ns, **changes)
         self.now_ns += TICK_NS
         return self.supervisor
 
 
-def armed_bench() -> Bench:
+def armed_bench():
     bench = Bench()
     bench.tick()
     bench.tick(requested_mode=Mode.ACTIVE, armed=True, arm_edge=True)
@@ -96,7 +95,7 @@ SIGNS: list[tuple[Fault, Reaction, dict[str, object]]] = [
 DRIVE_OFF = (Fault.SIGN_FLIP, Fault.DRIVE_NOT_FOLLOWING, Fault.HARDWIRED_STOP)
 
 
-def conditions_in(seen: Situation, *reactions: Reaction) -> list[tuple[Fault, Condition]]:
+def conditions_in(seen, *reactions):
     """Conditions of these reactions that hold."""
     return [
         (row.code, condition)
@@ -106,7 +105,7 @@ def conditions_in(seen: Situation, *reactions: Reaction) -> list[tuple[Fault, Co
     ]
 
 
-def test_signs_are_those_of_the_table() -> None:
+def test_signs_are_those_of_the_table():
     ending = (Reaction.STOP, Reaction.RAMP)
     assert not conditions_in(situation(), *Reaction)
     found = []
@@ -120,9 +119,7 @@ def test_signs_are_those_of_the_table() -> None:
 
 
 @pytest.mark.parametrize(("fault", "reaction", "sign"), SIGNS)
-def test_fault_while_armed_ends_at_zero_and_stays_there(
-    fault: Fault, reaction: Reaction, sign: dict[str, object]
-) -> None:
+def test_fault_while_armed_ends_at_zero_and_stays_there(fault, reaction, sign):
     bench = armed_bench()
     supervisor = bench.tick(**{**ACTIVE, **sign})
     assert (supervisor.mode, supervisor.fault) == (Mode.FAULT, fault)
@@ -134,7 +131,7 @@ def test_fault_while_armed_ends_at_zero_and_stays_there(
     assert not supervisor.drive_wanted
 
 
-def test_faults_that_cut_the_pressure_are_named_before_those_that_ramp() -> None:
+def test_faults_that_cut_the_pressure_are_named_before_those_that_ramp():
     for ramp in (sign for _, reaction, sign in SIGNS if reaction is Reaction.RAMP):
         for fault, reaction, sign in SIGNS:
             if reaction is Reaction.STOP and not ramp.keys() & sign.keys():
@@ -153,7 +150,7 @@ INIT_SIGNS = [
 ]
 
 
-def test_start_waits_for_bus_sensors_drive_and_versions_and_names_them_in_this_order() -> None:
+def test_start_waits_for_bus_sensors_drive_and_versions_and_names_them_in_this_order():
     bench = Bench()
     missing = {key: value for _, sign in INIT_SIGNS for key, value in sign.items()}
     for fault, sign in INIT_SIGNS:
@@ -163,7 +160,7 @@ def test_start_waits_for_bus_sensors_drive_and_versions_and_names_them_in_this_o
     assert bench.tick(**missing).mode is Mode.STANDBY
 
 
-def test_motion_sensor_loss_is_at_zero_within_250_ms_of_the_first_sample_that_is_missing() -> None:
+def test_motion_sensor_loss_is_at_zero_within_250_ms_of_the_first_sample_that_is_missing():
     bench = armed_bench()
     last_sample_ns = bench.now_ns
     while bench.supervisor.demand is not Demand.ZERO:
@@ -171,7 +168,7 @@ def test_motion_sensor_loss_is_at_zero_within_250_ms_of_the_first_sample_that_is
     assert bench.now_ns - last_sample_ns <= 260 * MILLISECOND_NS
 
 
-def test_stop_fault_during_a_ramp_cuts_it_short() -> None:
+def test_stop_fault_during_a_ramp_cuts_it_short():
     bench = armed_bench()
     bench.tick(**{**ACTIVE, "roll_rad": 1.0})
     assert bench.supervisor.demand is Demand.RAMP
@@ -179,7 +176,7 @@ def test_stop_fault_during_a_ramp_cuts_it_short() -> None:
     assert bench.supervisor.demand is Demand.ZERO
 
 
-def test_drive_out_of_operation_enabled_stops_after_40_ms() -> None:
+def test_drive_out_of_operation_enabled_stops_after_40_ms():
     bench = armed_bench()
     out = {**ACTIVE, "drive_enabled": False}
     for _ in range(4):
@@ -200,8 +197,8 @@ def test_drive_out_of_operation_enabled_stops_after_40_ms() -> None:
     ],
 )
 def test_drive_that_keeps_leaving_operation_enabled_counts_as_out(
-    begins_ms: int, in_ms: int, out_ms: int, found_ms: int | None
-) -> None:
+    begins_ms, in_ms, out_ms, found_ms
+):
     bench = armed_bench()
     begin_ns = bench.now_ns
     while bench.supervisor.mode is Mode.ACTIVE and bench.now_ns < begin_ns + 20 * 10**9:
@@ -215,7 +212,7 @@ def test_drive_that_keeps_leaving_operation_enabled_counts_as_out(
         assert time_ms == found_ms
 
 
-def test_reset_needs_the_cause_gone_and_does_not_arm() -> None:
+def test_reset_needs_the_cause_gone_and_does_not_arm():
     bench = armed_bench()
     bench.tick(**{**ACTIVE, "link_lost": True})
     assert bench.tick(**ACTIVE, reset_edge=True, link_lost=True).mode is Mode.FAULT
@@ -225,9 +222,7 @@ def test_reset_needs_the_cause_gone_and_does_not_arm() -> None:
 
 
 @pytest.mark.parametrize(("fault", "reaction", "sign"), SIGNS)
-def test_reset_is_refused_with_its_reason_while_any_cause_lasts(
-    fault: Fault, reaction: Reaction, sign: dict[str, object]
-) -> None:
+def test_reset_is_refused_with_its_reason_while_any_cause_lasts(fault, reaction, sign):
     for first in ({"link_lost": True}, sign):
         bench = armed_bench()
         bench.tick(**{**ACTIVE, **first})
@@ -252,7 +247,7 @@ def test_reset_is_refused_with_its_reason_while_any_cause_lasts(
         assert supervisor.reset_refused_by is Fault.NONE
 
 
-def test_old_levels_that_only_halve_the_pressure_refuse_a_reset_too() -> None:
+def test_old_levels_that_only_halve_the_pressure_refuse_a_reset_too():
     bench = armed_bench()
     bench.tick(**{**ACTIVE, "link_lost": True})
     for _ in range(60):
@@ -261,7 +256,7 @@ def test_old_levels_that_only_halve_the_pressure_refuse_a_reset_too() -> None:
     assert bench.supervisor.fault is Fault.BUS_LOST
 
 
-def test_new_it_waits_with_the_pump_at_zero_and_the_drive_off() -> None:
+def test_new_it_waits_with_the_pump_at_zero_and_the_drive_off():
     supervisor = Supervisor(SafetyLimits())
     assert (supervisor.mode, supervisor.fault) == (Mode.INIT, Fault.NONE)
     assert supervisor.demand is Demand.ZERO
@@ -271,7 +266,7 @@ def test_new_it_waits_with_the_pump_at_zero_and_the_drive_off() -> None:
     assert supervisor.reset_refused_by is Fault.NONE
 
 
-def test_reset_waits_half_a_second_for_the_drive_to_leave_its_fault() -> None:
+def test_reset_waits_half_a_second_for_the_drive_to_leave_its_fault():
     for ticks, mode in ((49, Mode.STANDBY), (50, Mode.FAULT)):
         bench = armed_bench()
         bench.tick(**{**ACTIVE, "drive_fault": True})
@@ -281,14 +276,14 @@ def test_reset_waits_half_a_second_for_the_drive_to_leave_its_fault() -> None:
         assert bench.tick().mode is mode
 
 
-def test_a_drive_that_was_out_is_no_reason_to_refuse_the_reset() -> None:
+def test_a_drive_that_was_out_is_no_reason_to_refuse_the_reset():
     bench = armed_bench()
     bench.tick(**{**ACTIVE, "link_lost": True})
     assert bench.tick(drive_out_ms=50.0, reset_edge=True).mode is Mode.STANDBY
 
 
 @pytest.mark.parametrize(("age_ms", "mode"), [(600, Mode.PASSIVE), (601, Mode.STANDBY)])
-def test_passive_is_not_entered_on_an_old_order(age_ms: float, mode: Mode) -> None:
+def test_passive_is_not_entered_on_an_old_order(age_ms, mode):
     bench = Bench()
     bench.tick(motion_age_ms=STALE_MS)  # INIT
     bench.tick(requested_mode=Mode.PASSIVE, passive_edge=True, panel_age_ms=age_ms)
@@ -296,14 +291,14 @@ def test_passive_is_not_entered_on_an_old_order(age_ms: float, mode: Mode) -> No
     assert bench.supervisor.mode is mode
 
 
-def passive_bench() -> Bench:
+def passive_bench():
     bench = Bench()
     bench.tick()
     assert bench.tick(requested_mode=Mode.PASSIVE, passive_edge=True).mode is Mode.PASSIVE
     return bench
 
 
-def test_passive_is_entered_once_for_each_time_that_it_was_asked_for() -> None:
+def test_passive_is_entered_once_for_each_time_that_it_was_asked_for():
     bench = Bench()
     for _ in range(5):
         bench.tick(requested_mode=Mode.PASSIVE)
@@ -322,9 +317,7 @@ def test_passive_is_entered_once_for_each_time_that_it_was_asked_for() -> None:
 
 
 @pytest.mark.parametrize(("later_s", "mode"), [(1.99, Mode.PASSIVE), (2.0, Mode.STANDBY)])
-def test_passive_that_could_not_be_entered_for_long_is_to_be_asked_for_anew(
-    later_s: float, mode: Mode
-) -> None:
+def test_passive_that_could_not_be_entered_for_long_is_to_be_asked_for_anew(later_s, mode):
     """A drive that is powered up an hour later is not to be enabled by that."""
     bench = Bench()
     bench.tick(drive_age_ms=1e6, requested_mode=Mode.PASSIVE, passive_edge=True)
@@ -334,7 +327,7 @@ def test_passive_that_could_not_be_entered_for_long_is_to_be_asked_for_anew(
     assert bench.supervisor.mode is mode
 
 
-def test_passive_that_was_asked_for_meanwhile_is_entered_when_it_can_be() -> None:
+def test_passive_that_was_asked_for_meanwhile_is_entered_when_it_can_be():
     bench = Bench()
     bench.tick(motion_age_ms=STALE_MS, requested_mode=Mode.PASSIVE, passive_edge=True)
     assert bench.supervisor.mode is Mode.INIT
@@ -353,8 +346,8 @@ def test_passive_that_was_asked_for_meanwhile_is_entered_when_it_can_be() -> Non
 
 @pytest.mark.parametrize(("fault", "reaction", "sign"), SIGNS)
 def test_without_pressure_no_fault_is_latched_but_what_must_switch_the_drive_off(
-    fault: Fault, reaction: Reaction, sign: dict[str, object]
-) -> None:
+    fault, reaction, sign
+):
     supervisor = passive_bench().tick(requested_mode=Mode.PASSIVE, **sign)
     latched = fault in DRIVE_OFF and reaction is Reaction.STOP
     assert (supervisor.mode is Mode.FAULT) is latched
@@ -365,26 +358,26 @@ def test_without_pressure_no_fault_is_latched_but_what_must_switch_the_drive_off
     assert bench.tick(command_pa=1e4, **sign).mode is not Mode.FAULT
 
 
-def test_a_drive_that_was_out_before_arming_is_no_reason_to_refuse_it() -> None:
+def test_a_drive_that_was_out_before_arming_is_no_reason_to_refuse_it():
     bench = Bench()
     bench.tick()
     assert bench.tick(**ARMING, drive_out_ms=50.0).arming
 
 
-def test_a_disarming_in_the_tick_of_the_arm_edge_is_not_lost() -> None:
+def test_a_disarming_in_the_tick_of_the_arm_edge_is_not_lost():
     bench = Bench()
     bench.tick()
     assert not bench.tick(**{**ARMING, "armed": False}).arming
 
 
 @pytest.mark.parametrize("mode", [Mode.STANDBY, Mode.PASSIVE])
-def test_an_arm_edge_without_the_wish_to_be_active_does_not_arm(mode: Mode) -> None:
+def test_an_arm_edge_without_the_wish_to_be_active_does_not_arm(mode):
     for bench in (Bench(), passive_bench()):
         bench.tick()
         assert not bench.tick(requested_mode=mode, armed=True, arm_edge=True).arming
 
 
-def test_why_arming_was_refused_stays_to_be_read() -> None:
+def test_why_arming_was_refused_stays_to_be_read():
     bench = Bench()
     bench.tick()
     bench.tick(**ARMING, high_level=True)
@@ -394,13 +387,13 @@ def test_why_arming_was_refused_stays_to_be_read() -> None:
     assert bench.tick(**ACTIVE).fault is Fault.NONE
 
 
-def test_arm_bit_held_since_before_the_start_never_arms() -> None:
+def test_arm_bit_held_since_before_the_start_never_arms():
     bench = Bench()
     for _ in range(50):
         assert bench.tick(**ACTIVE).mode is not Mode.ACTIVE
 
 
-def test_arming_is_given_up_when_the_drive_does_not_enable() -> None:
+def test_arming_is_given_up_when_the_drive_does_not_enable():
     bench = Bench()
     bench.tick()
     bench.tick(requested_mode=Mode.ACTIVE, armed=True, arm_edge=True)
@@ -414,7 +407,7 @@ def test_arming_is_given_up_when_the_drive_does_not_enable() -> None:
     assert not bench.supervisor.drive_wanted
 
 
-def test_active_is_not_arming_any_more_and_forgets_why_it_was_refused_before() -> None:
+def test_active_is_not_arming_any_more_and_forgets_why_it_was_refused_before():
     bench = Bench()
     bench.tick()
     assert bench.tick(**ARMING, high_level=True).fault is Fault.LEVEL_LIMIT
@@ -426,9 +419,7 @@ def test_active_is_not_arming_any_more_and_forgets_why_it_was_refused_before() -
 
 
 @pytest.mark.parametrize("wish", [{"stop": True}, {"armed": False}])
-def test_what_ends_active_without_a_fault_leaves_neither_fault_nor_half_pressure(
-    wish: dict[str, object],
-) -> None:
+def test_what_ends_active_without_a_fault_leaves_neither_fault_nor_half_pressure(wish):
     bench = armed_bench()
     assert bench.tick(**ACTIVE, tank_age_ms=90).mode is Mode.ACTIVE
     assert bench.tick(**ACTIVE, tank_age_ms=150).degraded
@@ -437,7 +428,7 @@ def test_what_ends_active_without_a_fault_leaves_neither_fault_nor_half_pressure
     assert not supervisor.degraded
 
 
-def test_a_fault_after_a_reset_is_latched_like_the_first() -> None:
+def test_a_fault_after_a_reset_is_latched_like_the_first():
     bench = armed_bench()
     bench.tick(**{**ACTIVE, "link_lost": True})
     assert bench.tick(reset_edge=True).mode is Mode.STANDBY
@@ -448,7 +439,7 @@ def test_a_fault_after_a_reset_is_latched_like_the_first() -> None:
         assert bench.tick(**ACTIVE).mode is Mode.FAULT
 
 
-def test_a_fault_while_arming_during_the_ramp_ends_the_arming() -> None:
+def test_a_fault_while_arming_during_the_ramp_ends_the_arming():
     bench = disarmed_bench()
     assert bench.tick(**RAMPING, requested_mode=Mode.ACTIVE, armed=True, arm_edge=True).arming
     supervisor = bench.tick(**{**ACTIVE, **RAMPING, "drive_enabled": False, "link_lost": True})
@@ -456,7 +447,7 @@ def test_a_fault_while_arming_during_the_ramp_ends_the_arming() -> None:
     assert not supervisor.arming
 
 
-def test_a_drive_that_is_off_after_a_fault_counts_as_no_second_one() -> None:
+def test_a_drive_that_is_off_after_a_fault_counts_as_no_second_one():
     bench = armed_bench()
     bench.tick(**{**ACTIVE, "link_lost": True})
     for _ in range(10):
@@ -465,9 +456,7 @@ def test_a_drive_that_is_off_after_a_fault_counts_as_no_second_one() -> None:
 
 @pytest.mark.parametrize(("fault", "reaction", "sign"), SIGNS)
 @pytest.mark.parametrize("with_the_drive", [False, True])
-def test_whatever_ends_active_ends_arming(
-    fault: Fault, reaction: Reaction, sign: dict[str, object], with_the_drive: bool
-) -> None:
+def test_whatever_ends_active_ends_arming(fault, reaction, sign, with_the_drive):
     bench = Bench()
     bench.tick()
     bench.tick(requested_mode=Mode.ACTIVE, armed=True, arm_edge=True)
@@ -480,7 +469,7 @@ def test_whatever_ends_active_ends_arming(
         assert bench.tick(**ACTIVE).mode is not Mode.ACTIVE
 
 
-def test_arming_is_refused_without_a_commissioning_and_ends_when_it_is_missing() -> None:
+def test_arming_is_refused_without_a_commissioning_and_ends_when_it_is_missing():
     bench = Bench()
     bench.tick()
     supervisor = bench.tick(**ARMING, commissioned=OwnState().commissioned)
@@ -489,7 +478,7 @@ def test_arming_is_refused_without_a_commissioning_and_ends_when_it_is_missing()
     assert not supervisor.drive_wanted
 
 
-def test_a_panel_that_goes_silent_ends_arming_as_it_refuses_it() -> None:
+def test_a_panel_that_goes_silent_ends_arming_as_it_refuses_it():
     bench = Bench()
     bench.tick()
     bench.tick(requested_mode=Mode.ACTIVE, armed=True, arm_edge=True)
@@ -497,7 +486,7 @@ def test_a_panel_that_goes_silent_ends_arming_as_it_refuses_it() -> None:
     assert (supervisor.mode, supervisor.fault) == (Mode.STANDBY, Fault.OPERATOR_SILENT)
 
 
-def test_disarming_ramps_down_with_the_drive_enabled() -> None:
+def test_disarming_ramps_down_with_the_drive_enabled():
     bench = armed_bench()
     supervisor = bench.tick(requested_mode=Mode.ACTIVE, armed=False, drive_enabled=True)
     assert (supervisor.mode, supervisor.demand) == (Mode.PASSIVE, Demand.RAMP)
@@ -507,7 +496,7 @@ def test_disarming_ramps_down_with_the_drive_enabled() -> None:
 RAMPING = {"drive_enabled": True, "command_pa": 20e3}
 
 
-def disarmed_bench() -> Bench:
+def disarmed_bench():
     bench = armed_bench()
     supervisor = bench.tick(**{**ACTIVE, "command_pa": 20e3, "armed": False})
     assert (supervisor.mode, supervisor.demand) == (Mode.PASSIVE, Demand.RAMP)
@@ -515,9 +504,7 @@ def disarmed_bench() -> Bench:
 
 
 @pytest.mark.parametrize(("fault", "reaction", "sign"), SIGNS)
-def test_whatever_ends_active_is_latched_during_the_ramp_after_disarming(
-    fault: Fault, reaction: Reaction, sign: dict[str, object]
-) -> None:
+def test_whatever_ends_active_is_latched_during_the_ramp_after_disarming(fault, reaction, sign):
     bench = disarmed_bench()
     bench.tick(**RAMPING)
     supervisor = bench.tick(**{**RAMPING, **sign})
@@ -526,7 +513,7 @@ def test_whatever_ends_active_is_latched_during_the_ramp_after_disarming(
 
 
 @pytest.mark.parametrize("disarmed", [False, True])
-def test_a_stop_in_the_tick_of_a_fault_that_ramps_is_not_lost(disarmed: bool) -> None:
+def test_a_stop_in_the_tick_of_a_fault_that_ramps_is_not_lost(disarmed):
     bench = disarmed_bench() if disarmed else armed_bench()
     before = RAMPING if disarmed else ACTIVE
     bench.tick(**before)
@@ -536,7 +523,7 @@ def test_a_stop_in_the_tick_of_a_fault_that_ramps_is_not_lost(disarmed: bool) ->
     assert not supervisor.drive_wanted
 
 
-def test_drive_that_drops_out_during_the_ramp_after_disarming_is_found() -> None:
+def test_drive_that_drops_out_during_the_ramp_after_disarming_is_found():
     bench = disarmed_bench()
     for _ in range(5):
         assert bench.supervisor.mode is Mode.PASSIVE
@@ -546,9 +533,7 @@ def test_drive_that_drops_out_during_the_ramp_after_disarming_is_found() -> None
 
 @pytest.mark.parametrize("mode", [Mode.STANDBY, Mode.PASSIVE])
 @pytest.mark.parametrize("command_pa", [20e3, 1.0])
-def test_ramp_after_disarming_is_cut_after_a_second_and_leaves_the_drive_enabled(
-    mode: Mode, command_pa: float
-) -> None:
+def test_ramp_after_disarming_is_cut_after_a_second_and_leaves_the_drive_enabled(mode, command_pa):
     bench = disarmed_bench()
     began_ns = bench.now_ns - TICK_NS
     while bench.supervisor.demand is Demand.RAMP:
@@ -560,7 +545,7 @@ def test_ramp_after_disarming_is_cut_after_a_second_and_leaves_the_drive_enabled
     assert bench.supervisor.drive_wanted
 
 
-def test_drive_that_drops_out_during_the_ramp_of_a_fault_ends_it() -> None:
+def test_drive_that_drops_out_during_the_ramp_of_a_fault_ends_it():
     bench = armed_bench()
     bench.tick(**{**ACTIVE, "roll_rad": 1.0})
     for _ in range(4):
@@ -569,7 +554,7 @@ def test_drive_that_drops_out_during_the_ramp_of_a_fault_ends_it() -> None:
     assert bench.tick(command_pa=20e3).demand is Demand.ZERO
 
 
-def test_arming_during_the_ramp_takes_over_and_the_ramps_end_is_forgotten() -> None:
+def test_arming_during_the_ramp_takes_over_and_the_ramps_end_is_forgotten():
     bench = disarmed_bench()
     bench.tick(**{**ACTIVE, **RAMPING, "arm_edge": True})
     for _ in range(200):
@@ -579,7 +564,7 @@ def test_arming_during_the_ramp_takes_over_and_the_ramps_end_is_forgotten() -> N
     assert bench.tick(**{**ACTIVE, **RAMPING}).demand is Demand.RAMP
 
 
-def ends_within_ms(sign: dict[str, object]) -> int:
+def ends_within_ms(sign):
     """The shortest time to zero that the table asks for."""
     found = conditions_in(situation(**sign), Reaction.RAMP)
     return min(condition.zero_within_ms for _, condition in found)
@@ -592,17 +577,13 @@ ENDS = list({ends_within_ms(sign): sign for sign in RAMP_SIGNS}.values())
 
 @pytest.mark.parametrize("first", [*RAMP_SIGNS, "disarmed"])
 @pytest.mark.parametrize("first_lasts", [False, True])
-def test_a_ramp_ends_at_the_earliest_of_the_ends_that_run(
-    first: dict[str, object] | str, first_lasts: bool
-) -> None:
+def test_a_ramp_ends_at_the_earliest_of_the_ends_that_run(first, first_lasts):
     for second in ENDS:
         for later_ms in (10, 300, 900):
             check_two_ramps(first, second, later_ms, first_lasts)
 
 
-def check_two_ramps(
-    first: dict[str, object] | str, second: dict[str, object], later_ms: int, first_lasts: bool
-) -> None:
+def check_two_ramps(first, second, later_ms, first_lasts):
     if isinstance(first, str):
         bench, sign, first_within_ms = disarmed_bench(), {}, 1000
         began_ns = bench.now_ns - TICK_NS
@@ -624,14 +605,14 @@ def check_two_ramps(
 
 
 @pytest.mark.parametrize("bench", [armed_bench, disarmed_bench])
-def test_operators_stop_is_immediate(bench: Callable[[], Bench]) -> None:
+def test_operators_stop_is_immediate(bench):
     for wishes in (ACTIVE, RAMPING):
         supervisor = bench().tick(**wishes, stop=True)
         assert (supervisor.mode, supervisor.demand) == (Mode.STANDBY, Demand.ZERO)
         assert not supervisor.drive_wanted
 
 
-def test_operators_stop_ends_the_ramp_of_a_fault_at_once_and_leaves_the_fault() -> None:
+def test_operators_stop_ends_the_ramp_of_a_fault_at_once_and_leaves_the_fault():
     bench = armed_bench()
     bench.tick(**{**ACTIVE, "roll_rad": 1.0})
     assert bench.supervisor.demand is Demand.RAMP
@@ -640,7 +621,7 @@ def test_operators_stop_ends_the_ramp_of_a_fault_at_once_and_leaves_the_fault() 
     assert not supervisor.drive_wanted
 
 
-def test_stop_keeps_from_arming_and_ends_it() -> None:
+def test_stop_keeps_from_arming_and_ends_it():
     bench = Bench()
     bench.tick()
     assert not bench.tick(**ARMING, stop=True).arming
@@ -654,7 +635,7 @@ def test_stop_keeps_from_arming_and_ends_it() -> None:
     "withdrawn", [{"armed": False}, {"requested_mode": Mode.PASSIVE},
                   {"requested_mode": Mode.STANDBY}]
 )  # fmt: skip
-def test_arming_that_is_withdrawn_is_over(withdrawn: dict[str, object]) -> None:
+def test_arming_that_is_withdrawn_is_over(withdrawn):
     bench = Bench()
     bench.tick()
     bench.tick(**ARMING)
@@ -664,12 +645,12 @@ def test_arming_that_is_withdrawn_is_over(withdrawn: dict[str, object]) -> None:
 
 
 @pytest.mark.parametrize("mode", [Mode.PASSIVE, Mode.STANDBY])
-def test_another_mode_ends_active_though_the_arm_bit_is_set(mode: Mode) -> None:
+def test_another_mode_ends_active_though_the_arm_bit_is_set(mode):
     supervisor = armed_bench().tick(**{**ACTIVE, "requested_mode": mode})
     assert (supervisor.mode, supervisor.demand) == (Mode.PASSIVE, Demand.RAMP)
 
 
-def test_reset_during_a_ramp_is_refused_and_the_refusal_is_told() -> None:
+def test_reset_during_a_ramp_is_refused_and_the_refusal_is_told():
     bench = armed_bench()
     bench.tick(**{**ACTIVE, "roll_rad": 1.0})
     assert bench.tick(**RAMPING).reset_refused_by is Fault.NONE
@@ -684,9 +665,7 @@ def test_reset_during_a_ramp_is_refused_and_the_refusal_is_told() -> None:
 
 
 @pytest.mark.parametrize("sign", [{"tank_age_ms": 150}, {"pump_age_ms": 1001}])
-def test_what_is_awaited_and_does_not_end_active_does_not_cut_the_ramp_after_disarming(
-    sign: dict[str, float],
-) -> None:
+def test_what_is_awaited_and_does_not_end_active_does_not_cut_the_ramp_after_disarming(sign):
     bench = disarmed_bench()
     ends = bool(conditions_in(situation(**sign), Reaction.RAMP))
     for _ in range(20):
@@ -701,7 +680,7 @@ def test_what_is_awaited_and_does_not_end_active_does_not_cut_the_ramp_after_dis
 @pytest.mark.parametrize(
     "end", [{"armed": False}, {"requested_mode": Mode.STANDBY}, {"commissioned": False}]
 )
-def test_arming_that_ends_during_the_ramp_leaves_the_ramp(end: dict[str, object]) -> None:
+def test_arming_that_ends_during_the_ramp_leaves_the_ramp(end):
     bench = disarmed_bench()
     arming = {**RAMPING, "requested_mode": Mode.ACTIVE, "armed": True, "drive_enabled": False}
     assert bench.tick(**{**arming, "arm_edge": True}).arming
@@ -711,7 +690,7 @@ def test_arming_that_ends_during_the_ramp_leaves_the_ramp(end: dict[str, object]
     assert supervisor.drive_wanted
 
 
-def test_what_is_latched_or_refuses_is_raised_in_that_tick_alone() -> None:
+def test_what_is_latched_or_refuses_is_raised_in_that_tick_alone():
     bench = Bench()
     assert bench.tick().raised is Fault.NONE
     assert bench.tick(**ARMING, high_level=True).raised is Fault.LEVEL_LIMIT
@@ -732,9 +711,7 @@ def test_what_is_latched_or_refuses_is_raised_in_that_tick_alone() -> None:
 
 
 @pytest.mark.parametrize("roll_rad", [0.36, -0.36])
-def test_a_ship_that_rolls_beyond_her_limit_is_not_armed_as_she_passes_upright(
-    roll_rad: float,
-) -> None:
+def test_a_ship_that_rolls_beyond_her_limit_is_not_armed_as_she_passes_upright(roll_rad):
     bench = Bench()
     bench.tick(roll_rad=roll_rad)
     for _ in range(998):
@@ -747,7 +724,7 @@ def test_a_ship_that_rolls_beyond_her_limit_is_not_armed_as_she_passes_upright(
     assert bench.tick(**ARMING).arming
 
 
-def test_a_roll_beyond_the_limit_while_arming_ends_it() -> None:
+def test_a_roll_beyond_the_limit_while_arming_ends_it():
     bench = Bench()
     bench.tick()
     assert bench.tick(**ARMING).arming
@@ -758,14 +735,14 @@ def test_a_roll_beyond_the_limit_while_arming_ends_it() -> None:
 PASSIVE = {"requested_mode": Mode.PASSIVE}
 
 
-def out_ms(bench: Bench, **changes: object) -> float:
+def out_ms(bench, **changes):
     """What a tick in PASSIVE counts; the tick stays there."""
     supervisor = bench.tick(**PASSIVE, **changes)
     assert supervisor.mode is Mode.PASSIVE
     return supervisor.drive_out_ms
 
 
-def test_a_drive_in_passive_has_its_time_to_get_enabled_and_then_counts_as_out() -> None:
+def test_a_drive_in_passive_has_its_time_to_get_enabled_and_then_counts_as_out():
     bench = passive_bench()
     assert {out_ms(bench) for _ in range(199)} == {0.0}
     assert [out_ms(bench) for _ in range(5)] == [10.0, 20.0, 30.0, 40.0, 50.0]
@@ -773,14 +750,14 @@ def test_a_drive_in_passive_has_its_time_to_get_enabled_and_then_counts_as_out()
     assert out_ms(bench, drive_enabled=True) == 0.0
 
 
-def test_a_drive_that_leaves_in_passive_counts_as_out_from_then_on() -> None:
+def test_a_drive_that_leaves_in_passive_counts_as_out_from_then_on():
     bench = passive_bench()
     assert out_ms(bench, drive_enabled=True) == 0.0
     assert [out_ms(bench) for _ in range(3)] == [10.0, 20.0, 30.0]
     assert out_ms(bench, drive_enabled=True) == 0.0
 
 
-def test_a_drive_that_comes_and_goes_in_passive_counts_as_out() -> None:
+def test_a_drive_that_comes_and_goes_in_passive_counts_as_out():
     bench = passive_bench()
     out_ms(bench, drive_enabled=True)
     counted = [out_ms(bench, drive_enabled=tick % 2 == 1) for tick in range(12)]
@@ -789,13 +766,13 @@ def test_a_drive_that_comes_and_goes_in_passive_counts_as_out() -> None:
     assert counted[-1] > 40.0
 
 
-def test_a_drive_counts_as_out_in_passive_after_active_at_once() -> None:
+def test_a_drive_counts_as_out_in_passive_after_active_at_once():
     bench = armed_bench()
     bench.tick(**{**ACTIVE, **PASSIVE})
     assert [out_ms(bench) for _ in range(2)] == [10.0, 20.0]
 
 
-def test_a_drive_that_is_out_in_passive_may_be_armed() -> None:
+def test_a_drive_that_is_out_in_passive_may_be_armed():
     bench = passive_bench()
     out_ms(bench, drive_enabled=True)
     assert [out_ms(bench) for _ in range(5)][-1] == 50.0
@@ -803,7 +780,7 @@ def test_a_drive_that_is_out_in_passive_may_be_armed() -> None:
     assert bench.tick(**ACTIVE).mode is Mode.ACTIVE
 
 
-def test_elsewhere_it_is_off_as_it_should_be() -> None:
+def test_elsewhere_it_is_off_as_it_should_be():
     bench = passive_bench()
     out_ms(bench, drive_enabled=True)
     assert out_ms(bench) == 10.0
@@ -817,21 +794,21 @@ READY = {
 }  # fmt: skip
 
 
-def test_ready_up_to_every_threshold_and_not_beyond() -> None:
+def test_ready_up_to_every_threshold_and_not_beyond():
     assert Bench().tick(**READY).mode is Mode.STANDBY
     for name, age_ms in READY.items():
         assert Bench().tick(**{**READY, name: age_ms + 1}).mode is Mode.INIT, name
 
 
 @pytest.mark.parametrize("age", [{"tank_age_ms": 150}, {"pump_age_ms": 250}])
-def test_old_levels_and_pressures_first_halve_the_pressure(age: dict[str, float]) -> None:
+def test_old_levels_and_pressures_first_halve_the_pressure(age):
     bench = armed_bench()
     bench.tick(**ACTIVE, **age)
     assert bench.supervisor.degraded
     assert bench.supervisor.mode is Mode.ACTIVE
 
 
-def test_a_lost_panel_forbids_arming_at_once() -> None:
+def test_a_lost_panel_forbids_arming_at_once():
     bench = Bench()
     bench.tick()
     late = {**ACTIVE, "panel_age_ms": 700, "arm_edge": True}
@@ -887,7 +864,7 @@ histories = st.builds(
 
 @given(histories)
 @example([*WAY_IN[:2], {**ACTIVE, "high_level": True}])
-def test_control_only_while_armed_fresh_and_after_an_edge(history: list[dict[str, object]]) -> None:
+def test_control_only_while_armed_fresh_and_after_an_edge(history):
     supervisor = Supervisor(SafetyLimits())
     edge_since_disarmed = False
     for index, changes in enumerate(history):
@@ -909,7 +886,7 @@ WARNING = ("FRAMES_LOST", "NOISE", "SATURATED", "NODE_SILENT")
 
 
 @pytest.mark.parametrize("name", [name for name in vars(Finding) if name.isupper()])
-def test_each_finding_of_the_monitors_does_something(name: str) -> None:
+def test_each_finding_of_the_monitors_does_something(name):
     finding = getattr(Finding, name)
     bench = armed_bench()
     supervisor = bench.tick(**ACTIVE, found=finding)
@@ -919,7 +896,7 @@ def test_each_finding_of_the_monitors_does_something(name: str) -> None:
     assert bool(warned) is (name in WARNING)
 
 
-def test_everything_that_halves_is_named_and_nothing_else() -> None:
+def test_everything_that_halves_is_named_and_nothing_else():
     seen = situation(tank_age_ms=150.0, pump_age_ms=250.0, found=Finding.DRIFT)
     halving = judging.standing(seen, SafetyLimits()) & judging.HALVING
     assert judging.faults(halving) == {

@@ -1,8 +1,6 @@
 """Directional spectra of wave models and buoys: heights, directions, and the sea drawn of them."""
 
 import gzip
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,7 +21,7 @@ class Holder(Section):
     sea: ScenarioSea
 
 
-def written(folder: Path, mean_deg: float = 200.0, places: int = 1) -> Path:
+def written(folder, mean_deg=200.0, places=1):
     """Write spectra in the layout of WAVEWATCH III: 2.5 m from one side, cos^2s about it."""
     shape = np.exp(-(((FREQUENCY_HZ - 0.1) / 0.02) ** 2))
     around = np.cos(np.radians(DIRECTION_DEG - mean_deg) / 2) ** 20
@@ -47,7 +45,7 @@ def written(folder: Path, mean_deg: float = 200.0, places: int = 1) -> Path:
     return path
 
 
-def test_height_direction_and_missing_hours_are_those_of_the_file(tmp_path: Path) -> None:
+def test_height_direction_and_missing_hours_are_those_of_the_file(tmp_path):
     spectra = load_directional(written(tmp_path))
     assert len(spectra) == 1
     assert "2026-03-01T03:00:00 has no values" in spectra.notes[0]
@@ -57,7 +55,7 @@ def test_height_direction_and_missing_hours_are_those_of_the_file(tmp_path: Path
     np.testing.assert_allclose(spectrum.direction_from_deg, 200.0, atol=0.1)
 
 
-def changed(folder: Path, change: Callable[[xarray.Dataset], xarray.Dataset]) -> Path:
+def changed(folder, change):
     """Write the first spectrum of `written`, changed."""
     content = xarray.load_dataset(written(folder)).isel(time=[0])
     path = folder / "changed.nc"
@@ -66,7 +64,7 @@ def changed(folder: Path, change: Callable[[xarray.Dataset], xarray.Dataset]) ->
 
 
 @pytest.mark.parametrize("mean_deg", [200.0, 0.0])
-def test_a_sector_of_directions_has_its_own_energy_alone(tmp_path: Path, mean_deg: float) -> None:
+def test_a_sector_of_directions_has_its_own_energy_alone(tmp_path, mean_deg):
     whole = load_directional(written(tmp_path, mean_deg)).at("2026-03-01T00:00")
     content = xarray.load_dataset(tmp_path / "spectra.nc").isel(time=[0])
     apart = (content.direction - mean_deg) % 360 - 180  # it says where waves go
@@ -82,19 +80,19 @@ def test_a_sector_of_directions_has_its_own_energy_alone(tmp_path: Path, mean_de
     assert np.all(abs(np.degrees(ends)) < 21)
 
 
-def test_a_band_without_values_is_no_calm(tmp_path: Path) -> None:
+def test_a_band_without_values_is_no_calm(tmp_path):
     path = changed(tmp_path, lambda content: content.where(abs(content.frequency - 0.1) > 1e-6))
     with pytest.raises(ValueError, match=r"has no value at .*: choose another time"):
         load_directional(path)[0]
 
 
-def test_one_direction_is_no_spread(tmp_path: Path) -> None:
+def test_one_direction_is_no_spread(tmp_path):
     path = changed(tmp_path, lambda content: content.isel(direction=[3, 4]))
     with pytest.raises(ValueError, match="has 2 directions: a sector has three or more"):
         load_directional(path)
 
 
-def test_a_place_is_chosen_by_latitude_and_longitude(tmp_path: Path) -> None:
+def test_a_place_is_chosen_by_latitude_and_longitude(tmp_path):
     path = written(tmp_path, places=2)
     with pytest.raises(ValueError, match=r"holds 2 places: choose one .*\[60, 4\], \[61, 4\]"):
         load_directional(path)
@@ -104,7 +102,7 @@ def test_a_place_is_chosen_by_latitude_and_longitude(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("course_deg", [0.0, 110.0])
-def test_the_sea_has_the_spread_of_the_file(tmp_path: Path, course_deg: float) -> None:
+def test_the_sea_has_the_spread_of_the_file(tmp_path, course_deg):
     spectrum = load_directional(written(tmp_path)).at("2026-03-01T00:00")
     sea = Sea.irregular(spectrum, 1, heading_rad=spectrum.heading_rad(course_deg), components=4000)
     around = np.degrees(sea.heading_rad) - (200 + 180 - course_deg)
@@ -115,7 +113,7 @@ def test_the_sea_has_the_spread_of_the_file(tmp_path: Path, course_deg: float) -
     assert np.degrees(np.angle(vector)) == pytest.approx(0.0, abs=0.5)
 
 
-def scenario(folder: Path, **keys: object) -> ScenarioSea:
+def scenario(folder, **keys):
     import yaml
 
     content = {"kind": "measured", "file": "./spectra.nc", "time": "2026-03-01T00:00", **keys}
@@ -123,7 +121,7 @@ def scenario(folder: Path, **keys: object) -> ScenarioSea:
     return load_config(folder / "scenario.yaml", Holder).sea
 
 
-def test_a_scenario_takes_course_or_heading(tmp_path: Path) -> None:
+def test_a_scenario_takes_course_or_heading(tmp_path):
     written(tmp_path)
     short = scenario(tmp_path, course_deg=110.0).sea(1)
     assert np.std(short.heading_rad) > 0.2
@@ -147,7 +145,7 @@ def test_a_scenario_takes_course_or_heading(tmp_path: Path) -> None:
         ("a.txt", b"", "must be a file of"),
     ],
 )
-def test_a_file_that_is_none_is_named(tmp_path: Path, name: str, content: bytes, said: str) -> None:
+def test_a_file_that_is_none_is_named(tmp_path, name, content, said):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(ValueError, match=said):
         load_directional(tmp_path / name)
@@ -158,7 +156,7 @@ def test_a_file_that_is_none_is_named(tmp_path: Path, name: str, content: bytes,
     assert str(packed) in str(error.value)
 
 
-def test_a_packed_file_gives_the_same_sea(tmp_path: Path) -> None:
+def test_a_packed_file_gives_the_same_sea(tmp_path):
     whole = load_directional(written(tmp_path))
     packed = tmp_path / "spectra.nc.gz"
     packed.write_bytes(gzip.compress((tmp_path / "spectra.nc").read_bytes()))
@@ -187,9 +185,7 @@ def test_a_packed_file_gives_the_same_sea(tmp_path: Path) -> None:
         ("ww3station.spec", None, "2022-09-12T06:00", 1.142, 13.57, 114, 0.014),
     ],
 )
-def test_files_of_others_have_their_right_values(
-    name, place, time, hs_m, tp_s, mean_deg, within
-) -> None:
+def test_files_of_others_have_their_right_values(name, place, time, hs_m, tp_s, mean_deg, within):
     spectrum = load_directional(others_file(f"seas/{name}"), place).at(time)
     assert spectrum.hs_m == pytest.approx(hs_m, rel=within)
     assert spectrum.tp_s == pytest.approx(tp_s, abs=0.01)

@@ -8,11 +8,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from utank_hil.sea import ittc, jonswap, pierson_moskowitz
-from utank_hil.sea.spectrum import (
-    developed_peak_period_s,
-    ittc_density,
-    jonswap_density,
-)
+from utank_hil.sea.spectrum import developed_peak_period_s, ittc_density, jonswap_density
 
 heights = st.floats(0.1, 20.0)
 periods = st.floats(2.0, 25.0)

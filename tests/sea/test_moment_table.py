@@ -1,5 +1,4 @@
 import gzip
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ STIFFNESS = 4.8e8
 SLOPE = EffectiveSlope(0.6, depth_m=2.0, beam_m=15.0)
 
 
-def write(file: Path, omega: np.ndarray, heading_deg: np.ndarray) -> Path:
+def write(file, omega, heading_deg):
     """The effective slope as a table."""
     lines = ["omega_rad_s, heading_deg, moment_nm_per_m, phase_deg"]
     for w in omega:
@@ -23,7 +22,7 @@ def write(file: Path, omega: np.ndarray, heading_deg: np.ndarray) -> Path:
     return file
 
 
-def test_a_wave_from_starboard_heels_the_other_way(tmp_path: Path) -> None:
+def test_a_wave_from_starboard_heels_the_other_way(tmp_path):
     file = write(tmp_path / "table.csv", np.array([0.5, 1.0]), np.array([0.0, 90.0, 180.0]))
     table, omega = MomentTable.read(file), np.array([0.7])
     from_port, from_starboard = (table.moment(omega, np.array([side])) for side in (1.1, -1.1))
@@ -32,7 +31,7 @@ def test_a_wave_from_starboard_heels_the_other_way(tmp_path: Path) -> None:
 
 
 @pytest.mark.evidence
-def test_table_of_the_effective_slope_gives_its_moment_from_either_side(tmp_path: Path) -> None:
+def test_table_of_the_effective_slope_gives_its_moment_from_either_side(tmp_path):
     omega, heading = np.linspace(0.1, 9.0, 900), np.linspace(0, 180, 181)
     table = MomentTable.read(write(tmp_path / "table.csv", omega, heading))
     sea = Sea.irregular(jonswap(3.0, 9.0), 1, heading_rad=-1.1, spreading=8.0)
@@ -43,7 +42,7 @@ def test_table_of_the_effective_slope_gives_its_moment_from_either_side(tmp_path
     assert not table.moment(np.array([0.05, 9.1]), np.array([1.0, 1.0])).any()
 
 
-def test_rows_may_stand_in_any_order(tmp_path: Path) -> None:
+def test_rows_may_stand_in_any_order(tmp_path):
     file = write(tmp_path / "table.csv", np.array([0.5, 1.0]), np.array([0.0, 90.0, 180.0]))
     before = MomentTable.read(file)
     head, *rows = file.read_text().splitlines()
@@ -56,10 +55,7 @@ def test_rows_may_stand_in_any_order(tmp_path: Path) -> None:
     [
         (lambda text: text.replace("phase_deg", "phase"), "needs the columns omega_rad_s"),
         (lambda text: text.replace("0.5", "half"), "line 2, omega_rad_s: 'half' is no number"),
-        (
-            lambda text: text.replace("\n0.5,0.0,", "\n0.5,0.0\n", 1),
-            "line 2 has 2 fields",
-        ),
+        (lambda text: text.replace("\n0.5,0.0,", "\n0.5,0.0\n", 1), "line 2 has 2 fields"),
         (lambda text: text + "1.0,90.0,1.0,0.0\n", "once"),
         (lambda text: text.replace(",180.0,", ",170.0,"), "headings from 0 to 180"),
         (lambda text: text.replace("\n0.5", "\nnan", 1), "finite"),
@@ -67,7 +63,7 @@ def test_rows_may_stand_in_any_order(tmp_path: Path) -> None:
         (lambda text: "\n".join(text.splitlines()[:2]), "two or more frequencies"),
     ],
 )
-def test_what_is_wrong_with_a_table_is_said(tmp_path: Path, change, reason: str) -> None:
+def test_what_is_wrong_with_a_table_is_said(tmp_path, change, reason):
     file = write(tmp_path / "table.csv", np.array([0.5, 1.0]), np.array([0.0, 90.0, 180.0]))
     file.write_text(change(file.read_text()))
     with pytest.raises(ValueError, match=reason):
@@ -75,7 +71,7 @@ def test_what_is_wrong_with_a_table_is_said(tmp_path: Path, change, reason: str)
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
-def test_a_table_is_read_as_any_other(tmp_path: Path, separator: str) -> None:
+def test_a_table_is_read_as_any_other(tmp_path, separator):
     file = write(tmp_path / "table.csv", np.array([0.5, 1.0]), np.array([0.0, 90.0, 180.0]))
     before = MomentTable.read(file)
     text = "\ufeff" + file.read_text().replace(",", separator).replace("\n", "\r\n")
@@ -84,6 +80,6 @@ def test_a_table_is_read_as_any_other(tmp_path: Path, separator: str) -> None:
     np.testing.assert_array_equal(other.moment_nm_per_m, before.moment_nm_per_m)
 
 
-def test_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_file_that_is_not_there_is_named(tmp_path):
     with pytest.raises(ValueError, match=r"missing\.csv can't be read"):
         MomentTable.read(tmp_path / "missing.csv")

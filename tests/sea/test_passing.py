@@ -7,11 +7,11 @@ from utank_hil.sea.sea import PassingSea
 YOUNG, OLD = jonswap(1.5, 6.0), jonswap(4.0, 11.0)
 
 
-def drawn(seed: int, **sizes: int) -> PassingSea:
+def drawn(seed, **sizes):
     return PassingSea.drawn([100.0, 500.0], [YOUNG, OLD], seed, heading_rad=[0.2, 1.4], **sizes)
 
 
-def test_sea_of_one_spectrum_is_the_sea_that_is_drawn_from_it() -> None:
+def test_sea_of_one_spectrum_is_the_sea_that_is_drawn_from_it():
     alone = Sea.irregular(OLD, 3, heading_rad=0.7, spreading=10.0)
     passing = PassingSea.drawn([0.0], [OLD], 3, heading_rad=[0.7], spreading=10.0)
     for sea in (passing, PassingSea.of(alone)):
@@ -24,7 +24,7 @@ def test_sea_of_one_spectrum_is_the_sea_that_is_drawn_from_it() -> None:
 @pytest.mark.parametrize(
     ("time_s", "share"), [(0.0, 0.0), (100.0, 0.0), (200.0, 0.25), (500.0, 1.0), (1e5, 1.0)]
 )
-def test_variance_passes_linearly_between_spectra(time_s: float, share: float) -> None:
+def test_variance_passes_linearly_between_spectra(time_s, share):
     amplitude_m, heading_rad = drawn(1).at(time_s)
     expected = (1 - share) * YOUNG.moment(0) + share * OLD.moment(0)
     assert (amplitude_m**2).sum() / 2 == pytest.approx(expected, rel=1e-9)
@@ -36,7 +36,7 @@ def test_variance_passes_linearly_between_spectra(time_s: float, share: float) -
         assert heading_rad.max() <= 1.4 + 1e-9
 
 
-def test_mean_over_seeds_has_each_spectrum_and_the_one_in_between() -> None:
+def test_mean_over_seeds_has_each_spectrum_and_the_one_in_between():
     edges = np.linspace(0.3, 2.4, 8)
     for time_s, share in ((100.0, 0.0), (300.0, 0.5), (500.0, 1.0)):
         found = np.zeros(len(edges) - 1)

@@ -9,7 +9,7 @@ from utank_hil.sea.spectrum import jonswap_density
 OMEGA = np.arange(0.1, 2.5, 0.01)
 
 
-def slope_of(hs_m: float, tp_s: float, coefficient: float) -> SlopeSpectrum:
+def slope_of(hs_m, tp_s, coefficient):
     """JONSWAP on the beam, by the moment that the ship's model of waves gives."""
     moment = np.abs(EffectiveSlope(coefficient).moment(OMEGA, np.full(OMEGA.size, np.pi / 2), 1.0))
     return SlopeSpectrum(OMEGA, jonswap_density(OMEGA, hs_m, tp_s) * moment**2)

@@ -18,7 +18,7 @@ NDBC_BANDS = (
 )
 
 
-def ndbc_table() -> tuple[np.ndarray, np.ndarray]:
+def ndbc_table():
     centres, widths = [], []
     for first, last, width in NDBC_BANDS:
         count = round((last - first) / width) + 1

@@ -163,13 +163,9 @@ def test_direct_paths_that_leave_the_command_undetermined_are_an_error():
 
 
 @pytest.mark.parametrize(
-    "design",
-    [None, GPC_ROLL, DPC_ROLL_LEVEL, LQG_ROLL_RATE_LEVEL],
-    ids=["pd", "gpc", "dpc", "lqg"],
+    "design", [None, GPC_ROLL, DPC_ROLL_LEVEL, LQG_ROLL_RATE_LEVEL], ids=["pd", "gpc", "dpc", "lqg"]
 )
-def test_laws_without_a_direct_path_have_the_eigenvalues_of_the_plain_form_bit_for_bit(
-    design,
-):
+def test_laws_without_a_direct_path_have_the_eigenvalues_of_the_plain_form_bit_for_bit(design):
     law, measured = design_pd(SHIP, TANK), ("level_m", "level_rate_m_s")
     if design is not None:
         law, measured = design.law(DesignPlant(SHIP, TANK)), design.predictor.measured

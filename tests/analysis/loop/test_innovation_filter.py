@@ -14,7 +14,7 @@ from utank_hil.analysis.loop.innovation_filter import (
     mean_positive_product,
 )
 from utank_hil.analysis.loop.margins import GAINS, closed_loop_radius, ship_variants
-from utank_hil.analysis.loop.self_tuning import SelfTuned, self_tuned
+from utank_hil.analysis.loop.self_tuning import self_tuned
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control.constrained.design import ConstrainedDesign, sea_plant
 from utank_hil.control.sea_model import SeaModel
@@ -31,7 +31,7 @@ WEIGHTS = (1.0, 3e-5, 2.6e-4)
 
 
 @functools.cache
-def problem() -> InnovationFilter:
+def problem():
     return InnovationFilter(LAW, DESIGN, PLANT, WEIGHTS)
 
 
@@ -47,12 +47,7 @@ def covariance(law):
     n = len(whole.A)
     noise[:n, :n] = process
     noise[n:, n:] = b @ np.diag(np.square(DESIGN.measurement_std)) @ b.T
-    out = np.vstack(
-        [
-            np.hstack([whole.C, whole.D @ c]),
-            np.hstack([np.zeros((1, n)), c]),
-        ]
-    )
+    out = np.vstack([np.hstack([whole.C, whole.D @ c]), np.hstack([np.zeros((1, n)), c])])
     return out @ solve_discrete_lyapunov(closed, noise) @ out.T
 
 
@@ -117,8 +112,8 @@ def test_within_limits_a_law_that_follows_commands_what_the_linear_one_does():
 def test_inputs_changed_in_the_twelfth_digit_do_not_move_the_design():
     rng = np.random.default_rng(4)
 
-    def designed(size: float) -> SelfTuned:
-        def changed(x: float) -> float:
+    def designed(size):
+        def changed(x):
             return x * (1 + size * rng.uniform(-1, 1))
 
         ship = dataclasses.replace(

@@ -113,13 +113,13 @@ def test_scaling_all_weights_of_an_lqg_law_scales_its_state_weight():
     )
 
 
-def test_a_constrained_law_is_scaled_by_its_pressure_weight() -> None:
+def test_a_constrained_law_is_scaled_by_its_pressure_weight():
     design = ConstrainedDesign("constrained_gpc", SEA)
     assert varied(design) == "output weight"
     assert scaled(design, 4.0).pressure_weight_rad2 == design.pressure_weight_rad2 / 4
 
 
-def written(folder: Path, law: str) -> Path:
+def written(folder, law):
     path = folder / "law.yaml"
     ship = CONTROLLERS.parent / "ships" / "thesis_first.yaml"
     path.write_text(f"name: any\nvessel: {ship}\nlaw: {law}\n")

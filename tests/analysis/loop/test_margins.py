@@ -5,11 +5,7 @@ import numpy as np
 import pytest
 
 from tools.thesis.linear_contest import PRINTED_ARX
-from utank_hil.analysis.loop.margins import (
-    closed_loop_radius,
-    loop_response,
-    margins,
-)
+from utank_hil.analysis.loop.margins import closed_loop_radius, loop_response, margins
 from utank_hil.control import ARX, PredictiveLaw, design_dpc, design_gpc, pump_model
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.sampling import LinearModel, sample
@@ -19,13 +15,13 @@ TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 ROLL = pump_model(SHIP, TANK, ("roll_rad",))
 
 
-def roll_law() -> PredictiveLaw:
+def roll_law():
     plant = sample(ROLL, 0.2, 0.05, 0.1)
     arx = ARX.from_state_space(control.ss(*plant), 8)
     return design_gpc(arx, 50, 50, 1e14)
 
 
-def proportional(gain: float, sample_time_s: float = 0.1) -> PredictiveLaw:
+def proportional(gain, sample_time_s=0.1):
     shape = (1, 1, 1)
     return PredictiveLaw(np.zeros(shape), np.full(shape, -gain), np.zeros(shape), sample_time_s)
 

@@ -68,7 +68,7 @@ def test_what_is_not_a_number_is_no_margin(field):
         assert dataclasses.replace(found, nominal=nominal).failures()
 
 
-def radii(law: GainLaw, **scales: float) -> float:
+def radii(law, **scales):
     """Greatest radius over the pump's gains with a number of the ship scaled."""
     ship = dataclasses.replace(SHIP, **{n: v * getattr(SHIP, n) for n, v in scales.items()})
     plant = sample(pump_model(ship, TANK, STATES), law.sample_time_s, 0.05, 0.1)

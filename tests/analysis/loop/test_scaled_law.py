@@ -3,13 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from utank_hil.analysis.loop.linear_tuning import (
-    STEP,
-    LinearKind,
-    NoLawError,
-    first_law,
-    scaled_law,
-)
+from utank_hil.analysis.loop.linear_tuning import STEP, NoLawError, first_law, scaled_law
 from utank_hil.analysis.loop.margins import robustness
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import DesignPlant, PumpLimits
@@ -22,7 +16,7 @@ assert isinstance(LAW, LQGDesign)
 SLOPE, PEAK = LAW.predictor.wave_slope_rad, LAW.predictor.wave_peak_rad_s
 
 
-def froude(plant: DesignPlant, scale: float) -> DesignPlant:
+def froude(plant, scale):
     """The same ship, all lengths multiplied: time by the root, mass by the cube, g the same."""
     ship, tank, limits, time = plant.ship, plant.tank, plant.limits, scale**0.5
     return DesignPlant(
@@ -48,7 +42,7 @@ def froude(plant: DesignPlant, scale: float) -> DesignPlant:
     )
 
 
-def test_the_first_ship_has_the_shipped_law() -> None:
+def test_the_first_ship_has_the_shipped_law():
     found = scaled_law("lqg", SHIPPED.plant, SLOPE, PEAK)
     assert found.state_weight == pytest.approx(LAW.state_weight, rel=0.01)
     assert found.washout_rad_s == pytest.approx(LAW.washout_rad_s)
@@ -61,9 +55,7 @@ def test_the_first_ship_has_the_shipped_law() -> None:
 
 
 @pytest.mark.parametrize("kind", ["gpc", "dpc"])
-def test_the_first_ship_has_the_other_shipped_laws_but_for_their_wave_peaks(
-    kind: LinearKind,
-) -> None:
+def test_the_first_ship_has_the_other_shipped_laws_but_for_their_wave_peaks(kind):
     shipped = load_config(Path(f"configs/controllers/{kind}.yaml"), ControllerConfig)
     law = shipped.law
     assert isinstance(law, PredictiveDesign)
@@ -79,7 +71,7 @@ def test_the_first_ship_has_the_other_shipped_laws_but_for_their_wave_peaks(
 
 
 @pytest.mark.parametrize("scale", [0.25, 4.0])
-def test_a_ship_of_another_size_has_the_same_loop(scale: float) -> None:
+def test_a_ship_of_another_size_has_the_same_loop(scale):
     """Froude similarity: nothing dimensionless of the loop depends on the size."""
     own = scaled_law("lqg", SHIPPED.plant, SLOPE, PEAK)
     larger = froude(SHIPPED.plant, scale)
@@ -92,7 +84,7 @@ def test_a_ship_of_another_size_has_the_same_loop(scale: float) -> None:
     assert theirs.radius == pytest.approx(mine.radius, abs=1e-3)
 
 
-def test_a_refused_law_is_asked_for_less_and_no_less_than_it_must() -> None:
+def test_a_refused_law_is_asked_for_less_and_no_less_than_it_must():
     # a ship of little damping and a pump with much more than the water needs
     plant = SHIPPED.plant
     strong = dataclasses.replace(plant, limits=PumpLimits(300e3, 600e3, 3.85))
@@ -104,7 +96,7 @@ def test_a_refused_law_is_asked_for_less_and_no_less_than_it_must() -> None:
         assert bool(judged.failures()) is fails
 
 
-def test_that_no_law_is_robust_enough_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_that_no_law_is_robust_enough_is_said(monkeypatch):
     monkeypatch.setattr("utank_hil.analysis.loop.linear_tuning.MOST_TRIALS", 1)
     strong = dataclasses.replace(SHIPPED.plant, limits=PumpLimits(300e3, 600e3, 3.85))
     with pytest.raises(NoLawError, match="the gentlest one is"):

@@ -11,15 +11,9 @@ import pytest
 from utank_hil.analysis.loop.innovation_filter import InnovationFilter
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.analysis.loop.margins import closed_loop_radius, of_period, robustness
-from utank_hil.analysis.loop.sea_response import (
-    at_its_motion,
-    at_work,
-    moment_of,
-    motion_in_sea,
-)
+from utank_hil.analysis.loop.sea_response import at_its_motion, at_work, moment_of, motion_in_sea
 from utank_hil.analysis.loop.self_tuning import (
     NoLawError,
-    SelfTuned,
     SelfTunedDesign,
     passive_roll_rad,
     self_tuned,
@@ -28,7 +22,6 @@ from utank_hil.analysis.loop.self_tuning import (
 from utank_hil.assembly import build_law
 from utank_hil.base.tick import TICK_S
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.control.interface import DesignPlant
 from utank_hil.control.lqg import LQGLaw
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import pump_model
@@ -46,7 +39,7 @@ BOAT_SEA = SeaModel(tuple(BOAT_SPECTRUM.frequency_hz), tuple(BOAT_SPECTRUM.densi
 
 
 @functools.cache
-def tuned(power_w: float = float("inf")) -> SelfTuned:
+def tuned(power_w=float("inf")):
     return self_tuned(PLANT, SEA, mean_power_w=power_w)
 
 
@@ -104,7 +97,7 @@ def test_a_power_budget_is_kept_and_costs_roll():
 def test_the_first_law_within_the_power_budget_is_taken(monkeypatch):
     found = tuned()
 
-    def best(_: object, costlier: float) -> SelfTuned:
+    def best(_, costlier):
         return replace(found, prediction=replace(found.prediction, power_w=1e4 / costlier))
 
     monkeypatch.setattr("utank_hil.analysis.loop.self_tuning._Search.best", best)
@@ -126,7 +119,7 @@ def test_another_ship_gets_a_law_with_all_margins_too():
 
 
 @functools.cache
-def patti_b() -> tuple[DesignPlant, SelfTuned]:
+def patti_b():
     plant = load_config(CONTROLLERS / "patti_b_constrained_gpc.yaml", ControllerConfig).plant
     return plant, SelfTunedDesign("self_tuned", BOAT_SEA).tuned(plant)
 
@@ -197,7 +190,7 @@ def test_a_file_names_a_sea_or_none(tmp_path):
 
 
 def test_a_first_law_keeps_its_damping_on_other_loads_with_the_pump_at_its_limit():
-    def radius(law: LQGLaw) -> float:
+    def radius(law):
         found = []
         for scale, share in itertools.product((0.85, 1.15, 1.3), (0.2, 0.4, 0.7, 1.0)):
             plant = replace(PLANT, ship=of_period(PLANT.ship, scale))

@@ -14,7 +14,6 @@ from utank_hil.analysis.loop.linear_tuning import AutoDesign
 from utank_hil.analysis.loop.sea_response import motion_in_sea
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign, unknown_sea
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.control.interface import DesignPlant
 from utank_hil.sea import Harmonics
 
 QUICK = (
@@ -43,7 +42,7 @@ def changed(value, rng):
     )  # fmt: skip
 
 
-def gains_and_roll(design, plant: DesignPlant, *, renews: bool):
+def gains_and_roll(design, plant, *, renews):
     """Gains of the linear law, and its roll in the broad sea of an unknown one."""
     starts = renews and isinstance(design, SelfTunedDesign)
     law = design.first(plant) if starts else design.build(plant)
@@ -57,7 +56,7 @@ def gains_and_roll(design, plant: DesignPlant, *, renews: bool):
     return gains or list(linear.matrices()[:4]), moved.roll_rms_rad
 
 
-def assert_stands(design, config: ControllerConfig, seeds: int) -> None:
+def assert_stands(design, config, seeds):
     gains, roll = gains_and_roll(design, config.plant, renews=config.renews)
     for seed in range(seeds):
         rng, plant = np.random.default_rng(seed), config.plant
@@ -71,18 +70,18 @@ def assert_stands(design, config: ControllerConfig, seeds: int) -> None:
         assert roll_too == pytest.approx(roll, rel=1e-9)
 
 
-def config_of(name: str) -> ControllerConfig:
+def config_of(name):
     return load_config(Path("configs/controllers") / f"{name}.yaml", ControllerConfig)
 
 
 @pytest.mark.parametrize("name", QUICK)
-def test_a_law_without_a_long_search_stands(name: str) -> None:
+def test_a_law_without_a_long_search_stands(name):
     config = config_of(name)
     assert_stands(config.law, config, seeds=3)
 
 
 @pytest.mark.parametrize(("ship", "kind"), BY_SHIP)
-def test_each_kind_stands_on_every_ship(ship: str, kind: str) -> None:
+def test_each_kind_stands_on_every_ship(ship, kind):
     """Patti-B's spring is a small difference of large numbers."""
     designs = {"pd": config_of("pd").law, "self_tuned": SelfTunedDesign("self_tuned")}
     assert_stands(designs.get(kind) or AutoDesign(kind, "auto"), config_of(ship), seeds=1)
@@ -90,6 +89,6 @@ def test_each_kind_stands_on_every_ship(ship: str, kind: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SEARCHED)
-def test_a_law_that_is_searched_for_stands(name: str) -> None:
+def test_a_law_that_is_searched_for_stands(name):
     config = config_of(name)
     assert_stands(config.law, config, seeds=1)

@@ -23,7 +23,7 @@ SHIP = RollShip(inertia_kg_m2=1.9275e9, stiffness_nm_rad=4.81875e8, damping_nms_
         ),
     ],
 )
-def test_closed_form_equals_integration_of_the_equation_of_motion(moment: Harmonics) -> None:
+def test_closed_form_equals_integration_of_the_equation_of_motion(moment):
     time_s = 0.05 * np.arange(4001)
     roll = roll_without_tank(SHIP, moment, 0.05, len(time_s))
     expected = integrated_roll(SHIP, moment, time_s)[0]
@@ -32,14 +32,14 @@ def test_closed_form_equals_integration_of_the_equation_of_motion(moment: Harmon
     assert abs(roll[0]) < 1e-15
 
 
-def test_step_only_samples_the_answer() -> None:
+def test_step_only_samples_the_answer():
     moment = Harmonics(np.array([2e7]), np.array([0.55]), np.array([0.1]))
     fine = roll_without_tank(SHIP, moment, 0.1, 1001)
     coarse = roll_without_tank(SHIP, moment, 1.0, 101)
     np.testing.assert_allclose(fine[::10], coarse, rtol=0, atol=1e-14)
 
 
-def test_wind_heels_the_ship_to_where_her_stiffness_holds_it() -> None:
+def test_wind_heels_the_ship_to_where_her_stiffness_holds_it():
     calm = Harmonics(np.zeros(1), np.ones(1), np.zeros(1))
     roll = roll_without_tank(replace(SHIP, wind_moment_nm=2e7), calm, 1.0, 3000)
     assert roll[0] == 0
@@ -47,7 +47,7 @@ def test_wind_heels_the_ship_to_where_her_stiffness_holds_it() -> None:
     assert roll[-1] == pytest.approx(2e7 / 4.81875e8, rel=1e-9)
 
 
-def test_overdamped_ship_is_refused() -> None:
+def test_overdamped_ship_is_refused():
     heavy = RollShip(inertia_kg_m2=1e9, stiffness_nm_rad=2.5e8, damping_nms_rad=1.01e9)
     moment = Harmonics(np.array([2e7]), np.array([0.55]), np.array([0.1]))
     with pytest.raises(ValueError, match="overdamped"):

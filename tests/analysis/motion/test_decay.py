@@ -15,14 +15,14 @@ from utank_hil.dynamics import RollModel, RollShip, Tank
 TANK = Tank(17.1, 4.88, 17.11, 6.22)
 
 
-def simulated(zeta: float, b2: float, start_rad: float = 0.2) -> tuple[np.ndarray, np.ndarray]:
+def simulated(zeta, b2, start_rad=0.2):
     ship = RollShip(2e9, 2e9 * 0.25, 2 * zeta * 0.5 * 2e9, b2 * 2e9)
     run = simulate(without_tank(RollModel(ship, TANK)), 200.0, (start_rad, 0, 0, 0))
     part = slice(0, None, 10)
     return run.time_s[part], run.state[part, 0]
 
 
-def measured(name: str) -> tuple[np.ndarray, np.ndarray]:
+def measured(name):
     (record,) = (
         each
         for each in json.loads(others_file("decay/records.json").read_text())
@@ -110,7 +110,7 @@ def test_the_answer_says_for_which_amplitudes_it_holds():
     assert min(found.halves_ratio) < found.equivalent_ratio[1] < 1.05 * max(found.halves_ratio)
 
 
-def whole_file() -> tuple[np.ndarray, np.ndarray]:
+def whole_file():
     with others_file("decay/kvlcc2_21337.csv").open() as lines:
         rows = [(float(row["time_s"]), float(row["roll_rad"])) for row in csv.DictReader(lines)]
     time, roll = np.array(rows).T

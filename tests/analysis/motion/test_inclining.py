@@ -7,7 +7,7 @@ MOMENT = 1e5 * np.array([0.0, 1, 2, 1, 0, -1, -2, -1])
 WEIGHT, GM = 1.9e7, 0.9
 
 
-def heel(noise: float = 0.0, seed: int = 1) -> np.ndarray:
+def heel(noise=0.0, seed=1):
     scatter = noise * np.random.default_rng(seed).normal(size=len(MOMENT))
     return np.arctan(0.003 + MOMENT / (WEIGHT * GM)) + scatter
 

@@ -21,9 +21,7 @@ TIME_S = np.arange(0, 200, 0.05)
     phase=st.floats(0, 6.28),
     mean=st.floats(-0.1, 0.1),
 )
-def test_sine_has_the_textbook_figures(
-    amplitude: float, period_s: float, phase: float, mean: float
-) -> None:
+def test_sine_has_the_textbook_figures(amplitude, period_s, phase, mean):
     whole = period_s * math.floor(200 / period_s)
     time_s = np.linspace(0, whole, 4001)[:-1]
     signal = amplitude * np.sin(2 * math.pi * time_s / period_s + phase)
@@ -39,7 +37,7 @@ def test_sine_has_the_textbook_figures(
     assert shifted.rms_rad == pytest.approx(math.hypot(amplitude / math.sqrt(2), mean), rel=1e-6)
 
 
-def test_significant_amplitude_is_the_mean_of_the_highest_third_counted_by_hand() -> None:
+def test_significant_amplitude_is_the_mean_of_the_highest_third_counted_by_hand():
     # six cycles of known heights, the last one not whole
     heights = [1.0, 5.0, 2.0, 6.0, 3.0, 4.0]
     cycle = np.sin(2 * math.pi * (np.arange(200) + 0.5) / 200)
@@ -48,7 +46,7 @@ def test_significant_amplitude_is_the_mean_of_the_highest_third_counted_by_hand(
     assert significant_amplitude(signal) == pytest.approx(crest * (6.0 + 5.0) / 2, rel=1e-6)
 
 
-def test_narrow_gaussian_sea_has_twice_its_standard_deviation() -> None:
+def test_narrow_gaussian_sea_has_twice_its_standard_deviation():
     elevation = Sea.irregular(jonswap(4.0, 10.0, 7.0), 3, components=400).elevation
     signal = elevation.series(0.1, 36000)
     significant = significant_amplitude(signal)
@@ -60,17 +58,17 @@ def test_narrow_gaussian_sea_has_twice_its_standard_deviation() -> None:
 @pytest.mark.parametrize(
     "signal", [np.zeros(10), np.ones(5), np.array([-1.0, 1.0]), np.arange(9.0)]
 )
-def test_record_without_a_whole_cycle_has_no_significant_amplitude(signal: np.ndarray) -> None:
+def test_record_without_a_whole_cycle_has_no_significant_amplitude(signal):
     assert significant_amplitude(signal) is None
     assert roll_statistics(signal).significant_rad is None
 
 
-def test_empty_record_is_refused() -> None:
+def test_empty_record_is_refused():
     with pytest.raises(ValueError, match="roll record is empty"):
         roll_statistics(np.empty(0))
 
 
-def test_pump_figures_count_drawn_power_only() -> None:
+def test_pump_figures_count_drawn_power_only():
     pressure = np.array([3.0, -4.0, 0.0, 0.0])
     power = np.array([10.0, -30.0, 20.0, 0.0])
     level = np.array([0.5, -2.0, 1.0, 0.0])

@@ -10,18 +10,18 @@ from others import others_file
 
 from utank_hil.configuration.hull_files.parts import Given
 from utank_hil.configuration.hull_files.reader import read_hull
-from utank_hil.dynamics.hull.hull_data import HullData, excitation_at, radiation_at
+from utank_hil.dynamics.hull.hull_data import excitation_at, radiation_at
 
 # centre of buoyancy and volume by WAMIT's own `.out`; the density is that of MSS
 FPSO = Given(density_kg_m3=1025.0, mass_kg=1025 * 97960.9, gravity_centre_m=(0.788631, 0.0, -1.0))
 SHIPX = np.array([-1.0, -1, 1, -1, -1, 1])
 
 
-def hulls(name: str) -> Path:
+def hulls(name):
     return others_file(f"hulls/{name}")
 
 
-def relative_rms(found: np.ndarray, expected: np.ndarray) -> np.ndarray:
+def relative_rms(found, expected):
     axes = tuple(range(found.ndim - 1))
     return np.sqrt(np.sum(abs(found - expected) ** 2, axes) / np.sum(abs(expected) ** 2, axes))
 
@@ -126,7 +126,7 @@ def test_shipx_moves_the_ship_as_veres_itself_did():
         ("wamit-fpso/fpso.mat", "wamit-fpso/fpso.1", FPSO),
     ],
 )
-def test_a_structure_of_mss_is_the_ship_it_was_made_from(one: str, other: str, given) -> None:
+def test_a_structure_of_mss_is_the_ship_it_was_made_from(one, other, given):
     """In sway, roll and yaw: MSS makes up surge of ShipX, and loses x_G of WAMIT."""
     theirs = roll_resonance(read_hull(hulls(one)), 0.05)
     ours = roll_resonance(read_hull(hulls(other), given), 0.05)
@@ -169,7 +169,7 @@ CYLINDERS = {
 
 
 @pytest.fixture(scope="module")
-def cylinders() -> dict[str, HullData]:
+def cylinders():
     return {code: read_hull(hulls(name), given) for code, (name, given) in CYLINDERS.items()}
 
 

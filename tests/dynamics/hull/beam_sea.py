@@ -5,14 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from utank_hil.base.arrays import ComplexArray
-from utank_hil.dynamics.hull.hull_data import (
-    HullData,
-    excitation_at,
-    free_roll,
-    radiation_at,
-    wave_number,
-)
+from utank_hil.dynamics.hull.hull_data import excitation_at, free_roll, radiation_at, wave_number
 
 
 @dataclass(frozen=True)
@@ -28,9 +21,7 @@ class RollResonance:
     sway_phase_rad: float
 
 
-def motions(
-    hull: HullData, omega_rad_s: float, heading_deg: float, roll_damping_nms_rad: float
-) -> ComplexArray:
+def motions(hull, omega_rad_s, heading_deg, roll_damping_nms_rad):
     """Motions about `hull.reference_m` per metre of wave at rest, shape (6,), m and rad."""
     added, damping = radiation_at(hull, omega_rad_s)
     damping = damping.copy()
@@ -43,7 +34,7 @@ def motions(
     return np.linalg.solve(matrix, excitation_at(hull, omega_rad_s, heading_deg))
 
 
-def roll_resonance(hull: HullData, viscous_ratio: float | None = None) -> RollResonance:
+def roll_resonance(hull, viscous_ratio=None):
     """Roll at its resonance; without a ratio the damping beside radiation is that of the data."""
     ship, free = hull.about_gravity_centre(), free_roll(hull)
     stiffness, omega = ship.hydrostatic[3, 3], 2 * math.pi / free.period_s

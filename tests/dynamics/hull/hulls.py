@@ -5,7 +5,7 @@ import numpy as np
 from utank_hil.dynamics.hull.hull_data import HullData
 
 
-def made_up_hull(**other: object) -> HullData:
+def made_up_hull(**other):
     random = np.random.default_rng(1)
     half = random.normal(size=(3, 6, 6))
     radiation = half @ np.swapaxes(half, 1, 2) + 6 * np.eye(6)

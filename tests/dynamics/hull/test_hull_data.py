@@ -5,12 +5,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.base.parameters import ParameterError
-from utank_hil.dynamics.hull.hull_data import DEGREES, TO_BODY_AXES, HullData
+from utank_hil.dynamics.hull.hull_data import DEGREES, TO_BODY_AXES
 
 POINT = st.tuples(*[st.floats(-20, 20)] * 3)
 
 
-def response(hull: HullData) -> np.ndarray:
+def response(hull):
     """Motions about the reference at 0.9 rad/s in the second heading."""
     w = 0.9
     return np.linalg.solve(

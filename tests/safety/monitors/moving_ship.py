@@ -17,6 +17,7 @@ SHIP = replace(CONFIG.vessel.ship, sway_of_slope=0.0)
 THRESHOLDS: MonitorThresholds = thresholds_of(
     CONFIG.plant, CONFIG.safety.roll_limit_rad, SensorFigures()
 )
+HALF_DEGREE = math.radians(0.5)
 FINDINGS = [bit for name, bit in vars(Finding).items() if name.isupper()]
 
 
@@ -24,13 +25,8 @@ class MovingShip:
     """Roll, its rate, level and pressure at any time, with the sensors' noise on demand."""
 
     def __init__(
-        self,
-        roll_rms_rad: float = math.radians(0.5),
-        pressure_rms_pa: float = 10e3,
-        frequency_rad_s: float = 0.6,
-        *,
-        noise: bool = True,
-    ) -> None:
+        self, roll_rms_rad=HALF_DEGREE, pressure_rms_pa=10e3, frequency_rad_s=0.6, *, noise=True
+    ):
         self.w = frequency_rad_s
         self.roll = math.sqrt(2) * roll_rms_rad + 0j
         self.pressure = math.sqrt(2) * pressure_rms_pa * cmath.exp(1.3j)
@@ -43,24 +39,24 @@ class MovingShip:
         self._random = np.random.default_rng(1)
         self._noise = SensorFigures() if noise else None
 
-    def _at(self, phasor: complex, time_s: float, noise: float) -> float:
+    def _at(self, phasor, time_s, noise):
         clean = (phasor * cmath.exp(1j * self.w * time_s)).real
         return clean + noise * self._random.standard_normal() if self._noise else clean
 
-    def roll_rad(self, t: float) -> float:
+    def roll_rad(self, t):
         return self._at(self.roll, t, 2e-4)
 
-    def rate_rad_s(self, t: float) -> float:
+    def rate_rad_s(self, t):
         return self._at(1j * self.w * self.roll, t, 5e-4)
 
-    def turned_rad(self, t: float, step_s: float) -> float:
+    def turned_rad(self, t, step_s):
         """Integral of the rate over the last step, as the samples of a sensor of 10 ms give it."""
         return self._at(self.roll, t, 5e-4 * math.sqrt(0.01 * step_s)) - self._at(
             self.roll, t - step_s, 0.0
         )
 
-    def level_m(self, t: float) -> float:
+    def level_m(self, t):
         return self._at(self.level, t, 0.005 / math.sqrt(2))
 
-    def pressure_pa(self, t: float) -> float:
+    def pressure_pa(self, t):
         return self._at(self.pressure, t, 100.0)

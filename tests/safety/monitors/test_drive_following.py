@@ -21,7 +21,7 @@ LOST = Finding.DRIVE_LAGS | Finding.DRIVE_LOST
 REVERSED = Finding.PUMP_SIGN
 
 
-def drive(command_pa: float, period_s: float) -> DriveFollowing:
+def drive(command_pa, period_s):
     """A drive without a lag that has followed a command for two seconds."""
     monitor = DriveFollowing(0.0, BOUNDS, period_s)
     for k in range(round(2.0 / period_s) + 1):
@@ -31,15 +31,8 @@ def drive(command_pa: float, period_s: float) -> DriveFollowing:
 
 
 def update(
-    monitor: DriveFollowing,
-    command_pa: float,
-    pressure_pa: float,
-    level_m: float = 0.0,
-    rate_m_s: float = 0.0,
-    *,
-    enabled: bool = True,
-    limited: bool = False,
-) -> int:
+    monitor, command_pa, pressure_pa, level_m=0.0, rate_m_s=0.0, *, enabled=True, limited=False
+):
     return monitor.update(
         command_pa, pressure_pa, level_m, rate_m_s, enabled=enabled, limited=limited
     )
@@ -47,9 +40,7 @@ def update(
 
 @pytest.mark.parametrize("changes_s", [0.05, 0.1, 0.3, 0.45])
 @pytest.mark.parametrize("commanded_pa", [0.0, 6000.0])
-def test_an_enable_that_chatters_excuses_no_pressure_that_stays(
-    changes_s: float, commanded_pa: float
-) -> None:
+def test_an_enable_that_chatters_excuses_no_pressure_that_stays(changes_s, commanded_pa):
     monitor, found = DriveFollowing(0.0, BOUNDS, 0.05), 0
     for k in range(100):
         enabled = int(k * 0.05 / changes_s + 1e-9) % 2 == 0
@@ -58,7 +49,7 @@ def test_an_enable_that_chatters_excuses_no_pressure_that_stays(
 
 
 @pytest.mark.parametrize(("off", "begun"), [(8, 4), (7, 2), (0, 2)])
-def test_the_third_hasty_change_begins_nothing_anew(off: int, begun: int) -> None:
+def test_the_third_hasty_change_begins_nothing_anew(off, begun):
     """Half a second off and the change to on is none of them; updates from that change on."""
     monitor = DriveFollowing(0.0, BOUNDS, 0.0625)
     for _ in range(off):
@@ -70,13 +61,13 @@ def test_the_third_hasty_change_begins_nothing_anew(off: int, begun: int) -> Non
     assert found[first] == LAGS
 
 
-def test_of_an_enable_that_chatters_no_pressure_is_expected_while_it_is_off() -> None:
+def test_of_an_enable_that_chatters_no_pressure_is_expected_while_it_is_off():
     monitor = DriveFollowing(0.0, BOUNDS, 0.0625)
     found = [update(monitor, 6000.0, 6000.0, enabled=k // 2 % 2 == 0) for k in range(40)]
     assert LAGS in found
 
 
-def test_a_drive_switched_on_and_off_again_is_excused() -> None:
+def test_a_drive_switched_on_and_off_again_is_excused():
     monitor = drive(0.0, 0.05)
     for enabled in (False, True, False):
         for _ in range(5):
@@ -84,9 +75,7 @@ def test_a_drive_switched_on_and_off_again_is_excused() -> None:
 
 
 @given(st.floats(-4e4, 4e4), st.floats(0.01, 1.0), st.floats(0.01, 0.2), st.integers(1, 50))
-def test_the_model_is_a_lag_one_step_behind_the_command(
-    command_pa: float, lag_s: float, period_s: float, steps: int
-) -> None:
+def test_the_model_is_a_lag_one_step_behind_the_command(command_pa, lag_s, period_s, steps):
     monitor = DriveFollowing(lag_s, BOUNDS, period_s)
     assert (monitor.expected_pa, monitor.late_pa) == (0.0, 0.0)
     for k in range(steps):
@@ -97,7 +86,7 @@ def test_the_model_is_a_lag_one_step_behind_the_command(
     assert monitor.expected_pa == 0.0
 
 
-def test_without_a_lag_it_is_the_command_before() -> None:
+def test_without_a_lag_it_is_the_command_before():
     monitor, before = DriveFollowing(0.0, BOUNDS, 0.05), 0.0
     for command_pa in (5e3, -7e3, 1e3):
         update(monitor, command_pa, 0.0)
@@ -142,14 +131,8 @@ def test_without_a_lag_it_is_the_command_before() -> None:
     ],
 )
 def test_what_is_found_of_a_pressure_that_stays(
-    way: int,
-    expected_pa: float,
-    pressure_pa: float,
-    along_m_s: float,
-    limited: bool,
-    found: int,
-    late_pa: float,
-) -> None:
+    way, expected_pa, pressure_pa, along_m_s, limited, found, late_pa
+):
     monitor = drive(way * expected_pa, 0.05)
     for _ in range(12):
         last = update(
@@ -169,9 +152,7 @@ def test_what_is_found_of_a_pressure_that_stays(
         (0.045, [0, 0, REVERSED, LAGS | REVERSED, *[LAGS | REVERSED] * 4, LOST | REVERSED]),
     ],
 )
-def test_each_comes_after_its_time_and_anew_after_every_good_sample(
-    period_s: float, found: list[int]
-) -> None:
+def test_each_comes_after_its_time_and_anew_after_every_good_sample(period_s, found):
     monitor = drive(6000, period_s)
     for _ in range(2):
         assert [update(monitor, 6000, -6000) for _ in found] == found
@@ -183,7 +164,7 @@ def test_each_comes_after_its_time_and_anew_after_every_good_sample(
     assert update(monitor, 6000, -6000) & REVERSED == found[0] & REVERSED
 
 
-def test_what_the_water_explained_is_not_counted_once_it_does_not() -> None:
+def test_what_the_water_explained_is_not_counted_once_it_does_not():
     monitor = drive(6000, 0.05)
     for _ in range(10):
         assert update(monitor, 6000, -4000, 0.0, 0.1, limited=True) == 0
@@ -192,7 +173,7 @@ def test_what_the_water_explained_is_not_counted_once_it_does_not() -> None:
 
 
 @pytest.mark.parametrize(("period_s", "judged"), [(0.25, 2), (0.45, 2), (0.6, 1), (0.0625, 8)])
-def test_a_drive_is_judged_half_a_second_after_each_change(period_s: float, judged: int) -> None:
+def test_a_drive_is_judged_half_a_second_after_each_change(period_s, judged):
     monitor = DriveFollowing(0.0, replace(BOUNDS, pressure_error_pa=1.0), period_s)
     for enabled in (True, False, True, False):
         late_pa = []
@@ -205,7 +186,7 @@ def test_a_drive_is_judged_half_a_second_after_each_change(period_s: float, judg
 
 
 @pytest.mark.parametrize("level_m", [-2.0, 0.0, 2.0])
-def test_a_rotor_that_turns_freely_is_allowed_more_for_each_metre_of_level(level_m: float) -> None:
+def test_a_rotor_that_turns_freely_is_allowed_more_for_each_metre_of_level(level_m):
     most_pa = LIMIT_PA + FREE_PA_M * abs(level_m)
     for pressure_pa, found in ((most_pa, 0), (most_pa + 1, LOST), (-most_pa, 0)):
         monitor = DriveFollowing(0.0, BOUNDS, 0.25)
@@ -216,9 +197,7 @@ def test_a_rotor_that_turns_freely_is_allowed_more_for_each_metre_of_level(level
         assert last == (LOST if abs(pressure_pa) > LIMIT_PA else 0)
 
 
-def first_saturated(
-    command_pa, drive_limited, from_update: int = 0, saturation: Saturation | None = None
-) -> int | None:
+def first_saturated(command_pa, drive_limited, from_update=0, saturation=None):
     """In which update of half a second it is found first."""
     monitor = saturation or Saturation(BOUNDS)
     for k in range(from_update, from_update + 80):
@@ -228,7 +207,7 @@ def first_saturated(
 
 
 @pytest.mark.parametrize("way", [-1, 1])
-def test_a_command_at_its_limit_is_saturated_after_ten_seconds(way: int) -> None:
+def test_a_command_at_its_limit_is_saturated_after_ten_seconds(way):
     """Counted from the update after the first: 20 are ten seconds, and one is more."""
     for share, first in ((0.979, None), (0.98, 21), (1.1, 21)):
         assert first_saturated(lambda _, s=share: 100 * s * way, lambda _: False) == first
@@ -240,9 +219,7 @@ def test_a_command_at_its_limit_is_saturated_after_ten_seconds(way: int) -> None
 
 @pytest.mark.parametrize("share", [0.5, 0.1])
 @pytest.mark.parametrize(("left", "still"), [(0.9, True), (-0.9, False), (0.898, False)])
-def test_once_found_less_than_the_degraded_pressure_ends_it(
-    share: float, left: float, still: bool
-) -> None:
+def test_once_found_less_than_the_degraded_pressure_ends_it(share, left, still):
     left_pa = left * share * 100.0
     saturation = Saturation(replace(BOUNDS, degraded_share=share))
     assert first_saturated(lambda _: 100.0, lambda _: False, saturation=saturation)
@@ -252,8 +229,8 @@ def test_once_found_less_than_the_degraded_pressure_ends_it(
         assert first_saturated(lambda _: 50.0, lambda _: False, saturation=saturation) is None
 
 
-def test_a_drive_at_its_own_limit_is_saturated_after_ten_seconds_whatever_the_command() -> None:
-    def swings(k: int) -> float:
+def test_a_drive_at_its_own_limit_is_saturated_after_ten_seconds_whatever_the_command():
+    def swings(k):
         return 1.0 if k % 2 else -1.0
 
     assert first_saturated(swings, lambda _: True) == 20

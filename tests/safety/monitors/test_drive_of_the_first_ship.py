@@ -13,9 +13,7 @@ STEP_S = 0.05
 LAG_S = CONFIG.vessel.pump.lag_s
 
 
-def drive_findings(
-    actual, seconds: float = 30.0, limited: bool = False, along_m_s: float = 0.0
-) -> dict[int, float]:
+def drive_findings(actual, seconds=30.0, limited=False, along_m_s=0.0):
     """When a drive that makes `actual(time, pressure)` of the right pressure is found out.
 
     The water flows at `along_m_s` the way of the command.
@@ -39,12 +37,12 @@ def drive_findings(
     return first
 
 
-def test_drive_that_follows_is_left_alone() -> None:
+def test_drive_that_follows_is_left_alone():
     assert not drive_findings(lambda _, right: right)
 
 
 @pytest.mark.parametrize("begin_s", [2.0, 2.6, 4.0])
-def test_stalled_drive_is_found_by_300_ms_and_lost_by_500(begin_s: float) -> None:
+def test_stalled_drive_is_found_by_300_ms_and_lost_by_500(begin_s):
     """Counted from where the command is 15 % of the limit off."""
     found = drive_findings(lambda t, right: 0.0 if t >= begin_s else right)
     off_s = next(
@@ -57,13 +55,13 @@ def test_stalled_drive_is_found_by_300_ms_and_lost_by_500(begin_s: float) -> Non
     assert Finding.PUMP_SIGN not in found
 
 
-def test_reversed_pump_is_found_within_200_ms_limited_or_not() -> None:
+def test_reversed_pump_is_found_within_200_ms_limited_or_not():
     for limited in (False, True):
         found = drive_findings(lambda t, right: -right if t >= 2.0 else right, limited=limited)
         assert found[Finding.PUMP_SIGN] <= 2.2
 
 
-def test_drive_at_its_own_limit_may_stay_behind() -> None:
+def test_drive_at_its_own_limit_may_stay_behind():
     def weak(_, right):
         return min(max(right, -10e3), 10e3)
 
@@ -71,7 +69,7 @@ def test_drive_at_its_own_limit_may_stay_behind() -> None:
     assert not drive_findings(weak, limited=True)
 
 
-def off_findings(pressure_pa, level_m=0.0, seconds: float = 3.0, limited: bool = False):
+def off_findings(pressure_pa, level_m=0.0, seconds=3.0, limited=False):
     """First findings of a drive that held 40 kPa and is switched off at zero."""
     monitor = DriveFollowing(LAG_S, THRESHOLDS, STEP_S)
     for _ in range(60):
@@ -89,7 +87,7 @@ def off_findings(pressure_pa, level_m=0.0, seconds: float = 3.0, limited: bool =
 
 @pytest.mark.parametrize("limited", [False, True])
 @pytest.mark.parametrize("sign", [-1, 1])
-def test_a_pump_that_presses_though_its_drive_is_off_is_found(sign: int, limited: bool) -> None:
+def test_a_pump_that_presses_though_its_drive_is_off_is_found(sign, limited):
     found = off_findings(lambda _: sign * 1.1 * THRESHOLDS.pressure_error_pa, limited=limited)
     assert 0.8 < found[Finding.DRIVE_LOST] < 1.1
     assert Finding.PUMP_SIGN not in found
@@ -97,7 +95,7 @@ def test_a_pump_that_presses_though_its_drive_is_off_is_found(sign: int, limited
     assert 2.3 < later[Finding.DRIVE_LOST] < 2.5
 
 
-def test_a_rotor_that_runs_down_or_turns_freely_in_the_water_is_left_alone() -> None:
+def test_a_rotor_that_runs_down_or_turns_freely_in_the_water_is_left_alone():
     assert not off_findings(lambda t: 40e3 * math.exp(-t / 0.2))
     for level_m in (-4.2, 4.2):
         # as measured, of a level that swings so far: docs/monitors.md
@@ -106,7 +104,7 @@ def test_a_rotor_that_runs_down_or_turns_freely_in_the_water_is_left_alone() -> 
     assert off_findings(lambda _: 1.5 * THRESHOLDS.pressure_error_pa, 0.5)
 
 
-def test_a_pressure_that_is_late_again_and_again_is_judged_by_what_comes_in_between() -> None:
+def test_a_pressure_that_is_late_again_and_again_is_judged_by_what_comes_in_between():
     monitor = DriveFollowing(LAG_S, THRESHOLDS, STEP_S)
     found = []
     for k in range(60):

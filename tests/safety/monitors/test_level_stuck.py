@@ -20,11 +20,11 @@ BAND_M = 0.125
 PERMITTED_M = 16 * BAND_M
 
 
-def monitor() -> LevelStuck:
+def monitor():
     return LevelStuck(SHIP, TUBE, replace(THRESHOLDS, level_still_m=BAND_M), STEP_S)
 
 
-def found_at_s(roll_rad, level_m: float, pressure_pa: float, until_s: float) -> float | None:
+def found_at_s(roll_rad, level_m, pressure_pa, until_s):
     stuck = monitor()
     for k in range(round(until_s / STEP_S)):
         if stuck.update(roll_rad(k * STEP_S), level_m, pressure_pa, 0.0):
@@ -45,8 +45,8 @@ def found_at_s(roll_rad, level_m: float, pressure_pa: float, until_s: float) -> 
     ],
 )
 def test_it_is_found_when_the_free_water_would_have_moved_sixteen_bands(
-    roll_rad, level_m: float, pressure_pa: float
-) -> None:
+    roll_rad, level_m, pressure_pa
+):
     steady = G * TUBE.width_m
     swinging = steady - TUBE.width_m * (TUBE.height_m + TUBE.lz_m) * W0**2
 
@@ -65,12 +65,12 @@ def test_it_is_found_when_the_free_water_would_have_moved_sixteen_bands(
 
 
 @pytest.mark.parametrize("level_m", [0.0, math.pi, -2.5])
-def test_the_first_sample_only_says_where_the_level_stands(level_m: float) -> None:
+def test_the_first_sample_only_says_where_the_level_stands(level_m):
     assert monitor().update(0.0, level_m, 1e12, 0.0) == 0
 
 
 @pytest.mark.parametrize("way", [-1, 1])
-def test_a_push_that_carries_the_water_not_quite_so_far_is_left_alone(way: int) -> None:
+def test_a_push_that_carries_the_water_not_quite_so_far_is_left_alone(way):
     """At rest at first, it overshoots once: by exp(-pi z / sqrt(1 - z^2)) of the way."""
     overshoot = math.exp(-math.pi * 0.2 / math.sqrt(1 - 0.2**2))
     least_pa = PERMITTED_M * 2 * 1025.0 * G / (1 + overshoot)
@@ -80,7 +80,7 @@ def test_a_push_that_carries_the_water_not_quite_so_far_is_left_alone(way: int) 
 
 
 @pytest.mark.parametrize(("away_m", "still"), [(BAND_M, True), (1.01 * BAND_M, False)])
-def test_a_level_that_stays_within_the_band_stands_still(away_m: float, still: bool) -> None:
+def test_a_level_that_stays_within_the_band_stands_still(away_m, still):
     stuck = monitor()
     found = 0
     for k in range(1000):
@@ -88,7 +88,7 @@ def test_a_level_that_stays_within_the_band_stands_still(away_m: float, still: b
     assert found == (Finding.LEVEL_STUCK if still else 0)
 
 
-def test_what_the_water_should_have_done_before_it_moved_does_not_count() -> None:
+def test_what_the_water_should_have_done_before_it_moved_does_not_count():
     stuck = monitor()
     alone_s = found_at_s(lambda _: 0.0, 0.0, 60e3, 20.0)
     assert alone_s is not None

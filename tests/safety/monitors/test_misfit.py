@@ -12,7 +12,7 @@ from utank_hil.safety.monitors.sway import Misfit
     share=st.floats(-1.0, 3.0), zero=st.floats(-2.0, 2.0), seed=st.integers(0, 1000),
     most=st.floats(0.5, 2.0),
 )  # fmt: skip
-def test_the_least_is_that_of_a_search(share: float, zero: float, seed: int, most: float) -> None:
+def test_the_least_is_that_of_a_search(share, zero, seed, most):
     noise = np.random.default_rng(seed).standard_normal((2, 400))
     u = noise[0] - noise[0].mean()
     e = zero - share * u + 0.1 * noise[1]

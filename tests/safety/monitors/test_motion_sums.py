@@ -9,7 +9,6 @@ from scipy.integrate import solve_ivp
 
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.motion import RollAgainstRate
-from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
 D = 1 / 64
 """The threshold of the drift, rad."""
@@ -19,16 +18,16 @@ DRIFTS = replace(THRESHOLDS, drift_rad=D)
 class Fed:
     """A monitor that is fed with what the roll moves and what the rate says."""
 
-    def __init__(self, step_s: float, thresholds: MonitorThresholds = DRIFTS) -> None:
+    def __init__(self, step_s, thresholds=DRIFTS):
         self.monitor = RollAgainstRate(thresholds)
         self.step_s, self.roll_rad = step_s, 0.0
         assert self.monitor.update(0.0, 0.0, step_s) == 0
 
-    def __call__(self, moved_rad: float, turned_rad: float = 0.0) -> int:
+    def __call__(self, moved_rad, turned_rad=0.0):
         self.roll_rad += moved_rad
         return self.monitor.update(self.roll_rad, turned_rad, self.step_s)
 
-    def to(self, unexplained_rad: float) -> int:
+    def to(self, unexplained_rad):
         """Jump so far that so much is left unexplained."""
         keep = 1 - self.step_s / 15
         return self(unexplained_rad / keep - self.monitor.unexplained_rad) & (
@@ -41,7 +40,7 @@ DRIFT, LASTS = Finding.DRIFT, Finding.DRIFT | Finding.DRIFT_LASTS
 
 @pytest.mark.parametrize("at_s", [20.0, 60.0, 260.0, 600.0])
 @pytest.mark.parametrize("way", [-1, 1])
-def test_of_a_constant_bias_so_much_is_left_as_has_not_been_learned(at_s: float, way: int) -> None:
+def test_of_a_constant_bias_so_much_is_left_as_has_not_been_learned(at_s, way):
     """In a leak of 15 s; it is learned as an average over 30 s and the time, at most 300 s."""
     bias_rad_s = way * 2e-4
 
@@ -68,8 +67,8 @@ def test_of_a_constant_bias_so_much_is_left_as_has_not_been_learned(at_s: float,
 @pytest.mark.parametrize("way", [-1, 1])
 @pytest.mark.parametrize(("jump", "learns"), [(6.0, False), (-6.0, False), (5.75, True)])
 def test_a_jump_is_learned_as_little_and_nothing_is_while_three_thresholds_are_left(
-    way: int, jump: float, learns: bool
-) -> None:
+    way, jump, learns
+):
     """Steps of half the leak's time: 7.5 s, of which the sum keeps half."""
     fed = Fed(7.5)
     fed(way * jump * D)
@@ -86,7 +85,7 @@ def test_a_jump_is_learned_as_little_and_nothing_is_while_three_thresholds_are_l
 
 
 @pytest.mark.parametrize("way", [-1, 1])
-def test_the_sum_stays_within_six_thresholds_and_forgets_in_fifteen_seconds(way: int) -> None:
+def test_the_sum_stays_within_six_thresholds_and_forgets_in_fifteen_seconds(way):
     fed = Fed(7.5)
     fed(way * 100 * D)
     assert fed.monitor.unexplained_rad == way * 6 * D
@@ -99,7 +98,7 @@ def test_the_sum_stays_within_six_thresholds_and_forgets_in_fifteen_seconds(way:
 
 
 @pytest.mark.parametrize("way", [-1, 1])
-def test_one_threshold_is_a_drift_and_four_of_the_smoothed_sum_are_too_many(way: int) -> None:
+def test_one_threshold_is_a_drift_and_four_of_the_smoothed_sum_are_too_many(way):
     for sum_rad, found in ((D, 0), (1.01 * D, DRIFT), (4 * D, DRIFT), (4.01 * D, LASTS)):
         assert Fed(7.5)(way * 2 * sum_rad) & LASTS == found
     # smoothed with 0.25 s: 0.32 of the rest in a step of 80 ms
@@ -111,9 +110,7 @@ def test_one_threshold_is_a_drift_and_four_of_the_smoothed_sum_are_too_many(way:
 
 @pytest.mark.parametrize(("dip", "forgets"), [(0.6, False), (0.9, False), (0.45, True)])
 @pytest.mark.parametrize("way", [-1, 1])
-def test_a_drift_lasts_after_thirty_seconds_that_half_of_it_ends(
-    dip: float, forgets: bool, way: int
-) -> None:
+def test_a_drift_lasts_after_thirty_seconds_that_half_of_it_ends(dip, forgets, way):
     fed = Fed(0.5)
     assert [fed.to(way * 2 * D) for _ in range(61)] == [DRIFT] * 60 + [LASTS]
     fed = Fed(0.5)
@@ -126,7 +123,7 @@ def test_a_drift_lasts_after_thirty_seconds_that_half_of_it_ends(
     assert [fed.to(way * 2 * D) for _ in range(61)] == [DRIFT] * 60 + [LASTS]
 
 
-def forgetting(fed: Fed, way: int) -> None:
+def forgetting(fed, way):
     """Leave four thresholds unexplained until the bias is forgotten, after a minute beyond three.
 
     In the first step nothing is unexplained yet.
@@ -138,13 +135,13 @@ def forgetting(fed: Fed, way: int) -> None:
     assert len(left) == 122
 
 
-def lasting(fed: Fed) -> int:
+def lasting(fed):
     """For how many steps without anything new the drift is still found."""
     return next(count for count in range(200) if not fed(0.0))
 
 
 @pytest.mark.parametrize("way", [-1, 1])
-def test_a_bias_that_explains_nothing_for_a_minute_is_forgotten(way: int) -> None:
+def test_a_bias_that_explains_nothing_for_a_minute_is_forgotten(way):
     fed = Fed(0.5)
     for _ in range(100):
         fed.to(way * 4 * D)
@@ -156,9 +153,7 @@ def test_a_bias_that_explains_nothing_for_a_minute_is_forgotten(way: int) -> Non
 
 @pytest.mark.parametrize("way", [-1, 1])
 @pytest.mark.parametrize("agreed", [0, 20, 57])
-def test_a_drift_among_the_thirty_seconds_of_agreement_begins_them_anew(
-    way: int, agreed: int
-) -> None:
+def test_a_drift_among_the_thirty_seconds_of_agreement_begins_them_anew(way, agreed):
     fed = Fed(0.5)
     forgetting(fed, way)
     assert [fed.to(0.0) for _ in range(agreed)] == [LASTS] * agreed
@@ -168,9 +163,7 @@ def test_a_drift_among_the_thirty_seconds_of_agreement_begins_them_anew(
 
 
 @pytest.mark.parametrize(("share", "found"), [(0.97, False), (1.03, True)])
-def test_noise_of_the_roll_is_its_second_difference_over_the_square_root_of_six(
-    share: float, found: bool
-) -> None:
+def test_noise_of_the_roll_is_its_second_difference_over_the_square_root_of_six(share, found):
     """Of a roll that goes to and fro by a the second difference is 4 a."""
     noisy = replace(THRESHOLDS, drift_rad=100.0, roll_noise_rad=0.01)
     a, fed = share * math.sqrt(6) * 0.01 / 4, Fed(0.7, noisy)

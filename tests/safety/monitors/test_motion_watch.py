@@ -16,7 +16,7 @@ STEP_S = 0.05
 LOOSE = replace(THRESHOLDS, drift_rad=100.0, roll_noise_rad=100.0, rate_noise_rad_s=100.0)
 
 
-def turn(watch: MotionWatch, t: float, jerk: float = 0.0) -> float:
+def turn(watch, t, jerk=0.0):
     """Hold each rate of a roll that turns faster and faster for a tick; the roll at the end."""
     for k in range(1, 6):
         rate_rad_s = 0.1 + 0.02 * (t + k * TICK_S)
@@ -27,7 +27,7 @@ def turn(watch: MotionWatch, t: float, jerk: float = 0.0) -> float:
     return roll_rad
 
 
-def test_rates_held_for_a_tick_each_make_the_trapezoid_of_a_rate_that_grows_evenly() -> None:
+def test_rates_held_for_a_tick_each_make_the_trapezoid_of_a_rate_that_grows_evenly():
     watch, last_rad = MotionWatch(LOOSE), 0.0
     assert watch.found == 0
     watch.update(MotionSample(0.0, 0.1), STEP_S, stale=False)
@@ -43,9 +43,7 @@ def test_rates_held_for_a_tick_each_make_the_trapezoid_of_a_rate_that_grows_even
 
 
 @pytest.mark.parametrize(("share", "found"), [(0.97, 0), (1.03, Finding.NOISE)])
-def test_noise_of_the_rate_is_its_second_difference_over_the_square_root_of_six(
-    share: float, found: int
-) -> None:
+def test_noise_of_the_rate_is_its_second_difference_over_the_square_root_of_six(share, found):
     """Of a rate that goes to and fro by a it is 4 a."""
     watch = MotionWatch(replace(LOOSE, rate_noise_rad_s=0.1))
     a = share * math.sqrt(6) * 0.1 / 4
@@ -61,7 +59,7 @@ def test_noise_of_the_rate_is_its_second_difference_over_the_square_root_of_six(
         assert watch.rate_noise.power == 0.0
 
 
-def spiked(spikes: int, rate_noise_rad_s: float) -> int:
+def spiked(spikes, rate_noise_rad_s):
     watch = MotionWatch(replace(LOOSE, rate_noise_rad_s=rate_noise_rad_s))
     for k in range(4):
         sample = MotionSample(0.0, 0.1 * (-1) ** k, discarded=spikes)
@@ -69,13 +67,13 @@ def spiked(spikes: int, rate_noise_rad_s: float) -> int:
     return watch.found
 
 
-def test_spikes_of_its_gate_are_found_unless_they_are_noise() -> None:
+def test_spikes_of_its_gate_are_found_unless_they_are_noise():
     assert spiked(4, 100.0) == 0
     assert spiked(5, 100.0) == Finding.SPIKES
     assert spiked(4, 1e-3) == spiked(5, 1e-3) == Finding.NOISE
 
 
-def test_what_the_roll_says_against_the_rate_is_found_beside_the_noise() -> None:
+def test_what_the_roll_says_against_the_rate_is_found_beside_the_noise():
     watch = MotionWatch(replace(LOOSE, drift_rad=0.01, rate_noise_rad_s=0.1))
     for k in range(10):
         watch.update(MotionSample(0.1 * k, (-1) ** k), 0.7, stale=False)
@@ -89,9 +87,7 @@ def test_what_the_roll_says_against_the_rate_is_found_beside_the_noise() -> None
 
 @pytest.mark.parametrize("cycle_s", [0.05, 0.0505])
 @pytest.mark.parametrize(("noise", "found"), [(1.0, 0), (12.0, Finding.NOISE)])
-def test_a_sensor_of_20_hz_is_as_noisy_as_its_samples(
-    cycle_s: float, noise: float, found: int
-) -> None:
+def test_a_sensor_of_20_hz_is_as_noisy_as_its_samples(cycle_s, noise, found):
     """A roll of 0.3 rad at 10 s; samples come up to 8 ms late, looks are each 50 ms."""
     watch, draw = MotionWatch(THRESHOLDS, 0.05), np.random.default_rng(2)
     w, next_s, sample = 2 * math.pi / 10, 0.0, MotionSample()
@@ -110,9 +106,7 @@ def test_a_sensor_of_20_hz_is_as_noisy_as_its_samples(
     assert set(seen[100:]) == {found}
 
 
-def found_dead(
-    samples: list[tuple[float, float]], period_s: float = 10.0, *, water_moves: bool = True
-) -> float:
+def found_dead(samples, period_s=10.0, *, water_moves=True):
     """Time of the samples, 50 ms apart, until they are found to repeat themselves."""
     watch = MotionWatch(replace(LOOSE, tank_period_s=period_s))
     for k, (roll_rad, rate_rad_s) in enumerate(samples):
@@ -126,18 +120,18 @@ def found_dead(
 @pytest.mark.parametrize(("period_s", "within_s"), [(22.0, 4.4), (10.0, 2.0), (3.0, 1.0)])
 @pytest.mark.parametrize("at", [(0.0, 0.0), (0.1, -0.02)])
 def test_a_sensor_that_repeats_itself_is_dead_after_a_fifth_of_a_period_or_a_second(
-    period_s: float, within_s: float, at: tuple[float, float]
-) -> None:
+    period_s, within_s, at
+):
     assert found_dead([at] * 100, period_s) == pytest.approx(within_s, abs=1.1 * STEP_S)
     assert found_dead([at] * 100, period_s, water_moves=False) == math.inf
 
 
-def test_a_digit_of_either_signal_in_each_fifth_of_a_period_is_alive() -> None:
+def test_a_digit_of_either_signal_in_each_fifth_of_a_period_is_alive():
     for digit in ((1e-4, 0.0), (0.0, 3e-5)):
         assert found_dead(([(0.0, 0.0)] * 20 + [digit] * 20) * 9) == math.inf
 
 
-def test_a_held_ship_has_a_sensor_with_noise() -> None:
+def test_a_held_ship_has_a_sensor_with_noise():
     """Digits of SENSOR_MOTION: 1e-4 rad and 3.125e-5 rad/s."""
     draw = np.random.default_rng(4)
     noise = draw.standard_normal((36000, 2)) * [2e-4, 5e-4]

@@ -1,4 +1,3 @@
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import pytest
@@ -21,12 +20,8 @@ class Counted:
 
 
 def first_found(
-    heard: float,
-    lost: float,
-    cycle_ms: int = 10,
-    seconds: float = 5.0,
-    what: int = Finding.SECOND_SENDER | Finding.NODE_SILENT,
-) -> float | None:
+    heard, lost, cycle_ms=10, seconds=5.0, what=Finding.SECOND_SENDER | Finding.NODE_SILENT
+):
     """When a stream is found that hears and loses so many frames every ten cycles."""
     counted = Counted(cycle_ms * 1_000_000)
     senders = Senders([Stream(counted, silent_s=1.0)], 1700.0)
@@ -38,7 +33,7 @@ def first_found(
     return None
 
 
-def test_message_at_its_cycle_is_left_alone_lost_frames_or_not() -> None:
+def test_message_at_its_cycle_is_left_alone_lost_frames_or_not():
     for heard in (10, 7, 5):
         assert first_found(heard, 10 - heard) is None
 
@@ -47,9 +42,7 @@ def test_message_at_its_cycle_is_left_alone_lost_frames_or_not() -> None:
     ("share", "cycle_ms", "within_s"),
     [(0.05, 10, 1.3), (0.005, 10, 14.4), (0.05, 100, 12.4), (0.0009, 10, None), (0.0, 10, None)],
 )
-def test_more_than_one_frame_of_a_thousand_lost_is_found(
-    share: float, cycle_ms: int, within_s: float | None
-) -> None:
+def test_more_than_one_frame_of_a_thousand_lost_is_found(share, cycle_ms, within_s):
     found_s = first_found(
         10 * (1 - share), 10 * share, cycle_ms, seconds=60.0, what=Finding.FRAMES_LOST
     )
@@ -57,7 +50,7 @@ def test_more_than_one_frame_of_a_thousand_lost_is_found(
     assert found_s is None or within_s is None or 0.6 * within_s <= found_s <= within_s
 
 
-def test_frames_lost_once_are_left_alone_and_a_loss_that_ended_is_forgotten() -> None:
+def test_frames_lost_once_are_left_alone_and_a_loss_that_ended_is_forgotten():
     counted = Counted()
     senders = Senders([Stream(counted)], 1700.0)
     found = []
@@ -73,24 +66,20 @@ def test_frames_lost_once_are_left_alone_and_a_loss_that_ended_is_forgotten() ->
 
 @pytest.mark.parametrize("cycle_ms", [10, 20])
 @pytest.mark.parametrize(("share", "found"), [(0.5, True), (0.7, True), (0.8, False), (0.0, False)])
-def test_message_slower_than_its_cycle_is_found_as_frames_lost(
-    share: float, found: bool, cycle_ms: int
-) -> None:
+def test_message_slower_than_its_cycle_is_found_as_frames_lost(share, found, cycle_ms):
     found_s = first_found(10 * share, 0, cycle_ms, what=Finding.FRAMES_LOST)
     assert (found_s is not None) is found
     assert found_s is None or found_s < 1.2
 
 
 @pytest.mark.parametrize(("share", "found"), [(0.5, True), (0.8, False)])
-def test_message_with_a_long_cycle_that_is_slower_is_found_after_two_seconds(
-    share: float, found: bool
-) -> None:
+def test_message_with_a_long_cycle_that_is_slower_is_found_after_two_seconds(share, found):
     found_s = first_found(10 * share, 0, 100, what=Finding.FRAMES_LOST)
     assert (found_s is not None) is found
     assert found_s is None or 2.0 < found_s < 2.5
 
 
-def test_bursts_too_long_for_the_counter_are_found_and_a_silence_is_not() -> None:
+def test_bursts_too_long_for_the_counter_are_found_and_a_silence_is_not():
     """Seven frames of four hundred: the counter does not count them as lost."""
     for gap, found_s in ((7, 4.3), (2, None), (40, None)):
         counted = Counted()
@@ -104,7 +93,7 @@ def test_bursts_too_long_for_the_counter_are_found_and_a_silence_is_not() -> Non
         assert first == (None if found_s is None else pytest.approx(found_s))
 
 
-def paced(*heard: int, cycle_ns: int = 10_000_000, every_s: float = STEP_S) -> list[int]:
+def paced(*heard, cycle_ns=10_000_000, every_s=STEP_S):
     """What a stream finds of so many frames in each look."""
     counted = Counted(cycle_ns)
     stream, found = Stream(counted), []
@@ -114,7 +103,7 @@ def paced(*heard: int, cycle_ns: int = 10_000_000, every_s: float = STEP_S) -> l
     return found
 
 
-def test_a_burst_counts_when_the_next_frames_come_and_only_of_a_sender_that_was_heard() -> None:
+def test_a_burst_counts_when_the_next_frames_come_and_only_of_a_sender_that_was_heard():
     lost = Finding.FRAMES_LOST
     assert paced(10, 3, 10) == [0, 0, lost]
     assert paced(10, 8, 10) == paced(3, 10, 10) == paced(0, 3, 10) == [0, 0, 0]
@@ -126,7 +115,7 @@ def test_a_burst_counts_when_the_next_frames_come_and_only_of_a_sender_that_was_
     assert paced(8, 2, 8, cycle_ns=125_000_000, every_s=0.99) == [0, 0, 0]
 
 
-def test_a_sender_that_begins_or_ends_between_two_looks_has_no_gap() -> None:
+def test_a_sender_that_begins_or_ends_between_two_looks_has_no_gap():
     counted = Counted()
     stream = Stream(counted)
     found = 0
@@ -136,7 +125,7 @@ def test_a_sender_that_begins_or_ends_between_two_looks_has_no_gap() -> None:
     assert found == 0
 
 
-def test_a_pause_is_no_slow_sender_and_one_that_ended_is_forgotten() -> None:
+def test_a_pause_is_no_slow_sender_and_one_that_ended_is_forgotten():
     counted = Counted()
     senders = Senders([Stream(counted)], 1700.0)
     found = []
@@ -148,13 +137,13 @@ def test_a_pause_is_no_slow_sender_and_one_that_ended_is_forgotten() -> None:
 
 
 @pytest.mark.parametrize(("cycle_ms", "within_s"), [(10, 0.31), (20, 0.41), (100, 1.7)])
-def test_second_sender_doubles_the_pace(cycle_ms: int, within_s: float) -> None:
+def test_second_sender_doubles_the_pace(cycle_ms, within_s):
     found_s = first_found(20, 0, cycle_ms)
     assert found_s is not None
     assert found_s <= within_s
 
 
-def panel(frames_per_s: float, changes_per_s: float, rejected_per_s: float = 0.0) -> float | None:
+def panel(frames_per_s, changes_per_s, rejected_per_s=0.0):
     """When a panel's stream is found, that sends on changes of its levers beside its cycle."""
     counted = Counted(200_000_000)
     senders = Senders([Stream(counted)], 1700.0)
@@ -168,16 +157,16 @@ def panel(frames_per_s: float, changes_per_s: float, rejected_per_s: float = 0.0
 
 
 @pytest.mark.parametrize("changes_per_s", [2, 5, 20])
-def test_frames_on_a_change_may_come_beside_the_cycle(changes_per_s: int) -> None:
+def test_frames_on_a_change_may_come_beside_the_cycle(changes_per_s):
     assert panel(5 + changes_per_s, changes_per_s) is None
     assert panel(5 + changes_per_s, 0) is not None
 
 
-def test_more_than_twenty_changes_a_second_are_counted() -> None:
+def test_more_than_twenty_changes_a_second_are_counted():
     assert panel(5 + 24, 24) is not None
 
 
-def test_what_was_rejected_or_changed_before_says_nothing_of_now() -> None:
+def test_what_was_rejected_or_changed_before_says_nothing_of_now():
     counted = Counted(200_000_000, heard=90, changes=50)
     counted.rejected[Rejection.REPEATED] = 7
     senders = Senders([Stream(counted)], 1700.0)
@@ -190,7 +179,7 @@ def test_what_was_rejected_or_changed_before_says_nothing_of_now() -> None:
     assert any(found[100:130])
 
 
-def test_changes_are_no_excuse_for_a_flood_nor_for_a_second_sender() -> None:
+def test_changes_are_no_excuse_for_a_flood_nor_for_a_second_sender():
     flood_s = panel(100, 95)
     assert flood_s is not None
     assert flood_s < 0.5
@@ -200,13 +189,13 @@ def test_changes_are_no_excuse_for_a_flood_nor_for_a_second_sender() -> None:
     assert second_s < 3.0
 
 
-def test_counter_that_skips_runs_ahead_of_the_cycle() -> None:
+def test_counter_that_skips_runs_ahead_of_the_cycle():
     found_s = first_found(10, 30)
     assert found_s is not None
     assert found_s <= 0.21
 
 
-def test_frames_that_waited_while_the_controller_did_are_no_second_sender() -> None:
+def test_frames_that_waited_while_the_controller_did_are_no_second_sender():
     counted = Counted()
     senders = Senders([Stream(counted)], 1700.0)
     counted.heard = 10
@@ -215,12 +204,12 @@ def test_frames_that_waited_while_the_controller_did_are_no_second_sender() -> N
     assert not senders.update(0, 2.0)
 
 
-def test_frames_before_the_first_look_do_not_count() -> None:
+def test_frames_before_the_first_look_do_not_count():
     counted = Counted(heard=280)
     assert not Senders([Stream(counted)], 1700.0).update(0, STEP_S)
 
 
-def test_silent_node_is_found_after_a_second() -> None:
+def test_silent_node_is_found_after_a_second():
     counted = Counted(100_000_000, heard=5)
     senders = Senders([Stream(counted, silent_s=1.0)], 1700.0)
     found = [senders.update(0, STEP_S) for _ in range(14)]
@@ -228,7 +217,7 @@ def test_silent_node_is_found_after_a_second() -> None:
 
 
 @pytest.mark.parametrize(("share", "expected"), [(0.05, False), (0.3, True), (0.8, True)])
-def test_frames_of_nobody_are_a_flood(share: float, expected: bool) -> None:
+def test_frames_of_nobody_are_a_flood(share, expected):
     senders, found = Senders([], 1700.0), 0
     for k in range(1, 13):
         found |= senders.update(int(share * 1700.0 * k * STEP_S), STEP_S)
@@ -236,7 +225,7 @@ def test_frames_of_nobody_are_a_flood(share: float, expected: bool) -> None:
 
 
 @pytest.mark.parametrize(("every_s", "found"), [(0.2, True), (0.3, True), (0.6, False)])
-def test_three_frames_a_second_with_a_wrong_crc_are_found(every_s: float, found: bool) -> None:
+def test_three_frames_a_second_with_a_wrong_crc_are_found(every_s, found):
     counted = Counted()
     senders = Senders([Stream(counted)], 1700.0)
     seen = 0
@@ -252,7 +241,7 @@ CYCLE_NS = 125_000_000
 """Four in a look of half a second: nothing is rounded."""
 
 
-def looks(*came: tuple[int, int], silent_s: float = 1.0) -> list[int]:
+def looks(*came, silent_s=1.0):
     """What a stream finds, every half a second, of so many frames heard and lost since then."""
     counted = Counted(CYCLE_NS, heard=7, lost=3)
     stream, found = Stream(counted, silent_s=silent_s), []
@@ -268,8 +257,8 @@ SECOND, LOST, SILENT = Finding.SECOND_SENDER, Finding.FRAMES_LOST, Finding.NODE_
 
 @pytest.mark.parametrize("looks_before", [0, 3])
 def test_more_than_eight_frames_above_a_quarter_are_a_second_sender_and_soon_forgotten(
-    looks_before: int,
-) -> None:
+    looks_before,
+):
     before = [(4, 0)] * looks_before
     none = [0] * looks_before
     assert looks(*before, (5 + 8, 0)) == [*none, 0]
@@ -280,7 +269,7 @@ def test_more_than_eight_frames_above_a_quarter_are_a_second_sender_and_soon_for
     assert looks(*before, (13, 1)) == [*none, SECOND]
 
 
-def test_fewer_than_three_quarters_for_more_than_two_seconds_are_frames_lost() -> None:
+def test_fewer_than_three_quarters_for_more_than_two_seconds_are_frames_lost():
     assert looks(*[(2, 0)] * 5) == [0, 0, 0, 0, LOST]
     assert looks(*[(3, 0)] * 5) == looks(*[(1, 2)] * 1, *[(3, 0)] * 4) == [0] * 5
     assert looks(*[(2, 0)] * 4, (3, 0), *[(2, 0)] * 5) == [0] * 9 + [LOST]
@@ -288,7 +277,7 @@ def test_fewer_than_three_quarters_for_more_than_two_seconds_are_frames_lost() -
     assert looks(*[(2, 0)] * 4, (0, 0), (2, 0)) == [0] * 5 + [LOST]
 
 
-def test_a_silence_of_more_than_its_limit_is_found_until_a_frame_comes() -> None:
+def test_a_silence_of_more_than_its_limit_is_found_until_a_frame_comes():
     quiet = [(0, 0)] * 3
     assert looks(*quiet, (4, 0), *quiet) == [0, 0, SILENT, 0, 0, 0, SILENT]
     assert looks(*[(0, 0)] * 9, silent_s=3.75) == [0] * 7 + [SILENT] * 2
@@ -297,11 +286,11 @@ def test_a_silence_of_more_than_its_limit_is_found_until_a_frame_comes() -> None
 
 @pytest.mark.parametrize("looks_before", [0, 3])
 def test_more_than_five_above_a_thousandth_are_frames_lost_and_forgotten_in_a_thousand(
-    looks_before: int,
-) -> None:
+    looks_before,
+):
     before = [(4, 0)] * looks_before
 
-    def lost(*came: tuple[int, int]) -> list[bool]:
+    def lost(*came):
         return [bool(found & LOST) for found in looks(*before, *came)[looks_before:]]
 
     assert lost((994, 6)) == [False]
@@ -312,7 +301,7 @@ def test_more_than_five_above_a_thousandth_are_frames_lost_and_forgotten_in_a_th
     assert lost((4, 99), (1000, 0)) == [True, False]
 
 
-def test_a_stream_that_nobody_awaits_may_be_silent_and_has_no_damaged_frame_before_a_look() -> None:
+def test_a_stream_that_nobody_awaits_may_be_silent_and_has_no_damaged_frame_before_a_look():
     counted = Counted(CYCLE_NS, rejected={Rejection.CRC: 5})
     stream = Stream(counted)
     assert stream.damaged == 0
@@ -321,7 +310,7 @@ def test_a_stream_that_nobody_awaits_may_be_silent_and_has_no_damaged_frame_befo
 
 
 @pytest.mark.parametrize("quiet", range(4))
-def test_every_stream_is_looked_at_in_every_second_call(quiet: int) -> None:
+def test_every_stream_is_looked_at_in_every_second_call(quiet):
     streams = [Counted(CYCLE_NS) for _ in range(4)]
     senders = Senders([Stream(each, silent_s=1.0) for each in streams], 1600.0)
     found = []
@@ -336,13 +325,13 @@ def test_every_stream_is_looked_at_in_every_second_call(quiet: int) -> None:
         assert found == [0] * 5 + [SILENT] * 2 + [0] * 3
 
 
-def test_a_look_spans_both_calls_however_long_each_was() -> None:
+def test_a_look_spans_both_calls_however_long_each_was():
     senders = Senders([Stream(Counted(CYCLE_NS), silent_s=1.0), Stream(Counted())], 1600.0)
     calls_s = (0.25, 0.125, 0.5, 0.125, 0.0625, 0.5)
     assert [senders.update(0, each_s) for each_s in calls_s] == [0, 0, 0, 0, SILENT, SILENT]
 
 
-def damage(frames: Sequence[int], step_s: float = 0.25) -> list[bool]:
+def damage(frames, step_s=0.25):
     """Whether so many damaged frames in each call are found."""
     counted = Counted(CYCLE_NS, heard=1)
     senders, found = Senders([Stream(counted)], 1600.0), []
@@ -352,7 +341,7 @@ def damage(frames: Sequence[int], step_s: float = 0.25) -> list[bool]:
     return found
 
 
-def test_three_damaged_frames_within_a_second_are_found_and_forgotten_after_it() -> None:
+def test_three_damaged_frames_within_a_second_are_found_and_forgotten_after_it():
     # looked at in every second call
     assert damage([3, *[0] * 7]) == [True] * 5 + [False] * 3
     assert damage([2, *[0] * 7]) == [False] * 8
@@ -366,9 +355,9 @@ def test_three_damaged_frames_within_a_second_are_found_and_forgotten_after_it()
 
 @pytest.mark.parametrize("calls_before", [0, 3])
 def test_more_than_forty_frames_above_a_tenth_of_the_bus_are_a_flood_and_soon_forgotten(
-    calls_before: int,
-) -> None:
-    def floods(*new: int) -> list[int]:
+    calls_before,
+):
+    def floods(*new):
         senders, foreign, found = Senders((), 1600.0), 0, []
         for each in (*[40] * calls_before, *new):
             foreign += each
@@ -382,12 +371,12 @@ def test_more_than_forty_frames_above_a_tenth_of_the_bus_are_a_flood_and_soon_fo
     assert floods(0, 0, 0, 80) == [0] * 4
 
 
-def test_a_flood_hides_nothing_else_that_is_found_in_this_call_or_the_one_before() -> None:
+def test_a_flood_hides_nothing_else_that_is_found_in_this_call_or_the_one_before():
     senders = Senders([Stream(Counted(CYCLE_NS), silent_s=0.125)], 1600.0)
     assert [senders.update(999 * k, 0.25) for k in (1, 2)] == [Finding.FLOOD | SILENT] * 2
 
 
-def test_what_came_before_the_beginning_is_not_judged() -> None:
+def test_what_came_before_the_beginning_is_not_judged():
     counted = Counted(heard=7, lost=3)
     senders = Senders([Stream(counted), Stream(Counted())], 1700.0)
     counted.heard, counted.lost = 1000, 500

@@ -8,9 +8,7 @@ from utank_hil.safety.monitors.motion import SpikeCount
 @pytest.mark.parametrize(("new", "found"), [(4, [False]), (5, [True, False]),
                                             (6, [True, True, False]),
                                             (99, [True, True, False])])  # fmt: skip
-def test_more_than_four_are_too_many_and_one_a_second_is_forgotten(
-    new: int, found: list[bool]
-) -> None:
+def test_more_than_four_are_too_many_and_one_a_second_is_forgotten(new, found):
     for quiet in range(3):
         count = SpikeCount()
         assert count.found is False
@@ -22,7 +20,7 @@ def test_more_than_four_are_too_many_and_one_a_second_is_forgotten(
         assert seen == found
 
 
-def test_a_second_is_a_second_in_steps_of_any_length() -> None:
+def test_a_second_is_a_second_in_steps_of_any_length():
     for steps in (1, 2, 4, 8):
         count = SpikeCount()
         assert not count.update(4, 0.125)

@@ -25,7 +25,7 @@ UNSTATED = replace(SHIP, sway_of_slope=None)
 OF_HULL = replace(THRESHOLDS, of_hull=True)
 
 
-def swaying(share: float, w: float, slope_rad: float, pressure_pa: float, effective: float):
+def swaying(share, w, slope_rad, pressure_pa, effective):
     """Roll and level in a regular wave of a slope, to which the sway is in phase."""
     mass, damping, stiffness = coupled_matrices(SHIP, TANK)
     area = TANK.reservoir_area_m2
@@ -37,9 +37,7 @@ def swaying(share: float, w: float, slope_rad: float, pressure_pa: float, effect
     return (*q, pressure)
 
 
-def found_in(
-    ship, phasors, w: float, sign: float = 1.0, noise_share: float = 1.0, thresholds=THRESHOLDS
-):
+def found_in(ship, phasors, w, sign=1.0, noise_share=1.0, thresholds=THRESHOLDS):
     equation = TankEquation(ship, TANK, thresholds, STEP_S)
     stuck = LevelStuck(ship, TANK, thresholds, STEP_S)
     noise = np.random.default_rng(1)
@@ -62,16 +60,14 @@ def found_in(
 @pytest.mark.parametrize("slope_rad", [0.01, 0.05])
 @pytest.mark.parametrize("pressure_pa", [0.0, 20e3])
 @pytest.mark.parametrize("thresholds", [THRESHOLDS, OF_HULL])
-def test_no_sway_that_a_ship_may_have_is_a_fault(
-    share: float, w: float, slope_rad: float, pressure_pa: float, thresholds
-) -> None:
+def test_no_sway_that_a_ship_may_have_is_a_fault(share, w, slope_rad, pressure_pa, thresholds):
     phasors = swaying(share, w, slope_rad, pressure_pa, effective=0.6)
     assert not found_in(UNSTATED, phasors, w, thresholds=thresholds)
     ship = replace(SHIP, sway_of_slope=share)
     assert not found_in(ship, phasors, w, thresholds=thresholds)
 
 
-def test_without_the_term_a_swaying_ship_is_told_to_check_its_wiring() -> None:
+def test_without_the_term_a_swaying_ship_is_told_to_check_its_wiring():
     phasors = swaying(1.0, 0.3, 0.05, 0.0, effective=0.5)
     assert Finding.WATER_SIGN in found_in(SHIP, phasors, 0.3)
     assert not found_in(UNSTATED, phasors, 0.3)
@@ -79,9 +75,7 @@ def test_without_the_term_a_swaying_ship_is_told_to_check_its_wiring() -> None:
 
 @pytest.mark.parametrize("slope_rad", [0.02, 0.05])
 @pytest.mark.parametrize("pressure_pa", [0.0, 20e3])
-def test_the_most_sway_in_a_long_swell_without_noise_is_no_fault(
-    slope_rad: float, pressure_pa: float
-) -> None:
+def test_the_most_sway_in_a_long_swell_without_noise_is_no_fault(slope_rad, pressure_pa):
     w = 2 * np.pi / 20.0
     phasors = swaying(1.0, w, slope_rad, pressure_pa, effective=0.5)
     assert not found_in(UNSTATED, phasors, w, noise_share=0.0)
@@ -92,14 +86,14 @@ def test_the_most_sway_in_a_long_swell_without_noise_is_no_fault(
 @pytest.mark.parametrize("pressure_pa", [0.0, 10e3])
 @pytest.mark.parametrize(("thresholds", "slope_rad"), [(THRESHOLDS, 0.03), (OF_HULL, 0.035)])
 def test_reversed_motion_sensor_is_found_within_two_roll_periods(
-    share: float, w: float, pressure_pa: float, thresholds, slope_rad: float
-) -> None:
+    share, w, pressure_pa, thresholds, slope_rad
+):
     phasors = swaying(share, w, slope_rad, pressure_pa, effective=0.7)
     found = found_in(UNSTATED, phasors, w, sign=-1.0, thresholds=thresholds)
     assert found[Finding.WATER_SIGN] <= 2 * T
 
 
-def wide_hull(share: float, w: float, slope_rad: float, pressure_pa: float):
+def wide_hull(share, w, slope_rad, pressure_pa):
     """Her roll moment per sway falls with the frequency: 0 at 1.65 w0, then of the other sign."""
     times = w / TANK.natural_frequency_rad_s
     return swaying(share, w, slope_rad, pressure_pa, effective=share * (0.9 - 0.33 * times**2))
@@ -110,7 +104,7 @@ RECORDED = json.loads((Path(__file__).parent / "data/swaying_ships.json").read_t
 every 0.1 s, with their self-tuned laws in charge from 5 s on."""
 
 
-def found_in_record(name: str, sign: float = 1.0) -> tuple[int, float]:
+def found_in_record(name, sign=1.0):
     """All that is found in a record of a ship, and the greatest doubt."""
     at = RECORDED[name]
     equation = TankEquation(
@@ -126,7 +120,7 @@ def found_in_record(name: str, sign: float = 1.0) -> tuple[int, float]:
 
 
 @pytest.mark.parametrize("name", RECORDED)
-def test_short_waves_that_sway_a_wide_hull_are_no_fault(name: str) -> None:
+def test_short_waves_that_sway_a_wide_hull_are_no_fault(name):
     found, doubt = found_in_record(name)
     assert not found
     assert doubt < 0.8
@@ -134,9 +128,7 @@ def test_short_waves_that_sway_a_wide_hull_are_no_fault(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", RECORDED)
-def test_without_the_band_they_look_like_a_wrong_sign(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_the_band_they_look_like_a_wrong_sign(name, monkeypatch):
     monkeypatch.setattr(tank_equation, "BAND", 40.0)
     monkeypatch.setattr(tank_equation, "NOTCH", 1e6)
     found, doubt = found_in_record(name)
@@ -145,14 +137,14 @@ def test_without_the_band_they_look_like_a_wrong_sign(
 
 
 @pytest.mark.parametrize("times", [0.8, 1.0, 1.1])
-def test_reversed_motion_sensor_of_a_wide_hull_is_found(times: float) -> None:
+def test_reversed_motion_sensor_of_a_wide_hull_is_found(times):
     w = times * TANK.natural_frequency_rad_s
     found = found_in(UNSTATED, wide_hull(0.8, w, 0.04, 5e3), w, sign=-1.0, thresholds=OF_HULL)
     assert found[Finding.WATER_SIGN] <= 2 * T
 
 
 @pytest.mark.parametrize(("ship", "stuck"), [(UNSTATED, False), (SHIP, True)])
-def test_a_ship_held_still_while_sway_moves_the_water_is_not_stuck(ship, stuck: bool) -> None:
+def test_a_ship_held_still_while_sway_moves_the_water_is_not_stuck(ship, stuck):
     """The moment of the water holds her; with no sway nothing would explain the water."""
     w, slope_rad, share = TANK.natural_frequency_rad_s, 0.05, 0.8
     mass, damping, stiffness = coupled_matrices(SHIP, TANK)
@@ -164,6 +156,6 @@ def test_a_ship_held_still_while_sway_moves_the_water_is_not_stuck(ship, stuck: 
     assert (Finding.ROLL_STUCK in found) is stuck
 
 
-def test_most_sway_is_that_of_long_waves_unless_the_ship_states_less() -> None:
+def test_most_sway_is_that_of_long_waves_unless_the_ship_states_less():
     for ship, most in ((UNSTATED, 2.0), (SHIP, 0.0), (replace(SHIP, sway_of_slope=0.7), 1.4)):
         assert most_sway(ship) == pytest.approx(most)

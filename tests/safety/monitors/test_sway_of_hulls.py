@@ -23,7 +23,7 @@ HULLS = {
 AROUND = np.linspace(0.75, 1.25, 21)
 
 
-def shares(name: str, viscous_ratio: float) -> tuple[np.ndarray, np.ndarray]:
+def shares(name, viscous_ratio):
     """Share k of sway, complex, and the slope that the roll tells, around roll resonance."""
     file, given = HULLS[name]
     hull = read_hull(Path(file) if name == "wigley" else others_file(file), given)
@@ -39,9 +39,7 @@ def shares(name: str, viscous_ratio: float) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("name", HULLS)
 @pytest.mark.parametrize("viscous_ratio", [0.03, 0.05, 0.1])
-def test_sway_is_a_nearly_constant_share_in_phase_with_the_roll_moment(
-    name: str, viscous_ratio: float
-) -> None:
+def test_sway_is_a_nearly_constant_share_in_phase_with_the_roll_moment(name, viscous_ratio):
     share, told = shares(name, viscous_ratio)
     power = abs(told) ** 2
     constant = float(np.sum(share.real * power) / np.sum(power))

@@ -13,7 +13,7 @@ FAULT_S = 60.0
 T = THRESHOLDS.tank_period_s
 
 
-def found_after(ship: MovingShip, fault, until_s: float = 60.0) -> dict[int, float]:
+def found_after(ship, fault, until_s=60.0):
     equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
     stuck = LevelStuck(SHIP, TANK, THRESHOLDS, STEP_S)
     first: dict[int, float] = {}
@@ -33,14 +33,12 @@ def found_after(ship: MovingShip, fault, until_s: float = 60.0) -> dict[int, flo
 @pytest.mark.parametrize("roll_deg", [0.0, 0.5, 5.0])
 @pytest.mark.parametrize("pressure_pa", [0.0, 10e3, 35e3])
 @pytest.mark.parametrize("frequency_rad_s", [0.45, 0.6, 1.0])
-def test_water_that_obeys_its_equation_is_left_alone(
-    roll_deg: float, pressure_pa: float, frequency_rad_s: float
-) -> None:
+def test_water_that_obeys_its_equation_is_left_alone(roll_deg, pressure_pa, frequency_rad_s):
     ship = MovingShip(math.radians(roll_deg), pressure_pa, frequency_rad_s)
     assert not found_after(ship, lambda _, *sample: sample, 120.0)
 
 
-def test_water_at_rest_under_a_steady_heel_and_pressure_is_not_stuck() -> None:
+def test_water_at_rest_under_a_steady_heel_and_pressure_is_not_stuck():
     """A heel pushes less than a roll of its amplitude: the water does not swing with it."""
     stuck = LevelStuck(SHIP, TANK, THRESHOLDS, STEP_S)
     heel_rad, pressure_pa = 0.1, 20e3
@@ -60,8 +58,8 @@ ZEROS = (math.radians(0.3), 0.044, 870.0)
 @pytest.mark.parametrize("sensor", [0, 1, 2])
 @pytest.mark.parametrize("way", [-1, 1])
 def test_zeros_of_the_sensors_are_no_wrong_sign_no_delay_and_nothing_stuck(
-    roll_deg: float, pressure_pa: float, frequency_rad_s: float, sensor: int, way: int
-) -> None:
+    roll_deg, pressure_pa, frequency_rad_s, sensor, way
+):
     ship = MovingShip(math.radians(roll_deg), pressure_pa, frequency_rad_s)
     equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
     stuck = LevelStuck(SHIP, TANK, THRESHOLDS, STEP_S)
@@ -72,7 +70,7 @@ def test_zeros_of_the_sensors_are_no_wrong_sign_no_delay_and_nothing_stuck(
         assert not stuck.update(*sample, equation.slope_push)
 
 
-def test_zeros_explain_a_standing_roll_only_as_far_as_they_go() -> None:
+def test_zeros_explain_a_standing_roll_only_as_far_as_they_go():
     """Water that is pushed by a constant and a wave, under a roll that does not move."""
     for times, explained in ((0.9, True), (3.0, False)):
         equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
@@ -81,7 +79,7 @@ def test_zeros_explain_a_standing_roll_only_as_far_as_they_go() -> None:
         assert bool(found[-1] & Finding.ROLL_STUCK) is not explained
 
 
-def test_level_gain_is_one_and_the_delay_is_the_delay() -> None:
+def test_level_gain_is_one_and_the_delay_is_the_delay():
     exact = replace(THRESHOLDS, zero_push_m2_s2=0.0)
     ship, equation = MovingShip(), TankEquation(SHIP, TANK, exact, STEP_S)
     late_s = 0.4
@@ -98,30 +96,28 @@ def test_level_gain_is_one_and_the_delay_is_the_delay() -> None:
 
 
 @pytest.mark.parametrize("pressure_pa", [0.0, 10e3])
-def test_sign_of_the_motion_sensor_is_found_in_one_roll_period_of_half_a_degree(
-    pressure_pa: float,
-) -> None:
+def test_sign_of_the_motion_sensor_is_found_in_one_roll_period_of_half_a_degree(pressure_pa):
     ship = MovingShip(math.radians(0.5), pressure_pa)
     found = found_after(ship, lambda _, roll, level, pressure: (-roll, level, pressure))
     assert found[Finding.WATER_SIGN] <= T
 
 
-def test_too_little_roll_tells_nothing_and_says_nothing() -> None:
+def test_too_little_roll_tells_nothing_and_says_nothing():
     ship = MovingShip(math.radians(0.1), 0.0)
     assert not found_after(ship, lambda _, roll, *rest: (-roll, *rest))
 
 
-def test_swapped_gauges_are_found_within_a_period() -> None:
+def test_swapped_gauges_are_found_within_a_period():
     found = found_after(MovingShip(), lambda _, roll, level, pressure: (roll, -level, pressure))
     assert found[Finding.WATER_SIGN] <= T
 
 
-def test_pressure_of_the_wrong_sign_is_found_within_a_period() -> None:
+def test_pressure_of_the_wrong_sign_is_found_within_a_period():
     found = found_after(MovingShip(), lambda _, roll, level, pressure: (roll, level, -pressure))
     assert found[Finding.PUMP_SIGN] <= T
 
 
-def test_levels_that_stand_still_are_found_within_five_seconds() -> None:
+def test_levels_that_stand_still_are_found_within_five_seconds():
     ship = MovingShip()
     for shift_s in (0.0, 1.0, 2.0, 3.0, 4.0):
         at = MovingShip(noise=False).level_m(FAULT_S + shift_s)
@@ -134,9 +130,7 @@ def test_levels_that_stand_still_are_found_within_five_seconds() -> None:
 
 @pytest.mark.parametrize("stands_deg", [0.0, 1.4])
 @pytest.mark.parametrize("pressure_pa", [0.0, 10e3])
-def test_a_roll_that_stands_still_with_its_rate_is_told_by_the_water(
-    pressure_pa: float, stands_deg: float
-) -> None:
+def test_a_roll_that_stands_still_with_its_rate_is_told_by_the_water(pressure_pa, stands_deg):
     """Roll and rate agree then, and no sign is wrong: a dead sensor may go on sending zeros."""
     stands_rad = math.radians(stands_deg)
     ship = MovingShip(math.radians(1.0), pressure_pa)
@@ -147,7 +141,7 @@ def test_a_roll_that_stands_still_with_its_rate_is_told_by_the_water(
 
 
 @pytest.mark.parametrize("shift_s", [0.0, 1.3, 5.2, 6.5])
-def test_gauges_that_jump_say_nothing_of_the_motion_sensor(shift_s: float) -> None:
+def test_gauges_that_jump_say_nothing_of_the_motion_sensor(shift_s):
     ship = MovingShip(math.radians(2.0), 5e3)
 
     def swap(t, roll, level, pressure):
@@ -158,7 +152,7 @@ def test_gauges_that_jump_say_nothing_of_the_motion_sensor(shift_s: float) -> No
     assert Finding.MOTION_LATE not in found
 
 
-def test_delay_of_two_seconds_is_found_and_of_100_ms_is_not() -> None:
+def test_delay_of_two_seconds_is_found_and_of_100_ms_is_not():
     ship = MovingShip(math.radians(2.0), 5e3)
 
     def late(delay_s):
@@ -168,7 +162,7 @@ def test_delay_of_two_seconds_is_found_and_of_100_ms_is_not() -> None:
     assert not found_after(ship, late(0.1))
 
 
-def test_no_delay_is_judged_by_little_more_than_the_least_push() -> None:
+def test_no_delay_is_judged_by_little_more_than_the_least_push():
     """In calm seas the sensors' noise looked like one in the course of an hour."""
     w0 = TANK.natural_frequency_rad_s
     least_rad = THRESHOLDS.least_roll_push_m2_s2 / roll_push_at_natural_frequency(SHIP, TANK)
@@ -185,7 +179,7 @@ def test_no_delay_is_judged_by_little_more_than_the_least_push() -> None:
         assert math.isfinite(late[-1]) is judged
 
 
-def test_restart_forgets() -> None:
+def test_restart_forgets():
     ship, equation = MovingShip(), TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
     for k in range(600):
         t = k * STEP_S
@@ -197,7 +191,7 @@ def test_restart_forgets() -> None:
 
 
 @pytest.mark.parametrize("every", [2, 4, 5])
-def test_samples_that_are_left_out_change_little(every: int) -> None:
+def test_samples_that_are_left_out_change_little(every):
     """Half a second is a twentieth of the period: the inputs run nearly straight."""
     exact = replace(THRESHOLDS, zero_push_m2_s2=0.0)
     ship = MovingShip(math.radians(2.0), noise=False)
@@ -213,7 +207,7 @@ def test_samples_that_are_left_out_change_little(every: int) -> None:
     assert gaps.late_s == pytest.approx(whole.late_s, abs=0.02)
 
 
-def test_inputs_run_straight_over_the_steps_that_are_left_out() -> None:
+def test_inputs_run_straight_over_the_steps_that_are_left_out():
     apart, together = (TankEquation(SHIP, TANK, THRESHOLDS, STEP_S) for _ in range(2))
     for k in range(100):
         found = [apart.update(0.01 * k, 0.02 * k, 300.0 * k), 0]
@@ -225,7 +219,7 @@ def test_inputs_run_straight_over_the_steps_that_are_left_out() -> None:
 
 
 @pytest.mark.parametrize("seconds", [0.0, 3.0, 30.0])
-def test_it_has_settled_after_six_time_constants_and_after_a_gap_again(seconds: float) -> None:
+def test_it_has_settled_after_six_time_constants_and_after_a_gap_again(seconds):
     equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
     settles_s = 6 * T / (4 * math.pi)
     assert not equation.settled
@@ -253,9 +247,7 @@ def test_it_has_settled_after_six_time_constants_and_after_a_gap_again(seconds: 
 )
 @pytest.mark.parametrize("roll_deg", [0.1, 0.25, 0.5, 1.0, 4.0])
 @pytest.mark.parametrize("zero", range(-3, 4))
-def test_no_zero_makes_a_wrong_sensor_look_obeyed(
-    fault, obeyed: bool, roll_deg: float, zero: int
-) -> None:
+def test_no_zero_makes_a_wrong_sensor_look_obeyed(fault, obeyed, roll_deg, zero):
     ship = MovingShip(math.radians(roll_deg), 0.0, noise=False)
     equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
     seen = []
@@ -272,7 +264,7 @@ def test_no_zero_makes_a_wrong_sensor_look_obeyed(
 
 
 @pytest.mark.parametrize("frequency", [0.85, 1.0, 1.15])
-def test_a_duct_that_loses_quadratically_is_no_late_motion_sensor(frequency: float) -> None:
+def test_a_duct_that_loses_quadratically_is_no_late_motion_sensor(frequency):
     """Water of 1.5 m with a damping ratio of 0.3 there, pushed by the roll as its equation asks."""
     tank = replace(TANK, damping_ratio=0.02)
     w = frequency * tank.natural_frequency_rad_s

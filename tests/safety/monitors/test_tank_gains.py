@@ -26,15 +26,7 @@ EXACT = replace(
 )  # fmt: skip
 
 
-def equation_of(
-    x: complex,
-    p: complex,
-    gain_x: float = 1.0,
-    gain_p: float = 1.0,
-    *,
-    valve: bool = False,
-    held: float = 0.0,
-) -> tuple[TankEquation, int]:
+def equation_of(x, p, gain_x=1.0, gain_p=1.0, *, valve=False, held=0.0):
     """After a minute in which roll and pump push the water by `x` and `p` times their gains.
 
     Pushes are phasors at W, in m^2/s^2, as root mean squares behind the filters. A valve holds
@@ -56,9 +48,7 @@ def equation_of(
     [(False, 1.0, 0), (False, -0.23, 0), (False, -0.27, 1), (False, -1.0, 1),
      (True, -0.48, 0), (True, -0.52, 1)],
 )  # fmt: skip
-def test_a_gain_of_roll_or_pump_is_found_and_judged_by_its_sign(
-    valve: bool, gain: float, found: int
-) -> None:
+def test_a_gain_of_roll_or_pump_is_found_and_judged_by_its_sign(valve, gain, found):
     """The other push is three times as large, so that the level's own gain is sound."""
     _, said = equation_of(3.0, 9j, gain_x=gain, valve=valve)
     assert said & ~Finding.MOTION_LATE == found * Finding.WATER_SIGN
@@ -71,9 +61,7 @@ def test_a_gain_of_roll_or_pump_is_found_and_judged_by_its_sign(
     [(1.0, 0), (0.32, 0), (0.28, Finding.LEVEL_STUCK), (-0.23, Finding.LEVEL_STUCK),
      (-0.27, Finding.WATER_SIGN)],
 )  # fmt: skip
-def test_the_level_has_a_gain_where_only_both_pushes_together_are_large_enough(
-    gain: float, found: int
-) -> None:
+def test_the_level_has_a_gain_where_only_both_pushes_together_are_large_enough(gain, found):
     equation, said = equation_of(0.8 * LEAST, 0.8 * LEAST, gain, gain)
     assert equation.level_gain == pytest.approx(gain, abs=0.015)
     assert said == found
@@ -85,8 +73,8 @@ def test_the_level_has_a_gain_where_only_both_pushes_together_are_large_enough(
      (True, 0.0, 0.06, 0.2)],
 )  # fmt: skip
 def test_a_push_that_is_small_in_itself_or_beside_the_other_tells_nothing(
-    valve: bool, held: float, share: float, pumps: float
-) -> None:
+    valve, held, share, pumps
+):
     """The sums swell and ebb by a fifth: what is far enough above or below is as said."""
     for times, told in ((0.75, False), (1.35, True)):
         small, large = times * LEAST, 60j * LEAST
@@ -101,7 +89,7 @@ def test_a_push_that_is_small_in_itself_or_beside_the_other_tells_nothing(
 
 
 @pytest.mark.parametrize("frequency_rad_s", [0.3, 1.2, 3.0])
-def test_the_filter_has_two_poles_and_both_derivatives(frequency_rad_s: float) -> None:
+def test_the_filter_has_two_poles_and_both_derivatives(frequency_rad_s):
     w, step_s = frequency_rad_s, 0.01
     once = DerivativeFilter(1.2, step_s)
     out = 1 / (1 + 1j * w / 1.2) ** 2
@@ -113,7 +101,7 @@ def test_the_filter_has_two_poles_and_both_derivatives(frequency_rad_s: float) -
     assert bend == pytest.approx((-(w**2) * out * turn).real, abs=1e-3)
 
 
-def test_the_filter_begins_at_rest_and_follows_a_straight_line_two_time_constants_late() -> None:
+def test_the_filter_begins_at_rest_and_follows_a_straight_line_two_time_constants_late():
     begun = DerivativeFilter(2.0, 0.5)
     begun.update(9.0)
     begun.start(5.0)

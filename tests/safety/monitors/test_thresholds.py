@@ -25,7 +25,7 @@ LIMITS = replace(CONFIG.plant.limits, pressure_pa=40e3)
 PLANT = replace(CONFIG.plant, ship=SHIP, tank=TANK, limits=LIMITS)
 
 
-def test_every_threshold_is_what_the_documents_say_of_ship_and_sensors() -> None:
+def test_every_threshold_is_what_the_documents_say_of_ship_and_sensors():
     found = thresholds_of(PLANT, 0.35, SensorFigures(1e-4, 4e-4, 0.003))
     expected = {
         "tank_period_s": 2 * math.pi / 0.6,
@@ -60,7 +60,7 @@ def test_every_threshold_is_what_the_documents_say_of_ship_and_sensors() -> None
     assert {name: getattr(found, name) for name in found.__slots__} == pytest.approx(expected)
 
 
-def test_coarse_gauges_and_a_low_roof_move_the_thresholds_that_hang_on_them() -> None:
+def test_coarse_gauges_and_a_low_roof_move_the_thresholds_that_hang_on_them():
     coarse = thresholds_of(PLANT, 0.35, SensorFigures(level_noise_m=0.04))
     assert coarse.volume_m == pytest.approx(0.24)
     low = replace(PLANT, tank=replace(TANK, headroom_m=1.0))
@@ -69,8 +69,8 @@ def test_coarse_gauges_and_a_low_roof_move_the_thresholds_that_hang_on_them() ->
 
 @pytest.mark.parametrize(("share", "pressure_pa"), [(0.2501, 20e3), (0.25, 80e3), (0.1, 200e3)])
 def test_a_pump_that_is_strong_for_her_size_has_less_than_a_quarter_until_the_water_obeyed(
-    share: float, pressure_pa: float
-) -> None:
+    share, pressure_pa
+):
     """Steady heel: K phi = rho g At L h, and 2 g h = P / rho + g L phi."""
     push_nm = TANK.reservoir_area_m2 * TANK.width_m * pressure_pa
     free_surface = TANK.density_kg_m3 * G * TANK.reservoir_area_m2 * TANK.width_m**2
@@ -84,7 +84,7 @@ def test_a_pump_that_is_strong_for_her_size_has_less_than_a_quarter_until_the_wa
     assert found == pytest.approx(min(share, 0.25), rel=3e-3)
 
 
-def test_degraded_is_half_of_what_takes_her_to_her_roll_limit() -> None:
+def test_degraded_is_half_of_what_takes_her_to_her_roll_limit():
     """A ship that stands 0.1 rad at 24 kPa by linear theory, K phi = rho g At L h, of 40 kPa."""
     push_nm = TANK.reservoir_area_m2 * TANK.width_m * 24e3
     free_surface = TANK.density_kg_m3 * G * TANK.reservoir_area_m2 * TANK.width_m**2
@@ -94,7 +94,7 @@ def test_degraded_is_half_of_what_takes_her_to_her_roll_limit() -> None:
     assert thresholds_of(replace(PLANT, ship=soft), 0.5, SensorFigures()).degraded_share == 0.5
 
 
-def test_sensors_are_as_their_makers_say_within_their_ranges() -> None:
+def test_sensors_are_as_their_makers_say_within_their_ranges():
     assert astuple(SensorFigures()) == (2e-4, 5e-4, 0.005)
     assert astuple(SensorFigures(2e-3, 1e-2, 0.05)) == (2e-3, 1e-2, 0.05)
     least = (1e-9, 1e-9, 1e-9)

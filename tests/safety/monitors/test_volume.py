@@ -13,10 +13,8 @@ QUIET = replace(THRESHOLDS, volume_m=LIMIT_M, level_noise_m=100.0)
 
 
 @pytest.mark.parametrize("way", [-1, 1])
-def test_the_first_sum_is_taken_as_it_is_and_judged_by_the_limit_and_three_times_it(
-    way: int,
-) -> None:
-    def first(sum_m: float) -> int:
+def test_the_first_sum_is_taken_as_it_is_and_judged_by_the_limit_and_three_times_it(way):
+    def first(sum_m):
         volume = Volume(QUIET)
         found = volume.update(7.0 * way, (sum_m - 7.0) * way, 0.1)
         assert volume.sum_m == sum_m * way
@@ -29,7 +27,7 @@ def test_the_first_sum_is_taken_as_it_is_and_judged_by_the_limit_and_three_times
     assert first(3.0625 * LIMIT_M) == Finding.VOLUME | Finding.VOLUME_LASTS
 
 
-def test_a_sum_that_jumps_follows_with_two_seconds() -> None:
+def test_a_sum_that_jumps_follows_with_two_seconds():
     volume = Volume(QUIET)
     assert volume.update(4.0, -4.0, 0.1) == 0
     for k in range(1, 40):
@@ -39,7 +37,7 @@ def test_a_sum_that_jumps_follows_with_two_seconds() -> None:
         assert found == (Finding.VOLUME if sum_m > LIMIT_M else 0)
 
 
-def test_it_lasts_after_thirty_seconds_without_a_break() -> None:
+def test_it_lasts_after_thirty_seconds_without_a_break():
     volume = Volume(QUIET)
     updates = [volume.update(0.0, 2 * LIMIT_M, 0.5) for _ in range(60)]
     assert updates == [Finding.VOLUME] * 60
@@ -52,7 +50,7 @@ def test_it_lasts_after_thirty_seconds_without_a_break() -> None:
     assert updates == [Finding.VOLUME] * 59 + [Finding.VOLUME | Finding.VOLUME_LASTS]
 
 
-def test_noise_is_what_the_smoothed_sum_leaves_of_the_sum() -> None:
+def test_noise_is_what_the_smoothed_sum_leaves_of_the_sum():
     volume = Volume(replace(QUIET, level_noise_m=0.5))
     assert volume.update(1.0, -1.0, 0.7) == 0
     assert volume.update(1.0, -0.5, 0.7) == 0  # just the limit
@@ -63,9 +61,7 @@ def test_noise_is_what_the_smoothed_sum_leaves_of_the_sum() -> None:
     assert volume.update(8.0, 8.0, 0.7) == (Finding.NOISE | Finding.VOLUME | Finding.VOLUME_LASTS)
 
 
-def volume_findings(
-    port_error_m: float, seconds: float, noise_m: float = 0.005, port_noise_m: float = 0.0
-) -> list[int]:
+def volume_findings(port_error_m, seconds, noise_m=0.005, port_noise_m=0.0):
     random, volume = np.random.default_rng(1), Volume(THRESHOLDS)
     found = []
     for k in range(round(seconds / 0.1)):
@@ -75,12 +71,12 @@ def volume_findings(
     return found
 
 
-def test_levels_that_mirror_one_another_are_left_alone() -> None:
+def test_levels_that_mirror_one_another_are_left_alone():
     assert not any(volume_findings(0.0, 600))
     assert not any(volume_findings(0.8 * THRESHOLDS.volume_m, 60)[30:])
 
 
-def test_a_gauge_that_is_off_degrades_and_ends_if_it_lasts_or_is_far_off() -> None:
+def test_a_gauge_that_is_off_degrades_and_ends_if_it_lasts_or_is_far_off():
     little = volume_findings(1.5 * THRESHOLDS.volume_m, 60)
     assert little[50] & Finding.VOLUME
     assert not little[50] & Finding.VOLUME_LASTS
@@ -88,11 +84,11 @@ def test_a_gauge_that_is_off_degrades_and_ends_if_it_lasts_or_is_far_off() -> No
     assert volume_findings(8 * THRESHOLDS.volume_m, 5)[-1] & Finding.VOLUME_LASTS
 
 
-def test_noise_of_one_gauge_is_seen_from_four_times_its_figure() -> None:
+def test_noise_of_one_gauge_is_seen_from_four_times_its_figure():
     found = volume_findings(0.0, 60.0, port_noise_m=0.0225)
     assert np.mean([bool(each & Finding.NOISE) for each in found]) > 0.6
     assert not any(volume_findings(0.0, 600.0, port_noise_m=0.0075))
 
 
-def test_noise_of_the_gauges_is_seen_in_their_sum() -> None:
+def test_noise_of_the_gauges_is_seen_in_their_sum():
     assert volume_findings(0.0, 2.0, noise_m=0.05)[-1] & Finding.NOISE
