@@ -8,12 +8,7 @@ from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.canbus.events import AlarmEvent
 from utank_hil.canbus.measurements import Measurements
 from utank_hil.safety import judging
-from utank_hil.safety.alarms import (
-    AlarmList,
-    Gravity,
-    active_faults,
-    stopping_faults,
-)
+from utank_hil.safety.alarms import AlarmList, Gravity, active_faults, stopping_faults
 from utank_hil.safety.monitoring import Monitors
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.senders import BusLoad

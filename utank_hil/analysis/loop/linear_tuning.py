@@ -151,10 +151,7 @@ def scaled_law(
 
 
 def first_law(
-    plant: DesignPlant,
-    slope_rad: float,
-    peak_rad_s: float,
-    kind: LinearKind = "lqg",
+    plant: DesignPlant, slope_rad: float, peak_rad_s: float, kind: LinearKind = "lqg"
 ) -> LinearDesign:
     """Find the law of `scaled_law` with the greatest weights at which it has the required margins.
 
