@@ -49,7 +49,8 @@ def write_recording(
             raise ValueError(f"run {run!r}: {rows.shape} is not (n, {len(columns)}), the columns")
         if len(rows) == 0:
             raise ValueError(f"run {run!r} has no rows")
-    time_s = np.concatenate([rows[:, rerun_log.time_index(columns)] for rows in runs.values()])
+    time = columns.index(rerun_log.TIME_COLUMN)
+    time_s = np.concatenate([rows[:, time] for rows in runs.values()])
     shown, size = columns_of(columns, about), scene_size(columns, about)
     zero = {
         (run, column)

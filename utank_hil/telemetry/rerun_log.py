@@ -85,7 +85,7 @@ class RunLog:
         self._scene: Scene | None = None
         if size is not None:
             self._scene = Scene(recording, path, columns, size, batch_s, alone)
-        self._time = time_index(columns)
+        self._time = columns.index(TIME_COLUMN)
         self._fields = [(i, field_of(c)) for i, c in enumerate(columns) if c != TIME_COLUMN]
         self._state = [columns.index(c) for c in STATE_COLUMNS if has_state(columns)]
         self._retuning = [columns.index("retuning")] if "retuning" in columns else []
@@ -154,13 +154,6 @@ class RunLog:
 def write_about(recording: rr.RecordingStream, about: Mapping[str, Any]) -> None:
     """Store a recording's origin, which the viewer shows."""
     recording.send_property(ABOUT, rr.TextDocument(json.dumps(about, indent=1)))
-
-
-def time_index(columns: Sequence[str]) -> int:
-    """Return the index of the time column; ValueError if there is none."""
-    if TIME_COLUMN not in columns:
-        raise ValueError(f"telemetry needs a column {TIME_COLUMN!r}, got {tuple(columns)}")
-    return columns.index(TIME_COLUMN)
 
 
 def has_state(columns: Sequence[str]) -> bool:
