@@ -124,11 +124,6 @@ def test_law_is_told_the_mean_of_what_left_before_each_answer():
     assert max(abs(told) for told in bench.law.told) > 20e3
 
 
-def test_sample_time_off_the_tick_is_refused():
-    with pytest.raises(ValueError, match=r"0\.205 s is not a whole number of ticks"):
-        ControllerBench(law=ToyLaw(sample_time_s=0.205))
-
-
 def test_no_frame_is_early_and_cycles_are_those_of_the_catalogue():
     bench = ControllerBench(START_NS)
     bench.run(1000)

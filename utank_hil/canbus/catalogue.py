@@ -61,13 +61,10 @@ class Catalogue:
             if kind is message_type
             and (source is address or (source is None and not address.name.endswith("_2")))
         }
-        if len(found) == 1:
-            return next(iter(found.values()))
-        if found:
-            senders = ", ".join(address.name for address in found)
+        if len(found) != 1:
+            senders = ", ".join(address.name for address in found) or "no such node"
             raise ValueError(f"{message_type.__name__} is sent by {senders}: say whose is meant")
-        sender = "" if source is None else f" sent by {source.name}"
-        raise ValueError(f"the catalogue has no message {message_type.__name__}{sender}")
+        return next(iter(found.values()))
 
     def ids_sent_by(self, address: Address) -> frozenset[int]:
         """Identifiers of all messages that a node sends."""

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.tick import TICK_NS, TICK_S, Schedule, is_whole_ticks
+from utank_hil.base.tick import TICK_NS, TICK_S, Schedule
 from utank_hil.canbus import RetuningOrder, RetuningState
 from utank_hil.canbus.enumerations import Mode
 from utank_hil.canbus.events import ModelSummary, RetuningEvent
@@ -50,7 +50,7 @@ class RunningLaw:
 
     `commands` is what it commands, see `BuiltLaw`. `limits` have the ages from which a law that
     plans has watched nothing, `thresholds` the share of the pressure that a plan begins with, and
-    the tank's period. ValueError is raised if the law's sample time is not a whole number of ticks.
+    the tank's period. The law's sample time is a whole number of ticks (`build_law`).
     """
 
     def __init__(
@@ -62,11 +62,6 @@ class RunningLaw:
         limits: SafetyLimits,
         thresholds: MonitorThresholds | None = None,
     ) -> None:
-        if not is_whole_ticks(law.sample_time_s):
-            raise ValueError(
-                f"sample time {law.sample_time_s} s is not a whole number of ticks of "
-                f"{TICK_S} s; design the controller for a multiple of it"
-            )
         self.law = law
         #: The law itself, where it is one that is exchanged for better ones while it runs.
         self.exchange = law if isinstance(law, LawExchange) else None
