@@ -65,12 +65,6 @@ def test_crc8_equals_the_oracle(data):
     assert crc8(data) == e2e.crc.calculate_crc8_h2f(data)
 
 
-@pytest.mark.parametrize("count", [0, 1, 15, 17])
-def test_a_list_of_other_than_sixteen_data_ids_is_refused(count):
-    with pytest.raises(ValueError, match="16 data IDs"):
-        first_byte_table(bytes(count))
-
-
 @pytest.mark.parametrize("case", PROTECTED, ids=PROTECTED_IDS)
 def test_up_to_three_flipped_bits_are_found_at_every_counter(case):
     """Hamming distance 4, counter bits included, where a flip also changes the data ID.

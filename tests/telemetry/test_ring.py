@@ -171,15 +171,6 @@ def test_a_closed_ring_takes_no_rows():
         writer.write(np.zeros(1))
 
 
-def test_bad_arguments_are_refused():
-    with pytest.raises(ValueError, match="different names"):
-        RowWriter(["a", "a"])
-    with pytest.raises(ValueError, match="columns"):
-        RowWriter([])
-    with pytest.raises(ValueError, match="two slots"):
-        RowWriter(["a"], slots=1)
-
-
 def test_a_missing_ring_and_a_foreign_segment_are_refused():
     with pytest.raises(RingError, match="is its writer running"):
         RowReader(f"utank-{os.getpid()}-none")

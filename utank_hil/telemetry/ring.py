@@ -87,10 +87,6 @@ class RingWriter(Closing):
         content: Mapping[str, Any] | None = None,
     ) -> None:
         slot_bytes = record_bytes * records
-        if slots < 2 or slot_bytes % 8 or slot_bytes <= 0:
-            raise ValueError(
-                f"a ring needs two slots or more of 8 bytes or a multiple, got {slots}"
-            )
         text = json.dumps({"kind": kind, **(content or {})}).encode()
         first = _first_slot_byte(len(text))
         stride = slot_bytes + 8
@@ -313,8 +309,6 @@ class RowWriter(RingWriter):
     def __init__(
         self, columns: Sequence[str], slots: int = 8192, about: Mapping[str, Any] | None = None
     ) -> None:
-        if not columns or len(set(columns)) != len(columns):
-            raise ValueError(f"a ring needs columns with different names, got {tuple(columns)}")
         content = {"columns": tuple(columns), "about": about}
         super().__init__(RingKind.ROWS, 8 * len(columns), 1, slots, content)
 
