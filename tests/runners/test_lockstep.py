@@ -191,14 +191,6 @@ def test_time_does_not_go_back():
         run.run_until(4)
 
 
-@pytest.mark.parametrize(
-    ("nodes", "message"),
-    [
-        ([], "at least one"),
-        ([ToyNode("a"), ToyNode("a")], "two are named 'a'"),
-        ([ToyNode("a", period_ns=0)], "'a': period_ns"),
-    ],
-)
-def test_group_that_can_not_run_is_refused(nodes, message):
-    with pytest.raises(ValueError, match=message):
-        Lockstep(nodes)
+def test_two_nodes_of_one_name_are_refused():
+    with pytest.raises(ValueError, match="two are named 'a'"):
+        Lockstep([ToyNode("a"), ToyNode("a")])

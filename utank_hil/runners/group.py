@@ -30,23 +30,15 @@ class NodeGroup:
     """The nodes of one runner, in the order given.
 
     `names` are by sender index; `next_tick_ns` is the time at which the next node is due.
-    ValueError is raised if there is no node, a name comes twice, or a period is not positive. Every
-    method raises NodeError if a node raises, or `send` refuses its frame; a ModelError in a tick
-    passes as it is.
+    ValueError is raised if a name comes twice. Every method raises NodeError if a node raises, or
+    `send` refuses its frame; a ModelError in a tick passes as it is.
     """
 
     def __init__(self, nodes: Sequence[Node]) -> None:
         self.names: Final = tuple(node.name for node in nodes)
-        if not nodes:
-            raise ValueError("nodes: a runner needs at least one node")
         for name in self.names:
             if self.names.count(name) > 1:
                 raise ValueError(f"nodes: two are named '{name}'; names tell them apart in traces")
-        for node in nodes:
-            if node.period_ns <= 0:
-                raise ValueError(
-                    f"node '{node.name}': period_ns is {node.period_ns}, must be positive"
-                )
         self._nodes = tuple(nodes)
         self._periods_ns = tuple(node.period_ns for node in nodes)
         self.base_period_ns: Final = gcd(*self._periods_ns)
