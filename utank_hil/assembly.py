@@ -77,18 +77,16 @@ _GETTERS: Final[dict[str, _Get]] = {
     "level_m": lambda measured, _, level: level.level_m if level.alone else measured.level_m,
     "level_rate_m_s": lambda _, __, level: level.rate_m_s,
 }
-MEASUREMENTS: Final = tuple(_GETTERS)
-"""Signals that a law may measure."""
 
 
 def measure_of(names: tuple[str, ...]) -> Measure:
     """Function that picks the named signals as a measurement vector, shape (m,).
 
-    Raises `ValueError` if a name is none of `MEASUREMENTS`.
+    Raises `ValueError` if a law can't measure one of them.
     """
     for name in names:
-        if name not in MEASUREMENTS:
-            raise ValueError(f"no measurement {name!r}; there are {', '.join(MEASUREMENTS)}")
+        if name not in _GETTERS:
+            raise ValueError(f"no measurement {name!r}; there are {', '.join(_GETTERS)}")
     getters = [_GETTERS[name] for name in names]
 
     def measure(measured: Measurements, motion: MotionSample, level: LevelObserver) -> FloatArray:
