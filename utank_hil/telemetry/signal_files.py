@@ -157,16 +157,11 @@ def write_signals(path: Path, parts: Iterable[Mapping[str, FloatArray]]) -> None
         import pyarrow
         from pyarrow import parquet
 
-        tables = (
-            pyarrow.table(
-                {n: pyarrow.array(values, from_pandas=True) for n, values in part.items()}
-            )
-            for part in chain([first], parts)
-        )
-        table = next(tables)
-        with left_whole(path), parquet.ParquetWriter(path, table.schema) as writer:
-            for each in chain([table], tables):
-                writer.write_table(each)
+        schema = pyarrow.schema([(name, pyarrow.float64()) for name in first])
+        with left_whole(path), parquet.ParquetWriter(path, schema) as writer:
+            for part in chain([first], parts):
+                arrays = [pyarrow.array(values, from_pandas=True) for values in part.values()]
+                writer.write_table(pyarrow.table(arrays, schema=schema))
         return
     with left_whole(path), path.open("w", newline="", encoding="utf-8") as content:
         writer = csv.writer(content)
