@@ -173,7 +173,15 @@ def run_bench(
     jobs = jobs_of(scenario, seed, duration_s, laws)
     if options.frames is not None:
         jobs = [replace(job, frames=options.frames / frames_name(job.name)) for job in jobs]
-    _refuse_what_can_not_be_sent(jobs)
+    for job in jobs:
+        try:
+            pickle.dumps(job)
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            why = (
+                f"can't be given to the process of its run ({error}): "
+                "it may hold functions of a module, but no lambda and no open file"
+            )
+            raise ParameterError("", [(f"controllers.{job.name}.law", why)]) from error
     started = time.monotonic()
     workers = 2 if options.channel is not None or not options.real_time else 1
     with stop_on_signals() as stopped:
@@ -194,18 +202,6 @@ def run_bench(
     mode = "real time" if options.real_time else LOCKSTEP
     mode += f" on {options.channel}" if options.channel is not None else ""
     return replace(_result(jobs, runs, mode, interrupted, started), killed=killed)
-
-
-def _refuse_what_can_not_be_sent(jobs: Iterable[Job]) -> None:
-    for job in jobs:
-        try:
-            pickle.dumps(job)
-        except (pickle.PicklingError, AttributeError, TypeError) as error:
-            why = (
-                f"can't be given to the process of its run ({error}): "
-                "it may hold functions of a module, but no lambda and no open file"
-            )
-            raise ParameterError("", [(f"controllers.{job.name}.law", why)]) from error
 
 
 def run_in_turn(

@@ -15,26 +15,17 @@ with quietly_interruptible():
     from utank_hil.console.common import failures_named
 
     with failures_named():
+        from firmware_sim import ship_side
         from firmware_sim.run import RECORD_NS, RECORD_S, SECOND_NS, ship_port
         from firmware_sim.scenario import Scenario
-        from firmware_sim.ship_side import (
-            EXTERNAL_DRIVE,
-            NODE_NAMES,
-            ExternalNode,
-            build_ship_side,
-            load_compiled_code,
-        )
         from firmware_sim.truth import TRUTH, MemoryLog, TruthRecorder
+        from utank_hil import runners
         from utank_hil.analysis.motion.statistics import pump_statistics, roll_statistics
         from utank_hil.console import common
         from utank_hil.console.common import fail
         from utank_hil.console.exit_codes import ExitCode
         from utank_hil.console.loops import opened, scheduled
         from utank_hil.console.terminal import Terminal, timing_table
-        from utank_hil.runners import (
-            LoopStatistics,
-            RealTimeLoop,
-        )
 
 app = common.new_app("Ship emulator, sensors, pump drive and operator panel on a CAN bus.")
 
@@ -50,7 +41,7 @@ def firmware_sim(
         typer.Option(
             metavar="NODES",
             help="Emulated nodes to leave out, with hardware in their place: some of "
-            f"{', '.join(NODE_NAMES)}.",
+            f"{', '.join(ship_side.NODE_NAMES)}.",
         ),
     ] = "",
     json_: common.Json = False,
@@ -72,21 +63,23 @@ def firmware_sim(
         fail(f"{scenario}: faults: are for the bench in simulated time: leave them out")
     length_s = loaded.duration_s if duration is None else duration
     seed = loaded.seed if seed is None else seed
-    load_compiled_code(loaded, seed)
-    ship = build_ship_side(loaded, seed, loaded.operator)
+    ship_side.load_compiled_code(loaded, seed)
+    ship = ship_side.build_ship_side(loaded, seed, loaded.operator)
     log = MemoryLog(len(TRUTH), -(-round(length_s * SECOND_NS) // RECORD_NS))
     try:
         nodes = ship.without([name.strip() for name in without.split(",") if name.strip()])
     except ValueError as error:
         fail(f"--without: {error}")
-    statistics = LoopStatistics()
-    emulated = ", ".join(node.name for node in nodes if node.name in NODE_NAMES)
+    statistics = runners.LoopStatistics()
+    emulated = ", ".join(node.name for node in nodes if node.name in ship_side.NODE_NAMES)
     emulated = emulated or "no node, nothing is sent"
     words = f"{loaded.name} on {bus}, emulated: {emulated}; Ctrl-C ends it."
     nodes.append(TruthRecorder(ship.plant, log, RECORD_NS))
     port_of = partial(ship_port, bus, nodes, loaded.vessel.foreign)
     with opened(port_of) as (port, stop), scheduled(words):
-        RealTimeLoop(nodes, port, statistics=statistics).run(stop, round(length_s * SECOND_NS))
+        runners.RealTimeLoop(nodes, port, statistics=statistics).run(
+            stop, round(length_s * SECOND_NS)
+        )
     if len(log.rows) == 0:
         fail("ended before the first sample", ExitCode.INTERRUPTED)
     roll_rad, level_m, pressure_pa, power_w = (
@@ -95,7 +88,12 @@ def firmware_sim(
     )
     roll, pump = roll_statistics(roll_rad), pump_statistics(pressure_pa, power_w, level_m)
     external = next(
-        (n for n in nodes if isinstance(n, ExternalNode) and n.name == EXTERNAL_DRIVE), None
+        (
+            n
+            for n in nodes
+            if isinstance(n, ship_side.ExternalNode) and n.name == ship_side.EXTERNAL_DRIVE
+        ),
+        None,
     )
     if json_:
         summary = {

@@ -136,7 +136,10 @@ class Plant:
             return
         while now_ns - self._now_ns >= TICK_NS:
             if self._ship_at is not None and self._ticks % SAILING_TICKS == 0:
-                self._sail(self._ship_at(self._ticks * TICK_S))
+                ship = self._ship_at(self._ticks * TICK_S)
+                if ship != self._ship:
+                    self._ship = ship
+                    self._load(ship)
             phasors, rotations = self._waves.at(self._ticks)
             self._tick(phasors, rotations)
             if self._turning is not None:
@@ -174,11 +177,6 @@ class Plant:
             self._state, self._x, self._ahead, self._row, *self._oscillators, self._per_piece,
             self._restoring, self._coefficients, phasors, rotations, self._weights,
         )  # fmt: skip
-
-    def _sail(self, ship: RollShip) -> None:
-        if ship != self._ship:
-            self._ship = ship
-            self._load(ship)
 
     def drive_pump(self, setpoint_pa: float, *, enabled: bool) -> None:
         """Set the pump's command from now on; a pump not `enabled` turns freely."""

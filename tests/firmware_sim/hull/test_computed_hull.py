@@ -133,7 +133,7 @@ def test_file_holds_the_ship_with_the_period_that_was_asked_for(tmp_path: Path) 
     write_hull(tmp_path / "wigley.nc", data)
     read = read_hull(tmp_path / "wigley.nc")
     assert free_roll(read).period_s == pytest.approx(7.5, rel=1e-6)
-    np.testing.assert_allclose(read.inertia_kg_m2, hull.inertia_kg_m2, rtol=1e-9)
+    np.testing.assert_allclose(read.inertia_kg_m2, hull.inertia_kg_m2, rtol=1e-9, atol=1e-3)
     np.testing.assert_allclose(read.excitation, hull.excitation)
     assert read.notes == ("roll damping is that of waves alone: add the viscous part",)
 
