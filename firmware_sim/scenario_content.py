@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.fmu_file import FmuFile
 from firmware_sim.scenario_sea import ScenarioSea
-from firmware_sim.scenario_sections import DriveLimits, RightingInWaves, SensorErrors
+from firmware_sim.scenario_sections import DriveLimits, Forecasts, RightingInWaves, SensorErrors
 from firmware_sim.voyage import Waypoint, ship_on_the_way, spectra_on_the_way, track, turning
 from firmware_sim.waves import PassingWaves, Response, SteadyWaves, Waves, beside
 from firmware_sim.wind import Gusts
@@ -70,6 +70,8 @@ class ScenarioContent(Section):
         dict[str, ControllerConfig], Field(default_factory=dict, max_length=MOST_CONTROLLERS)
     ]
     """Controllers to be run, at least one; optional where the vessel has no pump."""
+    preview: Forecasts | None = None
+    """What the vessel's preview station knows; by default 5 s, with an error of half the waves."""
     guard: bool = False
     """Whether a guard hears the frames and may cut the drive's power (docs/safety.md)."""
     operator: tuple[TimedAction, ...] = ()

@@ -28,6 +28,7 @@ def missing_nodes(vessel: Vessel, faults: Sequence[AnyFault], key: str = "faults
         "valve": vessel.valve is None,
         "sensors_2": not vessel.redundancy.second_motion_sensor,
         "hardwired": not vessel.redundancy.hardwired_inputs,
+        "preview": vessel.preview is None,
     }
     problems = [
         (f"{key}.{place}", f"can't be: the vessel has no {name}")
@@ -61,7 +62,12 @@ def foreign_role(vessel: Vessel, fault: AnyFault) -> str:
 
 def part_problems(scenario: ScenarioContent) -> list[Problem]:
     """Problems of the sections by themselves."""
-    return [*_weather_problems(scenario), *_hull_problems(scenario), *_fmu_problems(scenario)]
+    return [
+        *_weather_problems(scenario),
+        *_hull_problems(scenario),
+        *_fmu_problems(scenario),
+        *_preview_problems(scenario),
+    ]
 
 
 def whole_problems(scenario: ScenarioContent) -> list[Problem]:
@@ -159,6 +165,17 @@ def _fmu_problems(scenario: ScenarioContent) -> list[Problem]:
             has = "has a" if ours is not None else "has no"
             problems.append((f"fmu.variables.{key}", f"{verb}: the vessel {has} {part}"))
     return problems
+
+
+def _preview_problems(scenario: ScenarioContent) -> list[Problem]:
+    """Reasons why the waves can't be forecast."""
+    if scenario.vessel.preview is None:
+        wrong = [("preview", "needs a station: give the ship preview: {}")]
+        return [] if scenario.preview is None else wrong
+    if scenario.voyage or len(scenario.sea.spectra) > 1 or scenario.hull is not None:
+        reason = "is emulated on a ship that keeps course, speed and sea, and does not sway"
+        return [("vessel.preview", f"{reason}: leave it out, or remove voyage, sea.until and hull")]
+    return []
 
 
 def _ship_problems(scenario: ScenarioContent) -> list[Problem]:

@@ -58,6 +58,15 @@ class DriveLimits:
         refuse("drive", range_problems(self))
 
 
+class Forecasts(Section):
+    """Forecasts of the waves by the vessel's preview station."""
+
+    horizon_s: Annotated[float, Range(least=0.5, most=14)] = 5.0
+    """Time ahead up to which it forecasts; more are not sent in the time for which they count."""
+    error: Annotated[float, Range(least=0, most=10)] = 0.5
+    """Standard deviation of its error over that of the wave moment; 0 for a perfect one."""
+
+
 class RightingInWaves(Section):
     """Righting moment that changes as waves pass along: parametric roll, loss of stability.
 

@@ -18,6 +18,7 @@ from firmware_sim.drive import PumpDrive
 from firmware_sim.guard.parameters import guard_parameters
 from firmware_sim.guard.reference import GuardNode
 from firmware_sim.plant import Plant
+from firmware_sim.preview_station import PreviewStation
 from firmware_sim.scenario import Scenario
 from firmware_sim.sensors import ForeignFrames, SensorNode
 from firmware_sim.valve import ForeignValve, ValveNode
@@ -238,11 +239,12 @@ def _switch(on: bool) -> Switch:
     return Switch.ON if on else Switch.OFF
 
 
-NODE_NAMES: Final = ("sensors", "sensors_2", "hardwired", "drive", "valve", "panel")
+NODE_NAMES: Final = ("sensors", "sensors_2", "hardwired", "preview", "drive", "valve", "panel")
 """Names of the emulated nodes, in the order of their ticks; hardware may replace each.
 
 Only a ship with a pump has a drive, and only one with a valve has that node; the second motion
-sensor and the hard-wired inputs exist if the vessel's section `redundancy` lists them."""
+sensor and the hard-wired inputs exist if the vessel's section `redundancy` lists them, the preview
+station if there is a section `preview`."""
 
 
 # at zero pressure an enabled pump does not affect the tank; switched off, its rotor turns with the
@@ -267,12 +269,13 @@ class ShipSide:
     second_motion: SensorNode | None = None
     hardwired: HardwiredNode | None = None
     guard: GuardNode | None = None
+    preview: PreviewStation | None = None
 
     @property
     def nodes(self) -> tuple[Node, ...]:
         """Nodes in the order of their ticks."""
         optional: tuple[Node | None, ...] = (
-            self.second_motion, self.hardwired, self.guard, self.drive, self.valve,
+            self.second_motion, self.hardwired, self.guard, self.preview, self.drive, self.valve,
         )  # fmt: skip
         return self.sensors, *(node for node in optional if node is not None), self.panel
 
@@ -388,5 +391,14 @@ def build_ship_side(
         controller = controller or next(iter(scenario.controllers.values()))
         guard = GuardNode(guard_parameters(controller), plant)
     return ShipSide(
-        vessel, plant, sensors(seed=seed + 1), drive, panel, valve, second_motion, hardwired, guard
+        vessel,
+        plant,
+        sensors(seed=seed + 1),
+        drive,
+        panel,
+        valve,
+        second_motion,
+        hardwired,
+        guard,
+        None if vessel.preview is None else PreviewStation(scenario, seed, catalogue),
     )

@@ -17,8 +17,8 @@ ROOMS = (
 """Whole rooms: a new module is looked at, too, until it is named below."""
 DESIGNS = {
     *(f"utank_hil/control/{name}.py" for name in
-      ("arx", "constrained/design", "lqg_design", "optimal_tank", "predictive/design",
-       "python_law", "sea_model")),
+      ("arx", "constrained/design", "constrained/foresight", "lqg_design", "optimal_tank",
+       "predictive/design", "python_law", "sea_model")),
     *(f"utank_hil/dynamics/{name}.py" for name in ("hull/hull_data", "hull/lateral",
                                                    "roll_damping")),
     "utank_hil/retuning/redesign.py", "utank_hil/retuning/renewal.py",
@@ -29,7 +29,8 @@ DESIGNS = {
 """Modules that no tick runs through: designs, readers of files, judgements and tables."""
 PARTS = {
     "utank_hil/control/constrained/law.py": ("ConstrainedController", "ConstrainedLaw.controller",
-                                              "ConstrainedLaw.unlimited", "ConstrainedLaw.clipped"),
+                                              "ConstrainedLaw.unlimited", "ConstrainedLaw._gain",
+                                              "ConstrainedLaw.clipped"),
     "utank_hil/control/fuzzy/law.py": ("FuzzyBasis.memberships", "_degrees", "_gauss",
                                        "ErrorDynamics", "FuzzyController"),
     "utank_hil/control/lqg.py": ("LQGController", "GentleController"),

@@ -44,6 +44,7 @@ def _study(name: str) -> str:
 PARTS: Final = {
     # what the laws are worth
     "share_of_possible": Part("python -m tools.studies.share_of_possible --seeds 8 --json", 6),
+    "preview_worth": Part("python -m tools.studies.preview_worth --seeds 12 --json", 10),
     "renewed_seas": Part("python -m tools.studies.renewed_seas --seeds 3 --json", 30),
     "ten_hulls": Part("python -m tools.studies.ten_hulls --json", 15),
     "turning": Part("python -m tools.studies.turning --json", 1),

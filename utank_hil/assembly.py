@@ -23,6 +23,7 @@ from utank_hil.canbus.profiles.device_plan import ForeignDevices
 from utank_hil.canbus.profiles.drive_plan import COMMAND_MS
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign
+from utank_hil.control.constrained.design import previewed
 from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.interface import PRESSURE, VALVE
 from utank_hil.control.level_observer import LevelObserver
@@ -112,6 +113,8 @@ def build_law(config: ControllerConfig) -> BuiltLaw:
             )
             if law.linear is None and law.closes_loop and not law.dissipates:
                 law = _by_impulse_response(law)
+            if config.vessel.preview is not None:
+                law = previewed(law, config.vessel.ship)
             finite = law.linear is None or all(
                 np.isfinite(matrix).all() for matrix in law.linear.matrices()[:4]
             )

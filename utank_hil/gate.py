@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,6 +14,7 @@ from utank_hil.base.parameters import ParameterError, refuse
 from utank_hil.base.tick import TICK_S
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
+from utank_hil.control.constrained.law import ConstrainedLaw
 
 MOST_STEP_S: Final = TICK_S / 2
 """Of a law: the other half of a tick is for everything else in it."""
@@ -28,6 +30,7 @@ class JudgedLaw:
     law: BuiltLaw  #: Designed for it.
     robustness: Robustness | None  #: None where there is no loop, or none that can be judged.
     step_s: float  #: Time that a step of the law takes here, at rest.
+    foreseeing: tuple[str, ...] = ()  #: What it misses with a perfect forecast of the waves.
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -38,7 +41,18 @@ class JudgedLaw:
                 f"a step takes {1e3 * self.step_s:.1f} ms, more than half a tick, "
                 f"{1e3 * MOST_STEP_S:g} ms: the loop would miss deadlines and end at zero pressure"
             )
-        return (*found, *(() if self.robustness is None else self.robustness.failures()))
+        if self.robustness is not None:
+            found += self.robustness.failures()
+        return (*found, *self.foreseeing)
+
+    @property
+    def foreseen_s(self) -> tuple[float, float] | None:
+        """How far a forecast of the waves must reach, and what is used of it; None if none is."""
+        linear = self.law.linear
+        if not isinstance(linear, ConstrainedLaw) or linear.foresight is None:
+            return None
+        least, most = linear.foresight.reach
+        return least * linear.sample_time_s, most * linear.sample_time_s
 
     @property
     def accepted(self) -> bool:
@@ -70,7 +84,21 @@ def judge(config: ControllerConfig, *, with_delay_margin: bool = True) -> Judged
     figures = (found.nominal.radius, found.nominal.peak_sensitivity, found.worst_radius)
     if not all(map(math.isfinite, figures)):
         refuse("", [("law", "its margins can't be computed: they are not finite numbers")])
-    return JudgedLaw(config, law, found, step_s)
+    return JudgedLaw(config, law, found, step_s, tuple(_foreseeing_failures(config, law)))
+
+
+def _foreseeing_failures(config: ControllerConfig, law: BuiltLaw) -> Iterator[str]:
+    """What a law that takes forecasts misses with the shortest and longest, perfectly known."""
+    linear = law.linear
+    if not isinstance(linear, ConstrainedLaw) or linear.foresight is None:
+        return
+    for samples in linear.foresight.reach:
+        told = linear.foreseeing(samples)
+        found = robustness(
+            told, config.design_plant, law.linear_measured, with_delay_margin=False
+        ).failures()
+        ahead_s = samples * linear.sample_time_s
+        yield from (f"with a perfect forecast of {ahead_s:.3g} s: {each}" for each in found)
 
 
 def _step_time_s(law: BuiltLaw) -> float:

@@ -25,6 +25,7 @@ NODE_OF: Final = {
     Address.OPERATOR: "panel",
     Address.SENSORS_2: "sensors_2",
     Address.HARDWIRED: "hardwired",
+    Address.PREVIEW: "preview",
     Address.CONTROLLER: "controller",
 }  #: Name of the emulated node at an address.
 

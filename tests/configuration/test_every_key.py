@@ -58,6 +58,8 @@ NOT_TOLD: Final = {
     "thesis_first_devices.devices.pump.node": {10},
     # drives count speeds from a thousandth of a rev/min to one
     "thesis_first_devices.devices.pump.speed_rad_s_per_unit": {0.001, 10},
+    # from perfect to an error of five times the waves, a forecast is one
+    "preview.preview.error": {0.001, 10},
     # small ships in a small sea: three to eight times its height is a usual sea
     "naval_constrained_gpc.law.sea.density_m2_hz": {10, 60},
     "patti_b_constrained_gpc.law.sea.density_m2_hz": {10},

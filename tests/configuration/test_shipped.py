@@ -26,6 +26,7 @@ SEA_OF = {
     "Naval vessel": "naval_vessel.yaml",
     "Patti-B": "patti_b.yaml",
     "Thesis ship 1 with a duct valve": "semi_active.yaml",
+    "Thesis ship 1 with a preview station": "preview.yaml",
 }
 """A scenario for each ship, by her name."""
 SECOND_NS = 1_000_000_000
@@ -64,6 +65,7 @@ def test_drive_and_high_level_switch_follow_from_the_vessel_unless_written():
     "naval_self_tuning",
     "pd",
     "self_tuned",
+    "self_tuned_preview",
     "self_tuning",
     "valve_clipped",
 )

@@ -70,7 +70,7 @@ def problems_of(text):
         ("codes: [LEVEL_LIMIT]", "codes: [LEVEL]", "rows.65.expect.codes.0"),
         ("meets: [F17", "meets: [F18", "requirements"),
         ("{id: F01, ", "{id: F02, ", "requirements.0.id"),
-        ("setup: valve,", "setup: pump,", "rows.165.fault.inject.0"),
+        ("setup: valve,", "setup: pump,", "rows.170.fault.inject.0"),
         ("codes: [DRIVE_WARNING]", "codes: []", "rows.142.expect.codes"),
         ("fault_s: 40.0", "fault_s: 1.0e+300", "fault_s"),
         ("arm_s: 1.0", "arm_s: 1.0e+300", "arm_s"),

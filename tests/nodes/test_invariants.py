@@ -280,6 +280,8 @@ BEGIN_AND_END: dict[str, tuple[Callable[[Table], None], Callable[[Table], None]]
     "valve fault": judged("own", valve=ValveReport(fault=True)),
     "valve elsewhere": judged("own", valve=ValveReport(off_ms=1e3)),
     "little stability": judged("own", gm_low=True),
+    "forecast silent": judged("measured", forecast_age_ms=1e3),
+    "forecast contradicted": judged("own", doubts_forecast=True),
     "found, stops": found(Reaction.STOP),
     "found, ramps": found(Reaction.RAMP),
     "found, halves": found(Reaction.HALVE),

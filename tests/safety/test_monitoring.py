@@ -12,7 +12,15 @@ from controller_bench import VESSEL as SHIPPED
 from monitors.moving_ship import FINDINGS, MovingShip
 
 from utank_hil.base.tick import TICK_NS, TICK_S
-from utank_hil.canbus import DriveState, Frame, Quality, SensorMotion, SensorTank, Switch
+from utank_hil.canbus import (
+    Address,
+    DriveState,
+    Frame,
+    Quality,
+    SensorMotion,
+    SensorTank,
+    Switch,
+)
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.control import DesignPlant
 from utank_hil.dynamics.ship import RollShip
@@ -379,9 +387,13 @@ def test_the_levels_are_looked_at_every_50_ms():
 def test_frames_of_no_node_are_counted_and_those_of_the_catalogue_are_not():
     table = Table()
     foreign = min(set(range(100)) - CATALOGUE.can_ids)
-    for can_id in (*CATALOGUE.can_ids, foreign):
+    undeclared = CATALOGUE.ids_sent_by(Address.PREVIEW)
+    for can_id in (*CATALOGUE.can_ids - undeclared, foreign):
         table.inbox.receive(Frame(can_id, bytes(8)), 0)
     assert table.inbox.foreign == 1
+    for can_id in undeclared:
+        table.inbox.receive(Frame(can_id, bytes(8)), 0)
+    assert table.inbox.foreign == 1 + len(undeclared) == 4
 
 
 def test_twin_of_a_pump_at_rest_rolls_as_the_ship_does():

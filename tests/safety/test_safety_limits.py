@@ -17,6 +17,7 @@ LIMITS = {
     "tank_degraded_age_ms": (100, 1000),
     "pump_age_ms": (1000, 1000),
     "pump_degraded_age_ms": (200, 1000),
+    "forecast_age_ms": (600, 1000),
     "drive_age_ms": (60, 1000),
     "echo_age_ms": (100, 1000),
     "drive_enabled_within_ms": (40, 1000),

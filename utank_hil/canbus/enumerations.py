@@ -20,6 +20,7 @@ class Address(IntEnum):
     SENSORS_2 = 0x85
     HARDWIRED = 0x86
     OPERATOR_2 = 0x88
+    PREVIEW = 0x89
 
 
 class Mode(IntEnum):
@@ -80,6 +81,7 @@ class Fault(IntEnum):
     STABILITY_LOW = 39
     DRIVE_WARNING = 40
     NODE_SILENT = 41
+    FORECAST_IGNORED = 42
 
 
 class RetuningState(IntEnum):

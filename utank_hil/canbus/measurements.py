@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from utank_hil.canbus.enumerations import DriveState, Mode
+from utank_hil.canbus.messages import ForecastPoints
 
 MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 """Names of what a law may measure, of `MotionSample` or of `Measurements`."""
@@ -99,3 +100,6 @@ class Measurements:
     link_lost: Final[bool]  #: The bus could not be read or written in the last command cycle.
     frames: Final[int]  #: Frames so far, of any kind.
     foreign: Final[int]  #: Those that are not in the catalogue.
+    #: Points of a forecast of the waves by their time of receipt, also those that are too old.
+    forecast: "Final[tuple[tuple[int, ForecastPoints], ...]]" = ()
+    forecast_age_ms: Final[float] = 0.0

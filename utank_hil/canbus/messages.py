@@ -151,6 +151,17 @@ class HardwiredInputs(NamedTuple):
     quality: Quality | None
 
 
+@_dbc_message("WAVE_FORECAST")
+class ForecastPoints(NamedTuple):
+    """WAVE_FORECAST, preview station to controller, 20 ms: two points of a forecast a frame."""
+
+    lead_s: float
+    moment_rad: float
+    next_moment_rad: float
+    deviation_rad: float
+    quality: Quality | None
+
+
 @_dbc_message("CTRL_STATUS")
 class ControllerStatus(NamedTuple):
     """CTRL_STATUS, controller to all, 100 ms."""

@@ -56,6 +56,7 @@ def controller_json(judged: JudgedLaw) -> dict[str, Any]:
         "law": config.law.kind,
         "at_rest": _at_rest(judged.law),
         "dissipates": judged.law.dissipates,
+        "foreseen_s": judged.foreseen_s,
         "limits": finite(asdict(config.limits)),
         "robustness": None if report is None else finite(asdict(report)),
         "delay_margin_searched_s": None if report is None else _searched_s(judged.law),
@@ -213,10 +214,28 @@ def _remarks(judged: JudgedLaw, report: Robustness) -> list[str]:
             f"The worse of two tanks counts: the water's damping ratio is {working} in {sea}, "
             f"{calm} in small motions."
         )
+    notes += _preview_words(judged)
     gain = report.nominal.peak_loop_gain
     if gain < LEAST_LOOP_GAIN and not law.adapts:
         notes.append(f"It hardly acts: its loop gain is {gain:.2g} at most.")
     return notes
+
+
+def _preview_words(judged: JudgedLaw) -> list[str]:
+    """What is made of the forecasts of a ship's preview station."""
+    config, ahead_s = judged.config, judged.foreseen_s
+    if config.vessel.preview is None:
+        return []
+    where = config.vessel.preview.bus or "the controller's own bus"
+    if ahead_s is None:
+        takes = "constrained and self-tuned laws do that are not renewed under way"
+        return [f"It takes no forecasts of the waves: {takes}."]
+    least_s, most_s = ahead_s
+    return [
+        f"It takes forecasts of the waves from {where}, {least_s:.3g} s ahead or more, of which it "
+        f"plans {most_s:.3g}, each point for {config.safety.forecast_age_ms:g} ms. Without, or "
+        "where the motion contradicts them, it is the law judged above."
+    ]
 
 
 def _at_rest(law: BuiltLaw) -> str | None:

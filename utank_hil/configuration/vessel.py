@@ -11,6 +11,7 @@ from pydantic import ValidationInfo, field_validator, model_validator
 
 from utank_hil.base.parameters import Problem, Range, refuse
 from utank_hil.base.tick import TICK_S
+from utank_hil.canbus.frame import MOST_BUSES
 from utank_hil.canbus.profiles.device_plan import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.configuration.device_sections import NATIVE_DRIVE
 from utank_hil.configuration.devices import DevicesSection
@@ -33,6 +34,12 @@ _RATE_PER_PRESSURE: Final = 2.0
 _LEVEL_SHARE: Final = 3.85 / 4.88
 
 
+class PreviewSection(Section):
+    """Section ``preview``: a station that forecasts the waves, by WAVE_FORECAST."""
+
+    bus: str = ""  #: Interface that it is on; empty for the controller's own.
+
+
 class Vessel(Section):
     """A ship with its tank and pump: ``configs/ships``."""
 
@@ -53,12 +60,14 @@ class Vessel(Section):
 
     The nodes prove it by their version, which differs from that of the same ship on board."""
     devices: DevicesSection | None = None  #: What is on the bus in the place of the native nodes.
+    preview: PreviewSection | None = None
+    """Station that forecasts the waves; without it its frames are strangers'."""
     _hull: HullFile | None = None
     _written: frozenset[str] = frozenset()  # These are the keys of the ship in its file.
 
     @property
     def version(self) -> int:
-        """Hash of everything but the name, compared by the nodes before arming."""
+        """Hash of everything but name and preview, compared by the nodes before arming."""
         parts = (self.ship, self.tank, self.pump)
         content = [None if part is None else not_by_default(part) for part in parts]
         if self.valve is not None:
@@ -172,13 +181,19 @@ class Vessel(Section):
             problems += [(f"devices.{name}", reason) for name, reason in lacking]
             problems += vessel.devices.pump.pump_problems(vessel.pump)
             problems += vessel.devices.valve.valve_problems(vessel.valve)
+        buses = vessel.foreign.buses
+        if vessel.preview is not None and len(buses) > MOST_BUSES:
+            problems.append(("preview.bus", f"is the {len(buses)}th interface: there are no more"))
         refuse("", [in_written_key(each, vessel._written) for each in problems])
         return vessel
 
     @property
     def foreign(self) -> ForeignDevices:
-        """Devices that are not nodes of the catalogue."""
-        return NO_FOREIGN_DEVICES if self.devices is None else self.devices.foreign(self.pump)
+        """Devices that are not nodes of the catalogue, and on which bus the preview station is."""
+        found = NO_FOREIGN_DEVICES
+        if self.devices is not None:
+            found = self.devices.foreign(self.pump)
+        return found if self.preview is None else found.with_preview(self.preview.bus)
 
     @property
     def motion_cycles_s(self) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, Final, Protocol, runtime_checkable
+from typing import Annotated, Any, Final, NamedTuple, Protocol, runtime_checkable
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.parameters import NotNegative, Range, Share, range_problems, refuse
@@ -117,6 +117,26 @@ class Plans(Protocol):
 
     def allow(self, share: float) -> None:
         """Set the share of the pressure limit that the next plan may use."""
+
+
+class WaveForecast(NamedTuple):
+    """Forecast of the waves' roll moment over the roll stiffness, shapes (f,), f > 0."""
+
+    time_s: FloatArray  #: From the next measurement on, increasing.
+    moment_rad: FloatArray
+    deviation_rad: FloatArray  #: Standard deviation of its error.
+
+
+@runtime_checkable
+class Foresees(Protocol):
+    """A controller that takes forecasts of the waves."""
+
+    @property
+    def doubts_forecasts(self) -> bool:
+        """Whether forecasts are ignored, as they do not agree with the motion."""
+
+    def preview(self, forecast: WaveForecast | None) -> None:
+        """Take what is forecast, or that nothing is, for the next step."""
 
 
 @runtime_checkable

@@ -226,6 +226,7 @@ class ControllerNode:
             self.estimated.gm_low,
             self.commissioned,
             self._frames_sent,
+            law.doubts_forecast,
         )
 
     def _estimate_waves(self, measured: Measurements, judgement: Judgement) -> None:

@@ -28,6 +28,7 @@ from utank_hil.canbus.profiles.device import ProfiledDevice
 from utank_hil.canbus.profiles.device_plan import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.nodes.actuators_heard import ABSENT_NS, DriveHeard, ValveHeard
 from utank_hil.nodes.canopen_drive import CanopenDrive
+from utank_hil.nodes.forecast_heard import ForecastHeard
 from utank_hil.nodes.hardwired import HardwiredHeard
 from utank_hil.nodes.levels_heard import LevelsHeard
 from utank_hil.nodes.nodes_heard import NodesHeard
@@ -125,6 +126,13 @@ class Inbox:
         }
         matched = [address for address, here in native.items() if here]
         self._received: dict[Fault, str] = {}
+        self._forecast: ForecastHeard | None = None
+        if foreign.preview is not None:
+            self._forecast = ForecastHeard(
+                routing, catalogue, foreign.preview, self._versions, self._received
+            )
+        if foreign.preview != 0:
+            self._known -= catalogue.ids_sent_by(Address.PREVIEW)
         self._nodes = NodesHeard(
             routing, catalogue, self._versions, matched, self.stations, self._received
         )
@@ -155,6 +163,7 @@ class Inbox:
         """What is known at a tick; takes the operators' edges, which come once."""
         stations, hardwired, nodes = self.stations, self.hardwired, self._nodes
         levels, drive, valve = self._levels, self._drive, self._valve
+        forecast = self._forecast
         wishes = stations.take(now_ns)  # first of all: who is in command may change
         motions = tuple([sensor.sample(now_ns) for sensor in self.motions])
         hardwired_age_ms = 0.0
@@ -200,6 +209,8 @@ class Inbox:
             now_ns <= self._link_lost_until_ns,
             self.frames,
             self.foreign,
+            () if forecast is None else forecast.points,
+            0.0 if forecast is None else (now_ns - forecast.heard_ns) / MILLISECOND_NS,
         )
 
     @property

@@ -12,9 +12,10 @@ from utank_hil.canbus import RetuningOrder, RetuningState
 from utank_hil.canbus.enumerations import Mode
 from utank_hil.canbus.events import ModelSummary, RetuningEvent
 from utank_hil.canbus.measurements import Measurements, MotionSample
-from utank_hil.control.interface import PRESSURE, VALVE, Controller, Plans, StartsAnew
+from utank_hil.control.interface import PRESSURE, VALVE, Controller, Foresees, Plans, StartsAnew
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.nodes.actuators import Actuators
+from utank_hil.nodes.forecast_heard import forecast_of
 from utank_hil.retuning.estimate import ShipFigures
 from utank_hil.retuning.law_exchange import LawExchange
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
@@ -70,6 +71,8 @@ class RunningLaw:
         self._commands = commands
         self._limits = limits
         self._allow = law.allow if isinstance(law, Plans) else None
+        self._foresees = law if isinstance(law, Foresees) else None
+        self.foreseen_s = 0.0  #: How far ahead the waves were told to the last answer.
         self._starts_anew = isinstance(law, StartsAnew)
         self._samples = Schedule(round(law.sample_time_s / TICK_S) * TICK_NS)
         self._first_share = self._watched_share = 0.0
@@ -92,6 +95,11 @@ class RunningLaw:
     def fallbacks(self) -> int | None:
         """Plans that were not found in time, see `Plans`; None for a law that plans nothing."""
         return self.law.fallbacks if isinstance(self.law, Plans) else None
+
+    @property
+    def doubts_forecast(self) -> bool:
+        """Whether the law ignores forecasts that the motion contradicts."""
+        return self._foresees is not None and self._foresees.doubts_forecasts
 
     @property
     def state(self) -> RetuningState | None:
@@ -183,6 +191,8 @@ class RunningLaw:
                 passive_roll_rad=judgement.passive_roll_rad,
             )
         self._answered = True
+        if self._foresees is not None and measured.forecast:
+            self._foresee(self._foresees, measured)
         answer = self.law.step(self._measure(measured, motion, level))
         answered = dict(zip(self._commands, answer, strict=True))
         self.pressure_pa = pressure_pa = float(answered.get(PRESSURE, 0.0))
@@ -196,6 +206,13 @@ class RunningLaw:
             self._forget()
         elif not self._raised:
             self.failed = False
+
+    def _foresee(self, law: Foresees, measured: Measurements) -> None:
+        """Hand on what is forecast of the waves, if it is not too old."""
+        forecast = forecast_of(measured, self._limits.forecast_age_ms)
+        law.preview(forecast)
+        used = forecast is not None and not law.doubts_forecasts
+        self.foreseen_s = float(forecast.time_s[-1]) if forecast is not None and used else 0.0
 
     def _start_anew(self, measured: Measurements, judgement: Judgement) -> None:
         """Reset a law that asks for it when an operator arms or resets, and one that raised."""

@@ -36,6 +36,7 @@ _SLOW: Final = {
     "bus_load": "safety.situation.bus_load",
     "overruns": "telemetry.statistics.overruns",
     "retuning": "retuning_state",
+    "forecast_ahead_s": "law.foreseen_s",
     "roll_rms_rad": "safety.roll_rms_rad",
     "twin_roll_rms_rad": "safety.passive_roll_rms_rad",
     "sea_verdict": "estimated.sea.verdict",

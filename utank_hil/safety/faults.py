@@ -299,6 +299,14 @@ FAULTS: Final = (
          "Command: bus, its cable and load. Sensor: the drive's pressure feedback.",
          Condition(_WARN, "a warning bit in the last DRIVE_STATUS_2",
              lambda seen, _: seen.measured.drive_warns)),
+    _row(Fault.FORECAST_IGNORED, "The forecast of the waves is not used: it is late, missing, of "
+         "other versions, or the ship moves otherwise. The law goes on without it.",
+         "Check the preview station: supply, bus, the quality and heartbeat that it sends, and "
+         "sign, scale and time of its forecast against the roll.",
+         Condition(_WARN, "newest good WAVE_FORECAST older than {forecast_age_ms:g} ms",
+             lambda seen, limits: seen.measured.forecast_age_ms > limits.forecast_age_ms),
+         Condition(_WARN, "the law finds that the ship's motion contradicts it",
+             lambda seen, _: seen.own.doubts_forecast)),
     _row(Fault.BUS_DEGRADED, "Frames are lost on the CAN bus, a node sends too seldom, or a "
          "measurement has gaps.",
          "Check the cable, its plugs and termination, gateways between the nodes, the load, and "

@@ -48,6 +48,7 @@ class SafetyLimits:
     pump_age_ms: _Silence = 1000.0
     #: Age of that sample from which half the pressure is allowed.
     pump_degraded_age_ms: _Silence = 200.0
+    forecast_age_ms: _Silence = 600.0  #: Longest age of a point of a forecast that is used.
     drive_age_ms: _Silence = 60.0  #: Longest age of the drive's status.
     echo_age_ms: _Silence = 100.0  #: Longest age of the drive's last new command echo.
     #: Longest time the drive may be out of operation enabled while armed.

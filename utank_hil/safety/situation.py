@@ -51,6 +51,7 @@ class OwnState:
     gm_low: Final[bool] = False
     commissioned: Final[bool] = False  #: A commissioning was passed with this configuration.
     frames_sent: Final[int] = 0  #: Frames that the controller has sent since its start.
+    doubts_forecast: Final[bool] = False  #: The law ignores forecasts that the motion contradicts.
 
 
 @dataclass(slots=True, eq=False)

@@ -12,8 +12,7 @@ from utank_hil.analysis.loop.loop_simulation import SensorNoise, passive_motion,
 from utank_hil.analysis.loop.margins import robustness
 from utank_hil.base.ordered_sums import positive_solved
 from utank_hil.control import ConstrainedDesign, DesignPlant, PumpLimits, SeaModel
-from utank_hil.control.constrained.preview import WaveForecast
-from utank_hil.control.lqg import LQGLaw
+from utank_hil.control.interface import WaveForecast
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
 
 PLANT = DesignPlant(SHIP, TANK, limits=PumpLimits(50e3, 100e3, 4.0))
@@ -112,18 +111,38 @@ def test_without_a_forecast_it_is_the_law_without_preview(forecast):
     assert 0 < limited < 60
 
 
-def test_it_keeps_its_margins_where_it_knows_the_waves_from_others():
+@pytest.mark.parametrize("samples", [25, 60])
+def test_it_keeps_its_margins_where_it_knows_the_waves_from_others(samples):
     law = previewed()
-    n, at = len(LAW.model.A), np.arange(25)
-    rest = np.eye(n + 60) - law.steady_state
-    gain = -(law.horizon.unlimited_state[:1] @ rest + law.steady_command)
-    _, known, learnt, covariance = law.foresight
-    spread = known[np.ix_(at, at)] + 0.01 * covariance[0] * np.eye(25)
-    state = np.eye(n + 60)[:, :n] - learnt[:, at] @ np.linalg.solve(
-        spread, law.foresight.by_state[at]
-    )
-    whole = LQGLaw(LAW.model, gain @ state, LAW.observer_gain)
-    assert not robustness(whole, PLANT, MEASURED, with_delay_margin=False).failures()
+    told = law.foreseeing(samples)
+    assert not robustness(told, PLANT, MEASURED, with_delay_margin=False).failures()
+    with pytest.raises(ValueError, match="not previewed"):
+        LAW.foreseeing(samples)
+
+
+def test_the_law_of_a_perfect_forecast_is_that_of_a_plan_told_what_the_estimate_leaves():
+    """Waves of zero, said to be certain, for a state: the plan's first command is its own."""
+    law = previewed()
+    controller, state = law.controller(), 1e-5 * np.random.default_rng(3).normal(size=14)
+    controller._state = state.copy()
+    preview = controller._preview
+    preview.take(WaveForecast(0.2 * np.arange(27), np.zeros(27), np.zeros(27)))
+    told = controller._plan_gain[0] @ preview.expected(state)
+    told += controller._steady_command @ np.append(state, np.zeros(60))
+    np.testing.assert_allclose(told, -(law.foreseeing(25).gain @ state)[0], rtol=1e-6)
+
+
+def test_a_forecast_that_reaches_less_far_than_asked_is_left_out():
+    rng = np.random.default_rng(2)
+    y = rng.normal(size=3) * (1e-4, 5e-5, 1e-3)
+    answers = []
+    for least_s in (0.0, 4.6, 4.9):  # the forecast reaches 5 s, used up to 4.8 s
+        controller = LAW.previewed(least_s).controller()
+        controller.preview(WaveForecast(TIME_S, np.full(20, 0.01), np.zeros(20)))
+        answers.append(float(controller.step(y)[0]))
+    assert answers[0] == answers[1]
+    assert answers[2] == pytest.approx(float(LAW.controller().step(y)[0]), abs=2.0)
+    assert abs(answers[2] - answers[0]) > 100
 
 
 class Fed:

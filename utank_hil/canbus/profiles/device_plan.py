@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Final, Generic, TypeVar
 
@@ -184,11 +184,17 @@ class ForeignDevices:
     #: nodes, sources: CANopen nodes and source addresses of devices on the controller's own bus.
     nodes: frozenset[int] = frozenset()
     sources: frozenset[int] = frozenset()
+    preview: int | None = None  #: Bus of the preview station; None if there is none.
 
     @property
     def any(self) -> bool:
-        """Whether there are any."""
-        return self != NO_FOREIGN_DEVICES
+        """Whether there are any, or more interfaces than the controller's own."""
+        return replace(self, preview=None) != NO_FOREIGN_DEVICES
+
+    def with_preview(self, bus: str) -> "ForeignDevices":
+        """Return these with a preview station on an interface."""
+        buses = self.buses if bus in self.buses else (*self.buses, bus)
+        return replace(self, buses=buses, preview=buses.index(bus))
 
     def said(self) -> dict[int, tuple[str, str, bool]]:
         """Identifiers: device, message, and whether its node is silent until it is configured."""

@@ -7,7 +7,8 @@ knows the sea, from there on. Without either, a plan that leaves the ship swingi
 The part of the motion due to a steady heel is subtracted first.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated, Final, Literal
 
@@ -24,11 +25,13 @@ from utank_hil.base.parameters import (
     refuse,
 )
 from utank_hil.control.constrained.horizon import condense
-from utank_hil.control.constrained.law import ConstrainedLaw, Waves
+from utank_hil.control.constrained.law import ConstrainedLaw
+from utank_hil.control.constrained.preview import Waves
 from utank_hil.control.interface import BuiltLaw, DesignPlant, PumpLimits
 from utank_hil.control.lqg import kalman_predictor
 from utank_hil.control.predictive.design import measured_problems, per_output
 from utank_hil.control.sea_model import SeaModel
+from utank_hil.dynamics import RollShip
 from utank_hil.dynamics.linear import STATES, state_matrices
 from utank_hil.dynamics.sampling import LinearModel, noise_covariance
 
@@ -39,6 +42,9 @@ from utank_hil.dynamics.sampling import LinearModel, noise_covariance
 MOST_KNOTS: Final = 60
 MOST_HORIZON: Final = 400
 MOST_ITERATIONS: Final = 200
+LEAST_AHEAD: Final = 0.38
+"""Least time over the roll period that a forecast must reach: of shorter ones, perfectly known, the
+shipped laws can be unstable on a ship with 1.3 times her period (docs/control.md)."""
 # A metre above the level limit costs as much as this roll over the whole horizon.
 _PENALTY_ROLL_RAD = 0.05
 
@@ -242,6 +248,15 @@ class ConstrainedDesign:
         """Design the law for a plant."""
         law = self.law(plant)
         return BuiltLaw(law.controller, self.measured, law)
+
+
+def previewed(law: BuiltLaw, ship: RollShip) -> BuiltLaw:
+    """The law taking forecasts of the waves, if it is one that can (`ConstrainedLaw`)."""
+    linear = law.linear
+    if not isinstance(linear, ConstrainedLaw) or law.controller != linear.controller:
+        return law
+    foreseeing = linear.previewed(LEAST_AHEAD * 2 * math.pi / ship.natural_frequency_rad_s)
+    return replace(law, controller=foreseeing.controller, linear=foreseeing)
 
 
 def _cost_of_law(

@@ -16,16 +16,17 @@ zero without a heel correction, so the tank is passive if that persists.
 
 import math
 from dataclasses import dataclass, replace
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 
 from utank_hil.base.arrays import MOST_MEASURED, ComplexArray, FloatArray
 from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import Positive, Range, range_problems, refuse
+from utank_hil.control.constrained.foresight import foreseen
 from utank_hil.control.constrained.horizon import Horizon, PlanProgramme, condense
-from utank_hil.control.constrained.preview import Foresight, Preview, WaveForecast
-from utank_hil.control.interface import PumpLimits
+from utank_hil.control.constrained.preview import Foresight, Preview, Waves
+from utank_hil.control.interface import PumpLimits, WaveForecast
 from utank_hil.control.lqg import SHARES, GentleController, LQGLaw
 from utank_hil.dynamics.sampling import LinearModel
 
@@ -37,15 +38,6 @@ comparison or the rounding of a message depends on its last digit, which differs
 Rounding to a grid makes it equal on all.
 """
 _FOLLOWED = 0.02  # over the greatest pressure; a mean command this near the plan's counts as it
-
-
-class Waves(NamedTuple):
-    """The waves in a law's own model of n states."""
-
-    row: FloatArray  #: shape (n,): from the state to the wave moment over the roll stiffness.
-    noise: FloatArray  #: shape (n,): what unit white noise adds to the next state.
-    process_covariance: FloatArray  #: shape (n, n)
-    variance: FloatArray  #: shape (m,): of the measurements' noise.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,47 +134,42 @@ class ConstrainedLaw:
             steady_command=np.append(self.steady_command, np.zeros(f)),
         )
 
-    def previewed(self) -> "ConstrainedLaw":
-        """Return the law that takes forecasts of the waves.
+    def previewed(self, least_ahead_s: float = 0.0) -> "ConstrainedLaw":
+        """Return the law that takes forecasts of the waves, of `least_ahead_s` or more.
 
         ValueError is raised if the law has no model of the waves.
         """
-        from scipy.linalg import block_diag, solve_discrete_are, solve_discrete_lyapunov
+        from scipy.linalg import block_diag
 
-        waves, model, horizon = self.waves, self.model, self.horizon
-        if waves is None:
+        if self.waves is None:
             raise ValueError("a law without a model of the sea can't weigh a forecast of the waves")
-        own, n, samples = len(waves.row), len(model.A), len(horizon.interpolation)
-        a, c = model.A[:own, :own], model.C[:, :own]
-        error = solve_discrete_are(a.T, c.T, waves.process_covariance, np.diag(waves.variance))
-        noise = np.zeros((n, samples))
-        noise[:own, 0] = waves.noise
-        rest = np.zeros((samples, 1))
-        ahead = LinearModel(
-            np.block([[model.A, noise], [np.zeros((samples, n)), np.eye(samples, k=1)]]),
-            np.vstack([model.B, rest]),
-            np.hstack([model.C, np.zeros((len(c), samples))]),
-            model.D,
-            model.dt,
-        )
-        moment = np.empty((samples, n + samples))
-        moment[0] = np.append(waves.row, np.zeros(n - own + samples))
-        for q in range(1, samples):
-            moment[q] = moment[q - 1] @ ahead.A
-        learnt = block_diag(error, np.zeros((n - own, n - own)), np.eye(samples)) @ moment.T
-        stationary = solve_discrete_lyapunov(a, np.outer(waves.noise, waves.noise))
-        covariance = moment[:, :own] @ stationary @ waves.row
+        samples = len(self.horizon.interpolation)
+        least = min(max(math.ceil(least_ahead_s / self.sample_time_s), 1), samples)
+        ahead, foresight = foreseen(self.waves, self.model, samples, least)
 
         def padded(row: FloatArray) -> FloatArray:
             return np.append(row, np.zeros(samples))
 
         return replace(
             self,
-            horizon=self._horizon(ahead, padded(horizon.correction)),
+            horizon=self._horizon(ahead, padded(self.horizon.correction)),
             steady_state=block_diag(self.steady_state, np.zeros((samples, samples))),
             steady_command=padded(self.steady_command),
-            foresight=Foresight(moment[:, :n], moment @ learnt, learnt, covariance),
+            foresight=foresight,
         )
+
+    def foreseeing(self, samples: int) -> LQGLaw:
+        """Linear law where a perfect forecast of so many samples stands for the estimate's waves.
+
+        ValueError is raised if the law takes no forecasts.
+        """
+        if self.foresight is None:
+            raise ValueError("the law takes no forecasts: it is not previewed")
+        n, at = len(self.model.A), np.arange(samples)
+        weights, by_state = self.foresight.weights(at, 0.0), self.foresight.by_state[at]
+        state: FloatArray = -self.foresight.learnt[:, at] @ np.linalg.solve(weights, by_state)
+        state[:n] += np.eye(n)
+        return LQGLaw(self.model, product(self._gain, state), self.observer_gain)
 
     def _horizon(self, model: LinearModel, correction: FloatArray) -> Horizon:
         """Return the horizon for a model with more states, which the terminal cost leaves out."""
@@ -201,9 +188,13 @@ class ConstrainedLaw:
 
     def unlimited(self) -> LQGLaw:
         """Linear law that the controller follows while no limit is active."""
+        return LQGLaw(self.model, self._gain[:, : len(self.model.A)], self.observer_gain)
+
+    @property
+    def _gain(self) -> FloatArray:
+        """From the state, and the noises to come, to the pressure: u = -K x."""
         rest = np.eye(len(self.steady_state)) - self.steady_state
-        gain = -(product(self.horizon.unlimited_state[:1], rest) + self.steady_command)
-        return LQGLaw(self.model, gain[:, : len(self.model.A)], self.observer_gain)
+        return -(product(self.horizon.unlimited_state[:1], rest) + self.steady_command)
 
     def clipped(self) -> GentleController:
         """Return a new controller of the linear law; it takes shares of the pressure."""

@@ -11,7 +11,6 @@ the same forecast, heard again, would count twice. A plan for the noises to come
 that has them as states, shifted by one each sample.
 """
 
-import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -19,6 +18,7 @@ import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.ordered_sums import positive_solved, product
+from utank_hil.control.interface import WaveForecast
 
 MOST_GAP_S: Final = 0.8
 """Longest time between two points that are interpolated: one message of two points is lost."""
@@ -34,12 +34,13 @@ _MOST_DOUBT: Final = 10.0  # Of one plan, which then knows no forecast; so doubt
 _MOST_RAD: Final = 1.0  # No sea is as steep.
 
 
-class WaveForecast(NamedTuple):
-    """Forecast of the waves' roll moment over the roll stiffness, shapes (f,), f > 0."""
+class Waves(NamedTuple):
+    """The waves in a law's own model of n states."""
 
-    time_s: FloatArray  #: From the next measurement on, increasing.
-    moment_rad: FloatArray
-    deviation_rad: FloatArray  #: Standard deviation of its error.
+    row: FloatArray  #: shape (n,): from the state to the wave moment over the roll stiffness.
+    noise: FloatArray  #: shape (n,): what unit white noise adds to the next state.
+    process_covariance: FloatArray  #: shape (n, n)
+    variance: FloatArray  #: shape (m,): of the measurements' noise.
 
 
 class Foresight(NamedTuple):
@@ -49,6 +50,19 @@ class Foresight(NamedTuple):
     moment_covariance: FloatArray  #: shape (N, N): Sigma.
     learnt: FloatArray  #: shape (n + N, N): T.
     covariance: FloatArray  #: shape (N,): of moments so many samples apart, nothing known.
+    least: int = 1  #: Samples that a forecast must reach; a shorter one is left out.
+
+    @property
+    def reach(self) -> tuple[int, int]:
+        """Samples that a forecast must reach, and that are used of it."""
+        return self.least, len(self.covariance)
+
+    def weights(self, at: npt.NDArray[np.int64], error: FloatArray | float) -> FloatArray:
+        """Return the covariance of the moments at samples, known to an error's covariance."""
+        least = _LEAST_SHARE * _LEAST_SHARE * self.covariance[0]
+        known: FloatArray = self.moment_covariance[at[:, None], at]
+        whole: FloatArray = known + error + least * np.eye(len(at))
+        return whole
 
 
 class Preview:
@@ -63,9 +77,8 @@ class Preview:
     """
 
     def __init__(self, foresight: Foresight, sample_time_s: float) -> None:
-        self._by_state, self._moment_covariance, self._learnt, covariance = foresight
+        self._foresight, covariance = foresight, foresight.covariance
         samples = len(covariance)
-        self._deviation_rad = math.sqrt(covariance[0])
         apart = np.abs(np.arange(samples)[:, None] - np.arange(samples))
         self._correlation = (covariance / covariance[0])[apart]
         self._time_s = sample_time_s * np.arange(1, samples + 1)
@@ -84,11 +97,11 @@ class Preview:
 
     def expected(self, state: FloatArray) -> FloatArray:
         """Return state and noises to come, shape (n + N,), as the forecast has them."""
-        unknown = np.zeros(len(self._learnt))
+        unknown = np.zeros(len(self._foresight.learnt))
         forecast, self._forecast = self._forecast, None
         if forecast is not None:
             at, moment, deviation = self._on_samples(forecast)
-            if len(at):
+            if len(at) and at[-1] >= self._foresight.least - 1:
                 self._weigh(unknown, state, at, moment, deviation)
         unknown[: len(state)] += state
         return unknown
@@ -101,17 +114,15 @@ class Preview:
         moment: FloatArray,
         deviation: FloatArray,
     ) -> None:
-        least_rad = _LEAST_SHARE * self._deviation_rad
-        known = self._moment_covariance[at[:, None], at]
-        apart = moment - product(self._by_state[at], state)
+        apart = moment - product(self._foresight.by_state[at], state)
         error = deviation[:, None] * deviation * self._correlation[at[:, None], at]
-        spread = known + error + least_rad * least_rad * np.eye(len(at))
+        spread = self._foresight.weights(at, error)
         expected = np.diagonal(spread)[:_JUDGED]
         ratio = float(np.mean(apart[:_JUDGED] * apart[:_JUDGED] / expected))
         self.doubt += self._share * (min(ratio, _MOST_DOUBT) - self.doubt)
         self.doubted = self.doubt > DOUBTED[not self.doubted]
         if ratio < _MOST_DOUBT and not self.doubted:
-            unknown += product(self._learnt[:, at], positive_solved(spread, apart))
+            unknown += product(self._foresight.learnt[:, at], positive_solved(spread, apart))
 
     def _on_samples(
         self, forecast: WaveForecast
