@@ -221,7 +221,9 @@ def found(reaction):
     def begin(table):
         its = min(known, key=table.began.__getitem__)
         table.began[its] += 1
-        table.found |= table._draw.choice(list(its.findings)).value
+        mask = its.findings
+        bits = [1 << place for place in range(mask.bit_length()) if mask >> place & 1]
+        table.found |= table._draw.choice(bits)
 
     def end(table):
         table.found = 0
