@@ -3,11 +3,15 @@
 import http.client
 import json
 import os
+import re
 import signal
+import socket
 import statistics
+import threading
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -16,6 +20,7 @@ from ship_of_a_page import Bench, bench
 
 from utank_hil.canbus import AlarmState, Fault, Mode, Station
 from utank_hil.commands.panel import Keyboard
+from utank_hil.commands.web_panel import server
 from utank_hil.commands.web_panel.server import MOST_PAGES
 
 pytestmark = pytest.mark.slow
@@ -139,6 +144,8 @@ def test_arm_disarm_and_stop(at: tuple[Bench, Client]) -> None:
 def test_figures_are_of_the_bus_and_none_is_of_what_is_not_heard(at: tuple[Bench, Client]) -> None:
     made, client = at
     figures = client.until("abs(state['figures']['roll_deg']) > 1.0")["figures"]
+    scripts = [path.read_text() for path in Path(server.__file__).parent.glob("*.js")]
+    assert {name for each in scripts for name in re.findall(r"figures\.(\w+)", each)} <= {*figures}
     assert abs(figures["roll_deg"]) <= 3.45
     assert figures["starboard_m"] == pytest.approx(-figures["port_m"], abs=2e-3)
     assert figures["gm_m"] == pytest.approx(1.62, abs=0.01)
@@ -153,6 +160,7 @@ def test_figures_are_of_the_bus_and_none_is_of_what_is_not_heard(at: tuple[Bench
         # each grows old by itself, those of the sensors first
         shown = ("roll_deg", "heel_deg", "port_m", "given_kpa", "asked_kpa", "power_kw", "load")
         old = " and ".join(f"state['figures']['{name}'] is None" for name in shown)
+        old += " and state['figures']['drive'] is None and state['figures']['high_level'] is None"
         client.until(f"not state['heard'] and {old}")
     finally:
         made.ship.mute = False
@@ -248,6 +256,42 @@ def test_no_more_pages_than_leave_a_connection_for_orders(at: tuple[Bench, Clien
         refused.open()
     for other in (refused, *others):
         other.close()
+
+
+def test_a_page_that_takes_nothing_more_leaves_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "_PATIENCE_S", 1.0)
+    monkeypatch.setattr(server, "MOST_PAGES", 1)
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with (
+        ours,
+        theirs,
+        socket.socket() as asleep,
+        socket.create_server(("127.0.0.1", 0)) as listening,
+        server.PageServer(listening, theirs, "token") as served,
+    ):
+        address = listening.getsockname()
+        for target in (served.follow, served.serve_forever):
+            threading.Thread(target=target, daemon=True).start()
+        asleep.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        asleep.connect(address)
+        host = f"{address[0]}:{address[1]}"
+        asleep.sendall(f"GET /token/states HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
+        assert asleep.recv(15) == b"HTTP/1.1 200 OK"
+        for _ in range(100):  # some 1 MB: less than the system keeps for a page that is slow
+            ours.send(b" " * 10_000)
+            time.sleep(0.1)
+            if served.pages.acquire(blocking=False):
+                return
+        raise AssertionError("the page still has its place")
+
+
+def test_a_browser_leaves_out_the_port_of_http() -> None:
+    class Listening(socket.socket):
+        def getsockname(self) -> tuple[str, int]:
+            return "192.0.2.7", 80
+
+    with Listening() as listening, server.PageServer(listening, listening, "token") as served:
+        assert {"192.0.2.7", "192.0.2.7:80", "localhost"} <= served.hosts
 
 
 def test_orders_of_a_station_without_the_command_are_refused_in_words(

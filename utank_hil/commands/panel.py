@@ -2,6 +2,7 @@
 
 import os
 import select
+import socket
 import sys
 import time
 from collections.abc import Callable
@@ -260,9 +261,13 @@ def panel(
 
 def _server(listen: str) -> ServerProcess:
     host, _, port = listen.rpartition(":")
-    if not (host and port.isdecimal() and int(port) < 1 << 16) or host in ("0.0.0.0", "*"):
+    try:
+        address = socket.gethostbyname(host)  # 0 is all addresses, too
+    except OSError:
+        address = ""
+    if address in ("", "0.0.0.0") or not (port.isdecimal() and int(port) < 1 << 16):
         fail(f"--listen {listen}: name one address of this machine and a port, as {LISTEN}")
     try:
-        return ServerProcess(host, int(port))
+        return ServerProcess(address, int(port))
     except OSError as error:
         fail(f"--listen {listen}: {why(error)}; port 0 takes a free one", ExitCode.SYSTEM)

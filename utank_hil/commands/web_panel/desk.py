@@ -79,6 +79,8 @@ class Instruments:
         pump, tank_ms = vessel.pump, measured.tank_age_ms
         drive_ms = measured.drive_age_ms if pump else math.inf
         given_ms = measured.pump_age_ms if pump else math.inf
+        heard_ns = measured.valve_heard_ns
+        valve_ms = (now_ns - heard_ns) * 1e-6 if vessel.valve else math.inf
         most_w = pump.max_power_w if pump else math.inf
         return {
             "roll_deg": math.degrees(_fresh(motion.roll_rad, motion.age_ms)),
@@ -88,12 +90,16 @@ class Instruments:
             "passive_rms_deg": math.degrees(twin.twin_rms_rad) if twin and usable else math.nan,
             "port_m": _fresh(measured.port_level_m, tank_ms),
             "starboard_m": _fresh(measured.starboard_level_m, tank_ms),
-            "high_level": measured.high_level,
+            "high_level": measured.high_level or (False if tank_ms <= STALE_MS else None),
             "asked_kpa": command.pressure_pa * 1e-3 if command and pump else math.nan,
             "given_kpa": _fresh(measured.pressure_pa * 1e-3, given_ms),
             "power_kw": _fresh(measured.power_w * 1e-3, drive_ms),
             "load": _fresh(abs(measured.power_w) / most_w, drive_ms),
-            "valve": measured.valve_opening if vessel.valve else math.nan,
+            "pump_limited": measured.drive_held_back and drive_ms <= STALE_MS,
+            "drive": state.name
+            if (state := measured.drive_state) and drive_ms <= STALE_MS
+            else None,
+            "valve": _fresh(measured.valve_opening, valve_ms),
             "gm_m": ship.gm_m if ship and known else math.nan,
             "roll_period_s": ship.roll_period_s if ship and known else math.nan,
         }

@@ -13,6 +13,7 @@ import threading
 import time
 from contextlib import suppress
 from http import HTTPStatus
+from http.client import HTTP_PORT
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
@@ -67,6 +68,8 @@ class PageServer(ThreadingHTTPServer):
         self.socket = listening
         host, port = listening.getsockname()[:2]
         self.hosts = {f"{host}:{port}", f"localhost:{port}"}
+        if port == HTTP_PORT:  # Browsers leave it out.
+            self.hosts |= {host, "localhost"}
         self.token = token
         self.files = {name: Path(__file__).with_name(file or name) for name, file in FILES.items()}
         self._link = link
@@ -189,6 +192,9 @@ class _Page(BaseHTTPRequestHandler):
             self._answer(HTTPStatus.SERVICE_UNAVAILABLE, b"too many pages are open")
             return
         try:
+            # A page whose network or machine has gone must not keep its place for minutes.
+            patience_ms = round(1e3 * _PATIENCE_S)
+            self.connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, patience_ms)
             self._head(HTTPStatus.OK, "text/event-stream", None)
             self.close_connection = True
             self.wfile.write(b"retry: 300\n\n")
