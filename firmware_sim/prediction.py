@@ -108,24 +108,29 @@ class PlantInLoop:
         self._plant.advance(self._now_ns)
 
 
-def predict(scenario: Scenario, plant: DesignPlant, law: BuiltLaw | None) -> Expected:
+def predict(
+    scenario: Scenario,
+    plant: DesignPlant,
+    law: BuiltLaw | None,
+    seeds: tuple[int, ...] = SEEDS,
+) -> Expected:
     """Predict a bench: without tank, with it passive and, given a law of a pump, active.
 
-    `plant` gives limits and delay of the law.
+    `plant` gives limits and delay of the law, `seeds` draw the sea.
     """
     period_s = 2 * math.pi / scenario.ship_at(0.0).natural_frequency_rad_s
     settle = round(scenario.settle_s / RECORD_S)
     count = settle + round(ROLLS * period_s / RECORD_S)
     window_s = scenario.duration_s - scenario.settle_s
-    widened = math.sqrt(1 + ROLLS * len(SEEDS) * period_s / window_s)
+    widened = math.sqrt(1 + ROLLS * len(seeds) * period_s / window_s)
 
     def rms(rolled: Callable[[int], tuple[FloatArray, float]]) -> FloatArray | None:
         """Batches of the roll's RMS in all draws; None where the ship capsizes."""
-        draws = [rolled(seed) for seed in SEEDS]
+        draws = [rolled(seed) for seed in seeds]
         if any(math.isfinite(capsized_s) for _, capsized_s in draws):
             return None
         rolls = np.concatenate([roll[settle:] for roll, _ in draws])
-        return rms_batches(rolls, BATCHES * len(SEEDS))
+        return rms_batches(rolls, BATCHES * len(seeds))
 
     def of_a_bench(values: FloatArray | None) -> Interval | None:
         """Interval of a bench's figure: that of the mean, widened to one window."""
@@ -150,7 +155,7 @@ def predict(scenario: Scenario, plant: DesignPlant, law: BuiltLaw | None) -> Exp
     )
     if law is None:
         return found
-    runs = {seed: _active(scenario, plant, law, seed, count) for seed in SEEDS}
+    runs = {seed: _active(scenario, plant, law, seed, count) for seed in seeds}
     active = rms(lambda seed: (runs[seed][0]["roll_rad"], runs[seed][1]))
     if active is None:
         return found
@@ -162,7 +167,7 @@ def predict(scenario: Scenario, plant: DesignPlant, law: BuiltLaw | None) -> Exp
         found,
         active_rad=of_a_bench(active),
         active_below_passive=below(active, passive),
-        mean_power_w=of_a_bench(batch_means(np.maximum(power, 0.0), BATCHES * len(SEEDS))),
+        mean_power_w=of_a_bench(batch_means(np.maximum(power, 0.0), BATCHES * len(seeds))),
         pump=pump_statistics(pressure, power, level),
         flow_peak_m3_s=float(np.abs(flow).max()),
     )
@@ -178,16 +183,20 @@ def other_loadings(
     """
     if scenario.hull is not None or scenario.fmu is not None:
         return ()
-    found = []
-    for scale in PERIOD_SCALES:
-        ship = of_period(scenario.vessel.ship, scale)
-        actual = dict(scenario.actual_ship)
-        if "stiffness_nm_rad" in actual:
-            actual["stiffness_nm_rad"] /= scale * scale
-        vessel = scenario.vessel.model_copy(update={"ship": ship})
-        loaded = scenario.model_copy(update={"vessel": vessel, "actual_ship": actual})
-        found.append(Loading(scale, own if scale == 1 else predict(loaded, plant, law)))
-    return tuple(found)
+    return tuple(
+        Loading(scale, own if scale == 1 else predict(loaded(scenario, scale), plant, law))
+        for scale in PERIOD_SCALES
+    )
+
+
+def loaded(scenario: Scenario, scale: float) -> Scenario:
+    """Scenario with its ship loaded to a multiple of her roll period, by her stiffness."""
+    ship = of_period(scenario.vessel.ship, scale)
+    vessel = scenario.vessel.model_copy(update={"ship": ship})
+    actual = dict(scenario.actual_ship)
+    if "stiffness_nm_rad" in actual:
+        actual["stiffness_nm_rad"] /= scale * scale
+    return scenario.model_copy(update={"vessel": vessel, "actual_ship": actual})
 
 
 def _passive(scenario: Scenario, seed: int, count: int) -> tuple[FloatArray, float]:

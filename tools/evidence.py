@@ -49,6 +49,7 @@ PARTS: Final = {
     "ten_hulls": Part("python -m tools.studies.ten_hulls --json", 15),
     "turning": Part("python -m tools.studies.turning --json", 1),
     "less_pressure": Part("python -m tools.studies.less_pressure --json", 12),
+    "other_loads": Part("python -m tools.studies.other_loads --json", 15),
     "identified_ships": Part("python -m tools.studies.identified_ships --json", 15),
     "february_hours": Part(_study("february_hours"), 80),
     "storm_seeds": Part(_study("storm_seeds"), 30),

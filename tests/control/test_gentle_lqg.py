@@ -24,7 +24,7 @@ MEASURED = ("roll_rad", "roll_rate_rad_s", "level_m")
 
 @cache
 def first_law() -> ConstrainedLaw:
-    return CONFIG.law.tuned(PLANT, any_load=True).law  # type: ignore[union-attr]
+    return CONFIG.law.tuned(PLANT).law  # type: ignore[union-attr]
 
 
 def of_share(share: float, *, scaled: bool = False) -> LQGLaw:

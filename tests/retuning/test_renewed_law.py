@@ -66,6 +66,7 @@ def law_of(
         steady_state=draw(states, states),
         steady_command=draw(states),
         iteration_limit=int(rng.integers(1, 200)),
+        leeway=0.25,
     )
     return RenewedLaw(law, 0.02, 2e4, 0.03)
 

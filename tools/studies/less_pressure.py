@@ -83,7 +83,7 @@ def first_law() -> tuple[ConstrainedLaw, DesignPlant]:
     """The first law of the shipped self-tuning controller, and the ship of its file."""
     config = load_config(CONTROLLER, ControllerConfig)
     assert isinstance(config.law, SelfTunedDesign)
-    return config.law.tuned(config.plant, any_load=True).law, config.plant
+    return config.law.tuned(config.plant).law, config.plant
 
 
 def roll_over_passive(

@@ -193,6 +193,7 @@ class RenewedLawMessage(
     steady_command: FloatArray
     iteration_limit: Annotated[int, msgspec.Meta(ge=1, le=_MOST_ITERATIONS)]
     gentler: FloatArray | None
+    leeway: float | None
     roll_rad: float
     pressure_pa: float
     passive_roll_rad: float

@@ -22,6 +22,7 @@ from utank_hil.analysis.loop.self_tuning import (
 from utank_hil.assembly import build_law
 from utank_hil.base.tick import TICK_S
 from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.lqg import LQGLaw
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import pump_model
@@ -145,7 +146,8 @@ def test_no_oscillation_goes_on_by_itself_after_the_pump_was_at_its_limit():
 def test_a_law_is_stable_with_any_share_of_its_command(any_load):
     # Patti-B's law of least cost has all margins and is not, from 0.05 to 0.3
     config = load_config(Path("configs/controllers/patti_b_self_tuning.yaml"), ControllerConfig)
-    law = config.law.tuned(config.plant, any_load=any_load).law.unlimited()
+    sea = unknown_sea(config.plant.ship)
+    law = self_tuned(config.plant, sea, any_load=any_load).law.unlimited()
     model = config.plant.sampled(("roll_rad", "roll_rate_rad_s", "level_m"), law.sample_time_s)
     for share in np.linspace(0.01, 1.0, 30):
         clipped = LQGLaw(law.model, share * law.gain, law.observer_gain)
@@ -200,6 +202,25 @@ def test_a_first_law_keeps_its_damping_on_other_loads_with_the_pump_at_its_limit
             found.append(closed_loop_radius(clipped, sampled, 1.0))
         return max(found)
 
-    design = SelfTunedDesign("self_tuned")
-    assert radius(design.tuned(PLANT, any_load=True).law.unlimited()) < 1
-    assert radius(design.tuned(PLANT).law.unlimited()) > 1.001  # a limit cycle at 1.3
+    assert radius(SelfTunedDesign("self_tuned").tuned(PLANT).law.unlimited()) < 1
+    of_one_load = self_tuned(PLANT, unknown_sea(PLANT.ship)).law.unlimited()
+    assert radius(of_one_load) > 1.001  # a limit cycle at 1.3
+
+
+def test_on_another_load_the_plan_does_not_swing_the_water_from_limit_to_limit():
+    """At 1.3 the plan of the file's ship rolled her 1.3 to 2.6 times the passive roll."""
+    config = load_config(CONTROLLERS / "self_tuned.yaml", ControllerConfig)
+    ship, sea = config.plant.ship, config.law.sea
+    loaded = replace(config.plant, ship=of_period(ship, 1.3))
+    waves = Sea.irregular(sea.spectrum, 11).roll_moment(ship.stiffness_nm_rad, EffectiveSlope(0.5))
+    passive = passive_motion(loaded.ship, loaded.tank, waves, TICK_S, 20_001)
+
+    def share(law: ConstrainedLaw) -> float:
+        run = simulate_loop(loaded, passive, law.controller(), MEASURED, every=10)
+        return float(np.std(run.motion[500:, 0]) / np.std(passive[5000:, 0]))
+
+    found = config.law.tuned(config.plant).law
+    assert found.leeway is not None
+    assert share(found) < 0.9
+    assert share(replace(found, leeway=None)) > 1.5
+    assert share(self_tuned(config.plant, sea).law) > 1.5

@@ -11,9 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import sparse
 
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ARX, PumpLimits, design_gpc
 from utank_hil.control.constrained.horizon import LEVEL_SPACING
-from utank_hil.control.constrained.law import ConstrainedController
+from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
 
 WIDE = PumpLimits(pressure_pa=1e12, rate_pa_s=1e12, level_m=1e12)
 
@@ -217,6 +218,26 @@ def test_a_share_of_the_pressure_is_kept_as_soon_as_the_rate_allows_and_not_for_
     controller.allow(1.0)
     # a command that a limit bends is on a grid of 2^-19: this one, and the one before
     assert abs(float(controller.step(push)[0])) == pytest.approx(0.7, abs=2**-19)
+
+
+def test_a_plan_with_leeway_stays_near_what_the_linear_law_commands():
+    rng = np.random.default_rng(11)
+    limits = PumpLimits(pressure_pa=1.0, rate_pa_s=100.0, level_m=0.5)
+    arx = random_arx(rng, 3)
+    free = arx_law(arx, limits, 12, 15, (5.0, 1.0), level_output=1, level_penalty=100.0)
+
+    def differences(law: ConstrainedLaw) -> FloatArray:
+        controller, linear = law.controller(), law.unlimited().controller()
+        found = []
+        for y in 5 * np.random.default_rng(5).normal(size=(40, 2)):
+            command = controller.step(y)
+            found.append(abs(command[0] - np.clip(linear.step(y)[0], -1.0, 1.0)))
+            linear.applied(command)
+        return np.array(found)
+
+    near, free_of_it = differences(replace(free, leeway=0.1)), differences(free)
+    assert near.max() == pytest.approx(0.1, abs=1e-5)
+    assert free_of_it.max() > 1.0
 
 
 def test_when_the_budget_is_too_small_the_last_plan_goes_on_and_ends_in_zero():

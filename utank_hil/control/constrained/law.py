@@ -69,6 +69,9 @@ class ConstrainedLaw:
     #: shape (len(SHARES) - 1, n): gains of the linear law for less pressure (`GentleController`);
     #: without them it takes shares of its gain.
     gentler: FloatArray | None = None
+    #: Most by which a plan's first pressure differs from the linear law's within the limits, over
+    #: the greatest pressure; None for any difference.
+    leeway: Annotated[float, Range(above=0)] | None = None
 
     def __post_init__(self) -> None:
         problems = range_problems(self)
@@ -250,6 +253,7 @@ class ConstrainedController:
         self._knots = np.minimum(horizon.knots, samples - 2)
         power_pa_m_s = limits.power_w / law.reservoir_area_m2
         self._power_pa_m_s = math.inf if law.level_output is None else power_pa_m_s
+        self._leeway_pa = None if law.leeway is None else law.leeway * limits.pressure_pa
         self._preview = None if law.foresight is None else Preview(law.foresight, model.dt)
         self.reset()
 
@@ -352,7 +356,7 @@ class ConstrainedController:
 
     def _plan(self, best: FloatArray, state: FloatArray, steady_pa: float) -> FloatArray:
         """Commands at each sample of the horizon; `best` is the analytic plan."""
-        low, high = self._bounds(state, steady_pa)
+        low, high = self._bounds(state, steady_pa, best)
         last = self._last_pa - steady_pa
         levels = product(self._held_state, state)
         plan: FloatArray | None = best
@@ -364,8 +368,10 @@ class ConstrainedController:
             return np.append(self._plan_pa[1:], steady_pa)
         return product(self._interpolation, plan) + steady_pa
 
-    def _bounds(self, state: FloatArray, steady_pa: float) -> tuple[FloatArray, FloatArray]:
-        """Least and greatest pressure at the knots, less the steady command."""
+    def _bounds(
+        self, state: FloatArray, steady_pa: float, best: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Least and greatest pressure at the knots, less the steady command, about a plan."""
         high = np.full(len(self._knots), self._allowed_pa)
         low = -high
         if self._power_pa_m_s < math.inf:
@@ -375,6 +381,10 @@ class ConstrainedController:
             share = self._power_pa_m_s / np.maximum(np.abs(speed), 1e-9)
             high = np.where(speed > 0, np.minimum(high, share), high)
             low = np.where(speed < 0, np.maximum(low, -share), low)
+        if self._leeway_pa is not None:
+            near_pa = min(max(best[0] + steady_pa, low[0]), high[0])
+            low[0] = max(low[0], near_pa - self._leeway_pa)
+            high[0] = min(high[0], near_pa + self._leeway_pa)
         # a bound is relaxed to what the rate limit can reach
         high = np.maximum(high, self._last_pa - self._reach_pa)
         low = np.minimum(low, self._last_pa + self._reach_pa)
