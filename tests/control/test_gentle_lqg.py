@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from utank_hil.analysis.loop.margins import of_period, robustness
 from utank_hil.analysis.loop.sea_response import motion_in_sea
+from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import LQGLaw, SeaModel
 from utank_hil.control.constrained.law import ConstrainedLaw
@@ -24,7 +25,10 @@ MEASURED = ("roll_rad", "roll_rate_rad_s", "level_m")
 
 @cache
 def first_law() -> ConstrainedLaw:
-    return CONFIG.law.tuned(PLANT).law  # type: ignore[union-attr]
+    assert isinstance(CONFIG.law, SelfTunedDesign)
+    law = CONFIG.law.first(PLANT).linear
+    assert isinstance(law, ConstrainedLaw)
+    return law
 
 
 def of_share(share: float, *, scaled: bool = False) -> LQGLaw:

@@ -83,7 +83,9 @@ def first_law() -> tuple[ConstrainedLaw, DesignPlant]:
     """The first law of the shipped self-tuning controller, and the ship of its file."""
     config = load_config(CONTROLLER, ControllerConfig)
     assert isinstance(config.law, SelfTunedDesign)
-    return config.law.tuned(config.plant).law, config.plant
+    law = config.law.first(config.plant).linear
+    assert isinstance(law, ConstrainedLaw)
+    return law, config.plant
 
 
 def roll_over_passive(

@@ -72,8 +72,8 @@ def _higher(scenario: Scenario, factor: float) -> Scenario:
     )
 
 
-def sailed(name: str, draws: int) -> list[dict[str, Any]]:
-    """Rows of one ship: its heights and loads."""
+def sailed(name: str, draws: int, heights: Sequence[float]) -> list[dict[str, Any]]:
+    """Rows of one ship: heights and loads."""
     scenario, config = SHIPS[name]()
     plant, seeds = config.design_plant, tuple(range(FIRST_SEED, FIRST_SEED + draws))
     sea = getattr(config.law, "sea", None)
@@ -82,7 +82,7 @@ def sailed(name: str, draws: int) -> list[dict[str, Any]]:
         "GPC": AutoDesign("gpc", "auto", sea).build(plant),
     }
     rows = []
-    for height in HEIGHTS:
+    for height in heights:
         for load in LOADS:
             case = loaded(_higher(scenario, height), load)
             row: dict[str, Any] = {"ship": name, "height": height, "roll period": load}
@@ -105,13 +105,14 @@ def main(words: Sequence[str] | None = None) -> None:
     parser = command_line(__doc__)
     parser.add_argument("--only", default="", help="ships whose names hold this text")
     parser.add_argument("--draws", type=int, default=3)
+    parser.add_argument("--heights", type=float, nargs="+", default=HEIGHTS, help="over the sea's")
     parser.add_argument("--workers", type=int, default=2)
     arguments = parser.parse_args(words)
     names = [name for name in SHIPS if arguments.only in name]
     spawn = get_context("spawn")
     with one_thread_each(), ProcessPoolExecutor(arguments.workers, mp_context=spawn) as pool:
-        ships = pool.map(sailed, names, [arguments.draws] * len(names))
-        rows = [row for ship in ships for row in ship]
+        started = [pool.submit(sailed, name, arguments.draws, arguments.heights) for name in names]
+        rows = [row for ship in started for row in ship.result()]
     show(rows, arguments)
 
 

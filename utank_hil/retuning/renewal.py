@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from utank_hil.analysis.loop.sea_response import at_work, moment_of
-from utank_hil.analysis.loop.self_tuning import self_tuned
+from utank_hil.analysis.loop.self_tuning import CLIPPED_PEAK, self_tuned
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Verdict
 from utank_hil.control import DesignPlant
@@ -63,7 +63,7 @@ def renew(estimate: MotionEstimate, task: RenewalTask) -> RenewedLaw | Refusal:
             sea,
             mean_power_w=task.mean_power_w,
             sample_time_s=task.sample_time_s,
-            any_load=estimate.ship == ShipFigures.of(task.plant.ship),
+            loads_peak=CLIPPED_PEAK if estimate.ship == ShipFigures.of(task.plant.ship) else None,
         )
     except ValueError as error:  # NoLawError and LinAlgError are ValueErrors.
         return Refusal((str(error),))

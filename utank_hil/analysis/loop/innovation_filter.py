@@ -67,10 +67,6 @@ _LOADS: Final = (0.85, 1.0, 1.15, 1.3)
 """Scales of the roll period that a ship may be loaded to, where it is not identified."""
 _SHARES: Final = (0.1, 0.2, 0.4, 0.7, 1.0)
 """Shares of its command that a pump at its limit gives there."""
-_LOADS_PEAK: Final = 3.0
-"""Sensitivity from which these are penalized. With 40 the clipped law rolled a ship loaded to 1.3
-times its period 1.4 to 3.3 times the passive roll, with 6 up to 1.15 times, with 3 at most 0.98
-times; the storm's roll rises by 0, 0 and 4 %."""
 _EXACT: Final = 1e-14
 """Newton decrement of the last step. Newton's method squares the remaining error."""
 _MOST_STEPS: Final = 200  # Limit on the Newton steps. Chosen; no study.
@@ -93,8 +89,8 @@ class InnovationFilter:
 
     `law` is stable on all ships of the grid (`robustness`), and that of `design`. `weights` are the
     cost weights on the squares of roll in rad, level in m, and pressure over the pump's maximum.
-    With `any_load` the law also keeps a moderate sensitivity on ships loaded otherwise, with the
-    pump at its limit or not.
+    On ships loaded otherwise, with the pump at its limit or not, a sensitivity above `loads_peak`
+    is penalized; None for a ship whose load is known.
     """
 
     def __init__(
@@ -104,9 +100,9 @@ class InnovationFilter:
         plant: DesignPlant,
         weights: tuple[float, float, float],
         *,
-        any_load: bool = False,
+        loads_peak: float | None = None,
     ) -> None:
-        self._law, self._plant, self._any_load = law, plant, any_load
+        self._law, self._plant, self._loads_peak = law, plant, loads_peak
         self._unit_pa = plant.limits.pressure_pa
         angle = plant.ship.natural_frequency_rad_s * law.sample_time_s
         omega, self._mean = _quadrature(angle)
@@ -286,7 +282,7 @@ class InnovationFilter:
     def _other_ships(self) -> Iterator[tuple[ComplexArray, FloatArray]]:
         """Yield how 1 - Q D depends on the coefficients on another ship, and its sensitivity."""
         names = tuple(STATES[row] for row in self._measured)
-        for ship, gain, share, peak in _others(self._plant, any_load=self._any_load):
+        for ship, gain, share, peak in _others(self._plant, self._loads_peak):
             self._law_parts(share)
             pump = gain * self._pumped(ship, names)
             surprise = self._surprise(pump)
@@ -376,7 +372,7 @@ def _quadrature(roll_angle: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _others(
-    plant: DesignPlant, *, any_load: bool
+    plant: DesignPlant, loads_peak: float | None
 ) -> Iterator[tuple[DesignPlant, float, float, float]]:
     """Yield the other ships, the pump's gain, its share of the command, and the peak to penalize.
 
@@ -385,7 +381,7 @@ def _others(
     if plant.calm is not None:
         calm = replace(plant, tank=plant.calm, calm=None)
         yield calm, 1.0, 1.0, PEAK_SENSITIVITY
-        yield from _others(calm, any_load=any_load)
+        yield from _others(calm, loads_peak)
     late = replace(plant, delay_s=plant.delay_s + EXTRA_DELAY_S)
     yield late, 1.0, 1.0, _OTHERS_PEAK
     for period_scale, inertia_scale, ship in ship_variants(plant.ship):
@@ -394,7 +390,9 @@ def _others(
         for gain in (GAINS[0], GAINS[-1]):
             yield replace(plant, ship=ship), gain, 1.0, _OTHERS_PEAK
             yield replace(late, ship=ship), gain, 1.0, _OTHERS_PEAK
-    for scale in _LOADS if any_load else ():
+    if loads_peak is None:
+        return
+    for scale in _LOADS:
         loaded = replace(plant, ship=of_period(plant.ship, scale))
         for share in _SHARES:
-            yield loaded, 1.0, share, _LOADS_PEAK
+            yield loaded, 1.0, share, loads_peak

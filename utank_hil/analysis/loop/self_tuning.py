@@ -13,11 +13,10 @@ ship's stability that a heel and another load cannot be distinguished (`_LEAST_S
 The remaining choice is how far the law trusts ship and sea. The added noise of the slope is the
 least that makes it stable on all ships of the grid, times `_MORE_NOISE`. A filter on its
 innovations then gives it the least cost in the expected sea under the robustness requirements, a
-convex problem (`innovation_filter`). Where that misses a margin, the law without it is taken.
-On an identified ship a Kalman filter without the added noise predicts the waves for the plan at the
-limits. On one of 1.15 to 1.3 times the period it would swing the water from limit to limit, with 2
-to 8 times the passive roll. For a ship of any load the plan takes the robust law's estimate, and
-stays within `_LEEWAY` of what that law commands.
+convex problem (`innovation_filter`). Where that misses a margin, the law without it is taken. On an
+identified ship a Kalman filter without the added noise predicts the waves for the plan at the
+limits. On another load that swings the water from limit to limit, so there the plan takes the
+robust law's estimate, and stays within `_LEEWAY` of what that law commands.
 """
 
 import math
@@ -55,8 +54,7 @@ from utank_hil.sea import ittc
 _PRESSURE_COST: Final = 0.106  # Cost of constant pressure at its limit, over s^2.
 _LEVEL_COST: Final = 0.33  # Cost of a constant level at its limit h, over s^2.
 _PRESSURE_NOISE: Final = 11.0
-"""White pressure disturbance over P s / sqrt(w), s in rad; it stands for what the model neglects.
-"""
+"""White pressure disturbance over P s / sqrt(w), s in rad, for what the model neglects."""
 _SLOPE_NOISE: Final = 0.046  # Least white noise of the slope, over s / sqrt(w).
 _HEEL: Final = 0.13  # Standard deviation of the heel over s.
 _SMOOTHING: Final = 0.028
@@ -87,13 +85,16 @@ _PARTS: Final = np.linspace(0.02, 1.0, 50)
 _LEEWAY: Final = 0.25
 """Most by which the plan differs from the robust law, over the greatest pressure. Over the passive
 roll the first ship at 1.3 of her period has 0.95 at most with 0.25, 1.2 with 0.5, 3 without."""
+CLIPPED_PEAK: Final = 3.0
+"""`loads_peak` of a law that is clipped, or plans without leeway. With 40 the clipped law rolled a
+ship loaded to 1.3 times its period 1.4 to 3.3 times the passive roll, with 6 up to 1.15 times, with
+3 at most 0.98 times; the storm's roll rises by 0, 0 and 4 %."""
+_PLANNED_PEAK: Final = 4.0  # With leeway; with 3 it rolls the ship more on her own load.
 _LEAST_STIFFNESS: Final = 1 / 3
-"""Least stiffness of ship and water at the longest roll period over the nominal one; below it a
-heel and a load cannot be distinguished."""
+"""Least stiffness at the longest roll period over the nominal one that tells heel from load."""
 _SHARES: Final = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7)
-"""Of its command that a law may get: at the limit that holds until the water was seen to obey, in
-degraded operation, and where more does not pay. Patti-B's law of least cost, which has all margins,
-is unstable with 0.05 to 0.3 of its command: it rolled the ship to 17 degrees after arming."""
+"""Of its command that a law may get: after arming, in degraded operation, where more does not pay.
+Patti-B's law of least cost has all margins and is unstable with 0.05 to 0.3 of its command."""
 _MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 
 
@@ -118,16 +119,16 @@ def self_tuned(
     *,
     mean_power_w: float = math.inf,
     sample_time_s: float | None = None,
-    any_load: bool = False,
+    loads_peak: float | None = None,
 ) -> SelfTuned:
     """Design the constrained law of least predicted cost with all margins, within a mean power.
 
     `plant` has the limits of its pump; `mean_power_w` limits the predicted mean power, infinite for
     the least cost; the default of `sample_time_s` follows from the roll frequency. With
-    `any_load` the ship may be loaded otherwise (`InnovationFilter`), also while the pump is at its
-    limit. Raises `NoLawError` if no law has the margins, or the sea does not roll the ship.
+    `loads_peak` the ship may be loaded otherwise (`InnovationFilter`). Raises `NoLawError` if no
+    law has the margins, or the sea does not roll the ship.
     """
-    search, gentlest_w = _Search(plant, sea, sample_time_s, any_load=any_load), math.inf
+    search, gentlest_w = _Search(plant, sea, sample_time_s, loads_peak), math.inf
     first = search.least_cost()
     for power in range(_MOST_STEPS + 1):
         found = search.best(first * _COSTLIER**power)
@@ -180,7 +181,7 @@ class SelfTunedDesign:
 
         Raises `NoLawError` as `self_tuned`.
         """
-        return _tuned(self, plant)
+        return _tuned(self, plant, CLIPPED_PEAK if needs_plan(plant) else _PLANNED_PEAK)
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Design the law for a plant."""
@@ -189,7 +190,7 @@ class SelfTunedDesign:
 
     def first(self, plant: DesignPlant) -> BuiltLaw:
         """Design the law that leads until the ship is identified, clipped if it can be."""
-        law = self.tuned(plant).law
+        law = _tuned(self, plant, CLIPPED_PEAK).law
         return BuiltLaw(law.controller if needs_plan(plant) else law.clipped, _MEASURED, law)
 
 
@@ -200,10 +201,10 @@ def needs_plan(plant: DesignPlant) -> bool:
 
 
 @lru_cache(maxsize=16)
-def _tuned(design: SelfTunedDesign, plant: DesignPlant) -> SelfTuned:
+def _tuned(design: SelfTunedDesign, plant: DesignPlant, loads_peak: float) -> SelfTuned:
     """Design as `SelfTunedDesign.tuned`; cached, as it takes seconds and several callers use it."""
     sea = design.sea or unknown_sea(plant.ship)
-    return self_tuned(plant, sea, mean_power_w=design.mean_power_w, any_load=True)
+    return self_tuned(plant, sea, mean_power_w=design.mean_power_w, loads_peak=loads_peak)
 
 
 def unknown_sea(ship: RollShip) -> SeaModel:
@@ -226,10 +227,9 @@ class _Search:
         plant: DesignPlant,
         sea: SlopeDensity,
         sample_time_s: float | None,
-        *,
-        any_load: bool = False,
+        loads_peak: float | None,
     ) -> None:
-        noise, self._any_load = SensorNoise(), any_load
+        noise, self._loads_peak = SensorNoise(), loads_peak
         self._plant, self._std = plant, (noise.roll_rad, noise.roll_rate_rad_s, noise.level_m)
         self._roll_rad = passive_roll_rad(plant, sea)
         if not (math.isfinite(self._roll_rad) and self._roll_rad > 0):
@@ -267,7 +267,7 @@ class _Search:
             if self._stands_hard_cases(design):
                 start = design.law(self._plant).unlimited()
                 search = InnovationFilter(
-                    start, design, self._plant, self._weights(costlier), any_load=self._any_load
+                    start, design, self._plant, self._weights(costlier), loads_peak=self._loads_peak
                 )
                 for linear in (*search.laws(), start):
                     judged = robustness(linear, self._plant, _MEASURED, with_delay_margin=False)
@@ -282,7 +282,7 @@ class _Search:
         self, search: InnovationFilter, design: ConstrainedDesign, linear: LQGLaw, costlier: float
     ) -> ConstrainedLaw:
         """The law that plans at the limits, and within them commands what the linear law does."""
-        if not self._any_load:
+        if self._loads_peak is None:
             return self._design(0.0, costlier).law(self._plant).following(linear)
         planner = design.law(self._plant)
         gains = self._gentler(search, design, linear)
@@ -303,7 +303,7 @@ class _Search:
         return math.exp(high)
 
     def _weights(self, costlier: float) -> tuple[float, float, float]:
-        """Cost weights on squared roll, level, and pressure over the pump's maximum."""
+        """Cost weights as `cost_weights`."""
         roll, level, pressure = cost_weights(self._roll_rad, self._plant.limits)
         return roll, level, costlier * pressure
 
