@@ -220,11 +220,14 @@ def test_a_share_of_the_pressure_is_kept_as_soon_as_the_rate_allows_and_not_for_
     assert abs(float(controller.step(push)[0])) == pytest.approx(0.7, abs=2**-19)
 
 
-def test_a_plan_with_leeway_stays_near_what_the_linear_law_commands():
+def test_a_plan_with_leeway_stays_near_what_the_linear_law_commands(monkeypatch):
     rng = np.random.default_rng(11)
-    limits = PumpLimits(pressure_pa=1.0, rate_pa_s=100.0, level_m=0.5)
     arx = random_arx(rng, 3)
-    free = arx_law(arx, limits, 12, 15, (5.0, 1.0), level_output=1, level_penalty=100.0)
+
+    def law_of(level_m: float, leeway: float | None) -> ConstrainedLaw:
+        limits = PumpLimits(pressure_pa=1.0, rate_pa_s=100.0, level_m=level_m)
+        law = arx_law(arx, limits, 12, 15, (5.0, 1.0), level_output=1, level_penalty=100.0)
+        return replace(law, leeway=leeway)
 
     def differences(law: ConstrainedLaw) -> FloatArray:
         controller, linear = law.controller(), law.unlimited().controller()
@@ -235,9 +238,30 @@ def test_a_plan_with_leeway_stays_near_what_the_linear_law_commands():
             linear.applied(command)
         return np.array(found)
 
-    near, free_of_it = differences(replace(free, leeway=0.1)), differences(free)
+    monkeypatch.setattr(ConstrainedController, "_rises_too_far", lambda *_: 0.0)
+    near, free_of_it = differences(law_of(0.5, 0.1)), differences(law_of(0.5, None))
     assert near.max() == pytest.approx(0.1, abs=1e-5)
     assert free_of_it.max() > 1.0
+
+
+def test_a_plan_with_leeway_may_brake_the_water_before_its_limit():
+    """But only against the way that the level goes, and where the near plan passes the limit."""
+    rng = np.random.default_rng(11)
+    arx = random_arx(rng, 3)
+    limits = PumpLimits(pressure_pa=1.0, rate_pa_s=100.0, level_m=0.5)
+    law = arx_law(arx, limits, 12, 15, (5.0, 1.0), level_output=1, level_penalty=100.0)
+    controller, braked = replace(law, leeway=0.1).controller(), 0
+    for _ in range(60):
+        state = rng.normal(size=len(law.model.A))
+        best = rng.uniform(-1, 1, len(controller._knots))
+        low, high = controller._bounds(state, 0.0, best)
+        rise = controller._rises_too_far(state, best)
+        free_low, free_high = low[0] < best[0] - 0.11, high[0] > best[0] + 0.11
+        reach = controller._reach_pa[0]
+        if reach >= 2 and abs(best[0]) < 0.8:
+            assert (free_low, free_high) == (rise > 0, rise < 0)
+            braked += rise != 0
+    assert 5 < braked < 60
 
 
 def test_when_the_budget_is_too_small_the_last_plan_goes_on_and_ends_in_zero():

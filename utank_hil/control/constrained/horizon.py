@@ -287,7 +287,7 @@ class PlanProgramme:
         self.held = np.arange(LEVEL_SPACING - 1, end, LEVEL_SPACING)
         levels = len(self.held)
         self._by_plan: FloatArray = horizon.outputs_plan[self.held, level_output or 0]
-        self._level_m = limits.level_m
+        self.level_m = limits.level_m
         self._rise_pa = limits.rate_pa_s * sample_time_s * np.diff(horizon.knots, prepend=-1)
 
         self._unit_pa = limits.pressure_pa
@@ -337,7 +337,7 @@ class PlanProgramme:
         steps = np.diff(plan, prepend=last)
         if (np.abs(steps) > self._rise_pa).any():
             return False
-        return bool((np.abs(levels + product(self._by_plan, plan)) <= self._level_m).all())
+        return bool((np.abs(levels + product(self._by_plan, plan)) <= self.level_m).all())
 
     def solve(
         self,
@@ -368,7 +368,7 @@ class PlanProgramme:
         lower[self._rates], upper[self._rates] = -rates, rates
         lower[self._rates.start] += last / unit
         upper[self._rates.start] += last / unit
-        upper[self._high_side] = self._level_m - levels
-        lower[self._low_side] = -self._level_m - levels
+        upper[self._high_side] = self.level_m - levels
+        lower[self._low_side] = -self.level_m - levels
         solution = self._solver.solve(self._gradient, lower, upper)
         return None if solution is None else solution[:knots] * unit

@@ -368,6 +368,16 @@ class ConstrainedController:
             return np.append(self._plan_pa[1:], steady_pa)
         return product(self._interpolation, plan) + steady_pa
 
+    def _rises_too_far(self, state: FloatArray, plan: FloatArray) -> float:
+        """Rise of the level to starboard in the next sample where a plan passes the level's limit.
+
+        Zero where it does not: then nothing has to be braked.
+        """
+        levels = product(self._levels_state, state) + product(self._levels_plan, plan)
+        if float(np.abs(levels).max()) <= self._programme.level_m:
+            return 0.0
+        return float(levels[1] - levels[0])
+
     def _bounds(
         self, state: FloatArray, steady_pa: float, best: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
@@ -383,8 +393,11 @@ class ConstrainedController:
             low = np.where(speed < 0, np.maximum(low, -share), low)
         if self._leeway_pa is not None:
             near_pa = min(max(best[0] + steady_pa, low[0]), high[0])
-            low[0] = max(low[0], near_pa - self._leeway_pa)
-            high[0] = min(high[0], near_pa + self._leeway_pa)
+            rising = self._rises_too_far(state, np.clip(best, low - steady_pa, high - steady_pa))
+            if rising <= 0:
+                low[0] = max(low[0], near_pa - self._leeway_pa)
+            if rising >= 0:
+                high[0] = min(high[0], near_pa + self._leeway_pa)
         # a bound is relaxed to what the rate limit can reach
         high = np.maximum(high, self._last_pa - self._reach_pa)
         low = np.minimum(low, self._last_pa + self._reach_pa)
