@@ -54,8 +54,8 @@ def test_of_a_quadratic_loss_the_pump_adds_what_is_missing_and_none_in_fast_wate
     for rate in (1.1 * full_m_s, -5 * full_m_s):
         assert controller.step(np.array([0.0, rate])) == [0.0]
     bare = PDDesign().build(DesignPlant(SHIP, TANK))
-    np.testing.assert_array_equal(bare.controller().step(np.array([0.1, 3.0])),
-                                  -design_pd(SHIP, TANK).gain @ [0.1, 3.0])  # fmt: skip
+    np.testing.assert_allclose(bare.controller().step(np.array([0.1, 3.0])),
+                               -design_pd(SHIP, TANK).gain @ [0.1, 3.0], rtol=1e-14)  # fmt: skip
 
 
 def test_a_pump_that_brakes_less_than_the_tank_keeps_driving():

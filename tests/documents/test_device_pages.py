@@ -162,7 +162,7 @@ FRAMES: dict[str, dict[str, float]] = {
     "VALVE_STATUS": {"state": 1, "opening": 0.4, "command_echo": 3},
     "HEARTBEAT_SENSORS": {
         "state": 2,
-        "catalogue_version": 579,
+        "catalogue_version": 271,
         "configuration_version": 1437,
         "transmit_error_count": 16 * 0xF,
         "receive_error_count": 16 * 0xF,

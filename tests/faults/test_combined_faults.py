@@ -17,6 +17,7 @@ from utank_hil.assembly import build_law
 from utank_hil.canbus import DriveFault, load_catalogue
 from utank_hil.canbus.codec import field_kind
 from utank_hil.configuration import load_config
+from utank_hil.configuration.vessel import PreviewSection
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.nodes.redundancy import Redundancy
 
@@ -31,11 +32,12 @@ Strategy = st.SearchStrategy[Any]
 
 @cache
 def ship():
-    """With every node that there is: pump, valve, second motion sensor, hard-wired inputs."""
+    """With every node: pump, valve, second motion sensor, hard-wired inputs, preview station."""
     scenario = load_config(Path("configs/scenarios/semi_active.yaml"), Scenario)
     config = scenario.controllers["pump_with_valve"]
     both = Redundancy(second_motion_sensor=True, hardwired_inputs=True)
-    vessel = config.vessel.model_copy(update={"redundancy": both})
+    seen_ahead = {"redundancy": both, "preview": PreviewSection()}
+    vessel = config.vessel.model_copy(update=seen_ahead)
     config = config.model_copy(update={"vessel": vessel})
     return scenario.model_copy(update={"vessel": vessel}), config, build_law(config)
 

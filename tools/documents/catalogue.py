@@ -28,8 +28,9 @@ INTRODUCTION = """\
   too.
 * Encoding saturates at the range. A value that is out of range, not available or not in a value
   table decodes to NaN or None and counts as missing.
-* Catalogue version: {version} (12-bit hash of the DBC). HEARTBEAT and CTRL_STATUS carry it. Nodes
-  whose versions differ keep the controller from arming.
+* Catalogue version: {version}, the first number of the DBC's `VERSION`. The second is a 12-bit
+  hash of its other lines; where it is not theirs, that hash is the version. HEARTBEAT and
+  CTRL_STATUS carry it. Nodes whose versions differ keep the controller from arming.
 
 ### Protection
 All messages but ADDRESS_CLAIM are protected in the style of AUTOSAR E2E Profile 2:

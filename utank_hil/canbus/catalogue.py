@@ -87,17 +87,27 @@ def load_catalogue(path: Path = DBC_PATH) -> Catalogue:
     # isort: split
     from cantools.database.can import Database  # slow to import, and needed only here
 
-    content = path.read_bytes()
     database = Database()  # strict: refuses overlapping signals and those outside their frame
-    database.add_dbc_string(content.decode())
+    database.add_dbc_string(path.read_text("utf-8"))
     types = {name: kind for kind, name in DBC_NAMES.items()}
     found = []
     for message in database.messages:
         (sender,) = message.senders
         kind = types.get(message.name) or types[common_name(message.name, sender)]
         found.append(NamedMessage(kind, Address[sender], _compile(message, kind)))
-    digest = hashlib.sha256(content.replace(b"\r\n", b"\n")).digest()
-    return Catalogue(found, int.from_bytes(digest, "big") % _VERSIONS)
+    return Catalogue(found, _version(database.version or "", path.read_text("utf-8")))
+
+
+def _version(said: str, text: str) -> int:
+    """Return the version that a DBC says it has, if the hash behind it is that of its other lines.
+
+    So an addition that no node needs to know keeps the version, and a DBC that was changed by
+    somebody else has another one: its hash.
+    """
+    rest = text.partition("\n")[2].encode()
+    found = int.from_bytes(hashlib.sha256(rest).digest(), "big") % _VERSIONS
+    version, _, of = said.partition(" ")
+    return int(version) if of == str(found) else found
 
 
 def common_name(message: str, sender: str) -> str:

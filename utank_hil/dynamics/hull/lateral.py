@@ -45,7 +45,7 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 _OSCILLATORS = 3  # Number for each motion; surge, heave and pitch need one more for 1 %.
 _START_RATIO = 0.5
 """Damping ratio of the oscillators before the fit; radiation of hulls is a broad hump."""
-_MOST_STEPS = 600
+_FEW_STEPS, _MOST_STEPS = 200, 600
 """The fit creeps along a valley: it has not ended by then, and leaves 0.2 % or less."""
 
 
@@ -152,7 +152,10 @@ def fit_radiation(
     if infinite_added_mass is None:
         start.append(limit[upper])
     first = np.concatenate([each.ravel() for each in start])
-    found = least_squares(left, first, jac=slopes, method="lm", max_nfev=_MOST_STEPS)
+    if infinite_added_mass is None:  # which the data hardly show: stay near the last frequency's
+        found = least_squares(left, first, jac=slopes, max_nfev=_FEW_STEPS)
+    else:
+        found = least_squares(left, first, jac=slopes, method="lm", max_nfev=_MOST_STEPS)
     direction, frequency, loss, free = parts(found.x)
     error = float(np.linalg.norm(found.fun) / np.linalg.norm(flat(wanted(free)[:, None])))
     return Radiation(free * scale, direction * unit, frequency, loss, error)
