@@ -1,5 +1,6 @@
 """Logs in binary formats: BLF of Vector's programs, and MDF 4 (``.mf4``)."""
 
+import errno
 import logging
 import zlib
 from collections.abc import Iterator
@@ -214,9 +215,9 @@ class Mf4Log(FrameSource):
                 for message in Reader(content):
                     self._count += 1
                     yield of_message(message, str(message.channel))
-        except OSError:
-            raise
         except Exception as error:  # The readers raise many kinds of exception at damaged bytes.
+            if isinstance(error, OSError) and error.errno != errno.EINVAL:  # A place that is none.
+                raise
             raise BusLogError(
                 f"{self._path}: can't be read as MF4 after frame {self._count}"
             ) from error
