@@ -144,6 +144,7 @@ class Expectation(Section):
 
     reaction: Reaction
     codes: tuple[FaultName, ...] = ()  #: Accepted fault codes.
+    elsewhere: tuple[FaultName, ...] = ()  #: Those that another ship may have besides.
     #: Faults that must also be alarms, and flags that CTRL_STATUS must set.
     also: tuple[FaultName | StatusFlag, ...] = ()
     #: Faults that may end a run after `Trial.followed_s`, while the roll is compared.
@@ -171,6 +172,8 @@ class Limit(Section):
     counts_from: Annotated[dict[CountsFrom, Positive], Field(default_factory=dict, max_length=1)]
     #: Largest ratio of the roll variance to that of the passive ship; None where it is not judged.
     roll: Positive | None = 1.05
+    #: Whether a ship whose pump went off at the fault's moment may stand for the passive one.
+    beside_stop: bool = False
     #: Time over which the roll is compared, instead of the one for all rows.
     roll_window_s: FaultSpan | None = None
 
@@ -323,12 +326,14 @@ def _resized(row: Row, by: Ratios) -> Row:
     counts_from = {
         key: value * by.range.get(key, 1.0) for key, value in row.limit.counts_from.items()
     }
-    limit: dict[str, Any] = {"counts_from": counts_from}
+    limit: dict[str, Any] = {"counts_from": counts_from, "beside_stop": True}
+    codes = row.expect.codes + row.expect.elsewhere
     if row.fault.hardwired_stop:
         limit["roll"] = None
     return row.model_copy(
         update={
             "fault": row.fault.model_copy(update={"inject": inject}),
+            "expect": row.expect.model_copy(update={"codes": codes}),
             "limit": row.limit.model_copy(update=limit),
         }
     )

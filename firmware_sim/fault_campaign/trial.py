@@ -78,10 +78,10 @@ class Outcome:
     #: variance, passive_variance: roll variances in rad^2 of the ship and of the passive one.
     variance: float = math.nan
     passive_variance: float = math.nan
-    #: The same without the fault. Where control has ended, its pump is off from the fault on: that
-    #: ship rolls on from what the law had it do. Where control continues, over a window shorter
-    #: than that of `--full`: in a lull a sound law may roll the ship more than the passive one. NaN
-    #: elsewhere.
+    #: The same without the fault. Where an own ship's control has ended, its pump is off from the
+    #: fault on: that ship rolls on from what the law had it do. Where control continues, over a
+    #: window shorter than that of `--full`: in a lull a sound law may roll the ship more than the
+    #: passive one. NaN elsewhere.
     sound_variance: float = math.nan
     window_s: float = math.nan
     wire: str = ""  #: First frame that the fault changed; empty if none differs.
@@ -244,7 +244,8 @@ class Sea:
         passive = passive[start_ns // SAMPLE_NS : end_ns // SAMPLE_NS]
         sound = (self._cut if stopped else self._sound)[: len(passive)]
         compared = not row.fault.from_start and len(sound) == len(passive)
-        compared = compared and (stopped or window_s < Window().running_s)
+        short = window_s < Window().running_s
+        compared = compared and (row.limit.beside_stop if stopped else short)
         wire = ""
         if row.fault.on_bus:
             difference = first_difference(reference, log.frames, watched_ns)

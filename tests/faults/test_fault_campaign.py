@@ -577,7 +577,12 @@ def test_a_fault_is_as_large_for_another_ship_as_for_the_first():
     ):
         here, there = (getattr(each[name].fault.inject[0], key) for each in (rows, moved))
         assert there / here == pytest.approx(getattr(limits[1], limit) / getattr(limits[0], limit))
-    assert moved["roll-spike"] == rows["roll-spike"]
+    assert moved["roll-spike"].fault == rows["roll-spike"].fault
+    # what another ship may be told and roll does not count on the first one
+    assert moved["law-opposite"].expect.codes == ("ROLL_AMPLIFIED", "HEEL_LIMIT")
+    assert rows["law-opposite"].expect.codes == ("ROLL_AMPLIFIED",)
+    assert moved["motion-zero"].limit.beside_stop
+    assert not any(row.limit.beside_stop for row in CAMPAIGN.rows)
     seen = moved["pump-stuck-at-50-kpa"].limit.counts_from["pressure_pa"]
     assert seen == pytest.approx(12e3 * limits[1].pressure_pa / limits[0].pressure_pa)
     # no command takes that pressure away
