@@ -424,10 +424,9 @@ READERS = [
     Reader("41010w2019.txt", made_ndbc, load_ndbc),
     Reader("a.nc", made_netcdf, load_directional, cost=16),
     Reader("moments.csv", made_moments, MomentTable.read, cost=0.4),
-    *(
-        Reader(name, made_law, read_system, cost=0.5)
-        for name in ("law.json", "law.npz", "law.mat", "packed.mat", "v73.mat")
-    ),
+    *(Reader(name, made_law, read_system, cost=0.5) for name in ("law.json", "law.npz", "v73.mat")),
+    # A process of its own reads it, as scipy's reader may end with a segmentation fault.
+    *(Reader(name, made_law, read_system, cost=200) for name in ("law.mat", "packed.mat")),
     Reader("a.fmu", made_fmu, fmu, cost=0.6),
     Reader("a.ring", made_ring, ring, cost=0.4),
     Reader("a.commissioning.json", made_record, commissioned, cost=7),
@@ -472,7 +471,7 @@ OTHERS: dict[str, tuple[Callable[[Path], Any], float]] = {
     "hulls/nemoh3-cylinder/Nemoh.cal": (read_hull, 6),
     "hulls/nemoh3-cylinder/results/ExcitationForce.tec": (nemoh_results, 11),
     "hulls/shipx-supply/input.re7": (read_hull, 18),
-    "hulls/shipx-supply/supply.mat": (read_hull, 10),
+    "hulls/shipx-supply/supply.mat": (read_hull, 200),
     "seas/41010.data_spec": (load_ndbc, 16),
     "seas/41010w2019part.txt.gz": (load_ndbc, 2),
     "seas/swanfile.spec": (load_directional, 2),

@@ -2,6 +2,7 @@
 
 import json
 import math
+import struct
 from pathlib import Path
 
 import control
@@ -130,6 +131,34 @@ def test_what_is_wrong_is_said_at_its_key(tmp_path, suffix, content, message):
         configured(tmp_path, written(tmp_path, suffix, content))
     assert message in str(caught.value)
     assert f"{tmp_path / 'law.yaml'}: law.system" in str(caught.value)
+
+
+def test_a_file_at_which_scipy_crashes_is_refused_in_words(tmp_path):
+    """A data type that does not exist ends scipy 1.17's reader by a segmentation fault."""
+    savemat(tmp_path / "law.mat", {**LAW, "Ts": 0.1})
+    whole = (tmp_path / "law.mat").read_bytes()
+    doubles = struct.pack("<II", 9, 8 * len(LAW["B"]))
+    assert doubles in whole
+    (tmp_path / "law.mat").write_bytes(whole.replace(doubles, b"\x29" + doubles[1:]))
+    with pytest.raises(ConfigError, match=r"law\.mat holds no matrices"):
+        configured(tmp_path, "./law.mat")
+
+
+def test_indices_beyond_a_sparse_matrix_are_refused(tmp_path):
+    content = {**{name: csc_matrix(value) for name, value in LAW.items()}, "Ts": 0.1}
+    savemat(tmp_path / "law.mat", content)
+    whole = (tmp_path / "law.mat").read_bytes()
+    rows = content["A"].indices.astype("<i4")
+    place = whole.index(struct.pack("<II", 5, rows.nbytes) + rows.tobytes()) + 8
+    beyond = (rows + 1_000_000).tobytes()
+    (tmp_path / "law.mat").write_bytes(whole[:place] + beyond + whole[place + len(beyond) :])
+    with pytest.raises(ConfigError, match=r"law\.mat: A is no sparse matrix: "):
+        configured(tmp_path, "./law.mat")
+    matlab_73(tmp_path / "law.mat", {**LAW, "Ts": 0.1})
+    with h5py.File(tmp_path / "law.mat", "r+") as file:
+        file["sys/A/ir"][...] += 1_000_000
+    with pytest.raises(ConfigError, match=r"law\.mat: A is no sparse matrix: "):
+        configured(tmp_path, "./law.mat")
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """Matrices of a discrete system, read from the files of python-control, numpy and MATLAB."""
 
 import json
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -11,6 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator
 
 from utank_hil.base.text_files import open_text
+from utank_hil.configuration.mat_files import read_mat
 from utank_hil.control.state_space import SystemMatrices
 
 _NAMES: Final = ("A", "B", "C", "D")
@@ -18,7 +18,6 @@ _SAMPLE_TIMES: Final = ("sample_time_s", "dt", "Ts")
 _LIMIT_BYTES: Final = 1 << 26  #: Of a law's file; one of a hundred states has some 200 kB.
 _MOST_ELEMENTS: Final = 1 << 20  #: Of a matrix; a law of a thousand states has as many.
 _HDF5: Final = b"\x89HDF\r\n\x1a\n"
-_COMPRESSED: Final = 15  #: Type of a compressed element of a MATLAB file.
 _MATLAB_73: Final = b"MATLAB 7.3"
 _AS_STRUCT: Final = (
     "save its matrices: s = struct('A',sys.A,'B',sys.B,'C',sys.C,'D',sys.D,'Ts',sys.Ts); "
@@ -77,9 +76,14 @@ def _matrix(path: Path, name: str, value: Any) -> Any:
     """Return an array of real numbers; ValueError names the matrix and what it holds."""
     if np.prod(np.maximum(getattr(value, "shape", 0), 1), dtype=float) > _MOST_ELEMENTS:
         raise ValueError(f"{path.name}: {name} has more than {_MOST_ELEMENTS} elements")
-    toarray = getattr(value, "toarray", None)
+    if hasattr(value, "toarray"):
+        try:
+            value.check_format()  # Elements beyond the matrix would be written anywhere in memory.
+        except ValueError as error:
+            raise ValueError(f"{path.name}: {name} is no sparse matrix: {error}") from error
+        value = value.toarray()
     try:
-        matrix = np.asarray(value if toarray is None else toarray())
+        matrix = np.asarray(value)
     except ValueError as error:
         raise ValueError(f"{path.name}: {name} must have rows of one length") from error
     if matrix.size and matrix.dtype.kind not in "iufc":
@@ -173,35 +177,6 @@ def _mat(path: Path) -> Mapping[str, Any]:
     if any(isinstance(value, MatlabOpaque) for value in found.values()):
         raise ValueError(f"it holds a MATLAB object, not matrices: {_AS_STRUCT}")
     return found
-
-
-def read_mat(path: Path, **options: Any) -> dict[str, Any]:
-    """Read a MATLAB file up to version 7, with options of `scipy.io.loadmat`.
-
-    ValueError is raised for a damaged file, and one that unpacks to more than `_LIMIT_BYTES`.
-    """
-    from scipy.io import loadmat
-
-    try:
-        with path.open("rb") as file:
-            order: Any = "big" if file.read(128)[126:] == b"MI" else "little"
-            left = _LIMIT_BYTES
-            while len(tag := file.read(8)) == 8:
-                size = int.from_bytes(tag[4:], order)
-                if int.from_bytes(tag[:4], order) == _COMPRESSED:
-                    left -= len(zlib.decompressobj().decompress(file.read(size), left + 1))
-                else:
-                    file.seek(size, 1)
-                if left < 0:
-                    raise ValueError(
-                        f"it unpacks to more than {_LIMIT_BYTES} bytes, the most that is read"
-                    )
-            file.seek(0)
-            return dict(loadmat(file, appendmat=False, **options))
-    except OSError:
-        raise
-    except Exception as error:  # The library raises any exception at a damaged file.
-        raise ValueError(f"{error}" or type(error).__name__) from error
 
 
 def _mat_73(path: Path) -> Mapping[str, Any]:
