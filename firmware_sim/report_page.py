@@ -36,6 +36,7 @@ _SEAS: Final = {
     "ittc": "of given height and period (ITTC)",
     "pierson_moskowitz": "fully developed (Pierson-Moskowitz)",
     "regular": "one regular wave",
+    "components": "given waves",
 }
 _SEA_KEYS: Final = {
     "time": "{} UTC",

@@ -243,7 +243,8 @@ def _voyage_problems(scenario: ScenarioContent) -> list[Problem]:
             reason = f"does not go with this scenario's sea: give {right}"
             problems.append((f"{at}.{wrong}", reason))
         if point.sea is not None and len(scenario.sea.spectra) != 1:
-            why = "regular" if not scenario.sea.spectra else "given by its own records (until)"
+            own = "given by its own records (until)"
+            why = own if scenario.sea.spectra else "given wave by wave"
             problems.append((f"{at}.sea", f"can't follow: the scenario's sea is {why}"))
         elif point.sea is not None and scenario.sea.turn_deg[1]:
             why = "the scenario's sea has measured directions, a spectrum alone has none"

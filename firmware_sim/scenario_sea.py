@@ -1,4 +1,4 @@
-"""Sea of a scenario: an irregular one with any spectrum, or one regular wave.
+"""Sea of a scenario: an irregular one with any spectrum, one regular wave, or given components.
 
 Irregular seas differ in their spectrum only; heading, speed, spreading and effective slope have the
 same keys in all.
@@ -37,6 +37,7 @@ from utank_hil.configuration.spectra import (
 )
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea, Spectrum
+from utank_hil.sea.components import read_components
 from utank_hil.sea.measured import SUFFIXES
 from utank_hil.sea.moment_table import MomentTable
 from utank_hil.sea.sea import PassingSea
@@ -286,7 +287,24 @@ class MeasuredSea(MeasuredSpectrum, IrregularSea):
         return spectrum.heading_rad(self.course_deg)
 
 
-class RegularSea(_AnySea):
+class _GivenWaves(_AnySea):
+    """Waves with nothing to draw, and no spectrum to pass to another."""
+
+    def passing_sea(self, known: Sequence[tuple[float, SpectrumSection]], seed: int) -> PassingSea:  # noqa: ARG002
+        """The waves; they do not change."""
+        return PassingSea.of(self.sea(seed))
+
+    @abstractmethod
+    def sea(self, seed: int) -> Sea:
+        """The waves."""
+
+    @property
+    def spectra(self) -> list[tuple[float, SpectrumSection]]:
+        """Empty list."""
+        return []
+
+
+class RegularSea(_GivenWaves):
     """Regular wave."""
 
     kind: Literal["regular"]
@@ -313,17 +331,35 @@ class RegularSea(_AnySea):
             speed_m_s=self.speed_m_s,
         )
 
-    def passing_sea(self, known: Sequence[tuple[float, SpectrumSection]], seed: int) -> PassingSea:  # noqa: ARG002
-        """The regular wave; it does not change."""
-        return PassingSea.of(self.sea(seed))
 
-    @property
-    def spectra(self) -> list[tuple[float, SpectrumSection]]:
-        """Empty list: a regular wave has no spectrum."""
-        return []
+class ComponentsSea(_GivenWaves):
+    """Waves one by one, of a record (`utank-hil identify sea`) or another program."""
+
+    kind: Literal["components"]
+    file: Path
+    """CSV: `omega_rad_s`, `amplitude_m`, `phase_rad` at the ship at the start, and, if not all come
+    from `heading_deg`, `heading_deg`."""
+
+    @field_validator("file")
+    @classmethod
+    def _readable(cls, file: Path) -> Path:
+        read_components(file)
+        return file
+
+    def sea(self, seed: int) -> Sea:  # noqa: ARG002, nothing is drawn
+        """The waves of the file; they do not depend on the seed."""
+        return replace(
+            read_components(self.file, math.radians(self.heading_deg)), speed_m_s=self.speed_m_s
+        )
 
 
 ScenarioSea = Annotated[
-    MeasuredSea | TabulatedSea | JonswapSea | IttcSea | PiersonMoskowitzSea | RegularSea,
+    MeasuredSea
+    | TabulatedSea
+    | JonswapSea
+    | IttcSea
+    | PiersonMoskowitzSea
+    | RegularSea
+    | ComponentsSea,
     Field(discriminator="kind"),
 ]  #: Section ``sea`` of a scenario.

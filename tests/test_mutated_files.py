@@ -55,6 +55,8 @@ from utank_hil.configuration.hull_files.reader import read_hull
 from utank_hil.configuration.matrices import read_system
 from utank_hil.configuration.spectra import TabulatedSpectrum
 from utank_hil.reports.recording import _alarms
+from utank_hil.sea import Sea, jonswap
+from utank_hil.sea.components import read_components, write_components
 from utank_hil.sea.measured import load_directional
 from utank_hil.sea.moment_table import MomentTable
 from utank_hil.sea.ndbc import load_ndbc
@@ -265,6 +267,10 @@ def made_moments(path):
     path.write_text("omega_rad_s,heading_deg,moment_nm_per_m,phase_deg\n" + "".join(rows))
 
 
+def made_components(path):
+    write_components(Sea.irregular(jonswap(4.0, 10.0), 1, components=30), path)
+
+
 LAW = {
     "A": [[0.5, 0.1], [0.0, 0.2]],
     "B": [[1.0], [0.5]],
@@ -424,6 +430,7 @@ READERS = [
     Reader("41010w2019.txt", made_ndbc, load_ndbc),
     Reader("a.nc", made_netcdf, load_directional, cost=16),
     Reader("moments.csv", made_moments, MomentTable.read, cost=0.4),
+    Reader("sea.csv", made_components, read_components, cost=0.4),
     *(Reader(name, made_law, read_system, cost=0.5) for name in ("law.json", "law.npz", "v73.mat")),
     # A process of its own reads it, as scipy's reader may end with a segmentation fault.
     *(Reader(name, made_law, read_system, cost=200) for name in ("law.mat", "packed.mat")),

@@ -154,11 +154,11 @@ def scenario(**changes):
     ("changes", "key", "words"),
     [
         ({"sea": {"kind": "JONSWAP", "hs_m": 2.0, "tp_s": 8.0}}, "sea.kind",
-         "must be one of measured, tabulated, jonswap, ittc, pierson_moskowitz, regular; did you "
-         "mean jonswap? (got 'JONSWAP')"),
+         "must be one of measured, tabulated, jonswap, ittc, pierson_moskowitz, regular, "
+         "components; did you mean jonswap? (got 'JONSWAP')"),
         ({"sea": {"hs_m": 2.0}}, "sea",
          "needs the key kind: one of measured, tabulated, jonswap, ittc, pierson_moskowitz, "
-         "regular"),
+         "regular, components"),
         ({"sea": "rough"}, "sea", "must be a mapping of keys to values, got 'rough'"),
         ({"operator": [{"time_s": 5.0, "action": "amr"}]}, "operator.0.action",
          "must be one of standby, passive, arm, disarm, stop, reset"),

@@ -10,6 +10,7 @@ from firmware_sim.waves import PassingWaves
 from tools.thesis.capsize import equilibria
 from utank_hil.configuration import ConfigError, Vessel, load_config
 from utank_hil.dynamics import RollModel
+from utank_hil.sea.components import write_components
 
 CONFIGS = Path("configs").resolve()
 STORM = CONFIGS / "scenarios" / "storm.yaml"
@@ -40,6 +41,20 @@ def scenario_file(folder: Path, **changes: object) -> Path:
         encoding="utf-8",
     )
     return path
+
+
+def test_waves_of_a_file_roll_the_ship_as_the_sea_that_they_are_of(tmp_path: Path) -> None:
+    sea = load_config(scenario_file(tmp_path, sea=STORM_SEA), Scenario).sea.sea(7)
+    file = write_components(sea, tmp_path / "sea.csv")
+    drawn = load_config(scenario_file(tmp_path, sea=STORM_SEA), Scenario).wave_moment(7)
+    given = load_config(
+        scenario_file(tmp_path, sea={"kind": "components", "file": str(file)}), Scenario
+    )
+    for seed in (1, 2):  # Nothing is drawn.
+        again = given.wave_moment(seed)
+        assert np.array_equal(again.amplitude, drawn.amplitude)
+        assert np.array_equal(again.frequency_rad_s, drawn.frequency_rad_s)
+        assert np.array_equal(again.phase_rad, drawn.phase_rad)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +119,7 @@ def test_shipped_scenarios_are_valid(path: Path) -> None:
         ({"voyage": [{"time_s": 9.0, "course_deg": 9.0}]}, "voyage.0.course_deg",
          "give heading_deg"),
         ({"voyage": [{"time_s": 9.0, "sea": {"kind": "ittc", "hs_m": 1.0, "tp_s": 6.0}}]},
-         "voyage.0.sea", "the scenario's sea is regular"),
+         "voyage.0.sea", "the scenario's sea is given wave by wave"),
         ({"voyage": [{"time_s": 9.0, "ship": {"gm_m": 1.0}}]}, "voyage.0.ship.gm_m",
          "can't change; it takes inertia_kg_m2"),
         ({"voyage": [{"time_s": 9.0, "ship": {"inertia_kg_m2": -1.0}}]},

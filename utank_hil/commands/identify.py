@@ -19,6 +19,7 @@ from utank_hil.assembly import retuning_task
 from utank_hil.base.finite import finite
 from utank_hil.base.provenance import describe
 from utank_hil.commands.identified import CONTROLLER, VESSEL, IdentifiedShips, read_controller
+from utank_hil.commands.identify_sea import sea
 from utank_hil.commands.identify_test import decay, inclining_test, refuse
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.console import common
@@ -304,9 +305,10 @@ class _LogUnlessNamed(TyperGroup):
 
 
 application = common.new_app(
-    "Identify ship and tank from a recording (LOG CONFIG), or from a test of the ship.",
+    "Identify ship and tank from a recording (LOG CONFIG), from a test of the ship, or its sea.",
     cls=_LogUnlessNamed,
 )
 application.command("log")(identify_log)
 application.command("decay")(decay)
 application.command("inclining")(inclining_test)
+application.command("sea")(sea)

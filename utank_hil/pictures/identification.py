@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.signal import welch
 
 from utank_hil.analysis.motion.decay import RollDecay
 from utank_hil.base.arrays import ComplexArray, FloatArray
@@ -17,6 +18,7 @@ from utank_hil.retuning.redesign import Identification, RetuningTask
 from utank_hil.retuning.settings import estimation_samples
 
 SHOWN_S = 120.0  #: Length of the held-out record in the figure. Chosen; no study.
+SEGMENT_S = 200.0  #: Of a spectrum: 0.03 rad/s apart. Chosen; no study.
 BAND_RAD_S = np.linspace(0.15, 1.5, 300)  #: Rolls of 4 to 42 s.
 
 
@@ -93,5 +95,26 @@ def draw_decay(
         top.set_ylabel("Roll (°)")
         low.plot(found.time_s, np.degrees(found.roll_rad - found.fit_rad), color=COLORS[0], lw=0.8)
         low.set(xlabel="Time (s)", ylabel="Less fit (°)")
+        figure.legend(**BELOW)
+    return path
+
+
+def draw_waves(
+    roll_rad: FloatArray, slope_rad: FloatArray, step_s: float, path: Path, title: str,
+    about: Mapping[str, Any] | None = None,
+) -> Path:  # fmt: skip
+    """Draw the wave slope of a record beside its roll, and the energy of both by frequency."""
+    with picture(path, title, (WIDEST_IN, 5.5), about) as figure:
+        top, low = figure.subplots(2, 1)
+        time_s = step_s * np.arange(len(roll_rad))
+        segment = min(len(roll_rad), round(SEGMENT_S / step_s))
+        for n, (name, values) in enumerate((("wave slope", slope_rad), ("roll", roll_rad))):
+            style: dict[str, Any] = {"linestyle": DASHES[2 * n], "color": COLORS[2 * n]}
+            degrees = np.degrees(values)
+            top.plot(time_s, degrees, label=name, lw=0.8, **style)
+            frequency_hz, density = welch(degrees, 1 / step_s, nperseg=segment)
+            low.plot(2 * np.pi * frequency_hz, density / (2 * np.pi), **style)
+        top.set(xlabel="Time (s)", ylabel="Angle (°)")
+        low.set(xlabel="Frequency (rad/s)", ylabel="Density (°² s/rad)", xlim=(0, 2.5))
         figure.legend(**BELOW)
     return path

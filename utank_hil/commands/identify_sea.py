@@ -1,0 +1,138 @@
+"""``utank-hil identify sea``: the waves of a record, for the bench."""
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from utank_hil.analysis.motion.wave_slope import BAND_RAD_S, beam_sea, wave_slope
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.provenance import describe
+from utank_hil.commands.identify_test import refuse
+from utank_hil.configuration import Vessel
+from utank_hil.console import common
+from utank_hil.console.terminal import Terminal, new_table, say_note
+from utank_hil.dynamics.nonlinear import RollModel
+from utank_hil.sea.components import write_components
+
+FILE, PICTURE = "sea.csv", "sea.png"
+STEP_S = 0.1  #: Samples in it are averaged: at 3 rad/s it takes 0.4 % of the amplitude.
+LONGEST_GAP_S = 1.0  #: Filled by a line; waves of 2 s are the shortest.
+SHORTEST_S = 120.0  #: Of a record; its ends rise and fall over 20 s.
+
+
+def sea(
+    context: typer.Context,
+    log: Annotated[
+        Path, typer.Argument(help="With roll and levels: .rrd, .frames, .csv, bus log.")
+    ],
+    ship: Annotated[Path, typer.Option(help="Ship as it was loaded: by `identify`, if need be.")],
+    run: common.Run = None,
+    channel: common.Channel = None,
+    from_s: common.From = None,
+    to_s: common.To = None,
+    slope: Annotated[
+        float, typer.Option(min=0.05, max=1.0, help="Effective slope coefficient of the scenario.")
+    ] = 1.0,
+    out: common.Out = common.OUT,
+    json_: common.Json = False,
+) -> None:
+    """Find the waves of a record, so that the bench meets them with any law.
+
+    The pump may have been at work. The ship must be that of the file: its moment is what the waves
+    are taken from. Waves of 2 to 126 s are found, and what heels the ship steadily. Exit code 1:
+    the record has gaps of over a second, or is shorter than 120 s.
+
+    **Example:** utank-hil identify sea out/bench.rrd --ship configs/ships/thesis_first.yaml
+    """
+    from utank_hil.pictures.identification import draw_waves
+    from utank_hil.telemetry.signal_files import read_signals, require
+
+    vessel = common.load(ship, Vessel)
+    low_s, high_s = -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s
+    names = ("time_s", "roll_rad", "port_level_m", "starboard_level_m")
+    try:
+        runs = read_signals(
+            log, say_note, channel=channel, names=names[1:], between_s=(low_s, high_s)
+        )
+        name = common.chosen_run(log, runs, run)
+        require(log, runs[name], *names)
+    except (OSError, ValueError) as error:
+        common.fail(error)
+    time_s, roll, port, starboard = (runs[name][each] for each in names)
+    part = (time_s >= low_s) & (time_s <= high_s)
+    try:
+        if not part.any() or float(np.ptp(time_s[part])) < SHORTEST_S:
+            raise ValueError(f"is shorter than {SHORTEST_S:g} s: take a longer part")
+        if (np.diff(time_s[part]) <= 0).any():
+            raise ValueError("needs rising times: sort the rows, and keep one of each time")
+        roll_rad, level_m = (
+            even_means(time_s[part], each[part]) for each in (roll, (starboard - port) / 2)
+        )
+    except ValueError as error:
+        refuse(f"{log}: {error}", json_)
+    slope_rad, heeling_nm = wave_slope(
+        roll_rad, level_m, STEP_S, RollModel(vessel.ship, vessel.tank)
+    )
+    found = beam_sea(slope_rad, STEP_S, slope)
+    out = common.prepare_out(out, (FILE, PICTURE))
+    about = describe("identify sea", vessel, out, options=context.params)
+    file = write_components(found, out / FILE)
+    title = f"{log.name}, {name}"
+    picture = draw_waves(roll_rad, slope_rad, STEP_S, out / PICTURE, title, about)
+    energy = found.slope.amplitude**2
+    if not energy.any():
+        refuse(f"{log}: the ship does not move", json_)
+    figures = {
+        "slope_rms_rad": slope * math.sqrt(found.slope.variance),
+        "mean_frequency_rad_s": float(np.average(found.omega_rad_s, weights=energy)),
+        "heeling_moment_nm": heeling_nm,
+        "components": len(energy),
+        "duration_s": STEP_S * len(slope_rad),
+    }
+    files = {"sea": file, "picture": picture}
+    if json_:
+        common.print_json(
+            about | figures | {"files": {key: str(path) for key, path in files.items()}}
+        )
+        return
+    terminal = Terminal()
+    table = new_table("Waves of the record", "value")
+    for row in (
+        ("effective wave slope, ° RMS", f"{math.degrees(figures['slope_rms_rad']):.3g}"),
+        ("mean frequency, rad/s", f"{figures['mean_frequency_rad_s']:.3g}"),
+        (f"waves from {BAND_RAD_S[0]:g} to {BAND_RAD_S[1]:g} rad/s", f"{len(energy)}"),
+        ("steady heeling moment, kN m", f"{heeling_nm / 1e3:.3g}"),
+        ("length, after which it repeats, s", f"{figures['duration_s']:.0f}"),
+    ):
+        table.add_row(*row)
+    terminal.table(table)
+    terminal.say("Section of a scenario of this ship, beside the file:")
+    coefficient = "" if slope == 1 else f", effective_slope: {{coefficient: {slope:g}}}"
+    terminal.say(f"  sea: {{kind: components, file: ./{FILE}{coefficient}}}")
+    terminal.files(files)
+
+
+def even_means(time_s: FloatArray, values: FloatArray) -> FloatArray:
+    """Return means over steps of `STEP_S`, shape (M,), from the first time on.
+
+    Gaps of up to `LONGEST_GAP_S` are filled by lines; ValueError names a longer one.
+    """
+    good = np.isfinite(values)
+    if not good.any():
+        raise ValueError("a column has no values")
+    place = np.rint((time_s - time_s[0]) / STEP_S).astype(np.int64)
+    sums = np.bincount(place[good], values[good])
+    numbers = np.bincount(place[good], minlength=len(sums))
+    (there,) = np.nonzero(numbers)
+    gaps = np.diff(there, prepend=-1, append=int(place[-1]) + 1)
+    longest = int(gaps.argmax())
+    if gaps[longest] > LONGEST_GAP_S / STEP_S:
+        end_s = float(time_s[0]) + STEP_S * float(there[min(longest, len(there) - 1)])
+        raise ValueError(
+            f"has a gap of {STEP_S * gaps[longest]:.3g} s around {end_s:.5g} s: choose a part "
+            "without by --from and --to"
+        )
+    return np.interp(np.arange(place[-1] + 1), there, sums[there] / numbers[there])
