@@ -27,6 +27,7 @@ S. Boyd, C. Barratt, Linear Controller Design: Limits of Performance, Prentice H
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache, lru_cache
 from typing import Final
 
 import numpy as np
@@ -106,7 +107,7 @@ class InnovationFilter:
         self._unit_pa = plant.limits.pressure_pa
         angle = plant.ship.natural_frequency_rad_s * law.sample_time_s
         omega, self._mean = _quadrature(angle)
-        self._z = np.exp(1j * omega)
+        self._angle, self._z = angle, np.exp(1j * omega)
         share = np.where(omega > 2e-3 * angle, self._mean / omega, 0.0)
         self._octaves = share / share.sum()  # each octave has the same weight
         self._measured = [STATES.index(name) for name in design.measured]
@@ -119,7 +120,6 @@ class InnovationFilter:
         self._basis = state_space_response(basis, self._z)[..., 0]
         self._by_pump = self._pumped(plant, STATES)
         self._by_sea = self._in_sea(design)
-        self._law_parts()
         self._own_ship(np.asarray(weights))
         turning, peaks = zip(*self._other_ships(), strict=True)
         self._turning, self._others_peak = np.array(turning), np.array(peaks)
@@ -193,7 +193,8 @@ class InnovationFilter:
         gradient = 2 * (self._slope + quadratic @ c) + along.T @ peak - rooms.T @ other
         hessian = 2 * quadratic + outer
         hessian += (_POWER - 2) * along.T @ (along * (peak / square)[:, None])
-        hessian += (_OTHERS_POWER + 1) * rooms.T @ (rooms * (other / room)[:, None])
+        rooms = rooms * np.sqrt((_OTHERS_POWER + 1) * other / room)[:, None]
+        hessian += rooms.T @ rooms  # of one matrix: half the work
         return gradient, hessian
 
     def minimum(self, coefficients: FloatArray) -> FloatArray:
@@ -213,7 +214,7 @@ class InnovationFilter:
                 break
         return coefficients
 
-    def _law_parts(self, share: float = 1.0) -> None:
+    def _law_parts(self, share: float) -> "_LawParts":
         """Compute transfers from command and innovations to the estimate's command and output.
 
         The estimate is x = (z - A + B K)^-1 (B q + L nu), the command q - K x. A pump at its limit
@@ -233,26 +234,23 @@ class InnovationFilter:
             ),
             self._z,
         )
-        self._command_by_command = 1 - response[:, 0, 0]
-        self._command_by_surprise = -response[:, 0, 1:]
-        self._expected_by_command = response[:, 1:, 0] + unit * d[:, 0]
-        self._expected_by_surprise = response[:, 1:, 1:]
-
-    def _surprise(self, pump: ComplexArray) -> ComplexArray:
-        """Inverse of the return difference at the innovations, on a plant."""
-        loop = self._expected_by_surprise - pump[..., None] * self._command_by_surprise[:, None]
-        return np.asarray(np.linalg.inv(np.eye(loop.shape[-1]) + loop), dtype=np.complex128)
+        return _LawParts(
+            command_by_command=1 - response[:, 0, 0],
+            command_by_surprise=-response[:, 0, 1:],
+            expected_by_command=response[:, 1:, 0] + unit * d[:, 0],
+            expected_by_surprise=response[:, 1:, 1:],
+        )
 
     def _own_ship(self, weights: FloatArray) -> None:
         """Compute cost and sensitivity on the nominal ship as functions of the coefficients."""
-        pump = self._by_pump[:, self._measured]
-        surprise = self._surprise(pump)
+        pump, parts = self._by_pump[:, self._measured], self._law_parts(1.0)
+        surprise = parts.surprise(pump)
         noise = np.broadcast_to(self._noise, surprise.shape)
         self._seen = np.concatenate([self._by_sea[:, self._measured, None], noise], axis=2)
         innovations = surprise @ self._seen
         spread = np.einsum("w,wic,wjc->ij", self._mean, innovations, innovations.conj()).real
         self._whitening = np.linalg.inv(np.linalg.cholesky(spread))
-        start = np.einsum("wi,wij->wj", self._command_by_surprise, surprise)
+        start = np.einsum("wi,wij->wj", parts.command_by_surprise, surprise)
         # A command v gives roll, level and pressure m + g v, at a cost |g|^2 |v - best|^2.
         picked = [STATES.index("roll_rad"), STATES.index("level_m")]
         g = np.hstack([self._by_pump[:, picked], np.ones((len(self._z), 1))])
@@ -267,7 +265,7 @@ class InnovationFilter:
         error *= root[:, None]
         by = np.einsum(
             "w,wk,wjc->wckj",
-            root * self._command_by_command,
+            root * parts.command_by_command,
             self._basis,
             self._whitening @ innovations,
         ).reshape(error.size, -1)
@@ -277,17 +275,17 @@ class InnovationFilter:
         self._start = float(np.sum(np.abs(error) ** 2)) + left
         self._sensitivity_start = np.einsum("wm,wm->w", start, pump)
         by_pump = self._along(np.einsum("wij,wj->wi", surprise, pump))
-        self._sensitivities = self._command_by_command[:, None] * by_pump
+        self._sensitivities = parts.command_by_command[:, None] * by_pump
 
     def _other_ships(self) -> Iterator[tuple[ComplexArray, FloatArray]]:
         """Yield how 1 - Q D depends on the coefficients on another ship, and its sensitivity."""
         names = tuple(STATES[row] for row in self._measured)
+        by_share = cache(self._law_parts)
         for ship, gain, share, peak in _others(self._plant, self._loads_peak):
-            self._law_parts(share)
-            pump = gain * self._pumped(ship, names)
-            surprise = self._surprise(pump)
-            effect = pump * self._command_by_command[:, None] - self._expected_by_command
-            start = np.einsum("wi,wij->wj", self._command_by_surprise, surprise)
+            parts, pump = by_share(share), gain * self._pumped(ship, names)
+            surprise = parts.surprise(pump)
+            effect = pump * parts.command_by_command[:, None] - parts.expected_by_command
+            start = np.einsum("wi,wij->wj", parts.command_by_surprise, surprise)
             yield (
                 -share * self._along(np.einsum("wij,wj->wi", surprise, effect)),
                 np.abs(1 + share * np.einsum("wm,wm->w", start, pump)) / peak,
@@ -321,9 +319,7 @@ class InnovationFilter:
         return per.reshape(len(self._z), -1)
 
     def _pumped(self, plant: DesignPlant, names: tuple[str, ...]) -> ComplexArray:
-        model = plant.sampled(names, self._law.sample_time_s)
-        response: ComplexArray = self._unit_pa * state_space_response(model, self._z)[..., 0]
-        return response
+        return self._unit_pa * _pumped(plant, names, self._law.sample_time_s, self._angle)
 
     def _in_sea(self, design: ConstrainedDesign) -> ComplexArray:
         """Response of the motion with passive tank to the sea's white noise; shape (N, 4)."""
@@ -335,6 +331,32 @@ class InnovationFilter:
         response = state_space_response(model._replace(B=noise, D=0 * model.D), self._z)
         motion: ComplexArray = response[..., 0]
         return motion
+
+
+@dataclass(frozen=True, slots=True)
+class _LawParts:
+    """Transfers of the law: command and expected measurement, by command and innovations."""
+
+    command_by_command: ComplexArray
+    command_by_surprise: ComplexArray
+    expected_by_command: ComplexArray
+    expected_by_surprise: ComplexArray
+
+    def surprise(self, pump: ComplexArray) -> ComplexArray:
+        """Inverse of the return difference at the innovations, on a plant."""
+        loop = self.expected_by_surprise - pump[..., None] * self.command_by_surprise[:, None]
+        return np.asarray(np.linalg.inv(np.eye(loop.shape[-1]) + loop), dtype=np.complex128)
+
+
+@lru_cache(maxsize=256)
+def _pumped(
+    plant: DesignPlant, names: tuple[str, ...], sample_time_s: float, roll_angle: float
+) -> ComplexArray:
+    """Motion by the command, at the nodes of `_quadrature`; the same for each law of a search."""
+    z = np.exp(1j * _quadrature(roll_angle)[0])
+    response = state_space_response(plant.sampled(names, sample_time_s), z)[..., 0]
+    response.flags.writeable = False
+    return response
 
 
 def laguerre(order: int, pole: float) -> tuple[FloatArray, FloatArray]:

@@ -270,11 +270,15 @@ class _Search:
                     start, design, self._plant, self._weights(costlier), loads_peak=self._loads_peak
                 )
                 for linear in (*search.laws(), start):
+                    if not (bears := self._bears_shares(linear)):
+                        continue
                     judged = robustness(linear, self._plant, _MEASURED, with_delay_margin=False)
-                    if not judged.failures() and self._bears_shares(linear):
+                    if not judged.failures():
                         law = self._planned(search, design, linear, costlier)
                         prediction = search.prediction(linear)
                         return SelfTuned(design, law, judged, self._roll_rad, prediction)
+                if not bears:
+                    return None  # the gain decides, which is the same with more noise
             noise *= _MORE_NOISE
         return None
 
