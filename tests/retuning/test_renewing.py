@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningOrder, RetuningState, Verdict
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control.constrained.design import ConstrainedDesign
+from utank_hil.control.constrained.horizon import PlanProgramme
 from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.retuning import (
@@ -23,7 +25,14 @@ from utank_hil.retuning import (
     RenewingController,
     ShipFigures,
 )
-from utank_hil.retuning.law_bank import FADE_SAMPLES
+from utank_hil.retuning.estimate import ChangeMonitor
+from utank_hil.retuning.law_bank import (
+    FADE_SAMPLES,
+    WARM_UP_SAMPLES,
+    MonitoredLaw,
+    SampleHistory,
+    WarmUp,
+)
 from utank_hil.retuning.law_exchange import RETRY_NS
 from utank_hil.retuning.renewing import (
     FIRST_EFFORT,
@@ -403,6 +412,29 @@ def test_the_new_law_knows_the_past_as_if_it_had_been_stepped_all_along() -> Non
     active = rig.controller.laws.active.controller
     assert isinstance(active, ConstrainedController)
     assert active._state == pytest.approx(alone._state, rel=1e-3, abs=1e-6)
+
+
+def test_a_law_that_plans_makes_no_plan_while_its_memory_is_filled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Fifty programmes in a tick may outlast it."""
+    history = SampleHistory(WARM_UP_SAMPLES, 3)
+    for k in range(100):
+        history.add(0.0, np.array([0.2, 0.1, 4.0]) * np.sin(0.1 * k), fresh=True)
+    controller, plans = law_for(2.0, 8.0).controller(), list[int]()
+    solve = PlanProgramme.solve
+
+    def counted(self: PlanProgramme, *arguments: Any) -> FloatArray | None:
+        plans.append(1)
+        return solve(self, *arguments)
+
+    monkeypatch.setattr(PlanProgramme, "solve", counted)
+    warm_up = WarmUp(MonitoredLaw(controller, ChangeMonitor(SHIP)), history)
+    while not warm_up.done:
+        warm_up.advance()
+    assert not plans
+    controller.step(np.zeros(3))
+    assert plans  # of the state that the past has left
 
 
 def test_the_exchange_makes_no_step_in_the_pressure() -> None:

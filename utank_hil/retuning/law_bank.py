@@ -19,6 +19,7 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.events import ModelSummary
 from utank_hil.control import Controller
+from utank_hil.control.constrained.law import ConstrainedController
 from utank_hil.retuning.estimate import ChangeMonitor, MotionEstimate, ShipFigures
 
 FADE_SAMPLES: Final = 15
@@ -183,7 +184,10 @@ class SampleHistory:
 
 
 class WarmUp:
-    """Steps a new law through past samples, one chunk per sample time."""
+    """Takes a new law through past samples, one chunk per sample time.
+
+    A law that plans makes no plans meanwhile: in a storm those of a chunk may outlast a tick.
+    """
 
     def __init__(self, law: MonitoredLaw, history: SampleHistory) -> None:
         self.law = law
@@ -201,5 +205,8 @@ class WarmUp:
         rows = self._history.latest(missing)[:WARM_UP_CHUNK]
         for row in rows:
             controller.applied(row[:1])
-            controller.step(row[1:])
+            if isinstance(controller, ConstrainedController):
+                controller.observe(row[1:])
+            else:
+                controller.step(row[1:])
         self._stepped += len(rows)
