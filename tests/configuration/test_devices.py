@@ -86,6 +86,7 @@ def test_a_change_of_a_device_voids_the_commissioning(tmp_path):
         ({"motion": {"profile": "sbg"}}, "no profile 'sbg': there are native, cia401_valve,"),
         ({"motion": {"profile": "sbg_ellipse"}}, "accept_unprotected: must be set to true"),
         ({"motion": SBG | {"cycle_ms": 100, "age_ms": 300}}, "10 Hz: too slow"),
+        ({"levels": LEVELS | {"cycle_ms": 100, "age_ms": 300}}, "levels.cycle_ms: is 100, 10 Hz"),
         ({"motion": SBG | {"age_ms": 10}}, "must be 20 or more, two cycles"),
         ({"motion": SBG | {"protection": {"stamps": []}}}, "unchanged_ms"),
         ({"motion": {"profile": "cia410", "node": 4, "accept_unprotected": True}}, "is derived"),

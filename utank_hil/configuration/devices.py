@@ -61,9 +61,9 @@ UNGUARDED: Final = (
     "The guard (docs/safety.md) reads native frames and hears none of these devices: cut the "
     "drive's power by a hard-wired stop instead, and say redundancy: {hardwired_inputs: true}"
 )
-MOST_MOTION_CYCLE_MS: Final = 50.0
-"""The monitors look at motion every 50 ms and take a gap of 100 ms as a loss: below 20 Hz they see
-nothing."""
+MOST_CYCLE_MS: Final = 50.0
+"""The monitors look at motion and levels every 50 ms and take a gap of 100 ms as a loss: below 20
+Hz they see nothing."""
 NATIVE_PUMP_MS: Final = 20.0  #: Cycle of SENSOR_PUMP.
 
 
@@ -228,12 +228,12 @@ class DevicesSection(Section):
             for role, device in self.devices().items()
             for name, reason in device.problems(ROLES[role])
         ]
-        for role in ("motion", "motion_2"):
-            cycle_ms = self.sensors()[role].cycle_ms
-            if cycle_ms is not None and cycle_ms > MOST_MOTION_CYCLE_MS:
+        for role, sensor in self.sensors().items():
+            cycle_ms = sensor.cycle_ms
+            if cycle_ms is not None and cycle_ms > MOST_CYCLE_MS:
                 reason = (
                     f"is {cycle_ms:g}, {1e3 / cycle_ms:.3g} Hz: too slow for any law and for the "
-                    f"monitors, which need {1e3 / MOST_MOTION_CYCLE_MS:g} Hz or more"
+                    f"monitors, which need {1e3 / MOST_CYCLE_MS:g} Hz or more"
                 )
                 problems.append((f"{role}.cycle_ms", reason))
         problems += [(f"pump.{name}", reason) for name, reason in self.pump.problems()]
