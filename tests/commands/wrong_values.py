@@ -113,4 +113,6 @@ WRONG: list[tuple[str, dict[str, object], dict[str, str]]] = [
     ("gpc", {"sea_estimate": {"every_s": 1, "record_s": 60, "effective_slope": 0}},
      {"sea_estimate.every_s": "30 to 3600", "sea_estimate.record_s": "300 to 3600",
       "sea_estimate.effective_slope": "must be above 0"}),
+    ("gpc", {"sea_estimate": {"record_s": 560}},
+     {"sea_estimate.record_s": "must be 45 of the ship's roll periods, 566, or more"}),
 ]  # fmt: skip

@@ -22,7 +22,7 @@ from utank_hil.configuration.vessel import Vessel
 from utank_hil.control import DesignPlant, PassiveDesign, PredictiveDesign, PumpLimits
 from utank_hil.control.predictive.design import MOST_ORDER, WASHOUT_SHARE
 from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign
-from utank_hil.retuning.estimator import EstimateSettings
+from utank_hil.retuning.estimator import LEAST_PERIODS, EstimateSettings
 from utank_hil.retuning.settings import RetuningSettings, record_problems
 from utank_hil.runners.bus_model import SimulatedBus
 from utank_hil.safety.monitors.thresholds import SensorFigures
@@ -91,6 +91,7 @@ class ControllerConfig(Section):
         if self.renews and not isinstance(self.law, SelfTunedDesign):
             reason = f"is for a law of kind self_tuned, not {self.law.kind}: leave it out"
             problems.append(("sea_estimate.renew", reason))
+        problems += self._record_problems()
         refuse("", problems)
         return self
 
@@ -234,6 +235,16 @@ class ControllerConfig(Section):
             settings.roll_period_range_s[0],
         )
         return [(f"retuning.{name}", reason) for name, reason in problems]
+
+    def _record_problems(self) -> list[Problem]:
+        least_s = LEAST_PERIODS * 2 * math.pi / self.vessel.ship.natural_frequency_rad_s
+        if self.sea_estimate is None or self.sea_estimate.record_s >= least_s:
+            return []
+        reason = (
+            f"must be {LEAST_PERIODS:g} of the ship's roll periods, {math.ceil(least_s)}, or more: "
+            f"{self.sea_estimate.record_s:g} never tell sea and ship"
+        )
+        return [("sea_estimate.record_s", reason)]
 
     def _law_problems(self) -> list[Problem]:
         if self.vessel.pump is None and not isinstance(self.law, _WITHOUT_PUMP):

@@ -23,6 +23,7 @@ COLUMNS: Final = ("pressure_pa", "roll_rad", "roll_rate_rad_s", "level_m")
 """Columns of the motion record."""
 SAMPLE_TIME_S: Final = 0.2
 """Sample time of the record; its Nyquist frequency is six times `motion_fit.TOP_RAD_S`."""
+LEAST_PERIODS: Final = 45.0  #: Shortest record in natural roll periods.
 LONGEST_RECORD_S: Final = 3600.0  #: Longest record: a sea counts as stationary for one hour.
 OUTDATED: Final = 3.0  #: Number of intervals after which an estimate is outdated: two may fail.
 SHIP_OUTDATED_S: Final = 3600.0

@@ -15,7 +15,7 @@ from utank_hil.control import DesignPlant
 from utank_hil.identification.motion_fit import KNOWN_SPREAD, MotionFit, fit_motion
 from utank_hil.retuning.answer import Refusal, RenewedLaw
 from utank_hil.retuning.estimate import EstimateRequest, MotionEstimate, ShipFigures
-from utank_hil.retuning.estimator import COLUMNS
+from utank_hil.retuning.estimator import COLUMNS, LEAST_PERIODS
 from utank_hil.sea import SlopeSpectrum
 
 TAIL_SHARE: Final = 0.15
@@ -78,7 +78,6 @@ def renew(estimate: MotionEstimate, task: RenewalTask) -> RenewedLaw | Refusal:
     return RenewedLaw(tuned.law, predicted.roll_rad, predicted.pressure_pa, tuned.passive_roll_rad)
 
 
-LEAST_PERIODS: Final = 45.0  #: Shortest record in natural roll periods.
 MOST_MISSING: Final = 0.05  #: Largest share of missing samples; gaps are interpolated.
 LEAST_CLEAR: Final = 0.8
 """Smallest share of the wave moment's energy in bands above the sensors' noise."""
