@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from retuning_toys import scribble
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import PumpLimits
 from utank_hil.control.constrained.horizon import condense
 from utank_hil.control.constrained.law import ConstrainedLaw
@@ -99,6 +100,15 @@ def test_any_law_crosses_bit_for_bit(sizes: tuple[int, ...], seed: int) -> None:
     assert before.keys() == after.keys()
     for name, value in before.items():
         assert np.array_equal(np.asarray(value), np.asarray(after[name])), name
+
+
+def test_a_law_for_the_longest_delay_crosses() -> None:
+    config = load_config("configs/controllers/self_tuning.yaml", ControllerConfig)
+    built = config.law.build(dataclasses.replace(config.plant, delay_s=1.0)).linear
+    assert isinstance(built, ConstrainedLaw)
+    came = read_answer(answer_bytes(RenewedLaw(built, 0.02, 2e4, 0.03)))
+    assert isinstance(came, RenewedLaw)
+    assert len(came.law.model.A) == len(built.model.A)
 
 
 @given(st.data())

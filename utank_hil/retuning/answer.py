@@ -28,11 +28,11 @@ from utank_hil.dynamics import STATES, LinearModel
 from utank_hil.retuning.estimate import MOST_BANDS, MotionEstimate
 
 _MOST_OUTPUTS: Final = len(STATES)
-MOST_STATES: Final = 64
+MOST_STATES: Final = 68
 MOST_KNOTS: Final = 40
 MOST_PLANNED: Final = 150
 """Largest sizes of a law, condensed in milliseconds. A shipped one has 58 states, 19 knots, 60
-samples.
+samples; one for the longest delay, 1 s, has 68 states.
 """
 _MOST_ITERATIONS: Final = 200  # This is three times the budget of the shipped laws.
 
