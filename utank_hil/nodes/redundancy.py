@@ -12,8 +12,8 @@ class Redundancy:
     #: HARDWIRED_INPUTS, high-level switches and a stop loop by wires of their own, comes from a
     #: node apart from sensors and drive.
     hardwired_inputs: bool = False
-    #: A second operator's panel may take the command. Of one that is not declared only stop and
-    #: disarm count.
+    #: A second operator's panel may take the command. Of one that is not declared only stop, disarm
+    #: and a ban on retuning count.
     second_station: bool = False
 
 

@@ -4,8 +4,8 @@ The first station has the command until the second, where the ship's file declar
 and gets it back the same way. A station takes it only with a live heartbeat of the controller's own
 versions. What a station's levers say counts from when it has the command: one that takes it while
 the controller is active sends the mode that it finds, with the arm bit set, or else it disarms.
-Stop and disarm act from either, declared or not. Alarms can be accepted at both, and retuning be
-forbidden.
+Stop, disarm and a ban on retuning act from either, declared or not; alarms can be accepted at both
+where the second is declared.
 """
 
 from typing import Final
