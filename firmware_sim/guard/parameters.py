@@ -16,6 +16,7 @@ ROLL_RAD: Final = 1e-4
 RATE_RAD_S: Final = 3.125e-5
 LEVEL_M: Final = 1e-3  #: Units of the frames.
 MOST_RATE: Final = 32000
+MOST_STEP: Final = 65535  #: Greater than any step of 16 bits.
 LEVEL_SHARE: Final = 0.97
 """Of the level at which a reservoir is full or empty; the shipped switches close at 0.943."""
 STREAMS: Final[tuple[tuple[type[tuple[Any, ...]], canbus.Address], ...]] = (
@@ -104,7 +105,8 @@ def guard_parameters(config: ControllerConfig) -> GuardParameters:
     return GuardParameters(
         tuple(messages),
         pressure=math.ceil(limits.pressure_pa / PRESSURE_PA) + 1,
-        step=math.ceil(limits.rate_pa_s * 0.02 / PRESSURE_PA) + 2,  # a cycle, rounded twice
+        # a cycle, rounded twice; 16 of it fit 32 bits
+        step=min(math.ceil(limits.rate_pa_s * 0.02 / PRESSURE_PA) + 2, MOST_STEP),
         error=round(thresholds.pressure_error_pa / PRESSURE_PA),
         free_rotor=round(thresholds.free_rotor_pa_m / PRESSURE_PA),
         level=round(2 * LEVEL_SHARE * vessel.tank.level_limit_m / LEVEL_M),

@@ -247,6 +247,16 @@ def protected(stream: Stream, second: int, content: bytes) -> bytes:
 
 
 @pytest.mark.slow
+def test_a_command_with_hardly_any_limit_of_its_rate_may_step_as_far_as_it_likes(
+    folder: Path,
+) -> None:
+    fast = PATTI.model_copy(update={"limits": replace(PATTI.limits, rate_pa_s=1e12)})
+    bench = Bench(folder, guard_parameters(fast))
+    bench.press(15e3)
+    bench.say(Stream.COMMAND, pressure_pa=-15e3)
+    assert not bench.run(2) & Reason.COMMANDED
+
+
 def test_an_age_is_held_at_its_end(bench: Bench) -> None:
     for _ in range(OLDEST + 3):
         bench.tick()
