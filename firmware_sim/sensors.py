@@ -26,6 +26,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.codec import Codec
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
+from utank_hil.canbus.line_names import LINES
 from utank_hil.canbus.profiles.device_plan import (
     NO_FOREIGN_DEVICES,
     DevicePlan,
@@ -33,6 +34,7 @@ from utank_hil.canbus.profiles.device_plan import (
     MessageEncoder,
 )
 from utank_hil.canbus.profiles.drive_plan import HEARTBEAT
+from utank_hil.canbus.sentences import SentenceReader, sentence
 from utank_hil.nodes.housekeeping import Housekeeping
 
 if TYPE_CHECKING:
@@ -55,10 +57,18 @@ def _said(message: tuple[Any, ...]) -> tuple[float, ...]:
 class ForeignFrames:
     """Encodes what a device of the plan sends, but for the heartbeat that its node sends itself.
 
+    On a `line` of sentences the frames are those that the controller reads in these.
     ValueError is raised if a cycle is no whole number of ticks: an emulated device has no other.
     """
 
-    def __init__(self, plan: DevicePlan[Any], native: Transmitter[Any], codec: Codec[Any]) -> None:
+    def __init__(
+        self,
+        plan: DevicePlan[Any],
+        native: Transmitter[Any],
+        codec: Codec[Any],
+        *,
+        line: bool = False,
+    ) -> None:
         for each in plan.messages:
             if each.cycle_ns % TICK_NS:
                 raise ValueError(
@@ -72,6 +82,7 @@ class ForeignFrames:
         self.spoiled: list[Any] = []
         self._native, self._codec = native, codec
         self._kept: tuple[Any, ...] | None = None
+        self._reader = SentenceReader() if line else None
         own = STANDARD | HEARTBEAT + (plan.node or 0)  # a CANopen node sends it by itself
         self._encoders = [
             MessageEncoder(each)
@@ -110,11 +121,17 @@ class ForeignFrames:
         values = _said(message)
         measured = [signal.place for each in self.plan.messages for signal in each.signals]
         missing = any(math.isnan(values[place]) for place in measured)
-        return [
-            each.frame(values, now_ns, missing=missing)
-            for each in self._encoders
-            if tick % (each.plan.cycle_ns // TICK_NS) == 0
-        ]
+        for each in self._encoders:
+            if tick % (each.plan.cycle_ns // TICK_NS) == 0:
+                frame = each.frame(values, now_ns, missing=missing)
+                frames += [frame] if self._reader is None else self._read(frame)
+        return frames
+
+    def _read(self, frame: Frame) -> list[Frame]:
+        assert self._reader is not None
+        tag = self.plan.bus << BUS_SHIFT
+        said = sentence(Frame(frame.can_id - tag, frame.data))
+        return [Frame(tag | each.can_id, each.data) for each in self._reader.take(said)]
 
     def _spoil(self, message: tuple[Any, ...], now_ns: int) -> tuple[Any, ...] | None:
         """What is left of a measurement by the faults; None if nothing is."""
@@ -177,6 +194,7 @@ class SensorNode:
         # the noise is drawn in this order: append a new message at the end
         motion = catalogue.transmitter(SensorMotion, address)
         self._foreign: list[tuple[ForeignFrames, Callable[[], tuple[Any, ...]]]] = []
+        self._buses = foreign.buses
         self._send(motion, self._measure_motion, foreign.motions[second])
         if not second:
             self._send(catalogue.transmitter(SensorTank), self._measure_tank, foreign.levels)
@@ -194,7 +212,9 @@ class SensorNode:
             self._messages.append((ticks, transmitter.frame, measure))
             return
         codec = self._catalogue.codec(plan.kind, Address(transmitter.can_id & 0xFF))
-        device = self.devices[codec.can_id] = ForeignFrames(plan, transmitter, codec)
+        line = self._buses[plan.bus].startswith(LINES)
+        device = ForeignFrames(plan, transmitter, codec, line=line)
+        self.devices[codec.can_id] = device
         self.hears |= device.hears
         self._foreign.append((device, measure))
 

@@ -20,6 +20,7 @@ from utank_hil.configuration.files import ConfigError, load_config
 MOTION = load_catalogue().codec(SensorMotion, Address.SENSORS).can_id
 SHIP = Path("configs/ships/thesis_first.yaml").resolve()
 SBG = {"profile": "sbg_ellipse", "accept_unprotected": True}
+PSXN = {"profile": "psxn", "accept_unprotected": True}
 SSI2 = {"profile": "j1939_ssi2", "source": 0x20, "accept_unprotected": True}
 LEVELS = {
     "profile": "cia404_levels", "node": 9, "high_level_m": 4.6, "accept_unprotected": True,
@@ -92,6 +93,12 @@ def test_a_change_of_a_device_voids_the_commissioning(tmp_path):
         ({"motion": {"profile": "cia410", "node": 4, "accept_unprotected": True}}, "is derived"),
         ({"motion": {"profile": "cia410", "accept_unprotected": True}}, "motion.node"),
         ({"motion": {"profile": "n2k_attitude", "source": 3, "accept_unprotected": True}}, "10 Hz"),
+        ({"motion": PSXN | {"bus": "udp:127.0.0.1:5001"}}, "motion.bus: udp:127.0.0.1:5001"),
+        ({"motion": PSXN | {"bus": "udp:10.0.0.1:5001:239.1.1.1"}}, "is no one's own address"),
+        ({"motion": PSXN | {"bus": "can1"}}, "attitude comes on a line, and can1 is none"),
+        ({"motion": PSXN | {"bus": "serial:/dev/ttyS0:9600"}}, "is derived of the roll"),
+        ({"motion": SBG | {"bus": "udp:127.0.0.1:1:127.0.0.1"}}, "is for frames of CAN, and udp:"),
+        ({"valve": ON_OFF | {"bus": "serial:/dev/ttyS0:9600"}}, "it can't be commanded"),
         ({"motion_2": SBG}, "second_motion_sensor: true"),
         ({"motion": SBG | {"signals": {"roll_rad": {"from": "attitude.YAW"}}}}, "is no signal"),
         ({"motion": SBG | {"signals": {"heave_m": {"from": "attitude.ROLL"}}}}, "is no value"),
@@ -166,6 +173,7 @@ def test_every_shipped_profile_is_cited_and_usable(tmp_path):
     needs = {"j1939_ssi2": {"source": 0x20}, "cia410": {"node": 3}, "cia404_levels": {"node": 9}}
     scaled = {name: {"scale": 0.25, "offset": -3} for name in ("port_level_m", "starboard_level_m")}
     needs["cia401_valve"] = {"node": 9, "age_ms": 700}
+    needs |= {each: {"bus": "serial:/dev/ttyS0:115200"} for each in ("em3000", "psxn", "tss1")}
     needs["n2k_attitude"] = {"source": 0x20, "cycle_ms": 50}
     needs["cia404_levels"] |= {"signals": scaled, "high_level_m": 4.6}
     both = {"redundancy": {"second_motion_sensor": True}}

@@ -26,6 +26,8 @@ from utank_hil.runners.lockstep import with_more
 fault_of = TypeAdapter(AnyFault).validate_python
 SECOND_NS = 1_000_000_000
 SBG = {"profile": "sbg_ellipse", "bus": "can1", "accept_unprotected": True}
+LINES = "psxn", "tss1", "em3000"
+LINE = "udp:127.0.0.1:5001:127.0.0.1"
 LEVELS = {
     "profile": "cia404_levels", "bus": "can2", "node": 7, "high_level_m": 4.6,
     "accept_unprotected": True,
@@ -81,6 +83,18 @@ def test_with_two_sensors_the_ship_rolls_as_with_native_nodes():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", LINES)
+def test_with_motion_sentences_the_ship_rolls_as_with_native_nodes(name):
+    native, _, _ = roll_and_shares(None, second=True)
+    motion = {"profile": name, "bus": LINE, "accept_unprotected": True}
+    foreign, shares, buses = roll_and_shares({"motion": motion}, second=True)
+    assert set(shares) == {1.0}
+    rms = np.sqrt(np.mean(native**2))
+    assert 1e-6 < np.sqrt(np.mean((foreign - native) ** 2)) < 0.03 * rms
+    assert [sender for sender, number in buses if number] == ["sensors"]
+
+
+@pytest.mark.slow
 def test_alone_without_counter_or_checksum_it_has_half_the_pressure():
     _, shares, _ = roll_and_shares({"motion": SBG}, second=False, seconds=18)
     assert set(shares) == {0.5}
@@ -95,7 +109,12 @@ def test_a_cycle_that_is_no_whole_tick_is_refused():
 
 
 @pytest.mark.parametrize(
-    "device", [SBG, {"profile": "j1939_ssi2", "source": 0x20, "accept_unprotected": True}]
+    "device",
+    [
+        SBG,
+        {"profile": "j1939_ssi2", "source": 0x20, "accept_unprotected": True},
+        *({"profile": name, "bus": LINE, "accept_unprotected": True} for name in LINES),
+    ],
 )
 @pytest.mark.parametrize(
     ("fault", "usable"),
@@ -109,7 +128,8 @@ def test_a_cycle_that_is_no_whole_tick_is_refused():
 def test_faults_of_a_message_are_those_of_the_device_that_stands_for_it(device, fault, usable):
     """What the faults of the campaign do to another maker's frames, as the controller hears it."""
     scenario = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
-    vessel = scenario.vessel.model_copy(update={"devices": DevicesSection(motion=device)})
+    devices = DevicesSection(motion=device)
+    vessel = scenario.vessel.model_copy(update={"devices": devices})
     scenario = scenario.model_copy(update={"vessel": vessel})
     node = FaultyNode(build_ship_side(scenario, 1, scenario.operator).sensors)
     bench = SimpleNamespace(nodes={"sensors": node})

@@ -5,8 +5,8 @@ import subprocess
 from collections.abc import Sequence
 
 from utank_hil.canbus.frame import BUS_SHIFT, OTHER_BUS, Frame, Port, PortError
+from utank_hil.canbus.line_names import LINES, SLCAN, tty_and_bit_rate
 from utank_hil.canbus.profiles.device_plan import ForeignDevices
-from utank_hil.canbus.serial_names import SLCAN, tty_and_bit_rate
 
 
 def why_other_bit_rate(channel: str, bit_rate: int) -> str:
@@ -101,6 +101,8 @@ def open_port(own: str, foreign: ForeignDevices) -> Port:
     """Open the controller's own interface and those of devices on others (`open_buses`)."""
     from utank_hil.canbus.socketcan import SocketCanPort
 
+    if own.startswith(LINES):
+        raise PortError(f"{own} only brings sentences: name a CAN interface")
     return open_buses(own, foreign) if foreign.any else SocketCanPort(own)
 
 
@@ -118,7 +120,8 @@ def open_buses(own: str, foreign: ForeignDevices, *, sends: bool = False) -> Bus
     try:
         for name in (own, *foreign.buses[1:]):
             silent = name in foreign.receive_only and not sends
-            ports.append(SocketCanPort(name, standard=True, receive_only=silent))
+            port = SocketCanPort(name, standard=True, receive_only=silent, emulates=sends)
+            ports.append(port)
     except PortError:
         for port in ports:
             port.close()

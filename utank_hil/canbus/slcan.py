@@ -5,7 +5,7 @@ from typing import Any
 from can import CanOperationError, Message
 from can.interfaces.slcan import slcanBus
 
-from utank_hil.canbus.serial_names import tty_and_bit_rate
+from utank_hil.canbus.line_names import tty_and_bit_rate
 
 
 class SerialBus(slcanBus):

@@ -11,8 +11,9 @@ from contextlib import suppress
 from typing import Final
 
 from utank_hil.canbus.frame import LONGEST_ID, STANDARD, Frame, PortError
+from utank_hil.canbus.line_names import LINE_REMEDY, LINES, SERIAL_REMEDY, SLCAN
 from utank_hil.canbus.python_can import SocketcanBus, can
-from utank_hil.canbus.serial_names import SERIAL_REMEDY, SLCAN
+from utank_hil.canbus.sentence_line import STRANGER, SentenceLine
 
 #: More than the kernel's receive buffer (about 280 frames); bounds the time on a babbling bus.
 MAX_FRAMES_PER_CALL: Final = 320
@@ -45,12 +46,21 @@ _CHECK_BUS: Final = "check wiring, termination and bit rate"
 
 
 def open_bus(
-    name: str, filters: list[can.typechecking.CanFilter] | None = None, *, listens: bool = False
+    name: str,
+    filters: list[can.typechecking.CanFilter] | None = None,
+    *,
+    listens: bool = False,
+    emulates: bool = False,
 ) -> can.BusABC:
-    """A SocketCAN interface, or a serial adapter; that `listens` without acknowledging.
+    """A CAN interface, a serial adapter that `listens` without acknowledging, or a line.
 
-    OSError is raised if there is none.
+    Of a line it is the sensor's end that `emulates`. OSError is raised if there is none.
     """
+    if name.startswith(LINES):
+        try:
+            return SentenceLine(name, sends=emulates)
+        except OSError as error:
+            raise OSError(f"{error}; {LINE_REMEDY}") from error
     if name.startswith(SLCAN):
         from utank_hil.canbus.slcan import SerialBus  # here: pyserial need not be there
 
@@ -66,12 +76,13 @@ def open_bus(
 
 
 class SocketCanPort:
-    """A SocketCAN interface, or a serial adapter (`SLCAN`); see `Port` for what it does.
+    """A SocketCAN interface, a serial adapter (`SLCAN`) or a line; see `Port` for what it does.
 
     An interface that was down is used again when it is up. One that was deleted is reopened by the
     first call after it exists again; until then, or if there never was one, calls raise PortError.
     `can_ids` is an acceptance filter of extended identifiers in the kernel. Frames with identifiers
-    of 11 bits are only counted unless they are `standard`.
+    of 11 bits are only counted unless they are `standard`. On a line (`LINES`) only who `emulates`
+    its sensor sends.
     """
 
     def __init__(
@@ -81,9 +92,11 @@ class SocketCanPort:
         *,
         standard: bool = False,
         receive_only: bool = False,
+        emulates: bool = False,
     ) -> None:
-        self.channel = channel
-        self._standard, self._receive_only = standard, receive_only
+        self.channel, self._emulates = channel, emulates
+        self._line = channel.startswith(LINES)
+        self._standard, self._receive_only = standard, receive_only or self._line > emulates
         self.others = 0  #: Received frames of all other kinds.
         self._filters: list[can.typechecking.CanFilter] | None = None
         if can_ids is not None:
@@ -171,7 +184,7 @@ class SocketCanPort:
             raise self._port_error("closed", "open a new port")
         if self._bus is None:
             try:
-                self._bus = open_bus(self.channel, self._filters)
+                self._bus = open_bus(self.channel, self._filters, emulates=self._emulates)
             except OSError as error:
                 if error.errno == errno.ENODEV:
                     raise self._port_error("not found", _CREATE, errno.ENODEV) from error
@@ -182,6 +195,8 @@ class SocketCanPort:
         """Count an error frame; the error that it stands for, None if it only warns."""
         self.others += 1
         classes = message.arbitration_id
+        if classes == STRANGER:
+            return self._port_error("there is another sender than its own", "nothing of it is read")
         detail = message.data[1] if classes & _CONTROLLER_PROBLEM and len(message.data) > 1 else 0
         for bits, meanings in ((classes, _ERROR_CLASSES), (detail, _CONTROLLER_PROBLEMS)):
             for bit, meaning in meanings.items():
@@ -191,11 +206,12 @@ class SocketCanPort:
 
     def _failure(self, error: can.CanError | OSError) -> PortError:
         number = getattr(error, "error_code", None) or getattr(error, "errno", None)
-        if self.channel.startswith(SLCAN):
+        if self._line or self.channel.startswith(SLCAN):
             with suppress(can.CanError, OSError):  # its port may be gone
                 self._close_bus()
             self._bus = None
-            return self._port_error(str(error), SERIAL_REMEDY)
+            remedy = LINE_REMEDY if self._line else SERIAL_REMEDY
+            return self._port_error(str(error).removesuffix(f"; {remedy}"), remedy)
         if number in _GONE:
             self._close_bus()
         if number == errno.ENETDOWN:
@@ -204,5 +220,6 @@ class SocketCanPort:
         return self._port_error(str(error), remedy, number)
 
     def _port_error(self, what: str, remedy: str, number: int | None = None) -> PortError:
-        text = f"CAN interface {self.channel}: {what}; {remedy.format(channel=self.channel)}"
+        kind = "line" if self._line else "CAN interface"
+        text = f"{kind} {self.channel}: {what}; {remedy.format(channel=self.channel)}"
         return PortError(text) if number is None else PortError(number, text)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from utank_hil.base.text_files import TextFileError
-from utank_hil.canbus.serial_names import DEFAULT_BIT_RATE, SLCAN
+from utank_hil.canbus.line_names import DEFAULT_BIT_RATE, LINES, SLCAN
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.configuration.files import ConfigError, kind_of
 from utank_hil.configuration.vessel import Vessel
@@ -49,7 +49,9 @@ def bus(
     """
     vessel, said = _ship(ship)
     rate = bit_rate or said or DEFAULT_BIT_RATE
-    log = not place.startswith(SLCAN) and (Path(place).exists() or bool(Path(place).suffix))
+    log = not place.startswith((SLCAN, *LINES)) and (
+        Path(place).exists() or bool(Path(place).suffix)
+    )
     census = BusCensus(rate, vessel, interface if log else place)
     try:
         for message in BusLog(Path(place), channel).frames() if log else _heard(place, seconds):

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from utank_hil.base.parameters import Problem, Range
 from utank_hil.canbus.frame import BUS_SHIFT, LONGEST_STANDARD_ID, STANDARD, Frame
+from utank_hil.canbus.line_names import LINE_REMEDY, LINES, line_of
 from utank_hil.canbus.messages import OperatorCommand, SensorMotion, SensorTank, ValveStatus
 from utank_hil.canbus.profiles.device_plan import (
     FIELDS,
@@ -54,7 +55,9 @@ class DeviceSection(CanopenSection):
 
     profile: str = NATIVE
     """Shipped profile, or `native` for a node of this project's own catalogue."""
-    bus: str = ""  #: Interface that it is on; empty for the controller's own.
+    bus: str = ""
+    """Interface that it is on; empty for the controller's own. Of a motion sensor it may be a line:
+    `udp:OWN_ADDRESS:PORT:SENDER_ADDRESS` or `serial:/dev/ttyUSB0:115200`."""
     device: str = ""  #: Maker and kind, in the shipped profiles.
     documents: str = ""  #: Public documents that the profile was made from.
     canopen_profile: Annotated[int, Range(least=301, most=0xFFFF)] | None = None
@@ -132,6 +135,11 @@ class DeviceSection(CanopenSection):
                 reason = "is for a device with a profile: native nodes are on the controller's bus"
                 yield "bus", reason
             return
+        if self.bus.startswith(LINES):
+            try:
+                line_of(self.bus)
+            except ValueError as error:
+                yield "bus", f"{error}: {LINE_REMEDY}"
         for name in ("cycle_ms", "age_ms"):
             if getattr(self, name) is None:
                 yield name, "is required but missing"
@@ -187,6 +195,11 @@ class DeviceSection(CanopenSection):
                 yield "source", f"is required but missing: it sends PGN {message.pgn}"
             elif message.cob is not None and self.node is None:
                 yield "node", "is required but missing: its identifiers follow from it"
+            elif (message.format == "sentence") != self.bus.startswith(LINES):
+                reason = f"is for frames of CAN, and {self.bus} a line of sentences"
+                if message.format == "sentence":
+                    reason = f"comes on a line, and {self.bus or 'the own interface'} is none"
+                yield "bus", f"messages.{name} {reason}: {LINE_REMEDY}"
             elif message.format == "11bit" and (message.id or 0) > LONGEST_STANDARD_ID:
                 reason = f"must be 29bit: {message.id:#x} has more than 11 bits"
                 yield f"messages.{name}.format", reason

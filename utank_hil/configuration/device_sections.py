@@ -107,7 +107,8 @@ class MessageSection(_Part):
     """Layout and identifier of a message: by `id`, by `pgn` and source, or by `cob` and node."""
 
     id: Id29 | None = None  #: Identifier.
-    format: Literal["11bit", "29bit"] = "11bit"  #: Length of the identifier.
+    format: Literal["11bit", "29bit", "sentence"] = "11bit"
+    """Length of the identifier; on a line, the sentence that it stands for."""
     pgn: Pgn | None = None  #: Group by SAE J1939-21; any priority is accepted.
     cob: Id11 | None = None  #: Identifier to which the node's number is added.
     bytes: Annotated[int, Range(least=1, most=8), _WHOLE] = 8

@@ -11,6 +11,7 @@ from utank_hil.base.parameters import Problem, Range, refuse
 from utank_hil.canbus.catalogue import load_catalogue
 from utank_hil.canbus.enumerations import Address
 from utank_hil.canbus.frame import BUS_SHIFT, MOST_BUSES, STANDARD, Frame
+from utank_hil.canbus.line_names import LINES
 from utank_hil.canbus.messages import (
     OperatorCommand,
     SensorMotion,
@@ -243,7 +244,7 @@ class DevicesSection(Section):
         if self.panel.authentication is not None:
             told["panel"] = self.panel.bus
         for role, bus in told.items():
-            if bus in self.receive_only:
+            if bus in self.receive_only or bus.startswith(LINES):
                 problems.append((f"{role}.bus", f"{bus} is receive-only: it can't be commanded"))
         buses = self.buses()
         if len(buses) > MOST_BUSES:
@@ -362,7 +363,8 @@ class DevicesSection(Section):
         plans: dict[str, DevicePlan[Any] | None] = dict.fromkeys(ROLES)
         for role, device in self.devices().items():
             if not device.native:
-                bus, silent = buses.index(device.bus), device.bus in self.receive_only
+                bus = buses.index(device.bus)
+                silent = device.bus in self.receive_only or device.bus.startswith(LINES)
                 plans[role] = device.plan(ROLES[role], role, bus, silent=silent)
         valve, pump_plan = plans["valve"], None
         if not self.pump.native and pump is not None:

@@ -6,6 +6,8 @@ from typing import Any, Final
 
 from utank_hil.canbus import Address, Frame, HardwiredInputs, Heartbeat, Rejection, load_catalogue
 from utank_hil.canbus.frame import BUS_SHIFT, OTHER_BUS, STANDARD
+from utank_hil.canbus.line_names import LINES
+from utank_hil.canbus.sentences import SENTENCES
 from utank_hil.configuration import Vessel
 from utank_hil.nodes.inbox import Inbox
 from utank_hil.runners.bus_model import frame_bits
@@ -56,6 +58,7 @@ class BusCensus:
         self._catalogue = load_catalogue()
         self._beats = {self._catalogue.codec(Heartbeat, each).can_id: each.name for each in Address}
         self._seen: dict[int, Seen] = {}
+        self._line = interface.startswith(LINES)
         self._bits = 0
         self._begin_s: float | None = None
         self._end_s = 0.0
@@ -151,6 +154,8 @@ class BusCensus:
         if can_id in self._catalogue.by_id:
             known = self._catalogue.by_id[can_id]
             return device or known.source.name, str(known.codec.name)
+        if self._line:
+            return device or "line", SENTENCES.get(can_id, name)
         if can_id & STANDARD:
             beats = (can_id & ~STANDARD) - 0x700 in self.states
             return device or f"node {can_id & 0x7F}", name or "CANopen heartbeat" * beats
