@@ -422,7 +422,7 @@ READERS = [
     Reader("a.trc", made_log, frames, streamed=True, cost=0.9),
     Reader("savvy.csv", made_savvycan, frames, streamed=True, cost=0.8),
     Reader("a.blf", made_log, frames, cost=0.3),
-    Reader("a.mf4", made_log, frames, cost=2),
+    Reader("a.mf4", made_log, frames, cost=200),  # As law.mat below.
     Reader("a.frames", made_log, records, streamed=True, cost=0.7),
     Reader("a.csv", made_signals, read_signals, cost=2),
     Reader("a.parquet", made_signals, read_signals, cost=2),
@@ -636,6 +636,19 @@ def test_a_damaged_file_is_read_or_refused_in_words(name, tmp_path, capfd):
             begun.one(mutations)
 
         holds()
+
+
+@pytest.mark.parametrize(
+    ("name", "mutation"),
+    [
+        ("law.mat", ("flip", 568277, 367, 59197)),
+        ("a.mf4", ("flip", 251259, 284, 62286)),
+    ],
+)
+def test_a_file_that_ends_its_librarys_process_is_refused(name, mutation, tmp_path, capfd):
+    reader = KINDS_OF_FILES[name]
+    with trial(placed(reader, tmp_path), reader.read, capfd, reader.streamed) as begun:
+        begun.one([mutation])
 
 
 @pytest.mark.evidence

@@ -1,16 +1,15 @@
 """Logs in binary formats: BLF of Vector's programs, and MDF 4 (``.mf4``)."""
 
-import errno
 import logging
 import zlib
 from collections.abc import Iterator
-from contextlib import suppress
 from datetime import UTC, datetime
 from importlib import reload
 from importlib.util import find_spec
 from struct import Struct
-from typing import Any, BinaryIO, Final
+from typing import BinaryIO, Final
 
+from utank_hil.base.apart import apart
 from utank_hil.base.text_files import open_content
 from utank_hil.telemetry.bus_files.frame import (
     FD_LENGTHS,
@@ -36,6 +35,7 @@ _CONTAINER_HEAD: Final = 16
 _LIMIT: Final = 1 << 26  #: Largest object: programs write containers of 128 kB.
 _EXTENDED: Final = 0x80000000
 _MASK: Final = 0x1FFFFFFF
+_PART: Final = 1000  #: Number of frames that are handed from process to process at once.
 _TICK_NS: Final = 10_000  #: Unit of time of objects with the flag 1; of others it is 1 ns.
 
 
@@ -187,44 +187,54 @@ class Mf4Log(FrameSource):
     """
 
     def __iter__(self) -> Iterator[BusFrame]:
-        import can.io.mf4
-
         if find_spec("asammdf") is None:  # The reader would not name the package.
             raise ModuleNotFoundError("asammdf is not installed", name="asammdf")
-
-        from asammdf.blocks import mdf_v4
-
-        # Its own writes to standard error, and where the machine is slow to standard output.
-        mdf_v4.MDF4.__del__ = _close_what_is_open  # type: ignore[method-assign]
-        vars(mdf_v4)["print"] = lambda *_, **__: None
-        said = _Said()
-        log = logging.getLogger("asammdf")
-        log.handlers, log.propagate = [said], False
-        # It was imported without asammdf (`utank_hil.canbus.python_can`).
-        module = reload(can.io.mf4)
-
-        class Reader(module.MF4Reader):  # type: ignore[misc, name-defined]
-            """The library's own opens the file twice and leaves it open, or takes it whole."""
-
-            def __init__(self, content: BinaryIO) -> None:
-                self._mdf = module.MDF(content)
-                self._start_timestamp = self._mdf.header.start_time.timestamp()
-
+        self._path.open("rb").close()  # This error has the system's words.
         try:
-            with self._path.open("rb") as content:
-                for message in Reader(content):
+            for found in apart(mf4_parts, str(self._path)):
+                if isinstance(found, str):
+                    self.notes.append(f"{self._path.name} is damaged, and this left out: {found}")
+                    break
+                for frame in found:
                     self._count += 1
-                    yield of_message(message, str(message.channel))
-        except Exception as error:  # The readers raise many kinds of exception at damaged bytes.
-            if isinstance(error, OSError) and error.errno != errno.EINVAL:  # A place that is none.
-                raise
+                    yield frame
+        except ValueError as error:
             raise BusLogError(
-                f"{self._path}: can't be read as MF4 after frame {self._count}"
+                f"{self._path}: can't be read as MF4 after frame {self._count}: {error}"
             ) from error
         if not self._count:
             raise BusLogError(f"{self._path}: no frames of a bus in it")
-        if said.first:
-            self.notes.append(f"{self._path.name} is damaged, and this left out: {said.first:.200}")
+
+
+def mf4_parts(path: str) -> Iterator[list[BusFrame] | str]:
+    """Yield the frames of an MF4 file by parts, then what the library says first of damage."""
+    import can.io.mf4
+
+    said = _Said()
+    log = logging.getLogger("asammdf")
+    log.handlers, log.propagate = [said], False
+    # It was imported without asammdf (`utank_hil.canbus.python_can`).
+    module = reload(can.io.mf4)
+
+    class Reader(module.MF4Reader):  # type: ignore[misc, name-defined]
+        """The library's own opens the file twice and leaves it open, or takes it whole."""
+
+        def __init__(self, content: BinaryIO) -> None:
+            self._mdf = module.MDF(content)
+            self._start_timestamp = self._mdf.header.start_time.timestamp()
+
+    part = []
+    try:
+        with open(path, "rb") as content:
+            for message in Reader(content):
+                part.append(of_message(message, str(message.channel)))
+                if len(part) == _PART:
+                    yield part
+                    part = []
+    finally:  # Frames before a damaged block count.
+        yield part
+    if said.first:
+        yield f"{said.first:.200}"
 
 
 class _Said(logging.Handler):
@@ -235,9 +245,3 @@ class _Said(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Take a record."""
         self.first = self.first or record.getMessage().partition("\n")[0]
-
-
-def _close_what_is_open(file: Any) -> None:
-    """Close a file of asammdf, which lacks attributes where it was refused early."""
-    with suppress(AttributeError):
-        file.close()
