@@ -23,6 +23,7 @@ from utank_hil.safety.safety_limits import SafetyLimits
 
 MS = 1_000_000
 CATALOGUE = load_catalogue()
+INPUTS = "levels: inputs 0x187"
 SSI2 = {"profile": "j1939_ssi2", "source": 0x20, "accept_unprotected": True}
 
 
@@ -210,7 +211,7 @@ def test_a_canopen_sensor_is_configured_and_read_back_before_its_levels_count():
     assert [sdo[0x6132][n].raw for n in (1, 2)] == [3, 3]
     assert [sdo[0x1800][n].raw for n in (2, 3, 5)] == [255, 0, 20]
     assert (seen.port_level_m, seen.starboard_level_m) == pytest.approx((0.0, 1.0), abs=1e-3)
-    assert (now_age(seen) < 30, gauges.inbox.received(Fault.TANK_SILENT)) == (True, "")
+    assert (now_age(seen) < 30, gauges.inbox.received(Fault.TANK_SILENT)) == (True, INPUTS)
     sent = gauges.sent
     gauges.run(300)
     assert gauges.sent == sent  # it is left alone
@@ -273,10 +274,10 @@ def test_an_emergency_of_a_sensor_is_in_its_alarm_until_it_is_over():
     gauges.node.emcy.send(0x5000, 0x81)  # device hardware, as canopen sends it
     gauges.run(4)
     said = gauges.inbox.received(Fault.TANK_SILENT)
-    assert said == "node 7: emergency 5000h, register 0x81"
+    assert said == "node 7: emergency 5000h, register 0x81; " + INPUTS
     gauges.node.emcy.reset()
     gauges.run(4)
-    assert gauges.inbox.received(Fault.TANK_SILENT) == ""
+    assert gauges.inbox.received(Fault.TANK_SILENT) == INPUTS
 
 
 def test_a_name_is_asked_for_until_it_is_told():

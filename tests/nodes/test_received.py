@@ -1,6 +1,10 @@
 """An alarm says which node, which message and which value it is raised for."""
 
+import re
+from pathlib import Path
 from types import SimpleNamespace
+
+import pytest
 
 from utank_hil.canbus import (
     Address,
@@ -11,13 +15,21 @@ from utank_hil.canbus import (
     DriveStatus1,
     DriveStatus2,
     Fault,
+    Frame,
     Heartbeat,
     Mode,
     NodeState,
+    Quality,
+    SensorMotion,
     load_catalogue,
 )
 from utank_hil.canbus.events import AlarmEvent
+from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
+from utank_hil.configuration import Vessel, load_config
+from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.inbox import Inbox
+from utank_hil.nodes.redundancy import Redundancy
+from utank_hil.safety.faults import FAULTS
 from utank_hil.telemetry.events import event_text
 
 CATALOGUE = load_catalogue()
@@ -55,6 +67,54 @@ def test_what_was_received_is_in_words():
     inbox.link_error(1, 1, "CAN interface can0: bus-off; check wiring")
     assert inbox.received(Fault.BUS_LOST) == "CAN interface can0: bus-off; check wiring"
     assert inbox.received(Fault.LEVEL_LIMIT) == ""
+
+
+SENSOR = {"profile": "sbg_ellipse", "bus": "can1", "accept_unprotected": True}
+GAUGES = {
+    "profile": "cia404_levels", "bus": "can2", "node": 7, "high_level_m": 4.6,
+    "accept_unprotected": True,
+    "signals": {name: {"scale": 0.65, "offset": -7.8} for name in
+                ("port_level_m", "starboard_level_m")},
+}  # fmt: skip
+
+
+def test_an_alarm_names_the_device_that_the_ship_has_and_its_message():
+    foreign = DevicesSection(motion_2=SENSOR, levels=GAUGES).foreign()
+    inbox = Inbox(CATALOGUE, 7, foreign=foreign, redundancy=Redundancy(second_motion_sensor=True))
+    gauges = 0x187 | STANDARD | 2 << BUS_SHIFT
+    said = inbox.received(Fault.TANK_SILENT)
+    assert said == "levels: inputs 0x187 on can2, never heard"
+    for data in (bytes(5), bytes(6), bytes(7)):
+        inbox.receive(Frame(gauges, data), 1)
+    said = inbox.received(Fault.TANK_SILENT)
+    assert said == "levels: inputs 0x187 on can2, 2 with wrong length"
+    assert inbox.received(Fault.PROTECTION) == said
+    motion = CATALOGUE.transmitter(SensorMotion, Address.SENSORS)
+    number = motion.can_id
+    assert inbox.received(Fault.MOTION_SILENT) == (
+        f"sensors: SENSOR_MOTION 0x{number:08X}, never heard"
+    )
+    inbox.receive(motion.frame(SensorMotion(0.0, 0.0, Quality.GOOD)), 5)
+    assert "motion_2: attitude 0x132 on can1, never heard; " in (
+        inbox.received(Fault.MOTION_SILENT) + "; "
+    )
+    assert "SENSOR_MOTION" not in inbox.received(Fault.MOTION_SILENT)
+    assert "SENSOR_PUMP" in inbox.received(Fault.PUMP_SENSOR_SILENT)
+    assert "DRIVE_STATUS_1" in inbox.received(Fault.DRIVE_SILENT)
+    assert "OPERATOR_CMD" in inbox.received(Fault.OPERATOR_SILENT)
+
+
+def test_a_canopen_drive_is_named_and_its_frames():
+    ship = load_config(Path("configs/ships/thesis_first_devices.yaml"), Vessel)
+    said = Inbox(CATALOGUE, 7, foreign=ship.foreign).received(Fault.DRIVE_SILENT)
+    assert "pump: TPDO1 0x185 on can2, never heard" in said
+    assert "DRIVE_STATUS" not in said
+
+
+@pytest.mark.parametrize("row", FAULTS, ids=lambda row: row.code.name)
+def test_the_remedy_of_a_fault_names_no_message_that_a_ship_need_not_have(row):
+    """What is received, and which message it is in, stands behind it, see `Inbox.received`."""
+    assert not re.search(r"\b(SENSOR|DRIVE|VALVE|PUMP)_[A-Z]+", row.remedy)
 
 
 def test_the_text_of_an_alarm_has_it():

@@ -882,7 +882,7 @@ def test_control_only_while_armed_fresh_and_after_an_edge(history):
 
 
 DEGRADING = ("DRIFT", "VOLUME", "UNWATCHED")
-WARNING = ("FRAMES_LOST", "NOISE", "SATURATED", "NODE_SILENT")
+WARNING = ("FRAMES_LOST", "NOISE", "SATURATED", "NODE_SILENT", "WRONG_PROOF")
 
 
 @pytest.mark.parametrize("name", [name for name in vars(Finding) if name.isupper()])

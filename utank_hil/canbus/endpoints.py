@@ -24,6 +24,7 @@ class Rejection(Enum):
     CRC = "wrong CRC or data ID"
     REPEATED = "counter repeated"
     SEQUENCE = "counter out of sequence"
+    PROOF = "a proof of another key"
 
 
 class Transmitter(Generic[T]):

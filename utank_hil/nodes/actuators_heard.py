@@ -18,6 +18,7 @@ from utank_hil.canbus.profiles.device import hear
 from utank_hil.nodes.canopen_drive import CanopenDrive, DriveReport
 from utank_hil.nodes.plausibility import NEVER_HEARD_NS
 from utank_hil.nodes.routing import Routing
+from utank_hil.safety.monitors.senders import Heard
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ENABLED: Final = DriveState.OPERATION_ENABLED
@@ -49,11 +50,13 @@ class DriveHeard:
         self._canopen = canopen
         self._first: Receiver[DriveStatus1] | None = None
         self._second_heard = True
+        self.watched: tuple[Heard, ...] = ()  #: Counters of both messages.
         self.slow: tuple[int, ...] = ()  #: Its second message: no age tells of its silence.
         if pump and canopen is not None:
             canopen.deliver = self._take_report
             for can_id, take in canopen.takes.items():
                 hear(routing.devices, can_id, take)
+            self.watched = canopen.watched
             routing.watched += canopen.watched
             self.slow = (canopen.watched[1].can_id,)
         elif pump:
@@ -61,6 +64,7 @@ class DriveHeard:
             self._first = routing.subscribe(catalogue.receiver(DriveStatus1), self._take_first)
             second = routing.subscribe(catalogue.receiver(DriveStatus2), self._take_second)
             self.slow = (second.can_id,)
+            self.watched = self._first, second
 
     @property
     def native(self) -> bool:

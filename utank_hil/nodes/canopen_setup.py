@@ -145,9 +145,9 @@ class SensorSetup:
     """
 
     def __init__(self, device: ProfiledDevice[Any]) -> None:
-        plan = self._plan = device.plan
+        plan = device.plan
         assert plan.node is not None
-        self._device, self._node = device, plan.node
+        self.device, self._node = device, plan.node
         self.setup = CanopenSetup(plan.bus, plan.node, plan.steps)
         beat = plan.bus << BUS_SHIFT | STANDARD | cia.HEARTBEAT + plan.node
         for can_id, take in (*self.setup.takes.items(), (beat, self._take_heartbeat)):
@@ -161,20 +161,15 @@ class SensorSetup:
         emergency = self.setup.emergency
         return self.setup.problem or (emergency and f"node {self._node}: {emergency}")
 
-    @property
-    def kind(self) -> type[tuple[Any, ...]]:
-        """Message that it stands for."""
-        return self._plan.kind
-
     def frames(self, now_ns: int) -> list[Frame]:
         """What the configuration needs in this tick, usually nothing."""
         setup = self.setup
-        if setup.done and self._device.silent(now_ns) and now_ns - self._done_ns > SILENT_NS:
+        if setup.done and self.device.silent(now_ns) and now_ns - self._done_ns > SILENT_NS:
             setup.restart(now_ns)
         frames = setup.frames(now_ns)
-        if setup.done and not self._device.named:
+        if setup.done and not self.device.named:
             self._done_ns = now_ns
-        self._device.named = setup.done
+        self.device.named = setup.done
         return frames
 
     def _take_heartbeat(self, frame: Frame, now_ns: int) -> None:

@@ -5,8 +5,9 @@ content is no measurement: not available, out of range, or declared bad by the s
 """
 
 import math
+from collections.abc import Sequence
 from functools import partial
-from typing import Final
+from typing import Any, Final, TypeAlias
 
 from utank_hil.canbus import (
     Address,
@@ -15,7 +16,7 @@ from utank_hil.canbus import (
     Frame,
     HardwiredInputs,
     Heartbeat,
-    OperatorCommand,
+    Receiver,
     SensorMotion,
     SensorPump,
     SensorTank,
@@ -33,18 +34,16 @@ from utank_hil.nodes.hardwired import HardwiredHeard
 from utank_hil.nodes.levels_heard import LevelsHeard
 from utank_hil.nodes.nodes_heard import NodesHeard
 from utank_hil.nodes.plausibility import MILLISECOND_NS, NEVER_HEARD_NS, USABLE, MotionSensor
+from utank_hil.nodes.received import message_words
 from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.nodes.routing import Routing
 from utank_hil.nodes.stations import ADDRESSES, Stations
 from utank_hil.safety.monitors.senders import Heard
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
-_OF_SENSORS: Final = {
-    Fault.MOTION_SILENT: SensorMotion, Fault.TANK_SILENT: SensorTank,
-    Fault.PUMP_SENSOR_SILENT: SensorPump, Fault.VALVE_SILENT: ValveStatus,
-    Fault.OPERATOR_SILENT: OperatorCommand,
-}  # fmt: skip
-_OF_DRIVE: Final = (Fault.DRIVE_FAULT, Fault.DRIVE_SILENT)
+_OF_DRIVE: Final = (Fault.DRIVE_FAULT, Fault.DRIVE_WARNING)
+
+_Source: TypeAlias = Receiver[Any] | ProfiledDevice[Any]
 
 
 class Inbox:
@@ -78,7 +77,8 @@ class Inbox:
     ) -> None:
         self._versions = (catalogue.version, configuration_version)
         self._known = catalogue.can_ids
-        self._foreign = foreign
+        self._catalogue, self._foreign = catalogue, foreign
+        self._sources: dict[Fault, _Source] = {}  # whose silence is which fault
         self._routing = routing = Routing()
         # a second sensor that is silent is missed but not waited for
         senders = [Address.SENSORS, Address.SENSORS_2][: 1 + redundancy.second_motion_sensor]
@@ -93,6 +93,7 @@ class Inbox:
         tank = catalogue.receiver(SensorTank) if levels is None else ProfiledDevice(levels)
         self._levels = LevelsHeard(tank, level_limit_m, thresholds)
         routing.hear(tank, self._levels.take)
+        self._sources[Fault.TANK_SILENT] = tank
         self._pressure_pa = 0.0
         self._pressure_ns = NEVER_HEARD_NS if pump else ABSENT_NS
         if pump:
@@ -100,15 +101,20 @@ class Inbox:
                 catalogue.receiver(SensorPump) if pressure is None else ProfiledDevice(pressure)
             )
             routing.hear(source, self._take_pressure)
+            self._sources[Fault.PUMP_SENSOR_SILENT] = source
         if drive is None and foreign.pump is not None:
             drive = CanopenDrive(foreign.pump, hears_only=True)
         self.canopen_drive = drive
         self._drive = DriveHeard(routing, catalogue, pump=pump, canopen=drive)
         self._valve = ValveHeard()
-        if valve and foreign.valve is not None:
-            routing.hear(ProfiledValve(foreign.valve), self._valve.take)
-        elif valve:
-            routing.subscribe(catalogue.receiver(ValveStatus), self._valve.take)
+        if valve:
+            says: Receiver[ValveStatus] | ProfiledDevice[ValveStatus] = (
+                catalogue.receiver(ValveStatus)
+                if foreign.valve is None
+                else ProfiledValve(foreign.valve)
+            )
+            routing.hear(says, self._valve.take)
+            self._sources[Fault.VALVE_SILENT] = self._sources[Fault.VALVE_FAULT] = says
         self._hardwired_declared = redundancy.hardwired_inputs
         self.hardwired = hardwired = HardwiredHeard(catalogue.receiver(HardwiredInputs))
         routing.accept(hardwired.receiver.can_id, hardwired.accept, hardwired.take)
@@ -238,12 +244,25 @@ class Inbox:
 
     def received(self, code: Fault) -> str:
         """Node, message and value that a fault was last judged by, in words."""
-        if code in _OF_SENSORS:
-            kind, each = _OF_SENSORS[code], self._routing.setups
-            return "; ".join([one.words for one in each if one.kind is kind and one.words])
         if code in _OF_DRIVE:
             return self._drive.words
-        return self._received.get(code, "")
+        source, parts = self._sources.get(code), [self._received.get(code, "")]
+        heard: Sequence[Heard] = ()
+        if code is Fault.MOTION_SILENT:
+            source = min(self.motions, key=lambda sensor: sensor.heard_ns).receiver
+        elif code is Fault.OPERATOR_SILENT:
+            source = self.stations.orders[self.stations.in_command].receiver
+        elif code is Fault.DRIVE_SILENT:
+            heard, parts = self._drive.watched, [self._drive.words]
+        elif code is Fault.PROTECTION:
+            heard = [each for each in self.watched if any(each.rejected.values())]
+        if isinstance(source, ProfiledDevice):
+            parts = [each.words for each in self._routing.setups if each.device is source]
+            heard = source.watched
+        elif source is not None:
+            heard = (source,)
+        parts += [message_words(each, self._catalogue, self._foreign) for each in heard]
+        return "; ".join(filter(None, parts))
 
     def other_frames(self, count: int) -> None:
         """Take note of frames of other kinds on the bus."""

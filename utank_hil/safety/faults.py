@@ -97,7 +97,7 @@ FAULTS: Final = (
              lambda seen, _: seen.measured.hardwired_stop, ends_passive=True)),
     _row(Fault.HARDWIRED_SILENT, "The node of the hard-wired stop and high-level switches is not "
          "heard.",
-         "Check the node's supply and bus connection, and the quality in HARDWIRED_INPUTS.",
+         "Check the node's supply and bus connection, and the quality that it sends.",
          Condition(_STOP, "last good frame older than {hardwired_age_ms:g} ms",
              lambda seen, limits: seen.measured.hardwired_age_ms > limits.hardwired_age_ms,
              awaited=9)),
@@ -120,7 +120,7 @@ FAULTS: Final = (
              lambda seen, _: not seen.measured.panel_matches)),
     _row(Fault.DRIVE_FAULT, "The pump drive reports a fault, is not in operation enabled, or can't "
          "be switched off.",
-         "Read the drive's fault in DRIVE_STATUS_2 and remove its cause. If it can't be switched "
+         "Remove the cause of the fault that the drive tells. If it can't be switched "
          "off, cut its power (hard-wired stop, main switch).",
          Condition(_STOP, "drive reports a fault", lambda seen, _: seen.measured.drive_fault),
          Condition(_STOP, "drive out of operation enabled for over {drive_enabled_within_ms:g} ms, "
@@ -133,8 +133,8 @@ FAULTS: Final = (
              lambda seen, limits: seen.arming_ms > limits.arming_timeout_ms)),
     _row(Fault.DRIVE_SILENT, "The pump drive sends no status, or does not receive the commands in "
          "time.",
-         "Check the drive's supply and bus connection. If DRIVE_STATUS_1 arrives but its command "
-         "echo stands still, the drive does not accept PUMP_CMD; if it is behind, look for what "
+         "Check the drive's supply and bus connection. If its status arrives but its command "
+         "echo stands still, the drive accepts no commands; if it is behind, look for what "
          "holds frames up, a gateway for example.",
          Condition(_STOP, "status older than {drive_age_ms:g} ms, or DRIVE_STATUS_2 never heard; "
              "no new command echo, at most three commands behind, for over {echo_age_ms:g} ms",
@@ -148,15 +148,15 @@ FAULTS: Final = (
              "inputs, silent for 1 s", Finding.NODE_SILENT)),
     _row(Fault.VALVE_SILENT, "The tank's valve sends no status, or does not receive the commands "
          "in time.",
-         "Check the valve's supply and bus connection. If VALVE_STATUS arrives but its command "
-         "echo stands still, the valve does not accept VALVE_CMD; if it is behind, look for what "
+         "Check the valve's supply and bus connection. If its status arrives but its command "
+         "echo stands still, the valve accepts no commands; if it is behind, look for what "
          "holds frames up, a gateway for example.",
          Condition(_STOP, "status older than {valve_age_ms:g} ms, or no new command echo, at most "
              "three commands behind, for over {valve_echo_age_ms:g} ms", lambda seen, limits: (
              seen.own.valve.age_ms > limits.valve_age_ms
              or seen.own.valve.echo_age_ms > limits.valve_echo_age_ms), awaited=7)),
     _row(Fault.VALVE_FAULT, "The tank's valve reports a fault, or does not follow.",
-         "Read the valve's fault in VALVE_STATUS and remove its cause.",
+         "Remove the cause of the fault that the valve tells.",
          Condition(_STOP, "valve reports a fault, or is not following for over "
              "{valve_follows_within_ms:g} ms", lambda seen, limits: (seen.own.valve.fault
              or seen.own.valve.out_ms > limits.valve_follows_within_ms))),
@@ -201,7 +201,7 @@ FAULTS: Final = (
          _found(_STOP, "over 10% of the bus in use by identifiers that are not in the catalogue",
              Finding.FLOOD)),
     _row(Fault.MOTION_SILENT, "No usable measurement comes from the motion sensor.",
-         "Check the sensor's supply and bus connection, and what SENSOR_MOTION carries: its "
+         "Check the sensor's supply and bus connection, and what it sends: its "
          "quality, and values that jump, which are discarded.",
          Condition(_RAMP, "last good sample older than {motion_age_ms:g} ms",
              lambda seen, limits: seen.motion.age_ms > limits.motion_age_ms,
@@ -214,25 +214,27 @@ FAULTS: Final = (
          _found(_RAMP, "roll apart by half a degree for 0.3 s, or their rates by as much at 2 w0",
              Finding.SENSORS_DISAGREE)),
     _row(Fault.TANK_SILENT, "No usable measurement comes from the tank's level gauges.",
-         "Check the gauges' supply and bus connection, and the quality that SENSOR_TANK carries.",
+         "Check the gauges' supply and bus connection, and the quality that they send.",
          Condition(_HALVE, "last good sample older than {tank_degraded_age_ms:g} ms",
              lambda seen, limits: seen.measured.tank_age_ms > limits.tank_degraded_age_ms,
              awaited=4),
          Condition(_RAMP, "last good sample older than {tank_age_ms:g} ms",
              lambda seen, limits: seen.measured.tank_age_ms > limits.tank_age_ms)),
     _row(Fault.PUMP_SENSOR_SILENT, "No usable measurement comes from the pump's pressure sensor.",
-         "Check the sensor's supply and bus connection, and the quality that SENSOR_PUMP carries.",
+         "Check the sensor's supply and bus connection, and the quality that it sends.",
          Condition(_HALVE, "last good sample older than {pump_degraded_age_ms:g} ms",
              lambda seen, limits: seen.measured.pump_age_ms > limits.pump_degraded_age_ms),
          Condition(_RAMP, "last good sample older than {pump_age_ms:g} ms",
              lambda seen, limits: seen.measured.pump_age_ms > limits.pump_age_ms, awaited=5)),
     _row(Fault.PROTECTION, "Messages of a sensor, drive, valve or panel keep arriving damaged or "
-         "out of order.",
+         "out of order, or a panel has not the ship's key.",
          "Look for a second sender of their identifiers, a node that protects them wrongly, and "
-         "disturbance on the cable.",
+         "disturbance on the cable; give the panel the key of the ship's file.",
          Condition(_RAMP, f"leaky bucket of rejected frames at {BUCKET_LIMIT}",
              lambda seen, _: not (seen.motion.valid and seen.measured.protection_valid)),
-         _found(_RAMP, "three frames a second with a wrong CRC or data ID", Finding.DAMAGED)),
+         _found(_RAMP, "three frames a second with a wrong CRC or data ID", Finding.DAMAGED),
+         _found(_WARN, "a panel's third wrong proof of its key in succession",
+             Finding.WRONG_PROOF)),
     _row(Fault.STUCK_SIGNAL, "The roll or the level stands still although the water is pushed.",
          "Check the motion sensor, the level gauges and whatever passes their messages on.",
          _found(_RAMP, "roll still while the water moves, or level still while it is pushed",
@@ -295,7 +297,7 @@ FAULTS: Final = (
              "the vessel's least_gm_m, or no estimate for three intervals",
              lambda seen, _: seen.own.gm_low)),
     _row(Fault.DRIVE_WARNING, "The pump drive warns: it may soon trip or not hold the pressure.",
-         "Read the warning bits in DRIVE_STATUS_2. Temperature: cooling, load. Voltage: supply. "
+         "Read what the drive warns of. Temperature: cooling, load. Voltage: supply. "
          "Command: bus, its cable and load. Sensor: the drive's pressure feedback.",
          Condition(_WARN, "a warning bit in the last DRIVE_STATUS_2",
              lambda seen, _: seen.measured.drive_warns)),

@@ -302,7 +302,7 @@ def test_more_than_five_above_a_thousandth_are_frames_lost_and_forgotten_in_a_th
 
 
 def test_a_stream_that_nobody_awaits_may_be_silent_and_has_no_damaged_frame_before_a_look():
-    counted = Counted(CYCLE_NS, rejected={Rejection.CRC: 5})
+    counted = Counted(CYCLE_NS, rejected=dict.fromkeys(Rejection, 0) | {Rejection.CRC: 5})
     stream = Stream(counted)
     assert stream.damaged == 0
     assert not any(stream.update(10.0) for _ in range(10))

@@ -35,6 +35,8 @@ class ProfiledValve(ProfiledDevice[ValveStatus]):
 PROOF: Final = 8  #: Bytes of challenge and proof: what a classic frame holds.
 TRY_NS: Final = 50_000_000
 """Between two proofs that are tried: who floods the bus with them takes no time of the tick."""
+WRONG: Final = 3
+"""Wrong proofs in succession, from which on they are told: a challenge may change under way."""
 _STOP: Final = FIELDS[OperatorCommand].index("stop")
 
 
@@ -55,7 +57,7 @@ class ProfiledPanel(ProfiledDevice[OperatorCommand]):
         self._key, self._said, self._tried_ns = key, b"", LONG_AGO
         self.nonce = os.urandom(PROOF)  #: The challenge; the next follows from it by the key.
         self.proved = plan.authentication is None
-        self.refused = 0  #: Proofs that were wrong.
+        self._wrong = 0  # proofs in succession
         self._arms = self._asked = False
         if plan.authentication is not None:
             for can_id in plan.authentication.proof_ids:
@@ -95,11 +97,13 @@ class ProfiledPanel(ProfiledDevice[OperatorCommand]):
             return
         self._tried_ns = now_ns
         if compare_digest(cmac(self._key, self.nonce + self._said)[:PROOF], frame.data):
-            self.proved = True
+            self.proved, self._wrong = True, 0
             self._renew()
             self.overhear(_order(self._values))  # there is something new in it
         else:
-            self.refused += 1
+            self._wrong += 1
+            if self._wrong >= WRONG:
+                self._needed[0].rejected[Rejection.PROOF] += 1
 
     def wake(self, now_ns: int) -> Frame | None:
         """What is to be sent to it: the challenge, where it has to be met."""

@@ -29,3 +29,4 @@ class Finding:
     FRAMES_LOST: Final = 1 << 20
     UNWATCHED: Final = 1 << 21
     UNWATCHED_LONG: Final = 1 << 22
+    WRONG_PROOF: Final = 1 << 23

@@ -45,6 +45,7 @@ DAMAGED_FRAMES: Final = 3
 DAMAGED_S: Final = 1.0
 
 _CRC: Final = Rejection.CRC
+_PROOF: Final = Rejection.PROOF
 
 
 class Heard(Protocol):
@@ -88,6 +89,7 @@ class Stream:
         receiver = self._receiver
         self._heard, self._lost = receiver.heard, receiver.lost
         self._damaged = receiver.rejected[_CRC]
+        self._proofs = receiver.rejected[_PROOF]
         self._changes = receiver.changes
         self._rejected = sum(receiver.rejected.values())
 
@@ -123,6 +125,9 @@ class Stream:
         found = Finding.SECOND_SENDER if excess > MOST_FRAMES else 0
         if missing > MOST_LOST or self._slow_s > SLOW_S:
             found |= Finding.FRAMES_LOST
+        if receiver.rejected[_PROOF] != self._proofs:
+            self._proofs = receiver.rejected[_PROOF]
+            found |= Finding.WRONG_PROOF
         return found | Finding.NODE_SILENT if self._silent_s > self._silent_limit_s else found
 
     def _on_change(self, elapsed_s: float) -> float:
