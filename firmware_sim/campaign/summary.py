@@ -1,7 +1,13 @@
-"""Summary of a campaign: means with confidence intervals, and paired comparison of laws."""
+"""Summary of a campaign: means with confidence intervals, and paired comparison of laws.
+
+Cases that share a seed met the same random waves, those of one day of a file the same weather, and
+those of a draw the same ship. So an interval is the widest of those whose independent units are the
+cases, and the values of each key that is averaged over.
+"""
 
 import itertools
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -10,9 +16,13 @@ from firmware_sim.campaign.simulations import FAILED, OK
 from firmware_sim.campaign.store import METRICS, Results
 from firmware_sim.campaign.study import Scalar
 from firmware_sim.figures import LEAST_ROLL_RAD, NO_TANK
-from utank_hil.analysis.motion.statistics import mean_interval
+from utank_hil.analysis.motion.statistics import clustered_interval
 
 ROLL: Final = "roll_rms_rad"
+_TIME: Final = re.compile(r"\d{4}-\d\d-\d\d(?=T)")
+_OF_CASES: Final = ("case", "index", "waves")  #: What a case has beside the varied keys.
+Units = Mapping[str, tuple[Scalar | tuple[Scalar, ...], ...]]
+"""What a case shares with others, by its name: a value for each way to share."""
 Figure = dict[str, float | int | None]
 """Mean, half width of its 95 % confidence interval (None for one case), and number of cases."""
 
@@ -59,12 +69,33 @@ def groups_of(results: Results) -> list[Group]:
     return groups
 
 
-def figure(values: Sequence[float]) -> Figure:
-    """Mean and confidence interval of values; NaN values are left out."""
-    known = [value for value in values if not math.isnan(value)]
-    mean, half_width = known[0] if known else None, None
+def units_of(results: Results) -> Units:
+    """Seed, day of a file or other value of each averaged key, and all drawn values together."""
+    averaged = results.about.get("configuration", {}).get("average_over", ())
+    own = {*_OF_CASES, *results.keys, *averaged}
+
+    def unit(value: Scalar) -> Scalar:
+        day = _TIME.match(value) if isinstance(value, str) else None
+        return value if day is None else day[0]
+
+    return {
+        case["case"]: (
+            *(unit(case[key]) for key in averaged if key in case and key not in results.keys),
+            tuple(value for key, value in case.items() if key not in own),
+        )
+        for case in results.cases
+    }
+
+
+def figure(values: Sequence[tuple[str, float]], units: Units) -> Figure:
+    """Mean and confidence interval of values by their cases; NaN values are left out."""
+    known = [(case, value) for case, value in values if not math.isnan(value)]
+    mean, half_width = known[0][1] if known else None, None
     if len(known) > 1:
-        mean, half_width = mean_interval(known)
+        cases, numbers = zip(*known, strict=True)
+        ways = zip(*(units[case] for case in cases), strict=True)
+        found = [clustered_interval(numbers, way) for way in (cases, *ways) if len(set(way)) > 1]
+        mean, half_width = max(found, key=lambda each: each.half_width)
     return {"mean": mean, "half_width": half_width, "cases": len(known)}
 
 
@@ -72,6 +103,7 @@ def summary(results: Results) -> list[dict[str, Any]]:
     """Figures of every group, ready for JSON."""
     groups = groups_of(results)
     cases = {case["case"]: case for case in results.cases}
+    units = units_of(results)
     own = {"case", "index", *results.keys}
     pairs = {
         name: tuple(value for key, value in case.items() if key not in own)
@@ -84,9 +116,9 @@ def summary(results: Results) -> list[dict[str, Any]]:
             "counted": len(group.rows),
             "failed": group.failed,
             "lost": group.lost,
-            "runs": {run: _run(group, run, cases) for run in group.runs},
-            "paired": _paired(group),
-            "beside_first": [] if group is groups[0] else _beside(groups[0], group, pairs),
+            "runs": {run: _run(group, run, cases, units) for run in group.runs},
+            "paired": _paired(group, units),
+            "beside_first": [] if group is groups[0] else _beside(groups[0], group, pairs, units),
         }
         for group in groups
     ]
@@ -101,11 +133,15 @@ def failures(results: Results) -> dict[str, int]:
     return reasons
 
 
-def _run(group: Group, run: str, cases: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+def _run(
+    group: Group, run: str, cases: Mapping[str, dict[str, Any]], units: Units
+) -> dict[str, Any]:
     rows = group.of_run(run)
     counted = [row for row in rows if not row["mark"]]
     marks = [row["mark"] for row in rows if row["mark"]]
-    made: dict[str, Any] = {name: figure([row[name] for row in counted]) for name in METRICS}
+    made: dict[str, Any] = {
+        name: figure([(row["case"], row[name]) for row in counted], units) for name in METRICS
+    }
     made["marked"] = {mark: marks.count(mark) for mark in dict.fromkeys(marks)}
     # the maximum covers all cases: a ship that capsized had the worst one
     worst = max(rows, key=lambda row: row[ROLL])
@@ -114,41 +150,48 @@ def _run(group: Group, run: str, cases: Mapping[str, dict[str, Any]]) -> dict[st
     return made
 
 
-def _paired(group: Group) -> list[dict[str, Any]]:
+def _paired(group: Group, units: Units) -> list[dict[str, Any]]:
     """Roll RMS of each run against those before it, paired by case and so by waves."""
     runs = [run for run in group.runs if run != NO_TANK]
     counted = [{row["run"]: row for row in rows if not row["mark"]} for rows in group.rows]
     pairs = []
     for against, run in itertools.combinations(runs, 2):
         both = [
-            (rows[against][ROLL], rows[run][ROLL])
+            (rows[run]["case"], rows[against][ROLL], rows[run][ROLL])
             for rows in counted
             if run in rows and against in rows
         ]
         if both:
-            pairs.append({"run": run, "against": against, **_pair(both)})
+            pairs.append({"run": run, "against": against, **_pair(both, units)})
     return pairs
 
 
 def _beside(
-    first: Group, group: Group, pairs_of: Mapping[str, tuple[Any, ...]]
+    first: Group, group: Group, pairs_of: Mapping[str, tuple[Any, ...]], units: Units
 ) -> list[dict[str, Any]]:
     """Roll RMS of each run against the same run of the first group, in the same waves."""
     pairs = []
     for run in group.runs:
         there, here = (
-            {pairs_of[row["case"]]: row[ROLL] for row in each.of_run(run) if not row["mark"]}
+            {pairs_of[row["case"]]: row for row in each.of_run(run) if not row["mark"]}
             for each in (first, group)
         )
-        both = [(there[name], roll) for name, roll in here.items() if name in there]
+        both = [
+            (row["case"], there[name][ROLL], row[ROLL])
+            for name, row in here.items()
+            if name in there
+        ]
         if both:
-            pairs.append({"run": run, **_pair(both)})
+            pairs.append({"run": run, **_pair(both, units)})
     return pairs
 
 
-def _pair(both: list[tuple[float, float]]) -> dict[str, Figure]:
+def _pair(both: list[tuple[str, float, float]], units: Units) -> dict[str, Figure]:
     """Mean difference of paired roll values, and mean relative reduction."""
+    shares = [(case, 1 - one / other) for case, other, one in both if other >= LEAST_ROLL_RAD]
     return {
-        "roll_rms_difference_rad": figure([one - other for other, one in both]),
-        "share_below": figure([1 - one / other for other, one in both if other >= LEAST_ROLL_RAD]),
+        "roll_rms_difference_rad": figure(
+            [(case, one - other) for case, other, one in both], units
+        ),
+        "share_below": figure(shares, units),
     }

@@ -8,6 +8,7 @@ import os
 import signal
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from one_process import in_one_process
@@ -19,9 +20,10 @@ from typer.testing import CliRunner
 from firmware_sim.campaign.driver import Driver, batch_of
 from firmware_sim.campaign.simulations import LOST, OK, run_batch
 from firmware_sim.campaign.store import METRICS, Results, Store, read_results
-from firmware_sim.campaign.summary import summary
+from firmware_sim.campaign.summary import figure, summary, units_of
 from firmware_sim.campaign.tables import pairs_table, runs_table
 from firmware_sim.commands.campaign import campaign
+from utank_hil.analysis.motion.statistics import mean_interval
 from utank_hil.console.common import new_app
 from utank_hil.console.exit_codes import ExitCode
 
@@ -155,6 +157,45 @@ def test_groups_of_the_same_waves_are_compared_with_the_first(run, tmp_path):
     assert gpc["share_below"]["cases"] == 3
     for same in (bare, passive):
         assert same["roll_rms_difference_rad"] == {"mean": 0.0, "half_width": 0.0, "cases": 3}
+
+
+def test_the_interval_of_a_mean_knows_what_cases_share():
+    """Six seeds in twelve days of weather, each with an effect of its own: coverage of 95 %.
+
+    As values of their own the 72 cases hold the truth in under six of ten campaigns.
+    """
+    rng, held, apart = np.random.default_rng(1), 0, 0
+    keys = [(seed, day) for seed in range(6) for day in range(12)]
+    cases = [
+        {"case": f"{n}", "index": n, "waves": f"{n}", "seed": seed,
+         "sea.time": f"2019-02-{day + 1:02}T05:40"}
+        for n, (seed, day) in enumerate(keys)
+    ]  # fmt: skip
+    about = {"configuration": {"average_over": ["seed", "sea.time"]}}
+    units = units_of(Results(about, (), cases, {}))
+    for _ in range(300):
+        of_seed, of_day, own = rng.normal(size=6), rng.normal(size=12), rng.normal(size=72)
+        values = [of_seed[seed] + of_day[day] + own[n] for n, (seed, day) in enumerate(keys)]
+        found = figure([(f"{n}", value) for n, value in enumerate(values)], units)
+        held += abs(found["mean"]) < found["half_width"]
+        apart += abs(found["mean"]) < mean_interval(values).half_width
+    assert held > 0.9 * 300
+    assert apart < 0.6 * 300
+
+
+def test_hours_of_one_day_are_one_weather_and_draws_one_ship():
+    cases = [
+        {"case": name, "index": n, "waves": name, "sea.time": time, "gm": gm, "seed": 1}
+        for n, (name, time, gm) in enumerate(
+            [("a", "2019-02-10T05:40", 1.0), ("b", "2019-02-10T06:40", 2.0),
+             ("c", "2019-02-11T05:40", 1.0)]
+        )
+    ]  # fmt: skip
+    about = {"configuration": {"average_over": ["sea.time"]}}
+    found = units_of(Results(about, ("seed",), cases, {}))
+    assert found == {
+        "a": ("2019-02-10", (1.0,)), "b": ("2019-02-10", (2.0,)), "c": ("2019-02-11", (1.0,))
+    }  # fmt: skip
 
 
 def test_draws_in_the_same_waves_are_paired_each_with_its_own():
