@@ -22,6 +22,7 @@ from utank_hil.dynamics.jit import njit
 from utank_hil.dynamics.kernels import CAPSIZED_S, MAX_IMPULSE, STRIKE_LOSS, STRIKES
 from utank_hil.dynamics.pump import PumpCoefficients
 from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.dynamics.valves import LOCKED
 
 
 @njit(error_model="numpy")
@@ -54,7 +55,11 @@ def advance_tick(
     """
     pump_coefficients = PumpCoefficients(*coefficients)
     pump, summary = kept_pump(state), state[kernel.SUMMED]
-    area, valve = parameters[22], parameters[22] * state[kernel.VALVE_LOSS]
+    area, valve = parameters[22], state[kernel.VALVE_LOSS]
+    if valve >= LOCKED:
+        x[lateral.LEVEL_RATE] = 0.0
+    else:
+        valve *= area
     books, shaft_j = np.zeros(lateral.BOOKS), 0.0
     books[lateral.IMPULSE] = summary[MAX_IMPULSE]
     degrees = len(ahead)

@@ -18,6 +18,7 @@ from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.dynamics.valves import LOCKED, locked_loss
 from utank_hil.sea import Harmonics
 
 SAILING_TICKS = 100  #: Ticks between updates of the ship's parameters: 1 s.
@@ -83,6 +84,7 @@ class Plant:
         self._lateral = None if hull is None else LateralModel(hull, self._ship, tank, six)
         self._load(self._ship)
         self._area_m2 = tank.reservoir_area_m2
+        self._locked_loss = locked_loss(tank)
         self._has_pump = pump is not None
         self._pump = pump or Pump.for_duct(tank.duct_area_m2)  # without effect if there is none
         self._coefficients = tuple(self._pump.coefficients)
@@ -215,8 +217,12 @@ class Plant:
         self._state[kernel.MODE] = kernel.IMPOSED
 
     def set_valve_loss(self, loss_pa_per_m2_s2: float) -> None:
-        """Set the pressure loss per ``|dh/dt| dh/dt`` from now on, see `dynamics.valves`."""
-        self._state[kernel.VALVE_LOSS] = loss_pa_per_m2_s2
+        """Set the pressure loss per ``|dh/dt| dh/dt`` from now on, see `dynamics.valves`.
+
+        A valve that is as good as tight holds the water.
+        """
+        tight = loss_pa_per_m2_s2 >= self._locked_loss
+        self._state[kernel.VALVE_LOSS] = LOCKED if tight else loss_pa_per_m2_s2
 
     def _show(self) -> None:
         """Show the state as plain numbers: reading elements of an array one by one costs more."""

@@ -26,6 +26,7 @@ from utank_hil.dynamics.kernels import (
     unpacked,
 )
 from utank_hil.dynamics.pump import PumpCoefficients, PumpState, compile_pump
+from utank_hil.dynamics.valves import LOCKED
 
 STEP_S = 1e-3
 STEPS = round(TICK_S / STEP_S)
@@ -145,7 +146,11 @@ def advance_tick(
     pump_coefficients = PumpCoefficients(*coefficients)
     pump = kept_pump(state)
     x = (state[ROLL], state[ROLL_RATE], state[LEVEL], state[LEVEL_RATE])
-    valve = c.area * state[VALVE_LOSS]
+    valve = state[VALVE_LOSS]
+    if valve >= LOCKED:
+        x = (x[0], x[1], x[2], 0.0)
+    else:
+        valve *= c.area
     moments, summary = state[MOMENTS], state[SUMMED]
     shaft_j, wave_j, pump_j, damped_j = 0.0, 0.0, 0.0, 0.0
     sway, change = state[SWAY], state[CHANGE]

@@ -25,6 +25,7 @@ from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign
 from utank_hil.control.constrained.design import previewed
 from utank_hil.control.constrained.law import ConstrainedLaw
+from utank_hil.control.heel_removal import HeelingTank, HeelRemovalDesign
 from utank_hil.control.interface import PRESSURE, VALVE
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.pressure_loop import PressureLoop
@@ -52,8 +53,10 @@ from utank_hil.retuning.estimator import COLUMNS
 from utank_hil.retuning.estimator import SAMPLE_TIME_S as ESTIMATE_SAMPLE_TIME_S
 from utank_hil.runners.statistics import LoopStatistics
 from utank_hil.safety.judge import Safety
-from utank_hil.safety.monitoring import Monitors
+from utank_hil.safety.monitoring import LONG_S, Monitors
+from utank_hil.safety.monitors.harbour import HarbourWatch
 from utank_hil.safety.monitors.thresholds import thresholds_of
+from utank_hil.safety.situation import THROTTLED_OFF, VALVE_OFF
 
 if TYPE_CHECKING:
     from utank_hil.retuning.redesign import RetuningTask
@@ -181,7 +184,8 @@ def build_controller_node(
     valve = None
     if vessel.valve is not None:
         plan = vessel.foreign.valve
-        valve = ValveCommander(vessel.valve, tank, catalogue, timeout_s, plan)
+        most_off = THROTTLED_OFF if isinstance(config.law, HeelRemovalDesign) else VALVE_OFF
+        valve = ValveCommander(vessel.valve, tank, catalogue, timeout_s, plan, most_off)
     pump = vessel.pump is not None
     monitors = None
     if monitored:
@@ -194,6 +198,7 @@ def build_controller_node(
             second_motion=vessel.redundancy.second_motion_sensor,
             motion_cycles_s=vessel.motion_cycles_s,
             of_hull=vessel.hull is not None,
+            harbour=_harbour_watch(config),
         )
     controller = law.controller() if exchange is None else exchange
     running = RunningLaw(
@@ -227,6 +232,14 @@ def build_controller_node(
         catalogue,
         estimator,
     )
+
+
+def _harbour_watch(config: ControllerConfig) -> HarbourWatch | None:
+    valve, tank = config.vessel.valve, config.vessel.tank
+    if not isinstance(config.law, HeelRemovalDesign) or valve is None:
+        return None
+    loss = partial(valve.loss, tank)
+    return HarbourWatch(HeelingTank.of(config.plant), config.law, loss, LONG_S)
 
 
 def key_of(foreign: ForeignDevices) -> bytes:

@@ -60,6 +60,9 @@ NOT_TOLD: Final = {
     "thesis_first_devices.devices.pump.speed_rad_s_per_unit": {0.001, 10},
     # from perfect to an error of five times the waves, a forecast is one
     "preview.preview.error": {0.001, 10},
+    # ten times a ripple at the quay is a sea, and ten times a container heavy cargo
+    "heel_removal.sea.hs_m": {10},
+    **{f"heel_removal.voyage.{at}.ship.offset_moment_nm": {10} for at in range(1, 6)},
     # small ships in a small sea: three to eight times its height is a usual sea
     "naval_constrained_gpc.law.sea.density_m2_hz": {10, 60},
     "patti_b_constrained_gpc.law.sea.density_m2_hz": {10},

@@ -27,6 +27,7 @@ SEA_OF = {
     "Patti-B": "patti_b.yaml",
     "Thesis ship 1 with a duct valve": "semi_active.yaml",
     "Thesis ship 1 with a preview station": "preview.yaml",
+    "Thesis ship 1 at the quay": "heel_removal.yaml",
 }
 """A scenario for each ship, by her name."""
 SECOND_NS = 1_000_000_000

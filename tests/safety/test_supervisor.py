@@ -87,6 +87,10 @@ SIGNS: list[tuple[Fault, Reaction, dict[str, object]]] = [
     (Fault.ROLL_AMPLIFIED, Reaction.RAMP, {"found": Finding.ROLL_AMPLIFIED}),
     (Fault.SENSORS_DISAGREE, Reaction.RAMP, {"found": Finding.SENSORS_DISAGREE}),
     (Fault.BUS_DEGRADED, Reaction.RAMP, {"found": Finding.UNWATCHED_LONG}),
+    (Fault.VALVE_NOT_FOLLOWING, Reaction.STOP, {"found": Finding.VALVE_PASSES}),
+    (Fault.STUCK_SIGNAL, Reaction.RAMP, {"found": Finding.HEEL_UNANSWERED}),
+    (Fault.HEEL_LIMIT, Reaction.RAMP, {"found": Finding.NOT_IN_HARBOUR}),
+    (Fault.STABILITY_LOW, Reaction.RAMP, {"found": Finding.HEEL_OVERDONE}),
     (Fault.HARDWIRED_STOP, Reaction.STOP, {"hardwired_stop": True}),
     (Fault.HARDWIRED_SILENT, Reaction.STOP, {"hardwired_age_ms": 160}),
 ]
@@ -882,7 +886,9 @@ def test_control_only_while_armed_fresh_and_after_an_edge(history):
 
 
 DEGRADING = ("DRIFT", "VOLUME", "UNWATCHED")
-WARNING = ("FRAMES_LOST", "NOISE", "SATURATED", "NODE_SILENT", "WRONG_PROOF")
+WARNING = (
+    "FRAMES_LOST", "NOISE", "SATURATED", "NODE_SILENT", "WRONG_PROOF", "TANK_USED_UP",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("name", [name for name in vars(Finding) if name.isupper()])

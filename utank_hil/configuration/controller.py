@@ -29,7 +29,11 @@ from utank_hil.safety.monitors.thresholds import SensorFigures
 from utank_hil.safety.safety_limits import SafetyLimits
 
 _WITHOUT_PUMP: Final = (PassiveDesign, OnOffValveDesign, ClippedValveDesign)
-_OF_ANY_OPENING: Final = ("valve_clipped", "pump_with_valve")  #: Laws that throttle.
+_OF_ANY_OPENING: Final = (
+    "valve_clipped",
+    "pump_with_valve",
+    "heel_removal",
+)  #: Laws that throttle.
 
 MOST_PRESSURE_PA: Final = 250e3
 """Largest pressure of PUMP_CMD: the codec cuts larger ones without the controller's knowledge."""

@@ -33,6 +33,7 @@ from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.feedback_linearization import FeedbackLinearizationDesign
 from utank_hil.control.fuzzy.adaptive import RobustFuzzy
 from utank_hil.control.gain import PassiveDesign, PDDesign
+from utank_hil.control.heel_removal import HeelRemovalDesign
 from utank_hil.control.interface import LawDesign
 from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.control.predictive.design import PredictiveDesign
@@ -54,6 +55,7 @@ LAWS: Final[tuple[type[LawDesign], ...]] = (
     OnOffValveDesign,
     ClippedValveDesign,
     PumpWithValveDesign,
+    HeelRemovalDesign,
 )
 
 

@@ -1,7 +1,7 @@
 """Compiled fixed-step integration of the nonlinear coupled model; imports numba, so import it late.
 
 The method is the classical Runge-Kutta of order four. Pump pressure and valve loss are held over
-whole steps.
+whole steps. Behind a valve that is `LOCKED` the water does not move.
 
 A step in which the level passes its limit ends at the impact, found by the Illinois method. The
 impulse is applied, and the rest of the step follows.
@@ -14,6 +14,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics import nonlinear
 from utank_hil.dynamics.jit import njit
 from utank_hil.dynamics.nonlinear import INSIDE_M, REST_M_S, RollCoefficients
+from utank_hil.dynamics.valves import LOCKED
 
 STRIKES_PER_STEP = 8  # The water comes to rest at the stop beyond these.
 # Entries of a ship's summary; the last two are the energy of impacts, and the damping energy in
@@ -75,6 +76,8 @@ def accelerations(
     roll_inertia, roll_moment, level_force = forces(
         c, righting, sin, cos, phi_dot, h, h_dot, moment, sway, pump, valve
     )
+    if valve >= LOCKED:
+        return roll_moment / roll_inertia, 0.0
     scale = 1 / (roll_inertia * c.level_inertia - c.coupling * c.coupling)
     h_ddot = (roll_inertia * level_force - c.coupling * roll_moment) * scale
     if abs(h) >= c.level_limit and h * h_dot >= 0 and h * h_ddot > 0:  # pressed against the stop

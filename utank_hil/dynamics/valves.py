@@ -2,7 +2,8 @@
 
 Both losses are quadratic in the flow speed, so the models take one number, the pressure loss per
 ``|dh/dt| dh/dt``. The air is treated as incompressible, which holds while the pressure across its
-valve is well below atmospheric. A closed valve (an air spring, or a locked tank) is not modelled.
+valve is well below atmospheric. A shut air valve (an air spring) is not modelled; a tight gate in
+the duct holds the water where it is.
 """
 
 import math
@@ -10,11 +11,13 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from utank_hil.base.parameters import Positive, Problem, Range, range_problems, refuse
-from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 AIR_DENSITY_KG_M3 = 1.225  # ISO 2533, at sea level
 STOPPING_S = 1e-3
 """Time to stop the water below which a valve is as good as closed. Chosen; no study."""
+LOCKED = 1e30
+"""Loss that stands for a shut, tight valve in the models: the water does not move at all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +26,8 @@ class ValveRange:
 
     open_loss: float  #: Smallest loss in Pa per (m/s)^2 of dh/dt.
     shut_loss: float  #: Greatest loss.
+    #: Why the valve does not hold the water in place, without power too; empty if it does.
+    lets_go: str = "is not known to hold the water"
 
     def __post_init__(self) -> None:
         if not 0 <= self.open_loss < self.shut_loss < math.inf:
@@ -79,8 +84,27 @@ class Valve:
         return min(max((share - self.leakage) / (1 - self.leakage), 0.0), 1.0)
 
     def range(self, tank: Tank) -> ValveRange:
-        """Losses of the valve, open and shut."""
-        return ValveRange(self.loss(tank, 1.0), self.loss(tank, 0.0))
+        """Losses of the valve, open and shut, and whether it holds the water."""
+        shut_loss, lets_go = self.loss(tank, 0.0), ""
+        if self.kind == "air":
+            lets_go = "is kind: air, and air yields: it must be kind: duct"
+        elif self.fail_position == "open":
+            lets_go = "has fail_position: open, and without power the water runs: it must be shut"
+        elif shut_loss < locked_loss(tank):
+            tight = self.leakage * math.sqrt(shut_loss / locked_loss(tank))
+            lets_go = f"has leakage: {self.leakage:g}: to be tight it must be {tight:.1g} or less"
+        return ValveRange(self.loss(tank, 1.0), shut_loss, lets_go)
+
+
+def locked_loss(tank: Tank) -> float:
+    """Loss from which a shut valve counts as tight.
+
+    With a reservoir's full height across it the flow settles within half of `STOPPING_S`; on the
+    first ship the level moves by less than 2 mm/s then.
+    """
+    head_pa = 2 * tank.density_kg_m3 * GRAVITY_M_S2 * tank.level_limit_m
+    settling = tank.density_kg_m3 * tank.effective_length_m / STOPPING_S
+    return settling * settling / head_pa
 
 
 def added_damping_ratio(tank: Tank, loss: float, level_m: float) -> float:
@@ -94,10 +118,13 @@ def added_damping_ratio(tank: Tank, loss: float, level_m: float) -> float:
 
 
 def valve_problems(tank: Tank, valve: Valve) -> list[Problem]:
-    """Return why a tank can't have a valve: it must let some water pass."""
+    """Return why a tank can't have a valve: it must let some water pass, or be tight."""
     speed_m_s = tank.natural_frequency_rad_s * tank.level_limit_m
     inertia_pa_s2_m = tank.density_kg_m3 * tank.effective_length_m
-    if valve.loss(tank, 0.0) * speed_m_s * STOPPING_S < inertia_pa_s2_m:
+    shut_loss = valve.loss(tank, 0.0)
+    if shut_loss * speed_m_s * STOPPING_S < inertia_pa_s2_m:
+        return []
+    if valve.kind == "duct" and shut_loss >= locked_loss(tank):
         return []
     reason = f"would stop the water within {1e3 * STOPPING_S:g} ms, as a closed one: raise it"
     return [("leakage" if valve.pipe_area_m2 is None else "pipe_area_m2", reason)]

@@ -140,7 +140,8 @@ class ValveCommander:
     """Turns the loss that a law asks for into VALVE_CMD, and watches the valve.
 
     The valve follows only while the law is in charge; else it goes to its fail position, as it does
-    after a silence of `timeout_s`, which is sent with every command.
+    after a silence of `timeout_s`, which is sent with every command. `most_off` is the part of its
+    way that it may be from where the commands should have brought it.
     """
 
     def __init__(
@@ -150,6 +151,7 @@ class ValveCommander:
         catalogue: Catalogue,
         timeout_s: float,
         plan: DevicePlan[ValveStatus] | None = None,
+        most_off: float = VALVE_OFF,
     ) -> None:
         command = None if plan is None else plan.command
         self._foreign = None if command is None else MessageEncoder(command)
@@ -157,7 +159,7 @@ class ValveCommander:
         self._valve = valve
         self._tank = tank
         self._sender = catalogue.transmitter(ValveCommand)
-        self._timeout_s = timeout_s
+        self._timeout_s, self._most_off = timeout_s, most_off
         self._most_step = TICK_S / valve.opening_time_s
         self._level_period_s = catalogue.codec(SensorTank).cycle_ns * 1e-9
         self._inertia_pa_s2_m = tank.density_kg_m3 * tank.effective_length_m
@@ -206,7 +208,7 @@ class ValveCommander:
         self._expected += min(max(step, -self._most_step), self._most_step)
         age_ms = (now_ns - measured.valve_heard_ns) / MILLISECOND_NS
         unknown = age_ms > STALE_MS  # others judge that
-        if unknown or abs(opening - self._expected) <= VALVE_OFF:
+        if unknown or abs(opening - self._expected) <= self._most_off:
             self._at_place_ns = now_ns
         return ValveReport(
             age_ms,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 from utank_hil.canbus.endpoints import BUCKET_LIMIT
 from utank_hil.canbus.enumerations import Address, Fault
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.situation import VALVE_OFF
+from utank_hil.safety.situation import THROTTLED_OFF, VALVE_OFF
 
 if TYPE_CHECKING:  # who prints the words of a fault needs no ship
     from utank_hil.safety.safety_limits import SafetyLimits
@@ -161,10 +161,13 @@ FAULTS: Final = (
              "{valve_follows_within_ms:g} ms", lambda seen, limits: (seen.own.valve.fault
              or seen.own.valve.out_ms > limits.valve_follows_within_ms))),
     _row(Fault.VALVE_NOT_FOLLOWING, "The tank's valve is not where it was commanded to be.",
-         "Look for what blocks the valve; compare its time from shut to open with the ship file.",
-         Condition(_STOP, f"more than {VALVE_OFF:.0%} of its way off for over "
-             "{valve_off_within_ms:g} ms",
-             lambda seen, limits: seen.own.valve.off_ms > limits.valve_off_within_ms)),
+         "Look for what blocks the valve, or keeps it from being tight; compare its time from shut "
+         "to open with the ship file.",
+         Condition(_STOP, f"more than {VALVE_OFF:.0%} of its way off, {THROTTLED_OFF:.0%} in heel "
+             "removal, for over {valve_off_within_ms:g} ms",
+             lambda seen, limits: seen.own.valve.off_ms > limits.valve_off_within_ms),
+         _found(_STOP, "heel removal: more water passes the valve than its opening lets through, "
+             "or any while it is shut", Finding.VALVE_PASSES)),
     _row(Fault.INTERNAL, "The control law raised an error, or gave no finite pressure.",
          "Report it with the recording and the configuration; use another law until it is mended.",
          Condition(_STOP, "the law raises, or its answer is not finite",
@@ -236,9 +239,12 @@ FAULTS: Final = (
          _found(_WARN, "a panel's third wrong proof of its key in succession",
              Finding.WRONG_PROOF)),
     _row(Fault.STUCK_SIGNAL, "The roll or the level stands still although the water is pushed.",
-         "Check the motion sensor, the level gauges and whatever passes their messages on.",
+         "Check the motion sensor, the level gauges and whatever passes their messages on; at the "
+         "quay whether the ship is aground or held.",
          _found(_RAMP, "roll still while the water moves, or level still while it is pushed",
-             Finding.ROLL_STUCK | Finding.LEVEL_STUCK)),
+             Finding.ROLL_STUCK | Finding.LEVEL_STUCK),
+         _found(_RAMP, "heel removal: the heel answers two pumpings in a row by less than a "
+             "third", Finding.HEEL_UNANSWERED)),
     _row(Fault.DRIFT, "Roll and integrated roll rate do not agree.",
          "Check the motion sensor: sign of each, a signal that stands still, alignment, bias of "
          "the gyroscope, filter of the roll.",
@@ -270,11 +276,14 @@ FAULTS: Final = (
          _found(_STOP, "15% of the pressure limit off for 500 ms; drive off: and 2 kPa per m of "
              "level", Finding.DRIVE_LOST, ends_passive=True),
          _found(_RAMP, "the same for 300 ms", Finding.DRIVE_LAGS)),
-    _row(Fault.SATURATION, "The pump has been held at its limit on one side.",
+    _row(Fault.SATURATION, "The pump has been held at its limit on one side, or the tank takes no "
+         "more heel away.",
          "Correct a steady heel by ballast; lower the law's gains if the sea asks for more than "
          "the pump has.",
          _found(_WARN, "command at its limit to one side, or drive at one of its own, for 10 s",
-             Finding.SATURATED)),
+             Finding.SATURATED),
+         _found(_WARN, "heel removal: the level is at its limit, and a heel over start_rad is left",
+             Finding.TANK_USED_UP)),
     _row(Fault.ROLL_AMPLIFIED, "The ship rolls more than it would with the pump at rest.",
          "Retune the law, or use one for this load and sea.",
          _found(_RAMP, "roll over 1.25 times the passive twin's for a quarter of a roll period "
@@ -287,6 +296,8 @@ FAULTS: Final = (
              abs(seen.motion.roll_rad) > limits.roll_limit_rad
              or abs(seen.heel_rad) > limits.heel_limit_rad)),
          # a ship that rolls through upright is upright twice in a period
+         _found(_RAMP, "heel removal: the root mean square of the roll is over its most_roll_rad, "
+             "as it is at sea", Finding.NOT_IN_HARBOUR),
          Condition(_REFUSE, f"roll over {{roll_limit_rad:g}} rad within the last {ROLL_CALM_S} s",
              lambda seen, _: seen.rolled_over_ms < 1e3 * ROLL_CALM_S)),
     _row(Fault.STABILITY_LOW, "The ship's metacentric height may be below the limit of its "
@@ -295,7 +306,9 @@ FAULTS: Final = (
          "estimates (the log has the reason) start the controller again when that can be done.",
          Condition(_WARN, "interval of the estimated GM, two standard deviations, reaches below "
              "the vessel's least_gm_m, or no estimate for three intervals",
-             lambda seen, _: seen.own.gm_low)),
+             lambda seen, _: seen.own.gm_low),
+         _found(_RAMP, "heel removal: the heel answers two pumpings in a row by more than twice "
+             "what is due", Finding.HEEL_OVERDONE)),
     _row(Fault.DRIVE_WARNING, "The pump drive warns: it may soon trip or not hold the pressure.",
          "Read what the drive warns of. Temperature: cooling, load. Voltage: supply. "
          "Command: bus, its cable and load. Sensor: the drive's pressure feedback.",

@@ -21,6 +21,7 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.retuning.estimate import ShipFigures
 from utank_hil.safety.monitors.drive import DriveFollowing, Saturation
 from utank_hil.safety.monitors.finding import Finding
+from utank_hil.safety.monitors.harbour import HarbourWatch
 from utank_hil.safety.monitors.level_stuck import LevelStuck, Volume
 from utank_hil.safety.monitors.motion import MotionPair, MotionWatch, SpikeCount
 from utank_hil.safety.monitors.senders import MEAN_FRAME_BITS, Heard, Senders, Stream
@@ -73,7 +74,8 @@ class Monitors:
     `roll_limit_rad` is the largest roll under control, `bit_rate` that of the bus. `compares` says
     whether the law is meant to roll the ship less than its passive twin; one without a loop is
     not. `motion_cycles_s` are the times between two samples of each motion sensor, `of_hull` says
-    whether the ship has hull data.
+    whether the ship has hull data. `harbour` judges the water, which is held or creeps, in the
+    place of the monitors of water that swings.
     """
 
     def __init__(
@@ -87,6 +89,7 @@ class Monitors:
         second_motion: bool = False,
         motion_cycles_s: tuple[float, ...] = (TICK_S, TICK_S),
         of_hull: bool = False,
+        harbour: HarbourWatch | None = None,
     ) -> None:
         self.thresholds: MonitorThresholds = thresholds_of(
             plant, roll_limit_rad, sensors, of_hull=of_hull
@@ -107,7 +110,7 @@ class Monitors:
         # what a valve that is nearly shut holds back is uncertain: only a wrong sign counts then
         self._water_free = plant.valve is None
         self._counts_of_water = ~0 if self._water_free else Finding.WATER_SIGN
-        self._compares = compares
+        self._compares, self._harbour = compares, harbour
         #: What is judged of each motion sensor by itself.
         self.watches = tuple(
             MotionWatch(thresholds, cycle_s) for cycle_s in motion_cycles_s[: 1 + second_motion]
@@ -129,7 +132,7 @@ class Monitors:
         # a wrong sign is not seen where the roll passes through zero
         self._doubted_ns = round(thresholds.tank_period_s * 1e9)
         #: Whether the water was seen to move as roll and pressure push it, and is watched since.
-        self.confirmed = False
+        self.confirmed = harbour is not None  # a wrong sign moves little before it is found
         self._looks: tuple[Callable[[Measurements, OwnState], int], ...] = (
             self._look_at_motion,
             self._look_at_drive,
@@ -254,7 +257,10 @@ class Monitors:
         fresh = measured.pump_age_ms <= STALE_MS
         pressure_pa = measured.pressure_pa if fresh else own.command_pa
         # what a valve that is not open takes from the water acts like a pump
-        pressure_pa -= own.held_pa - self._open_loss * abs(level_rate_m_s) * level_rate_m_s
+        if self._harbour is not None:
+            pressure_pa = self._harbour.balance_pa(measured.level_m, motion.roll_rad)
+        else:
+            pressure_pa -= own.held_pa - self._open_loss * abs(level_rate_m_s) * level_rate_m_s
         twin.update(
             motion.roll_rad,
             motion.roll_rate_rad_s,
@@ -275,6 +281,11 @@ class Monitors:
             self._level_found = 0
         motion = measured.motions[self.used]
         oldest_ms = max(motion.age_ms, measured.tank_age_ms, measured.pump_age_ms)
+        if self._harbour is not None:
+            if oldest_ms <= STALE_MS:
+                self._round_ns = now_ns
+                self._level_found = self._harbour.update(motion, measured, steps)
+            return self._level_found
         unwatched = self._note_watch(now_ns, elapsed_s, oldest_ms)
         if oldest_ms > STALE_MS:
             return self._level_found | unwatched

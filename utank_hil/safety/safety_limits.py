@@ -6,7 +6,7 @@ from typing import Annotated
 from utank_hil.base.parameters import Range, range_problems, refuse
 from utank_hil.dynamics.ship import RollLimit
 
-_HeelLimit = Annotated[float, Range(above=0, most=0.28)]
+_HeelLimit = Annotated[float, Range(least=1e-3, most=0.28)]
 _Silence = Annotated[float, Range(above=0, most=1000)]
 _Patience = Annotated[float, Range(above=0, most=10_000)]
 _BusLoad = Annotated[float, Range(above=0, most=0.85)]

@@ -14,6 +14,8 @@ if TYPE_CHECKING:  # who prints the words of a fault needs no ship
 MILLISECOND_NS: Final = 1_000_000
 VALVE_OFF: Final = 0.15
 """Part of its way that a valve may be from where the commands should have brought it."""
+THROTTLED_OFF: Final = 0.02
+"""The same for heel removal, which opens it by 0.05 or so."""
 
 
 @dataclass(slots=True, eq=False)

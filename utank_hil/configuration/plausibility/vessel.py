@@ -311,8 +311,6 @@ def _of_valve(ship: RollShip, tank: Tank, valve: Valve) -> list[Figure]:
     found = [
         Figure("valve.opening_time_s", valve.opening_time_s / roll_s, 0, 0, 0.25, _ANY,
                f"is {valve.opening_time_s:g} s, and the ship rolls in {roll_s:.3g} s"),
-        Figure("valve.leakage", valve.leakage, 0, 1e-3, _ANY, _ANY,
-               f"of {valve.leakage:g} is no gate's: it is a share of the open area"),
         Figure("valve.discharge_coefficient", coefficient, 0, 0.2, _ANY, _ANY,
                f"of {coefficient:g} is no orifice's: about 0.6"),
     ]  # fmt: skip

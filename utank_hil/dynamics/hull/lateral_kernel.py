@@ -14,6 +14,7 @@ from utank_hil.dynamics.jit import njit
 from utank_hil.dynamics.kernels import righting_moment, sine_cosine, within
 from utank_hil.dynamics.nonlinear import INSIDE_M, REST_M_S
 from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.dynamics.valves import LOCKED
 
 ROLL, ROLL_RATE, LEVEL, LEVEL_RATE, SWAY, SWAY_RATE, YAW, YAW_RATE, WAVES = range(9)
 # Rows of the mass matrix; without surge, heave and pitch the first three are not used.
@@ -189,7 +190,10 @@ def rates(
     if six:
         _move_up_and_along(p, vertical, x, at, force, m, q, out)
     at_stop = abs(h) >= p[25] and h * speed >= 0
-    if at_stop:
+    if valve >= LOCKED:
+        _solve(m, q, first, 6)
+        q[6] = 0.0
+    elif at_stop:
         for i in range(first, 7):
             out[i] = q[i]
         _solve(m, q, first, 7)

@@ -30,3 +30,8 @@ class Finding:
     UNWATCHED: Final = 1 << 21
     UNWATCHED_LONG: Final = 1 << 22
     WRONG_PROOF: Final = 1 << 23
+    VALVE_PASSES: Final = 1 << 24
+    NOT_IN_HARBOUR: Final = 1 << 25
+    HEEL_UNANSWERED: Final = 1 << 26
+    HEEL_OVERDONE: Final = 1 << 27
+    TANK_USED_UP: Final = 1 << 28

@@ -1,0 +1,167 @@
+"""The monitor of heel removal: what it finds, and what cargo at a sound ship does not feign."""
+
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.control.heel_removal import HeelingTank
+from utank_hil.safety.monitors.finding import Finding
+from utank_hil.safety.monitors.harbour import LEAK_M, HarbourWatch
+
+CONFIG = load_config(Path("configs/controllers/heel_removal.yaml"), ControllerConfig)
+TANK, VALVE = HeelingTank.of(CONFIG.plant), CONFIG.vessel.valve
+THROTTLED = VALVE.opening(CONFIG.vessel.tank, TANK.throttle_loss)
+PERIOD_S = 0.1
+ROLL_S = TANK.roll_period_s
+
+
+class Quay:
+    """A watch, and a ship in balance whose heel is that of its cargo and its water."""
+
+    def __init__(self, answers=1.0, roll_rad=0.0):
+        self.watch = HarbourWatch(
+            TANK, CONFIG.law, lambda opening: VALVE.loss(CONFIG.vessel.tank, opening), PERIOD_S
+        )
+        self.answers, self.roll_rad = answers, roll_rad
+        self.level_m = self.cargo_rad = self.time_s = 0.0
+        self.found = 0
+
+    @property
+    def heel_rad(self):
+        return self.cargo_rad + self.answers * TANK.heel_per_m * self.level_m
+
+    def run(self, seconds, *, rate_m_s=0.0, opening=0.0, pressure_pa=0.0, cargo_rad_s=0.0):
+        """Go on with a valve at an opening, and return all that is found."""
+        found, w0 = 0, 2 * math.pi / ROLL_S
+        for _ in range(round(seconds / PERIOD_S)):
+            self.time_s += PERIOD_S
+            self.level_m += rate_m_s * PERIOD_S
+            self.cargo_rad += cargo_rad_s * PERIOD_S
+            wave = w0 * self.time_s
+            motion = SimpleNamespace(
+                roll_rad=self.heel_rad + self.roll_rad * math.sin(wave),
+                roll_rate_rad_s=self.roll_rad * w0 * math.cos(wave),
+            )
+            measured = SimpleNamespace(
+                level_m=self.level_m, valve_opening=opening, pressure_pa=pressure_pa
+            )
+            found |= self.watch.update(motion, measured, 1)
+        self.found |= found
+        return found
+
+    def pump(self, level_m, **more):
+        """Move the water to a level as the law does, then hold it for its pause."""
+        way = math.copysign(1.0, level_m - self.level_m)
+        found = 0
+        while way * (level_m - self.level_m) > 0:
+            pressure = TANK.balance_pa(self.level_m, self.heel_rad) + way * TANK.flow_pa
+            found |= self.run(
+                1.0, rate_m_s=way * TANK.flow_m_s, opening=THROTTLED, pressure_pa=pressure, **more
+            )
+        return found | self.run(5.2 * ROLL_S, **more)
+
+
+def test_sound_pumpings_in_a_swell_are_left_alone():
+    quay = Quay(roll_rad=0.008)
+    quay.cargo_rad = 0.01
+    quay.run(70)
+    for level_m in (-0.9, -1.4, 0.3):
+        quay.pump(level_m)
+    assert quay.found & ~Finding.TANK_USED_UP == 0
+
+
+@pytest.mark.parametrize("answers", [0.4, 1.8])
+def test_a_ship_of_another_stiffness_still_answers(answers):
+    quay = Quay(answers)
+    quay.run(70)
+    for level_m in (-0.5, -1.0, -1.5):
+        quay.pump(level_m)
+    assert quay.found & (Finding.HEEL_UNANSWERED | Finding.HEEL_OVERDONE) == 0
+
+
+@pytest.mark.parametrize(
+    ("answers", "told"),
+    [(0.2, Finding.HEEL_UNANSWERED), (0.0, Finding.HEEL_UNANSWERED),
+     (-1.0, Finding.HEEL_UNANSWERED), (4.0, Finding.HEEL_OVERDONE)],
+)  # fmt: skip
+def test_a_heel_that_does_not_answer_as_it_should_is_found_at_the_second_pumping(answers, told):
+    quay = Quay(answers)
+    quay.run(70)
+    assert quay.pump(-0.5) == 0
+    assert quay.pump(-1.0) == told
+
+
+def test_cargo_that_comes_as_fast_as_the_pump_takes_its_heel_away_is_no_missing_answer():
+    quay = Quay()
+    rate_rad_s = 0.5 * TANK.heel_per_m / (0.5 / TANK.flow_m_s + 5.2 * ROLL_S)
+    quay.run(80, cargo_rad_s=rate_rad_s)
+    for level_m in (-0.5, -1.0, -1.5):
+        quay.pump(level_m, cargo_rad_s=rate_rad_s)
+    assert quay.found == 0
+    aground = Quay(answers=0.0)
+    aground.run(80)
+    for level_m in (-0.5, -1.0):
+        aground.pump(level_m)
+    assert aground.found == Finding.HEEL_UNANSWERED
+
+
+def test_one_load_that_swings_out_while_water_is_moved_is_no_missing_answer():
+    quay = Quay()
+    quay.run(70)
+    quay.cargo_rad += 1.2 * 0.5 * TANK.heel_per_m
+    quay.pump(-0.5)
+    quay.pump(-1.0)
+    assert quay.found == 0
+
+
+@pytest.mark.parametrize(
+    ("rate", "told"),
+    [(1.0, 0), (0.5, 0), (2.0, 0), (0.0, Finding.LEVEL_STUCK), (-1.0, Finding.WATER_SIGN),
+     (4.0, Finding.VALVE_PASSES)],
+)  # fmt: skip
+def test_water_that_does_not_creep_as_it_is_pressed_is_found_within_three_seconds(rate, told):
+    quay = Quay()
+    quay.run(5)
+    found = quay.run(3, rate_m_s=rate * TANK.flow_m_s, opening=THROTTLED, pressure_pa=TANK.flow_pa)
+    assert found == told
+
+
+def test_a_leak_is_found_before_a_tenth_of_a_metre_and_a_drift_of_a_gauge_is_not():
+    quay = Quay()
+    quay.run(20)
+    leak = quay.run(2 * LEAK_M / 0.002, rate_m_s=-0.002)
+    assert leak == Finding.VALVE_PASSES
+    slow = Quay()
+    slow.run(20)
+    assert slow.run(3600, rate_m_s=0.1 / 3600) == 0
+
+
+@pytest.mark.parametrize(("degrees", "told"), [(0.8, 0), (2.0, Finding.NOT_IN_HARBOUR)])
+def test_a_ship_that_rolls_is_at_sea(degrees, told):
+    rms = math.degrees(CONFIG.law.most_roll_rad)
+    quay = Quay(roll_rad=math.radians(degrees) * math.sqrt(2) * rms)
+    assert quay.run(60) == told
+
+
+def test_what_was_told_ends_so_that_it_can_be_reset():
+    quay = Quay()
+    quay.run(5)
+    quay.run(3, rate_m_s=0.0, opening=THROTTLED, pressure_pa=TANK.flow_pa)
+    assert quay.run(9.5) == Finding.LEVEL_STUCK
+    assert quay.run(5) == 0
+
+
+def test_a_tank_that_is_used_up_is_told_while_the_heel_is_left():
+    quay = Quay()
+    quay.cargo_rad = 0.03
+    quay.run(70)
+    quay.pump(-TANK.most_m)
+    assert quay.run(1) == Finding.TANK_USED_UP
+    quay.cargo_rad = -TANK.heel_per_m * quay.level_m
+    quay.run(100)
+    assert quay.run(1) == 0
+    assert np.isclose(quay.heel_rad, 0.0)
