@@ -124,7 +124,9 @@ def less(share: float | None) -> str:
 
 def percent(share: Interval | None) -> str:
     """A share and its interval in percent; empty without one."""
-    return "" if share is None else f"{share.mean:.0%} ± {share.half_width:.0%}"
+    if share is None:
+        return ""
+    return f"{round(share.mean, 2) + 0.0:.0%} ± {share.half_width:.0%}"  # no -0%
 
 
 def _degrees(angle_rad: Interval | None, unit: str = "°") -> str:

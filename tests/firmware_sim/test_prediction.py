@@ -14,7 +14,7 @@ from firmware_sim.commands.bench import STORM
 from firmware_sim.figures import BenchFigures, figures
 from firmware_sim.prediction import SEEDS, Expected, Loading, other_loadings, predict
 from firmware_sim.scenario import Scenario
-from firmware_sim.tank_report import loading_table
+from firmware_sim.tank_report import loading_table, percent
 from utank_hil.analysis.loop.margins import of_period
 from utank_hil.analysis.motion.statistics import Interval
 from utank_hil.assembly import build_law
@@ -166,3 +166,9 @@ def test_a_law_that_rolls_the_ship_more_is_marked() -> None:
     assert [cell[0] for cell in table.columns[3].cells] == ["5", "*"]
     assert "ROLL_AMPLIFIED" in str(table.caption)
     assert loading_table([Loading(1.0, good)]).caption is None
+
+
+def test_a_share_of_nothing_has_no_sign():
+    assert percent(Interval(-0.003, 0.41)) == "0% ± 41%"
+    assert percent(Interval(-0.013, 0.41)) == "-1% ± 41%"
+    assert percent(None) == ""
