@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from firmware_sim.fault_campaign.own_ship import Ratios, ratios, resized
+from firmware_sim.fault_campaign.own_ship import Ratios, ratios, renumbered, resized
 from firmware_sim.fault_injection.fault import FaultSpan, FaultTime, one_of
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.scenario import Scenario
@@ -14,6 +14,7 @@ from firmware_sim.scenario_problems import foreign_role, missing_nodes
 from utank_hil.base.parameters import Finite, Positive, refuse
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import Fault
+from utank_hil.canbus.profiles.drive_plan import DrivePlan
 from utank_hil.configuration import ControllerConfig, Section, Vessel
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.panel import TimedAction
@@ -283,22 +284,29 @@ class Campaign(Section):
     def on(self, scenario: Scenario, controller: str) -> "Campaign":
         """Campaign with another ship in the place of that of the setup `COMMON`.
 
-        Left are the rows of setups that change neither its parameters nor its devices, with faults
-        that its nodes can have, as large for it as for the first (`own_ship`). Of a device without
-        counters no single frame is missed.
+        Left are the rows of setups that change neither its parameters nor its devices, and of those
+        with a CANopen drive where it has one, with faults that its nodes can have, as large for it
+        as for the first (`own_ship`). Of a device without counters no single frame is missed.
         """
         common = self.setups[COMMON]
         bare = {"redundancy": common.redundancy, "commissioned": common.commissioned}
-        setups = {
-            name: setup.model_copy(update={"scenario": scenario, "controller": controller})
+        drive = scenario.vessel.foreign.pump
+        theirs = {
+            name: setup.equipped.vessel.foreign.pump
             for name, setup in self.setups.items()
-            if setup.model_copy(update=bare) == common
+            if drive is not None and setup.model_copy(update={"devices": None}) == common
+        }
+        changed = {"scenario": scenario, "controller": controller, "devices": None}
+        setups = {
+            name: setup.model_copy(update=changed)
+            for name, setup in self.setups.items()
+            if setup.model_copy(update=bare) == common or theirs.get(name) is not None
         }
         vessels = {name: setup.equipped.vessel for name, setup in setups.items()}
         own = setups[COMMON]
         by = ratios((common.scenario, common.config), (own.scenario, own.config))
         rows = tuple(
-            _resized(row, by)
+            _resized(row, by, theirs.get(row.fault.setup), drive)
             for row in self.rows
             if (vessel := vessels.get(row.fault.setup)) is not None
             and not missing_nodes(vessel, row.fault.inject)
@@ -320,9 +328,11 @@ class Campaign(Section):
         return [each for each in self.requirements if each.elsewhere and _begins(each.id, names)]
 
 
-def _resized(row: Row, by: Ratios) -> Row:
+def _resized(row: Row, by: Ratios, first: DrivePlan | None, own: DrivePlan | None) -> Row:
     """A row for another ship; by a pressure that no command takes away it rolls as it may."""
     inject = tuple(resized(each, by) for each in row.fault.inject)
+    if first is not None and own is not None:
+        inject = tuple(renumbered(each, first, own) for each in inject)
     counts_from = {
         key: value * by.range.get(key, 1.0) for key, value in row.limit.counts_from.items()
     }

@@ -1,16 +1,18 @@
 """The faults of a campaign, as large for another ship as for the first.
 
 Offsets, drifts and spikes of levels and pressures, and pressures that the pump adds, keep their
-share of the law's limits. Noise is as many times that of the sensor. Rolls and times stay.
+share of the law's limits. Noise is as many times that of the sensor. Rolls and times stay. Frames
+of a CANopen drive have the ship's own node numbers.
 """
 
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 from firmware_sim.fault_injection.kinds import AnyFault
-from firmware_sim.fault_injection.nodes import Pump
+from firmware_sim.fault_injection.nodes import LostIdentifier, Pump
 from firmware_sim.fault_injection.signals import Drift, Noise, Offset, Spikes
 from firmware_sim.scenario import Scenario
+from utank_hil.canbus.profiles.drive_plan import DrivePlan
 from utank_hil.configuration import ControllerConfig
 
 PRESSURE: Final = "pressure_pa"
@@ -57,6 +59,16 @@ def resized(fault: AnyFault, by: Ratios) -> AnyFault:
     if isinstance(fault, Drift):
         size = fault.by_per_s * by.range.get(fault.signals[0], 1.0)
         return fault.model_copy(update={"by_per_s": size})
+    return fault
+
+
+def renumbered(fault: AnyFault, first: DrivePlan, own: DrivePlan) -> AnyFault:
+    """A fault of a CANopen drive's frames with the node numbers of another ship."""
+    if isinstance(fault, LostIdentifier):
+        numbers = {first.node: own.node, first.controller_node: own.controller_node}
+        node = fault.id_11bit & 0x7F
+        number = fault.id_11bit - node + numbers.get(node, node)
+        return fault.model_copy(update={"id_11bit": number})
     return fault
 
 

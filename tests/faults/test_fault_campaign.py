@@ -618,6 +618,9 @@ def test_of_a_device_without_counters_no_row_asks_for_what_only_they_show():
     kept = {row.id for row in CAMPAIGN.on(storm, "gpc").rows}
     other = storm.model_copy(update={"vessel": vessel})
     left = {row.id for row in CAMPAIGN.on(other, "gpc").rows}
+    of_the_drive = {row.id for row in CAMPAIGN.rows if row.fault.setup == "canopen"}
+    assert of_the_drive <= left
+    left -= of_the_drive
     assert {"motion-silent", "motion-bad-quality", "motion-frozen", "tank-corrupted"} <= left < kept
     dropped = {"motion-1-frame-lost", "motion-corrupted-once", "motion-short-once",
                "motion-counter-frozen", "drive-status-corrupted"}  # fmt: skip
@@ -633,3 +636,41 @@ def test_a_scenario_can_not_spoil_what_a_device_does_not_send():
     storm["faults"] = [{"kind": "length", "message": "SENSOR_MOTION", "length": 7, "at_s": 5}]
     with pytest.raises(ValueError, match=r"devices\.motion sends no SENSOR_MOTION; take kind lost"):
         Scenario.model_validate(storm)
+
+
+def with_own_drive():
+    """The storm with a CANopen drive of other node numbers, on the controller's own bus."""
+    scenario = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
+    pump = CAMPAIGN.setups["canopen"].devices.pump
+    own = pump.model_copy(update={"node": 9, "controller_node": 120, "bus": ""})
+    vessel = scenario.vessel.model_copy(update={"devices": DevicesSection(pump=own.model_dump())})
+    controllers = {
+        name: config.model_copy(update={"vessel": vessel})
+        for name, config in scenario.controllers.items()
+    }
+    return scenario.model_copy(update={"vessel": vessel, "controllers": controllers})
+
+
+def test_rows_of_a_canopen_drive_run_on_a_ship_that_has_one():
+    moved = CAMPAIGN.on(with_own_drive(), "gpc")
+    rows = {row.id: row.fault.inject[0] for row in moved.rows if row.id.startswith("canopen")}
+    assert len(rows) == 8
+    assert rows["canopen-four-of-five-commands-lost"].id_11bit == 0x209
+    assert rows["canopen-heartbeat-lost"].id_11bit == 0x709
+    assert rows["canopen-controller-heartbeat-lost"].id_11bit == 0x778
+    assert moved.setups["canopen"].config.vessel.devices.pump.node == 9
+    native = CAMPAIGN.on(load_config(Path("configs/scenarios/storm.yaml"), Scenario), "gpc")
+    assert not [row.id for row in native.rows if row.id.startswith("canopen")]
+
+
+@pytest.mark.slow
+def test_a_drive_of_an_own_ship_that_hears_one_command_of_five_is_stopped():
+    moved = CAMPAIGN.on(with_own_drive(), "gpc")
+    row = next(row for row in moved.rows if row.id == "canopen-four-of-five-commands-lost")
+    own = moved.setups["canopen"]
+    sea = Sea(moved, own, build_law(own.config), 1, Window(12.0, 12.0))
+    sea.prepare([row])
+    outcome = sea.outcome(row)
+    assert outcome.code == "DRIVE_SILENT"
+    assert outcome.wire
+    assert outcome.found <= 100
