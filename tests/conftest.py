@@ -3,6 +3,7 @@
 import os
 import signal
 import threading
+from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
@@ -77,6 +78,16 @@ def one_process():
 
     with in_one_process():
         yield
+
+
+@pytest.fixture
+def few_rolls(monkeypatch):
+    """Predict from a tenth of the ship's time, for what does not judge the figures."""
+    from firmware_sim import prediction
+
+    one = partial(prediction.predict, seeds=prediction.SEEDS[:1])
+    monkeypatch.setattr(prediction, "predict", one)
+    monkeypatch.setattr(prediction, "ROLLS", 4)
 
 
 _MCL_ONFAULT = 0x4

@@ -1,6 +1,13 @@
 """A configuration with all the files it names."""
 
+from functools import cache
+
 from utank_hil.configuration.yaml_text import parse_yaml
+
+
+@cache
+def parsed(path):
+    return parse_yaml(path.read_text())[0]
 
 
 def whole(path):
@@ -17,4 +24,4 @@ def whole(path):
             return str((path.parent / value).resolve())
         return value
 
-    return resolved(parse_yaml(path.read_text())[0])
+    return resolved(parsed(path))

@@ -188,12 +188,14 @@ def test_figures_picture_and_recording_of_a_bench_hold_the_configuration_that_ra
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_rolls")
 def test_figures_and_picture_of_a_design_hold_ship_and_scenario(tmp_path):
     vessel = CONFIGS / "ships" / "patti_b.yaml"
     words = ["design", "tank", str(vessel), "--scenario", str(PATTI_B), "--out", str(tmp_path)]
     result = CliRunner().invoke(app, [*words, "--json"])
     assert result.exit_code == 0, result.output
     told = json.loads((tmp_path / "tank.json").read_text())
+    assert json.loads(result.stdout) == told
     again = loaded_again(told["configuration"], Vessel, tmp_path)
     assert values(again) == values(load_config(vessel, Vessel))
     scenario = loaded_again(told["scenario_configuration"], Scenario, tmp_path)

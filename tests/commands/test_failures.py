@@ -70,6 +70,7 @@ def test_an_export_that_can_not_be_written_is_named_and_not_left_in_half(
     assert said == f"error: {nowhere}: No such file or directory"
 
 
+@pytest.mark.usefixtures("few_rolls")
 def test_a_results_file_that_does_not_fit_ends_any_command_in_words(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
