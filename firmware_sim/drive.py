@@ -110,6 +110,8 @@ STOPPED_SHARE = 0.02
 """Share of the drive's pressure limit below which the pump counts as stopped. Chosen; no study."""
 LONGEST_STOP_NS = 500_000_000
 """Time after which a motor that has not removed the pressure is switched off. Chosen; no study."""
+MOST_CURRENT_A = 4000.0
+"""Range of DRIVE_STATUS_2; a larger current is not available, and not cut to it."""
 WARNED_MESSAGES = 2  #: Number of DRIVE_STATUS_2 messages that report one rejected command.
 _STOP_WORDS = (ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE, ControlWord.SHUTDOWN, None)
 """Control words that stop the drive; None, an unknown word, disables the voltage."""
@@ -297,11 +299,12 @@ class PumpDrive:
     def _status_2_frame(self) -> Frame:
         warned = self._warnings_left > 0
         self._warnings_left = max(self._warnings_left - 1, 0)
+        current_a = self._plant.pump_power_w / self._limits.bus_voltage_v
         return self._status_2.frame(
             DriveStatus2(
                 fault=self._states.fault,
                 bus_voltage_v=self._limits.bus_voltage_v,
-                current_a=self._plant.pump_power_w / self._limits.bus_voltage_v,
+                current_a=current_a if abs(current_a) <= MOST_CURRENT_A else math.nan,
                 motor_temperature_c=math.nan,
                 drive_temperature_c=math.nan,
                 temperature_warning=False,

@@ -142,6 +142,7 @@ class ForeignFrames:
 
 
 NOISE_BLOCK = 4096  #: Number of random values drawn at once. Chosen; no study.
+MOST_FLOW_M3_S = 30.0  #: Range of SENSOR_PUMP; a larger flow is not available, and not cut to it.
 
 # bound once: in Python 3.11 class access to an enum member is eight times slower
 _GOOD = Quality.GOOD
@@ -271,4 +272,5 @@ class SensorNode:
     def _measure_pump(self) -> SensorPump:
         plant = self._plant
         noise_pa = self._errors.pressure_noise_pa * self._draw()
-        return _new(SensorPump, (plant.pressure_pa + noise_pa, plant.flow_m3_s, _GOOD))
+        flow_m3_s = plant.flow_m3_s if abs(plant.flow_m3_s) <= MOST_FLOW_M3_S else math.nan
+        return _new(SensorPump, (plant.pressure_pa + noise_pa, flow_m3_s, _GOOD))

@@ -234,6 +234,13 @@ def test_status_can_say_the_power_of_every_shipped_pump() -> None:
         assert said_w == pytest.approx(power_w, rel=1e-3)
 
 
+def test_a_power_that_status_can_not_say_is_not_available() -> None:
+    bench = DriveBench()
+    bench.plant.pump_power_w = 5.3e6
+    bench.tick()
+    assert math.isnan(bench.status_2.current_a)
+
+
 RATE_PA_S = DriveLimits().pressure_rate_pa_s
 
 

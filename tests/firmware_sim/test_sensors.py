@@ -92,6 +92,16 @@ def test_exact_sensors_differ_from_the_truth_by_quantization_only() -> None:
     assert np.abs(bench.true(2)).max() > 1.0
 
 
+def test_a_flow_that_the_bus_can_not_say_is_not_available() -> None:
+    bench = SensorBench(EXACT)
+    bench.run(2)
+    bench.plant.flow_m3_s = 30.5  # stays, as no time passes
+    bench.run(1, TICK_NS)
+    told, not_told = bench.column(SensorPump, "flow_m3_s")
+    assert told == pytest.approx(0.0, abs=1e-3)
+    assert math.isnan(not_told)
+
+
 @pytest.mark.parametrize("delay_ms", [0, 10, 20, 50])
 def test_motion_is_as_old_as_the_delay_says_and_the_tank_is_not(delay_ms: int) -> None:
     bench = SensorBench(SensorErrors(0.0, 0.0, float(delay_ms), 0.0, 0.0))
