@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -51,6 +52,23 @@ def test_run_on_a_bus_that_is_down_ends_with_the_code_of_a_lost_bus(
     assert result.exit_code == ExitCode.BUS_LOST
     report = json.loads(result.stdout)
     assert (report["exit_code"], report["fault"]) == (ExitCode.BUS_LOST, "BUS_LOST")
+
+
+def test_run_that_is_ended_before_its_first_tick_ends_in_words(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Ended(QuietBus):
+        """An interface during whose start the service is stopped."""
+
+        def receive(self) -> tuple[()]:
+            signal.raise_signal(signal.SIGTERM)
+            return ()
+
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", Ended)
+    result = CliRunner().invoke(app, ["run", str(GPC), "--bus", "any0", "--json"])
+    assert result.exit_code == ExitCode.OK
+    report = json.loads(result.stdout)
+    assert (report["mode"], report["loop"]["ticks"]) == ("INIT", 0)
 
 
 def test_run_that_the_system_refuses_memory_is_started_again(
