@@ -1,5 +1,6 @@
 """The pages for makers of devices: their frames and limits, computed apart from the product."""
 
+import hashlib
 import re
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.enumerations import Address
 from utank_hil.commands.panel import LOOK_NS
+from utank_hil.nodes.commissioning.checks import RATE_SCALE, SCALE
 from utank_hil.nodes.panel import EDGE_NS, SILENT_NS
 from utank_hil.safety.faults import FAULTS
 from utank_hil.safety.safety_limits import SafetyLimits
@@ -180,6 +182,23 @@ def test_frames_to_test_an_encoder_with_are_right(name):
     others = dict.fromkeys(names - {"crc", "counter"}, 0.0)
     assert shown == encoded(name, counter, **others | FRAMES[name])
     assert int(row[2], 16) == data_id(name, counter)
+
+
+def test_the_catalogues_version_is_what_the_page_makes_of_the_dbc():
+    """271 where its second number is the hash of the other lines, as a maker computes it."""
+    head, _, rest = Path("utank_hil/canbus/utank.dbc").read_text(encoding="utf-8").partition("\n")
+    first, second = map(int, re.findall(r"\d+", head))
+    found = int.from_bytes(hashlib.sha256(rest.encode()).digest(), "big") % 4095
+    assert second == found
+    assert first == CATALOGUE.version
+    row = re.search(r"^\| catalogue \| (.*)$", text("device"), re.M)[1]
+    assert f"first number of the DBC's `VERSION`, {first}," in row
+    assert "SHA-256 of all lines after the first" in row
+
+
+def test_scales_of_the_page_are_those_that_a_commissioning_lets_pass():
+    said = re.search(r"rate within (\d+) % .* levels within (\d+) %", text("sensor"), re.S)
+    assert [float(each) / 100 for each in said.groups()] == [RATE_SCALE, SCALE]
 
 
 def test_cycles_of_the_pages_are_the_catalogues():
