@@ -1,12 +1,16 @@
 import math
+import random
 from dataclasses import replace
 
 import pytest
 from moving_ship import FINDINGS, SHIP, TANK, THRESHOLDS, MovingShip
 
+from utank_hil.control import DesignPlant, PumpLimits
+from utank_hil.dynamics import RollShip, Tank
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.level_stuck import LevelStuck
 from utank_hil.safety.monitors.tank_equation import TankEquation, roll_push_at_natural_frequency
+from utank_hil.safety.monitors.thresholds import SensorFigures, thresholds_of
 
 STEP_S = 0.1
 FAULT_S = 60.0
@@ -46,6 +50,19 @@ def test_water_at_rest_under_a_steady_heel_and_pressure_is_not_stuck():
     found = [stuck.update(heel_rad * min(k / 600, 1), 0.01 * k, 0.0, 0.0) for k in range(600)]
     found += [stuck.update(heel_rad, level_m, pressure_pa, 0.0) for _ in range(600)]
     assert not any(found)
+
+
+def test_a_boat_at_rest_is_not_stuck_for_the_noise_of_its_gauges():
+    """Noise of 5 mm in a tank of 0.44 m: it looks like pushes on the water."""
+    ship = RollShip(42e3 / 1.97**2, 42e3, 2 * 0.06 * 42e3 / 1.97)
+    tank = Tank(2.016, 0.4392, 0.1297, 0.06215, lz_m=0.28, damping_ratio=0.1, headroom_m=0.4392)
+    limits = PumpLimits(pressure_pa=3505.0, rate_pa_s=7e3, level_m=0.35)
+    plant = DesignPlant(ship, tank, limits=limits)
+    equation = TankEquation(ship, tank, thresholds_of(plant, 0.35, SensorFigures()), STEP_S)
+    draw = random.Random(1).gauss
+    for _ in range(6000):
+        level_m = (draw(0, 0.005) - draw(0, 0.005)) / 2
+        assert not equation.update(draw(0, 2e-4), level_m, draw(0, 100.0))
 
 
 ZEROS = (math.radians(0.3), 0.044, 870.0)

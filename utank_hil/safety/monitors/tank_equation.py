@@ -71,6 +71,8 @@ BAND_UNEXPLAINED: Final = 1.0
 STILL_PERIODS: Final = 0.25
 STILL_PUSHES: Final = 4.0
 """Of the least push, root mean square: so much must be left unexplained by a roll that is still."""
+STILL_LEVELS: Final = 1.8
+"""Likewise of the push that holds the level off by its band: the gauges' noise looks like half."""
 CREST_PERIODS: Final = 0.1
 """A level of 0.3 m stays within its noise for so long at a crest; a longer one has no sign."""
 MEMORY_PERIODS: Final = 0.4
@@ -188,7 +190,8 @@ class TankEquation:
         self._level_still_m = thresholds.level_still_m
         self._crest_samples = round(CREST_PERIODS * thresholds.tank_period_s / period_s)
         self._still_samples = round(STILL_PERIODS * thresholds.tank_period_s / period_s)
-        self._most_unmoved = STILL_PUSHES * STILL_PUSHES * self._least_xx
+        held = STILL_LEVELS * self._stiffness * thresholds.level_still_m
+        self._most_unmoved = max(STILL_PUSHES * roll, held)
         self._late_limit_s = thresholds.motion_late_s
         self._spike_m = thresholds.level_spike_m
         self._most_step_m = thresholds.level_most_m_s * period_s
@@ -365,7 +368,7 @@ class TankEquation:
             if gain < STUCK_GAIN and not found & Finding.WATER_SIGN:
                 found |= Finding.LEVEL_STUCK
         if self._still > self._still_samples:
-            most = math.sqrt(self._most_unmoved) + spread
+            most = self._most_unmoved / math.sqrt(1 - self._keep) + spread
             if sound > most * most:
                 found |= Finding.ROLL_STUCK
         dd = self._dd
