@@ -1,12 +1,13 @@
 import math
-import random
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from moving_ship import FINDINGS, SHIP, TANK, THRESHOLDS, MovingShip
 
 from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.dynamics import RollShip, Tank
+from utank_hil.dynamics.linear import state_matrices
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.level_stuck import LevelStuck
 from utank_hil.safety.monitors.tank_equation import TankEquation, roll_push_at_natural_frequency
@@ -52,17 +53,41 @@ def test_water_at_rest_under_a_steady_heel_and_pressure_is_not_stuck():
     assert not any(found)
 
 
-def test_a_boat_at_rest_is_not_stuck_for_the_noise_of_its_gauges():
+BOAT = RollShip(42e3 / 1.97**2, 42e3, 2 * 0.06 * 42e3 / 1.97)
+BOATS_TANK = Tank(2.016, 0.4392, 0.1297, 0.06215, lz_m=0.28, damping_ratio=0.1, headroom_m=0.4392)
+BOATS_LIMITS = PumpLimits(pressure_pa=3505.0, rate_pa_s=7e3, level_m=0.35)
+
+
+def found_on_a_boat(roll_rms_rad, *, sign=1.0, minutes=10.0):
+    """What is found of a boat of 8 m in waves about her roll period, by noisy gauges."""
+    plant = DesignPlant(BOAT, BOATS_TANK, limits=BOATS_LIMITS)
+    equation = TankEquation(BOAT, BOATS_TANK, thresholds_of(plant, 0.35, SensorFigures()), STEP_S)
+    random = np.random.default_rng(1)
+    a, b = state_matrices(BOAT, BOATS_TANK)
+    w = BOATS_TANK.natural_frequency_rad_s * random.uniform(0.7, 1.3, 40)
+    moved = np.linalg.solve(
+        1j * w[:, None, None] * np.eye(4) - a, np.broadcast_to(b[:, 1:], (40, 4, 1))
+    )[:, [0, 2], 0]
+    moved = moved * np.exp(2j * np.pi * random.uniform(size=(40, 1)))
+    t = STEP_S * np.arange(round(600 * minutes))
+    motion = (np.exp(1j * np.multiply.outer(t, w)) @ moved).real
+    motion *= roll_rms_rad / motion[:, 0].std()
+    motion *= [sign, 1.0]
+    motion += random.normal(size=motion.shape) * [2e-4, 0.005 / math.sqrt(2)]
+    found = 0
+    for roll_rad, level_m in motion.tolist():
+        found |= equation.update(roll_rad, level_m, 0.0)
+    return found
+
+
+@pytest.mark.parametrize("roll_deg", [0.0, 0.15, 0.25, 0.4, 0.7, 1.2])
+def test_a_boat_is_sound_whatever_the_noise_of_its_gauges_looks_like(roll_deg):
     """Noise of 5 mm in a tank of 0.44 m: it looks like pushes on the water."""
-    ship = RollShip(42e3 / 1.97**2, 42e3, 2 * 0.06 * 42e3 / 1.97)
-    tank = Tank(2.016, 0.4392, 0.1297, 0.06215, lz_m=0.28, damping_ratio=0.1, headroom_m=0.4392)
-    limits = PumpLimits(pressure_pa=3505.0, rate_pa_s=7e3, level_m=0.35)
-    plant = DesignPlant(ship, tank, limits=limits)
-    equation = TankEquation(ship, tank, thresholds_of(plant, 0.35, SensorFigures()), STEP_S)
-    draw = random.Random(1).gauss
-    for _ in range(6000):
-        level_m = (draw(0, 0.005) - draw(0, 0.005)) / 2
-        assert not equation.update(draw(0, 2e-4), level_m, draw(0, 100.0))
+    assert found_on_a_boat(math.radians(roll_deg)) == 0
+
+
+def test_a_boat_that_rolls_tells_a_wrong_sign():
+    assert found_on_a_boat(math.radians(1.2), sign=-1.0, minutes=1.0) & Finding.WATER_SIGN
 
 
 ZEROS = (math.radians(0.3), 0.044, 870.0)
