@@ -46,7 +46,7 @@ def test_thresholds_are_those_of_the_safety_manual():
 @pytest.mark.parametrize("name", LIMITS)
 def test_no_threshold_is_beyond_what_switches_a_protection_off(name):
     most = LIMITS[name][1]
-    least = 1 if name == "overruns_in_ten" else most * 1e-6
+    least = {"overruns_in_ten": 1, "heel_limit_rad": 1e-3}.get(name, most * 1e-6)
     for value in (least, most):
         assert getattr(SafetyLimits(**{name: value}), name) == value
     above = most + 1 if name == "overruns_in_ten" else math.nextafter(most, math.inf)
