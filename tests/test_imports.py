@@ -55,10 +55,10 @@ print(*loaded)
 """
 
 
-def loaded_by(source):
+def loaded_by(source, heavy=HEAVY):
     """Heavy packages that a new interpreter holds after running `source`."""
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", source + CHECK.format(heavy=HEAVY)],
+        [sys.executable, "-W", "error", "-c", source + CHECK.format(heavy=heavy)],
         capture_output=True,
         text=True,
         timeout=280,
@@ -75,6 +75,11 @@ def loaded_by(source):
 )
 def test_controllers_process_loads_nothing_heavy(source):
     assert loaded_by(source) == ""
+
+
+def test_scipy_is_loaded_with_the_first_design():
+    """It takes a third of a command's start."""
+    assert loaded_by(COMMAND, ("scipy",)) == ""
 
 
 def test_margins_are_judged_without_anything_heavy_because_run_does_it_first():

@@ -8,7 +8,6 @@ to the pump. Sensors, limiter and drive run every tick, level gauges and level o
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from utank_hil.analysis.loop.loop_ticks import (
     LEVEL_TICKS,
@@ -78,6 +77,8 @@ def between(motion: FloatArray, step_s: float, ticks: int) -> FloatArray:
     `motion`, shape (n, 4), is at multiples of `step_s`. Between them roll and level are cubics that
     have its values and rates: off by (w step_s)^4 / 384 of a wave's amplitude, 5e-8 at 1.3 rad/s.
     """
+    from scipy.interpolate import CubicHermiteSpline  # A third of the start, for campaigns alone.
+
     times = step_s * np.arange(len(motion))
     found = np.empty((ticks * (len(motion) - 1), len(STATES)))
     inside = step_s / ticks * np.arange(len(found))

@@ -207,6 +207,7 @@ def _tuned(design: SelfTunedDesign, plant: DesignPlant, loads_peak: float) -> Se
     return self_tuned(plant, sea, mean_power_w=design.mean_power_w, loads_peak=loads_peak)
 
 
+@lru_cache(maxsize=16)
 def unknown_sea(ship: RollShip) -> SeaModel:
     """A broad sea, mostly above the roll frequency, for a law whose sea is unknown."""
     w = ship.natural_frequency_rad_s
