@@ -130,6 +130,15 @@ def test_water_that_does_not_creep_as_it_is_pressed_is_found_within_three_second
     assert found == told
 
 
+@pytest.mark.parametrize("opening", [THROTTLED, 1.0])
+def test_water_that_is_met_behind_an_open_valve_says_nothing_at_first(opening):
+    quay = Quay()
+    quay.level_m = -2.0
+    pressure_pa = TANK.balance_pa(-2.0, quay.heel_rad) - 10.0
+    assert quay.run(0.5, opening=opening, pressure_pa=pressure_pa) == 0
+    assert quay.run(30) == 0
+
+
 def test_a_leak_is_found_before_a_tenth_of_a_metre_and_a_drift_of_a_gauge_is_not():
     quay = Quay()
     quay.run(20)

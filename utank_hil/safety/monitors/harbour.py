@@ -36,6 +36,8 @@ SEATED_S: Final = 3.0
 """Time after which the water behind a shut valve is at rest."""
 TRAVEL_M: Final = 0.15
 """Way of the level after which it is judged: thirty times a gauge's noise."""
+LEAST_LOSS: Final = 0.01
+"""Of the throttle: an open valve has none, and water that swings goes no faster."""
 FEW: Final = 1 / 3
 MANY: Final = 3.0
 """Ways of less and more than this are wrong. The loss of a valve is known by half."""
@@ -82,7 +84,8 @@ class HarbourWatch:
         self._shut_s = self._moved_s = 0.0
         self._marks = (math.nan, 0.0), (math.nan, 0.0)  # mean heels while shut, and when
         self._heel_rad = self._trend_rad_s = self._level_m = math.nan  # as a pumping began
-        self._begin_m = self._travel_m = 0.0
+        self._least_loss = LEAST_LOSS * tank.throttle_loss
+        self._begin_m, self._travel_m = math.nan, 0.0  # unknown where it starts with an open valve
         self._fast_m = self._mean_m = math.nan
         self._too_little = self._too_much = 0
         self._told = 0
@@ -140,7 +143,8 @@ class HarbourWatch:
             self._shut_s = self._moved_s = 0.0
             self._begin_travel(level_m)
         driving_pa = measured.pressure_pa - self._tank.balance_pa(level_m, roll_rad)
-        speed_m_s = math.sqrt(abs(driving_pa) / self._loss(measured.valve_opening))
+        loss = max(self._loss(measured.valve_opening), self._least_loss)
+        speed_m_s = math.sqrt(abs(driving_pa) / loss)
         self._travel_m += math.copysign(speed_m_s, driving_pa) * period_s
         moved_m = level_m - self._begin_m
         if self._travel_m < 0:
