@@ -3,7 +3,6 @@
 import os
 import signal
 import threading
-from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
@@ -85,8 +84,7 @@ def few_rolls(monkeypatch):
     """Predict from a tenth of the ship's time, for what does not judge the figures."""
     from firmware_sim import prediction
 
-    one = partial(prediction.predict, seeds=prediction.SEEDS[:1])
-    monkeypatch.setattr(prediction, "predict", one)
+    monkeypatch.setattr(prediction.predict, "__defaults__", (prediction.SEEDS[:1],))
     monkeypatch.setattr(prediction, "ROLLS", 4)
 
 

@@ -100,6 +100,7 @@ def test_period_by_the_weather_criterion_is_said_in_the_file(
     assert "weather criterion's formula" in (project(TRAWLER)[0] / "ship.yaml").read_text()
 
 
+@pytest.mark.usefixtures("few_rolls")
 def test_what_to_do_next_can_be_done_under_any_name(tmp_path: Path) -> None:
     name = 'The "Rolling\nStone": #1'
     done = run(tmp_path, PATROL, "--name", name)
