@@ -37,6 +37,7 @@ _OF_ANY_OPENING: Final = (
 
 MOST_PRESSURE_PA: Final = 250e3
 """Largest pressure of PUMP_CMD: the codec cuts larger ones without the controller's knowledge."""
+MOST_ROLL_RATE_RAD_S: Final = 1.0  #: Of SENSOR_MOTION; a faster roll is told as not available.
 LEAST_PAUSE_S: Final = 600.0  #: Shortest time between two scheduled retunings.
 COMMAND_S: Final = 0.02  #: Share of the delay that the cycle of the pump's commands takes.
 MOST_PULSES_S: Final = 3600.0
@@ -111,6 +112,17 @@ class ControllerConfig(Section):
                 f"{self.safety.roll_limit_rad:g}, safety.roll_limit_rad: set it lower"
             )
             found.append(("retuning.roll_limit_rad", reason))
+        rate_rad_s = self.safety.roll_limit_rad * self.vessel.ship.natural_frequency_rad_s
+        devices = self.vessel.devices
+        native = devices is None or devices.motion.native
+        if native and rate_rad_s > MOST_ROLL_RATE_RAD_S:
+            seen_rad = MOST_ROLL_RATE_RAD_S / self.vessel.ship.natural_frequency_rad_s
+            reason = (
+                f"is passed at {rate_rad_s:.2g} rad/s in a roll of the ship's period, and "
+                f"SENSOR_MOTION tells {MOST_ROLL_RATE_RAD_S:g} at most: control ends from "
+                f"{seen_rad:.2g} rad on, as the motion is unknown"
+            )
+            found.append(("safety.roll_limit_rad", reason))
         return [*found, *controller_warnings(self), *self.held_pressure_problems()]
 
     def held_pressure_problems(self) -> list[Problem]:
