@@ -32,6 +32,11 @@ def environment(heard: socket.socket, watchdog_us: int = 500_000) -> dict[str, s
     return {"NOTIFY_SOCKET": heard.getsockname(), "WATCHDOG_USEC": str(watchdog_us)}
 
 
+def test_a_watchdog_that_is_no_number_is_said(manager) -> None:
+    with pytest.raises(OSError, match="WATCHDOG_USEC=soon is no number of microseconds"):
+        ServiceManager(environment(manager) | {"WATCHDOG_USEC": "soon"})
+
+
 def messages(heard: socket.socket) -> list[str]:
     heard.setblocking(False)
     found = []

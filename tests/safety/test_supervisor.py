@@ -362,6 +362,15 @@ def test_without_pressure_no_fault_is_latched_but_what_must_switch_the_drive_off
     assert bench.tick(command_pa=1e4, **sign).mode is not Mode.FAULT
 
 
+@pytest.mark.parametrize(("calm_s", "arms"), [(15, False), (21, True)])
+def test_a_ship_that_rolls_in_30_s_is_not_armed_between_two_rolls_over_the_limit(calm_s, arms):
+    bench = Bench()
+    bench.tick(roll_rad=1.0)
+    bench.now_ns += round(calm_s * 1e9)
+    bench.tick()
+    assert bench.tick(**ARMING).arming is arms
+
+
 def test_a_drive_that_was_out_before_arming_is_no_reason_to_refuse_it():
     bench = Bench()
     bench.tick()

@@ -33,8 +33,11 @@ class ServiceManager(Closing):
         except OSError:
             self.close()
             raise
-        watchdog_ns = 1000 * int(environment.get("WATCHDOG_USEC", "0"))
-        if watchdog_ns:
+        watchdog_us = environment.get("WATCHDOG_USEC", "0")
+        if not watchdog_us.isdecimal():
+            self.close()
+            raise OSError(f"WATCHDOG_USEC={watchdog_us} is no number of microseconds")
+        if watchdog_ns := 1000 * int(watchdog_us):
             self._every_ticks = max(1, watchdog_ns // (_FEEDS * TICK_NS))
 
     def ready(self, status: str) -> None:

@@ -18,8 +18,8 @@ if TYPE_CHECKING:  # who prints the words of a fault needs no ship
     from utank_hil.safety.safety_limits import SafetyLimits
     from utank_hil.safety.situation import Situation
 
-ROLL_CALM_S: Final = 10
-"""Half the roll period of a ship that rolls slowly: from one greatest roll to the next."""
+ROLL_CALM_S: Final = 20
+"""Half the roll period of a ship that rolls slowly, 40 s: from one greatest roll to the next."""
 
 Holds: TypeAlias = "Callable[[Situation, SafetyLimits], bool]"
 
