@@ -215,6 +215,7 @@ def test_every_frame_is_heard_and_only_whole_ones_are_intact_whatever_their_coun
     assert (state(rx), rx.heard, dict(rx.rejected), rx.valid) == before
     assert rx.rejected == {
         Rejection.LENGTH: 1, Rejection.CRC: 1, Rejection.REPEATED: 1, Rejection.SEQUENCE: 1,
+        Rejection.PROOF: 0,
     }  # fmt: skip
 
 

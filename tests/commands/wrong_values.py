@@ -84,7 +84,7 @@ WRONG: list[tuple[str, dict[str, object], dict[str, str]]] = [
       "safety.tank_age_ms": "(got -1)", "safety.drive_age_ms": "(got 1001)",
       "safety.echo_age_ms": "at most 1000", "safety.panel_age_armed_ms": "at most 10000",
       "safety.arming_timeout_ms": "must be above 0", "safety.roll_limit_rad": "at most 0.7",
-      "safety.heel_limit_rad": "at most 0.28", "safety.bus_load_limit": "at most 0.85",
+      "safety.heel_limit_rad": "must be 0.001 to 0.28", "safety.bus_load_limit": "at most 0.85",
       "safety.overruns_in_ten": "must be 1 to 10"}),
     ("gpc", {"limits__pressure_pa": 60e3, "limits__level_m": 6.0},
      {"limits.pressure_pa": "set it to 50000 or less", "limits.level_m": "set it to 4.88 or less"}),
