@@ -362,15 +362,6 @@ def test_without_pressure_no_fault_is_latched_but_what_must_switch_the_drive_off
     assert bench.tick(command_pa=1e4, **sign).mode is not Mode.FAULT
 
 
-@pytest.mark.parametrize(("calm_s", "arms"), [(15, False), (21, True)])
-def test_a_ship_that_rolls_in_30_s_is_not_armed_between_two_rolls_over_the_limit(calm_s, arms):
-    bench = Bench()
-    bench.tick(roll_rad=1.0)
-    bench.now_ns += round(calm_s * 1e9)
-    bench.tick()
-    assert bench.tick(**ARMING).arming is arms
-
-
 def test_a_drive_that_was_out_before_arming_is_no_reason_to_refuse_it():
     bench = Bench()
     bench.tick()
@@ -724,10 +715,11 @@ def test_what_is_latched_or_refuses_is_raised_in_that_tick_alone():
 
 
 @pytest.mark.parametrize("roll_rad", [0.36, -0.36])
-def test_a_ship_that_rolls_beyond_her_limit_is_not_armed_as_she_passes_upright(roll_rad):
+def test_a_ship_that_rolls_beyond_its_limit_is_not_armed_as_it_passes_upright(roll_rad):
+    """Twenty seconds are half a roll of the slowest ships."""
     bench = Bench()
     bench.tick(roll_rad=roll_rad)
-    for _ in range(998):
+    for _ in range(1998):
         bench.tick()
     assert not bench.tick(**ARMING).arming
     assert (bench.supervisor.fault, bench.supervisor.raised) == (Fault.HEEL_LIMIT,) * 2
