@@ -1,6 +1,7 @@
 """``utank-hil identify sea``: the waves of a record, for the bench."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -48,63 +49,82 @@ def sea(
     **Example:** utank-hil identify sea out/bench.rrd --ship configs/ships/thesis_first.yaml
     """
     from utank_hil.pictures.identification import draw_waves
-    from utank_hil.telemetry.signal_files import read_signals, require
 
     vessel = common.load(ship, Vessel)
     low_s, high_s = -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s
-    names = ("time_s", "roll_rad", "port_level_m", "starboard_level_m")
+    name, columns = _columns(log, run, channel, (low_s, high_s))
     try:
-        runs = read_signals(
-            log, say_note, channel=channel, names=names[1:], between_s=(low_s, high_s)
-        )
-        name = common.chosen_run(log, runs, run)
-        require(log, runs[name], *names)
-    except (OSError, ValueError) as error:
-        common.fail(error)
-    time_s, roll, port, starboard = (runs[name][each] for each in names)
-    part = (time_s >= low_s) & (time_s <= high_s)
-    try:
-        if not part.any() or float(np.ptp(time_s[part])) < SHORTEST_S:
-            raise ValueError(f"is shorter than {SHORTEST_S:g} s: take a longer part")
-        if (np.diff(time_s[part]) <= 0).any():
-            raise ValueError("needs rising times: sort the rows, and keep one of each time")
-        roll_rad, level_m = (
-            even_means(time_s[part], each[part]) for each in (roll, (starboard - port) / 2)
-        )
+        roll_rad, level_m = _samples(columns, low_s, high_s)
     except ValueError as error:
         refuse(f"{log}: {error}", json_)
     slope_rad, heeling_nm = wave_slope(
         roll_rad, level_m, STEP_S, RollModel(vessel.ship, vessel.tank)
     )
     found = beam_sea(slope_rad, STEP_S, slope)
+    if not found.amplitude_m.any():
+        refuse(f"{log}: the ship does not move", json_)
     out = common.prepare_out(out, (FILE, PICTURE))
     about = describe("identify sea", vessel, out, options=context.params)
-    file = write_components(found, out / FILE)
     title = f"{log.name}, {name}"
-    picture = draw_waves(roll_rad, slope_rad, STEP_S, out / PICTURE, title, about)
-    energy = found.slope.amplitude**2
-    if not energy.any():
-        refuse(f"{log}: the ship does not move", json_)
+    files = {
+        "sea": write_components(found, out / FILE),
+        "picture": draw_waves(roll_rad, slope_rad, STEP_S, out / PICTURE, title, about),
+    }
     figures = {
         "slope_rms_rad": slope * math.sqrt(found.slope.variance),
-        "mean_frequency_rad_s": float(np.average(found.omega_rad_s, weights=energy)),
+        "mean_frequency_rad_s": float(
+            np.average(found.omega_rad_s, weights=found.slope.amplitude**2)
+        ),
         "heeling_moment_nm": heeling_nm,
-        "components": len(energy),
+        "components": len(found.omega_rad_s),
         "duration_s": STEP_S * len(slope_rad),
     }
-    files = {"sea": file, "picture": picture}
     if json_:
-        common.print_json(
-            about | figures | {"files": {key: str(path) for key, path in files.items()}}
-        )
-        return
+        paths = {key: str(path) for key, path in files.items()}
+        common.print_json(about | figures | {"files": paths})
+    else:
+        _print(figures, slope, files)
+
+
+def _columns(
+    log: Path, run: str | None, channel: str | None, between_s: tuple[float, float]
+) -> tuple[str, list[FloatArray]]:
+    """Return the name of the run, and its times, roll and the levels of both sides."""
+    from utank_hil.telemetry.signal_files import read_signals, require
+
+    names = ("time_s", "roll_rad", "port_level_m", "starboard_level_m")
+    try:
+        runs = read_signals(log, say_note, channel=channel, names=names[1:], between_s=between_s)
+        name = common.chosen_run(log, runs, run)
+        require(log, runs[name], *names)
+    except (OSError, ValueError) as error:
+        common.fail(error)
+    return name, [runs[name][each] for each in names]
+
+
+def _samples(
+    columns: list[FloatArray], low_s: float, high_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return roll and level every `STEP_S`; ValueError says what the record lacks."""
+    time_s, roll_rad, port_m, starboard_m = columns
+    part = (time_s >= low_s) & (time_s <= high_s)
+    if not part.any() or float(np.ptp(time_s[part])) < SHORTEST_S:
+        raise ValueError(f"is shorter than {SHORTEST_S:g} s: take a longer part")
+    if (np.diff(time_s[part]) <= 0).any():
+        raise ValueError("needs rising times: sort the rows, and keep one of each time")
+    level_m = (starboard_m - port_m) / 2
+    return even_means(time_s[part], roll_rad[part]), even_means(time_s[part], level_m[part])
+
+
+def _print(figures: Mapping[str, float], slope: float, files: Mapping[str, Path]) -> None:
     terminal = Terminal()
     table = new_table("Waves of the record", "value")
+    waves = f"waves from {BAND_RAD_S[0]:g} to {BAND_RAD_S[1]:g} rad/s"
     for row in (
         ("effective wave slope, ° RMS", f"{math.degrees(figures['slope_rms_rad']):.3g}"),
         ("mean frequency, rad/s", f"{figures['mean_frequency_rad_s']:.3g}"),
-        (f"waves from {BAND_RAD_S[0]:g} to {BAND_RAD_S[1]:g} rad/s", f"{len(energy)}"),
-        ("steady heeling moment, kN m", f"{heeling_nm / 1e3:.3g}"),
+        (waves, f"{figures['components']}"),
+        ("steady heeling moment, kN m", f"{figures['heeling_moment_nm'] / 1e3:.3g}"),
         ("length, after which it repeats, s", f"{figures['duration_s']:.0f}"),
     ):
         table.add_row(*row)
