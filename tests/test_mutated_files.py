@@ -651,6 +651,12 @@ def test_a_file_that_ends_its_librarys_process_is_refused(name, mutation, tmp_pa
         begun.one([mutation])
 
 
+def test_a_time_beyond_the_processors_integers_is_refused_in_words(tmp_path, capfd):
+    reader = KINDS_OF_FILES["41010w2019.txt"]
+    with trial(placed(reader, tmp_path), reader.read, capfd, reader.streamed) as begun:
+        begun.one([("number", 244472, 135, 65389), ("number", 602173, 22, 32720)])
+
+
 @pytest.mark.evidence
 @pytest.mark.timeout(0)
 @pytest.mark.parametrize("name", KINDS_OF_FILES)

@@ -268,7 +268,7 @@ def _time(words: list[str]) -> np.datetime64:
     try:
         year, *rest = (int(word) for word in words)
         moment = datetime(year + 1900 if year < 100 else year, *rest)  # type: ignore[arg-type]  # 3 or 4 integers
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise ValueError(f"bad time {' '.join(words)!r}: {error}") from None
     return np.datetime64(moment, "s")
 
