@@ -1,1 +1,0 @@
-"""Adaptive fuzzy laws."""
