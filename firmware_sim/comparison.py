@@ -12,7 +12,7 @@ from firmware_sim.plant_kernel import CAPSIZE_RAD
 from utank_hil.analysis.motion.statistics import batch_means, mean_interval, rms_batches
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Mode
-from utank_hil.telemetry.recording import read_about
+from utank_hil.telemetry.recording_reader import read_about
 from utank_hil.telemetry.signal_files import read_signals, require
 
 

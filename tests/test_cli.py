@@ -16,7 +16,7 @@ from firmware_sim.cli import app as ship_app
 from utank_hil.cli import app
 from utank_hil.cli import commands as entry_points
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.telemetry.recording import read_recording
+from utank_hil.telemetry.recording_reader import read_recording
 
 CONFIGS = Path("configs").resolve()
 SHIPPED = sorted((CONFIGS / "controllers").glob("*.yaml"))

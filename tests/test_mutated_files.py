@@ -426,7 +426,7 @@ READERS = [
     Reader("a.frames", made_log, records, streamed=True, cost=0.7),
     Reader("a.csv", made_signals, read_signals, cost=2),
     Reader("a.parquet", made_signals, read_signals, cost=2),
-    Reader("a.rrd", made_rrd, read_signals, cost=4),
+    Reader("a.rrd", made_rrd, read_signals, cost=1300),
     Reader("41010w2019.txt", made_ndbc, load_ndbc),
     Reader("a.nc", made_netcdf, load_directional, cost=16),
     Reader("moments.csv", made_moments, MomentTable.read, cost=0.4),

@@ -52,7 +52,7 @@ def test_items_come_in_their_order(capfd):
 def test_an_exception_becomes_its_words():
     items = apart(refused)
     assert next(items) == 1
-    with pytest.raises(ValueError, match=r"^\"the file's words\\nand more\"$"):
+    with pytest.raises(ValueError, match=r"^KeyError: \"the file's words\\nand more\"$"):
         next(items)
 
 

@@ -24,7 +24,7 @@ from utank_hil.base.provenance import commit, describe, headline, kernels, machi
 from utank_hil.cli import app
 from utank_hil.commands.recording import RunRecording
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
-from utank_hil.telemetry.recording import read_about
+from utank_hil.telemetry.recording_reader import read_about
 
 CONFIGS = Path("configs")
 PATTI_B = CONFIGS / "scenarios" / "patti_b.yaml"

@@ -12,7 +12,7 @@ from two_processes import CHANNEL, CONFIGS, Program, patient_controller
 from tools.vcan_launcher.linux import can_is_usable, create_vcan
 from utank_hil.canbus import Mode
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.telemetry.recording import read_recording
+from utank_hil.telemetry.recording_reader import read_recording
 
 pytestmark = [pytest.mark.evidence, pytest.mark.socketcan, pytest.mark.timeout(900)]
 

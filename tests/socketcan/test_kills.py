@@ -29,7 +29,7 @@ from two_processes import (
 
 from utank_hil.canbus import DriveState, Fault, Mode
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.telemetry.recording import read_recording
+from utank_hil.telemetry.recording_reader import read_recording
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.evidence, pytest.mark.timeout(7200)]
 

@@ -18,7 +18,7 @@ from utank_hil.configuration import load_config
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.telemetry.frame_log import FrameLog
-from utank_hil.telemetry.recording import read_recording
+from utank_hil.telemetry.recording_reader import read_recording
 from utank_hil.telemetry.replay import replay_log
 from utank_hil.telemetry.replay_head import recorded_config
 

@@ -23,7 +23,7 @@ from two_processes import (
 from utank_hil.canbus import ControlWord, DriveState, Fault, Mode
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.safety.faults import fault_text
-from utank_hil.telemetry.recording import read_recording
+from utank_hil.telemetry.recording_reader import read_recording
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
 

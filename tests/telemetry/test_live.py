@@ -20,7 +20,7 @@ from utank_hil.commands.monitor import _chosen
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.events import EventWriter
 from utank_hil.telemetry.live import LiveRun, LiveStream, live_runs
-from utank_hil.telemetry.recording import _read_chunks, read_about, read_recording
+from utank_hil.telemetry.recording_reader import _chunks, read_about, read_recording
 from utank_hil.telemetry.ring import RowWriter, ring_names
 from utank_hil.telemetry.viewer import rerun_binary, rerun_environment
 
@@ -143,10 +143,10 @@ def test_a_late_viewer_has_data_layout_events_and_what_comes(tmp_path):
             ring.close()
             assert not stream.send()
     name = "TextLog:text"
-    log = [chunk.to_record_batch().column(name) for chunk in _read_chunks(file, name)]
+    log = [chunk.to_record_batch().column(name) for chunk in _chunks(file, name)]
     texts = [text for column in log for (text,) in column.to_pylist()]
     assert "retuning REFUSED: too short" in texts
-    pictures = _read_chunks(file, "LineStrips2D:strips")
+    pictures = _chunks(file, "LineStrips2D:strips")
     assert any(chunk.entity_path == "/1/live/scene/ship/water" for chunk in pictures)
     with pytest.warns(RerunWarning, match="no footer"):
         assert len(RrdReader(file).blueprints()) == 1

@@ -31,7 +31,7 @@ from utank_hil.telemetry.recorder_process import (
     RecorderState,
     RecordingTask,
 )
-from utank_hil.telemetry.recording import read_recording
+from utank_hil.telemetry.recording_reader import read_recording
 from utank_hil.telemetry.ring import RowWriter
 
 pytestmark = pytest.mark.slow

@@ -1,5 +1,9 @@
 """Recordings: what is written comes back, whatever happened to the file's end."""
 
+import signal
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
@@ -7,7 +11,8 @@ from rerun.chunk import RrdReader
 from utank_hil.canbus.enumerations import Fault, RetuningState
 from utank_hil.canbus.events import RetuningEvent
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.recording import read_recording, write_recording
+from utank_hil.telemetry.recording import write_recording
+from utank_hil.telemetry.recording_reader import read_recording
 
 COLUMNS = (*SIGNALS, "true_roll_rad", "wave_moment_nm")
 
@@ -145,6 +150,20 @@ def test_an_hour_of_three_runs_takes_little_more_room_than_its_numbers(tmp_path)
     file = tmp_path / "hour.rrd"
     write_recording(file, COLUMNS, runs)
     assert file.stat().st_size < 1.1 * sum(rows.nbytes for rows in runs.values())
+
+
+def test_a_recording_that_aborts_its_reader_is_refused_in_words(tmp_path):
+    file = tmp_path / "a.rrd"
+    rows = np.column_stack([np.arange(3) * 0.1, np.zeros(3)])
+    write_recording(file, ["time_s", "roll_rad"], {"a": rows}, about={"version": "1"})
+    content = bytearray(file.read_bytes())
+    content[484] = 0xFF  # It is in the head of the first block, where Rerun 0.41 aborts.
+    file.write_bytes(content)
+    code = "import rerun.chunk as c, sys; c.RrdReader(sys.argv[1]).stream().to_chunks()"
+    command = [sys.executable, "-c", code, file]
+    assert subprocess.run(command, capture_output=True, check=False).returncode == -signal.SIGABRT
+    with pytest.raises(ValueError, match=r"a\.rrd: it is damaged: its reader ends by signal 6"):
+        read_recording(file)
 
 
 def test_what_is_no_recording_is_refused(tmp_path):

@@ -18,7 +18,7 @@ from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.events import EventWriter
 from utank_hil.telemetry.frame_log import LAYOUT, FrameLog, Kind, frame_ring
 from utank_hil.telemetry.recorder_process import RecorderProcess, RecorderReport, RecordingTask
-from utank_hil.telemetry.recording import read_about, read_recording
+from utank_hil.telemetry.recording_reader import read_about, read_recording
 from utank_hil.telemetry.ring import RowWriter
 from utank_hil.telemetry.rotation import make_room, part_of, remove_oldest
 

@@ -7,7 +7,8 @@ import pytest
 
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.recording import _read_chunks, highlight_s, write_recording
+from utank_hil.telemetry.recording import write_recording
+from utank_hil.telemetry.recording_reader import _chunks, highlight_s
 from utank_hil.telemetry.scene import PERIOD_S, SceneSize, scene_size
 
 SIZE = SceneSize(width_m=17.0, height_m=5.0, lz_m=2.0, level_limit_m=4.0, pressure_pa=5e4)
@@ -67,7 +68,7 @@ def test_a_recording_has_pictures_in_time_and_words_on_a_change(tmp_path):
     drawn = {
         chunk.entity_path.removeprefix("/1/run/scene/"): chunk.to_record_batch()
         for component in ("Transform3D:quaternion", "LineStrips2D:strips")
-        for chunk in _read_chunks(file, component)
+        for chunk in _chunks(file, component)
         if not chunk.is_static
     }
     assert set(drawn) == {"ship", "twin", "ship/water"}
@@ -81,7 +82,7 @@ def test_a_recording_has_pictures_in_time_and_words_on_a_change(tmp_path):
         np.testing.assert_allclose(angles, expected, atol=1e-7)
     words = [
         (time, text)
-        for chunk in _read_chunks(file, "TextDocument:text")
+        for chunk in _chunks(file, "TextDocument:text")
         if chunk.entity_path == "/1/run/words"
         for time, text in zip(
             chunk.to_record_batch().column("time").to_pylist(),

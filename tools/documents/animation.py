@@ -21,7 +21,7 @@ from matplotlib.transforms import Affine2D
 from PIL import Image
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.telemetry.recording import read_about, read_recording
+from utank_hil.telemetry.recording_reader import read_about, read_recording
 from utank_hil.telemetry.scene import (
     HULL,
     LIMIT,

@@ -1,7 +1,7 @@
 """Readers of compiled libraries in a process of their own, which a damaged file may end.
 
-scipy's reader of MATLAB files and asammdf trust the file: of a thousand damaged ones up to ten end
-their process with a segmentation fault, and the program with it.
+scipy's reader of MATLAB files, asammdf and Rerun trust the file: of a thousand damaged ones up to
+ten end their process with a signal, and the program with it.
 """
 
 import os
@@ -26,7 +26,9 @@ with Connection(int(sys.argv[1]), readable=False) as out:
             out.send(("item", item))
         out.send(("end", ""))
     except Exception as error:
-        text = str(error).strip() or type(error).__name__
+        text = str(error).strip()
+        if not text or not isinstance(error, (OSError, RuntimeError, ValueError)):
+            text = type(error).__name__ + ": " + text
         out.send(("error", text.splitlines()[0][:300]))
 """
 
@@ -63,7 +65,8 @@ def apart(function: Callable[..., Any], *arguments: Any, **options: Any) -> Iter
                     return
                 yield content
         except (EOFError, BrokenPipeError) as error:
-            reason = f"its reader ends by signal {-process.wait()}"
+            end = process.wait()
+            reason = f"its reader ends by {f'signal {-end}' if end < 0 else f'exit code {end}'}"
             raise ValueError(f"it is damaged: {reason}") from error
         finally:
             process.kill()

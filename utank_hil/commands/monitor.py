@@ -42,7 +42,7 @@ def monitor(
     **Example:** utank-hil monitor out
     """
     from utank_hil.telemetry.live import LiveStream, live_runs
-    from utank_hil.telemetry.recording import highlight_s
+    from utank_hil.telemetry.recording_reader import highlight_s
 
     if source is not None and source.startswith(LIVE):
         watch(source)

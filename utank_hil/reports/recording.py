@@ -17,6 +17,7 @@ from utank_hil.pictures import BenchCurve, draw_bench
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
 from utank_hil.reports.page import Report, about_section
 from utank_hil.safety.faults import fault_text
+from utank_hil.telemetry.recording_reader import in_service, read_about, read_recording
 from utank_hil.telemetry.rotation import whole_of
 
 
@@ -42,8 +43,6 @@ def recording_report(file: Path) -> Report:
     Raises `OSError, ValueError` if the file is no recording, one of several runs, one of hardly
     any rows, or of another version.
     """
-    from utank_hil.telemetry.recording import read_about, read_recording
-
     runs = read_recording(file)
     if len(runs) > 1:
         names = ", ".join(runs)
@@ -80,8 +79,6 @@ def _verdict(rows: dict[str, FloatArray], alarms: list[_Event]) -> Verdict:
         lines.append(f"In charge for {active.mean():.0%} of the time: {_rolled(rows, active)}.")
     else:
         lines.append("The controller was never in charge.")
-    from utank_hil.telemetry.recording import in_service  # It imports Rerun.
-
     codes = np.unique(rows["fault"][in_service(rows)])
     faults = [Fault(int(code)) for code in codes if code != Fault.NONE]
     lines += [fault_text(fault) for fault in faults]

@@ -31,6 +31,7 @@ from utank_hil.telemetry.bus_files.log import BusLog, source_of
 from utank_hil.telemetry.bus_logs import LoggedController
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
 from utank_hil.telemetry.logged_signals import Columns, signal_parts, signal_table
+from utank_hil.telemetry.recording_reader import read_recording
 from utank_hil.telemetry.replay import Entry, entries_of
 from utank_hil.telemetry.units import column_of
 
@@ -68,8 +69,6 @@ def read_signals(
     refuse_device(path)
     path.open("rb").close()  # Readers may give a less precise reason.
     if suffix == ".rrd":
-        from utank_hil.telemetry.recording import read_recording  # This imports Rerun.
-
         return read_recording(path)
     if not is_table(path):
         columns = signal_table(logged_parts(path, note, channel), names, between_s, path)
