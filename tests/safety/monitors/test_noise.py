@@ -1,4 +1,5 @@
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -6,7 +7,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from moving_ship import THRESHOLDS
 
-from utank_hil.safety.monitors.noise import Noise, SecondDifference, within
+from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.safety.monitors.noise import (
+    DerivativeFilter,
+    Noise,
+    SecondDifference,
+    most_pushes_of_noise,
+    within,
+)
+from utank_hil.safety.monitors.tank_equation import MEMORY_PERIODS, STILL_PUSHES
+from utank_hil.safety.monitors.thresholds import thresholds_of
 
 LIMIT = 0.5
 
@@ -62,3 +72,38 @@ def test_noise_ten_times_the_figure_is_found_within_two_seconds(times, expected)
         rate = 0.06 * math.sin(0.6 * 0.05 * k) + times * 5e-4 * random.standard_normal()
         found |= noise.update(smooth.update(rate), 0.05)
     assert found is expected
+
+
+def pushes_of_noise(period_s, hours=10):
+    """What gauges of unit push look like to a tank of this period: the greatest, two ways."""
+    w0, step_s = 2 * math.pi / period_s, 0.1
+    keep = math.exp(-step_s / (MEMORY_PERIODS * period_s))
+    turn = keep * np.exp(1j * w0 * step_s)
+    noise = DerivativeFilter(2 * w0, step_s)
+    like_roll = power = most_power = 0.0
+    now = 0j
+    for sample in np.random.default_rng(71).normal(size=round(36e3 * hours)).tolist():
+        push = noise.update(sample) / w0**2 + 0.2 * noise.rate / w0 + noise.value
+        now = turn * now + push  # its product with a roll that is at its greatest now
+        like_roll = max(like_roll, abs(now.real))
+        power = keep * power + push * push
+        most_power = max(most_power, power)
+    return math.sqrt(2) * like_roll * (1 - keep), math.sqrt(most_power * (1 - keep))
+
+
+@pytest.mark.parametrize("period_s", [3.2, 11.0])
+def test_ten_hours_of_the_gauges_noise_stay_below_what_a_thousand_hours_may_reach(period_s):
+    found = pushes_of_noise(period_s)
+    most = most_pushes_of_noise(1.0, MEMORY_PERIODS * period_s / 0.1)
+    assert 0.6 * most[0] < found[0] < most[0]
+    assert 0.75 * most[1] < found[1] < most[1]
+
+
+@pytest.mark.parametrize("name", ["gpc", "naval_constrained_gpc", "patti_b_constrained_gpc"])
+def test_the_gauges_of_a_shipped_ship_hide_no_roll(name):
+    config = load_config(Path(f"configs/controllers/{name}.yaml"), ControllerConfig)
+    found = thresholds_of(config.plant, config.safety.roll_limit_rad, config.sensors)
+    samples = MEMORY_PERIODS * found.tank_period_s / 0.1
+    like_roll, whole = most_pushes_of_noise(found.gauge_push_m2_s2, samples)
+    assert like_roll < found.least_roll_push_m2_s2
+    assert whole < STILL_PUSHES * found.least_roll_push_m2_s2

@@ -10,6 +10,11 @@ from utank_hil.dynamics.sampling import transition_and_step
 NOISE_S: Final = 0.7
 MOST: Final = 2.0
 """A residual counts as so many limits at most: one jump is no noise."""
+NOISE_DEVIATIONS: Final = 5.4
+"""One sample of 30 million, of which 1000 h have 36, is further out."""
+LIKE_ROLL: Final = 1.2
+"""Deviation of what looks like a roll's push, over that of a sample: 0.9 where the roll is now in
+the middle, 1.2 where it is greatest, for any tank (motions of 0.7 to 1.3 w0)."""
 
 
 def within(value: float, most: float) -> float:
@@ -103,3 +108,17 @@ class DerivativeFilter:
         self.rate = rate = self._a21 * old + self._a22 * rate + self._b2 * value + self._c2 * last
         bend: float = w * (w * (value - new) - self._twice * rate)
         return bend
+
+
+def most_pushes_of_noise(of_sample: float, samples: float) -> tuple[float, float]:
+    """What gauges' noise looks like to the tank's equation, root mean square, at most in 1000 h.
+
+    `of_sample` is the push that would hold the level off by the noise of one sample, `samples` is
+    the memory. First the part that looks like a roll's push, which the memory averages. Then all of
+    it: the derivatives, filtered at 2 w0, make it up to (2 w0 / w0)^2 times as large, and a mean
+    square has two degrees of freedom a sample (Wilson and Hilferty's quantile).
+    """
+    like_roll = LIKE_ROLL * of_sample / math.sqrt(samples)
+    spread = 2 / (9 * 2 * samples)
+    root = 1 - spread + NOISE_DEVIATIONS * math.sqrt(spread)
+    return NOISE_DEVIATIONS * like_roll, 4 * of_sample * root * math.sqrt(root)

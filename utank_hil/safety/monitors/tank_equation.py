@@ -43,7 +43,7 @@ from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.monitors.noise import DerivativeFilter
+from utank_hil.safety.monitors.noise import DerivativeFilter, most_pushes_of_noise
 from utank_hil.safety.monitors.sway import SPREAD, SPREAD_OF_SHARE, Misfit, SlopePush, most_sway
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
@@ -71,8 +71,6 @@ BAND_UNEXPLAINED: Final = 1.0
 STILL_PERIODS: Final = 0.25
 STILL_PUSHES: Final = 4.0
 """Of the least push, root mean square: so much must be left unexplained by a roll that is still."""
-STILL_LEVELS: Final = 1.8
-"""Likewise of the push that holds the level off by its band: the gauges' noise looks like half."""
 CREST_PERIODS: Final = 0.1
 """A level of 0.3 m stays within its noise for so long at a crest; a longer one has no sign."""
 MEMORY_PERIODS: Final = 0.4
@@ -180,7 +178,10 @@ class TankEquation:
         self._keep = exp(-period_s / (memory * thresholds.tank_period_s))
         self._late_keep = exp(-period_s / (LATE_PERIODS * thresholds.tank_period_s))
         # sums of so many squares of the least push
-        roll, pump = thresholds.least_roll_push_m2_s2, thresholds.least_pump_push_m2_s2
+        samples = memory * thresholds.tank_period_s / period_s
+        like_roll, whole = most_pushes_of_noise(thresholds.gauge_push_m2_s2, samples)
+        roll = max(thresholds.least_roll_push_m2_s2, like_roll)
+        pump = thresholds.least_pump_push_m2_s2
         self._least_xx, self._least_pp = (x * x / (1 - self._keep) for x in (roll, pump))
         late_share = LATE_PUSHES * roll * frequency_rad_s
         self._least_dd = late_share * late_share / (1 - self._late_keep)
@@ -190,8 +191,7 @@ class TankEquation:
         self._level_still_m = thresholds.level_still_m
         self._crest_samples = round(CREST_PERIODS * thresholds.tank_period_s / period_s)
         self._still_samples = round(STILL_PERIODS * thresholds.tank_period_s / period_s)
-        held = STILL_LEVELS * self._stiffness * thresholds.level_still_m
-        self._most_unmoved = max(STILL_PUSHES * roll, held)
+        self._most_unmoved = max(STILL_PUSHES * thresholds.least_roll_push_m2_s2, whole)
         self._late_limit_s = thresholds.motion_late_s
         self._spike_m = thresholds.level_spike_m
         self._most_step_m = thresholds.level_most_m_s * period_s

@@ -27,9 +27,6 @@ LEAST_ROLL_DEG: Final = 0.2
 ROLL_PUSH_AT_W0: Final = 0.6
 """The tank's equation judges from so many degrees RMS on, which push the water by this share of
 g L phi at w0: the least of the shipped tanks, the naval vessel's (Patti-B's has 0.93)."""
-GAUGE_SHARE: Final = 0.34
-"""And from this share of the push that holds a level off by its band on, which the gauges' noise
-looks like: Patti-B's, the least of the shipped ships."""
 ZERO_HEEL_DEG: Final = 0.3
 """Steady heel by which motion sensor, gauges and pressure sensor may disagree about the water."""
 
@@ -79,6 +76,7 @@ class MonitorThresholds:
     #: pressure over density, below which the tank's equation says nothing.
     least_roll_push_m2_s2: float
     least_pump_push_m2_s2: float
+    gauge_push_m2_s2: float  #: Push that would hold the level off by the noise of a sample.
     zero_push_m2_s2: float  #: Constant push that the sensors' zeros may feign, all together.
     motion_late_s: float  #: Delay of the motion sensor.
     pressure_error_pa: float  #: Error of the pump's pressure against the model of the drive.
@@ -105,8 +103,6 @@ def thresholds_of(
     fastest_rad_s = 2 * frequency_rad_s
     roll_s, rate_s = sensors.roll_noise_rad, sensors.roll_rate_noise_rad_s
     roll_push_m2_s2 = math.radians(LEAST_ROLL_DEG) * ROLL_PUSH_AT_W0 * GRAVITY_M_S2 * tank.width_m
-    level_still_m = 3 * sensors.level_noise_m
-    noise_push_m2_s2 = GAUGE_SHARE * 2 * GRAVITY_M_S2 * level_still_m
     model = RollModel(plant.ship, tank)
     held_pa = greatest_held_pa(model, limits.pressure_pa, roll_limit_rad)
     # the noise of 15 s of integrated rate, and of the roll itself
@@ -124,10 +120,11 @@ def thresholds_of(
         level_noise_m=3.75 * sensors.level_noise_m,  # in the sum of both
         drift_rad=6 * drift_s,
         roll_still_rad=5 * roll_s,
-        level_still_m=level_still_m,
+        level_still_m=3 * sensors.level_noise_m,
         volume_m=max(0.03 * tank.height_m, 6 * sensors.level_noise_m),
-        least_roll_push_m2_s2=max(roll_push_m2_s2, noise_push_m2_s2),
+        least_roll_push_m2_s2=roll_push_m2_s2,
         least_pump_push_m2_s2=0.1 * limits.pressure_pa / tank.density_kg_m3,
+        gauge_push_m2_s2=math.sqrt(2) * GRAVITY_M_S2 * sensors.level_noise_m,  # mean of two
         zero_push_m2_s2=GRAVITY_M_S2 * tank.width_m * math.radians(ZERO_HEEL_DEG),
         motion_late_s=0.2 / frequency_rad_s,
         pressure_error_pa=0.15 * limits.pressure_pa,
