@@ -154,9 +154,12 @@ def read_results(folder: Path) -> Results:
     try:
         about = json.loads(place.read_text(encoding="utf-8"))
         keys, place = tuple(about["keys"]), folder / ROWS
+        cases = _table(folder / CASES).to_pylist()
+        own = {case["case"] for case in cases}
         for row in Store(folder).rows().to_pylist():
-            rows.setdefault(row["case"], []).append(row)
-        return Results(about, keys, _table(folder / CASES).to_pylist(), rows)
+            if row["case"] in own:  # a study that was changed leaves rows of its former cases
+                rows.setdefault(row["case"], []).append(row)
+        return Results(about, keys, cases, rows)
     except StoreError:
         raise
     except (LookupError, TypeError, ValueError, pa.ArrowException) as error:
@@ -178,7 +181,7 @@ def _column(values: Iterable[Any]) -> pa.Array:
     values = list(values)
     try:
         return pa.array(values)
-    except (pa.ArrowInvalid, pa.ArrowTypeError):
+    except (pa.ArrowInvalid, pa.ArrowTypeError, OverflowError):
         return pa.array([None if value is None else str(value) for value in values])
 
 

@@ -55,13 +55,14 @@ def groups_of(results: Results) -> list[Group]:
         by_group.setdefault(tuple(each[key] for key in results.keys), []).append(each["case"])
     groups = []
     for group, names in by_group.items():
-        found = [results.rows[name] for name in dict.fromkeys(names) if name in results.rows]
+        different = dict.fromkeys(names)
+        found = [results.rows[name] for name in different if name in results.rows]
         states = [rows[0]["status"] for rows in found]
         groups.append(
             Group(
                 dict(zip(results.keys, group, strict=True)),
                 [rows for rows in found if rows[0]["status"] == OK],
-                len(names),
+                len(different),
                 states.count(FAILED),
                 len(states) - states.count(FAILED) - states.count(OK),
             )

@@ -100,4 +100,7 @@ def _short_keys(groups: list[dict[str, Any]]) -> list[str]:
 
 
 def _short(value: Any) -> str:
+    """Format the value of a key; empty in cases that do not name it."""
+    if value is None:
+        return ""
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -135,6 +135,20 @@ def test_command_resumes_counts_failures_and_compares_in_the_same_waves(run, tmp
     assert sorted((out / "rows").iterdir()) == rows
 
 
+def test_a_case_that_was_removed_from_the_study_fails_no_more_and_one_named_twice_counts_once(
+    run, tmp_path
+):
+    assert run(written(tmp_path, grid={"sea.heading_deg": [90.0, 0.0]})).exit_code == 0
+    again = run(
+        written(tmp_path, cases=[{"seed": 1}, {}, {"sea.speed_m_s": 1.0}]), "--json", "--resume"
+    )
+    found = json.loads(again.stdout)
+    assert found["failures"] == {}
+    assert [group["planned"] for group in found["groups"]] == [1, 1]
+    named = runs_table(found["groups"], "test").columns[1]
+    assert list(named.cells) == ["", "", "", "1", "1", "1"]
+
+
 def test_share_of_no_roll_is_no_figure(run, tmp_path):
     calm = {"kind": "jonswap", "hs_m": 1e-5, "tp_s": 9.0, "effective_slope": {"coefficient": 0.5}}
     done = run(written(tmp_path, set={"sea": calm}, grid={"seed": [1, 2]}), "--json")

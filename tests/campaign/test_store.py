@@ -63,8 +63,14 @@ def test_results_are_not_overwritten_unasked_and_those_of_other_cases_are_left_a
     with pytest.raises(StoreError, match="add --resume"):
         store.begin(loaded, {}, resume=False)
     found = read_results(tmp_path / "out")
-    assert [each["case"] for each in found.cases] == [loaded.cases[0].name]
+    assert [each["case"] for each in found.cases] == list(found.rows) == [loaded.cases[0].name]
     assert (tmp_path / "out" / "study.yaml").read_bytes() == loaded.path.read_bytes()
+
+
+def test_a_seed_beyond_the_integers_of_the_table_is_kept_as_text(tmp_path):
+    loaded, store = small(tmp_path, grid={"seed": [1, 10**20]}), Store(tmp_path / "out")
+    store.begin(loaded, {"keys": loaded.keys}, resume=False)
+    assert [case["seed"] for case in read_results(store.folder).cases] == ["1", f"{10**20}"]
 
 
 def test_rows_that_do_not_fit_are_named_and_those_before_stay(tmp_path):
