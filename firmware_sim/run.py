@@ -202,7 +202,12 @@ def frame_log(job: Job, desks: Tapped, block_ns: int) -> Iterator[Tap]:
     )  # fmt: skip
     with FrameLogWriter(job.frames, head) as writer:
         sink = BlockSink(writer, block_ns)
-        yield lambda controller: NodeTap(controller, sink.write, desks.taps)
+        try:
+            yield lambda controller: NodeTap(controller, sink.write, desks.taps)
+        except runners.NodeError as error:
+            if isinstance(error.__cause__, OSError):  # a full disk is no failure of the node
+                raise error.__cause__ from None
+            raise
         sink.flush()
 
 

@@ -1,5 +1,6 @@
 """A run of the bench leaves a frame log, and does the same as without one."""
 
+import errno
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from firmware_sim.scenario import Scenario
 from utank_hil.cli import app
 from utank_hil.configuration import load_config
 from utank_hil.telemetry.frame_comparison import ReplayResult
-from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.frame_log import FrameLog, FrameLogWriter
 from utank_hil.telemetry.replay import replay_log
 from utank_hil.telemetry.replay_head import recorded_config
 
@@ -94,3 +95,17 @@ def test_a_fault_of_the_controller_itself_can_t_be_logged(
     result = CliRunner().invoke(app, ["bench", str(file), "--frames"])
     assert result.exit_code == 2
     assert f"faults.1: kind {fault['kind']} changes the controller itself" in result.stderr
+
+
+def test_a_disk_that_fills_up_is_named_and_is_no_failure_of_the_controller(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = replace(job_of("passive", 3, []), frames=tmp_path / "passive.frames")
+
+    def full(_writer: FrameLogWriter, _records: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", str(job.frames))
+
+    monkeypatch.setattr(FrameLogWriter, "write", full)
+    monkeypatch.setattr("firmware_sim.run.FRAME_BLOCK_NS", 1)
+    with pytest.raises(OSError, match=r"No space left on device: '.*passive\.frames'"):
+        run_lockstep(job)

@@ -3,6 +3,7 @@
 import random
 import struct
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -166,6 +167,11 @@ def test_another_file_is_refused_with_its_name(tmp_path):
     (tmp_path / "b.frames").write_bytes((tmp_path / "b.frames").read_bytes()[:30])
     with pytest.raises(FrameLogError, match=r"b\.frames is cut at byte 30"):
         FrameLog(tmp_path / "b.frames")
+
+
+def test_a_log_that_does_not_even_begin_is_named():
+    with pytest.raises(OSError, match="No space left on device: '/dev/full'"):
+        FrameLogWriter(Path("/dev/full"), {})
 
 
 def test_a_log_that_does_not_fit_is_named_and_goes_on_in_the_next_part(tmp_path):

@@ -118,8 +118,12 @@ class FrameLogWriter(Closing):
     def __init__(self, file: Path, head: Mapping[str, Any], *, small: bool = False) -> None:
         self._small = small
         self._content = file.open("wb", buffering=0)  # `close` repeats no failed write
-        self._content.write(_MARK)
-        self._append(_HEAD, zlib.compress(json.dumps(head).encode()))
+        try:
+            self._write(_MARK)
+            self._append(_HEAD, zlib.compress(json.dumps(head).encode()))
+        except OSError:
+            self.close()
+            raise
 
     def write(self, records: Records) -> None:
         """Append records, if there are any."""
@@ -138,8 +142,11 @@ class FrameLogWriter(Closing):
 
     def _append(self, kind: bytes, payload: bytes) -> None:
         header = _BLOCK.pack(kind, len(payload), zlib.crc32(payload, zlib.crc32(kind)))
+        self._write(header + payload)
+
+    def _write(self, content: bytes) -> None:
         with errors_name(Path(self._content.name)):  # Half a block would end the reading.
-            append_whole(self._content, header + payload)
+            append_whole(self._content, content)
 
 
 class BlockSink:
