@@ -9,7 +9,8 @@ from utank_hil.base.elementary import exp
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import ControlWord, DriveFault, DriveState, Frame
 from utank_hil.canbus.profiles import drive_plan
-from utank_hil.dynamics.pump import Pump, pump_load, pump_pressure, pump_speed
+from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.pump_curve import pump_load, pump_pressure, pump_speed
 
 if TYPE_CHECKING:
     from firmware_sim.plant import Plant  # compiled: a scenario is read without it

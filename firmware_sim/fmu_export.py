@@ -21,7 +21,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.provenance import version
 from utank_hil.base.tick import TICK_S
 from utank_hil.dynamics.nonlinear import INSIDE_M, REST_M_S, RollCoefficients
-from utank_hil.dynamics.pump import PumpCoefficients
+from utank_hil.dynamics.pump_curve import PumpCoefficients
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 IDENTIFIER: Final = "utank_hil_ship"

@@ -16,7 +16,8 @@ from firmware_sim.waves import Waves
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.tick import TICK_S
 from utank_hil.dynamics.jit import njit
-from utank_hil.dynamics.pump import Pump, PumpCoefficients
+from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.pump_curve import PumpCoefficients
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.runners.node import ModelError

@@ -20,7 +20,7 @@ from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.dynamics.hull import lateral_kernel as lateral
 from utank_hil.dynamics.jit import njit
 from utank_hil.dynamics.kernels import CAPSIZED_S, MAX_IMPULSE, STRIKE_LOSS, STRIKES
-from utank_hil.dynamics.pump import PumpCoefficients
+from utank_hil.dynamics.pump_curve import PumpCoefficients
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.dynamics.valves import LOCKED
 

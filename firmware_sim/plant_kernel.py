@@ -25,7 +25,8 @@ from utank_hil.dynamics.kernels import (
     sway_work_j,
     unpacked,
 )
-from utank_hil.dynamics.pump import PumpCoefficients, PumpState, compile_pump
+from utank_hil.dynamics.pump import PumpState, compile_pump
+from utank_hil.dynamics.pump_curve import PumpCoefficients
 from utank_hil.dynamics.valves import LOCKED
 
 STEP_S = 1e-3

@@ -40,6 +40,7 @@ PATTERNS: Final = (
     "utank_hil/canbus/profiles/acting.py",
     "utank_hil/canbus/profiles/device.py",
     "utank_hil/canbus/profiles/field.py",
+    "utank_hil/dynamics/pump_curve.py",
     "utank_hil/control/level_observer.py",
     "utank_hil/control/limiter.py",
     "utank_hil/control/pressure_loop.py",

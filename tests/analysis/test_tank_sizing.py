@@ -25,7 +25,8 @@ from utank_hil.analysis.tank_sizing import (
 )
 from utank_hil.dynamics import RollShip, coupled_model
 from utank_hil.dynamics.linear import coupled_matrices
-from utank_hil.dynamics.pump import AT_REST, pump_speed, pump_step
+from utank_hil.dynamics.pump import AT_REST, pump_step
+from utank_hil.dynamics.pump_curve import pump_speed
 
 G = 9.80665
 

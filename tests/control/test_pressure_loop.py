@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from utank_hil.control.pressure_loop import PressureLoop, loop_margins
-from utank_hil.dynamics.pump import Pump, pump_pressure
+from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.pump_curve import pump_pressure
 
 PUMP = Pump.for_duct(6.22)
 CYCLE_S = 0.02

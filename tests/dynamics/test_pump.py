@@ -8,16 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pump_losses import pump_losses
 
-from utank_hil.dynamics.pump import (
-    AT_REST,
-    Pump,
-    compile_pump,
-    pump_coast,
-    pump_load,
-    pump_pressure,
-    pump_speed,
-    pump_step,
-)
+from utank_hil.dynamics.pump import AT_REST, Pump, compile_pump, pump_coast, pump_step
+from utank_hil.dynamics.pump_curve import pump_load, pump_pressure, pump_speed
 
 PUMP = Pump.for_duct(6.22)
 C = PUMP.coefficients

@@ -13,7 +13,8 @@ from collections import deque
 from dataclasses import dataclass
 
 from utank_hil.base.elementary import exp
-from utank_hil.dynamics.pump import Pump, pump_load, pump_speed
+from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.pump_curve import pump_load, pump_speed
 
 
 @dataclass(frozen=True, slots=True)

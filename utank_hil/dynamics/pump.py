@@ -18,37 +18,24 @@ turns the sum into a speed, which the drive's speed loop follows within its limi
 power. Inside the limits the pressure follows the set-point with a first-order lag of `lag_s`.
 
 The functions take and return plain numbers and named tuples of numbers, so that they can be
-compiled (`compile_pump`); this module does not import a compiler.
+compiled (`compile_pump`); this module does not import a compiler. The blade model is in a file of
+its own, `pump_curve`, since the tick of a controller with a pressure loop is compiled, too.
 """
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
+from pathlib import Path
 from types import FunctionType
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from utank_hil.base.elementary import exp
 from utank_hil.base.parameters import Positive, Problem, range_problems, refuse
+from utank_hil.dynamics.pump_curve import PumpCoefficients, pump_load, pump_pressure, pump_speed
 
-
-class PumpCoefficients(NamedTuple):
-    """Parameters of a `Pump` for the step functions, in SI units."""
-
-    area: float
-    radius: float
-    pitch: float
-    half_rho_lift: float
-    half_rho_friction: float
-    inertia: float
-    max_speed: float
-    max_torque: float
-    max_power: float
-    max_pressure: float
-    max_pressure_rate: float
-    reference_lag: float
-    speed_bandwidth: float
-    gain: float
-    integral_time: float
+_CURVE: Final = Path(__file__).with_name("pump_curve.py")
 
 
 class PumpState(NamedTuple):
@@ -176,51 +163,6 @@ class Pump:
         )
 
 
-def pump_pressure(speed: float, flow: float, c: PumpCoefficients) -> float:
-    """Pressure rise in Pa at a speed (rad/s) and a flow to starboard (m^3/s)."""
-    u, rn = flow / c.area, c.radius * speed
-    # `hypot` is the C library's, and not the same everywhere
-    return c.half_rho_lift * math.sqrt(rn * rn + u * u) * (c.pitch * speed - u)
-
-
-def pump_load(speed: float, flow: float, c: PumpCoefficients) -> tuple[float, float]:
-    """Load torque of the water in N m, and its derivative by speed in N m s, zero or more."""
-    area, radius, pitch = c.area, c.radius, c.pitch
-    lift, friction = c.half_rho_lift, c.half_rho_friction
-    u = flow / area
-    rn = radius * speed
-    w = math.sqrt(rn * rn + u * u) + 1e-9  # The offset avoids division by zero.
-    slip = pitch * speed - u
-    drag = pitch * lift * slip + friction * radius * rn
-    drag_slope = lift * pitch * pitch + friction * radius * radius
-    slope = area * (radius * rn / w * drag + w * drag_slope)
-    return area * w * drag, max(slope, 0.0)
-
-
-def pump_speed(pressure: float, flow: float, c: PumpCoefficients) -> float:
-    """Speed in rad/s that gives a pressure rise at a flow: the inverse of `pump_pressure`."""
-    radius, pitch = c.radius, c.pitch  # read once: Python takes most of its time for that
-    u = flow / c.area
-    wanted = pressure / c.half_rho_lift
-    # The start is from the slip s of (a |s| + b |u|) = wanted, exact without flow or slip.
-    a = radius / pitch
-    b = math.sqrt(1.0 + a * a) * abs(u)
-    slip = 2.0 * wanted / (b + math.sqrt(b * b + 4.0 * a * abs(wanted)) + 1e-12)
-    speed = (u + slip) / pitch
-    for _ in range(8):  # Newton's method: the head curve is smooth and monotone.
-        rn = radius * speed
-        w = math.sqrt(rn * rn + u * u)
-        slip = pitch * speed - u
-        slope = w * pitch + radius * radius * speed * slip / (w + 1e-12)
-        if slope < 1e-9:
-            break
-        change = (w * slip - wanted) / slope
-        speed -= change
-        if abs(change) < 1e-12 * abs(speed):
-            break
-    return speed
-
-
 def pump_step(
     state: PumpState, setpoint: float, flow: float, step_s: float, c: PumpCoefficients
 ) -> PumpState:
@@ -278,9 +220,15 @@ def compile_pump(compiler: Callable[[Any], Any]) -> tuple[Callable[..., Any], Ca
     The compiler, such as that of `utank_hil.dynamics.jit.njit`, compiles the functions in a
     separate namespace, callees first.
     """
+    # from its source: of what mypyc has compiled there is no code to compile again
+    spec = spec_from_loader(_CURVE.stem, SourceFileLoader(_CURVE.stem, str(_CURVE)))
+    assert spec is not None
+    assert spec.loader is not None
+    spec.loader.exec_module(curve := module_from_spec(spec))
     scope = dict(globals())
     scope["exp"] = compiler(exp)
-    for function in (pump_pressure, pump_load, pump_speed, pump_step, pump_coast):
+    blade = (curve.pump_pressure, curve.pump_load, curve.pump_speed)
+    for function in (*blade, pump_step, pump_coast):
         name = function.__name__
         scope[name] = compiler(FunctionType(function.__code__, scope, name))
     return scope["pump_step"], scope["pump_coast"]

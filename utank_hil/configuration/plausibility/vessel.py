@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 from utank_hil.dynamics import GRAVITY_M_S2, RollModel, RollShip, Tank, coupled_matrices
 from utank_hil.dynamics.nonlinear import righting_range
-from utank_hil.dynamics.pump import Pump, pump_load, pump_speed
+from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.pump_curve import pump_load, pump_speed
 from utank_hil.dynamics.valves import Valve
 
 

@@ -5,7 +5,8 @@ from typing import Final
 import numpy as np
 
 from utank_hil.control.interface import DesignPlant
-from utank_hil.dynamics.pump import Pump, pump_speed
+from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.pump_curve import pump_speed
 from utank_hil.nodes.commissioning.checks import Check, Record
 from utank_hil.nodes.commissioning.pulses import PulsePlan
 
