@@ -33,7 +33,7 @@ def device(role="motion", **section):
 
 
 def give(found, can_id, data, now_ns):
-    found.takes[can_id](Frame(can_id, bytes(data)), now_ns)
+    found.takers[can_id].take(Frame(can_id, bytes(data)), now_ns)
 
 
 def sbg_database():
@@ -300,7 +300,7 @@ def candump(name):
 def test_a_recorded_attitude_has_its_right_values():
     found, heard = n2k(0xCC)
     for now_ns, can_id, data in candump("n2k-candumpSample3.txt"):
-        if can_id in found.takes:
+        if can_id in found.takers:
             give(found, can_id, data, now_ns)
     rolls = [sample.roll_rad for _, sample in heard]
     assert len(rolls) == 175
@@ -317,7 +317,7 @@ def test_the_nmea2000_package_reads_the_same():
         message = decoder.decode(line)
         told += [field.value for field in message.fields if field.id == "roll"]
     for now_ns, can_id, data in candump("n2k-candumpSample3.txt"):
-        if can_id in found.takes:
+        if can_id in found.takers:
             give(found, can_id, data, now_ns)
     assert [sample.roll_rad for _, sample in heard] == pytest.approx(told)
 
@@ -327,7 +327,7 @@ def test_two_recorded_sensors_are_told_apart_by_their_source():
     second, of_second = n2k(0x34)
     for now_ns, can_id, data in candump("n2k-two-attitudes.candump.log"):
         for found in (first, second):
-            if can_id in found.takes:
+            if can_id in found.takers:
                 give(found, can_id, data, now_ns)
     means = [
         math.degrees(sum(s.roll_rad for _, s in heard) / len(heard))

@@ -307,7 +307,7 @@ def test_contents_that_share_an_identifier_are_told_apart(tmp_path):
     found.deliver = lambda message, _: heard.append(message)
     for page, counts in ((0, 250), (2, 999), (1, -40)):
         data = bytes((page,)) + counts.to_bytes(2, "little", signed=True) + bytes(5)
-        found.takes[STANDARD | 256](Frame(STANDARD | 256, data), 0)
+        found.takers[STANDARD | 256].take(Frame(STANDARD | 256, data), 0)
     assert heard == [(pytest.approx(0.25), pytest.approx(-0.04), Quality.GOOD)]
 
 

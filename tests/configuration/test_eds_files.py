@@ -78,7 +78,7 @@ def test_a_motion_sensor_by_its_eds_as_canopen_sends_it(tmp_path):
     pdo[0].raw, pdo[1].raw = -1234, 0.25
     pdo.transmit()
     ((can_id, data),) = wire.said
-    found.takes[can_id | STANDARD](Frame(can_id | STANDARD, data), 0)
+    found.takers[can_id | STANDARD].take(Frame(can_id | STANDARD, data), 0)
     assert heard == [(0, (pytest.approx(-0.1234), 0.25, Quality.GOOD))]
 
 
@@ -114,7 +114,7 @@ def test_two_gauges_by_a_makers_eds_as_canopen_sends_them():
         pdo[place].raw = raw
     pdo.transmit()
     ((can_id, data),) = wire.said
-    found.takes[can_id | STANDARD](Frame(can_id | STANDARD, data), 0)
+    found.takers[can_id | STANDARD].take(Frame(can_id | STANDARD, data), 0)
     assert heard[0][1][:2] == (1.2, -0.8)
     assert heard[0][1].quality is Quality.GOOD
 

@@ -332,4 +332,4 @@ def test_another_drive_than_commissioned_is_not_armed():
     assert bench.node.mode is not Mode.ACTIVE
     assert "1018h:4 is 0x63, not 0x4" in bench.node.actuators.drive.words
     assert bench.ship.drive.state.name == "PRE_OPERATIONAL"
-    assert 1 << BUS_SHIFT | STANDARD | 0x185 in bench.node.inbox._routing.devices
+    assert 1 << BUS_SHIFT | STANDARD | 0x185 in bench.node.inbox._routing.takers

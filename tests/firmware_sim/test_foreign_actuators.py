@@ -414,10 +414,10 @@ def test_another_content_of_the_keys_identifier_presses_nothing(theirs):
     device = ProfiledPanel(panel.plan(OperatorCommand, "panel", 0))
     said = []
     device.overhear = said.append
-    (take,) = {*device.takes.values()}
+    (taker,) = {*device.takers.values()}
     for count, stopped in ((1, False), (3, None), (2, True)):
         data = bytes([0 if stopped is not False else 4, count])
-        take(Frame(0, data + bytes([crc8(data)])), 0)
+        taker.take(Frame(0, data + bytes([crc8(data)])), 0)
     assert [order.stop for order in said] == [False, True]
 
 

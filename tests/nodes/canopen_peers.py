@@ -143,9 +143,9 @@ class Line:
                 state = {"OPERATIONAL": 5, "PRE-OPERATIONAL": 127, "STOPPED": 4}
                 self.wire.said.append((0x705, bytes([state.get(self.node.nmt.state, 127)])))
             for can_id, data in self.wire.said:
-                take = self.drive.takes.get(can_id | STANDARD)
-                if take is not None:
-                    take(Frame(can_id | STANDARD, data), self.now_ns + TICK_NS // 2)
+                taker = self.drive.takers.get(can_id | STANDARD)
+                if taker is not None:
+                    taker.take(Frame(can_id | STANDARD, data), self.now_ns + TICK_NS // 2)
             self.wire.said.clear()
             self.now_ns += TICK_NS
         return self

@@ -9,6 +9,7 @@ import pytest
 from tests.nodes.canopen_peers import Line
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import ControlWord, DriveState
+from utank_hil.canbus.profiles.device import hear
 from utank_hil.nodes.canopen_drive import CanopenDrive, state_of
 
 MS = 1_000_000
@@ -126,19 +127,12 @@ def test_who_only_hears_a_drive_gets_its_reports():
     panel = CanopenDrive(line.plan, hears_only=True)
     reports = []
     panel.deliver = lambda report, now_ns: reports.append(report)
-    line.drive.takes = {
-        each: both(take, panel.takes[each]) for each, take in line.drive.takes.items()
-    }
+    takers = dict(line.drive.takers)
+    for can_id, taker in panel.takers.items():
+        hear(takers, can_id, taker)
+    line.drive.takers = takers
     line.run(20, ControlWord.SHUTDOWN)
     assert reports[-1].state is DriveState.READY_TO_SWITCH_ON
-
-
-def both(first, second):
-    def take(frame, now_ns):
-        first(frame, now_ns)
-        second(frame, now_ns)
-
-    return take
 
 
 def test_the_controller_beats_with_each_command_and_stops_the_node():

@@ -91,7 +91,7 @@ class TrialLine(Line):
     def __init__(self, changes=(), tweak=lambda _: None):
         super().__init__(changes, tweak)
         self.drive = self.trial = DriveTrial(self.plan, PUMP, lambda what: lambda: True)
-        self.drive.takes = self.trial._drive.takes
+        self.drive.takers = self.trial._drive.takers
         self.controller_ns, self.watches, self.stops = 0, True, True
         self.speed = 0.0
 

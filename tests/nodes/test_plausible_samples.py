@@ -135,7 +135,7 @@ class Slow:
             words = struct.pack("<ff", roll_rad, 0.3 * 2 * math.pi / 10 * math.cos(turn))
             for can_id, data in ((6, bytes([k % 256])), (5, words)):
                 frame = Frame(can_id | STANDARD, data)
-                self.device.takes[frame.can_id](frame, now_ns)
+                self.device.takers[frame.can_id].take(frame, now_ns)
         return self.sensor.discarded
 
 

@@ -2,7 +2,6 @@
 
 import re
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -61,7 +60,7 @@ def test_what_was_received_is_in_words():
     assert inbox.received(Fault.DRIVE_FAULT) == (
         "drive: state 8 (FAULT) in DRIVE_STATUS_1, fault 1 (OVERCURRENT) in DRIVE_STATUS_2"
     )
-    own = SimpleNamespace(can_id=0x18FF0080, data=b"")
+    own = Frame(0x18FF0080, b"")
     inbox.receive(own, 1)
     assert inbox.received(Fault.ADDRESS_CONFLICT) == "identifier 0x18FF0080"
     inbox.link_error(1, 1, "CAN interface can0: bus-off; check wiring")

@@ -54,8 +54,8 @@ class DriveHeard:
         self.slow: tuple[int, ...] = ()  #: Its second message: no age tells of its silence.
         if pump and canopen is not None:
             canopen.deliver = self._take_report
-            for can_id, take in canopen.takes.items():
-                hear(routing.devices, can_id, take)
+            for can_id, taker in canopen.takers.items():
+                hear(routing.takers, can_id, taker)
             self.watched = canopen.watched
             routing.watched += canopen.watched
             self.slow = (canopen.watched[1].can_id,)

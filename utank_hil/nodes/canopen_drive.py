@@ -9,7 +9,7 @@ from utank_hil.canbus import ControlWord, DriveState, Frame
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.measurements import Measurements
 from utank_hil.canbus.profiles import drive_plan as cia
-from utank_hil.canbus.profiles.device import HeardMessage, Take, nobody
+from utank_hil.canbus.profiles.device import CalledTaker, HeardMessage, Taker, nobody
 from utank_hil.canbus.profiles.device_plan import MessagePlan
 from utank_hil.canbus.profiles.field import Field
 from utank_hil.control.pressure_loop import PressureLoop
@@ -56,8 +56,8 @@ class CanopenDrive:
     """One drive: configured, started, commanded, heard.
 
     `deliver` gets each report of a drive that is configured, operational and alive, and None as
-    long as its configuration is refused; `takes` has, by identifier, what takes a frame and the
-    time of its receipt. With `hears_only` somebody else configures and commands it.
+    long as its configuration is refused; `takers` has, by identifier, what takes its frames. With
+    `hears_only` somebody else configures and commands it.
     """
 
     def __init__(
@@ -85,6 +85,7 @@ class CanopenDrive:
         self._with = self._beat + [Frame(tag | cia.SYNC, b"")] * plan.synchronous
         self._received = tag | cia.RECEIVED_1 + plan.node
         sent, measured = (sum(b for _, b in each) // 8 for each in (plan.sent, plan.measured))
+        self._echoed = Field(16, 8 * sent - 16, sent)
         scale = plan.speed_rad_s_per_unit
         self._speed = Field(0, 32, measured, signed=True, scale=scale)
         self._torque_field = Field(32, 16, measured, signed=True, scale=1 / plan.units_per_si)
@@ -94,11 +95,11 @@ class CanopenDrive:
             HeardMessage(MessagePlan("", (tag | cob + plan.node,), length, cycle_ns))
             for cob, length in ((cia.SENT_1, sent), (cia.SENT_2, measured))
         )
-        self.takes: dict[int, Take] = {
-            tag | cia.SENT_1 + plan.node: self._on_status,
-            tag | cia.SENT_2 + plan.node: self._on_measured,
-            tag | cia.HEARTBEAT + plan.node: self._on_heartbeat,
-            **self.setup.takes,
+        self.takers: dict[int, Taker] = {
+            tag | cia.SENT_1 + plan.node: CalledTaker(self._on_status),
+            tag | cia.SENT_2 + plan.node: CalledTaker(self._on_measured),
+            tag | cia.HEARTBEAT + plan.node: CalledTaker(self._on_heartbeat),
+            **self.setup.takers,
         }
         self._sent: deque[tuple[int, int]] = deque(maxlen=KEPT)
         self._count = 0
@@ -200,7 +201,7 @@ class CanopenDrive:
             self._speed_rad_s = self._torque = math.nan
         state = state_of(self._status)
         if self._marked or state is _ENABLED:
-            self._heard(int.from_bytes(data[2:], "little"))
+            self._heard(self._echoed.raw(data))
         else:  # there is no demand
             self.echo_ns = now_ns
         alive = self._operational and now_ns - self._beat_ns <= self._late_ns

@@ -10,7 +10,7 @@ from typing import Any, Final
 from utank_hil.canbus import Frame
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.profiles import drive_plan as cia
-from utank_hil.canbus.profiles.device import SILENT_NS, ProfiledDevice, Take, hear
+from utank_hil.canbus.profiles.device import SILENT_NS, CalledTaker, ProfiledDevice, Taker, hear
 
 ANSWER_NS: Final = 300_000_000  #: CiA 301 names no time; servers of drives answer within 50 ms.
 PATIENCE_NS: Final = 300_000_000  #: For a mode to be entered, likewise.
@@ -26,7 +26,7 @@ class _Refused(Exception):
 class CanopenSetup:
     """The start of one node by its steps: `done`, or the `problem` that it was refused for.
 
-    `takes` has, by identifier, what takes its answers, and its emergencies, of which `emergency`
+    `takers` has, by identifier, what takes its answers, and its emergencies, of which `emergency`
     is the last.
     """
 
@@ -34,9 +34,9 @@ class CanopenSetup:
         self._node, self._steps = node, tuple(steps)
         self._tag = bus << BUS_SHIFT | STANDARD
         self.problem = self.emergency = ""
-        self.takes: dict[int, Take] = {
-            self._tag | cia.SDO_ANSWER + node: self._take_answer,
-            self._tag | cia.EMERGENCY + node: self._take_emergency,
+        self.takers: dict[int, Taker] = {
+            self._tag | cia.SDO_ANSWER + node: CalledTaker(self._take_answer),
+            self._tag | cia.EMERGENCY + node: CalledTaker(self._take_emergency),
         }
         self.restart(0)
 
@@ -150,8 +150,9 @@ class SensorSetup:
         self.device, self._node = device, plan.node
         self.setup = CanopenSetup(plan.bus, plan.node, plan.steps)
         beat = plan.bus << BUS_SHIFT | STANDARD | cia.HEARTBEAT + plan.node
-        for can_id, take in (*self.setup.takes.items(), (beat, self._take_heartbeat)):
-            hear(device.takes, can_id, take)
+        hears_beat = beat, CalledTaker(self._take_heartbeat)
+        for can_id, taker in (*self.setup.takers.items(), hears_beat):
+            hear(device.takers, can_id, taker)
         device.named = False
         self._done_ns = 0
 

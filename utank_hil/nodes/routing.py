@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from utank_hil.canbus import Frame, Receiver
-from utank_hil.canbus.profiles.device import ProfiledDevice, Take, hear
+from utank_hil.canbus.profiles.device import ProfiledDevice, Taker, hear
 from utank_hil.nodes.canopen_setup import SensorSetup
 from utank_hil.safety.monitors.senders import Heard
 
@@ -13,14 +13,23 @@ Accept = Callable[[Frame], tuple[Any, ...] | None]
 Handle = Callable[[Any, int], None]
 
 
+class _Subscription(Taker):
+    def __init__(self, accept: Accept, handle: Handle) -> None:
+        self._accept, self._handle = accept, handle
+
+    def take(self, frame: Frame, now_ns: int) -> None:
+        message = self._accept(frame)
+        if message is not None:
+            self._handle(message, now_ns)
+
+
 class Routing:
     """Subscriptions by identifier."""
 
     def __init__(self) -> None:
         self.watched: list[Heard] = []  #: Counters of every message that is heard.
         self.setups: list[SensorSetup] = []  #: Sensors that are configured by SDO.
-        self.devices: dict[int, Take] = {}  #: Devices of other makers.
-        self._subscriptions: dict[int, tuple[Accept, Handle]] = {}
+        self.takers: dict[int, Taker] = {}  #: What takes the frames of an identifier.
         self._sources: list[ProfiledDevice[Any]] = []
 
     def subscribe(self, receiver: Receiver[_M], handle: Callable[[_M, int], None]) -> Receiver[_M]:
@@ -31,7 +40,7 @@ class Routing:
 
     def accept(self, can_id: int, accept: Accept, handle: Handle) -> None:
         """Hand the messages of an identifier that `accept` returns to `handle`."""
-        self._subscriptions[can_id] = accept, handle
+        self.takers[can_id] = _Subscription(accept, handle)
 
     def hear(
         self, source: Receiver[_M] | ProfiledDevice[_M], handle: Callable[[_M, int], None]
@@ -44,24 +53,9 @@ class Routing:
         self._sources.append(source)
         if source.plan.steps:
             self.setups.append(SensorSetup(source))
-        for can_id, take in source.takes.items():
-            hear(self.devices, can_id, take)
+        for can_id, taker in source.takers.items():
+            hear(self.takers, can_id, taker)
         self.watched += source.watched
-
-    def passes_on(self, frame: Frame, now_ns: int) -> bool:
-        """Hand a frame on; False where nobody takes its identifier."""
-        subscription = self._subscriptions.get(frame.can_id)
-        if subscription is not None:
-            accept, handle = subscription
-            message = accept(frame)
-            if message is not None:
-                handle(message, now_ns)
-            return True
-        take = self.devices.get(frame.can_id)
-        if take is None:
-            return False
-        take(frame, now_ns)
-        return True
 
     def configures(self, now_ns: int) -> list[Frame]:
         """What CANopen sensors are configured with in this tick."""

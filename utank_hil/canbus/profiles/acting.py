@@ -11,7 +11,13 @@ from utank_hil.canbus.endpoints import Rejection
 from utank_hil.canbus.enumerations import Mode, ValveFault, ValveState
 from utank_hil.canbus.frame import Frame
 from utank_hil.canbus.messages import OperatorCommand, ValveStatus
-from utank_hil.canbus.profiles.device import LONG_AGO, MessageHeard, ProfiledDevice, hear
+from utank_hil.canbus.profiles.device import (
+    LONG_AGO,
+    CalledTaker,
+    MessageHeard,
+    ProfiledDevice,
+    hear,
+)
 from utank_hil.canbus.profiles.device_plan import FIELDS, DevicePlan
 
 
@@ -61,7 +67,7 @@ class ProfiledPanel(ProfiledDevice[OperatorCommand]):
         self._arms = self._asked = False
         if plan.authentication is not None:
             for can_id in plan.authentication.proof_ids:
-                hear(self.takes, can_id, self._take_proof)
+                hear(self.takers, can_id, CalledTaker(self._take_proof))
         self.overhear: Callable[[OperatorCommand], None] = lambda _: None
         self._values[_STOP] = 0.0  # nothing is pressed before it is heard
 
@@ -77,7 +83,8 @@ class ProfiledPanel(ProfiledDevice[OperatorCommand]):
         for message in self._needed:
             message.changes += new
 
-    def _take(self, message: MessageHeard, frame: Frame, now_ns: int) -> None:
+    def take(self, message: MessageHeard, frame: Frame, now_ns: int) -> None:
+        """Take a frame of one of its messages."""
         if message.signals and message.intact(frame.data) and not message.is_another(frame.data):
             values = list(self._values)
             for signal in message.signals:
@@ -89,7 +96,7 @@ class ProfiledPanel(ProfiledDevice[OperatorCommand]):
                 self.proved = False
                 self._renew()  # what was said for it and not used is worth nothing
             self._arms = order.arm
-        super()._take(message, frame, now_ns)
+        super().take(message, frame, now_ns)
 
     def _take_proof(self, frame: Frame, now_ns: int) -> None:
         """Try a proof of the last order, one in `TRY_NS`; a challenge that was met is used up."""

@@ -3,7 +3,6 @@
 import math
 from collections import deque
 from collections.abc import Callable
-from functools import partial
 from typing import Any, Final, Generic
 
 from utank_hil.base.tick import TICK_NS
@@ -106,18 +105,38 @@ def nobody(message: Any, now_ns: int) -> None:
     """Take what nobody has asked for yet."""
 
 
-Take = Callable[[Frame, int], None]
+class Taker:
+    """Takes the frames of one identifier; a class, since compiled its method is called directly."""
+
+    def take(self, frame: Frame, now_ns: int) -> None:
+        """Take a frame at the time of its receipt."""
+        raise NotImplementedError
 
 
-def hear(takes: dict[int, Take], can_id: int, take: Take) -> None:
+class CalledTaker(Taker):
+    """Calls a function with each frame."""
+
+    def __init__(self, function: Callable[[Frame, int], None]) -> None:
+        self._function = function
+
+    def take(self, frame: Frame, now_ns: int) -> None:
+        """Take a frame at the time of its receipt."""
+        self._function(frame, now_ns)
+
+
+class _Both(Taker):
+    def __init__(self, first: Taker, second: Taker) -> None:
+        self._first, self._second = first, second
+
+    def take(self, frame: Frame, now_ns: int) -> None:
+        self._first.take(frame, now_ns)
+        self._second.take(frame, now_ns)
+
+
+def hear(takers: dict[int, Taker], can_id: int, taker: Taker) -> None:
     """Add what takes the frames of an identifier; several may, one after the other."""
-    first = takes.get(can_id)
-    takes[can_id] = take if first is None else partial(_both, first, take)
-
-
-def _both(first: Take, second: Take, frame: Frame, now_ns: int) -> None:
-    first(frame, now_ns)
-    second(frame, now_ns)
+    first = takers.get(can_id)
+    takers[can_id] = taker if first is None else _Both(first, taker)
 
 
 class MessageHeard(HeardMessage):
@@ -145,8 +164,8 @@ class MessageHeard(HeardMessage):
 class ProfiledDevice(Generic[T]):
     """Hears one device, and hands on each measurement that is complete.
 
-    `deliver` is called with each message and the time at which it was complete. `takes` has, by
-    identifier, what takes a frame and the time of its receipt; `watched` counts its messages.
+    `deliver` is called with each message and the time at which it was complete. `takers` has, by
+    identifier, what takes its frames; `watched` counts its messages.
     """
 
     def __init__(self, plan: DevicePlan[T]) -> None:
@@ -174,12 +193,12 @@ class ProfiledDevice(Generic[T]):
         self._past: deque[tuple[int, float]] = deque()  # times and rolls, of `SLOPE_S` and before
         self.named = plan.name_id is None
         self.proved = True  #: Whether what it orders counts; all, but of a panel that has a key.
-        self.takes: dict[int, Take] = {}
+        self.takers: dict[int, Taker] = {}
         for message, each in zip(messages, plan.messages, strict=True):
             for can_id in each.can_ids:
-                hear(self.takes, can_id, partial(self._take, message))
+                hear(self.takers, can_id, _MessageTaker(self, message))
         if plan.name_id is not None:
-            hear(self.takes, plan.name_id[0], self._take_claim)
+            hear(self.takers, plan.name_id[0], CalledTaker(self._take_claim))
 
     @property
     def valid(self) -> bool:
@@ -209,8 +228,9 @@ class ProfiledDevice(Generic[T]):
         assert self.plan.name_id is not None
         self.named = int.from_bytes(frame.data, "little") == self.plan.name_id[1]
 
-    def _take(self, message: MessageHeard, frame: Frame, now_ns: int) -> None:
-        data = frame.data
+    def take(self, message: MessageHeard, frame: Frame, now_ns: int) -> None:
+        """Take a frame of one of its messages."""
+        data = frame[1]  # by its name it takes ten times as long
         if message.is_another(data) or not message.passes(data):
             return
         if message.status:
@@ -292,3 +312,11 @@ class ProfiledDevice(Generic[T]):
         if math.isfinite(self.plan.high_level_m):
             return Switch.OFF if level_m <= self.plan.high_level_m else Switch.ON
         return Switch.OFF if raw == 0.0 else Switch.ON
+
+
+class _MessageTaker(Taker):
+    def __init__(self, device: ProfiledDevice[Any], message: MessageHeard) -> None:
+        self._device, self._message = device, message
+
+    def take(self, frame: Frame, now_ns: int) -> None:
+        self._device.take(self._message, frame, now_ns)

@@ -19,7 +19,7 @@ class Field:
     """
 
     __slots__ = (
-        "_big", "_count", "_first", "_greatest", "_half", "_ieee", "_least", "_mask", "_most",
+        "_big", "_end", "_first", "_greatest", "_half", "_ieee", "_least", "_mask", "_most",
         "_shift", "_spare", "bits", "offset", "scale",
     )  # fmt: skip
 
@@ -47,9 +47,10 @@ class Field:
         self._big = big_endian
         self._shift = shift
         # its bytes, from the most of them to the least, and the bits that the least one has besides
-        self._count = (shift + bits - 1) // 8 - shift // 8 + 1
         least = shift // 8
-        self._first = length - least - self._count if big_endian else least + self._count - 1
+        count = (shift + bits - 1) // 8 - least + 1
+        self._first = length - least - count if big_endian else least + count - 1
+        self._end = self._first + (count if big_endian else -count)
         self._spare = shift % 8
         self._mask = (1 << bits) - 1
         self._half = 1 << (bits - 1) if signed and not real else 1 << bits
@@ -60,11 +61,13 @@ class Field:
 
     def raw(self, data: bytes) -> int:
         """Counts of the signal, with their sign."""
-        word, place = 0, self._first
-        step = 1 if self._big else -1
-        for _ in range(self._count):
-            word = word << 8 | data[place]
-            place += step
+        word = 0
+        if self._big:
+            for place in range(self._first, self._end):
+                word = word << 8 | data[place]
+        else:
+            for place in range(self._first, self._end, -1):
+                word = word << 8 | data[place]
         raw = word >> self._spare & self._mask
         return raw - self._mask - 1 if raw >= self._half else raw
 
@@ -141,11 +144,13 @@ class SignalPlan:
 class ConditionPlan:
     """What a status must say: its counts under a mask are among those allowed."""
 
-    __slots__ = ("allowed", "field", "mask")
+    __slots__ = ("_least", "allowed", "field", "mask")
 
     def __init__(self, field: Field, mask: int, allowed: frozenset[int]) -> None:
         self.field, self.mask, self.allowed = field, mask, allowed
+        self._least = min(allowed)  # of most devices the only one
 
     def holds(self, data: bytes) -> bool:
         """Whether a frame says so."""
-        return self.field.raw(data) & self.mask in self.allowed
+        counts = self.field.raw(data) & self.mask
+        return counts == self._least or counts in self.allowed

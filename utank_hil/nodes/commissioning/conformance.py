@@ -120,9 +120,9 @@ class SensorTrial(Trial):
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take what is the device's."""
-        take = self._device.takes.get(frame.can_id)
-        if take is not None:
-            take(frame, now_ns)
+        taker = self._device.takers.get(frame.can_id)
+        if taker is not None:
+            taker.take(frame, now_ns)
 
     def _frames(self) -> list[Frame]:
         frames = [] if self._setup is None else self._setup.frames(self.now_ns)
@@ -301,10 +301,10 @@ class DriveTrial(Trial):
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take what is the drive's; what it says by SDO counts as what it says by PDO."""
-        take = self._drive.takes.get(frame.can_id)
-        if take is None:
+        taker = self._drive.takers.get(frame.can_id)
+        if taker is None:
             return
-        take(frame, now_ns)
+        taker.take(frame, now_ns)
         cob = (frame.can_id ^ self._tag) - self._plan.node
         if cob == cia.SENT_1:
             self._state = self._drive.state
