@@ -12,6 +12,7 @@ from firmware_sim.plant_kernel import CAPSIZE_RAD
 from utank_hil.analysis.motion.statistics import batch_means, mean_interval, rms_batches
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Mode
+from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
 from utank_hil.telemetry.recording_reader import read_about
 from utank_hil.telemetry.signal_files import read_signals, require
 
@@ -129,8 +130,10 @@ def read_record(path: Path) -> Record:
     for columns in runs.values():
         require(path, columns, "roll_rad")
     about: dict[str, Any] = {}
-    if path.suffix == ".rrd":
-        with suppress(ValueError):  # a file of an older version has no provenance
+    with suppress(ValueError, KeyError):  # a file of an older version has no provenance
+        if path.suffix == SUFFIX:
+            about = FrameLog(path).head["about"]
+        elif path.suffix == ".rrd":
             about = read_about(path)
     return Record(path, about, runs)
 

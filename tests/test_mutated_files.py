@@ -54,17 +54,17 @@ from utank_hil.configuration.hull_files.parts import Given
 from utank_hil.configuration.hull_files.reader import read_hull
 from utank_hil.configuration.matrices import read_system
 from utank_hil.configuration.spectra import TabulatedSpectrum
-from utank_hil.reports.recording import _alarms
 from utank_hil.sea import Sea, jonswap
 from utank_hil.sea.components import read_components, write_components
 from utank_hil.sea.measured import load_directional
 from utank_hil.sea.moment_table import MomentTable
 from utank_hil.sea.ndbc import load_ndbc
 from utank_hil.telemetry.bus_files.log import BusLog
-from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.frame_log import EVENTS, ROWS, FrameLog, FrameLogWriter
 from utank_hil.telemetry.replay import entries_of
 from utank_hil.telemetry.replay_head import ReplayHeadError, causes, recorded_config
 from utank_hil.telemetry.ring import RingReader, RingWriter
+from utank_hil.telemetry.run_log import _packed, read_run_log
 from utank_hil.telemetry.signal_files import read_signals, require, write_signals
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -402,13 +402,17 @@ def made_campaign(path):
 
 
 def made_events(path):
-    event = {"event": "alarm", "time_s": 1.0, "fault": "A", "state": "b", "happened": ""}
-    event |= {"remedy": ""}
-    path.write_text("".join(json.dumps(event | {"time_s": i}) + "\n" for i in range(9)))
+    event = {"time_ns": 1, "code": 3, "state": 1, "mode": 2, "received": "a", "start_ns": 5}
+    path.write_text(json.dumps([event | {"time_ns": i} for i in range(9)]))
 
 
-def alarms(path):
-    return _alarms(path.with_name("run-a.rrd"))
+def events(path):
+    """Read the events of a run's log."""
+    log = path.with_name("whole.frames")
+    with FrameLogWriter(log, {"about": {}, "columns": ["time_s", "x"]}) as written:
+        written.append(ROWS, _packed(np.zeros((3, 2))))
+        written.append(EVENTS, path.read_bytes())
+    return wrapped(path, "a.frames", log.read_bytes(), lambda log: read_run_log(log).events)
 
 
 EDS = """[FileInfo]\nFileName=a.eds\n[DeviceInfo]\nVendorName=a\n[1000]\nParameterName=type
@@ -464,7 +468,7 @@ READERS = [
     Reader("climate.csv", copied("configs/seas/climate_northern_north_sea.csv"), drawn, cost=1.6),
     Reader("cases.parquet", made_campaign, lambda path: read_results(path.parent), cost=2),
     Reader("study.json", made_campaign, lambda path: read_results(path.parent), cost=0.5),
-    Reader("log-a.jsonl", made_events, alarms, cost=0.3),
+    Reader("events.json", made_events, events, cost=0.3),
     Reader(
         "hull.nc",
         lambda path: shutil.copyfile(ROOT / "tests/dynamics/data/wigley.nc", path),

@@ -263,8 +263,8 @@ def test_process_that_dies_at_its_start_is_an_error_at_once(
 def test_process_that_died_is_an_error_and_nothing_waits_for_it() -> None:
     announcer = Announcer()
     assert announcer.failure() == ""
-    announcer._process.kill()
-    wait_for(lambda: not announcer._process.is_alive())
+    announcer._process._process.kill()
+    announcer._process._process.join()
     assert "ended with code -9" in announcer.failure()
     assert announcer.failure() == ""  # once
     announcer.write(TRIAL, 0)

@@ -34,7 +34,7 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
     ("no space after a colon", "check {here}/colon.yaml", ("line 4", "a colon and a space")),
     ("a minute in a number", "check {here}/minute.yaml", ("period_s", "'0:22'", "number alone")),
     ("a percent", "check {here}/percent.yaml", ("damping_ratio", "as a share, 0.02")),
-    ("a report of a ship", f"report {{configs}}/{FIRST}", ("is no recording", ".rrd")),
+    ("a report of a ship", f"report {{configs}}/{FIRST}", ("is no log", ".frames")),
     ("a replay of a ship", f"replay {{configs}}/{FIRST}", ("is no .frames file", "--config")),
     ("a ship to faults", f"faults --scenario {{configs}}/{FIRST}", ("is a ship", "scenario")),
     ("a sea that is a ship", f"design tank {{configs}}/{FIRST} --scenario {{configs}}/{FIRST}",

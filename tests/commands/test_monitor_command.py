@@ -1,5 +1,6 @@
 """What `monitor` says where it can't show: a port in use, no display, no driver."""
 
+import json
 import os
 import signal
 import socket
@@ -12,12 +13,16 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.cli import app
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry import live, viewer
+from utank_hil.telemetry.frame_log import EVENTS, ROWS, FrameLogWriter
 from utank_hil.telemetry.recording import write_recording
+from utank_hil.telemetry.recording_reader import _chunks, read_recording
 from utank_hil.telemetry.ring import RowWriter
+from utank_hil.telemetry.run_log import _packed
 
 pytestmark = pytest.mark.slow
 
@@ -53,8 +58,35 @@ def test_a_port_that_was_taken_since_ends_the_viewer_with_the_remedy(
     monkeypatch.setattr(viewer, "hold_port", lambda: ports.pop(0))
     said = refused("monitor", str(recording))
     assert "the viewer failed" in said
-    assert f"if a port was in use, utank-hil monitor {recording} takes another" in said
+    assert "if a port was in use, another start takes another" in said
     assert recording.exists()  # not for the viewer to lose
+
+
+def test_the_log_of_a_run_is_shown_as_a_recording_where_something_happens(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    rows = np.zeros((100, len(SIGNALS)))
+    rows[:, SIGNALS.index("time_s")] = np.arange(100)
+    rows[60:, SIGNALS.index("mode")] = Mode.FAULT
+    rows[60:, SIGNALS.index("fault")] = Fault.LEVEL_LIMIT
+    alarm = {"time_ns": 60_000_000_000, "code": int(Fault.LEVEL_LIMIT), "state": None, "mode": 4}
+    with FrameLogWriter(tmp_path / "run-a.frames", {"about": {}, "columns": SIGNALS}) as log:
+        log.append(ROWS, _packed(rows))
+        log.append(EVENTS, json.dumps([alarm]).encode())
+    shown: list[object] = []
+
+    def watched(source: Path, at_s: float) -> None:
+        chunks = _chunks(source, "TextLog:text")
+        found = [chunk.to_record_batch().column("TextLog:text") for chunk in chunks]
+        texts = [text for each in found for (text,) in each.to_pylist()]
+        run = read_recording(source)["run"]["fault"]
+        shown.extend([source.name, at_s, run.tolist(), any("REFUSED" in text for text in texts)])
+
+    monkeypatch.setattr("utank_hil.commands.monitor.watch", watched)
+    result = CliRunner().invoke(app, ["monitor", str(tmp_path / "run-a.frames")])
+    assert result.exit_code == 0, result.output
+    assert shown == ["run-a.rrd", 60.0, rows[:, SIGNALS.index("fault")].tolist(), True]
+    assert [path.name for path in tmp_path.iterdir()] == ["run-a.frames"]
 
 
 def test_a_stream_whose_port_was_taken_is_refused_instead_of_showing_nothing(

@@ -67,7 +67,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
             break
     assert report["mode"] == Mode.ACTIVE.name
     assert report["recording"]["records_lost"] == 0
-    assert Path(report["recording"]["frames"]) == log_of(folder)
+    assert Path(report["recording"]["file"]) == log_of(folder)
     return folder
 
 

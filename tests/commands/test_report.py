@@ -5,9 +5,10 @@ import io
 import json
 import math
 import re
-import shutil
+from collections.abc import Sequence
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import matplotlib.image
 import numpy as np
@@ -17,13 +18,16 @@ from ports import QuietBus
 from typer.testing import CliRunner
 
 from utank_hil.base.provenance import describe
-from utank_hil.canbus.enumerations import Fault, Mode
+from utank_hil.canbus.enumerations import AlarmState, Fault, Mode
 from utank_hil.cli import app
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict, write_report_page
 from utank_hil.reports import recording as of_recording
+from utank_hil.safety.faults import fault_text
+from utank_hil.telemetry.frame_log import EVENTS, ROWS, FrameLogWriter
 from utank_hil.telemetry.recording import write_recording
+from utank_hil.telemetry.run_log import _packed
 
 pytestmark = pytest.mark.slow
 
@@ -35,10 +39,20 @@ def write_page(recording: Path, page: Path) -> Path:
 
 ACTIVE_FROM_S, FAULT_FROM_S, END_S = 20.0, 200.0, 240.0
 
-EVENT = {
-    "time_s": FAULT_FROM_S, "event": "alarm", "state": "RAISED", "fault": "LEVEL_LIMIT",
-    "happened": "A reservoir is <full>.", "remedy": "Look at it.",
+ALARM = {
+    "time_ns": int(1e9 * FAULT_FROM_S), "code": int(Fault.LEVEL_LIMIT),
+    "state": int(AlarmState.ACTIVE_UNACKNOWLEDGED), "mode": int(Mode.FAULT),
 }  # fmt: skip
+
+
+def write_log(
+    file: Path, rows: np.ndarray, about: dict[str, Any], events: Sequence[dict[str, Any]] = ()
+) -> Path:
+    """The log of a run."""
+    with FrameLogWriter(file, {"about": about, "columns": SIGNALS}) as log:
+        log.append(ROWS, _packed(rows))
+        log.append(EVENTS, json.dumps(events).encode())
+    return file
 
 
 class _Links(HTMLParser):
@@ -75,11 +89,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rows[time_s >= FAULT_FROM_S, SIGNALS.index("mode")] = Mode.FAULT
     config = load_config(Path("configs/controllers/gpc.yaml"), ControllerConfig)
     about = describe("run", config, folder, options={"bus": "can0"})
-    file = folder / "run-20260101T000000Z.rrd"
-    write_recording(file, SIGNALS, {"run": rows}, about=about)
-    log = folder / "log-20260101T000000Z.jsonl"
-    log.write_text(json.dumps(EVENT) + "\n" + '{"time_s": 3.0, "ev', encoding="utf-8")
-    return file
+    return write_log(folder / "run-20260101T000000Z.frames", rows, about, [ALARM])
 
 
 @pytest.fixture(scope="module")
@@ -110,47 +120,31 @@ def test_the_page_of_a_recording_says_what_happened(page: Path) -> None:
     assert f"{rms:.2f}° RMS, 50% less than the {2 * rms:.2f}° of its passive twin" in text
     assert "In charge for 75% of the time" in text
     assert 'class="verdict bad"' in text
-    assert "A reservoir is &lt;full&gt;. Look at it." in text
+    assert fault_text(Fault.LEVEL_LIMIT).partition(": ")[2] in text
+    assert "ACTIVE_UNACKNOWLEDGED" in text
     for begin, mode in ((0.0, "STANDBY"), (20.0, "ACTIVE"), (200.0, "FAULT")):
         assert re.search(rf"{begin:.1f} s</td><td[^>]*>{mode}<", text)
     assert "kind: gpc" in text  # the whole configuration
 
 
-@pytest.mark.usefixtures("one_pixel")
-def test_alarms_of_a_later_part_are_those_of_the_run_and_without_a_log_not_known(
-    recording: Path, tmp_path: Path
-) -> None:
-    for name in (recording.name, "log-20260101T000000Z.jsonl"):
-        shutil.copy(recording.with_name(name), tmp_path)
-    part = (tmp_path / recording.name).rename(tmp_path / "run-20260101T000000Z-part002.rrd")
-    page = write_page(part, tmp_path / "page.html").read_text(encoding="utf-8")
-    assert "A reservoir is &lt;full&gt;. Look at it." in page
-    (tmp_path / "log-20260101T000000Z.jsonl").unlink()
-    page = write_page(part, tmp_path / "page.html").read_text(encoding="utf-8")
-    assert "Not known: there is no log-20260101T000000Z.jsonl beside it." in page
-
-
 @pytest.mark.evidence
 @pytest.mark.usefixtures("one_pixel")
-def test_the_log_of_a_run_is_found_by_the_name_of_its_recording(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_log_of_a_run_has_a_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", QuietBus)
     words = ["run", "configs/controllers/gpc.yaml", "--bus", "any0", "--duration", "0.5"]
     assert CliRunner().invoke(app, [*words, "--out", str(tmp_path)]).exit_code == 0
-    (log,), (file,) = tmp_path.glob("log-*.jsonl"), tmp_path.glob("run-*.rrd")
-    log.write_text(json.dumps(EVENT) + "\n", encoding="utf-8")
+    (file,) = tmp_path.glob("run-*.frames")
     page = write_page(file, tmp_path / "page.html").read_text(encoding="utf-8")
-    assert "A reservoir is &lt;full&gt;. Look at it." in page
+    assert "The controller was never in charge." in page
 
 
 def test_a_folder_is_refused_and_says_what_to_name(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["report", str(tmp_path)])
     assert done.exit_code == 2
-    assert "name a recording" in " ".join(done.output.split())
+    assert "name a log" in " ".join(done.output.split())
 
 
-def of_roll(path: Path, roll_rad: np.ndarray, runs: tuple[str, ...] = ("run",)) -> Path:
+def of_roll(path: Path, roll_rad: np.ndarray) -> Path:
     """A recording of a law in charge throughout, whose passive twin rolls twice as much."""
     rows = np.zeros((len(roll_rad), len(SIGNALS)))
     for name, values in (
@@ -160,28 +154,31 @@ def of_roll(path: Path, roll_rad: np.ndarray, runs: tuple[str, ...] = ("run",)) 
         ("mode", Mode.ACTIVE),
     ):
         rows[:, SIGNALS.index(name)] = values
-    write_recording(path, SIGNALS, dict.fromkeys(runs, rows))
-    return path
+    config = load_config(Path("configs/controllers/gpc.yaml"), ControllerConfig)
+    return write_log(path, rows, describe("run", config, path.parent, options={}))
 
 
 @pytest.mark.usefixtures("one_pixel")
 def test_gaps_in_the_roll_are_left_out_of_its_figures(tmp_path: Path) -> None:
     roll = 0.03 * np.sin(0.5 * 0.05 * np.arange(5000))
     roll[:10] = roll[1000:1500] = np.nan
-    page = write_page(of_roll(tmp_path / "a.rrd", roll), tmp_path / "a.html").read_text()
+    page = write_page(of_roll(tmp_path / "a.frames", roll), tmp_path / "a.html").read_text()
     rms = math.degrees(math.sqrt(np.nanmean(roll**2)))
     assert f"{rms:.2f}° RMS, 50% less than the {2 * rms:.2f}° of its passive twin" in page
     assert "the roll is known for 89.8% of it" in page
-    page = write_page(of_roll(tmp_path / "b.rrd", np.nan * roll), tmp_path / "b.html").read_text()
+    page = write_page(
+        of_roll(tmp_path / "b.frames", np.nan * roll), tmp_path / "b.html"
+    ).read_text()
     assert "In charge for 100% of the time: the roll is not known." in page
 
 
 def test_what_no_report_can_be_made_of_is_refused(tmp_path: Path) -> None:
-    one = of_roll(tmp_path / "one.rrd", np.array([0.1]))
-    with pytest.raises(ValueError, match=r"one\.rrd: 1 rows are too few for a report"):
+    one = of_roll(tmp_path / "one.frames", np.array([0.1]))
+    with pytest.raises(ValueError, match=r"one\.frames: 1 rows are too few for a report"):
         write_page(one, tmp_path / "page.html")
-    bench = of_roll(tmp_path / "bench.rrd", np.zeros(100), ("passive", "gpc"))
-    with pytest.raises(ValueError, match="holds the runs passive, gpc of a bench"):
+    bench = tmp_path / "bench.rrd"
+    write_recording(bench, SIGNALS, {"passive": np.zeros((9, len(SIGNALS)))})
+    with pytest.raises(ValueError, match=r"bench\.rrd: is no frame log"):
         write_page(bench, tmp_path / "page.html")
 
 
@@ -213,11 +210,13 @@ def test_cells_are_escaped(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("one_pixel")
 def test_a_recording_of_another_version_is_named(tmp_path: Path) -> None:
-    file = tmp_path / "old.rrd"
+    file = tmp_path / "old.frames"
     rows = np.zeros((100, len(SIGNALS)))
     rows[:, SIGNALS.index("time_s")] = np.arange(100)
-    write_recording(file, SIGNALS, {"run": rows}, about={"configuration": {"name": "a law"}})
-    with pytest.raises(ValueError, match=r"old\.rrd: has no 'machine': it is of another version"):
+    write_log(file, rows, {"configuration": {"name": "a law"}})
+    with pytest.raises(
+        ValueError, match=r"old\.frames: has no 'machine': it is of another version"
+    ):
         write_page(file, tmp_path / "page.html")
 
 
@@ -244,10 +243,10 @@ def test_a_full_disk_is_said_with_the_page_and_leaves_no_half_of_it(
 
 @pytest.mark.parametrize(
     ("name", "expected"),
-    [("nothing.rrd", "nothing.rrd"), ("text.rrd", "text.rrd")],
+    [("nothing.frames", "nothing.frames"), ("text.frames", "text.frames")],
 )
 def test_what_is_no_run_is_named(tmp_path: Path, name: str, expected: str) -> None:
-    (tmp_path / "text.rrd").write_text("no recording")
+    (tmp_path / "text.frames").write_text("no recording")
     with pytest.raises((ValueError, OSError)) as caught:
         write_page(tmp_path / name, tmp_path / "page.html")
     assert expected in str(caught.value)

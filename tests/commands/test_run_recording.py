@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +21,8 @@ from utank_hil.commands import recording as module
 from utank_hil.commands import run as command
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.recorder_process import RecorderError, RecorderReport, RecordingTask
-from utank_hil.telemetry.recording import read_recording
 from utank_hil.telemetry.ring import RowReader
+from utank_hil.telemetry.run_log import RunLogTask, read_run_log
 
 SHM = Path("/dev/shm")
 
@@ -51,29 +51,31 @@ def record(folder: Path, count: int) -> RecordingSummary:
 class Instant:
     """A recorder that leaves a file and takes no time."""
 
-    url = None
-    has_ended = False
+    error = ""
 
-    def __init__(self, task: RecordingTask) -> None:
-        Path(task.file).write_text(task.rows)
+    def __init__(self, _what: str, _main: object, task: RunLogTask) -> None:
+        task.file.write_text(task.rows)
 
-    def stop(self) -> RecorderReport:
-        return RecorderReport(rows=5, lost=2)
+    def failure(self) -> str:
+        return ""
+
+    def stop(self) -> dict[str, int]:
+        return {"rows": 5, "lost": 2}
 
 
 @pytest.mark.slow
 def test_every_row_is_in_a_file_named_by_the_time(tmp_path: Path) -> None:
     summary = record(tmp_path / "new" / "folder", 33)
     assert summary.file is not None
-    assert re.fullmatch(r"run-\d{8}T\d{6}Z\.rrd", Path(summary.file).name)
+    assert re.fullmatch(r"run-\d{8}T\d{6}Z\.frames", Path(summary.file).name)
     assert (summary.rows, summary.lost, summary.error) == (33, 0, None)
-    assert len(read_recording(Path(summary.file))["live"]["time_s"]) == 33
+    assert len(read_run_log(Path(summary.file)).rows) == 33
 
 
 def test_no_recording_is_overwritten_however_soon_the_next_run_comes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "RecorderProcess", Instant)
+    monkeypatch.setattr(module, "Beside", Instant)
     files = {record(tmp_path, 1).file for _ in range(20)}
     assert len(files) == 20
     assert {str(path) for path in tmp_path.iterdir()} == files
@@ -81,7 +83,7 @@ def test_no_recording_is_overwritten_however_soon_the_next_run_comes(
 
 
 def test_lost_rows_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "RecorderProcess", Instant)
+    monkeypatch.setattr(module, "Beside", Instant)
     summary = record(tmp_path, 1)
     assert (summary.rows, summary.lost, summary.error) == (5, 2, None)
 
@@ -92,11 +94,11 @@ def test_a_recording_goes_on_in_another_file_each_hour_within_the_bound(
 ) -> None:
     given: list[object] = []
 
-    def recorder(task: RecordingTask) -> Instant:
+    def recorder(what: str, main: object, task: RunLogTask) -> Instant:
         given.append((task.part_s, task.keep_bytes))
-        return Instant(task)
+        return Instant(what, main, task)
 
-    monkeypatch.setattr(module, "RecorderProcess", recorder)
+    monkeypatch.setattr(module, "Beside", recorder)
     RunRecording(tmp_path, keep_bytes=keep_bytes).stop()
     assert given == [(3600.0, keep_bytes)]
 
@@ -136,11 +138,11 @@ def test_recorder_that_does_not_start_is_told_and_leaves_no_ring_behind(
     # a folder that is gone when the recorder comes to it, as a disk may be
     folder = tmp_path / "gone"
 
-    def unplugged(task: RecordingTask) -> Instant:
+    def unplugged(what: str, _main: object, _task: RunLogTask) -> Instant:
         shutil.rmtree(folder)
-        raise RecorderError(f"the recorder of {task.file} did not start: no such folder")
+        raise OSError(f"{what} did not start: no such folder")
 
-    monkeypatch.setattr(module, "RecorderProcess", unplugged)
+    monkeypatch.setattr(module, "Beside", unplugged)
     summary = record(folder, 10)
     assert summary.file is None
     assert summary.error is not None
@@ -150,12 +152,12 @@ def test_recorder_that_does_not_start_is_told_and_leaves_no_ring_behind(
 def test_without_a_recorder_viewers_still_see_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(task: RecordingTask) -> Instant:
-        raise RecorderError(f"the recorder of {task.file} did not start: no room")
+    def full(what: str, _main: object, _task: RunLogTask) -> Instant:
+        raise OSError(f"{what} did not start: no room")
 
-    monkeypatch.setattr(module, "RecorderProcess", full)
+    monkeypatch.setattr(module, "Beside", full)
     before = rings()
-    recording = RunRecording(tmp_path, head={"x": 1})
+    recording = RunRecording(tmp_path, head={"about": {}})
     assert not recording.keeps_records
     (ring,) = rings() - before
     with RowReader(ring) as viewer:
@@ -170,33 +172,29 @@ def test_recorder_that_fails_on_the_way_is_told_with_its_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Failing(Instant):
-        def stop(self) -> RecorderReport:
-            raise RecorderError("the recorder failed: disk full")
+        error = "the recorder ended with code 1"
 
-    monkeypatch.setattr(module, "RecorderProcess", Failing)
+        def stop(self) -> dict[str, int]:
+            return {}
+
+    monkeypatch.setattr(module, "Beside", Failing)
     summary = record(tmp_path, 10)
     assert summary.file is not None
-    assert summary.error == "the recorder failed: disk full"
+    assert summary.error == "the recorder ended with code 1"
     assert summary.rows is None
 
 
-@pytest.mark.evidence("15-the recorder ended before the run")
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("number", "words"),
-    [
-        (signal.SIGKILL, "the recorder failed: exit code -9"),
-        (signal.SIGTERM, "the recorder ended before the run"),
-    ],
-)
-def test_recorder_that_is_ended_is_told_once_while_the_run_goes_on(
-    tmp_path: Path, number: int, words: str
-) -> None:
+def test_recorder_that_is_killed_is_told_once_while_the_run_goes_on(tmp_path: Path) -> None:
     recording = RunRecording(tmp_path)
     assert recording._recorder.pid is not None
     assert recording.failure() == ""
-    os.kill(recording._recorder.pid, number)
-    os.waitid(os.P_PID, recording._recorder.pid, os.WEXITED | os.WNOWAIT)
+    os.kill(recording._recorder.pid, signal.SIGTERM)  # as a service manager does: no end
+    time.sleep(0.2)
+    assert recording.failure() == ""
+    os.kill(recording._recorder.pid, signal.SIGKILL)
+    recording._recorder._process.join()
+    words = "the recorder ended with code -9"
     assert [recording.failure() for _ in range(3)] == [words, "", ""]
     for row in rows(10):
         recording.write(row)
@@ -227,24 +225,26 @@ def test_run_says_within_a_second_that_nothing_is_recorded_or_logged_any_longer(
         for line in run.stderr:
             told.append(line)
             if "Ctrl-C ends it" in line:
-                os.kill(child_of(run.pid, b"utank_hil.telemetry.recorder"), signal.SIGKILL)
+                logs, records = children_of(run.pid)
+                os.kill(records, signal.SIGKILL)
             if "not recorded" in line:
-                os.kill(child_of(run.pid, b"multiprocessing.spawn"), signal.SIGKILL)
+                os.kill(logs, signal.SIGKILL)
             if "not logged" in line:
                 break
         run.send_signal(signal.SIGINT)
         output = run.communicate()[0]
     lost = "the process that logs events ended with code -9"
-    assert told[-2] == "not recorded any longer: the recorder failed: exit code -9\n"
+    assert told[-2] == "not recorded any longer: the recorder ended with code -9\n"
     assert told[-1] == f"events are not logged any longer: {lost}\n"
     report = json.loads(output)
-    assert report["recording"]["error"] == "the recorder failed: exit code -9"
+    assert report["recording"]["error"] == "the recorder ended with code -9"
     assert report["log_error"] == lost
 
 
-def child_of(run: int, words: bytes) -> int:
+def children_of(run: int) -> list[int]:
+    """The processes beside the loop, in the order in which they were started."""
     children = Path(f"/proc/{run}/task/{run}/children").read_text().split()
-    (found,) = [
-        int(child) for child in children if words in Path(f"/proc/{child}/cmdline").read_bytes()
-    ]
-    return found
+    spawned = b"multiprocessing.spawn"
+    return sorted(
+        int(child) for child in children if spawned in Path(f"/proc/{child}/cmdline").read_bytes()
+    )

@@ -29,7 +29,7 @@ from two_processes import (
 
 from utank_hil.canbus import DriveState, Fault, Mode
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.telemetry.recording_reader import read_recording
+from utank_hil.telemetry.run_log import read_run_log
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.evidence, pytest.mark.timeout(7200)]
 
@@ -122,8 +122,8 @@ def kill_controllers(folder):
                 watcher.forget()
                 watcher.watch(1.5)
             assert watcher.drive.state is DriveState.FAULT
-            (file,) = (folder / str(number) / "out").glob("run-*.rrd")
-            recording = read_recording(file)["live"]
+            (file,) = (folder / str(number) / "out").glob("run-*.frames")
+            recording = read_run_log(file).signals
             assert recording["mode"][-1] == Mode.ACTIVE
             file.unlink()
         # the last one restarts: it waits for the operator, who holds the arm bit

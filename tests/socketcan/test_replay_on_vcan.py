@@ -51,7 +51,7 @@ def driven(folder):
     recording = report["recording"]
     assert isinstance(recording, dict)
     assert recording["records_lost"] == 0
-    return Path(recording["frames"])
+    return Path(recording["file"])
 
 
 def wait_for_listener():

@@ -63,7 +63,7 @@ def sail(system, folder):
     """A service that hangs under pressure, is killed, loses the interface, and is stopped."""
     configure(folder)
     system.run("systemctl", "stop", "utank-hil")  # of an attempt that could not be judged
-    recordings = len(list(LOGS.resolve().glob("run-*.rrd")))
+    recordings = len(list(LOGS.resolve().glob("run-*.frames")))
     with watched() as watcher, run_ship(folder, STORM):
         watcher.wait(lambda w: w.drive is not None)
         system.run("systemctl", "start", "utank-hil", succeeds=True)  # returns when it is ready
@@ -91,7 +91,7 @@ def sail(system, folder):
         system.run("systemctl", "stop", "utank-hil", succeeds=True)
         assert time.monotonic() - begin_s < 30.0
         assert system.shown("ActiveState") == "inactive"
-        assert len(list(LOGS.resolve().glob("run-*.rrd"))) == recordings + 3
+        assert len(list(LOGS.resolve().glob("run-*.frames"))) == recordings + 3
 
 
 def test_the_service_never_leaves_a_pump_alone(system, tmp_path):

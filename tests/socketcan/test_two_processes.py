@@ -23,7 +23,7 @@ from two_processes import (
 from utank_hil.canbus import ControlWord, DriveState, Fault, Mode
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.safety.faults import fault_text
-from utank_hil.telemetry.recording_reader import read_recording
+from utank_hil.telemetry.run_log import read_run_log
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
 
@@ -38,7 +38,7 @@ def controller_into(folder, out):
 
 def only_recording(folder):
     """The recording of the one run that was recorded there."""
-    (file,) = folder.glob("run-*.rrd")
+    (file,) = folder.glob("run-*.frames")
     return file
 
 
@@ -82,7 +82,7 @@ def tell_story(folder):
             told.reports.append(ship.end()[0])
         told.log = candump.stop()
     for name in ("first", "second"):
-        told.recordings.append(read_recording(only_recording(folder / name))["live"])
+        told.recordings.append(read_run_log(only_recording(folder / name)).signals)
     return told
 
 
@@ -235,7 +235,7 @@ def take_the_link_down(folder):
 def test_interface_that_goes_down_under_an_armed_controller_latches_a_fault(tmp_path):
     report, file = first_that_can_be_judged(take_the_link_down, tmp_path)
     assert (report["mode"], report["fault"]) == ("FAULT", "BUS_LOST")
-    recording = read_recording(file)["live"]
+    recording = read_run_log(file).signals
     faulted = recording["mode"] == Mode.FAULT
     assert faulted.any()
     assert (recording["pressure_command_pa"][faulted] == 0.0).all()

@@ -7,8 +7,9 @@ import pytest
 
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.nodes.signals import SIGNALS
+from utank_hil.telemetry.highlight import highlight_s
 from utank_hil.telemetry.recording import write_recording
-from utank_hil.telemetry.recording_reader import _chunks, highlight_s
+from utank_hil.telemetry.recording_reader import _chunks, read_recording
 from utank_hil.telemetry.scene import PERIOD_S, SceneSize, scene_size
 
 SIZE = SceneSize(width_m=17.0, height_m=5.0, lz_m=2.0, level_limit_m=4.0, pressure_pa=5e4)
@@ -100,9 +101,9 @@ def test_a_recording_opens_at_its_fault_or_else_at_most_roll(tmp_path):
     rows = _rows(20.0)
     calm, faulty = tmp_path / "calm.rrd", tmp_path / "faulty.rrd"
     write_recording(calm, SIGNALS, {"run": rows})
-    assert highlight_s(calm) == pytest.approx(math.pi / 2, abs=0.05)
+    assert highlight_s([*read_recording(calm).values()]) == pytest.approx(math.pi / 2, abs=0.05)
     rows[200:, SIGNALS.index("fault")] = Fault.LEVEL_LIMIT
     rows[:20, SIGNALS.index("fault")] = Fault.MOTION_SILENT  # awaited at the start
     rows[:20, SIGNALS.index("mode")] = Mode.INIT
     write_recording(faulty, SIGNALS, {"still": _rows(20.0), "run": rows})
-    assert highlight_s(faulty) == pytest.approx(10.0)
+    assert highlight_s([*read_recording(faulty).values()]) == pytest.approx(10.0)

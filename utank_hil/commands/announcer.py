@@ -5,20 +5,15 @@ and writes the identified ship to files. It reads the remaining events even if t
 """
 
 import json
-import multiprocessing
-import os
-import signal
 import time
 from collections.abc import Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from datetime import UTC, datetime
 from io import FileIO
 from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Any, Final
 
-from utank_hil.base.background import give_way
 from utank_hil.base.whole_file import append_whole
 from utank_hil.canbus import RetuningState
 from utank_hil.canbus.events import AlarmEvent, RetuningEvent
@@ -26,16 +21,14 @@ from utank_hil.commands.identified import IdentifiedShips
 from utank_hil.commands.lines import Lines
 from utank_hil.commands.outward.outlets import Outlet, Outward
 from utank_hil.console.terminal import shown
-from utank_hil.runners.stopping import SIGNALS, signals_waiting
+from utank_hil.runners.beside import Beside, ready
 from utank_hil.safety.faults import FAULTS
 from utank_hil.telemetry.events import Event, EventReader, EventWriter, event_text
 
 LOG_NAME: Final = "log-{}.jsonl"
 _WORDS: Final = {row.code: (row.happened, row.remedy) for row in FAULTS}
 LOOK_S: Final = 0.5  #: Time between two reads of the ring, short enough for a reader.
-_NICENESS: Final = 5
-_START_S, _END_S, _PRINTED_S = 30.0, 10.0, 5.0
-"""Times for the process to start, to end, and to print the last lines, on a busy machine."""
+_PRINTED_S: Final = 5.0  #: Time to print the last lines on a busy machine.
 
 
 def log_event(file: FileIO, event: Event, start_ns: int) -> None:
@@ -87,11 +80,12 @@ class Announcer:
         #: Why events are not printed; the controller runs nevertheless.
         self.error: str | None = None
         self._writer: EventWriter | None = None
-        self._process: SpawnProcess | None = None
+        self._process: Beside | None = None
         try:
             self._writer = EventWriter()
             self.ring = self._writer.name
-            self._process = _started(self.ring, ships, log, outlets)
+            what = "the process that logs events"
+            self._process = Beside(what, announce, self.ring, ships, log, outlets)
         except OSError as error:
             self.error = str(error)
 
@@ -102,50 +96,19 @@ class Announcer:
 
     def failure(self) -> str:
         """Return once the reason why the process ended before the run; never waits."""
-        if self.error is not None or self._process is None or self._process.is_alive():
-            return ""
-        self._note_end(self._process)
-        return self.error or ""
+        failure = "" if self._process is None else self._process.failure()
+        self.error = failure or self.error
+        return failure
 
     def stop(self) -> None:
         """Let the last events be printed and check the result; idempotent."""
-        writer, self._writer = self._writer, None
-        if writer is None:
+        if self._writer is None:
             return
-        writer.close()
-        if self._process is None:
-            return
-        self._process.join(_END_S)
-        if self._process.is_alive():
-            self._process.kill()
-            self._process.join()
-            self.error = "the process that logs events did not end and was killed"
-        else:
-            self._note_end(self._process)
-
-    def _note_end(self, process: SpawnProcess) -> None:
-        if process.exitcode != 0:
-            self.error = f"the process that logs events ended with code {process.exitcode}"
-
-
-def _started(
-    ring: str, ships: IdentifiedShips | None, log: Path | None, outlets: Sequence[Outlet]
-) -> SpawnProcess:
-    context = multiprocessing.get_context("spawn")
-    heard, says = context.Pipe(duplex=False)
-    with heard:
-        process = context.Process(target=announce, args=(ring, ships, log, outlets, says))
-        try:
-            with signals_waiting():
-                process.start()
-        finally:
-            says.close()  # The process has its own copy, so that its end is detected.
-        with suppress(EOFError):
-            if heard.poll(_START_S) and heard.recv_bytes():
-                return process
-    process.kill()
-    process.join()
-    raise OSError(f"the process that logs events did not start ({process.exitcode})")
+        self._writer.close()
+        self._writer = None
+        if self._process is not None:
+            self._process.stop()
+            self.error = self._process.error or self.error
 
 
 def announce(
@@ -153,7 +116,7 @@ def announce(
     ships: IdentifiedShips | None,
     log: Path | None,
     outlets: Sequence[Outlet],
-    ready: Connection,
+    told: Connection,
 ) -> None:
     """Log, print and show events outward until their writer ends or dies; the process's main."""
     with EventReader(ring) as reader, ExitStack() as stack:
@@ -169,13 +132,7 @@ def announce(
         outward = None
         if outlets:
             outward = stack.enter_context(Outward(outlets, reader.writer_pid, lines.say))
-        ready.send_bytes(b"ready")
-        ready.close()
-        # The end of the ring ends it, not Ctrl-C, a closed terminal or a stopped service.
-        os.setsid()
-        for number in SIGNALS:
-            signal.signal(number, signal.SIG_IGN)
-        give_way(_NICENESS)
+        ready(told)
         while True:
             last = reader.ended
             for event in reader.read_events():

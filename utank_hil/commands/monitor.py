@@ -4,12 +4,14 @@ import os
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
 from utank_hil.console.common import fail
-from utank_hil.console.terminal import notes
+from utank_hil.console.terminal import notes, say_note
+from utank_hil.telemetry.frame_log import SUFFIX
 
 if TYPE_CHECKING:
     from utank_hil.telemetry.live import LiveRun
@@ -26,8 +28,8 @@ def monitor(
     source: Annotated[
         str | None,
         typer.Argument(
-            help="A recording (.rrd), a bench's folder, the process number of a run, or the "
-            "address of a stream.",
+            help="A log of a run (.frames), a bench's recording (.rrd) or folder, the process "
+            "number of a run, or the address of a stream.",
             show_default="the controller or bench in real time that runs on this machine",
         ),
     ] = None,
@@ -41,8 +43,11 @@ def monitor(
 
     **Example:** utank-hil monitor out
     """
+    from utank_hil.telemetry.highlight import highlight_s
     from utank_hil.telemetry.live import LiveStream, live_runs
-    from utank_hil.telemetry.recording_reader import highlight_s
+    from utank_hil.telemetry.recording import write_recording
+    from utank_hil.telemetry.recording_reader import read_recording
+    from utank_hil.telemetry.run_log import read_run_log
 
     if source is not None and source.startswith(LIVE):
         watch(source)
@@ -58,7 +63,15 @@ def monitor(
         file = Path(source) / "bench.rrd" if Path(source).is_dir() else Path(source)
         if not file.is_file():
             fail(f"{file}: is not there; give a recording, a bench's folder, or {LIVE}...")
-        watch(file, highlight_s(file))
+        if file.suffix != SUFFIX:
+            watch(file, highlight_s([*read_recording(file).values()]))
+            return
+        log = read_run_log(file, say_note)
+        with TemporaryDirectory() as folder:
+            shown = Path(folder) / file.with_suffix(".rrd").name
+            runs, events = {"run": log.rows}, {"run": log.events}
+            write_recording(shown, log.columns, runs, events, log.about)
+            watch(shown, highlight_s([log.signals]))
     except (OSError, ValueError) as error:
         fail(error)
 
@@ -84,10 +97,7 @@ def watch(
             if not viewer.failed:
                 return
             if viewer.url is not None:
-                again = "another start"
-                if isinstance(source, Path):
-                    again = f"utank-hil monitor {source}"
-                said = f"if a port was in use, {again} takes another"
+                said = "if a port was in use, another start takes another"
                 fail(f"the viewer failed; what it says is above; {said}")
             notes.say(
                 "the reason is above; a graphics driver for any machine: "

@@ -6,11 +6,12 @@ from typing import Annotated
 import typer
 
 from utank_hil.console.common import Json, fail, print_json
-from utank_hil.console.terminal import notes, shown
+from utank_hil.console.terminal import notes, say_note, shown
+from utank_hil.telemetry.frame_log import SUFFIX
 
 
 def report(
-    recording: Annotated[Path, typer.Argument(help="Recording of `utank-hil run` (.rrd).")],
+    recording: Annotated[Path, typer.Argument(help="Log of `utank-hil run` (.frames).")],
     out: Annotated[
         Path | None, typer.Option(help="The page; beside the recording if not given.")
     ] = None,
@@ -21,18 +22,18 @@ def report(
     Verdict, picture, modes, alarms, deadlines, and where the results come from. The page of a bench
     is written by the bench.
 
-    **Example:** utank-hil report out/run.rrd
+    **Example:** utank-hil report out/run-20261122T093000Z.frames
     """
     from utank_hil.pictures.report_page import write_report_page
     from utank_hil.reports.recording import recording_report
 
     if recording.is_dir():
-        fail(f"{recording}: is a folder; name a recording of `utank-hil run` (.rrd) in it")
-    if recording.exists() and recording.suffix != ".rrd":
-        fail(f"{recording}: is no recording; name one of `utank-hil run` (.rrd)")
+        fail(f"{recording}: is a folder; name a log of `utank-hil run` (.frames) in it")
+    if recording.exists() and recording.suffix != SUFFIX:
+        fail(f"{recording}: is no log of `utank-hil run` ({SUFFIX})")
     try:
         page = out or recording.with_suffix(".html")
-        written = write_report_page(page, *recording_report(recording))
+        written = write_report_page(page, *recording_report(recording, say_note))
     except (OSError, ValueError) as error:
         fail(error)
     if json_:

@@ -344,13 +344,10 @@ def _tell(console: Terminal, recording: RecordingSummary) -> None:
         said = f"recording: {shown(Path(recording.file))}"
         if recording.rows is not None:
             said += f", {recording.rows} rows, {recording.lost} lost"
+        if recording.records_lost:
+            said += f", {recording.records_lost} records of frames lost"
         if recording.parts is not None and recording.parts > 1:
             said += f", in {recording.parts} files"
-        console.say(said)
-    if recording.frames is not None:
-        said = f"frame log: {shown(Path(recording.frames))}"
-        if recording.records_lost:
-            said += f", {recording.records_lost} rows lost"
         console.say(said)
     if recording.error is not None:
         console.say(recording.error, red="recording failed:")

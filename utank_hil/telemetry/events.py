@@ -5,7 +5,7 @@ A write takes some twenty microseconds.
 
 import json
 from dataclasses import asdict, replace
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import msgspec
 
@@ -73,9 +73,11 @@ class EventReader(RingReader):
         contents = [json.loads(record) for record in self.read()]
         if contents:
             self.start_ns = contents[-1]["start_ns"]
-        return [
-            msgspec.convert(content, AlarmEvent)
-            if "code" in content
-            else msgspec.convert(content, RetuningEvent)
-            for content in contents
-        ]
+        return [event_of(content) for content in contents]
+
+
+def event_of(content: dict[str, Any]) -> Event:
+    """Return the event of a record of the ring; ValueError for other content."""
+    if "code" in content:
+        return msgspec.convert(content, AlarmEvent)
+    return msgspec.convert(content, RetuningEvent)

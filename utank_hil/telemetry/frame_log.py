@@ -2,7 +2,8 @@
 
 After the file's mark come blocks: kind, length, CRC-32, then that many compressed bytes. The first
 is the head, JSON that describes the log's origin; the others hold records of half a second,
-inputs and answers of a controller node: with its configuration they determine its behaviour.
+inputs and answers of a controller node: with its configuration they determine its behaviour. Rows
+of telemetry and events of a run are in blocks of their own (`run_log`).
 """
 
 import json
@@ -20,7 +21,7 @@ import numpy.typing as npt
 from utank_hil.base.closing import Closing
 from utank_hil.base.text_files import refuse_device
 from utank_hil.base.whole_file import append_whole, errors_name
-from utank_hil.telemetry.ring import RingKind, RingReader, RingWriter
+from utank_hil.telemetry.ring import RingKind, RingWriter
 from utank_hil.telemetry.rotation import part_of, whole_of
 
 PAYLOAD_BYTES: Final = 8
@@ -101,6 +102,8 @@ _BLOCK: Final = struct.Struct("<4sII")
 _HEAD: Final = b"HEAD"
 _QUICK: Final = b"BUSZ"  # Blocks of this kind are compressed with zlib.
 _SMALL: Final = b"BUSX"  # Blocks of this kind are compressed with xz.
+ROWS, EVENTS = b"ROWS", b"EVNT"
+"""Kinds of blocks beside the records, compressed with zlib: rows of telemetry, and events."""
 _MOST_BYTES: Final = 1 << 28  # Of a block, decompressed: 40 minutes of a full bus.
 
 
@@ -120,7 +123,7 @@ class FrameLogWriter(Closing):
         self._content = file.open("wb", buffering=0)  # `close` repeats no failed write
         try:
             self._write(_MARK)
-            self._append(_HEAD, zlib.compress(json.dumps(head).encode()))
+            self.append(_HEAD, json.dumps(head).encode())
         except OSError:
             self.close()
             raise
@@ -133,7 +136,11 @@ class FrameLogWriter(Closing):
         if self._small:
             self._append(_SMALL, lzma.compress(packed, preset=9 | lzma.PRESET_EXTREME))
         else:
-            self._append(_QUICK, zlib.compress(packed))
+            self.append(_QUICK, packed)
+
+    def append(self, kind: bytes, content: bytes) -> None:
+        """Append a block of another kind (`ROWS`, `EVENTS`)."""
+        self._append(kind, zlib.compress(content))
 
     def close(self) -> None:
         """Close the file; idempotent."""
@@ -203,7 +210,7 @@ class FrameLog:
         self.cut = ""
         for path in self._paths:
             for kind, payload in self._read(path):
-                if kind == _HEAD:
+                if kind not in (_QUICK, _SMALL):
                     continue
                 try:
                     records = unpack(payload)
@@ -215,6 +222,16 @@ class FrameLog:
                 break
         if self.cut and note is not None:
             note(f"{self.cut}; what follows in it is left out")
+
+    def others(self) -> Iterator[tuple[bytes, bytes]]:
+        """Yield kind and content of the blocks of this part that are no records, as for `append`.
+
+        After the last one `cut` says whether reading ended before the end of the file.
+        """
+        self.cut = ""
+        for kind, payload in self._read(self._paths[0]):
+            if kind in (ROWS, EVENTS):
+                yield kind, payload
 
     def _read(self, path: Path) -> Iterator[tuple[bytes, bytes]]:
         refuse_device(path)
@@ -245,7 +262,7 @@ def _whole(kind: bytes, payload: bytes) -> bytes:
     decompressor: Any
     if kind == _SMALL:
         decompressor = lzma.LZMADecompressor(memlimit=_MOST_BYTES)
-    elif kind in (_HEAD, _QUICK):
+    elif kind in (_HEAD, _QUICK, ROWS, EVENTS):
         decompressor = zlib.decompressobj()
     else:
         raise ValueError(f"a block of the kind {kind!r} is not known")
@@ -253,36 +270,3 @@ def _whole(kind: bytes, payload: bytes) -> bytes:
     if not decompressor.eof:
         raise ValueError(f"a block is cut, or holds more than {_MOST_BYTES >> 20} MB")
     return content
-
-
-class FrameRecording(Closing):
-    """Writes a ring of records, from `place` on, into a frame log beside recording `file`."""
-
-    def __init__(
-        self, ring: str, file: Path, head: Mapping[str, Any], place: int | None = None
-    ) -> None:
-        self._reader = RingReader(ring, place, RingKind.FRAMES)
-        self._writer = FrameLogWriter(file.with_suffix(SUFFIX), head)
-        #: Number of records overwritten before they were read; each lost slot counts as full.
-        self.lost = 0
-
-    @property
-    def place(self) -> int:
-        """Place in the ring up to which records are written (`RingReader`)."""
-        return self._reader.place
-
-    def write(self) -> None:
-        """Write what has come since the last call."""
-        records = np.frombuffer(b"".join(self._reader.read()), dtype=RECORD)
-        lost = IN_A_SLOT * self._reader.lost - self.lost
-        if lost and len(records):
-            self.lost += lost
-            gap = np.zeros(1, dtype=RECORD)
-            gap["kind"], gap["number"], gap["time_ns"] = Kind.LOST, lost, records["time_ns"][0]
-            records = np.concatenate([gap, records])
-        self._writer.write(records)
-
-    def close(self) -> None:
-        """Close ring and file; idempotent."""
-        self._reader.close()
-        self._writer.close()

@@ -9,9 +9,9 @@ import rerun as rr
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.whole_file import write_whole
-from utank_hil.canbus.events import RetuningEvent
 from utank_hil.telemetry import rerun_log
 from utank_hil.telemetry.blueprint import columns_of, make_blueprint
+from utank_hil.telemetry.events import Event
 from utank_hil.telemetry.scene import scene_size
 
 _BLOCK_ROWS: Final = 8192  #: Number of rows per chunk, the unit in which the viewer loads a file.
@@ -21,16 +21,16 @@ def write_recording(
     path: Path,
     columns: Sequence[str],
     runs: Mapping[str, FloatArray],
-    events: Mapping[str, Sequence[RetuningEvent]] | None = None,
+    events: Mapping[str, Sequence[Event]] | None = None,
     about: Mapping[str, Any] | None = None,
 ) -> None:
     """Write runs side by side on one time line into a `.rrd` file, with its blueprint.
 
     The columns are in SI units, `time_s` among them. `runs` has the rows of each, shape (n,
-    columns), by name; the first is the reference. `events` are those of retuning, `time_ns` on the
-    clock of `time_s`; `about` is the origin of the runs (`utank_hil.base.provenance`). Raises
-    `ValueError` if a table or a column does not fit. Raises `OSError` if the file can't be
-    written; it is then removed.
+    columns), by name; the first is the reference. `events` are those of retuning and alarms,
+    `time_ns` on the clock of `time_s`; `about` is the origin of the runs
+    (`utank_hil.base.provenance`). Raises `ValueError` if a table or a column does not fit. Raises
+    `OSError` if the file can't be written; it is then removed.
     """
     for run, rows in runs.items():
         if rows.ndim != 2 or rows.shape[1] != len(columns):

@@ -24,7 +24,6 @@ from utank_hil.telemetry.units import field_of
 APPLICATION: Final = "utank-hil"
 TIME_COLUMN: Final = "time_s"
 ABOUT: Final = "about"  #: Property that holds the origin (`utank_hil.base.provenance`) as JSON.
-LIVE_RUN: Final = "live"  #: Name of a live run, also in its recordings.
 ARCHETYPE: Final = "telemetry"
 COMPONENT: Final = "row"
 STATE, RETUNING, LOG = "state", "retuning", "log"
@@ -125,10 +124,6 @@ class RunLog:
             [event_text(event) for event in events],
             [rr.TextLogLevel.WARN if warns(event) else rr.TextLogLevel.INFO for event in events],
         )
-
-    def note(self, text: str) -> None:
-        """Log a warning about the recording itself."""
-        self._recording.log(f"{self._path}/{LOG}", rr.TextLog(text, level=rr.TextLogLevel.WARN))
 
     def _write_states(
         self, lane: str, rows: FloatArray, places: list[int], name: Callable[..., str]

@@ -45,7 +45,6 @@ from utank_hil.base.closing import Closing
 
 _SHM: Final = Path("/dev/shm")
 _PREFIX: Final = "utank-"
-_HELD: Final = "/proc/self/fd/"
 _MAGIC: Final = int.from_bytes(b"UTNKRING", "little")
 _VERSION: Final = 4
 _HEADER_WORDS: Final = 16
@@ -232,17 +231,9 @@ class RingReader(Closing):
         self._map.close()
 
 
-def held_ring(name: str) -> str:
-    """Return a name of a ring that stays valid in this process, through `exec` and writer's end."""
-    descriptor = _opened(name)
-    os.set_inheritable(descriptor, True)
-    return f"{_HELD}{descriptor}"
-
-
 def _opened(name: str) -> int:
     # Another user's file may be a pipe, which waits for a writer, or a link to a device.
-    flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK
-    flags |= 0 if name.startswith(_HELD) else os.O_NOFOLLOW
+    flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOFOLLOW
     try:
         descriptor = os.open(_SHM / name, flags)
     except FileNotFoundError as error:

@@ -1,7 +1,6 @@
 """Rotation of the files of a recording: their length, and how many are kept.
 
-A recording is a `.rrd` file, a frame log, or both under one name. A long one has parts:
-`run-x.rrd`, `run-x-part002.rrd`, ...
+A long one has parts: `run-x.frames`, `run-x-part002.frames`, ...
 """
 
 import os
@@ -14,7 +13,6 @@ from pathlib import Path
 from typing import Final
 
 _GROWTH: Final = 1.05  #: Growth of a file over the one before: compression differs.
-SUFFIXES: Final = (".rrd", ".frames")  #: Suffixes of the files of one recording.
 
 
 def make_room(file: Path, number: int, keep_bytes: int) -> None:
@@ -24,9 +22,8 @@ def make_room(file: Path, number: int, keep_bytes: int) -> None:
     """
     if number == 1:
         _put_before(file, time.time_ns())
-    before = part_of(file, number - 1).with_suffix
-    files = [] if number == 1 else [before(suffix) for suffix in SUFFIXES]
-    last_bytes = sum(status.st_size for _, status in _found(files))
+    before = [] if number == 1 else [part_of(file, number - 1)]
+    last_bytes = sum(status.st_size for _, status in _found(before))
     remove_oldest(part_of(file, number), keep_bytes - round(_GROWTH * last_bytes))
 
 
@@ -52,10 +49,9 @@ def _found(paths: Iterable[Path]) -> Iterator[tuple[Path, stat_result]]:
 
 def _alike(file: Path) -> Iterator[tuple[Path, stat_result]]:
     """Return other files of names like that of `file` up to the first hyphen, and their status."""
-    for suffix in SUFFIXES:
-        for path, status in _found(file.parent.glob(f"{file.stem.partition('-')[0]}-*{suffix}")):
-            if path.stem != file.stem:
-                yield path, status
+    for path, status in _found(file.parent.glob(f"{file.stem.partition('-')[0]}-*{file.suffix}")):
+        if path.stem != file.stem:
+            yield path, status
 
 
 def _put_before(file: Path, now_ns: int) -> None:
@@ -76,25 +72,19 @@ def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
     Only names like that of `file` up to the first hyphen count. It stays, as what another user
     owns; other parts of it go last.
     """
-    alike: dict[str, dict[Path, stat_result]] = {}
-    for path, status in _alike(file):
-        alike.setdefault(path.stem, {})[path] = status
+    alike = dict(_alike(file))
     own, _ = whole_of(file)  # It is newer than all others, even by a clock that was set back.
 
-    def age(stem: str) -> tuple[bool, int, str]:
-        of_own_run = whole_of(file.with_stem(stem))[0].stem == own.stem
-        return of_own_run, max(status.st_mtime_ns for status in alike[stem].values()), stem
+    def age(path: Path) -> tuple[bool, int, str]:
+        return whole_of(path)[0].stem == own.stem, alike[path].st_mtime_ns, path.stem
 
-    left = sum(status.st_size for files in alike.values() for status in files.values())
+    left = sum(status.st_size for status in alike.values())
     removed: list[Path] = []
-    for stem in sorted(alike, key=age):
+    for path in sorted(alike, key=age):
         if left <= keep_bytes:
             break
-        for path, status in alike[stem].items():
-            try:
-                path.unlink(missing_ok=True)
-            except PermissionError:  # Of another user.
-                continue
-            left -= status.st_size
+        with suppress(PermissionError):  # Of another user.
+            path.unlink(missing_ok=True)
+            left -= alike[path].st_size
             removed.append(path)
     return removed
