@@ -31,6 +31,13 @@ def test_sample_is_the_output_then_and_the_mean_command_since_the_one_before():
     assert np.isnan(record[0, 0])
 
 
+def test_a_gauge_alone_beside_a_column_of_the_level_is_left_aside():
+    columns = _columns()
+    columns["level_m"] = columns.pop("starboard_level_m")
+    record = logged_samples(columns, ("level_m",), 0.2)
+    assert record[:, 1] == pytest.approx(columns["level_m"][::4])
+
+
 @given(st.floats(0.0, 19.0), st.floats(0.0, 25.0))
 def test_part_of_a_recording_is_that_part_of_the_whole(from_s, length_s):
     whole = logged_samples(_columns(), ("roll_rad",), 0.2)

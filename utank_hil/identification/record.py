@@ -96,7 +96,7 @@ def logged_samples(
 
     ValueError is raised if the recording lacks a column or the part is empty.
     """
-    if "level_m" in measured and "port_level_m" in columns:
+    if "level_m" in measured and {"port_level_m", "starboard_level_m"} <= columns.keys():
         level_m = (columns["starboard_level_m"] - columns["port_level_m"]) / 2
         columns = {**columns, "level_m": level_m}
     for name in ("time_s", "pressure_command_pa", *measured):
