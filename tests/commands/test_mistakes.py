@@ -123,6 +123,8 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
      "--listen 127.0.0.1:99999", ("--listen", "port")),
     ("all addresses by another name", f"panel {{configs}}/{FIRST} --bus can0 --web --listen 0:0",
      ("--listen", "one address")),
+    ("an address with two points", f"panel {{configs}}/{FIRST} --bus can0 --web "
+     "--listen 127.0..1:8047", ("--listen", "one address")),
     ("a sea of no height", f"init {{here}}/a {' '.join(SHIP)} --roll-period 10 --hs 0",
      ("--hs", "positive")),
 ]  # fmt: skip

@@ -263,7 +263,7 @@ def _server(listen: str) -> ServerProcess:
     host, _, port = listen.rpartition(":")
     try:
         address = socket.gethostbyname(host)  # 0 is all addresses, too
-    except OSError:
+    except (OSError, UnicodeError):  # no such name, or none that could be one
         address = ""
     if address in ("", "0.0.0.0") or not (port.isdecimal() and int(port) < 1 << 16):
         fail(f"--listen {listen}: name one address of this machine and a port, as {LISTEN}")
