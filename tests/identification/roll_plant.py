@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import control
 import numpy as np
 
+from tools.thesis.era import markov_parameters
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.interface import PumpLimits
 from utank_hil.dynamics import RollShip, Tank, coupled_model
@@ -85,6 +86,11 @@ def jonswap_moment(samples, seed, moment_nm=2e7):
     time_s = np.arange(samples) * SAMPLE_TIME_S
     waves = np.cos(np.outer(time_s, omega) + phases) @ np.sqrt(shape)
     return moment_nm * waves / np.sqrt(np.sum(shape) / 2)
+
+
+def markov_of(result, count=401):
+    """Pulse responses of an identified model, shape (count, m, r)."""
+    return markov_parameters(result.arx, count)[0]
 
 
 def frequency_response(system, omega=BAND_RAD_S):

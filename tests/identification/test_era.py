@@ -3,16 +3,16 @@
 import control
 import numpy as np
 import pytest
-from roll_plant import noisy, plant, pulses, response_error
+from roll_plant import markov_of, noisy, plant, pulses, response_error
 
-from utank_hil.identification import IdentificationError, era, okid
+from tools.thesis.era import era
+from utank_hil.identification import IdentificationError, okid
 
 
 def _noisy_markov(seed, order=60):
     u, truth = pulses(seed), plant()
-    return okid(
-        u, noisy(truth.respond(u, np.zeros_like(u)), 0.02, seed), order, sample_time_s=0.2
-    ).markov
+    y = noisy(truth.respond(u, np.zeros_like(u)), 0.02, seed)
+    return markov_of(okid(u, y, order, sample_time_s=0.2))
 
 
 def test_exact_markov_parameters_give_the_system_back():

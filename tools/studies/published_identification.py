@@ -17,17 +17,15 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, lstsq
 from scipy.optimize import minimize
 
+from tools.thesis.era import realized
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ARX
-from utank_hil.identification import era
-from utank_hil.identification.okid import markov_parameters
 
 Model = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 Identify = Callable[[FloatArray, FloatArray, float], Model]
 """From u (N,), y (N, m) and the sample time to A, B, C, D."""
 
 _LAGS: Final = 120
-_MARKOV: Final = 401
 
 
 def pbsid(u: FloatArray, y: FloatArray, order: int, past: int, future: int) -> Model:
@@ -124,8 +122,7 @@ def regularised_arx(u: FloatArray, y: FloatArray, sample_time_s: float) -> Model
         found = np.asarray(root @ cho_solve(factor, root.T @ moment)).reshape(count, _LAGS)
         beta[:_LAGS, output, 0] = found[0]
         alpha[:, output, :] = found[1:].T
-    system = era(markov_parameters(ARX(alpha, beta, sample_time_s), _MARKOV)[0], 4,
-                 sample_time_s=sample_time_s)  # fmt: skip
+    system = realized(ARX(alpha, beta, sample_time_s), 4)
     a, b, c, d = (
         np.asarray(part, dtype=np.float64) for part in (system.A, system.B, system.C, system.D)
     )

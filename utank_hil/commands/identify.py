@@ -6,7 +6,6 @@ Its first word is a file, or one of the tests of `identify_test`.
 import dataclasses
 import math
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -28,20 +27,12 @@ from utank_hil.console.terminal import Terminal, new_table, say_note
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
-from utank_hil.identification import IdentificationError, ModalConfidence, modal_confidence
+from utank_hil.identification import IdentificationError
 from utank_hil.identification.record import logged_samples
 from utank_hil.retuning import Candidate, Refusal
 from utank_hil.retuning.redesign import Identification, RetuningTask, identify, judge
 
-STATES: Final = 4
 QUANTILE: Final = 1.96  #: Number of standard deviations to either side of a 95 % interval.
-
-
-def realized_modes(found: Identification) -> ModalConfidence | None:
-    """Return the modes of the model without physics; None if it has none with deviations."""
-    with suppress(IdentificationError, ValueError):
-        return modal_confidence(found.okid, STATES)
-    return None
 
 
 def figures(
@@ -49,18 +40,6 @@ def figures(
 ) -> dict[str, Any]:
     """Return all results for ``--json``; deviations are relative standard deviations."""
     fit, validation = found.fit, found.validation
-    modes = realized_modes(found)
-    columns = (
-        {}
-        if modes is None
-        else {
-            "frequency_rad_s": modes.modes.frequency_rad_s,
-            "frequency_std_rad_s": modes.frequency_std_rad_s,
-            "damping_ratio": modes.modes.damping_ratio,
-            "damping_ratio_std": modes.damping_ratio_std,
-        }
-    )
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     return {
         "accepted": isinstance(answer, Candidate),
         "reasons": [] if isinstance(answer, Candidate) else list(answer.reasons),
@@ -81,7 +60,6 @@ def figures(
         "whiteness_probability": validation.whiteness_probability.tolist(),
         "input_correlation": abs(validation.input_correlation).max(axis=(0, 2)).tolist(),
         "independence_probability": validation.independence_probability.ravel().tolist(),
-        "modes": [dict(zip(columns, row, strict=True)) for row in rows],
         "law": dataclasses.asdict(answer.summary) if isinstance(answer, Candidate) else None,
         "files": {name: str(path) for name, path in files.items()},
     }
@@ -150,27 +128,12 @@ def _ship_table(found: Identification, task: RetuningTask) -> Table:
 
 
 def _mode_table(found: Identification, task: RetuningTask) -> Table:
-    table = new_table(
-        "Modes of ship and tank together", "configured", "identified", "without\nphysics", "± 95 %"
-    )
+    table = new_table("Modes of ship and tank together", "configured", "identified")
     configured = _modes(task.plant.ship, task.plant.tank)
     fitted = _modes(found.fit.ship, found.fit.tank)
-    realized = realized_modes(found)
     for number, ((w0, z0), (w1, z1)) in enumerate(zip(configured, fitted, strict=True), start=1):
-        free = ["", "", "", ""]
-        if realized is not None:
-            modes = realized.modes
-            swinging = np.where(modes.damping_ratio < 1, modes.frequency_rad_s, np.inf)
-            k = int(np.argmin(abs(swinging - w1)))
-            free = [
-                f"{modes.frequency_rad_s[k]:.4f}",
-                f"{QUANTILE * realized.frequency_std_rad_s[k]:.4f}",
-                f"{modes.damping_ratio[k]:.4f}",
-                f"{QUANTILE * realized.damping_ratio_std[k]:.4f}",
-            ]
-        table.add_row(f"{number}: frequency, rad/s", f"{w0:.4f}", f"{w1:.4f}", *free[:2])
-        table.add_row("   damping ratio", f"{z0:.4f}", f"{z1:.4f}", *free[2:])
-    table.caption = "without physics: nearest mode of OKID and ERA, ± if the errors are white"
+        table.add_row(f"{number}: frequency, rad/s", f"{w0:.4f}", f"{w1:.4f}")
+        table.add_row("   damping ratio", f"{z0:.4f}", f"{z1:.4f}")
     return table
 
 

@@ -118,12 +118,11 @@ def shrinkage_estimate(
     """Return shrunk coefficients (n, m), and 1 / kappa for each output (m,).
 
     With a slow pump or a narrow-band input, the record does not determine the fast part of the
-    pulse responses. Least squares then amplifies noise to hundreds of times the signal, and ERA
-    realizes it. Here the input coefficients of each output have a Gaussian prior of zero mean and
-    variance tau^2 (ridge regression), and kappa = tau^2 / sigma^2 maximizes the likelihood of the
-    data (empirical Bayes, restricted likelihood; Pillonetto et al., Automatica 2014). With the
-    Schur complement S = V diag(l) V^T of the inputs in the normal equations and its right-hand side
-    c::
+    pulse responses. Least squares then amplifies noise to hundreds of times the signal. Here the
+    input coefficients of each output have a Gaussian prior of zero mean and variance tau^2 (ridge
+    regression), and kappa = tau^2 / sigma^2 maximizes the likelihood of the data (empirical Bayes,
+    restricted likelihood; Pillonetto et al., Automatica 2014). With the Schur complement
+    S = V diag(l) V^T of the inputs in the normal equations and its right-hand side c::
 
         beta = V kappa / (1 + kappa l) V^T c
 
@@ -177,7 +176,6 @@ class Fit:
     coefficients: FloatArray  #: shape (n, m)
     #: shape (m, m): covariance of the equation errors, with rows minus rank as degrees of freedom.
     residual_covariance: FloatArray
-    gram: FloatArray  #: shape (n, n): Gram matrix.
     #: shape (m,): term of the shrinkage on the diagonal of the inputs' part; zero without
     #: shrinkage.
     penalty: FloatArray
@@ -214,4 +212,4 @@ def fit(regression: LagRegression) -> Fit:
             rank = regression.columns
     errors = regression.residuals(coefficients)
     covariance = errors.T @ errors / (regression.rows - rank)
-    return Fit(coefficients, covariance, gram, penalty, int(rank), excitation_order)
+    return Fit(coefficients, covariance, penalty, int(rank), excitation_order)

@@ -2,13 +2,12 @@
 
 The observer Markov parameters of (3.12) are the coefficients of an ARX model: with
 A_o = A - K C they are alpha_i = C A_o^(i-1) K and beta_i = C A_o^(i-1) (B - K D). They are fitted
-by least squares together with a disturbance basis. The Markov parameters of the system
-follow by recursion. The order p must cover the observer's memory: p = 120 at 0.2 s is two roll
-periods.
+by least squares together with a disturbance basis. The order p must cover the observer's memory:
+p = 120 at 0.2 s is two roll periods.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,61 +17,8 @@ from utank_hil.identification.disturbance import disturbance_basis
 from utank_hil.identification.lag_regression import Fit, LagRegression, fit
 from utank_hil.identification.record import IdentificationError, channel_scale, stacked_record
 
-_MARKOV_COUNT = 401  # At 0.2 s this is a Hankel matrix over 40 s, longer than any roll period.
+_TRIED = 401  # Samples of a pulse response that must be finite: at 0.2 s, beyond any roll period.
 _LEAST_EXCITATION = 4  # One oscillation needs twice its order.
-
-
-def markov_parameters(arx: ARX, count: int) -> tuple[FloatArray, FloatArray]:
-    """Return K = `count` Markov parameters of the system and of the observer gain.
-
-    ::
-
-        Y_0 = beta_0,    Y_k  = beta_k + sum_{i=1..min(k,p)} alpha_i Y_{k-i}
-                         Yo_k = alpha_k + sum_{i=1..min(k-1,p)} alpha_i Yo_{k-i}
-
-    Y_k = C A^(k-1) B are the system's Markov parameters and Yo_k = C A^(k-1) K those of its
-    observer x(k+1) = A x + B u + K (y - C x - D u); K is -G of the thesis (3.10). Juang, Applied
-    System Identification, 6.3. Beyond p the terms beta_k and alpha_k are zero.
-
-    The parameters of the system, shape (K, m, r), are D, then C A^(k-1) B; those of the observer,
-    shape (K - 1, m, m), C A^(k-1) K.
-    """
-    p, m, r = arx.order, arx.outputs, arx.inputs
-    # Both recursions run at once, newest first, so that the last p responses are contiguous.
-    newest_first = np.zeros((count + p, m, r + m))
-    known = min(count, p + 1)
-    newest_first[count - known : count, :, :r] = arx.beta[:known][::-1]
-    newest_first[count - known : count - 1, :, r:] = arx.alpha[: known - 1][::-1]
-    alphas = np.ascontiguousarray(arx.alpha.transpose(1, 0, 2).reshape(m, p * m))
-    past = newest_first.reshape(-1, r + m)
-    for k in range(1, count):
-        first = count - k  # This is the row block of response k - 1.
-        newest_first[first - 1] += alphas @ past[first * m : (first + p) * m]
-    responses = newest_first[:count][::-1]
-    return responses[:, :, :r].copy(), responses[1:, :, r:].copy()
-
-
-def markov_gradient(arx: ARX, markov: FloatArray, weights: np.ndarray) -> np.ndarray:
-    """Gradient of sum_k <weights_k, Y_k> with respect to the ARX coefficients.
-
-    One backward pass through the recursion (adjoint method) is made. `markov` and the real or
-    complex `weights` have shape (K, m, r), the gradient (r + p (m + r), m) in the order of
-    `LagRegression`, without the disturbance basis.
-    """
-    p, m, r = arx.order, arx.outputs, arx.inputs
-    count = len(weights)
-    adjoint = np.zeros((count + p, m, r), dtype=weights.dtype)
-    adjoint[:count] = weights
-    transposed = np.ascontiguousarray(arx.alpha.transpose(2, 0, 1).reshape(m, p * m))
-    rows = adjoint.reshape(-1, r)
-    for k in range(count - 1, -1, -1):
-        adjoint[k] += transposed @ rows[(k + 1) * m : (k + 1 + p) * m]
-    result = np.zeros((p + 1, m + r, m), dtype=weights.dtype)
-    reach = min(p + 1, count)
-    result[:reach, m:] = adjoint[:reach].transpose(0, 2, 1)
-    for i in range(1, reach):
-        result[i, :m] = np.einsum("kar,kbr->ba", adjoint[i:count], markov[: count - i])
-    return result.reshape(-1, m)[m:]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,18 +26,8 @@ class OkidResult:
     """Result of OKID."""
 
     arx: ARX  #: Observer Markov parameters as a model.
-    #: shape (K, m, r): system Markov parameters; ``markov[0]`` is D, ``markov[k]`` is C A^(k-1) B.
-    markov: FloatArray
-    #: shape (K - 1, m, m): observer gain Markov parameters C A^(k-1) K, K being -G of the thesis.
-    observer_gain: FloatArray
     residual_covariance: FloatArray  #: shape (m, m): covariance of the one-step prediction errors.
-    #: shape (n, n): the regression's Gram matrix, with columns divided by
-    #: `column_scale`, in the order of `LagRegression`.
-    gram: FloatArray
-    column_scale: FloatArray  #: shape (n,)
-    #: shape (m,): term of the shrinkage on the inputs' diagonal of the Gram matrix; zero for plain
-    #: least squares, when the input excites well.
-    penalty: FloatArray
+    columns: int  #: Number n of the regression's columns: coefficients of each output.
     #: Rank of the regression; below n if the data fit exactly or the input does not excite.
     rank: int
     #: Order of persistent excitation of the input, at most p + 1. A system of order n needs 2 n or
@@ -152,16 +88,16 @@ def okid(
     errors = np.full((len(z), m), np.nan)
     errors[regression.at] = regression.residuals(solution.coefficients) * scale[:m]
     fitted = _in_units(solution, regression, scale, sample_time_s, errors)
+    kick = np.zeros((max(_TRIED, 2 * order + 1), fitted.arx.inputs))
+    kick[0] = 1.0
     with np.errstate(over="ignore", invalid="ignore"):
-        markov, observer_gain = markov_parameters(
-            fitted.arx, max(_MARKOV_COUNT, 2 * fitted.arx.order + 1)
-        )
-    if not (np.isfinite(markov).all() and np.isfinite(observer_gain).all()):
+        answer = fitted.arx.simulate(kick)
+    if not np.isfinite(answer).all():
         raise IdentificationError(
             "the fitted model is violently unstable, so the record does not determine it; "
             "record longer, excite more or raise the order"
         )
-    return replace(fitted, markov=markov, observer_gain=observer_gain)
+    return fitted
 
 
 def _in_units(
@@ -171,7 +107,7 @@ def _in_units(
     sample_time_s: float,
     errors: FloatArray,
 ) -> OkidResult:
-    """Convert a solution to the units of the record, yet without Markov parameters."""
+    """Convert a solution to the units of the record."""
     p, m = regression.order, regression.outputs
     y_scale = scale[:m]
     column_scale = np.concatenate([np.tile(scale, p + 1)[m:], np.ones(regression.basis_size)])
@@ -183,12 +119,8 @@ def _in_units(
     by_lag = by_lag.transpose(0, 2, 1)
     return OkidResult(
         ARX(by_lag[1:, :, :m], by_lag[:, :, m:], sample_time_s),
-        markov=np.empty(0),
-        observer_gain=np.empty(0),
         residual_covariance=solution.residual_covariance * np.outer(y_scale, y_scale),
-        gram=solution.gram,
-        column_scale=column_scale,
-        penalty=solution.penalty,
+        columns=len(column_scale),
         rank=solution.rank,
         excitation_order=solution.excitation_order,
         rows=regression.rows,

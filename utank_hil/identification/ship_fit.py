@@ -142,7 +142,7 @@ def fit_ship(
     except (np.linalg.LinAlgError, ValueError) as error:  # overflow, or a singular matrix
         raise IdentificationError(f"no ship fits the identified model: {error}") from None
     period_gradient = np.array([0.5, -0.5, 0.0, 0.0])
-    coefficients_per_row = len(result.column_scale) / result.rows
+    coefficients_per_row = result.columns / result.rows
     inflation = (1 + coefficients_per_row) / (1 - coefficients_per_row)
     fitted = physical_model(theta)
     return ShipFit(
