@@ -33,7 +33,7 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.control import PassiveDesign
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.pictures import BenchCurve
-from utank_hil.telemetry.recording import read_recording
+from utank_hil.telemetry.recording_reader import read_recording
 
 pytestmark = pytest.mark.slow
 

@@ -114,7 +114,7 @@ def test_more_runs_than_colours_are_refused(tmp_path):
 def test_the_controller_process_can_import_the_ring_without_rerun_or_matplotlib():
     code = """
 import sys
-import utank_hil.telemetry.recorder, utank_hil.telemetry.ring, utank_hil.telemetry.viewer
+import utank_hil.telemetry.ring, utank_hil.telemetry.run_log, utank_hil.telemetry.viewer
 heavy = {"rerun", "matplotlib", "numba", "control", "scipy", "pyarrow"} & set(sys.modules)
 assert not heavy, heavy
 import utank_hil.pictures
