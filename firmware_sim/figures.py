@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from firmware_sim.bench import BenchResult
 from firmware_sim.model_limits import passed_limits
-from firmware_sim.retuning_figures import RetuningFigures, retuning_figures
 from firmware_sim.run import RECORD_S, Run
 from firmware_sim.scenario_content import PASSIVE
 from firmware_sim.ship_side import passive_script
@@ -27,6 +26,7 @@ from utank_hil.console.common import KILLED
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.nodes.panel import Action
 from utank_hil.safety.faults import fault_text
+from utank_hil.telemetry.events import event_text
 
 NO_TANK: Final = "no tank"
 LEAST_ROLL_RAD: Final = 1e-6  #: Roll below which a ratio of rolls is meaningless.
@@ -89,7 +89,7 @@ class RunFigures:
     fallbacks: int | None
     law_error: str
     loop: dict[str, Any] | None  #: Timing statistics of the loop; None in simulated time.
-    retuning: RetuningFigures | None
+    retuning: tuple[dict[str, Any], ...]  #: Events of retuning, as JSON, on ship's time.
     rank: int | None = None  #: Rank by roll RMS among the runs that count, from 1.
     roll: RollStatistics | None = None
     #: roll_below_no_tank, roll_below_passive: relative reduction of the roll RMS against no tank,
@@ -121,6 +121,7 @@ class BenchFigures:
     exit_code: int
     endings: tuple[str, ...]  #: Remarks on the ends of runs; empty where all went as ordered.
     limits_passed: tuple[str, ...]  #: Limits of the model that were passed.
+    retuned: tuple[str, ...]  #: Events of retuning in words.
     no_tank: BareShip
     runs: tuple[RunFigures, ...]  #: All runs with at least one row; the passive tank first.
 
@@ -152,6 +153,11 @@ def figures(result: BenchResult) -> BenchFigures:
         exit_code=int(code),
         endings=tuple(_endings(result, marks)),
         limits_passed=tuple(passed_limits(result)),
+        retuned=tuple(
+            f"{run.name}, {event.time_ns * 1e-9:.0f} s: {event_text(event)}"
+            for run in result.runs
+            for event in run.events
+        ),
         no_tank=bare_figures(result),
         runs=run_figures(result),
     )
@@ -208,7 +214,7 @@ def run_figures(result: BenchResult) -> tuple[RunFigures, ...]:
                 expected_rows=result.expected_rows,
                 capsized_s=finite(run.capsized_s),
                 loop=None if run.loop is None else run.loop.summary(),
-                retuning=retuning_figures(run, result.scenario, result.settle_s),
+                retuning=tuple(event.as_json() for event in run.events),
                 **judged,
             )
         )

@@ -14,7 +14,6 @@ from firmware_sim.bench import BenchResult
 from firmware_sim.figures import NO_TANK as BARE
 from firmware_sim.figures import BenchFigures, RunFigures
 from firmware_sim.report_tables import few_rolls, in_one_unit, roll_interval, tables
-from firmware_sim.retuning_figures import events_on_ships_time
 from firmware_sim.run import COLUMNS, RECORD_S
 from firmware_sim.scenario_content import PASSIVE
 from firmware_sim.tank_report import less
@@ -72,6 +71,7 @@ def bench_page(found: BenchFigures, about: Mapping[str, Any], picture: bytes | N
             pictures=[] if picture is None else [report_page.ReportPicture(picture, says)],
             tables=[printed(table) for table in tables(found)],
         ),
+        *([report_page.ReportSection("Retuning", found.retuned)] if found.retuned else []),
         _deadlines(found),
         about_section(about, about["configuration"]),
     ]
@@ -246,6 +246,6 @@ def _record(result: BenchResult, about: Mapping[str, Any], path: Path) -> None:
         path,
         COLUMNS,
         {run.name: run.rows for run in result.runs},
-        {run.name: events_on_ships_time(run) for run in result.runs if run.retuning},
+        {run.name: run.events for run in result.runs},
         about,
     )

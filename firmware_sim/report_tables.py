@@ -2,13 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from textwrap import wrap
 from typing import Final
 
 from rich.table import Table as RichTable
 
 from firmware_sim.figures import NO_TANK, BenchFigures, RunFigures
-from firmware_sim.retuning_figures import SETTLING_S, RetuningFigures
 from firmware_sim.scenario_content import PASSIVE
 from utank_hil.analysis.motion.statistics import RollStatistics
 from utank_hil.console.terminal import new_table
@@ -43,7 +41,7 @@ def few_rolls(found: BenchFigures, roll_rad_s: float) -> str:
 
 def tables(found: BenchFigures) -> list[RichTable]:
     """All tables of a bench that have rows."""
-    made = [motion_table(found), pump_table(found), retuning_table(found)]
+    made = [motion_table(found), pump_table(found)]
     return [table for table in made if table.rows]
 
 
@@ -118,55 +116,6 @@ def in_one_unit(values: Sequence[float], unit: str) -> tuple[str, list[str]]:
     prefix, scale = next((each for each in _PREFIXES if largest >= each[1]), _PREFIXES[-1])
     digits = 2 if largest < scale else max(0, 2 - math.floor(math.log10(largest / scale)))
     return prefix + unit, [f"{value / scale:.{digits}f}" for value in values]
-
-
-def retuning_table(found: BenchFigures) -> RichTable:
-    """Table of retuning and its gain; empty where nothing retuned."""
-    rows = {run.name: _retuning_cells(run.retuning) for run in found.runs if run.retuning}
-    shown = [any(cells) for cells in zip(*rows.values(), strict=True)] or [True]
-    headings = [heading for heading, kept in zip(_RETUNING, shown, strict=False) if kept]
-    figures = [heading for heading in headings if heading not in _RETUNING[-2:]]
-    table = new_table("Retuning", *figures)
-    table.add_column("\nended in", no_wrap=True)
-    if "\nbecause" in headings:
-        table.add_column("\nbecause")
-    table.caption = (
-        f"± one standard deviation; before the first retuning, and from {SETTLING_S:g} s "
-        "after the new law took charge"
-    )
-    for name, cells in rows.items():
-        table.add_row(name, *(cell for cell, kept in zip(cells, shown, strict=True) if kept))
-    return table
-
-
-_RETUNING: Final = (
-    "retuned\nat s", "roll RMS\nbefore °", "roll RMS\nafter °", "\nless",
-    "roll period s\nfound ± / true", "ship damping MN m s\nfound / true",
-    "tank damping ratio\nfound / true", "\nended in", "\nbecause",
-)  # fmt: skip
-"""Headings; those of figures that no run has are left out."""
-
-
-def _retuning_cells(retuning: RetuningFigures) -> tuple[str, ...]:
-    found, true = retuning.found, retuning.truth
-    period = ship = tank = ""
-    if found is not None:
-        deviation_s = found.roll_period_s * found.period_deviation
-        period = f"{found.roll_period_s:.3f} ± {deviation_s:.3f} / {true.roll_period_s:.3f}"
-        ship = f"{found.damping_nms_rad / 1e6:#.4g} / {true.damping_nms_rad / 1e6:#.4g}"
-        tank = f"{found.tank_damping_ratio:.4f} / {true.tank_damping_ratio:.4f}"
-    rolls = (retuning.roll_before_rad, retuning.roll_after_rad)
-    state, attempts = retuning.state, retuning.attempts
-    return (
-        "" if retuning.retuned_at_s is None else f"{retuning.retuned_at_s:.0f}",
-        *("" if roll is None else f"{math.degrees(roll):.2f}" for roll in rolls),
-        _percent(retuning.roll_after_below_before),
-        period,
-        ship,
-        tank,
-        state if attempts <= 1 else f"{state}, attempt {attempts}",
-        "\n".join(wrap("; ".join(retuning.reasons), 24)),
-    )
 
 
 def _percent(share: float | None) -> str:

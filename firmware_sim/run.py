@@ -6,7 +6,7 @@ In simulated time, or in real time: in one process, or in two on a real bus.
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, NamedTuple, Protocol
 
@@ -23,6 +23,7 @@ from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.provenance import describe
 from utank_hil.base.tick import TICK_NS, TICK_S
+from utank_hil.canbus import RetuningState
 from utank_hil.canbus.frame import Port
 from utank_hil.canbus.ports import open_buses
 from utank_hil.canbus.profiles.device_plan import ForeignDevices
@@ -107,6 +108,22 @@ class Run:
     def end_s(self) -> float:
         """Ship's time of the last row; 0 if there is none."""
         return float(self.rows[-1, 0]) + RECORD_S if len(self.rows) else 0.0
+
+    @property
+    def events(self) -> tuple[RetuningEvent, ...]:
+        """Events of retuning on the time of the rows, to within one row.
+
+        The controller has its own clock; the changes of state are known on both.
+        """
+        time_s, state = self.column("time_s"), self.column("retuning")
+        shift_ns = 0
+        for event in reversed(self.retuning):
+            seen = time_s[state == event.state]
+            if event.state is not RetuningState.IDLE and len(seen):
+                shift_ns = round(float(seen[0]) * SECOND_NS) - event.time_ns
+        if self.retuning and not shift_ns:  # No row shows one: it was one of the last.
+            shift_ns = round(self.end_s * SECOND_NS) - self.retuning[-1].time_ns
+        return tuple(replace(each, time_ns=each.time_ns + shift_ns) for each in self.retuning)
 
     def between(self, start_s: float, end_s: float) -> npt.NDArray[np.bool_]:
         """Mask of the rows in a span of ship's time, shape (n,)."""

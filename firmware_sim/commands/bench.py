@@ -171,6 +171,9 @@ def _print(result: "BenchResult", found: "BenchFigures", files: Mapping[str, Pat
         console.table(table)
     if few := few_rolls(found, result.scenario.vessel.ship.natural_frequency_rad_s):
         console.say(yellow=few)
+    last = {event.partition(", ")[0]: event for event in found.retuned}
+    for event in last.values():  # the page has all of them
+        console.say(event)
     for ending in found.endings:
         console.say(red=ending)
     for limit in found.limits_passed:
