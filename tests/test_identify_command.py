@@ -98,7 +98,7 @@ def test_tables_hold_what_an_engineer_asks_for(accepted):
     for part in (
         "roll period, s", "± 95 %", "tank damping ratio",
         "delay against the configured one: roll_rad",
-        "1: frequency, rad/s", "2: frequency, rad/s", "white", "with the",
+        "1: frequency, rad/s", "2: frequency, rad/s", "correlated",
         "predictions", "Waves:", "Accepted: peak sensitivity",
     ):  # fmt: skip
         assert part in words, part

@@ -9,11 +9,7 @@ from utank_hil.identification.ship_fit import ModelLimits, ShipFit, model_object
 
 GOOD = Validation(
     one_step_fit=np.array([0.99, 0.95]),
-    simulation_fit=np.array([0.9, 0.9]),
     residual_correlation=np.full((25, 2), 0.1),
-    whiteness_probability=np.array([0.3, 0.3]),
-    input_correlation=np.zeros((26, 2, 1)),
-    independence_probability=np.array([[0.5], [0.5]]),
     rows=400,
 )
 FIT = ShipFit(

@@ -29,26 +29,10 @@ def _arx_record(seed, samples=4000):
     return model, u, y
 
 
-def test_true_model_has_white_errors_apart_from_the_input():
+def test_true_model_has_white_errors():
     result = validate(*_arx_record(1))
-    assert np.all(result.whiteness_probability > 0.01)
-    assert np.all(result.independence_probability > 0.01)
-    bound = 4 / np.sqrt(result.rows)
-    assert np.abs(result.residual_correlation).max() < bound
-    assert np.abs(result.input_correlation).max() < bound
+    assert np.abs(result.residual_correlation).max() < 4 / np.sqrt(result.rows)
     assert result.residual_correlation.shape == (25, 2)
-    assert result.input_correlation.shape == (26, 2, 1)
-
-
-@pytest.mark.slow
-def test_probabilities_of_the_true_model_are_uniform():
-    results = [validate(*_arx_record(seed, 1000), lags=10) for seed in range(60)]
-    for values in (
-        np.array([r.whiteness_probability for r in results]).ravel(),
-        np.array([r.independence_probability for r in results]).ravel(),
-    ):
-        assert 0.4 < np.mean(values) < 0.6
-        assert np.mean(values < 0.1) < 0.2
 
 
 def test_fit_is_that_of_the_prediction_by_the_model_itself():
@@ -57,30 +41,25 @@ def test_fit_is_that_of_the_prediction_by_the_model_itself():
     errors = (y - model.predict(u[:, None], y))[25:]
     expected = 1 - np.sqrt(np.mean(errors**2, axis=0)) / np.std(y[25:], axis=0)
     np.testing.assert_allclose(result.one_step_fit, expected, rtol=1e-9)
-    free = (y - model.simulate(u[:, None]))[300:]
-    assert result.simulation_fit == pytest.approx(
-        1 - np.sqrt(np.mean(free**2, axis=0)) / np.std(y[300:], axis=0), abs=0.01
-    )
 
 
-def test_wrong_input_path_goes_with_the_input_and_low_order_is_not_white():
+def test_a_wrong_input_path_fits_worse_and_a_low_order_is_not_white():
     model, u, y = _arx_record(1)
+    right = validate(model, u, y)
     wrong = validate(ARX(model.alpha, model.beta * 1.2, 0.2), u, y)
-    assert np.all(wrong.independence_probability < 1e-6)
+    assert np.all(wrong.one_step_fit < right.one_step_fit)
     low = validate(okid(u, y, 1, sample_time_s=SAMPLE_TIME_S).arx, u, y)
-    assert low.whiteness_probability.min() < 1e-6
+    assert np.abs(low.residual_correlation).max() > 10 / np.sqrt(low.rows)
 
 
-def test_free_run_of_an_exact_model_is_exact_through_gaps_and_waves():
+def test_an_exact_model_predicts_exactly_through_gaps_and_waves():
     truth, u = plant(), pulses(1)
     wave = 2e7 * np.cos(0.6 * np.arange(len(u)) * SAMPLE_TIME_S)
     y = truth.respond(u, wave)
     y[1000] = np.nan
     model = ARX.from_state_space(truth.state_space(), 4)
-    known = validate(model, u, y, disturbance_frequencies_rad_s=[0.6])
-    assert known.one_step_fit.min() > 1 - 1e-9
-    assert known.simulation_fit.min() > 1 - 1e-6
-    assert validate(model, u, y).simulation_fit.max() < 0.9
+    assert validate(model, u, y, [0.6]).one_step_fit.min() > 1 - 1e-9
+    assert validate(model, u, y).one_step_fit.max() < 1 - 1e-6
 
 
 def test_held_out_record_of_the_ship_is_predicted():
@@ -88,7 +67,6 @@ def test_held_out_record_of_the_ship_is_predicted():
     model = okid(u, noisy(truth.respond(u, 0 * u), 0.01, 1), 60, sample_time_s=SAMPLE_TIME_S).arx
     result = validate(model, v, noisy(truth.respond(v, 0 * v), 0.01, 2))
     assert result.one_step_fit.min() > 0.985
-    assert result.simulation_fit.min() > 0.985
 
 
 def test_offset_beside_which_a_model_was_identified_is_no_error_of_it():
@@ -96,7 +74,7 @@ def test_offset_beside_which_a_model_was_identified_is_no_error_of_it():
     upright = validate(model, u, y, disturbance_polynomial_degree=0)
     for heel in (5.0, -500.0):
         heeled = validate(model, u, y + heel, disturbance_polynomial_degree=0)
-        for name in ("one_step_fit", "simulation_fit", "residual_correlation"):
+        for name in ("one_step_fit", "residual_correlation"):
             expected = getattr(upright, name)
             np.testing.assert_allclose(getattr(heeled, name), expected, rtol=0, atol=1e-7)
         blind = validate(model, u, y + heel)
@@ -122,13 +100,6 @@ def test_record_that_does_not_fit_is_refused():
         validate(ARX(1e300 * model.alpha, model.beta, 0.2), u, y)
 
 
-def test_free_run_of_an_unstable_model_is_no_fit_at_all():
-    model, u, y = _arx_record(1)
-    result = validate(ARX(1.9 * model.alpha, model.beta, 0.2), u, y)
-    assert (result.simulation_fit == -np.inf).all()
-    assert np.isfinite(result.one_step_fit).all()
-
-
 def test_units_of_the_record_do_not_matter():
     model, u, y = _arx_record(1)
     scale = np.array([1e-30, 1e30])
@@ -139,6 +110,4 @@ def test_units_of_the_record_do_not_matter():
     )
     one, two = validate(model, u, y), validate(other, 1e-20 * u, scale * y)
     np.testing.assert_allclose(two.one_step_fit, one.one_step_fit)
-    np.testing.assert_allclose(
-        two.independence_probability, one.independence_probability, rtol=1e-6
-    )
+    np.testing.assert_allclose(two.residual_correlation, one.residual_correlation, atol=1e-9)

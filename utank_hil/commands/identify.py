@@ -55,11 +55,7 @@ def figures(
         "pressure_over_command": fit.pressure_gain,
         "dispersion": fit.dispersion,
         "held_out_fit": finite(validation.one_step_fit.tolist()),
-        "simulation_fit": finite(validation.simulation_fit.tolist()),
         "error_correlation": abs(validation.residual_correlation).max(axis=0).tolist(),
-        "whiteness_probability": validation.whiteness_probability.tolist(),
-        "input_correlation": abs(validation.input_correlation).max(axis=(0, 2)).tolist(),
-        "independence_probability": validation.independence_probability.ravel().tolist(),
         "law": dataclasses.asdict(answer.summary) if isinstance(answer, Candidate) else None,
         "files": {name: str(path) for name, path in files.items()},
     }
@@ -146,30 +142,15 @@ def _modes(ship: RollShip, tank: Tank) -> list[tuple[float, float]]:
 
 def _check_table(found: Identification, task: RetuningTask) -> Table:
     validation, limits = found.validation, task.limits
-    table = new_table(
-        "On held-out data",
-        "one-step\nfit", "simulation\nfit", "errors\ncorrelated", "if\nwhite",
-         "with the\ninput", "if\napart",
-    )  # fmt: skip
+    table = new_table("On held-out data", "one-step\nfit", "errors\ncorrelated")
     for column, name in enumerate(task.design.predictor.measured):
-        table.add_row(
-            name,
-            f"{validation.one_step_fit[column]:.3f}",
-            f"{validation.simulation_fit[column]:.3f}",
-            f"{abs(validation.residual_correlation[:, column]).max():.2f}",
-            _probability(float(validation.whiteness_probability[column])),
-            f"{abs(validation.input_correlation[:, column]).max():.2f}",
-            _probability(float(validation.independence_probability[column].min())),
-        )
+        correlation = abs(validation.residual_correlation[:, column]).max()
+        table.add_row(name, f"{validation.one_step_fit[column]:.3f}", f"{correlation:.2f}")
     table.caption = (
         f"{validation.rows} predictions; fit {limits.fit:g} or more and correlation "
-        f"{limits.correlation:g} or less are asked for; 'if' is the probability of more by chance"
+        f"{limits.correlation:g} or less are asked for"
     )
     return table
-
-
-def _probability(value: float) -> str:
-    return "< 0.001" if value < 1e-3 else f"{value:.3f}"
 
 
 ANY_PERIOD_S = (1.0, 60.0)

@@ -1,16 +1,14 @@
 """Validation of an identified model on data that it was not fitted to.
 
-The criteria are fit, whiteness of the prediction errors, and their correlation with the input.
-Coloured errors mean unmodelled dynamics or disturbances (a wave, a higher order). Errors correlated
-with past inputs mean a wrong transfer function. Ljung, System Identification, 16.6.
+The criteria are the fit of the prediction, and its errors' correlation with themselves: coloured
+errors mean unmodelled dynamics or disturbances (a wave, a higher order). Ljung, System
+Identification, 16.6.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
-from scipy.special import chdtrc
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
@@ -27,18 +25,8 @@ class Validation:
 
     #: shape (m,): 1 - rms(prediction error) / rms(y - mean y); 1 is perfect.
     one_step_fit: FloatArray
-    #: shape (m,): fit of the simulated response to input and disturbance basis, with the first p
-    #: samples of each segment as initial state. It includes the effect of an irregular sea. Minus
-    #: infinity for a response that overflows.
-    simulation_fit: FloatArray
     #: shape (lags, m): autocorrelation of the prediction errors at lags 1, 2, ...
     residual_correlation: FloatArray
-    #: shape (m,): p-value of the Ljung-Box test for white errors.
-    whiteness_probability: FloatArray
-    #: shape (lags + 1, m, r): correlation of the errors with the input at lags 0, 1, ...
-    input_correlation: FloatArray
-    #: shape (m, r): p-value of the test for errors independent of the input.
-    independence_probability: FloatArray
     rows: int  #: Number of predictions.
 
 
@@ -90,19 +78,8 @@ def validate(
         coefficients[-size:] = np.linalg.lstsq(known, errors, rcond=None)[0]
         errors = _errors(regression, coefficients)
     spread = np.std(regression.targets, axis=0)
-    whiteness, correlation = _whiteness(np.split(errors, regression.ends), lags)
-    independence, crossed = _independence(errors, regression, lags)
-    with np.errstate(over="ignore", invalid="ignore"):
-        simulated = 1 - _rms(regression.targets - _simulated(regression, coefficients)) / spread
-    return Validation(
-        1 - _rms(errors) / spread,
-        np.where(np.isnan(simulated), -np.inf, simulated),
-        correlation,
-        whiteness,
-        crossed,
-        independence,
-        regression.rows,
-    )
+    correlation = _correlation(np.split(errors, regression.ends), lags)
+    return Validation(1 - _rms(errors) / spread, correlation, regression.rows)
 
 
 def _refuse_unusable(regression: LagRegression, lags: int) -> None:
@@ -114,7 +91,8 @@ def _refuse_unusable(regression: LagRegression, lags: int) -> None:
         )
     # Outputs are compared at the predictions, inputs also at every lag before them.
     inputs = regression.channels - regression.outputs
-    lagged = np.stack([_lagged(regression, j, lags) for j in range(inputs)])
+    columns = (regression.input_rows[j::inputs][: lags + 1] for j in range(inputs))
+    lagged = np.stack([regression.matrix[:, each] for each in columns])
     for name, parts in (("output", regression.targets.T), ("input", lagged.transpose(0, 2, 1))):
         for number, part in enumerate(parts):
             if np.ptp(part, axis=-1).min() < _STILL:
@@ -122,13 +100,6 @@ def _refuse_unusable(regression: LagRegression, lags: int) -> None:
                     f"{name} {number} does not move in the samples that predictions are judged by; "
                     "validate on a stretch in which it moves throughout"
                 )
-
-
-def _lagged(regression: LagRegression, number: int, lags: int) -> FloatArray:
-    """Return an input at lags 0, 1, ... before the predictions, shape (rows, lags + 1)."""
-    inputs = regression.channels - regression.outputs
-    columns = regression.input_rows[number::inputs][: lags + 1]
-    return regression.matrix[:, columns]
 
 
 def _errors(regression: LagRegression, coefficients: FloatArray) -> FloatArray:
@@ -155,61 +126,16 @@ def _coefficients(arx: ARX, scale: FloatArray, regression: LagRegression) -> Flo
     return np.vstack([lagged, np.zeros((regression.basis_size, m))])
 
 
-def _simulated(regression: LagRegression, coefficients: FloatArray) -> FloatArray:
-    """Return the response, shape (rows, m), from each segment's first outputs on."""
-    p, m = regression.order, regression.outputs
-    split = len(coefficients) - regression.basis_size
-    by_lag = np.vstack([np.zeros((m, m)), coefficients[:split]]).reshape(p + 1, -1, m)
-    newest_first = by_lag[1:, :m].reshape(p * m, m).T
-    own = np.zeros(len(coefficients), dtype=np.bool_)
-    own[:split] = np.arange(m, split + m) % regression.channels < m
-    forced = regression.matrix[:, ~own] @ coefficients[~own]
-    begins = np.concatenate([[0], regression.ends, [regression.rows]])
-    responses = []
-    for first, last in pairwise(begins.tolist()):
-        count = last - first
-        history = np.zeros((count + p, m))  # The time is reversed: newest first.
-        history[count:] = regression.matrix[first, own].reshape(p, m)
-        for k in range(count):
-            now = count - 1 - k
-            past = history[now + 1 : now + 1 + p].ravel()
-            history[now] = newest_first @ past + forced[first + k]
-        responses.append(history[:count][::-1])
-    return np.vstack(responses)
-
-
 def _rms(errors: FloatArray) -> FloatArray:
     rms: FloatArray = np.sqrt(np.mean(errors**2, axis=0))
     return rms
 
 
-def _whiteness(errors: list[FloatArray], lags: int) -> tuple[FloatArray, FloatArray]:
-    """Return the Ljung-Box p-value and the autocorrelation of each output's errors."""
+def _correlation(errors: list[FloatArray], lags: int) -> FloatArray:
+    """Return the autocorrelation of each output's errors, shape (lags, m)."""
     total = sum(np.sum(e**2, axis=0) for e in errors)
-    correlation = np.array(
-        [sum(np.sum(e[lag:] * e[:-lag], axis=0) for e in errors) for lag in range(1, lags + 1)]
-    ) / np.maximum(total, 1e-300)
-    rows = sum(len(e) for e in errors)
-    weights = rows * (rows + 2) / (rows - np.arange(1, lags + 1))
-    return chdtrc(lags, weights @ correlation**2), correlation
-
-
-def _independence(
-    errors: FloatArray, regression: LagRegression, lags: int
-) -> tuple[FloatArray, FloatArray]:
-    """Return the p-value of the independence of errors and past inputs, and their correlation."""
-    inputs = regression.channels - regression.outputs
-    rows, probability = regression.rows, np.empty((regression.outputs, inputs))
-    correlation = np.empty((lags + 1, regression.outputs, inputs))
-    size = np.sqrt(np.maximum(np.sum(errors**2, axis=0), 1e-300))
-    for j in range(inputs):
-        lagged = _lagged(regression, j, lags)
-        power = lagged.T @ lagged
-        scale = np.sqrt(power.diagonal())
-        correlation[:, :, j] = lagged.T @ errors / scale[:, None] / size
-        # Lagged inputs are correlated, those of a slow input almost completely.
-        values, vectors = np.linalg.eigh(power / np.outer(scale, scale))
-        kept = values > 1e-6 * values[-1]
-        along = vectors[:, kept].T @ correlation[:, :, j] / np.sqrt(values[kept])[:, None]
-        probability[:, j] = chdtrc(np.count_nonzero(kept), rows * np.sum(along**2, axis=0))
-    return probability, correlation
+    products = [
+        sum(np.sum(e[lag:] * e[:-lag], axis=0) for e in errors) for lag in range(1, lags + 1)
+    ]
+    correlation: FloatArray = np.array(products) / np.maximum(total, 1e-300)
+    return correlation
