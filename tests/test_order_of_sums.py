@@ -31,6 +31,8 @@ PARTS = {
     "utank_hil/control/constrained/law.py": ("ConstrainedController", "ConstrainedLaw.controller",
                                               "ConstrainedLaw.unlimited", "ConstrainedLaw._gain",
                                               "ConstrainedLaw.clipped"),
+    "utank_hil/control/fuzzy/law.py": ("FuzzyBasis.memberships", "_degrees", "_gauss",
+                                       "ErrorDynamics", "FuzzyController"),
     "utank_hil/control/lqg.py": ("LQGController", "GentleController"),
     "utank_hil/control/predictive/law.py": ("PredictiveController",),
     "utank_hil/control/constrained/horizon.py": ("predictions", "_interpolation", "ActiveSetSolver",

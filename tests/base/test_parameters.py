@@ -151,7 +151,7 @@ def test_every_number_of_a_file_has_its_range():
     for model in (Vessel, ControllerConfig, Scenario):
         sections_in(model, owners)
     assert {"SafetyLimits", "RetuningSettings", "DriveLimits", "SensorErrors", "TimedAction",
-            "SeaModel", "EffectiveSlope", "Pump",
+            "SeaModel", "EffectiveSlope", "ErrorDynamics", "RobustFuzzy", "Pump",
             "Scenario", "RegularSea", "MeasuredSea", "ControllerConfig",
             } <= {owner.__name__ for owner in owners}  # fmt: skip
     bare = set()

@@ -324,18 +324,20 @@ def test_what_loads_can_be_built_and_what_does_not_is_told(tmp_path: Path, data:
     assert all(key.partition(".")[0] == "law" and reason for key, reason in told)
 
 
-@pytest.mark.slow
-def test_nonlinear_law_that_misses_its_margins_is_refused_unless_the_file_accepts_it(
-    tmp_path: Path,
+@pytest.mark.parametrize(
+    ("shipped", "changes", "missed"),
+    [
+        ("feedback_linearization", {"law__level_damping_ratio": 0.0}, "unstable on its own ship"),
+        ("feedback_linearization", {"law__frequency_rad_s": 50.0}, "unstable on its own ship"),
+        ("fuzzy_robust", {"law__initial": [500.0, 0.0]}, "unstable on its own ship"),
+    ],
+)
+def test_nonlinear_law_that_is_unstable_at_rest_is_refused_unless_the_file_accepts_it(
+    tmp_path: Path, shipped: str, changes: dict[str, object], missed: str
 ) -> None:
-    shipped = "pump_with_valve"
-    changes = {
-        "vessel": str(CONFIGS / "ships" / "thesis_first_valve.yaml"),
-        "law__pump__state_weight": [1e18, 0.0, 0.0, 0.0],
-    }
     refused = invoke("check", controller(tmp_path, shipped, **changes))
     assert refused.exit_code == 1
-    assert "unstable" in refused.stdout
+    assert missed in refused.stdout
     assert "margins of its slope at rest" in refused.stdout
     assert "remedy: law: {kind: self_tuned} passes" in refused.stdout
     started = invoke("run", controller(tmp_path, shipped, **changes), "--bus", "nowhere0")
@@ -353,6 +355,16 @@ def test_law_that_hardly_acts_is_told_so(tmp_path: Path, weight: float, hardly: 
     text = invoke("check", controller(tmp_path, "gpc", law__output_weight=[weight])).stdout
     assert "All requirements are met." in text
     assert ("It hardly acts" in text) == hardly
+
+
+@pytest.mark.parametrize("shipped", ["feedback_linearization", "fuzzy_robust"])
+def test_shipped_nonlinear_law_has_the_margins_that_are_required(shipped: str) -> None:
+    path = CONFIGS / "controllers" / f"{shipped}.yaml"
+    report = json.loads(invoke("check", path, "--json").stdout)
+    assert report["accepted"]
+    assert report["failures"] == []
+    assert report["robustness"]["nominal"]["radius"] < 1
+    assert ("parameters it starts from" in report["at_rest"]) == (shipped == "fuzzy_robust")
 
 
 def test_a_period_by_formula_is_said(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """The configuration files of the project are fit to be used."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,8 @@ from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Fault, Mode
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
+from utank_hil.control import RobustFuzzy
+from utank_hil.dynamics.linear import STATES
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.runners import Lockstep
@@ -133,3 +136,12 @@ def test_controller_of_each_other_ship_rolls_less_than_her_passive_tank(name, be
     passive = roll_rms_rad(scenario, None, seconds)
     for config in scenario.controllers.values():
         assert roll_rms_rad(scenario, config, seconds) < (1 - below) * passive
+
+
+@pytest.mark.parametrize("inputs", [2, 3, 4])
+def test_fuzzy_law_measures_what_it_has_ranges_for(inputs):
+    config = load_config(CONFIGS / "controllers" / "fuzzy_robust.yaml", ControllerConfig)
+    assert isinstance(config.law, RobustFuzzy)
+    built = replace(config.law, ranges=config.law.ranges[:inputs]).build(config.plant)
+    assert built.measured == STATES[:inputs]
+    assert built.controller().step(np.full(inputs, 0.1)).shape == (1,)

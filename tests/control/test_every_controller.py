@@ -9,9 +9,6 @@ from hypothesis import strategies as st
 from rolling_ship import SHIP, TANK
 from shipped_designs import LQG_ROLL_RATE_LEVEL
 
-from tools.thesis.direct_fuzzy import RobustFuzzy
-from tools.thesis.feedback_linearization import FeedbackLinearization, level_brake
-from tools.thesis.fuzzy import ErrorDynamics
 from tools.thesis.fuzzy_laws import IndirectFuzzy, SmallGainFuzzy
 from utank_hil.control import (
     ConstrainedDesign,
@@ -24,6 +21,9 @@ from utank_hil.control import (
     design_pd,
     pump_model,
 )
+from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
+from utank_hil.control.fuzzy.adaptive import RobustFuzzy
+from utank_hil.control.fuzzy.law import ErrorDynamics
 from utank_hil.control.interface import StartsAnew
 from utank_hil.control.lqg import design_lqr
 from utank_hil.control.semi_active import ClippedValve, OnOffValve

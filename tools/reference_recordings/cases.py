@@ -99,6 +99,7 @@ CASES: Final = (
         (11.0, Action.ARM), (13.0, Action.STOP),
     )),
     Case("planned", "constrained_gpc", 12),
+    Case("fuzzy", "fuzzy_robust", 12),
     Case("valve-and-pump", "pump_with_valve", 12, scenario="semi_active"),
     Case("motion-silent", "dpc", 12, (*ARM, *AGAIN), (_motion("lost", 3.0, 0.5),)),
     Case("frames-lost-and-damaged", "lqg", 12, ARM, (

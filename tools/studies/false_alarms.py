@@ -46,7 +46,7 @@ SEAS = {"calm": 0.2, "ordinary": 0.5, "storm": 1.0}
 SCENARIOS = ("storm", "patti_b", "naval_vessel", "semi_active")
 VOYAGE = "voyage"
 RIGHTLY_FOUND = {
-    *product(("pd",), (*SEAS, VOYAGE)),
+    *product(("feedback_linearization", "pd"), (*SEAS, VOYAGE)),
     ("self_tuned", VOYAGE),
 }
 """Laws that roll the ship more than the passive tank in a sea: none of `by_monitor`.

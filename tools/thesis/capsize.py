@@ -14,12 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from tools.thesis.batch import simulate_batch
-from tools.thesis.direct_fuzzy import RobustFuzzy
-from tools.thesis.feedback_linearization import FeedbackLinearization, level_brake
-from tools.thesis.fuzzy import ErrorDynamics
 from tools.thesis.fuzzy_laws import IndirectFuzzy, SmallGainFuzzy
 from tools.thesis.simulate import WaveMoment, whole_steps
 from utank_hil.base.arrays import FloatArray
+from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
+from utank_hil.control.fuzzy.adaptive import RobustFuzzy
+from utank_hil.control.fuzzy.law import ErrorDynamics
 from utank_hil.control.gain import PassiveController
 from utank_hil.control.interface import Controller, PumpLimits
 from utank_hil.control.limiter import CommandLimiter

@@ -27,12 +27,12 @@ from typing import Annotated
 
 import numpy as np
 
-from tools.thesis.direct_fuzzy import DirectFuzzyLaw
-from tools.thesis.fuzzy import FuzzyController, FuzzyInputs, FuzzyLaw
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.elementary import exp
 from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import Finite, NotNegative, Positive, Problem, Range
+from utank_hil.control.fuzzy.adaptive import DirectFuzzyLaw
+from utank_hil.control.fuzzy.law import FuzzyController, FuzzyInputs, FuzzyLaw
 
 
 @dataclass(frozen=True, slots=True)

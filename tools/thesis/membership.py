@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 
 from tools.thesis.figure import Check, Figure, Verdict, panel_of
-from tools.thesis.fuzzy import WIDTH, FuzzyBasis
 from utank_hil.base.arrays import FloatArray
+from utank_hil.control.fuzzy.law import WIDTH, FuzzyBasis
 
 RANGE: Final = math.pi / 6
 _NAMES: Final = ("negative", "zero", "positive")

@@ -18,10 +18,10 @@ from tools.thesis.capsize import (
     law_factory,
     without_tank,
 )
-from tools.thesis.direct_fuzzy import DirectFuzzyController
 from tools.thesis.figure import Check, Figure, Table, Verdict
 from tools.thesis.simulate import WaveMoment
 from utank_hil.base.arrays import FloatArray
+from utank_hil.control.fuzzy.adaptive import DirectFuzzyController
 from utank_hil.control.interface import Controller
 from utank_hil.dynamics import RollModel
 

@@ -4,14 +4,15 @@ import math
 from dataclasses import asdict, replace
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import numpy as np
 import typer
 from pydantic import BaseModel
 from rich.text import Text
 
-from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins, Robustness
+from utank_hil.analysis.loop.linear_tuning import LINEAR_KINDS, AutoDesign, Design, scaled, varied
+from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins, Robustness, robustness
 from utank_hil.analysis.loop.self_tuning import NoLawError, SelfTunedDesign
 from utank_hil.base.finite import finite
 from utank_hil.configuration.controller import ControllerConfig
@@ -24,6 +25,8 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Command, Terminal, new_table, run_command
 from utank_hil.control import BuiltLaw
 from utank_hil.control.constrained.design import ConstrainedDesign
+from utank_hil.control.interface import DesignPlant, LawDesign
+from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.gate import MOST_STEP_S, JudgedLaw
 
@@ -36,6 +39,8 @@ DISSIPATES = (
 )
 LEAST_LOOP_GAIN = 0.05
 """Loop gain below which a law with all margins hardly acts; the shipped laws have 1.3 and more."""
+GENTLER: Final = (0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4)  #: Factors on a weight on outputs or states.
+LONGER: Final = (1.3, 1.6, 2.0, 3.0)  #: Factors on the control horizon of an exact deadbeat.
 Judged = dict[str, JudgedLaw]
 
 
@@ -120,6 +125,8 @@ def _print_verdict(console: Terminal, judged: JudgedLaw) -> None:
         verdict = "accepted by the configuration" if judged.accepted else "refused"
         console.say(f"This law is {verdict}.")
         _print_remedy(console, judged)
+    elif judged.law.adapts:
+        console.say("met by what the law starts from", yellow="What it learns is not judged:")
     else:
         console.say(green="All requirements are met.")
 
@@ -166,7 +173,7 @@ def _verdict(judged: JudgedLaw) -> str | Text:
         return Text("accepted", "yellow") if judged.accepted else Text("refused", "red")
     if judged.robustness is None:
         return "dissipates" if judged.law.dissipates else "no loop"
-    return Text("ok", "green")
+    return "at rest" if judged.law.adapts else Text("ok", "green")
 
 
 def radius_words(radius: float) -> str:
@@ -209,7 +216,7 @@ def _remarks(judged: JudgedLaw, report: Robustness) -> list[str]:
         )
     notes += _preview_words(judged)
     gain = report.nominal.peak_loop_gain
-    if gain < LEAST_LOOP_GAIN:
+    if gain < LEAST_LOOP_GAIN and not law.adapts:
         notes.append(f"It hardly acts: its loop gain is {gain:.2g} at most.")
     return notes
 
@@ -234,14 +241,21 @@ def _preview_words(judged: JudgedLaw) -> list[str]:
 def _at_rest(law: BuiltLaw) -> str | None:
     if not law.at_rest:
         return None
-    return "The law is nonlinear: these are the margins of its slope at rest."
+    learning = " with the parameters it starts from" if law.adapts else ""
+    return f"The law is nonlinear: these are the margins of its slope at rest{learning}."
 
 
 def remedy(judged: JudgedLaw) -> str | None:
-    """Return what to do about a law that is refused for its margins; None about any other."""
+    """Return the first gentler design that meets all requirements, as keys of the file.
+
+    Of a law that has nothing to scale it is the self-tuned one. None is returned if the law is not
+    refused for its margins.
+    """
     design, plant, report = judged.config.law, judged.config.design_plant, judged.robustness
     if report is None or not report.failures() or judged.step_s > MOST_STEP_S:
         return None
+    if not isinstance(design, Design):
+        return _automatic(design, plant)
     stiffness = plant.ship.stiffness_nm_rad / report.worst_period_scale**2
     softer = replace(plant.ship, stiffness_nm_rad=stiffness)
     if np.linalg.eigvals(state_matrices(softer, plant.tank)[0]).real.max() > 0:
@@ -249,13 +263,51 @@ def remedy(judged: JudgedLaw) -> str | None:
             f"at {report.worst_period_scale:g} of the roll period the ship is unstable with the "
             "tank's water alone, whatever the law asks for: make the tank's reservoirs smaller"
         )
-    expected = design.sea if isinstance(design, ConstrainedDesign) else None
+    for factor in LONGER if varied(design) == "control horizon" else GENTLER:
+        gentler = scaled(design, factor)
+        try:
+            found = robustness(
+                gentler.law(plant), plant, judged.law.measured, with_delay_margin=False
+            )
+        except (ValueError, ArithmeticError):
+            continue  # It can't be designed or judged either.
+        if not found.failures():
+            return f"{_keys(gentler)} passes; a value between may, too"
+    return _automatic(design, plant) or (
+        f"no gentler {varied(design)} passes: choose another law, or another tank"
+    )
+
+
+def _automatic(design: LawDesign, plant: DesignPlant) -> str | None:
     try:
-        SelfTunedDesign("self_tuned", expected).tuned(plant)
+        if isinstance(design, ConstrainedDesign):
+            SelfTunedDesign("self_tuned", design.sea).tuned(plant)
+            return "law.kind: self_tuned with the same sea in place of the other numbers passes"
+        if design.kind in LINEAR_KINDS:
+            AutoDesign(design.kind, "auto").tuned(plant)
+            return f"law: {{kind: {design.kind}, tuning: auto}} passes"
+        SelfTunedDesign("self_tuned").tuned(plant)
     except NoLawError:
-        return "no self-tuned law passes, either: choose another tank"
-    same = "" if expected is None else " with the same sea"
-    return f"law: {{kind: self_tuned}}{same} passes; it finds its numbers itself"
+        return None
+    return "law: {kind: self_tuned} passes; it finds its numbers itself"
+
+
+def _keys(design: Design) -> str:
+    """Return the keys of the numbers that `scaled` scales, as written in a file."""
+    if isinstance(design, ConstrainedDesign):
+        return f"law.pressure_weight_rad2: {design.pressure_weight_rad2:.3g}"
+    if isinstance(design, LQGDesign):
+        return f"law.state_weight: {_list(design.state_weight)}"
+    if design.output_weight is not None:
+        return f"law.output_weight: {_list(design.output_weight)}"
+    return (
+        f"law.control_horizon: {design.control_horizon} with law.prediction_horizon: "
+        f"{design.prediction_horizon}"
+    )
+
+
+def _list(values: tuple[float, ...]) -> str:
+    return f"[{', '.join(f'{value:.3g}' for value in values)}]"
 
 
 GROUP = "utank_hil.collections"

@@ -30,6 +30,8 @@ from utank_hil.configuration.files import ALLOW_CODE
 from utank_hil.configuration.matrices import SystemFile
 from utank_hil.configuration.spectra import LawSea
 from utank_hil.control.constrained.design import ConstrainedDesign
+from utank_hil.control.feedback_linearization import FeedbackLinearizationDesign
+from utank_hil.control.fuzzy.adaptive import RobustFuzzy
 from utank_hil.control.gain import PassiveDesign, PDDesign
 from utank_hil.control.heel_removal import HeelRemovalDesign
 from utank_hil.control.interface import LawDesign
@@ -46,6 +48,8 @@ LAWS: Final[tuple[type[LawDesign], ...]] = (
     LQGDesign,
     PredictiveDesign,
     ConstrainedDesign,
+    FeedbackLinearizationDesign,
+    RobustFuzzy,
     StateSpaceDesign,
     PythonDesign,
     OnOffValveDesign,

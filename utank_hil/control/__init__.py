@@ -2,6 +2,10 @@
 
 from utank_hil.control.arx import ARX as ARX
 from utank_hil.control.constrained.design import ConstrainedDesign as ConstrainedDesign
+from utank_hil.control.feedback_linearization import FeedbackLinearization as FeedbackLinearization
+from utank_hil.control.feedback_linearization import level_brake as level_brake
+from utank_hil.control.fuzzy.adaptive import RobustFuzzy as RobustFuzzy
+from utank_hil.control.fuzzy.law import ErrorDynamics as ErrorDynamics
 from utank_hil.control.gain import PD_MEASURED as PD_MEASURED
 from utank_hil.control.gain import GainLaw as GainLaw
 from utank_hil.control.gain import PassiveController as PassiveController

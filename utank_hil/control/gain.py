@@ -6,6 +6,7 @@ ratio of `passive_optimum`. The pump changes the water's stiffness and loss, but
 ship and water. Of a tank with quadratic loss, c is what that leaves to be done (`MissingLoss`).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Final, Literal
@@ -15,7 +16,7 @@ import numpy as np
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import Range, SampleTime, range_problems, refuse
-from utank_hil.control.interface import BuiltLaw, DesignPlant, Memoryless
+from utank_hil.control.interface import BuiltLaw, Controller, DesignPlant, Memoryless
 from utank_hil.control.optimal_tank import passive_optimum, ship_ratios
 from utank_hil.dynamics import RollShip, Tank, coupled_matrices
 from utank_hil.dynamics.sampling import LinearModel
@@ -70,6 +71,25 @@ class GainController(Memoryless):
         """Return -K (y - reference)."""
         error = y if reference is None else y - reference
         return product(self._gain, error)
+
+
+def slope_at_rest(controller: Callable[[], Controller], inputs: int) -> GainLaw:
+    """Linearize a law at rest, as a law of constant gain.
+
+    A law that is unstable for the smallest roll is unstable, so its slope about rest must have the
+    margins of a linear law. A law that adapts is linearized with its initial parameters.
+
+    The first command of the controller must depend on its first measurement alone. ValueError is
+    raised if the slope is not finite.
+    """
+    columns = []
+    for push in STEP * np.eye(inputs):
+        up, down = (controller().step(sign * push) for sign in (1.0, -1.0))
+        columns.append((up - down) / (2 * STEP))
+    slope = np.column_stack(columns)
+    if not np.isfinite(slope).all():
+        raise ValueError("its answer at rest overflows")
+    return GainLaw(-slope, controller().sample_time_s)
 
 
 @dataclass(slots=True, eq=False)

@@ -185,6 +185,7 @@ class BuiltLaw:
     #: The law for the analysis of its loop, from `linear_measured` to the pressure.
     linear: LinearLaw | None = None
     at_rest: bool = False  #: The law is nonlinear, and `linear` is its slope at rest.
+    adapts: bool = False  #: The law changes while it runs, and `linear` is its initial form.
     #: The law feeds measurements back. If it does and `linear` is None, its loop is judged by its
     #: impulse response.
     closes_loop: bool = True

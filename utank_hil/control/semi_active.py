@@ -6,11 +6,11 @@ it is best open. So any pump law has its valve law (clipped optimal control)::
 
     zeta = -P / (abs(h') h')  where P h' < 0, within the valve's range;  open elsewhere
 
-The energy law needs no design. A pump's pressure P accelerates the roll by g_phi P, g_phi > 0, so
-its power in the energy of roll is proportional to P phi', and P = -kappa phi' takes the most: the
-valve shuts while phi' h' > 0, when the flow leads to a level that drives the roll, and opens while
-it leads to one that opposes it. A large kappa is the on-off law. Holding the water back makes the
-tank slower: the law gains in waves slower than the tank and loses in faster ones (docs/control.md).
+The energy law needs no design. The pump's power in the energy of roll is proportional to P phi'
+(g_phi > 0, see `feedback_linearization`), so P = -kappa phi' takes the most: the valve shuts while
+phi' h' > 0, when the flow leads to a level that drives the roll, and opens while it leads to one
+that opposes it. A large kappa is the on-off law. Holding the water back makes the tank slower: the
+law gains in waves slower than the tank and loses in faster ones (docs/control.md).
 
 The command is a loss in Pa per (m/s)^2 of dh/dt, as `utank_hil.dynamics.valves` gives it for an
 opening. Between two samples the valve is constant.

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL, LQG_ROLL_RATE_LEVEL
 
-from tools.thesis.feedback_linearization import FeedbackLinearization
 from utank_hil.analysis.loop import impulse_response
 from utank_hil.analysis.loop.impulse_response import (
     NoImpulseResponse,
@@ -23,11 +22,12 @@ from utank_hil.control import (
     PD_MEASURED,
     ConstrainedDesign,
     DesignPlant,
+    FeedbackLinearization,
     PassiveController,
     SeaModel,
     design_pd,
 )
-from utank_hil.control.gain import GainLaw
+from utank_hil.control.gain import slope_at_rest
 from utank_hil.control.state_space import StateSpaceLaw
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import STATES, pump_model
@@ -126,11 +126,9 @@ def test_robustness_takes_it_as_any_law():
 def test_of_a_static_nonlinear_law_it_is_the_slope_at_rest():
     law = FeedbackLinearization(0.5, 0.3, 3.0, 3.8, ship=SHIP, tank=TANK)
     found = impulse_response_law(law.controller, STATES)
-    small = 1e-6
-    slope = [(law.pressure_pa(y) - law.pressure_pa(-y)) / (2 * small) for y in small * np.eye(4)]
+    slope = slope_at_rest(law.controller, 4)
     z = np.exp(1j * np.array([0.001, 0.05]))
-    expected = GainLaw(-np.array([slope]), law.sample_time_s).response(z)
-    np.testing.assert_allclose(found.response(z), expected, rtol=1e-5)
+    np.testing.assert_allclose(found.response(z), slope.response(z), rtol=1e-5)
     assert len(found.matrices().A) == 1
 
 

@@ -18,7 +18,7 @@ from utank_hil.sea import Harmonics
 
 QUICK = (
     "pd", "lqg", "gpc", "dpc", "constrained_gpc", "naval_constrained_gpc",
-    "patti_b_constrained_gpc", "pump_with_valve",
+    "patti_b_constrained_gpc", "feedback_linearization", "fuzzy_robust", "pump_with_valve",
 )  # fmt: skip
 SEARCHED = ("self_tuned", "self_tuning", "naval_self_tuning", "patti_b_self_tuning")
 SHIPS = ("pd", "naval_self_tuning", "patti_b_self_tuning")  #: One controller of each.

@@ -24,7 +24,8 @@ from utank_hil.base.parameters import (
     refuse,
 )
 from utank_hil.base.tick import TICK_S
-from utank_hil.control.interface import Controller
+from utank_hil.control.gain import slope_at_rest
+from utank_hil.control.interface import BuiltLaw, Controller, DesignPlant
 from utank_hil.dynamics.linear import STATES
 
 SETS = 3  #: Negative, zero, positive.
@@ -141,6 +142,12 @@ class FuzzyLaw(ABC):
 
     def __post_init__(self) -> None:
         refuse("fuzzy law", self._problems())
+
+    def build(self, plant: DesignPlant) -> BuiltLaw:  # noqa: ARG002, its gain is a parameter
+        """Return the law, the same for any plant; its initial form has a slope at rest."""
+        measured = STATES[: len(self.ranges)]
+        slope = slope_at_rest(self.controller, len(measured))
+        return BuiltLaw(self.controller, measured, slope, at_rest=True, adapts=True)
 
     @abstractmethod
     def controller(self) -> Controller:

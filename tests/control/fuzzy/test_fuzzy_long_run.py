@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from tools.thesis.direct_fuzzy import RobustFuzzy
-from tools.thesis.fuzzy import ErrorDynamics
 from tools.thesis.fuzzy_laws import IndirectFuzzy, SmallGainFuzzy
+from utank_hil.control.fuzzy.adaptive import RobustFuzzy
+from utank_hil.control.fuzzy.law import ErrorDynamics
 
 pytestmark = pytest.mark.slow
 

@@ -19,12 +19,12 @@ The derivation, and deviations from the print, are in docs/control.md.
 import math
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
-from tools.thesis.fuzzy import FuzzyController, FuzzyInputs, FuzzyLaw
 from utank_hil.base.elementary import exp, tanh
 from utank_hil.base.ordered_sums import product
 from utank_hil.base.parameters import NotNegative, Positive, Problem, Range
+from utank_hil.control.fuzzy.law import FuzzyController, FuzzyInputs, FuzzyLaw
 
 
 class DirectFuzzyLaw(FuzzyLaw):
@@ -65,6 +65,7 @@ class RobustFuzzy(DirectFuzzyLaw):
     adaptation: tuple[Positive, Positive]  #: Gamma_1, Gamma_2.
     leakage: tuple[Positive, Positive]  #: sigma_1, sigma_2.
     initial: tuple[NotNegative, NotNegative] = (0.0, 0.0)  #: lambda_0, theta_0, zero or more.
+    kind: Literal["fuzzy_robust"] = "fuzzy_robust"
 
     def _problems(self) -> list[Problem]:
         return [*FuzzyLaw._problems(self), *self.q_problems(above=1)]

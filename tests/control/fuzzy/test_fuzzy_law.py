@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tools.thesis.direct_fuzzy import RobustFuzzy
-from tools.thesis.fuzzy import ErrorDynamics
 from tools.thesis.fuzzy_laws import IndirectFuzzy, SmallGainFuzzy
+from utank_hil.control.fuzzy.adaptive import RobustFuzzy
+from utank_hil.control.fuzzy.law import ErrorDynamics
 
 COMMON = (ErrorDynamics(0.8, 0.6, 2.5), (0.5, 0.5, 2.0, 2.0), 2e-8)
 LAWS = {

@@ -33,7 +33,8 @@ of the free water (w_t its natural frequency), goes from a soft to a hard limit.
 """
 
 import math
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, fields
+from typing import Literal
 
 import numpy as np
 
@@ -41,18 +42,14 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.elementary import sine_cosine
 from utank_hil.base.parameters import NotNegative, Positive, SampleTime, range_problems, refuse
 from utank_hil.base.tick import TICK_S
-from utank_hil.control.interface import Memoryless
-from utank_hil.dynamics import GRAVITY_M_S2, RollModel, RollShip, Tank
+from utank_hil.control.gain import slope_at_rest
+from utank_hil.control.interface import BuiltLaw, DesignPlant, Memoryless
+from utank_hil.dynamics import GRAVITY_M_S2, STATES, RollModel, RollShip, Tank
 
 
 @dataclass(frozen=True, slots=True)
-class FeedbackLinearization:
-    """The law and its model; it measures roll, roll rate, level and level rate.
-
-    ValueError is raised if a parameter is out of its range, the reservoirs end between the soft and
-    the hard limit of the level, or the pump does not affect the shifted output within the hard
-    limit.
-    """
+class FeedbackLinearizationDesign:
+    """Parameters of the law."""
 
     frequency_rad_s: Positive  #: w of the linear response of the output s.
     damping_ratio: Positive  #: zeta of that response.
@@ -63,6 +60,32 @@ class FeedbackLinearization:
     shift_rad_m: NotNegative = 0.0  #: kL, zero or more.
     shift_length_m: Positive = 1.0  #: l.
     level_damping_ratio: NotNegative = 0.0  #: zeta_h; 0 for the exact linear response.
+    kind: Literal["feedback_linearization"] = "feedback_linearization"
+
+    def __post_init__(self) -> None:
+        problems = range_problems(self)
+        if not self.soft_level_m < self.hard_level_m:
+            reason = f"must be below hard_level_m, got {self.soft_level_m} and {self.hard_level_m}"
+            problems.append(("soft_level_m", reason))
+        refuse("feedback linearization", problems)
+
+    def build(self, plant: DesignPlant) -> BuiltLaw:
+        """Design the law for a plant; it does not include the plant's delay and lag."""
+        parameters = {each.name: getattr(self, each.name) for each in fields(self)}
+        law = FeedbackLinearization(**parameters, ship=plant.ship, tank=plant.tank)
+        slope = slope_at_rest(law.controller, len(STATES))
+        return BuiltLaw(law.controller, STATES, slope, at_rest=True)
+
+
+@dataclass(frozen=True, slots=True)
+class FeedbackLinearization(FeedbackLinearizationDesign):
+    """The law and its model; it measures roll, roll rate, level and level rate.
+
+    ValueError is raised if a parameter is out of its range, the reservoirs end between the soft and
+    the hard limit of the level, or the pump does not affect the shifted output within the hard
+    limit.
+    """
+
     _: KW_ONLY
     ship: RollShip
     tank: Tank
@@ -71,11 +94,7 @@ class FeedbackLinearization:
     _brake_pa_s_m: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        problems = range_problems(self)
-        if not self.soft_level_m < self.hard_level_m:
-            reason = f"must be below hard_level_m, got {self.soft_level_m} and {self.hard_level_m}"
-            problems.append(("soft_level_m", reason))
-        refuse("feedback linearization", problems)
+        FeedbackLinearizationDesign.__post_init__(self)
         end_m = self.tank.level_limit_m
         if self.soft_level_m < end_m < self.hard_level_m:
             reason = (

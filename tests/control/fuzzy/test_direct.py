@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tools.thesis.direct_fuzzy import RobustFuzzy
-from tools.thesis.fuzzy import ErrorDynamics, FuzzyBasis
 from tools.thesis.fuzzy_laws import SmallGainFuzzy
+from utank_hil.control.fuzzy.adaptive import RobustFuzzy
+from utank_hil.control.fuzzy.law import ErrorDynamics, FuzzyBasis
 
 ERROR = ErrorDynamics(0.8, 0.6, 2.5)
 RANGES = (0.5, 0.5)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tools.thesis.feedback_linearization import FeedbackLinearization
 from utank_hil.analysis.loop.margins import closed_loop_radius
+from utank_hil.control.feedback_linearization import FeedbackLinearization
 from utank_hil.control.gain import GainLaw
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import STATES, pump_model

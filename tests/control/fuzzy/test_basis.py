@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tools.thesis.fuzzy import FuzzyBasis
+from utank_hil.control.fuzzy.law import FuzzyBasis
 
 RANGES = (np.pi / 6, np.pi / 6, 1.0, 1.0)
 inputs = st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=4, max_size=4)

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tools.thesis.fuzzy import ErrorDynamics, FuzzyBasis
 from tools.thesis.fuzzy_laws import IndirectFuzzy
+from utank_hil.control.fuzzy.law import ErrorDynamics, FuzzyBasis
 
 ERROR = ErrorDynamics(1.0, 0.7, 2.0)
 RANGES = (0.5, 0.5)
