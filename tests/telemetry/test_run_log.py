@@ -7,6 +7,7 @@ import signal
 import time
 from contextlib import contextmanager
 from itertools import count
+from multiprocessing import Pipe
 
 import numpy as np
 import pytest
@@ -239,6 +240,17 @@ def test_a_failure_is_said_once_and_at_the_end(tmp_path, monkeypatch, capfd):
     assert json.loads(told.said[-1])["error"] == "[Errno 28] No space left on device: 'a.frames'"
     said = capfd.readouterr().err
     assert said.count("recording failed: [Errno 28] No space left") == 1
+
+
+def test_the_recorder_of_a_run_that_was_killed_ends_without_a_word(tmp_path, monkeypatch):
+    monkeypatch.setattr(recording, "ready", lambda _told: None)
+    monkeypatch.setattr(time, "sleep", lambda _s: run.rows.close())
+    heard, told = Pipe(duplex=False)
+    heard.close()
+    with rings() as run, told:
+        run.feed(range(3))
+        record(run.task(tmp_path / "run.frames"), told)
+    assert len(read_run_log(tmp_path / "run.frames").rows) == 3
 
 
 @pytest.mark.slow

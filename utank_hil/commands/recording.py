@@ -3,7 +3,7 @@
 import json
 import time
 from collections.abc import Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -52,7 +52,8 @@ def record(task: RunLogTask, told: Connection) -> None:
                 failure = str(error)
             if not last:
                 time.sleep(BATCH_S)
-        told.send_bytes(json.dumps(asdict(log.report) | {"error": failure or None}).encode())
+        with suppress(BrokenPipeError):  # A run that was killed hears nothing.
+            told.send_bytes(json.dumps(asdict(log.report) | {"error": failure or None}).encode())
 
 
 @dataclass(slots=True)
