@@ -124,11 +124,14 @@ class Record:
 def read_record(path: Path) -> Record:
     """Read a recording, a log of the bus or a table.
 
-    Raises `ValueError` if the file is none of these, or has no roll.
+    Raises `ValueError` if the file is none of these, or has no roll, or times that do not rise.
     """
     runs = read_signals(path)
     for columns in runs.values():
-        require(path, columns, "roll_rad")
+        require(path, columns, "time_s", "roll_rad")
+        if not (np.diff(columns["time_s"]) >= 0).all():  # NaN is not, either
+            reason = "times must rise: sort the rows, and leave out those without a time"
+            raise CompareError(f"{path}: {reason}")
     about: dict[str, Any] = {}
     with suppress(ValueError, KeyError):  # a file of an older version has no provenance
         if path.suffix == SUFFIX:

@@ -206,3 +206,19 @@ def test_what_can_not_be_compared_is_said(tmp_path):
         done = CliRunner().invoke(APP, [str(first), str(other)])
         assert done.exit_code == 2
         assert said in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("roll_rad\n0\n1\n", "has no column time_s"),
+        ("time_s,roll_rad\n2,0\n1,1\n0,2\n", "times must rise"),
+        ("time_s,roll_rad\n,0\n1,1\n2,2\n", "times must rise"),
+    ],
+)
+def test_a_table_without_rising_times_is_refused(tmp_path, table, said):
+    (tmp_path / "a.csv").write_text("time_s,roll_rad\n0,0\n1,1\n2,0\n")
+    (tmp_path / "b.csv").write_text(table)
+    done = CliRunner().invoke(APP, [str(tmp_path / "a.csv"), str(tmp_path / "b.csv")])
+    assert done.exit_code == 2
+    assert f"b.csv: {said}" in done.stderr.replace("\n", " ")
