@@ -167,6 +167,10 @@ def test_a_motion_signal_without_unit_is_refused(tmp_path):
     )
     device["signals"]["roll_rad"]["scale"] = device["signals"]["roll_rate_rad_s"]["scale"] = 1e-3
     assert ship(tmp_path, {"motion": device}).devices.motion.step("roll_rad") == 1e-3
+    del device["signals"]["roll_rate_rad_s"]
+    assert "roll_rate_rad_s: is required but missing, or else {source: derived}" in problems(
+        tmp_path, {"motion": device}
+    )
 
 
 def test_every_shipped_profile_is_cited_and_usable(tmp_path):
@@ -200,7 +204,7 @@ def test_a_slow_sensor_is_refused_by_the_delay_of_the_law_with_the_number(tmp_pa
     path = tmp_path / "c.yaml"
     path.write_text(yaml.safe_dump(law | {"delay_s": 0.05}))
     with pytest.raises(
-        ConfigError, match=r"58 ms late.*of 23.8 Hz or more, or set delay_s to 0.058"
+        ConfigError, match=r"58 ms late.*of 23.8 Hz or more, or set delay_s of the .*file to 0.058"
     ):
         load_config(path, ControllerConfig)
     path.write_text(yaml.safe_dump(law | {"delay_s": 0.06}))

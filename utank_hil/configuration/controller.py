@@ -180,7 +180,8 @@ class ControllerConfig(Section):
                 reason = (
                     f"brings {brings} {late_ms:g} ms late, cycle and latency, but the law is made "
                     f"for a delay of {1e3 * self.delay_s:g} ms and bears {borne_ms:g}: {faster}set "
-                    f"delay_s to {late_ms * 1e-3 + COMMAND_S - EXTRA_DELAY_S:.3g} or more"
+                    "delay_s of the controller's file to "
+                    f"{late_ms * 1e-3 + COMMAND_S - EXTRA_DELAY_S:.3g} or more"
                 )
                 problems.append((f"vessel.devices.{role}.cycle_ms", reason))
         return problems

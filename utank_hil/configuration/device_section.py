@@ -246,6 +246,7 @@ class DeviceSection(CanopenSection):
             if name not in self.signals:
                 more = ", or else high_level_m" if name in SWITCHES else ""
                 more = ", or else is_open and is_shut" if name == "opening" else more
+                more = ", or else {source: derived}" if name == "roll_rate_rad_s" else more
                 yield f"signals.{name}", f"is required but missing{more}"
 
     def _paths(self) -> Iterator[tuple[str, str]]:
