@@ -281,7 +281,7 @@ def test_the_command_leads_through_and_writes_the_record(
     places = [said.index(words) for words in ("Waiting until", "Measuring the zeros", "Arm at the",
                                               "move a little. Stop", "Done.")]  # fmt: skip
     assert places == sorted(places)
-    assert " of 28 s" in said
+    assert " of 54 s" in said
     assert reason(file) == ""
 
 
@@ -321,7 +321,7 @@ def test_json_is_the_record_and_nothing_else(
     printed = json.loads(result.stdout)
     assert printed.pop("record") == str(path)
     assert printed == json.loads(path.read_text())
-    assert len(printed["checks"]) == 17
+    assert len(printed["checks"]) == 18
 
 
 def test_ended_before_the_end_it_writes_nothing(

@@ -24,7 +24,8 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.enumerations import Address
 from utank_hil.commands.panel import LOOK_NS
-from utank_hil.nodes.commissioning.checks import RATE_SCALE, SCALE
+from utank_hil.nodes.commissioning.checks import RATE_SCALE
+from utank_hil.nodes.commissioning.precision import SCALE
 from utank_hil.nodes.panel import EDGE_NS, SILENT_NS
 from utank_hil.safety.faults import FAULTS
 from utank_hil.safety.safety_limits import SafetyLimits

@@ -79,5 +79,5 @@ def test_a_controller_arms_once_it_was_commissioned(tmp_path_factory):
     folder = tmp_path_factory.mktemp("quay")
     made = first_that_can_be_judged(story, folder)
     assert made["passed"] is True
-    assert len(made["checks"]) == 16
+    assert len(made["checks"]) == 17
     print(json.dumps({each["name"]: each["measured"] for each in made["checks"]}))

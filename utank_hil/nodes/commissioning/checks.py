@@ -2,11 +2,12 @@
 
 What the pump's pulses show: signs, scales and order of sensors and pump, and natural periods.
 
-Three equations, low-pass filtered on both sides (`DerivativeFilter`), are solved by least squares.
-With the level h, the roll phi, the pressure P and the notation of `utank_hil.dynamics.linear`::
+Three equations, low-pass filtered on both sides (`filtered`), are solved by least squares, that of
+the tank with instrumental variables (`utank_hil.nodes.commissioning.precision`). With the level h,
+the roll phi, the pressure P and the notation of `utank_hil.dynamics.linear`::
 
     pump   P = a P_promised                                   by command, delay and lag
-    tank   P / rho = Le h'' + c h' + k h - r (g L phi + L (H + Lz) phi'')     of either gauge
+    tank   P / rho = Le h'' + c h' + k h - r (g L phi + L (H + Lz) phi'') + q |h'| h'   either gauge
     ship   -(M01 h'' + K01 h) = M00 phi'' + B00 phi' + K00 phi
 
 By hydrostatics k is 2 g and r is 1, whatever friction and load are. So 2 g / k is a gauge's scale
@@ -16,7 +17,7 @@ taken out, so that a wrong one shows in its own check alone.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Generic, NamedTuple, TypeVar
 
@@ -27,8 +28,17 @@ from utank_hil.base.tick import TICK_S
 from utank_hil.control.interface import DesignPlant
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.nodes.commissioning.precision import (
+    ROLL_SCALE,
+    SCALE,
+    Record,
+    columns_of,
+    filtered,
+    instruments,
+    push_of,
+    times_needed,
+)
 from utank_hil.nodes.commissioning.pulses import PulsePlan, ValveStroke
-from utank_hil.safety.monitors.noise import DerivativeFilter
 from utank_hil.safety.monitors.thresholds import ZERO_HEEL_DEG
 from utank_hil.safety.situation import VALVE_OFF
 
@@ -42,9 +52,6 @@ WATER_HEEL_DEG: Final = ZERO_HEEL_DEG * 2 / 3
 
 STILL: Final = 0.2
 """Share of the plan's peaks: ship and water that move more by themselves hide what pulses do."""
-
-Record = Mapping[str, FloatArray]
-"""Columns of equal length by name, one row every sample time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +130,12 @@ def judge_rest(
             Check("level_still", "level about its mean, RMS", float(level_m.std()), 0.0,
                   STILL * plan.level_m, "m", wait),
         ]  # fmt: skip
+        noise = math.sqrt(times_needed(rest, plan.of_noise) / plan.most_times)
+        checks.append(
+            Check("noise", "noise at rest, by what the longest pulses average", noise, 0.0, 1.0,
+                  "1", "Take gauges and a pressure sensor with less noise by this factor, "
+                  "or filter it where it is measured.")
+        )  # fmt: skip
         limit_kpa = plant.limits.pressure_pa * 1e-3
         checks.append(
             Check("pressure_zero", "pump pressure at rest", mean["pressure_pa"] * 1e-3, 0.0,
@@ -166,23 +179,17 @@ def _gauge_zero(side: str, measured_m: float, expected_m: float, tolerance_m: fl
     )  # fmt: skip
 
 
-SCALE: Final = 0.06
-"""Of pressure, and of levels by it: at sea the monitors bear 10 % of either, not 15 (the storm)."""
 RATE_SCALE: Final = 0.03
 """At sea the monitors bear it, and not 4 % (Patti-B); at the quay it is found to 1 %."""
-ROLL_SCALE: Final = 0.3
 ROLL_2_SCALE: Final = 0.05
 """Two sensors that are farther apart disagree at sea: half a degree at a roll of ten."""
 TANK_PERIOD: Final = 0.1
 ROLL_PERIOD: Final = 0.15
 """Tolerances, as shares."""
-CORNER: Final = 0.5
-"""Of the filters, as a share of the tank's frequency: a gauge's noise biases what is found with
-one that lets more of it through."""
 NO_PRESSURE: Final = 0.15
 """Of what was commanded: less is none."""
-STILL_SHARE: Final = 0.03
-"""Of the plan's peak, after the filter, which lets a fifth through: less is no motion."""
+STILL_SHARE: Final = 0.1
+"""Of the plan's peak, after the filter, which lets two thirds through: less is no motion."""
 
 _T = TypeVar("_T")
 _BEND, _RATE, _VALUE = range(3)  # rows of a filtered signal
@@ -216,20 +223,21 @@ def judge_pulses(
     between two rows.
     """
 
-    def filtered(name: str) -> FloatArray:
-        return _filtered(pulses[name] - rest[name].mean(), plant, sample_time_s)
+    def moved(name: str) -> FloatArray:
+        return filtered(pulses[name] - rest[name].mean(), plant, sample_time_s)
 
-    roll, rate, pressure = map(filtered, ("roll_rad", "roll_rate_rad_s", "pressure_pa"))
-    port, starboard = -filtered("port_level_m"), filtered("starboard_level_m")
+    roll, rate, pressure = map(moved, ("roll_rad", "roll_rate_rad_s", "pressure_pa"))
+    port, starboard = -moved("port_level_m"), moved("starboard_level_m")
     promised_pa = _promised(pulses["command_pa"], plant, sample_time_s)
-    promised = _filtered(promised_pa, plant, sample_time_s)
+    promised = filtered(promised_pa, plant, sample_time_s)
     mass, _, stiffness = coupled_matrices(plant.ship, plant.tank)
-    water_kg_m = plant.tank.density_kg_m3 * plant.tank.reservoir_area_m2
-    push = -(mass[1, 0] * roll[_BEND] + stiffness[1, 0] * roll[_VALUE]) / water_kg_m
+    push = push_of(roll, plant)
+    known = instruments(pulses["command_pa"], plant, sample_time_s)
+    of_tank, of_roll = known[:5], known[5:]
     pushed = pressure[_VALUE] / plant.tank.density_kg_m3
     # a pressure of nothing but zero fits any water: there is then no equation
     fits = [
-        _least_squares([*gauge, -push], pushed)
+        _least_squares(list((of_tank @ columns_of(gauge, push).T).T), of_tank @ pushed)
         if _moves(gauge, plan.level_m) and pushed.any()
         else None
         for gauge in (port, starboard)
@@ -238,11 +246,11 @@ def judge_pulses(
     good = [fit for fit in fits if fit is not None]
     rolls = _moves(roll, plan.roll_rad)
     scales = Each(
-        _slope(pressure[_VALUE], promised[_VALUE]),
+        _slope(pressure[_VALUE], promised[_VALUE], promised[_VALUE]),
         gauges[0],
         gauges[1],
         _mean([float(fit[3]) for fit in good]) if rolls else 0.0,
-        _slope(rate[_VALUE], roll[_RATE]) if rolls else 0.0,
+        _slope(rate[_VALUE], roll[_RATE], of_roll[_RATE]) if rolls else 0.0,
     )
     checks = [
         _scale_check(name, what, scale, tolerance, remedy)
@@ -251,13 +259,14 @@ def judge_pulses(
         )
     ]
     if "roll_2_rad" in pulses:
-        roll_2, rate_2 = filtered("roll_2_rad"), filtered("roll_rate_2_rad_s")
+        roll_2, rate_2 = moved("roll_2_rad"), moved("roll_rate_2_rad_s")
+        of_first = _slope(roll_2[_VALUE], roll[_VALUE], of_roll[_VALUE])
         remedy = "Mount both motion sensors alike: roll is positive starboard down."
         checks += [
             _scale_check("roll_2", "second sensor's roll, by the first's",
-                         _slope(roll_2[_VALUE], roll[_VALUE]), ROLL_2_SCALE, remedy),
+                         of_first, ROLL_2_SCALE, remedy),
             _scale_check("roll_rate_2", "second sensor's rate, by its roll",
-                         _slope(rate_2[_VALUE], roll_2[_RATE]), RATE_SCALE, remedy),
+                         _slope(rate_2[_VALUE], roll_2[_RATE], of_roll[_RATE]), RATE_SCALE, remedy),
         ]  # fmt: skip
     tank_period_s = _period_s(_mean([float(fit[_VALUE] / fit[_BEND]) for fit in good]))
     ship_period_s = math.nan
@@ -267,7 +276,8 @@ def judge_pulses(
         ]
         level = np.mean(true, axis=0)
         righting = -(mass[0, 1] * level[_BEND] + stiffness[0, 1] * level[_VALUE])
-        inertia, _, righted = _least_squares(list(roll / scales.roll), righting).tolist()
+        true_roll = [of_roll @ each / scales.roll for each in roll]
+        inertia, _, righted = _least_squares(true_roll, of_roll @ righting).tolist()
         # less the water's share
         inertia -= mass[0, 0] - plant.ship.inertia_kg_m2
         righted -= stiffness[0, 0] - plant.ship.stiffness_nm_rad
@@ -363,12 +373,6 @@ def _period_s(square_rad2_s2: float) -> float:
     return 2 * math.pi / math.sqrt(square_rad2_s2) if square_rad2_s2 > 0 else math.nan
 
 
-def _filtered(column: FloatArray, plant: DesignPlant, sample_time_s: float) -> FloatArray:
-    """A signal's second derivative, first derivative and value, low-pass filtered, shape (3, n)."""
-    signal = DerivativeFilter(CORNER * plant.tank.natural_frequency_rad_s, sample_time_s)
-    return np.array([(signal.update(x), signal.rate, signal.value) for x in column.tolist()]).T
-
-
 def _promised(command_pa: FloatArray, plant: DesignPlant, sample_time_s: float) -> FloatArray:
     """The pressure that the files promise for a command."""
     late = np.roll(command_pa, round(plant.delay_s / sample_time_s))  # the record ends at zero
@@ -385,10 +389,10 @@ def _moves(signal: FloatArray, expected: float) -> bool:
     return bool(np.abs(signal[_VALUE]).max() > STILL_SHARE * expected)
 
 
-def _slope(y: FloatArray, x: FloatArray) -> float:
-    """Least-squares slope of y against x, through zero."""
-    power = float(x @ x)
-    return float(x @ y) / power if power > 0 else math.nan
+def _slope(y: FloatArray, x: FloatArray, known: FloatArray) -> float:
+    """Slope of y against x, through zero, by what is known of x."""
+    power = float(known @ x)
+    return float(known @ y) / power if power else math.nan
 
 
 def _least_squares(columns: list[FloatArray], y: FloatArray) -> FloatArray:

@@ -7,7 +7,8 @@ import numpy as np
 from utank_hil.control.interface import DesignPlant
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.pump_curve import pump_speed
-from utank_hil.nodes.commissioning.checks import Check, Record
+from utank_hil.nodes.commissioning.checks import Check
+from utank_hil.nodes.commissioning.precision import Record
 from utank_hil.nodes.commissioning.pulses import PulsePlan
 
 SPEED: Final = "drive_speed_rad_s"

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from enum import Enum
 from typing import Final
 
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.tick import TICK_NS, TICK_S
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Frame, Mode, OperatorCommand, Station
 from utank_hil.control.interface import PRESSURE, VALVE, DesignPlant
 from utank_hil.dynamics.pump import Pump
@@ -16,20 +17,23 @@ from utank_hil.nodes.commissioning.checks import (
     PRESSED,
     SETTLED_S,
     Check,
-    Record,
     judge_pulses,
     judge_rest,
     judge_valve,
     stopped_ms,
 )
 from utank_hil.nodes.commissioning.drive_speed import SPEED, judge_speed
-from utank_hil.nodes.commissioning.pulses import PulseLaw, PulsePlan, ValveStroke
+from utank_hil.nodes.commissioning.precision import Record, noise_of, times_needed
+from utank_hil.nodes.commissioning.pulses import (
+    ROW_S,
+    ROW_TICKS,
+    PulseLaw,
+    PulsePlan,
+    ValveStroke,
+)
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.safety.faults import fault_text
 
-ROW_TICKS: Final = 5
-ROW_S: Final = ROW_TICKS * TICK_S
-"""A row is the mean of so much time, also where the loop left out a tick of it."""
 REST_S: Final = 20.0
 SETTLE_S: Final = 1.0
 """From ACTIVE to the first pulse."""
@@ -99,13 +103,10 @@ class CommissioningNode:
         self.link_error, self.stop = node.link_error, node.stop
         self._law = law
         self._plant = plant
-        self._plan = plan
         self._stroke = stroke
         self._pump = pump
         self._volume_m, self._stop_within_ms = volume_m, stop_within_ms
-        self._pulses_s = 0.0 if plan is None else plan.duration_s
-        self._push_s = self._pulses_s + (0.0 if stroke is None else stroke.duration_s)
-        self._moving_s = self._push_s + (0.0 if plan is None else PUSH_S)
+        self._take(plan)
         self._pushed: list[float] = []  # pressure of each tick before the stop, and after it
         self._stopping: list[float] = []
         self._sources = dict(_PAIR if len(node.inbox.motions) == 2 else _SINGLE)
@@ -116,6 +117,13 @@ class CommissioningNode:
         self.rest: Record = {}
         self.moved: Record = {}
         self._enter(Stage.WAITING, 0)
+
+    def _take(self, plan: PulsePlan | None) -> None:
+        stroke_s = 0.0 if self._stroke is None else self._stroke.duration_s
+        self._plan = plan
+        self._pulses_s = 0.0 if plan is None else plan.duration_s
+        self._push_s = self._pulses_s + stroke_s
+        self._moving_s = self._push_s + (0.0 if plan is None else PUSH_S)
 
     def checks(self) -> list[Check]:
         """Judge what was recorded; takes tens of milliseconds, so not while the loop runs."""
@@ -140,11 +148,18 @@ class CommissioningNode:
         return checks
 
     def _stop_check(self, plan: PulsePlan) -> Check:
-        """The time from the stop to a fifth of the pressure, each pressure the mean of three."""
+        """The time from the stop to a fifth of the pressure, each the mean of three ticks or more.
+
+        So many that a third of that fifth is the noise of their mean, and half of those of a tick
+        to come.
+        """
         zero_pa = float(self.rest["pressure_pa"].mean())
         before_pa = float(np.mean(self._pushed or [math.nan])) - zero_pa
-        pressures = np.array([before_pa, before_pa, *(each - zero_pa for each in self._stopping)])
-        smooth: list[float] = np.convolve(pressures, np.full(3, 1 / 3), "valid").tolist()
+        noise = noise_of(self.rest["pressure_pa"]) / (plan.push_pa * PRESSED / 3)
+        half = max(math.ceil(noise * noise * ROW_TICKS / 2), 1)
+        pressures = [before_pa] * (half + 1) + [each - zero_pa for each in self._stopping]
+        mean = np.full(2 * half + 1, 1 / (2 * half + 1))
+        smooth: list[float] = np.convolve(pressures, mean, "valid").tolist()
         pressed = abs(before_pa) > plan.push_pa / 2  # its sign is the pulses' business
         shares = [each / before_pa if pressed else 1.0 for each in smooth]
         remedy = (
@@ -229,6 +244,9 @@ class CommissioningNode:
             self.rest = self._record()
             zeros = judge_rest(self.rest, self._plant, self._plan, self._volume_m)
             passed = all(check.passed for check in zeros)
+            if passed and (plan := self._plan) is not None:
+                times = math.ceil(times_needed(self.rest, plan.of_noise))
+                self._take(replace(plan, times=max(times, 1)))
             self._enter(Stage.ARM if passed else Stage.DONE, now_ns)
 
     def _move(self, time_s: float, now_ns: int) -> None:

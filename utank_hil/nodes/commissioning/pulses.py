@@ -12,7 +12,13 @@ from utank_hil.base.tick import TICK_S
 from utank_hil.control.interface import DesignPlant
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve
+from utank_hil.nodes.commissioning.precision import deviations
 
+ROW_TICKS: Final = 5
+ROW_S: Final = ROW_TICKS * TICK_S
+"""A row is the mean of so much time, also where the loop left out a tick of it."""
+MOST_S: Final = 600.0
+"""Of pulses, unless once takes longer."""
 LEVEL_SHARE: Final = 0.2
 """Greatest level of the plan, as a share of the limit of the level."""
 MOST_ROLL_RAD: Final = 0.035
@@ -25,6 +31,7 @@ STROKE_SPARE_S: Final = 1.0
 
 SHAPE: Final = ((1.0, 1.0), (-1.0, 0.5), (1.0, 0.5), (-1.0, 0.5), (0.0, 2.0))
 """Pulses as a sign and a length in periods of the tank; to starboard first, then water at rest."""
+SHAPE_PERIODS: Final = sum(periods for _, periods in SHAPE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,15 +43,24 @@ class PulsePlan:
     #: level_m, roll_rad: greatest level and roll that the linear model predicts.
     level_m: float
     roll_rad: float
+    of_noise: FloatArray  #: Its `deviations` of the scales by noise.
     push_pa: float = 0.0  #: Pressure before the stop that is timed.
+    times: int = 1  #: How often `SHAPE` is gone through.
 
     @property
     def duration_s(self) -> float:
         """Length of all pulses and of the rest after them."""
-        return self.period_s * sum(periods for _, periods in SHAPE)
+        return self.times * self.period_s * SHAPE_PERIODS
+
+    @property
+    def most_times(self) -> int:
+        """How often `SHAPE` is gone through at most."""
+        return max(int(MOST_S / (self.period_s * SHAPE_PERIODS)), 1)
 
     def pressure_at(self, time_s: float) -> float:
         """Pressure at a time since the first pulse began; zero after the last one."""
+        if time_s < self.duration_s:
+            time_s %= self.period_s * SHAPE_PERIODS
         for sign, periods in SHAPE:
             time_s -= periods * self.period_s
             if time_s < 0:
@@ -55,7 +71,7 @@ class PulsePlan:
 def plan_pulses(plant: DesignPlant) -> PulsePlan:
     """Pulses for a plant, as strong as the shares of this module allow."""
     period_s = 2 * math.pi / plant.tank.natural_frequency_rad_s
-    unit = PulsePlan(1.0, period_s, 0.0, 0.0)
+    unit = PulsePlan(1.0, period_s, 0.0, 0.0, np.zeros((2, 2)))
     step_s = round(period_s / 200 / TICK_S + 0.5) * TICK_S
     model = plant.sampled(("level_m", "roll_rad"), step_s)
     state = np.zeros(len(model.A))
@@ -72,7 +88,10 @@ def plan_pulses(plant: DesignPlant) -> PulsePlan:
     )
     level_m, roll_rad = level_per_pa * pressure_pa, roll_per_pa * pressure_pa
     push_pa = PRESSURE_SHARE * limits.pressure_pa
-    return PulsePlan(pressure_pa, period_s, level_m, roll_rad, push_pa)
+    rows = range(round(unit.duration_s / ROW_S))
+    command_pa = np.array([pressure_pa * unit.pressure_at(row * ROW_S) for row in rows])
+    of_noise = deviations(command_pa, plant, ROW_S)
+    return PulsePlan(pressure_pa, period_s, level_m, roll_rad, of_noise, push_pa)
 
 
 @dataclass(frozen=True, slots=True)
