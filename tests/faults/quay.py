@@ -58,7 +58,7 @@ def commissioned(config, *more, spoil=None, begin_ns=0, seed=1, nodes=None, end_
 def another_ship(config, ship, tank):
     """Nodes of a ship that is not as her file says."""
     scenario, catalogue = still_water(config), load_catalogue()
-    plant = Plant(ship, tank, config.vessel.pump, scenario.waves(1), linear=False)
+    plant = Plant(ship, tank, config.vessel.pump, scenario.waves(1))
     version = config.vessel.version
     return (
         SensorNode(plant, scenario.sensors, catalogue, configuration_version=version, seed=2),

@@ -185,7 +185,7 @@ def test_the_bench_reads_units_of_its_own_fmu(tmp_path: Path) -> None:
     [
         ("voyage", {}, "cc", "voyage, actual_from_s, sea: .* changes"),
         ("load_change", {}, "cc", "voyage, actual_from_s, sea: .* changes"),
-        ("storm", {"plant": "linear"}, "cc", "plant: is linear"),
+        ("storm", {"plant": "six_degrees"}, "cc", "plant: is six_degrees"),
         ("storm", {}, "no-such-compiler", "no C compiler 'no-such-compiler': apt-get install"),
         ("storm", {}, "false", "false failed"),
     ],

@@ -211,7 +211,7 @@ def plant_of(file: Path, **changes: Any) -> FmuPlant:
 
 
 def test_ship_moves_as_the_linear_plant(fmu: Path) -> None:
-    ours = Plant(VESSEL.ship, VESSEL.tank, VESSEL.pump, MOMENT, linear=True)
+    ours = Plant(VESSEL.ship, VESSEL.tank, VESSEL.pump, MOMENT)
     plants = plant_of(fmu), ours
     rows = []
     for tick in range(1200):

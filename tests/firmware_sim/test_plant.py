@@ -29,8 +29,15 @@ SWELL = Harmonics(
 STEP_S = 1e-3
 
 
-def plant_in(sea: Harmonics, *, linear: bool = True) -> Plant:
-    return Plant(VESSEL.ship, VESSEL.tank, VESSEL.pump, sea, linear=linear)
+def irregular(scale: float) -> Harmonics:
+    return Harmonics(scale * SWELL.amplitude, SWELL.frequency_rad_s, SWELL.phase_rad)
+
+
+SMALL = 1e-4  #: Share of waves and pressure at which the ship is linear to 1e-8.
+
+
+def plant_in(sea: Harmonics) -> Plant:
+    return Plant(VESSEL.ship, VESSEL.tank, VESSEL.pump, sea)
 
 
 def state_of(plant: Plant) -> tuple[float, ...]:
@@ -84,12 +91,12 @@ class ExactShip:
 @pytest.mark.slow
 @pytest.mark.parametrize("enabled", [True, False])
 def test_plant_equals_a_matrix_exponential_with_the_same_moment_and_pump(enabled: bool) -> None:
-    plant, exact = plant_in(SWELL), ExactShip(SWELL)
+    plant, exact = plant_in(irregular(SMALL)), ExactShip(irregular(SMALL))
     coefficients, pump, energy_j = VESSEL.pump.coefficients, AT_REST, 0.0
     plant.advance(0)
     largest = np.zeros(4)
     for tick in range(2500):
-        setpoint_pa = 30e3 * math.sin(0.6 * tick * 0.01)
+        setpoint_pa = SMALL * 30e3 * math.sin(0.6 * tick * 0.01)
         plant.drive_pump(setpoint_pa, enabled=enabled)
         plant.advance((tick + 1) * TICK_NS)
         for _ in range(10):
@@ -101,21 +108,21 @@ def test_plant_equals_a_matrix_exponential_with_the_same_moment_and_pump(enabled
             exact.step(pump.pressure_pa)
         found = np.array([plant.roll_rad, plant.level_m, plant.roll_rate_rad_s])
         largest[:3] = np.maximum(largest[:3], np.abs(found))
-        # a thousandth of a microradian: the moment is interpolated, the rest is rounding
-        np.testing.assert_allclose(found, exact.x[[0, 1, 2]], rtol=0, atol=1e-9)
-    assert largest[0] > 0.02
-    assert largest[1] > 0.3
+        # the moment is interpolated, the rest is rounding and the ship's own small angles
+        np.testing.assert_allclose(found, exact.x[[0, 1, 2]], rtol=0, atol=SMALL * 1e-8)
+    assert largest[0] > SMALL * 0.02
+    assert largest[1] > SMALL * 0.3
     assert plant.pump_speed_rad_s == pytest.approx(pump.speed_rad_s, rel=1e-6)
-    assert plant.pressure_pa == pytest.approx(pump.pressure_pa, rel=1e-6, abs=1e-3)
+    assert plant.pressure_pa == pytest.approx(pump.pressure_pa, rel=1e-6, abs=SMALL * 1e-3)
     assert plant.pump_energy_j == pytest.approx(energy_j, rel=1e-6)
 
 
 def test_imposed_pressure_acts_as_it_is_and_its_work_is_the_waters() -> None:
-    plant, exact = plant_in(SWELL), ExactShip(SWELL)
+    plant, exact = plant_in(irregular(SMALL)), ExactShip(irregular(SMALL))
     plant.advance(0)
     work_j, rotor = 0.0, AT_REST
     for tick in range(1500):
-        pressure_pa = 60e3 * math.sin(0.6 * tick * 0.01)  # above the emulated pump's own limit
+        pressure_pa = SMALL * 60e3 * math.sin(0.6 * tick * 0.01)
         plant.impose_pressure(pressure_pa)
         plant.advance((tick + 1) * TICK_NS)
         for _ in range(10):
@@ -123,11 +130,11 @@ def test_imposed_pressure_acts_as_it_is_and_its_work_is_the_waters() -> None:
             rotor = pump_coast(rotor, exact.flow_m3_s, STEP_S, VESSEL.pump.coefficients)
             exact.step(pressure_pa)
         assert plant.pressure_pa == pressure_pa
-        assert [plant.roll_rad, plant.level_m] == pytest.approx(exact.x[:2], abs=1e-9)
+        assert [plant.roll_rad, plant.level_m] == pytest.approx(exact.x[:2], abs=SMALL * 1e-8)
     assert plant.pump_energy_j == pytest.approx(work_j, rel=1e-6)
     # the rotor turned with the water, so that there is no jolt when the pressure ends
     assert plant.pump_speed_rad_s == pytest.approx(rotor.speed_rad_s, rel=1e-6)
-    assert abs(plant.pump_speed_rad_s) > 1.0
+    assert abs(plant.pump_speed_rad_s) > SMALL * 0.01
 
 
 def mechanical_energy_j(plant: Plant, vessel: Vessel = VESSEL) -> float:
@@ -139,7 +146,7 @@ def mechanical_energy_j(plant: Plant, vessel: Vessel = VESSEL) -> float:
 
 
 def test_shaft_work_pays_for_motion_friction_and_losses() -> None:
-    plant = plant_in(CALM, linear=False)
+    plant = plant_in(CALM)
     plant.advance(0)
     for tick in range(3000):
         plant.drive_pump(25e3 * math.sin(0.55 * tick * 0.01), enabled=True)
@@ -152,7 +159,7 @@ def test_shaft_work_pays_for_motion_friction_and_losses() -> None:
 
 
 def test_with_the_motor_off_and_no_wave_energy_never_grows() -> None:
-    plant = plant_in(CALM, linear=False)
+    plant = plant_in(CALM)
     plant.advance(0)
     for tick in range(1500):
         plant.drive_pump(40e3 * math.sin(0.55 * tick * 0.01), enabled=True)
@@ -176,13 +183,12 @@ def test_with_the_motor_off_and_no_wave_energy_never_grows() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("after_s", [0.0, 2.0])
 def test_wind_and_cargo_heel_the_ship_and_the_water_runs_to_the_low_side(after_s: float) -> None:
-    heeled = replace(VESSEL.ship, wind_moment_nm=2.5e7, offset_moment_nm=-5e6)
+    heeled = replace(VESSEL.ship, wind_moment_nm=2.5e5, offset_moment_nm=-5e4)
     plant = Plant(
         lambda time_s: heeled if time_s >= after_s else VESSEL.ship,
         VESSEL.tank,
         VESSEL.pump,
         CALM,
-        linear=True,
     )
     plant.advance(0)
     for tick in range(80_000):
@@ -195,8 +201,8 @@ def test_wind_and_cargo_heel_the_ship_and_the_water_runs_to_the_low_side(after_s
     assert plant.level_m == pytest.approx(level_m, rel=1e-4)
     _, _, stiffness = coupled_matrices(VESSEL.ship, VESSEL.tank)
     moment_nm = stiffness[0] @ [plant.roll_rad, plant.level_m]
-    assert moment_nm == pytest.approx(2e7, rel=1e-4)
-    assert plant.roll_rad > 2e7 / VESSEL.ship.stiffness_nm_rad
+    assert moment_nm == pytest.approx(2e5, rel=1e-4)
+    assert plant.roll_rad > 2e5 / VESSEL.ship.stiffness_nm_rad
     assert plant.wave_moment_nm == 0.0
 
 
@@ -290,10 +296,6 @@ BEATING = Harmonics(
 )
 
 
-def irregular(scale: float) -> Harmonics:
-    return Harmonics(scale * SWELL.amplitude, SWELL.frequency_rad_s, SWELL.phase_rad)
-
-
 def history(plant: Plant, seconds: float) -> np.ndarray:
     """Roll and level at every second."""
     found = []
@@ -383,18 +385,6 @@ def test_work_of_waves_and_pump_is_energy_and_losses_strikes_included(valve: flo
     assert work_j == pytest.approx(gained_j, abs=1e-6 * plant.wave_work_j)
 
 
-def test_small_motions_are_those_of_the_linear_model() -> None:
-    small = irregular(1e-4)
-    linear = history(plant_in(small), 60)
-    nonlinear = history(plant_in(small, linear=False), 60)
-    np.testing.assert_allclose(nonlinear, linear, rtol=0, atol=1e-6 * np.abs(linear).max())
-    large = (
-        history(plant_in(irregular(4.0)), 60),
-        history(plant_in(irregular(4.0), linear=False), 60),
-    )
-    assert np.abs(large[0] - large[1]).max() > 0.01
-
-
 def test_ship_that_passes_ninety_degrees_has_capsized_and_stays() -> None:
     sea = Harmonics(np.array([3e5]), np.array([0.6]), np.array([0.0]))
     plant = Plant(PATTI_B.ship, PATTI_B.tank, PATTI_B.pump, sea)
@@ -437,7 +427,7 @@ def test_ship_without_her_tank_is_the_roll_equation_alone() -> None:
 
 
 def test_tank_without_a_pump_has_no_pressure_and_no_rotor() -> None:
-    without, zero = Plant(VESSEL.ship, VESSEL.tank, None, SWELL), plant_in(SWELL, linear=False)
+    without, zero = Plant(VESSEL.ship, VESSEL.tank, None, SWELL), plant_in(SWELL)
     for plant in (without, zero):
         plant.advance(0)
         plant.drive_pump(40e3, enabled=plant is without)

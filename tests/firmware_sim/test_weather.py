@@ -67,7 +67,6 @@ def test_a_great_windage_feels_less_of_a_short_gust_as_vickery_says() -> None:
 def test_the_bench_rolls_in_gusts_as_its_transfer_function_says(tmp_path: Path) -> None:
     changes = {
         "sea": {"kind": "regular", "amplitude_m": 0.0, "period_s": 10.0},
-        "plant": "linear",
         "actual_ship": {"wind_moment_nm": 1e7},
         "gusts": {"mean_speed_m_s": 20.0},
     }
@@ -211,7 +210,7 @@ def test_work_of_turns_gusts_and_righting_moments_is_booked() -> None:
             "ship's mass",
         ),
         (
-            {"righting_in_waves": {"length_m": 100.0, "share_per_m": -0.1}, "plant": "linear"},
+            {"righting_in_waves": {"length_m": 100.0, "share_per_m": -0.1}, "plant": "fmu"},
             "righting_in_waves",
             "needs plant: roll",
         ),
