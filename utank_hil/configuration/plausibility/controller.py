@@ -14,6 +14,8 @@ from utank_hil.dynamics import GRAVITY_M_S2
 
 _PERIODS: Final = (0.2, 5.0)
 """Range of a period of waves or of a wanted motion per the ship's roll period."""
+_RATIOS: Final = (0.005, 3.0)
+"""Damping ratios that a law may want of a motion, or see in a sea's peak."""
 
 
 def controller_warnings(config: Any) -> Iterator[Problem]:
@@ -26,12 +28,20 @@ def controller_warnings(config: Any) -> Iterator[Problem]:
     full = f"a reservoir is full or empty at {height_m:.3g} m"
     most_pa = 0.0 if pump is None else pump.max_pressure_pa
     gives = f"the pump gives {most_pa:g} Pa"
+    share = "it is a share of critical damping, 10 % is 0.10"
     rows: list[tuple[str, float, float, float, str]] = [
         ("limits.level_m", height_m, 0.05, 1, full),
         ("limits.pressure_pa", most_pa, 0.05, math.inf, gives),
         ("limits.rate_pa_s", config.limits.pressure_pa / roll_s, 1, math.inf,
          f"{rolls}, and the pressure needs longer to its limit"),
+        ("law.frequency_rad_s", roll_rad_s, *_PERIODS, rolls),
+        ("law.damping_ratio", 1, *_RATIOS, share),
+        ("law.level_damping_ratio", 1, *_RATIOS, share),
+        ("law.soft_level_m", height_m, 0.05, 1, full),
+        ("law.hard_level_m", height_m, 0.05, 1, full),
         ("law.level_margin_m", height_m, 0.005, 0.5, full),
+        ("law.error.frequency_rad_s", roll_rad_s, *_PERIODS, rolls),
+        ("law.error.damping_ratio", 1, *_RATIOS, share),
         ("law.washout_rad_s", roll_rad_s, 0.002, 0.3, rolls),
         ("law.sample_time_s", roll_s, 0, 0.1, rolls),
         ("law.pump.washout_rad_s", roll_rad_s, 0.002, 0.3, rolls),
