@@ -23,23 +23,9 @@ def check(folder: Path, shipped: str, ship: str, **law: Any) -> dict[str, Any]:
     return json.loads(CliRunner().invoke(app, ["check", str(file), "--json"]).stdout)
 
 
-@pytest.mark.evidence("change0")
-@pytest.mark.parametrize("change", [{}, {"output_weight": [1e16]}])
-def test_what_is_named_passes_when_it_is_written(tmp_path: Path, change: dict[str, Any]) -> None:
-    refused = check(tmp_path, "gpc", "naval_vessel", **change)
-    assert not refused["accepted"]
-    key, _, value = refused["remedy"].partition(" passes")[0].partition(": ")
-    assert key == "law.output_weight"
-    mended = check(tmp_path, "gpc", "naval_vessel", output_weight=json.loads(value))
-    assert mended["accepted"]
-    assert mended["remedy"] is None
-
-
-@pytest.mark.evidence
-def test_where_no_gentler_weight_passes_the_law_that_finds_its_numbers_is_named(
-    tmp_path: Path,
-) -> None:
-    refused = check(tmp_path, "lqg", "thesis_first", state_weight=[1e30, 0.0, 0.0, 0.0])
+@pytest.mark.slow
+def test_what_is_named_passes_when_it_is_written(tmp_path: Path) -> None:
+    refused = check(tmp_path, "gpc", "naval_vessel")
     assert not refused["accepted"]
     law, found, _ = refused["remedy"].removeprefix("law: ").partition(" passes")
     assert found
@@ -48,7 +34,8 @@ def test_where_no_gentler_weight_passes_the_law_that_finds_its_numbers_is_named(
     }
     file = tmp_path / "mended.yaml"
     file.write_text(yaml.safe_dump(mended))
-    assert json.loads(CliRunner().invoke(app, ["check", str(file), "--json"]).stdout)["accepted"]
+    passed = json.loads(CliRunner().invoke(app, ["check", str(file), "--json"]).stdout)
+    assert (passed["accepted"], passed["remedy"]) == (True, None)
 
 
 def test_ship_that_no_law_can_mend_is_told_so(tmp_path: Path) -> None:

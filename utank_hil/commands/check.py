@@ -4,15 +4,14 @@ import math
 from dataclasses import asdict, replace
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 from pydantic import BaseModel
 from rich.text import Text
 
-from utank_hil.analysis.loop.linear_tuning import LINEAR_KINDS, AutoDesign, Design, scaled, varied
-from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins, Robustness, robustness
+from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins, Robustness
 from utank_hil.analysis.loop.self_tuning import NoLawError, SelfTunedDesign
 from utank_hil.base.finite import finite
 from utank_hil.configuration.controller import ControllerConfig
@@ -25,8 +24,6 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Command, Terminal, new_table, run_command
 from utank_hil.control import BuiltLaw
 from utank_hil.control.constrained.design import ConstrainedDesign
-from utank_hil.control.interface import DesignPlant, LawDesign
-from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.gate import MOST_STEP_S, JudgedLaw
 
@@ -39,8 +36,6 @@ DISSIPATES = (
 )
 LEAST_LOOP_GAIN = 0.05
 """Loop gain below which a law with all margins hardly acts; the shipped laws have 1.3 and more."""
-GENTLER: Final = (0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4)  #: Factors on a weight on outputs or states.
-LONGER: Final = (1.3, 1.6, 2.0, 3.0)  #: Factors on the control horizon of an exact deadbeat.
 Judged = dict[str, JudgedLaw]
 
 
@@ -246,16 +241,10 @@ def _at_rest(law: BuiltLaw) -> str | None:
 
 
 def remedy(judged: JudgedLaw) -> str | None:
-    """Return the first gentler design that meets all requirements, as keys of the file.
-
-    Of a law that has nothing to scale it is the self-tuned one. None is returned if the law is not
-    refused for its margins.
-    """
+    """Return what to do about a law that is refused for its margins; None about any other."""
     design, plant, report = judged.config.law, judged.config.design_plant, judged.robustness
     if report is None or not report.failures() or judged.step_s > MOST_STEP_S:
         return None
-    if not isinstance(design, Design):
-        return _automatic(design, plant)
     stiffness = plant.ship.stiffness_nm_rad / report.worst_period_scale**2
     softer = replace(plant.ship, stiffness_nm_rad=stiffness)
     if np.linalg.eigvals(state_matrices(softer, plant.tank)[0]).real.max() > 0:
@@ -263,51 +252,14 @@ def remedy(judged: JudgedLaw) -> str | None:
             f"at {report.worst_period_scale:g} of the roll period the ship is unstable with the "
             "tank's water alone, whatever the law asks for: make the tank's reservoirs smaller"
         )
-    for factor in LONGER if varied(design) == "control horizon" else GENTLER:
-        gentler = scaled(design, factor)
-        try:
-            found = robustness(
-                gentler.law(plant), plant, judged.law.measured, with_delay_margin=False
-            )
-        except (ValueError, ArithmeticError):
-            continue  # It can't be designed or judged either.
-        if not found.failures():
-            return f"{_keys(gentler)} passes; a value between may, too"
-    return _automatic(design, plant) or (
-        f"no gentler {varied(design)} passes: choose another law, or another tank"
-    )
-
-
-def _automatic(design: LawDesign, plant: DesignPlant) -> str | None:
-    try:
-        if isinstance(design, ConstrainedDesign):
-            SelfTunedDesign("self_tuned", design.sea).tuned(plant)
-            return "law.kind: self_tuned with the same sea in place of the other numbers passes"
-        if design.kind in LINEAR_KINDS:
-            AutoDesign(design.kind, "auto").tuned(plant)
-            return f"law: {{kind: {design.kind}, tuning: auto}} passes"
-        SelfTunedDesign("self_tuned").tuned(plant)
-    except NoLawError:
-        return None
-    return "law: {kind: self_tuned} passes; it finds its numbers itself"
-
-
-def _keys(design: Design) -> str:
-    """Return the keys of the numbers that `scaled` scales, as written in a file."""
+    same, tuned = "", SelfTunedDesign("self_tuned")
     if isinstance(design, ConstrainedDesign):
-        return f"law.pressure_weight_rad2: {design.pressure_weight_rad2:.3g}"
-    if isinstance(design, LQGDesign):
-        return f"law.state_weight: {_list(design.state_weight)}"
-    if design.output_weight is not None:
-        return f"law.output_weight: {_list(design.output_weight)}"
-    return (
-        f"law.control_horizon: {design.control_horizon} with law.prediction_horizon: "
-        f"{design.prediction_horizon}"
-    )
-
-
-def _list(values: tuple[float, ...]) -> str:
-    return f"[{', '.join(f'{value:.3g}' for value in values)}]"
+        same, tuned = " with the same sea", SelfTunedDesign("self_tuned", design.sea)
+    try:
+        tuned.tuned(plant)
+    except NoLawError:
+        return "no self-tuned law passes, either: choose another tank"
+    return f"law: {{kind: self_tuned}}{same} passes; it finds its numbers itself"
 
 
 GROUP = "utank_hil.collections"

@@ -1,11 +1,10 @@
 """``tuning: auto``: margins and cost of what is found, another ship, and what a file may say."""
 
-import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
-from shipped_designs import DPC_ROLL_LEVEL, LQG_ROLL_RATE_LEVEL
+from shipped_designs import LQG_ROLL_RATE_LEVEL
 
 from utank_hil.analysis.loop.linear_tuning import (
     LINEAR_KINDS,
@@ -13,7 +12,6 @@ from utank_hil.analysis.loop.linear_tuning import (
     _Search,
     auto_tuned,
     scaled,
-    varied,
 )
 from utank_hil.analysis.loop.margins import robustness
 from utank_hil.analysis.loop.sea_response import motion_in_sea
@@ -25,7 +23,6 @@ from utank_hil.analysis.loop.self_tuning import (
 )
 from utank_hil.assembly import build_law
 from utank_hil.configuration import ConfigError, ControllerConfig, load_config
-from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
 
@@ -95,28 +92,11 @@ def test_a_sea_without_waves_is_refused():
         auto_tuned("lqg", PLANT, Still())
 
 
-def test_an_exact_deadbeat_is_scaled_by_its_horizon_and_keeps_its_window():
-    exact = dataclasses.replace(DPC_ROLL_LEVEL, output_weight=None)
-    assert varied(exact) == "control horizon"
-    half = scaled(exact, 0.5)
-    assert half.control_horizon == round(exact.control_horizon / 2)
-    window = exact.prediction_horizon - exact.control_horizon
-    assert half.prediction_horizon - half.control_horizon == window
-    assert scaled(exact, 1.0) == exact
-
-
 def test_scaling_all_weights_of_an_lqg_law_scales_its_state_weight():
-    assert varied(LQG_ROLL_RATE_LEVEL) == "state weight"
     tenfold = scaled(LQG_ROLL_RATE_LEVEL, 10.0)
     np.testing.assert_allclose(
         tenfold.state_weight, 10 * np.array(LQG_ROLL_RATE_LEVEL.state_weight)
     )
-
-
-def test_a_constrained_law_is_scaled_by_its_pressure_weight():
-    design = ConstrainedDesign("constrained_gpc", SEA)
-    assert varied(design) == "output weight"
-    assert scaled(design, 4.0).pressure_weight_rad2 == design.pressure_weight_rad2 / 4
 
 
 def written(folder, law):

@@ -21,7 +21,7 @@ with the cost of a self-tuned law (`cost_weights`).
 
 import math
 from dataclasses import asdict, dataclass, replace
-from typing import Final, Literal, NamedTuple, TypeVar, get_args
+from typing import Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -37,7 +37,6 @@ from utank_hil.analysis.loop.self_tuning import (
 )
 from utank_hil.control import (
     BuiltLaw,
-    ConstrainedDesign,
     DesignPlant,
     PredictiveDesign,
     Predictor,
@@ -49,8 +48,6 @@ from utank_hil.dynamics import STATES
 LinearKind = Literal["gpc", "dpc", "lqg"]
 LINEAR_KINDS: Final[tuple[LinearKind, ...]] = get_args(LinearKind)
 LinearDesign = PredictiveDesign | LQGDesign
-Design = LinearDesign | ConstrainedDesign
-DesignT = TypeVar("DesignT", bound=Design)
 
 STEP: Final = 2.0  #: Factor between successive trials of the weights. Chosen; no study.
 MOST_TRIALS: Final = 16  #: Limit on trials, down to weights of 2^-15. Chosen; no study.
@@ -88,30 +85,12 @@ _SLOPE: Final = 1.46
 """Significant slope of the sea assumed for the scaled law, over the passive roll's RMS."""
 
 
-def varied(design: Design) -> str:
-    """Name of the parameter that `scaled` scales: a weight, or a deadbeat's control horizon."""
-    if isinstance(design, LQGDesign):
-        return "state weight"
-    if isinstance(design, PredictiveDesign) and design.output_weight is None:
-        return "control horizon"
-    return "output weight"
-
-
-def scaled(design: DesignT, factor: float) -> DesignT:
-    """Return the design with its `varied` parameter multiplied.
-
-    A horizon is rounded to whole samples and its window of targets keeps its length. A constrained
-    design has its pressure weight divided, which is equivalent.
-    """
-    if isinstance(design, ConstrainedDesign):
-        return replace(design, pressure_weight_rad2=design.pressure_weight_rad2 / factor)
+def scaled(design: LinearDesign, factor: float) -> LinearDesign:
+    """Return the design with its weights on outputs or states multiplied."""
     if isinstance(design, LQGDesign):
         return replace(design, state_weight=tuple(factor * w for w in design.state_weight))
-    if design.output_weight is not None:
-        return replace(design, output_weight=tuple(factor * w for w in design.output_weight))
-    horizon = max(1, round(factor * design.control_horizon))
-    window = design.prediction_horizon - design.control_horizon
-    return replace(design, control_horizon=horizon, prediction_horizon=horizon + window)
+    assert design.output_weight is not None
+    return replace(design, output_weight=tuple(factor * w for w in design.output_weight))
 
 
 def scaled_law(
