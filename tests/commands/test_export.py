@@ -305,6 +305,9 @@ def test_a_ship_is_identified_from_a_table_in_other_units(tmp_path: Path) -> Non
         (("{}/none.frames", "--to", "{}/a.csv"), "none.frames"),
         (("{}/none.csv", "--to", "{}/a.blf"), "holds signals and no frames"),
         (("{}/none.csv", "--to", "{}/a.csv", "--from", 3), "a table is exported whole"),
+        ((LOG, "--to", "{}/a.csv", "--channel", "can1"), "--channel is for logs of the bus"),
+        ((LOG, "--to", "{}/a.csv", "--from", 3, "--until", 2), "--from must be before --until"),
+        ((LOG, "--to", "{}/a.blf", "--from", "nan"), "--from must be before --until"),
     ],
 )
 def test_what_can_not_be_done_is_said_with_its_reason(

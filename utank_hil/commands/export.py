@@ -1,5 +1,6 @@
 """``utank-hil export``: frames or signals of a recording for other programs."""
 
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -59,6 +60,10 @@ def export(
         fail(f"--to {to} is what is read: name another file")
     if run is not None and recording.suffix.lower() != ".rrd":
         fail("--run is for recordings (.rrd), which hold several: leave it out")
+    if channel is not None and recording.suffix.lower() == SUFFIX:
+        fail(f"--channel is for logs of the bus, which may hold several; {SUFFIX} are of one")
+    if not (-math.inf if from_s is None else from_s) < (math.inf if until_s is None else until_s):
+        fail("--from must be before --until")
     said: list[str] = []
     try:
         if kind in BUS_SUFFIXES:
