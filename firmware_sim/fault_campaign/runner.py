@@ -43,6 +43,8 @@ def _do(setup_name: str, seed: int, rows: list[Row], first: bool) -> list[Outcom
         for row in rows:
             try:
                 outcomes.append(sea.outcome(row))
+            except BrokenProcessPool:  # too little memory is no fault of the row
+                raise
             except RuntimeError as error:
                 outcomes.append(Outcome(row.id, seed, error=str(error).strip().splitlines()[-1]))
             with done.get_lock():

@@ -11,6 +11,7 @@ import select
 import signal
 import traceback
 from collections.abc import Callable
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar, cast, get_args
 
@@ -332,8 +333,8 @@ def _words(there: Heard | None, here: Heard | None, start_ns: int) -> str:
 def in_a_copy(work: Callable[[], T], stopped: Callable[[], bool] = lambda: False) -> T:
     """Run a function in a copy of this process and return its result.
 
-    Raises `InterruptedError` if `stopped` became true first. Raises `RuntimeError` if the function
-    failed, with its traceback.
+    Raises `InterruptedError` if `stopped` became true first, `BrokenProcessPool` if the copy was
+    killed, and `RuntimeError` if the function failed, with its traceback.
     """
     reading, writing = os.pipe()
     parent_pid = os.getpid()
@@ -358,7 +359,9 @@ def in_a_copy(work: Callable[[], T], stopped: Callable[[], bool] = lambda: False
                 raise InterruptedError
         told = pipe.read()
     os.waitpid(child, 0)
-    done, answer = pickle.loads(told) if told else (False, "the process ended without an answer")
+    if not told:
+        raise BrokenProcessPool("a copy of the process was killed")
+    done, answer = pickle.loads(told)
     if not done:
         raise RuntimeError(answer)
     return cast(T, answer)

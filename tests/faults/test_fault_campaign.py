@@ -5,6 +5,7 @@ import math
 import os
 import signal
 import time
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -336,6 +337,20 @@ def test_a_copy_of_the_process_hands_back_what_it_did_and_changes_nothing():
         in_a_copy(lambda: 1 / 0)
     with pytest.raises(InterruptedError):
         in_a_copy(lambda: time.sleep(3600), lambda: True)
+    with pytest.raises(BrokenProcessPool):
+        in_a_copy(lambda: os.kill(os.getpid(), signal.SIGKILL))
+
+
+def test_a_row_whose_copy_was_killed_gets_no_verdict(monkeypatch):
+    def killed(_row):
+        raise BrokenProcessPool
+
+    sea = SimpleNamespace(prepare=lambda _: None, outcome=killed)
+    monkeypatch.setattr(runner, "Sea", lambda *_, **__: sea)
+    monkeypatch.setattr(runner, "shared", lambda: (CAMPAIGN, Window(), None, None))
+    monkeypatch.setitem(runner._laws, ROWS[GOOD.row].fault.setup, None)
+    with pytest.raises(BrokenProcessPool):
+        runner._do(ROWS[GOOD.row].fault.setup, 1, [ROWS[GOOD.row]], True)
 
 
 @pytest.mark.evidence
