@@ -122,7 +122,8 @@ def again(about: Mapping[str, Any]) -> str:
         if name in ("out", "json_", "frames", "fmu") or value is None or value is False:
             continue
         words.append(f"--{_FLAGS.get(name, name.replace('_', '-'))}")
-        words += [] if value is True else [f"{value:g}" if isinstance(value, float) else str(value)]
+        said = f"{value:.15g}" if isinstance(value, float) else str(value)
+        words += [] if value is True else [said]
     return shlex.join(filter(None, words))
 
 
