@@ -262,10 +262,11 @@ def test_the_picture_says_power_by_three_digits_and_no_difference_of_nothing() -
 
 def test_the_page_says_the_sea_and_the_command_that_gives_it_again() -> None:
     result = result_of(PASSIVE_RUN, run("a", 0.03))
-    options = {"scenario": "my seas/storm.yaml", "duration": 800.125, "real_time": True, "out": "o"}
+    options = {"scenario": "my seas/storm.yaml", "duration": 80000.125}
+    options |= {"real_time": True, "out": "o"}
     about = describe("bench", result.scenario, Path.cwd(), options=options, seed=3)
     said = bench_page(figures(result), about, None).sections[0].texts
-    again = "Again: utank-hil bench 'my seas/storm.yaml' --seed 3 --duration 800.125 --realtime"
+    again = "Again: utank-hil bench 'my seas/storm.yaml' --seed 3 --duration 80000.125 --realtime"
     assert said[-1] == again
     height = 4 * math.sqrt(result.scenario.sea.sea(result.scenario.seed).elevation.variance)
     assert f"significant height {height:.2f} m" in said[1]
