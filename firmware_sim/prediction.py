@@ -56,6 +56,7 @@ class Expected:
     mean_power_w: Interval | None = None  #: Of the shaft; what flows back counts as zero.
     pump: PumpStatistics | None = None  #: Over all draws, so its peaks are those of a longer run.
     flow_peak_m3_s: float | None = None  #: Through the pump, likewise.
+    roll_peak_rad: float | None = None  #: With the law, likewise.
 
     def as_json(self) -> dict[str, Any]:
         """Figures in SI units; an interval has its mean and half width."""
@@ -159,9 +160,9 @@ def predict(
     active = rms(lambda seed: (runs[seed][0]["roll_rad"], runs[seed][1]))
     if active is None:
         return found
-    level, flow, pressure, power = (
+    roll, level, flow, pressure, power = (
         np.concatenate([record[name][settle:] for record, _ in runs.values()])
-        for name in ("level_m", "flow_m3_s", "pressure_pa", "power_w")
+        for name in ("roll_rad", "level_m", "flow_m3_s", "pressure_pa", "power_w")
     )
     return replace(
         found,
@@ -170,6 +171,7 @@ def predict(
         mean_power_w=of_a_bench(batch_means(np.maximum(power, 0.0), BATCHES * len(seeds))),
         pump=pump_statistics(pressure, power, level),
         flow_peak_m3_s=float(np.abs(flow).max()),
+        roll_peak_rad=float(np.abs(roll).max()),
     )
 
 

@@ -159,7 +159,7 @@ def init(
     (config,) = scenario.controllers.values()
     with notes.busy(f"{ship_name}: what a bench of its scenario would give"):
         expected = predict(scenario, config.plant, build_law(config))
-    little = _little_help(project, expected)
+    little = _little_help(project, expected, config.safety.roll_limit_rad)
     if json_:
         figures = {"possible": True, "little_help": little, **_as_json(project)}
         figures["expected"] = expected.as_json()
@@ -176,9 +176,15 @@ def init(
     console.lead_on(*((command, files[file]) for command, file in steps))
 
 
-def _little_help(project: StarterProject, found: Expected) -> str | None:
+def _little_help(project: StarterProject, found: Expected, limit_rad: float) -> str | None:
     if found.active_rad is None or found.without_tank_rad is None:
         return None  # a ship that capsizes has no roll to compare with
+    if found.roll_peak_rad is not None and found.roll_peak_rad > limit_rad:
+        return (
+            f"with the law she rolls to {math.degrees(found.roll_peak_rad):.0f} degrees in this "
+            f"sea, and from {math.degrees(limit_rad):.0f} on the pump is off (HEEL_LIMIT): then "
+            "she has the passive tank's roll. Try a lower --hs, more room, or --gm-loss"
+        )
     less = 1 - found.active_rad.mean / found.without_tank_rad.mean
     if less >= WORTH_IT:
         return None

@@ -14,8 +14,10 @@ from typer.testing import CliRunner, Result
 from firmware_sim.bench import BenchOptions, run_bench
 from firmware_sim.commands.init import init
 from firmware_sim.figures import figures
+from firmware_sim.prediction import Expected
 from firmware_sim.scenario import Scenario
 from firmware_sim.starter import StarterShip
+from utank_hil.analysis.motion.statistics import Interval
 from utank_hil.analysis.tank_sizing import usable_level_m
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
 from utank_hil.console.common import new_app
@@ -149,6 +151,20 @@ def test_a_tank_that_hardly_helps_is_said_to(project: Project) -> None:
     slow = {"length": 300, "beam": 48, "displacement": 180e3, "gm": 0.6, "roll-period": 45}
     said = project(slow)[1]["little_help"]
     assert "of the roll in a sea of 18 s, and the ship rolls in 45.0 s" in said
+
+
+def test_a_sea_in_which_the_pump_is_switched_off_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A bench ends in HEEL_LIMIT there, whatever was predicted of a law that goes on."""
+    of_pilot_boat = Expected(
+        840.0, Interval(0.29, 0.06), Interval(0.2, 0.05), Interval(0.19, 0.05), roll_peak_rad=0.6
+    )
+    monkeypatch.setattr("firmware_sim.commands.init.predict", lambda *_: of_pilot_boat)
+    said = json.loads(run(tmp_path, PATROL, "--json").stdout)["little_help"]
+    assert (
+        "she rolls to 34 degrees in this sea, and from 20 on the pump is off (HEEL_LIMIT)" in said
+    )
 
 
 def test_a_tank_that_cannot_be_is_refused_with_the_reason(tmp_path: Path) -> None:
