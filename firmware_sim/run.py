@@ -116,13 +116,14 @@ class Run:
         The controller has its own clock; the changes of state are known on both.
         """
         time_s, state = self.column("time_s"), self.column("retuning")
-        shift_ns = 0
-        for event in reversed(self.retuning):
+        if not self.retuning:
+            return ()
+        shift_ns = round(self.end_s * SECOND_NS) - self.retuning[-1].time_ns  # if no row shows one
+        for event in self.retuning:
             seen = time_s[state == event.state]
             if event.state is not RetuningState.IDLE and len(seen):
                 shift_ns = round(float(seen[0]) * SECOND_NS) - event.time_ns
-        if self.retuning and not shift_ns:  # No row shows one: it was one of the last.
-            shift_ns = round(self.end_s * SECOND_NS) - self.retuning[-1].time_ns
+                break
         return tuple(replace(each, time_ns=each.time_ns + shift_ns) for each in self.retuning)
 
     def between(self, start_s: float, end_s: float) -> npt.NDArray[np.bool_]:

@@ -1,6 +1,7 @@
 """Events of retuning on the ship's time, in words and as JSON."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +54,11 @@ def test_events_are_on_the_ships_time() -> None:
         times_s = [event.time_ns * 1e-9 for event in told]
         assert times_s == pytest.approx([step[0] for step in steps], abs=RECORD_S)
         assert [event.reasons for event in told] == [step[3] for step in steps]
+        # in simulated time both clocks are one
+        one = replace(run := voyage(*steps), retuning=tuple(
+            replace(event, time_ns=event.time_ns - round(CLOCK_S * 1e9)) for event in run.retuning
+        ))  # fmt: skip
+        assert one.events == one.retuning
     # an event that no row shows was one of the last
     (told_last,) = voyage((399.99, IDENTIFY, 0.02, (), None)).events
     assert told_last.time_ns * 1e-9 == pytest.approx(400.0)
