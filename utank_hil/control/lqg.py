@@ -277,12 +277,11 @@ class GentleController(LQGController):
         self._rows = -product(np.vstack([law.gain, gains]), ahead)
 
     def use(self, share: float) -> None:
-        """Take the gain for a share from 0 to 1; below the last of `SHARES` a share of its gain."""
-        below = min(share / SHARES[-1], 1.0)
+        """Take the gain for a share, at least the last of `SHARES` and at most 1."""
         share = min(max(share, SHARES[-1]), SHARES[0])
         lower = 1
         while share < SHARES[lower]:
             lower += 1
         upper = lower - 1
         part = (SHARES[upper] - share) / (SHARES[upper] - SHARES[lower])
-        self._advance[-1] = below * ((1.0 - part) * self._rows[upper] + part * self._rows[lower])
+        self._advance[-1] = (1.0 - part) * self._rows[upper] + part * self._rows[lower]

@@ -2,7 +2,6 @@
 
 import pytest
 
-from tools.studies import less_pressure
 from tools.studies.less_pressure import GAINS, OF_COMMAND, OF_GAIN, roll_over_passive
 
 pytestmark = pytest.mark.slow
@@ -19,10 +18,3 @@ def test_a_share_that_pays_is_found():
 
 def test_a_ship_that_rolls_faster_than_its_file_says_is_quieted_too():
     assert roll_over_passive(GAINS, 0.85, 3.0, 8.0, 400.0, 2)[0] < 0.9
-
-
-def test_a_law_that_wins_nothing_rolls_the_ship_no_more(monkeypatch):
-    """Loaded to 1.3 times her period, in short waves; 1.013 with a twentieth as the least share."""
-    monkeypatch.setattr(less_pressure, "WINDOW_S", 600.0)
-    of_windows = roll_over_passive(GAINS, 1.3, 2.6, 8.0, 1800.0, 9703)[1:]
-    assert max(of_windows) < 1.007
