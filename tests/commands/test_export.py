@@ -212,6 +212,17 @@ def test_of_frames_before_the_first_tick_the_last_of_each_message_are_held(
     assert most_bytes < 1 << 20
 
 
+@pytest.mark.parametrize("rows", [70, 1000])
+def test_a_value_is_held_for_two_seconds_and_then_unknown(
+    entries: list[Entry], rows: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("utank_hil.telemetry.logged_signals._PART", rows)
+    heard = [each for each in entries if each.kind == Kind.RECEIVED]
+    ticks = [each for each in entries if each.kind == Kind.TICK][:400]
+    table = signal_table(signal_parts(chain(heard, ticks)))
+    assert np.flatnonzero(np.isfinite(table["roll_rad"])).tolist() == list(range(201))
+
+
 def test_a_table_of_the_frames_shows_what_the_telemetry_showed(entries: list[Entry]) -> None:
     rows: list[FloatArray] = []
     with recorded_config(FrameLog(LOG).head) as config:

@@ -12,6 +12,7 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.text_files import VALUES_LIMIT, TextFileError, more_values
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import AddressClaim, DriveStatus2, load_catalogue
 from utank_hil.canbus.codec import FRAME_BYTES, Codec
 from utank_hil.telemetry.frame_log import Kind
@@ -36,6 +37,8 @@ _NAMES: Final = {
     ("PASSIVE_TWIN", "roll_rms_rad"): "roll_rms_rad",
 }  # Signals with the name of a telemetry column; others are named after their message.
 _PART: Final = 1 << 14  #: Number of ticks that are decoded at once.
+_HELD_TICKS: Final = 2_000_000_000 // TICK_NS
+"""Ticks for which a value is held: two of the longest cycles, then its sender has fallen silent."""
 
 
 class _Heard:
@@ -61,14 +64,15 @@ class _Heard:
     def held(self, ticks: int) -> FloatArray:
         """Return the last values in each tick, (fields, ticks), and begin the next part.
 
-        They are NaN before the first frame.
+        They are NaN before the first frame, and where the last one is too old.
         """
         if not self.ticks:
             return np.full((len(self.fields), ticks), np.nan)
-        values = np.asarray(self.values).reshape(-1, len(self.fields))
-        last = np.searchsorted(np.asarray(self.ticks), np.arange(ticks), side="right") - 1
-        self.ticks, self.values = array("q", [0]), array("d", values[-1])
-        return np.where(last < 0, np.nan, values[last].T)
+        values, at = np.asarray(self.values).reshape(-1, len(self.fields)), np.asarray(self.ticks)
+        last = np.searchsorted(at, np.arange(ticks), side="right") - 1
+        unknown = (last < 0) | (np.arange(ticks) - at[last] > _HELD_TICKS)
+        self.ticks, self.values = array("q", [at[-1] - ticks]), array("d", values[-1])
+        return np.where(unknown, np.nan, values[last].T)
 
 
 def signal_parts(entries: Iterable[Entry]) -> Iterator[Columns]:
@@ -77,7 +81,7 @@ def signal_parts(entries: Iterable[Entry]) -> Iterator[Columns]:
     A received frame counts from the next tick on, a sent one from its own. Each part has arrays
     (n,), one value per tick: ``time_s`` since the first tick, the telemetry's columns, and every
     other signal of the catalogue as ``<message>_<signal>``, in SI units, states and flags as
-    numbers. NaN before the first frame and where unavailable.
+    numbers. NaN before the first frame, where unavailable, and 2 s after the last frame.
     """
     heard = {
         codec.can_id: _Heard(codec, message._fields)
