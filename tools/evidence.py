@@ -73,6 +73,7 @@ PARTS: Final = {
     "tests_on_vcan": Part(
         "tools/vcan pytest -m evidence tests/socketcan --ignore=tests/socketcan/test_service.py", 60
     ),
+    "two_buses": Part("tools/vcan python -m tools.studies.two_buses --json", 25),
     "service": Part("tools/vcan --uml pytest -rA -m evidence tests/socketcan/test_service.py", 4),
     # what it costs
     **{
