@@ -79,60 +79,32 @@ class Inbox:
         self._known = catalogue.can_ids
         self._catalogue, self._foreign = catalogue, foreign
         self._sources: dict[Fault, _Source] = {}  # whose silence is which fault
+        self._received: dict[Fault, str] = {}
         self._routing = routing = Routing()
         self._takers = routing.takers
-        # a second sensor that is silent is missed but not waited for
-        senders = [Address.SENSORS, Address.SENSORS_2][: 1 + redundancy.second_motion_sensor]
-        sources = [
-            catalogue.receiver(SensorMotion, sender) if plan is None else ProfiledDevice(plan)
-            for sender, plan in zip(senders, foreign.motions, strict=False)
-        ]
-        self.motions = tuple(MotionSensor(source, thresholds) for source in sources)
-        for sensor in self.motions:
-            routing.hear(sensor.receiver, sensor.take)
-        levels, pressure = foreign.levels, foreign.pump_sensor
-        tank = catalogue.receiver(SensorTank) if levels is None else ProfiledDevice(levels)
-        self._levels = LevelsHeard(tank, level_limit_m, thresholds)
-        routing.hear(tank, self._levels.take)
-        self._sources[Fault.TANK_SILENT] = tank
+        second = redundancy.second_motion_sensor
+        self._hear_motions([Address.SENSORS, Address.SENSORS_2][: 1 + second], thresholds)
+        self._hear_levels(level_limit_m, thresholds)
         self._pressure_pa = 0.0
         self._pressure_ns = NEVER_HEARD_NS if pump else ABSENT_NS
         if pump:
-            source = (
-                catalogue.receiver(SensorPump) if pressure is None else ProfiledDevice(pressure)
-            )
-            routing.hear(source, self._take_pressure)
-            self._sources[Fault.PUMP_SENSOR_SILENT] = source
+            self._hear_pressure()
         if drive is None and foreign.pump is not None:
             drive = CanopenDrive(foreign.pump, hears_only=True)
         self.canopen_drive = drive
         self._drive = DriveHeard(routing, catalogue, pump=pump, canopen=drive)
         self._valve = ValveHeard()
         if valve:
-            says: Receiver[ValveStatus] | ProfiledDevice[ValveStatus] = (
-                catalogue.receiver(ValveStatus)
-                if foreign.valve is None
-                else ProfiledValve(foreign.valve)
-            )
-            routing.hear(says, self._valve.take)
-            self._sources[Fault.VALVE_SILENT] = self._sources[Fault.VALVE_FAULT] = says
+            self._hear_valve()
         self._hardwired_declared = redundancy.hardwired_inputs
         self.hardwired = hardwired = HardwiredHeard(catalogue.receiver(HardwiredInputs))
         routing.accept(hardwired.receiver.can_id, hardwired.accept, hardwired.take)
         routing.watched.append(hardwired.receiver)
         self.panel = None if foreign.panel is None else ProfiledPanel(foreign.panel, key)
-        second = redundancy.second_station
-        self.stations = Stations(catalogue, self._versions, second=second, panel=self.panel)
+        self.stations = Stations(
+            catalogue, self._versions, second=redundancy.second_station, panel=self.panel
+        )
         self._hear_orders()
-        native = {
-            Address.SENSORS: None in (foreign.motions[0], levels, pressure if pump else levels),
-            Address.DRIVE: self._drive.native,
-            Address.VALVE: valve and foreign.valve is None,
-            Address.HARDWIRED: redundancy.hardwired_inputs,
-            Address.SENSORS_2: len(senders) == 2 and foreign.motions[1] is None,
-        }
-        matched = [address for address, here in native.items() if here]
-        self._received: dict[Fault, str] = {}
         self._forecast: ForecastHeard | None = None
         if foreign.preview is not None:
             self._forecast = ForecastHeard(
@@ -141,13 +113,62 @@ class Inbox:
         if foreign.preview != 0:
             self._known -= catalogue.ids_sent_by(Address.PREVIEW)
         self._nodes = NodesHeard(
-            routing, catalogue, self._versions, matched, self.stations, self._received
+            routing,
+            catalogue,
+            self._versions,
+            self._native(pump=pump, valve=valve, second=second),
+            self.stations,
+            self._received,
         )
         self._hear_panels(catalogue)
         self.watched: list[Heard] = routing.watched
         self.expected = frozenset((*self._drive.slow, *self._nodes.beats))
         self._link_lost_until_ns = NEVER_HEARD_NS
         self.frames = self.foreign = 0
+
+    def _hear_motions(self, senders: list[Address], thresholds: MonitorThresholds | None) -> None:
+        """Subscribe to one or two motion sensors; a second one is missed, but not waited for."""
+        sources = [
+            self._catalogue.receiver(SensorMotion, sender) if plan is None else ProfiledDevice(plan)
+            for sender, plan in zip(senders, self._foreign.motions, strict=False)
+        ]
+        self.motions = tuple(MotionSensor(source, thresholds) for source in sources)
+        for sensor in self.motions:
+            self._routing.hear(sensor.receiver, sensor.take)
+
+    def _hear_levels(self, level_limit_m: float, thresholds: MonitorThresholds | None) -> None:
+        plan = self._foreign.levels
+        tank = self._catalogue.receiver(SensorTank) if plan is None else ProfiledDevice(plan)
+        self._levels = LevelsHeard(tank, level_limit_m, thresholds)
+        self._routing.hear(tank, self._levels.take)
+        self._sources[Fault.TANK_SILENT] = tank
+
+    def _hear_pressure(self) -> None:
+        plan = self._foreign.pump_sensor
+        source = self._catalogue.receiver(SensorPump) if plan is None else ProfiledDevice(plan)
+        self._routing.hear(source, self._take_pressure)
+        self._sources[Fault.PUMP_SENSOR_SILENT] = source
+
+    def _hear_valve(self) -> None:
+        plan = self._foreign.valve
+        says: Receiver[ValveStatus] | ProfiledDevice[ValveStatus] = (
+            self._catalogue.receiver(ValveStatus) if plan is None else ProfiledValve(plan)
+        )
+        self._routing.hear(says, self._valve.take)
+        self._sources[Fault.VALVE_SILENT] = self._sources[Fault.VALVE_FAULT] = says
+
+    def _native(self, *, pump: bool, valve: bool, second: bool) -> list[Address]:
+        """Return the native nodes that the ship has, whose versions and heartbeats are judged."""
+        foreign = self._foreign
+        pressure = pump and foreign.pump_sensor is None
+        native = {
+            Address.SENSORS: foreign.motions[0] is None or foreign.levels is None or pressure,
+            Address.DRIVE: self._drive.native,
+            Address.VALVE: valve and foreign.valve is None,
+            Address.HARDWIRED: self._hardwired_declared,
+            Address.SENSORS_2: second and foreign.motions[1] is None,
+        }
+        return [address for address, here in native.items() if here]
 
     def _hear_orders(self) -> None:
         """Subscribe to what the operator stations order."""
