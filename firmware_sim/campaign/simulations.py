@@ -1,5 +1,6 @@
 """Simulation of cases, each failing alone: bare ship, passive tank and every controller."""
 
+import errno
 import json
 import math
 import time
@@ -182,6 +183,7 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
 
 
 OK: Final = "ok"
+_OF_THE_MACHINE: Final = (errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOSPC)
 FAILED: Final = "failed"  #: Status of a case that cannot be computed; it would fail again.
 LOST: Final = "lost"  #: Status of a case that was ended from outside; `--resume` tries it again.
 
@@ -232,6 +234,9 @@ def _case(batch: Batch, name: str, seed: int, values: str) -> Sequence[Row]:
         rows = rows_of(batch.simulation, scenario, seed, laws)
     except MemoryError:
         return [failed_row(name, LOST, "the worker's memory did not suffice")]
+    except OSError as error:
+        status = LOST if error.errno in _OF_THE_MACHINE else FAILED
+        return [failed_row(name, status, f"{type(error).__name__}: {error}")]
     except ValidationError as error:
         found = problems_in_words(error, content, Scenario)
         reason = "; ".join(f"{'.'.join(map(str, key))}: {why}" for key, why in found)

@@ -1,5 +1,6 @@
 """The command and its workers: killed ones change nothing, and what is there is not done again."""
 
+import errno
 import importlib
 import io
 import json
@@ -17,8 +18,9 @@ from rich.measure import Measurement
 from studies import small, written
 from typer.testing import CliRunner
 
+from firmware_sim.campaign import simulations
 from firmware_sim.campaign.driver import Driver, batch_of
-from firmware_sim.campaign.simulations import LOST, OK, run_batch
+from firmware_sim.campaign.simulations import FAILED, LOST, OK, run_batch
 from firmware_sim.campaign.store import METRICS, Results, Store, read_results
 from firmware_sim.campaign.summary import figure, summary, units_of
 from firmware_sim.campaign.tables import pairs_table, runs_table
@@ -83,6 +85,20 @@ def test_a_case_that_kills_each_process_is_lost_alone(tmp_path):
     rows = read_results(tmp_path / "out").rows
     status = {case.seed: rows[case.name][0]["status"] for case in loaded.cases}
     assert status == {1: OK, 2: LOST, 3: OK, 4: OK}
+
+
+@pytest.mark.parametrize(("number", "status"), [(errno.ENOSPC, LOST), (errno.ENOENT, FAILED)])
+def test_what_the_machine_lacks_is_tried_again_and_a_missing_file_is_not(
+    tmp_path, monkeypatch, number, status
+):
+    def fails(*_):
+        raise OSError(number, "a reason", "a file")
+
+    monkeypatch.setattr(simulations, "rows_of", fails)
+    loaded = small(tmp_path, grid={"seed": [1]})
+    (row,) = run_batch(batch_of(loaded, loaded.cases))
+    assert row["status"] == status
+    assert "a reason: 'a file'" in row["reason"]
 
 
 @pytest.fixture

@@ -319,6 +319,8 @@ def test_a_ship_is_identified_from_a_table_in_other_units(tmp_path: Path) -> Non
         ((LOG, "--to", "{}/a.csv", "--channel", "can1"), "--channel is for logs of the bus"),
         ((LOG, "--to", "{}/a.csv", "--from", 3, "--until", 2), "--from must be before --until"),
         ((LOG, "--to", "{}/a.blf", "--from", "nan"), "--from must be before --until"),
+        ((LOG, "--to", "{}/a.csv", "--from", 1e6), "no record of the log is within these times"),
+        ((LOG, "--to", "{}/a.blf", "--from", 1e6), "no record of the log is within these times"),
     ],
 )
 def test_what_can_not_be_done_is_said_with_its_reason(
@@ -328,6 +330,7 @@ def test_what_can_not_be_done_is_said_with_its_reason(
     assert result.exit_code == 2
     assert isinstance(result.exception, SystemExit)
     assert said in result.stderr
+    assert not [*tmp_path.glob("a.*")]
 
 
 @pytest.mark.parametrize("name", ["a.log", "a.csv"])

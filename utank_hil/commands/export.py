@@ -3,8 +3,9 @@
 import math
 import os
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import typer
 
@@ -20,6 +21,8 @@ from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
 from utank_hil.telemetry.replay import entries_of
 
 _FORMATS = ", ".join((*BUS_SUFFIXES, *signal_files.TABLE_SUFFIXES))
+
+_T = TypeVar("_T")
 
 
 def export(
@@ -64,13 +67,16 @@ def export(
         fail(f"--channel is for logs of the bus, which may hold several; {SUFFIX} are of one")
     if not (-math.inf if from_s is None else from_s) < (math.inf if until_s is None else until_s):
         fail("--from must be before --until")
+    between = (from_s, until_s) != (None, None)
     said: list[str] = []
     try:
         if kind in BUS_SUFFIXES:
             frames = _frames(recording, channel, from_s, until_s, said)
+            if between:
+                frames = _some(to, frames)
             count, unit = write_frames(to, frames, said), "frames"
         elif recording.suffix.lower() == ".rrd" or signal_files.is_table(recording):
-            if (channel, from_s, until_s) != (None, None, None):
+            if between or channel is not None:
                 fail("--channel, --from and --until are for logs: a table is exported whole")
             runs = signal_files.read_signals(recording, said.append)
             name = chosen_run(recording, runs, run)
@@ -79,6 +85,8 @@ def export(
             count, unit = len(runs[name]["time_s"]), "rows"
         else:
             parts = signal_files.logged_parts(recording, said.append, channel, from_s, until_s)
+            if between:
+                parts = _some(to, (part for part in parts if len(part["time_s"])))
             count, unit = signal_files.export_parts(to, parts), "rows"
     except (OSError, ValueError) as error:
         fail(error)
@@ -103,3 +111,11 @@ def _frames(
         raise ValueError(f"{recording}: holds signals and no frames{hint}")
     else:
         yield from BusLog(recording, channel, from_s, to_s).frames(said)
+
+
+def _some(to: Path, items: Iterator[_T]) -> Iterator[_T]:
+    """Return the same items; ValueError without one."""
+    first = next(items, None)
+    if first is None:
+        raise ValueError(f"{to} is not written: no record of the log is within these times")
+    return chain([first], items)
