@@ -21,7 +21,7 @@ from utank_hil.telemetry.recording_reader import read_recording
 CONFIGS = Path("configs").resolve()
 SHIPPED = sorted((CONFIGS / "controllers").glob("*.yaml"))
 BIN = Path(sys.executable).parent
-RESULTS = ("out/bench.rrd", "out/gpc.frames", "out/run.rrd")
+RESULTS = ("out/bench.rrd", "out/gpc.frames", "out/run-20261122T093000Z.frames")
 """Of `utank-hil bench --frames` and `run --out`, for the examples."""
 PLAIN = {"TERM": "dumb", "COLUMNS": "200", "NO_COLOR": "1"}
 
