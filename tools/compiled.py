@@ -13,6 +13,8 @@ import subprocess
 import sysconfig
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Final
 
@@ -172,10 +174,16 @@ def c_sources(scratch: Path) -> tuple[list[Path], list[str]]:
     settings.write_text(MYPY)
     # no cache from before: a type error that it hides would show on another machine first
     options = ["--config-file", str(settings), "--cache-dir", str(scratch / "cache")]
-    library = mypycify(
-        [*options, *files, str(codecs)],
-        multi_file=True, target_dir=str(scratch), group_name=GROUP,
-    )[0]  # fmt: skip
+    said = StringIO()
+    try:
+        with redirect_stdout(said):  # a warning of a construct that is slower is nothing to act on
+            library = mypycify(
+                [*options, *files, str(codecs)],
+                multi_file=True, target_dir=str(scratch), group_name=GROUP,
+            )[0]  # fmt: skip
+    except SystemExit:
+        print(said.getvalue(), end="")
+        raise
     modules = [file.removesuffix(".py").replace("/", "___") for file in (*files, CODECS)]
     starts = scratch / "starts.c"
     starts.write_text("#include <Python.h>\n" + "\n".join(map(START.format, modules)))
