@@ -11,6 +11,7 @@ from rich.progress import TaskProgressColumn
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import describe
 from utank_hil.base.shipped import CONFIGS
+from utank_hil.commands.monitor import watch
 from utank_hil.configuration.files import files_named
 from utank_hil.console import terminal
 from utank_hil.console.admission import admit
@@ -21,6 +22,7 @@ from utank_hil.console.common import (
     Json,
     Out,
     Seed,
+    View,
     argument,
     fail,
     load,
@@ -64,6 +66,7 @@ def bench(
         option("Run nothing: write the emulated ship as FMU for other programs.", metavar="FILE"),
     ] = None,
     json_: Json = False,
+    view: View = False,
     allow_code: AllowCode = False,
 ) -> None:
     """Run a scenario: the tank passive, then with each controller, in the same waves.
@@ -111,6 +114,8 @@ def bench(
         terminal.Terminal().lead_on(*following, allow_code=allow_code)
     if failures:
         fail("; ".join(failures))
+    if view:
+        watch(files["recording"])
     raise typer.Exit(found.exit_code)
 
 

@@ -276,6 +276,9 @@ def usual_scenario(vessel: Vessel, file: Path) -> Path | None:
     return next(own, None)
 
 
-design = new_app("Design a tank: what it could be, and what it would cost.")
+design = new_app(
+    "Design a tank: what it could be, and what it would cost.\n\n"
+    "**Example:** utank-hil design tank configs/ships/naval_vessel.yaml"
+)
 design.command()(tank)
 design.command()(filling)

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import json
 import os
 import subprocess
 import sys
@@ -10,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from ports import QuietBus
 
 from utank_hil.canbus import (
     Alarm,
@@ -21,7 +23,7 @@ from utank_hil.canbus import (
     Station,
     load_catalogue,
 )
-from utank_hil.commands.panel import LEAVE_NS, Keyboard
+from utank_hil.commands.panel import LEAVE_NS, Keyboard, panel
 from utank_hil.nodes.panel import SILENT_NS, Action, OperatorPanel
 from utank_hil.safety.faults import fault_text
 
@@ -256,6 +258,28 @@ def test_status_is_said_in_words_when_it_changes_and_silence_too(table: Table) -
     table.hear(Mode.STANDBY)
     table.look()
     assert table.said[2:] == ["controller: STANDBY"]
+
+
+class InFault(QuietBus):
+    """An interface on which a controller says that it is in FAULT, and why."""
+
+    def receive(self):
+        level = (Fault.LEVEL_LIMIT, *(False,) * 5, 0.25, 3, 9)
+        status = CATALOGUE.transmitter(ControllerStatus).frame(ControllerStatus(Mode.FAULT, *level))
+        alarm = Alarm(AlarmState.ACTIVE_UNACKNOWLEDGED, Fault.LEVEL_LIMIT, 0, 1, 1, 0.0)
+        return [status, CATALOGUE.transmitter(Alarm).frame(alarm)]
+
+
+def test_what_was_heard_last_is_one_json_object(monkeypatch, capsys):
+    monkeypatch.setattr("utank_hil.commands.panel.SocketCanPort", InFault)
+    monkeypatch.setattr(sys, "stdin", None)
+    panel(Path("configs/ships/thesis_first.yaml"), "can0", 0.3, json_=True)
+    assert json.loads(capsys.readouterr().out) == {
+        "station": "OPERATOR",
+        "mode": "FAULT",
+        "fault": "LEVEL_LIMIT",
+        "alarms": [{"code": "LEVEL_LIMIT", "state": "ACTIVE_UNACKNOWLEDGED"}],
+    }
 
 
 def test_controller_that_was_never_heard_is_silent(table: Table) -> None:

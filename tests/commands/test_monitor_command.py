@@ -75,7 +75,7 @@ def test_the_log_of_a_run_is_shown_as_a_recording_where_something_happens(
         log.append(EVENTS, json.dumps([alarm]).encode())
     shown: list[object] = []
 
-    def watched(source: Path, at_s: float) -> None:
+    def watched(source: Path, at_s: float, json_: bool) -> None:
         chunks = _chunks(source, "TextLog:text")
         found = [chunk.to_record_batch().column("TextLog:text") for chunk in chunks]
         texts = [text for each in found for (text,) in each.to_pylist()]
@@ -100,6 +100,46 @@ def test_a_stream_whose_port_was_taken_is_refused_instead_of_showing_nothing(
         f"port {viewer.port_of(taken)} of this machine was taken; start it again: it takes another"
         in said
     )
+
+
+class Page:
+    """In place of a viewer: one that is served, and closed at once."""
+
+    url, ports, failed = "http://127.0.0.1:9?url=x", (9, 10), False
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def wait(self, longest_s):
+        return True
+
+
+def test_the_address_for_a_browser_is_one_json_object(
+    monkeypatch: pytest.MonkeyPatch, recording: Path
+) -> None:
+    monkeypatch.setattr(viewer, "open_viewer", lambda *_, **__: Page())
+    result = CliRunner().invoke(app, ["monitor", str(recording), "--json"])
+    assert result.exit_code == 0
+    assert json.loads(result.stdout) == {"url": Page.url, "ports": [9, 10], "at_s": 0.0}
+    monkeypatch.setattr(Page, "url", None)  # a window
+    result = CliRunner().invoke(app, ["monitor", str(recording), "--json"])
+    assert json.loads(result.stdout)["url"] is None
+
+
+@pytest.mark.usefixtures("one_process")
+def test_a_bench_is_shown_when_it_has_ended(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    shown: list[Path] = []
+    monkeypatch.setattr("firmware_sim.commands.bench.watch", shown.append)
+    still = "configs/scenarios/still_water.yaml"
+    words = ["bench", still, "--duration", "1", "--view", "--json", "--out", str(tmp_path)]
+    result = CliRunner().invoke(app, words)
+    assert shown == [tmp_path / "bench.rrd"], result.output
+    json.loads(result.stdout)
 
 
 def test_where_no_window_can_be_the_page_and_the_remedy_are_named(recording: Path) -> None:

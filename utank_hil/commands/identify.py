@@ -249,7 +249,8 @@ class _LogUnlessNamed(TyperGroup):
 
 
 application = common.new_app(
-    "Identify ship and tank from a recording (LOG CONFIG), from a test of the ship, or its sea.",
+    "Identify ship and tank from a recording (LOG CONFIG), from a test of the ship, or its sea.\n\n"
+    "**Example:** utank-hil identify log out/gpc.frames configs/controllers/dpc.yaml",
     cls=_LogUnlessNamed,
 )
 application.command("log")(identify_log)

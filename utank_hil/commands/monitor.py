@@ -1,6 +1,7 @@
 """``utank-hil monitor``: shows a recording, or a running controller."""
 
 import os
+import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from utank_hil.console.common import fail
+from utank_hil.console.common import Json, fail, print_json
 from utank_hil.console.terminal import notes, say_note
 from utank_hil.telemetry.frame_log import SUFFIX
 
@@ -33,13 +34,14 @@ def monitor(
             show_default="the controller or bench in real time that runs on this machine",
         ),
     ] = None,
+    json_: Json = False,
 ) -> None:
     """Show ship, tank and alarms in the viewer: the first tab for the watch, others for engineers.
 
     Without a source it attaches to what runs on this machine, which does not notice. A recording
     opens where something happens: at the first fault, else where a new law was tried, else at the
     largest roll. Without a display the viewer is served on loopback for a browser; how to reach it
-    from another machine by ssh is printed.
+    from another machine by ssh is printed; with --json, so is the address, as soon as it is served.
 
     **Example:** utank-hil monitor out
     """
@@ -50,7 +52,7 @@ def monitor(
     from utank_hil.telemetry.run_log import read_run_log
 
     if source is not None and source.startswith(LIVE):
-        watch(source)
+        watch(source, json_=json_)
         return
     try:
         if source is None or source.isdecimal():
@@ -58,36 +60,41 @@ def monitor(
             with LiveStream(
                 _chosen(live_runs(), None if source is None else int(source))
             ) as stream:
-                watch(stream.url, send=stream.send)
+                watch(stream.url, send=stream.send, json_=json_)
             return
         file = Path(source) / "bench.rrd" if Path(source).is_dir() else Path(source)
         if not file.is_file():
             fail(f"{file}: is not there; give a recording, a bench's folder, or {LIVE}...")
         if file.suffix != SUFFIX:
-            watch(file, highlight_s([*read_recording(file).values()]))
+            watch(file, highlight_s([*read_recording(file).values()]), json_=json_)
             return
         log = read_run_log(file, say_note)
         with TemporaryDirectory() as folder:
             shown = Path(folder) / file.with_suffix(".rrd").name
             runs, events = {"run": log.rows}, {"run": log.events}
             write_recording(shown, log.columns, runs, events, log.about)
-            watch(shown, highlight_s([log.signals]))
+            watch(shown, highlight_s([log.signals]), json_=json_)
     except (OSError, ValueError) as error:
         fail(error)
 
 
 def watch(
-    source: Path | str, at_s: float | None = None, send: Callable[[], bool] | None = None
+    source: Path | str,
+    at_s: float | None = None,
+    send: Callable[[], bool] | None = None,
+    *,
+    json_: bool = False,
 ) -> None:
     """Show a recording or a stream, as `open_viewer`, until the viewer is closed or Ctrl-C.
 
-    `send` sends new data, and returns whether more may come.
+    `send` sends new data, and returns whether more may come. With `json_` the address for a browser
+    is printed as JSON, null if the viewer has its own window.
     """
     from utank_hil.runners import stop_on_signals
     from utank_hil.telemetry.viewer import open_viewer
 
     with stop_on_signals() as stopped, ExitStack() as stack:
-        viewer = _said(stack.enter_context(open_viewer(source, at_s)), at_s)
+        viewer = _said(stack.enter_context(open_viewer(source, at_s)), at_s, json_)
         while not stopped():
             if send is not None and not send():
                 send = None
@@ -95,7 +102,7 @@ def watch(
             if not viewer.wait(_LOOK_S) or stopped():
                 continue
             if not viewer.failed:
-                return
+                break
             if viewer.url is not None:
                 said = "if a port was in use, another start takes another"
                 fail(f"the viewer failed; what it says is above; {said}")
@@ -104,12 +111,22 @@ def watch(
                 "apt-get install mesa-vulkan-drivers",
                 yellow="no window:",
             )
-            viewer = _said(stack.enter_context(open_viewer(source, at_s, window=False)), at_s)
+            page = stack.enter_context(open_viewer(source, at_s, window=False))
+            viewer = _said(page, at_s, json_)
+    if json_ and viewer.url is None:
+        _print_address(viewer, at_s)
     notes.say("viewer closed")
 
 
-def _said(viewer: "Viewer", at_s: float | None) -> "Viewer":
+def _print_address(viewer: "Viewer", at_s: float | None) -> None:
+    print_json({"url": viewer.url, "ports": viewer.ports, "at_s": at_s})
+    sys.stdout.flush()  # a script that reads from a pipe opens the address now
+
+
+def _said(viewer: "Viewer", at_s: float | None, json_: bool) -> "Viewer":
     if viewer.url is not None:
+        if json_:
+            _print_address(viewer, at_s)
         tunnel = " ".join(f"-L {port}:127.0.0.1:{port}" for port in viewer.ports)
         notes.say(
             f"Open {viewer.url}{LOOKS} in a browser; Ctrl-C ends the viewer.\n"

@@ -20,7 +20,7 @@ from utank_hil.commands.lines import printed_lines
 from utank_hil.commands.web_panel.desk import LASTING, Desk, Instruments
 from utank_hil.commands.web_panel.server import ServerProcess
 from utank_hil.configuration.vessel import Vessel
-from utank_hil.console.common import Bus, Duration, fail, load, why
+from utank_hil.console.common import Bus, Duration, Json, fail, load, print_json, why
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.loops import opened
 from utank_hil.nodes.panel import SILENT_NS, Action, OperatorPanel
@@ -210,6 +210,7 @@ def panel(
     listen: Annotated[
         str, typer.Option(metavar="ADDRESS:PORT", help="Where --web listens; port 0: a free one.")
     ] = LISTEN,
+    json_: Json = False,
 ) -> None:
     """Operate the controller from the keyboard: type an action and Enter; Enter alone stops.
 
@@ -217,6 +218,8 @@ def panel(
     help, quit; for retuning: retune, undo, forbid, permit. They may be piped in, one a line, and
     cut short. Alarms are shown with what happened and what to do. Leaving the panel silences it; a
     controller in charge then ramps down after five seconds.
+
+    With **--json** it prints at its end what it heard last: mode, fault and alarms.
 
     With **--web** it is a page in a browser too, whose address is printed; the panel is silent, but
     for a stop, while no page is open.
@@ -255,8 +258,24 @@ def panel(
             return keyboard.look(now_ns, signalled=signalled()) or ended
 
         RealTimeLoop(nodes, heard).run(look, None if duration is None else round(duration * 1e9))
+    if json_:
+        print_json(_as_json(node))
     if desk is not None and desk.ended:
         fail("the process that serves the page has ended: start the panel again", ExitCode.SYSTEM)
+
+
+def _as_json(node: OperatorPanel) -> dict[str, object]:
+    status = node.status
+    return {
+        "station": node.station.name,
+        "mode": None if status is None or status.mode is None else status.mode.name,
+        "fault": status.fault.name if status is not None and status.fault else None,
+        "alarms": [
+            {"code": alarm.code.name, "state": None if alarm.state is None else alarm.state.name}
+            for alarm in node.alarms
+            if alarm.code is not None
+        ],
+    }
 
 
 def _server(listen: str) -> ServerProcess:

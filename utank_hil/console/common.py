@@ -77,6 +77,7 @@ Channel = Annotated[
 AllowCode = Annotated[
     bool, option("Run code that the file names as a law or ship.", "--allow-code")
 ]
+View = Annotated[bool, option("Show it in the viewer, as `utank-hil monitor` does.", "--view")]
 Duration = Annotated[
     float | None,
     # a float without a limit may be infinite
