@@ -20,7 +20,7 @@ DESIGNS = {
       ("arx", "constrained/design", "constrained/foresight", "lqg_design", "optimal_tank",
        "predictive/design", "python_law", "sea_model")),
     *(f"utank_hil/dynamics/{name}.py" for name in ("hull/hull_data", "hull/lateral",
-                                                   "roll_damping")),
+                                                   "roll_damping", "wrench")),
     "utank_hil/retuning/redesign.py", "utank_hil/retuning/renewal.py",
     "utank_hil/sea/harmonics.py", "utank_hil/sea/measured.py", "utank_hil/sea/ndbc.py",
     "firmware_sim/comparison.py", "firmware_sim/model_limits.py", "firmware_sim/report_tables.py",

@@ -10,7 +10,6 @@ import pytest
 
 from firmware_sim.plant import Plant
 from firmware_sim.waves import SteadyWaves
-from tools.thesis.wrench import tank_wrench, water_moments
 from utank_hil.base.tick import TICK_NS
 from utank_hil.configuration.hull_files.parts import Given
 from utank_hil.configuration.hull_files.reader import read_hull
@@ -20,6 +19,7 @@ from utank_hil.dynamics.hull.hull_data import radiation_at
 from utank_hil.dynamics.hull.lateral import LateralHull, LateralModel, fit_radiation
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.dynamics.wrench import tank_wrench, water_moments
 from utank_hil.sea import Harmonics
 
 TANK = Tank(8.0, 2.5, 2.0, 0.7, lx_m=3.0, lz_m=-0.5, damping_ratio=0.1, density_kg_m3=1025.0)

@@ -6,9 +6,9 @@ from roll_energy import LEVERS, PATTI, PATTI_TANK, THESIS_SHIP, THESIS_TANK, bou
 from scipy.integrate import simpson
 
 from tools.thesis.reference import after_impact, simulate_reference
-from tools.thesis.wrench import tank_wrench, water_moments
 from utank_hil.dynamics import RollModel, RollShip, Tank, coupled_model
 from utank_hil.dynamics.valves import air_valve_loss, duct_valve_loss
+from utank_hil.dynamics.wrench import tank_wrench, water_moments
 
 PAIRS = {
     "thesis_first": (THESIS_SHIP, THESIS_TANK),

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from roll_energy import PATTI, PATTI_TANK, THESIS_SHIP, THESIS_TANK
 
-from tools.thesis.wrench import tank_wrench
 from utank_hil.dynamics.nonlinear import RollModel
+from utank_hil.dynamics.wrench import tank_wrench
 
 UNIT = st.floats(-1, 1)
 

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import control
 import numpy as np
 
-from tools.thesis.era import markov_parameters
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.interface import PumpLimits
 from utank_hil.dynamics import RollShip, Tank, coupled_model
-from utank_hil.identification import random_pulses
+from utank_hil.identification import era, random_pulses
 
 SAMPLE_TIME_S = 0.2
 INERTIA_KG_M2 = 1.9275e9
@@ -88,9 +87,9 @@ def jonswap_moment(samples, seed, moment_nm=2e7):
     return moment_nm * waves / np.sqrt(np.sum(shape) / 2)
 
 
-def markov_of(result, count=401):
-    """Pulse responses of an identified model, shape (count, m, r)."""
-    return markov_parameters(result.arx, count)[0]
+def realized(result, order=None):
+    """State-space model of an identification."""
+    return era(result.markov, order, sample_time_s=result.arx.sample_time_s)
 
 
 def frequency_response(system, omega=BAND_RAD_S):

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from roll_plant import markov_of, plant, pulses
+from roll_plant import plant, pulses, realized
 
-from tools.thesis.era import era, realized
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ARX
 from utank_hil.identification import (
     IdentificationError,
+    era,
     find_disturbance_frequencies,
     okid,
     validate,
@@ -87,7 +87,7 @@ def model_of(u, y, order):
 def test_okid_ends_in_a_finite_model_or_a_refusal(record, order):
     result = model_of(*record, order)
     if result is not None:
-        assert np.isfinite(markov_of(result)).all()
+        assert np.isfinite(result.markov).all()
         assert np.isfinite(result.residual_covariance).all()
 
 
@@ -115,7 +115,7 @@ def test_what_follows_okid_takes_every_model_it_makes(record, order):
     if result is None:
         return
     try:
-        system = realized(result.arx)
+        system = realized(result)
     except IdentificationError as refusal:
         says_why(refusal)
         return

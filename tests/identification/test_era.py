@@ -3,16 +3,15 @@
 import control
 import numpy as np
 import pytest
-from roll_plant import markov_of, noisy, plant, pulses, response_error
+from roll_plant import noisy, plant, pulses, response_error
 
-from tools.thesis.era import era
-from utank_hil.identification import IdentificationError, okid
+from utank_hil.identification import IdentificationError, era, okid
 
 
 def _noisy_markov(seed, order=60):
     u, truth = pulses(seed), plant()
     y = noisy(truth.respond(u, np.zeros_like(u)), 0.02, seed)
-    return markov_of(okid(u, y, order, sample_time_s=0.2))
+    return okid(u, y, order, sample_time_s=0.2).markov
 
 
 def test_exact_markov_parameters_give_the_system_back():

@@ -3,10 +3,9 @@ is identified from 200 s to 700 s with random pulses under a regular beam sea.""
 
 import numpy as np
 import pytest
-from roll_plant import SAMPLE_TIME_S, SLOW_PUMP, jonswap_moment, noisy, plant, pulses
+from roll_plant import SAMPLE_TIME_S, SLOW_PUMP, jonswap_moment, noisy, plant, pulses, realized
 
-from tools.thesis.era import modal_parameters, realized
-from utank_hil.identification import find_disturbance_frequencies, okid
+from utank_hil.identification import find_disturbance_frequencies, modal_parameters, okid
 
 pytestmark = pytest.mark.slow
 
@@ -32,7 +31,7 @@ def test_ship_is_found_again_after_loading(outputs, order, sea, frequency_error,
     waves = find_disturbance_frequencies(u, y, sample_time_s=SAMPLE_TIME_S, most=1)
     assert waves == (pytest.approx((0.8,), abs=5e-4) if sea == "regular" else ())
     result = okid(u, y, order, disturbance_frequencies_rad_s=waves, sample_time_s=SAMPLE_TIME_S)
-    modes = modal_parameters(realized(result.arx, 4))
+    modes = modal_parameters(realized(result, 4))
     right = truth.poles_rad_s()
     assert modes.frequency_rad_s == pytest.approx(np.abs(right), rel=frequency_error)
     damping = -right.real / np.abs(right)

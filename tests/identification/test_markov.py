@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tools.thesis.era import markov_parameters
 from utank_hil.control import ARX
+from utank_hil.identification import markov_parameters
 
 
 def _arx(seed):

@@ -4,10 +4,9 @@ import control
 import numpy as np
 import pytest
 from cramer_rao import cramer_rao
-from roll_plant import noisy, plant, pulses
+from roll_plant import noisy, plant, pulses, realized
 
-from tools.thesis.era import modal_parameters, realized
-from utank_hil.identification import okid
+from utank_hil.identification import modal_parameters, okid
 
 pytestmark = pytest.mark.slow
 
@@ -49,7 +48,7 @@ def test_bias_and_variance_against_the_cramer_rao_bound(runs):
     right = _true_modes(truth)
     found = np.empty((runs, 4))
     for run in range(runs):
-        model = okid(u, noisy(clean, NOISE, run), 120, sample_time_s=0.2).arx
+        model = okid(u, noisy(clean, NOISE, run), 120, sample_time_s=0.2)
         modes = modal_parameters(realized(model, 4))
         found[run] = np.concatenate([modes.frequency_rad_s, modes.damping_ratio])
     spread = np.std(found, axis=0)

@@ -11,14 +11,13 @@ from roll_plant import (
     BAND_RAD_S,
     SAMPLE_TIME_S,
     frequency_response,
-    markov_of,
     noisy,
     plant,
     pulses,
+    realized,
     response_error,
 )
 
-from tools.thesis.era import markov_parameters, realized
 from utank_hil.identification import (
     IdentificationError,
     OkidResult,
@@ -42,8 +41,8 @@ def test_exact_data_give_markov_parameters_poles_and_zeros(order, outputs):
     u, truth = pulses(1), plant()
     y = truth.respond(u, np.zeros_like(u))[:, :outputs]
     result = okid(u, y, order, sample_time_s=SAMPLE_TIME_S)
-    assert _relative(markov_of(result), truth.markov(401)[:, :outputs]) < 1e-8
-    system = realized(result.arx, 4)
+    assert _relative(result.markov, truth.markov(401)[:, :outputs]) < 1e-8
+    system = realized(result, 4)
     expected = truth.state_space()[:outputs, 0]
     order_of = np.argsort
     poles, right = system.poles(), expected.poles()
@@ -66,8 +65,8 @@ def test_wave_of_known_frequency_and_unknown_phase_leaves_the_model_exact(order)
     result = okid(
         u, y, order, disturbance_frequencies_rad_s=[WAVE_RAD_S], sample_time_s=SAMPLE_TIME_S
     )
-    assert _relative(markov_of(result), truth.markov(401)) < 1e-8
-    assert response_error(realized(result.arx, 4), truth).max() < 1e-8
+    assert _relative(result.markov, truth.markov(401)) < 1e-8
+    assert response_error(realized(result, 4), truth).max() < 1e-8
 
 
 def test_wave_of_unknown_frequency_and_phase_gives_the_same_model():
@@ -76,9 +75,9 @@ def test_wave_of_unknown_frequency_and_phase_gives_the_same_model():
     y = calm + truth.respond(np.zeros_like(u), _wave(len(u), 2.0, 0.6173))
     frequencies = find_disturbance_frequencies(u, y, sample_time_s=SAMPLE_TIME_S)
     assert frequencies == pytest.approx([0.6173], abs=2e-4)
-    quiet = realized(okid(u, calm, 120, sample_time_s=SAMPLE_TIME_S).arx, 4)
+    quiet = realized(okid(u, calm, 120, sample_time_s=SAMPLE_TIME_S), 4)
     rough = realized(
-        okid(u, y, 120, disturbance_frequencies_rad_s=frequencies, sample_time_s=SAMPLE_TIME_S).arx,
+        okid(u, y, 120, disturbance_frequencies_rad_s=frequencies, sample_time_s=SAMPLE_TIME_S),
         4,
     )
     assert response_error(quiet, truth).max() < 0.005
@@ -89,7 +88,7 @@ def test_without_its_basis_a_low_order_is_ruined_by_a_wave_and_a_high_one_is_not
     u, truth = pulses(1), plant()
     y = noisy(truth.respond(u, _wave(len(u))), 0.01, 2)
     error = {
-        p: response_error(realized(okid(u, y, p, sample_time_s=SAMPLE_TIME_S).arx, 4), truth).max()
+        p: response_error(realized(okid(u, y, p, sample_time_s=SAMPLE_TIME_S), 4), truth).max()
         for p in (30, 120)
     }
     assert error[30] > 0.05
@@ -103,7 +102,7 @@ def test_offset_and_drift_are_taken_out_by_their_basis():
     heel = still + np.outer(0.02 + 1e-5 * time_s, [1.0, 5.0])
     markov = truth.markov(401)
     found = okid(u, heel, 8, disturbance_polynomial_degree=1, sample_time_s=SAMPLE_TIME_S)
-    assert _relative(markov_of(found), markov) < 1e-8
+    assert _relative(found.markov, markov) < 1e-8
 
 
 def test_arx_predicts_the_record_and_markov_parameters_are_its_pulse_response():
@@ -116,7 +115,7 @@ def test_arx_predicts_the_record_and_markov_parameters_are_its_pulse_response():
     pulse = np.zeros((300, 1))
     pulse[0] = 1.0
     np.testing.assert_allclose(
-        markov_of(result, 300)[:, :, 0], result.arx.simulate(pulse), rtol=1e-9, atol=1e-15
+        result.markov[:300, :, 0], result.arx.simulate(pulse), rtol=1e-9, atol=1e-15
     )
 
 
@@ -124,11 +123,11 @@ def test_observer_of_the_identified_model_predicts_like_the_arx_model():
     u, truth = pulses(1), plant()
     y = noisy(truth.respond(u, np.zeros_like(u)), 0.01, 2)
     result = okid(u, y, 40, sample_time_s=SAMPLE_TIME_S)
-    system = realized(result.arx, 4)
+    system = realized(result, 4)
     a, b, c = (np.asarray(part) for part in (system.A, system.B, system.C))
     # the observer's Markov parameters are C A^(k-1) K
     size = y.std(axis=0)[:, None]
-    gains = markov_parameters(result.arx, 401)[1] / size
+    gains = result.observer_gain / size
     powers = [c @ np.linalg.matrix_power(a, k) / size for k in range(len(gains))]
     gain = np.linalg.lstsq(np.vstack(powers), gains.reshape(-1, 2), rcond=None)[0]
     d = np.asarray(system.D)[:, 0]
@@ -146,15 +145,15 @@ def test_two_inputs_are_told_apart():
     result = okid(np.column_stack([u, moment]), y, 10, sample_time_s=SAMPLE_TIME_S)
     truth = plant()
     both = control.ss(truth.a, truth.b, truth.c, np.zeros((2, 2)), SAMPLE_TIME_S)
-    found = frequency_response(realized(result.arx, 4))
+    found = frequency_response(realized(result, 4))
     np.testing.assert_allclose(found, frequency_response(both), rtol=1e-8)
 
 
 def test_units_of_the_record_do_not_matter():
     u = pulses(1)
     y = noisy(plant().respond(u, np.zeros_like(u)), 0.01, 2)
-    pascals = markov_of(okid(u, y, 20, sample_time_s=SAMPLE_TIME_S))
-    other = markov_of(okid(u * 1e-5, y * [57.3, 100.0], 20, sample_time_s=SAMPLE_TIME_S))
+    pascals = okid(u, y, 20, sample_time_s=SAMPLE_TIME_S).markov
+    other = okid(u * 1e-5, y * [57.3, 100.0], 20, sample_time_s=SAMPLE_TIME_S).markov
     np.testing.assert_allclose(other / [[57.3e5], [100e5]], pascals, rtol=1e-6, atol=1e-20)
 
 
@@ -165,7 +164,7 @@ def test_gaps_are_left_out_and_time_goes_on_through_them():
     u[1500] = np.nan
     y[1800, 1] = np.inf
     result = okid(u, y, 30, disturbance_frequencies_rad_s=[WAVE_RAD_S], sample_time_s=SAMPLE_TIME_S)
-    assert _relative(markov_of(result), truth.markov(401)) < 1e-8
+    assert _relative(result.markov, truth.markov(401)) < 1e-8
     assert result.rows == 2500 - 30 - (30 + 30) - (1 + 30) - (1 + 30)
 
 
@@ -253,7 +252,7 @@ def test_what_a_clipped_sensor_does_to_a_model_is_refused_before_it_matters():
             result = okid(u, clipped, 120, sample_time_s=SAMPLE_TIME_S)
         except IdentificationError:
             continue
-        assert response_error(realized(result.arx, 4), truth).max() < 0.03
+        assert response_error(realized(result, 4), truth).max() < 0.03
 
 
 def test_records_of_the_wrong_shape_are_refused():
@@ -292,7 +291,7 @@ def test_any_record_ends_in_a_finite_model_or_a_refusal(seed):
         result: OkidResult = okid(u, y, order, sample_time_s=SAMPLE_TIME_S)
     except IdentificationError:
         return
-    assert np.isfinite(markov_of(result)).all()
+    assert np.isfinite(result.markov).all()
     assert np.isfinite(result.residual_covariance).all()
 
 

@@ -17,15 +17,16 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, lstsq
 from scipy.optimize import minimize
 
-from tools.thesis.era import realized
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ARX
+from utank_hil.identification import era, markov_parameters
 
 Model = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 Identify = Callable[[FloatArray, FloatArray, float], Model]
 """From u (N,), y (N, m) and the sample time to A, B, C, D."""
 
 _LAGS: Final = 120
+_MARKOV: Final = 401
 
 
 def pbsid(u: FloatArray, y: FloatArray, order: int, past: int, future: int) -> Model:
@@ -122,7 +123,8 @@ def regularised_arx(u: FloatArray, y: FloatArray, sample_time_s: float) -> Model
         found = np.asarray(root @ cho_solve(factor, root.T @ moment)).reshape(count, _LAGS)
         beta[:_LAGS, output, 0] = found[0]
         alpha[:, output, :] = found[1:].T
-    system = realized(ARX(alpha, beta, sample_time_s), 4)
+    markov, _ = markov_parameters(ARX(alpha, beta, sample_time_s), _MARKOV)
+    system = era(markov, 4, sample_time_s=sample_time_s)
     a, b, c, d = (
         np.asarray(part, dtype=np.float64) for part in (system.A, system.B, system.C, system.D)
     )

@@ -6,7 +6,7 @@ moment on the ship; the line integral of (acceleration - g) gives the fluid's ow
 script
 
 1. prints the derived expressions (`--print`),
-2. checks them against `tools.thesis.wrench.tank_wrench` at random states, and
+2. checks them against `utank_hil.dynamics.wrench.tank_wrench` at random states, and
 3. prints every term of the printed (2.11), (2.12), (2.14), (2.16), (4.2), (4.3) that differs
    (`--errata`), of which docs/thesis.md has the table.
 
@@ -20,8 +20,8 @@ import sys
 import numpy as np
 import sympy as sp
 
-from tools.thesis.wrench import tank_wrench
 from utank_hil.dynamics import GRAVITY_M_S2, Tank
+from utank_hil.dynamics.wrench import tank_wrench
 
 rho, At, Ap, L, H, Lx, Lz, g, h = sp.symbols("rho At Ap L H Lx Lz g h")
 L_L, L_R = sp.symbols("L_L L_R")  # printed in (2.16), explained nowhere

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tools.thesis.era import realized
 from tools.thesis.linear_contest import SAMPLE_TIME_S, Entrant, held_model, radius
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
@@ -22,7 +21,7 @@ from utank_hil.dynamics.linear import STATES, state_matrices
 from utank_hil.dynamics.sampling import LinearModel, transition_and_step
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
-from utank_hil.identification import find_disturbance_frequencies, okid, random_pulses
+from utank_hil.identification import era, find_disturbance_frequencies, okid, random_pulses
 
 if TYPE_CHECKING:
     from control import StateSpace
@@ -140,7 +139,7 @@ def _identified(
     found = okid(
         u, y, adaptation.order, disturbance_frequencies_rad_s=waves, sample_time_s=SAMPLE_TIME_S
     )
-    return realized(found.arx, SYSTEM_ORDER)
+    return era(found.markov, SYSTEM_ORDER, sample_time_s=SAMPLE_TIME_S)
 
 
 def _modes(a: FloatArray) -> tuple[float, ...]:

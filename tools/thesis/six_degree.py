@@ -21,10 +21,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tools.thesis.wrench import gravity_body, tank_wrench, water_moments
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.ship import Restoring, RollShip, restoring
 from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics.wrench import gravity_body, tank_wrench, water_moments
 
 Matrix6 = tuple[tuple[float, ...], ...]
 ZERO6: Matrix6 = ((0.0,) * 6,) * 6

@@ -9,3 +9,4 @@ from utank_hil.dynamics.sampling import sampled_model as sampled_model
 from utank_hil.dynamics.ship import RollShip as RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2 as GRAVITY_M_S2
 from utank_hil.dynamics.tank import Tank as Tank
+from utank_hil.dynamics.wrench import tank_wrench as tank_wrench

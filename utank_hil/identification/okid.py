@@ -2,12 +2,12 @@
 
 The observer Markov parameters of (3.12) are the coefficients of an ARX model: with
 A_o = A - K C they are alpha_i = C A_o^(i-1) K and beta_i = C A_o^(i-1) (B - K D). They are fitted
-by least squares together with a disturbance basis. The order p must cover the observer's memory:
-p = 120 at 0.2 s is two roll periods.
+by least squares together with a disturbance basis. The Markov parameters of the system follow by
+recursion. The order p must cover the observer's memory: p = 120 at 0.2 s is two roll periods.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,8 +17,38 @@ from utank_hil.identification.disturbance import disturbance_basis
 from utank_hil.identification.lag_regression import Fit, LagRegression, fit
 from utank_hil.identification.record import IdentificationError, channel_scale, stacked_record
 
-_TRIED = 401  # Samples of a pulse response that must be finite: at 0.2 s, beyond any roll period.
+_MARKOV_COUNT = 401  # At 0.2 s this is a Hankel matrix over 40 s, longer than any roll period.
 _LEAST_EXCITATION = 4  # One oscillation needs twice its order.
+
+
+def markov_parameters(arx: ARX, count: int) -> tuple[FloatArray, FloatArray]:
+    """Return K = `count` Markov parameters of the system and of the observer gain.
+
+    ::
+
+        Y_0 = beta_0,    Y_k  = beta_k + sum_{i=1..min(k,p)} alpha_i Y_{k-i}
+                         Yo_k = alpha_k + sum_{i=1..min(k-1,p)} alpha_i Yo_{k-i}
+
+    Y_k = C A^(k-1) B are the system's Markov parameters and Yo_k = C A^(k-1) K those of its
+    observer x(k+1) = A x + B u + K (y - C x - D u); K is -G of the thesis (3.10). Juang, Applied
+    System Identification, 6.3. Beyond p the terms beta_k and alpha_k are zero.
+
+    The parameters of the system, shape (K, m, r), are D, then C A^(k-1) B; those of the observer,
+    shape (K - 1, m, m), C A^(k-1) K.
+    """
+    p, m, r = arx.order, arx.outputs, arx.inputs
+    # Both recursions run at once, newest first, so that the last p responses are contiguous.
+    newest_first = np.zeros((count + p, m, r + m))
+    known = min(count, p + 1)
+    newest_first[count - known : count, :, :r] = arx.beta[:known][::-1]
+    newest_first[count - known : count - 1, :, r:] = arx.alpha[: known - 1][::-1]
+    alphas = np.ascontiguousarray(arx.alpha.transpose(1, 0, 2).reshape(m, p * m))
+    past = newest_first.reshape(-1, r + m)
+    for k in range(1, count):
+        first = count - k  # This is the row block of response k - 1.
+        newest_first[first - 1] += alphas @ past[first * m : (first + p) * m]
+    responses = newest_first[:count][::-1]
+    return responses[:, :, :r].copy(), responses[1:, :, r:].copy()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,6 +56,10 @@ class OkidResult:
     """Result of OKID."""
 
     arx: ARX  #: Observer Markov parameters as a model.
+    #: shape (K, m, r): system Markov parameters; ``markov[0]`` is D, ``markov[k]`` is C A^(k-1) B.
+    markov: FloatArray
+    #: shape (K - 1, m, m): observer gain Markov parameters C A^(k-1) K, K being -G of the thesis.
+    observer_gain: FloatArray
     residual_covariance: FloatArray  #: shape (m, m): covariance of the one-step prediction errors.
     columns: int  #: Number n of the regression's columns: coefficients of each output.
     #: Rank of the regression; below n if the data fit exactly or the input does not excite.
@@ -88,16 +122,14 @@ def okid(
     errors = np.full((len(z), m), np.nan)
     errors[regression.at] = regression.residuals(solution.coefficients) * scale[:m]
     fitted = _in_units(solution, regression, scale, sample_time_s, errors)
-    kick = np.zeros((max(_TRIED, 2 * order + 1), fitted.arx.inputs))
-    kick[0] = 1.0
     with np.errstate(over="ignore", invalid="ignore"):
-        answer = fitted.arx.simulate(kick)
-    if not np.isfinite(answer).all():
+        markov, observer_gain = markov_parameters(fitted.arx, max(_MARKOV_COUNT, 2 * order + 1))
+    if not (np.isfinite(markov).all() and np.isfinite(observer_gain).all()):
         raise IdentificationError(
             "the fitted model is violently unstable, so the record does not determine it; "
             "record longer, excite more or raise the order"
         )
-    return fitted
+    return replace(fitted, markov=markov, observer_gain=observer_gain)
 
 
 def _in_units(
@@ -107,7 +139,7 @@ def _in_units(
     sample_time_s: float,
     errors: FloatArray,
 ) -> OkidResult:
-    """Convert a solution to the units of the record."""
+    """Convert a solution to the units of the record, yet without Markov parameters."""
     p, m = regression.order, regression.outputs
     y_scale = scale[:m]
     column_scale = np.concatenate([np.tile(scale, p + 1)[m:], np.ones(regression.basis_size)])
@@ -119,6 +151,8 @@ def _in_units(
     by_lag = by_lag.transpose(0, 2, 1)
     return OkidResult(
         ARX(by_lag[1:, :, :m], by_lag[:, :, m:], sample_time_s),
+        markov=np.empty(0),
+        observer_gain=np.empty(0),
         residual_covariance=solution.residual_covariance * np.outer(y_scale, y_scale),
         columns=len(column_scale),
         rank=solution.rank,

@@ -11,12 +11,11 @@ are scaled to equal energy, because pascals, radians and metres share the singul
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
-from utank_hil.control.arx import ARX
 from utank_hil.identification.record import IdentificationError
 
 if TYPE_CHECKING:
@@ -25,36 +24,6 @@ if TYPE_CHECKING:
 _HIGHEST_ORDER = 20  # This limits an order chosen from the singular values. Chosen; no study.
 _SMALLEST, _LARGEST = 1e-140, 1e140  # Products stay finite in this range.
 _SIGNAL = 1e-3  # This is the smallest singular value of a signal, relative to the largest.
-
-
-def markov_parameters(arx: ARX, count: int) -> tuple[FloatArray, FloatArray]:
-    """Return K = `count` Markov parameters of the system and of the observer gain.
-
-    ::
-
-        Y_0 = beta_0,    Y_k  = beta_k + sum_{i=1..min(k,p)} alpha_i Y_{k-i}
-                         Yo_k = alpha_k + sum_{i=1..min(k-1,p)} alpha_i Yo_{k-i}
-
-    Y_k = C A^(k-1) B are the system's Markov parameters and Yo_k = C A^(k-1) K those of its
-    observer x(k+1) = A x + B u + K (y - C x - D u); K is -G of the thesis (3.10). Juang, Applied
-    System Identification, 6.3. Beyond p the terms beta_k and alpha_k are zero.
-
-    The parameters of the system, shape (K, m, r), are D, then C A^(k-1) B; those of the observer,
-    shape (K - 1, m, m), C A^(k-1) K.
-    """
-    p, m, r = arx.order, arx.outputs, arx.inputs
-    # Both recursions run at once, newest first, so that the last p responses are contiguous.
-    newest_first = np.zeros((count + p, m, r + m))
-    known = min(count, p + 1)
-    newest_first[count - known : count, :, :r] = arx.beta[:known][::-1]
-    newest_first[count - known : count - 1, :, r:] = arx.alpha[: known - 1][::-1]
-    alphas = np.ascontiguousarray(arx.alpha.transpose(1, 0, 2).reshape(m, p * m))
-    past = newest_first.reshape(-1, r + m)
-    for k in range(1, count):
-        first = count - k  # This is the row block of response k - 1.
-        newest_first[first - 1] += alphas @ past[first * m : (first + p) * m]
-    responses = newest_first[:count][::-1]
-    return responses[:, :, :r].copy(), responses[1:, :, r:].copy()
 
 
 def era(markov: FloatArray, order: int | None = None, *, sample_time_s: float) -> "StateSpace":
@@ -183,12 +152,3 @@ def modal_parameters(system: "StateSpace") -> ModalParameters:
     damping = np.ones(len(s))
     damping[oscillating] = -s[oscillating].real / np.abs(s[oscillating])
     return ModalParameters(poles, np.abs(s), damping)
-
-
-MARKOV: Final = 401  #: At 0.2 s a Hankel matrix over 40 s, longer than any roll period.
-
-
-def realized(arx: ARX, order: int | None = None) -> "StateSpace":
-    """Realize an identified model by its Markov parameters."""
-    markov, _ = markov_parameters(arx, max(MARKOV, 2 * arx.order + 1))
-    return era(markov, order, sample_time_s=arx.sample_time_s)

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from streamline import GRAVITY, Motion, apply, particles, rotation
 
-from tools.thesis.wrench import tank_wrench, water_moments
 from utank_hil.dynamics import Tank
+from utank_hil.dynamics.wrench import tank_wrench, water_moments
 
 STEP = 0.01
 FIRST = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280]) / STEP
