@@ -12,14 +12,7 @@ from firmware_sim.scenario import Scenario
 from utank_hil.analysis import tank_sizing
 from utank_hil.analysis.loop.self_tuning import SelfTuned, SelfTunedDesign
 from utank_hil.analysis.tank_response import expected_sea
-from utank_hil.base.parameters import (
-    ParameterError,
-    Positive,
-    Problem,
-    Range,
-    range_problems,
-    refuse,
-)
+from utank_hil.base import parameters
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.configuration.files import problems_in_words
 from utank_hil.configuration.ship_keys import WrittenShip, weather_criterion_period_s
@@ -48,20 +41,20 @@ class StarterShip:
     """
 
     name: str
-    length_m: Positive
-    beam_m: Positive
-    displacement_t: Positive
-    gm_m: Positive
+    length_m: parameters.Positive
+    beam_m: parameters.Positive
+    displacement_t: parameters.Positive
+    gm_m: parameters.Positive
     #: Roll period; by default from the weather criterion's formula, which needs the draught.
-    roll_period_s: Positive | None = None
-    draught_m: Positive | None = None
+    roll_period_s: parameters.Positive | None = None
+    draught_m: parameters.Positive | None = None
     #: Of the roll; by default estimated from the draught, without it `USUAL_DAMPING_RATIO`.
-    roll_damping_ratio: Annotated[float, Range(above=0, most=0.3)] | None = None
+    roll_damping_ratio: Annotated[float, parameters.Range(above=0, most=0.3)] | None = None
     #: Of radiated waves, of hull data; in place of the estimate's part by waves.
     radiated_ratio: float | None = None
 
     def __post_init__(self) -> None:
-        problems = range_problems(self)
+        problems = parameters.range_problems(self)
         if self.roll_period_s is None and self.draught_m is None:
             reason = "is needed, or else the draught for the weather criterion's period"
             problems.append(("roll_period_s", reason))
@@ -69,9 +62,9 @@ class StarterShip:
         if given is not None and given < least:
             reason = f"is {given:g}, and waves alone take {least:.3g} from this hull: raise it"
             problems.append(("roll_damping_ratio", reason))
-        refuse("ship", problems or self._shape_problems())
+        parameters.refuse("ship", problems or self._shape_problems())
 
-    def _shape_problems(self) -> list[Problem]:
+    def _shape_problems(self) -> list[parameters.Problem]:
         """Implausible combinations for the beam: displacement and length, period and GM."""
         if self.beam_m >= self.length_m:
             reason = f"is {self.beam_m:g} m, and the length {self.length_m:g} m: swap the two"
@@ -252,7 +245,7 @@ def _valid(model: type[ModelT], content: dict[str, Any]) -> ModelT:
     except ValidationError as error:
         found = problems_in_words(error, content, model)
         problems = [(".".join(map(str, key)), reason) for key, reason in found]
-        raise ParameterError("starter", problems) from error
+        raise parameters.ParameterError("starter", problems) from error
 
 
 def number(value: float) -> str:

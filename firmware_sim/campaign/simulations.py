@@ -21,12 +21,7 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_content import PASSIVE
 from utank_hil.analysis.loop import sea_response
 from utank_hil.analysis.loop.loop_simulation import between, passive_motion, simulate_loop
-from utank_hil.analysis.motion.statistics import (
-    PumpStatistics,
-    RollStatistics,
-    pump_statistics,
-    roll_statistics,
-)
+from utank_hil.analysis.motion import statistics
 from utank_hil.assembly import build_law
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import ParameterError
@@ -94,12 +89,12 @@ def _judged(scenario: Scenario, records: list[_Record]) -> list[Row]:
     rolls: dict[str, float] = {}
     references = {"roll_below_no_tank": NO_TANK, "roll_below_passive": PASSIVE}
     for record in records:
-        roll = roll_statistics(record.roll_rad[window])
+        roll = statistics.roll_statistics(record.roll_rad[window])
         sunk = record.capsized_s < scenario.duration_s
         if record.name == NO_TANK:
             row = _row(NO_TANK, CAPSIZED if sunk else "", roll)
         else:
-            pump = pump_statistics(
+            pump = statistics.pump_statistics(
                 record.pressure_pa[window], record.power_w[window], record.level_m[window]
             )
             row = _row(record.name, CAPSIZED if sunk else "", roll, pump, record.strikes)
@@ -116,8 +111,8 @@ def _judged(scenario: Scenario, records: list[_Record]) -> list[Row]:
 def _row(
     name: str,
     mark: str,
-    roll: RollStatistics,
-    pump: PumpStatistics | None = None,
+    roll: statistics.RollStatistics,
+    pump: statistics.PumpStatistics | None = None,
     strikes: float = _NO_FIGURE,
 ) -> Row:
     row: Row = {

@@ -13,24 +13,8 @@ from utank_hil.base.provenance import describe
 from utank_hil.base.shipped import CONFIGS
 from utank_hil.commands.monitor import watch
 from utank_hil.configuration.files import files_named
-from utank_hil.console import terminal
+from utank_hil.console import common, terminal
 from utank_hil.console.admission import admit
-from utank_hil.console.common import (
-    OUT,
-    AllowCode,
-    Duration,
-    Json,
-    Out,
-    Seed,
-    View,
-    argument,
-    fail,
-    load,
-    option,
-    prepare_out,
-    print_json,
-    why,
-)
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.control import BuiltLaw
 from utank_hil.runners.node import ModelError
@@ -47,27 +31,32 @@ REAL_TIME_S = 120.0  #: Default length of a run in real time. Chosen; no study.
 
 def bench(
     context: typer.Context,
-    scenario: Annotated[Path, argument("Scenario file.", default="the measured storm")] = STORM,
+    scenario: Annotated[
+        Path, common.argument("Scenario file.", default="the measured storm")
+    ] = STORM,
     real_time: Annotated[
-        bool, option("Real time, or simulated time as fast as it goes.", "--realtime/--lockstep")
+        bool,
+        common.option("Real time, or simulated time as fast as it goes.", "--realtime/--lockstep"),
     ] = False,
     bus: Annotated[
         str | None,
-        option("SocketCAN interface for real time; without it all nodes share one process."),
+        common.option("SocketCAN interface for real time; without it all nodes share one process."),
     ] = None,
-    seed: Seed = None,
-    duration: Duration = None,
-    out: Out = OUT,
+    seed: common.Seed = None,
+    duration: common.Duration = None,
+    out: common.Out = common.OUT,
     frames: Annotated[
-        bool, option("Keep each run's frame log there, for replay and export.", "--frames")
+        bool, common.option("Keep each run's frame log there, for replay and export.", "--frames")
     ] = False,
     fmu: Annotated[
         Path | None,
-        option("Run nothing: write the emulated ship as FMU for other programs.", metavar="FILE"),
+        common.option(
+            "Run nothing: write the emulated ship as FMU for other programs.", metavar="FILE"
+        ),
     ] = None,
-    json_: Json = False,
-    view: View = False,
-    allow_code: AllowCode = False,
+    json_: common.Json = False,
+    view: common.View = False,
+    allow_code: common.AllowCode = False,
 ) -> None:
     """Run a scenario: the tank passive, then with each controller, in the same waves.
 
@@ -84,16 +73,16 @@ def bench(
     from firmware_sim.scenario import Scenario
 
     if bus is not None and not real_time:
-        fail("--bus is for real time: add --realtime, or leave --bus out")
-    loaded = load(scenario, Scenario, allow_code=allow_code)
+        common.fail("--bus is for real time: add --realtime, or leave --bus out")
+    loaded = common.load(scenario, Scenario, allow_code=allow_code)
     if fmu is not None:
         _write_fmu(scenario, loaded, fmu, loaded.seed if seed is None else seed)
         if json_:
-            print_json({"file": str(fmu)})
+            common.print_json({"file": str(fmu)})
         raise typer.Exit
     _refuse_faults(scenario, loaded, real_time=real_time, frames=frames)
     logs = [frames_name(name) for name in ("passive", *loaded.controllers)] if frames else []
-    out = prepare_out(out, (*REPORT_FILES, *logs))
+    out = common.prepare_out(out, (*REPORT_FILES, *logs))
     laws = {
         name: admit(controller, scenario, f"controllers.{name}")
         for name, controller in loaded.controllers.items()
@@ -107,13 +96,13 @@ def bench(
     files, failures = write_files(result, found, out, about)
     files |= {f"frames of {Path(name).stem}": out / name for name in logs}
     if json_:
-        print_json(found.as_json(files, about))
+        common.print_json(found.as_json(files, about))
     else:
         _print(result, found, files)
         following = (("monitor", out), *_run_next(found, scenario))
         terminal.Terminal().lead_on(*following, allow_code=allow_code)
     if failures:
-        fail("; ".join(failures))
+        common.fail("; ".join(failures))
     if view:
         watch(files["recording"])
     raise typer.Exit(found.exit_code)
@@ -125,16 +114,16 @@ def _write_fmu(path: Path, scenario: "Scenario", fmu: Path, seed: int) -> None:
     try:
         write_fmu(scenario, fmu, seed)
     except (OSError, ValueError) as error:
-        fail(f"{path}: {error}" if isinstance(error, ValueError) else error)
+        common.fail(f"{path}: {error}" if isinstance(error, ValueError) else error)
     terminal.notes.say(f"{terminal.shown(fmu)}: FMI 2 for co-simulation, with its source")
 
 
 def _refuse_faults(path: Path, scenario: "Scenario", *, real_time: bool, frames: bool) -> None:
     if real_time and scenario.faults:
-        fail(f"{path}: faults: are for simulated time: leave --realtime out, or the faults")
+        common.fail(f"{path}: faults: are for simulated time: leave --realtime out, or the faults")
     for number, fault in enumerate(scenario.faults if frames else ()):
         if not fault.replayable:
-            fail(
+            common.fail(
                 f"{path}: faults.{number}: kind {fault.kind} changes the controller itself, so "
                 "its frames can't be replayed: leave --frames out, or the fault"
             )
@@ -158,14 +147,17 @@ def _run(
                 scenario, options, lambda name, done: bar.update(tasks[name], completed=done), laws
             )
         except ParameterError as error:
-            fail(error, ExitCode.USAGE)
+            common.fail(error, ExitCode.USAGE)
         except InterruptedError as error:
-            fail(error, ExitCode.INTERRUPTED)
+            common.fail(error, ExitCode.INTERRUPTED)
         except OSError as error:
             if isinstance(error, RingError) or (error.errno == ENOSPC and error.filename is None):
-                fail(f"/dev/shm, the memory that processes share: {why(error)}", ExitCode.SYSTEM)
+                common.fail(
+                    f"/dev/shm, the memory that processes share: {common.why(error)}",
+                    ExitCode.SYSTEM,
+                )
             of_bus = options.channel is not None and not isinstance(error, ModelError)
-            fail(error, ExitCode.NO_BUS if of_bus else ExitCode.USAGE)
+            common.fail(error, ExitCode.NO_BUS if of_bus else ExitCode.USAGE)
 
 
 def _print(result: "BenchResult", found: "BenchFigures", files: Mapping[str, Path]) -> None:

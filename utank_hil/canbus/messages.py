@@ -14,25 +14,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple, TypeVar
 
-from utank_hil.canbus.enumerations import (
-    AlarmState,
-    ControlWord,
-    DriveFault,
-    DriveState,
-    FailPosition,
-    Fault,
-    Mode,
-    NodeState,
-    Quality,
-    ResetCause,
-    RetuningState,
-    Station,
-    Switch,
-    ValveControl,
-    ValveFault,
-    ValveState,
-    Verdict,
-)
+from utank_hil.canbus import enumerations
 
 _T = TypeVar("_T", bound=type[tuple[Any, ...]])
 DBC_NAMES: Final[dict[type[tuple[Any, ...]], str]] = {}
@@ -53,7 +35,7 @@ class PumpCommand(NamedTuple):
     """PUMP_CMD, controller to drive, 20 ms; without a control word nothing may be enabled."""
 
     pressure_pa: float
-    control_word: ControlWord | None
+    control_word: enumerations.ControlWord | None
     timeout_s: float
 
 
@@ -63,7 +45,7 @@ class DriveStatus1(NamedTuple):
 
     pressure_pa: float
     speed_rad_s: float
-    state: DriveState | None
+    state: enumerations.DriveState | None
     command_echo: int | None
     pressure_limited: bool
     speed_limited: bool
@@ -75,7 +57,7 @@ class DriveStatus1(NamedTuple):
 class DriveStatus2(NamedTuple):
     """DRIVE_STATUS_2, drive to controller, 100 ms; power is `bus_voltage_v * current_a`."""
 
-    fault: DriveFault | None
+    fault: enumerations.DriveFault | None
     bus_voltage_v: float
     current_a: float
     motor_temperature_c: float
@@ -91,7 +73,7 @@ class ValveCommand(NamedTuple):
     """VALVE_CMD, controller to valve, 20 ms; without `control` it is to keep its fail position."""
 
     opening: float
-    control: ValveControl | None
+    control: enumerations.ValveControl | None
     timeout_s: float
 
 
@@ -100,10 +82,10 @@ class ValveStatus(NamedTuple):
     """VALVE_STATUS, valve to controller, 20 ms."""
 
     opening: float
-    state: ValveState | None
-    fault: ValveFault | None
+    state: enumerations.ValveState | None
+    fault: enumerations.ValveFault | None
     command_echo: int | None
-    fail_position: FailPosition | None
+    fail_position: enumerations.FailPosition | None
     moving: bool
     open_limit: bool
     shut_limit: bool
@@ -118,7 +100,7 @@ class SensorMotion(NamedTuple):
 
     roll_rad: float
     roll_rate_rad_s: float
-    quality: Quality | None
+    quality: enumerations.Quality | None
 
 
 @_dbc_message("SENSOR_TANK")
@@ -127,9 +109,9 @@ class SensorTank(NamedTuple):
 
     port_level_m: float
     starboard_level_m: float
-    port_high: Switch | None
-    starboard_high: Switch | None
-    quality: Quality | None
+    port_high: enumerations.Switch | None
+    starboard_high: enumerations.Switch | None
+    quality: enumerations.Quality | None
 
 
 @_dbc_message("SENSOR_PUMP")
@@ -138,17 +120,17 @@ class SensorPump(NamedTuple):
 
     pressure_pa: float
     flow_m3_s: float
-    quality: Quality | None
+    quality: enumerations.Quality | None
 
 
 @_dbc_message("HARDWIRED_INPUTS")
 class HardwiredInputs(NamedTuple):
     """HARDWIRED_INPUTS, a node apart from sensors and drive to controller, 50 ms."""
 
-    port_high: Switch | None
-    starboard_high: Switch | None
-    stop_loop: Switch | None
-    quality: Quality | None
+    port_high: enumerations.Switch | None
+    starboard_high: enumerations.Switch | None
+    stop_loop: enumerations.Switch | None
+    quality: enumerations.Quality | None
 
 
 @_dbc_message("WAVE_FORECAST")
@@ -159,15 +141,15 @@ class ForecastPoints(NamedTuple):
     moment_rad: float
     next_moment_rad: float
     deviation_rad: float
-    quality: Quality | None
+    quality: enumerations.Quality | None
 
 
 @_dbc_message("CTRL_STATUS")
 class ControllerStatus(NamedTuple):
     """CTRL_STATUS, controller to all, 100 ms."""
 
-    mode: Mode | None
-    fault: Fault | None
+    mode: enumerations.Mode | None
+    fault: enumerations.Fault | None
     armed: bool
     alarm: bool
     degraded: bool
@@ -176,15 +158,15 @@ class ControllerStatus(NamedTuple):
     bus_load: float
     catalogue_version: int | None
     configuration_version: int | None
-    retuning: RetuningState | None = None
-    station: Station | None = None
+    retuning: enumerations.RetuningState | None = None
+    station: enumerations.Station | None = None
 
 
 @_dbc_message("SEA_ESTIMATE")
 class SeaEstimate(NamedTuple):
     """SEA_ESTIMATE, controller to panels, 1 s."""
 
-    verdict: Verdict | None
+    verdict: enumerations.Verdict | None
     significant_height_m: float
     peak_period_s: float
     moment_rms_rad: float
@@ -196,7 +178,7 @@ class SeaEstimate(NamedTuple):
 class ShipEstimate(NamedTuple):
     """SHIP_ESTIMATE, controller to panels, 1 s."""
 
-    verdict: Verdict | None
+    verdict: enumerations.Verdict | None
     roll_period_s: float
     roll_period_deviation_s: float
     gm_m: float
@@ -208,7 +190,7 @@ class ShipEstimate(NamedTuple):
 class PassiveTwin(NamedTuple):
     """PASSIVE_TWIN, controller to panels, 100 ms: the same ship with a passive tank."""
 
-    quality: Quality | None
+    quality: enumerations.Quality | None
     twin_roll_rad: float
     twin_rms_rad: float
     roll_rms_rad: float
@@ -221,8 +203,8 @@ class Alarm(NamedTuple):
     An empty list is one frame of 0 `alarms`, code NONE and state NORMAL.
     """
 
-    state: AlarmState | None
-    code: Fault | None
+    state: enumerations.AlarmState | None
+    code: enumerations.Fault | None
     place: int | None
     alarms: int | None
     times_raised: int | None
@@ -236,7 +218,7 @@ class OperatorCommand(NamedTuple):
     OPERATOR_CMD_2 is that of a second station.
     """
 
-    mode_request: Mode | None
+    mode_request: enumerations.Mode | None
     arm: bool
     stop: bool
     reset: bool
@@ -253,8 +235,8 @@ class OperatorCommand(NamedTuple):
 class Heartbeat(NamedTuple):
     """HEARTBEAT_<NODE>, every node to all, 100 ms."""
 
-    state: NodeState | None
-    reset_cause: ResetCause | None
+    state: enumerations.NodeState | None
+    reset_cause: enumerations.ResetCause | None
     uptime_s: float
     catalogue_version: int | None
     configuration_version: int | None

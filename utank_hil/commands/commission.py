@@ -13,13 +13,7 @@ from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import AlarmState, Fault, PortError
 from utank_hil.canbus.events import AlarmEvent, RetuningEvent
 from utank_hil.canbus.ports import open_port, why_other_bit_rate
-from utank_hil.commands.commissioning_record import (
-    make_record,
-    record_path,
-    remove_record,
-    why_not_replaceable,
-    write_record,
-)
+from utank_hil.commands import commissioning_record
 from utank_hil.commands.lines import Lines, printed_lines
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.console.common import Bus, Config, Json, fail, load, print_json, why_not_writable
@@ -59,8 +53,10 @@ def commission(
     loaded = load(config, ControllerConfig, allow_code=True)  # The law is not built.
     if other := why_other_bit_rate(channel, loaded.bit_rate):
         fail(f"{config}: bit_rate: {other}")
-    path = record or record_path(config)
-    reason = why_not_replaceable(path) or why_not_writable(path.parent, (path.name,))
+    path = record or commissioning_record.record_path(config)
+    reason = commissioning_record.why_not_replaceable(path) or why_not_writable(
+        path.parent, (path.name,)
+    )
     if reason:
         fail(f"{reason}; choose another place with --record")
     statistics = LoopStatistics()
@@ -94,11 +90,11 @@ def commission(
         _give_up(node.stage, path)
     # The previous record is void from now on, whatever this commissioning yields.
     with suppress(OSError):  # What can't be removed can't be replaced either, and that is reported.
-        remove_record(path)
-    made = make_record(loaded, config, channel, node.checks(), node.ended)
+        commissioning_record.remove_record(path)
+    made = commissioning_record.make_record(loaded, config, channel, node.checks(), node.ended)
     unwritten = ""
     try:
-        write_record(path, made)
+        commissioning_record.write_record(path, made)
     except OSError as error:
         left = "; remove the one that is there" if path.exists() else ""
         unwritten = f"{path}: the record can't be written: {error.strerror}{left}"
@@ -118,7 +114,7 @@ def _give_up(stage: Stage, path: Path) -> NoReturn:
     what = "ended before all was checked; there is no new record"
     if stage in (Stage.MOVING, Stage.STOPPING):
         try:
-            remove_record(path)
+            commissioning_record.remove_record(path)
         except OSError as error:
             fail(f"{what}, and the one before can't be removed: {error}; remove it")
         what += ", and the one before is removed"
@@ -163,7 +159,7 @@ def _print(record: dict[str, Any], path: Path, config: Path, *, code: bool) -> N
         console.say(where, red="not passed: arming is refused;")
     else:
         console.say(where, green="passed;")
-        named = ("--record", path) if path != record_path(config) else ()
+        named = ("--record", path) if path != commissioning_record.record_path(config) else ()
         following = ("run", config, "--bus", record["bus"], *named, "--out", "log")
         console.lead_on(following, allow_code=code)
 

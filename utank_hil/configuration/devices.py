@@ -8,17 +8,11 @@ from typing import Annotated, Any, Final
 from pydantic import Field, model_validator
 
 from utank_hil.base.parameters import Problem, Range, refuse
+from utank_hil.canbus import messages
 from utank_hil.canbus.catalogue import load_catalogue
 from utank_hil.canbus.enumerations import Address
 from utank_hil.canbus.frame import BUS_SHIFT, MOST_BUSES, STANDARD, Frame
 from utank_hil.canbus.line_names import LINES
-from utank_hil.canbus.messages import (
-    OperatorCommand,
-    SensorMotion,
-    SensorPump,
-    SensorTank,
-    ValveStatus,
-)
 from utank_hil.canbus.profiles.acting import PROOF
 from utank_hil.canbus.profiles.device_plan import (
     COMMANDS,
@@ -201,12 +195,12 @@ class OthersSection(Section):
 
 
 KINDS: Final[dict[str, type[tuple[Any, ...]]]] = {
-    "motion": SensorMotion,
-    "motion_2": SensorMotion,
-    "levels": SensorTank,
-    "pump_sensor": SensorPump,
+    "motion": messages.SensorMotion,
+    "motion_2": messages.SensorMotion,
+    "levels": messages.SensorTank,
+    "pump_sensor": messages.SensorPump,
 }
-ROLES: Final = {**KINDS, "valve": ValveStatus, "panel": OperatorCommand}
+ROLES: Final = {**KINDS, "valve": messages.ValveStatus, "panel": messages.OperatorCommand}
 
 
 class DevicesSection(Section):

@@ -4,18 +4,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
+from utank_hil import canbus
 from utank_hil.base.parameters import NotNegative, range_problems, refuse
 from utank_hil.base.tick import TICK_NS
-from utank_hil.canbus import (
-    Alarm,
-    Catalogue,
-    ControllerStatus,
-    Fault,
-    Frame,
-    Mode,
-    OperatorCommand,
-    Station,
-)
 from utank_hil.nodes.housekeeping import Housekeeping
 from utank_hil.nodes.stations import ADDRESSES
 
@@ -26,7 +17,7 @@ RAMP_NS = 1_100_000_000
 """How long stop is held in FAULT: the ramp of a fault, which a stop cuts, may last a second."""
 SILENT_NS = 300_000_000
 """After so long without a status no controller is heard."""
-_UNDER_POWER = (Mode.ACTIVE, Mode.PASSIVE, None)
+_UNDER_POWER = (canbus.Mode.ACTIVE, canbus.Mode.PASSIVE, None)
 """Modes that a stop has not ended yet."""
 _SPARE_ALARMS = 5
 """Frames of ALARM that may be missing before one that is not repeated counts as over."""
@@ -85,41 +76,41 @@ class OperatorPanel:
 
     def __init__(
         self,
-        catalogue: Catalogue,
+        catalogue: canbus.Catalogue,
         *,
         configuration_version: int,
         script: Iterable[TimedAction] = (),
-        station: Station = Station.OPERATOR,
+        station: canbus.Station = canbus.Station.OPERATOR,
         period_ns: int = 10 * TICK_NS,
     ) -> None:
         address = ADDRESSES[station]
         self.period_ns = period_ns
         self.station = station
-        self._sender = catalogue.transmitter(OperatorCommand, address)
+        self._sender = catalogue.transmitter(canbus.OperatorCommand, address)
         self._cycle_ticks = self._sender.cycle_ns // period_ns
-        self._listener = catalogue.receiver(ControllerStatus)
-        self._alarm_listener = catalogue.receiver(Alarm)
+        self._listener = catalogue.receiver(canbus.ControllerStatus)
+        self._alarm_listener = catalogue.receiver(canbus.Alarm)
         self.hears = frozenset([self._listener.can_id, self._alarm_listener.can_id])
         self._housekeeping = Housekeeping(address, catalogue, configuration_version)
-        self._alarms: dict[Fault, tuple[Alarm, int]] = {}
+        self._alarms: dict[canbus.Fault, tuple[canbus.Alarm, int]] = {}
         # the next one last; of several at a time, the first given comes first
         self._script = sorted(script, key=lambda timed: timed.time_s)[::-1]
         self._start_ns: int | None = None
-        self._mode = Mode.STANDBY
+        self._mode = canbus.Mode.STANDBY
         self._armed = False
         self._forbidden = False
         self._pressed_until_ns = dict.fromkeys(_EDGES, 0)
         self._stopped_ns = self._arms_ns = self._asks_ns = 0
         self.stopping = False  #: Whether stop is held.
         self._pressed: list[Action] = []
-        self._sent: OperatorCommand | None = None
+        self._sent: canbus.OperatorCommand | None = None
         self._ticks = 0
-        self.status: ControllerStatus | None = None  #: Latest status of the controller.
+        self.status: canbus.ControllerStatus | None = None  #: Latest status of the controller.
         self.heard_ns: int | None = None  #: When that status came.
         self.attended = self._spoke = True
 
     @property
-    def _found(self) -> Mode | None:
+    def _found(self) -> canbus.Mode | None:
         """Mode of the controller by its last status."""
         return None if self.status is None else self.status.mode
 
@@ -134,7 +125,7 @@ class OperatorPanel:
         return bool(self._pressed) or self.stopping
 
     @property
-    def alarms(self) -> tuple[Alarm, ...]:
+    def alarms(self) -> tuple[canbus.Alarm, ...]:
         """The controller's alarms, the most urgent first."""
         return tuple(
             sorted((alarm for alarm, _ in self._alarms.values()), key=lambda each: each.place or 0)
@@ -161,7 +152,7 @@ class OperatorPanel:
         """Press a button; it takes effect with the next tick."""
         self._pressed.append(action)
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame: canbus.Frame, now_ns: int) -> None:
         """Take the controller's status and alarms."""
         if frame.can_id == self._alarm_listener.can_id:
             alarm = self._alarm_listener.accept(frame)
@@ -175,13 +166,13 @@ class OperatorPanel:
             return
         self.status, self.heard_ns = status, now_ns
         # an earlier one may have been on its way when stop was pressed
-        held_ns = RAMP_NS if status.mode is Mode.FAULT else EDGE_NS
+        held_ns = RAMP_NS if status.mode is canbus.Mode.FAULT else EDGE_NS
         if now_ns - self._stopped_ns >= held_ns and status.mode not in _UNDER_POWER:
             self.stopping = False
 
-    def tick(self, now_ns: int) -> Iterable[Frame]:
+    def tick(self, now_ns: int) -> Iterable[canbus.Frame]:
         """Send the state of the buttons when it is due or has changed."""
-        if self._start_ns is None and self._found not in (None, Mode.INIT):
+        if self._start_ns is None and self._found not in (None, canbus.Mode.INIT):
             self._start_ns = now_ns
         if self._start_ns is not None:
             while self._script and self._script[-1].time_s * 1e9 <= now_ns - self._start_ns:
@@ -190,16 +181,16 @@ class OperatorPanel:
             self._take(action, now_ns)
         self._pressed.clear()
         speaks = self.attended or self.stopping
-        in_charge = self._found is Mode.ACTIVE and not self.silent(now_ns)
+        in_charge = self._found is canbus.Mode.ACTIVE and not self.silent(now_ns)
         if speaks and not self._spoke and self._armed and not in_charge:
-            self._mode, self._armed = Mode.STANDBY, False
+            self._mode, self._armed = canbus.Mode.STANDBY, False
         self._spoke = speaks
         if not speaks:
             return ()
         # PASSIVE that is asked for again comes after STANDBY
-        waits = self._mode is Mode.PASSIVE and now_ns < self._asks_ns
-        command = OperatorCommand(
-            mode_request=Mode.STANDBY if waits else self._mode,
+        waits = self._mode is canbus.Mode.PASSIVE and now_ns < self._asks_ns
+        command = canbus.OperatorCommand(
+            mode_request=canbus.Mode.STANDBY if waits else self._mode,
             arm=self._armed and now_ns >= self._arms_ns,
             stop=self.stopping,
             reset=now_ns < self._pressed_until_ns[Action.RESET],
@@ -217,7 +208,7 @@ class OperatorPanel:
         self._ticks += 1
         return frames
 
-    def _note_alarm(self, alarm: Alarm, code: Fault, now_ns: int) -> None:
+    def _note_alarm(self, alarm: canbus.Alarm, code: canbus.Fault, now_ns: int) -> None:
         """Keep an alarm, and forget those that the controller no longer repeats."""
         alarms = alarm.alarms or 0
         if alarms:
@@ -237,25 +228,25 @@ class OperatorPanel:
         if action is Action.ARM:
             if not self.stopping:
                 # without another rising edge a second press would do nothing after a fault
-                if self._armed and self._found is not Mode.ACTIVE:
+                if self._armed and self._found is not canbus.Mode.ACTIVE:
                     self._arms_ns = now_ns + EDGE_NS
-                self._mode, self._armed = Mode.ACTIVE, True
+                self._mode, self._armed = canbus.Mode.ACTIVE, True
         elif action in (Action.FORBID, Action.PERMIT):
             self._forbidden = action is Action.FORBID
         elif action in (Action.PASSIVE, Action.DISARM):
             # nor does a wish that is not new bring it back to where it was
-            again = action is Action.PASSIVE and self._mode is Mode.PASSIVE
+            again = action is Action.PASSIVE and self._mode is canbus.Mode.PASSIVE
             if again and self._found not in _UNDER_POWER:
                 self._asks_ns = now_ns + EDGE_NS
-            self._mode, self._armed = Mode.PASSIVE, False
+            self._mode, self._armed = canbus.Mode.PASSIVE, False
         elif action in (Action.STANDBY, Action.STOP):
-            self._mode, self._armed = Mode.STANDBY, False
+            self._mode, self._armed = canbus.Mode.STANDBY, False
 
     def _adopt(self, now_ns: int) -> None:
         """Take over what the controller does: who takes the command is not to change it."""
         mode = None if self.silent(now_ns) else self._found
-        self._armed = mode is Mode.ACTIVE and not self.stopping
+        self._armed = mode is canbus.Mode.ACTIVE and not self.stopping
         if self._armed:
-            self._mode = Mode.ACTIVE
+            self._mode = canbus.Mode.ACTIVE
         else:
-            self._mode = Mode.PASSIVE if mode is Mode.PASSIVE else Mode.STANDBY
+            self._mode = canbus.Mode.PASSIVE if mode is canbus.Mode.PASSIVE else canbus.Mode.STANDBY

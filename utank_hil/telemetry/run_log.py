@@ -17,17 +17,8 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.closing import Closing
 from utank_hil.base.whole_file import left_whole
+from utank_hil.telemetry import frame_log
 from utank_hil.telemetry.events import Event, event_of
-from utank_hil.telemetry.frame_log import (
-    EVENTS,
-    IN_A_SLOT,
-    RECORD,
-    ROWS,
-    FrameLog,
-    FrameLogError,
-    FrameLogWriter,
-    Kind,
-)
 from utank_hil.telemetry.ring import RingKind, RingReader, RowReader
 from utank_hil.telemetry.rotation import make_room, part_of
 
@@ -99,13 +90,13 @@ class RunLogWriter(Closing):
         self._stack.close()
         self._file.close()
 
-    def _begun(self) -> FrameLogWriter:
+    def _begun(self) -> frame_log.FrameLogWriter:
         number = self.report.parts + 1
         file = part_of(self._task.file, number)
         if self._task.keep_bytes is not None:
             make_room(self._task.file, number, self._task.keep_bytes)
         with left_whole(file):
-            begun = FrameLogWriter(file, self._head)
+            begun = frame_log.FrameLogWriter(file, self._head)
         self.report.parts = number
         self._begin_ns: int | None = None
         self._full = False
@@ -121,14 +112,16 @@ class RunLogWriter(Closing):
             raise
 
     def _write_frames(self) -> None:
-        records = np.frombuffer(b"".join(self._frames.read()), dtype=RECORD)
+        records = np.frombuffer(b"".join(self._frames.read()), dtype=frame_log.RECORD)
         if not len(records):
             return
         first_ns, last_ns = (int(records["time_ns"][at]) for at in (0, -1))
-        lost = IN_A_SLOT * self._frames.lost - self.report.records_lost  # Each counts as full.
+        lost = (
+            frame_log.IN_A_SLOT * self._frames.lost - self.report.records_lost
+        )  # Each counts as full.
         if lost:
-            gap = np.zeros(1, dtype=RECORD)
-            gap["kind"], gap["number"], gap["time_ns"] = Kind.LOST, lost, first_ns
+            gap = np.zeros(1, dtype=frame_log.RECORD)
+            gap["kind"], gap["number"], gap["time_ns"] = frame_log.Kind.LOST, lost, first_ns
             records = np.concatenate([gap, records])
         self._file.write(records)
         self.report.records_lost += lost
@@ -138,14 +131,14 @@ class RunLogWriter(Closing):
     def _write_rows(self) -> None:
         rows = self._rows.read_rows()
         if len(rows):
-            self._file.append(ROWS, _packed(rows))
+            self._file.append(frame_log.ROWS, _packed(rows))
             self.report.rows += len(rows)
         self.report.lost = self._rows.lost
 
     def _write_events(self) -> None:
         assert self._events is not None
         if found := self._events.read():
-            self._file.append(EVENTS, b"[" + b",".join(found) + b"]")
+            self._file.append(frame_log.EVENTS, b"[" + b",".join(found) + b"]")
 
 
 def _packed(rows: FloatArray) -> bytes:
@@ -183,19 +176,21 @@ def read_run_log(path: Path, note: Callable[[str], None] | None = None) -> RunLo
 
     Raises `FrameLogError` if the file is no frame log, or holds no telemetry.
     """
-    log = FrameLog(path)
+    log = frame_log.FrameLog(path)
     try:
         about, columns = dict(log.head["about"]), tuple(map(str, log.head.get("columns", ())))
         blocks, events = [], []
         for kind, content in log.others():
-            if kind == ROWS:
+            if kind == frame_log.ROWS:
                 blocks.append(_unpacked(content, len(columns)))
             else:
                 events += [event_of(each) for each in json.loads(content)]
     except (LookupError, TypeError, ValueError, RecursionError, struct.error) as error:
-        raise FrameLogError(f"{path}: its telemetry is damaged: {error}") from error
+        raise frame_log.FrameLogError(f"{path}: its telemetry is damaged: {error}") from error
     if not blocks:
-        raise FrameLogError(f"{path}: holds no telemetry: name a log that utank-hil run wrote")
+        raise frame_log.FrameLogError(
+            f"{path}: holds no telemetry: name a log that utank-hil run wrote"
+        )
     if log.cut and note is not None:
         note(f"{log.cut}; what follows in it is left out")
     return RunLog(about, columns, np.concatenate(blocks), events)

@@ -15,17 +15,8 @@ from typing import Final
 
 import numpy as np
 
+from utank_hil.base import text_files
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.text_files import (
-    VALUES_LIMIT,
-    TextFileError,
-    is_time,
-    kind_of,
-    more_values,
-    read_number_table,
-    refuse_device,
-    since_first,
-)
 from utank_hil.base.whole_file import errors_name, left_whole
 from utank_hil.telemetry.bus_files.log import BusLog, source_of
 from utank_hil.telemetry.bus_logs import LoggedController
@@ -65,15 +56,15 @@ def read_signals(
     `between_s` are kept (`signal_table`); of other files all. ValueError has the file's name, the
     line if any, and the remedy.
     """
-    suffix = kind_of(path)
-    refuse_device(path)
+    suffix = text_files.kind_of(path)
+    text_files.refuse_device(path)
     path.open("rb").close()  # Readers may give a less precise reason.
     if suffix == ".rrd":
         return read_recording(path)
     if not is_table(path):
         columns = signal_table(logged_parts(path, note, channel), names, between_s, path)
     elif suffix == ".csv":
-        columns = _all_in_si(path, read_number_table(path).items())
+        columns = _all_in_si(path, text_files.read_number_table(path).items())
     else:
         columns = _all_in_si(path, _read_parquet(path, note))
     packed = path.suffix.lower() == ".gz"
@@ -91,7 +82,7 @@ def logged_parts(
 
     `from_s` and `to_s` are in seconds from the first record.
     """
-    if kind_of(path) == SUFFIX:
+    if text_files.kind_of(path) == SUFFIX:
         entries = part_of_entries(entries_of(FrameLog(path).blocks(note)), from_s, to_s)
     else:
         notes: list[str] = []
@@ -103,7 +94,7 @@ def logged_parts(
 
 def is_table(path: Path) -> bool:
     """Whether a file is a table of signals by its name, and no table of frames."""
-    return kind_of(path) in TABLE_SUFFIXES and not (path.exists() and source_of(path))
+    return text_files.kind_of(path) in TABLE_SUFFIXES and not (path.exists() and source_of(path))
 
 
 def part_of_entries(
@@ -189,13 +180,15 @@ def even_rows(
     low, high = -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s
     (kept,) = np.nonzero((time_s >= low) & (time_s <= high) | np.isnan(time_s))
     if len(kept) < 3:
-        raise TextFileError(f"{path}: {len(kept)} rows between {low:g} and {high:g} s: too few")
+        raise text_files.TextFileError(
+            f"{path}: {len(kept)} rows between {low:g} and {high:g} s: too few"
+        )
     part_s = time_s[kept]
 
-    def refused(index: int, reason: str) -> TextFileError:
+    def refused(index: int, reason: str) -> text_files.TextFileError:
         row = int(kept[index])
-        place = f"line {row + 2}" if kind_of(path) == ".csv" else f"row {row}"
-        return TextFileError(f"{path}: {place}{reason}")
+        place = f"line {row + 2}" if text_files.kind_of(path) == ".csv" else f"row {row}"
+        return text_files.TextFileError(f"{path}: {place}{reason}")
 
     if not np.isfinite(part_s).all():
         row = int(np.flatnonzero(~np.isfinite(part_s))[0])
@@ -249,10 +242,10 @@ def require(path: Path, columns: Mapping[str, FloatArray], *names: str) -> None:
             other = f", or {' and '.join(_LEVEL_OF_GAUGES)}"
         if name.endswith("_pa"):
             other = f" or {name.removesuffix('_pa')}_kpa"
-        unclear = [column for column in columns if name == "time_s" and is_time(column)]
+        unclear = [column for column in columns if name == "time_s" and text_files.is_time(column)]
         if unclear:
             other = f": name {unclear[0]!r} {name} if it is in seconds"
-        raise TextFileError(
+        raise text_files.TextFileError(
             f"{path}: has no column {name}{other}; in SI units it has {', '.join(columns)}. Name "
             "columns by what they hold and their unit (docs/how-to/logs.md)"
         )
@@ -269,19 +262,21 @@ def _read_parquet(path: Path, note: Callable[[str], None] | None) -> Iterator[_C
             numbers, other = [], []
             for name, kind in zip(file.schema_arrow.names, file.schema_arrow.types, strict=True):
                 number = types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind)
-                dated = types.is_timestamp(kind) and is_time(name)
+                dated = types.is_timestamp(kind) and text_files.is_time(name)
                 fits = number or dated or types.is_boolean(kind)
                 numbers.append(name) if fits else other.append(f"{name} ({kind})")
-            if file.metadata.num_rows * len(numbers) > VALUES_LIMIT:
-                raise more_values(path)
+            if file.metadata.num_rows * len(numbers) > text_files.VALUES_LIMIT:
+                raise text_files.more_values(path)
             table = file.read(columns=numbers)
     except (pyarrow.ArrowException, OSError, UnicodeError) as error:
-        raise TextFileError(f"{path}: is no Parquet file that can be read: {error}") from error
+        raise text_files.TextFileError(
+            f"{path}: is no Parquet file that can be read: {error}"
+        ) from error
     for field, column in zip(table.schema, table.columns, strict=True):
         if types.is_timestamp(field.type):
             seconds = column.cast(pyarrow.timestamp("ns", field.type.tz)).cast(pyarrow.int64())
             values = seconds.cast(pyarrow.float64(), safe=False).to_numpy(zero_copy_only=False)
-            yield since_first(path, field.name, values * 1e-9)
+            yield text_files.since_first(path, field.name, values * 1e-9)
             continue
         if types.is_boolean(field.type):
             column = column.cast(pyarrow.int8())
@@ -289,7 +284,7 @@ def _read_parquet(path: Path, note: Callable[[str], None] | None) -> Iterator[_C
     if other:
         why = f"{path}: columns that are no numbers are left out: {', '.join(other)}"
         if note is None:
-            raise TextFileError(why)
+            raise text_files.TextFileError(why)
         note(why)
 
 
@@ -304,10 +299,10 @@ def _all_in_si(path: Path, columns: Iterable[_Column]) -> Columns:
             both = (
                 f"names {name!r} twice" if name == other else f"{other} and {name} are one signal"
             )
-            raise TextFileError(f"{path}: {both}: remove or rename one")
+            raise text_files.TextFileError(f"{path}: {both}: remove or rename one")
         sources[column], found[column] = name, in_si
     if not found:
-        raise TextFileError(f"{path}: has no column of numbers")
+        raise text_files.TextFileError(f"{path}: has no column of numbers")
     return found
 
 

@@ -32,13 +32,7 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.analysis.loop.margins import (
-    EXTRA_DELAY_S,
-    GAINS,
-    PEAK_SENSITIVITY,
-    of_period,
-    ship_variants,
-)
+from utank_hil.analysis.loop import margins
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control import ConstrainedDesign, DesignPlant, LQGLaw
 from utank_hil.control.constrained.design import sea_plant
@@ -49,7 +43,7 @@ _ORDER: Final = 14
 """Filter states. From 8 to 14 the roll of the shipped laws falls by 1.5 %, to 16 by 0.2 % more."""
 _POLE: Final = 0.7
 """Decay rate of the Laguerre basis over w; from 0.5 to 1 the roll changes by 0.5 %."""
-_BOUND: Final = 0.85 * PEAK_SENSITIVITY
+_BOUND: Final = 0.85 * margins.PEAK_SENSITIVITY
 """Peak sensitivity that the penalty aims at: the required one less 15 %. The 15 % is chosen; no
 study."""
 _POWER: Final = 16  # Exponent of the penalty on the ship's sensitivity. Chosen; no study.
@@ -402,19 +396,19 @@ def _others(
     """
     if plant.calm is not None:
         calm = replace(plant, tank=plant.calm, calm=None)
-        yield calm, 1.0, 1.0, PEAK_SENSITIVITY
+        yield calm, 1.0, 1.0, margins.PEAK_SENSITIVITY
         yield from _others(calm, loads_peak)
-    late = replace(plant, delay_s=plant.delay_s + EXTRA_DELAY_S)
+    late = replace(plant, delay_s=plant.delay_s + margins.EXTRA_DELAY_S)
     yield late, 1.0, 1.0, _OTHERS_PEAK
-    for period_scale, inertia_scale, ship in ship_variants(plant.ship):
+    for period_scale, inertia_scale, ship in margins.ship_variants(plant.ship):
         if period_scale == inertia_scale == 1:
             continue
-        for gain in (GAINS[0], GAINS[-1]):
+        for gain in (margins.GAINS[0], margins.GAINS[-1]):
             yield replace(plant, ship=ship), gain, 1.0, _OTHERS_PEAK
             yield replace(late, ship=ship), gain, 1.0, _OTHERS_PEAK
     if loads_peak is None:
         return
     for scale in _LOADS:
-        loaded = replace(plant, ship=of_period(plant.ship, scale))
+        loaded = replace(plant, ship=margins.of_period(plant.ship, scale))
         for share in _SHARES:
             yield loaded, 1.0, share, loads_peak

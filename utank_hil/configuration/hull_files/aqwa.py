@@ -9,26 +9,20 @@ from typing import Any
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.configuration.hull_files.parts import (
-    Given,
-    floats,
-    half_turn,
-    hull_of,
-    phase_at,
-    rigid_body,
-    text,
-)
+from utank_hil.configuration.hull_files import parts
 from utank_hil.dynamics.hull.hull_data import HullData, wave_number
 
 
-def read_aqwa(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same for all readers
+def read_aqwa(path: Path, given: parts.Given) -> HullData:  # noqa: ARG001, the same for all readers
     """Read an ``.AH1``."""
     blocks = _blocks(path)
     head = [number for row in blocks[""] for number in row]
     bodies, directions, count = (int(each) for each in head[:3])
     if bodies != 1:
         raise ValueError(f"{path}: has {bodies} bodies: one hull is wanted")
-    heading, keep = np.unique(half_turn(np.array(head[3 : 3 + directions])), return_index=True)
+    heading, keep = np.unique(
+        parts.half_turn(np.array(head[3 : 3 + directions])), return_index=True
+    )
     omega = np.array(head[3 + directions : 3 + directions + count])
     for name in ("GENERAL", "COG", "MASS", "HYDSTIFFNESS", "ADDEDMASS", "DAMPING", "FORCERAO"):
         if name not in blocks:
@@ -42,7 +36,7 @@ def read_aqwa(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same f
     lag = np.array(force[..., 1].tolist(), dtype=np.float64)[..., -6:]
     excitation = size[keep] * np.exp(-1j * np.radians(lag[keep]))
     k = wave_number(omega, depth, gravity)
-    body: dict[str, Any] = rigid_body(_matrix(blocks["MASS"], 1))
+    body: dict[str, Any] = parts.rigid_body(_matrix(blocks["MASS"], 1))
     body["gravity_centre_m"] = centre
     viscous = blocks["FIDD"][0][4] if "FIDD" in blocks else 0.0
     notes = [
@@ -50,7 +44,7 @@ def read_aqwa(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same f
         "ADDEDMASS_HF is of 100 rad/s, not the limit: left out" if "ADDEDMASS_HF" in blocks else "",
         "" if viscous else "roll damping is that of waves alone: add the viscous part",
     ]
-    return hull_of(
+    return parts.hull_of(
         path,
         notes,
         frequency_rad_s=omega,
@@ -58,7 +52,7 @@ def read_aqwa(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same f
         damping=_matrices(blocks["DAMPING"], count),
         wave_frequency_rad_s=omega,
         heading_deg=heading,
-        excitation=excitation * phase_at(centre, heading, k),
+        excitation=excitation * parts.phase_at(centre, heading, k),
         hydrostatic=_matrix(blocks["HYDSTIFFNESS"], 1),
         viscous_roll_nms_rad=np.full(count, viscous) if viscous else None,
         reference_m=centre,
@@ -73,10 +67,10 @@ def _blocks(path: Path) -> dict[str, list[list[float]]]:
     """Return the rows of numbers by their key word; those before the first by an empty one."""
     blocks: dict[str, list[list[float]]] = {}
     name = ""
-    for line in text(path).splitlines():
+    for line in parts.text(path).splitlines():
         if line.startswith("*"):
             continue
-        if row := floats(line):
+        if row := parts.floats(line):
             blocks.setdefault(name, []).append(row)
         elif line.strip():
             name = line.split()[0].upper()

@@ -11,16 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
-from utank_hil.configuration.hull_files.parts import (
-    Given,
-    floats,
-    half_turn,
-    hull_of,
-    phase_at,
-    rigid_body,
-    sibling,
-    text,
-)
+from utank_hil.configuration.hull_files import parts
 from utank_hil.configuration.mat_files import read_mat
 from utank_hil.dynamics.hull.hull_data import TO_BODY_AXES, HullData, inverse_shift, wave_number
 
@@ -30,9 +21,9 @@ _LEAST_OF_NEXT = 0.7
 _INFINITE_RAD_S = 10.0  #: MSS writes WAMIT's infinite frequency as this.
 
 
-def read_shipx(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same for all readers
+def read_shipx(path: Path, given: parts.Given) -> HullData:  # noqa: ARG001, the same for all readers
     """Read a ``.re7`` of one speed, zero, and its ``.re8``."""
-    wave_file = sibling(path, ".re8")
+    wave_file = parts.sibling(path, ".re8")
     if wave_file is None:
         raise ValueError(f"{path}: the excitation is missing: put the .re8 beside it")
     rows, other = _rows(path), _rows(wave_file)
@@ -58,7 +49,7 @@ def read_shipx(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same 
     viscous = np.empty((count, 2))
     toward, force = np.empty(headings), np.empty((headings, count, 6), dtype=np.complex128)
     for m in range(headings):
-        toward[m] = half_turn(next(rows)[0] + 180)
+        toward[m] = parts.half_turn(next(rows)[0] + 180)
         next(other)
         for n in range(count):
             omega[n] = next(rows)[0]  # at rest, all headings have the same coefficients
@@ -69,9 +60,9 @@ def read_shipx(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same 
     keep = _sound_rows(radiation[:, 0])
     order = np.argsort(toward)
     reference = np.array([0.0, 0.0, start[4] - draught])
-    body = rigid_body(mass, reference)
+    body = parts.rigid_body(mass, reference)
     body["gravity_centre_m"] = np.array([start[3] - aft, 0.0, above_keel - draught])
-    return hull_of(
+    return parts.hull_of(
         path,
         [
             "added matrices of the run (tanks, fins) are left out"
@@ -109,8 +100,8 @@ _SIGN = np.outer(_FROM_SHIPX, _FROM_SHIPX)
 
 def _rows(path: Path) -> Iterator[list[float]]:
     """Return the rows of numbers after the six lines of text."""
-    for line in text(path).splitlines()[6:]:
-        if row := floats(line):
+    for line in parts.text(path).splitlines()[6:]:
+        if row := parts.floats(line):
             yield row
     raise ValueError(f"{path}: ends too early")
 
@@ -119,7 +110,7 @@ def _square(rows: Iterator[list[float]]) -> FloatArray:
     return np.array([next(rows)[:6] for _ in range(6)])
 
 
-def read_mss(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same for all readers
+def read_mss(path: Path, given: parts.Given) -> HullData:  # noqa: ARG001, the same for all readers
     """Read MSS's structure ``vessel`` of a ``.mat``, up to version 7."""
     try:
         vessel = read_mat(path, squeeze_me=True, struct_as_record=False)["vessel"]
@@ -137,12 +128,12 @@ def read_mss(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same fo
         waves = np.asarray(force.w, dtype=np.float64)
         headings = -np.degrees(np.asarray(vessel.headings, dtype=np.float64))
         density, gravity = float(main.rho), float(main.g)
-        body = rigid_body(_SIGN_MSS * np.asarray(vessel.MRB, dtype=np.float64))
+        body = parts.rigid_body(_SIGN_MSS * np.asarray(vessel.MRB, dtype=np.float64))
     except (OSError, KeyError, AttributeError, IndexError) as error:
         raise ValueError(
             f"{path} is no structure of MSS with a speed of zero: {error!r}"
         ) from error
-    headings = half_turn(headings)
+    headings = parts.half_turn(headings)
     order = np.argsort(headings)
     excitation: ComplexArray = TO_BODY_AXES * (amplitude * np.exp(1j * phase)).transpose(2, 1, 0)
     excitation = excitation[order]
@@ -150,14 +141,14 @@ def read_mss(path: Path, given: Given) -> HullData:  # noqa: ARG001, the same fo
     if hasattr(vessel, "roll"):  # of ShipX: forces refer to the centre's x, matrices to midship
         k = wave_number(waves, np.inf, gravity)
         place = np.array([float(main.CG[0]), 0.0, 0.0])
-        excitation = excitation * phase_at(place, headings[order], k) @ inverse_shift(-place)
+        excitation = excitation * parts.phase_at(place, headings[order], k) @ inverse_shift(-place)
         notes.append("surge added mass and damping are MSS's guesses from sway")
     inside = np.flatnonzero((first > 0) & (first < _INFINITE_RAD_S))
     keep = _sound_rows(added[inside])
     inside = inside[keep]
     notes.append(_NOT_SOUND if keep.start else "")
     limit = added[first == _INFINITE_RAD_S]
-    return hull_of(
+    return parts.hull_of(
         path,
         notes,
         frequency_rad_s=first[inside],

@@ -17,28 +17,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from utank_hil.configuration.hull_files.parts import (
-    GRAVITY_M_S2,
-    Given,
-    floats,
-    hull_of,
-    mode,
-    rigid_body,
-    sibling,
-    table,
-    text,
-)
+from utank_hil.configuration.hull_files import parts
 from utank_hil.dynamics.hull.hull_data import HullData
 
 _TURNS = np.array([0, 0, 0, 1, 1, 1])
 _PAIR = _TURNS[:, None] + _TURNS
 
 
-def read_wamit(path: Path, given: Given) -> HullData:
+def read_wamit(path: Path, given: parts.Given) -> HullData:
     """Read the files beside a ``.1``."""
-    rows = table(path, 4)
+    rows = parts.table(path, 4)
     _refuse_gaps(path, [row[:1] for row in rows])
-    config = text(found) if (found := sibling(path, ".cfg")) else ""
+    config = parts.text(found) if (found := parts.sibling(path, ".cfg")) else ""
     by_frequency = _option(config, "IPEROUT")
     if by_frequency not in (1, 2):
         raise ValueError(f"{path}: first column is a wave number (IPEROUT {by_frequency}): use 1")
@@ -47,7 +37,7 @@ def read_wamit(path: Path, given: Given) -> HullData:
     body: dict[str, Any] = {}
     lift_kgm = 0.0
     density = given.density_kg_m3
-    if force := sibling(path, ".frc"):
+    if force := parts.sibling(path, ".frc"):
         density, body, lift_kgm = _body(force, _option(config, "IALTFRC"), given, place)
     if density is None:
         raise ValueError(f"{path}: density_kg_m3 is missing: WAMIT's numbers are non-dimensional")
@@ -60,34 +50,36 @@ def read_wamit(path: Path, given: Given) -> HullData:
 
     first = {at(row[0]): np.zeros((2, 6, 6)) for row in rows}
     for row in rows:
-        i, j = mode(path, row[1]), mode(path, row[2])
+        i, j = parts.mode(path, row[1]), parts.mode(path, row[2])
         first[at(row[0])][:, i, j] = [*row[3:5], 0.0][:2]
     scale = density * unit_m ** (3 + _PAIR)
     omega = np.array(sorted(w for w in first if 0 < w < np.inf))
-    forces = sibling(path, ".3") or sibling(path, ".2")
+    forces = parts.sibling(path, ".3") or parts.sibling(path, ".2")
     if forces is None:
         raise ValueError(f"{path}: the excitation is missing: put the .3 or .2 beside it")
-    force_rows = np.array([[at(row[0]), *row[1:7]] for row in table(forces, 7)])
+    force_rows = np.array([[at(row[0]), *row[1:7]] for row in parts.table(forces, 7)])
     _refuse_gaps(forces, force_rows[:, :2])
     waves, headings = np.unique(force_rows[:, 0]), np.unique(force_rows[:, 1])
     excitation = np.zeros((len(headings), len(waves), 6), dtype=np.complex128)
     where = (
         np.searchsorted(headings, force_rows[:, 1]),
         np.searchsorted(waves, force_rows[:, 0]),
-        np.array([mode(forces, number) for number in force_rows[:, 2]]),
+        np.array([parts.mode(forces, number) for number in force_rows[:, 2]]),
     )
     excitation[where] = force_rows[:, 5] + 1j * force_rows[:, 6]
     hydrostatic = None
-    if stiff := sibling(path, ".hst"):
+    if stiff := parts.sibling(path, ".hst"):
         hydrostatic = np.zeros((6, 6))
-        for row in table(stiff, 3):
-            hydrostatic[mode(stiff, row[0]), mode(stiff, row[1])] = row[2]
+        for row in parts.table(stiff, 3):
+            hydrostatic[parts.mode(stiff, row[0]), parts.mode(stiff, row[1])] = row[2]
         hydrostatic = hydrostatic * density * gravity * unit_m ** (2.0 + _PAIR)
         hydrostatic[[3, 4], [3, 4]] -= lift_kgm * gravity
-    return hull_of(
+    return parts.hull_of(
         path,
         [
-            "" if sibling(path, ".gdf") else "no .gdf beside it: ULEN is taken as 1 m, g as 9.81",
+            ""
+            if parts.sibling(path, ".gdf")
+            else "no .gdf beside it: ULEN is taken as 1 m, g as 9.81",
             "roll damping is that of waves alone: add the viscous part",
         ],
         frequency_rad_s=omega,
@@ -124,27 +116,27 @@ def _option(config: str, name: str) -> int:
 
 
 def _unit_and_gravity(path: Path) -> tuple[float, float]:
-    if (found := sibling(path, ".gdf")) is None:
-        return 1.0, GRAVITY_M_S2
-    lines = text(found).splitlines()
-    numbers = floats(lines[1]) if len(lines) > 1 else []
+    if (found := parts.sibling(path, ".gdf")) is None:
+        return 1.0, parts.GRAVITY_M_S2
+    lines = parts.text(found).splitlines()
+    numbers = parts.floats(lines[1]) if len(lines) > 1 else []
     if len(numbers) < 2:
         raise ValueError(f"{found}: line 2 must hold ULEN and GRAV")
     return numbers[0], numbers[1]
 
 
 def _body(
-    path: Path, form: int, given: Given, place: list[float]
+    path: Path, form: int, given: parts.Given, place: list[float]
 ) -> tuple[float | None, dict[str, Any], float]:
     """Return density, and mass, centre and inertia of the ``.frc``, as far as it has them.
 
     To that comes the mass times the height of the given centre above that of the ``.hst``.
     """
-    lines = [floats(line) for line in text(path).splitlines()[1:]]
+    lines = [parts.floats(line) for line in parts.text(path).splitlines()[1:]]
     lines = [line for line in lines if line][1:]  # without the options
     origin = np.array(place)
     if form == 2:
-        body = rigid_body(np.array(lines[3:9])[:, :6], origin) if lines[2][0] else {}
+        body = parts.rigid_body(np.array(lines[3:9])[:, :6], origin) if lines[2][0] else {}
         return lines[0][0], body | {"gravity_centre_m": lines[1][:3] + origin}, 0.0
     z_m, about_origin = lines[0][0], np.array([line[:3] for line in lines[1:4]])
     if given.mass_kg is None or given.gravity_centre_m is None:
@@ -163,14 +155,14 @@ def _body(
 
 def _place(path: Path) -> tuple[list[float], float]:
     """Return the body's origin in global axes, and the depth, of the ``.pot``."""
-    if (found := sibling(path, ".pot")) is None:
+    if (found := parts.sibling(path, ".pot")) is None:
         return [0.0, 0.0, 0.0], np.inf
-    lines = text(found).splitlines()
+    lines = parts.text(found).splitlines()
     names = [n for n, line in enumerate(lines) if n and ".gdf" in line.lower()]
     if names:  # IALTPOT 2: depth in line 2, XBODY after the body's file
-        depth, place = floats(lines[1])[0], floats(lines[names[0] + 1])[:4]
+        depth, place = parts.floats(lines[1])[0], parts.floats(lines[names[0] + 1])[:4]
     else:
-        row = next(numbers for line in lines[1:] if len(numbers := floats(line)) >= 5)
+        row = next(numbers for line in lines[1:] if len(numbers := parts.floats(line)) >= 5)
         depth, place = row[0], row[1:5]
     if place[3] != 0:
         raise ValueError(f"{found}: the body is turned by {place[3]:g} degrees (XBODY): use 0")

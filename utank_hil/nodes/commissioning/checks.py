@@ -28,16 +28,7 @@ from utank_hil.base.tick import TICK_S
 from utank_hil.control.interface import DesignPlant
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.tank import GRAVITY_M_S2
-from utank_hil.nodes.commissioning.precision import (
-    ROLL_SCALE,
-    SCALE,
-    Record,
-    columns_of,
-    filtered,
-    instruments,
-    push_of,
-    times_needed,
-)
+from utank_hil.nodes.commissioning import precision
 from utank_hil.nodes.commissioning.pulses import PulsePlan, ValveStroke
 from utank_hil.safety.monitors.thresholds import ZERO_HEEL_DEG
 from utank_hil.safety.situation import VALVE_OFF
@@ -96,7 +87,7 @@ def stopped_ms(shares: Sequence[float], share: float = STOPPED) -> float:
 
 
 def judge_rest(
-    rest: Record, plant: DesignPlant, plan: PulsePlan | None, volume_m: float
+    rest: precision.Record, plant: DesignPlant, plan: PulsePlan | None, volume_m: float
 ) -> list[Check]:
     """Zeros of the sensors, and whether ship and water are still enough for pulses.
 
@@ -130,7 +121,7 @@ def judge_rest(
             Check("level_still", "level about its mean, RMS", float(level_m.std()), 0.0,
                   STILL * plan.level_m, "m", wait),
         ]  # fmt: skip
-        noise = math.sqrt(times_needed(rest, plan.of_noise) / plan.most_times)
+        noise = math.sqrt(precision.times_needed(rest, plan.of_noise) / plan.most_times)
         checks.append(
             Check("noise", "noise at rest, by what the longest pulses average", noise, 0.0, 1.0,
                   "1", "Take gauges and a pressure sensor with less noise by this factor, "
@@ -206,16 +197,20 @@ class Each(NamedTuple, Generic[_T]):
 
 
 _SCALES: Final = (
-    ("pressure", "pump pressure, by the command", SCALE),
-    ("port_level", "port level, by the pump pressure", SCALE),
-    ("starboard_level", "starboard level, by the pump pressure", SCALE),
-    ("roll", "roll, by what it does to the water", ROLL_SCALE),
+    ("pressure", "pump pressure, by the command", precision.SCALE),
+    ("port_level", "port level, by the pump pressure", precision.SCALE),
+    ("starboard_level", "starboard level, by the pump pressure", precision.SCALE),
+    ("roll", "roll, by what it does to the water", precision.ROLL_SCALE),
     ("roll_rate", "roll rate, by the roll", RATE_SCALE),
 )  #: Check, what is judged, and tolerance of each scale.
 
 
 def judge_pulses(
-    rest: Record, pulses: Record, plant: DesignPlant, plan: PulsePlan, sample_time_s: float
+    rest: precision.Record,
+    pulses: precision.Record,
+    plant: DesignPlant,
+    plan: PulsePlan,
+    sample_time_s: float,
 ) -> list[Check]:
     """Judge the records at rest, and from the moment at which the first pulse began.
 
@@ -224,20 +219,20 @@ def judge_pulses(
     """
 
     def moved(name: str) -> FloatArray:
-        return filtered(pulses[name] - rest[name].mean(), plant, sample_time_s)
+        return precision.filtered(pulses[name] - rest[name].mean(), plant, sample_time_s)
 
     roll, rate, pressure = map(moved, ("roll_rad", "roll_rate_rad_s", "pressure_pa"))
     port, starboard = -moved("port_level_m"), moved("starboard_level_m")
     promised_pa = _promised(pulses["command_pa"], plant, sample_time_s)
-    promised = filtered(promised_pa, plant, sample_time_s)
+    promised = precision.filtered(promised_pa, plant, sample_time_s)
     mass, _, stiffness = coupled_matrices(plant.ship, plant.tank)
-    push = push_of(roll, plant)
-    known = instruments(pulses["command_pa"], plant, sample_time_s)
+    push = precision.push_of(roll, plant)
+    known = precision.instruments(pulses["command_pa"], plant, sample_time_s)
     of_tank, of_roll = known[:5], known[5:]
     pushed = pressure[_VALUE] / plant.tank.density_kg_m3
     # a pressure of nothing but zero fits any water: there is then no equation
     fits = [
-        _least_squares(list((of_tank @ columns_of(gauge, push).T).T), of_tank @ pushed)
+        _least_squares(list((of_tank @ precision.columns_of(gauge, push).T).T), of_tank @ pushed)
         if _moves(gauge, plan.level_m) and pushed.any()
         else None
         for gauge in (port, starboard)
@@ -303,8 +298,8 @@ def remedies_of(scales: Each[float]) -> Each[str]:
         no_pump = "The pump gives no pressure, or its sensor shows none. Check both."
         return Each(no_pump, *["Without pressure nothing moves."] * 4)
     # whoever is compared with a wrong pressure shows the inverse of its scale
-    sensor = abs(pressure - 1) > SCALE and all(
-        abs(pressure * gauge - 1) <= 2 * SCALE for gauge in (port, starboard)
+    sensor = abs(pressure - 1) > precision.SCALE and all(
+        abs(pressure * gauge - 1) <= 2 * precision.SCALE for gauge in (port, starboard)
     )
     if sensor:
         of_pressure = (
@@ -337,7 +332,7 @@ def remedies_of(scales: Each[float]) -> Each[str]:
     ]
     if roll == 0:
         of_roll = of_rate = "The motion sensor shows no roll: check it and its cable."
-    elif sensor and abs(roll / pressure - 1) <= 2 * ROLL_SCALE:
+    elif sensor and abs(roll / pressure - 1) <= 2 * precision.ROLL_SCALE:
         of_roll, of_rate = agrees, "Correct the sign or scaling of the roll rate."
     elif roll < 0:
         of_roll = "The roll has the wrong sign: it is positive starboard down. " + (

@@ -6,19 +6,8 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any, Final
 
+from utank_hil import canbus
 from utank_hil.base.tick import TICK_NS, Schedule
-from utank_hil.canbus import (
-    ControlWord,
-    DriveState,
-    Frame,
-    OperatorCommand,
-    Quality,
-    SensorMotion,
-    SensorPump,
-    SensorTank,
-    ValveState,
-    ValveStatus,
-)
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.profiles import drive_plan as cia
 from utank_hil.canbus.profiles.acting import device_of
@@ -39,20 +28,22 @@ TURNED_SHARE: Final = 0.25
 """Of the roll: its integrated rate may differ by so much, for a sensor that is tilted by hand."""
 BACK_S: Final = 5.0  #: For a device to measure again after its power is back.
 PATIENCE_S: Final = 3600.0  #: For a person.
-GOOD: Final = (Quality.GOOD, Quality.DEGRADED)
+GOOD: Final = (canbus.Quality.GOOD, canbus.Quality.DEGRADED)
 MOVES: Final[dict[type[tuple[Any, ...]], tuple[tuple[str, float, str, str], ...]]] = {
-    SensorMotion: (("roll_rad", math.radians(1.0), "rad",
+    canbus.SensorMotion: (("roll_rad", math.radians(1.0), "rad",
                     "Heel the ship, or tilt the sensor, to starboard by two degrees or more"),),
-    SensorTank: (("port_level_m", 0.05, "m", "Raise the port level, or its float, by 0.1 m"),
+    canbus.SensorTank: (("port_level_m", 0.05, "m", "Raise the port level, or its float, by 0.1 m"),
                  ("starboard_level_m", 0.05, "m", "Raise the starboard level by 0.1 m")),
-    OperatorCommand: (("stop", 1.0, "", "Press stop, and hold it"),
+    canbus.OperatorCommand: (("stop", 1.0, "", "Press stop, and hold it"),
                       ("acknowledge", 1.0, "", "Let it go, press acknowledge, and hold that"),
                       ("arm", 1.0, "", "Let it go, and turn the key to arm")),
-    SensorPump: (("pressure_pa", 500.0, "Pa", "Press with 0.1 m of water on the starboard side"),),
+    canbus.SensorPump: (
+        ("pressure_pa", 500.0, "Pa", "Press with 0.1 m of water on the starboard side"),
+    ),
 }  # fmt: skip
 """What is moved by hand: value, least move in its unit, and what to do."""
 
-Script = Iterator[list[Frame]]
+Script = Iterator[list[canbus.Frame]]
 Ask = Callable[[str], Callable[[], bool]]
 """Asks a person to do something; what is returned says, each tick, whether it is done."""
 
@@ -75,10 +66,10 @@ class Trial(ABC):
         """The frames of each tick, as long as the trial lasts."""
 
     @abstractmethod
-    def receive(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame: canbus.Frame, now_ns: int) -> None:
         """Take what is the device's."""
 
-    def tick(self, now_ns: int) -> list[Frame]:
+    def tick(self, now_ns: int) -> list[canbus.Frame]:
         """Go on with the script."""
         self.now_ns = now_ns
         frames = next(self._script, None)
@@ -86,7 +77,7 @@ class Trial(ABC):
         return frames or []
 
     @abstractmethod
-    def _frames(self) -> list[Frame]:
+    def _frames(self) -> list[canbus.Frame]:
         """The frames of a tick in which nothing is asked of the device."""
 
     def _wait(self, seconds: float, until: Callable[[], bool] = lambda: False) -> Script:
@@ -118,13 +109,13 @@ class SensorTrial(Trial):
         self._wakes = Schedule(SILENT_NS)
         super().__init__(ask)
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame: canbus.Frame, now_ns: int) -> None:
         """Take what is the device's."""
         taker = self._device.takers.get(frame.can_id)
         if taker is not None:
             taker.take(frame, now_ns)
 
-    def _frames(self) -> list[Frame]:
+    def _frames(self) -> list[canbus.Frame]:
         frames = [] if self._setup is None else self._setup.frames(self.now_ns)
         if self._wakes.due(self.now_ns) and (wake := self._device.wake(self.now_ns)) is not None:
             frames.append(wake)
@@ -174,11 +165,13 @@ class SensorTrial(Trial):
         return sum(sum(each.rejected.values()) for each in self._device.watched)
 
     def _usable(self, message: tuple[Any, ...]) -> bool:
-        if isinstance(message, OperatorCommand):  # it is delivered only if it is usable
+        if isinstance(message, canbus.OperatorCommand):  # it is delivered only if it is usable
             return True
-        if isinstance(message, ValveStatus):
-            return message.state is ValveState.FOLLOWING and math.isfinite(message.opening)
-        values = message[: 1 if self._plan.kind is SensorPump else 2]  # a flow need not be there
+        if isinstance(message, canbus.ValveStatus):
+            return message.state is canbus.ValveState.FOLLOWING and math.isfinite(message.opening)
+        values = message[
+            : 1 if self._plan.kind is canbus.SensorPump else 2
+        ]  # a flow need not be there
         return message[-1] in GOOD and all(map(math.isfinite, values))
 
     def _judge_pace(self) -> None:
@@ -199,7 +192,7 @@ class SensorTrial(Trial):
         ]  # fmt: skip
 
     def _move(self, value: str, least: float, unit: str, what: str) -> Script:
-        turns = self._plan.kind is SensorMotion
+        turns = self._plan.kind is canbus.SensorMotion
         self._heard = []
         yield from self._wait(1.0)
         at_rest, begun = self._mean(value), len(self._heard) - 1
@@ -246,7 +239,7 @@ class ValveTrial(SensorTrial):
         self._told, self._speaks = valve.fail_opening, False
         super().__init__(plan, ask, listen_s)
 
-    def _frames(self) -> list[Frame]:
+    def _frames(self) -> list[canbus.Frame]:
         frames = super()._frames()
         if not self._speaks or self.now_ns // TICK_NS % (cia.COMMAND_MS * 1_000_000 // TICK_NS):
             return frames
@@ -283,7 +276,7 @@ TURN_S: Final = 1.0
 CONFIGURED_S: Final = 15.0  #: Some forty entries at 0.3 s each, as slow as a server may be.
 STATE_S: Final = 2.0  #: For a change of state; a drive that charges its capacitors takes one.
 IDENTITY: Final = cia.Place(0x1018, 1)  #: Read-only by CiA 301.
-_ENABLED: Final = DriveState.OPERATION_ENABLED
+_ENABLED: Final = canbus.DriveState.OPERATION_ENABLED
 
 
 class DriveTrial(Trial):
@@ -292,14 +285,14 @@ class DriveTrial(Trial):
     def __init__(self, plan: cia.DrivePlan, pump: Pump, ask: Ask) -> None:
         self._plan, self._drive = plan, CanopenDrive(plan)
         self._target = SHARE * (pump.max_torque_nm if plan.mode.torque else pump.max_speed_rad_s)
-        self._word, self._pushes, self._speaks = ControlWord.DISABLE_VOLTAGE, False, True
+        self._word, self._pushes, self._speaks = canbus.ControlWord.DISABLE_VOLTAGE, False, True
         self._tag = plan.bus << BUS_SHIFT | STANDARD
         self._answer: cia.Answer | None = None
-        self._state: DriveState | None = None
+        self._state: canbus.DriveState | None = None
         self._speed_rad_s = math.nan
         super().__init__(ask)
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame: canbus.Frame, now_ns: int) -> None:
         """Take what is the drive's; what it says by SDO counts as what it says by PDO."""
         taker = self._drive.takers.get(frame.can_id)
         if taker is None:
@@ -318,11 +311,11 @@ class DriveTrial(Trial):
                 speed = (got.value ^ 1 << 31) - (1 << 31)
                 self._speed_rad_s = speed * self._plan.speed_rad_s_per_unit
 
-    def stop(self, now_ns: int) -> list[Frame]:  # noqa: ARG002
+    def stop(self, now_ns: int) -> list[canbus.Frame]:  # noqa: ARG002
         """Leave the drive braking, however the trial ends."""
         return self._drive.stop()
 
-    def _frames(self) -> list[Frame]:
+    def _frames(self) -> list[canbus.Frame]:
         cycle = self.now_ns // TICK_NS % (cia.COMMAND_MS * 1_000_000 // TICK_NS)
         if self._speaks:
             frames = self._drive.frames(self.now_ns)
@@ -334,11 +327,11 @@ class DriveTrial(Trial):
         place = (cia.SPEED, cia.STATUS_WORD)[self.now_ns // (cia.COMMAND_MS * 1_000_000) % 2]
         return [*self._command()[1:-1], self._request(cia.read_request(place))]
 
-    def _command(self) -> list[Frame]:
+    def _command(self) -> list[canbus.Frame]:
         return self._drive.follow(self._target if self._pushes else 0.0, self._word)
 
-    def _request(self, data: bytes) -> Frame:
-        return Frame(self._tag | cia.SDO_REQUEST + self._plan.node, data)
+    def _request(self, data: bytes) -> canbus.Frame:
+        return canbus.Frame(self._tag | cia.SDO_REQUEST + self._plan.node, data)
 
     def script(self) -> Script:
         """Configure, try what must be refused, turn and stop in two ways."""
@@ -346,7 +339,7 @@ class DriveTrial(Trial):
         yield from self._configure(self._drive.setup)
         if not self._drive.setup.done:
             return
-        yield from self._wait(STATE_S, lambda: self._state is DriveState.SWITCH_ON_DISABLED)
+        yield from self._wait(STATE_S, lambda: self._state is canbus.DriveState.SWITCH_ON_DISABLED)
         yield from self._refusals()
         yield from self._stop("quick_stop", "quick stop to standstill", speaks=True)
         yield from self._stop(
@@ -354,12 +347,12 @@ class DriveTrial(Trial):
         )
 
     def _refusals(self) -> Script:
-        self._word = ControlWord.ENABLE_OPERATION
+        self._word = canbus.ControlWord.ENABLE_OPERATION
         yield from self._wait(10 * cia.COMMAND_MS * 1e-3)
         what = "it is not enabled out of its order of states"
         remedy = "By CiA 402-2 it goes through ready and switched on: look at its settings."
         self._flag("leap", what, remedy, right=self._state is not _ENABLED)
-        self._word, self._answer = ControlWord.DISABLE_VOLTAGE, None
+        self._word, self._answer = canbus.ControlWord.DISABLE_VOLTAGE, None
         yield [self._request(cia.write_request(IDENTITY, 0, 4))]
         yield from self._wait(STATE_S, lambda: self._answer is not None)
         refused = self._answer is not None and self._answer.abort != 0
@@ -384,7 +377,7 @@ class DriveTrial(Trial):
         remedy = "Look at the sign of pressure_pa_per_unit or speed_rad_s_per_unit, and the echo."
         said = f"it turns as commanded, {speed_rad_s:.3g} rad/s"
         self._flag(f"{name}_turns", said, remedy, right=turns)
-        self._pushes, self._word, self._speaks = False, ControlWord.QUICK_STOP, speaks
+        self._pushes, self._word, self._speaks = False, canbus.ControlWord.QUICK_STOP, speaks
         shares: list[float] = []
         end_ns = self.now_ns + round(SETTLED_S * SECOND_NS)
         while self.now_ns < end_ns:
@@ -397,4 +390,4 @@ class DriveTrial(Trial):
         yield from self._wait(STATE_S / 2)
         remedy = "It must not run on: set 6007h, 605Ah and 605Eh, or take another drive."
         self._flag(f"{name}_off", "it is off afterwards", remedy, right=self._state is not _ENABLED)
-        self._speaks, self._word = True, ControlWord.DISABLE_VOLTAGE
+        self._speaks, self._word = True, canbus.ControlWord.DISABLE_VOLTAGE
