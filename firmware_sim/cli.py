@@ -9,8 +9,6 @@ with quietly_interruptible():
     from pathlib import Path
     from typing import Annotated
 
-    import typer
-
     import utank_hil.console.single_thread  # noqa: F401, first: it must run before numpy loads
     from utank_hil.console.common import failures_named
 
@@ -32,16 +30,16 @@ app = common.new_app("Ship emulator, sensors, pump drive and operator panel on a
 
 @app.command()
 def firmware_sim(
-    scenario: Annotated[Path, typer.Argument(help="Scenario file.")],
-    bus: Annotated[str, typer.Option(help="CAN interface, for example can0 or vcan0.")],
+    scenario: Annotated[Path, common.argument("Scenario file.")],
+    bus: Annotated[str, common.option("CAN interface, for example can0 or vcan0.")],
     seed: common.Seed = None,
     duration: common.Duration = None,
     without: Annotated[
         str,
-        typer.Option(
-            metavar="NODES",
-            help="Emulated nodes to leave out, with hardware in their place: some of "
+        common.option(
+            "Emulated nodes to leave out, with hardware in their place: some of "
             f"{', '.join(ship_side.NODE_NAMES)}.",
+            metavar="NODES",
         ),
     ] = "",
     json_: common.Json = False,

@@ -9,7 +9,7 @@ from rich.progress import MofNCompleteColumn
 
 from utank_hil.base.provenance import describe
 from utank_hil.configuration import ConfigError
-from utank_hil.console.common import OUT, AllowCode, Json, fail, fail_with, prepare_out, print_json
+from utank_hil.console import common
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, notes, progress_bar, shown
 
@@ -19,19 +19,16 @@ if TYPE_CHECKING:
 
 def campaign(
     context: typer.Context,
-    study: Annotated[Path, typer.Argument(help="Study file, such as configs/studies/*.yaml.")],
+    study: Annotated[Path, common.argument("Study file, such as configs/studies/*.yaml.")],
     out: Annotated[
-        Path | None,
-        typer.Option(help="Folder for the results.", show_default="out/NAME OF THE FILE"),
+        Path | None, common.option("Folder for the results.", default="out/NAME OF THE FILE")
     ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Compute only what the folder does not hold yet.")
+        bool, common.option("Compute only what the folder does not hold yet.", "--resume")
     ] = False,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes.", show_default="one a core")
-    ] = None,
-    json_: Json = False,
-    allow_code: AllowCode = False,
+    workers: Annotated[int | None, common.option("Processes.", default="one a core", min=1)] = None,
+    json_: common.Json = False,
+    allow_code: common.AllowCode = False,
 ) -> None:
     """Run the cases of a study, keep their figures as Parquet, and compare the laws.
 
@@ -48,22 +45,22 @@ def campaign(
     try:
         loaded = load_study(study, allow_code=allow_code)
     except ConfigError as error:
-        fail_with(error)
-    folder = OUT / study.stem if out is None else out
-    prepare_out(folder, FILES, keep=False)
+        common.fail_with(error)
+    folder = common.OUT / study.stem if out is None else out
+    common.prepare_out(folder, FILES, keep=False)
     store = Store(folder)
     try:
         store.begin(loaded, _about(loaded, folder, context.params), resume=resume)
         interrupted = _run(loaded, store, workers or len(os.sched_getaffinity(0)))
         results = read_results(folder)
     except StoreError as error:
-        fail(error)
+        common.fail(error)
     groups = summary(results)
     failed = failures(results)
     content = {**results.about, "interrupted": interrupted, "groups": groups, "failures": failed}
     store.write_json(SUMMARY, content)
     if json_:
-        print_json(content)
+        common.print_json(content)
     else:
         _print(loaded, groups, failed)
         Terminal().say(f"results: {shown(folder)}")
@@ -109,7 +106,7 @@ def _run(loaded: "LoadedStudy", store: Any, workers: int) -> bool:
     except KeyboardInterrupt:
         return True
     except OtherCodeError as error:
-        fail(error)
+        common.fail(error)
     return False
 
 

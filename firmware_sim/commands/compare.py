@@ -5,10 +5,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-import typer
 from rich.table import Table
 
-from utank_hil.console.common import Json, fail, print_json
+from utank_hil.console.common import Json, argument, fail, print_json
 from utank_hil.console.terminal import Terminal, new_table, shown
 
 if TYPE_CHECKING:
@@ -23,8 +22,8 @@ _SCALES: Final = {
 
 
 def compare(
-    reference: Annotated[Path, typer.Argument(help="Bench folder; or a recording, log or table.")],
-    others: Annotated[list[Path], typer.Argument(help="One or more of the same kind.")],
+    reference: Annotated[Path, argument("Bench folder; or a recording, log or table.")],
+    others: Annotated[list[Path], argument("One or more of the same kind.")],
     json_: Json = False,
 ) -> None:
     """Compare runs or recordings with the first: differences with 95 % intervals.

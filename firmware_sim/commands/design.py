@@ -18,7 +18,7 @@ from utank_hil.analysis.tank_sizing import moving, tank_cost, with_duct_loss
 from utank_hil.base.provenance import describe
 from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import ControllerConfig, Vessel
-from utank_hil.console.common import OUT, Json, Out, fail, load, new_app, prepare_out, print_json
+from utank_hil.console import common
 from utank_hil.console.ship_report import order_words
 from utank_hil.console.terminal import Terminal, new_table, notes
 from utank_hil.control import BuiltLaw, DesignPlant, PumpLimits
@@ -37,19 +37,17 @@ DISPLACEMENTS = (0.85, 1.0, 1.15)
 
 SeaOption = Annotated[
     Path | None,
-    typer.Option(
-        help="Scenario whose sea counts.", show_default="scenario.yaml beside, or a shipped one"
-    ),
+    common.option("Scenario whose sea counts.", default="scenario.yaml beside, or a shipped one"),
 ]
-Ship = Annotated[Path, typer.Argument(help="Ship, tank and pump: a file of configs/ships.")]
+Ship = Annotated[Path, common.argument("Ship, tank and pump: a file of configs/ships.")]
 
 
 def tank(
     context: typer.Context,
     vessel: Ship,
     scenario: SeaOption = None,
-    out: Out = OUT,
-    json_: Json = False,
+    out: common.Out = common.OUT,
+    json_: common.Json = False,
 ) -> None:
     """Say what a tank costs the ship and what it does in a sea, beside the best passive one.
 
@@ -64,13 +62,13 @@ def tank(
     from firmware_sim.tank_report import interval_words, loading_table, rolls
     from utank_hil.pictures.tank import draw_tank
 
-    loaded = load(vessel, Vessel)
+    loaded = common.load(vessel, Vessel)
     try:
         best = best_passive_tank(loaded.ship, loaded.tank)
         if loaded.tank.quadratic_loss:
             best = with_duct_loss(loaded.ship, best)
     except ValueError as error:
-        fail(error)
+        common.fail(error)
     tanks = {"present": loaded.tank, "best": best}
     path = scenario or usual_scenario(loaded, vessel)
     console = Terminal()
@@ -78,14 +76,14 @@ def tank(
     if path is None:
         figures |= {name: _figures(loaded, each, None) for name, each in tanks.items()}
         if json_:
-            print_json(figures)
+            common.print_json(figures)
             return
         console.table(_table(loaded, tanks, {}))
         console.say("Name a sea with --scenario for the roll to be expected.")
         return
     chosen, waves = _sea(path, loaded)
     name = chosen.name
-    out = prepare_out(out, (PICTURE, FIGURES))
+    out = common.prepare_out(out, (PICTURE, FIGURES))
     with notes.busy(f"{loaded.name}: a law for each tank, and what a bench would give"):
         benches = {key: _bench(chosen, loaded, each, waves) for key, each in tanks.items()}
         found = {key: predict(*bench) for key, bench in benches.items()}
@@ -121,23 +119,23 @@ def _keep(figures: dict[str, Any], picture: Path, file: Path, *, json_: bool) ->
     figures["files"] = {key: str(path) for key, path in files.items()}
     write_whole(file, json.dumps(figures, indent=2) + "\n")
     if json_:
-        print_json(figures)
+        common.print_json(figures)
     return files
 
 
 def filling(
     context: typer.Context,
-    vessel: Annotated[Path, typer.Argument(help="Ship with displacement, and tank with roof.")],
+    vessel: Annotated[Path, common.argument("Ship with displacement, and tank with roof.")],
     scenario: SeaOption = None,
     gm: Annotated[
         list[float] | None,
-        typer.Option(help="GM without the tank's free surface, in m; may be given again."),
+        common.option("GM without the tank's free surface, in m; may be given again."),
     ] = None,
     displacement: Annotated[
-        list[float] | None, typer.Option(help="Displacement in t; may be given again.")
+        list[float] | None, common.option("Displacement in t; may be given again.")
     ] = None,
-    out: Out = OUT,
-    json_: Json = False,
+    out: common.Out = common.OUT,
+    json_: common.Json = False,
 ) -> None:
     """Say how far to fill the tank, by displacement and GM: the still level that rolls her least.
 
@@ -150,16 +148,16 @@ def filling(
     from firmware_sim.tank_report import filling_table
     from utank_hil.pictures.tank import draw_filling
 
-    loaded = load(vessel, Vessel)
+    loaded = common.load(vessel, Vessel)
     path = scenario or usual_scenario(loaded, vessel)
     if path is None:
-        fail(f"{vessel}: no shipped scenario has this ship: name a sea with --scenario")
+        common.fail(f"{vessel}: no shipped scenario has this ship: name a sea with --scenario")
     for name, values in (("--gm", gm), ("--displacement", displacement)):
         if any(not 0 < value < math.inf for value in values or ()):
-            fail(f"{name}: must be above 0")
+            common.fail(f"{name}: must be above 0")
     ship, (chosen, waves) = loaded.ship, _sea(path, loaded)
     if not ship.displacement_n > 0:
-        fail(f"{vessel}: ship.displacement_t is needed to tell GM from stiffness: state it")
+        common.fail(f"{vessel}: ship.displacement_t is needed to tell GM from stiffness: state it")
     own_t, own_m = ship.displacement_n / 9806.65, ship.stiffness_nm_rad / ship.displacement_n
     loads_t = displacement or [share * own_t for share in DISPLACEMENTS]
     gms_m = gm or [share * own_m for share in GMS]
@@ -167,8 +165,8 @@ def filling(
     try:
         found = fillings(_plant(loaded), waves, loadings)
     except ValueError as error:
-        fail(f"{vessel}: {error}")
-    out = prepare_out(out, ("filling.png", "filling.json"))
+        common.fail(f"{vessel}: {error}")
+    out = common.prepare_out(out, ("filling.png", "filling.json"))
     about = describe("design filling", loaded, out, options=context.params, scenario=chosen)
     title = f"{loaded.name}: filling for {chosen.name}"
     draw_filling(found, out / "filling.png", title, about)
@@ -188,18 +186,18 @@ def _sea(path: Path, vessel: Vessel) -> "tuple[Scenario, Harmonics]":
     """
     from utank_hil.analysis.loop.sea_response import CalmSeaError
 
-    scenario = load(path, Scenario, allow_code=True)  # laws are not built from it
+    scenario = common.load(path, Scenario, allow_code=True)  # laws are not built from it
     if scenario.vessel.version != vessel.version:
         if scenario.hull is not None or scenario.fmu is not None:
-            fail(f"{path}: plant: {scenario.plant} is {scenario.vessel.name}, not {vessel.name}; "
-                 "name a scenario with plant: roll")  # fmt: skip
+            why = f"plant: {scenario.plant} is {scenario.vessel.name}, not {vessel.name}"
+            common.fail(f"{path}: {why}; name a scenario with plant: roll")
         others = {"vessel": vessel, "controllers": {}, "actual_ship": {}, "voyage": ()}
         scenario = scenario.model_copy(update=others | {"gusts": None})
     waves = scenario.pooled_wave_moment()
     try:
         expected_sea(vessel.ship, waves)
     except CalmSeaError as error:
-        fail(f"{path}: sea: {error}; name another scenario with --scenario")
+        common.fail(f"{path}: sea: {error}; name another scenario with --scenario")
     return scenario, waves
 
 
@@ -272,11 +270,11 @@ def usual_scenario(vessel: Vessel, file: Path) -> Path | None:
     beside = file.with_name("scenario.yaml")
     shipped = [STORM, *sorted(STORM.parent.glob("*.yaml"))]
     usual = [beside, *shipped] if beside.exists() else shipped
-    own = (p for p in usual if load(p, _VesselOfScenario).vessel.version == vessel.version)
+    own = (p for p in usual if common.load(p, _VesselOfScenario).vessel.version == vessel.version)
     return next(own, None)
 
 
-design = new_app(
+design = common.new_app(
     "Design a tank: what it could be, and what it would cost.\n\n"
     "**Example:** utank-hil design tank configs/ships/naval_vessel.yaml"
 )

@@ -11,7 +11,7 @@ from rich.progress import MofNCompleteColumn
 
 from utank_hil.base.provenance import describe
 from utank_hil.base.shipped import CONFIGS
-from utank_hil.console.common import KILLED, Json, fail, load, print_json
+from utank_hil.console.common import KILLED, Json, argument, fail, load, option, print_json
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, progress_bar
 
@@ -26,19 +26,16 @@ ROLLS_IN_CHARGE: Final = 5  #: Rolls over which an own ship with its law is comp
 
 
 def faults(
-    campaign: Annotated[
-        Path, typer.Argument(help="Campaign file.", show_default="the fault table")
-    ] = CAMPAIGN,
-    seeds: Annotated[int, typer.Option(min=1, help="Seas, from seed 1 on.")] = 5,
+    campaign: Annotated[Path, argument("Campaign file.", default="the fault table")] = CAMPAIGN,
+    seeds: Annotated[int, option("Seas, from seed 1 on.", min=1)] = 5,
     rows: Annotated[
-        str, typer.Option(metavar="NAMES", help="Rows or requirements, or the beginnings of names.")
+        str, option("Rows or requirements, or the beginnings of names.", metavar="NAMES")
     ] = "",
     scenario: Annotated[
-        Path | None,
-        typer.Option(help="Your ship in the place of the first, with its first controller."),
+        Path | None, option("Your ship in the place of the first, with its first controller.")
     ] = None,
     full: Annotated[
-        bool, typer.Option(help="Compare the roll over 600 s, as is asked for: ten times the work.")
+        bool, option("Compare the roll over 600 s, as is asked for: ten times the work.")
     ] = False,
     json_: Json = False,
 ) -> None:

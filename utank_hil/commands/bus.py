@@ -12,7 +12,7 @@ from utank_hil.canbus.line_names import DEFAULT_BIT_RATE, LINES, SLCAN
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.configuration.files import ConfigError, kind_of
 from utank_hil.configuration.vessel import Vessel
-from utank_hil.console.common import Json, fail, load, print_json
+from utank_hil.console.common import Json, argument, fail, load, option, print_json
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.telemetry.bus_census import BusCensus
@@ -21,22 +21,17 @@ from utank_hil.telemetry.bus_files.log import READ, BusLog
 
 
 def bus(
-    place: Annotated[str, typer.Argument(help=f"CAN interface, or a log of it: {READ}.")],
-    ship: Annotated[
-        Path | None, typer.Option(help="Controller or ship whose file is compared.")
-    ] = None,
+    place: Annotated[str, argument(f"CAN interface, or a log of it: {READ}.")],
+    ship: Annotated[Path | None, option("Controller or ship whose file is compared.")] = None,
     interface: Annotated[
-        str,
-        typer.Option(help="With a log: the interface that it is of, as the ship's file has it."),
+        str, option("With a log: the interface that it is of, as the ship's file has it.")
     ] = "",
-    channel: Annotated[
-        str | None, typer.Option(help="With a log of several buses: the one to list.")
-    ] = None,
+    channel: Annotated[str | None, option("With a log of several buses: the one to list.")] = None,
     seconds: Annotated[
-        float, typer.Option(min=0.5, max=3600, help="How long to listen to an interface.")
+        float, option("How long to listen to an interface.", min=0.5, max=3600)
     ] = 5.0,
     bit_rate: Annotated[
-        int | None, typer.Option(min=10_000, max=1_000_000, help="Of the bus, for its load.")
+        int | None, option("Of the bus, for its load.", min=10_000, max=1_000_000)
     ] = None,
     json_: Json = False,
 ) -> None:

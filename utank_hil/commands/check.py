@@ -19,7 +19,7 @@ from utank_hil.configuration.files import ConfigError, files_named, kind_of
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.console import ship_report
 from utank_hil.console.admission import judge_law
-from utank_hil.console.common import AllowCode, Json, fail, load, print_json, warnings_of
+from utank_hil.console.common import AllowCode, Json, argument, fail, load, print_json, warnings_of
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Command, Terminal, new_table, run_command
 from utank_hil.control import BuiltLaw
@@ -268,7 +268,7 @@ GROUP = "utank_hil.collections"
 
 
 def check(
-    config: Annotated[Path, typer.Argument(help="Controller, scenario or ship.")],
+    config: Annotated[Path, argument("Controller, scenario or ship.")],
     json_: Json = False,
     allow_code: AllowCode = False,
 ) -> None:

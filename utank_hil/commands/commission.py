@@ -16,7 +16,7 @@ from utank_hil.canbus.ports import open_port, why_other_bit_rate
 from utank_hil.commands import commissioning_record
 from utank_hil.commands.lines import Lines, printed_lines
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.console.common import Bus, Config, Json, fail, load, print_json, why_not_writable
+from utank_hil.console import common
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.loops import opened, scheduled
 from utank_hil.console.terminal import Terminal, notes, shown
@@ -28,17 +28,17 @@ SAY_TICKS: Final = 500  #: Ticks between two lines about one stage.
 
 
 def commission(
-    config: Config,
-    channel: Bus,
+    config: common.Config,
+    channel: common.Bus,
     record: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Where the record goes; without it beside the configuration, with the ending "
+        common.option(
+            "Where the record goes; without it beside the configuration, with the ending "
             ".commissioning.json.",
+            metavar="FILE",
         ),
     ] = None,
-    json_: Json = False,
+    json_: common.Json = False,
 ) -> None:
     """Check every sensor, the pump and the valve at the quay, and write the record of it.
 
@@ -50,15 +50,15 @@ def commission(
 
     **Example:** utank-hil commission configs/controllers/gpc.yaml --bus can0
     """
-    loaded = load(config, ControllerConfig, allow_code=True)  # The law is not built.
+    loaded = common.load(config, ControllerConfig, allow_code=True)  # The law is not built.
     if other := why_other_bit_rate(channel, loaded.bit_rate):
-        fail(f"{config}: bit_rate: {other}")
+        common.fail(f"{config}: bit_rate: {other}")
     path = record or commissioning_record.record_path(config)
-    reason = commissioning_record.why_not_replaceable(path) or why_not_writable(
+    reason = commissioning_record.why_not_replaceable(path) or common.why_not_writable(
         path.parent, (path.name,)
     )
     if reason:
-        fail(f"{reason}; choose another place with --record")
+        common.fail(f"{reason}; choose another place with --record")
     statistics = LoopStatistics()
     with ExitStack() as stack:
         bus = opened(lambda: open_port(channel, loaded.vessel.foreign))
@@ -76,7 +76,7 @@ def commission(
         try:
             node = build_commissioning_node(loaded, statistics=statistics, event_sink=tell)
         except ValueError as error:
-            fail(f"{config}: vessel: {error}")
+            common.fail(f"{config}: vessel: {error}")
         guide = Guide(node, lines)
         notes.say(
             f"{loaded.name} on {channel}: about {node.duration_s:.0f} s; Ctrl-C ends it, and then "
@@ -101,11 +101,11 @@ def commission(
     # The exit code reports the end if the output is full or gone (Rich ends by SystemExit).
     with suppress(OSError, SystemExit):
         if json_:
-            print_json({**made, "record": str(path)})
+            common.print_json({**made, "record": str(path)})
         else:
             _print(made, path, config, code=loaded.law.kind == "python")
     if unwritten:
-        fail(unwritten)
+        common.fail(unwritten)
     raise typer.Exit(ExitCode.OK if made["passed"] else ExitCode.REFUSED)
 
 
@@ -116,9 +116,9 @@ def _give_up(stage: Stage, path: Path) -> NoReturn:
         try:
             commissioning_record.remove_record(path)
         except OSError as error:
-            fail(f"{what}, and the one before can't be removed: {error}; remove it")
+            common.fail(f"{what}, and the one before can't be removed: {error}; remove it")
         what += ", and the one before is removed"
-    fail(what, ExitCode.INTERRUPTED)
+    common.fail(what, ExitCode.INTERRUPTED)
 
 
 class Guide:

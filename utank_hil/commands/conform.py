@@ -15,7 +15,7 @@ from utank_hil.commands.commission import print_checks
 from utank_hil.commands.commissioning_record import listed, made_with, write_record
 from utank_hil.configuration.devices import ROLES
 from utank_hil.configuration.vessel import Vessel
-from utank_hil.console.common import Bus, Json, fail, load, print_json, why_not_writable
+from utank_hil.console import common
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.loops import opened
 from utank_hil.console.terminal import Terminal, notes, shown
@@ -24,20 +24,18 @@ from utank_hil.runners import RealTimeLoop
 
 
 def conform(
-    device: Annotated[str, typer.Argument(help="Its key in section devices, as motion or pump.")],
-    channel: Bus,
-    ship: Annotated[Path, typer.Option(help="Ship whose section devices has the device.")],
-    record: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Where the record goes.")
-    ] = None,
+    device: Annotated[str, common.argument("Its key in section devices, as motion or pump.")],
+    channel: common.Bus,
+    ship: Annotated[Path, common.option("Ship whose section devices has the device.")],
+    record: Annotated[Path | None, common.option("Where the record goes.", metavar="FILE")] = None,
     seconds: Annotated[
-        float, typer.Option(min=1.0, max=3600, help="How long to measure a sensor's pace.")
+        float, common.option("How long to measure a sensor's pace.", min=1.0, max=3600)
     ] = 10.0,
     hand_s: Annotated[
         float | None,
-        typer.Option(min=0.5, max=600, help="Wait so long for each step by hand, not for Enter."),
+        common.option("Wait so long for each step by hand, not for Enter.", min=0.5, max=600),
     ] = None,
-    json_: Json = False,
+    json_: common.Json = False,
 ) -> None:
     """Put a device of another maker through its profile, and write the record of it.
 
@@ -50,15 +48,15 @@ def conform(
     """
     from utank_hil.canbus.socketcan import SocketCanPort
 
-    vessel = load(ship, Vessel)
+    vessel = common.load(ship, Vessel)
     path = record or Path(f"{device}.conformance.json")
-    if reason := why_not_writable(path.parent, (path.name,)):
-        fail(f"{reason}; choose another place with --record")
+    if reason := common.why_not_writable(path.parent, (path.name,)):
+        common.fail(f"{reason}; choose another place with --record")
     trial, silent = trial_of(vessel, device, ship, asks(hand_s), seconds)
     with opened(lambda: SocketCanPort(channel, standard=True, receive_only=silent)) as (port, stop):
         RealTimeLoop([trial], port).run(lambda: trial.done or stop())
     if not trial.done:
-        fail("ended before all was checked; there is no record", ExitCode.INTERRUPTED)
+        common.fail("ended before all was checked; there is no record", ExitCode.INTERRUPTED)
     passed, checks = all(each.passed for each in trial.checks), listed(trial.checks)
     made = {
         **made_with(vessel, ship, channel),
@@ -69,7 +67,7 @@ def conform(
     }
     write_record(path, made)
     if json_:
-        print_json({**made, "record": str(path)})
+        common.print_json({**made, "record": str(path)})
     else:
         console = Terminal()
         print_checks(console, f"{device} of {vessel.name}", checks)
@@ -85,9 +83,9 @@ def trial_of(
     devices = vessel.devices
     names = (*ROLES, "pump")
     if device not in names:
-        fail(f"no device {device!r}: there are {', '.join(names)}")
+        common.fail(f"no device {device!r}: there are {', '.join(names)}")
     if devices is None or getattr(devices, device).native:
-        fail(f"{file}: devices.{device} is native: utank-hil commission checks it")
+        common.fail(f"{file}: devices.{device} is native: utank-hil commission checks it")
     if device == "pump":
         assert vessel.pump is not None  # else the file would have been refused
         return conformance.DriveTrial(devices.pump.plan(0, vessel.pump), vessel.pump, ask), False
@@ -115,7 +113,7 @@ def asks(hand_s: float | None) -> conformance.Ask:
             if not select.select([sys.stdin], [], [], 0)[0]:
                 return False
             if not sys.stdin.readline():
-                fail("the input has ended: use --hand-s where nobody is there")
+                common.fail("the input has ended: use --hand-s where nobody is there")
             return True
 
         return entered

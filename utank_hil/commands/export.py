@@ -9,7 +9,7 @@ from typing import Annotated, TypeVar
 
 import typer
 
-from utank_hil.console.common import Channel, Json, Run, chosen_run, fail, print_json
+from utank_hil.console import common
 from utank_hil.console.terminal import notes, say_note, shown
 from utank_hil.telemetry import signal_files
 from utank_hil.telemetry.bus_files.frame import BusFrame
@@ -28,26 +28,26 @@ _T = TypeVar("_T")
 def export(
     recording: Annotated[
         Path,
-        typer.Argument(
-            help=f"Frame log ({SUFFIX}), recording (.rrd), table (.csv, .parquet) or log of the "
+        common.argument(
+            f"Frame log ({SUFFIX}), recording (.rrd), table (.csv, .parquet) or log of the "
             f"bus ({READ})."
         ),
     ],
     to: Annotated[
         Path,
-        typer.Option(
+        common.option(
+            "Frames: .log (candump), .asc, .blf. Signals: .csv, .parquet. Overwritten.",
             metavar="FILE",
-            help="Frames: .log (candump), .asc, .blf. Signals: .csv, .parquet. Overwritten.",
         ),
     ],
-    run: Run = None,
-    channel: Channel = None,
+    run: common.Run = None,
+    channel: common.Channel = None,
     from_s: Annotated[
         float | None,
-        typer.Option("--from", metavar="SECONDS", help="From the first record; of logs only."),
+        common.option("From the first record; of logs only.", "--from", metavar="SECONDS"),
     ] = None,
     until_s: Annotated[float | None, typer.Option("--until", metavar="SECONDS")] = None,
-    json_: Json = False,
+    json_: common.Json = False,
 ) -> None:
     """Write frames or signals of a recording in a format that other programs read.
 
@@ -58,15 +58,17 @@ def export(
     """
     kind = to.suffix.lower()
     if kind not in (*BUS_SUFFIXES, *signal_files.TABLE_SUFFIXES):
-        fail(f"--to {to}: its suffix says the format, one of {_FORMATS}")
+        common.fail(f"--to {to}: its suffix says the format, one of {_FORMATS}")
     if to.exists() and recording.exists() and os.path.samefile(recording, to):
-        fail(f"--to {to} is what is read: name another file")
+        common.fail(f"--to {to} is what is read: name another file")
     if run is not None and recording.suffix.lower() != ".rrd":
-        fail("--run is for recordings (.rrd), which hold several: leave it out")
+        common.fail("--run is for recordings (.rrd), which hold several: leave it out")
     if channel is not None and recording.suffix.lower() == SUFFIX:
-        fail(f"--channel is for logs of the bus, which may hold several; {SUFFIX} are of one")
+        common.fail(
+            f"--channel is for logs of the bus, which may hold several; {SUFFIX} are of one"
+        )
     if not (-math.inf if from_s is None else from_s) < (math.inf if until_s is None else until_s):
-        fail("--from must be before --until")
+        common.fail("--from must be before --until")
     between = (from_s, until_s) != (None, None)
     said: list[str] = []
     try:
@@ -77,9 +79,9 @@ def export(
             count, unit = write_frames(to, frames, said), "frames"
         elif recording.suffix.lower() == ".rrd" or signal_files.is_table(recording):
             if between or channel is not None:
-                fail("--channel, --from and --until are for logs: a table is exported whole")
+                common.fail("--channel, --from and --until are for logs: a table is exported whole")
             runs = signal_files.read_signals(recording, said.append)
-            name = chosen_run(recording, runs, run)
+            name = common.chosen_run(recording, runs, run)
             signal_files.require(recording, runs[name], "time_s")
             signal_files.write_signals(to, [runs[name]])
             count, unit = len(runs[name]["time_s"]), "rows"
@@ -89,11 +91,11 @@ def export(
                 parts = _some(to, (part for part in parts if len(part["time_s"])))
             count, unit = signal_files.export_parts(to, parts), "rows"
     except (OSError, ValueError) as error:
-        fail(error)
+        common.fail(error)
     for text in said:
         say_note(text)
     if json_:
-        print_json({"file": str(to), unit: count, "cut": "; ".join(said)})
+        common.print_json({"file": str(to), unit: count, "cut": "; ".join(said)})
     else:
         notes.say(f"{shown(to)}: {count} {unit}")
 

@@ -161,19 +161,19 @@ def identify_log(
     context: typer.Context,
     log: Annotated[
         Path,
-        typer.Argument(
-            help="With pulses of the pump in it: .rrd, .frames, .csv, .parquet, log of the bus."
+        common.argument(
+            "With pulses of the pump in it: .rrd, .frames, .csv, .parquet, log of the bus."
         ),
     ],
     config: Annotated[
-        Path, typer.Argument(help="Controller configuration: signals, design, ship to begin with.")
+        Path, common.argument("Controller configuration: signals, design, ship to begin with.")
     ],
     run: common.Run = None,
     channel: common.Channel = None,
     from_s: common.From = None,
     to_s: common.To = None,
     order: Annotated[
-        int | None, typer.Option(min=2, help="Of the ARX model, instead of the configuration's.")
+        int | None, common.option("Of the ARX model, instead of the configuration's.", min=2)
     ] = None,
     out: common.Out = common.OUT,
     json_: common.Json = False,

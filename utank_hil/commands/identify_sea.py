@@ -26,16 +26,14 @@ SHORTEST_S = 120.0  #: Of a record; its ends rise and fall over 20 s.
 
 def sea(
     context: typer.Context,
-    log: Annotated[
-        Path, typer.Argument(help="With roll and levels: .rrd, .frames, .csv, bus log.")
-    ],
-    ship: Annotated[Path, typer.Option(help="Ship as it was loaded: by `identify`, if need be.")],
+    log: Annotated[Path, common.argument("With roll and levels: .rrd, .frames, .csv, bus log.")],
+    ship: Annotated[Path, common.option("Ship as it was loaded: by `identify`, if need be.")],
     run: common.Run = None,
     channel: common.Channel = None,
     from_s: common.From = None,
     to_s: common.To = None,
     slope: Annotated[
-        float, typer.Option(min=0.05, max=1.0, help="Effective slope coefficient of the scenario.")
+        float, common.option("Effective slope coefficient of the scenario.", min=0.05, max=1.0)
     ] = 1.0,
     out: common.Out = common.OUT,
     json_: common.Json = False,

@@ -15,7 +15,7 @@ from utank_hil.analysis.motion.inclining import inclining
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.provenance import describe
 from utank_hil.configuration import Vessel
-from utank_hil.console.common import OUT, From, Json, Out, To, fail, load, prepare_out, print_json
+from utank_hil.console import common
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, new_table, notes
 from utank_hil.dynamics.tank import GRAVITY_M_S2
@@ -25,14 +25,14 @@ PICTURE = "decay.png"
 
 def decay(
     context: typer.Context,
-    record: Annotated[Path, typer.Argument(help="Roll against time: a log or a table.")],
+    record: Annotated[Path, common.argument("Roll against time: a log or a table.")],
     ship: Annotated[
-        Path | None, typer.Option(help="Ship whose GM turns the quadratic part into its key.")
+        Path | None, common.option("Ship whose GM turns the quadratic part into its key.")
     ] = None,
-    from_s: From = None,
-    to_s: To = None,
-    out: Out = OUT,
-    json_: Json = False,
+    from_s: common.From = None,
+    to_s: common.To = None,
+    out: common.Out = common.OUT,
+    json_: common.Json = False,
 ) -> None:
     """Find roll period and damping in a free decay, with intervals of 95 %.
 
@@ -46,8 +46,8 @@ def decay(
     from utank_hil.pictures.identification import draw_decay
 
     if from_s is not None and to_s is not None and from_s >= to_s:
-        fail(f"--from {from_s:g} is not before --to {to_s:g}")
-    vessel = None if ship is None else load(ship, Vessel)
+        common.fail(f"--from {from_s:g} is not before --to {to_s:g}")
+    vessel = None if ship is None else common.load(ship, Vessel)
     low_s, high_s = -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s
     time_s, roll_rad = _columns(record, "time_s", "roll_rad", between_s=(low_s, high_s))
     part = (time_s >= low_s) & (time_s <= high_s)
@@ -55,7 +55,7 @@ def decay(
         found = roll_decay(time_s[part], roll_rad[part])
     except ValueError as error:
         refuse(f"{record}: {error}; --from and --to choose a part", json_)
-    out = prepare_out(out, (PICTURE,))
+    out = common.prepare_out(out, (PICTURE,))
     about = (
         {} if vessel is None else describe("identify decay", vessel, out, options=context.params)
     )
@@ -74,7 +74,7 @@ def decay(
         for name, value in asdict(found).items()
         if name not in ("time_s", "roll_rad", "fit_rad")
     }
-    print_json(about | plain | {"ship": keys, "warnings": warnings, "picture": str(path)})
+    common.print_json(about | plain | {"ship": keys, "warnings": warnings, "picture": str(path)})
 
 
 def ship_keys(found: RollDecay, vessel: Vessel | None) -> dict[str, float]:
@@ -92,11 +92,11 @@ def ship_keys(found: RollDecay, vessel: Vessel | None) -> dict[str, float]:
 
 
 def inclining_test(
-    record: Annotated[Path, typer.Argument(help="Table: moment_nm, and heel_rad or heel_deg.")],
+    record: Annotated[Path, common.argument("Table: moment_nm, and heel_rad or heel_deg.")],
     displacement_t: Annotated[
-        float, typer.Option("--displacement", min=1e-3, help="Of the ship as it lay, t.")
+        float, common.option("Of the ship as it lay, t.", "--displacement", min=1e-3)
     ],
-    json_: Json = False,
+    json_: common.Json = False,
 ) -> None:
     """Find GM in an inclining test: a row a position of the weights.
 
@@ -110,7 +110,7 @@ def inclining_test(
     except ValueError as error:
         refuse(f"{record}: {error}", json_)
     if json_:
-        print_json(found._asdict())
+        common.print_json(found._asdict())
         return
     low, high = found.interval_m
     terminal = Terminal()
@@ -127,7 +127,7 @@ def _columns(
         run = list(read_signals(path, names=names, between_s=between_s).values())[-1]
         require(path, run, *names)
     except (OSError, ValueError) as error:
-        fail(error)
+        common.fail(error)
     return [run[name] for name in names]
 
 
@@ -135,7 +135,7 @@ def refuse(reason: str, json_: bool) -> NoReturn:
     """Print why nothing follows from a record, and end."""
     notes.say(reason, red="refused:")
     if json_:
-        print_json({"accepted": False, "reasons": [reason]})
+        common.print_json({"accepted": False, "reasons": [reason]})
     raise typer.Exit(ExitCode.REFUSED)
 
 

@@ -8,9 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Final
 
-import typer
-
-from utank_hil.console.common import Json, fail, print_json
+from utank_hil.console.common import Json, argument, fail, print_json
 from utank_hil.console.terminal import notes, say_note
 from utank_hil.telemetry.frame_log import SUFFIX
 
@@ -28,10 +26,10 @@ _NICENESS: Final = 5  #: Below what controls, above idle.
 def monitor(
     source: Annotated[
         str | None,
-        typer.Argument(
-            help="A log of a run (.frames), a bench's recording (.rrd) or folder, the process "
+        argument(
+            "A log of a run (.frames), a bench's recording (.rrd) or folder, the process "
             "number of a run, or the address of a stream.",
-            show_default="the controller or bench in real time that runs on this machine",
+            default="the controller or bench in real time that runs on this machine",
         ),
     ] = None,
     json_: Json = False,

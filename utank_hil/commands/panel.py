@@ -10,8 +10,6 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Annotated, Final
 
-import typer
-
 from utank_hil import canbus
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus.ports import open_port
@@ -20,7 +18,7 @@ from utank_hil.commands.lines import printed_lines
 from utank_hil.commands.web_panel.desk import LASTING, Desk, Instruments
 from utank_hil.commands.web_panel.server import ServerProcess
 from utank_hil.configuration.vessel import Vessel
-from utank_hil.console.common import Bus, Duration, Json, fail, load, print_json, why
+from utank_hil.console import common
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.loops import opened
 from utank_hil.nodes.panel import SILENT_NS, Action, OperatorPanel
@@ -198,19 +196,19 @@ LISTEN = "127.0.0.1:8047"  #: Where the page is, by default; no well-known servi
 
 
 def panel(
-    vessel: Annotated[Path, typer.Argument(help="Ship, tank and pump: a file of configs/ships.")],
-    bus: Bus,
-    duration: Duration = None,
+    vessel: Annotated[Path, common.argument("Ship, tank and pump: a file of configs/ships.")],
+    bus: common.Bus,
+    duration: common.Duration = None,
     second: Annotated[
-        bool, typer.Option("--second", help="Be the second station; it watches until it takes.")
+        bool, common.option("Be the second station; it watches until it takes.", "--second")
     ] = False,
     web: Annotated[
-        bool, typer.Option("--web", help="Serve a page for a browser, on this machine alone.")
+        bool, common.option("Serve a page for a browser, on this machine alone.", "--web")
     ] = False,
     listen: Annotated[
-        str, typer.Option(metavar="ADDRESS:PORT", help="Where --web listens; port 0: a free one.")
+        str, common.option("Where --web listens; port 0: a free one.", metavar="ADDRESS:PORT")
     ] = LISTEN,
-    json_: Json = False,
+    json_: common.Json = False,
 ) -> None:
     """Operate the controller from the keyboard: type an action and Enter; Enter alone stops.
 
@@ -226,7 +224,7 @@ def panel(
 
     **Example:** utank-hil panel configs/ships/thesis_first.yaml --bus can0 --web
     """
-    loaded = load(vessel, Vessel)
+    loaded = common.load(vessel, Vessel)
     catalogue = canbus.load_catalogue()
     station = canbus.Station.OPERATOR_2 if second else canbus.Station.OPERATOR
     node = OperatorPanel(
@@ -259,9 +257,11 @@ def panel(
 
         RealTimeLoop(nodes, heard).run(look, None if duration is None else round(duration * 1e9))
     if json_:
-        print_json(_as_json(node))
+        common.print_json(_as_json(node))
     if desk is not None and desk.ended:
-        fail("the process that serves the page has ended: start the panel again", ExitCode.SYSTEM)
+        common.fail(
+            "the process that serves the page has ended: start the panel again", ExitCode.SYSTEM
+        )
 
 
 def _as_json(node: OperatorPanel) -> dict[str, object]:
@@ -285,8 +285,10 @@ def _server(listen: str) -> ServerProcess:
     except (OSError, UnicodeError):  # no such name, or none that could be one
         address = ""
     if address in ("", "0.0.0.0") or not (port.isdecimal() and int(port) < 1 << 16):
-        fail(f"--listen {listen}: name one address of this machine and a port, as {LISTEN}")
+        common.fail(f"--listen {listen}: name one address of this machine and a port, as {LISTEN}")
     try:
         return ServerProcess(address, int(port))
     except OSError as error:
-        fail(f"--listen {listen}: {why(error)}; port 0 takes a free one", ExitCode.SYSTEM)
+        common.fail(
+            f"--listen {listen}: {common.why(error)}; port 0 takes a free one", ExitCode.SYSTEM
+        )

@@ -16,7 +16,7 @@ from utank_hil.base.finite import finite
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import kernels, machine
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.console.common import AllowCode, Channel, Json, fail, load
+from utank_hil.console.common import AllowCode, Channel, Json, argument, fail, load, option
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, say_note
 from utank_hil.telemetry.bus_files.log import BusLog
@@ -33,21 +33,18 @@ from utank_hil.telemetry.replay_head import ReplayHeadError, few, recorded_confi
 def replay(
     log: Annotated[
         Path,
-        typer.Argument(
-            help=f"Frame log ({SUFFIX}) of a run, its first part; or a log of the bus, such as "
+        argument(
+            f"Frame log ({SUFFIX}) of a run, its first part; or a log of the bus, such as "
             "candump's."
         ),
     ],
     config: Annotated[
-        Path | None,
-        typer.Option(help="Controller configuration to replay with, instead of the recorded one."),
+        Path | None, option("Controller configuration to replay with, instead of the recorded one.")
     ] = None,
     channel: Channel = None,
     explain: Annotated[
         int | None,
-        typer.Option(
-            min=0, metavar="TICK", help="Print the way of a tick, from its frames to its command."
-        ),
+        option("Print the way of a tick, from its frames to its command.", min=0, metavar="TICK"),
     ] = None,
     json_: Json = False,
     allow_code: AllowCode = False,

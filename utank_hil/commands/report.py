@@ -3,18 +3,14 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from utank_hil.console.common import Json, fail, print_json
+from utank_hil.console.common import Json, argument, fail, option, print_json
 from utank_hil.console.terminal import notes, say_note, shown
 from utank_hil.telemetry.frame_log import SUFFIX
 
 
 def report(
-    recording: Annotated[Path, typer.Argument(help="Log of `utank-hil run` (.frames).")],
-    out: Annotated[
-        Path | None, typer.Option(help="The page; beside the recording if not given.")
-    ] = None,
+    recording: Annotated[Path, argument("Log of `utank-hil run` (.frames).")],
+    out: Annotated[Path | None, option("The page; beside the recording if not given.")] = None,
     json_: Json = False,
 ) -> None:
     """Write one HTML page of a recording: it needs no network and prints well.

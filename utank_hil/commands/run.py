@@ -55,33 +55,32 @@ def run(
     duration: common.Duration = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            help="Folder for recording, log, and configurations of ships that retuning finds; "
+        common.option(
+            "Folder for recording, log, and configurations of ships that retuning finds; "
             "without it there are none."
         ),
     ] = None,
     keep: Annotated[
         float | None,
-        typer.Option(
+        common.option(
+            "Remove the folder's oldest recordings beyond so much; without it none are.",
             metavar="MB",
             min=0,
             max=1e9,  # A float without a limit may be infinite.
-            help="Remove the folder's oldest recordings beyond so much; without it none are.",
         ),
     ] = None,
     record: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Record of utank-hil commission, if it is not beside the configuration.",
+        common.option(
+            "Record of utank-hil commission, if it is not beside the configuration.", metavar="FILE"
         ),
     ] = None,
     outward: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="URL",
-            help="Show alarms to the ship's systems: udp:// or iec450://ADDRESS:PORT (IEC 61162), "
+        common.option(
+            "Show alarms to the ship's systems: udp:// or iec450://ADDRESS:PORT (IEC 61162), "
             "modbus://ADDRESS:PORT; may be repeated.",
+            metavar="URL",
         ),
     ] = None,
     json_: common.Json = False,
