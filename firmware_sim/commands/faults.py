@@ -79,8 +79,9 @@ def faults(
             stopped,
         )
         interrupted = stopped()
-    partly = [row.id for row in chosen if len(outcomes[row.id]) < seeds]
-    results = [judged(loaded, row, outcomes[row.id]) for row in chosen if row.id not in partly]
+    ended_early = any(len(outcomes[row.id]) < seeds for row in chosen)
+    begun = [row for row in chosen if outcomes[row.id]]
+    results = [judged(loaded, row, outcomes[row.id]) for row in begun]
     not_run = {
         each.id: f"{each.fault}: shown by {each.elsewhere}"
         for each in loaded.shown_elsewhere(names)
@@ -92,18 +93,20 @@ def faults(
         if row.id not in kept
     }
     not_run |= {row.id: "takes long: --full or --rows" for row in too_long}
-    killed = bool(partly) and not interrupted
-    not_run |= dict.fromkeys(partly, KILLED if killed else INTERRUPTED)
+    killed = ended_early and not interrupted
+    not_begun = [row.id for row in chosen if row not in begun]
+    not_run |= dict.fromkeys(not_begun, KILLED if killed else INTERRUPTED)
     options = {"seeds": seeds, "full": full, "rows": names, "scenario": str(scenario or "")}
     about = describe("faults", loaded, Path(), options=options, seed=1)
     if json_:
         print_json(as_json(results, not_run, about))
     else:
-        _print(results)
+        _print(results, seeds)
         failed = sum(not result.passed for result in results)
         Terminal().say(
-            f"{len(results)} rows in {seeds} sea{'s' * (seeds > 1)}, {failed} failed, "
-            f"{len(not_run)} not run; roll compared over {window.stopped_s:g} s, "
+            f"{len(results)} row{'s' * (len(results) != 1)} in {'up to ' * ended_early}{seeds} "
+            f"sea{'s' * (seeds > 1)}, {failed} failed, {len(not_run)} not run; "
+            f"roll compared over {window.stopped_s:g} s, "
             f"in charge over {window.running_s:g} s; {time.monotonic() - began:.0f} s."
         )
     if killed:
@@ -136,11 +139,12 @@ def _window(campaign: "Campaign") -> "Window":
     return Window(600.0, max(20.0, round(rolls_s)))
 
 
-def _print(results: Sequence["Result"]) -> None:
+def _print(results: Sequence["Result"], seeds: int) -> None:
     from firmware_sim.fault_campaign.verdict import table
 
     console = Terminal()
-    console.table(table(results))
+    if results:
+        console.table(table(results, seeds))
     for result in results:
         for problem in result.problems:
             console.say(problem, red=f"{result.row.id}:")

@@ -258,8 +258,11 @@ def as_json(
     }
 
 
-def table(results: Sequence[Result]) -> Table:
-    """Table with two lines a row, what was found above what is asked for."""
+def table(results: Sequence[Result], seeds: int) -> Table:
+    """Table with two lines a row, what was found above what is asked for.
+
+    A row that lacks some of the seeds says how many it has.
+    """
     drawn = Table(title="Faults")
     drawn.add_column("row\n  reaction, alarms", no_wrap=True)
     for heading in ("found\nms", "zero\nms", "roll\nvar.", ""):
@@ -273,12 +276,15 @@ def table(results: Sequence[Result]) -> Table:
         said = " ".join((result.row.expect.reaction, *result.codes))
         found = _over(result.found_ms, result.row.limit.found_ms)
         zero = _over(result.zero_ms, result.zero_limit_ms)
+        verdict = Text("pass", "green") if result.passed else Text("fail", "red")
+        if len(result.outcomes) < seeds:
+            verdict.append(f"\n{len(result.outcomes)} of {seeds}", "default")
         drawn.add_row(
             "\n  ".join([result.row.id, *wrap(said, 40)]),
             found,
             zero,
             "" if math.isnan(result.roll_ratio) else f"{result.roll_ratio:.2f}",
-            Text("pass", "green") if result.passed else Text("fail", "red"),
+            verdict,
         )
     return drawn
 

@@ -499,21 +499,27 @@ def test_a_row_that_fails_is_told_by_the_exit_code(found_ms, late, monkeypatch):
     ("signalled", "code", "why"),
     [(True, ExitCode.INTERRUPTED, "interrupted"), (False, ExitCode.SYSTEM, KILLED)],
 )
-def test_a_campaign_that_ends_early_judges_no_row_that_lacks_a_sea_and_says_why(
+def test_a_campaign_that_ends_early_judges_what_was_run_and_says_what_lacks(
     signalled, code, why, monkeypatch
 ):
     def run_rows(_, rows, seeds, *__, **___):
         if signalled:
             os.kill(os.getpid(), signal.SIGINT)
-        whole = [replace(GOOD, seed=seed) for seed in seeds]
-        return {row.id: whole if row.id == GOOD.row else whole[:1] for row in rows}
+        outcomes = [replace(GOOD, seed=seed) for seed in seeds]
+        return {row.id: outcomes[:1] if row.id == GOOD.row else [] for row in rows}
 
     monkeypatch.setattr(runner, "run_rows", run_rows)
-    done = invoke("--rows", f"{GOOD.row},rate-stuck", "--seeds", "2", "--json")
+    asked = "--rows", f"{GOOD.row},rate-stuck", "--seeds", "2"
+    done = invoke(*asked, "--json")
     assert done.exit_code == code
     told = json.loads(done.stdout)
-    assert [(row["id"], row["verdict"]) for row in told["rows"]] == [(GOOD.row, "pass")]
+    assert [(row["id"], row["verdict"], row["seeds"]) for row in told["rows"]] == [
+        (GOOD.row, "pass", 1)
+    ]
     assert told["not_run"] == [{"id": "rate-stuck", "why": why}]
+    printed = invoke(*asked).stdout
+    assert "1 of 2" in printed
+    assert "1 row in up to 2 seas" in printed
 
 
 @pytest.mark.parametrize(
