@@ -1,6 +1,8 @@
-"""Differences of means of recordings, by batch: paired or independent."""
+"""Differences of means, paired or independent: of recordings by batch, of campaigns by case."""
 
 import json
+import math
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from firmware_sim.campaign.store import METRICS, Results, read_results
+from firmware_sim.campaign.summary import groups_of
 from firmware_sim.plant_kernel import CAPSIZE_RAD
 from utank_hil.analysis.motion.statistics import batch_means, mean_interval, rms_batches
 from utank_hil.base.arrays import FloatArray
@@ -41,6 +45,7 @@ class Comparison:
     source: str  #: Origin of the run.
     run: str
     figures: dict[str, Difference]
+    parameters: dict[str, Any]  #: Values of the keys that a campaign varies.
     remarks: tuple[str, ...] = ()  #: Remarks on the validity of the comparison.
 
 
@@ -61,6 +66,65 @@ def difference(reference: FloatArray, values: FloatArray, *, paired: bool) -> Di
         width = float(interval.high - interval.low) / 2
     first, second = float(np.mean(reference)), float(np.mean(values))
     return Difference(first, second, second - first, width, count, paired)
+
+
+def compare_campaigns(reference: Path, others: list[Path]) -> list[Comparison]:
+    """Compare campaigns with the first one, group by group and run by run.
+
+    Cases of the same waves are paired. Raises `CompareError` if the campaigns vary different keys
+    or share no group, and `StoreError` if a folder is no campaign.
+    """
+    first = read_results(reference)
+    return [each for other in others for each in _campaigns_compared(first, other)]
+
+
+def _campaigns_compared(first: Results, path: Path) -> list[Comparison]:
+    second = read_results(path)
+    if set(first.keys) != set(second.keys):
+        here, there = (", ".join(each.keys) or "nothing" for each in (second, first))
+        reason = f"varies {here}, the reference {there}: only like can be compared"
+        raise CompareError(f"{path}: {reason}")
+    kinds = [each.about["configuration"]["simulation"] for each in (first, second)]
+    codes = [each.about["code"] for each in (first, second)]
+    remarks = tuple(
+        f"different {words}: {one} and {other}"
+        for words, (one, other) in (
+            ("kinds of simulation", kinds),
+            ("versions of the program", codes),
+        )
+        if one != other
+    )
+    groups = {tuple(sorted(group.parameters.items())): group for group in groups_of(second)}
+    waves = [{case["case"]: case["waves"] for case in each.cases} for each in (first, second)]
+    found = []
+    for group in groups_of(first):
+        other = groups.get(tuple(sorted(group.parameters.items())))
+        if other is None:
+            continue
+        for run in (run for run in group.runs if run in other.runs):
+            sides = [
+                {cases[row["case"]]: row for row in each.of_run(run) if not row["mark"]}
+                for each, cases in ((group, waves[0]), (other, waves[1]))
+            ]
+            figures = {metric: _of_metric(metric, *sides) for metric in METRICS}
+            known = {metric: figure for metric, figure in figures.items() if figure is not None}
+            found.append(Comparison(str(path), run, known, group.parameters, remarks))
+    if not found:
+        raise CompareError(f"{path}: has no run at the same values of {', '.join(first.keys)}")
+    return found
+
+
+def _of_metric(metric: str, *sides: Mapping[str, Mapping[str, float]]) -> Difference | None:
+    """Difference of a metric by the waves of its cases; None where one side lacks it."""
+    values = [
+        {waves: row[metric] for waves, row in side.items() if not math.isnan(row[metric])}
+        for side in sides
+    ]
+    if not all(values):
+        return None
+    common = [waves for waves in values[0] if waves in values[1]]
+    chosen = [[each[waves] for waves in common or each] for each in values]
+    return difference(*(np.array(each) for each in chosen), paired=bool(common))
 
 
 BATCH_PERIODS: Final = 40
@@ -176,7 +240,7 @@ def _records_compared(first: Record, second: Record) -> list[Comparison]:
         ]
         if capsized:
             remarks.append(f"not compared: the ship capsized in {' and '.join(capsized)}")
-            found.append(Comparison(str(second.path), run, {}, tuple(remarks)))
+            found.append(Comparison(str(second.path), run, {}, {}, tuple(remarks)))
             continue
         remarks += _in_charge(run, one, two)
         times = one["time_s"], two["time_s"]
@@ -199,7 +263,7 @@ def _records_compared(first: Record, second: Record) -> list[Comparison]:
             )
         if min(counts) < LEAST_BATCHES:
             remarks.append(f"no interval: shorter than {LEAST_BATCHES * LEAST_PERIODS} rolls")
-        found.append(Comparison(str(second.path), run, figures, tuple(remarks)))
+        found.append(Comparison(str(second.path), run, figures, {}, tuple(remarks)))
     return found
 
 

@@ -173,12 +173,8 @@ def bare_figures(result: BenchResult) -> BareShip:
 
 def run_figures(result: BenchResult) -> tuple[RunFigures, ...]:
     """Figures of each run, ranked."""
-    compared = [run for run in result.runs if result.compares(run)]
     marks = {run.name: mark_of(result, run) for run in result.runs}
-    rolls = {
-        run.name: roll_statistics(run.column("true_roll_rad")[_window(result, run)])
-        for run in compared
-    }
+    rolls = {name: roll_statistics(roll) for name, roll in rolls_compared(result).items()}
     order = sorted((name for name in rolls if marks[name] is None), key=lambda n: rolls[n].rms_rad)
     passive = rolls[PASSIVE] if PASSIVE in order else None
     afloat = result.without_tank_capsized_s >= result.end_s
@@ -219,6 +215,15 @@ def run_figures(result: BenchResult) -> tuple[RunFigures, ...]:
             )
         )
     return tuple(found)
+
+
+def rolls_compared(result: BenchResult) -> dict[str, FloatArray]:
+    """Roll of each compared run over the window."""
+    return {
+        run.name: run.column("true_roll_rad")[_window(result, run)]
+        for run in result.runs
+        if result.compares(run)
+    }
 
 
 def mark_of(result: BenchResult, run: Run) -> Mark | None:

@@ -9,22 +9,25 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from pydantic import TypeAdapter, ValidationError
 
 from firmware_sim.bench import BenchResult
 from firmware_sim.figures import NO_TANK as BARE
-from firmware_sim.figures import BenchFigures, RunFigures
+from firmware_sim.figures import BenchFigures, RunFigures, rolls_compared
 from firmware_sim.report_tables import few_rolls, in_one_unit, roll_interval, tables
 from firmware_sim.run import COLUMNS, RECORD_S
 from firmware_sim.scenario_content import PASSIVE
 from firmware_sim.tank_report import less
+from utank_hil.base.arrays import FloatArray
 from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import Vessel
 from utank_hil.console.common import why
 from utank_hil.console.ship_report import power_words, ship_line
 from utank_hil.pictures import BenchBar, BenchCurve, draw_bench, report_page
 from utank_hil.pictures.style import COLORS, NO_TANK
-from utank_hil.reports.page import Report, about_section, printed
+from utank_hil.reports.page import Report, about_section, printed, roll_section
 from utank_hil.telemetry.recording import write_recording
+from utank_hil.telemetry.recording_reader import read_recording
 
 PICTURE, RECORDING, FIGURES, PAGE = "bench.png", "bench.rrd", "bench.json", "report.html"
 
@@ -50,8 +53,13 @@ _SEA_KEYS: Final = {
 }
 
 
-def bench_page(found: BenchFigures, about: Mapping[str, Any], picture: bytes | None) -> Report:
-    """Return the page of a bench."""
+def bench_page(
+    found: BenchFigures,
+    about: Mapping[str, Any],
+    picture: bytes | None,
+    rolls: Mapping[str, FloatArray],
+) -> Report:
+    """Return the page of a bench; `rolls` has each run's over the window, every `RECORD_S`."""
     vessel = Vessel.model_validate(about["configuration"]["vessel"])
     few = few_rolls(found, vessel.ship.natural_frequency_rad_s)
     says = "Roll and power of each run, and roll, level and pressure over time"
@@ -71,6 +79,7 @@ def bench_page(found: BenchFigures, about: Mapping[str, Any], picture: bytes | N
             pictures=[] if picture is None else [report_page.ReportPicture(picture, says)],
             tables=[printed(table) for table in tables(found)],
         ),
+        *([roll_section(rolls, RECORD_S)] if rolls else []),
         *([report_page.ReportSection("Retuning", found.retuned)] if found.retuned else []),
         _deadlines(found),
         about_section(about, about["configuration"]),
@@ -80,6 +89,27 @@ def bench_page(found: BenchFigures, about: Mapping[str, Any], picture: bytes | N
         f"{found.end_s:g} s of the same waves for each run. {about['date']}."
     )
     return Report(f"{found.scenario}: bench", below, [_verdict(found, few)], sections)
+
+
+def read_bench(folder: Path) -> Report:
+    """Return the page of a bench from its files.
+
+    Raises `OSError, ValueError` if a file is missing or invalid, and `KeyError` if it is of another
+    version.
+    """
+    content = json.loads((folder / FIGURES).read_text(encoding="utf-8"))
+    try:
+        found = TypeAdapter(BenchFigures).validate_python(content)
+    except ValidationError as error:
+        key = ".".join(map(str, error.errors()[0]["loc"]))
+        reason = f"has no {key} that can be used: it is of another version, make it again"
+        raise ValueError(f"{folder / FIGURES}: {reason}") from error
+    recorded, rolls = read_recording(folder / RECORDING), {}
+    for run in found.compared:
+        time_s = recorded[run.name]["time_s"]
+        window = (time_s > found.settle_s - RECORD_S / 2) & (time_s < found.end_s - RECORD_S / 2)
+        rolls[run.name] = recorded[run.name]["true_roll_rad"][window]
+    return bench_page(found, content, (folder / PICTURE).read_bytes(), rolls)
 
 
 def _verdict(found: BenchFigures, few: str) -> report_page.Verdict:
@@ -162,7 +192,9 @@ def write_files(
 
     def write_page(path: Path) -> None:
         picture = files["picture"].read_bytes() if "picture" in files else None
-        report_page.write_report_page(path, *bench_page(found, about, picture))
+        report_page.write_report_page(
+            path, *bench_page(found, about, picture, rolls_compared(result))
+        )
 
     writers: tuple[tuple[str, str, Callable[[Path], None]], ...] = (
         ("picture", PICTURE, partial(_draw, result, found, about)),

@@ -50,8 +50,8 @@ LEAVES_OUT: Final = {
 
 
 STUDY, ABOUT, CASES, ROWS = "study.yaml", "study.json", "cases.parquet", "rows"
-SUMMARY = "summary.json"
-FILES: Final = (STUDY, ABOUT, CASES, SUMMARY)
+SUMMARY, PICTURE = "summary.json", "campaign.png"
+FILES: Final = (STUDY, ABOUT, CASES, SUMMARY, PICTURE)
 _TEXTS: Final = ("case", "run", "status", "reason", "mark")
 _SCHEMA: Final = pa.schema(
     [(name, pa.string()) for name in _TEXTS]

@@ -38,7 +38,8 @@ def campaign(
     was. A case that fails is recorded with its reason and ends nothing.
     """
     # imported late: `--help` needs none of it
-    from firmware_sim.campaign.store import FILES, SUMMARY, Store, StoreError, read_results
+    from firmware_sim.campaign.report import draw
+    from firmware_sim.campaign.store import FILES, PICTURE, SUMMARY, Store, StoreError, read_results
     from firmware_sim.campaign.study import load_study
     from firmware_sim.campaign.summary import failures, summary
 
@@ -59,6 +60,7 @@ def campaign(
     failed = failures(results)
     content = {**results.about, "interrupted": interrupted, "groups": groups, "failures": failed}
     store.write_json(SUMMARY, content)
+    draw(results, groups, folder / PICTURE)
     if json_:
         common.print_json(content)
     else:

@@ -1,4 +1,4 @@
-"""``utank-hil compare``: differences between runs or recordings."""
+"""``utank-hil compare``: differences between runs, recordings or campaigns."""
 
 import math
 from dataclasses import asdict
@@ -22,27 +22,36 @@ _SCALES: Final = {
 
 
 def compare(
-    reference: Annotated[Path, argument("Bench folder; or a recording, log or table.")],
+    reference: Annotated[Path, argument("Bench or campaign folder; or a recording, log or table.")],
     others: Annotated[list[Path], argument("One or more of the same kind.")],
     json_: Json = False,
 ) -> None:
-    """Compare runs or recordings with the first: differences with 95 % intervals.
+    """Compare runs, recordings or campaigns with the first: differences with 95 % intervals.
 
     **Example:** utank-hil compare out out/seed7
 
-    Pieces of recordings of the same seed and sea are compared pair by pair. A study with several
-    cases compares what it varies itself (utank-hil campaign).
+    Pieces of recordings of the same seed and sea are compared pair by pair; so are cases of
+    campaigns in the same waves. What one study varies it compares itself (utank-hil campaign).
     """
-    from firmware_sim.comparison import CompareError, compare_records
+    from firmware_sim.campaign.store import ABOUT
+    from firmware_sim.comparison import CompareError, compare_campaigns, compare_records
     from firmware_sim.report_page import RECORDING
 
-    files = [place / RECORDING if place.is_dir() else place for place in (reference, *others)]
-    for place, file in zip((reference, *others), files, strict=True):
-        if not file.is_file():
-            wanted = RECORDING if place.is_dir() else "such file"
-            fail(f"{place}: there is no {wanted}; name a folder of `bench`, or a file")
+    places = [reference, *others]
+    campaigns = [(place / ABOUT).is_file() for place in places]
+    if any(campaigns) and not all(campaigns):
+        fail("a campaign and a recording can't be compared: name things of one kind")
+    files = [place / RECORDING if place.is_dir() else place for place in places]
+    for place, file, campaign in zip(places, files, campaigns, strict=True):
+        if not (file.is_file() or campaign):
+            wanted = f"{RECORDING} or {ABOUT}" if place.is_dir() else "such file"
+            named = "name a folder of `bench` or `campaign`, or a file"
+            fail(f"{place}: there is no {wanted}; {named}")
     try:
-        found = compare_records(files[0], files[1:])
+        if all(campaigns):
+            found = compare_campaigns(reference, others)
+        else:
+            found = compare_records(files[0], files[1:])
     except (CompareError, ValueError) as error:
         fail(error)
     if json_:
@@ -63,12 +72,13 @@ def _table(reference: Path, found: list["Comparison"]) -> Table:
     table = new_table(
         f"{shown(Path(found[0].source))} against {shown(reference)}",
         *("first", "this", "difference", "%", "pairs"),
-        names=("run", "figure"),
+        names=("run", *found[0].parameters, "figure"),
         caption="difference ± half width of its 95 % interval" if intervals else None,
     )
     for each in found:
         for name, figure in each.figures.items():
-            table.add_row(each.run, *_cells(name, figure))
+            values = map(str, each.parameters.values())
+            table.add_row(each.run, *values, *_cells(name, figure))
     return table
 
 

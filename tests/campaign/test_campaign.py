@@ -25,6 +25,7 @@ from firmware_sim.campaign.store import METRICS, Results, Store, read_results
 from firmware_sim.campaign.summary import figure, summary, units_of
 from firmware_sim.campaign.tables import pairs_table, runs_table
 from firmware_sim.commands.campaign import campaign
+from firmware_sim.commands.report import report
 from utank_hil.analysis.motion.statistics import mean_interval
 from utank_hil.console.common import new_app
 from utank_hil.console.exit_codes import ExitCode
@@ -115,6 +116,10 @@ def run(tmp_path):
     return invoke
 
 
+reports = new_app()
+reports.command()(report)
+
+
 def test_command_resumes_counts_failures_and_compares_in_the_same_waves(run, tmp_path):
     grid = {"seed": {"first": 1, "count": 3}, "sea.heading_deg": [90.0, 60.0, 0.0]}
     path = written(tmp_path, grid=grid)
@@ -147,6 +152,12 @@ def test_command_resumes_counts_failures_and_compares_in_the_same_waves(run, tmp
     again = run(path, "--resume")
     assert again.exit_code == 0, again.output
     assert "roll RMS below it %" in again.stdout
+    assert (out / "campaign.png").stat().st_size > 10_000
+    done = CliRunner().invoke(reports, [str(out), str(out), "--json"])
+    assert done.exit_code == 0, done.output
+    page = Path(json.loads(done.stdout)["page"]).read_text()
+    assert page.count("3 cases have no result.") == 2
+    assert f"{100 * shares['mean']:.1f} ± " in page
     assert "3 cases without a result: sea.heading_deg" in again.stdout
     assert sorted((out / "rows").iterdir()) == rows
 

@@ -111,6 +111,7 @@ def one_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
         Image.new("L", (1, 1)).save(file)
         return file
 
+    monkeypatch.setattr("utank_hil.reports.page.draw_roll_statistics", drawn)
     monkeypatch.setattr(of_recording, "draw_bench", drawn)
 
 
@@ -189,7 +190,7 @@ def test_the_page_needs_nothing_else_and_is_whole(page: Path) -> None:
     links.feed(text)
     assert links.open == []
     assert "http" not in text.replace("https://", "http://").split("<details>")[0]
-    assert len(links.targets) == 1
+    assert len(links.targets) == 2  # the histories, and the roll's spectra and exceedance
     for target in links.targets:
         kind, _, content = target.partition(",")
         assert kind == "data:image/png;base64"

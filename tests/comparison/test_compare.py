@@ -9,6 +9,10 @@ import pytest
 from scipy.stats import ttest_ind
 from typer.testing import CliRunner
 
+from firmware_sim.campaign.driver import batch_of
+from firmware_sim.campaign.simulations import run_batch
+from firmware_sim.campaign.store import Store
+from firmware_sim.campaign.study import load_study
 from firmware_sim.commands.compare import compare
 from firmware_sim.comparison import batch_count, difference
 from utank_hil.analysis.motion.statistics import batch_means, rms_batches
@@ -20,6 +24,30 @@ APP = new_app()
 APP.command()(compare)
 COLUMNS = ("time_s", "roll_rad", "starboard_level_m", "port_level_m", "pressure_actual_pa",
            "pump_power_w")  # fmt: skip
+
+
+STUDY = """
+name: {name}
+scenario: {configs}/scenarios/storm.yaml
+simulation: linear
+set:
+  controllers: {{gpc: {configs}/controllers/gpc.yaml}}
+  controllers.gpc.limits.pressure_pa: {pressure_pa}
+  duration_s: 30
+  settle_s: 10
+grid: {{seed: {{first: {first}, count: 4}}}}
+"""
+
+
+def ran(folder, name, pressure_pa=5e4, first=1):
+    """A campaign's folder."""
+    path, configs = folder / f"{name}.yaml", Path("configs").resolve()
+    path.write_text(STUDY.format(name=name, configs=configs, pressure_pa=pressure_pa, first=first))
+    loaded, store = load_study(path), Store(folder / name)
+    about = {"keys": loaded.keys, "code": "same", "configuration": {"simulation": "linear"}}
+    store.begin(loaded, about, resume=False)
+    store.write(run_batch(batch_of(loaded, loaded.cases)))
+    return folder / name
 
 
 def found(*arguments):
@@ -222,3 +250,23 @@ def test_a_table_without_rising_times_is_refused(tmp_path, table, said):
     done = CliRunner().invoke(APP, [str(tmp_path / "a.csv"), str(tmp_path / "b.csv")])
     assert done.exit_code == 2
     assert f"b.csv: {said}" in done.stderr.replace("\n", " ")
+
+
+@pytest.mark.slow
+def test_campaigns_in_the_same_waves_are_paired_and_their_passive_tank_is_the_same(tmp_path):
+    strong, weak = ran(tmp_path, "strong"), ran(tmp_path, "weak", pressure_pa=1.5e4)
+    by_run = {each["run"]: each for each in found(strong, weak)["comparisons"]}
+    roll = by_run["gpc"]["figures"]["roll_rms_rad"]
+    assert (roll["paired"], roll["count"]) == (True, 4)
+    assert roll["difference"] == pytest.approx(roll["value"] - roll["reference"])
+    peak = by_run["gpc"]["figures"]["pressure_peak_pa"]
+    assert (peak["reference"], peak["value"]) == pytest.approx((5e4, 1.5e4), rel=0.02)
+    passive = by_run["passive"]["figures"]["roll_rms_rad"]
+    assert (passive["difference"], passive["half_width"]) == (0, 0)
+    other = ran(tmp_path, "other", first=50)
+    unpaired = found(strong, other)["comparisons"][0]["figures"]["roll_rms_rad"]
+    assert not unpaired["paired"]
+    done = CliRunner().invoke(APP, [str(strong), str(weak)])
+    assert "pressure_peak kPa" in done.stdout
+    done = CliRunner().invoke(APP, [str(strong), str(recorded(tmp_path / "a.rrd", waves(1, 60.0)))])
+    assert "name things of one kind" in done.output

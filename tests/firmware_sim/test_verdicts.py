@@ -265,7 +265,7 @@ def test_the_page_says_the_sea_and_the_command_that_gives_it_again() -> None:
     options = {"scenario": "my seas/storm.yaml", "duration": 80000.125}
     options |= {"real_time": True, "out": "o"}
     about = describe("bench", result.scenario, Path.cwd(), options=options, seed=3)
-    said = bench_page(figures(result), about, None).sections[0].texts
+    said = bench_page(figures(result), about, None, {}).sections[0].texts
     again = "Again: utank-hil bench 'my seas/storm.yaml' --seed 3 --duration 80000.125 --realtime"
     assert said[-1] == again
     height = 4 * math.sqrt(result.scenario.sea.sea(result.scenario.seed).elevation.variance)
@@ -275,6 +275,6 @@ def test_the_page_says_the_sea_and_the_command_that_gives_it_again() -> None:
 def test_the_page_of_a_short_window_carries_its_interval() -> None:
     result = result_of(PASSIVE_RUN, run("a", 0.03))
     about = describe("bench", result.scenario, Path.cwd(), options={}, seed=1)
-    page = bench_page(figures(result), about, None)
+    page = bench_page(figures(result), about, None, {})
     # 80 s of a ship of 0.5 rad/s: 1.96 / 2 / sqrt(0.1 * 0.5 * 80)
     assert "uncertain by ±49% (95 %)" in " ".join(page.verdicts[0].lines)

@@ -1,12 +1,16 @@
 """What reports of runs share: their parts, and the page that they are written to."""
 
+import tempfile
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import yaml
 from rich.table import Table
 
-from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict
+from utank_hil.base.arrays import FloatArray
+from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
+from utank_hil.pictures.roll_statistics import draw_roll_statistics
 
 
 class Report(NamedTuple):
@@ -16,6 +20,28 @@ class Report(NamedTuple):
     about: str
     verdicts: Sequence[Verdict]
     sections: Sequence[ReportSection]
+
+
+def joined(reports: Sequence[Report]) -> Report:
+    """One report of several, one after the other."""
+    if len(reports) == 1:
+        return reports[0]
+    return Report(
+        ", ".join(each.title for each in reports),
+        " ".join(f"{each.title}: {each.about}" for each in reports),
+        [verdict for each in reports for verdict in each.verdicts],
+        [section for each in reports for section in each.sections],
+    )
+
+
+def roll_section(rolls: Mapping[str, FloatArray], step_s: float) -> ReportSection:
+    """Spectra of the roll (rad, each of shape (n,)) and exceedance of its amplitudes."""
+    title = "Roll at which periods, how often"
+    with tempfile.TemporaryDirectory() as scratch:
+        file = draw_roll_statistics(rolls, step_s, Path(scratch) / "roll.png", title)
+        png = file.read_bytes()
+    says = "Left: spectra of the roll over its period. Right: share of amplitudes above each angle."
+    return ReportSection("Spectra and exceedance", pictures=[ReportPicture(png, says)])
 
 
 def printed(table: Table) -> ReportTable:

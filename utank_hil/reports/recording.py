@@ -10,11 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.analysis.motion.statistics import roll_statistics
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.canbus.events import AlarmEvent
 from utank_hil.pictures import BenchCurve, draw_bench
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
-from utank_hil.reports.page import Report, about_section
+from utank_hil.reports.page import Report, about_section, roll_section
 from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.highlight import Columns, in_service
 from utank_hil.telemetry.run_log import read_run_log
@@ -35,11 +36,16 @@ def recording_report(file: Path, note: Callable[[str], None] | None = None) -> R
         raise ValueError(f"{file}: {len(log.rows)} rows are too few for a report")
     duration_s = float(rows["time_s"][-1] - rows["time_s"][0])
     alarms = [event for event in log.events if isinstance(event, AlarmEvent)]
+    rolls = {"passive twin": rows["twin_roll_rad"], "ship": rows["roll_rad"]}
+    stretches = {name: _longest_known(roll) for name, roll in rolls.items()}
+    known = {name: roll for name, roll in stretches.items() if len(roll) >= LEAST_ROWS}
+    step_s = float(np.median(np.diff(rows["time_s"])))
     try:
         sections = [
             ReportSection("Roll, level and pressure", pictures=[_histories(rows, file.stem)]),
             ReportSection("Modes", tables=[_modes(rows)]),
             _alarm_section(alarms),
+            *([roll_section(known, step_s)] if known else []),
             _deadlines(rows),
             about_section(about, about["configuration"]),
         ]
@@ -82,6 +88,13 @@ def _rolled(rows: Columns, active: npt.NDArray[np.bool_]) -> str:
     words += f"; {_degrees(roll.maximum_rad)} at most"
     share_known = known.sum() / active.sum()
     return words if share_known == 1 else f"{words}; the roll is known for {share_known:.1%} of it"
+
+
+def _longest_known(roll_rad: FloatArray) -> FloatArray:
+    """The longest stretch without a gap, which a spectrum needs."""
+    ends = np.flatnonzero(~np.isfinite(np.concatenate([[np.nan], roll_rad, [np.nan]])))
+    longest = int(np.diff(ends).argmax())
+    return roll_rad[ends[longest] : ends[longest + 1] - 1]
 
 
 def _degrees(angle_rad: float) -> str:

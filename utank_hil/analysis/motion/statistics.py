@@ -78,6 +78,23 @@ def pump_statistics(
     )
 
 
+def exceedance(signal: FloatArray, levels: FloatArray) -> FloatArray:
+    """Share of single amplitudes of a record above each level, shape (k,).
+
+    A single amplitude is the largest deviation from the mean between two crossings of it, to either
+    side. The parts before the first crossing and after the last are left out. Raises `ValueError`
+    if the record crosses its mean less than twice.
+    """
+    centred = signal - signal.mean()
+    crossings = np.flatnonzero(np.diff(np.signbit(centred))) + 1
+    if len(crossings) < 2:
+        raise ValueError("the record holds no whole half-cycle: exceedance needs a longer one")
+    size = np.abs(centred[: crossings[-1]])
+    amplitudes = np.maximum.reduceat(size, crossings[:-1])
+    share: FloatArray = np.mean(amplitudes[:, None] > np.asarray(levels), axis=0)
+    return share
+
+
 class Interval(NamedTuple):
     """Confidence interval of a mean: mean - half_width ... mean + half_width."""
 
