@@ -27,6 +27,7 @@ from collections.abc import Callable
 from contextlib import contextmanager
 from importlib import reload
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -70,6 +71,7 @@ from utank_hil.telemetry.signal_files import read_signals, require, write_signal
 ROOT = Path(__file__).resolve().parents[1]
 OWN = ("utank_hil", "firmware_sim")
 MOST_S, MOST_MB = 20, 700
+MEMORY = Path("/dev/shm")
 FILES = [float(each) for each in os.environ.get("UTANK_HIL_MUTATIONS", "0:1e7").split(":")]
 KINDS = ("flip", "cut", "double", "swap", "insert", "number", "count")
 NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
@@ -109,7 +111,7 @@ def records(path):
 
 
 def ring(path):
-    shared = Path("/dev/shm") / f"utank-mutated-{os.getpid()}"
+    shared = MEMORY / f"utank-mutated-{os.getpid()}"
     shutil.copyfile(path, shared)
     try:
         with RingReader(shared.name) as reader:
@@ -317,7 +319,7 @@ def made_ring(path):
     with RingWriter(RingKind.ROWS, 16, 1, 8, {"columns": ["a", "b"]}) as writer:
         for i in range(12):
             writer.write(np.array([i, -i], dtype=float))
-        shutil.copyfile(Path("/dev/shm") / writer.name, path)
+        shutil.copyfile(MEMORY / writer.name, path)
 
 
 def made_fmu(path):
@@ -628,11 +630,18 @@ def placed(reader, folder):
     return folder / "copy" / theirs.relative_to(root)
 
 
+@pytest.fixture
+def folder():
+    """A folder in memory, where there is one: ext4 writes a file that is replaced to the disk."""
+    with TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as path:
+        yield Path(path)
+
+
 @pytest.mark.parametrize("name", KINDS_OF_FILES)
-def test_a_damaged_file_is_read_or_refused_in_words(name, tmp_path, capfd):
+def test_a_damaged_file_is_read_or_refused_in_words(name, folder, capfd):
     reader = KINDS_OF_FILES[name]
     examples = max(1, int(settings.default.max_examples // max(1, reader.cost)))
-    with trial(placed(reader, tmp_path), reader.read, capfd, reader.streamed) as begun:
+    with trial(placed(reader, folder), reader.read, capfd, reader.streamed) as begun:
 
         @settings(max_examples=examples, phases=(Phase.generate, Phase.shrink))
         @given(st.lists(MUTATION, min_size=1, max_size=3))
@@ -649,25 +658,25 @@ def test_a_damaged_file_is_read_or_refused_in_words(name, tmp_path, capfd):
         ("a.mf4", ("flip", 251259, 284, 62286)),
     ],
 )
-def test_a_file_that_ends_its_librarys_process_is_refused(name, mutation, tmp_path, capfd):
+def test_a_file_that_ends_its_librarys_process_is_refused(name, mutation, folder, capfd):
     reader = KINDS_OF_FILES[name]
-    with trial(placed(reader, tmp_path), reader.read, capfd, reader.streamed) as begun:
+    with trial(placed(reader, folder), reader.read, capfd, reader.streamed) as begun:
         begun.one([mutation])
 
 
-def test_a_time_beyond_the_processors_integers_is_refused_in_words(tmp_path, capfd):
+def test_a_time_beyond_the_processors_integers_is_refused_in_words(folder, capfd):
     reader = KINDS_OF_FILES["41010w2019.txt"]
-    with trial(placed(reader, tmp_path), reader.read, capfd, reader.streamed) as begun:
+    with trial(placed(reader, folder), reader.read, capfd, reader.streamed) as begun:
         begun.one([("number", 244472, 135, 65389), ("number", 602173, 22, 32720)])
 
 
 @pytest.mark.evidence
 @pytest.mark.timeout(0)
 @pytest.mark.parametrize("name", KINDS_OF_FILES)
-def test_ten_million_damaged_files_are_read_or_refused_in_words(name, tmp_path, capfd):
+def test_ten_million_damaged_files_are_read_or_refused_in_words(name, folder, capfd):
     reader = KINDS_OF_FILES[name]
     whole = sum(1 / each.cost for each in KINDS_OF_FILES.values())
-    with trial(placed(reader, tmp_path), reader.read, capfd, reader.streamed) as begun:
+    with trial(placed(reader, folder), reader.read, capfd, reader.streamed) as begun:
         first, last = (int(each / reader.cost / whole) for each in ([0.0, *FILES])[-2:])
         for number in range(first, last + 1):
             draw = random.Random(f"{name} {number}")
