@@ -60,10 +60,11 @@ def advance_tick(
         x[lateral.LEVEL_RATE] = 0.0
     else:
         valve *= area
-    books, shaft_j = np.zeros(lateral.BOOKS), 0.0
+    books, shaft_j, degrees = np.zeros(lateral.BOOKS), 0.0, len(ahead)
     books[lateral.IMPULSE] = summary[MAX_IMPULSE]
-    degrees = len(ahead)
-    forces, room = np.empty((3, degrees)), np.empty((4, max(len(x), lateral.ROOM)))
+    room = np.empty((7, 7)), np.empty(7), np.empty((3, degrees)), np.empty((3, len(x)))
+    ship = lateral.Step(parameters, oscillators, vertical, per_piece, restoring, valve, *room)
+    forces = np.empty((3, degrees))
     forces[2] = ahead[:, 1]
     for step in range(len(weights) // 4):
         if summary[CAPSIZED_S] < np.inf:
@@ -78,17 +79,11 @@ def advance_tick(
             forces[0, i] = forces[2, i]
             forces[1, i] = interpolated(weights, 4 * step + 2, ahead[i])
             forces[2, i] = interpolated(weights, 4 * step + 4, ahead[i])
-        lateral.advance(
-            parameters, oscillators, vertical, per_piece, restoring, x, forces, push, valve,
-            2 * STEP_S, books, room,
-        )  # fmt: skip
+        lateral.advance(ship, x, forces, push, 2 * STEP_S, books)
         if abs(x[lateral.ROLL]) >= CAPSIZE_RAD:
             summary[CAPSIZED_S] = state[kernel.TIME] + (step + 1) * 2 * STEP_S
     rates = np.empty(len(x))
-    lateral.rates(
-        parameters, oscillators, vertical, per_piece, restoring, x, forces[2],
-        area * pump.pressure_pa, valve, room[3, :49].reshape(7, 7), room[3, 49:56], rates,
-    )  # fmt: skip
+    lateral.rates(ship, x, forces[2], area * pump.pressure_pa, rates)
     state[kernel.ROLL], state[kernel.ROLL_RATE] = x[lateral.ROLL], x[lateral.ROLL_RATE]
     state[kernel.LEVEL], state[kernel.LEVEL_RATE] = x[lateral.LEVEL], x[lateral.LEVEL_RATE]
     state[kernel.SWAY_NOW] = rates[lateral.SWAY_RATE] / GRAVITY_M_S2

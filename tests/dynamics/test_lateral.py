@@ -99,10 +99,11 @@ def test_ship_and_water_move_by_the_exact_wrench(six):
         x = [roll, rate, level, speed, 0.0, sway, 0.0, 0.0]
         x += [0.0, 0.0, 0.0, 0.0, fall, 0.0] if six else []
         out = np.zeros(14)
-        kernel.rates(
-            parameters, np.zeros((0, 7)), np.zeros((0, 7)), *roll_model.packed[1:], np.array(x),
-            force, tank.reservoir_area_m2 * pressure, 0.0, np.empty((7, 7)), np.empty(7), out,
+        step = kernel.Step(
+            parameters, np.zeros((0, 7)), np.zeros((0, 7)), *roll_model.packed[1:], 0.0,
+            np.empty((7, 7)), np.empty(7), np.empty((3, 6)), np.empty((3, len(x))),
         )  # fmt: skip
+        kernel.rates(step, np.array(x), force, tank.reservoir_area_m2 * pressure, out)
         sin, cos = math.sin(roll), math.cos(roll)
         down = out[12]
         water_force, moment, residual = tank_wrench(

@@ -8,6 +8,7 @@ all velocities jump by the mass matrix, and the rest of the step follows.
 """
 
 import math
+from typing import NamedTuple
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.jit import njit
@@ -22,8 +23,22 @@ M_HEAVE, M_PITCH, M_SWAY, M_ROLL, M_YAW, M_LEVEL = range(1, 7)
 # Work and losses of a step in J, the impulses of impacts on the ship, and their number.
 WAVE_WORK, PUMP_WORK, DAMPED, STRUCK, IMPULSE, NUMBER = range(6)
 BOOKS = 6
-ROOM = 7 * 7 + 7 + 3 * 6  #: Numbers that a step needs beside four states.
 G = GRAVITY_M_S2
+
+
+class Step(NamedTuple):
+    """What a step needs: the parameters of `LateralModel`, the valve, and room to work in."""
+
+    p: FloatArray
+    oscillators: FloatArray
+    vertical: FloatArray
+    per_piece: float
+    restoring: FloatArray
+    valve: float  #: Its loss times the reservoir area.
+    m: FloatArray  #: shape (7, 7)
+    q: FloatArray  #: shape (7,)
+    part: FloatArray  #: shape (3, 3 or 6): forces at start, middle and end of a part of the step.
+    room: FloatArray  #: shape (3, n): the last row is the state after the part.
 
 
 @njit(error_model="numpy")
@@ -108,11 +123,9 @@ def _radiate(
 
 
 @njit(error_model="numpy")
-def _move_up_and_along(
-    p: FloatArray, vertical: FloatArray, x: FloatArray, at: int, force: FloatArray, m: FloatArray,
-    q: FloatArray, out: FloatArray,
-) -> None:  # fmt: skip
-    """Write the forces of surge, heave and pitch, whose states begin at `at`, to `q`."""
+def _move_up_and_along(s: Step, x: FloatArray, at: int, force: FloatArray, out: FloatArray) -> None:
+    """Write the forces of surge, heave and pitch, whose states begin at `at`, to `s.q`."""
+    p, q = s.p, s.q
     speeds = (x[at + 3], x[at + 4], x[at + 5])
     for i in range(3):
         out[at + i] = speeds[i]
@@ -122,41 +135,28 @@ def _move_up_and_along(
     flow, across, h = p[12], p[12] * p[13], x[LEVEL]
     side, down = across * h, p[14] - flow * h * h
     roll, speed = x[ROLL_RATE], x[LEVEL_RATE]
-    moved = 2 * m[M_SWAY, M_LEVEL] * roll * speed - (side * sin + down * cos) * roll * roll
+    moved = 2 * s.m[M_SWAY, M_LEVEL] * roll * speed - (side * sin + down * cos) * roll * roll
     moved -= 2 * flow * cos * speed * speed
     q[0] = force[3] - (p[33] * x0 + p[34] * x1 + p[35] * x2)
     q[1] = force[4] - (p[34] * x0 + p[36] * x1 + p[37] * x2) - moved
     q[2] = force[5] - (p[35] * x0 + p[37] * x1 + p[38] * x2) + p[11] * moved
-    _radiate(vertical, x, at + 6, speeds, q, 0, out)
+    _radiate(s.vertical, x, at + 6, speeds, q, 0, out)
 
 
 @njit(error_model="numpy")
-def rates(
-    p: FloatArray,
-    oscillators: FloatArray,
-    vertical: FloatArray,
-    per_piece: float,
-    restoring: FloatArray,
-    x: FloatArray,
-    force: FloatArray,
-    pump: float,
-    valve: float,
-    m: FloatArray,
-    q: FloatArray,
-    out: FloatArray,
-) -> None:
+def rates(s: Step, x: FloatArray, force: FloatArray, pump: float, out: FloatArray) -> None:
     """Write the rates of the state `x` to `out`.
 
     `force`, shape (3,) or (6,), is the waves' sway force, roll and yaw moment, then surge and heave
-    force and pitch moment; `pump` and `valve` are the reservoir area times pressure, and times
-    valve loss; `m`, shape (7, 7), and `q`, shape (7,), are room to work in.
+    force and pitch moment; `pump` is the reservoir area times pressure.
     """
+    p, m, q = s.p, s.m, s.q
     phi, roll, h, speed, sway, yaw = x[0], x[1], x[2], x[3], x[5], x[7]
     sin, cos = sine_cosine(phi)
     flow, across, lx = p[12], p[12] * p[13], p[11]
     side, down = across * h, p[14] - flow * h * h
-    righting = righting_moment(per_piece, restoring, phi)
-    at = WAVES + 2 * len(oscillators)
+    righting = righting_moment(s.per_piece, s.restoring, phi)
+    at = WAVES + 2 * len(s.oscillators)
     six = len(x) > at
     first = 0 if six else 3
     mass_matrix(p, phi, h, six, m)
@@ -183,14 +183,14 @@ def rates(
     )  # fmt: skip
     q[5] = force[2] - lx * moved - (spin_phi * roll + spin_h * speed) * yaw
     q[6] = (
-        pump - (p[23] + (p[24] + valve) * abs(speed)) * speed
+        pump - (p[23] + (p[24] + s.valve) * abs(speed)) * speed
         + G * (across * sin - 2 * flow * h * cos) + by_h - pull * along
     )  # fmt: skip
-    _radiate(oscillators, x, WAVES, (sway, roll, yaw), q, 3, out)
+    _radiate(s.oscillators, x, WAVES, (sway, roll, yaw), q, 3, out)
     if six:
-        _move_up_and_along(p, vertical, x, at, force, m, q, out)
+        _move_up_and_along(s, x, at, force, out)
     at_stop = abs(h) >= p[25] and h * speed >= 0
-    if valve >= LOCKED:
+    if s.valve >= LOCKED:
         _solve(m, q, first, 6)
         q[6] = 0.0
     elif at_stop:
@@ -226,160 +226,140 @@ def _radiated_w(oscillators: FloatArray, x: FloatArray, at: int) -> float:
 
 
 @njit(error_model="numpy")
-def dissipation_w(
-    p: FloatArray, oscillators: FloatArray, vertical: FloatArray, x: FloatArray, valve: float
-) -> float:
+def dissipation_w(s: Step, x: FloatArray) -> float:
     """Return the power that roll damping, the tank's losses and radiated waves take."""
-    roll, speed = x[ROLL_RATE], x[LEVEL_RATE]
+    p, roll, speed = s.p, x[ROLL_RATE], x[LEVEL_RATE]
     power = (p[18] + p[19] * abs(roll)) * roll * roll
-    power += (p[23] + (p[24] + valve) * abs(speed)) * speed * speed
-    power += _radiated_w(oscillators, x, WAVES)
-    at = WAVES + 2 * len(oscillators)
+    power += (p[23] + (p[24] + s.valve) * abs(speed)) * speed * speed
+    power += _radiated_w(s.oscillators, x, WAVES)
+    at = WAVES + 2 * len(s.oscillators)
     if len(x) > at:
-        power += _radiated_w(vertical, x, at + 6)
+        power += _radiated_w(s.vertical, x, at + 6)
     return float(power)
 
 
 @njit(error_model="numpy")
-def _rk4(
-    p: FloatArray,
-    oscillators: FloatArray,
-    vertical: FloatArray,
-    per_piece: float,
-    restoring: FloatArray,
-    x: FloatArray,
-    forces: FloatArray,
-    pump: float,
-    valve: float,
-    dt: float,
-    room: FloatArray,
-    m: FloatArray,
-    q: FloatArray,
-    after: FloatArray,
+def _move(
+    s: Step, x: FloatArray, forces: FloatArray, pump: float, begin: float, end: float, dt: float
 ) -> None:
-    """Write the state after a step to `after`; `forces` (3, n) are at start, middle and end."""
-    count = len(x)
-    k, y = room[0, :count], room[1, :count]
-    for i in range(count):
+    """Write the state after a part of the step, of the duration `dt`, and the forces in it.
+
+    `forces`, shape (3, n), are those at start, middle and end of the whole step.
+    """
+    k, y, after = s.room[0], s.room[1], s.room[2]
+    for i in range(forces.shape[1]):
+        values = (forces[0, i], forces[1, i], forces[2, i])
+        s.part[0, i], s.part[1, i], s.part[2, i] = within(values, begin, end)
+    for i in range(len(x)):
         after[i] = x[i]
         y[i] = x[i]
     for stage in range(4):
-        rates(
-            p, oscillators, vertical, per_piece, restoring, y, forces[(stage + 1) // 2], pump,
-            valve, m, q, k,
-        )  # fmt: skip
+        rates(s, y, s.part[(stage + 1) // 2], pump, k)
         weight = dt / 3 if 0 < stage < 3 else dt / 6
         ahead = dt if stage == 2 else dt / 2
-        for i in range(count):
+        for i in range(len(x)):
             after[i] += weight * k[i]
             y[i] = x[i] + ahead * k[i]
 
 
 @njit(error_model="numpy")
-def _within(forces: FloatArray, begin: float, end: float, part: FloatArray) -> None:
-    """Interpolate forces at start, middle and end of a part of the step, quadratically."""
-    for i in range(forces.shape[1]):
-        values = (forces[0, i], forces[1, i], forces[2, i])
-        part[0, i], part[1, i], part[2, i] = within(values, begin, end)
+def _move_to_impact(
+    s: Step, x: FloatArray, forces: FloatArray, pump: float, done: float, dt: float
+) -> float:
+    """Move to the impact that the rest of the step brings; return its share of the step."""
+    limit, level = s.p[25], s.room[2, LEVEL]
+    side = math.copysign(1.0, level)
+    low, high = 0.0, 1.0 - done
+    g_low, g_high = side * x[LEVEL] - limit, side * level - limit
+    for _ in range(60):
+        if abs(g_high) < 1e-13 or high - low < 1e-15 or g_low >= 0:
+            break
+        share = high - g_high * (high - low) / (g_high - g_low)
+        _move(s, x, forces, pump, done, done + share, share * dt)
+        g = side * s.room[2, LEVEL] - limit
+        if g > 0:
+            high, g_high = share, g
+            g_low *= 0.5
+        else:
+            low, g_low = share, g
+            g_high *= 0.5
+    _move(s, x, forces, pump, done, done + high, high * dt)
+    return high
+
+
+@njit(error_model="numpy")
+def _book(s: Step, x: FloatArray, pump: float, share: float, dt: float, books: FloatArray) -> None:
+    """Add the work and the losses from `x` to the state after a part of the step."""
+    part, after = s.part, s.room[2]
+    at = WAVES + 2 * len(s.oscillators)
+    for i, place in enumerate((SWAY, ROLL, YAW)):
+        work = 0.5 * (part[0, i] + part[2, i]) * (after[place] - x[place])
+        books[WAVE_WORK] += work
+    for i in range(3, part.shape[1]):
+        work = 0.5 * (part[0, i] + part[2, i]) * (after[at + i - 3] - x[at + i - 3])
+        books[WAVE_WORK] += work
+    books[PUMP_WORK] += pump * (after[LEVEL] - x[LEVEL])
+    lost = dissipation_w(s, x)
+    lost += dissipation_w(s, after)
+    books[DAMPED] += lost / 2 * share * dt
+
+
+@njit(error_model="numpy")
+def _rebound(s: Step, x: FloatArray, side: float, books: FloatArray) -> None:
+    """Let the water rebound from its limit on a side, with a jump of all velocities."""
+    p, m, q, column = s.p, s.m, s.q, s.part[0]
+    at = WAVES + 2 * len(s.oscillators)
+    six = len(x) > at
+    first = 0 if six else 3
+    speed = x[LEVEL_RATE]
+    rebound = -p[26] * speed
+    if p[26] < 1 and abs(rebound) < REST_M_S:
+        rebound = 0.0
+    jump = rebound - speed
+    mass_matrix(p, x[ROLL], x[LEVEL], six, m)
+    impulse = m[M_LEVEL, M_LEVEL] * jump
+    for i in range(first, M_LEVEL):
+        q[i] = -m[i, M_LEVEL] * jump
+        column[i - first] = m[i, M_LEVEL]  # `_solve` changes the matrix
+    _solve(m, q, first, M_LEVEL)
+    for i in range(first, M_LEVEL):
+        impulse += column[i - first] * q[i]
+    x[SWAY_RATE] += q[M_SWAY]
+    x[ROLL_RATE] += q[M_ROLL]
+    x[YAW_RATE] += q[M_YAW]
+    if six:
+        for i in range(3):
+            x[at + 3 + i] += q[i]
+    x[LEVEL_RATE] = rebound
+    x[LEVEL] = side * (p[25] if rebound == 0.0 else p[25] - INSIDE_M)
+    books[STRUCK] -= impulse * (speed + rebound) / 2
+    books[IMPULSE] = max(books[IMPULSE], abs(p[3] * q[M_ROLL]))
+    books[NUMBER] += 1
 
 
 @njit(error_model="numpy")
 def advance(
-    p: FloatArray,
-    oscillators: FloatArray,
-    vertical: FloatArray,
-    per_piece: float,
-    restoring: FloatArray,
-    x: FloatArray,
-    forces: FloatArray,
-    pump: float,
-    valve: float,
-    dt: float,
-    books: FloatArray,
-    room: FloatArray,
+    s: Step, x: FloatArray, forces: FloatArray, pump: float, dt: float, books: FloatArray
 ) -> None:
     """Advance the state `x` by a step, in place, and add to `books`.
 
-    The parameters are those of `LateralModel`. `forces`, shape (3, 3) or (3, 6), are the waves' at
-    start, middle and end of the step; `room`, shape (4, n), has n of at least the length of `x` and
-    `ROOM`.
+    `forces`, shape (3, 3) or (3, 6), are the waves' at start, middle and end of the step.
     """
-    count = len(x)
-    after = room[2, :count]
-    degrees = forces.shape[1]
-    m, q = room[3, :49].reshape(7, 7), room[3, 49:56]
-    part = room[3, 56 : 56 + 3 * degrees].reshape(3, degrees)
-    at = WAVES + 2 * len(oscillators)
-    six = len(x) > at
-    first = 0 if six else 3
-    limit, done = p[25], 0.0
+    limit, done, after = s.p[25], 0.0, s.room[2]
     for strike in range(9):
         left = 1.0 - done
-        _within(forces, done, 1.0, part)
-        _rk4(p, oscillators, vertical, per_piece, restoring, x, part, pump, valve, left * dt,
-             room, m, q, after)  # fmt: skip
+        _move(s, x, forces, pump, done, 1.0, left * dt)
+        side = math.copysign(1.0, after[LEVEL])
         struck = abs(after[LEVEL]) > limit
         if struck and strike == 8:
-            after[LEVEL] = math.copysign(limit, after[LEVEL])
+            after[LEVEL] = side * limit
             struck = False
         if struck:
-            side = math.copysign(1.0, after[LEVEL])
-            low, high = 0.0, left
-            g_low, g_high = side * x[LEVEL] - limit, side * after[LEVEL] - limit
-            for _ in range(60):
-                if abs(g_high) < 1e-13 or high - low < 1e-15 or g_low >= 0:
-                    break
-                s = high - g_high * (high - low) / (g_high - g_low)
-                _within(forces, done, done + s, part)
-                _rk4(p, oscillators, vertical, per_piece, restoring, x, part, pump, valve, s * dt,
-                     room, m, q, after)  # fmt: skip
-                g = side * after[LEVEL] - limit
-                if g > 0:
-                    high, g_high = s, g
-                    g_low *= 0.5
-                else:
-                    low, g_low = s, g
-                    g_high *= 0.5
-            left = high
-            _within(forces, done, done + left, part)
-            _rk4(p, oscillators, vertical, per_piece, restoring, x, part, pump, valve, left * dt,
-                 room, m, q, after)  # fmt: skip
-        for i, place in enumerate((SWAY, ROLL, YAW)):
-            work = 0.5 * (part[0, i] + part[2, i]) * (after[place] - x[place])
-            books[WAVE_WORK] += work
-        for i in range(3, degrees):
-            work = 0.5 * (part[0, i] + part[2, i]) * (after[at + i - 3] - x[at + i - 3])
-            books[WAVE_WORK] += work
-        books[PUMP_WORK] += pump * (after[LEVEL] - x[LEVEL])
-        lost = dissipation_w(p, oscillators, vertical, x, valve)
-        lost += dissipation_w(p, oscillators, vertical, after, valve)
-        books[DAMPED] += lost / 2 * left * dt
-        for i in range(count):
+            left = _move_to_impact(s, x, forces, pump, done, dt)
+        _book(s, x, pump, left, dt, books)
+        for i in range(len(x)):
             x[i] = after[i]
         if not struck:
             return
         done += left
-        speed = x[LEVEL_RATE]
-        rebound = -p[26] * speed
-        if p[26] < 1 and abs(rebound) < REST_M_S:
-            rebound = 0.0
-        jump = rebound - speed
-        mass_matrix(p, x[ROLL], x[LEVEL], six, m)
-        impulse = m[M_LEVEL, M_LEVEL] * jump
-        for i in range(first, M_LEVEL):
-            q[i] = -m[i, M_LEVEL] * jump
-            part[0, i - first] = m[i, M_LEVEL]  # `_solve` changes the matrix
-        _solve(m, q, first, M_LEVEL)
-        for i in range(first, M_LEVEL):
-            impulse += part[0, i - first] * q[i]
-        x[SWAY_RATE] += q[M_SWAY]
-        x[ROLL_RATE] += q[M_ROLL]
-        x[YAW_RATE] += q[M_YAW]
-        if six:
-            for i in range(3):
-                x[at + 3 + i] += q[i]
-        x[LEVEL_RATE] = rebound
-        x[LEVEL] = side * (limit if rebound == 0.0 else limit - INSIDE_M)
-        books[STRUCK] -= impulse * (speed + rebound) / 2
-        books[IMPULSE] = max(books[IMPULSE], abs(p[3] * q[M_ROLL]))
-        books[NUMBER] += 1
+        _rebound(s, x, side, books)
