@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from itertools import count
-from typing import Annotated, Any, ClassVar, Final
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final
 
 from pydantic import AfterValidator
 
@@ -70,6 +70,8 @@ class Fault(Section, ABC):
     needs: ClassVar[tuple[str, ...]] = ()
     """Nodes that must be emulated for every fault of the kind."""
 
+    if TYPE_CHECKING:
+        kind: str  #: Each class that has one is a kind of faults (`kinds`).
     at_s: FaultTime = 0.0
     for_s: FaultSpan | None = None
 

@@ -1,49 +1,22 @@
 """Kinds of faults in a configuration, and their placement in a bench."""
 
 from collections.abc import Sequence
-from typing import Annotated
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
 from firmware_sim.fault_injection import frames, nodes, signals, traffic
 from firmware_sim.fault_injection.bench_parts import Bench
+from firmware_sim.fault_injection.fault import Fault
 
-AnyFault = Annotated[
-    signals.Stuck
-    | signals.Offset
-    | signals.Scale
-    | signals.Drift
-    | signals.Noise
-    | signals.Spikes
-    | signals.Sign
-    | signals.Swapped
-    | signals.Late
-    | signals.Value
-    | frames.Lost
-    | frames.Frozen
-    | frames.Replayed
-    | frames.Doubled
-    | frames.Inserted
-    | frames.Counter
-    | frames.Corrupted
-    | frames.WrongDataId
-    | frames.WrongLength
-    | nodes.Silenced
-    | nodes.Killed
-    | nodes.LostIdentifier
-    | nodes.Replaced
-    | nodes.Link
-    | nodes.Pump
-    | nodes.Drive
-    | nodes.Valve
-    | nodes.Law
-    | traffic.Disturbed
-    | traffic.BitErrors
-    | traffic.Flood
-    | traffic.Impostor
-    | traffic.SecondPanel,
-    Field(discriminator="kind"),
-]
+if TYPE_CHECKING:
+    AnyFault = Fault
+else:
+    _classes = [x for each in (signals, frames, nodes, traffic) for x in vars(each).values()]
+    _kinds = [x for x in _classes if "kind" in getattr(x, "model_fields", ())]
+    AnyFault = Annotated[reduce(or_, _kinds), Field(discriminator="kind")]
 
 
 def place_all(faults: Sequence[AnyFault], bench: Bench, start_ns: int, seed: int) -> None:
