@@ -7,15 +7,6 @@ takes two steps of the pump at once.
 import numpy as np
 
 from firmware_sim import plant_kernel as kernel
-from firmware_sim.plant_kernel import (
-    CAPSIZE_RAD,
-    STEP_S,
-    interpolated,
-    keep_pump,
-    kept_pump,
-    pump_after,
-    turned_sum,
-)
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.dynamics.hull import lateral_kernel as lateral
 from utank_hil.dynamics.jit import njit
@@ -54,7 +45,7 @@ def advance_tick(
         Of `LateralModel`.
     """
     pump_coefficients = PumpCoefficients(*coefficients)
-    pump, summary = kept_pump(state), state[kernel.SUMMED]
+    pump, summary = kernel.kept_pump(state), state[kernel.SUMMED]
     area, valve = parameters[22], state[kernel.VALVE_LOSS]
     if valve >= LOCKED:
         x[lateral.LEVEL_RATE] = 0.0
@@ -72,22 +63,22 @@ def advance_tick(
             break
         push = 0.0
         for _ in range(2):
-            pump = pump_after(state, pump, area * x[lateral.LEVEL_RATE], pump_coefficients)
-            shaft_j += pump.power_w * STEP_S
+            pump = kernel.pump_after(state, pump, area * x[lateral.LEVEL_RATE], pump_coefficients)
+            shaft_j += pump.power_w * kernel.STEP_S
             push += area * pump.pressure_pa / 2
         for i in range(degrees):
             forces[0, i] = forces[2, i]
-            forces[1, i] = interpolated(weights, 4 * step + 2, ahead[i])
-            forces[2, i] = interpolated(weights, 4 * step + 4, ahead[i])
-        lateral.advance(ship, x, forces, push, 2 * STEP_S, books)
-        if abs(x[lateral.ROLL]) >= CAPSIZE_RAD:
-            summary[CAPSIZED_S] = state[kernel.TIME] + (step + 1) * 2 * STEP_S
+            forces[1, i] = kernel.interpolated(weights, 4 * step + 2, ahead[i])
+            forces[2, i] = kernel.interpolated(weights, 4 * step + 4, ahead[i])
+        lateral.advance(ship, x, forces, push, 2 * kernel.STEP_S, books)
+        if abs(x[lateral.ROLL]) >= kernel.CAPSIZE_RAD:
+            summary[CAPSIZED_S] = state[kernel.TIME] + (step + 1) * 2 * kernel.STEP_S
     rates = np.empty(len(x))
     lateral.rates(ship, x, forces[2], area * pump.pressure_pa, rates)
     state[kernel.ROLL], state[kernel.ROLL_RATE] = x[lateral.ROLL], x[lateral.ROLL_RATE]
     state[kernel.LEVEL], state[kernel.LEVEL_RATE] = x[lateral.LEVEL], x[lateral.LEVEL_RATE]
     state[kernel.SWAY_NOW] = rates[lateral.SWAY_RATE] / GRAVITY_M_S2
-    keep_pump(state, pump)
+    kernel.keep_pump(state, pump)
     state[kernel.SHAFT_WORK] += shaft_j
     state[kernel.WAVE_WORK] += books[lateral.WAVE_WORK]
     state[kernel.PUMP_WORK] += books[lateral.PUMP_WORK]
@@ -95,12 +86,12 @@ def advance_tick(
     summary[STRIKE_LOSS] += books[lateral.STRUCK]
     summary[STRIKES] += books[lateral.NUMBER]
     summary[MAX_IMPULSE] = books[lateral.IMPULSE]
-    state[kernel.TIME] += (len(weights) // 2) * STEP_S
+    state[kernel.TIME] += (len(weights) // 2) * kernel.STEP_S
     if degrees > 3:
         at = lateral.WAVES + 2 * len(oscillators) + 3
         state[kernel.HEAVE_NOW] = rates[at + 1] - parameters[11] * rates[at + 2]
     for i in range(degrees):
         row = ahead[i]
         row[0], row[1], row[2] = row[1], row[2], row[3]
-        row[3] = turned_sum(phasors[i], rotations[i])
+        row[3] = kernel.turned_sum(phasors[i], rotations[i])
     state[kernel.MOMENT_NOW] = ahead[1, 1]

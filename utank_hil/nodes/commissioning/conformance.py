@@ -30,13 +30,19 @@ BACK_S: Final = 5.0  #: For a device to measure again after its power is back.
 PATIENCE_S: Final = 3600.0  #: For a person.
 GOOD: Final = (canbus.Quality.GOOD, canbus.Quality.DEGRADED)
 MOVES: Final[dict[type[tuple[Any, ...]], tuple[tuple[str, float, str, str], ...]]] = {
-    canbus.SensorMotion: (("roll_rad", math.radians(1.0), "rad",
-                    "Heel the ship, or tilt the sensor, to starboard by two degrees or more"),),
-    canbus.SensorTank: (("port_level_m", 0.05, "m", "Raise the port level, or its float, by 0.1 m"),
-                 ("starboard_level_m", 0.05, "m", "Raise the starboard level by 0.1 m")),
-    canbus.OperatorCommand: (("stop", 1.0, "", "Press stop, and hold it"),
-                      ("acknowledge", 1.0, "", "Let it go, press acknowledge, and hold that"),
-                      ("arm", 1.0, "", "Let it go, and turn the key to arm")),
+    canbus.SensorMotion: (
+        ("roll_rad", math.radians(1.0), "rad",
+         "Heel the ship, or tilt the sensor, to starboard by two degrees or more"),
+    ),
+    canbus.SensorTank: (
+        ("port_level_m", 0.05, "m", "Raise the port level, or its float, by 0.1 m"),
+        ("starboard_level_m", 0.05, "m", "Raise the starboard level by 0.1 m"),
+    ),
+    canbus.OperatorCommand: (
+        ("stop", 1.0, "", "Press stop, and hold it"),
+        ("acknowledge", 1.0, "", "Let it go, press acknowledge, and hold that"),
+        ("arm", 1.0, "", "Let it go, and turn the key to arm"),
+    ),
     canbus.SensorPump: (
         ("pressure_pa", 500.0, "Pa", "Press with 0.1 m of water on the starboard side"),
     ),
@@ -169,9 +175,8 @@ class SensorTrial(Trial):
             return True
         if isinstance(message, canbus.ValveStatus):
             return message.state is canbus.ValveState.FOLLOWING and math.isfinite(message.opening)
-        values = message[
-            : 1 if self._plan.kind is canbus.SensorPump else 2
-        ]  # a flow need not be there
+        count = 1 if self._plan.kind is canbus.SensorPump else 2  # a flow need not be there
+        values = message[:count]
         return message[-1] in GOOD and all(map(math.isfinite, values))
 
     def _judge_pace(self) -> None:
