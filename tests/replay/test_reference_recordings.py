@@ -33,9 +33,9 @@ from utank_hil.canbus import (
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.dynamics.linear import pump_model
+from utank_hil.telemetry.frame_comparison import RecordedRetuner
 from utank_hil.telemetry.frame_log import FrameLog, Kind
 from utank_hil.telemetry.law_values import decoded, encoded, law_values
-from utank_hil.telemetry.recorded_retuner import RecordedRetuner
 from utank_hil.telemetry.replay import entries_of, replay, replay_log
 from utank_hil.telemetry.replay_head import law_differences, recorded_config, recorded_law
 

@@ -11,8 +11,7 @@ from retuning_toys import SUMMARY, Rig, ToyRetuner, candidate_of, law_of, scribb
 
 from utank_hil.canbus import Verdict
 from utank_hil.control import PredictiveLaw
-from utank_hil.control.predictive.design import MOST_ORDER, MOST_SAMPLES
-from utank_hil.control.washout import WashoutLaw
+from utank_hil.control.predictive.design import MOST_ORDER, MOST_SAMPLES, WashoutLaw
 from utank_hil.dynamics.linear import STATES
 from utank_hil.retuning import Candidate, MotionEstimate, Refusal, ShipFigures
 from utank_hil.retuning.adaptive import gains

@@ -13,9 +13,9 @@ from utank_hil.control import PredictiveLaw
 from utank_hil.retuning import Answer, Candidate, ModelSummary, Refusal
 from utank_hil.retuning.answer import answer_bytes
 from utank_hil.runners import LoopStatistics
+from utank_hil.telemetry.frame_comparison import RecordedRetuner
 from utank_hil.telemetry.frame_log import LAYOUT, Kind
 from utank_hil.telemetry.node_tap import NodeTap, RetunerTap
-from utank_hil.telemetry.recorded_retuner import RecordedRetuner
 
 TICK = 10_000_000
 SUMMARY = ModelSummary(8.0, 0.01, 2e9, 1e9, 5e7, 0.1, 0.99, 1.2, 0.3)

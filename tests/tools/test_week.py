@@ -9,7 +9,7 @@ from firmware_sim.scenario import Scenario
 from tools.studies.week import SCENARIO, Sample, sail, verdict
 from utank_hil.assembly import retuning_task
 from utank_hil.configuration import load_config
-from utank_hil.control.washout import WashoutLaw
+from utank_hil.control.predictive.design import WashoutLaw
 from utank_hil.retuning import Candidate, ModelSummary, RetuningSettings
 
 SETTINGS = RetuningSettings((6.0, 20.0), identification_s=10.0, trial_s=30.0, pulse_pa=10e3)

@@ -24,8 +24,8 @@ from utank_hil.base.compiled import in_use
 from utank_hil.base.tick import TICK_S
 from utank_hil.configuration import load_config
 from utank_hil.control.level_observer import BANDWIDTH_RAD_S
+from utank_hil.control.predictive.design import WashoutLaw
 from utank_hil.control.predictive.law import PredictiveLaw
-from utank_hil.control.washout import WashoutLaw
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.sampling import transition_and_step
 from utank_hil.dynamics.tank import GRAVITY_M_S2

@@ -24,9 +24,8 @@ from utank_hil.telemetry.bus_logs import LoggedController
 from utank_hil.telemetry.explained_tick import ExplainedTick, Number
 from utank_hil.telemetry.frame_comparison import ReplayResult
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
-from utank_hil.telemetry.law_verdict import LawVerdict
+from utank_hil.telemetry.replay import LawVerdict, replay_log
 from utank_hil.telemetry.replay import replay as run_replay
-from utank_hil.telemetry.replay import replay_log
 from utank_hil.telemetry.replay_head import ReplayHeadError, few, recorded_config
 
 

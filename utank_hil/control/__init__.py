@@ -23,6 +23,7 @@ from utank_hil.control.lqg import design_lqg as design_lqg
 from utank_hil.control.lqg import design_lqr as design_lqr
 from utank_hil.control.predictive.design import PredictiveDesign as PredictiveDesign
 from utank_hil.control.predictive.design import Predictor as Predictor
+from utank_hil.control.predictive.design import WashoutLaw as WashoutLaw
 from utank_hil.control.predictive.design import wave_arx as wave_arx
 from utank_hil.control.predictive.law import PredictiveLaw as PredictiveLaw
 from utank_hil.control.predictive.law import design_dpc as design_dpc
@@ -31,5 +32,4 @@ from utank_hil.control.sea_model import SeaModel as SeaModel
 from utank_hil.control.semi_active import ClippedValve as ClippedValve
 from utank_hil.control.semi_active import OnOffValve as OnOffValve
 from utank_hil.control.state_space import StateSpaceLaw as StateSpaceLaw
-from utank_hil.control.washout import WashoutLaw as WashoutLaw
 from utank_hil.dynamics.linear import pump_model as pump_model

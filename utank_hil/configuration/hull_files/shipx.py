@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.configuration.hull_files import parts
-from utank_hil.configuration.mat_files import read_mat
+from utank_hil.configuration.matrices import read_mat
 from utank_hil.dynamics.hull.hull_data import TO_BODY_AXES, HullData, inverse_shift, wave_number
 
 _FROM_SHIPX = np.array([-1.0, -1, 1, -1, -1, 1])
