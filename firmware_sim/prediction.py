@@ -110,10 +110,7 @@ class PlantInLoop:
 
 
 def predict(
-    scenario: Scenario,
-    plant: DesignPlant,
-    law: BuiltLaw | None,
-    seeds: tuple[int, ...] = SEEDS,
+    scenario: Scenario, plant: DesignPlant, law: BuiltLaw | None, seeds: tuple[int, ...] = SEEDS
 ) -> Expected:
     """Predict a bench: without tank, with it passive and, given a law of a pump, active.
 

@@ -32,11 +32,7 @@ from utank_hil.console.terminal import Terminal, notes, shown, timing_table
 from utank_hil.control import BuiltLaw
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.signals import ROW_TICKS
-from utank_hil.runners import (
-    LoopStatistics,
-    Node,
-    RealTimeLoop,
-)
+from utank_hil.runners import LoopStatistics, Node, RealTimeLoop
 from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.events import Event, event_text
 from utank_hil.telemetry.node_tap import NodeTap, Tapped

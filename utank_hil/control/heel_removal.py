@@ -29,13 +29,7 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray, plausible
 from utank_hil.base.elementary import exp
-from utank_hil.base.parameters import (
-    ParameterError,
-    Range,
-    SampleTime,
-    range_problems,
-    refuse,
-)
+from utank_hil.base.parameters import ParameterError, Range, SampleTime, range_problems, refuse
 from utank_hil.control.interface import PRESSURE, VALVE, BuiltLaw, DesignPlant
 from utank_hil.control.semi_active import valve_range
 from utank_hil.dynamics.linear import coupled_matrices

@@ -30,9 +30,7 @@ def loop_margins(design_delay_s: float, delay_s: float) -> LoopMargins:
     """Margins of exp(-s delay_s) / (2 design_delay_s s)."""
     crossover_rad_s = 0.5 / design_delay_s
     return LoopMargins(
-        crossover_rad_s,
-        math.pi / 2 - crossover_rad_s * delay_s,
-        math.pi * design_delay_s / delay_s,
+        crossover_rad_s, math.pi / 2 - crossover_rad_s * delay_s, math.pi * design_delay_s / delay_s
     )
 
 

@@ -35,13 +35,7 @@ from utank_hil.analysis.loop.self_tuning import (
     short,
     unknown_sea,
 )
-from utank_hil.control import (
-    BuiltLaw,
-    DesignPlant,
-    PredictiveDesign,
-    Predictor,
-    SeaModel,
-)
+from utank_hil.control import BuiltLaw, DesignPlant, PredictiveDesign, Predictor, SeaModel
 from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.dynamics import STATES
 

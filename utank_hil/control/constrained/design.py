@@ -174,10 +174,7 @@ class ConstrainedDesign:
     sample_time_s: SampleTime = 0.2
 
     def __post_init__(self) -> None:
-        problems = [
-            *measured_problems(self.measured, "roll_rad", "level_m"),
-            *range_problems(self),
-        ]
+        problems = [*measured_problems(self.measured, "roll_rad", "level_m"), *range_problems(self)]
         if len(self.measurement_std) != len(self.measured):
             problems.append(per_output("measurement_std", self.measurement_std, self.measured))
         if len(self.knots) > MOST_KNOTS:
@@ -230,10 +227,7 @@ class ConstrainedDesign:
             observer_gain=observer_gain,
             horizon=horizon,
             limits=PumpLimits(
-                limits.pressure_pa,
-                limits.rate_pa_s,
-                limits.level_m - margin_m,
-                limits.power_w,
+                limits.pressure_pa, limits.rate_pa_s, limits.level_m - margin_m, limits.power_w
             ),
             level_output=level,
             level_penalty=_PENALTY_ROLL_RAD**2 * self.horizon,

@@ -232,12 +232,7 @@ class ConstrainedController:
         self._steady_command = law.steady_command
         self._interpolation = horizon.interpolation
         self._programme = PlanProgramme(
-            horizon,
-            limits,
-            model.dt,
-            law.level_output,
-            law.level_penalty,
-            law.iteration_limit,
+            horizon, limits, model.dt, law.level_output, law.level_penalty, law.iteration_limit
         )
         output = law.level_output or 0
         held = horizon.outputs_held[:, output]

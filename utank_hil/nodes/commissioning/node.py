@@ -24,13 +24,7 @@ from utank_hil.nodes.commissioning.checks import (
 )
 from utank_hil.nodes.commissioning.drive_speed import SPEED, judge_speed
 from utank_hil.nodes.commissioning.precision import Record, noise_of, times_needed
-from utank_hil.nodes.commissioning.pulses import (
-    ROW_S,
-    ROW_TICKS,
-    PulseLaw,
-    PulsePlan,
-    ValveStroke,
-)
+from utank_hil.nodes.commissioning.pulses import ROW_S, ROW_TICKS, PulseLaw, PulsePlan, ValveStroke
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.safety.faults import fault_text
 

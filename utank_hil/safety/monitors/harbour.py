@@ -21,12 +21,7 @@ from collections.abc import Callable
 from typing import Final
 
 from utank_hil.canbus.measurements import Measurements, MotionSample
-from utank_hil.control.heel_removal import (
-    SETTLED_PERIODS,
-    HeelingTank,
-    HeelRemovalDesign,
-    MeanHeel,
-)
+from utank_hil.control.heel_removal import SETTLED_PERIODS, HeelingTank, HeelRemovalDesign, MeanHeel
 from utank_hil.safety.monitors.finding import Finding
 
 ROLL_MEMORY_S: Final = 60.0
