@@ -37,6 +37,7 @@ PARTS = {
     "utank_hil/control/predictive/law.py": ("PredictiveController",),
     "utank_hil/control/constrained/horizon.py": ("predictions", "_interpolation", "ActiveSetSolver",
                                                     "PlanProgramme"),
+    "utank_hil/control/stimulation.py": ("StimulationController",),
     "utank_hil/dynamics/sampling.py": ("transition_and_step",),
 }  # fmt: skip
 """Of modules that design, too: what a tick runs through."""

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from rolling_ship import SHIP, TANK
 
-from tools.thesis.fuzzy_laws import IndirectFuzzy, SmallGainFuzzy
 from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
 from utank_hil.control.fuzzy.adaptive import RobustFuzzy
+from utank_hil.control.fuzzy.indirect import IndirectFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.law import ErrorDynamics, FuzzyBasis
 from utank_hil.control.gain import slope_at_rest
 from utank_hil.dynamics import RollModel

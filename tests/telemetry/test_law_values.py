@@ -81,7 +81,7 @@ def answers_of(controller, measured):
 @pytest.mark.parametrize(
     "name",
     ["constrained_gpc", "dpc", "feedback_linearization", "fuzzy_robust", "gpc", "lqg", "pd",
-     "pump_with_valve", "valve_clipped", "valve_on_off"],
+     "pump_with_valve", "stimulate", "valve_clipped", "valve_on_off"],
 )  # fmt: skip
 def test_a_law_of_every_kind_takes_recorded_numbers_and_answers_as_recorded(name):
     law = build_law(shipped(name))

@@ -14,11 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from tools.thesis.batch import simulate_batch
-from tools.thesis.fuzzy_laws import IndirectFuzzy, SmallGainFuzzy
 from tools.thesis.simulate import WaveMoment, whole_steps
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
 from utank_hil.control.fuzzy.adaptive import RobustFuzzy
+from utank_hil.control.fuzzy.indirect import IndirectFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.law import ErrorDynamics
 from utank_hil.control.gain import PassiveController
 from utank_hil.control.interface import Controller, PumpLimits

@@ -8,11 +8,11 @@ import numpy as np
 
 from tools.thesis.capsize import PATTI_B, WAVE_RAD_S, law_factory
 from tools.thesis.figure import Check, Curve, Figure, Panel, Verdict
-from tools.thesis.fuzzy_laws import SmallGainFuzzy
 from tools.thesis.patti_b import METHOD, MIDDLE_NM, ROBUST, SMALL_GAIN, Run, run_controller, told
 from tools.thesis.simulate import WaveMoment
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.fuzzy.adaptive import DirectFuzzyController, DirectFuzzyLaw, RobustFuzzy
+from utank_hil.control.fuzzy.indirect import SmallGainFuzzy
 
 DURATION_S: Final = 120.0
 _OPEN: Final = (

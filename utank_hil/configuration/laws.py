@@ -32,6 +32,7 @@ from utank_hil.configuration.spectra import LawSea
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.feedback_linearization import FeedbackLinearizationDesign
 from utank_hil.control.fuzzy.adaptive import RobustFuzzy
+from utank_hil.control.fuzzy.indirect import IndirectFuzzy, SmallGainFuzzy
 from utank_hil.control.gain import PassiveDesign, PDDesign
 from utank_hil.control.heel_removal import HeelRemovalDesign
 from utank_hil.control.interface import LawDesign
@@ -41,6 +42,7 @@ from utank_hil.control.python_law import PythonDesign
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign, PumpWithValveDesign
 from utank_hil.control.state_space import StateSpaceDesign, SystemMatrices
+from utank_hil.control.stimulation import StimulationDesign
 
 LAWS: Final[tuple[type[LawDesign], ...]] = (
     PassiveDesign,
@@ -50,6 +52,9 @@ LAWS: Final[tuple[type[LawDesign], ...]] = (
     ConstrainedDesign,
     FeedbackLinearizationDesign,
     RobustFuzzy,
+    SmallGainFuzzy,
+    IndirectFuzzy,
+    StimulationDesign,
     StateSpaceDesign,
     PythonDesign,
     OnOffValveDesign,

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tools.thesis.fuzzy_laws import IndirectFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.adaptive import RobustFuzzy
+from utank_hil.control.fuzzy.indirect import IndirectFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.law import ErrorDynamics
 
 COMMON = (ErrorDynamics(0.8, 0.6, 2.5), (0.5, 0.5, 2.0, 2.0), 2e-8)

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from tools.thesis.fuzzy_laws import IndirectFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.adaptive import RobustFuzzy
+from utank_hil.control.fuzzy.indirect import IndirectFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.law import ErrorDynamics
 
 pytestmark = pytest.mark.slow

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tools.thesis.fuzzy_laws import IndirectFuzzy
+from utank_hil.control.fuzzy.indirect import IndirectFuzzy
 from utank_hil.control.fuzzy.law import ErrorDynamics, FuzzyBasis
 
 ERROR = ErrorDynamics(1.0, 0.7, 2.0)

@@ -1,4 +1,4 @@
-"""The thesis's other two adaptive fuzzy laws, beside `utank_hil.control.RobustFuzzy`.
+"""The thesis's other two adaptive fuzzy laws, beside `RobustFuzzy`.
 
 `SmallGainFuzzy`, section 4.4.3, (4.20)-(4.22), one parameter lambda::
 
@@ -23,7 +23,7 @@ g is near one.
 """
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -44,6 +44,7 @@ class SmallGainFuzzy(DirectFuzzyLaw):
     adaptation: Positive  #: Gamma.
     leakage: Positive  #: sigma.
     initial: NotNegative = 0.0  #: lambda_0, zero or more.
+    kind: Literal["fuzzy_small_gain"] = "fuzzy_small_gain"
 
     def _problems(self) -> list[Problem]:
         return [*FuzzyLaw._problems(self), *self.q_problems(above=2)]
@@ -77,6 +78,7 @@ class IndirectFuzzy(FuzzyLaw):
     least_gain: Annotated[float, Range(above=0, below=1)] = 0.3
     #: Initial f of every rule: a constant, then a factor for each input.
     prior: tuple[Finite, ...] | None = None
+    kind: Literal["fuzzy_indirect"] = "fuzzy_indirect"
 
     def _problems(self) -> list[Problem]:
         problems, needed = FuzzyLaw._problems(self), len(self.ranges) + 1
