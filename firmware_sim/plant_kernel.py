@@ -16,6 +16,8 @@ from utank_hil.dynamics.kernels import (
     DAMPED_AROUND,
     STRIKE_LOSS,
     SUMMARY,
+    Held,
+    InStep,
     damping_w,
     righting_moment,
     rk4,
@@ -112,6 +114,13 @@ def pump_after(
 
 
 @njit(error_model="numpy")
+def _in_step(weights: FloatArray, step: int, first: float, values: FloatArray) -> InStep:
+    """Return a wave's values at start, middle and end of a step."""
+    middle = interpolated(weights, 2 * step + 1, values)
+    return first, middle, interpolated(weights, 2 * step + 2, values)
+
+
+@njit(error_model="numpy")
 def advance_tick(
     state: FloatArray,
     row: FloatArray,
@@ -149,7 +158,7 @@ def advance_tick(
     moments, summary = state[MOMENTS], state[SUMMED]
     shaft_j, wave_j, pump_j, damped_j = 0.0, 0.0, 0.0, 0.0
     sway, change = state[SWAY], state[CHANGE]
-    first, sway_first, change_first = moments[1], sway[1], change[1]
+    moment, lateral, share = (0.0, 0.0, moments[1]), (0.0, 0.0, sway[1]), (0.0, 0.0, change[1])
     # not STEPS: numba's cache would keep the number of an earlier tick
     for step in range(len(weights) // 2):
         if summary[CAPSIZED_S] < np.inf:
@@ -157,37 +166,29 @@ def advance_tick(
             break
         flow_m3_s = c.area * x[3]
         pump = pump_after(state, pump, flow_m3_s, pump_coefficients)
-        middle = interpolated(weights, 2 * step + 1, moments)
-        last = interpolated(weights, 2 * step + 2, moments)
-        sway_middle = interpolated(weights, 2 * step + 1, sway)
-        sway_last = interpolated(weights, 2 * step + 2, sway)
-        change_middle = interpolated(weights, 2 * step + 1, change)
-        change_last = interpolated(weights, 2 * step + 2, change)
-        waves = (
-            (first, middle, last),
-            (sway_first, sway_middle, sway_last),
-            (change_first, change_middle, change_last),
-        )
+        moment = _in_step(weights, step, moment[2], moments)
+        lateral = _in_step(weights, step, lateral[2], sway)
+        share = _in_step(weights, step, share[2], change)
+        waves = (moment, lateral, share)
         force = c.area * pump.pressure_pa
-        after = rk4(c, row[17], restoring, x, waves, force, valve, STEP_S)
+        held = Held(c, row[17], restoring, force, valve)
+        after = rk4(held, x, waves, STEP_S)
         if abs(after[2]) > c.level_limit:
-            after = step_with_impacts(
-                c, row[17], restoring, x, waves, force, valve, STEP_S,
-                state[TIME] + step * STEP_S, np.empty((0, 5)), summary,
-            )  # fmt: skip
+            time_s = state[TIME] + step * STEP_S
+            after = step_with_impacts(held, x, waves, STEP_S, time_s, np.empty((0, 5)), summary)
         else:
             damped_j += (damping_w(c, x, valve) + damping_w(c, after, valve)) / 2 * STEP_S
         shaft_j += pump.power_w * STEP_S
         # force times distance, which also holds in a step with an impact
-        wave_j += (first + last) / 2 * (after[0] - x[0])
+        wave_j += (moment[0] + moment[2]) / 2 * (after[0] - x[0])
         pump_j += force * (after[2] - x[2])
         if len(phasors) > 1:
-            wave_j += sway_work_j(c, x, after, (sway_first + sway_last) / 2)
+            wave_j += sway_work_j(c, x, after, (lateral[0] + lateral[2]) / 2)
         if len(phasors) > 2:
             middle_rad = (x[0] + after[0]) / 2
             righting_nm = righting_moment(row[17], restoring, middle_rad)
-            wave_j -= (change_first + change_last) / 2 * righting_nm * (after[0] - x[0])
-        x, first, sway_first, change_first = after, last, sway_last, change_last
+            wave_j -= (share[0] + share[2]) / 2 * righting_nm * (after[0] - x[0])
+        x = after
         if abs(x[0]) >= CAPSIZE_RAD:
             summary[CAPSIZED_S] = state[TIME] + (step + 1) * STEP_S
     state[ROLL], state[ROLL_RATE], state[LEVEL], state[LEVEL_RATE] = x

@@ -61,7 +61,7 @@ def test_compiled_run_equals_the_adaptive_reference(reference):
 
 @pytest.mark.parametrize("ship", [SHIP, PATTI, LEVERS], ids=["thesis", "patti", "levers"])
 def test_compiled_accelerations_equal_the_model(ship):
-    from utank_hil.dynamics.kernels import accelerations
+    from utank_hil.dynamics.kernels import Held, accelerations
 
     ship = replace(ship, quadratic_damping_nms2_rad2=3e8, offset_moment_nm=1e6, wind_moment_nm=-2e6)
     tank = replace(TANK, quadratic_loss=2.0)
@@ -70,16 +70,14 @@ def test_compiled_accelerations_equal_the_model(ship):
     states = rng.uniform(-1, 1, (500, 4)) * [1.4, 0.5, 4.8, 3]
     pressure, wave, sway = rng.uniform(-1, 1, (3, 500)) * [[5e4], [2e7], [0.3]]
     expected = model.derivative(states, pressure, wave, 3e4, 9.80665 * sway)
+    area_m2 = tank.reservoir_area_m2
     values = [
         accelerations(
-            model.coefficients,
-            *model.packed[1:],
+            Held(model.coefficients, *model.packed[1:], area_m2 * p, area_m2 * 3e4),
             *state,
             w,
             s,
             0.0,
-            tank.reservoir_area_m2 * p,
-            tank.reservoir_area_m2 * 3e4,
         )
         for state, p, w, s in zip(states, pressure, wave, sway, strict=True)
     ]

@@ -13,6 +13,7 @@ from utank_hil.dynamics.kernels import (
     CAPSIZED_S,
     MAX_LEVEL,
     MAX_ROLL,
+    Held,
     rk4,
     sine_cosine,
     step_with_impacts,
@@ -98,11 +99,10 @@ def advance(
             valve = c.area * valve_loss[min(sample, len(valve_loss) - 1)]
         held += 1
         in_step = ((start, middle, end), NONE, NONE)
-        after = rk4(c, per_piece, restoring, now, in_step, pump, valve, dt)
+        ship = Held(c, per_piece, restoring, pump, valve)
+        after = rk4(ship, now, in_step, dt)
         if abs(after[2]) > c.level_limit:
-            after = step_with_impacts(
-                c, per_piece, restoring, now, in_step, pump, valve, dt, step * dt, impacts, summary
-            )
+            after = step_with_impacts(ship, now, in_step, dt, step * dt, impacts, summary)
         now, start = after, end
         max_roll, max_level = max(max_roll, abs(now[0])), max(max_level, abs(now[2]))
         if not abs(now[0]) < capsize:

@@ -8,6 +8,7 @@ impulse is applied, and the rest of the step follows.
 """
 
 import math
+from typing import NamedTuple
 
 from utank_hil.base import elementary
 from utank_hil.base.arrays import FloatArray
@@ -27,6 +28,18 @@ InStep = tuple[float, float, float]  #: Values of a quantity at start, middle an
 InWaves = tuple[InStep, InStep, InStep]
 """Roll moment of the waves, lateral acceleration over g, and the righting moment's change as a
 share."""
+
+
+class Held(NamedTuple):
+    """The ship with her tank, and what pump and valve do over a step."""
+
+    c: RollCoefficients
+    per_piece: float  #: This and the next are of `righting_moment`.
+    restoring: FloatArray
+    pump: float  #: Pressure times the reservoir area.
+    valve: float  #: Loss times the reservoir area.
+
+
 # No kernel reorders or fuses sums (`fastmath`): processors would differ in their last digits.
 sine_cosine = njit(error_model="numpy")(elementary.sine_cosine)
 forces = njit(error_model="numpy", inline="always")(nonlinear.forces)
@@ -57,26 +70,17 @@ def righting_moment(per_piece: float, restoring: FloatArray, phi: float) -> floa
 # Passing the coefficients four times a step would cost a third of the step.
 @njit(error_model="numpy", inline="always")
 def accelerations(
-    c: RollCoefficients,
-    per_piece: float,
-    restoring: FloatArray,
-    phi: float,
-    phi_dot: float,
-    h: float,
-    h_dot: float,
-    moment: float,
-    sway: float,
-    change: float,
-    pump: float,
-    valve: float,
-) -> tuple[float, float]:
+    s: Held, phi: float, phi_dot: float, h: float, h_dot: float,
+    moment: float, sway: float, change: float,
+) -> tuple[float, float]:  # fmt: skip
     """Roll and level acceleration by `utank_hil.dynamics.nonlinear.forces`."""
+    c = s.c
     sin, cos = sine_cosine(phi)
-    righting = (1.0 + change) * righting_moment(per_piece, restoring, phi)
+    righting = (1.0 + change) * righting_moment(s.per_piece, s.restoring, phi)
     roll_inertia, roll_moment, level_force = forces(
-        c, righting, sin, cos, phi_dot, h, h_dot, moment, sway, pump, valve
+        c, righting, sin, cos, phi_dot, h, h_dot, moment, sway, s.pump, s.valve
     )
-    if valve >= LOCKED:
+    if s.valve >= LOCKED:
         return roll_moment / roll_inertia, 0.0
     scale = 1 / (roll_inertia * c.level_inertia - c.coupling * c.coupling)
     h_ddot = (roll_inertia * level_force - c.coupling * roll_moment) * scale
@@ -86,36 +90,18 @@ def accelerations(
 
 
 @njit(error_model="numpy")
-def rk4(
-    c: RollCoefficients,
-    per_piece: float,
-    restoring: FloatArray,
-    state: State,
-    waves: InWaves,
-    pump: float,
-    valve: float,
-    dt: float,
-) -> State:
+def rk4(s: Held, state: State, waves: InWaves, dt: float) -> State:
     """Advance by one Runge-Kutta step."""
     x, v1, h, w1 = state
-    (start, middle, end), (sway, sway_middle, sway_end), (change, change_middle, change_end) = waves
+    (m1, m2, m4), (s1, s2, s4), (c1, c2, c4) = waves
     half = 0.5 * dt
-    a1, b1 = accelerations(c, per_piece, restoring, x, v1, h, w1, start, sway, change, pump, valve)
+    a1, b1 = accelerations(s, x, v1, h, w1, m1, s1, c1)
     v2, w2 = v1 + half * a1, w1 + half * b1
-    x2, h2 = x + half * v1, h + half * w1
-    a2, b2 = accelerations(
-        c, per_piece, restoring, x2, v2, h2, w2, middle, sway_middle, change_middle, pump, valve
-    )
+    a2, b2 = accelerations(s, x + half * v1, v2, h + half * w1, w2, m2, s2, c2)
     v3, w3 = v1 + half * a2, w1 + half * b2
-    x3, h3 = x + half * v2, h + half * w2
-    a3, b3 = accelerations(
-        c, per_piece, restoring, x3, v3, h3, w3, middle, sway_middle, change_middle, pump, valve
-    )
+    a3, b3 = accelerations(s, x + half * v2, v3, h + half * w2, w3, m2, s2, c2)
     v4, w4 = v1 + dt * a3, w1 + dt * b3
-    x4, h4 = x + dt * v3, h + dt * w3
-    a4, b4 = accelerations(
-        c, per_piece, restoring, x4, v4, h4, w4, end, sway_end, change_end, pump, valve
-    )
+    a4, b4 = accelerations(s, x + dt * v3, v4, h + dt * w3, w4, m4, s4, c4)
     sixth = dt / 6
     return (
         x + sixth * (v1 + 2 * (v2 + v3) + v4),
@@ -173,25 +159,17 @@ def _damped_j(c: RollCoefficients, before: State, after: State, valve: float, ti
 
 @njit(error_model="numpy")
 def step_with_impacts(
-    c: RollCoefficients,
-    per_piece: float,
-    restoring: FloatArray,
-    state: State,
-    waves: InWaves,
-    pump: float,
-    valve: float,
-    dt: float,
-    time: float,
-    impacts: FloatArray,
+    s: Held, state: State, waves: InWaves, dt: float, time: float, impacts: FloatArray,
     summary: FloatArray,
-) -> State:
+) -> State:  # fmt: skip
     """Return the state after a step with impacts, each counted and written to `impacts`."""
+    c, valve = s.c, s.valve
     done = 0.0
     limit = c.level_limit
     for strike in range(STRIKES_PER_STEP + 1):
         left = 1.0 - done
         part = _part_of(waves, done, 1.0)
-        after = rk4(c, per_piece, restoring, state, part, pump, valve, left * dt)
+        after = rk4(s, state, part, left * dt)
         if abs(after[2]) <= limit:
             summary[DAMPED_AROUND] += _damped_j(c, state, after, valve, left * dt)
             return after
@@ -201,15 +179,15 @@ def step_with_impacts(
         for _ in range(60):
             if g_high < 1e-13 or high - low < 1e-15 or g_low >= 0:
                 break
-            s = high - g_high * (high - low) / (g_high - g_low)
-            part = _part_of(waves, done, done + s)
-            candidate = rk4(c, per_piece, restoring, state, part, pump, valve, s * dt)
+            share = high - g_high * (high - low) / (g_high - g_low)
+            part = _part_of(waves, done, done + share)
+            candidate = rk4(s, state, part, share * dt)
             g = side * candidate[2] - limit
             if g > 0:
-                high, g_high, after = s, g, candidate
+                high, g_high, after = share, g, candidate
                 g_low *= 0.5
             else:
-                low, g_low = s, g
+                low, g_low = share, g
                 g_high *= 0.5
         done += high
         summary[DAMPED_AROUND] += _damped_j(c, state, after, valve, high * dt)
@@ -236,5 +214,5 @@ def step_with_impacts(
         h = side * (limit if rebound == 0.0 else limit - INSIDE_M)
         state = (x, v + roll_jump, h, rebound)
     part, left = _part_of(waves, done, 1.0), 1.0 - done
-    x, v, h, w = rk4(c, per_piece, restoring, state, part, pump, valve, left * dt)
+    x, v, h, w = rk4(s, state, part, left * dt)
     return x, v, math.copysign(min(abs(h), limit), h), w
