@@ -4,14 +4,15 @@ import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
+from can import CanError
 from rich.progress import MofNCompleteColumn
 
 from utank_hil.base.provenance import describe
 from utank_hil.base.shipped import CONFIGS
-from utank_hil.console.common import KILLED, Json, argument, fail, load, option, print_json
+from utank_hil.console.common import KILLED, Json, argument, fail, load, option, print_json, why
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, progress_bar
 
@@ -37,6 +38,10 @@ def faults(
     full: Annotated[
         bool, option("Compare the roll over 600 s, as is asked for: ten times the work.")
     ] = False,
+    bus: Annotated[
+        str | None, option("SocketCAN interface for the live rows, such as vcan0.")
+    ] = None,
+    junit: Annotated[Path | None, option("Write the result as JUnit XML, too.")] = None,
     json_: Json = False,
 ) -> None:
     """Inject each fault of the fault table and judge what becomes of it.
@@ -45,14 +50,17 @@ def faults(
 
     In lockstep on all cores. Without **--full** the roll is compared over 60 s (an own ship's over
     600 s), and over 20 s where the controller stays in charge (an own ship's over five rolls, if
-    these are longer), and rows that take minutes are left out. The exit code says whether a row
-    failed (docs/deployment.md).
+    these are longer), and rows that take minutes are left out. Live rows start, kill and stop the
+    deployed programs, with **--bus** only. The exit code says whether a row failed
+    (docs/deployment.md).
     """
     # imported late: `--help` needs none of it
     from firmware_sim.fault_campaign.campaign import Campaign
+    from firmware_sim.fault_campaign.junit import write_junit
     from firmware_sim.fault_campaign.runner import run_rows
     from firmware_sim.fault_campaign.trial import Window
     from firmware_sim.fault_campaign.verdict import as_json, judged
+    from firmware_sim.live_faults.rows import ROWS
     from utank_hil.runners import stop_on_signals
 
     whole = load(campaign, Campaign)
@@ -62,10 +70,17 @@ def faults(
     window = Window() if full else Window(60.0, 20.0) if scenario is None else _window(loaded)
     too_long = [row for row in chosen if row.long and not (full or names)]
     chosen = [row for row in chosen if row not in too_long]
+    live = [name for name in ROWS if not names or name.startswith(tuple(names))]
     for name in names:
-        if not (whole.chosen([name]) or whole.shown_elsewhere([name])):
+        if not (
+            whole.chosen([name])
+            or whole.shown_elsewhere([name])
+            or any(each.startswith(name) for each in live)
+        ):
             fail(f"--rows: no row or requirement begins with {name}")
-    if names and not chosen:
+    if names and live and not chosen and bus is None:
+        fail("--rows: live rows need --bus")
+    if names and not (chosen or live):
         fail("--rows: nothing to run: tests show all of them, or the ship has none of these nodes")
     began = time.monotonic()
     with progress_bar(MofNCompleteColumn()) as bar, stop_on_signals() as stopped:
@@ -98,13 +113,23 @@ def faults(
     not_run |= dict.fromkeys(not_begun, KILLED if killed else INTERRUPTED)
     options = {"seeds": seeds, "full": full, "rows": names, "scenario": str(scenario or "")}
     about = describe("faults", loaded, Path(), options=options, seed=1)
+    if bus is None or ended_early:
+        not_run |= dict.fromkeys(live, INTERRUPTED if ended_early else "needs a live bus: --bus")
+    on_bus = [] if bus is None or ended_early else _live(live, bus)
+    content = as_json(results, not_run, about)
+    content["rows"] += on_bus
+    lost = sum(each["verdict"] == "fail" for each in on_bus)
+    failed = content["failed"] = content["failed"] + lost
+    content["passed"] += len(on_bus) - lost
+    if junit is not None:
+        write_junit(junit, content)
     if json_:
-        print_json(as_json(results, not_run, about))
+        print_json(content)
     else:
-        _print(results, seeds)
-        failed = sum(not result.passed for result in results)
+        _print(results, on_bus, seeds)
+        count = len(content["rows"])
         Terminal().say(
-            f"{len(results)} row{'s' * (len(results) != 1)} in {'up to ' * ended_early}{seeds} "
+            f"{count} row{'s' * (count != 1)} in {'up to ' * ended_early}{seeds} "
             f"sea{'s' * (seeds > 1)}, {failed} failed, {len(not_run)} not run; "
             f"roll compared over {window.stopped_s:g} s, "
             f"in charge over {window.running_s:g} s; {time.monotonic() - began:.0f} s."
@@ -113,8 +138,23 @@ def faults(
         fail(KILLED, ExitCode.SYSTEM)
     if interrupted:
         raise typer.Exit(ExitCode.INTERRUPTED)
-    if not all(result.passed for result in results):
+    if failed:
         raise typer.Exit(ExitCode.REFUSED)
+
+
+def _live(names: Sequence[str], bus: str) -> list[dict[str, Any]]:
+    from firmware_sim.live_faults.rows import ROWS, as_json
+
+    try:
+        with progress_bar(MofNCompleteColumn()) as bar:
+            task = bar.add_task(f"on {bus}", total=len(names))
+            found = []
+            for name in names:
+                found.append(as_json(name, ROWS[name], bus))
+                bar.advance(task)
+            return found
+    except (OSError, CanError) as error:
+        fail(f"--bus {bus}: {why(error)}", ExitCode.NO_BUS)
 
 
 def _on(campaign: "Campaign", path: Path) -> "Campaign":
@@ -139,7 +179,7 @@ def _window(campaign: "Campaign") -> "Window":
     return Window(600.0, max(20.0, round(rolls_s)))
 
 
-def _print(results: Sequence["Result"], seeds: int) -> None:
+def _print(results: Sequence["Result"], live: Sequence[dict[str, Any]], seeds: int) -> None:
     from firmware_sim.fault_campaign.verdict import table
 
     console = Terminal()
@@ -148,3 +188,10 @@ def _print(results: Sequence["Result"], seeds: int) -> None:
     for result in results:
         for problem in result.problems:
             console.say(problem, red=f"{result.row.id}:")
+    for row in live:
+        took = row["zero_ms"] if row["limit_ms"] is None else row["found_ms"]
+        limit = row["zero_limit_ms"] if row["limit_ms"] is None else row["limit_ms"]
+        if row["problems"]:
+            console.say("; ".join(row["problems"]), red=f"{row['id']}:")
+        else:
+            console.say(f"{row['id']}: passed, {took:.0f} ms of {limit:.0f}")

@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
+from xml.etree import ElementTree
 
 import pytest
 import typer
@@ -26,6 +27,8 @@ from firmware_sim.fault_campaign.runner import run_rows
 from firmware_sim.fault_campaign.trial import Sea, Window, in_a_copy, times_of
 from firmware_sim.fault_campaign.verdict import judged
 from firmware_sim.fault_campaign.watch import BusLog, Watch, first_difference
+from firmware_sim.live_faults import rows as live
+from firmware_sim.live_faults.bench import LiveTimes
 from firmware_sim.scenario import Scenario
 from utank_hil.assembly import build_law
 from utank_hil.canbus import Fault, Mode
@@ -493,6 +496,36 @@ def test_a_row_that_fails_is_told_by_the_exit_code(found_ms, late, monkeypatch):
     done = invoke("--rows", GOOD.row, "--seeds", "1")
     assert done.exit_code == (ExitCode.REFUSED if late else ExitCode.OK), done.output
     assert ("allowed" in done.output) is late
+
+
+def test_live_rows_are_run_on_a_bus_alone_and_all_stands_in_the_junit_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(runner, "run_rows", lambda *_, **__: {GOOD.row: [GOOD]})
+    xml, on_bus = tmp_path / "faults.xml", []
+
+    def attempted(row, bus):
+        on_bus.append(bus)
+        killed = row is live.ROWS["live-controller-killed"]
+        return ["the drive went on"] if killed else [], LiveTimes(50.0, 60.0, 0.0)
+
+    monkeypatch.setattr(live, "attempted", attempted)
+    asked = "--rows", f"{GOOD.row},live-controller", "--seeds", "1", "--junit", str(xml), "--json"
+    done = invoke(*asked)
+    assert done.exit_code == ExitCode.OK
+    assert on_bus == []
+    names = [name for name in live.ROWS if name.startswith("live-controller")]
+    waiting = [{"id": name, "why": "needs a live bus: --bus"} for name in names]
+    assert json.loads(done.stdout)["not_run"] == waiting
+    assert len(ElementTree.parse(xml).findall("testcase/skipped")) == len(names)
+    done = invoke(*asked, "--bus", "vcan7")
+    assert done.exit_code == ExitCode.REFUSED
+    told = json.loads(done.stdout)
+    assert [row["id"] for row in told["rows"]] == [GOOD.row, *names]
+    assert (told["passed"], told["failed"], told["not_run"]) == (len(names), 1, [])
+    assert set(on_bus) == {"vcan7"}
+    (failed,) = ElementTree.parse(xml).findall("testcase/failure")
+    assert failed.text == "the drive went on"
+    assert "passed, 60 ms of 500" in invoke(*asked[:-1], "--bus", "vcan7").stdout
+    assert "need --bus" in invoke("--rows", "live").output
 
 
 @pytest.mark.parametrize(

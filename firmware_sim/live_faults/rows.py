@@ -1,12 +1,8 @@
-"""Live rows: what is done to the deployed programs, and how soon they must react.
-
-``python -m tools.live_faults.rows vcan0`` runs all of them; docs/faults.md.
-"""
+"""Live rows: what is done to the deployed programs, and how soon they must react."""
 
 import signal
 import socket
 import struct
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -14,9 +10,9 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
-from tools.live_faults.bench import (
+from firmware_sim.live_faults.bench import (
     HELD_UP_S,
     Later,
     LiveBench,
@@ -69,18 +65,18 @@ def bus_off(bench: LiveBench) -> Later:
 
 
 ROWS: Final = {
-    "controller-killed": LiveRow(_sent("controller", signal.SIGKILL), 120, "commands"),
-    "controller-stopped": LiveRow(_sent("controller", signal.SIGSTOP), 120, "commands"),
-    "controller-stopped-for-a-second": LiveRow(
+    "live-controller-killed": LiveRow(_sent("controller", signal.SIGKILL), 120, "commands"),
+    "live-controller-stopped": LiveRow(_sent("controller", signal.SIGSTOP), 120, "commands"),
+    "live-controller-stopped-for-a-second": LiveRow(
         _sent("controller", signal.SIGSTOP, rested=True), 120, "commands"
     ),
-    "controller-terminated": LiveRow(_sent("controller", signal.SIGTERM), 500),
-    "controller-hung-up": LiveRow(_sent("controller", signal.SIGHUP), 500),
-    "ship-killed": LiveRow(_sent("ship", signal.SIGKILL), 250, "motions", "found"),
-    "ship-stopped-for-a-second": LiveRow(
+    "live-controller-terminated": LiveRow(_sent("controller", signal.SIGTERM), 500),
+    "live-controller-hung-up": LiveRow(_sent("controller", signal.SIGHUP), 500),
+    "live-ship-killed": LiveRow(_sent("ship", signal.SIGKILL), 250, "motions", "found"),
+    "live-ship-stopped-for-a-second": LiveRow(
         _sent("ship", signal.SIGSTOP, rested=True), 250, "motions", "found"
     ),
-    "bus-off": LiveRow(bus_off, 250, judged="found"),
+    "live-bus-off": LiveRow(bus_off, 250, judged="found"),
 }
 
 
@@ -106,22 +102,22 @@ def in_charge(bus: str) -> Iterator[LiveBench]:
                 return
 
 
-def run_live(row: LiveRow, bus: str) -> list[str]:
-    """Run a row on an interface; return its problems, none where it passed.
+def run_live(row: LiveRow, bus: str) -> tuple[list[str], LiveTimes]:
+    """Run a row on an interface; return its problems, none where it passed, and the times.
 
     Raises `OSError` if the interface cannot be used.
     """
     for attempt in range(1, ATTEMPTS + 1):
-        problems, held_up_ms = attempted(row, bus)
-        if not problems or held_up_ms <= 1e3 * HELD_UP_S:
+        problems, times = attempted(row, bus)
+        if not problems or times.held_up_ms <= 1e3 * HELD_UP_S:
             break
-        held_up = f"the machine held processes up for {held_up_ms:.0f} ms, attempt {attempt}"
+        held_up = f"the machine held processes up for {times.held_up_ms:.0f} ms, attempt {attempt}"
         problems.append(held_up)
-    return problems
+    return problems, times
 
 
-def attempted(row: LiveRow, bus: str) -> tuple[list[str], float]:
-    """Run a row once; return its problems, and the ms for which processes were delayed."""
+def attempted(row: LiveRow, bus: str) -> tuple[list[str], LiveTimes]:
+    """Run a row once; return its problems, and the times."""
     problems = []
     times = LiveTimes(None, None, 0.0)
     end = ""
@@ -141,18 +137,18 @@ def attempted(row: LiveRow, bus: str) -> tuple[list[str], float]:
         problems.append(missing + end)
     elif judged_ms is not None and judged_ms > row.within_ms:
         problems.append(f"after {judged_ms:.0f} ms, {row.within_ms:.0f} allowed{end}")
-    return problems, times.held_up_ms
+    return problems, times
 
 
-def main(bus: str) -> bool:
-    """Run all rows and print each; return whether all passed."""
-    passed = True
-    for name, row in ROWS.items():
-        problems = run_live(row, bus)
-        passed &= not problems
-        sys.stdout.write(f"{name}: {'; '.join(problems) or 'passed'}\n")
-    return passed
-
-
-if __name__ == "__main__":
-    sys.exit(not main(sys.argv[1]))
+def as_json(name: str, row: LiveRow, bus: str) -> dict[str, Any]:
+    """Run a row; return its result for `json.dumps`, with the keys of a lockstep row."""
+    problems, times = run_live(row, bus)
+    return {
+        "id": name,
+        "found_ms": times.found_ms,
+        "zero_ms": times.zero_ms,
+        "limit_ms": row.within_ms if row.judged == "found" else None,
+        "zero_limit_ms": row.within_ms if row.judged == "zero" else None,
+        "verdict": "fail" if problems else "pass",
+        "problems": problems,
+    }

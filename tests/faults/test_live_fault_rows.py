@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from tools.live_faults import rows
-from tools.live_faults.bench import LiveError, LiveLog, LiveTimes, times_of
+from firmware_sim.live_faults import rows
+from firmware_sim.live_faults.bench import LiveError, LiveLog, LiveTimes, times_of
 from utank_hil.canbus import DriveState, Mode
 
 FAULT_S = 100.0
@@ -128,10 +128,13 @@ def test_only_what_the_machine_spoilt_is_tried_again(monkeypatch, attempts, pass
 
     def attempt(row, bus):
         problems, held_up_ms = waiting.pop(0)
-        return [*problems], held_up_ms
+        return [*problems], LiveTimes(None, 130.0, held_up_ms)
 
     monkeypatch.setattr(rows, "attempted", attempt)
-    problems = rows.run_live(rows.ROWS["controller-killed"], "vcan0")
+    told = rows.as_json("live-controller-killed", rows.ROWS["live-controller-killed"], "vcan0")
+    problems = told["problems"]
+    assert told["verdict"] == ("pass" if passed else "fail")
+    assert (told["zero_ms"], told["zero_limit_ms"], told["limit_ms"]) == (130.0, 120, None)
     assert (not problems) is passed
     assert len(attempts) - len(waiting) == tried
     held_up = any("the machine held processes up for 40 ms" in each for each in problems)
