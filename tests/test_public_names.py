@@ -95,5 +95,6 @@ def test_spectra_of_a_buoy_have_time_frequency_density_height_and_period(tmp_pat
     )
     spectra = load_ndbc(path)
     assert len(spectra.time) == len(spectra.density) == len(spectra.hs_m) == len(spectra.tp_s) == 1
-    assert spectra.frequency_hz[0].tolist() == pytest.approx([0.05, 0.1, 0.15, 0.2])
+    assert spectra.frequency_hz.tolist() == pytest.approx([0.05, 0.1, 0.15, 0.2])
+    assert spectra.density.shape == (len(spectra.time), len(spectra.frequency_hz))
     assert spectra.tp_s[0] == pytest.approx(10.0)

@@ -43,7 +43,7 @@ TUNED: Final = {
 
 NOT_TOLD: Final = {
     # still water has no waves whose period could be wrong
-    "still_water.sea.period_s": {0.001},
+    "still_water.sea.period_s": {0.001}, "stimulation.sea.period_s": {0.001},
     # a thousandth of an angle is an angle
     "heading_deg": {0.001}, "course_deg": {0.001},
     # Patti-B, with 0.002, is damped so little that 60 times it is a usual hull

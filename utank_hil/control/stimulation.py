@@ -39,10 +39,13 @@ class StimulationDesign:
     limit, or the duration ends within the ramp in.
     """
 
-    amplitude_rad: Positive  #: Amplitude of the wanted roll.
-    period_s: Positive  #: Period of the wanted roll.
-    ramp_s: Positive  #: Time in which the amplitude goes from zero to full and back.
-    roll_limit_rad: Positive  #: Roll at which the stimulation ends.
+    #: Amplitude of the wanted roll.
+    amplitude_rad: Annotated[float, Range(least=1e-3, most=0.5)]
+    period_s: Annotated[float, Range(least=1, most=60)]  #: Period of the wanted roll.
+    #: Time in which the amplitude goes from zero to full and back.
+    ramp_s: Annotated[float, Range(least=1, most=600)]
+    #: Roll at which the stimulation ends.
+    roll_limit_rad: Annotated[float, Range(above=0, most=0.6)]
     correction_s: Positive = 120.0  #: T.
     #: Time from the beginning of the ramp in to that of the ramp out; infinite for no planned end.
     duration_s: Annotated[float, Range(above=0, infinite=True)] = math.inf

@@ -28,11 +28,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredSpectra:
-    """A time series of spectra, each on its own frequencies."""
+    """A time series of spectra."""
 
     source: str  #: Origin, for error messages.
     time: npt.NDArray[np.datetime64]  #: shape (N,): UTC, increasing.
-    #: shape (N, F): centre frequencies; nan behind the last band of a spectrum of fewer.
+    #: shape (F,): centre frequencies; (N, F) where they change within the source, with nan behind
+    #: the last band of a spectrum of fewer.
     frequency_hz: FloatArray
     density: FloatArray  #: shape (N, F): spectral density in m^2/Hz; nan where the source has none.
     #: shape (N, F): mean direction the waves come from, degrees from true north; nan where the
@@ -110,7 +111,8 @@ class MeasuredSpectra:
 
     def _bands(self, index: int) -> tuple[FloatArray, FloatArray]:
         """Frequencies and densities, with zeros for missing densities at either end."""
-        frequency_hz = self.frequency_hz[index][np.isfinite(self.frequency_hz[index])]
+        bands_hz = self.frequency_hz if self.frequency_hz.ndim == 1 else self.frequency_hz[index]
+        frequency_hz = bands_hz[np.isfinite(bands_hz)]
         density = self.density[index, : len(frequency_hz)]
         present = np.isfinite(density)
         begun, ahead = np.logical_or.accumulate(present), np.logical_or.accumulate(present[::-1])
@@ -273,5 +275,5 @@ def _spectra(
     energy = np.maximum(energy, 0.0)
     mean_deg = np.degrees(np.angle(energy @ np.exp(1j * np.radians(direction_deg)))) % 360
     spread = Spread(direction_deg, energy)
-    bands = np.broadcast_to(frequency_hz.astype(float), total.shape)
-    return MeasuredSpectra(str(path), time, bands, total, mean_deg, spread, tuple(notes))
+    bands_hz = frequency_hz.astype(float)
+    return MeasuredSpectra(str(path), time, bands_hz, total, mean_deg, spread, tuple(notes))

@@ -101,7 +101,8 @@ def load_ndbc(path: str | Path, direction_path: str | Path | None = None) -> Mea
                 notes.append(f"{direction_path}: {reason}")
         if shared and not np.isfinite(direction).any():
             raise ValueError(f"{direction_path}: frequencies differ from those of {path}")
-    return MeasuredSpectra(str(path), time, frequency, density, direction, notes=tuple(notes))
+    bands_hz = frequency[0] if (frequency == frequency[0]).all() else frequency
+    return MeasuredSpectra(str(path), time, bands_hz, density, direction, notes=tuple(notes))
 
 
 _Row = tuple[np.datetime64, FloatArray, FloatArray]
