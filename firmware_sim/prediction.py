@@ -153,8 +153,8 @@ def predict(
     )
     if law is None:
         return found
-    runs = {seed: _active(scenario, plant, law, seed, count) for seed in seeds}
-    active = rms(lambda seed: (runs[seed][0]["roll_rad"], runs[seed][1]))
+    runs = {seed: active_run(scenario, plant, law, seed, count) for seed in seeds}
+    active = rms(lambda seed: (runs[seed][0]["roll_rad"], runs[seed][1].capsized_s))
     if active is None:
         return found
     roll, level, flow, pressure, power = (
@@ -208,10 +208,10 @@ def _passive(scenario: Scenario, seed: int, count: int) -> tuple[FloatArray, flo
     return roll, plant.capsized_s
 
 
-def _active(
+def active_run(
     scenario: Scenario, plant: DesignPlant, law: BuiltLaw, seed: int, count: int
-) -> tuple[dict[str, FloatArray], float]:
-    """Run with the law armed from the start; return records every `RECORD_S` and `capsized_s`."""
+) -> tuple[dict[str, FloatArray], Plant]:
+    """Run with the law armed from the start; return records every `RECORD_S`, and the ship."""
     controller, ticks = law.controller(), count * ROW_TICKS
     noise, _ = sensed_noise(noise_of(scenario), ticks, seed, controller.sample_time_s)
     ship, area_m2 = plant_of(scenario, seed), plant.tank.reservoir_area_m2
@@ -220,7 +220,7 @@ def _active(
     roll, _, level, rate = run.motion.T
     record = {"roll_rad": roll, "level_m": level, "flow_m3_s": area_m2 * rate}
     record |= {"pressure_pa": run.pressure_pa, "power_w": np.array(loop.power_w)}
-    return record, ship.capsized_s
+    return record, ship
 
 
 def noise_of(scenario: Scenario) -> SensorNoise:

@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from firmware_sim.campaign.simulations import FAILED, LOST, Batch, Row, failed_row, run_batch
+from firmware_sim.campaign.stopping import Stopping
 from firmware_sim.campaign.store import Store
-from firmware_sim.campaign.study import Case, LoadedStudy, as_text, code_digest
+from firmware_sim.campaign.study import Case, LoadedStudy, Scalar, as_text, code_digest
 from firmware_sim.worker_pool import WorkerPool
 from utank_hil.base.background import one_thread_each
 
@@ -20,6 +21,9 @@ BATCH_S: Final = 0.5
 MOST_TOGETHER: Final = 200  #: Most cases in a batch. Chosen; no study.
 AHEAD: Final = 2  #: Number of batches queued or running at each worker.
 FLUSH_S: Final = 1.0  #: Longest delay in s between the return of rows and their writing to disk.
+
+CONNECT_S: Final = 10.0  #: Time in s allowed for the scheduler to answer. Chosen; no study.
+KILLED: Final = "each process that computed it was killed: too little memory?"
 
 Work = Callable[[Batch], list[Row]]
 
@@ -49,13 +53,14 @@ Progress = Callable[[Count], None]
 
 @dataclass(slots=True)
 class Driver:
-    """Sender of the missing cases of a study to processes of this machine."""
+    """Sender of the missing cases of a study to processes of this machine or of a cluster."""
 
     loaded: LoadedStudy
     store: Store
     progress: Progress
     work: Work = run_batch
     count: Count = field(init=False)
+    _stopping: Stopping = field(init=False)
     _waiting: deque[Case] = field(init=False)
     #: Batches that were under way when a process was killed.
     _suspected: deque[list[Case]] = field(init=False, default_factory=deque)
@@ -66,13 +71,24 @@ class Driver:
         done = self.store.done()
         # a study may contain the same case twice
         missing = {case.name: case for case in self.loaded.cases if case.name not in done}
-        self._waiting = deque(missing.values())
+        groups: dict[tuple[Scalar, ...], list[str]] = {}
+        for case in self.loaded.cases:
+            groups.setdefault(case.group, []).append(case.name)
+        self._stopping = Stopping(self.loaded.study.stop, groups)
+        self._stopping.add(self.store.rows().to_pylist())
+        self._waiting = deque(case for case in missing.values() if self._stopping.needs(case.name))
         self.count = Count(len(self._waiting))
 
-    def run(self, workers: int) -> None:
-        """Compute the missing cases; raise `OtherCodeError` if the code has changed meanwhile."""
+    def run(self, workers: int, scheduler: str | None = None) -> None:
+        """Compute the missing cases, in processes of this machine or of a Dask `scheduler`.
+
+        Raises `OtherCodeError` if the code is another one there, or has changed meanwhile, and
+        `OSError` if the scheduler does not answer.
+        """
         self._written_s = time.monotonic()
         try:
+            if scheduler is not None:
+                self._run_on(scheduler)
             while self._waiting or self._suspected:
                 with (
                     suppress(BrokenProcessPool),  # a killed process ends its pool
@@ -83,6 +99,26 @@ class Driver:
         finally:
             self._write()
         self.store.gather()
+
+    def _run_on(self, scheduler: str) -> None:
+        from distributed import Client, KilledWorker
+
+        with Client(scheduler, timeout=CONNECT_S) as client:
+            workers = len(client.scheduler_info(n_workers=-1)["workers"])
+            executor = client.get_executor(pure=False)
+            sent: dict[Future[list[Row]], list[Case]] = {}
+            while True:
+                while len(sent) < AHEAD * max(1, workers) and (cases := self._next()):
+                    sent[executor.submit(self.work, batch_of(self.loaded, cases))] = cases
+                if not sent:
+                    return
+                for future in wait(sent, return_when=FIRST_COMPLETED).done:
+                    cases = sent.pop(future)
+                    try:
+                        rows = future.result()
+                    except KilledWorker:  # Dask has tried it on several workers
+                        rows = [failed_row(case.name, LOST, KILLED) for case in cases]
+                    self._take(rows)
 
     def _compute(self, pool: WorkerPool, most: int) -> None:
         while self._suspected:  # one at a time, which shows the batch that kills its process
@@ -105,8 +141,7 @@ class Driver:
         try:
             self._take(pool.submit(self.work, batch_of(self.loaded, cases)).result())
         except BrokenProcessPool:
-            reason = "each process that computed it was killed: too little memory?"
-            self._take([failed_row(case.name, LOST, reason) for case in cases])
+            self._take([failed_row(case.name, LOST, KILLED) for case in cases])
             raise
 
     def _submit(self, pool: WorkerPool, cases: list[Case]) -> Future[list[Row]]:
@@ -121,10 +156,18 @@ class Driver:
         size = 1
         if self.count.done:
             size = round(BATCH_S / max(self.count.case_s, BATCH_S / MOST_TOGETHER))
-        return [self._waiting.popleft() for _ in range(min(max(size, 1), len(self._waiting)))]
+        taken: list[Case] = []
+        while self._waiting and len(taken) < max(size, 1):
+            case = self._waiting.popleft()
+            if self._stopping.needs(case.name):
+                taken.append(case)
+            else:
+                self.count.needed -= 1
+        return taken
 
     def _take(self, rows: list[Row]) -> None:
         self._unwritten += rows
+        self._stopping.add(rows)
         self.count.add(rows)
         if time.monotonic() - self._written_s > FLUSH_S:
             self._write()

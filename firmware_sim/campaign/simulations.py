@@ -15,8 +15,8 @@ from pydantic import ValidationError
 from firmware_sim.bench import run_in_turn
 from firmware_sim.campaign.study import Content, as_text, changed, code_digest
 from firmware_sim.figures import LEAST_ROLL_RAD, NO_TANK, bare_figures, run_figures
-from firmware_sim.prediction import noise_of
-from firmware_sim.run import RECORD_S
+from firmware_sim.prediction import active_run, noise_of
+from firmware_sim.run import RECORD_S, roll_without_tank
 from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_content import PASSIVE
 from utank_hil.analysis.loop import sea_response
@@ -28,6 +28,7 @@ from utank_hil.base.parameters import ParameterError
 from utank_hil.configuration import ControllerConfig
 from utank_hil.configuration.files import ALLOW_CODE, problems_in_words
 from utank_hil.control import BuiltLaw, DesignPlant
+from utank_hil.control.gain import PassiveDesign
 from utank_hil.control.interface import PRESSURE
 from utank_hil.dynamics.linear import STATES
 from utank_hil.nodes.signals import ROW_TICKS
@@ -35,6 +36,7 @@ from utank_hil.nodes.signals import ROW_TICKS
 Row = dict[str, str | float]
 Laws = Mapping[str, BuiltLaw]
 CAPSIZED: Final = "capsized"
+_NO_VALVE: Final = "vessel.valve is moved by simulation: bus alone: take that"
 _NO_FIGURE: Final = math.nan
 _LEVEL, _LEVEL_RATE = STATES.index("level_m"), STATES.index("level_rate_m_s")
 
@@ -55,7 +57,7 @@ class _Record:
 def rows_of(simulation: str, scenario: Scenario, seed: int, laws: Laws) -> list[Row]:
     """Compute a case.
 
-    `simulation` is "bus" or "linear"; `seed` replaces the scenario's. There is one row
+    `simulation` is "bus", "linear" or "nonlinear"; `seed` replaces the scenario's. There is one row
     for the bare ship and for each run: ``run``, ``mark`` (why it does not count, or empty) and the
     figures of `METRICS`. Raises `ValueError` if this kind of simulation cannot compute the
     scenario.
@@ -64,7 +66,8 @@ def rows_of(simulation: str, scenario: Scenario, seed: int, laws: Laws) -> list[
         return _on_the_bus(scenario, seed, laws)
     if scenario.faults:
         raise ValueError("faults befall bus and nodes, which simulation: bus alone has: take that")
-    return _judged(scenario, list(_linear(scenario, seed, laws)))
+    records = {"linear": _linear, "nonlinear": _nonlinear}[simulation](scenario, seed, laws)
+    return _judged(scenario, list(records))
 
 
 def _on_the_bus(scenario: Scenario, seed: int, laws: Laws) -> list[Row]:
@@ -141,16 +144,17 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
     ship, tank = scenario.ship_at(0.0), scenario.vessel.tank
     later = scenario.actual_ship and scenario.actual_from_s > 0
     changes = later or scenario.voyage or len(scenario.sea.spectra) > 1
+    if scenario.vessel.valve:
+        raise ValueError(_NO_VALVE)
     for wrong, why in (
-        (scenario.vessel.valve, "vessel.valve is moved by simulation: bus alone: take that"),
-        (changes, "simulation: linear keeps ship, course and sea: take bus"),
-        (ship.heeling_moment_nm, "simulation: linear knows no steady heel: take bus"),
-        (ship.sway_of_slope or scenario.hull, "simulation: linear knows no sway: take bus"),
-        (scenario.righting_in_waves, "simulation: linear has one righting moment: take bus"),
-        (scenario.fmu, "simulation: linear knows no ship of an FMU: take bus"),
+        (changes, "keeps ship, course and sea"),
+        (ship.heeling_moment_nm, "knows no steady heel"),
+        (ship.sway_of_slope or scenario.hull, "knows no sway"),
+        (scenario.righting_in_waves, "has one righting moment"),
+        (scenario.fmu, "knows no ship of an FMU"),
     ):
         if wrong:
-            raise ValueError(why)
+            raise ValueError(f"simulation: linear {why}: take nonlinear or bus")
     moment = scenario.wave_moment(seed)
     count = round(scenario.duration_s / RECORD_S)
     at_rest = np.zeros(count)
@@ -175,6 +179,27 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
         motion, pressure_pa = run.motion, run.pressure_pa
         power_w = pressure_pa * tank.reservoir_area_m2 * motion[:, _LEVEL_RATE]
         yield _Record(name, motion[:, 0], motion[:, _LEVEL], pressure_pa, power_w)
+
+
+def _nonlinear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
+    """Simulate the bench's plant with law, limiter, level observer and sensor noise."""
+    if scenario.vessel.valve:
+        raise ValueError(_NO_VALVE)
+    count = round(scenario.duration_s / RECORD_S)
+    at_rest, own = np.zeros(count), DesignPlant(scenario.vessel.ship, scenario.vessel.tank)
+    roll_rad, capsized_s = roll_without_tank(scenario, seed, count)
+    yield _Record(NO_TANK, roll_rad, at_rest, at_rest, at_rest, capsized_s=capsized_s)
+    plants = {name: each.plant for name, each in scenario.controllers.items()}
+    passive = next(iter(plants.values()), own)
+    for name, plant in {PASSIVE: passive, **plants}.items():
+        law = laws[name] if name in laws else PassiveDesign().build(plant)
+        if law.commands != (PRESSURE,):
+            raise ValueError(f"controllers.{name} moves a valve: take simulation: bus")
+        kept, ship = active_run(scenario, plant, law, seed, count)
+        roll, level, pressure, power = (
+            kept[key] for key in ("roll_rad", "level_m", "pressure_pa", "power_w")
+        )
+        yield _Record(name, roll, level, pressure, power, ship.strikes, ship.capsized_s)
 
 
 OK: Final = "ok"

@@ -17,24 +17,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from firmware_sim.campaign.metrics import METRICS as METRICS
 from firmware_sim.campaign.simulations import LOST, Row
 from firmware_sim.campaign.study import LoadedStudy
 from utank_hil.base.whole_file import errors_name, left_whole
-
-METRICS: Final = {
-    "roll_rms_rad": "root mean square of the roll",
-    "roll_significant_rad": "significant single amplitude of the roll",
-    "roll_max_rad": "greatest roll",
-    "roll_below_no_tank": "share by which the roll RMS is less than without a tank",
-    "roll_below_passive": "share by which the roll RMS is less than with the passive tank",
-    "level_peak_m": "greatest deviation of a reservoir's level",
-    "pressure_rms_pa": "root mean square of the pump's pressure",
-    "pressure_peak_pa": "greatest pressure of the pump",
-    "power_mean_w": "mean power drawn; of the shaft, in the linear simulation into the water",
-    "power_peak_w": "greatest power drawn",
-    "strikes": "how often the water struck a limit of its level",
-    "active_share": "share of the time in which the controller was in charge",
-}  #: Meaning of each metric's column over the scenario's window; NaN where it does not apply.
 
 LEAVES_OUT: Final = {
     "bus": (),
@@ -45,6 +31,12 @@ LEAVES_OUT: Final = {
         "the pump's rotor: its pressure follows the command with the delay and lag that the law "
         "was designed for, and its power is that into the water",
         "errors of the sensors but white noise",
+    ),
+    "nonlinear": (
+        "bus, nodes, modes and monitors: the law is in charge from the start",
+        "retuning",
+        "errors of the sensors but white noise",
+        "the drive's own limits",
     ),
 }  #: Effects that each kind of simulation leaves out.
 

@@ -15,8 +15,9 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 from pydantic import Field, ValidationError, model_validator
 
 from firmware_sim.campaign.axes import MOST_CASES, Axis, Draws
+from firmware_sim.campaign.metrics import METRICS
 from firmware_sim.scenario import Scenario
-from utank_hil.base.parameters import ParameterError, refuse
+from utank_hil.base.parameters import ParameterError, Positive, Range, refuse
 from utank_hil.configuration import Section
 from utank_hil.configuration.error_words import known_keys, nearest
 from utank_hil.configuration.files import (
@@ -167,6 +168,31 @@ Scalar = str | float | int | bool
 SEED: Final = "seed"
 
 
+class Stop(Section):
+    """Stopping rule for a group of cases.
+
+    The interval is computed over the first cases of the group in their order, so it does not depend
+    on which cases return first.
+    """
+
+    metric: str  #: Column of the results whose interval is judged.
+    half_width: Positive | None = None
+    """Largest half width of the 95 % confidence interval, in the metric's unit."""
+    relative: Positive | None = None
+    """Largest half width as a share of the mean, instead of `half_width`."""
+    least: Annotated[int, Range(least=3)] = 10  #: Least number of cases computed.
+
+    @model_validator(mode="after")
+    def _one_measure(self) -> "Stop":
+        problems = []
+        if self.metric not in METRICS:
+            problems.append(("metric", f"must be one of {', '.join(METRICS)}"))
+        if (self.half_width is None) == (self.relative is None):
+            problems.append(("half_width", "or relative: give one of the two"))
+        refuse("stop", problems)
+        return self
+
+
 class Study(Section):
     """Scenario and the keys that are varied in it."""
 
@@ -174,7 +200,7 @@ class Study(Section):
 
     name: str
     scenario: Content  #: Scenario file that is varied.
-    simulation: Literal["bus", "linear"]
+    simulation: Literal["bus", "linear", "nonlinear"]
     """Kind of simulation, which determines the effects that are left out."""
     set: Content = Field(default_factory=dict)  #: Values by dotted key that apply to every case.
     cases: Annotated[tuple[Content, ...], Field(min_length=1)] = ({},)
@@ -184,6 +210,7 @@ class Study(Section):
     random: Draws | None = None  #: Random samples, each combined with all of `cases` and `grid`.
     average_over: tuple[str, ...] = (SEED,)
     """Keys that are averaged over and define no group; drawn keys always belong to them."""
+    stop: Stop | None = None  #: Rule by which a group needs no more cases.
 
     @model_validator(mode="after")
     def _consistent(self) -> "Study":

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from firmware_sim.campaign.simulations import FAILED, OK
+from firmware_sim.campaign.stopping import Stopping
 from firmware_sim.campaign.store import METRICS, Results
-from firmware_sim.campaign.study import Scalar
+from firmware_sim.campaign.study import Scalar, Stop
 from firmware_sim.figures import LEAST_ROLL_RAD, NO_TANK
 from utank_hil.analysis.motion.statistics import clustered_interval
 
@@ -49,14 +50,17 @@ class Group:
 
 
 def groups_of(results: Results) -> list[Group]:
-    """Groups of a campaign with their rows."""
+    """Groups of a campaign with the rows that count by `Stopping`."""
     by_group: dict[tuple[Scalar, ...], list[str]] = {}
     for each in results.cases:
         by_group.setdefault(tuple(each[key] for key in results.keys), []).append(each["case"])
+    written = results.about.get("configuration", {}).get("stop")
+    stopping = Stopping(None if written is None else Stop.model_validate(written), by_group)
+    stopping.add(row for rows in results.rows.values() for row in rows)
     groups = []
     for group, names in by_group.items():
-        different = dict.fromkeys(names)
-        found = [results.rows[name] for name in different if name in results.rows]
+        different, used = dict.fromkeys(names), dict.fromkeys(stopping.used(group))
+        found = [results.rows[name] for name in used if name in results.rows]
         states = [rows[0]["status"] for rows in found]
         groups.append(
             Group(

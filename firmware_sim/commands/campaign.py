@@ -1,4 +1,4 @@
-"""``utank-hil campaign``: many cases of a scenario, on all cores."""
+"""``utank-hil campaign``: many cases of a scenario, on all cores or on a cluster."""
 
 import os
 from pathlib import Path
@@ -26,6 +26,12 @@ def campaign(
     resume: Annotated[
         bool, common.option("Compute only what the folder does not hold yet.", "--resume")
     ] = False,
+    scheduler: Annotated[
+        str | None,
+        common.option(
+            "Dask scheduler, as tcp://10.0.0.5:8786, instead of this machine.", metavar="ADDRESS"
+        ),
+    ] = None,
     workers: Annotated[int | None, common.option("Processes.", default="one a core", min=1)] = None,
     json_: common.Json = False,
     allow_code: common.AllowCode = False,
@@ -43,6 +49,8 @@ def campaign(
     from firmware_sim.campaign.study import load_study
     from firmware_sim.campaign.summary import failures, summary
 
+    if scheduler is not None and workers is not None:
+        common.fail("--workers is for this machine: leave it out, or --scheduler")
     try:
         loaded = load_study(study, allow_code=allow_code)
     except ConfigError as error:
@@ -52,7 +60,7 @@ def campaign(
     store = Store(folder)
     try:
         store.begin(loaded, _about(loaded, folder, context.params), resume=resume)
-        interrupted = _run(loaded, store, workers or len(os.sched_getaffinity(0)))
+        interrupted = _run(loaded, store, workers or len(os.sched_getaffinity(0)), scheduler)
         results = read_results(folder)
     except StoreError as error:
         common.fail(error)
@@ -88,7 +96,7 @@ def _about(loaded: "LoadedStudy", folder: Path, given: dict[str, Any]) -> dict[s
     }
 
 
-def _run(loaded: "LoadedStudy", store: Any, workers: int) -> bool:
+def _run(loaded: "LoadedStudy", store: Any, workers: int, scheduler: str | None) -> bool:
     from firmware_sim.campaign.driver import Count, Driver
     from firmware_sim.campaign.simulations import OtherCodeError
 
@@ -104,11 +112,15 @@ def _run(loaded: "LoadedStudy", store: Any, workers: int) -> bool:
         return False
     try:
         with bar:
-            driver.run(workers)
+            driver.run(workers, scheduler)
     except KeyboardInterrupt:
         return True
     except OtherCodeError as error:
         common.fail(error)
+    except OSError as error:
+        if scheduler is None:
+            raise
+        common.fail(f"--scheduler {scheduler}: {error}", ExitCode.SYSTEM)
     return False
 
 

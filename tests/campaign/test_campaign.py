@@ -7,7 +7,10 @@ import json
 import multiprocessing
 import os
 import signal
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -256,10 +259,65 @@ def test_draws_in_the_same_waves_are_paired_each_with_its_own():
 
 
 @pytest.mark.evidence
+def test_a_group_stops_where_its_interval_is_narrow(run, tmp_path):
+    wide = {"metric": "roll_rms_rad", "half_width": 1.0, "least": 3}
+    path = written(tmp_path, grid={"seed": {"first": 1, "count": 40}}, stop=wide)
+    done = run(path, "--workers", "1", "--json")
+    (group,) = json.loads(done.stdout)["groups"]
+    assert (group["planned"], group["counted"]) == (40, 3)
+    assert len(Store(tmp_path / "out").done()) < 40
+
+
+class Client:
+    """In place of a Dask client: a cluster of two threads, one of whose workers dies once."""
+
+    def __init__(self, address, timeout):
+        if address != "tcp://10.0.0.5:8786":
+            raise OSError("no answer")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def scheduler_info(self, n_workers):
+        return {"workers": {"a": 1, "b": 2}}
+
+    def get_executor(self, pure):
+        return ThreadPoolExecutor(2)
+
+
+def test_a_cluster_computes_the_same_and_a_batch_that_kills_its_workers_is_lost(
+    tmp_path, monkeypatch, run
+):
+    class KilledWorker(Exception):
+        pass
+
+    def work(batch):
+        if "2" in [str(seed) for _, seed, _ in batch.cases]:
+            raise KilledWorker
+        return run_batch(batch)
+
+    dask = SimpleNamespace(Client=Client, KilledWorker=KilledWorker)
+    monkeypatch.setitem(sys.modules, "distributed", dask)
+    loaded = small(tmp_path, grid={"seed": [1, 2, 3]})
+    store = Store(tmp_path / "cluster")
+    store.begin(loaded, {"keys": loaded.keys}, resume=False)
+    Driver(loaded, store, lambda count: None, work).run(1, "tcp://10.0.0.5:8786")
+    rows = read_results(tmp_path / "cluster").rows
+    assert {case.seed: rows[case.name][0]["status"] for case in loaded.cases} == {
+        1: OK, 2: LOST, 3: OK,
+    }  # fmt: skip
+    path = written(tmp_path, grid={"seed": [1]})
+    assert "tcp://10.0.0.6:1: no answer" in run(path, "--scheduler", "tcp://10.0.0.6:1").stderr
+    assert "leave it out" in run(path, "--scheduler", "tcp://a:1", "--workers", "1").stderr
+
+
 def test_interrupted_campaign_says_so_keeps_what_there_is_and_goes_on(run, tmp_path, monkeypatch):
     path, whole = written(tmp_path, grid={"seed": [1, 2]}), Driver.run
 
-    def interrupted(driver, workers):
+    def interrupted(driver, workers, scheduler):
         whole(driver, workers)
         raise KeyboardInterrupt
 

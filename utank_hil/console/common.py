@@ -223,6 +223,7 @@ EXTRA_OF: Final = {
     "asammdf": "files",
     "capytaine": "hulls",
     "cryptography": "keys",
+    "distributed": "cluster",
     "fmpy": "models",
     **dict.fromkeys(("clarabel", "control", "jinja2", "matplotlib", "numba"), "bench"),
     **dict.fromkeys(("pyarrow", "rerun", "rerun_cli"), "viewer"),
