@@ -39,8 +39,11 @@ def advance_tick(
         As of `plant_kernel`.
     x : ndarray
         State of `lateral_kernel`.
-    ahead : ndarray, shape (3 or 6, 4)
-        Forces of `LateralHull.forces` at t - 1, t, t + 1 and t + 2 ticks.
+    ahead : ndarray, shape (4 or 7, 4)
+        Forces of `LateralHull.forces`, then the righting moment's change as a share, at t - 1, t,
+        t + 1 and t + 2 ticks.
+    phasors, rotations : ndarray, shape (3, 4, 6 or 7, n)
+        Wave components of these rows; the last may be missing.
     parameters, oscillators, vertical, per_piece, restoring
         Of `LateralModel`.
     """
@@ -87,11 +90,12 @@ def advance_tick(
     summary[STRIKES] += books[lateral.NUMBER]
     summary[MAX_IMPULSE] = books[lateral.IMPULSE]
     state[kernel.TIME] += (len(weights) // 2) * kernel.STEP_S
-    if degrees > 3:
+    if degrees > 4:
         at = lateral.WAVES + 2 * len(oscillators) + 3
         state[kernel.HEAVE_NOW] = rates[at + 1] - parameters[11] * rates[at + 2]
     for i in range(degrees):
         row = ahead[i]
         row[0], row[1], row[2] = row[1], row[2], row[3]
-        row[3] = kernel.turned_sum(phasors[i], rotations[i])
+        if i < len(phasors):
+            row[3] = kernel.turned_sum(phasors[i], rotations[i])
     state[kernel.MOMENT_NOW] = ahead[1, 1]

@@ -52,9 +52,9 @@ class Plant:
         of the righting moment as a share if it has one, from the plant's start on.
     hull : LateralHull, optional
         Hull of a ship that is free to sway and yaw; the waves are then sway force, roll and yaw
-        moment.
+        moment, and the righting moment's change if it has one.
     six : bool
-        Whether the hull is free to surge, heave and pitch, too; their forces follow the others.
+        Whether the hull is free to surge, heave and pitch, too; their forces follow the yaw moment.
     turning : callable, optional
         Roll moment in N m, and lateral acceleration over g, besides those of the waves, as a
         function of the time in s; the waves then have a lateral acceleration, if of zero.
@@ -93,7 +93,7 @@ class Plant:
         if self._lateral is not None:
             self._oscillators = self._lateral.oscillators, self._lateral.vertical
             self._x = np.zeros(self._lateral.states)
-            self._ahead = np.zeros((len(phasors), 4))
+            self._ahead = np.zeros((7 if six else 4, 4))
             ahead = list(self._ahead)
         for index in range(4):
             for wave, phasor, rotation in zip(ahead, phasors, rotations, strict=False):

@@ -97,7 +97,7 @@ class ScenarioContent(Section):
     draught: the ship heels outward in the turns of the voyage. Without it they do not heel it."""
     gusts: Gusts | None = None  #: Gusts about the steady wind of ``wind_moment_nm``.
     righting_in_waves: RightingInWaves | None = None
-    """Change of the righting moment as waves pass along the hull, for plant: roll."""
+    """Change of the righting moment as waves pass along the hull; not for plant: fmu."""
     faults: tuple[AnyFault, ...] = ()
     """Faults in simulated runs with a controller; the passive run has none."""
 
@@ -198,7 +198,7 @@ class ScenarioContent(Section):
         if self.gusts is not None:  # drawn apart from waves and noise
             gusts = self.gusts.moment(self.sailing_ship.wind_moment_nm, seed + _GUSTS)
         if self.hull is not None:
-            forces = self._hull_forces(seed)
+            forces = [*self._hull_forces(seed), *self._righting_change(seed)]
             return SteadyWaves(*(forces if gusts is None else beside(forces, gusts, 1)))
         sway, changing = self.sailing_ship.sway_of_slope, self.righting_in_waves
         if sway is None and (changing is not None or self.turning_lever_m is not None):
@@ -208,9 +208,7 @@ class ScenarioContent(Section):
             sea = self.sea.sea(seed)
             if sway is not None:
                 forces.append(replace(sea.slope, amplitude=sway * sea.slope.amplitude))
-            if changing is not None:
-                change = changing.change_per_m(sea.omega_rad_s, sea.heading_rad)
-                forces.append(sea.harmonics(sea.amplitude_m * change))
+            forces += self._righting_change(seed)
             return SteadyWaves(*(forces if gusts is None else beside(forces, gusts, 0)))
         responses: list[Response] = [self.sea.moment(self.vessel.ship.stiffness_nm_rad)]
         if sway is not None:
@@ -236,6 +234,14 @@ class ScenarioContent(Section):
             np.concatenate([sea.frequency_rad_s for sea in seas]),
             np.concatenate([sea.phase_rad for sea in seas]),
         )
+
+    def _righting_change(self, seed: int) -> list[Harmonics]:
+        """Change of the righting moment in the initial sea, if it has one."""
+        if self.righting_in_waves is None:
+            return []
+        sea = self.sea.sea(seed)
+        share = self.righting_in_waves.change_per_m(sea.omega_rad_s, sea.heading_rad)
+        return [sea.harmonics(sea.amplitude_m * share)]
 
     def _hull_forces(self, seed: int) -> list[Harmonics]:
         """Forces of the initial sea in the order of `LateralHull.forces`."""

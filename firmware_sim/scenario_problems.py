@@ -135,8 +135,8 @@ def _weather_problems(scenario: ScenarioContent) -> list[Problem]:
     if scenario.gusts is not None and ship["wind_moment_nm"] == 0:
         reason = "needs a steady wind: give actual_ship.wind_moment_nm, the moment of its mean"
         problems.append(("gusts", reason))
-    if scenario.righting_in_waves is not None and scenario.plant != "roll":
-        problems.append(("righting_in_waves", "needs plant: roll"))
+    if scenario.righting_in_waves is not None and scenario.plant == "fmu":
+        problems.append(("righting_in_waves", "does not act on the ship of an FMU: remove it"))
     if scenario.turning_lever_m is None:
         return problems
     if not scenario.voyage:

@@ -94,14 +94,15 @@ def test_ship_and_water_move_by_the_exact_wrench(six):
     rng = np.random.default_rng(1)
     for _ in range(100):
         roll, rate, level, speed, sway = rng.uniform(-1, 1, 5) * [0.8, 0.4, 2.0, 1.0, 2.0]
-        force, pressure = rng.uniform(-1, 1, 6) * ([1e5, 1e6, 1e6] * 2), 1e4 * rng.uniform(-1, 1)
+        change, pressure = rng.uniform(-0.5, 0.5), 1e4 * rng.uniform(-1, 1)
+        force = np.append(rng.uniform(-1, 1, 6) * ([1e5, 1e6, 1e6] * 2), change)
         fall = float(rng.uniform(-2, 2)) if six else 0.0
         x = [roll, rate, level, speed, 0.0, sway, 0.0, 0.0]
         x += [0.0, 0.0, 0.0, 0.0, fall, 0.0] if six else []
         out = np.zeros(14)
         step = kernel.Step(
             parameters, np.zeros((0, 7)), np.zeros((0, 7)), *roll_model.packed[1:], 0.0,
-            np.empty((7, 7)), np.empty(7), np.empty((3, 6)), np.empty((3, len(x))),
+            np.empty((7, 7)), np.empty(7), np.empty((3, 7)), np.empty((3, len(x))),
         )  # fmt: skip
         kernel.rates(step, np.array(x), force, tank.reservoir_area_m2 * pressure, out)
         sin, cos = math.sin(roll), math.cos(roll)
@@ -117,7 +118,7 @@ def test_ship_and_water_move_by_the_exact_wrench(six):
         loads += force[:3]
         viscous = model.viscous_nms_rad + rough.quadratic_damping_nms2_rad2 * abs(rate)
         loads[1] += rough.wind_moment_nm + rough.offset_moment_nm * cos - viscous * rate
-        loads[1] -= float(roll_model.restoring.moment_nm(roll))
+        loads[1] -= (1 + change) * float(roll_model.restoring.moment_nm(roll))
         np.testing.assert_allclose(inertia @ out[[5, 1, 7]], loads, atol=1e-9 * abs(loads).max())
         loss = (tank.loss_pa_per_m_s + tank.quadratic_loss_pa_per_m2_s2 * abs(speed)) * speed
         assert tank.density_kg_m3 * residual == pytest.approx(pressure - loss, abs=1e-6)
@@ -200,14 +201,16 @@ def test_long_wave_carries_the_ship_and_its_water_along():
     assert abs(level) < 0.1 * abs(roll) * TANK.width_m / 2
 
 
-@pytest.mark.parametrize("six", [False, True])
-def test_energy_adds_up_with_strikes(six):
+@pytest.mark.parametrize(("six", "change"), [(False, 0.0), (True, 0.0), (False, 0.2), (True, 0.2)])
+def test_energy_adds_up_with_strikes(six, change):
     tank = replace(TANK, quadratic_loss=2.0, headroom_m=0.6, restitution=0.2)
     heavy = replace(ship(), quadratic_damping_nms2_rad2=3e6, wind_moment_nm=3e5)
     model = LateralModel(hull(), heavy, tank, six)
     force = hull().forces(np.array([0.8]), np.array([2.0]), six=six)[:, 0]
     waves = [Harmonics(np.array([abs(f)]), np.array([0.8]), np.array([np.angle(f)]))
              for f in force]  # fmt: skip
+    if change:
+        waves.append(Harmonics(np.array([change]), np.array([0.8]), np.array([1.0])))
     plant = Plant(heavy, tank, None, SteadyWaves(*waves), hull=hull(), six=six)
     for tick in range(6001):
         plant.advance(tick * TICK_NS)

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 from firmware_sim.plant import Plant
 from firmware_sim.scenario import Scenario
-from firmware_sim.ship_side import build_ship_side
+from firmware_sim.ship_side import bare_plant, build_ship_side
 from firmware_sim.waves import PassingWaves, SteadyWaves
 from utank_hil.assembly import build_controller_node
 from utank_hil.base.tick import TICK_NS
@@ -167,6 +167,21 @@ def test_scenario_with_a_hull_sways_rolls_and_yaws() -> None:
     assert 0.05 < abs(ship.plant.lateral_m_s2) / (9.80665 * slope) < 1.2
     moment = scenario.wave_moment(1).at(30.0)
     assert ship.plant.wave_moment_nm == pytest.approx(float(moment), rel=1e-6)
+
+
+@pytest.mark.parametrize("plant", ["sway_roll_yaw", "six_degrees"])
+def test_a_hull_rolls_parametrically_where_its_righting_moment_swings_at_twice_its_roll(plant):
+    sea = {"kind": "regular", "amplitude_m": 0.5, "period_s": 3.9, "heading_deg": 175.0}
+    greatest = []
+    for changes in ({}, {"righting_in_waves": {"length_m": 25.0, "share_per_m": -0.8}}):
+        scenario = hull_scenario(sea=sea, plant=plant, **changes)
+        moved, late = bare_plant(scenario, 1), 0.0
+        for tick in range(20_001):
+            moved.advance(tick * TICK_NS)
+            if tick > 15_000:
+                late = max(late, abs(moved.roll_rad))
+        greatest.append(late)
+    assert greatest[1] > 20 * greatest[0]
 
 
 @pytest.mark.evidence

@@ -212,7 +212,7 @@ def test_work_of_turns_gusts_and_righting_moments_is_booked() -> None:
         (
             {"righting_in_waves": {"length_m": 100.0, "share_per_m": -0.1}, "plant": "fmu"},
             "righting_in_waves",
-            "needs plant: roll",
+            "does not act on the ship of an FMU",
         ),
     ],
 )

@@ -37,7 +37,7 @@ class Step(NamedTuple):
     valve: float  #: Its loss times the reservoir area.
     m: FloatArray  #: shape (7, 7)
     q: FloatArray  #: shape (7,)
-    part: FloatArray  #: shape (3, 3 or 6): forces at start, middle and end of a part of the step.
+    part: FloatArray  #: shape (3, 4 or 7): forces at start, middle and end of a part of the step.
     room: FloatArray  #: shape (3, n): the last row is the state after the part.
 
 
@@ -147,15 +147,16 @@ def _move_up_and_along(s: Step, x: FloatArray, at: int, force: FloatArray, out: 
 def rates(s: Step, x: FloatArray, force: FloatArray, pump: float, out: FloatArray) -> None:
     """Write the rates of the state `x` to `out`.
 
-    `force`, shape (3,) or (6,), is the waves' sway force, roll and yaw moment, then surge and heave
-    force and pitch moment; `pump` is the reservoir area times pressure.
+    `force`, shape (4,) or (7,), is the waves' sway force, roll and yaw moment, then in six degrees
+    surge and heave force and pitch moment, and the righting moment's change as a share; `pump` is
+    the reservoir area times pressure.
     """
     p, m, q = s.p, s.m, s.q
     phi, roll, h, speed, sway, yaw = x[0], x[1], x[2], x[3], x[5], x[7]
     sin, cos = sine_cosine(phi)
     flow, across, lx = p[12], p[12] * p[13], p[11]
     side, down = across * h, p[14] - flow * h * h
-    righting = righting_moment(s.per_piece, s.restoring, phi)
+    righting = (1.0 + force[len(force) - 1]) * righting_moment(s.per_piece, s.restoring, phi)
     at = WAVES + 2 * len(s.oscillators)
     six = len(x) > at
     first = 0 if six else 3
@@ -291,13 +292,18 @@ def _move_to_impact(
 def _book(s: Step, x: FloatArray, pump: float, share: float, dt: float, books: FloatArray) -> None:
     """Add the work and the losses from `x` to the state after a part of the step."""
     part, after = s.part, s.room[2]
+    change = part.shape[1] - 1
     at = WAVES + 2 * len(s.oscillators)
     for i, place in enumerate((SWAY, ROLL, YAW)):
         work = 0.5 * (part[0, i] + part[2, i]) * (after[place] - x[place])
         books[WAVE_WORK] += work
-    for i in range(3, part.shape[1]):
+    for i in range(3, change):
         work = 0.5 * (part[0, i] + part[2, i]) * (after[at + i - 3] - x[at + i - 3])
         books[WAVE_WORK] += work
+    if part[0, change] != 0 or part[2, change] != 0:
+        righting = righting_moment(s.per_piece, s.restoring, 0.5 * (x[ROLL] + after[ROLL]))
+        work = 0.5 * (part[0, change] + part[2, change]) * righting * (after[ROLL] - x[ROLL])
+        books[WAVE_WORK] -= work
     books[PUMP_WORK] += pump * (after[LEVEL] - x[LEVEL])
     lost = dissipation_w(s, x)
     lost += dissipation_w(s, after)
@@ -343,7 +349,7 @@ def advance(
 ) -> None:
     """Advance the state `x` by a step, in place, and add to `books`.
 
-    `forces`, shape (3, 3) or (3, 6), are the waves' at start, middle and end of the step.
+    `forces`, shape (3, 4) or (3, 7), are those of `rates` at start, middle and end of the step.
     """
     limit, done, after = s.p[25], 0.0, s.room[2]
     for strike in range(9):
