@@ -186,8 +186,8 @@ def test_of_a_long_log_a_part_is_held_and_more_than_the_limit_is_refused(
     ).values()
     assert set(part) == {"time_s", "pressure_command_pa", *names}
     np.testing.assert_array_equal(
-        logged_samples(part, measured, 0.2, 2.0, 7.0),
-        logged_samples(whole, measured, 0.2, 2.0, 7.0),
+        logged_samples(part, measured, 0.2, (2.0, 7.0)),
+        logged_samples(whole, measured, 0.2, (2.0, 7.0)),
     )
     with pytest.raises(ValueError, match=r"every-mode.frames: has more than .* values"):
         read_signals(LOG)
@@ -269,17 +269,17 @@ def test_a_log_of_the_bus_needs_a_configuration_and_the_controllers_start(tmp_pa
 def test_the_same_record_is_read_from_every_kind_of_log(tmp_path: Path) -> None:
     measured, part = ("roll_rad", "level_m"), (2.0, 12.0)
     (signals,) = read_signals(LOG).values()
-    expected = logged_samples(signals, measured, 0.2, *part)
+    expected = logged_samples(signals, measured, 0.2, part)
     assert len(expected) == 51
     assert np.isfinite(expected).all()
     for name in ("a.log", "a.asc", "a.blf", "a.csv", "a.parquet"):
         file = exported(tmp_path, name)
         (signals,) = read_signals(file).values()
         if file.suffix in TABLE_SUFFIXES:
-            signals = even_rows(file, signals, 0.2, *part)
+            signals = even_rows(file, signals, 0.2, part)
             record = logged_samples(signals, measured, 0.2)
         else:
-            record = logged_samples(signals, measured, 0.2, *part)
+            record = logged_samples(signals, measured, 0.2, part)
         np.testing.assert_array_equal(record[1:], expected[1:], err_msg=name)
 
 

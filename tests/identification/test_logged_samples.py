@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -42,7 +44,7 @@ def test_a_gauge_alone_beside_a_column_of_the_level_is_left_aside():
 def test_part_of_a_recording_is_that_part_of_the_whole(from_s, length_s):
     whole = logged_samples(_columns(), ("roll_rad",), 0.2)
     try:
-        part = logged_samples(_columns(), ("roll_rad",), 0.2, from_s, from_s + length_s)
+        part = logged_samples(_columns(), ("roll_rad",), 0.2, (from_s, from_s + length_s))
     except ValueError:
         assert length_s < 0.2
         return
@@ -66,11 +68,11 @@ def test_rows_that_were_lost_are_gaps():
 @pytest.mark.parametrize(
     ("measured", "part", "word"),
     [
-        (("level_rate_m_s",), (None, None), "level_rate_m_s"),
-        (("roll_rad",), (30.0, None), "nothing between"),
+        (("level_rate_m_s",), (0.0, 9.0), "level_rate_m_s"),
+        (("roll_rad",), (30.0, math.inf), "nothing between"),
         (("roll_rad",), (5.0, 4.0), "nothing between"),
     ],
 )
 def test_what_is_not_in_the_recording_is_named(measured, part, word):
     with pytest.raises(ValueError, match=word):
-        logged_samples(_columns(), measured, 0.2, *part)
+        logged_samples(_columns(), measured, 0.2, part)

@@ -1,5 +1,6 @@
 """Tables of anybody's: units from their names, times checked, errors with line and remedy."""
 
+import math
 from datetime import datetime
 from decimal import Decimal
 from pathlib import Path
@@ -219,14 +220,14 @@ def test_times_rounded_to_milliseconds_are_even_all_the_same():
 
 def test_a_part_is_taken_and_its_lines_are_those_of_the_file():
     time_s = np.arange(100) * 0.1
-    found = even_rows(PATH, table(time_s), 0.2, 2.0, 5.0)
+    found = even_rows(PATH, table(time_s), 0.2, (2.0, 5.0))
     np.testing.assert_array_equal(found["roll_rad"], np.arange(20, 51))
     time_s[40:] += 0.5
     with pytest.raises(TextFileError) as error:
-        even_rows(PATH, table(time_s), 0.2, 2.0)
+        even_rows(PATH, table(time_s), 0.2, (2.0, math.inf))
     assert "line 42: time_s goes from 3.9 to 4.5, a gap where rows are 0.1 s" in str(error.value)
     assert "leave it out by --from 4.5 or --to 3.9" in str(error.value)
-    assert len(even_rows(PATH, table(time_s), 0.2, 4.5)["time_s"]) == 60
+    assert len(even_rows(PATH, table(time_s), 0.2, (4.5, math.inf))["time_s"]) == 60
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """``utank-hil export``: frames or signals of a recording for other programs."""
 
-import math
 import os
 from collections.abc import Iterator
 from itertools import chain
@@ -9,6 +8,7 @@ from typing import Annotated, TypeVar
 
 import typer
 
+from utank_hil.base.between import ALWAYS, Between, between
 from utank_hil.console import common
 from utank_hil.console.terminal import notes, say_note, shown
 from utank_hil.telemetry import signal_files
@@ -67,18 +67,18 @@ def export(
         common.fail(
             f"--channel is for logs of the bus, which may hold several; {SUFFIX} are of one"
         )
-    if not (-math.inf if from_s is None else from_s) < (math.inf if until_s is None else until_s):
+    part_s = between(from_s, until_s)
+    if not part_s[0] < part_s[1]:
         common.fail("--from must be before --until")
-    between = (from_s, until_s) != (None, None)
     said: list[str] = []
     try:
         if kind in BUS_SUFFIXES:
-            frames = _frames(recording, channel, from_s, until_s, said)
-            if between:
+            frames = _frames(recording, channel, part_s, said)
+            if part_s != ALWAYS:
                 frames = _some(to, frames)
             count, unit = write_frames(to, frames, said), "frames"
         elif recording.suffix.lower() == ".rrd" or signal_files.is_table(recording):
-            if between or channel is not None:
+            if part_s != ALWAYS or channel is not None:
                 common.fail("--channel, --from and --until are for logs: a table is exported whole")
             runs = signal_files.read_signals(recording, said.append)
             name = common.chosen_run(recording, runs, run)
@@ -86,8 +86,8 @@ def export(
             signal_files.write_signals(to, [runs[name]])
             count, unit = len(runs[name]["time_s"]), "rows"
         else:
-            parts = signal_files.logged_parts(recording, said.append, channel, from_s, until_s)
-            if between:
+            parts = signal_files.logged_parts(recording, said.append, channel, part_s)
+            if part_s != ALWAYS:
                 parts = _some(to, (part for part in parts if len(part["time_s"])))
             count, unit = signal_files.export_parts(to, parts), "rows"
     except (OSError, ValueError) as error:
@@ -101,18 +101,18 @@ def export(
 
 
 def _frames(
-    recording: Path, channel: str | None, from_s: float | None, to_s: float | None, said: list[str]
+    recording: Path, channel: str | None, between_s: Between, said: list[str]
 ) -> Iterator[BusFrame]:
     suffix = recording.suffix.lower()
     if suffix == SUFFIX:
         entries = entries_of(FrameLog(recording).blocks(said.append))
-        yield from frames_of(signal_files.part_of_entries(entries, from_s, to_s), said)
+        yield from frames_of(signal_files.part_of_entries(entries, between_s), said)
     elif suffix == ".rrd" or signal_files.is_table(recording):
         beside = recording.with_suffix(SUFFIX)
         hint = f": give {beside}" if suffix == ".rrd" and beside.exists() else ""
         raise ValueError(f"{recording}: holds signals and no frames{hint}")
     else:
-        yield from BusLog(recording, channel, from_s, to_s).frames(said)
+        yield from BusLog(recording, channel, between_s).frames(said)
 
 
 def _some(to: Path, items: Iterator[_T]) -> Iterator[_T]:

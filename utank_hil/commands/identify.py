@@ -15,15 +15,16 @@ from rich.table import Table
 from typer.core import TyperGroup
 
 from utank_hil.assembly import retuning_task
+from utank_hil.base.between import ALWAYS, between
 from utank_hil.base.finite import finite
 from utank_hil.base.provenance import describe
 from utank_hil.commands.identified import CONTROLLER, VESSEL, IdentifiedShips, read_controller
 from utank_hil.commands.identify_sea import sea
-from utank_hil.commands.identify_test import decay, inclining_test, refuse
+from utank_hil.commands.identify_test import decay, inclining_test, read_run, refuse
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.console import common
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import Terminal, new_table, say_note
+from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
@@ -189,7 +190,7 @@ def identify_log(
     **Example:** utank-hil identify log out/bench.rrd configs/controllers/dpc.yaml --from 200
     """
     from utank_hil.pictures.identification import draw_identification
-    from utank_hil.telemetry.signal_files import even_rows, is_table, read_signals, require
+    from utank_hil.telemetry.signal_files import even_rows, is_table
 
     for option, value in (("--from", from_s), ("--to", to_s)):
         if value is not None and not math.isfinite(value):
@@ -205,22 +206,20 @@ def identify_log(
         common.fail(f"{config}: {error}")
     content = read_controller(config)
     out = common.prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
-    measured = task.design.predictor.measured
+    measured, sample_time_s = task.design.predictor.measured, task.design.predictor.sample_time_s
+    part_s = between(from_s, to_s)
+    name, signals = read_run(
+        log,
+        ("time_s", "pressure_command_pa", *measured),
+        (part_s[0] - sample_time_s, part_s[1] + sample_time_s),
+        ("port_level_m", "starboard_level_m"),
+        channel=channel,
+        run=run,
+    )
     try:
-        sample_time_s = task.design.predictor.sample_time_s
-        low_s, high_s = -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s
-        runs = read_signals(
-            log, say_note, channel=channel,
-            names=("pressure_command_pa", "port_level_m", "starboard_level_m", *measured),
-            between_s=(low_s - sample_time_s, high_s + sample_time_s),
-        )  # fmt: skip
-        name = common.chosen_run(log, runs, run)
-        signals = runs[name]
-        require(log, signals, "time_s", "pressure_command_pa", *measured)
         if is_table(log):
-            signals = even_rows(log, signals, sample_time_s, from_s, to_s)
-            from_s = to_s = None
-        record = logged_samples(signals, measured, sample_time_s, from_s, to_s)
+            signals, part_s = even_rows(log, signals, sample_time_s, part_s), ALWAYS
+        record = logged_samples(signals, measured, sample_time_s, part_s)
     except (OSError, ValueError) as error:
         common.fail(error)
     try:

@@ -3,22 +3,24 @@
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import numpy as np
 import typer
 
 from utank_hil.analysis.motion.wave_slope import BAND_RAD_S, beam_sea, wave_slope
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.between import Between, between
 from utank_hil.base.provenance import describe
-from utank_hil.commands.identify_test import refuse
+from utank_hil.commands.identify_test import read_run, refuse
 from utank_hil.configuration import Vessel
 from utank_hil.console import common
-from utank_hil.console.terminal import Terminal, new_table, say_note
+from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.sea.components import write_components
 
 FILE, PICTURE = "sea.csv", "sea.png"
+NEEDED: Final = ("time_s", "roll_rad", "port_level_m", "starboard_level_m")
 STEP_S = 0.1  #: Samples in it are averaged: at 3 rad/s it takes 0.4 % of the amplitude.
 LONGEST_GAP_S = 1.0  #: Filled by a line; waves of 2 s are the shortest.
 SHORTEST_S = 120.0  #: Of a record; its ends rise and fall over 20 s.
@@ -49,10 +51,10 @@ def sea(
     from utank_hil.pictures.identification import draw_waves
 
     vessel = common.load(ship, Vessel)
-    low_s, high_s = -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s
-    name, columns = _columns(log, run, channel, (low_s, high_s))
+    part_s = between(from_s, to_s)
+    name, columns = read_run(log, NEEDED, part_s, channel=channel, run=run)
     try:
-        roll_rad, level_m = _samples(columns, low_s, high_s)
+        roll_rad, level_m = _samples(columns, part_s)
     except ValueError as error:
         refuse(f"{log}: {error}", json_)
     slope_rad, heeling_nm = wave_slope(
@@ -84,28 +86,12 @@ def sea(
         _print(figures, slope, files)
 
 
-def _columns(
-    log: Path, run: str | None, channel: str | None, between_s: tuple[float, float]
-) -> tuple[str, list[FloatArray]]:
-    """Return the name of the run, and its times, roll and the levels of both sides."""
-    from utank_hil.telemetry.signal_files import read_signals, require
-
-    names = ("time_s", "roll_rad", "port_level_m", "starboard_level_m")
-    try:
-        runs = read_signals(log, say_note, channel=channel, names=names[1:], between_s=between_s)
-        name = common.chosen_run(log, runs, run)
-        require(log, runs[name], *names)
-    except (OSError, ValueError) as error:
-        common.fail(error)
-    return name, [runs[name][each] for each in names]
-
-
 def _samples(
-    columns: list[FloatArray], low_s: float, high_s: float
+    columns: Mapping[str, FloatArray], between_s: Between
 ) -> tuple[FloatArray, FloatArray]:
     """Return roll and level every `STEP_S`; ValueError says what the record lacks."""
-    time_s, roll_rad, port_m, starboard_m = columns
-    part = (time_s >= low_s) & (time_s <= high_s)
+    time_s, roll_rad, port_m, starboard_m = (columns[name] for name in NEEDED)
+    part = (time_s >= between_s[0]) & (time_s <= between_s[1])
     if not part.any() or float(np.ptp(time_s[part])) < SHORTEST_S:
         raise ValueError(f"is shorter than {SHORTEST_S:g} s: take a longer part")
     if (np.diff(time_s[part]) <= 0).any():

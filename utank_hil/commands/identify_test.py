@@ -13,11 +13,12 @@ from utank_hil.analysis.loop.margins import PERIOD_SCALES
 from utank_hil.analysis.motion.decay import RollDecay, roll_decay
 from utank_hil.analysis.motion.inclining import inclining
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.between import ALWAYS, Between, between
 from utank_hil.base.provenance import describe
 from utank_hil.configuration import Vessel
 from utank_hil.console import common
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import Terminal, new_table, notes
+from utank_hil.console.terminal import Terminal, new_table, notes, say_note
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 PICTURE = "decay.png"
@@ -48,8 +49,9 @@ def decay(
     if from_s is not None and to_s is not None and from_s >= to_s:
         common.fail(f"--from {from_s:g} is not before --to {to_s:g}")
     vessel = None if ship is None else common.load(ship, Vessel)
-    low_s, high_s = -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s
-    time_s, roll_rad = _columns(record, "time_s", "roll_rad", between_s=(low_s, high_s))
+    low_s, high_s = between(from_s, to_s)
+    _, columns = read_run(record, ("time_s", "roll_rad"), (low_s, high_s))
+    time_s, roll_rad = columns["time_s"], columns["roll_rad"]
     part = (time_s >= low_s) & (time_s <= high_s)
     try:
         found = roll_decay(time_s[part], roll_rad[part])
@@ -104,9 +106,10 @@ def inclining_test(
 
     **Example:** utank-hil identify inclining shifts.csv --displacement 1900
     """
-    moment_nm, heel_rad = _columns(record, "moment_nm", "heel_rad")
+    _, table = read_run(record, ("moment_nm", "heel_rad"))
     try:
-        found = inclining(moment_nm, heel_rad, 1e3 * GRAVITY_M_S2 * displacement_t)
+        weight_n = 1e3 * GRAVITY_M_S2 * displacement_t
+        found = inclining(table["moment_nm"], table["heel_rad"], weight_n)
     except ValueError as error:
         refuse(f"{record}: {error}", json_)
     if json_:
@@ -118,17 +121,26 @@ def inclining_test(
     terminal.say(f"The ship lists by {math.degrees(found.list_rad):.2f}°.")
 
 
-def _columns(
-    path: Path, *names: str, between_s: tuple[float, float] = (-math.inf, math.inf)
-) -> list[FloatArray]:
+def read_run(
+    path: Path,
+    needed: Sequence[str],
+    between_s: Between = ALWAYS,
+    also: Sequence[str] = (),
+    *,
+    channel: str | None = None,
+    run: str | None = None,
+) -> tuple[str, dict[str, FloatArray]]:
+    """Name and columns of a run, by default the last; it ends the command without the `needed`."""
     from utank_hil.telemetry.signal_files import read_signals, require
 
     try:
-        run = list(read_signals(path, names=names, between_s=between_s).values())[-1]
-        require(path, run, *names)
+        names = (*needed, *also)
+        runs = read_signals(path, say_note, channel=channel, names=names, between_s=between_s)
+        name = common.chosen_run(path, runs, run)
+        require(path, runs[name], *needed)
     except (OSError, ValueError) as error:
         common.fail(error)
-    return [run[name] for name in names]
+    return name, runs[name]
 
 
 def refuse(reason: str, json_: bool) -> NoReturn:

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.between import ALWAYS, Between
 
 _SMALLEST, _LARGEST = 1e-60, 1e60  # Products of squares stay finite in this range.
 _CLIPPED = 0.01  # largest share; at twice that a model of roll has errors of 2 %
@@ -84,15 +85,14 @@ def logged_samples(
     columns: Mapping[str, FloatArray],
     measured: tuple[str, ...],
     sample_time_s: float,
-    from_s: float | None = None,
-    to_s: float | None = None,
+    between_s: Between = ALWAYS,
 ) -> FloatArray:
     """Return rows (mean command since the last sample, outputs...), the retuner's record.
 
     `columns`, of shape (n,), are those of one run (`telemetry.recording.read_recording`), of which
     rows may be missing. The outputs `measured` are among roll_rad, roll_rate_rad_s and level_m. The
     samples, shape (N, 1 + m), are at multiples of the sample time on the time axis of the
-    recording, from `from_s` to `to_s`; missing values are NaN.
+    recording, `between_s`; missing values are NaN.
 
     ValueError is raised if the recording lacks a column or the part is empty.
     """
@@ -103,8 +103,7 @@ def logged_samples(
         if name not in columns:
             raise ValueError(f"the recording has no {name}")
     time_s = columns["time_s"]
-    low = time_s[0] if from_s is None else max(from_s, float(time_s[0]))
-    high = time_s[-1] if to_s is None else min(to_s, float(time_s[-1]))
+    low, high = max(float(time_s[0]), between_s[0]), min(float(time_s[-1]), between_s[1])
     first = int(np.ceil(low / sample_time_s - 1e-6))
     count = int(np.floor(high / sample_time_s + 1e-6)) - first + 1
     if count < 1:

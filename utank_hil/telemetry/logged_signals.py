@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.between import ALWAYS, Between
 from utank_hil.base.text_files import VALUES_LIMIT, TextFileError, more_values
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import AddressClaim, DriveStatus2, load_catalogue
@@ -121,7 +122,7 @@ def signal_parts(entries: Iterable[Entry]) -> Iterator[Columns]:
 def signal_table(
     parts: Iterable[Columns],
     names: Container[str] | None = None,
-    between_s: tuple[float, float] = (-math.inf, math.inf),
+    between_s: Between = ALWAYS,
     of: object = "the log",
 ) -> Columns:
     """Join the parts of a table; signals that are NaN throughout are left out.

@@ -5,7 +5,6 @@ Tables (CSV, Parquet) may have other units, by their names (``roll_deg``, ``pres
 """
 
 import csv
-import math
 import zlib
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from itertools import chain
@@ -17,6 +16,7 @@ import numpy as np
 
 from utank_hil.base import text_files
 from utank_hil.base.arrays import FloatArray
+from utank_hil.base.between import ALWAYS, Between
 from utank_hil.base.whole_file import errors_name, left_whole
 from utank_hil.telemetry.bus_files.log import BusLog, source_of
 from utank_hil.telemetry.bus_logs import LoggedController
@@ -46,7 +46,7 @@ def read_signals(
     *,
     channel: str | None = None,
     names: Container[str] | None = None,
-    between_s: tuple[float, float] = (-math.inf, math.inf),
+    between_s: Between = ALWAYS,
 ) -> dict[str, Columns]:
     """Read the runs of a file by name; a file without names has one run, named by its stem.
 
@@ -75,18 +75,17 @@ def logged_parts(
     path: Path,
     note: Callable[[str], None] | None,
     channel: str | None,
-    from_s: float | None = None,
-    to_s: float | None = None,
+    between_s: Between = ALWAYS,
 ) -> Iterator[Columns]:
     """Yield the table of a frame log or a log of the bus by parts, as `signal_parts` does.
 
-    `from_s` and `to_s` are in seconds from the first record.
+    `between_s` counts from the first record.
     """
     if text_files.kind_of(path) == SUFFIX:
-        entries = part_of_entries(entries_of(FrameLog(path).blocks(note)), from_s, to_s)
+        entries = part_of_entries(entries_of(FrameLog(path).blocks(note)), between_s)
     else:
         notes: list[str] = []
-        entries = LoggedController(BusLog(path, channel, from_s, to_s), notes).entries()
+        entries = LoggedController(BusLog(path, channel, between_s), notes).entries()
         if note is not None and notes:
             note("; ".join(notes))
     yield from signal_parts(entries)
@@ -97,15 +96,12 @@ def is_table(path: Path) -> bool:
     return text_files.kind_of(path) in TABLE_SUFFIXES and not (path.exists() and source_of(path))
 
 
-def part_of_entries(
-    entries: Iterable[Entry], from_s: float | None, to_s: float | None
-) -> Iterator[Entry]:
-    """Yield the records between two times, in seconds from the first; None is no limit."""
+def part_of_entries(entries: Iterable[Entry], between_s: Between) -> Iterator[Entry]:
+    """Yield the records between two times, in seconds from the first."""
     begin_ns = None
     for entry in entries:
         begin_ns = entry.time_ns if begin_ns is None else begin_ns
-        after_s = (entry.time_ns - begin_ns) * 1e-9
-        if (from_s is None or after_s >= from_s) and (to_s is None or after_s <= to_s):
+        if between_s[0] <= (entry.time_ns - begin_ns) * 1e-9 <= between_s[1]:
             yield entry
 
 
@@ -166,8 +162,7 @@ def even_rows(
     path: Path,
     columns: Mapping[str, FloatArray],
     sample_time_s: float,
-    from_s: float | None = None,
-    to_s: float | None = None,
+    between_s: Between = ALWAYS,
 ) -> Columns:
     """Return a part of a table, with rows on an even grid that divides a law's sample time.
 
@@ -177,7 +172,7 @@ def even_rows(
     """
     require(path, columns, "time_s")
     time_s = columns["time_s"]
-    low, high = -math.inf if from_s is None else from_s, math.inf if to_s is None else to_s
+    low, high = between_s
     (kept,) = np.nonzero((time_s >= low) & (time_s <= high) | np.isnan(time_s))
     if len(kept) < 3:
         raise text_files.TextFileError(

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from utank_hil.base.between import ALWAYS, Between
 from utank_hil.base.text_files import open_content, open_text
 from utank_hil.telemetry.bus_files import asc, binary, candump, savvycan, trc
 from utank_hil.telemetry.bus_files.frame import (
@@ -180,13 +181,12 @@ def source_of(path: Path) -> FrameSource | None:
 class BusLog:
     """Frames of a log, compressed with gzip or not; read anew by every call of `frames`.
 
-    Without a `channel` all are read; `from_s` and `to_s` are seconds from the first frame.
+    Without a `channel` all are read; `between_s` counts from the first frame.
     """
 
     path: Path
     channel: str | None = None
-    from_s: float | None = None
-    to_s: float | None = None
+    between_s: Between = ALWAYS
 
     def frames(self, notes: list[str] | None = None) -> Iterator[BusFrame]:
         """Yield the frames in the order of the file, on one clock; `notes` gets what was found.
@@ -204,11 +204,9 @@ class BusLog:
         for frame in clock:
             begin_ns = frame.time_ns if begin_ns is None else begin_ns
             after_s = (frame.time_ns - begin_ns) * 1e-9
-            if self.from_s is not None and after_s < self.from_s:
-                continue
-            if self.to_s is not None and after_s > self.to_s:
-                if after_s > self.to_s + 1.0:  # A burst may be written late.
-                    break
+            if after_s > self.between_s[1] + 1.0:  # A burst may be written late.
+                break
+            if after_s < self.between_s[0] or after_s > self.between_s[1]:
                 continue
             found = True
             yield frame
