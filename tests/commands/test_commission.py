@@ -366,7 +366,8 @@ def test_the_record_before_is_void_whatever_hinders_the_new_one(
 
     passed(file)
     assert reason(file) == ""
-    monkeypatch.setattr(module, "write_record" if full else "make_record", fails)
+    replaced = "write_record" if full else "make_record"
+    monkeypatch.setattr(module.commissioning_record, replaced, fails)
     result = commission(monkeypatch, Stopped, file)
     assert "there is no record" in reason(file)
     if full:
