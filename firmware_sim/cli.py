@@ -85,32 +85,25 @@ def firmware_sim(
         for name in ("roll_rad", "level_m", "pressure_pa", "shaft_power_w")
     )
     roll, pump = roll_statistics(roll_rad), pump_statistics(pressure_pa, power_w, level_m)
-    external = next(
-        (
-            n
-            for n in nodes
-            if isinstance(n, ship_side.ExternalNode) and n.name == ship_side.EXTERNAL_DRIVE
-        ),
-        None,
-    )
+    hardware = {node.name: node for node in nodes if isinstance(node, ship_side.ExternalNode)}
+    external = hardware.get(ship_side.EXTERNAL_DRIVE)
     if json_:
-        summary = {
-            "duration_s": len(log.rows) * RECORD_S,
-            "roll": asdict(roll),
-            "pump": asdict(pump),
-            "refused_commands": None if external else ship.refused_commands,
-            "reported_pressure_share": external and external.reported_share,
-            "loop": statistics.summary(),
-        }
-        common.print_json(summary)
+        common.print_json(
+            {
+                "duration_s": len(log.rows) * RECORD_S,
+                "roll": asdict(roll),
+                "pump": asdict(pump),
+                "refused_commands": None if external else ship.refused_commands,
+                "reported_pressure_share": external and external.reported_share,
+                "loop": statistics.summary(),
+            }
+        )
         return
     console = Terminal()
     console.table(timing_table({"ship": statistics}))
-    drive = (
-        f"pressure reported in {external.reported_share:.1%} of the time"
-        if external
-        else f"{ship.refused_commands} commands refused"
-    )
+    drive = f"{ship.refused_commands} commands refused"
+    if external is not None:
+        drive = f"pressure reported in {external.reported_share:.1%} of the time"
     console.say(
         f"roll RMS {math.degrees(roll.rms_rad):.2f}°, largest "
         f"{math.degrees(roll.maximum_rad):.2f}°; "

@@ -16,7 +16,7 @@ from utank_hil.analysis.loop.self_tuning import SelfTunedDesign, sample_time_of
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.tick import TICK_S, is_whole_ticks
-from utank_hil.canbus import load_catalogue
+from utank_hil.canbus import Catalogue, load_catalogue
 from utank_hil.canbus.cmac import read_key
 from utank_hil.canbus.measurements import MEASURED, Measurements, MotionSample
 from utank_hil.canbus.profiles.device_plan import ForeignDevices
@@ -175,63 +175,75 @@ def build_controller_node(
     has no monitors. KeyFileError is raised where the key of the ship's panel is not there.
     """
     law = law or build_law(config)
-    vessel, tank, catalogue = config.vessel, config.vessel.tank, load_catalogue()
+    vessel, safety, catalogue = config.vessel, config.safety, load_catalogue()
     exchange = None if retuner is None else _exchange(config, law, retuner)
     estimator = None
     if estimating is not None and config.sea_estimate is not None:
-        estimator = Estimator(config.sea_estimate, estimating, vessel.ship, tank, vessel.least_gm_m)
-    timeout_s = config.command_timeout_ms * 1e-3
-    valve = None
-    if vessel.valve is not None:
-        plan = vessel.foreign.valve
-        most_off = THROTTLED_OFF if isinstance(config.law, HeelRemovalDesign) else VALVE_OFF
-        valve = ValveCommander(vessel.valve, tank, catalogue, timeout_s, plan, most_off)
-    pump = vessel.pump is not None
-    monitors = None
-    if monitored:
-        monitors = Monitors(
-            config.plant,
-            config.safety.roll_limit_rad,
-            config.sensor_figures,
-            config.bit_rate,
-            compares=law.closes_loop,
-            second_motion=vessel.redundancy.second_motion_sensor,
-            motion_cycles_s=vessel.motion_cycles_s,
-            of_hull=vessel.hull is not None,
-            harbour=_harbour_watch(config),
+        estimator = Estimator(
+            config.sea_estimate, estimating, vessel.ship, vessel.tank, vessel.least_gm_m
         )
-    controller = law.controller() if exchange is None else exchange
+    monitors = _monitors(config, compares=law.closes_loop) if monitored else None
     running = RunningLaw(
-        controller,
+        law.controller() if exchange is None else exchange,
         measure_of(law.measured),
         law.commands,
-        limits=config.safety,
+        limits=safety,
         thresholds=None if monitors is None else monitors.thresholds,
     )
-    limiter = CommandLimiter(config.limits, tank, TICK_S)
-    foreign, drive = vessel.foreign, None
-    if foreign.pump is not None and vessel.pump is not None:
-        of = foreign.pump
-        loop = PressureLoop(vessel.pump, COMMAND_MS * 1e-3, of.delay_s, torque=of.mode.torque)
-        drive = CanopenDrive(of, loop, tank.reservoir_area_m2)
     return ControllerNode(
         running,
         Safety(
-            config.safety,
+            safety,
             config.bit_rate,
             monitors,
-            pump=pump,
+            pump=vessel.pump is not None,
             motion_cycles_s=vessel.motion_cycles_s,
             unprotected=vessel.devices is not None and vessel.devices.unprotected,
         ),
-        Actuators(limiter, catalogue, timeout_s, pump=pump, valve=valve, drive=drive),
+        _actuators(config, catalogue),
         Telemetry(statistics, sink, sink_every, event_sink),
         ControllerSettings(
-            config.vessel.version, commissioned, tank, vessel.redundancy, foreign, key_of(foreign)
+            vessel.version,
+            commissioned,
+            vessel.tank,
+            vessel.redundancy,
+            vessel.foreign,
+            key_of(vessel.foreign),
         ),
         catalogue,
         estimator,
     )
+
+
+def _monitors(config: ControllerConfig, *, compares: bool) -> Monitors:
+    vessel = config.vessel
+    return Monitors(
+        config.plant,
+        config.safety.roll_limit_rad,
+        config.sensor_figures,
+        config.bit_rate,
+        compares=compares,
+        second_motion=vessel.redundancy.second_motion_sensor,
+        motion_cycles_s=vessel.motion_cycles_s,
+        of_hull=vessel.hull is not None,
+        harbour=_harbour_watch(config),
+    )
+
+
+def _actuators(config: ControllerConfig, catalogue: Catalogue) -> Actuators:
+    vessel, tank, foreign = config.vessel, config.vessel.tank, config.vessel.foreign
+    timeout_s = config.command_timeout_ms * 1e-3
+    valve = drive = None
+    if vessel.valve is not None:
+        most_off = THROTTLED_OFF if isinstance(config.law, HeelRemovalDesign) else VALVE_OFF
+        valve = ValveCommander(vessel.valve, tank, catalogue, timeout_s, foreign.valve, most_off)
+    if foreign.pump is not None and vessel.pump is not None:
+        of = foreign.pump
+        loop = PressureLoop(vessel.pump, COMMAND_MS * 1e-3, of.delay_s, torque=of.mode.torque)
+        drive = CanopenDrive(of, loop, tank.reservoir_area_m2)
+    limiter = CommandLimiter(config.limits, tank, TICK_S)
+    pump = vessel.pump is not None
+    return Actuators(limiter, catalogue, timeout_s, pump=pump, valve=valve, drive=drive)
 
 
 def _harbour_watch(config: ControllerConfig) -> HarbourWatch | None:

@@ -97,18 +97,9 @@ def faults(
     ended_early = any(len(outcomes[row.id]) < seeds for row in chosen)
     begun = [row for row in chosen if outcomes[row.id]]
     results = [judged(loaded, row, outcomes[row.id]) for row in begun]
-    not_run = {
-        each.id: f"{each.fault}: shown by {each.elsewhere}"
-        for each in loaded.shown_elsewhere(names)
-    }
-    kept = {row.id for row in loaded.rows}
-    not_run |= {
-        row.id: f"needs a ship, nodes and counters as of setup {row.fault.setup}"
-        for row in whole.chosen(names)
-        if row.id not in kept
-    }
-    not_run |= {row.id: "takes long: --full or --rows" for row in too_long}
     killed = ended_early and not interrupted
+    not_run = _not_to_run(whole, loaded, names)
+    not_run |= {row.id: "takes long: --full or --rows" for row in too_long}
     not_begun = [row.id for row in chosen if row not in begun]
     not_run |= dict.fromkeys(not_begun, KILLED if killed else INTERRUPTED)
     options = {"seeds": seeds, "full": full, "rows": names, "scenario": str(scenario or "")}
@@ -177,6 +168,20 @@ def _window(campaign: "Campaign") -> "Window":
     ship = campaign.setups[COMMON].scenario.vessel.ship
     rolls_s = ROLLS_IN_CHARGE * 2 * math.pi / ship.natural_frequency_rad_s
     return Window(600.0, max(20.0, round(rolls_s)))
+
+
+def _not_to_run(whole: "Campaign", loaded: "Campaign", names: Sequence[str]) -> dict[str, str]:
+    """Why each row of these names is none of this campaign: tests show it, or the ship can't."""
+    kept = {row.id for row in loaded.rows}
+    shown = {
+        each.id: f"{each.fault}: shown by {each.elsewhere}"
+        for each in loaded.shown_elsewhere(names)
+    }
+    return shown | {
+        row.id: f"needs a ship, nodes and counters as of setup {row.fault.setup}"
+        for row in whole.chosen(names)
+        if row.id not in kept
+    }
 
 
 def _print(results: Sequence["Result"], live: Sequence[dict[str, Any]], seeds: int) -> None:

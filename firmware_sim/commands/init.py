@@ -101,9 +101,6 @@ def init(
     **Example:** utank-hil init patrol --length 63 --beam 9.5 --displacement 1900
     --gm 0.9 --roll-period 9.5
     """
-    from firmware_sim.hull.compute import Loading, usual_hull, write_hull
-    from firmware_sim.hull.mesh import MeshError
-
     for path in (folder / file for file in (*FILES, *([HULL] * hull))):
         if path.exists():
             fail(f"{path}: is there already; name another folder, or remove it")
@@ -128,16 +125,7 @@ def init(
             fail(f"--{which}: must be positive and finite, got {value}")
     data, slope = None, None
     if hull:
-        if draught is None:
-            fail("--hull: needs --draught")
-        loading = Loading(gm, roll_period_s=ship.period_s, displacement_t=displacement)
-        try:
-            with _at_options(), notes.busy(f"{ship_name}: computing the hull"):
-                data, found = usual_hull(ship.form, loading)
-                slope = found.effective_slope
-                ship = replace(ship, radiated_ratio=found.radiation_ratio)
-        except (MeshError, ValueError) as error:
-            fail(f"--hull: the usual hull of these dimensions {error}")
+        ship, data, slope = _with_usual_hull(ship)
     try:
         with _at_options(), notes.busy(f"{ship_name}: sizing tank and pump, designing a law"):
             project = make_starter(ship, room, gm_loss, hs, tp, slope)
@@ -148,13 +136,7 @@ def init(
         raise typer.Exit(ExitCode.REFUSED) from None
     except CalmSeaError as error:
         fail(f"--tp: {error}")
-    prepare_out(folder, ())  # written last: a refusal leaves no files behind
-    files = {file: folder / file for file in FILES}
-    for file, path in files.items():
-        write_whole(path, project.texts[file])
-    if data is not None:
-        files[HULL] = folder / HULL
-        write_hull(files[HULL], data)
+    files = _written(project, data, folder)
     scenario = load(files[SCENARIO], Scenario)
     (config,) = scenario.controllers.values()
     with notes.busy(f"{ship_name}: what a bench of its scenario would give"):
@@ -165,7 +147,42 @@ def init(
         figures["expected"] = expected.as_json()
         figures["files"] = {Path(file).stem: str(path) for file, path in files.items()}
         print_json(figures)
-        return
+    else:
+        _print(project, expected, little, files)
+
+
+def _with_usual_hull(ship: StarterShip) -> tuple[StarterShip, Any, float | None]:
+    """Ship with the radiation of a usual hull, that hull's data, and its effective slope."""
+    from firmware_sim.hull.compute import Loading, usual_hull
+    from firmware_sim.hull.mesh import MeshError
+
+    if ship.draught_m is None:
+        fail("--hull: needs --draught")
+    loading = Loading(ship.gm_m, roll_period_s=ship.period_s, displacement_t=ship.displacement_t)
+    try:
+        with _at_options(), notes.busy(f"{ship.name}: computing the hull"):
+            data, found = usual_hull(ship.form, loading)
+            return replace(ship, radiated_ratio=found.radiation_ratio), data, found.effective_slope
+    except (MeshError, ValueError) as error:
+        fail(f"--hull: the usual hull of these dimensions {error}")
+
+
+def _written(project: StarterProject, data: Any | None, folder: Path) -> dict[str, Path]:
+    prepare_out(folder, ())  # written last: a refusal leaves no files behind
+    files = {file: folder / file for file in FILES}
+    for file, path in files.items():
+        write_whole(path, project.texts[file])
+    if data is not None:
+        from firmware_sim.hull.compute import write_hull
+
+        files[HULL] = folder / HULL
+        write_hull(files[HULL], data)
+    return files
+
+
+def _print(
+    project: StarterProject, expected: Expected, little: str | None, files: dict[str, Path]
+) -> None:
     console = Terminal()
     console.table(_table(project, expected))
     if little:

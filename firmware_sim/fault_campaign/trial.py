@@ -20,6 +20,7 @@ import numpy as np
 from firmware_sim.fault_campaign.campaign import Campaign, Row, Setup, StatusFlag
 from firmware_sim.fault_campaign.watch import BusLog, Heard, Watch, first_difference
 from firmware_sim.faulty_bench import FaultyBench
+from firmware_sim.plant import Plant
 from firmware_sim.ship_side import build_ship_side
 from firmware_sim.worker_pool import end_with
 from utank_hil.assembly import estimator_work
@@ -168,11 +169,7 @@ class Sea:
         """Roll of the sound ship if its pump is off from the fault on: no stop is sooner."""
         plant = self._underway[0].ship.plant
         plant.drive_pump(0.0, enabled=False)
-        rolls, end_ns = [], self._fault_ns + round(seconds * SECOND_NS)
-        for time_ns in range(self._fault_ns, end_ns, SAMPLE_NS):
-            plant.advance(time_ns)
-            rolls.append(plant.roll_rad)
-        return np.array(rolls)
+        return _rolls(plant, self._fault_ns, self._fault_ns + round(seconds * SECOND_NS))
 
     def _without_fault(self, end_ns: int, roll_end_ns: int) -> tuple[list[Heard], FloatArray]:
         """Frames until a time, and the roll until another or the same."""
@@ -198,11 +195,7 @@ class Sea:
             plant.set_valve_loss(valve.loss(scenario.vessel.tank, opening))
         plant.advance(0)
         plant.drive_pump(0.0, enabled=enabled)
-        rolls = []
-        for time_ns in range(0, self._fault_ns + round(seconds * SECOND_NS), SAMPLE_NS):
-            plant.advance(time_ns)
-            rolls.append(plant.roll_rad)
-        return np.array(rolls)
+        return _rolls(plant, 0, self._fault_ns + round(seconds * SECOND_NS))
 
     def outcome(self, row: Row) -> Outcome:
         """Run a row in a copy of this process."""
@@ -236,9 +229,7 @@ class Sea:
         window_s = max(row.limit.roll_window_s or window_s, (alone_ns - start_ns) / SECOND_NS)
         end_ns = start_ns + round(window_s * SECOND_NS)
         if stopped:  # nothing acts on the ship any more: it is integrated alone
-            for time_ns in range(alone_ns, end_ns, TICK_NS):
-                bench.ship.plant.advance(time_ns)
-                watch.rolls.append(bench.ship.plant.roll_rad)
+            watch.rolls += _rolls(bench.ship.plant, alone_ns, end_ns, TICK_NS).tolist()
         else:
             bench.run(end_ns)
         passive = self._passive_beside(bench, (end_ns - self._fault_ns) / SECOND_NS, stopped)
@@ -290,6 +281,15 @@ class Sea:
 
     def _pump_enabled(self, bench: FaultyBench) -> bool:
         return bench.ship.drive is not None and bench.ship.drive.enabled
+
+
+def _rolls(plant: Plant, begin_ns: int, end_ns: int, step_ns: int = SAMPLE_NS) -> FloatArray:
+    """Roll of a ship that is integrated alone, from one time up to another."""
+    rolls = []
+    for time_ns in range(begin_ns, end_ns, step_ns):
+        plant.advance(time_ns)
+        rolls.append(plant.roll_rad)
+    return np.array(rolls)
 
 
 def times_of(row: Row, watch: Watch, log: BusLog, start_ns: int) -> dict[str, Any]:

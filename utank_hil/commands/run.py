@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, NamedTuple
 
 import typer
 
@@ -19,7 +19,7 @@ from utank_hil.canbus.ports import BusPorts, open_port, why_other_bit_rate
 from utank_hil.commands.announcer import LOG_NAME, Announcer
 from utank_hil.commands.commissioning_record import why_not_commissioned
 from utank_hil.commands.identified import IdentifiedShips, read_controller
-from utank_hil.commands.lines import printed_lines
+from utank_hil.commands.lines import Lines, printed_lines
 from utank_hil.commands.outward.outlets import Outlet, read_outlet
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.commands.service_manager import ServiceManager
@@ -32,6 +32,7 @@ from utank_hil.console.terminal import Terminal, notes, shown, timing_table
 from utank_hil.control import BuiltLaw
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.signals import ROW_TICKS
+from utank_hil.retuning import Desk
 from utank_hil.runners import LoopStatistics, Node, RealTimeLoop
 from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.events import Event, event_text
@@ -112,29 +113,14 @@ def run(
         notes.say(refused, yellow="arming will be refused:")
     statistics = LoopStatistics()
     with _refusals_named(), ExitStack() as stack:
-        try:
-            manager = stack.enter_context(ServiceManager())
-        except OSError as error:
-            what = "the service manager can't be reached"
-            common.fail(f"NOTIFY_SOCKET: {what}: {error}", ExitCode.SYSTEM)
+        manager = _service_manager(stack)
         port, stop = stack.enter_context(opened(lambda: open_port(bus, loaded.vessel.foreign)))
         _refuse_beside_another(port, bus)
         announcer, recording = _outputs(
             stack, context, loaded, law, config, out, keep, outlets, commissioned=not refused
         )
-        desks_of = stack.enter_context(retuner_process(loaded))
-        if any(desk is not None and not desk.alive for desk in desks_of):
-            text = "nothing will be retuned or estimated"
-            notes.say(text, red="the retuner did not start:")
-        alarms = stack.enter_context(printed_lines())
-
-        def announce(event: Event, start_ns: int) -> None:
-            if isinstance(event, AlarmEvent):
-                alarms.tell(event, start_ns)
-            if announcer is not None:
-                announcer.write(event, start_ns)
-
-        desks = Tapped(*desks_of, wanted=recording.keeps_records)
+        desks = Tapped(*_desks(stack, loaded), wanted=recording.keeps_records)
+        told = _Told(stack.enter_context(printed_lines()), announcer, recording)
         node = build_controller_node(
             loaded,
             law,
@@ -143,7 +129,7 @@ def run(
             statistics=statistics,
             sink=recording.write,
             sink_every=ROW_TICKS,
-            event_sink=announce,
+            event_sink=told.event,
             commissioned=not refused,
         )
         on_bus: Node = node
@@ -151,15 +137,9 @@ def run(
             on_bus = NodeTap(node, recording.write_records, desks.taps, ROW_TICKS)
 
         def ended() -> bool:
-            ticks = statistics.ticks
-            manager.progress(ticks)
-            if ticks % LOOK_TICKS == 0:
-                for error in port.take_errors() if isinstance(port, BusPorts) else ():
-                    alarms.say(f"a sensor's bus fails: {error}")
-                if failure := recording.failure():
-                    alarms.say(f"not recorded any longer: {failure}")
-                if announcer is not None and (failure := announcer.failure()):
-                    alarms.say(f"events are not logged any longer: {failure}")
+            manager.progress(statistics.ticks)
+            if statistics.ticks % LOOK_TICKS == 0:
+                told.failures(port)
             return stop()
 
         with _in_real_time(f"{loaded.name} on {bus}", manager):
@@ -178,6 +158,43 @@ def run(
         else:
             _print_summary(loaded.name, node, statistics, kept)
     raise typer.Exit(_code(node))
+
+
+def _service_manager(stack: ExitStack) -> ServiceManager:
+    try:
+        return stack.enter_context(ServiceManager())
+    except OSError as error:
+        what = "the service manager can't be reached"
+        common.fail(f"NOTIFY_SOCKET: {what}: {error}", ExitCode.SYSTEM)
+
+
+def _desks(stack: ExitStack, loaded: ControllerConfig) -> tuple[Desk | None, Desk | None]:
+    desks = stack.enter_context(retuner_process(loaded))
+    if any(desk is not None and not desk.alive for desk in desks):
+        notes.say("nothing will be retuned or estimated", red="the retuner did not start:")
+    return desks
+
+
+class _Told(NamedTuple):
+    """Who hears of a run's events and failures."""
+
+    lines: Lines
+    announcer: Announcer | None
+    recording: RunRecording
+
+    def event(self, event: Event, start_ns: int) -> None:
+        if isinstance(event, AlarmEvent):
+            self.lines.tell(event, start_ns)
+        if self.announcer is not None:
+            self.announcer.write(event, start_ns)
+
+    def failures(self, port: canbus.Port) -> None:
+        for error in port.take_errors() if isinstance(port, BusPorts) else ():
+            self.lines.say(f"a sensor's bus fails: {error}")
+        if failure := self.recording.failure():
+            self.lines.say(f"not recorded any longer: {failure}")
+        if self.announcer is not None and (failure := self.announcer.failure()):
+            self.lines.say(f"events are not logged any longer: {failure}")
 
 
 def _refuse_beside_another(port: canbus.Port, bus: str) -> None:

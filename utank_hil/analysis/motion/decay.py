@@ -158,34 +158,46 @@ def _motion(time: FloatArray, p: FloatArray) -> tuple[FloatArray, FloatArray]:
     return run[:, 0] + p[4] + p[5] * since, by
 
 
-def _fit(time: FloatArray, roll: FloatArray, start: FloatArray) -> RollDecay:
-    """Fit all parameters to all samples."""
+def _parameters(time: FloatArray, roll: FloatArray, start: FloatArray) -> FloatArray:
+    """Return the parameters that meet all samples best, in the order of `_start`."""
     size = float(np.max(np.abs(roll - start[4])))
     scale = np.array([start[0], 0.01, 0.1, 1.0, size, size / (time[-1] - time[0]), size, size])
     bounds = (
         [0.5 * start[0], -0.5, -20, -20, -np.inf, -np.inf, -np.inf, -np.inf],
         [2 * start[0], 2, 20, 20, np.inf, np.inf, np.inf, np.inf],
     )
-    p = least_squares(
+    found = least_squares(
         lambda p: _motion(time, p)[0] - roll,
         start,
         lambda p: _motion(time, p)[1],
         bounds,
         x_scale=scale,
         max_nfev=50,  # good records take about ten
-    ).x
+    )
+    return np.asarray(found.x)
+
+
+def _half_swings(time: FloatArray, period: float) -> FloatArray:
+    """Return the number of the half swing of each sample; ValueError if they are too few."""
+    since = time - time[0]
+    parts = int(since[-1] / (0.5 * period))
+    if parts <= _BLOCK:
+        raise ValueError(
+            f"a decay test needs {(_BLOCK + 1) / 2} swings, whose scatter gives the intervals, has "
+            f"{since[-1] / period:.1f}: use more of the record"
+        )
+    return np.asarray(np.minimum(np.floor(since / (0.5 * period)), parts - 1))
+
+
+def _fit(time: FloatArray, roll: FloatArray, start: FloatArray) -> RollDecay:
+    """Fit all parameters to all samples."""
+    p = _parameters(time, roll, start)
     fit, by = _motion(time, p)
     rest = roll - fit
     swing = np.abs(fit - p[4] - p[5] * (time - time[0]))
     period = 2 * math.pi / p[0]
-    parts = int((time[-1] - time[0]) / (0.5 * period))
-    if parts <= _BLOCK:
-        raise ValueError(
-            f"a decay test needs {(_BLOCK + 1) / 2} swings, whose scatter gives the intervals, has "
-            f"{(time[-1] - time[0]) / period:.1f}: use more of the record"
-        )
-    block = np.minimum(((time - time[0]) / (0.5 * period)).astype(int), parts - 1)
-    peaks = np.array([np.max(swing[block == n]) for n in range(parts) if np.any(block == n)])
+    half_swing = _half_swings(time, period)
+    peaks = np.array([np.max(swing[half_swing == n]) for n in np.unique(half_swing)])
     share = float(np.sqrt(np.mean(rest**2)) / np.max(peaks))
     if share > _MOST_RESIDUAL:
         raise ValueError(
@@ -195,7 +207,7 @@ def _fit(time: FloatArray, roll: FloatArray, start: FloatArray) -> RollDecay:
     amplitude = np.array([np.min(peaks), 0.0, np.max(peaks)])
     amplitude[1] = (amplitude[0] + amplitude[2]) / 2
     equivalent = p[1] + _EQUAL_WORK * p[2] * amplitude
-    deviation = _deviation(by, rest, block // _BLOCK)
+    deviation = _deviation(by, rest, half_swing // _BLOCK)
 
     def interval(value: float, gradient: FloatArray) -> Interval:
         half = float(np.linalg.norm(deviation @ gradient))

@@ -225,7 +225,6 @@ def judge_pulses(
     port, starboard = -moved("port_level_m"), moved("starboard_level_m")
     promised_pa = _promised(pulses["command_pa"], plant, sample_time_s)
     promised = precision.filtered(promised_pa, plant, sample_time_s)
-    mass, _, stiffness = coupled_matrices(plant.ship, plant.tank)
     push = precision.push_of(roll, plant)
     known = precision.instruments(pulses["command_pa"], plant, sample_time_s)
     of_tank, of_roll = known[:5], known[5:]
@@ -254,29 +253,15 @@ def judge_pulses(
         )
     ]
     if "roll_2_rad" in pulses:
-        roll_2, rate_2 = moved("roll_2_rad"), moved("roll_rate_2_rad_s")
-        of_first = _slope(roll_2[_VALUE], roll[_VALUE], of_roll[_VALUE])
-        remedy = "Mount both motion sensors alike: roll is positive starboard down."
-        checks += [
-            _scale_check("roll_2", "second sensor's roll, by the first's",
-                         of_first, ROLL_2_SCALE, remedy),
-            _scale_check("roll_rate_2", "second sensor's rate, by its roll",
-                         _slope(rate_2[_VALUE], roll_2[_RATE], of_roll[_RATE]), RATE_SCALE, remedy),
-        ]  # fmt: skip
+        checks += _second_sensor(moved("roll_2_rad"), moved("roll_rate_2_rad_s"), roll, of_roll)
     tank_period_s = _period_s(_mean([float(fit[_VALUE] / fit[_BEND]) for fit in good]))
     ship_period_s = math.nan
     if good and rolls:
         true = [
             each / scale for each, scale in zip((port, starboard), gauges, strict=True) if scale
         ]
-        level = np.mean(true, axis=0)
-        righting = -(mass[0, 1] * level[_BEND] + stiffness[0, 1] * level[_VALUE])
         true_roll = [of_roll @ each / scales.roll for each in roll]
-        inertia, _, righted = _least_squares(true_roll, of_roll @ righting).tolist()
-        # less the water's share
-        inertia -= mass[0, 0] - plant.ship.inertia_kg_m2
-        righted -= stiffness[0, 0] - plant.ship.stiffness_nm_rad
-        ship_period_s = _period_s(righted / inertia)
+        ship_period_s = _ship_period_s(np.mean(true, axis=0), true_roll, of_roll, plant)
     return [
         *checks,
         _period_check("tank_period", "natural period of the tank", tank_period_s, plan.period_s,
@@ -286,6 +271,33 @@ def judge_pulses(
                       "Slacken the moorings and try again; else give its roll period as loaded in "
                       "the ship's file."),
     ]  # fmt: skip
+
+
+def _second_sensor(
+    roll_2: FloatArray, rate_2: FloatArray, roll: FloatArray, of_roll: FloatArray
+) -> list[Check]:
+    of_first = _slope(roll_2[_VALUE], roll[_VALUE], of_roll[_VALUE])
+    of_itself = _slope(rate_2[_VALUE], roll_2[_RATE], of_roll[_RATE])
+    remedy = "Mount both motion sensors alike: roll is positive starboard down."
+    return [
+        _scale_check("roll_2", "second sensor's roll, by the first's",
+                     of_first, ROLL_2_SCALE, remedy),
+        _scale_check("roll_rate_2", "second sensor's rate, by its roll",
+                     of_itself, RATE_SCALE, remedy),
+    ]  # fmt: skip
+
+
+def _ship_period_s(
+    level: FloatArray, roll: list[FloatArray], of_roll: FloatArray, plant: DesignPlant
+) -> float:
+    """Period of the ship alone, by how it answers the water; NaN if it finds none."""
+    mass, _, stiffness = coupled_matrices(plant.ship, plant.tank)
+    righting = -(mass[0, 1] * level[_BEND] + stiffness[0, 1] * level[_VALUE])
+    inertia, _, righted = _least_squares(roll, of_roll @ righting).tolist()
+    # less the water's share
+    inertia -= mass[0, 0] - plant.ship.inertia_kg_m2
+    righted -= stiffness[0, 0] - plant.ship.stiffness_nm_rad
+    return _period_s(righted / inertia)
 
 
 def remedies_of(scales: Each[float]) -> Each[str]:
