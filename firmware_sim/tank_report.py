@@ -9,6 +9,7 @@ from firmware_sim.prediction import Expected, Loading
 from utank_hil.analysis.motion.statistics import Interval
 from utank_hil.analysis.tank_filling import Filling
 from utank_hil.analysis.tank_sizing import TankCost
+from utank_hil.analysis.tank_sweep import SweptTank
 from utank_hil.console.ship_report import power_words, three_digits, tonnes
 from utank_hil.console.terminal import new_table
 from utank_hil.control.optimal_tank import TankFigures
@@ -112,6 +113,26 @@ def filling_table(found: Sequence[Filling], present_m: float, sea: str) -> Table
             f"{each.gm_loss_m:.2f}",
             less(each.passive_below_no_tank),
         )
+    return table
+
+
+def sweep_table(found: Sequence[SweptTank]) -> Table:
+    """Roll of other passive tanks, by share of stability and by frequency."""
+    ratios = sorted({each.frequency_ratio for each in found})
+    table = new_table(
+        "Other tanks, passive: roll RMS in °",
+        *(f"{ratio:g}" for ratio in ratios),
+        names=("stability", "water t"),
+        caption="by stability taken, and by the water's frequency per roll frequency; linear",
+    )
+    for share in sorted({each.stability_share for each in found}):
+        row = {each.frequency_ratio: each for each in found if each.stability_share == share}
+        water_t = [each.water_t for each in row.values()]
+        cells = (
+            f"{math.degrees(row[ratio].roll_rms_rad):.2f}" if ratio in row else ""
+            for ratio in ratios
+        )
+        table.add_row(f"{share:.0%}", f"{min(water_t):.4g} to {max(water_t):.4g}", *cells)
     return table
 
 

@@ -7,14 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from pydantic import BaseModel
 from rich.table import Table
 
-from firmware_sim.commands.bench import STORM
+from firmware_sim.commands.design_controller import controller
+from firmware_sim.commands.sea_choice import SeaOption, sea_of, usual_scenario
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis.tank_filling import fillings
 from utank_hil.analysis.tank_response import expected_sea, roll_curves
 from utank_hil.analysis.tank_sizing import moving, tank_cost, with_duct_loss
+from utank_hil.analysis.tank_sweep import sweep_tank
 from utank_hil.base.provenance import describe
 from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import ControllerConfig, Vessel
@@ -30,15 +31,11 @@ if TYPE_CHECKING:
     from firmware_sim.prediction import Expected
 
 
-PICTURE, FIGURES = "tank.png", "tank.json"
+PICTURE, FIGURES, SWEEP = "tank.png", "tank.json", "tank_sweep.png"
 GMS = (0.6, 0.8, 1.0, 1.2, 1.4, 1.6)
 DISPLACEMENTS = (0.85, 1.0, 1.15)
 """Loadings that filling is advised for by default, over those of the file."""
 
-SeaOption = Annotated[
-    Path | None,
-    common.option("Scenario whose sea counts.", default="scenario.yaml beside, or a shipped one"),
-]
 Ship = Annotated[Path, common.argument("Ship, tank and pump: a file of configs/ships.")]
 
 
@@ -46,6 +43,9 @@ def tank(
     context: typer.Context,
     vessel: Ship,
     scenario: SeaOption = None,
+    sweep: Annotated[
+        bool, common.option("Other tanks, too: share of stability and frequency.", "--sweep")
+    ] = False,
     out: common.Out = common.OUT,
     json_: common.Json = False,
 ) -> None:
@@ -59,8 +59,8 @@ def tank(
     **Example:** utank-hil design tank configs/ships/naval_vessel.yaml
     """
     from firmware_sim.prediction import other_loadings, predict
-    from firmware_sim.tank_report import interval_words, loading_table, rolls
-    from utank_hil.pictures.tank import draw_tank
+    from firmware_sim.tank_report import interval_words, loading_table, rolls, sweep_table
+    from utank_hil.pictures.tank import draw_sweep, draw_tank
 
     loaded = common.load(vessel, Vessel)
     try:
@@ -74,6 +74,8 @@ def tank(
     console = Terminal()
     figures: dict[str, Any] = {"vessel": loaded.name, "scenario": None}
     if path is None:
+        if sweep:
+            common.fail(f"{vessel}: no shipped scenario has this ship: name a sea with --scenario")
         figures |= {name: _figures(loaded, each, None) for name, each in tanks.items()}
         if json_:
             common.print_json(figures)
@@ -81,9 +83,9 @@ def tank(
         console.table(_table(loaded, tanks, {}))
         console.say("Name a sea with --scenario for the roll to be expected.")
         return
-    chosen, waves = _sea(path, loaded)
+    chosen, waves = sea_of(path, loaded)
     name = chosen.name
-    out = common.prepare_out(out, (PICTURE, FIGURES))
+    out = common.prepare_out(out, (PICTURE, FIGURES, SWEEP))
     with notes.busy(f"{loaded.name}: a law for each tank, and what a bench would give"):
         benches = {key: _bench(chosen, loaded, each, waves) for key, each in tanks.items()}
         found = {key: predict(*bench) for key, bench in benches.items()}
@@ -101,7 +103,10 @@ def tank(
     figures["loading"] = [
         {"period_scale": each.period_scale, **each.expected.as_json()} for each in loadings
     ]
-    files = _keep(figures | {"scenario": name}, out / PICTURE, out / FIGURES, json_=json_)
+    others = sweep_tank(_plant(loaded), waves) if sweep else ()
+    figures |= {"scenario": name, "sweep": [asdict(each) for each in others]}
+    more = {"sweep": draw_sweep(others, out / SWEEP, title, about)} if sweep else {}
+    files = _keep(figures, out / PICTURE, out / FIGURES, json_=json_, **more)
     if json_:
         return
     console.table(_table(loaded, tanks, found, interval_words(found["present"], name)))
@@ -111,11 +116,15 @@ def tank(
         console.say(f"pump: net head, flow, shaft, duty: {order_words(loaded)}")
     if loadings:
         console.table(loading_table(loadings))
+    if sweep:
+        console.table(sweep_table(others))
     console.files(files)
 
 
-def _keep(figures: dict[str, Any], picture: Path, file: Path, *, json_: bool) -> dict[str, Path]:
-    files = {"picture": picture, "figures": file}
+def _keep(
+    figures: dict[str, Any], picture: Path, file: Path, *, json_: bool, **more: Path
+) -> dict[str, Path]:
+    files = {"picture": picture, "figures": file, **more}
     figures["files"] = {key: str(path) for key, path in files.items()}
     write_whole(file, json.dumps(figures, indent=2) + "\n")
     if json_:
@@ -155,7 +164,7 @@ def filling(
     for name, values in (("--gm", gm), ("--displacement", displacement)):
         if any(not 0 < value < math.inf for value in values or ()):
             common.fail(f"{name}: must be above 0")
-    ship, (chosen, waves) = loaded.ship, _sea(path, loaded)
+    ship, (chosen, waves) = loaded.ship, sea_of(path, loaded)
     if not ship.displacement_n > 0:
         common.fail(f"{vessel}: ship.displacement_t is needed to tell GM from stiffness: state it")
     own_t, own_m = ship.displacement_n / 9806.65, ship.stiffness_nm_rad / ship.displacement_n
@@ -177,28 +186,6 @@ def filling(
         console = Terminal()
         console.table(filling_table(found, loaded.tank.height_m, chosen.name))
         console.files(files)
-
-
-def _sea(path: Path, vessel: Vessel) -> "tuple[Scenario, Harmonics]":
-    """Scenario of the vessel, and the roll moment of its sea in N m.
-
-    One of another ship gives its sea alone.
-    """
-    from utank_hil.analysis.loop.sea_response import CalmSeaError
-
-    scenario = common.load(path, Scenario, allow_code=True)  # laws are not built from it
-    if scenario.vessel.version != vessel.version:
-        if scenario.hull is not None or scenario.fmu is not None:
-            why = f"plant: {scenario.plant} is {scenario.vessel.name}, not {vessel.name}"
-            common.fail(f"{path}: {why}; name a scenario with plant: roll")
-        others = {"vessel": vessel, "controllers": {}, "actual_ship": {}, "voyage": ()}
-        scenario = scenario.model_copy(update=others | {"gusts": None})
-    waves = scenario.pooled_wave_moment()
-    try:
-        expected_sea(vessel.ship, waves)
-    except CalmSeaError as error:
-        common.fail(f"{path}: sea: {error}; name another scenario with --scenario")
-    return scenario, waves
 
 
 def _plant(vessel: Vessel) -> DesignPlant:
@@ -259,24 +246,10 @@ def _table(
     return table
 
 
-class _VesselOfScenario(BaseModel):
-    """Vessel of a scenario; loading the rest could require the design of its controllers."""
-
-    vessel: Vessel
-
-
-def usual_scenario(vessel: Vessel, file: Path) -> Path | None:
-    """Scenario of a vessel: the one beside its file, the storm, or the first one shipped."""
-    beside = file.with_name("scenario.yaml")
-    shipped = [STORM, *sorted(STORM.parent.glob("*.yaml"))]
-    usual = [beside, *shipped] if beside.exists() else shipped
-    own = (p for p in usual if common.load(p, _VesselOfScenario).vessel.version == vessel.version)
-    return next(own, None)
-
-
 design = common.new_app(
-    "Design a tank: what it could be, and what it would cost.\n\n"
+    "Design a tank, or judge a law: what it could be, and what it would cost.\n\n"
     "**Example:** utank-hil design tank configs/ships/naval_vessel.yaml"
 )
 design.command()(tank)
 design.command()(filling)
+design.command()(controller)

@@ -7,16 +7,63 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from utank_hil.analysis import tank_sweep
 from utank_hil.cli import app
 
 pytestmark = pytest.mark.slow
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 FIRST = CONFIGS / "ships" / "thesis_first.yaml"
+GPC = CONFIGS / "controllers" / "gpc.yaml"
 
 
 def run(*arguments):
     return CliRunner().invoke(app, ["design", *map(str, arguments)])
+
+
+@pytest.fixture
+def two_factors(monkeypatch):
+    monkeypatch.setattr("utank_hil.analysis.loop.trade.WEIGHT_FACTORS", (1.0, 10.0))
+
+
+def test_a_law_is_traded_in_one_json_object_that_is_the_file_s(two_factors, tmp_path: Path):
+    result = run("controller", GPC, "--out", tmp_path, "--json")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert found == json.loads((tmp_path / "design.json").read_text())
+    assert found["scenario"] == "Storm of 10 February 2019"
+    design, hard = found["points"]
+    assert (design["factor"], design["refused"], hard["refused"]) == (1.0, False, True)
+    assert design["roll_below_passive"] == pytest.approx(0.37, abs=0.01)
+    assert any("peak sensitivity" in failure for failure in hard["failures"])
+    assert Path(found["files"]["picture"]).stat().st_size > 20_000
+
+
+def test_a_law_without_weights_and_a_calm_sea_are_refused_by_name(tmp_path: Path):
+    path = tmp_path / "passive.yaml"
+    path.write_text(f"name: none\nvessel: {FIRST}\nlaw: {{kind: passive}}\n")
+    result = run("controller", path, "--out", tmp_path)
+    assert result.exit_code == 2
+    assert "law.kind: a passive law has no weight to trade: take {kind: gpc, t" in result.stderr
+    still = CONFIGS / "scenarios" / "still_water.yaml"
+    result = run("controller", GPC, "--scenario", still, "--out", tmp_path)
+    assert result.exit_code == 2
+    assert f"{still}: sea: " in result.stderr
+
+
+@pytest.mark.usefixtures("few_rolls")
+def test_tank_command_sweeps(tmp_path: Path, monkeypatch):
+    monkeypatch.setattr(tank_sweep, "STABILITY_SHARES", (0.05, 0.1))
+    monkeypatch.setattr(tank_sweep, "FREQUENCY_RATIOS", (0.7, 1.0))
+    result = run("tank", FIRST, "--sweep", "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    assert "Other tanks, passive" in result.stdout
+    found = json.loads((tmp_path / "tank.json").read_text())
+    shares = [(each["stability_share"], each["frequency_ratio"]) for each in found["sweep"]]
+    assert shares == [(0.05, 0.7), (0.05, 1.0), (0.1, 0.7), (0.1, 1.0)]
+    slow, tuned, _, heavy = (each["roll_rms_rad"] for each in found["sweep"])
+    assert heavy < tuned < slow
+    assert Path(found["files"]["sweep"]).stat().st_size > 20_000
 
 
 @pytest.mark.usefixtures("few_rolls")

@@ -9,6 +9,7 @@ import numpy as np
 
 from utank_hil.analysis.tank_filling import Filling
 from utank_hil.analysis.tank_response import RollCurves
+from utank_hil.analysis.tank_sweep import SweptTank
 from utank_hil.pictures.style import BELOW, COLORS, DASHES, WIDEST_IN, picture
 
 _NAMES = ("without tank", "passive tank", "active tank")
@@ -44,6 +45,30 @@ def draw_tank(
         loading.set_xlabel("Roll period, times the ship's: tank and law as they are")
         loading.set_ylabel("Roll RMS in the sea (°)")
         figure.legend(*waves.get_legend_handles_labels(), **BELOW)
+    return path
+
+
+def draw_sweep(
+    found: Sequence[SweptTank], path: Path, title: str, about: Mapping[str, Any] | None = None
+) -> Path:
+    """Draw roll in the sea over the water's frequency, a curve for each share of stability."""
+    with picture(path, title, (WIDEST_IN, 4.6), about) as figure:
+        axes = figure.add_subplot()
+        shares = dict.fromkeys(each.stability_share for each in found)
+        for share, color, dash in zip(shares, cycle(COLORS), cycle(DASHES)):
+            here = [each for each in found if each.stability_share == share]
+            axes.plot(
+                [each.frequency_ratio for each in here],
+                [np.degrees(each.roll_rms_rad) for each in here],
+                color=color,
+                linestyle=dash,
+                marker="o",
+                label=f"{share:.0%}",
+            )
+        axes.set(xlabel="Frequency of the water per roll frequency")
+        axes.set_ylabel("Roll RMS in the sea, passive tank (°)")
+        axes.set_ylim(bottom=0)
+        figure.legend(*axes.get_legend_handles_labels(), title="Stability taken", **BELOW)
     return path
 
 

@@ -1,0 +1,55 @@
+"""Which sea a design is judged in."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel
+
+from firmware_sim.commands.bench import STORM
+from firmware_sim.scenario import Scenario
+from utank_hil.analysis.tank_response import expected_sea
+from utank_hil.configuration import Vessel
+from utank_hil.console import common
+from utank_hil.sea import Harmonics
+
+SeaOption = Annotated[
+    Path | None,
+    common.option("Scenario whose sea counts.", default="scenario.yaml beside, or a shipped one"),
+]
+
+
+def sea_of(path: Path, vessel: Vessel) -> "tuple[Scenario, Harmonics]":
+    """Scenario of the vessel, and the roll moment of its sea in N m.
+
+    One of another ship gives its sea alone.
+    """
+    from utank_hil.analysis.loop.sea_response import CalmSeaError
+
+    scenario = common.load(path, Scenario, allow_code=True)  # laws are not built from it
+    if scenario.vessel.version != vessel.version:
+        if scenario.hull is not None or scenario.fmu is not None:
+            why = f"plant: {scenario.plant} is {scenario.vessel.name}, not {vessel.name}"
+            common.fail(f"{path}: {why}; name a scenario with plant: roll")
+        others = {"vessel": vessel, "controllers": {}, "actual_ship": {}, "voyage": ()}
+        scenario = scenario.model_copy(update=others | {"gusts": None})
+    waves = scenario.pooled_wave_moment()
+    try:
+        expected_sea(vessel.ship, waves)
+    except CalmSeaError as error:
+        common.fail(f"{path}: sea: {error}; name another scenario with --scenario")
+    return scenario, waves
+
+
+class _VesselOfScenario(BaseModel):
+    """Vessel of a scenario; loading the rest could require the design of its controllers."""
+
+    vessel: Vessel
+
+
+def usual_scenario(vessel: Vessel, file: Path) -> Path | None:
+    """Scenario of a vessel: the one beside its file, the storm, or the first one shipped."""
+    beside = file.with_name("scenario.yaml")
+    shipped = [STORM, *sorted(STORM.parent.glob("*.yaml"))]
+    usual = [beside, *shipped] if beside.exists() else shipped
+    own = (p for p in usual if common.load(p, _VesselOfScenario).vessel.version == vessel.version)
+    return next(own, None)
