@@ -4,19 +4,29 @@ from functools import partial
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from roll_plant import SAMPLE_TIME_S, plant
 
 from utank_hil.control import ARX
 from utank_hil.control.interface import PumpLimits
-from utank_hil.identification import random_pulses, response_scale
+from utank_hil.identification import chirp, multisine, prbs, random_pulses, response_scale
 from utank_hil.identification.lag_regression import LagRegression, input_excitation
 
 LIMITS = PumpLimits(pressure_pa=5e4, rate_pa_s=1e5)
 pulses = partial(random_pulses, sample_time_s=SAMPLE_TIME_S)
+SIGNALS = {
+    "random pulses": pulses,
+    "prbs": partial(prbs, sample_time_s=SAMPLE_TIME_S),
+    "multisine": partial(multisine, sample_time_s=SAMPLE_TIME_S),
+    "chirp": lambda duration_s, limits, seed: chirp(
+        duration_s, limits, sample_time_s=SAMPLE_TIME_S
+    ),
+}
 
 
+@pytest.mark.parametrize("name", SIGNALS)
+@settings(max_examples=20)
 @given(
     duration_s=st.floats(40.0, 600.0),
     pressure_pa=st.floats(1.0, 1e6),
@@ -24,20 +34,21 @@ pulses = partial(random_pulses, sample_time_s=SAMPLE_TIME_S)
     seed=st.integers(0, 99),
 )
 def test_pressure_and_rate_are_kept_and_both_ends_are_zero(
-    duration_s, pressure_pa, seconds_to_full, seed
+    name, duration_s, pressure_pa, seconds_to_full, seed
 ):
     limits = PumpLimits(pressure_pa=pressure_pa, rate_pa_s=pressure_pa / seconds_to_full)
-    pressure = pulses(duration_s, limits, seed)
+    pressure = SIGNALS[name](duration_s, limits, seed)
     assert len(pressure) == round(duration_s / SAMPLE_TIME_S)
     assert np.abs(pressure).max() <= limits.pressure_pa * (1 + 1e-12)
     steps = np.diff(pressure, prepend=0.0, append=0.0)
     assert np.abs(steps).max() <= limits.rate_pa_s * SAMPLE_TIME_S * (1 + 1e-9)
     assert pressure[0] == pressure[-1] == 0
-    assert np.array_equal(pressure, pulses(duration_s, limits, seed))
+    assert np.array_equal(pressure, SIGNALS[name](duration_s, limits, seed))
 
 
-def test_another_seed_gives_another_signal_of_useful_size():
-    one, other = (pulses(500.0, LIMITS, seed) for seed in (1, 2))
+@pytest.mark.parametrize("name", ["random pulses", "prbs", "multisine"])
+def test_another_seed_gives_another_signal_of_useful_size(name):
+    one, other = (SIGNALS[name](500.0, LIMITS, seed) for seed in (1, 2))
     assert not np.array_equal(one, other)
     assert np.std(one) > 0.15 * LIMITS.pressure_pa
 
@@ -85,6 +96,21 @@ def test_scale_keeps_level_and_added_roll_within_their_limits():
     assert np.all(scaled <= limits * (1 + 1e-9))
     assert response_scale(pressure, model, response * 2) == 1.0
     assert response_scale(0 * pressure, model, response) == 1.0
+
+
+def test_multisine_and_chirp_hold_their_band():
+    for pressure in (
+        multisine(500.0, LIMITS, 1, sample_time_s=SAMPLE_TIME_S),
+        chirp(500.0, LIMITS, sample_time_s=SAMPLE_TIME_S),
+    ):
+        power = np.abs(np.fft.rfft(pressure)) ** 2
+        omega = 2 * np.pi * np.fft.rfftfreq(len(pressure), SAMPLE_TIME_S)
+        inside = (omega > 0.19) & (omega < 1.25)
+        assert power[inside].sum() > 0.97 * power.sum()
+    with pytest.raises(ValueError, match="no harmonic"):
+        multisine(5.0, LIMITS, 1, band_rad_s=(0.2, 0.3), sample_time_s=SAMPLE_TIME_S)
+    with pytest.raises(ValueError, match="band_rad_s must rise"):
+        chirp(50.0, LIMITS, band_rad_s=(1.0, 0.3), sample_time_s=SAMPLE_TIME_S)
 
 
 def test_bad_requests_are_refused():

@@ -21,6 +21,7 @@ from roll_plant import (
 from utank_hil.identification import (
     IdentificationError,
     OkidResult,
+    arx,
     find_disturbance_frequencies,
     okid,
 )
@@ -34,6 +35,25 @@ def _wave(samples, phase=1.0, omega=WAVE_RAD_S):
 
 def _relative(found, true):
     return float(np.max(np.abs(found - true).max(axis=(0, 2)) / np.abs(true).max(axis=(0, 2))))
+
+
+def test_the_model_alone_is_that_of_okid_and_a_decaying_disturbance_is_no_ship():
+    u, truth = pulses(1), plant()
+    y = truth.respond(u, np.zeros_like(u))
+    model = arx(u, y, 12, sample_time_s=SAMPLE_TIME_S)
+    found = okid(u, y, 12, sample_time_s=SAMPLE_TIME_S).arx
+    np.testing.assert_array_equal(model.alpha, found.alpha)
+    np.testing.assert_array_equal(model.beta, found.beta)
+    rates = (0.02, -0.01)
+    late_s = SAMPLE_TIME_S * (np.arange(len(u)) - len(u))
+    drifting = y + 0.3 * np.exp(-0.02 * SAMPLE_TIME_S * np.arange(len(u)))[:, None]
+    drifting += 0.1 * np.exp(0.01 * late_s)[:, None]
+    told = okid(u, drifting, 2, sample_time_s=SAMPLE_TIME_S, disturbance_decay_rates_1_s=rates)
+    assert _relative(told.markov, truth.markov(401)) < 1e-7
+    assert _relative(okid(u, drifting, 2, sample_time_s=SAMPLE_TIME_S).markov, told.markov) > 1e-4
+    for wrong in ((0.0,), (0.1, 0.1), (np.nan,)):
+        with pytest.raises(ValueError, match="decay"):
+            arx(u, y, 12, sample_time_s=SAMPLE_TIME_S, disturbance_decay_rates_1_s=wrong)
 
 
 @pytest.mark.parametrize(("order", "outputs"), [(2, 2), (30, 2), (120, 2), (200, 1)])

@@ -7,6 +7,7 @@ from utank_hil.control import DesignPlant, PumpLimits, pump_model
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.sampling import sample
 from utank_hil.retuning import RetuningSettings, make_pulses
+from utank_hil.retuning.settings import Excitation
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -24,9 +25,15 @@ def _largest_response(pulses: np.ndarray) -> tuple[float, float]:
     return float(largest[0]), float(largest[1])
 
 
-@pytest.mark.parametrize("added_roll_rad", [0.005, 0.02, 0.5])
-def test_pulses_keep_within_pressure_rate_roll_and_level(added_roll_rad: float) -> None:
-    settings = RetuningSettings((6.0, 20.0), added_roll_rad=added_roll_rad)
+@pytest.mark.parametrize(
+    ("kind", "added_roll_rad"),
+    [("random_pulses", 0.005), ("random_pulses", 0.02), ("random_pulses", 0.5), ("prbs", 0.02),
+     ("multisine", 0.02), ("chirp", 0.02)],
+)  # fmt: skip
+def test_pulses_keep_within_pressure_rate_roll_and_level(kind, added_roll_rad: float) -> None:
+    settings = RetuningSettings(
+        (6.0, 20.0), added_roll_rad=added_roll_rad, excitation=Excitation(kind)
+    )
     made = make_pulses(settings, DesignPlant(SHIP, TANK, limits=LIMITS), 0.2)
     pulses = made.pressure_pa
     assert len(pulses) == 2500
@@ -39,6 +46,14 @@ def test_pulses_keep_within_pressure_rate_roll_and_level(added_roll_rad: float) 
     assert (
         max(roll_rad / added_roll_rad, level_m / LIMITS.level_m, np.abs(pulses).max() / 30e3) > 0.9
     )
+
+
+def test_a_band_is_for_multisine_and_chirp_and_rises() -> None:
+    assert Excitation("chirp", (0.3, 0.9)).band == (0.3, 0.9)
+    with pytest.raises(ValueError, match="band_rad_s"):
+        Excitation("prbs", (0.3, 0.9))
+    with pytest.raises(ValueError, match="must rise"):
+        Excitation("chirp", (0.9, 0.3))
 
 
 def test_pumps_own_limit_counts_too() -> None:
@@ -62,6 +77,7 @@ def test_pumps_own_limit_counts_too() -> None:
         {"answer_within_s": 601.0},
         {"roll_limit_rad": 0.71},
         {"seed": -1},
+        {"identification_s": 5.0, "excitation": Excitation("multisine")},
     ],
 )
 def test_settings_out_of_range_are_refused_by_name(wrong: dict[str, object]) -> None:

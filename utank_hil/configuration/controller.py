@@ -237,6 +237,9 @@ class ControllerConfig(Section):
             (every_s < LEAST_PAUSE_S, "every_s",
              f"must be {LEAST_PAUSE_S:g} or more, got {every_s:g}: during the pulses, and for "
              "eight roll periods after, no law is compared with the passive ship"),
+            (settings.excitation.banded and settings.excitation.band[1] >= math.pi / period_s,
+             "excitation.band_rad_s",
+             f"must stay below {math.pi / period_s:.3g}, half of the law's sampling"),
             (length_s > MOST_PULSES_S, "identification_s",
              f"must be {MOST_PULSES_S:g} at most, got {length_s:g}"),
             (law.washout_rad_s > most_rad_s, "roll_period_range_s",

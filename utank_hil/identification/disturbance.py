@@ -26,17 +26,22 @@ def disturbance_basis(
     sample_time_s: float,
     frequencies_rad_s: Sequence[float] = (),
     polynomial_degree: int | None = None,
+    decay_rates_1_s: Sequence[float] = (),
 ) -> FloatArray:
     """Functions of time at t = 0, dt, ...; shape (d, samples), no value above 1 in magnitude.
 
     They are a sine and a cosine of each frequency, and with a degree Legendre polynomials over the
     record: up to 0 for an offset (a steady heel, the bias of a sensor), up to 1 for a drift as
-    well. ValueError is raised if the frequencies are not distinct and positive, or the degree is
-    negative.
+    well; and exp(-rate t) of each rate, where a negative one grows. ValueError is raised if
+    frequencies or rates are not finite and distinct, a frequency is not positive, a rate is zero,
+    or the degree is negative.
     """
-    values = list(frequencies_rad_s)
-    if not all(math.isfinite(w) for w in values) or len(set(values)) != len(values):
-        raise ValueError(f"disturbance frequencies_rad_s must be finite and distinct, got {values}")
+    values, rates = list(frequencies_rad_s), list(decay_rates_1_s)
+    for name, given in (("frequencies_rad_s", values), ("decay_rates_1_s", rates)):
+        if not all(math.isfinite(v) for v in given) or len(set(given)) != len(given):
+            raise ValueError(f"disturbance {name} must be finite and distinct, got {given}")
+    if 0 in rates:
+        raise ValueError("disturbance decay rates must not be zero; use polynomial_degree=0")
     if not all(w > 0 for w in values):
         raise ValueError(
             f"disturbance frequencies must be positive, got {values}; an offset is "
@@ -51,6 +56,9 @@ def disturbance_basis(
     if polynomial_degree is not None:
         span = np.linspace(-1.0, 1.0, samples)
         rows += list(np.polynomial.legendre.legvander(span, polynomial_degree).T)
+    for rate in rates:
+        # The value is 1 at the end where the function is largest, so that none overflows.
+        rows.append(np.exp(-abs(rate) * (time_s if rate > 0 else time_s[::-1])))
     return np.array(rows).reshape(len(rows), samples)
 
 

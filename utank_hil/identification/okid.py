@@ -71,6 +71,26 @@ class OkidResult:
     errors: FloatArray  #: shape (N, m): one-step prediction errors; NaN where there is none.
 
 
+def arx(
+    u: FloatArray,
+    y: FloatArray,
+    order: int = 120,
+    *,
+    sample_time_s: float,
+    disturbance_frequencies_rad_s: Sequence[float] = (),
+    disturbance_polynomial_degree: int | None = None,
+    disturbance_decay_rates_1_s: Sequence[float] = (),
+) -> ARX:
+    """Fit an ARX model by least squares: the first step of `okid`.
+
+    Parameters and errors are those of `okid`, except that strongly unstable models, whose one-step
+    predictions are valid, are not refused. The result is `OkidResult.arx` of the same record.
+    """
+    waves = disturbance_frequencies_rad_s
+    shapes = (waves, disturbance_polynomial_degree, disturbance_decay_rates_1_s)
+    return _fitted(u, y, order, sample_time_s, shapes).arx
+
+
 def okid(
     u: FloatArray,
     y: FloatArray,
@@ -79,6 +99,7 @@ def okid(
     sample_time_s: float,
     disturbance_frequencies_rad_s: Sequence[float] = (),
     disturbance_polynomial_degree: int | None = None,
+    disturbance_decay_rates_1_s: Sequence[float] = (),
 ) -> OkidResult:
     """Identify a model from a record of inputs and outputs.
 
@@ -102,16 +123,37 @@ def okid(
         Frequencies of regular waves; see `find_disturbance_frequencies`.
     disturbance_polynomial_degree : int or None
         0 fits an offset, 1 also a drift.
+    disturbance_decay_rates_1_s : sequence of float
+        Decay rates of exponential disturbances.
     """
+    waves = disturbance_frequencies_rad_s
+    shapes = (waves, disturbance_polynomial_degree, disturbance_decay_rates_1_s)
+    fitted = _fitted(u, y, order, sample_time_s, shapes)
+    with np.errstate(over="ignore", invalid="ignore"):
+        markov, observer_gain = markov_parameters(fitted.arx, max(_MARKOV_COUNT, 2 * order + 1))
+    if not (np.isfinite(markov).all() and np.isfinite(observer_gain).all()):
+        raise IdentificationError(
+            "the fitted model is violently unstable, so the record does not determine it; "
+            "record longer, excite more or raise the order"
+        )
+    return replace(fitted, markov=markov, observer_gain=observer_gain)
+
+
+def _fitted(
+    u: FloatArray,
+    y: FloatArray,
+    order: int,
+    sample_time_s: float,
+    shapes: tuple[Sequence[float], int | None, Sequence[float]],
+) -> OkidResult:
+    """The result with a disturbance basis of these shapes, yet without Markov parameters."""
     if not (np.isfinite(sample_time_s) and sample_time_s > 0):
         raise ValueError(f"sample_time_s must be positive, got {sample_time_s}")
     if int(order) != order or order < 1:
         raise ValueError(f"order must be a positive integer, got {order}")
     z, m = stacked_record(u, y)
     scale = channel_scale(z, m)
-    functions = disturbance_basis(
-        len(z), sample_time_s, disturbance_frequencies_rad_s, disturbance_polynomial_degree
-    )
+    functions = disturbance_basis(len(z), sample_time_s, *shapes)
     regression = LagRegression(z / scale, m, int(order), functions)
     solution = fit(regression)
     if solution.excitation_order < min(_LEAST_EXCITATION, order + 1):
@@ -121,15 +163,7 @@ def okid(
         )
     errors = np.full((len(z), m), np.nan)
     errors[regression.at] = regression.residuals(solution.coefficients) * scale[:m]
-    fitted = _in_units(solution, regression, scale, sample_time_s, errors)
-    with np.errstate(over="ignore", invalid="ignore"):
-        markov, observer_gain = markov_parameters(fitted.arx, max(_MARKOV_COUNT, 2 * order + 1))
-    if not (np.isfinite(markov).all() and np.isfinite(observer_gain).all()):
-        raise IdentificationError(
-            "the fitted model is violently unstable, so the record does not determine it; "
-            "record longer, excite more or raise the order"
-        )
-    return replace(fitted, markov=markov, observer_gain=observer_gain)
+    return _in_units(solution, regression, scale, sample_time_s, errors)
 
 
 def _in_units(

@@ -254,19 +254,23 @@ def make_pulses(settings: RetuningSettings, plant: DesignPlant, sample_time_s: f
     the limiter applies the level limit to the sum of waves, law and pulses.
     """
     # scipy.optimize is slow to import and needed with retuning only
-    from utank_hil.identification import random_pulses, response_scale
+    from utank_hil.identification import chirp, multisine, prbs, random_pulses, response_scale
 
     limits = plant.limits
     bounds = PumpLimits(
         pressure_pa=min(settings.pulse_pa, limits.pressure_pa), rate_pa_s=limits.rate_pa_s
     )
-    pulses = random_pulses(
-        settings.identification_s,
-        bounds,
-        settings.seed,
-        settings.pulse_hold_s,
-        sample_time_s=sample_time_s,
-    )
+    length_s, seed, step_s = settings.identification_s, settings.seed, sample_time_s
+    hold_s, band = settings.pulse_hold_s, settings.excitation.band
+    match settings.excitation.kind:
+        case "random_pulses":
+            pulses = random_pulses(length_s, bounds, seed, hold_s, sample_time_s=step_s)
+        case "prbs":
+            pulses = prbs(length_s, bounds, seed, hold_s[0], sample_time_s=step_s)
+        case "multisine":
+            pulses = multisine(length_s, bounds, seed, band, sample_time_s=step_s)
+        case "chirp":
+            pulses = chirp(length_s, bounds, band, sample_time_s=step_s)
     sampled = plant.sampled(("roll_rad", "level_m"), sample_time_s)
     model = ARX.from_state_space(sampled, len(sampled.A))
     response_limits = np.array([settings.added_roll_rad, limits.level_m])

@@ -1,15 +1,18 @@
 """Settings of retuning in a controller's configuration."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import count
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 
 from utank_hil.base.parameters import Positive, Problem, Range, range_problems, refuse
 from utank_hil.dynamics.ship import RollLimit
 
 EARLIEST_VERDICT_S: Final = 30.0
 """Shortest time after which a trial is judged: a few roll periods."""
+
+_SWEPT: Final = ("multisine", "chirp")
+_BAND_RAD_S: Final = (0.2, 1.2)  # As of `identification.excitation`, which loads scipy.
 
 VALIDATION_SHARE: Final = 0.2  #: Share of the record, at its end, that validates the model.
 LEAST_PREDICTIONS: Final = 100
@@ -29,6 +32,40 @@ class TrialSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class Excitation:
+    """Excitation signal of an identification: key ``excitation`` of the section.
+
+    Raises `ValueError` if a value is out of its range, or a band is given for another kind.
+    """
+
+    #: A function of `utank_hil.identification.excitation`; the clock of ``prbs`` is the shortest
+    #: pulse of `RetuningSettings.pulse_hold_s`.
+    kind: Literal["random_pulses", "prbs", "multisine", "chirp"] = "random_pulses"
+    #: Frequency band of multisine and chirp; None: 0.2 to 1.2 rad/s.
+    band_rad_s: tuple[Positive, Positive] | None = None
+
+    def __post_init__(self) -> None:
+        problems = range_problems(self)
+        if self.band_rad_s is not None:
+            low, high = self.band_rad_s
+            if self.kind not in _SWEPT:
+                problems.append(("band_rad_s", f"is for {' and '.join(_SWEPT)}, not {self.kind}"))
+            elif not low < high:
+                problems.append(("band_rad_s", f"must rise, got {low} and {high}"))
+        refuse("excitation", problems)
+
+    @property
+    def banded(self) -> bool:
+        """Whether the signal has a band."""
+        return self.kind in _SWEPT
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """The frequency band, with its default."""
+        return self.band_rad_s or _BAND_RAD_S
+
+
+@dataclass(frozen=True, slots=True)
 class RetuningSettings:
     """Settings of retuning: section ``retuning`` of a controller.
 
@@ -44,6 +81,7 @@ class RetuningSettings:
     identification_s: Positive = 500.0  #: Time for which pulses are given and recorded.
     pulse_pa: Positive = 30e3  #: Greatest pressure of the pulses.
     pulse_hold_s: tuple[Positive, Positive] = (1.0, 5.0)  #: Shortest and longest pulse.
+    excitation: Excitation = field(default_factory=Excitation)  #: Signal type of the pulses.
     #: Whether the pulses replace the law's pressure instead of being added to it.
     alone: bool = False
     #: Greatest roll that the pulses alone may cause in still water, on the configured ship.
@@ -72,6 +110,11 @@ class RetuningSettings:
         low, high = self.roll_period_range_s
         if not low < high:
             problems.append(("roll_period_range_s", f"must rise, got {low} and {high}"))
+        if self.excitation.kind == "multisine":
+            least_s = 2 * math.pi / (self.excitation.band[1] - self.excitation.band[0])
+            if self.identification_s < least_s:  # The band holds at least one harmonic.
+                reason = f"must be {least_s:.0f} or more for a multisine in the band"
+                problems.append(("identification_s", f"{reason}, got {self.identification_s:g}"))
         refuse("retuning", problems)
 
 
