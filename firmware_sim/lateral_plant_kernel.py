@@ -39,11 +39,10 @@ def advance_tick(
         As of `plant_kernel`.
     x : ndarray
         State of `lateral_kernel`.
-    ahead : ndarray, shape (4 or 7, 4)
-        Forces of `LateralHull.forces`, then the righting moment's change as a share, at t - 1, t,
-        t + 1 and t + 2 ticks.
+    ahead : ndarray, shape (5 or 8, 4)
+        Forces of `lateral_kernel.rates` at t - 1, t, t + 1 and t + 2 ticks.
     phasors, rotations : ndarray, shape (3, 4, 6 or 7, n)
-        Wave components of these rows; the last may be missing.
+        Wave components of these forces; the last may be missing, that of a turn is.
     parameters, oscillators, vertical, per_piece, restoring
         Of `LateralModel`.
     """
@@ -54,11 +53,11 @@ def advance_tick(
         x[lateral.LEVEL_RATE] = 0.0
     else:
         valve *= area
-    books, shaft_j, degrees = np.zeros(lateral.BOOKS), 0.0, len(ahead)
+    books, shaft_j, rows = np.zeros(lateral.BOOKS), 0.0, len(ahead)
     books[lateral.IMPULSE] = summary[MAX_IMPULSE]
-    room = np.empty((7, 7)), np.empty(7), np.empty((3, degrees)), np.empty((3, len(x)))
+    room = np.empty((7, 7)), np.empty(7), np.empty((3, rows)), np.empty((3, len(x)))
     ship = lateral.Step(parameters, oscillators, vertical, per_piece, restoring, valve, *room)
-    forces = np.empty((3, degrees))
+    forces = np.empty((3, rows))
     forces[2] = ahead[:, 1]
     for step in range(len(weights) // 4):
         if summary[CAPSIZED_S] < np.inf:
@@ -69,7 +68,7 @@ def advance_tick(
             pump = kernel.pump_after(state, pump, area * x[lateral.LEVEL_RATE], pump_coefficients)
             shaft_j += pump.power_w * kernel.STEP_S
             push += area * pump.pressure_pa / 2
-        for i in range(degrees):
+        for i in range(rows):
             forces[0, i] = forces[2, i]
             forces[1, i] = kernel.interpolated(weights, 4 * step + 2, ahead[i])
             forces[2, i] = kernel.interpolated(weights, 4 * step + 4, ahead[i])
@@ -80,7 +79,7 @@ def advance_tick(
     lateral.rates(ship, x, forces[2], area * pump.pressure_pa, rates)
     state[kernel.ROLL], state[kernel.ROLL_RATE] = x[lateral.ROLL], x[lateral.ROLL_RATE]
     state[kernel.LEVEL], state[kernel.LEVEL_RATE] = x[lateral.LEVEL], x[lateral.LEVEL_RATE]
-    state[kernel.SWAY_NOW] = rates[lateral.SWAY_RATE] / GRAVITY_M_S2
+    state[kernel.SWAY_NOW] = (rates[lateral.SWAY_RATE] + forces[2, rows - 1]) / GRAVITY_M_S2
     kernel.keep_pump(state, pump)
     state[kernel.SHAFT_WORK] += shaft_j
     state[kernel.WAVE_WORK] += books[lateral.WAVE_WORK]
@@ -90,12 +89,11 @@ def advance_tick(
     summary[STRIKES] += books[lateral.NUMBER]
     summary[MAX_IMPULSE] = books[lateral.IMPULSE]
     state[kernel.TIME] += (len(weights) // 2) * kernel.STEP_S
-    if degrees > 4:
+    if rows > 5:
         at = lateral.WAVES + 2 * len(oscillators) + 3
         state[kernel.HEAVE_NOW] = rates[at + 1] - parameters[11] * rates[at + 2]
-    for i in range(degrees):
+    for i in range(rows):
         row = ahead[i]
         row[0], row[1], row[2] = row[1], row[2], row[3]
-        if i < len(phasors):
-            row[3] = kernel.turned_sum(phasors[i], rotations[i])
+        row[3] = kernel.turned_sum(phasors[i], rotations[i]) if i < len(phasors) else 0.0
     state[kernel.MOMENT_NOW] = ahead[1, 1]

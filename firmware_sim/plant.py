@@ -93,7 +93,7 @@ class Plant:
         if self._lateral is not None:
             self._oscillators = self._lateral.oscillators, self._lateral.vertical
             self._x = np.zeros(self._lateral.states)
-            self._ahead = np.zeros((7 if six else 4, 4))
+            self._ahead = np.zeros((8 if six else 5, 4))
             ahead = list(self._ahead)
         for index in range(4):
             for wave, phasor, rotation in zip(ahead, phasors, rotations, strict=False):
@@ -131,8 +131,12 @@ class Plant:
             if self._turning is not None:
                 # the tick has moved the waves on to three ticks after its start
                 turned = self._turning((self._ticks + 1 + AHEAD_TICKS) * TICK_S)
-                self._state[kernel.MOMENTS][3] += turned[0]
-                self._state[kernel.SWAY][3] += turned[1]
+                if self._lateral is None:
+                    self._state[kernel.MOMENTS][3] += turned[0]
+                    self._state[kernel.SWAY][3] += turned[1]
+                else:
+                    self._ahead[1, 3] += turned[0]
+                    self._ahead[-1, 3] += GRAVITY_M_S2 * turned[1]
             self._now_ns += TICK_NS
             self._ticks += 1
         self._show()

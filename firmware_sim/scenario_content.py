@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
@@ -13,7 +14,14 @@ from firmware_sim.fmu_file import FmuFile
 from firmware_sim.scenario_sea import ScenarioSea
 from firmware_sim.scenario_sections import DriveLimits, Forecasts, RightingInWaves, SensorErrors
 from firmware_sim.voyage import Waypoint, ship_on_the_way, spectra_on_the_way, track, turning
-from firmware_sim.waves import PassingWaves, Response, SteadyWaves, Waves, beside
+from firmware_sim.waves import (
+    PassingWaves,
+    Response,
+    SteadyWaves,
+    Waves,
+    beside,
+    responses_of,
+)
 from firmware_sim.wind import Gusts
 from utank_hil.base.parameters import Finite, NotNegative, Range
 from utank_hil.configuration import ControllerConfig, Section, Vessel
@@ -30,15 +38,15 @@ MOST_CONTROLLERS = 7
 
 PASSIVE = "passive"  #: Name of the run with the passive tank.
 
+HEELED: Final = ("offset_moment_nm", "wind_moment_nm")  #: Moments that heel a ship steadily.
 SAILED: Final = (
     "inertia_kg_m2",
     "stiffness_nm_rad",
     "damping_nms_rad",
     "quadratic_damping_nms2_rad2",
     "displacement_n",
-    "offset_moment_nm",
-    "wind_moment_nm",
-)  #: Parameters of the ship that may differ from the vessel's; the last two heel it.
+    *HEELED,
+)  #: Parameters of the ship that may differ from the vessel's.
 
 SWAY: Final = "sway_of_slope"  #: Another one, which does not change under way.
 
@@ -197,28 +205,43 @@ class ScenarioContent(Section):
         gusts = None
         if self.gusts is not None:  # drawn apart from waves and noise
             gusts = self.gusts.moment(self.sailing_ship.wind_moment_nm, seed + _GUSTS)
-        if self.hull is not None:
-            forces = [*self._hull_forces(seed), *self._righting_change(seed)]
-            return SteadyWaves(*(forces if gusts is None else beside(forces, gusts, 1)))
-        sway, changing = self.sailing_ship.sway_of_slope, self.righting_in_waves
-        if sway is None and (changing is not None or self.turning_lever_m is not None):
-            sway = 0.0  # a row for the lateral acceleration of turns
+        of_gusts = 0 if self.hull is None else 1
         if not self.voyage and len(spectra) <= 1:
-            forces = [self.wave_moment(seed)]
-            sea = self.sea.sea(seed)
-            if sway is not None:
-                forces.append(replace(sea.slope, amplitude=sway * sea.slope.amplitude))
-            forces += self._righting_change(seed)
-            return SteadyWaves(*(forces if gusts is None else beside(forces, gusts, 0)))
-        responses: list[Response] = [self.sea.moment(self.vessel.ship.stiffness_nm_rad)]
-        if sway is not None:
-            responses.append(lambda omega, heading: sway * slope_per_m(omega, heading))
-        if changing is not None:
-            responses.append(changing.change_per_m)
+            forces = [*self._forces(seed), *self._righting_change(seed)]
+            return SteadyWaves(*(forces if gusts is None else beside(forces, gusts, of_gusts)))
+        responses = self._responses()
+        if self.righting_in_waves is not None:
+            responses.append(self.righting_in_waves.change_per_m)
         return PassingWaves(
             self.sea.passing_sea(spectra, seed), self.turn_rad, self._speed_m_s, *responses,
-            gusts=gusts,
+            gusts=gusts, of_gusts=of_gusts,
         )  # fmt: skip
+
+    @property
+    def _sway_of_slope(self) -> float | None:
+        """Sway of a ship without hull data; 0 for a row that turns, or what follows it, need."""
+        sway = self.sailing_ship.sway_of_slope
+        needed = self.righting_in_waves is not None or self.turning_lever_m is not None
+        return 0.0 if sway is None and needed else sway
+
+    def _forces(self, seed: int) -> list[Harmonics]:
+        """Forces of the initial sea on a ship that keeps its course."""
+        if self.hull is not None:
+            return self._hull_forces(seed)
+        forces, sway = [self.wave_moment(seed)], self._sway_of_slope
+        if sway is not None:
+            slope = self.sea.sea(seed).slope
+            forces.append(replace(slope, amplitude=sway * slope.amplitude))
+        return forces
+
+    def _responses(self) -> list[Response]:
+        """Responses of the forces to a wave."""
+        if (hull := self.lateral_hull) is not None:
+            return responses_of(partial(hull.forces, six=self.six), 6 if self.six else 3)
+        moment, sway = self.sea.moment(self.vessel.ship.stiffness_nm_rad), self._sway_of_slope
+        if sway is None:
+            return [moment]
+        return [moment, lambda omega, heading: sway * slope_per_m(omega, heading)]
 
     def wave_moment(self, seed: int) -> Harmonics:
         """Roll moment of the initial sea on a ship that keeps its course."""

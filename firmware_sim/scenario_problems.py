@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from firmware_sim.fault_injection.kinds import AnyFault
-from firmware_sim.scenario_content import OF_HULL, SAILED, SWAY, ScenarioContent
+from firmware_sim.scenario_content import HEELED, OF_HULL, SAILED, SWAY, ScenarioContent
 from firmware_sim.voyage import moment_problems, waypoint_problems
 from utank_hil.base.parameters import ParameterError, Problem
 from utank_hil.configuration import ControllerConfig, Vessel
@@ -118,15 +118,24 @@ def _hull_problems(scenario: ScenarioContent) -> list[Problem]:
     if scenario.hull is None or scenario.plant not in OF_HULL:
         return _of_plant(scenario, "hull", *OF_HULL)
     problems = []
-    if scenario.voyage or len(scenario.sea.spectra) > 1:
-        reason = "keeps course, speed and sea: remove voyage and sea.until, or take plant: roll"
-        problems.append(("plant", f"is {scenario.plant}, which {reason}"))
+    for index, point in enumerate(scenario.voyage):
+        reason = f"can't change: the hull data are of one loading; it takes {', '.join(HEELED)}"
+        problems += [
+            (f"voyage.{index}.ship.{key}", reason) for key in point.ship if key not in HEELED
+        ]
     given = {"effective_slope", "roll_moment_table"} & scenario.sea.model_fields_set
     problems += [(f"sea.{key}", "and hull exclude each other: remove one") for key in given]
     try:
-        LateralModel(scenario.hull.hull, scenario.sailing_ship, scenario.vessel.tank, scenario.six)
+        hull = scenario.hull.hull
+        LateralModel(hull, scenario.sailing_ship, scenario.vessel.tank, scenario.six)
     except (OSError, ValueError) as error:
-        problems.append(("hull", f"does not fit: {error}"))
+        return [*problems, ("hull", f"does not fit: {error}")]
+    if scenario.voyage:
+        around = np.radians(np.arange(0.0, 360.0, 5.0))
+        try:
+            hull.forces(np.full(around.shape, hull.about_g.wave_frequency_rad_s[0]), around)
+        except ValueError as error:
+            problems.append(("voyage", f"needs hull data at all headings: {error}"))
     return problems
 
 
@@ -204,7 +213,7 @@ def _heel_problems(scenario: ScenarioContent, ship: RollShip) -> list[str]:
     heel = steady_heel(RollModel(ship, scenario.vessel.tank))
     if heel is not None and not heel.at_the_end:
         return []
-    remedy = f"lower {' or '.join(SAILED[-2:])}"
+    remedy = f"lower {' or '.join(HEELED)}"
     if heel is None:
         return [f"capsizes the ship without a wave, as no righting moment holds it: {remedy}"]
     return [

@@ -1,6 +1,7 @@
 """Forces of the waves as rotating phasors, one for each component."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -74,8 +75,8 @@ class PassingWaves:
     The angle of each component at the ship is the integral of its frequency of encounter, so
     changes of course and speed cause no jump of the moment. `turn_rad` and `speed_m_s` are
     functions of time in s: clockwise turn of the ship since the start, and its speed. Each response
-    gives a force's complex amplitude per m of the wave's. `gusts` act on the first force besides,
-    whatever the course.
+    gives a force's complex amplitude per m of the wave's. `gusts` act besides, whatever the course,
+    on the force at `of_gusts`.
     """
 
     def __init__(
@@ -85,6 +86,7 @@ class PassingWaves:
         speed_m_s: Callable[[float], float],
         *responses: Response,
         gusts: Harmonics | None = None,
+        of_gusts: int = 0,
     ) -> None:
         self._sea, self._turn_rad, self._speed_m_s = sea, turn_rad, speed_m_s
         self._responses = responses
@@ -97,7 +99,9 @@ class PassingWaves:
         self._count = waves.shape[1]
         if gusts is not None:
             others, turns = SteadyWaves(gusts).begin()
-            waves = np.hstack([waves, np.vstack([others, np.zeros((len(waves) - 1, others.size))])])
+            besides = np.zeros((len(waves), others.size), dtype=np.complex128)
+            besides[of_gusts] = others
+            waves = np.hstack([waves, besides])
             rotations = np.hstack([rotations, np.tile(turns, (len(waves), 1))])
         self._phasors, self._rotations = waves, rotations
 
@@ -144,6 +148,19 @@ class PassingWaves:
         size = sizes(amplitude)
         least = _LEAST * np.maximum(size.max(axis=1, keepdims=True), 1.0)
         return np.where(size > least, amplitude, least)
+
+
+def responses_of(forces: Response, count: int) -> list[Response]:
+    """Responses of `forces`, shape (count, N), one each; computed anew where headings are new."""
+    known: list[tuple[FloatArray, ComplexArray]] = []
+
+    def row(place: int, omega_rad_s: FloatArray, heading_rad: FloatArray) -> ComplexArray:
+        if not known or not np.array_equal(known[0][0], heading_rad):
+            known[:] = [(heading_rad, forces(omega_rad_s, heading_rad))]
+        found: ComplexArray = known[0][1][place]
+        return found
+
+    return [partial(row, place) for place in range(count)]
 
 
 Waves = SteadyWaves | PassingWaves

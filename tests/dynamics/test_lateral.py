@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from firmware_sim.plant import Plant
+from firmware_sim.voyage import turning
 from firmware_sim.waves import SteadyWaves
 from utank_hil.base.tick import TICK_NS
 from utank_hil.configuration.hull_files.parts import Given
@@ -94,28 +95,30 @@ def test_ship_and_water_move_by_the_exact_wrench(six):
     rng = np.random.default_rng(1)
     for _ in range(100):
         roll, rate, level, speed, sway = rng.uniform(-1, 1, 5) * [0.8, 0.4, 2.0, 1.0, 2.0]
-        change, pressure = rng.uniform(-0.5, 0.5), 1e4 * rng.uniform(-1, 1)
-        force = np.append(rng.uniform(-1, 1, 6) * ([1e5, 1e6, 1e6] * 2), change)
+        (change, turn), pressure = rng.uniform(-0.5, 0.5, 2), 1e4 * rng.uniform(-1, 1)
+        force = np.append(rng.uniform(-1, 1, 6) * ([1e5, 1e6, 1e6] * 2), [change, turn])
         fall = float(rng.uniform(-2, 2)) if six else 0.0
         x = [roll, rate, level, speed, 0.0, sway, 0.0, 0.0]
         x += [0.0, 0.0, 0.0, 0.0, fall, 0.0] if six else []
         out = np.zeros(14)
         step = kernel.Step(
             parameters, np.zeros((0, 7)), np.zeros((0, 7)), *roll_model.packed[1:], 0.0,
-            np.empty((7, 7)), np.empty(7), np.empty((3, 7)), np.empty((3, len(x))),
+            np.empty((7, 7)), np.empty(7), np.empty((3, 8)), np.empty((3, len(x))),
         )  # fmt: skip
         kernel.rates(step, np.array(x), force, tank.reservoir_area_m2 * pressure, out)
         sin, cos = math.sin(roll), math.cos(roll)
-        down = out[12]
+        down, aside = out[12], out[5] + turn
         water_force, moment, residual = tank_wrench(
             tank, level, speed, out[kernel.LEVEL_RATE],
             [0, sway * cos + fall * sin, fall * cos - sway * sin], [rate, 0, 0],
-            [0, (out[5] + fall * rate) * cos + (down - sway * rate) * sin,
-             (down - sway * rate) * cos - (out[5] + fall * rate) * sin],
+            [0, (aside + fall * rate) * cos + (down - sway * rate) * sin,
+             (down - sway * rate) * cos - (aside + fall * rate) * sin],
             [out[1], out[7] * sin, out[7] * cos], roll, 0.0,
         )  # fmt: skip
         loads = np.array([water_force @ [0, cos, -sin], moment[0], moment @ [0, sin, cos]])
         loads += force[:3]
+        # the forces on hull and rudder turn the water, too
+        loads += tank.water_kg * turn * np.array([1.0, 0.0, tank.lx_m])
         viscous = model.viscous_nms_rad + rough.quadratic_damping_nms2_rad2 * abs(rate)
         loads[1] += rough.wind_moment_nm + rough.offset_moment_nm * cos - viscous * rate
         loads[1] -= (1 + change) * float(roll_model.restoring.moment_nm(roll))
@@ -209,9 +212,11 @@ def test_energy_adds_up_with_strikes(six, change):
     force = hull().forces(np.array([0.8]), np.array([2.0]), six=six)[:, 0]
     waves = [Harmonics(np.array([abs(f)]), np.array([0.8]), np.array([np.angle(f)]))
              for f in force]  # fmt: skip
+    turn = None
     if change:
         waves.append(Harmonics(np.array([change]), np.array([0.8]), np.array([1.0])))
-    plant = Plant(heavy, tank, None, SteadyWaves(*waves), hull=hull(), six=six)
+        turn = turning(lambda t: 0.02 * max(t - 20, 0), lambda _: 7.0, 1e6, 2.0)
+    plant = Plant(heavy, tank, None, SteadyWaves(*waves), hull=hull(), six=six, turning=turn)
     for tick in range(6001):
         plant.advance(tick * TICK_NS)
     assert plant.strikes > 3

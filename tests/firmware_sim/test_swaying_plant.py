@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 from pydantic import ValidationError
 from roll_energy import energy
 from scipy.integrate import solve_ivp
 
 from firmware_sim.plant import Plant
 from firmware_sim.scenario import Scenario
-from firmware_sim.ship_side import bare_plant, build_ship_side
+from firmware_sim.ship_side import bare_plant, build_ship_side, plant_of
 from firmware_sim.waves import PassingWaves, SteadyWaves
 from utank_hil.assembly import build_controller_node
 from utank_hil.base.tick import TICK_NS
@@ -184,6 +185,56 @@ def test_a_hull_rolls_parametrically_where_its_righting_moment_swings_at_twice_i
     assert greatest[1] > 20 * greatest[0]
 
 
+@pytest.mark.parametrize("plant", ["sway_roll_yaw", "six_degrees"])
+def test_a_hull_on_a_voyage_without_changes_rolls_as_one_that_keeps_its_course(plant):
+    sea = {"kind": "jonswap", "hs_m": 1.0, "tp_s": 6.0, "heading_deg": 70.0, "speed_m_s": 4.0}
+    changes = {"gusts": {"mean_speed_m_s": 15.0}, "actual_ship": {"wind_moment_nm": 2e5}}
+    changes["righting_in_waves"] = {"length_m": 60.0, "share_per_m": -0.2}
+    still = {"voyage": [{"time_s": 5.0, "heading_deg": 70.0, "speed_m_s": 4.0}]}
+    found = []
+    for voyage in ({}, still):
+        moved = bare_plant(hull_scenario(sea=sea, plant=plant, **changes, **voyage), 1)
+        rolls = []
+        for tick in range(4001):
+            moved.advance(tick * TICK_NS)
+            rolls.append((moved.roll_rad, moved.lateral_m_s2, moved.heave_m_s2))
+        found.append(np.array(rolls))
+    assert found[0][:, 0].std() > 0.005
+    np.testing.assert_allclose(found[1], found[0], atol=1e-6)
+
+
+def test_a_voyage_needs_hull_data_at_every_heading(tmp_path):
+    with xarray.open_dataset(HULL["file"]) as whole:
+        whole.sel(wave_direction=whole.wave_direction[[0]]).to_netcdf(tmp_path / "one.nc")
+    hull = {**HULL, "file": str(tmp_path / "one.nc")}
+    still = {**SEA, "heading_deg": 0.0}
+    hull_scenario(sea=still, hull=hull)
+    with pytest.raises(ValidationError, match="voyage needs hull data at all headings"):
+        hull_scenario(sea=still, hull=hull, voyage=[{"time_s": 5.0, "speed_m_s": 3.0}])
+
+
+@pytest.mark.parametrize("plant", ["sway_roll_yaw", "six_degrees"])
+def test_a_hull_in_a_turn_heels_outward_and_its_water_lies_square_to_gravity_and_turn(plant):
+    rate_rad_s, speed_m_s, lever_m, mass_kg = math.radians(1.0), 6.0, 2.0, 1e6
+    scenario = hull_scenario(
+        sea={"kind": "regular", "amplitude_m": 0.0, "period_s": 8.0, "speed_m_s": speed_m_s},
+        plant=plant, turning_lever_m=lever_m, duration_s=300.0,
+        actual_ship={"displacement_n": 9.80665 * mass_kg},
+        voyage=[{"time_s": 10.0 + 90 * leg, "heading_deg": 90.0 * (1 - leg)} for leg in range(4)],
+    )  # fmt: skip
+    inward = speed_m_s * rate_rad_s / 9.80665  # to starboard
+    bare, moved = bare_plant(scenario, 1), plant_of(scenario, 1)
+    for tick in range(25_001):
+        bare.advance(tick * TICK_NS)
+        moved.advance(tick * TICK_NS)
+    ship = scenario.sailing_ship
+    heel_rad = -9.80665 * mass_kg * inward * lever_m / ship.stiffness_nm_rad
+    assert bare.roll_rad == pytest.approx(heel_rad, rel=0.02)
+    assert moved.lateral_m_s2 == pytest.approx(9.80665 * inward, rel=0.01)
+    level_m = math.tan(moved.roll_rad - math.atan(inward)) * scenario.vessel.tank.width_m / 2
+    assert moved.level_m == pytest.approx(level_m, rel=0.01)
+
+
 @pytest.mark.evidence
 def test_scenario_in_six_degrees_heaves_and_pitches_too() -> None:
     """In a beam wave of 15 s and 0.5 m the ship and its tank go up and down as the water does."""
@@ -209,7 +260,11 @@ def test_scenario_in_six_degrees_heaves_and_pitches_too() -> None:
         ({"plant": "roll"}, "hull", "needs plant: sway_roll_yaw or six_degrees"),
         ({"plant": "six_degrees", "hull": None}, "hull", "is required with plant: six_degrees"),
         ({"sea": {**SEA, "effective_slope": {"coefficient": 0.5}}}, "sea.effective_slope", "hull"),
-        ({"voyage": [{"time_s": 5.0, "speed_m_s": 3.0}]}, "plant", "remove voyage"),
+        (
+            {"voyage": [{"time_s": 5.0, "ship": {"stiffness_nm_rad": 2.1e7}}]},
+            "voyage.0.ship.stiffness_nm_rad",
+            "of one loading",
+        ),
         ({"hull": {"file": HULL["file"]}}, "hull", "inertia_kg_m2 is missing"),
         ({"actual_ship": {"stiffness_nm_rad": 2.6e7}}, "hull", "make them agree"),
     ],

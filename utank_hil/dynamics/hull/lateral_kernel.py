@@ -37,7 +37,7 @@ class Step(NamedTuple):
     valve: float  #: Its loss times the reservoir area.
     m: FloatArray  #: shape (7, 7)
     q: FloatArray  #: shape (7,)
-    part: FloatArray  #: shape (3, 4 or 7): forces at start, middle and end of a part of the step.
+    part: FloatArray  #: shape (3, 5 or 8): forces at start, middle and end of a part of the step.
     room: FloatArray  #: shape (3, n): the last row is the state after the part.
 
 
@@ -147,16 +147,18 @@ def _move_up_and_along(s: Step, x: FloatArray, at: int, force: FloatArray, out: 
 def rates(s: Step, x: FloatArray, force: FloatArray, pump: float, out: FloatArray) -> None:
     """Write the rates of the state `x` to `out`.
 
-    `force`, shape (4,) or (7,), is the waves' sway force, roll and yaw moment, then in six degrees
-    surge and heave force and pitch moment, and the righting moment's change as a share; `pump` is
-    the reservoir area times pressure.
+    `force`, shape (5,) or (8,), is the waves' sway force, roll and yaw moment, then in six degrees
+    surge and heave force and pitch moment, the righting moment's change as a share, and the lateral
+    acceleration of a turn, which the force on the hull gives the ship; `pump` is the reservoir area
+    times pressure.
     """
     p, m, q = s.p, s.m, s.q
     phi, roll, h, speed, sway, yaw = x[0], x[1], x[2], x[3], x[5], x[7]
     sin, cos = sine_cosine(phi)
     flow, across, lx = p[12], p[12] * p[13], p[11]
     side, down = across * h, p[14] - flow * h * h
-    righting = (1.0 + force[len(force) - 1]) * righting_moment(s.per_piece, s.restoring, phi)
+    change, turn = force[len(force) - 2], force[len(force) - 1]
+    righting = (1.0 + change) * righting_moment(s.per_piece, s.restoring, phi)
     at = WAVES + 2 * len(s.oscillators)
     six = len(x) > at
     first = 0 if six else 3
@@ -187,6 +189,8 @@ def rates(s: Step, x: FloatArray, force: FloatArray, pump: float, out: FloatArra
         pump - (p[23] + (p[24] + s.valve) * abs(speed)) * speed
         + G * (across * sin - 2 * flow * h * cos) + by_h - pull * along
     )  # fmt: skip
+    q[4] += turn * (down * cos + side * sin)  # The water does not turn with the ship by itself.
+    q[6] -= turn * m[3, 6]
     _radiate(s.oscillators, x, WAVES, (sway, roll, yaw), q, 3, out)
     if six:
         _move_up_and_along(s, x, at, force, out)
@@ -289,10 +293,17 @@ def _move_to_impact(
 
 
 @njit(error_model="numpy")
+def _sideways(p: FloatArray, phi: float, h: float) -> float:
+    """First moment of the water to starboard, in kg m."""
+    sin, cos = sine_cosine(phi)
+    return float(p[12] * p[13] * h * cos - (p[14] - p[12] * h * h) * sin)
+
+
+@njit(error_model="numpy")
 def _book(s: Step, x: FloatArray, pump: float, share: float, dt: float, books: FloatArray) -> None:
     """Add the work and the losses from `x` to the state after a part of the step."""
     part, after = s.part, s.room[2]
-    change = part.shape[1] - 1
+    change, turn = part.shape[1] - 2, part.shape[1] - 1
     at = WAVES + 2 * len(s.oscillators)
     for i, place in enumerate((SWAY, ROLL, YAW)):
         work = 0.5 * (part[0, i] + part[2, i]) * (after[place] - x[place])
@@ -304,6 +315,8 @@ def _book(s: Step, x: FloatArray, pump: float, share: float, dt: float, books: F
         righting = righting_moment(s.per_piece, s.restoring, 0.5 * (x[ROLL] + after[ROLL]))
         work = 0.5 * (part[0, change] + part[2, change]) * righting * (after[ROLL] - x[ROLL])
         books[WAVE_WORK] -= work
+    moved = _sideways(s.p, after[ROLL], after[LEVEL]) - _sideways(s.p, x[ROLL], x[LEVEL])
+    books[WAVE_WORK] -= 0.5 * (part[0, turn] + part[2, turn]) * moved
     books[PUMP_WORK] += pump * (after[LEVEL] - x[LEVEL])
     lost = dissipation_w(s, x)
     lost += dissipation_w(s, after)
@@ -349,7 +362,7 @@ def advance(
 ) -> None:
     """Advance the state `x` by a step, in place, and add to `books`.
 
-    `forces`, shape (3, 4) or (3, 7), are those of `rates` at start, middle and end of the step.
+    `forces`, shape (3, 5) or (3, 8), are those of `rates` at start, middle and end of the step.
     """
     limit, done, after = s.p[25], 0.0, s.room[2]
     for strike in range(9):
