@@ -16,6 +16,8 @@ from utank_hil.sea import Spectrum
 
 MOST_ROLL_RAD: Final = math.radians(40.0)
 """Roll up to which decks stay dry and cargo does not shift. Chosen; no study."""
+MOST_LINEAR_ROLL_RAD: Final = math.radians(10.0)
+"""Roll up to which the linear plant is used. Chosen; no study."""
 OVERSPEED: Final = 1.02
 """Ratio to the pump's speed limit up to which the speed loop lets the rotor overshoot."""
 
@@ -31,12 +33,12 @@ def steepness(spectrum: Spectrum) -> tuple[float, float]:
     return found, float(np.interp(period_s, [6.0, 12.0], [1 / 10, 1 / 15]))
 
 
-def _roll(result: BenchResult) -> Iterator[str]:
+def _roll(result: BenchResult, limit_rad: float = MOST_ROLL_RAD) -> Iterator[str]:
     rolls = {"no tank": result.without_tank_rad}
     rolls |= {run.name: run.column("true_roll_rad") for run in result.runs}
     for name, roll_rad in rolls.items():
         most_rad = float(np.abs(roll_rad).max())
-        if most_rad > MOST_ROLL_RAD:
+        if most_rad > limit_rad:
             yield f"{name} rolled to {math.degrees(most_rad):.0f}°"
 
 
@@ -78,6 +80,13 @@ MODEL_LIMITS: Final[tuple[tuple[str, Callable[[BenchResult], Iterator[str]]], ..
         f"roll beyond {math.degrees(MOST_ROLL_RAD):.0f}°: neither deck in the water nor shifting "
         "cargo, and waves and damping as for an upright ship",
         _roll,
+    ),
+    (
+        f"roll beyond {math.degrees(MOST_LINEAR_ROLL_RAD):.0f}° by linear equations: neither the "
+        "restoring curve nor quadratic damping (plant: roll has both)",
+        lambda result: _roll(
+            result, MOST_LINEAR_ROLL_RAD if result.scenario.plant == "linear" else math.inf
+        ),
     ),
     ("level at the tank's end: a strike is one impulse, without sloshing or trapped air", _level),
     ("steeper sea than there is: waves are linear and do not break", _sea),

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.dynamics.hull.lateral import LateralHull, LateralModel
 from utank_hil.dynamics.kernels import MAX_IMPULSE, STRIKES
+from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
@@ -50,6 +52,8 @@ class Plant:
     waves : Waves or Harmonics
         Roll moment of the waves in N m, lateral acceleration over g if the ship sways, and change
         of the righting moment as a share if it has one, from the plant's start on.
+    linear : bool
+        Whether to integrate the small-angle limit: no quadratic loss, level limit or capsizing.
     hull : LateralHull, optional
         Hull of a ship that is free to sway and yaw; the waves are then sway force, roll and yaw
         moment, and the righting moment's change if it has one.
@@ -67,6 +71,7 @@ class Plant:
         pump: Pump | None,
         waves: Waves | Harmonics,
         *,
+        linear: bool = False,
         hull: LateralHull | None = None,
         six: bool = False,
         turning: Callable[[float], tuple[float, float]] | None = None,
@@ -75,6 +80,7 @@ class Plant:
         self._ship_at = ship if callable(ship) else None
         self._ship = ship(0.0) if callable(ship) else ship
         self._tank = tank
+        self._linear = linear
         self._lateral = None if hull is None else LateralModel(hull, self._ship, tank, six)
         self._load(self._ship)
         self._area_m2 = tank.reservoir_area_m2
@@ -107,7 +113,17 @@ class Plant:
         self._cuts: set[str] = set()
 
     def _load(self, ship: RollShip) -> None:
-        model = RollModel(ship, self._tank)
+        tank = self._tank
+        self._linear_model = np.zeros((0, 8))
+        if self._linear:
+            a, b = state_matrices(ship, tank)
+            heel = b[:, 1:] * ship.heeling_moment_nm
+            push_pa = tank.density_kg_m3 * GRAVITY_M_S2 * tank.width_m  # per acceleration over g
+            lever_nm = GRAVITY_M_S2 * tank.water_lever_kgm
+            self._linear_model = np.hstack([a, b, heel, b[:, 1:] * lever_nm - b[:, :1] * push_pa])
+            ship = replace(ship, quadratic_damping_nms2_rad2=0.0)
+            tank = replace(tank, quadratic_loss=0.0)
+        model = RollModel(ship, tank)
         self._per_piece = 1 / model.restoring.piece_rad
         self._row: FloatArray = np.array([*model.coefficients, self._per_piece])
         if self._lateral is not None:
@@ -154,6 +170,7 @@ class Plant:
                 self._state,
                 self._row,
                 self._restoring,
+                self._linear_model,
                 self._coefficients,
                 phasors,
                 rotations,

@@ -18,6 +18,7 @@ from utank_hil.dynamics.kernels import (
     SUMMARY,
     Held,
     InStep,
+    State,
     damping_w,
     righting_moment,
     rk4,
@@ -125,6 +126,7 @@ def advance_tick(
     state: FloatArray,
     row: FloatArray,
     restoring: FloatArray,
+    linear: FloatArray,
     coefficients: tuple[float, ...],
     phasors: ComplexArray,
     rotations: ComplexArray,
@@ -138,6 +140,9 @@ def advance_tick(
         `RollCoefficients`, and the pieces of the restoring moment per radian.
     restoring : ndarray, shape (pieces, powers)
         Coefficients of `utank_hil.dynamics.ship.Restoring`.
+    linear : ndarray, shape (4, 8) or (0, 8)
+        Linear model that replaces `row` and `restoring`. Columns: state matrix, effect of pressure,
+        effect of wave moment, accelerations by steady heeling moments, effect of sway.
     coefficients : tuple of float
         `PumpCoefficients` as a plain tuple: numba needs 2 us to unbox a named one.
     phasors, rotations : ndarray, shape (1 to 3, n)
@@ -172,8 +177,11 @@ def advance_tick(
         waves = (moment, lateral, share)
         force = c.area * pump.pressure_pa
         held = Held(c, row[17], restoring, force, valve)
-        after = rk4(held, x, waves, STEP_S)
-        if abs(after[2]) > c.level_limit:
+        if len(linear) > 0:
+            after = _linear_step(linear, x, moment, lateral, pump.pressure_pa)
+        else:
+            after = rk4(held, x, waves, STEP_S)
+        if abs(after[2]) > c.level_limit and len(linear) == 0:
             time_s = state[TIME] + step * STEP_S
             after = step_with_impacts(held, x, waves, STEP_S, time_s, np.empty((0, 5)), summary)
         else:
@@ -189,7 +197,7 @@ def advance_tick(
             righting_nm = righting_moment(row[17], restoring, middle_rad)
             wave_j -= (share[0] + share[2]) / 2 * righting_nm * (after[0] - x[0])
         x = after
-        if abs(x[0]) >= CAPSIZE_RAD:
+        if abs(x[0]) >= CAPSIZE_RAD and len(linear) == 0:
             summary[CAPSIZED_S] = state[TIME] + (step + 1) * STEP_S
     state[ROLL], state[ROLL_RATE], state[LEVEL], state[LEVEL_RATE] = x
     keep_pump(state, pump)
@@ -220,3 +228,45 @@ def interpolated(weights: FloatArray, row: int, moments: FloatArray) -> float:
     # explicit: a product of four numbers is not worth a call of the linear algebra library
     w, m = weights[row], moments
     return float(w[0] * m[0] + w[1] * m[1] + w[2] * m[2] + w[3] * m[3])
+
+
+@njit(error_model="numpy")
+def _linear_step(
+    model: FloatArray, x: State, moments: InStep, sways: InStep, pressure_pa: float
+) -> State:
+    k1 = _rates(model, x, x, 0.0, pressure_pa, moments[0], sways[0])
+    k2 = _rates(model, x, k1, STEP_S / 2, pressure_pa, moments[1], sways[1])
+    k3 = _rates(model, x, k2, STEP_S / 2, pressure_pa, moments[1], sways[1])
+    k4 = _rates(model, x, k3, STEP_S, pressure_pa, moments[2], sways[2])
+    return (
+        x[0] + STEP_S / 6 * (k1[0] + 2 * k2[0] + 2 * k3[0] + k4[0]),
+        x[1] + STEP_S / 6 * (k1[1] + 2 * k2[1] + 2 * k3[1] + k4[1]),
+        x[2] + STEP_S / 6 * (k1[2] + 2 * k2[2] + 2 * k3[2] + k4[2]),
+        x[3] + STEP_S / 6 * (k1[3] + 2 * k2[3] + 2 * k3[3] + k4[3]),
+    )
+
+
+@njit(error_model="numpy")
+def _rates(
+    model: FloatArray,
+    x: State,
+    slope: State,
+    time_s: float,
+    pressure_pa: float,
+    moment_nm: float,
+    sway: float,
+) -> State:
+    """Rates of the state at x + time_s * slope."""
+    a = x[0] + time_s * slope[0]
+    b = x[1] + time_s * slope[1]
+    c = x[2] + time_s * slope[2]
+    d = x[3] + time_s * slope[3]
+    m = model
+    roll = m[1, 0] * a + m[1, 1] * b + m[1, 2] * c + m[1, 3] * d
+    level = m[3, 0] * a + m[3, 1] * b + m[3, 2] * c + m[3, 3] * d
+    return (
+        b,
+        roll + m[1, 4] * pressure_pa + m[1, 5] * moment_nm + m[1, 6] + m[1, 7] * sway,
+        d,
+        level + m[3, 4] * pressure_pa + m[3, 5] * moment_nm + m[3, 6] + m[3, 7] * sway,
+    )

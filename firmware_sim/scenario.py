@@ -29,6 +29,12 @@ class Scenario(ScenarioContent):
             problems.append(("guard", f"can't be with devices: leave it out. {UNGUARDED}"))
         elif self.guard and self.vessel.pump is None:
             problems.append(("guard", "is for a ship with a pump: leave it out"))
+        if self.plant == "linear" and self.vessel.valve is not None:
+            reason = (
+                "is linear, but the loss of the vessel's valve is quadratic and would change "
+                "nothing: leave it out, or take a vessel without a valve"
+            )
+            problems.append(("plant", reason))
         if PASSIVE in self.controllers:
             reason = (
                 "names one 'passive', the run without a controller that is always made: rename it"

@@ -87,9 +87,9 @@ class ScenarioContent(Section):
     duration_s: Annotated[float, Range(above=0, most=LONGEST_S)]
     settle_s: NotNegative  #: Time at the start that is left out of the statistics.
     seed: Annotated[int, Range(least=0)] = 1
-    plant: Literal["roll", "sway_roll_yaw", "six_degrees", "fmu"] = "roll"
-    """Equations of the emulated ship: roll, three or six degrees of `hull`, or those of another
-    program in `fmu`."""
+    plant: Literal["roll", "linear", "sway_roll_yaw", "six_degrees", "fmu"] = "roll"
+    """Equations of the emulated ship: roll, its small-motion limit, three or six degrees of `hull`,
+    or those of another program in `fmu`."""
     hull: Annotated[HullFile | None, Field(validate_default=True)] = None
     """Hull data of the ship at rest, for the plants that sway; by default the vessel's."""
     fmu: FmuFile | None = None  #: Ship and tank of another program, for plant: fmu.

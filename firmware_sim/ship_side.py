@@ -327,6 +327,7 @@ def _plant(scenario: Scenario, seed: int, tank: Tank, pump: Pump | None) -> Plan
         tank,
         pump,
         scenario.waves(seed),
+        linear=scenario.plant == "linear",
         hull=scenario.lateral_hull,
         six=scenario.six,
         turning=scenario.turning,

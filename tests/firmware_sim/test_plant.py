@@ -449,3 +449,18 @@ def test_tank_without_a_pump_has_no_pressure_and_no_rotor() -> None:
     # a rotor that turns freely is carried along, and changes the water's motion
     assert zero.pump_speed_rad_s != 0
     assert without.level_m != zero.level_m
+
+
+def test_the_linear_plant_is_the_limit_of_small_motions():
+    def rolls(scale, linear):
+        waves = irregular(scale)
+        plant = Plant(VESSEL.ship, VESSEL.tank, VESSEL.pump, waves, linear=linear)
+        found = []
+        for tick in range(6000):
+            plant.advance(tick * TICK_NS)
+            found.append([plant.roll_rad, plant.level_m])
+        return np.array(found)
+
+    linear = rolls(1e-4, True)
+    np.testing.assert_allclose(rolls(1e-4, False), linear, rtol=0, atol=1e-6 * np.abs(linear).max())
+    assert np.abs(rolls(4.0, False) - rolls(4.0, True)).max() > 0.01

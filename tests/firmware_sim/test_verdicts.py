@@ -203,13 +203,13 @@ def test_what_passes_a_limit_of_the_model_is_said_with_its_figure() -> None:
     )
     result = result_of(PASSIVE_RUN, wild)
     steep = JonswapSea(kind="jonswap", hs_m=7.2, tp_s=7.0)
-    changes = {"sea": steep}
+    changes = {"sea": steep, "plant": "linear"}
     result = dataclasses.replace(result, scenario=STORM.model_copy(update=changes))
     said = passed_limits(result)
     assert len(said) == len(MODEL_LIMITS)
     for words, expected in zip(
         said,
-        ("wild rolled to 42°",
+        ("wild rolled to 42°", "wild rolled to 42°",
          "wild: water struck roof or bottom 12 times, at most with 3.4 MN m",
          "the sea's steepness is ", "wild: rotor at "),
         strict=True,
