@@ -50,6 +50,7 @@ PATTERNS: Final = (
     "utank_hil/runners/bus_model.py",
     "utank_hil/nodes/actuators.py",
     "utank_hil/nodes/canopen_drive.py",
+    "utank_hil/nodes/canopen_setup.py",
     "utank_hil/nodes/controller.py",
     "utank_hil/safety/faults.py",
     "utank_hil/runners/group.py",

@@ -2,7 +2,6 @@
 
 import re
 import struct
-from types import SimpleNamespace
 
 import canopen
 import pytest
@@ -11,7 +10,6 @@ from others import others_file
 from tests.nodes.canopen_peers import Wire
 from utank_hil.canbus import Address, Fault, Frame, Heartbeat, NodeState, load_catalogue
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
-from utank_hil.canbus.measurements import MotionSample
 from utank_hil.canbus.profiles.device import SILENT_NS
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.inbox import Inbox
@@ -126,9 +124,8 @@ def test_levels_without_switches_say_by_themselves_that_they_are_high():
 def test_an_unprotected_sensor_alone_costs_half_the_pressure(motions, spare_age_ms, finding, alone):
     for unprotected in (False, True):
         safety = Safety(SafetyLimits(), 250_000, unprotected=unprotected)
-        measured = SimpleNamespace(motions=(MotionSample(),) * motions)
-        safety.situation = SimpleNamespace(measured=measured, motion_spare_age_ms=spare_age_ms)
-        assert safety._alone(finding) is (alone and unprotected)
+        found = safety._alone(finding, spare_age_ms, second=motions == 2)
+        assert found is (alone and unprotected)
 
 
 def test_noise_of_a_sensor_of_20_hz_is_that_of_its_samples():

@@ -9,7 +9,6 @@ closed loop that it recommends: an open loop of exp(-sT) / (2 T s).
 """
 
 import math
-from collections import deque
 from dataclasses import dataclass
 
 from utank_hil.base.elementary import exp
@@ -49,38 +48,41 @@ class PressureLoop:
         self._follow = 1 - exp(-cycle_s / self._lag_s) if self._lag_s else 1.0
         self._per_s = 0.5 / delay_s
         self._late = max(1, round(delay_s / cycle_s))
+        self._most_pa = pump.max_pressure_rate_pa_s * cycle_s
+        self._inertia = pump.coefficients.inertia
+        self._most_speed, self._most_torque = self._c.max_speed, self._c.max_torque
         self.reset()
 
     def reset(self) -> None:
         """Forget the past: the pump has stood still."""
         self._reference_pa = self._expected_pa = self._correction_pa = 0.0
         self._speed_rad_s = 0.0
-        self._references = deque([0.0] * self._late, self._late)
-        self._speeds = deque([0.0] * self._late, self._late)
+        self._references = [0.0] * self._late
+        self._speeds = [0.0] * self._late
 
     def step(
         self, wanted_pa: float, measured_pa: float, flow_m3_s: float, speed_rad_s: float
     ) -> float:
         """The next target; NaN as a measurement leaves its correction as it is."""
-        pump, c, cycle_s = self._pump, self._c, self._cycle_s
-        most_pa = pump.max_pressure_rate_pa_s * cycle_s
+        c, cycle_s, most_pa = self._c, self._cycle_s, self._most_pa
         change_pa = self._toward * (wanted_pa - self._reference_pa)
         self._reference_pa += min(max(change_pa, -most_pa), most_pa)
-        self._expected_pa += self._follow * (self._references[0] - self._expected_pa)
+        self._expected_pa += self._follow * (self._references.pop(0) - self._expected_pa)
         self._references.append(self._reference_pa)
+        follows = self._speeds.pop(0)
         error_pa = self._expected_pa - measured_pa if math.isfinite(measured_pa) else 0.0
         proportional_pa = self._per_s * self._lag_s * error_pa
         correction_pa = self._correction_pa + self._per_s * cycle_s * error_pa
         demanded = pump_speed(self._reference_pa + correction_pa + proportional_pa, flow_m3_s, c)
-        speed = min(max(demanded, -c.max_speed), c.max_speed)
+        speed = min(max(demanded, -self._most_speed), self._most_speed)
         target = limited = speed
         if self._torque:
             acceleration = (speed - self._speed_rad_s) / cycle_s
-            behind = self._speeds[0] - speed_rad_s if math.isfinite(speed_rad_s) else 0.0
-            target = pump_load(speed, flow_m3_s, c)[0] + c.inertia * (
+            behind = follows - speed_rad_s if math.isfinite(speed_rad_s) else 0.0
+            target = pump_load(speed, flow_m3_s, c)[0] + self._inertia * (
                 acceleration + self._per_s * behind
             )
-            limited = min(max(target, -c.max_torque), c.max_torque)
+            limited = min(max(target, -self._most_torque), self._most_torque)
         self._speed_rad_s = speed
         self._speeds.append(speed)
         # at a limit the correction grows no further into it

@@ -6,7 +6,7 @@ from typing import Final
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.canbus.events import AlarmEvent
-from utank_hil.canbus.measurements import Measurements
+from utank_hil.canbus.measurements import Measurements, MotionSample
 from utank_hil.safety import judging
 from utank_hil.safety.alarms import AlarmList, Gravity, active_faults, stopping_faults
 from utank_hil.safety.monitoring import Monitors
@@ -131,20 +131,23 @@ class Safety:
         now_ns, supervisor, monitors = measured.now_ns, self.supervisor, self.monitors
         self._lateness.update(now_ns)
         load = self._load.update(now_ns, measured.frames + own.frames_sent)
-        if len(measured.motions) == 2:
-            self._leave_silent_sensor(measured)
-        motion = measured.motions[self._motion]
+        motions = measured.motions
+        second = len(motions) == 2
+        if second:
+            self._leave_silent_sensor(motions)
+        motion = motions[self._motion]
         if motion.age_ms <= HEEL_AGE_MS:
             self._heel.update(motion.roll_rad)
         found = 0
         if monitors is not None:
             found = monitors.update(measured, own, self._motion)
         supervisor.count(measured, motion.roll_rad, own.command_pa)
+        spare_age_ms = motions[1 - self._motion].age_ms if second else 0.0
         self.situation = situation = Situation(
             measured,
             own,
             motion,
-            0.0 if len(measured.motions) == 1 else measured.motions[1 - self._motion].age_ms,
+            spare_age_ms,
             found,
             self._heel.heel_rad,
             self._lateness.late_ms,
@@ -156,6 +159,7 @@ class Safety:
         )
         supervisor.update(situation, judging.standing(situation, supervisor.limits))
         self._note_causes(now_ns)
+        alone = self._alone(found, spare_age_ms, second=second)
         unconfirmed_share, passive_roll_rad = None, math.nan
         if monitors is not None:
             passive_roll_rad = monitors.twin.roll_rad
@@ -167,23 +171,23 @@ class Safety:
             supervisor.demand,
             supervisor.drive_wanted,
             self._motion,
-            self._degraded_share if supervisor.degraded or self._alone(found) else 1.0,
+            self._degraded_share if supervisor.degraded or alone else 1.0,
             unconfirmed_share,
             supervisor.standing,
             passive_roll_rad,
         )
 
-    def _alone(self, found: int) -> bool:
+    def _alone(self, found: int, spare_age_ms: float, *, second: bool) -> bool:
         """Whether unprotected motion is used that no second sensor confirms."""
         if not self._unprotected:
             return False
-        spare_age_ms = self.situation.motion_spare_age_ms
-        agrees = len(self.situation.measured.motions) == 2 and not found & Finding.SENSORS_DISAGREE
-        return not (agrees and spare_age_ms <= self.supervisor.limits.motion_spare_age_ms)
+        if not second or found & Finding.SENSORS_DISAGREE:
+            return True
+        return spare_age_ms > self.supervisor.limits.motion_spare_age_ms
 
-    def _leave_silent_sensor(self, measured: Measurements) -> None:
+    def _leave_silent_sensor(self, motions: tuple[MotionSample, ...]) -> None:
         """Use the other motion sensor if this one is silent, and that one is not."""
-        motions, used = measured.motions, self._motion
+        used = self._motion
         spare, silent_ms = 1 - used, self._silent_ms
         if motions[used].age_ms > silent_ms[used] and motions[spare].age_ms <= silent_ms[spare]:
             self._motion = spare
