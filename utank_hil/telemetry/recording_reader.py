@@ -60,13 +60,14 @@ def _read(path: Path, items: Callable[[Path], Iterator[Any]]) -> list[Any]:
     A killed recorder leaves a truncated file. A warning names any other damage, as by a temporarily
     full disk or a power cut: rows may be missing in the middle.
     """
+    rerun = rerun_binary()
     try:
         return list(apart(items, path))
     except ValueError as error:
         damage = str(error)
     with tempfile.TemporaryDirectory() as folder:
         intact = Path(folder) / path.name
-        command = [rerun_binary(), "rrd", "optimize", "--continue-on-error"]
+        command = [rerun, "rrd", "optimize", "--continue-on-error"]
         command += [str(path), "-o", str(intact)]
         done = subprocess.run(command, env=rerun_environment(), check=False, capture_output=True)
         try:

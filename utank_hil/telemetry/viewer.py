@@ -102,8 +102,8 @@ def _move_cursor(viewer: Viewer, port: int, at_s: float) -> None:
 def rerun_binary() -> str:
     """Return the viewer's executable; the `rerun` script would leave it running if killed."""
     package = importlib.util.find_spec("rerun_cli")
-    assert package is not None
-    assert package.origin is not None
+    if package is None or package.origin is None:
+        raise ModuleNotFoundError("rerun is not installed", name="rerun")
     return str(Path(package.origin).with_name("rerun"))
 
 
