@@ -39,6 +39,13 @@ TRUTH: Final = (
 )
 
 
+def true_values(plant: Plant) -> tuple[float, float, float, float, float]:
+    """Values of `TRUTH` but the time."""
+    return (
+        plant.roll_rad, plant.level_m, plant.pressure_pa, plant.pump_power_w, plant.wave_moment_nm,
+    )  # fmt: skip
+
+
 class TruthRecorder:
     """Recorder of the plant on a fixed time grid: a node without frames."""
 
@@ -62,10 +69,7 @@ class TruthRecorder:
             self.start_ns = now_ns
         plant = self._plant
         plant.advance(now_ns)
-        self._row[:] = (
-            (now_ns - self.start_ns) * 1e-9, plant.roll_rad, plant.level_m, plant.pressure_pa,
-            plant.pump_power_w, plant.wave_moment_nm,
-        )  # fmt: skip
+        self._row[:] = ((now_ns - self.start_ns) * 1e-9, *true_values(plant))
         self._log.write(self._row)
         self.pump_speed_rad_s = max(self.pump_speed_rad_s, abs(plant.pump_speed_rad_s))
         return ()

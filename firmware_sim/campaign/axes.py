@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final
 import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from utank_hil.base.parameters import Finite, Range, refuse
+from utank_hil.base.parameters import Finite, Positive, Range, refuse
 from utank_hil.base.text_files import lines_of, open_text
 from utank_hil.configuration import Section
 from utank_hil.configuration.spectra import read_spectra, utc
@@ -97,6 +97,27 @@ class Uniform(Section):
         return [float(each) for each in self.low + (self.high - self.low) * rng.random(count)]
 
 
+class Normal(Section):
+    """Normally distributed numbers."""
+
+    mean: Finite  #: Mean of the distribution.
+    std: Positive  #: Standard deviation.
+
+    def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:
+        """Draw `count` values."""
+        return [float(each) for each in self.mean + self.std * rng.standard_normal(count)]
+
+
+class Choice(Section):
+    """Equally likely choice among given values."""
+
+    one_of: Annotated[list[Value], Field(min_length=1)]  #: The values.
+
+    def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:
+        """Draw `count` values."""
+        return [self.one_of[int(each)] for each in rng.integers(len(self.one_of), size=count)]
+
+
 class Consecutive(Section):
     """Consecutive whole numbers, one for each sample, such as seeds."""
 
@@ -113,7 +134,7 @@ class Draws(Section):
     samples: _Count  #: Number of samples.
     seed: Annotated[int, Range(least=0)] = 1
     """Seed of the draws, independent of the seed of the waves."""
-    keys: dict[str, Uniform | Consecutive] = Field(default_factory=dict)
+    keys: dict[str, Uniform | Normal | Consecutive | Choice] = Field(default_factory=dict)
     """Distribution of each dotted key."""
     table: Path | None = None
     """CSV file whose header names keys and `weight`; a sample takes the values of one row."""

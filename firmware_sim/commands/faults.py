@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -12,9 +13,19 @@ from rich.progress import MofNCompleteColumn
 
 from utank_hil.base.provenance import describe
 from utank_hil.base.shipped import CONFIGS
-from utank_hil.console.common import KILLED, Json, argument, fail, load, option, print_json, why
+from utank_hil.console.common import (
+    KILLED,
+    Json,
+    argument,
+    fail,
+    load,
+    option,
+    prepare_out,
+    print_json,
+    why,
+)
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import Terminal, progress_bar
+from utank_hil.console.terminal import Terminal, progress_bar, shown
 
 if TYPE_CHECKING:
     from firmware_sim.fault_campaign.campaign import Campaign
@@ -34,6 +45,9 @@ def faults(
     ] = "",
     scenario: Annotated[
         Path | None, option("Your ship in the place of the first, with its first controller.")
+    ] = None,
+    out: Annotated[
+        Path | None, option("Folder for a recording of each row, of the first seed.")
     ] = None,
     full: Annotated[
         bool, option("Compare the roll over 600 s, as is asked for: ten times the work.")
@@ -59,7 +73,7 @@ def faults(
     from firmware_sim.fault_campaign.junit import write_junit
     from firmware_sim.fault_campaign.runner import run_rows
     from firmware_sim.fault_campaign.trial import Window
-    from firmware_sim.fault_campaign.verdict import as_json, judged
+    from firmware_sim.fault_campaign.verdict import as_json, judged, write_recordings
     from firmware_sim.live_faults.rows import ROWS
     from utank_hil.runners import stop_on_signals
 
@@ -82,6 +96,8 @@ def faults(
         fail("--rows: live rows need --bus")
     if names and not (chosen or live):
         fail("--rows: nothing to run: tests show all of them, or the ship has none of these nodes")
+    if out is not None:
+        out = prepare_out(out, [f"{row.id}.rrd" for row in chosen])
     began = time.monotonic()
     with progress_bar(MofNCompleteColumn()) as bar, stop_on_signals() as stopped:
         task = bar.add_task("faults", total=len(chosen) * seeds)
@@ -92,6 +108,7 @@ def faults(
             window,
             lambda done: bar.update(task, completed=done),
             stopped,
+            recorded=out is not None,
         )
         interrupted = stopped()
     ended_early = any(len(outcomes[row.id]) < seeds for row in chosen)
@@ -103,7 +120,11 @@ def faults(
     not_begun = [row.id for row in chosen if row not in begun]
     not_run |= dict.fromkeys(not_begun, KILLED if killed else INTERRUPTED)
     options = {"seeds": seeds, "full": full, "rows": names, "scenario": str(scenario or "")}
-    about = describe("faults", loaded, Path(), options=options, seed=1)
+    about = describe("faults", loaded, out or Path(), options=options, seed=1)
+    if out is not None:
+        files = write_recordings(out, outcomes, about)
+        kept = {name: shown(file) for name, file in files.items()}
+        results = [replace(each, recording=kept.get(each.row.id, "")) for each in results]
     if bus is None or ended_early:
         not_run |= dict.fromkeys(live, INTERRUPTED if ended_early else "needs a live bus: --bus")
     on_bus = [] if bus is None or ended_early else _live(live, bus)

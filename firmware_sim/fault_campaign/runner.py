@@ -28,13 +28,13 @@ _laws: dict[str, BuiltLaw] = {}
 
 def _do(setup_name: str, seed: int, rows: list[Row], first: bool) -> list[Outcome]:
     """Run rows of one setup in one sea, in a process of the pool."""
-    campaign, window, done, stop = shared()
+    campaign, window, recorded, done, stop = shared()
     setup = campaign.setups[setup_name]
     if setup_name not in _laws:
         _laws[setup_name] = build_law(setup.config)
     sea = Sea(
         campaign, setup, _laws[setup_name], seed, window,
-        patient=first,
+        recorded=recorded and first, patient=first,
         stopped=lambda: bool(stop.value),
     )  # fmt: skip
     outcomes = []
@@ -59,11 +59,14 @@ def run_rows(
     window: Window,
     progress: Progress,
     stopped: Callable[[], bool],
+    *,
+    recorded: bool = False,
 ) -> dict[str, list[Outcome]]:
     """Run rows in the seas of some seeds.
 
-    `stopped` says whether to end early. There is a process for each core. The outcomes of a row are
-    in the order of the seeds, and incomplete after an early end or a killed process.
+    `stopped` says whether to end early; `recorded`, whether the outcomes of the first seed have
+    recordings. There is a process for each core. The outcomes of a row are in the order of the
+    seeds, and incomplete after an early end or a killed process.
     """
     context = multiprocessing.get_context("spawn")
     done, stop = context.Value("i", 0), context.Value("b", 0, lock=False)
@@ -72,7 +75,7 @@ def run_rows(
         by_setup[row.fault.setup].append(row)
     futures: list[Future[list[Outcome]]] = []
     outcomes: list[Outcome] = []
-    common = campaign, window, done, stop
+    common = campaign, window, recorded, done, stop
     with suppress(BrokenProcessPool), WorkerPool(len(os.sched_getaffinity(0)), common) as pool:
         for seed in seeds:
             for setup, its in by_setup.items():

@@ -22,6 +22,7 @@ from firmware_sim.fault_campaign.watch import BusLog, Heard, Watch, first_differ
 from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.plant import Plant
 from firmware_sim.ship_side import build_ship_side
+from firmware_sim.truth import TRUTH, true_values
 from firmware_sim.worker_pool import end_with
 from utank_hil.assembly import estimator_work
 from utank_hil.base.arrays import FloatArray
@@ -29,12 +30,17 @@ from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Mode
 from utank_hil.control import BuiltLaw
 from utank_hil.nodes.panel import Action, TimedAction
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import SimulatedRetuner
 
 T = TypeVar("T")
 
 SECOND_NS: Final = 1_000_000_000
-SAMPLE_TICKS: Final = 5  #: Ticks between samples of a passive ship's roll: 50 ms.
+SAMPLE_TICKS: Final = 5
+"""Ticks between samples of a passive ship's roll and of a recording: 50 ms."""
+COLUMNS: Final = (*SIGNALS, *TRUTH[1:])
+RECORDED_S: Final = 10.0
+"""Time in s before the fault at which a recording begins. Chosen; no study."""
 SAMPLE_NS: Final = SAMPLE_TICKS * TICK_NS
 _LOOK_S: Final = 0.1  # Interval in s at which Ctrl-C is checked while a copy works.
 REARMED_S: Final = 20.0
@@ -88,6 +94,7 @@ class Outcome:
     window_s: float = math.nan
     wire: str = ""  #: First frame that the fault changed; empty if none differs.
     error: str = ""
+    rows: FloatArray | None = None  #: Recording with columns `COLUMNS`, if asked for.
 
 
 class Sea:
@@ -105,13 +112,14 @@ class Sea:
         seed: int,
         window: Window,
         *,
+        recorded: bool = False,
         patient: bool = False,
         stopped: Callable[[], bool] = lambda: False,
     ) -> None:
         self._stopped = stopped
         self._campaign, self._setup, self._law = campaign, setup, law
         self._seed, self._window = seed, window
-        self._patient = patient
+        self._patient, self._recorded = patient, recorded
         self._fault_s = campaign.fault_at_s(seed)
         self._fault_ns = round(self._fault_s * SECOND_NS)
         #: Ship under way, up to the fault, and the log of its bus.
@@ -124,6 +132,11 @@ class Sea:
     def _start(self) -> tuple[FaultyBench, BusLog]:
         log, config = BusLog(), self._setup.config
         work = estimator_work(config)
+        self._rows: list[FloatArray] = []
+
+        def record(row: FloatArray) -> None:
+            self._rows.append(np.array([*row, *true_values(bench.ship.plant)]))
+
         bench = FaultyBench(
             self._setup.scenario_of(self._fault_s),
             config,
@@ -131,6 +144,8 @@ class Sea:
             seed=self._seed,
             script=(TimedAction(self._campaign.arm_s, Action.ARM),),
             trace=log,
+            sink=record if self._recorded else None,
+            sink_every=SAMPLE_TICKS,
             estimating=work and SimulatedRetuner(work[0]),
             commissioned=self._setup.commissioned,
         )
@@ -259,7 +274,14 @@ class Sea:
             sound_variance=float(sound.var()) if compared else math.nan,
             window_s=window_s,
             wire=wire,
+            rows=self._recorded_rows(start_ns),
         )
+
+    def _recorded_rows(self, start_ns: int) -> FloatArray | None:
+        """Rows from `RECORDED_S` before the fault on, if asked for."""
+        first_s = start_ns / SECOND_NS - RECORDED_S
+        kept = [each for each in self._rows if each[0] >= first_s]
+        return np.array(kept) if self._recorded and kept else None
 
     def _passive_beside(self, bench: FaultyBench, seconds: float, stopped: bool) -> FloatArray:
         """Roll of the passive ship with pump and valve in the final state of a bench."""

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from textwrap import wrap
 from typing import Any, Final
 
@@ -11,7 +12,7 @@ from rich.text import Text
 
 from firmware_sim.fault_campaign.campaign import Campaign, Row, Setup
 from firmware_sim.fault_campaign.campaign import Reaction as Asked
-from firmware_sim.fault_campaign.trial import FLAGS, Outcome
+from firmware_sim.fault_campaign.trial import COLUMNS, FLAGS, Outcome
 from utank_hil.canbus import PumpCommand, load_catalogue
 from utank_hil.safety.faults import FAULTS, Reaction
 
@@ -60,6 +61,7 @@ class Result:
     window_s: float  #: Time over which `roll_ratio` was computed.
     problems: tuple[str, ...]  #: Reasons for failure; empty if passed.
     outcomes: tuple[Outcome, ...] = field(repr=False)
+    recording: str = ""  #: File that holds the first seed.
 
     @property
     def passed(self) -> bool:
@@ -87,6 +89,7 @@ class Result:
             "roll_limit": limit.roll,
             "roll_window_s": None if math.isnan(self.window_s) else self.window_s,
             "seeds": len(self.outcomes),
+            "recording": self.recording or None,
         }
 
 
@@ -243,6 +246,21 @@ def _unsaid(row: Row, outcome: Outcome) -> Iterator[str]:
             yield f"CTRL_STATUS never said {name}"
         elif name not in FLAGS and name not in outcome.alarms:
             yield f"no alarm {name} was sent"
+
+
+def write_recordings(
+    folder: Path, outcomes: Mapping[str, Sequence[Outcome]], about: Mapping[str, Any]
+) -> dict[str, Path]:
+    """Write the recordings of the rows that have one; return the files by row."""
+    from utank_hil.telemetry.recording import write_recording
+
+    files = {}
+    for name, each in outcomes.items():
+        kept = {f"seed {one.seed}": one.rows for one in each if one.rows is not None}
+        if kept:
+            files[name] = folder / f"{name}.rrd"
+            write_recording(files[name], COLUMNS, kept, about=about)
+    return files
 
 
 def as_json(

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 import typer
 import yaml
@@ -42,6 +43,7 @@ from utank_hil.nodes.running_law import RunningLaw
 from utank_hil.safety.faults import FAULTS
 from utank_hil.safety.monitors.drive import DriveFollowing
 from utank_hil.safety.supervisor import Supervisor
+from utank_hil.telemetry.recording_reader import read_recording
 
 commands_load = commands.load
 
@@ -350,7 +352,7 @@ def test_a_row_whose_copy_was_killed_gets_no_verdict(monkeypatch):
 
     sea = SimpleNamespace(prepare=lambda _: None, outcome=killed)
     monkeypatch.setattr(runner, "Sea", lambda *_, **__: sea)
-    monkeypatch.setattr(runner, "shared", lambda: (CAMPAIGN, Window(), None, None))
+    monkeypatch.setattr(runner, "shared", lambda: (CAMPAIGN, Window(), False, None, None))
     monkeypatch.setitem(runner._laws, ROWS[GOOD.row].fault.setup, None)
     with pytest.raises(BrokenProcessPool):
         runner._do(ROWS[GOOD.row].fault.setup, 1, [ROWS[GOOD.row]], True)
@@ -487,6 +489,24 @@ def test_command_prints_one_object():
         assert row["requirement"].startswith("F12: spike")
     assert told["not_run"]
     assert [each["id"] for each in told["not_run"]] == ["F26"]
+
+
+def test_a_row_leaves_a_recording_of_its_first_sea(tmp_path, monkeypatch):
+    row = next(row for row in CAMPAIGN.rows if row.id == "roll-spikes")
+    setup = CAMPAIGN.setups[row.fault.setup]
+    law = build_law(setup.config)
+    sea = Sea(CAMPAIGN, setup, law, 1, Window(1.0, 1.0), recorded=True)
+    sea.prepare([row])
+    outcome = sea.outcome(row)
+    monkeypatch.setattr(runner, "run_rows", lambda *_, **__: {row.id: [outcome]})
+    done = invoke("--rows", row.id, "--seeds", "1", "--json", "--out", str(tmp_path))
+    (told,) = json.loads(done.stdout)["rows"]
+    (rows,) = read_recording(Path(told["recording"])).values()
+    before_s = CAMPAIGN.fault_at_s(1) - rows["time_s"][0]
+    assert before_s == pytest.approx(10.0, abs=0.11)
+    assert np.abs(rows["true_roll_rad"] - rows["roll_rad"]).max() < 0.02
+    assert json.loads(invoke("--rows", row.id, "--seeds", "1", "--json").stdout)["rows"][0][
+        "recording"] is None  # fmt: skip
 
 
 @pytest.mark.parametrize(("found_ms", "late"), [(500.0, False), (1e6, True)])
