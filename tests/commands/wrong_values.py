@@ -64,7 +64,7 @@ WRONG: list[tuple[str, dict[str, object], dict[str, str]]] = [
      {"law.soft_level_m": "must be below hard_level_m"}),
     ("feedback_linearization", {"law__shift_rad_m": 5.0, "law__shift_length_m": 1.0},
      {"law.shift_rad_m": "loses its grip"}),
-    ("stimulate", {"law__period_s": -1}, {"law.period_s": "must be positive"}),
+    ("stimulate", {"law__period_s": -1}, {"law.period_s": "must be 1 to 60"}),
     ("stimulate", {"law__roll_limit_rad": 0.05}, {"law.amplitude_rad": "below roll_limit_rad"}),
     ("stimulate", {"law__period_s": 4.0}, {"law.amplitude_rad": "nearer to the natural period"}),
     ("fuzzy_robust", {"law__error__q": -1, "law__error__damping_ratio": 0,
