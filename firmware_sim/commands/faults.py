@@ -118,7 +118,8 @@ def faults(
     not_run = _not_to_run(whole, loaded, names)
     not_run |= {row.id: "takes long: --full or --rows" for row in too_long}
     not_begun = [row.id for row in chosen if row not in begun]
-    not_run |= dict.fromkeys(not_begun, KILLED if killed else INTERRUPTED)
+    ended = KILLED if killed else INTERRUPTED
+    not_run |= dict.fromkeys(not_begun, ended)
     options = {"seeds": seeds, "full": full, "rows": names, "scenario": str(scenario or "")}
     about = describe("faults", loaded, out or Path(), options=options, seed=1)
     if out is not None:
@@ -126,7 +127,7 @@ def faults(
         kept = {name: shown(file) for name, file in files.items()}
         results = [replace(each, recording=kept.get(each.row.id, "")) for each in results]
     if bus is None or ended_early:
-        not_run |= dict.fromkeys(live, INTERRUPTED if ended_early else "needs a live bus: --bus")
+        not_run |= dict.fromkeys(live, ended if ended_early else "needs a live bus: --bus")
     on_bus = [] if bus is None or ended_early else _live(live, bus)
     content = as_json(results, not_run, about)
     content["rows"] += on_bus

@@ -562,14 +562,15 @@ def test_a_campaign_that_ends_early_judges_what_was_run_and_says_what_lacks(
         return {row.id: outcomes[:1] if row.id == GOOD.row else [] for row in rows}
 
     monkeypatch.setattr(runner, "run_rows", run_rows)
-    asked = "--rows", f"{GOOD.row},rate-stuck", "--seeds", "2"
+    live = "live-controller-killed"
+    asked = "--rows", f"{GOOD.row},rate-stuck,{live}", "--seeds", "2", "--bus", "none0"
     done = invoke(*asked, "--json")
     assert done.exit_code == code
     told = json.loads(done.stdout)
     assert [(row["id"], row["verdict"], row["seeds"]) for row in told["rows"]] == [
         (GOOD.row, "pass", 1)
     ]
-    assert told["not_run"] == [{"id": "rate-stuck", "why": why}]
+    assert told["not_run"] == [{"id": name, "why": why} for name in ("rate-stuck", live)]
     printed = invoke(*asked).stdout
     assert "1 of 2" in printed
     assert "1 row in up to 2 seas" in printed
