@@ -2,10 +2,10 @@
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
 import typer
 from can import CanError
@@ -28,13 +28,22 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, progress_bar, shown
 
 if TYPE_CHECKING:
-    from firmware_sim.fault_campaign.campaign import Campaign
-    from firmware_sim.fault_campaign.trial import Window
+    from firmware_sim.fault_campaign.campaign import Campaign, Row
+    from firmware_sim.fault_campaign.trial import Outcome, Window
     from firmware_sim.fault_campaign.verdict import Result
 
 CAMPAIGN = CONFIGS / "faults" / "campaign.yaml"
-INTERRUPTED: Final = "interrupted"
 ROLLS_IN_CHARGE: Final = 5  #: Rolls over which an own ship with its law is compared. Chosen.
+
+
+class _End(NamedTuple):
+    """Why the rows ended early, and the exit code that says so."""
+
+    why: str
+    code: ExitCode
+
+
+INTERRUPTED: Final = _End("interrupted", ExitCode.INTERRUPTED)
 
 
 def faults(
@@ -71,19 +80,67 @@ def faults(
     # imported late: `--help` needs none of it
     from firmware_sim.fault_campaign.campaign import Campaign
     from firmware_sim.fault_campaign.junit import write_junit
-    from firmware_sim.fault_campaign.runner import run_rows
     from firmware_sim.fault_campaign.trial import Window
-    from firmware_sim.fault_campaign.verdict import as_json, judged, write_recordings
-    from firmware_sim.live_faults.rows import ROWS
+    from firmware_sim.fault_campaign.verdict import as_json, judged
     from utank_hil.runners import stop_on_signals
 
     whole = load(campaign, Campaign)
     loaded = whole if scenario is None else _on(whole, scenario)
     names = [name.strip() for name in rows.split(",") if name.strip()]
-    chosen = loaded.chosen(names)
+    chosen, live, not_run = _chosen(whole, loaded, names, full=full, on_bus=bus is not None)
     window = Window() if full else Window(60.0, 20.0) if scenario is None else _window(loaded)
-    too_long = [row for row in chosen if row.long and not (full or names)]
-    chosen = [row for row in chosen if row not in too_long]
+    if out is not None:
+        out = prepare_out(out, [f"{row.id}.rrd" for row in chosen])
+    options = {"seeds": seeds, "full": full, "rows": names, "scenario": str(scenario or "")}
+    about = describe("faults", loaded, out or Path(), options=options, seed=1)
+    began, end = time.monotonic(), None
+    with stop_on_signals() as stopped:
+        outcomes = _run(loaded, chosen, seeds, window, stopped, recorded=out is not None)
+        results = [judged(loaded, row, outcomes[row.id]) for row in chosen if outcomes[row.id]]
+        if out is not None:
+            results, end = _recorded(results, outcomes, out, about)
+        ended_early = any(len(outcomes[row.id]) < seeds for row in chosen)
+        if ended_early:
+            end = _End(KILLED, ExitCode.SYSTEM)
+        if stopped():
+            end = INTERRUPTED
+    on_bus: list[dict[str, Any]] = []
+    if bus is not None and end is None:
+        on_bus, end = _run_live(live, bus)
+    begun = {each.row.id for each in results} | {each["id"] for each in on_bus}
+    left = [name for name in (*(row.id for row in chosen), *live) if name not in begun]
+    not_run |= dict.fromkeys(left, "needs a live bus: --bus" if end is None else end.why)
+    content = as_json(results, not_run, about, on_bus)
+    if json_:
+        print_json(content)
+    else:
+        _print(results, on_bus, seeds)
+        count = len(content["rows"])
+        Terminal().say(
+            f"{count} row{'s' * (count != 1)} in {'up to ' * ended_early}{seeds} "
+            f"sea{'s' * (seeds > 1)}, {content['failed']} failed, {len(not_run)} not run; "
+            f"roll compared over {window.stopped_s:g} s, "
+            f"in charge over {window.running_s:g} s; {time.monotonic() - began:.0f} s."
+        )
+    if junit is not None:
+        write_junit(junit, content)
+    if end is INTERRUPTED:
+        raise typer.Exit(end.code)
+    if end is not None:
+        fail(end.why, end.code)
+    if content["failed"]:
+        raise typer.Exit(ExitCode.REFUSED)
+
+
+def _chosen(
+    whole: "Campaign", loaded: "Campaign", names: Sequence[str], *, full: bool, on_bus: bool
+) -> tuple[list["Row"], list[str], dict[str, str]]:
+    """Rows to run, live rows, and why others are not run; end where a name or all is none."""
+    from firmware_sim.live_faults.rows import ROWS
+
+    asked = loaded.chosen(names)
+    too_long = [row.id for row in asked if row.long and not (full or names)]
+    chosen = [row for row in asked if row.id not in too_long]
     live = [name for name in ROWS if not names or name.startswith(tuple(names))]
     for name in names:
         if not (
@@ -92,82 +149,71 @@ def faults(
             or any(each.startswith(name) for each in live)
         ):
             fail(f"--rows: no row or requirement begins with {name}")
-    if names and live and not chosen and bus is None:
+    if names and live and not chosen and not on_bus:
         fail("--rows: live rows need --bus")
     if names and not (chosen or live):
         fail("--rows: nothing to run: tests show all of them, or the ship has none of these nodes")
-    if out is not None:
-        out = prepare_out(out, [f"{row.id}.rrd" for row in chosen])
-    began = time.monotonic()
-    with progress_bar(MofNCompleteColumn()) as bar, stop_on_signals() as stopped:
-        task = bar.add_task("faults", total=len(chosen) * seeds)
-        outcomes = run_rows(
-            loaded,
-            chosen,
-            range(1, seeds + 1),
-            window,
-            lambda done: bar.update(task, completed=done),
-            stopped,
-            recorded=out is not None,
-        )
-        interrupted = stopped()
-    ended_early = any(len(outcomes[row.id]) < seeds for row in chosen)
-    begun = [row for row in chosen if outcomes[row.id]]
-    results = [judged(loaded, row, outcomes[row.id]) for row in begun]
-    killed = ended_early and not interrupted
     not_run = _not_to_run(whole, loaded, names)
-    not_run |= {row.id: "takes long: --full or --rows" for row in too_long}
-    not_begun = [row.id for row in chosen if row not in begun]
-    ended = KILLED if killed else INTERRUPTED
-    not_run |= dict.fromkeys(not_begun, ended)
-    options = {"seeds": seeds, "full": full, "rows": names, "scenario": str(scenario or "")}
-    about = describe("faults", loaded, out or Path(), options=options, seed=1)
-    if out is not None:
-        files = write_recordings(out, outcomes, about)
-        kept = {name: shown(file) for name, file in files.items()}
-        results = [replace(each, recording=kept.get(each.row.id, "")) for each in results]
-    if bus is None or ended_early:
-        not_run |= dict.fromkeys(live, ended if ended_early else "needs a live bus: --bus")
-    on_bus = [] if bus is None or ended_early else _live(live, bus)
-    content = as_json(results, not_run, about)
-    content["rows"] += on_bus
-    lost = sum(each["verdict"] == "fail" for each in on_bus)
-    failed = content["failed"] = content["failed"] + lost
-    content["passed"] += len(on_bus) - lost
-    if junit is not None:
-        write_junit(junit, content)
-    if json_:
-        print_json(content)
-    else:
-        _print(results, on_bus, seeds)
-        count = len(content["rows"])
-        Terminal().say(
-            f"{count} row{'s' * (count != 1)} in {'up to ' * ended_early}{seeds} "
-            f"sea{'s' * (seeds > 1)}, {failed} failed, {len(not_run)} not run; "
-            f"roll compared over {window.stopped_s:g} s, "
-            f"in charge over {window.running_s:g} s; {time.monotonic() - began:.0f} s."
-        )
-    if killed:
-        fail(KILLED, ExitCode.SYSTEM)
-    if interrupted:
-        raise typer.Exit(ExitCode.INTERRUPTED)
-    if failed:
-        raise typer.Exit(ExitCode.REFUSED)
+    return chosen, live, not_run | dict.fromkeys(too_long, "takes long: --full or --rows")
 
 
-def _live(names: Sequence[str], bus: str) -> list[dict[str, Any]]:
+def _run(
+    campaign: "Campaign",
+    rows: Sequence["Row"],
+    seeds: int,
+    window: "Window",
+    stopped: Callable[[], bool],
+    *,
+    recorded: bool,
+) -> "dict[str, list[Outcome]]":
+    """Run rows in lockstep, with the progress of their trials."""
+    from firmware_sim.fault_campaign.runner import run_rows
+
+    with progress_bar(MofNCompleteColumn()) as bar:
+        task = bar.add_task("faults", total=len(rows) * seeds)
+
+        def progress(done: int) -> None:
+            bar.update(task, completed=done)
+
+        numbers = range(1, seeds + 1)
+        return run_rows(campaign, rows, numbers, window, progress, stopped, recorded=recorded)
+
+
+def _recorded(
+    results: list["Result"],
+    outcomes: "Mapping[str, Sequence[Outcome]]",
+    folder: Path,
+    about: Mapping[str, Any],
+) -> tuple[list["Result"], _End | None]:
+    """Write the recordings; return the results with their names, or why there are none."""
+    from firmware_sim.fault_campaign.verdict import write_recordings
+
+    try:
+        files = write_recordings(folder, outcomes, about)
+    except OSError as error:
+        return results, _End(why(error), ExitCode.USAGE)
+    kept = {name: shown(file) for name, file in files.items()}
+    return [replace(each, recording=kept.get(each.row.id, "")) for each in results], None
+
+
+def _run_live(names: Sequence[str], bus: str) -> tuple[list[dict[str, Any]], _End | None]:
+    """Run live rows; return the results, and what ended them early."""
     from firmware_sim.live_faults.rows import ROWS, as_json
 
+    found: list[dict[str, Any]] = []
     try:
         with progress_bar(MofNCompleteColumn()) as bar:
             task = bar.add_task(f"on {bus}", total=len(names))
-            found = []
             for name in names:
                 found.append(as_json(name, ROWS[name], bus))
                 bar.advance(task)
-            return found
+    except KeyboardInterrupt:  # of SIGTERM, too
+        return found, INTERRUPTED
     except (OSError, CanError) as error:
-        fail(f"--bus {bus}: {why(error)}", ExitCode.NO_BUS)
+        if getattr(error, "filename", None) is not None:
+            return found, _End(why(error), ExitCode.USAGE)
+        return found, _End(f"--bus {bus}: {why(error)}", ExitCode.NO_BUS)
+    return found, None
 
 
 def _on(campaign: "Campaign", path: Path) -> "Campaign":

@@ -264,14 +264,19 @@ def write_recordings(
 
 
 def as_json(
-    results: Sequence[Result], not_run: Mapping[str, str], about: Mapping[str, Any]
+    results: Sequence[Result],
+    not_run: Mapping[str, str],
+    about: Mapping[str, Any],
+    live: Sequence[dict[str, Any]] = (),
 ) -> dict[str, Any]:
-    """Return all results, and the reasons of rows that were not run, for `json.dumps`."""
+    """Return all results, also of `live` rows, and why others were not run, for `json.dumps`."""
+    rows = [*(result.as_json() for result in results), *live]
+    failed = sum(row["verdict"] == "fail" for row in rows)
     return {
-        "rows": [result.as_json() for result in results],
+        "rows": rows,
         "not_run": [{"id": name, "why": why} for name, why in not_run.items()],
-        "passed": sum(result.passed for result in results),
-        "failed": sum(not result.passed for result in results),
+        "passed": len(rows) - failed,
+        "failed": failed,
         "about": dict(about),
     }
 

@@ -1,5 +1,6 @@
 """The campaign: its rows against the fault table, its judgement, and all of it in one sea."""
 
+import errno
 import json
 import math
 import os
@@ -23,6 +24,7 @@ from typer.testing import CliRunner
 
 from firmware_sim.commands import faults as commands
 from firmware_sim.fault_campaign import runner
+from firmware_sim.fault_campaign import verdict as verdicts
 from firmware_sim.fault_campaign.campaign import Campaign, Limit, Row
 from firmware_sim.fault_campaign.runner import run_rows
 from firmware_sim.fault_campaign.trial import Sea, Window, in_a_copy, times_of
@@ -574,6 +576,57 @@ def test_a_campaign_that_ends_early_judges_what_was_run_and_says_what_lacks(
     printed = invoke(*asked).stdout
     assert "1 of 2" in printed
     assert "1 row in up to 2 seas" in printed
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "why"),
+    [
+        (KeyboardInterrupt(), ExitCode.INTERRUPTED, "interrupted"),
+        (OSError(errno.ENODEV, "no interface vcan7"), ExitCode.NO_BUS, "--bus vcan7: no interface"),
+        (OSError(errno.ENOSPC, "disk full", "/tmp/x"), ExitCode.USAGE, "/tmp/x: disk full"),
+    ],
+)
+def test_what_was_judged_before_live_rows_end_early_is_kept(
+    error, code, why, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(runner, "run_rows", lambda *_, **__: {GOOD.row: [GOOD]})
+    began = []
+
+    def attempted(row, _):
+        began.append(row)
+        if len(began) == 2:
+            raise error
+        return [], LiveTimes(50.0, 60.0, 0.0)
+
+    monkeypatch.setattr(live, "attempted", attempted)
+    xml = tmp_path / "faults.xml"
+    asked = "--rows", f"{GOOD.row},live-ship,live-bus", "--seeds", "1", "--bus", "vcan7"
+    done = invoke(*asked, "--junit", str(xml), "--json")
+    assert done.exit_code == code, done.output
+    told = json.loads(done.stdout)
+    kept, *left = [name for name in live.ROWS if name.startswith(("live-ship", "live-bus"))]
+    assert [row["id"] for row in told["rows"]] == [GOOD.row, kept]
+    assert (told["passed"], told["failed"]) == (2, 0)
+    assert [row["id"] for row in told["not_run"]] == left
+    assert all(row["why"].startswith(why) for row in told["not_run"])
+    assert len(ElementTree.parse(xml).findall("testcase")) == 4
+    began.clear()
+    done = invoke(*asked)
+    assert f"{kept}: passed" in done.stdout
+    assert "2 rows in 1 sea, 0 failed, 2 not run" in done.stdout
+    assert (why in done.stderr) is (code is not ExitCode.INTERRUPTED)
+
+
+def test_a_disk_too_full_for_recordings_loses_no_verdict(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path / "row.rrd"))
+
+    monkeypatch.setattr(runner, "run_rows", lambda *_, **__: {GOOD.row: [GOOD]})
+    monkeypatch.setattr(verdicts, "write_recordings", full)
+    done = invoke("--rows", GOOD.row, "--seeds", "1", "--out", str(tmp_path))
+    assert done.exit_code == ExitCode.USAGE
+    assert GOOD.row in done.stdout
+    assert "row.rrd: No space left" in done.stderr
 
 
 @pytest.mark.parametrize(
