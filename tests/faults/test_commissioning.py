@@ -1,6 +1,7 @@
 """Commissioning in lockstep: a ship that is as her files say passes; whatever is not is named."""
 
 import math
+import random
 import tracemalloc
 from collections.abc import Iterable
 from dataclasses import replace
@@ -8,7 +9,7 @@ from itertools import count
 
 import numpy as np
 import pytest
-from fault_bench import SECOND, FaultBench, altered, dropped
+from fault_bench import SECOND, Failing, FaultBench, altered, dropped
 from quay import ARM_S, another_ship, commissioned, controller, still_water
 
 from firmware_sim import plant_kernel as kernel
@@ -294,6 +295,44 @@ def test_ticks_that_the_loop_leaves_out_leave_out_no_check():
     assert all(check.passed for check in checks)
     # the stage ended when its time was over, with a row for each 50 ms of it
     assert len(node.moved["roll_rad"]) == pytest.approx(node.length_s / ROW_S, abs=1)
+
+
+class HeldUp(Failing):
+    """Holds an inclinometer's frames for 90 ms, one time of five, once the pulses may begin."""
+
+    def __init__(self, node):
+        super().__init__(node)
+        self._late, self._until_ns, self._random = [], 0, random.Random(1)
+
+    def tick(self, now_ns):
+        frames = super().tick(now_ns)
+        self._late += [frame for frame in frames if frame.can_id & 0x7FF == 0x185]
+        frames = [frame for frame in frames if frame not in self._late]
+        if now_ns < self._until_ns:
+            return frames
+        if now_ns > ARM_S * SECOND and self._random.random() < 0.2:
+            self._until_ns = now_ns + 90_000_000
+        late, self._late = self._late, []
+        return frames + late
+
+
+def test_a_derived_rate_that_late_frames_spoil_is_not_to_be_scaled():
+    device = {"profile": "cia410", "node": 5, "bus": "can1", "accept_unprotected": True,
+              "age_ms": 500}  # fmt: skip
+    thesis = controller("gpc")
+    vessel = thesis.vessel.model_copy(
+        update={"devices": DevicesSection.model_validate({"motion": device}),
+                "redundancy": Redundancy(second_motion_sensor=True)}
+    )  # fmt: skip
+    config = thesis.model_copy(update={"vessel": vessel, "delay_s": 0.08})
+    scenario = still_water(config)
+    ship = [HeldUp(each) for each in build_ship_side(scenario, 1, scenario.operator).nodes]
+    node = build_commissioning_node(config)
+    lockstep = Lockstep([*ship, node], with_more(SimulatedBus(), 1, config.bit_rate))
+    lockstep.run_until(round(75 * SECOND))
+    assert (node.stage, node.ended) == (Stage.DONE, "")
+    (remedy,) = failed(node).values()
+    assert "up to 90 ms after one another where 10 was promised" in remedy
 
 
 @pytest.mark.parametrize(

@@ -211,11 +211,13 @@ def judge_pulses(
     plant: DesignPlant,
     plan: PulsePlan,
     sample_time_s: float,
+    of_derived: Sequence[str] = ("", ""),
 ) -> list[Check]:
     """Judge the records at rest, and from the moment at which the first pulse began.
 
     `plant` is as the files describe it, `plan` what was to be done, `sample_time_s` the time
-    between two rows.
+    between two rows. `of_derived` is what to do about the rate of each motion sensor if it is
+    derived of the roll; else it is empty.
     """
 
     def moved(name: str) -> FloatArray:
@@ -249,11 +251,12 @@ def judge_pulses(
     checks = [
         _scale_check(name, what, scale, tolerance, remedy)
         for (name, what, tolerance), scale, remedy in zip(
-            _SCALES, scales, remedies_of(scales), strict=True
+            _SCALES, scales, remedies_of(scales, of_derived[0]), strict=True
         )
     ]
     if "roll_2_rad" in pulses:
-        checks += _second_sensor(moved("roll_2_rad"), moved("roll_rate_2_rad_s"), roll, of_roll)
+        motion_2 = moved("roll_2_rad"), moved("roll_rate_2_rad_s")
+        checks += _second_sensor(*motion_2, roll, of_roll, of_derived[1])
     tank_period_s = _period_s(_mean([float(fit[_VALUE] / fit[_BEND]) for fit in good]))
     ship_period_s = math.nan
     if good and rolls:
@@ -274,7 +277,7 @@ def judge_pulses(
 
 
 def _second_sensor(
-    roll_2: FloatArray, rate_2: FloatArray, roll: FloatArray, of_roll: FloatArray
+    roll_2: FloatArray, rate_2: FloatArray, roll: FloatArray, of_roll: FloatArray, of_derived: str
 ) -> list[Check]:
     of_first = _slope(roll_2[_VALUE], roll[_VALUE], of_roll[_VALUE])
     of_itself = _slope(rate_2[_VALUE], roll_2[_RATE], of_roll[_RATE])
@@ -283,7 +286,7 @@ def _second_sensor(
         _scale_check("roll_2", "second sensor's roll, by the first's",
                      of_first, ROLL_2_SCALE, remedy),
         _scale_check("roll_rate_2", "second sensor's rate, by its roll",
-                     of_itself, RATE_SCALE, remedy),
+                     of_itself, RATE_SCALE, of_derived or remedy),
     ]  # fmt: skip
 
 
@@ -300,10 +303,11 @@ def _ship_period_s(
     return _period_s(righted / inertia)
 
 
-def remedies_of(scales: Each[float]) -> Each[str]:
+def remedies_of(scales: Each[float], of_derived: str = "") -> Each[str]:
     """What to do about each scale if it is wrong; all of them together say what is reversed.
 
-    Of the signed `scales` 1 is right, and 0 did not move.
+    Of the signed `scales` 1 is right, and 0 did not move. `of_derived` is said of a rate that is
+    derived of the roll: it has no sign and scale of its own.
     """
     pressure, port, starboard, roll, rate = scales
     if abs(pressure) < NO_PRESSURE:
@@ -345,15 +349,15 @@ def remedies_of(scales: Each[float]) -> Each[str]:
     if roll == 0:
         of_roll = of_rate = "The motion sensor shows no roll: check it and its cable."
     elif sensor and abs(roll / pressure - 1) <= 2 * precision.ROLL_SCALE:
-        of_roll, of_rate = agrees, "Correct the sign or scaling of the roll rate."
+        of_roll, of_rate = agrees, of_derived or "Correct the sign or scaling of the roll rate."
     elif roll < 0:
         of_roll = "The roll has the wrong sign: it is positive starboard down. " + (
             "Turn the motion sensor round." if rate > 0 else "The roll rate's is right."
         )
-        of_rate = "It agrees once the roll has the right sign."
+        of_rate = of_derived or "It agrees once the roll has the right sign."
     else:
         of_roll = "Correct the roll's scaling; check the tank's measures in the ship's file."
-        of_rate = (
+        of_rate = of_derived or (
             "The roll rate has the wrong sign: it is positive while starboard goes down."
             if rate < 0
             else "Correct the scaling of the roll rate."

@@ -11,6 +11,7 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Frame, Mode, OperatorCommand, Station
+from utank_hil.canbus.profiles.device import ProfiledDevice
 from utank_hil.control.interface import PRESSURE, VALVE, DesignPlant
 from utank_hil.dynamics.pump import Pump
 from utank_hil.nodes.commissioning.checks import (
@@ -106,6 +107,7 @@ class CommissioningNode:
         self._sources = dict(_PAIR if len(node.inbox.motions) == 2 else _SINGLE)
         if (drive := node.actuators.drive) is not None:
             self._sources[SPEED] = lambda _: drive.speed_rad_s
+        self._oldest_ms = [0.0] * len(node.inbox.motions)  # ages of each sensor's motion
         self.ended = ""  #: Why it ended before its time, in words; else empty.
         #: rest, moved: what was recorded at rest, and from ACTIVE on; empty before.
         self.rest: Record = {}
@@ -131,7 +133,8 @@ class CommissioningNode:
         rows = len(record.get("roll_rad", ()))
         if plan is not None and (whole or rows >= begin + plan.period_s / ROW_S):
             pulses = {name: column[begin:end] for name, column in record.items()}
-            checks += judge_pulses(self.rest, pulses, self._plant, plan, ROW_S)
+            derived = self._of_derived()
+            checks += judge_pulses(self.rest, pulses, self._plant, plan, ROW_S, derived)
             if SPEED in pulses and self._pump is not None:
                 checks.append(judge_speed(self.rest, pulses, self._plant, plan, self._pump, ROW_S))
         if stroke is not None and (whole or rows >= end + stroke.duration_s / ROW_S - 1):
@@ -140,6 +143,21 @@ class CommissioningNode:
         if plan is not None and whole:
             checks.append(self._stop_check(plan))
         return checks
+
+    def _of_derived(self) -> list[str]:
+        """What to do about each sensor's rate if it is derived of the roll; else empty."""
+        return [
+            "It is the slope of the roll by the times at which its frames came, up to "
+            f"{oldest_ms:.0f} ms after one another where {source.cycle_ns * 1e-6:g} was promised. "
+            "Mend what holds them up on the bus or this machine, and commission again."
+            if isinstance(source, ProfiledDevice) and source.plan.derived
+            else ""
+            for source, oldest_ms in zip(
+                [sensor.receiver for sensor in self.node.inbox.motions],
+                self._oldest_ms,
+                strict=True,
+            )
+        ]
 
     def _stop_check(self, plan: PulsePlan) -> Check:
         """The time from the stop to a fifth of the pressure, each the mean of three ticks or more.
@@ -266,6 +284,9 @@ class CommissioningNode:
             if stops:  # by the way of a panel's: the next tick hears it
                 node.inbox.stations.orders[Station.OPERATOR].overhear(_STOP)
         elif time_s >= 0:
+            self._oldest_ms = list(
+                map(max, self._oldest_ms, (each.age_ms for each in node.measured.motions))
+            )
             pushes = plan is not None and time_s >= self._push_s
             if pushes and time_s >= self._push_s + PUSH_S / 2:
                 self._pushed.append(node.measured.pressure_pa)
