@@ -82,6 +82,23 @@ def test_a_line_that_is_not_understood_is_counted_with_its_reason(tmp_path, line
 
 
 @pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("0.6 CANFD 1 Rx", "ends before its identifier"),
+        ("0.6 1 SENSOR_MOTION Rx d 1 00", "'SENSOR_MOTION' is no identifier"),
+        ("0.6 1 100 d 1 00", "says neither Rx nor Tx"),
+        ("0.6 1 100 Rx", "is no frame, such as"),
+    ],
+)
+def test_an_asc_line_that_is_not_understood_is_counted_with_its_reason(tmp_path, line, why):
+    text = f"{ASC}0.5 1 100 Rx d 1 00\n{line}\n0.7 1 100 Rx d 1 00\n"
+    frames, (note,) = read(tmp_path, text, "a.asc")
+    assert len(frames) == 2
+    assert "1 line is not understood and left out" in note
+    assert why in note
+
+
+@pytest.mark.parametrize(
     ("text", "why"),
     [
         ("(2026-02-03 10:00:00.000000) can0 123#01\n", "line 1: '2026-02-03 10:00:00.000000' is"),

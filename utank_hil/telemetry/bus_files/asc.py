@@ -110,7 +110,10 @@ def _whole(text: str, base: int) -> int:
 def _why(words: list[str]) -> str:
     if not {"rx", "tx"} & {word.lower() for word in words}:
         return "says neither Rx nor Tx"
-    identifier = words[2 + 2 * (words[1].upper() == "CANFD")]
+    at = 2 + 2 * (words[1].upper() == "CANFD")
+    if len(words) <= at:
+        return "ends before its identifier"
+    identifier = words[at]
     if not re.fullmatch(r"[0-9A-F]+x?", identifier, re.I):
         return f"{identifier!r} is no identifier, such as 8FF1080x: log with numeric identifiers"
     return "is no frame, such as 0.5 1 8FF1080x Rx d 2 01 02"
