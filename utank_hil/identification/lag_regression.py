@@ -169,18 +169,23 @@ def _maximum_likelihood(
     return float(np.exp(minimize_scalar(cost, bounds=_LOG_KAPPA, method="bounded").x))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Fit:
     """Solution of a regression."""
 
     coefficients: FloatArray  #: shape (n, m)
-    #: shape (m, m): covariance of the equation errors, with rows minus rank as degrees of freedom.
+    #: shape (m, m): covariance of the one-step prediction errors, with rows minus rank as degrees
+    #: of freedom.
     residual_covariance: FloatArray
     #: shape (m,): term of the shrinkage on the diagonal of the inputs' part; zero without
     #: shrinkage.
     penalty: FloatArray
-    rank: int
-    excitation_order: int  #: See `input_excitation`, for p + 1 lags.
+    rows: int  #: Number of equations, without gaps.
+    columns: int  #: Number n of coefficients of each output.
+    rank: int  #: Below n if the data fit exactly or the input does not excite.
+    #: Order of persistent excitation of the input, at most p + 1. A system of order n needs 2 n or
+    #: more.
+    excitation_order: int
 
 
 def fit(regression: LagRegression) -> Fit:
@@ -211,5 +216,12 @@ def fit(regression: LagRegression) -> Fit:
             coefficients, penalty = shrinkage_estimate(regression, gram)
             rank = regression.columns
     errors = regression.residuals(coefficients)
-    covariance = errors.T @ errors / (regression.rows - rank)
-    return Fit(coefficients, covariance, penalty, int(rank), excitation_order)
+    return Fit(
+        coefficients=coefficients,
+        residual_covariance=errors.T @ errors / (regression.rows - rank),
+        penalty=penalty,
+        rows=regression.rows,
+        columns=regression.columns,
+        rank=int(rank),
+        excitation_order=excitation_order,
+    )

@@ -7,7 +7,7 @@ recursion. The order p must cover the observer's memory: p = 120 at 0.2 s is two
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -51,23 +51,15 @@ def markov_parameters(arx: ARX, count: int) -> tuple[FloatArray, FloatArray]:
     return responses[:, :, :r].copy(), responses[1:, :, r:].copy()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class OkidResult:
-    """Result of OKID."""
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class OkidResult(Fit):
+    """Result of OKID: a fit in the units of the record, but for its `penalty`."""
 
     arx: ARX  #: Observer Markov parameters as a model.
     #: shape (K, m, r): system Markov parameters; ``markov[0]`` is D, ``markov[k]`` is C A^(k-1) B.
     markov: FloatArray
     #: shape (K - 1, m, m): observer gain Markov parameters C A^(k-1) K, K being -G of the thesis.
     observer_gain: FloatArray
-    residual_covariance: FloatArray  #: shape (m, m): covariance of the one-step prediction errors.
-    columns: int  #: Number n of the regression's columns: coefficients of each output.
-    #: Rank of the regression; below n if the data fit exactly or the input does not excite.
-    rank: int
-    #: Order of persistent excitation of the input, at most p + 1. A system of order n needs 2 n or
-    #: more.
-    excitation_order: int
-    rows: int  #: Number of equations, without gaps.
     errors: FloatArray  #: shape (N, m): one-step prediction errors; NaN where there is none.
 
 
@@ -151,46 +143,34 @@ def _fitted(
         raise ValueError(f"sample_time_s must be positive, got {sample_time_s}")
     if int(order) != order or order < 1:
         raise ValueError(f"order must be a positive integer, got {order}")
+    order = int(order)
     z, m = stacked_record(u, y)
     scale = channel_scale(z, m)
     functions = disturbance_basis(len(z), sample_time_s, *shapes)
-    regression = LagRegression(z / scale, m, int(order), functions)
+    regression = LagRegression(z / scale, m, order, functions)
     solution = fit(regression)
     if solution.excitation_order < min(_LEAST_EXCITATION, order + 1):
         raise IdentificationError(
             f"the input is persistently exciting of order {solution.excitation_order} only, "
             f"one oscillation takes {_LEAST_EXCITATION}; use random pulses or a PRBS"
         )
-    errors = np.full((len(z), m), np.nan)
-    errors[regression.at] = regression.residuals(solution.coefficients) * scale[:m]
-    return _in_units(solution, regression, scale, sample_time_s, errors)
-
-
-def _in_units(
-    solution: Fit,
-    regression: LagRegression,
-    scale: FloatArray,
-    sample_time_s: float,
-    errors: FloatArray,
-) -> OkidResult:
-    """Convert a solution to the units of the record, yet without Markov parameters."""
-    p, m = regression.order, regression.outputs
     y_scale = scale[:m]
-    column_scale = np.concatenate([np.tile(scale, p + 1)[m:], np.ones(regression.basis_size)])
+    errors = np.full((len(z), m), np.nan)
+    errors[regression.at] = regression.residuals(solution.coefficients) * y_scale
+    column_scale = np.concatenate([np.tile(scale, order + 1)[m:], np.ones(len(functions))])
     coefficients = solution.coefficients * y_scale / column_scale[:, None]
     if not np.isfinite(coefficients).all():
         raise IdentificationError("the least-squares problem overflowed; check the record's units")
-    split = len(coefficients) - regression.basis_size
-    by_lag = np.vstack([np.zeros((m, m)), coefficients[:split]]).reshape(p + 1, -1, m)
-    by_lag = by_lag.transpose(0, 2, 1)
+    lagged = coefficients[: len(coefficients) - len(functions)]
+    by_lag = np.vstack([np.zeros((m, m)), lagged]).reshape(order + 1, -1, m).transpose(0, 2, 1)
+    figures = asdict(solution) | {
+        "coefficients": coefficients,
+        "residual_covariance": solution.residual_covariance * np.outer(y_scale, y_scale),
+    }
     return OkidResult(
-        ARX(by_lag[1:, :, :m], by_lag[:, :, m:], sample_time_s),
+        arx=ARX(by_lag[1:, :, :m], by_lag[:, :, m:], sample_time_s),
         markov=np.empty(0),
         observer_gain=np.empty(0),
-        residual_covariance=solution.residual_covariance * np.outer(y_scale, y_scale),
-        columns=len(column_scale),
-        rank=solution.rank,
-        excitation_order=solution.excitation_order,
-        rows=regression.rows,
         errors=errors,
+        **figures,
     )
