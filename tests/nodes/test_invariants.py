@@ -284,6 +284,7 @@ BEGIN_AND_END: dict[str, tuple[Callable[[Table], None], Callable[[Table], None]]
     "little stability": judged("own", gm_low=True),
     "forecast silent": judged("measured", forecast_age_ms=1e3),
     "forecast contradicted": judged("own", doubts_forecast=True),
+    "law at its own limit": judged("own", law_passed_limit=True),
     "found, stops": found(Reaction.STOP),
     "found, ramps": found(Reaction.RAMP),
     "found, halves": found(Reaction.HALVE),

@@ -153,6 +153,13 @@ class StartsAnew(Protocol):
         """Return to the initial state."""
 
 
+@runtime_checkable
+class EndsByItself(Protocol):
+    """A controller that gives nothing more, until its reset, once it has passed a limit."""
+
+    passed_limit: str  #: Measurement that passed its limit; empty if none did.
+
+
 class LinearLaw(Protocol):
     """A linear law from outputs y to command u, in the timing of `utank_hil.control.arx`.
 

@@ -228,6 +228,7 @@ class ControllerNode:
             self.commissioned,
             self._frames_sent,
             law.doubts_forecast,
+            law.passed_limit,
         )
 
     def _estimate_waves(self, measured: Measurements, judgement: Judgement) -> None:

@@ -12,7 +12,15 @@ from utank_hil.canbus import RetuningOrder, RetuningState
 from utank_hil.canbus.enumerations import Mode
 from utank_hil.canbus.events import ModelSummary, RetuningEvent
 from utank_hil.canbus.measurements import Measurements, MotionSample
-from utank_hil.control.interface import PRESSURE, VALVE, Controller, Foresees, Plans, StartsAnew
+from utank_hil.control.interface import (
+    PRESSURE,
+    VALVE,
+    Controller,
+    EndsByItself,
+    Foresees,
+    Plans,
+    StartsAnew,
+)
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.nodes.actuators import Actuators
 from utank_hil.nodes.forecast_heard import forecast_of
@@ -72,6 +80,7 @@ class RunningLaw:
         self._limits = limits
         self._allow = law.allow if isinstance(law, Plans) else None
         self._foresees = law if isinstance(law, Foresees) else None
+        self._ends = law if isinstance(law, EndsByItself) else None
         self.foreseen_s = 0.0  #: How far ahead the waves were told to the last answer.
         self._starts_anew = isinstance(law, StartsAnew)
         self._samples = Schedule(round(law.sample_time_s / TICK_S) * TICK_NS)
@@ -100,6 +109,11 @@ class RunningLaw:
     def doubts_forecast(self) -> bool:
         """Whether the law ignores forecasts that the motion contradicts."""
         return self._foresees is not None and self._foresees.doubts_forecasts
+
+    @property
+    def passed_limit(self) -> bool:
+        """Whether the law has ended by itself, at a limit of its own."""
+        return self._ends is not None and self._ends.passed_limit != ""
 
     @property
     def state(self) -> RetuningState | None:

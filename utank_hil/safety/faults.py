@@ -298,6 +298,8 @@ FAULTS: Final = (
          # a ship that rolls through upright is upright twice in a period
          _found(_RAMP, "heel removal: the root mean square of the roll is over its most_roll_rad, "
              "as it is at sea", Finding.NOT_IN_HARBOUR),
+         Condition(_WARN, "stimulation: its own limit of roll or level was passed; it gives no "
+             "pressure until it is armed again", lambda seen, _: seen.own.law_passed_limit),
          Condition(_REFUSE, f"roll over {{roll_limit_rad:g}} rad within the last {ROLL_CALM_S} s",
              lambda seen, _: seen.rolled_over_ms < 1e3 * ROLL_CALM_S)),
     _row(Fault.STABILITY_LOW, "The ship's metacentric height may be below the limit of its "

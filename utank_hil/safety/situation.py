@@ -54,6 +54,7 @@ class OwnState:
     commissioned: Final[bool] = False  #: A commissioning was passed with this configuration.
     frames_sent: Final[int] = 0  #: Frames that the controller has sent since its start.
     doubts_forecast: Final[bool] = False  #: The law ignores forecasts that the motion contradicts.
+    law_passed_limit: Final[bool] = False  #: The law ended by itself, at a limit of its own.
 
 
 @dataclass(slots=True, eq=False)
