@@ -43,6 +43,7 @@ def table_rows(text):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_rolls")
 def test_its_quick_commands_work(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     walk(PAGE, tmp_path, slow=False)
