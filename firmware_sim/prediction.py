@@ -189,7 +189,7 @@ def other_loadings(
 
 
 def loaded(scenario: Scenario, scale: float) -> Scenario:
-    """Scenario with its ship loaded to a multiple of her roll period, by her stiffness."""
+    """Scenario with its ship loaded to a multiple of its roll period, by its stiffness."""
     ship = of_period(scenario.vessel.ship, scale)
     vessel = scenario.vessel.model_copy(update={"ship": ship})
     actual = dict(scenario.actual_ship)

@@ -146,7 +146,7 @@ def filling(
     out: common.Out = common.OUT,
     json_: common.Json = False,
 ) -> None:
-    """Say how far to fill the tank, by displacement and GM: the still level that rolls her least.
+    """Say how far to fill the tank, by displacement and GM: the still level with the least roll.
 
     The tank's walls stay. Roll is a linear prediction for the passive tank in the scenario's sea,
     with the same waves for every loading. Without --gm and --displacement: 0.6 to 1.6 times the

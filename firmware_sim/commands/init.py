@@ -198,9 +198,9 @@ def _little_help(project: StarterProject, found: Expected, limit_rad: float) -> 
         return None  # a ship that capsizes has no roll to compare with
     if found.roll_peak_rad is not None and found.roll_peak_rad > limit_rad:
         return (
-            f"with the law she rolls to {math.degrees(found.roll_peak_rad):.0f} degrees in this "
-            f"sea, and from {math.degrees(limit_rad):.0f} on the pump is off (HEEL_LIMIT): then "
-            "she has the passive tank's roll. Try a lower --hs, more room, or --gm-loss"
+            f"with the law the ship rolls to {math.degrees(found.roll_peak_rad):.0f} degrees in "
+            f"this sea, and from {math.degrees(limit_rad):.0f} on the pump is off (HEEL_LIMIT): then "
+            "it has the passive tank's roll. Try a lower --hs, more room, or --gm-loss"
         )
     less = 1 - found.active_rad.mean / found.without_tank_rad.mean
     if less >= WORTH_IT:

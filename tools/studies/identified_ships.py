@@ -2,7 +2,7 @@
 
     python -m tools.studies.identified_ships --json     # --records, --workers
 
-Each record is of the first ship, linear, loaded to 0.85 to 1.3 times the roll period of her file,
+Each record is of the first ship, linear, loaded to 0.85 to 1.3 times the roll period of its file,
 in one of five seas. The shipped GPC in a storm, made for the file's ship, is in charge: for twenty
 minutes alone, then with its configuration's pulses added to the command. Limits, rate, lag, delay
 and sensor noise are the bench's. The motion's own estimate is made of the first part and the last

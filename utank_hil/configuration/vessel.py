@@ -77,7 +77,7 @@ class Vessel(Section):
         if not self.emulated:
             content.append({"emulated": False})
         if self.devices is not None:
-            later = ("pump", "valve", "panel")  # so a ship without these has the version she had
+            later = ("pump", "valve", "panel")  # so a ship without these has the version it had
             native = {each for each in later if getattr(self.devices, each).native}
             content.append({"devices": self.devices.model_dump(mode="json", exclude=native)})
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).digest()

@@ -31,7 +31,7 @@ share."""
 
 
 class Held(NamedTuple):
-    """The ship with her tank, and what pump and valve do over a step."""
+    """The ship with its tank, and what pump and valve do over a step."""
 
     c: RollCoefficients
     per_piece: float  #: This and the next are of `righting_moment`.

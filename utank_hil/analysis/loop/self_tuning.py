@@ -84,12 +84,12 @@ _PARTS: Final = np.linspace(0.02, 1.0, 50)
 """Fractions of the requested pressure that a pump at its limit may give."""
 _LEEWAY: Final = 0.25
 """Most by which the plan differs from the robust law, over the greatest pressure. Over the passive
-roll the first ship at 1.3 of her period has 0.95 at most with 0.25, 1.2 with 0.5, 3 without."""
+roll the first ship at 1.3 of its period has 0.95 at most with 0.25, 1.2 with 0.5, 3 without."""
 CLIPPED_PEAK: Final = 3.0
 """`loads_peak` of a law that is clipped, or plans without leeway. With 40 the clipped law rolled a
 ship loaded to 1.3 times its period 1.4 to 3.3 times the passive roll, with 6 up to 1.15 times, with
 3 at most 0.98 times; the storm's roll rises by 0, 0 and 4 %."""
-_PLANNED_PEAK: Final = 4.0  # With leeway; with 3 it rolls the ship more on her own load.
+_PLANNED_PEAK: Final = 4.0  # With leeway; with 3 the ship rolls more at its own load.
 _LEAST_STIFFNESS: Final = 1 / 3
 """Least stiffness at the longest roll period over the nominal one that tells heel from load."""
 _SHARES: Final = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7)

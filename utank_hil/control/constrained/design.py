@@ -44,7 +44,7 @@ MOST_HORIZON: Final = 400
 MOST_ITERATIONS: Final = 200
 LEAST_AHEAD: Final = 0.38
 """Least time over the roll period that a forecast must reach: of shorter ones, perfectly known, the
-shipped laws can be unstable on a ship with 1.3 times her period (docs/control.md)."""
+shipped laws can be unstable on a ship with 1.3 times its period (docs/control.md)."""
 # A metre above the level limit costs as much as this roll over the whole horizon.
 _PENALTY_ROLL_RAD = 0.05
 
