@@ -199,8 +199,8 @@ def _little_help(project: StarterProject, found: Expected, limit_rad: float) -> 
     if found.roll_peak_rad is not None and found.roll_peak_rad > limit_rad:
         return (
             f"with the law the ship rolls to {math.degrees(found.roll_peak_rad):.0f} degrees in "
-            f"this sea, and from {math.degrees(limit_rad):.0f} on the pump is off (HEEL_LIMIT): then "
-            "it has the passive tank's roll. Try a lower --hs, more room, or --gm-loss"
+            f"this sea, and from {math.degrees(limit_rad):.0f} on the pump is off (HEEL_LIMIT): "
+            "then it has the passive tank's roll. Try a lower --hs, more room, or --gm-loss"
         )
     less = 1 - found.active_rad.mean / found.without_tank_rad.mean
     if less >= WORTH_IT:
