@@ -257,7 +257,7 @@ def bar_of(run: RunFigures, color: str) -> BenchBar:
         share, side = f"{abs(below):.0%}", "below" if below >= 0 else "above"
         said += "   as passive" if share == "0%" else f"   {share} {side} passive"
     unit, (mean, most) = in_one_unit([pump.power_mean_w, pump.power_peak_w], "W")
-    cost = f"{mean} {unit}, at most {most}"
+    cost = f"{mean}, at most {most} {unit}"
     return BenchBar(run.name, color, run.roll.rms_rad, said, pump.power_mean_w, cost)
 
 

@@ -84,14 +84,17 @@ def _motion_cells(run: RunFigures) -> tuple[str, ...]:
 def pump_table(found: BenchFigures) -> RichTable:
     """Table of the pump."""
     pumps = [(run, run.pump) for run in found.compared if run.pump is not None]
+    pressures_pa = [pump.pressure_rms_pa for _, pump in pumps]
+    pressures_pa += [pump.pressure_peak_pa for _, pump in pumps]
+    # A peak with fewer digits than its RMS would read less.
+    unit, cells = in_one_unit(pressures_pa, "Pa")
     columns = [
-        (heading, *in_one_unit([getattr(pump, name) for _, pump in pumps], unit))
-        for heading, name, unit in (
-            ("pressure\nRMS", "pressure_rms_pa", "Pa"),
-            ("pressure\npeak", "pressure_peak_pa", "Pa"),
-            ("power\nmean", "power_mean_w", "W"),
-            ("power\npeak", "power_peak_w", "W"),
-        )
+        ("pressure\nRMS", unit, cells[: len(pumps)]),
+        ("pressure\npeak", unit, cells[len(pumps) :]),
+    ]
+    columns += [
+        (heading, *in_one_unit([getattr(pump, name) for _, pump in pumps], "W"))
+        for heading, name in (("power\nmean", "power_mean_w"), ("power\npeak", "power_peak_w"))
     ]
     headings = (f"{heading} {unit}" for heading, unit, _ in columns)
     caption = "peaks of values every 50 ms; power that\nthe shaft draws, not what flows back"

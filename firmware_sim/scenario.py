@@ -16,7 +16,10 @@ class Scenario(ScenarioContent):
     def _consistent(self) -> "Scenario":
         problems = []
         if self.settle_s >= self.duration_s:
-            reason = "must be less than duration_s, else nothing is left to judge"
+            reason = (
+                f"is {self.settle_s:g}, must be less than duration_s, {self.duration_s:g}, else "
+                "nothing is left to judge: both are in seconds"
+            )
             problems.append(("settle_s", reason))
         if self.vessel.pump is not None:
             if not self.controllers:

@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import dataclass, replace
+from textwrap import wrap
 from typing import Annotated, Any, Final, TypeVar
 
 import yaml
@@ -30,6 +31,9 @@ _GYRATION_PER_BEAM: Final = (0.1, 1.2)
 """Plausible radius of gyration per beam; usual ships have about 0.4."""
 _DEPTH_PER_BEAM: Final = (0.01, 1.0)
 """Plausible ratio of displaced volume to length times squared beam."""
+
+_BLOCK: Final = (0.15, 1.0)
+"""Plausible block coefficient."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +81,14 @@ class StarterShip:
                 "displacement is in tonnes, length and beam in metres"
             )
             return [("displacement_t", reason)]
+        block = depth_m / 1.025 / (self.draught_m or math.inf)
+        least, most = _BLOCK
+        if self.draught_m is not None and not least <= block <= most:
+            reason = (
+                f"of {self.draught_m:g} m makes a block coefficient of {block:.2g} with length, "
+                "beam and displacement; ships have 0.35 to 0.9: it is in metres"
+            )
+            return [("draught_m", reason)]
         gyration_m = self.period_s / (2 * math.pi) * math.sqrt(GRAVITY_M_S2 * self.gm_m)
         least, most = _GYRATION_PER_BEAM
         if least <= gyration_m / self.beam_m <= most:
@@ -110,6 +122,13 @@ class StarterShip:
         if outside:
             words += f" ({'; '.join(outside)})"
         return min(max(ratio, _LEAST_DAMPING), _MOST_DAMPING), words
+
+    @property
+    def period_source(self) -> str:
+        """Where the roll period comes from."""
+        if self.roll_period_s is not None:
+            return "as given"
+        return "weather criterion's formula (IS Code 2008, A 2.3.4): measure it"
 
     @property
     def form(self) -> HullForm:
@@ -269,9 +288,7 @@ def ship_file(
     water_t = tank.water_kg / 1e3
     share, taken = water_t / ship.displacement_t, tank_sizing.stability_taken(bare, tank)
     damping_ratio, where_from = ship.damping
-    period = "as given"
-    if ship.roll_period_s is None:
-        period = "weather criterion's formula (IS Code 2008, A 2.3.4): measure it"
+    where_from = "\n  # ".join(wrap(where_from, 96))
     length_m, breadth_m = sized.reservoir_length_m, sized.reservoir_breadth_m
     slope_deg = math.degrees(tank_sizing.PUMP_SLOPE_RAD)
     rate_m_s = tank.natural_frequency_rad_s * demand.level_m
@@ -284,7 +301,7 @@ name: {json.dumps(ship.name)}
 ship:  # without the tank's water
   displacement_t: {number(ship.displacement_t)}
   gm_m: {number(ship.gm_m)}
-  roll_period_s: {number(written.roll_period_s)}  # {period}
+  roll_period_s: {number(written.roll_period_s)}  # {ship.period_source}
   damping_ratio: {number(damping_ratio)}  # of the roll: a decay test tells
   # {where_from}
 # Room: {room.breadth_m:.2f} m across, {room.height_m:.2f} m high, {length_m:.2f} m along the ship.

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from rich.table import Table
 
 from firmware_sim.prediction import Expected, Loading
+from firmware_sim.report_tables import in_one_unit
 from utank_hil.analysis.motion.statistics import Interval
 from utank_hil.analysis.tank_filling import Filling
 from utank_hil.analysis.tank_sizing import TankCost
@@ -59,11 +60,12 @@ def roll_rows(found: Expected) -> Rows:
     ]
     if pump is None or mean_w is None or flow_m3_s is None:
         return [*rows, *((text, "") for text in _NEEDS)]
+    unit, (mean, width) = in_one_unit(mean_w, "W")
     pressures = f"{pump.pressure_rms_pa / 1e3:.1f}, {pump.pressure_peak_pa / 1e3:.1f} kPa"
     needs = (
         pressures,
         f"{pump.level_peak_m:.2f} m, {three_digits(flow_m3_s)} m³/s",
-        f"{power_words(mean_w.mean)} ± {power_words(mean_w.half_width)}",
+        f"{mean} ± {width} {unit}",
         power_words(pump.power_peak_w),
     )
     return [*rows, *zip(_NEEDS, needs, strict=True)]

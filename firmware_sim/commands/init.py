@@ -20,7 +20,15 @@ from utank_hil.analysis.tank_sizing import TankImpossibleError, TankRoom, tank_c
 from utank_hil.assembly import build_law
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.whole_file import write_whole
-from utank_hil.console.common import Json, argument, fail, load, option, prepare_out, print_json
+from utank_hil.console.common import (
+    Json,
+    argument,
+    fail,
+    load,
+    option,
+    print_json,
+    why_not_writable,
+)
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.ship_report import order_words
 from utank_hil.console.terminal import Terminal, notes, rows_table, shown
@@ -148,7 +156,7 @@ def init(
         figures["files"] = {Path(file).stem: str(path) for file, path in files.items()}
         print_json(figures)
     else:
-        _print(project, expected, little, files)
+        _print(ship, project, expected, little, files)
 
 
 def _with_usual_hull(ship: StarterShip) -> tuple[StarterShip, Any, float | None]:
@@ -168,7 +176,8 @@ def _with_usual_hull(ship: StarterShip) -> tuple[StarterShip, Any, float | None]
 
 
 def _written(project: StarterProject, data: Any | None, folder: Path) -> dict[str, Path]:
-    prepare_out(folder, ())  # written last: a refusal leaves no files behind
+    if reason := why_not_writable(folder):  # written last: a refusal leaves no files behind
+        fail(f"{reason}; name another folder")
     files = {file: folder / file for file in FILES}
     for file, path in files.items():
         write_whole(path, project.texts[file])
@@ -181,10 +190,17 @@ def _written(project: StarterProject, data: Any | None, folder: Path) -> dict[st
 
 
 def _print(
-    project: StarterProject, expected: Expected, little: str | None, files: dict[str, Path]
+    ship: StarterShip,
+    project: StarterProject,
+    expected: Expected,
+    little: str | None,
+    files: dict[str, Path],
 ) -> None:
     console = Terminal()
     console.table(_table(project, expected))
+    period_s, (ratio, damping_source) = ship.period_s, ship.damping
+    console.say(f"Roll period {period_s:.3g} s: {ship.period_source}.")
+    console.say(f"Damping ratio of the roll {ratio:.2g}: {damping_source}.")
     if little:
         console.say(little, yellow="little help:")
     for path in files.values():

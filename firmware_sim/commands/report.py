@@ -59,5 +59,8 @@ def _report(run: Path) -> "Report":
             f"name such a one, or name a log of `utank-hil run` ({SUFFIX})"
         )
     if run.exists() and run.suffix != SUFFIX:
-        fail(f"{run}: is no log of `utank-hil run` ({SUFFIX})")
+        fail(
+            f"{run}: is no log of `utank-hil run` ({SUFFIX}): name one, or a folder of `bench` or "
+            "`campaign`"
+        )
     return recording_report(run, say_note)

@@ -64,6 +64,8 @@ def read_mesh(
         raise MeshError("there is no such file")
     if path.suffix in _BY_MESHIO and find_spec("meshio") is None:
         raise MeshError(f"{path.suffix} needs meshio: pip install meshio")
+    if path.suffix not in FORMATS:
+        raise MeshError(f"can't be read as panels by its name; known are {FORMATS}")
     try:
         with open_content(path, _LIMIT_BYTES) as content:
             source: Any = io.StringIO(content.read().decode("latin-1"))

@@ -15,7 +15,7 @@ from firmware_sim.commands.bench import STORM
 from firmware_sim.figures import BenchFigures, figures
 from firmware_sim.prediction import SEEDS, Expected, Loading, other_loadings, predict
 from firmware_sim.scenario import Scenario
-from firmware_sim.tank_report import loading_table, percent
+from firmware_sim.tank_report import loading_table, percent, roll_rows
 from utank_hil.analysis.loop.margins import of_period
 from utank_hil.analysis.motion.statistics import Interval, PumpStatistics
 from utank_hil.assembly import build_law
@@ -180,6 +180,13 @@ def test_a_law_that_rolls_the_ship_more_is_marked() -> None:
     assert [cell[0] for cell in table.columns[3].cells] == ["5", "*"]
     assert "ROLL_AMPLIFIED" in str(table.caption)
     assert loading_table([Loading(1.0, good)]).caption is None
+
+
+def test_an_interval_of_power_has_no_more_digits_than_its_mean():
+    pump = PumpStatistics(3.1e3, 7.3e3, 3.87e3, 19.8e3, 0.58)
+    roll, power = Interval(0.02, 0.002), Interval(3870.0, 594.0)
+    found = Expected(840.0, roll, roll, roll, mean_power_w=power, pump=pump, flow_peak_m3_s=1.82)
+    assert dict(roll_rows(found))["shaft power mean"] == "3.87 ± 0.59 kW"
 
 
 def test_a_share_of_nothing_has_no_sign():

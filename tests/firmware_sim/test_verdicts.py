@@ -251,12 +251,21 @@ def test_small_ships_pumps_are_shown_in_kilowatts() -> None:
     assert list(table.columns[3].cells) == ["0.00", "4.20"]
 
 
+def test_no_peak_of_the_pressure_reads_less_than_its_rms() -> None:
+    still = with_column(run("a", 0.03), "true_pressure_pa", 12.0, slice(None))
+    pressed = with_column(run("b", 0.03), "true_pressure_pa", 12_300.0, slice(None, None, 9))
+    table = pump_table(figures(result_of(PASSIVE_RUN, still, pressed)))
+    rms, peak = (list(map(float, column.cells)) for column in table.columns[1:3])
+    assert peak[-1] > rms[-1] > 0
+    assert all(most >= mean for mean, most in zip(rms, peak, strict=True))
+
+
 def test_the_picture_says_power_by_three_digits_and_no_difference_of_nothing() -> None:
     weak = with_column(run("a", 0.03), "true_shaft_power_w", 102_700.0, slice(None))
     found = figures(result_of(PASSIVE_RUN, weak)).runs[1]
     for below, words in ((-0.001, "as passive"), (-0.02, "2% above passive")):
         bar = bar_of(dataclasses.replace(found, roll_below_passive=below), "C0")
-        assert bar.cost == "103 kW, at most 103"
+        assert bar.cost == "103, at most 103 kW"
         assert bar.said == f"1.73°   {words}"
 
 

@@ -76,3 +76,21 @@ def test_rows_that_were_lost_are_gaps():
 def test_what_is_not_in_the_recording_is_named(measured, part, word):
     with pytest.raises(ValueError, match=word):
         logged_samples(_columns(), measured, 0.2, part)
+
+
+def test_a_sample_time_that_rows_do_not_divide_is_served_between_them():
+    columns = _columns()
+    columns["roll_rad"] = np.sin(0.6 * columns["time_s"])
+    kept = np.ones(COUNT, dtype=bool)
+    kept[200:240] = False
+    columns = {name: value[kept] for name, value in columns.items()}
+    record = logged_samples(columns, ("roll_rad",), 0.17)
+    at_s = 0.17 * np.arange(len(record))
+    there = (at_s < 9.95) | (at_s > 12.0)
+    assert record[there, 1] == pytest.approx(np.sin(0.6 * at_s[there]), abs=2e-4)
+    assert np.isnan(record[~there, 1]).all()
+    # From 0.17 to 0.34 s: 0.03 s of the row at 0.15 s, 0.1 s of the next two, 0.04 s of the last.
+    shares = np.array([0.03, 0.05, 0.05, 0.04]) / 0.17
+    assert record[2, 0] == pytest.approx(shares @ columns["pressure_command_pa"][3:7])
+    assert np.isnan(record[59:71, 0]).all()
+    assert np.isfinite(record[1:58, 0]).all()

@@ -41,8 +41,10 @@ def kind_of(path: Path) -> str:
 
 
 def refuse_device(path: Path) -> None:
-    """Raise TextFileError for a pipe, socket or device, which may never begin or end."""
-    if path.exists() and not (path.is_file() or path.is_dir()):
+    """Raise TextFileError for a folder, and a pipe, socket or device, which may never end."""
+    if path.is_dir():
+        raise TextFileError(f"{path}: is a folder; name a file in it")
+    if path.exists() and not path.is_file():
         raise TextFileError(f"{path}: is no regular file but a pipe, socket or device")
 
 
@@ -73,12 +75,14 @@ def open_text(
     Bytes that are no text are a TextFileError, or replaced (`errors`, as of `open`).
     """
     with open_content(path, limit_bytes, on_cut) as content:
-        begin = content.peek(2)[:2]  # type: ignore[attr-defined]  # of a BufferedReader
-        encoding = "utf-16" if begin in _UTF_16 else "utf-8-sig"
+        begin = content.peek(512)  # type: ignore[attr-defined]  # of a BufferedReader
+        encoding = "utf-16" if begin[:2] in _UTF_16 else "utf-8-sig"
         try:
             yield io.TextIOWrapper(content, encoding, errors)
         except UnicodeError as error:
-            raise TextFileError(f"{path}: is no text in UTF-8: save it as that") from error
+            other = " but a recording, picture or archive: name a text file"
+            what = other if b"\0" in begin else ": save it as that"
+            raise TextFileError(f"{path}: is no text in UTF-8{what}") from error
 
 
 def lines_of(path: Path, text: TextIO) -> Iterator[tuple[int, str]]:

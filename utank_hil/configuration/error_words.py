@@ -39,10 +39,13 @@ def known_keys(model: type[BaseModel], location: Iterable[str | int]) -> set[str
     return {name for place in _places(model, location) for name in _members(place)}
 
 
-def kinds_at(model: type[BaseModel], location: Iterable[str | int]) -> list[str]:
-    """Return the kinds of sections that may stand at a place."""
-    kinds = (get_args(_members(place).get("kind")) for place in _places(model, location))
-    return list(dict.fromkeys(kind for each in kinds for kind in each))
+def choices_at(
+    model: type[BaseModel], location: Iterable[str | int], key: str | int = "kind"
+) -> list[str]:
+    """Return the words that a key of a place may have, if it has one of a few."""
+    hints = (_members(place).get(str(key)) for place in _places(model, location))
+    chosen = (get_args(hint) for hint in hints if get_origin(hint) is Literal)
+    return list(dict.fromkeys(str(word) for each in chosen for word in each))
 
 
 def _places(model: type[BaseModel], location: Iterable[str | int]) -> list[Any]:
@@ -131,15 +134,18 @@ def words_for(error: Any, model: type[BaseModel]) -> str:
     """
     kind, value, context = error["type"], error["input"], error.get("ctx", {})
     if kind == "missing":
-        return "is required but missing"
+        *parents, key = error["loc"]
+        choices = choices_at(model, parents, key)
+        return "is required but missing" + (f": one of {', '.join(choices)}" if choices else "")
     if kind in ("extra_forbidden", "unexpected_keyword_argument"):
         return "is not a known key" + instead_of(model, error["loc"])
     if kind == "union_tag_not_found":
-        return f"needs the key kind: one of {', '.join(kinds_at(model, error['loc']))}"
+        return f"needs the key kind: one of {', '.join(choices_at(model, error['loc']))}"
     if kind == "union_tag_invalid":
-        return f"must be {_one_of(context, 'expected_tags')} (got {_short(context['tag'])!r})"
+        tag = context["tag"]
+        return f"must be {_one_of(context, 'expected_tags', tag)} (got {_short(tag)!r})"
     if kind in ("enum", "literal_error"):
-        return f"must be {_one_of(context, 'expected')} (got {_shown(value)})"
+        return f"must be {_one_of(context, 'expected', value)} (got {_shown(value)})"
     if kind in ("too_short", "too_long"):
         most = kind == "too_long"
         bound = f"{context['max_length']} at most" if most else f"{context['min_length']} or more"
@@ -156,10 +162,10 @@ def words_for(error: Any, model: type[BaseModel]) -> str:
     return f"{words} (got {_short(repr(value))})"
 
 
-def _one_of(context: Any, key: str) -> str:
+def _one_of(context: Any, key: str, written: Any) -> str:
     """Return the choices of an error, and the probably intended one."""
     choices = re.findall(r"'([^' ]*)'", context[key])
-    near = nearest(str(context.get("tag", "")).lower(), choices)
+    near = nearest(str(written).lower(), choices)
     return f"one of {', '.join(choices)}" + (f"; did you mean {near}?" if near else "")
 
 
@@ -182,6 +188,9 @@ def _remedy(wanted: str, value: Any) -> str:
     """Return how to write a value validly; empty if that is unknown."""
     if wanted == "text":
         return ": put it in quotes" if isinstance(value, bool | int | float | date) else ""
+    if wanted == _NUMBER and isinstance(value, dict) and len(value) == 1:
+        (number,) = value.values()
+        return f": write {number:g} alone" if isinstance(number, int | float) else ""
     if wanted not in (_NUMBER, _WHOLE) or not isinstance(value, str):
         return ""
     if re.fullmatch(r"\s*[-+]?\d+,\d+\s*", value):

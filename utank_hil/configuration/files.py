@@ -193,8 +193,6 @@ class _Reader:
                 text = content_of.read()
         except (OSError, RuntimeError, ValueError) as error:
             reason = f"can't be read: {_why(error).removeprefix(f'{file}: ')}"
-            if isinstance(error, IsADirectoryError):
-                reason = "is a folder; name a file in it"
             if namer is None:
                 return self._give_up(key, ConfigProblem(file, "", reason))
             where, within = self._within(namer)

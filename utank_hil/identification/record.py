@@ -92,7 +92,8 @@ def logged_samples(
     `columns`, of shape (n,), are those of one run (`telemetry.recording.read_recording`), of which
     rows may be missing. The outputs `measured` are among roll_rad, roll_rate_rad_s and level_m. The
     samples, shape (N, 1 + m), are at multiples of the sample time on the time axis of the
-    recording, `between_s`; missing values are NaN.
+    recording, `between_s`; missing values are NaN. Where the sample time is no whole number of the
+    steps between rows, outputs are interpolated from row to row.
 
     ValueError is raised if the recording lacks a column or the part is empty.
     """
@@ -108,6 +109,10 @@ def logged_samples(
     count = int(np.floor(high / sample_time_s + 1e-6)) - first + 1
     if count < 1:
         raise ValueError(f"the recording has nothing between {low:g} and {high:g} s")
+    step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else sample_time_s
+    if abs(sample_time_s / step_s - round(sample_time_s / step_s)) > 1e-2:
+        at_s = sample_time_s * np.arange(first, first + count, dtype=np.float64)
+        return _between_rows(columns, measured, at_s, step_s)
     place = time_s / sample_time_s - first
     record = np.full((count, 1 + len(measured)), np.nan)
     # A command is held to the next row, so it belongs to the sample after it.
@@ -120,4 +125,25 @@ def logged_samples(
     exact = (np.abs(place - nearest) < 1e-3) & (nearest >= 0) & (nearest < count)
     for column, name in enumerate(measured, start=1):
         record[nearest[exact], column] = columns[name][exact]
+    return record
+
+
+def _between_rows(
+    columns: Mapping[str, FloatArray], measured: tuple[str, ...], at_s: FloatArray, step_s: float
+) -> FloatArray:
+    """Rows of `logged_samples` at times between those of the recording's rows, a step apart."""
+    time_s, command_pa = columns["time_s"], columns["pressure_command_pa"]
+    lengths_s = np.diff(time_s)
+    lost = (lengths_s > 1.5 * step_s) | ~np.isfinite(command_pa[:-1])
+    held_pa_s, lost_s = (
+        np.interp(at_s, time_s, np.concatenate(([0.0], np.cumsum(np.where(counted, value, 0.0)))))
+        for counted, value in ((~lost, command_pa[:-1] * lengths_s), (lost, lengths_s))
+    )
+    record = np.full((len(at_s), 1 + len(measured)), np.nan)
+    known = np.diff(lost_s) == 0.0
+    record[1:, 0][known] = (np.diff(held_pa_s) / np.diff(at_s))[known]
+    before = np.clip(np.searchsorted(time_s, at_s, "right") - 1, 0, len(lost) - 1)
+    near = lengths_s[before] <= 1.5 * step_s
+    for column, name in enumerate(measured, start=1):
+        record[near, column] = np.interp(at_s[near], time_s, columns[name])
     return record

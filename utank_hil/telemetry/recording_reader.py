@@ -23,6 +23,9 @@ TIME_COLUMN: Final = "time_s"
 _Block = tuple[str, dict[str, FloatArray]]
 
 
+_MAGIC: Final = b"RRF"  #: First bytes of a recording; its version follows.
+
+
 def read_recording(path: Path) -> dict[str, dict[str, FloatArray]]:
     """Read the runs of a recording, also of a live or a truncated one.
 
@@ -60,6 +63,10 @@ def _read(path: Path, items: Callable[[Path], Iterator[Any]]) -> list[Any]:
     A killed recorder leaves a truncated file. A warning names any other damage, as by a temporarily
     full disk or a power cut: rows may be missing in the middle.
     """
+    if path.is_file():
+        with path.open("rb") as file:
+            if file.read(len(_MAGIC)) != _MAGIC:
+                raise ValueError(f"{path}: is no recording (.rrd): it begins otherwise")
     rerun = rerun_binary()
     try:
         return list(apart(items, path))

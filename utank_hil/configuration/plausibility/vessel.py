@@ -55,7 +55,9 @@ def stages(
     yield _of_heights(tank)
     yield _of_ship(ship, tank) + _of_righting(ship, tank)
     yield _of_weight(ship, tank) if ship.displacement_n > 0 else []
-    yield _of_tank(tank) + _of_water(ship, tank)
+    yield _of_tank(tank)
+    yield _of_water(ship, tank)
+    yield _of_loss(tank)
     if pump is not None:
         yield _of_pump(tank, pump)
         yield _of_motor(pump)
@@ -121,7 +123,11 @@ def _of_ship(ship: RollShip, tank: Tank) -> list[Figure]:
         ("lift_damping_ns2_rad", _SPEED_M_S * ship.lift_damping_ns2_rad / critical,
          "N m s per m/s"),
     )  # fmt: skip
+    total = sum(ratio for _, ratio, _ in dampings)
     return [
+        Figure("ship.damping_nms_rad", total, 0, 0.004 if total > 0 else 0, _ANY, _ANY,
+               f"makes a damping ratio of {total:.2g} with all other damping of the ship; hulls "
+               "have 0.005 to 0.15: it is in N m s"),
         Figure("ship.inertia_kg_m2", of_width, 0.35, 1.6, _ANY, _ANY,
                f"gives a roll period of {period_s:.2g} s, short {beam}: inertia_kg_m2 is in kg m2 "
                f"(in t m2 it would be {period_s * _PER_1000:.3g} s), stiffness_nm_rad in N m"),
@@ -129,7 +135,7 @@ def _of_ship(ship: RollShip, tank: Tank) -> list[Figure]:
                f"gives a roll period of {period_s:.3g} s, long {beam}: stiffness_nm_rad is in N m "
                f"(in kN m it would be {period_s / _PER_1000:.3g} s), inertia_kg_m2 in kg m2"),
         # Patti-B, the least damped of the shipped ships, has 0.002; zero is a choice.
-        *(Figure(f"ship.{name}", ratio, 0, 1e-4 if ratio > 0 else 0, 0.2, 1,
+        *(Figure(f"ship.{name}", ratio, 0, 1e-4 if ratio > 0 else 0, 0.15, 1,
                  f"is a damping ratio of {ratio:.3g} at {math.degrees(_ROLL_RAD):.0f} degrees of "
                  f"roll and {_SPEED_M_S:g} m/s; hulls have 0.005 to 0.15: it is in {unit}")
           for name, ratio, unit in dampings),
@@ -231,6 +237,22 @@ def _of_water(ship: RollShip, tank: Tank) -> list[Figure]:
         Figure("tank.reservoir_area_m2", taken, 0, 0, 0.3, _ANY,
                f"takes {taken:.0%} of the ship's stability by its free surface, most tanks 2 to "
                "20 %: lower it, or the distance of the reservoirs, width_m"),
+    ]  # fmt: skip
+
+
+def _of_loss(tank: Tank) -> list[Figure]:
+    """Return figures of the loss at inlet, outlet and throttle."""
+    loss, level_m = tank.quadratic_loss, tank.level_limit_m / 2
+    if loss == 0:
+        return []
+    ratio = tank.linearized(tank.natural_frequency_rad_s * level_m).damping_ratio
+    return [
+        Figure("tank.quadratic_loss", ratio, 0, 0, 1, 10,
+               f"of {loss:g} makes a damping ratio of {ratio:.3g} at a level of {level_m:.2g} m, "
+               "half of what the tank holds; tanks have 0.05 to 0.4: it is a coefficient of loss "
+               "of the speed in the duct, inlet and outlet together 1.5"),
+        Figure("tank.quadratic_loss", loss, 0, 0.3, _ANY, _ANY,
+               f"of {loss:g} is less than that of any inlet and outlet, which have 1 to 1.5"),
     ]  # fmt: skip
 
 

@@ -197,7 +197,10 @@ class BusLog:
         if source is None:
             begin = next(iter(_begin(self.path)), "")
             what = f"it begins with {begin[:60]!r}" if begin else "it is empty"
-            raise BusLogError(f"{self.path}: is no log of the bus, such as {READ}: {what}")
+            raise BusLogError(
+                f"{self.path}: is no log of the bus, such as {READ}: {what}; a recording is .rrd "
+                "or .frames, a table .csv or .parquet"
+            )
         others: set[str] = set()
         clock = OneClock(self.path.name, self._of_channel(source, others), lambda: source.place)
         begin_ns, found = None, False
