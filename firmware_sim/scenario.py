@@ -6,7 +6,7 @@ from firmware_sim.scenario_content import PASSIVE, ScenarioContent
 from firmware_sim.scenario_problems import controller_problems, part_problems, whole_problems
 from firmware_sim.voyage import unusual_loadings, unusual_sea, unusual_waypoints
 from utank_hil.base.parameters import Problem, refuse
-from utank_hil.configuration.devices import UNGUARDED
+from utank_hil.canbus.profiles.guarded import guard_parts
 
 
 class Scenario(ScenarioContent):
@@ -28,10 +28,13 @@ class Scenario(ScenarioContent):
                 )
             if "operator" not in self.model_fields_set:
                 problems.append(("operator", "is required but missing: who arms the controllers"))
-        if self.guard and self.vessel.foreign.any:
-            problems.append(("guard", f"can't be with devices: leave it out. {UNGUARDED}"))
-        elif self.guard and self.vessel.pump is None:
+        if self.guard and self.vessel.pump is None:
             problems.append(("guard", "is for a ship with a pump: leave it out"))
+        elif self.guard:
+            try:
+                guard_parts(self.vessel.foreign)
+            except ValueError as error:
+                problems.append(("guard", f"can't be: {error}"))
         if self.plant == "linear" and self.vessel.valve is not None:
             reason = (
                 "is linear, but the loss of the vessel's valve is quadratic and would change "

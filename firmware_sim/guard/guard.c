@@ -1,9 +1,6 @@
 /* See guard.h. `reference.py` is the same logic in Python, equal bit for bit. */
 #include "guard.h"
 
-#define NONE 16U         /* no counter was heard */
-#define MOST_LOST 3U     /* frames that may be missing between two that count */
-#define RESYNC 3U        /* frames in sequence after which another counter counts */
 #define OLDEST 65535U
 #define UNKNOWN 2U       /* a bit of which no frame has told */
 #define ZERO 32768       /* raw pressure of 0 Pa */
@@ -23,20 +20,7 @@
 #define READY 0x21U
 #define SWITCHED_ON 0x23U
 #define FAULT 0x08U
-
-static uint8_t crc8(const uint8_t *data, uint8_t data_id)
-{
-    uint32_t crc = 0xFFU;
-    uint32_t place;
-    uint32_t bit;
-    for (place = 1U; place < 9U; place++) {
-        crc ^= (place < 8U) ? data[place] : data_id;
-        for (bit = 0U; bit < 8U; bit++) {
-            crc = ((crc & 0x80U) != 0U) ? (((crc << 1) ^ 0x2FU) & 0xFFU) : (crc << 1);
-        }
-    }
-    return (uint8_t)(crc ^ 0xFFU);
-}
+#define ENABLE 0x0FU /* control word by which it may press */
 
 static int32_t word(const uint8_t *data, uint32_t place)
 {
@@ -57,27 +41,6 @@ static uint16_t longer(uint16_t lasted, bool holds)
     return next;
 }
 
-/* Cycles since the last frame that counted, 0 if this one does not. */
-static uint8_t accepted(struct guard_stream *stream, uint8_t counter)
-{
-    uint8_t cycles = NONE;
-    if (stream->expected != NONE) {
-        const uint8_t missing = (uint8_t)((counter + 16U - stream->expected) & 15U);
-        if (missing <= MOST_LOST) {
-            cycles = (uint8_t)(missing + 1U);
-        } else {
-            stream->run = (counter == stream->candidate) ? (uint8_t)(stream->run + 1U) : 1U;
-            stream->candidate = (uint8_t)((counter + 1U) & 15U);
-            cycles = (stream->run < RESYNC) ? 0U : NONE;
-        }
-    }
-    if (cycles != 0U) {
-        stream->expected = (uint8_t)((counter + 1U) & 15U);
-        stream->run = 0U;
-    }
-    return cycles;
-}
-
 void guard_start(struct guard *guard, const struct guard_parameters *parameters)
 {
     uint32_t index;
@@ -88,8 +51,11 @@ void guard_start(struct guard *guard, const struct guard_parameters *parameters)
     guard->parameters = parameters;
     for (index = 0U; index < GUARD_STREAMS; index++) {
         guard->streams[index].age = OLDEST;
-        guard->streams[index].expected = NONE;
-        guard->streams[index].candidate = NONE;
+        guard->streams[index].expected = GUARD_NO_COUNTER;
+        guard->streams[index].candidate = GUARD_NO_COUNTER;
+    }
+    for (index = 0U; index < GUARD_PARTS; index++) {
+        guard->part_age[index] = OLDEST;
     }
     for (index = 0U; index < 2U; index++) {
         guard->arm_bit[index] = UNKNOWN;
@@ -113,42 +79,19 @@ static void take_command(struct guard *guard, const uint8_t *data, uint8_t cycle
     guard->streams[GUARD_COMMAND].age = 0U;
 }
 
-static void take_motion(struct guard *guard, const uint8_t *data, uint32_t stream)
-{
-    const int32_t roll = word(data, 2U);
-    const int32_t rate = word(data, 4U);
-    if (((data[1] >> 4) <= 1U) && (roll <= (2 * MIDDLE)) && (rate <= (2 * MIDDLE))) {
-        guard->roll = roll - MIDDLE;
-        guard->roll_rate = rate - MIDDLE;
-        guard->streams[stream].age = 0U;
-    }
-}
-
-static void take_tank(struct guard *guard, const uint8_t *data)
-{
-    const int32_t port = word(data, 2U);
-    const int32_t starboard = word(data, 4U);
-    guard->tank_high = (data[1] & 0xF0U) != 0U;
-    if (((data[6] & 15U) <= 1U) && (port >= 2000) && (port <= 62000) && (starboard >= 2000)
-        && (starboard <= 62000)) {
-        guard->level = starboard - port;
-        guard->streams[GUARD_TANK].age = 0U;
-    }
-}
-
 /* Stop and disarm act from any whole frame, arm and reset from one that counts. */
-static void take_order(struct guard *guard, const uint8_t *data, uint32_t station, uint8_t counts)
+static void take_order(struct guard *guard, uint8_t bits, uint32_t station, bool counts)
 {
-    const uint8_t arm = (uint8_t)(data[2] & 1U);
-    const bool stop = (data[2] & 2U) != 0U;
-    const uint8_t reset = (uint8_t)((data[2] >> 2) & 1U);
+    const uint8_t arm = (uint8_t)(bits & 1U);
+    const bool stop = (bits & 2U) != 0U;
+    const uint8_t reset = (uint8_t)((bits >> 2) & 1U);
     if (stop) {
         guard->stop_heard = true;
     }
     if (stop || ((arm == 0U) && (guard->arm_bit[station] == 1U))) {
         guard->armed = false;
     }
-    if (counts != 0U) {
+    if (counts) {
         const bool may = (station == 0U) || guard->parameters->second_station;
         if (may) {
             if ((arm == 1U) && (guard->arm_bit[station] == 0U) && (!stop)) {
@@ -181,10 +124,35 @@ static void take_hardwired(struct guard *guard, const uint8_t *data, uint8_t cou
     }
 }
 
+/* The values of a stream; `whole` if they are good and of now. */
+static void take_values(struct guard *guard, uint32_t stream, bool whole)
+{
+    const int32_t *values = guard->values[stream];
+    switch (stream) {
+    case GUARD_TANK:
+        guard->tank_high = (values[2] != 0) || (values[3] != 0);
+        guard->level = whole ? (values[1] - values[0]) : guard->level;
+        break;
+    case GUARD_PUMP:
+        guard->pump_pressure = whole ? values[0] : guard->pump_pressure;
+        break;
+    default:
+        guard->roll = whole ? values[0] : guard->roll;
+        guard->roll_rate = whole ? values[1] : guard->roll_rate;
+        break;
+    }
+    if (whole) {
+        guard->streams[stream].age = 0U;
+    }
+}
+
 static void take(struct guard *guard, uint32_t stream, const uint8_t *data, uint8_t cycles)
 {
-    const int32_t pressure = word(data, 2U) - ZERO;
-    const bool known = magnitude(pressure) <= 31250;
+    const int32_t first = word(data, 2U);
+    const int32_t second = word(data, 4U);
+    const bool known = magnitude(first - ZERO) <= 31250;
+    const bool good = (data[1] >> 4) <= 1U;
+    int32_t *values = guard->values[stream];
     switch (stream) {
     case GUARD_COMMAND:
         take_command(guard, data, cycles);
@@ -192,27 +160,62 @@ static void take(struct guard *guard, uint32_t stream, const uint8_t *data, uint
     case GUARD_DRIVE:
         guard->drive_state = data[6];
         if (known) {
-            guard->drive_pressure = pressure;
+            guard->drive_pressure = first - ZERO;
             guard->streams[stream].age = 0U;
         }
         break;
     case GUARD_TANK:
-        take_tank(guard, data);
+        values[0] = first;
+        values[1] = second;
+        values[2] = (int32_t)data[1] & 0xF0;
+        take_values(guard, stream,
+                    ((data[6] & 15U) <= 1U) && (first >= 2000) && (first <= 62000)
+                        && (second >= 2000) && (second <= 62000));
         break;
     case GUARD_PUMP:
-        if (known && ((data[1] >> 4) <= 1U)) {
-            guard->pump_pressure = pressure;
-            guard->streams[stream].age = 0U;
-        }
+        values[0] = first - ZERO;
+        take_values(guard, stream, known && good);
         break;
     default:
-        take_motion(guard, data, stream);
+        values[0] = first - MIDDLE;
+        values[1] = second - MIDDLE;
+        take_values(guard, stream, good && (first <= (2 * MIDDLE)) && (second <= (2 * MIDDLE)));
+        break;
+    }
+}
+
+/* What a device of another maker says. */
+static void take_device(struct guard *guard, uint32_t stream)
+{
+    const bool whole = guard_device_whole(guard, stream);
+    const int32_t *values = guard->values[stream];
+    const uint32_t word_402 = (uint32_t)values[0];
+    uint32_t bits = 0U;
+    uint32_t place;
+    switch (stream) {
+    case GUARD_COMMAND:
+        guard->command = ((word_402 & 0x8FU) == ENABLE) ? guard->parameters->pressure : 0;
+        guard->streams[stream].age = 0U;
+        break;
+    case GUARD_DRIVE: /* in some states the bit of quick stop does not count */
+        guard->drive_state = (uint8_t)(word_402 & (((word_402 & 7U) == 0U) ? 0x4FU : 0x6FU));
+        guard->streams[stream].age = 0U;
+        break;
+    case GUARD_ORDER:
+        for (place = 0U; place < 3U; place++) {
+            bits |= (values[place] != 0) ? ((uint32_t)1U << place) : 0U;
+        }
+        take_order(guard, (uint8_t)bits, 0U, whole);
+        break;
+    default:
+        take_values(guard, stream, whole);
         break;
     }
 }
 
 void guard_receive(struct guard *guard, uint32_t can_id, const uint8_t *data, uint8_t length)
 {
+    uint32_t devices;
     uint32_t stream = 0U;
     while ((stream < GUARD_STREAMS)
            && (guard->parameters->messages[stream].can_id != can_id)) {
@@ -220,10 +223,10 @@ void guard_receive(struct guard *guard, uint32_t can_id, const uint8_t *data, ui
     }
     if ((stream < GUARD_STREAMS) && (length == 8U)) {
         const uint8_t counter = (uint8_t)(data[1] & 15U);
-        if (data[0] == crc8(data, guard->parameters->messages[stream].data_ids[counter])) {
-            const uint8_t cycles = accepted(&guard->streams[stream], counter);
+        if (guard_intact(data, guard->parameters->messages[stream].data_ids[counter])) {
+            const uint8_t cycles = guard_accepted(&guard->streams[stream], counter);
             if ((stream == GUARD_ORDER) || (stream == GUARD_ORDER_2)) {
-                take_order(guard, data, stream - GUARD_ORDER, cycles);
+                take_order(guard, data[2], stream - GUARD_ORDER, cycles != 0U);
             } else if (stream == GUARD_HARDWIRED) {
                 take_hardwired(guard, data, cycles);
             } else if (cycles != 0U) {
@@ -231,6 +234,12 @@ void guard_receive(struct guard *guard, uint32_t can_id, const uint8_t *data, ui
             } else {
                 /* a frame out of sequence says nothing */
             }
+        }
+    }
+    devices = guard_device_heard(guard, can_id, data, length);
+    for (stream = 0U; stream < GUARD_STREAMS; stream++) {
+        if (((devices >> stream) & 1U) != 0U) {
+            take_device(guard, stream);
         }
     }
 }
@@ -264,6 +273,11 @@ static bool silent(const struct guard *guard)
     return found;
 }
 
+static int32_t commanded(const struct guard *guard)
+{
+    return (guard->streams[GUARD_COMMAND].age <= COMMAND_AGE) ? guard->command : 0;
+}
+
 /* Keep the least and the most of the commands, and zero, of this window and the last. */
 static void note_command(struct guard *guard, int32_t command)
 {
@@ -281,8 +295,12 @@ static void note_command(struct guard *guard, int32_t command)
 
 static bool is_off(const struct guard *guard, int32_t pressure, int32_t error)
 {
-    const int32_t least = (guard->least[0] < guard->least[1]) ? guard->least[0] : guard->least[1];
-    const int32_t most = (guard->most[0] > guard->most[1]) ? guard->most[0] : guard->most[1];
+    int32_t least = (guard->least[0] < guard->least[1]) ? guard->least[0] : guard->least[1];
+    int32_t most = (guard->most[0] > guard->most[1]) ? guard->most[0] : guard->most[1];
+    if (guard->parameters->torque_drive) {
+        most = commanded(guard);
+        least = -most;
+    }
     return (pressure < (least - error)) || (pressure > (most + error));
 }
 
@@ -291,16 +309,18 @@ uint8_t guard_tick(struct guard *guard)
     const struct guard_parameters *limits = guard->parameters;
     uint32_t index;
     uint32_t reasons = 0U;
-    int32_t command;
     int32_t error = limits->error;
     bool off = false;
     bool drive_heard;
     bool live;
     for (index = 0U; index < GUARD_STREAMS; index++) {
         guard->streams[index].age = longer(guard->streams[index].age, true);
+        guard->same[index] = longer(guard->same[index], true);
     }
-    command = (guard->streams[GUARD_COMMAND].age <= COMMAND_AGE) ? guard->command : 0;
-    note_command(guard, command);
+    for (index = 0U; index < GUARD_PARTS; index++) {
+        guard->part_age[index] = longer(guard->part_age[index], true);
+    }
+    note_command(guard, commanded(guard));
     if (younger(guard, GUARD_MOTION, GUARD_MOTION_2) <= FRESH) {
         guard->heel += ((guard->roll * HEEL_SCALE) - guard->heel) / HEEL_TICKS;
     }

@@ -5,6 +5,10 @@
  * called every 10 ms by its own clock. It allocates nothing and calls no library. Numbers are those
  * of the frames: pressure in 8 Pa, roll in 1e-4 rad, roll rate in 3.125e-5 rad/s, level in mm; times
  * are in ticks of 10 ms. The table of parameters is written by `python -m firmware_sim.guard`.
+ *
+ * An identifier has 29 bits, or 11 bits and bit 29; bits 30 and 31 are the number of the bus. Of a
+ * device of another maker the table has parts: where a value, a status or a counter stands in its
+ * frames, and how the value follows from the counts.
  */
 #ifndef GUARD_H
 #define GUARD_H
@@ -24,6 +28,13 @@
 #define GUARD_HARDWIRED 8U
 #define GUARD_STREAMS 9U
 
+/* Places of a stream: motion roll and rate; tank port, starboard and their switches; pump pressure;
+ * order arm, stop and reset; drive status word; command control word. Else a part is a condition
+ * (4), or a counter or stamp that must move. */
+#define GUARD_PLACES 4U
+#define GUARD_MOVES 5U
+#define GUARD_PARTS 32U /* at most */
+
 /* Reasons to cut, as bits; none allows. */
 #define GUARD_WAITING 1U   /* not every message was heard since power-up */
 #define GUARD_STOP 2U      /* a station's stop, or the stop loop */
@@ -35,9 +46,37 @@
 #define GUARD_ROLL 128U    /* roll, heel or roll rate beyond its limit */
 
 struct guard_message {
-    uint32_t can_id;
-    uint16_t patience; /* greatest age under pressure; 0: its silence is not judged */
+    uint32_t can_id;    /* of a device of another maker nobody's */
+    uint16_t patience;  /* greatest age under pressure; 0: its silence is not judged */
+    uint16_t unchanged; /* time after which values that stand are none; 0: they may */
     uint8_t data_ids[16];
+};
+
+struct guard_crc {
+    uint8_t at; /* its place; beyond the frame's length there is none */
+    uint8_t polynomial;
+    uint8_t start;
+    uint8_t final;
+};
+
+struct guard_part {
+    uint32_t can_id;
+    uint32_t id_bits; /* those of the identifier that count */
+    uint8_t length;   /* of the frame */
+    struct guard_crc crc;
+    uint8_t stream;
+    uint8_t place;
+    uint16_t old;      /* age from which it says nothing */
+    bool most_first;   /* order of the bytes */
+    uint8_t shift;     /* from the least bit of the frame as one number */
+    uint32_t mask;     /* bits that count */
+    uint32_t sign_bit; /* 0: there is none */
+    int64_t least;     /* counts that are a value, or a status that is good */
+    int64_t most;
+    int64_t times; /* value = (counts * times + plus) / by */
+    int64_t plus;
+    int64_t by;
+    int32_t otherwise; /* where the counts are no value */
 };
 
 struct guard_parameters {
@@ -51,11 +90,16 @@ struct guard_parameters {
     int32_t roll_rate;
     int32_t heel;
     bool second_station; /* whether a second station may arm */
+    bool torque_drive;   /* told torque or speed: may press up to the limit, or not at all */
+    uint8_t part_count;
+    struct guard_part parts[GUARD_PARTS];
 };
+
+#define GUARD_NO_COUNTER 16U
 
 struct guard_stream {
     uint16_t age;      /* since the last frame that counts, held at its end */
-    uint8_t expected;  /* next counter; 16: none was heard */
+    uint8_t expected;  /* next counter */
     uint8_t candidate; /* counter after the last rejected one */
     uint8_t run;       /* rejected ones in sequence */
 };
@@ -63,6 +107,10 @@ struct guard_stream {
 struct guard {
     const struct guard_parameters *parameters;
     struct guard_stream streams[GUARD_STREAMS];
+    int32_t values[GUARD_STREAMS][GUARD_PLACES];
+    uint16_t same[GUARD_STREAMS]; /* since a value of it changed */
+    uint16_t part_age[GUARD_PARTS];
+    uint32_t part_raw[GUARD_PARTS];
     int32_t command;
     int32_t drive_pressure;
     int32_t pump_pressure;
@@ -95,5 +143,18 @@ void guard_start(struct guard *guard, const struct guard_parameters *parameters)
 void guard_receive(struct guard *guard, uint32_t can_id, const uint8_t *data, uint8_t length);
 /* Called every 10 ms; returns the reasons to cut, 0 if the drive's power may stay on. */
 uint8_t guard_tick(struct guard *guard);
+
+/* guard_frame.c: checksum over all bytes but its own; whether a native frame is whole; cycles since
+ * the last frame that counted, 0 if this one does not. */
+uint8_t guard_crc8(const uint8_t *data, uint8_t length, const struct guard_crc *how);
+bool guard_intact(const uint8_t *data, uint8_t data_id);
+uint8_t guard_accepted(struct guard_stream *stream, uint8_t counter);
+
+/* guard_device.c: takes a frame as what devices of other makers say; returns the streams that it has
+ * a value of, as bits. */
+uint32_t guard_device_heard(struct guard *guard, uint32_t can_id, const uint8_t *data,
+                            uint8_t length);
+/* Whether all parts of a stream are good and of now. */
+bool guard_device_whole(const struct guard *guard, uint32_t stream);
 
 #endif

@@ -6,15 +6,20 @@ from typing import Any, Final
 
 from utank_hil import canbus
 from utank_hil.base.tick import TICK_NS
+from utank_hil.canbus.profiles.guarded import (
+    LEVEL_M,
+    PRESSURE_PA,
+    RATE_RAD_S,
+    ROLL_RAD,
+    GuardPart,
+    Stream,
+    guard_parts,
+    unchanged_ticks,
+)
 from utank_hil.configuration import ControllerConfig
-from utank_hil.configuration.devices import UNGUARDED
 from utank_hil.safety.monitors.thresholds import thresholds_of
 
 TICK_MS: Final = TICK_NS / 1e6
-PRESSURE_PA: Final = 8.0
-ROLL_RAD: Final = 1e-4
-RATE_RAD_S: Final = 3.125e-5
-LEVEL_M: Final = 1e-3  #: Units of the frames.
 MOST_RATE: Final = 32000
 MOST_STEP: Final = 65535  #: Greater than any step of 16 bits.
 LEVEL_SHARE: Final = 0.97
@@ -29,7 +34,9 @@ STREAMS: Final[tuple[tuple[type[tuple[Any, ...]], canbus.Address], ...]] = (
     (canbus.OperatorCommand, canbus.Address.OPERATOR),
     (canbus.OperatorCommand, canbus.Address.OPERATOR_2),
     (canbus.HardwiredInputs, canbus.Address.HARDWIRED),
-)  #: Messages in the order of the enumeration in guard.h.
+)  #: Native messages by `Stream`.
+NOBODY: Final = 0xFFFFFFFF
+"""Identifier of a native message where a device of another maker is in its place."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +45,7 @@ class Message:
 
     can_id: int
     patience: int  #: Greatest age under pressure in ticks; 0: its silence is not judged.
+    unchanged: int  #: Ticks after which values that stand are none; 0: they may.
     data_ids: bytes
 
 
@@ -55,36 +63,50 @@ class GuardParameters:
     roll_rate: int
     heel: int
     second_station: int
+    torque_drive: int  #: Whether the drive is told torque or speed, and no pressure.
+    parts: tuple[GuardPart, ...]
 
     @property
     def header(self) -> str:
         """The table as a C header."""
         rows = "".join(
-            f"    {{0x{each.can_id:08X}U, {each.patience}U, "
+            f"    {{0x{each.can_id:08X}U, {each.patience}U, {each.unchanged}U, "
             f"{{{', '.join(f'{number}U' for number in each.data_ids)}}}}},\n"
             for each in self.messages
         )
-        numbers = ", ".join(str(getattr(self, name)) for name in self.__slots__[1:])
+        numbers = ", ".join(str(getattr(self, name)) for name in self.__slots__[1:-1])
+        parts = "".join(f"    {{{_row(each)}}},\n" for each in self.parts) or "    {0}\n"
         return (
             "/* Written by python -m firmware_sim.guard; do not edit. */\n"
             '#include "guard.h"\n\n'
             "static const struct guard_parameters GUARD_PARAMETERS = {\n"
-            f"    {{\n{rows}    }},\n    {numbers}\n}};\n"
+            f"    {{\n{rows}    }},\n    {numbers},\n"
+            f"    {len(self.parts)}U,\n    {{\n{parts}    }}\n}};\n"
         )
+
+
+def _row(part: GuardPart) -> str:
+    crc = part.crc
+    values = {name: f"{int(getattr(part, name))}" for name in GuardPart.__slots__ if name != "crc"}
+    for name in ("can_id", "id_bits", "mask", "sign_bit"):
+        values[name] = f"0x{getattr(part, name):X}U"
+    words = list(values.values())
+    words.insert(3, f"{{{crc.byte}U, {crc.polynomial}U, {crc.start}U, {crc.final}U}}")
+    return ", ".join(words)
 
 
 def guard_parameters(config: ControllerConfig) -> GuardParameters:
     """Return the parameters for a ship and the limits of its controller.
 
     The guard is more patient than the controller: its ages end after the controller's ramps.
-    ValueError is raised if the ship has no pump, or devices of other makers, whose frames the guard
-    does not read.
+    ValueError is raised if the ship has no pump, or devices of other makers that the guard can't
+    judge.
     """
     vessel, safety, limits = config.vessel, config.safety, config.limits
     if vessel.pump is None:
         raise ValueError("the ship has no pump: there is nothing to guard")
-    if vessel.foreign.any:
-        raise ValueError(UNGUARDED)
+    parts = guard_parts(vessel.foreign)
+    unchanged = unchanged_ticks(vessel.foreign)
     patience_ms = (
         150.0,
         safety.drive_age_ms + 140,
@@ -98,10 +120,13 @@ def guard_parameters(config: ControllerConfig) -> GuardParameters:
     )
     thresholds = thresholds_of(config.plant, safety.roll_limit_rad, config.sensors)
     catalogue, messages = canbus.load_catalogue(), []
-    for (kind, source), patience in zip(STREAMS, patience_ms, strict=True):
+    others = {part.stream for part in parts}
+    for stream, (kind, source) in zip(Stream, STREAMS, strict=True):
         codec = catalogue.codec(kind, source)
         assert codec.data_ids is not None  # the catalogue has checked it
-        messages.append(Message(codec.can_id, math.ceil(patience / TICK_MS), codec.data_ids))
+        can_id = NOBODY if stream in others else codec.can_id
+        patience, still = math.ceil(patience_ms[stream] / TICK_MS), unchanged.get(stream, 0)
+        messages.append(Message(can_id, patience, still, codec.data_ids))
     return GuardParameters(
         tuple(messages),
         pressure=math.ceil(limits.pressure_pa / PRESSURE_PA) + 1,
@@ -114,4 +139,6 @@ def guard_parameters(config: ControllerConfig) -> GuardParameters:
         roll_rate=min(round(thresholds.roll_most_rad_s / RATE_RAD_S), MOST_RATE),
         heel=round(safety.heel_limit_rad / ROLL_RAD),
         second_station=int(vessel.redundancy.second_station),
+        torque_drive=int(vessel.foreign.pump is not None),
+        parts=parts,
     )

@@ -4,13 +4,15 @@ Numbers are those of the frames, times ticks of 10 ms; see guard.h and guard.c.
 """
 
 from collections.abc import Iterable
-from enum import IntEnum, IntFlag
+from enum import IntFlag
 from typing import TYPE_CHECKING, Final
 
+from firmware_sim.guard.devices_heard import OLDEST, DevicesHeard
 from firmware_sim.guard.parameters import GuardParameters
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Frame
 from utank_hil.canbus.e2e import profile2_crc
+from utank_hil.canbus.profiles.guarded import Stream
 
 if TYPE_CHECKING:
     from firmware_sim.plant import Plant  # compiled: a scenario is read without it
@@ -24,7 +26,9 @@ class GuardNode:
 
     def __init__(self, parameters: GuardParameters, plant: "Plant | None" = None) -> None:
         self.guard = Guard(parameters)
-        self.hears = frozenset(each.can_id for each in parameters.messages)
+        self.hears = frozenset(each.can_id for each in parameters.messages).union(
+            *(part.can_ids for part in parameters.parts)
+        )
         self._plant = plant  # without one it only judges
 
     def receive(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
@@ -39,7 +43,6 @@ class GuardNode:
         return ()
 
 
-OLDEST: Final = 65535
 COMMAND_AGE: Final = 15
 FRESH: Final = 10
 RELEASE: Final = 120
@@ -49,20 +52,7 @@ PERSIST: Final = 10
 HEEL_TICKS: Final = 6000
 HEEL_SCALE: Final = 4096
 NO_TORQUE: Final = (0x00, 0x40, 0x21, 0x23, 0x08)  #: CiA 402 states.
-
-
-class Stream(IntEnum):
-    """Messages, in the order of guard.h."""
-
-    COMMAND = 0
-    DRIVE = 1
-    MOTION = 2
-    MOTION_2 = 3
-    TANK = 4
-    PUMP = 5
-    ORDER = 6
-    ORDER_2 = 7
-    HARDWIRED = 8
+ENABLE: Final = 0x0F
 
 
 class Reason(IntFlag):
@@ -85,6 +75,9 @@ class Guard:
         self.parameters = parameters
         self.reasons = int(Reason.WAITING)
         self._streams = {each.can_id: index for index, each in enumerate(parameters.messages)}
+        self._devices = DevicesHeard(
+            parameters.parts, tuple(each.unchanged for each in parameters.messages)
+        )
         self._age = [OLDEST] * len(Stream)
         self._expected = [16] * len(Stream)
         self._candidate, self._run = [16] * len(Stream), [0] * len(Stream)
@@ -100,6 +93,11 @@ class Guard:
 
     def receive(self, frame: Frame) -> None:
         """Take one frame from the bus."""
+        self._receive_native(frame)
+        for stream in self._devices.heard(frame):
+            self._take_device(stream)
+
+    def _receive_native(self, frame: Frame) -> None:
         stream, data = self._streams.get(frame.can_id), frame.data
         if stream is None or len(data) != 8:
             return
@@ -152,19 +150,46 @@ class Guard:
                 return
             self._drive_pa = pressure
         elif stream == Stream.TANK:
-            self._switches[Stream.TANK] = data[1] & 0xF0 != 0
-            if data[6] & 15 > 1 or not (2000 <= w1 <= 62000 and 2000 <= w2 <= 62000):
-                return
-            self._level = w2 - w1
+            good = data[6] & 15 <= 1 and 2000 <= w1 <= 62000 and 2000 <= w2 <= 62000
+            self._take_values(stream, [w1, w2, data[1] & 0xF0, 0], whole=good)
+            return
         elif stream == Stream.PUMP:
-            if not (known and usable):
-                return
-            self._pump_pa = pressure
+            self._take_values(stream, [pressure], whole=known and usable)
+            return
         else:
-            if not usable or max(w1, w2) > 64000:
-                return
-            self._roll, self._rate = w1 - 32000, w2 - 32000
+            good = usable and max(w1, w2) <= 64000
+            self._take_values(stream, [w1 - 32000, w2 - 32000], whole=good)
+            return
         self._age[stream] = 0
+
+    def _take_values(self, stream: int, values: list[int], *, whole: bool) -> None:
+        """Take the values of a stream, `whole` if they are good and of now."""
+        if stream == Stream.TANK:
+            self._switches[Stream.TANK] = any(values[2:])
+        if not whole:
+            return
+        if stream == Stream.TANK:
+            self._level = values[1] - values[0]
+        elif stream == Stream.PUMP:
+            self._pump_pa = values[0]
+        else:
+            self._roll, self._rate = values[:2]
+        self._age[stream] = 0
+
+    def _take_device(self, stream: Stream) -> None:
+        """Take what a device of another maker says."""
+        values, whole = self._devices.values[stream], self._devices.whole(stream)
+        if stream == Stream.COMMAND:
+            self._command = self.parameters.pressure if values[0] & 0x8F == ENABLE else 0
+            self._age[stream] = 0
+        elif stream == Stream.DRIVE:  # in some states the bit of quick stop does not count
+            self._state = values[0] & (0x6F if values[0] & 7 else 0x4F)
+            self._age[stream] = 0
+        elif stream == Stream.ORDER:
+            bits = sum(1 << place for place, value in enumerate(values[:3]) if value)
+            self._order(stream, bits, counts=whole)
+        else:
+            self._take_values(stream, values, whole=whole)
 
     def _order(self, stream: int, byte: int, *, counts: bool) -> None:
         """Obey a stop and a disarm of any whole frame, arm and reset of one that counts."""
@@ -202,7 +227,8 @@ class Guard:
         """Return the reasons to cut, 0 if the drive's power may stay on; called every 10 ms."""
         limits = self.parameters
         self._age = [min(age + 1, OLDEST) for age in self._age]
-        self._note(self._command if self._age[Stream.COMMAND] <= COMMAND_AGE else 0)
+        self._devices.tick()
+        self._note(self._commanded)
         if self._younger(Stream.MOTION, Stream.MOTION_2) <= FRESH:
             away = self._roll * HEEL_SCALE - self._heel
             self._heel += abs(away) // HEEL_TICKS * (1 if away > 0 else -1)
@@ -246,6 +272,10 @@ class Guard:
         self._reset = self._stop_heard = self._bad_command = False
         return self.reasons
 
+    @property
+    def _commanded(self) -> int:
+        return self._command if self._age[Stream.COMMAND] <= COMMAND_AGE else 0
+
     def _note(self, command: int) -> None:
         self._window += 1
         if self._window >= WINDOW:
@@ -256,7 +286,10 @@ class Guard:
 
     def _is_off(self, pressure: int, error: int) -> bool:
         """Whether a pressure is off all commands of half a second, and off zero."""
-        return not min(self._least) - error <= pressure <= max(self._most) + error
+        least, most = min(self._least), max(self._most)
+        if self.parameters.torque_drive:
+            least, most = -self._commanded, self._commanded
+        return not least - error <= pressure <= most + error
 
 
 def _longer(lasted: int, holds: bool) -> int:

@@ -52,10 +52,6 @@ from utank_hil.safety.safety_limits import SafetyLimits
 
 _OF_DRIVE: Final = (SENT_1, SENT_2, SDO_ANSWER)
 """What the controller itself has the drive send, by function (CiA 301)."""
-UNGUARDED: Final = (
-    "The guard (docs/safety.md) reads native frames and hears none of these devices: cut the "
-    "drive's power by a hard-wired stop instead, and say redundancy: {hardwired_inputs: true}"
-)
 MOST_CYCLE_MS: Final = 50.0
 """The monitors look at motion and levels every 50 ms and take a gap of 100 ms as a loss: below 20
 Hz they see nothing."""

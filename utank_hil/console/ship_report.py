@@ -6,10 +6,11 @@ from typing import Any, Final
 import numpy as np
 
 from utank_hil.analysis.tank_sizing import pump_demand, pump_level_m
+from utank_hil.canbus.profiles.guarded import guard_parts
 from utank_hil.configuration import Vessel
 from utank_hil.configuration.device_section import DeviceSection
 from utank_hil.configuration.device_sections import unit_of
-from utank_hil.configuration.devices import UNGUARDED, DevicesSection, PanelSection, ValveSection
+from utank_hil.configuration.devices import DevicesSection, PanelSection, ValveSection
 from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
 from utank_hil.console.terminal import Terminal, new_table, rows_table
 from utank_hil.control.optimal_tank import tank_figures
@@ -311,8 +312,11 @@ def print_devices(console: Terminal, devices: DevicesSection | None) -> None:
             console.say(", ".join(each["not_protected_by"]), yellow="  not protected by")
     if devices is not None and devices.unprotected:
         console.say("Half the pressure is allowed until a second motion sensor agrees.")
-    if devices_json(devices):
-        console.say(f"{UNGUARDED}.")
+    if devices is not None:
+        try:
+            guard_parts(devices.foreign())
+        except ValueError as error:
+            console.say(f"{error}.")
 
 
 def _print_drive(console: Terminal, drive: dict[str, Any], where: str) -> None:

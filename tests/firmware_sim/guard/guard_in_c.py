@@ -7,9 +7,10 @@ from pathlib import Path
 
 from firmware_sim.guard import parameters as module
 from firmware_sim.guard.parameters import GuardParameters
-from firmware_sim.guard.reference import Stream
+from utank_hil.canbus.profiles.guarded import MOST_PARTS, PLACES, GuardPart, Stream
 
 SOURCE = Path(module.__file__).parent
+SOURCES = sorted(SOURCE.glob("*.c"))
 FLAGS = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-ffreestanding")
 
 
@@ -17,22 +18,42 @@ class _Message(ctypes.Structure):
     _fields_ = [
         ("can_id", ctypes.c_uint32),
         ("patience", ctypes.c_uint16),
+        ("unchanged", ctypes.c_uint16),
         ("data_ids", ctypes.c_uint8 * 16),
+    ]
+
+
+class _Crc(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_uint8) for name in ("at", "polynomial", "start", "final")]
+
+
+class _Part(ctypes.Structure):
+    _fields_ = [
+        *((name, ctypes.c_uint32) for name in ("can_id", "id_bits")),
+        ("length", ctypes.c_uint8),
+        ("crc", _Crc),
+        *((name, ctypes.c_uint8) for name in ("stream", "place")),
+        ("old", ctypes.c_uint16),
+        *((name, ctypes.c_uint8) for name in ("most_first", "shift")),
+        *((name, ctypes.c_uint32) for name in ("mask", "sign_bit")),
+        *((name, ctypes.c_int64) for name in ("least", "most", "times", "plus", "by")),
+        ("otherwise", ctypes.c_int32),
     ]
 
 
 class _Parameters(ctypes.Structure):
     _fields_ = [
         ("messages", _Message * len(Stream)),
-        *((name, ctypes.c_int32) for name in GuardParameters.__slots__[1:-1]),
-        ("second_station", ctypes.c_uint8),
+        *((name, ctypes.c_int32) for name in GuardParameters.__slots__[1:-3]),
+        *((name, ctypes.c_uint8) for name in ("second_station", "torque_drive", "part_count")),
+        ("parts", _Part * MOST_PARTS),
     ]
 
 
 @cache
 def library(folder: Path) -> ctypes.CDLL:
     out = folder / "guard.so"
-    words = ["cc", *FLAGS, "-O2", "-shared", "-fPIC", SOURCE / "guard.c", "-o", out]
+    words = ["cc", *FLAGS, "-O2", "-shared", "-fPIC", *SOURCES, "-o", out]
     subprocess.run([str(word) for word in words], check=True)
     found = ctypes.CDLL(str(out))
     found.guard_tick.restype = ctypes.c_uint8
@@ -42,22 +63,71 @@ def library(folder: Path) -> ctypes.CDLL:
     return found
 
 
+class _Stream(ctypes.Structure):
+    _fields_ = [
+        ("age", ctypes.c_uint16),
+        *((name, ctypes.c_uint8) for name in ("expected", "candidate", "run")),
+    ]
+
+
+class _Head(ctypes.Structure):
+    """The first members of `struct guard`."""
+
+    _fields_ = [
+        ("parameters", ctypes.c_void_p),
+        ("streams", _Stream * len(Stream)),
+        ("values", (ctypes.c_int32 * PLACES) * len(Stream)),
+        ("same", ctypes.c_uint16 * len(Stream)),
+        ("part_age", ctypes.c_uint16 * MOST_PARTS),
+        ("part_raw", ctypes.c_uint32 * MOST_PARTS),
+        *(
+            (name, ctypes.c_int32)
+            for name in ("command", "drive", "pump", "roll", "rate", "heel", "level")
+        ),
+    ]
+
+
+def _part(part: GuardPart) -> _Part:
+    crc = part.crc
+    values = {name: int(getattr(part, name)) for name in GuardPart.__slots__ if name != "crc"}
+    return _Part(crc=_Crc(crc.byte, crc.polynomial, crc.start, crc.final), **values)
+
+
+def _table(parameters: GuardParameters) -> _Parameters:
+    messages = [
+        _Message(each.can_id, each.patience, each.unchanged, (ctypes.c_uint8 * 16)(*each.data_ids))
+        for each in parameters.messages
+    ]
+    numbers = [getattr(parameters, name) for name in GuardParameters.__slots__[1:-1]]
+    parts = [_part(each) for each in parameters.parts]
+    return _Parameters(
+        (_Message * len(Stream))(*messages), *numbers, len(parts), (_Part * MOST_PARTS)(*parts)
+    )
+
+
 class GuardInC:
     """As `Guard`."""
 
     def __init__(self, parameters: GuardParameters, folder: Path) -> None:
         self._library = library(folder)
-        messages = [
-            _Message(each.can_id, each.patience, (ctypes.c_uint8 * 16)(*each.data_ids))
-            for each in parameters.messages
-        ]
-        numbers = [getattr(parameters, name) for name in GuardParameters.__slots__[1:]]
-        self._parameters = _Parameters((_Message * len(Stream))(*messages), *numbers)
+        self._parameters = _table(parameters)
         self._state = ctypes.create_string_buffer(4096)
         self._library.guard_start(self._state, ctypes.byref(self._parameters))
+
+    @staticmethod
+    def table_of(parameters: GuardParameters) -> bytes:
+        """The table's bytes, as a C compiler lays them out."""
+        return bytes(_table(parameters))
 
     def receive(self, can_id: int, data: bytes) -> None:
         self._library.guard_receive(self._state, can_id, data, len(data))
 
     def tick(self) -> int:
         return int(self._library.guard_tick(self._state))
+
+    @property
+    def numbers(self) -> tuple[list[int], ...]:
+        """What it has read: ages of the streams, values, and the numbers that are judged."""
+        head = _Head.from_buffer(self._state)
+        judged = [head.command, head.pump, head.roll, head.rate, head.heel, head.level]
+        return [each.age for each in head.streams], judged, list(head.part_raw), list(head.part_age)

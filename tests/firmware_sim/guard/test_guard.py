@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from guard_in_c import FLAGS, SOURCE, GuardInC
+from guard_in_c import FLAGS, SOURCE, SOURCES, GuardInC
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from firmware_sim.guard.devices_heard import OLDEST
 from firmware_sim.guard.parameters import STREAMS, GuardParameters, guard_parameters
-from firmware_sim.guard.reference import OLDEST, Guard, Reason, Stream
+from firmware_sim.guard.reference import Guard, Reason
 from utank_hil.canbus import (
     Address,
     ControlWord,
@@ -34,6 +35,7 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.canbus.e2e import profile2_crc
+from utank_hil.canbus.profiles.guarded import Stream
 from utank_hil.configuration import ControllerConfig, load_config
 
 CATALOGUE = load_catalogue()
@@ -276,7 +278,7 @@ def test_the_header_compiles_into_a_freestanding_program(tmp_path: Path) -> None
     )
     out = tmp_path / "all.o"
     subprocess.run(["cc", *FLAGS, f"-I{SOURCE}", "-c", main, "-o", out], check=True)
-    subprocess.run(["cc", *FLAGS, "-c", SOURCE / "guard.c", "-o", out], check=True)
+    subprocess.run(["cc", *FLAGS, "-r", "-nostdlib", *SOURCES, "-o", out], check=True)
     undefined = subprocess.run(["nm", "-u", out], capture_output=True, text=True, check=True)
     assert undefined.stdout.split() == []  # it calls nothing
 
@@ -294,7 +296,7 @@ def test_cppcheck_finds_no_breach_of_misra_c(tmp_path: Path) -> None:
     breach = subprocess.run([*words, seeded], capture_output=True, text=True)
     assert breach.returncode == 1
     assert "misra-c2012-12.1" in breach.stderr
-    result = subprocess.run([*words, SOURCE / "guard.c"], capture_output=True, text=True)
+    result = subprocess.run([*words, *SOURCES], capture_output=True, text=True)
     assert (result.returncode, result.stderr) == (0, "")
 
 

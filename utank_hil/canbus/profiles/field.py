@@ -19,8 +19,8 @@ class Field:
     """
 
     __slots__ = (
-        "_big", "_end", "_first", "_greatest", "_half", "_ieee", "_least", "_mask", "_most",
-        "_shift", "_spare", "bits", "offset", "scale",
+        "_end", "_first", "_greatest", "_half", "_ieee", "_mask", "_spare", "big_endian", "bits",
+        "least_raw", "most_raw", "offset", "scale", "shift",
     )  # fmt: skip
 
     def __init__(
@@ -44,8 +44,8 @@ class Field:
             raise ValueError(f"bits {start} and on, {bits} of them, are not in {length} bytes")
         if real and bits not in _REAL:
             raise ValueError(f"a real number has 16, 32 or 64 bits, not {bits}")
-        self._big = big_endian
-        self._shift = shift
+        self.big_endian = big_endian
+        self.shift = shift
         # its bytes, from the most of them to the least, and the bits that the least one has besides
         least = shift // 8
         count = (shift + bits - 1) // 8 - least + 1
@@ -55,14 +55,24 @@ class Field:
         self._mask = (1 << bits) - 1
         self._half = 1 << (bits - 1) if signed and not real else 1 << bits
         self._ieee, self._greatest = _REAL[bits] if real else ("", 0.0)
-        self._least = -(1 << bits) if least_raw is None else least_raw
-        self._most = 1 << bits if most_raw is None else most_raw
+        self.least_raw = -(1 << bits) if least_raw is None else least_raw
+        self.most_raw = 1 << bits if most_raw is None else most_raw
         self.bits, self.scale, self.offset = bits, scale, offset
+
+    @property
+    def signed(self) -> bool:
+        """Whether the counts are two's complement."""
+        return self._half <= self._mask
+
+    @property
+    def real(self) -> bool:
+        """Whether it is a real number."""
+        return self._ieee != ""
 
     def raw(self, data: bytes) -> int:
         """Counts of the signal, with their sign."""
         word = 0
-        if self._big:
+        if self.big_endian:
             for place in range(self._first, self._end):
                 word = word << 8 | data[place]
         else:
@@ -74,7 +84,7 @@ class Field:
     def value(self, data: bytes) -> float:
         """Physical value; NaN if the counts say that there is none."""
         raw = self.raw(data)
-        if not self._least <= raw <= self._most:
+        if not self.least_raw <= raw <= self.most_raw:
             return math.nan
         if self._ieee:
             packed = raw.to_bytes(self.bits // 8, "little")
@@ -92,7 +102,7 @@ class Field:
             raw = min(max(raw, -self._greatest), self._greatest) if raw == raw else raw
             counts = int.from_bytes(struct.pack(self._ieee, raw), "little")
             return self.put_counts(word, counts, length)
-        least, most = self._least, self._most
+        least, most = self.least_raw, self.most_raw
         low, high = -self._half if self._half <= self._mask else 0, min(self._half - 1, self._mask)
         if math.isnan(value):
             counts = most + 1 if most < high else least - 1 if least > low else 0
@@ -102,11 +112,11 @@ class Field:
 
     def put_counts(self, word: int, counts: int, length: int, mask: int = -1) -> int:
         """Likewise with these counts, or the bits of a `mask` of them."""
-        mask = (mask & self._mask) << self._shift
-        if self._big:
+        mask = (mask & self._mask) << self.shift
+        if self.big_endian:
             word = int.from_bytes(word.to_bytes(length, "little"), "big")
-        word = word & ~mask | counts << self._shift & mask
-        if self._big:
+        word = word & ~mask | counts << self.shift & mask
+        if self.big_endian:
             word = int.from_bytes(word.to_bytes(length, "big"), "little")
         return word
 
