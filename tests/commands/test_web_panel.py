@@ -30,7 +30,7 @@ class Client:
     """A page without a browser: follows the states, answers them, and orders."""
 
     def __init__(self, url: str) -> None:
-        parts = urlsplit(url)
+        self.url, parts = url, urlsplit(url)
         assert parts.hostname is not None
         self.host = parts.netloc
         self.path = parts.path
@@ -197,7 +197,7 @@ def test_a_lost_page_silences_the_panel_and_one_that_returns_goes_on(
     before = len(made.ship.frames)
     time.sleep(0.5)
     assert len(made.ship.frames) == before  # neither orders nor a heartbeat
-    with page(f"http://{client.host}{client.path}") as again:
+    with page(client.url) as again:
         again.follow()
         made.wait("node.attended")
         again.until("state['mode'] == 'ACTIVE'")
@@ -213,12 +213,27 @@ def test_a_panel_that_was_lost_while_the_controller_left_active_asks_for_nothing
     lose_the_page_that_armed(made, client)
     made.ship.mode = Mode.FAULT
     time.sleep(0.3)
-    with page(f"http://{client.host}{client.path}") as again:
+    with page(client.url) as again:
         again.until("state['mode'] == 'FAULT'")
         made.wait("node.attended and not ship.heard[-1][1].arm")
         made.ship.mode = Mode.STANDBY
         again.until("state['mode'] == 'STANDBY'")
         assert not made.ship.heard[-1][1].arm
+
+
+def test_a_page_that_asks_again_gets_no_state_of_a_panel_that_hangs(
+    at: tuple[Bench, Client],
+) -> None:
+    made, client = at
+    made.held.set()
+    time.sleep(0.3)
+    again = Client(client.url)
+    again.stream.timeout = 1.5
+    with pytest.raises(TimeoutError):
+        again.open().follow()
+    again.close()
+    made.held.clear()
+    client.follow()
 
 
 def test_stop_is_sent_without_an_open_page(running: tuple[Bench, str]) -> None:
@@ -235,7 +250,7 @@ def test_stop_is_sent_without_an_open_page(running: tuple[Bench, str]) -> None:
 
 def test_two_pages_both_see_and_either_stops(at: tuple[Bench, Client]) -> None:
     made, client = at
-    with page(f"http://{client.host}{client.path}") as other:
+    with page(client.url) as other:
         client.order("arm")
         other.until("state['mode'] == 'ACTIVE' and state['said']['lines'][-1] == 'arm'")
         client.follow()

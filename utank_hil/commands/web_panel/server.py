@@ -75,7 +75,7 @@ class PageServer(ThreadingHTTPServer):
         self._link = link
         self._changed = threading.Condition()
         self._state = b""
-        self._number = 0
+        self.number = 0
         self.pages = threading.BoundedSemaphore(MOST_PAGES)
         self._room = threading.BoundedSemaphore(MOST_CONNECTIONS)
 
@@ -84,7 +84,7 @@ class PageServer(ThreadingHTTPServer):
         with suppress(OSError):
             while state := self._link.recv(1 << 20):
                 with self._changed:
-                    self._state, self._number = state, self._number + 1
+                    self._state, self.number = state, self.number + 1
                     self._changed.notify_all()
         self.shutdown()
 
@@ -94,13 +94,13 @@ class PageServer(ThreadingHTTPServer):
         TimeoutError is raised if none comes.
         """
         with self._changed:
-            if not self._changed.wait_for(lambda: self._number > number, _PATIENCE_S):
+            if not self._changed.wait_for(lambda: self.number > number, _PATIENCE_S):
                 raise TimeoutError
-            return self._number, self._state
+            return self.number, self._state
 
     def hand_on(self, order: Order) -> str:
         """Tell the panel of an answer, and of its button; return why not."""
-        late = not 0 <= self._number - order.number <= LATE
+        late = not 0 <= self.number - order.number <= LATE
         if late and order.action is not Action.STOP:
             return "late: what this page shows is old"
         button = PRESENT if order.action is None else order.action.value
@@ -198,7 +198,7 @@ class _Page(BaseHTTPRequestHandler):
             self._head(HTTPStatus.OK, "text/event-stream", None)
             self.close_connection = True
             self.wfile.write(b"retry: 300\n\n")
-            number = 0
+            number = self.server.number  # A page that asks again must not take an old one as new.
             while True:
                 number, state = self.server.next_state(number)
                 self.wfile.write(b"id: %d\ndata: %s\n\n" % (number, state))
