@@ -339,6 +339,9 @@ def controller_file(name: str, sea: dict[str, Any], limits: dict[str, float]) ->
     return f"""\
 # A law that finds its numbers for ship, pump and sea, with all margins. Without the section sea it
 # expects no sea in particular. mean_power_w in W, beside it, bounds what the pump spends.
+# In a sea far from this one, as following waves at speed, it can roll the ship more, and ends in
+# ROLL_AMPLIFIED. Without sea, and with sea_estimate: {{renew: true}} below law, it is renewed for
+# the waves that the ship meets.
 name: {json.dumps(f"{name}, self-tuned")}
 vessel: ship.yaml
 law:
