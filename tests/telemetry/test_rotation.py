@@ -77,6 +77,16 @@ def test_runs_of_a_computer_without_a_clock_are_removed_in_their_order(tmp_path,
     assert [int(path.stem[4]) for path in removed] == [9, 9, 8, 8, 7, 7, 6, 6]
 
 
+def test_recordings_of_an_earlier_version_count_and_are_removed(tmp_path):
+    """It recorded a run into a file of frames and one of Rerun."""
+    old = [tmp_path / "run-1.frames", tmp_path / "run-1.rrd", tmp_path / "run-1-part002.rrd"]
+    for age, path in enumerate(old):
+        path.write_bytes(bytes(1000))
+        os.utime(path, ns=(age, age))
+    (tmp_path / "bench-1.rrd").write_bytes(bytes(3000))
+    assert remove_oldest(tmp_path / "run-2.frames", 1500) == old[:2]
+
+
 def test_a_file_that_somebody_else_removes_meanwhile_ends_no_recording(tmp_path):
     """A link to nowhere is as such a file: it has a name, and nothing is known of it."""
     (tmp_path / "run-1.frames").symlink_to(tmp_path / "gone")

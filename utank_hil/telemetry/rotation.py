@@ -12,6 +12,7 @@ from os import stat_result
 from pathlib import Path
 from typing import Final
 
+_EARLIER: Final = ".rrd"  #: Ending of the recordings of 0.2.0, which count too.
 _GROWTH: Final = 1.05  #: Growth of a file over the one before: compression differs.
 
 
@@ -49,9 +50,11 @@ def _found(paths: Iterable[Path]) -> Iterator[tuple[Path, stat_result]]:
 
 def _alike(file: Path) -> Iterator[tuple[Path, stat_result]]:
     """Return other files of names like that of `file` up to the first hyphen, and their status."""
-    for path, status in _found(file.parent.glob(f"{file.stem.partition('-')[0]}-*{file.suffix}")):
-        if path.stem != file.stem:
-            yield path, status
+    names = f"{file.stem.partition('-')[0]}-*"
+    for suffix in {file.suffix, _EARLIER}:
+        for path, status in _found(file.parent.glob(names + suffix)):
+            if path.stem != file.stem:
+                yield path, status
 
 
 def _put_before(file: Path, now_ns: int) -> None:
