@@ -123,11 +123,7 @@ def init(
         ship = StarterShip(
             ship_name, length, beam, displacement, gm, roll_period, draught, roll_damping
         )
-        usual = TankRoom.in_hull(length, beam)
-    with _at_options("tank-"):
-        room = replace(usual, **{key: of for key, of in given.items() if of is not None})
-    if room.breadth_m > beam:
-        fail(f"--tank-breadth: is {room.breadth_m:g} m, and the ship's beam {beam:g} m")
+    room = _room(length, beam, given)
     for which, value in (("hs", hs), ("tp", tp)):
         if value is not None and not 0 < value < math.inf:
             fail(f"--{which}: must be positive and finite, got {value}")
@@ -145,9 +141,25 @@ def init(
     except CalmSeaError as error:
         fail(f"--tp: {error}")
     files = _written(project, data, folder)
+    _tell(ship, project, files, json_)
+
+
+def _room(length: float, beam: float, given: dict[str, float | None]) -> TankRoom:
+    """Room for the tank: what is given, and else what is usual in such a hull."""
+    with _at_options():
+        usual = TankRoom.in_hull(length, beam)
+    with _at_options("tank-"):
+        room = replace(usual, **{key: of for key, of in given.items() if of is not None})
+    if room.breadth_m > beam:
+        fail(f"--tank-breadth: is {room.breadth_m:g} m, and the ship's beam {beam:g} m")
+    return room
+
+
+def _tell(ship: StarterShip, project: StarterProject, files: dict[str, Path], json_: bool) -> None:
+    """Predict what a bench of the project would give, and print all that is known of it."""
     scenario = load(files[SCENARIO], Scenario)
     (config,) = scenario.controllers.values()
-    with notes.busy(f"{ship_name}: what a bench of its scenario would give"):
+    with notes.busy(f"{project.vessel.name}: what a bench of its scenario would give"):
         expected = predict(scenario, config.plant, build_law(config))
     little = _little_help(project, expected, config.safety.roll_limit_rad)
     if json_:

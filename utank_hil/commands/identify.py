@@ -196,14 +196,7 @@ def identify_log(
         if value is not None and not math.isfinite(value):
             common.fail(f"{option} must be a number of seconds, got {value}")
     loaded = common.load(config, ControllerConfig, allow_code=True)  # Code is refused, not run.
-    settings = loaded.retuning
-    if order is None:
-        order = 120 if settings is None else settings.order
-    period_range_s = ANY_PERIOD_S if settings is None else settings.roll_period_range_s
-    try:
-        task = retuning_task(loaded, order, period_range_s)
-    except ValueError as error:
-        common.fail(f"{config}: {error}")
+    task = _task(loaded, config, order)
     content = read_controller(config)
     out = common.prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
     measured, sample_time_s = task.design.predictor.measured, task.design.predictor.sample_time_s
@@ -239,6 +232,18 @@ def identify_log(
         print_report(Terminal(), found, task, answer, files)
     if not isinstance(answer, Candidate):
         raise typer.Exit(ExitCode.REFUSED)
+
+
+def _task(loaded: ControllerConfig, config: Path, order: int | None) -> RetuningTask:
+    """What is identified and designed, as the configuration's retuning does it if it has one."""
+    settings = loaded.retuning
+    if order is None:
+        order = 120 if settings is None else settings.order
+    period_range_s = ANY_PERIOD_S if settings is None else settings.roll_period_range_s
+    try:
+        return retuning_task(loaded, order, period_range_s)
+    except ValueError as error:
+        common.fail(f"{config}: {error}")
 
 
 class _LogUnlessNamed(TyperGroup):

@@ -102,15 +102,10 @@ def run(
     except ValueError as error:
         common.fail(f"--outward: {error}")
     law = admit(loaded, config)
-    if loaded.safety.overruns_in_ten is None:
-        notes.say("safety.overruns_in_ten", yellow="repeated late ticks are not judged:")
     if other := why_other_bit_rate(bus, loaded.bit_rate):
         common.fail(f"{config}: bit_rate: {other}")
     refused = why_not_commissioned(loaded, bus, config, record)
-    if loaded.vessel.emulated:
-        notes.say("no node on board counts as one of this ship", yellow="vessel.emulated: true:")
-    if refused:
-        notes.say(refused, yellow="arming will be refused:")
+    _warn(loaded, refused)
     statistics = LoopStatistics()
     with _refusals_named(), ExitStack() as stack:
         manager = _service_manager(stack)
@@ -158,6 +153,16 @@ def run(
         else:
             _print_summary(loaded.name, node, statistics, kept)
     raise typer.Exit(_code(node))
+
+
+def _warn(loaded: ControllerConfig, refused: str) -> None:
+    """Say what is unusual of this run."""
+    if loaded.safety.overruns_in_ten is None:
+        notes.say("safety.overruns_in_ten", yellow="repeated late ticks are not judged:")
+    if loaded.vessel.emulated:
+        notes.say("no node on board counts as one of this ship", yellow="vessel.emulated: true:")
+    if refused:
+        notes.say(refused, yellow="arming will be refused:")
 
 
 def _service_manager(stack: ExitStack) -> ServiceManager:

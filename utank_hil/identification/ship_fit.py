@@ -26,6 +26,7 @@ squares, was found by measurement (docs/retuning.md).
 
 import dataclasses
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -128,17 +129,8 @@ def fit_ship(
 
     try:
         weight = np.linalg.cholesky(np.linalg.inv(result.residual_covariance)).T
-        starts = [np.where(np.arange(len(spread)) == 1, start, 0.0) for start in _STARTS]
-        theta = min(starts, key=lambda start: float(np.sum(misfit(start, weight) ** 2)))
-        dispersion = 1.0
-        for _ in range(_PASSES):
-            solution = least_squares(misfit, theta, x_scale=spread, args=(weight / dispersion,))
-            theta = solution.x
-            residual_rms = float(np.sqrt(np.mean(solution.fun[: -len(theta)] ** 2)))
-            dispersion = max(1.0, dispersion * residual_rms)
-            if abs(residual_rms - 1) < _CONVERGED or dispersion == 1:
-                break
-        covariance = np.linalg.inv(solution.jac.T @ solution.jac)[:_PRESSURE, :_PRESSURE]
+        theta, covariance, dispersion = _solved(misfit, weight, spread)
+        covariance = covariance[:_PRESSURE, :_PRESSURE]
     except (np.linalg.LinAlgError, ValueError) as error:  # overflow, or a singular matrix
         raise IdentificationError(f"no ship fits the identified model: {error}") from None
     period_gradient = np.array([0.5, -0.5, 0.0, 0.0])
@@ -154,6 +146,23 @@ def fit_ship(
         theta[_PRESSURE + 1 :],
         float(np.exp(theta[_PRESSURE])),
     )
+
+
+def _solved(
+    misfit: Callable[[FloatArray, FloatArray], FloatArray], weight: FloatArray, spread: FloatArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """Parameters, their covariance, and how much larger the errors are than `weight` says."""
+    starts = [np.where(np.arange(len(spread)) == 1, start, 0.0) for start in _STARTS]
+    theta = min(starts, key=lambda start: float(np.sum(misfit(start, weight) ** 2)))
+    dispersion = 1.0
+    for _ in range(_PASSES):
+        solution = least_squares(misfit, theta, x_scale=spread, args=(weight / dispersion,))
+        theta = solution.x
+        residual_rms = float(np.sqrt(np.mean(solution.fun[: -len(theta)] ** 2)))
+        dispersion = max(1.0, dispersion * residual_rms)
+        if abs(residual_rms - 1) < _CONVERGED or dispersion == 1:
+            break
+    return theta, np.linalg.inv(solution.jac.T @ solution.jac), dispersion
 
 
 def _amplitude(u: FloatArray, result: OkidResult) -> FloatArray:

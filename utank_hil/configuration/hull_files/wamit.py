@@ -11,12 +11,14 @@ body's origin.
 
 import math
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.configuration.hull_files import parts
 from utank_hil.dynamics.hull.hull_data import HullData
 
@@ -54,19 +56,7 @@ def read_wamit(path: Path, given: parts.Given) -> HullData:
         first[at(row[0])][:, i, j] = [*row[3:5], 0.0][:2]
     scale = density * unit_m ** (3 + _PAIR)
     omega = np.array(sorted(w for w in first if 0 < w < np.inf))
-    forces = parts.sibling(path, ".3") or parts.sibling(path, ".2")
-    if forces is None:
-        raise ValueError(f"{path}: the excitation is missing: put the .3 or .2 beside it")
-    force_rows = np.array([[at(row[0]), *row[1:7]] for row in parts.table(forces, 7)])
-    _refuse_gaps(forces, force_rows[:, :2])
-    waves, headings = np.unique(force_rows[:, 0]), np.unique(force_rows[:, 1])
-    excitation = np.zeros((len(headings), len(waves), 6), dtype=np.complex128)
-    where = (
-        np.searchsorted(headings, force_rows[:, 1]),
-        np.searchsorted(waves, force_rows[:, 0]),
-        np.array([parts.mode(forces, number) for number in force_rows[:, 2]]),
-    )
-    excitation[where] = force_rows[:, 5] + 1j * force_rows[:, 6]
+    waves, headings, excitation = _excitation(path, at)
     hydrostatic = None
     if stiff := parts.sibling(path, ".hst"):
         hydrostatic = np.zeros((6, 6))
@@ -96,6 +86,26 @@ def read_wamit(path: Path, given: parts.Given) -> HullData:
         infinite_added_mass=scale * first[np.inf][0] if np.inf in first else None,
         **body,
     )
+
+
+def _excitation(
+    path: Path, at: Callable[[float], float]
+) -> tuple[FloatArray, FloatArray, ComplexArray]:
+    """Frequencies, headings and numbers of the ``.3`` or ``.2``; `at` is of its first column."""
+    forces = parts.sibling(path, ".3") or parts.sibling(path, ".2")
+    if forces is None:
+        raise ValueError(f"{path}: the excitation is missing: put the .3 or .2 beside it")
+    rows = np.array([[at(row[0]), *row[1:7]] for row in parts.table(forces, 7)])
+    _refuse_gaps(forces, rows[:, :2])
+    waves, headings = np.unique(rows[:, 0]), np.unique(rows[:, 1])
+    excitation = np.zeros((len(headings), len(waves), 6), dtype=np.complex128)
+    where = (
+        np.searchsorted(headings, rows[:, 1]),
+        np.searchsorted(waves, rows[:, 0]),
+        np.array([parts.mode(forces, number) for number in rows[:, 2]]),
+    )
+    excitation[where] = rows[:, 5] + 1j * rows[:, 6]
+    return waves, headings, excitation
 
 
 def _refuse_gaps(path: Path, begin: npt.ArrayLike) -> None:

@@ -144,21 +144,25 @@ def fit_radiation(
             shapes.append(s[..., None] * (entries + np.swapaxes(np.triu(entries, 1), -1, -2)))
         return flat(np.concatenate(shapes, axis=1)).T
 
-    low, high = np.log(omega_rad_s[0]), np.log(omega_rad_s[-1])
-    centres = low + (high - low) * (np.arange(oscillators) + 1) / (oscillators + 1)
-    centres = np.tile(centres, size)
-    own = np.repeat(np.eye(size), oscillators, axis=0)
-    start = [own, own * np.sqrt(2 * _START_RATIO * np.exp(centres))[:, None], centres]
-    if infinite_added_mass is None:
-        start.append(limit[upper])
-    first = np.concatenate([each.ravel() for each in start])
+    first = _start(omega_rad_s, size, oscillators)
     if infinite_added_mass is None:  # which the data hardly show: stay near the last frequency's
+        first = np.concatenate([first, limit[upper]])
         found = least_squares(left, first, jac=slopes, max_nfev=_FEW_STEPS)
     else:
         found = least_squares(left, first, jac=slopes, method="lm", max_nfev=_MOST_STEPS)
     direction, frequency, loss, free = parts(found.x)
     error = float(np.linalg.norm(found.fun) / np.linalg.norm(flat(wanted(free)[:, None])))
     return Radiation(free * scale, direction * unit, frequency, loss, error)
+
+
+def _start(omega_rad_s: FloatArray, size: int, oscillators: int) -> FloatArray:
+    """Oscillators of each motion alone, apart by equal ratios: directions, losses, log w0."""
+    low, high = np.log(omega_rad_s[0]), np.log(omega_rad_s[-1])
+    centres = low + (high - low) * (np.arange(oscillators) + 1) / (oscillators + 1)
+    centres = np.tile(centres, size)
+    own = np.repeat(np.eye(size), oscillators, axis=0)
+    losses = own * np.sqrt(2 * _START_RATIO * np.exp(centres))[:, None]
+    return np.concatenate([own.ravel(), losses.ravel(), centres])
 
 
 def _answer(
