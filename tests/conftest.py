@@ -1,5 +1,6 @@
 """Settings of all tests."""
 
+import gc
 import os
 import signal
 import threading
@@ -80,6 +81,14 @@ def one_process():
 
 
 @pytest.fixture
+def read_here(monkeypatch):
+    """Read recordings in this process: a new one takes half a second to import Rerun."""
+    from utank_hil.telemetry import recording_reader
+
+    monkeypatch.setattr(recording_reader, "apart", lambda function, *given: function(*given))
+
+
+@pytest.fixture
 def few_rolls(monkeypatch):
     """Predict from a tenth of the ship's time, for what does not judge the figures."""
     from firmware_sim import prediction
@@ -98,6 +107,9 @@ def _a_loop_runs_where_other_tests_ran():
     It locks the memory that is in use. All that is mapped would stay in memory for good: gigabytes.
     """
     left = set(threading.enumerate()) - {threading.current_thread()}
+    # it collects garbage before it begins: of what is imported half a second each time
+    gc.collect()
+    gc.freeze()
 
     def begun_since():
         return [thread for thread in threading.enumerate() if thread not in left]

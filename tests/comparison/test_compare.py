@@ -113,6 +113,7 @@ def test_independent_means_have_welch_s_interval():
     assert not found.paired
 
 
+@pytest.mark.usefixtures("read_here")
 def test_recordings_of_the_same_waves_are_paired_piece_by_piece(tmp_path):
     def about_it(file, width_m):
         scenario = {"sea": {"file": file}, "vessel": {"tank": {"duct_width_m": width_m}}}
@@ -138,6 +139,7 @@ def test_recordings_of_the_same_waves_are_paired_piece_by_piece(tmp_path):
     assert "not the same waves" in apart["remarks"][0]
 
 
+@pytest.mark.usefixtures("read_here")
 def test_recording_and_somebody_s_table_are_compared_by_the_columns_that_both_have(tmp_path):
     roll = waves(3, 1800.0)
     first = recorded(tmp_path / "a.rrd", roll)
@@ -154,6 +156,7 @@ def test_recording_and_somebody_s_table_are_compared_by_the_columns_that_both_ha
     assert "has no column roll_rad or roll_deg" in done.stderr
 
 
+@pytest.mark.usefixtures("read_here")
 def test_gaps_are_left_out_if_they_are_few(tmp_path):
     roll = waves(5, 1800.0)
     first, second = roll.copy(), 0.5 * roll
@@ -179,6 +182,7 @@ def test_gaps_are_left_out_if_they_are_few(tmp_path):
     assert "know 90% of the values" in done.stderr
 
 
+@pytest.mark.usefixtures("read_here")
 def test_capsized_ship_has_no_figures_and_a_law_that_lost_the_pump_is_named(tmp_path):
     names, roll = ("time_s", "roll_rad", "true_roll_rad", "mode"), waves(5, 600.0)
     active = np.full(len(roll), Mode.ACTIVE)
@@ -204,6 +208,7 @@ def test_record_without_a_known_roll_raises_no_warning(tmp_path, recwarn):
     assert not recwarn.list
 
 
+@pytest.mark.usefixtures("read_here")
 def test_table_of_a_bench_fits_eighty_columns(tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.chdir(tmp_path)
@@ -214,6 +219,7 @@ def test_table_of_a_bench_fits_eighty_columns(tmp_path, monkeypatch):
     assert "± half width of its 95 % interval" in done.stdout
 
 
+@pytest.mark.usefixtures("read_here")
 def test_record_that_is_too_short_has_no_interval(tmp_path):
     short = [recorded(tmp_path / f"{n}.rrd", waves(n, 300.0)) for n in (1, 2)]
     (each,) = found(*short)["comparisons"]

@@ -299,6 +299,7 @@ def test_bench_sails_it_and_keeps_its_hash(fmu: Path, tmp_path: Path) -> None:
         ({"fail_at": -1}, "its step: fmi[23]DoStep failed"),
     ],
 )
+@pytest.mark.usefixtures("one_process")
 def test_failure_under_way_ends_the_bench_in_plain_words(
     fmu: Path, tmp_path: Path, parameters: dict[str, float], words: str
 ) -> None:
