@@ -158,11 +158,11 @@ def test_parts_of_a_table_are_the_whole_and_none_but_one_is_held(
         )
 
     def long_log() -> Iterator[Entry]:
-        for turn in range(40):
+        for turn in range(12):
             for each in entries:
                 yield each._replace(time_ns=each.time_ns + turn * 14_000_000_000)
 
-    monkeypatch.setattr(logged_signals, "_PART", 500)
+    monkeypatch.setattr(logged_signals, "_PART", 150)
     tracemalloc.start()
     try:
         rows = export_parts(tmp_path / "long.parquet", signal_parts(long_log()))
@@ -170,7 +170,7 @@ def test_parts_of_a_table_are_the_whole_and_none_but_one_is_held(
     finally:
         tracemalloc.stop()
     table = pyarrow.parquet.read_table(tmp_path / "long.parquet")
-    assert table.num_rows == rows == 40 * 1400
+    assert table.num_rows == rows == 12 * 1400
     assert most_bytes < table.num_rows * table.num_columns * 8 / 6
 
 

@@ -116,8 +116,8 @@ def _answer_at(desk: Desk, number: int) -> Answer | None:
 
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A heart that has not beaten for 1.5 s, not 5 s, is no sign of life."""
-    monkeypatch.setattr("utank_hil.retuning.retuner._ALIVE_NS", 1_500_000_000)
+    """A heart that has not beaten for 0.6 s, not 5 s, is no sign of life."""
+    monkeypatch.setattr("utank_hil.retuning.retuner._ALIVE_NS", 600_000_000)
 
 
 @pytest.fixture(scope="module")
@@ -225,11 +225,11 @@ def test_nonsense_in_the_mailbox_is_a_refusal(retuner: RetunerProcess) -> None:
 
 @pytest.mark.usefixtures("impatient")
 def test_worker_that_hangs_shows_no_sign_of_life_and_is_replaced() -> None:
-    with running(sleeps_on_seven, hangs_after_s=2.0) as retuner:
+    with running(sleeps_on_seven, hangs_after_s=1.0) as retuner:
         retuner.desks[0].submit(1, RECORD + 7, 0)
         _wait(lambda: not retuner.alive)
         answer = _answer(retuner, 1)
-        assert answer == Refusal(("the retuner was busy for more than 2 s, and was restarted",))
+        assert answer == Refusal(("the retuner was busy for more than 1 s, and was restarted",))
         _wait(lambda: retuner.alive)
         retuner.desks[0].submit(2, RECORD, 0)
         assert _answer(retuner, 2) == Refusal(("no",))

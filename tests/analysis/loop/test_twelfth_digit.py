@@ -80,6 +80,7 @@ def test_a_law_without_a_long_search_stands(name):
     assert_stands(config.law, config, seeds=3)
 
 
+@pytest.mark.evidence("pd-dpc", "pd-lqg", "naval_self_tuning-gpc")
 @pytest.mark.parametrize(("ship", "kind"), BY_SHIP)
 def test_each_kind_stands_on_every_ship(ship, kind):
     """Patti-B's spring is a small difference of large numbers."""
