@@ -34,7 +34,7 @@ class Scenario(ScenarioContent):
             try:
                 guard_parts(self.vessel.foreign)
             except ValueError as error:
-                problems.append(("guard", f"can't be: {error}"))
+                problems.append(("guard", f"must be left out: {error}"))
         if self.plant == "linear" and self.vessel.valve is not None:
             reason = (
                 "is linear, but the loss of the vessel's valve is quadratic and would change "

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from device_ship import (
     ALL,
     ENABLE,
@@ -23,13 +24,17 @@ from device_ship import (
 from guard_in_c import FLAGS, SOURCE, GuardInC
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
 from firmware_sim.fault_injection.nodes import Pump
 from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.guard.parameters import guard_parameters
 from firmware_sim.guard.reference import Reason
+from firmware_sim.scenario import Scenario
 from utank_hil.canbus import Frame
 from utank_hil.canbus.profiles.guarded import Stream
+from utank_hil.cli import app
+from utank_hil.configuration import ConfigError, load_config
 
 
 @pytest.fixture(scope="session")
@@ -263,3 +268,26 @@ def test_the_header_of_a_ship_with_devices_compiles(tmp_path: Path) -> None:
     of.restype = ctypes.c_void_p
     expected = GuardInC.table_of(guard_parameters(config_of_all()))
     assert ctypes.string_at(of(), len(expected)) == expected
+
+
+def test_check_and_a_scenario_name_what_it_cannot_judge(tmp_path: Path) -> None:
+    configs = Path("configs").resolve()
+    ship = yaml.safe_load((configs / "ships/thesis_first_devices.yaml").read_text())
+    path = tmp_path / "ship.yaml"
+    path.write_text(yaml.safe_dump(ship))
+    assert "guard" not in CliRunner().invoke(app, ["check", str(path)]).output
+    ship["devices"]["motion"] |= GAPS
+    path.write_text(yaml.safe_dump(ship))
+    said = CliRunner(env={"COLUMNS": "300"}).invoke(app, ["check", str(path)]).output
+    assert "the guard can't judge this ship: devices.motion has in status good states" in said
+    law = yaml.safe_load((configs / "controllers/pd.yaml").read_text()) | {"vessel": "ship.yaml"}
+    (tmp_path / "pd.yaml").write_text(yaml.safe_dump(law))
+    sea = yaml.safe_load((configs / "scenarios/storm.yaml").read_text())["sea"]
+    sea["file"] = str(configs / "scenarios" / sea["file"])
+    content = {
+        "name": "x", "vessel": "ship.yaml", "controllers": {"pd": "pd.yaml"}, "sea": sea,
+        "operator": [], "duration_s": 60, "settle_s": 1, "guard": True,
+    }  # fmt: skip
+    (tmp_path / "x.yaml").write_text(yaml.safe_dump(content))
+    with pytest.raises(ConfigError, match="guard: must be left out: the guard can't judge this ship"):
+        load_config(tmp_path / "x.yaml", Scenario)
