@@ -135,6 +135,11 @@ def test_barrier_allows_what_its_formula_says(brake_share, sharpness, share):
     assert command == pytest.approx(expected, abs=10)
 
 
+def test_a_millimetre_below_the_level_all_of_the_pressure_brakes():
+    limits = PumpLimits(rate_pa_s=1e9, level_m=2e-3, lookahead_s=0.0)
+    assert CommandLimiter(limits, TANK, PERIOD_S).limit(1e6, 1e-3, 1e-9) == -50e3
+
+
 def test_mean_of_the_commands_between_two_steps():
     limiter = CommandLimiter(PumpLimits(rate_pa_s=1e5), TANK, PERIOD_S)
     commands = [limiter.limit(50e3, 0.0, 0.0) for _ in range(10)]
@@ -164,7 +169,7 @@ def test_new_and_after_a_cut_or_ramp_it_limits_nothing():
         limiter.limit(50e3, 0.0, 0.0)
         assert limiter.limiting
         relieve()
-        assert not limiter.limiting
+        assert limiter.limiting is False
     limiter.limit(limiter.command_pa, 0.0, 0.0)
     assert not limiter.limiting
 

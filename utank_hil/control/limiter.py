@@ -46,6 +46,7 @@ class CommandLimiter:
         `share` is the currently allowed part of the greatest pressure. If an argument is not
         finite, the command falls to zero at its rate limit.
         """
+        # a sum of these, or a difference, is finite only if all of them are
         if math.isfinite(desired_pa + level_m + level_rate_m_s):
             target_pa = self._permitted_pa(desired_pa, level_m, level_rate_m_s, share)
         else:
@@ -91,7 +92,7 @@ class CommandLimiter:
             return min(max(desired_pa, -most), most)
         way = math.copysign(1.0, rate_m_s)  # positive in the direction of the water's motion
         power_pa = self._limits.power_w / flow_m3_s
-        high = min(most, self._barrier_pa(way * level_m, abs(rate_m_s), most), power_pa)
+        high = min(self._barrier_pa(way * level_m, abs(rate_m_s), most), power_pa)
         return way * max(min(way * desired_pa, high), -most)
 
     def _barrier_pa(self, level_m: float, rate_m_s: float, most_pa: float) -> float:
