@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
+from controller_bench import new_monitors
 from situations import MEASURED, OWN
 
 from utank_hil.base.tick import TICK_NS, TICK_S
@@ -124,3 +125,27 @@ def test_the_second_motion_sensor_is_left_for_the_first_one_that_is_back():
         motions = MotionSample(0.1, age_ms=first_ms), MotionSample(0.2, age_ms=second_ms)
         used.append(safety.judge(replace(MEASURED, motions=motions), OWN).motion)
     assert used == [1, 1, 0, 0]
+
+
+def test_the_judgement_bounds_the_pressure_by_what_is_in_doubt():
+    """All of it; half, alone without protection; what she stands, by her monitors' thresholds."""
+    motions = MotionSample(), MotionSample()
+    of_one, of_two = replace(MEASURED, motions=motions[:1]), replace(MEASURED, motions=motions)
+    bare, bought = (
+        Safety(SafetyLimits(), 250_000),
+        Safety(SafetyLimits(), 250_000, unprotected=True),
+    )
+    assert (bare.judge(of_one, OWN).share, bare.judge(of_two, OWN).share) == (1.0, 1.0)
+    assert (bought.judge(of_one, OWN).share, bought.judge(of_two, OWN).share) == (0.5, 1.0)
+    assert bought.judge(of_one, OWN).unconfirmed_share is None
+    for pump in (True, False):
+        monitors = new_monitors()
+        monitors.thresholds = replace(
+            monitors.thresholds, degraded_share=0.125, unconfirmed_share=0.25
+        )
+        of = {} if pump else {"pump": False}
+        safety = Safety(SafetyLimits(), 250_000, monitors, unprotected=True, **of)
+        judgement = safety.judge(of_one, OWN)
+        assert judgement.share == 0.125
+        assert judgement.unconfirmed_share == (0.25 if pump else None)
+        assert judgement.passive_roll_rad == monitors.twin.roll_rad
