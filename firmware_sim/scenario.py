@@ -7,6 +7,18 @@ from firmware_sim.scenario_problems import controller_problems, part_problems, w
 from firmware_sim.voyage import unusual_loadings, unusual_sea, unusual_waypoints
 from utank_hil.base.parameters import Problem, refuse
 from utank_hil.canbus.profiles.guarded import guard_parts
+from utank_hil.configuration import Vessel
+
+
+def guard_problem(vessel: Vessel) -> str:
+    """Why a ship can have no guard; empty if she can."""
+    if vessel.pump is None:
+        return "is for a ship with a pump: leave it out"
+    try:
+        guard_parts(vessel.foreign)
+    except ValueError as error:
+        return f"must be left out: {error}"
+    return ""
 
 
 class Scenario(ScenarioContent):
@@ -28,13 +40,8 @@ class Scenario(ScenarioContent):
                 )
             if "operator" not in self.model_fields_set:
                 problems.append(("operator", "is required but missing: who arms the controllers"))
-        if self.guard and self.vessel.pump is None:
-            problems.append(("guard", "is for a ship with a pump: leave it out"))
-        elif self.guard:
-            try:
-                guard_parts(self.vessel.foreign)
-            except ValueError as error:
-                problems.append(("guard", f"must be left out: {error}"))
+        if self.guard and (reason := guard_problem(self.vessel)):
+            problems.append(("guard", reason))
         if self.plant == "linear" and self.vessel.valve is not None:
             reason = (
                 "is linear, but the loss of the vessel's valve is quadratic and would change "

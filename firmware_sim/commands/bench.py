@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from errno import ENOSPC
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.progress import TaskProgressColumn
@@ -54,6 +54,10 @@ def bench(
             "Run nothing: write the emulated ship as FMU for other programs.", metavar="FILE"
         ),
     ] = None,
+    with_: Annotated[
+        Literal["guard"] | None,
+        common.option("Add a node: a guard that may cut the drive's power.", "--with"),
+    ] = None,
     json_: common.Json = False,
     view: common.View = False,
     allow_code: common.AllowCode = False,
@@ -70,11 +74,15 @@ def bench(
     from firmware_sim.bench import BenchOptions, frames_name
     from firmware_sim.figures import figures
     from firmware_sim.report_page import REPORT_FILES, write_files
-    from firmware_sim.scenario import Scenario
+    from firmware_sim.scenario import Scenario, guard_problem
 
     if bus is not None and not real_time:
         common.fail("--bus is for real time: add --realtime, or leave --bus out")
     loaded = common.load(scenario, Scenario, allow_code=allow_code)
+    if with_ == "guard":
+        if reason := guard_problem(loaded.vessel):
+            common.fail(f"{scenario}: --with guard {reason}")
+        loaded = loaded.model_copy(update={"guard": True})
     if fmu is not None:
         _write_fmu(scenario, loaded, fmu, loaded.seed if seed is None else seed)
         if json_:

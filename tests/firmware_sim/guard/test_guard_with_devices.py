@@ -26,6 +26,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+import firmware_sim.commands.bench as bench_command
 from firmware_sim.fault_injection.nodes import Pump
 from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.guard.parameters import guard_parameters
@@ -289,5 +290,25 @@ def test_check_and_a_scenario_name_what_it_cannot_judge(tmp_path: Path) -> None:
         "operator": [], "duration_s": 60, "settle_s": 1, "guard": True,
     }  # fmt: skip
     (tmp_path / "x.yaml").write_text(yaml.safe_dump(content))
-    with pytest.raises(ConfigError, match="guard: must be left out: the guard can't judge this ship"):
+    with pytest.raises(ConfigError, match="must be left out: the guard can't judge this ship"):
         load_config(tmp_path / "x.yaml", Scenario)
+    del content["guard"]
+    (tmp_path / "x.yaml").write_text(yaml.safe_dump(content))
+    words = ["bench", str(tmp_path / "x.yaml"), "--with", "guard", "--out", str(tmp_path / "out")]
+    refused = CliRunner(env={"COLUMNS": "300"}).invoke(app, words)
+    assert "--with guard must be left out: the guard can't judge" in refused.output
+    assert refused.exit_code == 2
+
+
+def test_bench_adds_it_by_an_option(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class StopError(Exception):
+        pass
+
+    def run(loaded: Scenario, *_: object) -> None:
+        assert loaded.guard
+        raise StopError
+
+    monkeypatch.setattr(bench_command, "_run", run)
+    words = ["bench", "configs/scenarios/still_water.yaml", "--with", "guard"]
+    result = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "out")])
+    assert isinstance(result.exception, StopError)
