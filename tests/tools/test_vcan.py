@@ -10,6 +10,7 @@ import random
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -101,8 +102,15 @@ def start_loop():
     return process
 
 
-def test_command_runs_as_without_it(tmp_path):
-    directory = tmp_path / "a b"
+@pytest.fixture
+def on_disk():
+    """A folder that the emulated kernel sees, wherever temporary ones are: /dev/shm is its own."""
+    with tempfile.TemporaryDirectory(dir="/var/tmp") as folder:
+        yield Path(folder)
+
+
+def test_command_runs_as_without_it(on_disk):
+    directory = on_disk / "a b"
     directory.mkdir()
     arguments = ["two words", "", "quote ' and \"", "$HOME `id` \\n", "roulis ± 5° ☃", "--uml"]
     odd = "line\nbreak = ü 'x'"
