@@ -183,9 +183,7 @@ def mat_bomb(path):
     name = struct.pack("<LLLLL8s", 6, 8, 6, 0, 5, struct.pack("<ll", size // 8, 1))
     content = struct.pack("<LL", 14, size + 56) + name
     content += struct.pack("<LHH4sLL", 1, 1, 0, b"A\0\0\0", 9, size)
-    packing = zlib.compressobj(9)
-    packed = packing.compress(content)
-    packed += b"".join(packing.compress(bytes(1 << 20)) for _ in range(400)) + packing.flush()
+    packed = packed_zeros(size, content)
     path.write_bytes(path.read_bytes()[:128] + struct.pack("<LL", 15, len(packed)) + packed)
 
 

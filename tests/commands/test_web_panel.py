@@ -386,7 +386,7 @@ def test_stop_reaches_the_bus_as_fast_as_from_the_keyboard(at: tuple[Bench, Clie
     made.desk.look = lambda now_ns: look(now_ns) or keyboard.look(now_ns)
     taken: dict[str, list[float]] = {"keyboard": [], "page": []}
     try:
-        for way in ("keyboard", "page") * 5:
+        for way in ("keyboard", "page") * 3:
             client.until("state['mode'] == 'STANDBY' and not state['stopping']")
             client.order("arm")
             client.until("state['mode'] == 'ACTIVE'")

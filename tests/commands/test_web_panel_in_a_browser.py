@@ -55,7 +55,7 @@ def arms(seen: Opened) -> None:
         seen.page.bring_to_front()
         seen.page.keyboard.down("a")
         with suppress(TimeoutError):
-            word.wait_for(timeout=5000)
+            word.wait_for(timeout=2000)
         seen.page.keyboard.up("a")
         if word.count():
             return
