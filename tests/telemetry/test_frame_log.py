@@ -158,6 +158,17 @@ def test_nothing_is_read_beyond_a_damaged_part(tmp_path):
     assert log.cut.startswith("run-a.frames is damaged")
 
 
+@pytest.mark.parametrize("begin", [b"", b"UTANK", bytes(100)])
+def test_a_part_that_a_power_cut_left_without_its_beginning_costs_none_before_it(tmp_path, begin):
+    whole, _ = write_log(tmp_path / "run-a.frames", 300)
+    (tmp_path / "run-a-part002.frames").write_bytes(begin)
+    noted = []
+    log = FrameLog(tmp_path / "run-a.frames")
+    assert b"".join(block.tobytes() for block in log.blocks(noted.append)) == whole
+    assert noted == ["run-a-part002.frames is no frame log of this version; "
+                     "what follows in it is left out"]  # fmt: skip
+
+
 def test_another_file_is_refused_with_its_name(tmp_path):
     for content in (b"", b"time_s,roll_rad\n0,1\n"):
         (tmp_path / "a.frames").write_bytes(content)

@@ -237,7 +237,10 @@ class FrameLog:
         refuse_device(path)
         with path.open("rb") as content:
             if content.read(len(_MARK)) != _MARK:
-                raise FrameLogError(f"{path}: is no frame log of this version")
+                if path == self._paths[0]:
+                    raise FrameLogError(f"{path}: is no frame log of this version")
+                self.cut = f"{path.name} is no frame log of this version"  # after a power cut
+                return
             while header := content.read(_BLOCK.size):
                 place = content.tell() - len(header)
                 whole = len(header) == _BLOCK.size
