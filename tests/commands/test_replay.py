@@ -248,3 +248,34 @@ def test_a_file_that_is_no_log_is_an_error_with_its_name(tmp_path: Path, content
     assert result.exit_code == 2
     assert "x.frames: is no frame log" in result.stderr
     assert "x.rrd holds no frames: give a .frames" in invoke(replay, tmp_path / "x.rrd").stderr
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"retuner": None}, {"packages": []}, {"catalogue": None}, {"law": 3},
+        {"law": {"gains": ["<f8", [1], "zzzz"]}}, {"law": {"gains": ["<f8"]}},
+        {"files": {"a.csv": "zzzz"}}, {"files": {"a.csv": law_values.packed(bytes(1 << 29))}},
+    ],
+)  # fmt: skip
+def test_a_head_that_no_program_of_ours_writes_is_refused_in_words(
+    tmp_path: Path, changed: dict[str, Any]
+) -> None:
+    log = FrameLog(Path("tests/replay/motion-silent.frames"))
+    file = tmp_path / "x.frames"
+    FrameLogWriter(file, log.head | changed).close()
+    result = invoke(replay, file)
+    assert result.exit_code == ExitCode.USAGE, result.exception
+    assert "its head is not one that this program writes" in result.stderr
+
+
+@pytest.mark.parametrize("kind", [Kind.STARTED, Kind.ALIVE])
+def test_a_record_without_its_byte_ends_no_replay(tmp_path: Path, kind: Kind) -> None:
+    log = FrameLog(Path("tests/replay/motion-silent.frames"))
+    records = next(log.blocks()).copy()
+    records["kind"][0], records["length"][0] = kind, 0
+    file = tmp_path / "x.frames"
+    with FrameLogWriter(file, log.head) as writer:
+        writer.write(records)
+    result = invoke(replay, file)
+    assert isinstance(result.exception, SystemExit), result.exception

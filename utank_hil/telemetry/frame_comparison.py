@@ -42,7 +42,7 @@ class RecordedRetuner:
     def take(self, data: bytes, *, alive: bool) -> None:
         """Take a record for the next tick: the retuner's state, or a piece of its answer."""
         if alive:
-            self._alive.append(bool(data[0]))
+            self._alive.append(any(data))
         else:
             self._answer += data
 

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 Part = TypeVar("Part")
 Values = dict[str, npt.NDArray[Any]]  #: Arrays by the path of attributes that leads to them.
+_MOST_BYTES: Final = 1 << 28  #: Of an array or a data file; a bomb has more.
 _DEEPEST: Final = 12  #: Depth at which a circle of objects ends. Chosen; no study.
 
 
@@ -83,8 +84,15 @@ def packed(content: bytes) -> str:
 
 
 def unpacked(text: str) -> bytes:
-    """Invert `packed`."""
-    return zlib.decompress(base64.b85decode(text))
+    """Invert `packed`; ValueError for more than 256 MB, or for what `packed` does not give."""
+    decompressor = zlib.decompressobj()
+    try:
+        content = decompressor.decompress(base64.b85decode(text), _MOST_BYTES)
+    except zlib.error as error:
+        raise ValueError(str(error)) from error
+    if not decompressor.eof:
+        raise ValueError(f"is cut, or holds more than {_MOST_BYTES >> 20} MB")
+    return content
 
 
 def encoded(values: Values) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from utank_hil.telemetry.explained_tick import ExplainedTick
 from utank_hil.telemetry.frame_comparison import FrameComparison, RecordedRetuner, ReplayResult
 from utank_hil.telemetry.frame_log import LAYOUT, FrameLog, Kind, Records
 from utank_hil.telemetry.law_values import ValueDifference
-from utank_hil.telemetry.replay_head import causes, law_differences, recorded_law
+from utank_hil.telemetry.replay_head import causes, law_differences, recorded_law, refuse_foreign
 
 
 class LoopFigures(NamedTuple):
@@ -114,8 +114,9 @@ def replay_log(
     """Run `replay` with a controller as the log's head describes it.
 
     If `config` is the recorded one (`as_recorded`), the recorded law runs if possible, else that of
-    `config`.
+    `config`. ReplayHeadError is raised for a head that is not as `replay_head` writes it.
     """
+    refuse_foreign(log.head)
     law = designed = build_law(config)
     why_not = "another configuration was named"
     if as_recorded or isinstance(config.law, PythonDesign):
@@ -173,7 +174,7 @@ def replay(
         elif kind in (Kind.ESTIMATOR_ALIVE, Kind.ESTIMATE):
             estimates.take(entry.data, alive=kind == Kind.ESTIMATOR_ALIVE)
         elif kind == Kind.STARTED:
-            statistics.real_time = bool(entry.data[0])
+            statistics.real_time = any(entry.data)
         else:
             run.take(entry)
         if kind == Kind.TICK:

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+import msgspec
 from pydantic import ValidationError
 
 from utank_hil.base.finite import mapped
@@ -28,6 +29,34 @@ _SHOWN: Final = 10  #: Differences that fit on a screen.
 
 class ReplayHeadError(ValueError):
     """The content of a log can't be run here; the message gives reason and remedy."""
+
+
+class _Head(msgspec.Struct):
+    """What `replay` takes from a head."""
+
+    about: dict[str, Any]
+    retuner: bool
+    packages: dict[str, str]
+    catalogue: int
+    law: dict[str, tuple[str, list[int], str]]
+    files: dict[str, str]
+    estimating: bool = False
+    commissioned: bool = True
+
+
+def refuse_foreign(head: Mapping[str, Any]) -> None:
+    """Raise ReplayHeadError for a head that is not as `replay_head` writes it."""
+    try:
+        found = msgspec.convert(head, _Head)
+        law_values.decoded(found.law)
+        for data in found.files.values():
+            unpacked(data)
+    except (ValueError, TypeError) as error:
+        raise _foreign(error) from error
+
+
+def _foreign(error: Exception) -> ReplayHeadError:
+    return ReplayHeadError(f"its head is not one that this program writes: {error!r}")
 
 
 def replay_head(
@@ -75,10 +104,8 @@ def recorded_config(head: Mapping[str, Any]) -> Iterator[ControllerConfig]:
                 places[name] = str(Path(folder, f"{number}-{Path(name).name}"))
                 Path(places[name]).write_bytes(unpacked(data))
             content = _put(_in_full(head["about"]["configuration"]), places)
-        except (LookupError, TypeError, AttributeError) as error:
-            raise ReplayHeadError(
-                f"its head is not one that this program writes: {error!r}"
-            ) from error
+        except (LookupError, TypeError, AttributeError, ValueError) as error:
+            raise _foreign(error) from error
         if code := next(_code(content.get("law")), None):
             raise ReplayHeadError(
                 f"its law is Python code, {code}, which a log must not choose: name the "
