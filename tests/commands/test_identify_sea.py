@@ -35,6 +35,7 @@ def roll_rms(figures, name):
     return next(each["roll"]["rms_rad"] for each in figures["runs"] if each["name"] == name)
 
 
+@pytest.mark.usefixtures("one_process")
 def test_the_passive_ship_rolls_in_the_waves_of_a_record_under_a_law_as_in_the_sea(tmp_path):
     first = bench(scenario_in(tmp_path))
     code, out = run(
