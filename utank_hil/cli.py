@@ -19,6 +19,8 @@ with quietly_interruptible():
 
     import utank_hil.console.single_thread  # noqa: F401, first: it must run before numpy loads
     from utank_hil.console.common import Version, failures_named, new_app
+    from utank_hil.console.exit_codes import ExitCode
+    from utank_hil.console.terminal import notes
 
 GROUP = "utank_hil.commands"
 
@@ -67,6 +69,13 @@ class _Unloaded(TyperCommand):
 
 
 class _Commands(TyperGroup):
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:  # a command that keeps something handles it itself
+            notes.say("interrupted before there was a result")
+            raise typer.Exit(ExitCode.INTERRUPTED) from None
+
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
         return list(commands())
 

@@ -9,6 +9,7 @@ from firmware_sim.figures import NO_TANK
 from utank_hil.console.terminal import new_table
 
 Figure = dict[str, Any]
+_FEW = 4  #: Cases from which on Student's factor, below 3.2, leaves an interval to judge by.
 
 
 def interval(figure: Figure, scale: float, digits: int) -> str:
@@ -28,7 +29,9 @@ def runs_table(groups: list[dict[str, Any]], title: str) -> Table:
         "cases", "roll\nRMS °", "below\npassive %", "max.\nroll °", "level\npeak\nm",
         f"power\n{power[1]}", *(["not\ncounted"] if marked else []),
     )  # fmt: skip
-    caption = "mean ± 95 % of the mean"
+    counts = [run["roll_rms_rad"]["cases"] for group in groups for run in group["runs"].values()]
+    few = "; few cases: more seeds narrow it" if min(counts, default=_FEW) < _FEW else ""
+    caption = f"mean ± 95 % of the mean{few}"
     table = new_table(title, *figures, names=("run", *_short_keys(groups)), caption=caption)
     for group in groups:
         for run, found in group["runs"].items():

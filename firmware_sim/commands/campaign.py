@@ -76,7 +76,8 @@ def campaign(
         Terminal().say(f"results: {shown(folder)}")
     if interrupted:
         again = ("campaign", study, "--resume", *(() if out is None else ("--out", out)))
-        notes.say("interrupted: --resume goes on from here")
+        kept = f"{len(results.rows)} of {len(loaded.cases)} cases are kept"
+        notes.say(f"interrupted: {kept}, --resume goes on from here")
         notes.lead_on(again, allow_code=allow_code)
         raise typer.Exit(ExitCode.INTERRUPTED)
 
@@ -129,7 +130,8 @@ def _print(loaded: "LoadedStudy", groups: list[dict[str, Any]], failed: dict[str
     from firmware_sim.campaign.tables import pairs_table, runs_table
 
     console, study = Terminal(), loaded.study
-    console.table(runs_table(groups, f"{study.name}, simulation: {study.simulation}"))
+    if any(group["runs"] for group in groups):
+        console.table(runs_table(groups, f"{study.name}, simulation: {study.simulation}"))
     if any(group["paired"] for group in groups):
         console.table(pairs_table(groups))
     for reason, number in failed.items():

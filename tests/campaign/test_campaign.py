@@ -333,6 +333,19 @@ def test_interrupted_campaign_says_so_keeps_what_there_is_and_goes_on(run, tmp_p
     assert json.loads(again.stdout)["interrupted"] is False
 
 
+def test_a_campaign_interrupted_before_its_first_case_shows_no_empty_table(
+    run, tmp_path, monkeypatch
+):
+    def interrupted(driver, workers, scheduler):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Driver, "run", interrupted)
+    done = run(written(tmp_path, grid={"seed": [1, 2]}))
+    assert done.exit_code == ExitCode.INTERRUPTED, done.output
+    assert "0 of 2 cases are kept, --resume goes on from here" in done.stderr
+    assert "cases" not in done.stdout
+
+
 def test_wrong_study_ends_before_anything_is_computed(run, tmp_path):
     path = written(tmp_path, grid={"sea.headin_deg": [90.0]})
     done = run(path)

@@ -73,3 +73,22 @@ def test_handlers_are_as_before_and_others_are_left_alone() -> None:
             assert signal.getsignal(signal.SIGINT) is handler
     finally:
         signal.signal(signal.SIGINT, found)
+
+
+INTERRUPTED = """
+import utank_hil.console.common as common
+def load(*_, **__):
+    raise KeyboardInterrupt
+common.load = load
+from utank_hil.cli import main
+main()
+"""
+
+
+def test_ctrl_c_in_a_command_without_a_loop_of_its_own_is_said() -> None:
+    words = ["check", "configs/ships/thesis_first.yaml"]
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED, *words], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 130
+    assert done.stderr.strip() == "interrupted before there was a result"

@@ -63,6 +63,7 @@ def own(tmp_path: Path) -> Path:
     _write(folder / "law.yaml", LAW)
     _write(folder / "scenario.yaml", SCENARIO)
     _write(folder / "study.yaml", {"name": "seas", "scenario": "scenario.yaml", "grid": {}})
+    (folder / "swan.spec").write_text("SWAN   1    Swan standard spectral file\n$   of a model\n")
     (folder / "out" / "bench.rrd").write_bytes(b"RRF2\0\0\0\x00\xff\xfe\xff" * 9)
     (folder / "out" / "bench.png").write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\xff")
     return folder
@@ -147,6 +148,12 @@ SLIPS: list[tuple[str, str, object, tuple[str, ...]]] = [
     ("box", "pump.max_power_w", 1e-3, ("225 kW is 225e3",)),
     ("scenario", "sea.tp_s", 1 / 60, ("such waves break", "tp_s")),
     ("scenario", "duration_s", 1 / 60, ("settle_s: is 60", "duration_s, 15", "in seconds")),
+    (
+        "scenario",
+        "sea",
+        {"kind": "tabulated", "file": "swan.spec"},
+        ("sea.file", "swan.spec", "columns frequency_hz and density_m2_hz", "is kind: measured"),
+    ),
     ("law", "law.sea.effective_slope", {"coefficient": 0.7}, ("write 0.7 alone",)),
     ("scenario", "operator.0.action", "Arm", ("did you mean arm?",)),
 ]

@@ -169,6 +169,10 @@ class TabulatedSpectrum(Section):
             columns = read_number_table(self.file)
         except OSError as error:
             raise ValueError(_unread(error)) from error
+        except ValueError as error:
+            other = f"a table has the columns {' and '.join(_BANDS)}"
+            measured = "a file of a buoy or of a wave model is kind: measured"
+            raise ValueError(f"{error}; {other}, {measured}") from error
         if set(columns) != set(_BANDS):
             has = ", ".join(columns)
             raise ValueError(f"{self.file} needs the columns {' and '.join(_BANDS)}, has {has}")

@@ -63,11 +63,11 @@ def _read(path: Path, items: Callable[[Path], Iterator[Any]]) -> list[Any]:
     A killed recorder leaves a truncated file. A warning names any other damage, as by a temporarily
     full disk or a power cut: rows may be missing in the middle.
     """
+    rerun = rerun_binary()
     if path.is_file():
         with path.open("rb") as file:
             if file.read(len(_MAGIC)) != _MAGIC:
                 raise ValueError(f"{path}: is no recording (.rrd): it begins otherwise")
-    rerun = rerun_binary()
     try:
         return list(apart(items, path))
     except ValueError as error:
