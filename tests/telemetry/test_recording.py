@@ -157,7 +157,8 @@ def test_a_recording_that_aborts_its_reader_is_refused_in_words(tmp_path):
     rows = np.column_stack([np.arange(3) * 0.1, np.zeros(3)])
     write_recording(file, ["time_s", "roll_rad"], {"a": rows}, about={"version": "1"})
     content = bytearray(file.read_bytes())
-    content[484] = 0xFF  # It is in the head of the first block, where Rerun 0.41 aborts.
+    # In the head of the first block, where Rerun 0.41 aborts.
+    content[content.index(b"/__properties") + 79] = 0xFF
     file.write_bytes(content)
     code = "import rerun.chunk as c, sys; c.RrdReader(sys.argv[1]).stream().to_chunks()"
     command = [sys.executable, "-c", code, file]
