@@ -90,11 +90,15 @@ def read_here(monkeypatch):
 
 @pytest.fixture
 def few_rolls(monkeypatch):
-    """Predict from a tenth of the ship's time, for what does not judge the figures."""
+    """Predict from a tenth of the ship's time and in one more loading, not four.
+
+    For what does not judge the figures.
+    """
     from firmware_sim import prediction
 
     monkeypatch.setattr(prediction.predict, "__defaults__", (prediction.SEEDS[:1],))
     monkeypatch.setattr(prediction, "ROLLS", 4)
+    monkeypatch.setattr(prediction, "PERIOD_SCALES", (1.0, 1.3))
 
 
 _MCL_ONFAULT = 0x4

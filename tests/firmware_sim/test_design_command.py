@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from firmware_sim import prediction
 from utank_hil.analysis import tank_sweep
+from utank_hil.analysis.loop.margins import PERIOD_SCALES
 from utank_hil.cli import app
 
 pytestmark = pytest.mark.slow
@@ -67,7 +69,8 @@ def test_tank_command_sweeps(tmp_path: Path, monkeypatch):
 
 
 @pytest.mark.usefixtures("few_rolls")
-def test_tank_command_says_how_far_the_tank_is_from_the_best(tmp_path: Path):
+def test_tank_command_says_how_far_the_tank_is_from_the_best(tmp_path: Path, monkeypatch):
+    monkeypatch.setattr(prediction, "PERIOD_SCALES", PERIOD_SCALES)
     table = run("tank", FIRST, "--out", tmp_path).stdout
     found = json.loads((tmp_path / "tank.json").read_text())
     assert found["best"]["peak"] < found["present"]["peak"]
