@@ -108,7 +108,7 @@ def test_a_roll_that_is_not_measured_any_more_is_no_heel():
 
 @pytest.mark.parametrize(
     ("first_ms", "second_ms", "used"),
-    [(25.0, 0.0, 0), (26.0, 0.0, 1), (26.0, 25.0, 1), (26.0, 26.0, 0), (1e9, 1e9, 0)],
+    [(25.0, 0.0, 0), (25.01, 0.0, 1), (26.0, 25.0, 1), (26.0, 26.0, 0), (1e9, 1e9, 0)],
 )
 def test_a_motion_sensor_that_is_silent_is_left_for_one_that_is_not(first_ms, second_ms, used):
     safety = Safety(SafetyLimits(), 250_000)

@@ -66,6 +66,8 @@ def test_coarse_gauges_and_a_low_roof_move_the_thresholds_that_hang_on_them():
     assert coarse.volume_m == pytest.approx(0.24)
     low = replace(PLANT, tank=replace(TANK, headroom_m=1.0))
     assert thresholds_of(low, 0.35, SensorFigures()).level_most_m_s == pytest.approx(1.2)
+    for of_hull in (True, False):
+        assert thresholds_of(low, 0.35, SensorFigures(), of_hull=of_hull).of_hull is of_hull
 
 
 @pytest.mark.parametrize(("share", "pressure_pa"), [(0.2501, 20e3), (0.25, 80e3), (0.1, 200e3)])
