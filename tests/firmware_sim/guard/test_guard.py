@@ -156,6 +156,16 @@ def test_what_is_silent_under_pressure_cuts(bench: Bench, stream: Stream) -> Non
     assert bench.run(10, without=[stream]) & Reason.SILENT
 
 
+@pytest.mark.parametrize("stream", [Stream.MOTION, Stream.TANK, Stream.PUMP])
+def test_a_degraded_measurement_counts_and_a_bad_one_does_not(bench: Bench, stream: Stream) -> None:
+    bench.press(10e3)
+    patience = TABLE.messages[stream].patience
+    bench.say(stream, quality=Quality.DEGRADED)
+    assert bench.run(patience + 20) == 0
+    bench.say(stream, quality=Quality.BAD)
+    assert bench.run(patience + 20) & Reason.SILENT
+
+
 def test_a_pump_that_is_off_and_a_saturated_one_are_let_on(bench: Bench) -> None:
     bench.press(15e3)
     bench.say(Stream.DRIVE, pressure_pa=6e3)
