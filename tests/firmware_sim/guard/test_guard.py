@@ -166,6 +166,18 @@ def test_a_degraded_measurement_counts_and_a_bad_one_does_not(bench: Bench, stre
     assert bench.run(patience + 20) & Reason.SILENT
 
 
+def test_a_sender_that_begins_anew_counts_from_its_third_frame_in_sequence(bench: Bench) -> None:
+    bench.press(10e3)
+    bench.senders[Stream.MOTION].counter += 8
+    bench.say(Stream.MOTION, roll_rad=0.05)
+    rolls = []
+    for _ in range(4):
+        bench.run(2)
+        rolls.append(bench.guards[0]._roll)
+    assert rolls == [0, 0, 500, 500]
+    assert bench.run(TABLE.messages[Stream.MOTION].patience + 20) == 0
+
+
 def test_a_pump_that_is_off_and_a_saturated_one_are_let_on(bench: Bench) -> None:
     bench.press(15e3)
     bench.say(Stream.DRIVE, pressure_pa=6e3)

@@ -106,5 +106,5 @@ def test_sensors_are_as_their_makers_say_within_their_ranges():
         with pytest.raises(ValueError, match="must be"):
             SensorFigures(*figures)
     for index in range(3):
-        with pytest.raises(ValueError, match="must be"):
+        with pytest.raises(ValueError, match=r"^sensors .* must be"):
             SensorFigures(*(0.0 if k == index else 1e-3 for k in range(3)))

@@ -144,5 +144,6 @@ def _unconfirmed_share(plant: DesignPlant) -> float:
     stiffness = coupled_matrices(plant.ship, plant.tank)[2]
     (k11, k12), (_, k22) = stiffness.tolist()
     heel_rad = abs(k12 * push_n / (k11 * k22 - k12 * k12))
+    # where both are equal, so is the share
     least = UNCONFIRMED_SHARE * heel_rad <= math.radians(UNCONFIRMED_HEEL_DEG)
     return UNCONFIRMED_SHARE if least else float(math.radians(UNCONFIRMED_HEEL_DEG) / heel_rad)
