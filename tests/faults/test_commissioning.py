@@ -34,10 +34,11 @@ from utank_hil.canbus.events import AlarmEvent, RetuningEvent
 from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.drive_plan import SENT_2
 from utank_hil.configuration.devices import DevicesSection
-from utank_hil.nodes.commissioning.checks import RATE_SCALE, Each, remedies_of
+from utank_hil.nodes.commissioning.checks import RATE_SCALE
 from utank_hil.nodes.commissioning.node import PUSH_S, REST_S, Stage
 from utank_hil.nodes.commissioning.precision import SCALE, times_needed
 from utank_hil.nodes.commissioning.pulses import ROW_S, plan_pulses
+from utank_hil.nodes.commissioning.remedies import Each, remedies_of
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.runners import Lockstep, SimulatedBus

@@ -74,6 +74,12 @@ def headline() -> str:
     return f"{PROGRAM} {version()}, commit {commit()}"
 
 
+def made_by() -> dict[str, str]:
+    """Return what every result begins with: program, version, commit, and time (UTC)."""
+    now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
+    return {"program": PROGRAM, "version": version(), "commit": commit(), "date": now}
+
+
 def describe(
     command: str,
     configuration: BaseModel,
@@ -96,10 +102,7 @@ def describe(
     files: dict[str, Path] = {}
     plain = _plain(parts, folder, files)
     return {
-        "program": PROGRAM,
-        "version": version(),
-        "commit": commit(),
-        "date": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
+        **made_by(),
         "machine": machine(),
         "command": command,
         "options": {name: _given(value) for name, value in options.items()},

@@ -6,14 +6,13 @@ import os
 import shlex
 import tempfile
 from dataclasses import asdict
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final, Literal
 
 from pydantic import BaseModel
 
 from utank_hil.base.finite import finite
-from utank_hil.base.provenance import PROGRAM, commit, version
+from utank_hil.base.provenance import made_by
 from utank_hil.base.text_files import refuse_device
 from utank_hil.base.whole_file import left_whole
 from utank_hil.canbus import load_catalogue
@@ -46,10 +45,7 @@ def commissioned_for(config: ControllerConfig) -> dict[str, Any]:
 def made_with(vessel: Vessel, file: Path, bus: str) -> dict[str, Any]:
     """Return what each record begins with: program, time, ship, its file, and the interface."""
     return {
-        "program": PROGRAM,
-        "version": version(),
-        "commit": commit(),
-        "date": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
+        **made_by(),
         "vessel": vessel.name,
         "file": file.name,
         "bus": bus,

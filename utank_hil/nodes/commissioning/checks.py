@@ -19,7 +19,7 @@ taken out, so that a wrong one shows in its own check alone.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Generic, NamedTuple, TypeVar
+from typing import Final
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.nodes.commissioning import precision
 from utank_hil.nodes.commissioning.pulses import PulsePlan, ValveStroke
+from utank_hil.nodes.commissioning.remedies import Each, remedies_of
 from utank_hil.safety.monitors.thresholds import ZERO_HEEL_DEG
 from utank_hil.safety.situation import VALVE_OFF
 
@@ -177,23 +178,10 @@ ROLL_2_SCALE: Final = 0.05
 TANK_PERIOD: Final = 0.1
 ROLL_PERIOD: Final = 0.15
 """Tolerances, as shares."""
-NO_PRESSURE: Final = 0.15
-"""Of what was commanded: less is none."""
 STILL_SHARE: Final = 0.1
 """Of the plan's peak, after the filter, which lets two thirds through: less is no motion."""
 
-_T = TypeVar("_T")
 _BEND, _RATE, _VALUE = range(3)  # rows of a filtered signal
-
-
-class Each(NamedTuple, Generic[_T]):
-    """Something for each signal."""
-
-    pressure: _T
-    port: _T
-    starboard: _T
-    roll: _T
-    rate: _T
 
 
 _SCALES: Final = (
@@ -301,68 +289,6 @@ def _ship_period_s(
     inertia -= mass[0, 0] - plant.ship.inertia_kg_m2
     righted -= stiffness[0, 0] - plant.ship.stiffness_nm_rad
     return _period_s(righted / inertia)
-
-
-def remedies_of(scales: Each[float], of_derived: str = "") -> Each[str]:
-    """What to do about each scale if it is wrong; all of them together say what is reversed.
-
-    Of the signed `scales` 1 is right, and 0 did not move. `of_derived` is said of a rate that is
-    derived of the roll: it has no sign and scale of its own.
-    """
-    pressure, port, starboard, roll, rate = scales
-    if abs(pressure) < NO_PRESSURE:
-        no_pump = "The pump gives no pressure, or its sensor shows none. Check both."
-        return Each(no_pump, *["Without pressure nothing moves."] * 4)
-    # whoever is compared with a wrong pressure shows the inverse of its scale
-    sensor = abs(pressure - 1) > precision.SCALE and all(
-        abs(pressure * gauge - 1) <= 2 * precision.SCALE for gauge in (port, starboard)
-    )
-    if sensor:
-        of_pressure = (
-            "The pressure sensor is connected the wrong way round: exchange its sides."
-            if pressure < 0
-            else "The water moves by what was commanded: correct the pressure sensor's scaling."
-        )
-    elif pressure < 0:
-        of_pressure = (
-            "The pump pushes to port when it is to push to starboard: exchange two of the motor's "
-            "phases, or correct the drive's direction."
-        )
-    else:
-        of_pressure = "Check the pump for blockage, and the drive's limits and scaling."
-    agrees = "It agrees once the pressure sensor is right."
-    swapped = "The gauge falls when the pump pushes to its side: port and starboard are swapped."
-    of_gauges = [
-        agrees
-        if sensor
-        else swapped
-        if port < 0 and starboard < 0
-        else f"Only the {side} gauge counts downwards: correct its sign."
-        if scale < 0
-        else f"The {side} gauge does not move: check it, its pipe and its cable."
-        if scale == 0
-        else "The motion sensor shows no roll, and its push on the water is missing here."
-        if roll == 0
-        else f"Correct the {side} gauge's scaling."
-        for side, scale in (("port", port), ("starboard", starboard))
-    ]
-    if roll == 0:
-        of_roll = of_rate = "The motion sensor shows no roll: check it and its cable."
-    elif sensor and abs(roll / pressure - 1) <= 2 * precision.ROLL_SCALE:
-        of_roll, of_rate = agrees, of_derived or "Correct the sign or scaling of the roll rate."
-    elif roll < 0:
-        of_roll = "The roll has the wrong sign: it is positive starboard down. " + (
-            "Turn the motion sensor round." if rate > 0 else "The roll rate's is right."
-        )
-        of_rate = of_derived or "It agrees once the roll has the right sign."
-    else:
-        of_roll = "Correct the roll's scaling; check the tank's measures in the ship's file."
-        of_rate = of_derived or (
-            "The roll rate has the wrong sign: it is positive while starboard goes down."
-            if rate < 0
-            else "Correct the scaling of the roll rate."
-        )
-    return Each(of_pressure, of_gauges[0], of_gauges[1], of_roll, of_rate)
 
 
 def _scale_check(name: str, what: str, scale: float, tolerance: float, remedy: str) -> Check:
