@@ -73,7 +73,7 @@ def roll_rows(found: Expected) -> Rows:
 
 def interval_words(found: Expected, scenario: str) -> str:
     """Meaning of the rows of `roll_rows`, for a caption."""
-    return f"roll and pump in {scenario}; ±: 95 % of its benches, of {found.window_s:.0f} s each"
+    return f"roll and pump in {scenario}; ±: 95 % of its benches of {found.window_s:.0f} s"
 
 
 def loading_table(loadings: Sequence[Loading]) -> Table:

@@ -58,10 +58,9 @@ def campaign_report(folder: Path) -> Report:
     groups, failed, study = content["groups"], content["failures"], content["configuration"]
     picture = ReportPicture((folder / PICTURE).read_bytes(), "Rolls of each run, with intervals")
     tables = [printed(runs_table(groups, "Runs")), printed(pairs_table(groups))]
-    sections = [
-        ReportSection("Results", pictures=[picture], tables=tables),
-        ReportSection("What it leaves out", [f"{each}." for each in content["leaves_out"]]),
-    ]
+    sections = [ReportSection("Results", pictures=[picture], tables=tables)]
+    if left_out := content["leaves_out"]:
+        sections.append(ReportSection("What it leaves out", [f"{each}." for each in left_out]))
     if failed:
         rows = [[reason, str(count)] for reason, count in failed.items()]
         table = ReportTable(["reason", "cases"], rows, text=True)

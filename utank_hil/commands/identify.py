@@ -33,6 +33,7 @@ from utank_hil.identification.record import logged_samples
 from utank_hil.retuning import Candidate, Refusal
 from utank_hil.retuning.redesign import Identification, RetuningTask, identify, judge
 
+_LOADINGS: Final = (0.7, 1.3)  #: Of the roll period, as in the grid that a law is judged on.
 QUANTILE: Final = 1.96  #: Number of standard deviations to either side of a 95 % interval.
 
 
@@ -73,6 +74,9 @@ def print_report(
     console.table(_ship_table(found, task))
     console.table(_mode_table(found, task))
     console.table(_check_table(found, task))
+    periods_s = (2 * math.pi / x.natural_frequency_rad_s for x in (task.plant.ship, found.fit.ship))
+    if unlike := unlike_period(*periods_s):
+        console.say(unlike, yellow="warning:")
     waves = "no regular one found; an irregular sea is in the model of the errors."
     if found.wave_frequencies_rad_s:
         named = (f"{w:.4f} rad/s ({2 * math.pi / w:.2f} s)" for w in found.wave_frequencies_rad_s)
@@ -88,6 +92,18 @@ def print_report(
         for reason in answer.reasons:
             console.say(reason, red="refused:")
     console.files(files)
+
+
+def unlike_period(configured_s: float, found_s: float) -> str:
+    """What a period says that no loading of the configured ship has; empty for another one."""
+    scale = found_s / configured_s
+    if _LOADINGS[0] <= scale <= _LOADINGS[1]:
+        return ""
+    return (
+        f"the roll period found is {scale:.2f} times the configured one, and loadings have "
+        f"{_LOADINGS[0]:g} to {_LOADINGS[1]:g}: another ship, or a record without pulses of the "
+        "pump, or too short? Look into it before its files are used"
+    )
 
 
 def _ship_table(found: Identification, task: RetuningTask) -> Table:
