@@ -541,7 +541,7 @@ def test_what_passes_at_the_quay_does_not_trip_at_sea(scaled):
         pytest.param(1.0, set(), marks=pytest.mark.evidence),  # as 0.8
         (0.8, set()),
         (1.3, {"drive_speed"}),
-        pytest.param(0.0, {"drive_speed"}, marks=pytest.mark.evidence),  # as -1
+        (0.0, {"drive_speed"}),
         (-1.0, {"drive_speed", "pressure"}),
         (60 / math.tau, {"drive_speed", "pressure", "stop_ms"}),
     ],
