@@ -137,7 +137,10 @@ def test_the_judgement_bounds_the_pressure_by_what_is_in_doubt():
     )
     assert (bare.judge(of_one, OWN).share, bare.judge(of_two, OWN).share) == (1.0, 1.0)
     assert (bought.judge(of_one, OWN).share, bought.judge(of_two, OWN).share) == (0.5, 1.0)
-    assert bought.judge(of_one, OWN).unconfirmed_share is None
+    judgement = bought.judge(of_one, OWN)
+    assert judgement.unconfirmed_share is None
+    assert (judgement.mode, judgement.fault) == (bought.supervisor.mode, bought.supervisor.fault)
+    assert bought.situation.motion_spare_age_ms == 0.0
     for pump in (True, False):
         monitors = new_monitors()
         monitors.thresholds = replace(
