@@ -4,6 +4,7 @@ from cantools.database.can import Database
 
 from utank_hil.canbus import Fault
 from utank_hil.canbus.catalogue import DBC_PATH
+from utank_hil.safety import judging
 from utank_hil.safety.faults import FAULTS, fault_text
 
 NOT_AVAILABLE = 255
@@ -32,3 +33,8 @@ def test_people_read_what_happened_and_what_to_do():
         assert row.happened.endswith(".")
         assert row.remedy.endswith(".")
     assert fault_text(Fault.NONE) == "NONE"
+
+
+def test_of_several_conditions_the_first_of_the_table_is_named():
+    assert judging.first(0b10100) == judging.CONDITIONS[2]
+    assert judging.first(0) is None
