@@ -4,8 +4,9 @@ PYTHON := $(VENV)/bin/python
 READY := $(VENV)/.ready
 # of 12,500 files most are never imported: those that are, are compiled then
 PIP := $(PYTHON) -m pip install --quiet --disable-pip-version-check --no-compile
-# a worker on each core; one that has nothing left takes half of what another still has
-PARALLEL := $(VENV)/bin/pytest -n auto --dist worksteal
+# a worker on each core and one more, as some tests wait; one that has nothing left takes half of
+# what another still has
+PARALLEL := $(VENV)/bin/pytest -n $(shell expr $$(nproc) + 1) --dist worksteal
 # extras stay in the lock: pip, as Debian has it, would take the newest release for them and refuse it
 COMPILE := $(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-header --no-annotate --no-emit-index-url --no-strip-extras

@@ -52,7 +52,7 @@ def test_a_recording_that_can_not_be_read_is_named_with_the_reason(
     for words in commands_for(missing):
         assert refused(*words) == f"error: {missing}: No such file or directory"
     for words in commands_for(folder):
-        assert refused(*words) == f"error: {folder}: Is a directory"
+        assert refused(*words) == f"error: {folder}: is a folder; name a file in it"
     for words in commands_for(binary):
         assert str(binary) in refused(*words)
 

@@ -139,8 +139,8 @@ def margins(
     """Margins of the loop that a law with one input closes around a system.
 
     `system` is continuous, from the pump pressure to the law's measurements, in its order;
-    `delay_s` and `lag_s` are as in `sampled_model`. The search for the delay margin takes most of
-    the time. ValueError is raised if the system has more than one input.
+    `delay_s` and `lag_s` are as in `sampled_model`. ValueError is raised if the system has more
+    than one input.
     """
     if system.B.shape[1] != 1:
         raise ValueError(f"margins are those of one pump, the model has {system.B.shape[1]} inputs")
@@ -160,7 +160,9 @@ def margins(
         gain_high=high,
         phase_margin_rad=_phase_margin(loop),
         delay_margin_s=(
-            _delay_margin(law, system, delay_s, lag_s) if with_delay_margin else math.nan
+            _delay_margin(law, system, delay_s, lag_s, _delay_of_phase(w, loop))
+            if with_delay_margin
+            else math.nan
         ),
         disk_margin=float(1 / np.abs(1 / (1 - loop) - 0.5).max()),
         peak_loop_gain=peak_gain,
@@ -217,21 +219,34 @@ def _phase_margin(loop: ComplexArray) -> float:
     return float(np.abs(angle).min(initial=np.inf))
 
 
+def _delay_of_phase(frequency_rad_s: FloatArray, loop: ComplexArray) -> float:
+    """Least delay whose phase alone turns L to the critical point 1; inf if abs(L) is below one."""
+    at = np.flatnonzero((np.abs(loop[:-1]) < 1) != (np.abs(loop[1:]) < 1))
+    delay_s = np.angle(loop[at]) % (2 * np.pi) / frequency_rad_s[at]
+    return float(delay_s.min(initial=np.inf))
+
+
 def _delay_margin(
-    law: LinearLaw, system: "StateSpace | LinearModel", delay_s: float, lag_s: float
+    law: LinearLaw, system: "StateSpace | LinearModel", delay_s: float, lag_s: float, near_s: float
 ) -> float:
-    """Least destabilizing delay, by eigenvalues at quarters of a sample and bisection to 0.1 ms."""
+    """Least destabilizing delay, by eigenvalues at quarters of a sample and bisection to 0.1 ms.
+
+    The search begins at `near_s`, by the phase: a part of a sample changes the hold, too.
+    """
 
     def stable(extra_s: float) -> bool:
         plant = sample(system, law.sample_time_s, delay_s + extra_s, lag_s)
         return closed_loop_radius(law, plant) < 1
 
-    grid = law.sample_time_s * np.arange(1, 4 * DELAY_SAMPLES + 1) / 4
-    first = next((i for i, extra_s in enumerate(grid) if not stable(extra_s)), None)
-    if first is None:
+    quarter_s = law.sample_time_s / 4
+    count = int(min(near_s / quarter_s, 4 * DELAY_SAMPLES))
+    while count > 0 and not stable(count * quarter_s):
+        count -= 1
+    while count < 4 * DELAY_SAMPLES and stable((count + 1) * quarter_s):
+        count += 1
+    if count == 4 * DELAY_SAMPLES:
         return float("inf")
-    bad = float(grid[first])
-    good = bad - law.sample_time_s / 4
+    good, bad = count * quarter_s, (count + 1) * quarter_s
     while bad - good > 1e-4:
         middle = (good + bad) / 2
         good, bad = (middle, bad) if stable(middle) else (good, middle)
