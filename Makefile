@@ -24,7 +24,7 @@ OLDER := NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR" OPENBLAS
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
 	@echo "make bench      the main job: a controller quiets a rolling ship, table, picture, recording"
-	@echo "make test       lint, types and the tests, those on a real CAN bus included: eight to 16 minutes"
+	@echo "make test       lint, types and the tests, those on a real CAN bus included: eight to 13 minutes"
 	@echo "make test-fast  the quick tests, without CAN: three minutes"
 	@echo "make test-all   'make test', then the tests that take minutes each, and ten million damaged"
 	@echo "                files: three hours; UTANK_HIL_MUTATIONS is another number of files"
