@@ -15,6 +15,8 @@ STATE = """
 import gc, json, os, pathlib, resource, sys
 from utank_hil.runners import real_time_scheduling
 
+at_start = gc.get_freeze_count()  # Python 3.12.1 has some
+
 def state():
     status = pathlib.Path("/proc/self/status").read_text().splitlines()
     locked = next(int(line.split()[1]) for line in status if line.startswith("VmLck"))
@@ -22,7 +24,7 @@ def state():
                   for fd in os.listdir("/proc/self/fd"))
     return {"policy": os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK,
             "priority": os.sched_getparam(0).sched_priority, "locked": locked > 0,
-            "latency": latency, "gc": gc.isenabled(), "frozen": gc.get_freeze_count() > 0}
+            "latency": latency, "gc": gc.isenabled(), "frozen": gc.get_freeze_count() > at_start}
 
 before = state()
 """
