@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterator
-from contextlib import suppress
 from typing import Any, Final
 
 import yaml
@@ -23,8 +22,8 @@ class YamlError(ValueError):
     """The text has no usable content."""
 
 
-class _Made(yaml.constructor.SafeConstructor, yaml.resolver.Resolver):
-    """Makes values, and reports the place of one that resembles a date or number but is none.
+class _Loader(yaml.SafeLoader):
+    """Loader that reports the place of a value that resembles a date or number but is none.
 
     Numbers are decimal, as in YAML 1.2: ``1e7`` is one, ``010`` is ten, ``1:30`` is text.
     """
@@ -43,8 +42,8 @@ class _Made(yaml.constructor.SafeConstructor, yaml.resolver.Resolver):
             ) from error
 
 
-_Made.add_implicit_resolver(_INT, re.compile(r"[-+]?[0-9]+$"), list("-+0123456789"))
-_Made.add_implicit_resolver(
+_Loader.add_implicit_resolver(_INT, re.compile(r"[-+]?[0-9]+$"), list("-+0123456789"))
+_Loader.add_implicit_resolver(
     _FLOAT,
     re.compile(
         r"[-+]?(?:\.[0-9]+|[0-9]+\.?[0-9]*)(?:[eE][-+]?[0-9]+)?$"
@@ -52,35 +51,7 @@ _Made.add_implicit_resolver(
     ),
     list("-+.0123456789"),
 )
-_Made.add_constructor(_INT, lambda _, node: int(node.value))
-
-
-class _Loader(_Made, yaml.SafeLoader):
-    """All in Python, with words for what is wrong."""
-
-
-def _fast_loader() -> type[Any] | None:
-    """Loader with the scanner of libyaml, a fifth of the time; None where PyYAML has none.
-
-    Nodes are put together in Python: libyaml's own way recurses until it ends the process.
-    """
-    try:
-        from yaml._yaml import CParser
-    except ImportError:
-        return None
-
-    class Fast(_Made, yaml.composer.Composer, CParser):
-        def __init__(self, text: str) -> None:
-            CParser.__init__(self, text)
-            yaml.composer.Composer.__init__(self)
-            _Made.__init__(self)
-
-    return Fast
-
-
-_FAST: Final = _fast_loader()
-_READ_DIFFERENTLY: Final = re.compile(r"[\t!?|>\ufeff]")
-"""What libyaml takes in more places than PyYAML does, or for something else."""
+_Loader.add_constructor(_INT, lambda _, node: int(node.value))
 
 
 def parse_yaml(text: str) -> tuple[Any, list[Finding]]:
@@ -89,11 +60,15 @@ def parse_yaml(text: str) -> tuple[Any, list[Finding]]:
     YamlError is raised if the text is not valid YAML, nested without end, or if its aliases make it
     too large.
     """
-    if _FAST is not None and not _READ_DIFFERENTLY.search(text):
-        with suppress(yaml.YAMLError, RecursionError, UnicodeError):  # the other one has words
-            return _content(_FAST(text))
     try:
-        return _content(_Loader(text))
+        loader = _Loader(text)
+        node = loader.get_single_node()
+        if node is None:
+            return None, []
+        if _values(node, {}) > _MOST_VALUES:
+            raise YamlError(f"holds more than {_MOST_VALUES} values, aliases (*) written out")
+        findings = list(_findings(node, ()))
+        return loader.construct_document(node), findings
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         place = "" if mark is None else f" in line {mark.line + 1}, column {mark.column + 1}"
@@ -102,16 +77,6 @@ def parse_yaml(text: str) -> tuple[Any, list[Finding]]:
         raise YamlError(f"is not valid YAML: {error}") from error
     except RecursionError:
         raise YamlError("is not valid YAML: it is nested too deeply") from None
-
-
-def _content(loader: Any) -> tuple[Any, list[Finding]]:
-    node = loader.get_single_node()
-    if node is None:
-        return None, []
-    if _values(node, {}) > _MOST_VALUES:
-        raise YamlError(f"holds more than {_MOST_VALUES} values, aliases (*) written out")
-    findings = list(_findings(node, ()))
-    return loader.construct_document(node), findings
 
 
 def _in_words(problem: str) -> str:
