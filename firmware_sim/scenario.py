@@ -11,7 +11,7 @@ from utank_hil.configuration import Vessel
 
 
 def guard_problem(vessel: Vessel) -> str:
-    """Why a ship can have no guard; empty if she can."""
+    """Why a ship can have no guard; empty if it can."""
     if vessel.pump is None:
         return "is for a ship with a pump: leave it out"
     try:

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bought_devices import LEVELS, SBG
 from pydantic import TypeAdapter
 
 from firmware_sim.fault_injection.bench_parts import FaultyNode
@@ -25,15 +26,8 @@ from utank_hil.runners.lockstep import with_more
 
 fault_of = TypeAdapter(AnyFault).validate_python
 SECOND_NS = 1_000_000_000
-SBG = {"profile": "sbg_ellipse", "bus": "can1", "accept_unprotected": True}
 LINES = "psxn", "tss1", "em3000"
 LINE = "udp:127.0.0.1:5001:127.0.0.1"
-LEVELS = {
-    "profile": "cia404_levels", "bus": "can2", "node": 7, "high_level_m": 4.6,
-    "accept_unprotected": True,
-    "signals": {name: {"scale": 0.65, "offset": -7.8} for name in
-                ("port_level_m", "starboard_level_m")},
-}  # fmt: skip
 
 
 def roll_and_shares(devices, *, second, seconds=30):

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+from bought_devices import LEVELS, SBG
 
 from utank_hil.canbus import (
     Address,
@@ -68,17 +69,8 @@ def test_what_was_received_is_in_words():
     assert inbox.received(Fault.LEVEL_LIMIT) == ""
 
 
-SENSOR = {"profile": "sbg_ellipse", "bus": "can1", "accept_unprotected": True}
-GAUGES = {
-    "profile": "cia404_levels", "bus": "can2", "node": 7, "high_level_m": 4.6,
-    "accept_unprotected": True,
-    "signals": {name: {"scale": 0.65, "offset": -7.8} for name in
-                ("port_level_m", "starboard_level_m")},
-}  # fmt: skip
-
-
 def test_an_alarm_names_the_device_that_the_ship_has_and_its_message():
-    foreign = DevicesSection(motion_2=SENSOR, levels=GAUGES).foreign()
+    foreign = DevicesSection(motion_2=SBG, levels=LEVELS).foreign()
     inbox = Inbox(CATALOGUE, 7, foreign=foreign, redundancy=Redundancy(second_motion_sensor=True))
     gauges = 0x187 | STANDARD | 2 << BUS_SHIFT
     said = inbox.received(Fault.TANK_SILENT)

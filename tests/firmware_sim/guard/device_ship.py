@@ -5,6 +5,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from bought_devices import LEVELS, SBG
 from guard_in_c import GuardInC
 
 from firmware_sim.guard.parameters import guard_parameters
@@ -23,14 +24,7 @@ from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.redundancy import Redundancy
 
-SBG = {"profile": "sbg_ellipse", "bus": "can1", "accept_unprotected": True}
 J1939 = {"profile": "j1939_ssi2", "source": 0x20, "accept_unprotected": True}
-LEVELS = {
-    "profile": "cia404_levels", "bus": "can2", "node": 7, "high_level_m": 4.6,
-    "accept_unprotected": True,
-    "signals": {name: {"scale": 0.65, "offset": -7.8} for name in
-                ("port_level_m", "starboard_level_m")},
-}  # fmt: skip
 PUMP = {
     "profile": "cia402", "bus": "can2", "node": 5, "mode": "torque", "pressure_pa_per_unit": 80,
     "speed_rad_s_per_unit": 0.001,
