@@ -157,6 +157,15 @@ def test_a_ramp_that_comes_before_the_stop_has_the_stops_time():
     assert spoken("both-signs-flipped", GOOD).zero_limit_ms == 600.0
 
 
+def test_wrong_signs_may_be_found_by_the_still_water_if_the_alarm_names_them_too():
+    still = replace(GOOD, code="STUCK_SIGNAL", found=3550.0, zero=4600.0)
+    assert spoken("both-signs-from-start", still).passed
+    silent = replace(said("both-signs-from-start", still), alarms=("STUCK_SIGNAL",))
+    assert verdict("both-signs-from-start", silent).problems == (
+        "seed 1: no alarm MOTION_SIGN_FLIP was sent",
+    )
+
+
 def test_a_fault_that_refuses_arming_is_found():
     refused = replace(GOOD, found=None, zero=0.0, mode="STANDBY", was_active=False)
     assert spoken("both-signs-from-start", refused).passed
