@@ -88,6 +88,8 @@ def faults(
     loaded = whole if scenario is None else _on(whole, scenario)
     names = [name.strip() for name in rows.split(",") if name.strip()]
     chosen, live, not_run = _chosen(whole, loaded, names, full=full, on_bus=bus is not None)
+    if bus is not None and live:
+        _open_once(bus)  # before minutes of other rows
     window = Window() if full else Window(60.0, 20.0) if scenario is None else _window(loaded)
     if out is not None:
         out = prepare_out(out, [f"{row.id}.rrd" for row in chosen])
@@ -194,6 +196,15 @@ def _recorded(
         return results, _End(why(error), ExitCode.USAGE)
     kept = {name: shown(file) for name, file in files.items()}
     return [replace(each, recording=kept.get(each.row.id, "")) for each in results], None
+
+
+def _open_once(bus: str) -> None:
+    from utank_hil.canbus.socketcan import SocketCanPort
+
+    try:
+        SocketCanPort(bus).close()
+    except OSError as error:
+        fail(f"--bus {bus}: {why(error)}", ExitCode.NO_BUS)
 
 
 def _run_live(names: Sequence[str], bus: str) -> tuple[list[dict[str, Any]], _End | None]:

@@ -520,6 +520,7 @@ def test_a_row_that_fails_is_told_by_the_exit_code(found_ms, late, monkeypatch):
     assert ("allowed" in done.output) is late
 
 
+@pytest.mark.usefixtures("_vcan7")
 def test_live_rows_are_run_on_a_bus_alone_and_all_stands_in_the_junit_file(tmp_path, monkeypatch):
     monkeypatch.setattr(runner, "run_rows", lambda *_, **__: {GOOD.row: [GOOD]})
     xml, on_bus = tmp_path / "faults.xml", []
@@ -550,6 +551,19 @@ def test_live_rows_are_run_on_a_bus_alone_and_all_stands_in_the_junit_file(tmp_p
     assert "need --bus" in invoke("--rows", "live").output
 
 
+def test_a_bus_that_is_none_is_said_before_any_row_is_run(monkeypatch):
+    monkeypatch.setattr(runner, "run_rows", lambda *_, **__: pytest.fail("a row was run"))
+    done = invoke("--rows", f"{GOOD.row},live-controller", "--bus", "none0")
+    assert done.exit_code == ExitCode.NO_BUS
+    assert "--bus none0: " in done.stderr
+
+
+@pytest.fixture
+def _vcan7(monkeypatch):
+    monkeypatch.setattr(commands, "_open_once", lambda _: None)
+
+
+@pytest.mark.usefixtures("_vcan7")
 @pytest.mark.parametrize(
     ("signalled", "code", "why"),
     [(True, ExitCode.INTERRUPTED, "interrupted"), (False, ExitCode.SYSTEM, KILLED)],
@@ -578,6 +592,7 @@ def test_a_campaign_that_ends_early_judges_what_was_run_and_says_what_lacks(
     assert "1 row in up to 2 seas" in printed
 
 
+@pytest.mark.usefixtures("_vcan7")
 @pytest.mark.parametrize(
     ("error", "code", "why"),
     [
