@@ -2,6 +2,7 @@
 
 import errno
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -94,11 +95,14 @@ def test_a_full_disk_behind_standard_output_is_said(words: tuple[str, ...]) -> N
     assert done.stderr == "error: No space left on device\n"
 
 
-def test_a_pipe_that_nobody_reads_is_no_refusal() -> None:
+@pytest.mark.parametrize("words", ["--help", "--version", f"check {SHIP}", f"check {SHIP} --json"])
+def test_a_pipe_that_nobody_reads_ends_it_quietly_as_sigpipe_does(words: str) -> None:
     read, written = os.pipe()
     os.close(read)
     with os.fdopen(written, "w") as closed:
-        assert started(("check", SHIP), stdout=closed).returncode == ExitCode.USAGE
+        done = started(tuple(words.split()), stdout=closed)
+    assert (done.returncode, done.stderr) == (ExitCode.UNREAD, "")
+    assert ExitCode.UNREAD == 128 + signal.SIGPIPE
 
 
 @pytest.mark.evidence("2>&-", "<&-")

@@ -2,6 +2,8 @@
 
 import fcntl
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -59,3 +61,27 @@ def test_the_working_folder_has_a_name_too(tmp_path: Path, monkeypatch: pytest.M
     assert written(".") == "."
     assert (tmp_path / "home-2").is_dir() is False
     assert Path(written(".")).resolve() == tmp_path / "home-2"
+
+
+ENDED = """
+import sys
+from pathlib import Path
+from utank_hil.console.common import prepare_out
+folder = prepare_out(Path(sys.argv[1]), ("a.txt",))
+if len(sys.argv) > 2:
+    (folder / sys.argv[2]).touch()
+raise KeyboardInterrupt
+"""
+
+
+def test_a_command_that_ends_early_leaves_no_empty_folder(tmp_path: Path) -> None:
+    def ended(*words: object) -> None:
+        asked = [sys.executable, "-c", ENDED, *map(str, words)]
+        assert subprocess.run(asked, stderr=subprocess.DEVNULL, check=False).returncode != 0
+
+    (tmp_path / "mine").mkdir()
+    ended(tmp_path / "mine" / "new" / "deep")
+    ended(tmp_path / "mine")
+    ended(tmp_path / "held" / "deep", "b.txt")
+    left = sorted(str(each.relative_to(tmp_path)) for each in tmp_path.rglob("*"))
+    assert left == ["held", "held/deep", "held/deep/b.txt", "mine"]

@@ -1,5 +1,6 @@
 """What the commands share: their options, reading of files, errors."""
 
+import atexit
 import errno
 import fcntl
 import io
@@ -9,7 +10,7 @@ import sys
 import tempfile
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from concurrent.futures import BrokenExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn, TypeVar
@@ -158,9 +159,15 @@ def fail_with(error: "ConfigError") -> NoReturn:
 
 
 def why_not_writable(folder: Path, files: Iterable[str] = ()) -> str | None:
-    """Make a folder; the reason if files of these names can't be written there."""
+    """Make a folder; the reason if files of these names can't be written there.
+
+    What is made and left empty is taken away when the process ends.
+    """
     if folder.exists() and not folder.is_dir():
         return f"{folder}: is not a folder"
+    for each in (*reversed(folder.absolute().parents), folder.absolute()):
+        if not each.exists():
+            atexit.register(_taken_away_if_empty, each)  # the last one goes first
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -173,6 +180,11 @@ def why_not_writable(folder: Path, files: Iterable[str] = ()) -> str | None:
         if path.exists() and not os.access(path, os.W_OK):
             return f"{path}: must not be written"
     return None
+
+
+def _taken_away_if_empty(folder: Path) -> None:
+    with suppress(OSError):
+        folder.rmdir()
 
 
 def prepare_out(folder: Path, files: Collection[str], *, keep: bool = True) -> Path:
@@ -248,6 +260,10 @@ def failures_named() -> Iterator[None]:
     try:
         yield
         return
+    except SystemExit as end:  # of Rich and Typer, with the code of a refusal
+        if not isinstance(end.__context__, BrokenPipeError):
+            raise
+        raise SystemExit(ExitCode.UNREAD) from None
     except ModuleNotFoundError as error:
         name = (error.name or "").partition(".")[0]
         if name not in EXTRA_OF:

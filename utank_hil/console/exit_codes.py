@@ -63,3 +63,8 @@ class ExitCode(IntEnum):
         "`firmware-sim`, before the first sample. `bench`, `campaign` and `faults` keep what "
         "there is.",
     )
+    UNREAD = (
+        141,
+        "all",
+        "What read standard output has ended, such as `head`: as other programs end by SIGPIPE.",
+    )

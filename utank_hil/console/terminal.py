@@ -15,8 +15,6 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from utank_hil.console.exit_codes import ExitCode
-
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn
 
@@ -84,13 +82,6 @@ class Terminal(Console):
                 yield segment
             else:
                 yield Segment(_STEERS.sub("\N{REPLACEMENT CHARACTER}", segment.text), segment.style)
-
-    def on_broken_pipe(self) -> None:
-        """End as where results can't be written; Rich's own exit code is that of a refusal."""
-        try:
-            super().on_broken_pipe()
-        except SystemExit:
-            raise SystemExit(ExitCode.USAGE) from None
 
     def say(self, text: str = "", *, red: str = "", yellow: str = "", green: str = "") -> None:
         """Print a line, however long, after words in a colour."""
