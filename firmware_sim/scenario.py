@@ -8,6 +8,7 @@ from firmware_sim.voyage import unusual_loadings, unusual_sea, unusual_waypoints
 from utank_hil.base.parameters import Problem, refuse
 from utank_hil.canbus.profiles.guarded import guard_parts
 from utank_hil.configuration import Vessel
+from utank_hil.dynamics.hull.lateral import GOOD_FIT
 
 
 def guard_problem(vessel: Vessel) -> str:
@@ -85,6 +86,13 @@ class Scenario(ScenarioContent):
             for key, time_s in late.items()
             if time_s > self.duration_s
         ]
+        if (hull := self.lateral_hull) is not None:
+            found += [
+                ("hull", f"has radiation of {motions} that the memory fitted to it misses by "
+                 f"{error:.1%}, more than {GOOD_FIT:.0%}: is it smooth over the frequency?")
+                for motions, error in hull.memory_errors(six=self.six).items()
+                if error > GOOD_FIT
+            ]  # fmt: skip
         loadings = {f"voyage.{index}.ship": point.ship for index, point in enumerate(self.voyage)}
         loadings = {"actual_ship": self.actual_ship, **loadings}
         if self.fmu is not None:

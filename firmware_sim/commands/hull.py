@@ -91,6 +91,7 @@ def hull(
 def hull_figures(hull: "HullData") -> dict[str, float]:
     """Figures by which a naval architect knows the ship again."""
     from utank_hil.dynamics.hull.hull_data import free_roll
+    from utank_hil.dynamics.hull.lateral import LateralHull
 
     free = free_roll(hull)
     about_g: Any = hull.about_gravity_centre()
@@ -102,6 +103,7 @@ def hull_figures(hull: "HullData") -> dict[str, float]:
         "roll_period_s": free.period_s,
         "roll_gyration_m": math.sqrt(about_g.inertia_kg_m2[0, 0] / mass_kg),
         "damping_by_radiated_waves_ratio": free.radiation_ratio,
+        "radiation_memory_error_ratio": max(LateralHull(hull).memory_errors(six=True).values()),
         "shortest_wave_s": 2 * math.pi / hull.wave_frequency_rad_s[-1],
         "longest_wave_s": 2 * math.pi / hull.wave_frequency_rad_s[0],
     }

@@ -15,6 +15,7 @@ from utank_hil.base.tick import TICK_NS
 from utank_hil.configuration.hull_files.parts import Given
 from utank_hil.configuration.hull_files.reader import read_hull
 from utank_hil.dynamics import RollShip, Tank
+from utank_hil.dynamics.hull import lateral
 from utank_hil.dynamics.hull import lateral_kernel as kernel
 from utank_hil.dynamics.hull.hull_data import radiation_at
 from utank_hil.dynamics.hull.lateral import LateralHull, LateralModel, fit_radiation
@@ -133,6 +134,13 @@ def test_ship_and_water_move_by_the_exact_wrench(six):
 
 def test_memory_of_surge_heave_and_pitch_is_the_radiation_of_the_data_to_one_percent():
     assert hull().vertical_radiation.error < 0.01
+
+
+def test_a_start_from_which_the_fit_goes_astray_is_followed_by_another(monkeypatch):
+    monkeypatch.setattr(lateral, "_START_RATIOS", (10.0,))
+    assert min(LateralHull(hull().data).memory_errors(six=True).values()) > 0.1
+    monkeypatch.setattr(lateral, "_START_RATIOS", (10.0, 0.5, 0.25, 1.0))
+    assert max(LateralHull(hull().data).memory_errors(six=True).values()) < 0.01
 
 
 @pytest.mark.parametrize("limit", [True, False])

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -168,6 +169,20 @@ def test_scenario_with_a_hull_sways_rolls_and_yaws() -> None:
     assert 0.05 < abs(ship.plant.lateral_m_s2) / (9.80665 * slope) < 1.2
     moment = scenario.wave_moment(1).at(30.0)
     assert ship.plant.wave_moment_nm == pytest.approx(float(moment), rel=1e-6)
+
+
+def test_a_memory_that_does_not_follow_the_radiation_is_warned_of(tmp_path):
+    assert not [key for key, _ in hull_scenario(plant="six_degrees").warnings() if key == "hull"]
+    with xarray.open_dataset(HULL["file"]) as whole:
+        rough = whole.load().copy(deep=True)
+    damping = rough.radiation_damping
+    at = {"omega": damping.omega[1::2], "radiating_dof": "Heave", "influenced_dof": "Heave"}
+    damping.loc[at] *= 1.5
+    rough.to_netcdf(tmp_path / "rough.nc")
+    hull = {**HULL, "file": str(tmp_path / "rough.nc")}
+    assert not [key for key, _ in hull_scenario(hull=hull).warnings() if key == "hull"]
+    said = dict(hull_scenario(hull=hull, plant="six_degrees").warnings())
+    assert re.search(r"surge, heave and pitch .* misses by .* more than 1%", said["hull"])
 
 
 @pytest.mark.parametrize("plant", ["sway_roll_yaw", "six_degrees"])
