@@ -1,11 +1,17 @@
 """The fault table, the enumeration and the DBC have the same codes."""
 
+import math
+from dataclasses import replace
+
+import pytest
 from cantools.database.can import Database
+from situations import situation
 
 from utank_hil.canbus import Fault
 from utank_hil.canbus.catalogue import DBC_PATH
 from utank_hil.safety import judging
-from utank_hil.safety.faults import FAULTS, fault_text
+from utank_hil.safety.faults import FAULTS, ROLL_CALM_S, Reaction, fault_text
+from utank_hil.safety.safety_limits import SafetyLimits
 
 NOT_AVAILABLE = 255
 
@@ -38,3 +44,77 @@ def test_people_read_what_happened_and_what_to_do():
 def test_of_several_conditions_the_first_of_the_table_is_named():
     assert judging.first(0b10100) == judging.CONDITIONS[2]
     assert judging.first(0) is None
+
+
+def test_a_code_without_a_row_has_its_name_alone():
+    assert fault_text(Fault.COUNTER_FROZEN) == "COUNTER_FROZEN"
+
+
+LIMITS = SafetyLimits()
+LIMITED = {
+    "motion_age_ms": [LIMITS.motion_age_ms],
+    "motion_spare_age_ms": [LIMITS.motion_spare_age_ms],
+    "hardwired_age_ms": [LIMITS.hardwired_age_ms],
+    "tank_age_ms": [LIMITS.tank_degraded_age_ms, LIMITS.tank_age_ms],
+    "pump_age_ms": [LIMITS.pump_degraded_age_ms, LIMITS.pump_age_ms],
+    "forecast_age_ms": [LIMITS.forecast_age_ms],
+    "drive_age_ms": [LIMITS.drive_age_ms],
+    "echo_age_ms": [LIMITS.echo_age_ms],
+    "drive_out_ms": [LIMITS.drive_enabled_within_ms],
+    "arming_ms": [LIMITS.arming_timeout_ms],
+    "valve_age_ms": [LIMITS.valve_age_ms],
+    "valve_echo_age_ms": [LIMITS.valve_echo_age_ms],
+    "valve_out_ms": [LIMITS.valve_follows_within_ms],
+    "valve_off_ms": [LIMITS.valve_off_within_ms],
+    "panel_age_ms": [LIMITS.panel_age_to_arm_ms, LIMITS.panel_age_armed_ms],
+    "roll_rad": [LIMITS.roll_limit_rad],
+    "heel_rad": [LIMITS.heel_limit_rad],
+    "bus_load": [LIMITS.bus_load_limit],
+}
+"""What is judged, and its limits: beyond each one condition more holds."""
+
+
+def count(limits=LIMITS, **changes):
+    return judging.standing(situation(**changes), limits).bit_count()
+
+
+@pytest.mark.parametrize("name", LIMITED)
+def test_a_condition_holds_beyond_its_limit_and_not_at_it(name):
+    for before, limit in enumerate(LIMITED[name]):
+        assert count(**{name: limit}) == before
+        assert count(**{name: math.nextafter(limit, math.inf)}) == before + 1
+        if name in ("roll_rad", "heel_rad"):
+            assert count(**{name: -limit}) == 0
+            assert count(**{name: -math.nextafter(limit, math.inf)}) == 1
+
+
+def test_a_roll_or_heel_that_is_no_number_is_beyond_every_limit():
+    assert count(roll_rad=math.nan) == count(heel_rad=math.nan) == 1
+
+
+def test_late_ticks_and_a_roll_that_was_beyond_its_limit_hold_at_theirs():
+    assert count(tick_late_ms=math.nextafter(LIMITS.long_overrun_ms, 0.0)) == 0
+    assert count(tick_late_ms=LIMITS.long_overrun_ms) == 1
+    assert [count(overruns_in_ten=late) for late in range(5)] == [0, 1, 1, 2, 2]
+    unjudged = replace(LIMITS, overruns_in_ten=None)
+    assert [count(unjudged, overruns_in_ten=late) for late in (0, 1, 10)] == [0, 1, 1]
+    assert count(rolled_over_ms=1e3 * ROLL_CALM_S) == 0
+    assert count(rolled_over_ms=math.nextafter(1e3 * ROLL_CALM_S, 0.0)) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "fault", "reaction"),
+    [
+        ("law_passed_limit", Fault.HEEL_LIMIT, Reaction.WARN),
+        ("gm_low", Fault.STABILITY_LOW, Reaction.WARN),
+        ("drive_warns", Fault.DRIVE_WARNING, Reaction.WARN),
+        ("doubts_forecast", Fault.FORECAST_IGNORED, Reaction.WARN),
+        ("commissioned", Fault.NOT_COMMISSIONED, Reaction.REFUSE),
+    ],
+)
+def test_what_is_said_but_ends_nothing(name, fault, reaction):
+    bits = judging.standing(situation(**{name: name != "commissioned"}), LIMITS)
+    assert bits.bit_count() == 1
+    first = judging.first(bits)
+    assert first is not None
+    assert (first[0], first[1].reaction) == (fault, reaction)

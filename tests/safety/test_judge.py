@@ -4,13 +4,19 @@ import math
 from dataclasses import replace
 
 import pytest
-from controller_bench import new_monitors
+from controller_bench import VESSEL, new_monitors
+from hypothesis import given
+from hypothesis import strategies as st
 from situations import MEASURED, OWN
 
 from utank_hil.base.tick import TICK_NS, TICK_S
+from utank_hil.canbus.enumerations import Fault
 from utank_hil.canbus.measurements import MotionSample
-from utank_hil.safety.judge import HEEL_TIME_CONSTANT_S, Lateness, Safety
+from utank_hil.control.interface import DesignPlant
+from utank_hil.safety.judge import HEEL_TIME_CONSTANT_S, QUIET_START_NS, Lateness, Safety
+from utank_hil.safety.monitoring import Monitors
 from utank_hil.safety.monitors.senders import BusLoad
+from utank_hil.safety.monitors.thresholds import SensorFigures
 from utank_hil.safety.safety_limits import SafetyLimits
 
 MS = 1_000_000
@@ -40,6 +46,22 @@ def test_a_late_tick_counts_for_ten_ticks():
         now_ns += TICK_NS
     lateness.update(now_ns)
     assert lateness.in_ten == 0
+
+
+LATER_NS = [-MS, 0, 1, TICK_NS, TICK_NS + 1, 3 * TICK_NS, 9 * TICK_NS, 9 * TICK_NS + 1, 10**9]
+
+
+@given(st.lists(st.sampled_from(LATER_NS), min_size=1, max_size=40))
+def test_late_ticks_in_ten_are_the_grid_points_that_were_missed(later_ns):
+    lateness, now_ns, missed = Lateness(), 7 * TICK_NS, [0] * 10
+    lateness.update(now_ns)
+    assert (lateness.late_ms, lateness.in_ten) == (0.0, 0)
+    for late_ns in later_ns:
+        now_ns += TICK_NS + late_ns
+        lateness.update(now_ns)
+        missed += [1] * math.ceil(late_ns / TICK_NS) or [0]
+        assert lateness.in_ten == sum(missed[-10:])
+        assert lateness.late_ms == max(late_ns, 0) / MS
 
 
 class Table:
@@ -95,9 +117,12 @@ def test_a_roll_that_is_not_measured_any_more_is_no_heel():
     table = Table()
     table.measure(0.0, 60.0)
     table.measure(0.2)
-    for _ in range(9):
+    for _ in range(8):
         table.tick()
+    younger_rad = table.heel_rad
+    table.tick()
     counted_rad = table.heel_rad
+    assert counted_rad > younger_rad
     assert table.safety.situation.motion.age_ms == 100.0
     for _ in range(12_000):
         table.tick()
@@ -152,3 +177,34 @@ def test_the_judgement_bounds_the_pressure_by_what_is_in_doubt():
         assert judgement.share == 0.125
         assert judgement.unconfirmed_share == (0.25 if pump else None)
         assert judgement.passive_roll_rad == monitors.twin.roll_rad
+
+
+def test_unprotected_motion_is_trusted_beside_a_second_sensor_that_agrees_and_is_heard():
+    limit_ms = SafetyLimits().motion_spare_age_ms
+    for age_ms, share in ((limit_ms, 1.0), (math.nextafter(limit_ms, math.inf), 0.5)):
+        safety = Safety(SafetyLimits(), 250_000, unprotected=True)
+        motions = MotionSample(), MotionSample(age_ms=age_ms)
+        assert safety.judge(replace(MEASURED, motions=motions), OWN).share == share
+    for unprotected, share in ((False, 1.0), (True, 0.5)):
+        monitors = Monitors(
+            DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures(), 250_000,
+            second_motion=True,
+        )  # fmt: skip
+        safety = Safety(SafetyLimits(), 250_000, monitors, unprotected=unprotected)
+        shares = []
+        for tick in range(100):
+            now_ns = tick * TICK_NS
+            motions = MotionSample(heard_ns=now_ns), MotionSample(0.05, heard_ns=now_ns)
+            seen = replace(MEASURED, now_ns=now_ns, motions=motions)
+            shares.append(safety.judge(seen, OWN).share)
+        assert (shares[0], shares[-1]) == (1.0, share)
+
+
+def test_what_is_awaited_at_the_start_is_told_after_ten_seconds():
+    safety, started_ns = Safety(SafetyLimits(), 250_000), 3 * 10**9
+    safety.judge(replace(MEASURED, now_ns=started_ns, tank_age_ms=1e6), OWN)
+    for since_ns in (0, QUIET_START_NS - 1):
+        assert safety.update_alarms([], started_ns + since_ns) == []
+    told = safety.update_alarms([], started_ns + QUIET_START_NS)
+    assert [event.code for event in told] == [Fault.TANK_SILENT]
+    assert Safety(SafetyLimits(), 250_000).update_alarms([], 10**12) == []

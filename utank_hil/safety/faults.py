@@ -292,9 +292,9 @@ FAULTS: Final = (
     _row(Fault.HEEL_LIMIT, "The ship rolls or heels beyond the limit for active control.",
          "Wait until the roll is small; correct the heel by ballast; check the motion sensor.",
          Condition(_RAMP, "roll over {roll_limit_rad:g} rad, or its mean over a minute over "
-             "{heel_limit_rad:g} rad", lambda seen, limits: (
-             abs(seen.motion.roll_rad) > limits.roll_limit_rad
-             or abs(seen.heel_rad) > limits.heel_limit_rad)),
+             "{heel_limit_rad:g} rad", lambda seen, limits: not (
+             abs(seen.motion.roll_rad) <= limits.roll_limit_rad
+             and abs(seen.heel_rad) <= limits.heel_limit_rad)),  # so that NaN is beyond, too
          # a ship that rolls through upright is upright twice in a period
          _found(_RAMP, "heel removal: the root mean square of the roll is over its most_roll_rad, "
              "as it is at sea", Finding.NOT_IN_HARBOUR),

@@ -29,7 +29,7 @@ SILENT_CYCLES: Final = 2.5
 as silent."""
 QUIET_START_NS: Final = 10_000_000_000
 """What is awaited at the start is an alarm only when it has not come by then."""
-_ALL_LATE: Final = 0x3FF  #: The last ten ticks.
+_TEN: Final = 10
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _INIT: Final = Mode.INIT
@@ -40,21 +40,21 @@ _NO_FAULT: Final = Fault.NONE
 class Lateness:
     """Late ticks."""
 
+    late_ms: float  #: Lateness of this tick.
+    in_ten: int  #: Late ticks among the last ten; one that is late by three counts three times.
+
     def __init__(self) -> None:
         self._last_ns: int | None = None
         self._history = 0
-        self.late_ms = 0.0  #: Lateness of this tick.
-        #: Late ticks among the last ten; one that is late by three counts three times.
-        self.in_ten = 0
 
     def update(self, now_ns: int) -> None:
         """Take the time of a tick."""
         last_ns = now_ns if self._last_ns is None else self._last_ns
         self._last_ns = now_ns
         late_ns = max(0, now_ns - last_ns - TICK_NS)
-        missed = -(-late_ns // TICK_NS)  # grid points, each of which counts
-        late = (1 << missed) - 1 if missed < 10 else _ALL_LATE
-        self._history = (self._history << max(1, missed) | late) & _ALL_LATE
+        missed = min(-(-late_ns // TICK_NS), _TEN)  # grid points, each of which counts
+        late = (1 << missed) - 1
+        self._history = (self._history << max(1, missed) | late) & ((1 << _TEN) - 1)
         self.late_ms = late_ns / MILLISECOND_NS
         self.in_ten = self._history.bit_count()
 

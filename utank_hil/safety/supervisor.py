@@ -77,7 +77,7 @@ class Supervisor:
         `roll_rad` is that of the motion sensor in use, `command_pa` the pressure last commanded.
         """
         now_ns = measured.now_ns
-        if abs(roll_rad) > self.limits.roll_limit_rad:
+        if not abs(roll_rad) <= self.limits.roll_limit_rad:  # so that NaN is beyond it, too
             self._rolled_over_ns = now_ns
         self.rolled_over_ms = (now_ns - self._rolled_over_ns) / MILLISECOND_NS
         since_ns = self._arming_since_ns

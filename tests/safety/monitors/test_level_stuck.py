@@ -64,6 +64,38 @@ def test_it_is_found_when_the_free_water_would_have_moved_sixteen_bands(
     assert found_s == pytest.approx(moved_s, abs=0.02)
 
 
+@pytest.mark.parametrize("way", [-1, 1])
+@pytest.mark.parametrize("share", [0.2, 0.45, 0.8, 2.3, -0.5])
+def test_it_has_to_have_moved_whatever_share_of_the_slope_the_sway_has_taken(way, share):
+    """Of a slope that pushes for a quarter period and by `share` of what the pump does."""
+    pressure_pa, most_sway = way * 60e3, 2.0
+    slope_push = share * pressure_pa / 1025.0 / most_sway
+    ends_s = math.pi / 2 / W0
+
+    def slopes(t, state):
+        level, rate, swayed, sway_rate = state
+        pushes = pressure_pa / 1025.0, slope_push if t < ends_s else 0.0
+        spring = 2 * 0.2 * W0 * np.array([rate, sway_rate]) + W0**2 * np.array([level, swayed])
+        level_m_s2, sway_m_s2 = np.array(pushes) / LENGTH_M - spring
+        return rate, level_m_s2, sway_rate, sway_m_s2
+
+    times_s = np.arange(0.0, 40.0, STEP_S)
+    solved = solve_ivp(slopes, (0, 40), [0.0] * 4, t_eval=times_s, rtol=1e-6, max_step=0.05).y
+    with_sway = solved[0] - most_sway * solved[2]
+    stuck = np.minimum(way * solved[0], way * with_sway) > PERMITTED_M
+    monitor = LevelStuck(
+        replace(SHIP, sway_of_slope=1.0), TUBE, replace(THRESHOLDS, level_still_m=BAND_M), STEP_S
+    )
+    for _ in range(300):  # where it stood before, and what was taken there, says nothing
+        monitor.update(0.0, 2 * BAND_M, 0.0, -way * 3.0)
+    found_s = next(
+        time_s
+        for time_s in times_s
+        if monitor.update(0.0, 0.0, pressure_pa, slope_push if time_s < ends_s else 0.0)
+    )
+    assert found_s == pytest.approx(times_s[np.argmax(stuck)], abs=0.03)
+
+
 @pytest.mark.parametrize("level_m", [0.0, math.pi, -2.5])
 def test_the_first_sample_only_says_where_the_level_stands(level_m):
     assert monitor().update(0.0, level_m, 1e12, 0.0) == 0

@@ -74,7 +74,6 @@ class LevelStuck:
 
     def restart(self) -> None:
         """Begin anew after a gap."""
-        self._level_m = math.inf
         self._begin(math.inf)
 
     def _begin(self, level_m: float) -> None:
