@@ -115,8 +115,10 @@ class DeviceBench:
         self.guards[1].receive(frame.can_id, frame.data)
 
     def tick(self) -> int:
-        reasons = self.guards[0].tick()
-        assert self.guards[1].tick() == reasons
+        python, in_c = self.guards
+        reasons = python.tick()
+        assert in_c.tick() == reasons
+        in_c.agrees(python)
         return reasons
 
     def run(self, ticks: int, without: Collection[str] = (), missing: Collection[str] = ()) -> int:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from firmware_sim.guard import parameters as module
 from firmware_sim.guard.parameters import GuardParameters
+from firmware_sim.guard.reference import Guard
 from utank_hil.canbus.profiles.guarded import MOST_PARTS, PLACES, GuardPart, Stream
 
 SOURCE = Path(module.__file__).parent
@@ -110,8 +111,12 @@ class GuardInC:
 
     def __init__(self, parameters: GuardParameters, folder: Path) -> None:
         self._library = library(folder)
-        self._parameters = _table(parameters)
-        self._state = ctypes.create_string_buffer(4096)
+        self._parameters = table = _table(parameters)
+        for place in range(table.part_count, MOST_PARTS):  # rows that are none say otherwise
+            table.parts[place] = table.parts[0]
+            table.parts[place].times += 1
+            table.parts[place].old = 0
+        self._state = ctypes.create_string_buffer(b"\xa5" * 4096)
         self._library.guard_start(self._state, ctypes.byref(self._parameters))
 
     @staticmethod
@@ -125,9 +130,17 @@ class GuardInC:
     def tick(self) -> int:
         return int(self._library.guard_tick(self._state))
 
-    @property
-    def numbers(self) -> tuple[list[int], ...]:
-        """What it has read: ages of the streams, values, and the numbers that are judged."""
+    def agrees(self, python: Guard) -> None:
+        """Hold what it has read to what the guard in Python has."""
         head = _Head.from_buffer(self._state)
         judged = [head.command, head.pump, head.roll, head.rate, head.heel, head.level]
-        return [each.age for each in head.streams], judged, list(head.part_raw), list(head.part_age)
+        assert judged == [python._command, python._pump_pa, python._roll, python._rate,
+                          python._heel, python._level]  # fmt: skip
+        assert [each.age for each in head.streams] == python._age
+        devices = python._devices
+        count = len(devices._raw)
+        assert list(head.part_raw)[:count] == devices._raw
+        assert list(head.part_age)[:count] == devices._age
+        assert list(head.same) == devices._same
+        for stream in {part.stream for part in python.parameters.parts}:
+            assert list(head.values[stream]) == devices.values[stream]

@@ -74,8 +74,10 @@ class Bench:
         self.says[stream] = self.says[stream]._replace(**changes)
 
     def tick(self) -> int:
-        reasons = self.guards[0].tick()
-        assert self.guards[1].tick() == reasons
+        python, in_c = self.guards
+        reasons = python.tick()
+        assert in_c.tick() == reasons
+        in_c.agrees(python)
         return reasons
 
     def run(self, ticks: int, without: Iterable[Stream] = ()) -> int:
@@ -175,6 +177,14 @@ def test_a_sender_that_begins_anew_counts_from_its_third_frame_in_sequence(bench
         bench.run(2)
         rolls.append(bench.guards[0]._roll)
     assert rolls == [0, 0, 500, 500]
+    # what was awaited before the last frame that counted is awaited no more
+    bench.run(8)
+    bench.senders[Stream.MOTION].counter -= 5
+    bench.say(Stream.MOTION, roll_rad=0.0)
+    for _ in range(4):
+        bench.run(2)
+        rolls.append(bench.guards[0]._roll)
+    assert rolls[4:] == [500, 500, 0, 0]
     assert bench.run(TABLE.messages[Stream.MOTION].patience + 20) == 0
 
 
@@ -279,6 +289,20 @@ def test_a_command_with_hardly_any_limit_of_its_rate_may_step_as_far_as_it_likes
     bench.press(15e3)
     bench.say(Stream.COMMAND, pressure_pa=-15e3)
     assert not bench.run(2) & Reason.COMMANDED
+
+
+def test_a_guard_begins_in_its_own_memory_alone(tmp_path: Path) -> None:
+    main = tmp_path / "main.c"
+    main.write_text(
+        '#include "guard.h"\n'
+        "int main(void) {"
+        " static struct guard two[2]; static struct guard_parameters table;"
+        " guard_start(&two[1], &table); guard_start(&two[0], &table);"
+        " return (two[1].parameters == &table) ? 0 : 1; }\n"
+    )
+    words = ["cc", f"-I{SOURCE}", main, *SOURCES, "-o", tmp_path / "main"]
+    subprocess.run([str(word) for word in words], check=True)
+    subprocess.run([tmp_path / "main"], check=True)
 
 
 def test_an_age_is_held_at_its_end(bench: Bench) -> None:

@@ -309,6 +309,16 @@ def test_a_stream_that_nobody_awaits_may_be_silent_and_has_no_damaged_frame_befo
     assert stream.damaged == 0
 
 
+def test_a_wrong_proof_of_the_key_is_found_in_its_look_alone():
+    counted = Counted(CYCLE_NS, rejected=dict.fromkeys(Rejection, 0) | {Rejection.PROOF: 5})
+    stream, found = Stream(counted), []
+    for proofs in (0, 1, 0, 2, 0):
+        counted.heard += 4
+        counted.rejected[Rejection.PROOF] += proofs
+        found.append(stream.update(0.5))
+    assert found == [0, Finding.WRONG_PROOF, 0, Finding.WRONG_PROOF, 0]
+
+
 @pytest.mark.parametrize("quiet", range(4))
 def test_every_stream_is_looked_at_in_every_second_call(quiet):
     streams = [Counted(CYCLE_NS) for _ in range(4)]
