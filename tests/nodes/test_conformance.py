@@ -199,3 +199,14 @@ def test_a_pump_that_swings_after_its_stop_has_no_time_of_it():
     swings = [0.5 * (-1) ** k for k in range(51)]
     assert math.isnan(stopped_ms(swings))
     assert math.isnan(stopped_ms([*swings, 0.0]))  # at rest for a tick alone
+    # half of the speed the other way is no stop, the water's share of it is one
+    assert stopped_ms([1.0, *[-0.51] * 9, *[0.0] * 40]) == 100.0
+    assert stopped_ms([1.0, *[-0.5] * 9, *[0.0] * 40]) == 10.0
+    assert stopped_ms([1.0, *[0.1] * 9, *[0.0] * 40]) == 10.0
+    assert stopped_ms([1.0, *[0.11] * 9, *[0.0] * 40]) == 100.0
+    assert stopped_ms([*[1.0] * 5, *[0.5] * 5]) == 50.0
+    assert math.isnan(stopped_ms([*[1.0] * 5, *[0.51] * 5]))
+    assert math.isnan(stopped_ms([*[1.0] * 5, *[-0.51] * 5]))
+    assert stopped_ms([*[0.0] * 5]) == 0.0
+    assert math.isnan(stopped_ms([0.0] * 4))
+    assert math.isnan(stopped_ms([]))

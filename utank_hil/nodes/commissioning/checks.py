@@ -76,13 +76,13 @@ def stopped_ms(shares: Sequence[float], share: float = STOPPED) -> float:
     """Time in ms that a pump takes to stop; NaN if it runs on.
 
     `shares`, one each tick from the stop on, are of the speed or pressure before; it has stopped
-    with so small a `share` of the fall left.
+    with so small a `share` of the fall left, and not while it drives the other way.
     """
     last = shares[-AT_REST:]
     end = math.fsum(last) / max(len(last), 1)
     if not (last and abs(end) <= RUNS_ON):
         return math.nan
-    low = [each <= end + share * (1 - end) for each in shares]
+    low = [-RUNS_ON <= each <= end + share * (1 - end) for each in shares]
     rests = (at for at in range(len(low) - AT_REST + 1) if all(low[at : at + AT_REST]))
     return next(rests, math.nan) * TICK_S * 1e3
 
