@@ -69,8 +69,7 @@ static void take_command(struct guard *guard, const uint8_t *data, uint8_t cycle
     const struct guard_parameters *limits = guard->parameters;
     const int32_t asked = word(data, 2U) - ZERO;
     const int32_t last = guard->command;
-    const bool nearer = (magnitude(asked) <= magnitude(last))
-                        && ((asked == 0) || ((asked < 0) == (last < 0)));
+    const bool nearer = (magnitude(asked) <= magnitude(last)) && ((asked * last) >= 0);
     if ((magnitude(asked) > limits->pressure)
         || ((!nearer) && (magnitude(asked - last) > (limits->step * (int32_t)cycles)))) {
         guard->bad_command = true;

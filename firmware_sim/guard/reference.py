@@ -139,7 +139,7 @@ class Guard:
         known = abs(pressure) <= 31250
         if stream == Stream.COMMAND:
             last = self._command
-            nearer = abs(pressure) <= abs(last) and (not pressure or (pressure < 0) == (last < 0))
+            nearer = abs(pressure) <= abs(last) and pressure * last >= 0
             step = abs(pressure - last)
             if abs(pressure) > limits.pressure or (not nearer and step > limits.step * cycles):
                 self._bad_command = True

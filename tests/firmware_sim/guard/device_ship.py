@@ -97,6 +97,7 @@ class DeviceBench:
         self.foreign = config.vessel.foreign
         self.table = guard_parameters(config)
         self.guards = Guard(self.table), GuardInC(self.table, folder)
+        self.guards[1].agrees(self.guards[0])
         foreign = self.foreign
         plans = [*foreign.motions, foreign.levels, foreign.pump_sensor, foreign.panel]
         self.encoders = {

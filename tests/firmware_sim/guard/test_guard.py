@@ -158,7 +158,7 @@ def test_what_is_silent_under_pressure_cuts(bench: Bench, stream: Stream) -> Non
     assert bench.run(10, without=[stream]) & Reason.SILENT
 
 
-@pytest.mark.parametrize("stream", [Stream.MOTION, Stream.TANK, Stream.PUMP])
+@pytest.mark.parametrize("stream", [Stream.MOTION, Stream.TANK, Stream.PUMP, Stream.HARDWIRED])
 def test_a_degraded_measurement_counts_and_a_bad_one_does_not(bench: Bench, stream: Stream) -> None:
     bench.press(10e3)
     patience = TABLE.messages[stream].patience
@@ -214,6 +214,20 @@ def test_a_cut_stays_until_a_reset_and_then_nothing_is_armed(bench: Bench) -> No
     assert bench.run(124) == Reason.DISARMED
 
 
+def test_a_loop_that_a_bad_frame_called_open_is_open_until_a_good_one(bench: Bench) -> None:
+    bench.run(4)
+    for quality, stop_loop, left in (
+        (Quality.BAD, Switch.ON, Reason.STOP),
+        (Quality.BAD, OFF, Reason.STOP),
+        (Quality.GOOD, OFF, 0),
+    ):
+        bench.say(Stream.HARDWIRED, quality=quality, stop_loop=stop_loop)
+        assert bench.run(2) == Reason.STOP
+        bench.say(Stream.ORDER, reset=True)
+        assert bench.run(2, without=[Stream.HARDWIRED]) == left
+        bench.say(Stream.ORDER, reset=False)
+
+
 def test_a_disarm_out_of_sequence_acts_and_no_frame_out_of_sequence_arms(bench: Bench) -> None:
     bench.press(10e3)
     sender = CATALOGUE.transmitter(OperatorCommand)
@@ -231,6 +245,48 @@ def test_a_second_station_arms_only_where_it_is_declared(folder: Path) -> None:
         bench.run(2)
         bench.say(Stream.COMMAND, pressure_pa=500.0)
         assert bench.run(130) == (0 if declared else Reason.DISARMED)
+
+
+@pytest.mark.parametrize("station", [Stream.ORDER, Stream.ORDER_2])
+def test_what_was_pressed_before_the_first_frame_is_no_edge(folder: Path, station: Stream) -> None:
+    bench = Bench(folder, replace(TABLE, second_station=1))
+    bench.says[station] = SOUND[Stream.ORDER]._replace(arm=True, reset=True)
+    bench.send(
+        CATALOGUE.transmitter(HardwiredInputs).frame(
+            SOUND[Stream.HARDWIRED]._replace(stop_loop=Switch.ON)
+        )
+    )
+    assert bench.tick() & Reason.STOP
+    assert bench.run(10) == Reason.STOP | Reason.WAITING
+    bench = Bench(folder, replace(TABLE, second_station=1))
+    bench.says[station] = SOUND[Stream.ORDER]._replace(arm=True)
+    bench.run(4)
+    bench.say(Stream.COMMAND, pressure_pa=500.0)
+    assert bench.run(130) == Reason.DISARMED
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+@pytest.mark.parametrize(
+    ("last", "asked", "lost", "bad"),
+    [
+        (0, 100, 0, False), (0, 101, 0, True),  # a step away from zero
+        (300, 400, 0, False), (300, 401, 0, True),
+        (0, 200, 1, False), (0, 201, 1, True), (0, 400, 3, False), (0, 401, 3, True),
+        (300, 0, 0, False), (300, 1, 0, False), (300, 300, 0, False),  # toward it
+        (300, -1, 0, True), (50, -50, 0, False), (60, -60, 0, True),
+        (2450, 2500, 0, False), (2450, 2501, 0, True), (2600, 2501, 0, True),  # its limit
+    ],
+)  # fmt: skip
+def test_a_command_may_fall_at_once_and_grow_by_its_rate_up_to_its_limit(
+    folder: Path, way: int, last: int, asked: int, lost: int, bad: bool
+) -> None:
+    bench = Bench(folder, replace(TABLE, step=100, pressure=2500))
+    bench.run(4)
+    bench.guards[0]._command = way * last
+    bench.guards[1].set_command(way * last)
+    bench.senders[Stream.COMMAND].counter += lost
+    bench.say(Stream.COMMAND, pressure_pa=8.0 * way * asked)
+    assert bool(bench.run(2) & Reason.COMMANDED) is bad
 
 
 _FRAMES = st.tuples(st.sampled_from(list(Stream)), st.binary(min_size=6, max_size=6))

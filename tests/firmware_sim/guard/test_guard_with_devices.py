@@ -108,6 +108,7 @@ def test_a_drive_that_says_that_it_is_off_and_presses_is_cut(bench: DeviceBench)
             ((f"motion.{name}", "motion_2"), Stream.MOTION)
             for name in ("status", "gyro", "gyro_info", "attitude", "attitude_info")
         ),
+        (("motion.gyro", "motion.attitude", "motion_2"), Stream.MOTION),
         (("motion", "motion_2.slope"), Stream.MOTION),
         (("motion", "motion_2.rates"), Stream.MOTION),
         (("levels",), Stream.TANK),
