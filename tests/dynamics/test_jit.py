@@ -1,7 +1,10 @@
 """Compiling where nothing can be kept."""
 
+import fcntl
 import importlib
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import TimeoutError as NotDone
 
 import pytest
 from numba.core.caching import CacheImpl
@@ -43,3 +46,14 @@ def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(tmp_path, monk
     for name in ("calling", "called_kernel"):
         del sys.modules[name]
     assert found == [(2, 0), (2, 1), (20, 0)]
+
+
+def test_a_kernel_waits_for_what_another_process_compiles():
+    compiled = njit()(lambda number: 3 * number)
+    with ThreadPoolExecutor(1) as thread, open(jit.__file__, "rb") as of_another:
+        fcntl.flock(of_another, fcntl.LOCK_EX)
+        waiting = thread.submit(compiled, 7.0)
+        with pytest.raises(NotDone):
+            waiting.result(timeout=0.5)
+        fcntl.flock(of_another, fcntl.LOCK_UN)
+        assert waiting.result(timeout=60.0) == 21.0

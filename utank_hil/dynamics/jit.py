@@ -1,18 +1,22 @@
 """Numba's compiler with its cache, if a folder is available."""
 
+import fcntl
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import IO, Any, Final, TypeVar
 
 import numba
+from numba.core.compiler_lock import global_compiler_lock
 
 from utank_hil.base import elementary
 
 F = TypeVar("F", bound=Callable[..., Any])
 SOURCES: Final = [Path(elementary.__file__), *sorted(Path(__file__).parent.rglob("*.py"))]
 """Files of what a kernel may call, beside the kernels in its own folder."""
+_turn: list[IO[bytes]] = []  # The locked file while a kernel is compiled.
 
 
 def njit(**options: Any) -> Callable[[F], F]:
@@ -20,6 +24,7 @@ def njit(**options: Any) -> Callable[[F], F]:
 
     The cache is beside the source, in the user's cache folder, or in ``NUMBA_CACHE_DIR``. With a
     read-only installation and a user without a home there is none, and every process compiles.
+    Of processes that need a kernel at once, one compiles and the others wait for it.
     """
 
     def decorate(function: F) -> F:
@@ -30,9 +35,31 @@ def njit(**options: Any) -> Callable[[F], F]:
         index = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
         if index is not None:  # numba itself looks at the kernel's own file alone
             index._source_stamp = _digest(Path(function.__code__.co_filename))
+            _compile_in_turn(compiled)
         return compiled
 
     return decorate
+
+
+def _compile_in_turn(compiled: Any) -> None:
+    load_or_compile = compiled.compile
+
+    def in_turn(signature: Any) -> Any:
+        with global_compiler_lock:
+            if _turn:  # of a kernel that calls this one
+                return load_or_compile(signature)
+            with open(__file__, "rb") as file:
+                _turn.append(file)
+                try:
+                    with suppress(OSError):  # A file system without locks: each compiles.
+                        fcntl.flock(file, fcntl.LOCK_EX)
+                    return load_or_compile(signature)
+                finally:
+                    _turn.clear()
+                    with suppress(OSError):
+                        fcntl.flock(file, fcntl.LOCK_UN)  # A forked process has the file, too.
+
+    compiled.compile = in_turn
 
 
 @cache
