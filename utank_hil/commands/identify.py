@@ -18,6 +18,7 @@ from utank_hil.assembly import retuning_task
 from utank_hil.base.between import ALWAYS, between
 from utank_hil.base.finite import finite
 from utank_hil.base.provenance import describe
+from utank_hil.base.text_files import TextFileError, refuse_device
 from utank_hil.commands.identified import CONTROLLER, VESSEL, IdentifiedShips, read_controller
 from utank_hil.commands.identify_sea import sea
 from utank_hil.commands.identify_test import decay, inclining_test, read_run, refuse
@@ -212,6 +213,10 @@ def identify_log(
         if value is not None and not math.isfinite(value):
             common.fail(f"{option} must be a number of seconds, got {value}")
     loaded = common.load(config, ControllerConfig, allow_code=True)  # Code is refused, not run.
+    try:
+        refuse_device(log)  # before seconds of a design
+    except TextFileError as error:
+        common.fail(error)
     task = _task(loaded, config, order)
     content = read_controller(config)
     out = common.prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
