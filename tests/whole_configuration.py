@@ -1,13 +1,6 @@
 """A configuration with all the files it names."""
 
-from functools import cache
-
 from utank_hil.configuration.yaml_text import parse_yaml
-
-
-@cache
-def parsed(path):
-    return parse_yaml(path.read_text())[0]
 
 
 def whole(path):
@@ -24,4 +17,4 @@ def whole(path):
             return str((path.parent / value).resolve())
         return value
 
-    return resolved(parsed(path))
+    return resolved(parse_yaml(path.read_text())[0])

@@ -217,3 +217,13 @@ def test_any_number_comes_back_from_json(value):
 @pytest.mark.parametrize("text", ["1e", "e5", "1e5m", "0x1e5"])
 def test_words_that_look_like_numbers_are_no_floats(text):
     assert not isinstance(parse_yaml(f"x: {text}")[0]["x"], float)
+
+
+def test_what_is_read_of_a_text_is_the_readers_own():
+    text = "law: {weights: [1.0]}"
+    for _ in range(2):
+        content, findings = parse_yaml(text)
+        assert content == {"law": {"weights": [1.0]}}
+        content["law"]["weights"].append(2.0)
+        findings.append("else")
+    assert parse_yaml(text)[1] == []

@@ -2,6 +2,8 @@
 
 import re
 from collections.abc import Iterator
+from copy import deepcopy
+from functools import lru_cache
 from typing import Any, Final
 
 import yaml
@@ -61,14 +63,7 @@ def parse_yaml(text: str) -> tuple[Any, list[Finding]]:
     too large.
     """
     try:
-        loader = _Loader(text)
-        node = loader.get_single_node()
-        if node is None:
-            return None, []
-        if _values(node, {}) > _MOST_VALUES:
-            raise YamlError(f"holds more than {_MOST_VALUES} values, aliases (*) written out")
-        findings = list(_findings(node, ()))
-        return loader.construct_document(node), findings
+        return deepcopy(_parsed(text))
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         place = "" if mark is None else f" in line {mark.line + 1}, column {mark.column + 1}"
@@ -77,6 +72,18 @@ def parse_yaml(text: str) -> tuple[Any, list[Finding]]:
         raise YamlError(f"is not valid YAML: {error}") from error
     except RecursionError:
         raise YamlError("is not valid YAML: it is nested too deeply") from None
+
+
+@lru_cache(maxsize=32)  # the file of a ship is read again for each law that names it
+def _parsed(text: str) -> tuple[Any, list[Finding]]:
+    loader = _Loader(text)
+    node = loader.get_single_node()
+    if node is None:
+        return None, []
+    if _values(node, {}) > _MOST_VALUES:
+        raise YamlError(f"holds more than {_MOST_VALUES} values, aliases (*) written out")
+    findings = list(_findings(node, ()))
+    return loader.construct_document(node), findings
 
 
 def _in_words(problem: str) -> str:
