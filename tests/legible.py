@@ -160,9 +160,15 @@ def _same(one, other):
 
 def _covered(figure):
     """Pixels of data below each legend."""
-    legends = [each for each in figure.findobj(Legend) if each.get_visible()]
-    boxes = [legend.get_window_extent() for legend in legends]
     data = [artist for axes in figure.axes for artist in _data(axes) if artist.get_visible()]
+    grounds = [axes.get_window_extent() for axes in figure.axes]
+    grounds += [artist.get_window_extent() for artist in data if not artist.get_clip_on()]
+    legends = [
+        each
+        for each in figure.findobj(Legend)
+        if each.get_visible() and any(_common(each.get_window_extent(), box) for box in grounds)
+    ]
+    boxes = [legend.get_window_extent() for legend in legends]
     if not legends:
         return
     _show(legends, visible=False)

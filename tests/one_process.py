@@ -1,5 +1,6 @@
 """Benches and campaigns in this process: a new one takes seconds to import all."""
 
+import pickle
 from concurrent.futures import Future
 from contextlib import contextmanager, nullcontext
 from types import SimpleNamespace
@@ -13,6 +14,7 @@ from firmware_sim.fault_campaign import runner
 
 def _submit(function, *arguments):
     future = Future[object]()
+    pickle.dumps((function, arguments))  # as what is sent to a process
     try:
         future.set_result(function(*arguments))
     except Exception as error:  # the caller asks for it, as for that of a process

@@ -8,6 +8,13 @@ import pytest
 import yaml
 from commands.test_identify_test import run
 
+from firmware_sim.bench import run_in_turn
+from firmware_sim.figures import figures
+from firmware_sim.run import COLUMNS
+from firmware_sim.scenario import Scenario
+from utank_hil.configuration import load_config
+from utank_hil.telemetry.recording import write_recording
+
 STORM = Path("configs/scenarios/storm.yaml")
 SHIP = Path("configs/ships/thesis_first.yaml").resolve()
 
@@ -25,21 +32,18 @@ def scenario_in(folder, **keys):
     return path
 
 
-def bench(scenario):
-    code, out = run("bench", scenario, "--json", "--out", scenario.parent / "bench")
-    assert code == 0, out
-    return json.loads(out)
+def benched(scenario, **changes):
+    loaded = load_config(scenario, Scenario).model_copy(update=changes)
+    return run_in_turn(loaded, loaded.seed)
 
 
-def roll_rms(figures, name):
-    return next(each["roll"]["rms_rad"] for each in figures["runs"] if each["name"] == name)
-
-
-@pytest.mark.usefixtures("one_process")
+@pytest.mark.usefixtures("read_here")
 def test_the_passive_ship_rolls_in_the_waves_of_a_record_under_a_law_as_in_the_sea(tmp_path):
-    first = bench(scenario_in(tmp_path))
+    first = benched(scenario_in(tmp_path))
+    runs = {each.name: each.rows for each in first.runs}
+    write_recording(tmp_path / "bench.rrd", COLUMNS, runs)
     code, out = run(
-        "identify", "sea", tmp_path / "bench/bench.rrd", "--run", "gpc", "--ship", SHIP,
+        "identify", "sea", tmp_path / "bench.rrd", "--run", "gpc", "--ship", SHIP,
         "--slope", 0.5, "--out", tmp_path / "sea", "--json",
     )  # fmt: skip
     assert code == 0, out
@@ -47,9 +51,10 @@ def test_the_passive_ship_rolls_in_the_waves_of_a_record_under_a_law_as_in_the_s
     assert found["duration_s"] == pytest.approx(240, abs=0.5)
     assert (tmp_path / "sea/sea.png").stat().st_size > 10_000
     sea = {"kind": "components", "file": "./sea.csv", "effective_slope": {"coefficient": 0.5}}
-    again = bench(scenario_in(tmp_path / "sea", sea=sea))
-    for name in ("passive", "gpc"):
-        assert roll_rms(again, name) == pytest.approx(roll_rms(first, name), rel=0.03)
+    # in the same waves laws do the same
+    again = benched(scenario_in(tmp_path / "sea", sea=sea), controllers={})
+    passive, expected = (figures(each).runs[0].roll.rms_rad for each in (again, first))
+    assert passive == pytest.approx(expected, rel=0.03)
 
 
 def table(path, roll_deg, *, gap=slice(0), levels=True):

@@ -271,7 +271,7 @@ def test_a_head_that_no_program_of_ours_writes_is_refused_in_words(
 
 @pytest.mark.parametrize("kind", [Kind.STARTED, Kind.ALIVE])
 def test_a_record_without_its_byte_ends_no_replay(tmp_path: Path, kind: Kind) -> None:
-    log = FrameLog(Path("tests/replay/motion-silent.frames"))
+    log = FrameLog(Path("tests/replay/drive-fault.frames"))
     records = next(log.blocks()).copy()
     records["kind"][0], records["length"][0] = kind, 0
     file = tmp_path / "x.frames"

@@ -7,6 +7,7 @@ import hashlib
 import re
 import subprocess
 import zipfile
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 import yaml
 from fmpy.validation import validate_fmu
+from one_process import in_one_process
 from pythonfmu.builder import FmuBuilder
 from typer.testing import CliRunner
 
@@ -302,10 +304,12 @@ def test_bench_sails_it_and_keeps_its_hash(fmu: Path, tmp_path: Path) -> None:
 def test_failure_under_way_ends_the_bench_in_plain_words(
     fmu: Path, tmp_path: Path, parameters: dict[str, float], words: str
 ) -> None:
-    # in the bench's own processes: one that pythonfmu made and that fails damages its process
     path = scenario(tmp_path, fmu, parameters=parameters)
     arguments = ["bench", str(path), "--allow-code", "--json", "--out", str(tmp_path / "out")]
-    ran = CliRunner().invoke(app, arguments)
+    # one that pythonfmu made and that fails damages its process: it is one of the bench's own
+    damages = (fmu.parent / "ship.py").exists() and "DoStep" in words
+    with nullcontext() if damages else in_one_process():
+        ran = CliRunner().invoke(app, arguments)
     said = " ".join(ran.stderr.split())
     assert ran.exit_code == 2, said
     assert "Ship.fmu" in said

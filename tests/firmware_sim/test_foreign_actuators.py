@@ -192,6 +192,7 @@ def test_a_valve_that_is_stuck_or_dead_is_found(theirs, break_it, fault):
     assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, fault)
 
 
+@pytest.mark.usefixtures("one_process")
 def test_a_panel_that_cannot_ask_for_passive_leaves_the_bench_its_reference(theirs):
     scenario = load_config(Path("configs/scenarios/semi_active.yaml"), Scenario)
     section = DevicesSection(**theirs(panel=PANEL))
