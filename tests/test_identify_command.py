@@ -117,3 +117,16 @@ def test_file_that_is_no_recording_is_said_to_be_none(tmp_path):
     (tmp_path / "log.rrd").write_bytes(b"not a recording")
     result = CliRunner().invoke(app, ["identify", str(tmp_path / "log.rrd"), str(CONFIG)])
     assert result.exit_code == 2
+
+
+def test_a_record_with_a_law_in_charge_is_refused(tmp_path):
+    """Its command would be predicted by the motion; the intervals would not hold."""
+    rows = _rows(9.0)
+    rate_rad_s = np.gradient(rows[:, 1], 0.2)
+    rows[4:, 4] = 2e6 * rate_rad_s[:-4] + 0.05 * rows[4:, 4]
+    write_recording(tmp_path / "log.rrd", COLUMNS, {"run": rows})
+    result = identify(tmp_path / "log.rrd", tmp_path / "out")
+    assert result.exit_code == 1
+    assert "refused: the command follows the motion" in result.stdout
+    assert "Record pulses of the pump alone" in " ".join(result.stdout.split())
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["identification.png"]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.identification.record import logged_samples
+from utank_hil.identification.record import feedback_share, logged_samples
 
 STEP_S = 0.05
 COUNT = 400
@@ -94,3 +94,27 @@ def test_a_sample_time_that_rows_do_not_divide_is_served_between_them():
     assert record[2, 0] == pytest.approx(shares @ columns["pressure_command_pa"][3:7])
     assert np.isnan(record[59:71, 0]).all()
     assert np.isfinite(record[1:58, 0]).all()
+
+
+def _pushed(command, seconds=400.0):
+    """Roll in a sea, pushed by what `command` gives for the last roll and the time's number."""
+    random = np.random.default_rng(3)
+    roll, rate, wave, rows = 0.0, 0.0, 0.0, []
+    for k in range(round(seconds / 0.2)):
+        u = command(roll, rate, k)
+        wave += 0.2 * (random.standard_normal() - wave)
+        rate += 0.2 * (-0.36 * roll - 0.06 * rate + 0.02 * wave + 0.01 * u)
+        roll += 0.2 * rate
+        rows.append((u, roll + 1e-4 * random.standard_normal()))
+    return np.array(rows).T
+
+
+def test_a_law_s_command_follows_the_motion_and_that_of_pulses_does_not():
+    pulses = np.repeat(np.random.default_rng(1).choice([-1.0, 1.0], 400), 5)
+    u, roll = _pushed(lambda *_: pulses[_[2]])
+    assert abs(feedback_share(u, roll[:, None])) < 0.01
+    u, roll = _pushed(lambda roll, rate, _: -5 * rate)
+    assert feedback_share(u, roll[:, None]) > 0.5
+    u[::30] = np.nan  # a gap is no command
+    assert feedback_share(u, roll[:, None]) > 0.5
+    assert feedback_share(u[:60], roll[:60, None]) == 0.0  # too short to say

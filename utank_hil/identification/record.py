@@ -3,12 +3,14 @@
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.between import ALWAYS, Between
 
 _SMALLEST, _LARGEST = 1e-60, 1e60  # Products of squares stay finite in this range.
 _CLIPPED = 0.01  # largest share; at twice that a model of roll has errors of 2 %
+_NOTHING = 1e-6  # Of a variance: less is rounding.
 _FEWEST = 4  # Fewer equal samples are chance.
 
 
@@ -79,6 +81,30 @@ def _refuse_clipped(output: FloatArray, number: int) -> None:
                 "sensor is clipped or stuck; widen its range, give weaker pulses, or mark those "
                 "samples as gaps (NaN)"
             )
+
+
+def feedback_share(u: FloatArray, y: FloatArray, lags: int = 20) -> float:
+    """Return how much better a command is predicted where past outputs are known, too: 0 to 1.
+
+    `u` has shape (N,) and `y` (N, m); rows with NaN are gaps. The share of the variance that
+    `lags` past commands leave open and as many outputs explain is 0 for pulses and near 1 for a
+    linear law alone, but for what measured at chance. It is 0 where the record is too short to say.
+    """
+    z = np.column_stack([u, y])
+    z = (z - np.nanmean(z, axis=0)) / np.nanstd(z, axis=0)
+    windows = sliding_window_view(z, lags + 1, axis=0)
+    windows = windows[np.isfinite(windows).all(axis=(1, 2))]
+    past, now = windows[:, :, :-1], windows[:, 0, -1]
+    if len(now) < 2 * past[:1].size:
+        return 0.0
+
+    def left_open(known: FloatArray) -> float:
+        columns = np.column_stack([known.reshape(len(now), -1), np.ones(len(now))])
+        error = now - columns @ np.linalg.lstsq(columns, now)[0]
+        variance: float = float(error @ error) / (len(now) - columns.shape[1])
+        return variance + _NOTHING
+
+    return 1 - left_open(past) / left_open(past[:, :1])
 
 
 def logged_samples(
