@@ -20,12 +20,14 @@ from utank_hil.control.semi_active import (
     OnOffValve,
     OnOffValveDesign,
 )
+from utank_hil.control.stimulation import StimulationDesign
 from utank_hil.dynamics import RollModel, RollShip, Tank
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.valves import ValveRange, duct_valve_loss
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.03)
+ROLLS = StimulationDesign(amplitude_rad=0.02, period_s=12.3, ramp_s=120, roll_limit_rad=0.1)
 VALVE = ValveRange(0.0, duct_valve_loss(TANK, 0.1))
 states = st.lists(st.floats(-3, 3), min_size=4, max_size=4).map(np.array)
 
@@ -185,6 +187,7 @@ def test_law_of_a_valve_can_go_to_another_process(design):
         (OnOffValveDesign(), replace(PLANT, valve=None), "the vessel has none"),
         (ClippedValveDesign(PDDesign()), replace(PLANT, valve=None), "the vessel has none"),
         (ClippedValveDesign(OnOffValveDesign()), PLANT, "pump must be a law that drives a pump"),
+        (ClippedValveDesign(ROLLS), PLANT, "pump.kind must be of a law that takes roll"),
     ],
 )
 def test_design_of_a_valve_s_law_that_can_not_be_is_refused(design, plant, message):

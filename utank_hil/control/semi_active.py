@@ -145,6 +145,8 @@ class ClippedValveDesign:
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Design both laws for a plant."""
         valve, pump = valve_range(plant), built_pump_law(self.pump, plant)
+        if not pump.closes_loop:  # no throttle rolls a ship
+            raise ParameterError("", [("pump.kind", "must be of a law that takes roll, as lqg")])
         make = partial(on_pump_law, ClippedValve, valve, pump)
         return BuiltLaw(make, (*pump.measured, FLOW), commands=(VALVE,))
 
