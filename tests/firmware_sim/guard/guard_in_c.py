@@ -130,9 +130,9 @@ class GuardInC:
     def tick(self) -> int:
         return int(self._library.guard_tick(self._state))
 
-    def set_command(self, counts: int) -> None:
-        """Put the last command there."""
-        _Head.from_buffer(self._state).command = counts
+    def put(self, name: str, value: int) -> None:
+        """Put a number there."""
+        setattr(_Head.from_buffer(self._state), name, value)
 
     def agrees(self, python: Guard) -> None:
         """Hold what it has read to what the guard in Python has."""

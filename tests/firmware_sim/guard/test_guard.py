@@ -267,6 +267,80 @@ def test_what_was_pressed_before_the_first_frame_is_no_edge(folder: Path, statio
 
 @pytest.mark.parametrize("way", [-1, 1])
 @pytest.mark.parametrize(
+    ("stream", "name", "unit", "most", "reason"),
+    [
+        (Stream.MOTION, "roll_rad", 1e-4, TABLE.roll, Reason.ROLL),
+        (Stream.MOTION, "roll_rate_rad_s", 3.125e-5, TABLE.roll_rate, Reason.ROLL),
+        (Stream.TANK, "port_level_m", 1e-3, TABLE.level, Reason.LEVEL),
+        (Stream.TANK, "starboard_level_m", 1e-3, TABLE.level, Reason.LEVEL),
+        (Stream.DRIVE, "pressure_pa", 8.0, TABLE.error, Reason.PRESSURE),
+        (Stream.PUMP, "pressure_pa", 8.0, TABLE.error, Reason.PRESSURE),
+    ],
+)
+def test_a_limit_itself_is_no_reason(
+    folder: Path, way: int, stream: Stream, name: str, unit: float, most: int, reason: Reason
+) -> None:
+    for beyond in (0, 1):
+        bench = Bench(folder)
+        bench.run(4)
+        bench.say(stream, **{name: way * unit * (most + beyond)})
+        assert bench.run(70) == reason * beyond
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+def test_a_heel_at_its_limit_is_no_reason(folder: Path, way: int) -> None:
+    for beyond in (0, 1):
+        bench = Bench(folder)
+        bench.say(Stream.MOTION, roll_rad=way * 1e-4 * TABLE.heel)
+        bench.run(4)
+        bench.guards[0]._heel = heel = way * (TABLE.heel * 4096 + beyond)
+        bench.guards[1].put("heel", heel)
+        assert bench.run(4) == Reason.ROLL * beyond
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+@pytest.mark.parametrize("silent", [False, True])
+def test_a_rotor_that_is_free_may_press_by_the_level(folder: Path, way: int, silent: bool) -> None:
+    for beyond in (0, 1):
+        bench = Bench(folder)
+        bench.say(Stream.TANK, port_level_m=-1.7 * way)
+        bench.say(Stream.DRIVE, state=DriveState.SWITCHED_ON)
+        bench.run(4)
+        most = TABLE.error + 1700 * TABLE.free_rotor // 2000
+        bench.say(Stream.PUMP, pressure_pa=8.0 * way * (most + beyond))
+        without = [Stream.DRIVE] if silent else []
+        bench.run(TABLE.messages[Stream.DRIVE].patience + 4, without)
+        assert bench.run(70, without) & Reason.PRESSURE == Reason.PRESSURE * beyond
+
+
+@pytest.mark.parametrize("state", DriveState)
+def test_a_drive_that_gives_no_torque_may_be_commanded_unarmed(
+    bench: Bench, state: DriveState
+) -> None:
+    bench.run(4)
+    bench.say(Stream.DRIVE, state=state)
+    bench.say(Stream.COMMAND, pressure_pa=500.0)
+    live = state in (
+        DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE,
+        DriveState.FAULT_REACTION_ACTIVE,
+    )  # fmt: skip
+    assert bench.run(130) == (Reason.DISARMED if live else 0)
+
+
+@pytest.mark.parametrize("after", range(0, 60, 7))
+@pytest.mark.parametrize("way", [-1, 1])
+def test_a_pump_that_stays_where_it_was_commanded_is_found_in_less_than_two_seconds(
+    bench: Bench, way: int, after: int
+) -> None:
+    bench.press(way * 10e3)
+    bench.run(after)
+    bench.say(Stream.COMMAND, pressure_pa=0.0)
+    assert bench.run(90) == 0
+    assert bench.run(34) == Reason.PRESSURE
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+@pytest.mark.parametrize(
     ("last", "asked", "lost", "bad"),
     [
         (0, 100, 0, False), (0, 101, 0, True),  # a step away from zero
@@ -283,7 +357,7 @@ def test_a_command_may_fall_at_once_and_grow_by_its_rate_up_to_its_limit(
     bench = Bench(folder, replace(TABLE, step=100, pressure=2500))
     bench.run(4)
     bench.guards[0]._command = way * last
-    bench.guards[1].set_command(way * last)
+    bench.guards[1].put("command", way * last)
     bench.senders[Stream.COMMAND].counter += lost
     bench.say(Stream.COMMAND, pressure_pa=8.0 * way * asked)
     assert bool(bench.run(2) & Reason.COMMANDED) is bad
@@ -334,6 +408,34 @@ def test_any_frames_are_judged_alike_in_both(
 def protected(stream: Stream, second: int, content: bytes) -> bytes:
     data = bytes((0, second)) + content
     return bytes((profile2_crc(data, TABLE.messages[stream].data_ids),)) + data[1:]
+
+
+@pytest.mark.parametrize(
+    ("stream", "quality", "words", "counts"),
+    [
+        *(
+            (stream, 0, (32768 + sign * (31250 + beyond), 0), not beyond)
+            for stream in (Stream.DRIVE, Stream.PUMP) for sign in (-1, 1) for beyond in (0, 1)
+        ),
+        (Stream.MOTION, 1, (0, 64000), True), (Stream.MOTION, 1, (64000, 0), True),
+        (Stream.MOTION, 1, (0, 64001), False), (Stream.MOTION, 1, (64001, 0), False),
+        (Stream.MOTION, 2, (0, 0), False), (Stream.PUMP, 1, (32768, 0), True),
+        (Stream.PUMP, 2, (32768, 0), False),
+        (Stream.TANK, 1, (2000, 2000), True), (Stream.TANK, 1, (62000, 62000), True),
+        (Stream.TANK, 0, (1999, 2000), False), (Stream.TANK, 0, (2000, 1999), False),
+        (Stream.TANK, 0, (62001, 62000), False), (Stream.TANK, 0, (62000, 62001), False),
+        (Stream.TANK, 2, (32000, 32000), False),
+    ],
+)  # fmt: skip
+def test_a_measurement_counts_within_its_range_and_quality(
+    bench: Bench, stream: Stream, quality: int, words: tuple[int, int], counts: bool
+) -> None:
+    of_tank = stream is Stream.TANK
+    content = b"".join(word.to_bytes(2, "little") for word in words) + bytes((quality * of_tank, 0))
+    second = 0 if of_tank else quality << 4
+    bench.send(Frame(TABLE.messages[stream].can_id, protected(stream, second, content)))
+    assert (bench.guards[0]._age[stream] == 0) is counts
+    bench.tick()
 
 
 @pytest.mark.slow
