@@ -29,7 +29,7 @@ static int32_t word(const uint8_t *data, uint32_t place)
 
 static int32_t magnitude(int32_t value)
 {
-    return (value < 0) ? -value : value;
+    return (value < 0) ? -value : value; /* no mutate: of 0 either way is 0 */
 }
 
 static uint16_t longer(uint16_t lasted, bool holds)
@@ -45,6 +45,7 @@ void guard_start(struct guard *guard, const struct guard_parameters *parameters)
 {
     uint32_t index;
     uint8_t *byte = (uint8_t *)guard;
+    /* no mutate `1U`: the first byte is of the pointer, set below */
     for (index = 0U; index < (uint32_t)sizeof *guard; index++) {
         byte[index] = 0U;
     }
@@ -69,6 +70,7 @@ static void take_command(struct guard *guard, const uint8_t *data, uint8_t cycle
     const struct guard_parameters *limits = guard->parameters;
     const int32_t asked = word(data, 2U) - ZERO;
     const int32_t last = guard->command;
+    /* no mutate `<`: two equal ones are no step */
     const bool nearer = (magnitude(asked) <= magnitude(last)) && ((asked * last) >= 0);
     if ((magnitude(asked) > limits->pressure)
         || ((!nearer) && (magnitude(asked - last) > (limits->step * (int32_t)cycles)))) {
@@ -166,7 +168,7 @@ static void take(struct guard *guard, uint32_t stream, const uint8_t *data, uint
     case GUARD_TANK:
         values[0] = first;
         values[1] = second;
-        values[2] = (int32_t)data[1] & 0xF0;
+        values[2] = (int32_t)data[1] & 0xF0; /* no mutate: [3] counts alike */
         take_values(guard, stream,
                     ((data[6] & 15U) <= 1U) && (first >= 2000) && (first <= 62000)
                         && (second >= 2000) && (second <= 62000));

@@ -6,7 +6,7 @@
 
 static uint32_t raw_of(const struct guard_part *part, const uint8_t *data)
 {
-    uint64_t word = 0U;
+    uint64_t word = 0U; /* no mutate: what is above the message is masked off */
     uint32_t place;
     for (place = 0U; place < part->length; place++) {
         word = (word << 8) | data[part->most_first ? place : (part->length - 1U - place)];
@@ -17,7 +17,7 @@ static uint32_t raw_of(const struct guard_part *part, const uint8_t *data)
 static int32_t value_of(const struct guard_part *part, int64_t counts)
 {
     int64_t value = ((counts * part->times) + part->plus) / part->by;
-    value = (value > MOST_VALUE) ? MOST_VALUE : value;
+    value = (value > MOST_VALUE) ? MOST_VALUE : value; /* no mutate: it is its bound, or beyond */
     value = (value < -MOST_VALUE) ? -MOST_VALUE : value;
     return (int32_t)value;
 }
@@ -51,7 +51,7 @@ uint32_t guard_device_heard(struct guard *guard, uint32_t can_id, const uint8_t 
     for (index = 0U; index < guard->parameters->part_count; index++) {
         const struct guard_part *part = &guard->parameters->parts[index];
         if (((can_id & part->id_bits) == part->can_id) && (length == part->length)
-            && ((part->crc.at >= length)
+            && ((part->crc.at >= length) /* no mutate: 255 is none */
                 || (data[part->crc.at] == guard_crc8(data, length, &part->crc)))) {
             take_part(guard, index, data);
             streams |= (part->place < GUARD_PLACES) ? ((uint32_t)1U << part->stream) : 0U;
