@@ -152,7 +152,11 @@ def test_indices_beyond_a_sparse_matrix_are_refused(tmp_path):
     place = whole.index(struct.pack("<II", 5, rows.nbytes) + rows.tobytes()) + 8
     beyond = (rows + 1_000_000).tobytes()
     (tmp_path / "law.mat").write_bytes(whole[:place] + beyond + whole[place + len(beyond) :])
-    with pytest.raises(ConfigError, match=r"law\.mat: A is no sparse matrix: "):
+    # scipy checks them as it reads, in its own words, up to 1.16
+    refused = (
+        r"law\.mat(: A is no sparse matrix: | holds no matrices: axis 0 index 100000\d exceeds)"
+    )
+    with pytest.raises(ConfigError, match=refused):
         configured(tmp_path, "./law.mat")
     matlab_73(tmp_path / "law.mat", {**LAW, "Ts": 0.1})
     with h5py.File(tmp_path / "law.mat", "r+") as file:

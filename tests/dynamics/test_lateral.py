@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from others import others_file
 
 from firmware_sim.plant import Plant
 from firmware_sim.voyage import turning
@@ -137,10 +138,26 @@ def test_memory_of_surge_heave_and_pitch_is_the_radiation_of_the_data_to_one_per
 
 
 def test_a_start_from_which_the_fit_goes_astray_is_followed_by_another(monkeypatch):
-    monkeypatch.setattr(lateral, "_START_RATIOS", (10.0,))
-    assert min(LateralHull(hull().data).memory_errors(six=True).values()) > 0.1
-    monkeypatch.setattr(lateral, "_START_RATIOS", (10.0, 0.5, 0.25, 1.0))
-    assert max(LateralHull(hull().data).memory_errors(six=True).values()) < 0.01
+    starts = lateral._STARTS
+    monkeypatch.setattr(lateral, "_STARTS", ((10.0, 0.0),))
+    assert LateralHull(hull().data).radiation.error > 0.1
+    monkeypatch.setattr(lateral, "_STARTS", ((10.0, 0.0), *starts))
+    assert LateralHull(hull().data).radiation.error < 0.005
+
+
+@pytest.mark.parametrize(
+    ("file", "given"),
+    [
+        ("wamit-fpso/fpso.1", Given(density_kg_m3=1025.0, mass_kg=1.004e8,
+                                    gyration_m=(16.3, 54.0, 54.0), gravity_centre_m=(0, 0, -1.0))),
+        ("shipx-supply/input.re7", Given()),
+        ("aqwa-cylinder/cylinder.AH1", Given(gyration_m=(0.2, 0.2, 0.2))),
+    ],
+    ids=["fpso", "supply", "cylinder"],
+)  # fmt: skip
+def test_memory_is_the_radiation_of_other_peoples_hulls_to_one_percent(file, given):
+    found = LateralHull(read_hull(others_file(f"hulls/{file}"), given))
+    assert found.radiation.error < 0.01
 
 
 @pytest.mark.parametrize("limit", [True, False])

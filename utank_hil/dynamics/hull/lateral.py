@@ -43,10 +43,19 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 _OSCILLATORS = 3  # Number for each motion; surge, heave and pitch need one more for 1 %.
-_START_RATIOS = (0.5, 0.25, 1.0, 0.35, 0.7)
-"""Damping ratios of the oscillators before a fit; radiation of hulls is a broad hump. From each,
-another rounding may end in another valley."""
-GOOD_FIT = 0.01  #: Error of a fit of radiation after which no other start is tried.
+_STARTS = ((0.5, 0.0), (0.5, 0.01), (0.25, 0.01), (1.0, 0.01))
+"""Damping ratio of the oscillators before a fit, for radiation of hulls is a broad hump, and share
+of the greatest damping from which on their frequencies lie. From each, another rounding may end in
+another valley."""
+_MOST_DRAUGHTS = 3.5
+"""Wave number times mean draught up to which radiation is fitted. At 3.5 a wave has 3 % of its
+pressure left there; shorter ones don't move a ship, and panel codes have irregular frequencies."""
+_LEAST_FREQUENCIES = 8
+_MOST_FREQUENCIES = 64  #: In a fit: 525 of a file take 20 s and change nothing.
+GOOD_FIT = 0.01  #: Error of a fit of radiation above which users are warned.
+_BEST_FIT = (
+    GOOD_FIT / 2
+)  #: After which no other start is tried; a motion may be missed by twice it.
 _FEW_STEPS, _MOST_STEPS = 200, 600
 """The fit creeps along a valley: it has not ended by then, and leaves 0.2 % or less."""
 
@@ -110,6 +119,7 @@ def fit_radiation(
     entries = np.zeros((len(upper[0]), size, size))
     entries[np.arange(len(upper[0])), upper[0], upper[1]] = 1.0
     s = 1j * omega_rad_s[:, None, None]
+    some = slice(None, None, math.ceil(len(s) / _MOST_FREQUENCIES))
 
     def parts(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         direction, loss = x[: 2 * count * size].reshape(2, count, size)
@@ -119,49 +129,54 @@ def fit_radiation(
             free = np.triu(free) + np.triu(free, 1).T
         return direction, np.exp(x[2 * count * size :][:count]), loss, free
 
-    def wanted(free: FloatArray) -> ComplexArray:
-        return np.asarray(damped + s * (added - free), dtype=np.complex128)
+    def wanted(free: FloatArray, at: slice = some) -> ComplexArray:
+        return np.asarray(damped[at] + s[at] * (added[at] - free), dtype=np.complex128)
 
     def flat(values: ComplexArray) -> FloatArray:
         rows = values[..., upper[0], upper[1]]
         rows = np.moveaxis(rows, 0, -1).reshape(rows[0].size // len(upper[0]), -1)
         return np.asarray(np.concatenate([rows.real, rows.imag], axis=-1))
 
-    def left(x: FloatArray) -> FloatArray:
+    def left(x: FloatArray, at: slice = some) -> FloatArray:
         direction, frequency, loss, free = parts(x)
-        found = s * (direction.T @ _answer(omega_rad_s, frequency, loss, direction))
-        return np.asarray(flat((found - wanted(free))[:, None])[0])
+        found = s[at] * (direction.T @ _answer(omega_rad_s[at], frequency, loss, direction))
+        return np.asarray(flat((found - wanted(free, at))[:, None])[0])
 
     def slopes(x: FloatArray) -> FloatArray:
         direction, frequency, loss, _ = parts(x)
-        answer = _answer(omega_rad_s, frequency, loss, direction)
+        at = s[some]
+        answer = _answer(omega_rad_s[some], frequency, loss, direction)
         lost = loss.T @ answer
-        by_direction = s[..., None, None] * np.einsum("kjb,ac->kjcab", answer, np.eye(size))
-        by_loss = -(s**2)[..., None, None] * np.einsum("kja,kcb->kjcab", answer, lost)
+        by_direction = at[..., None, None] * np.einsum("kjb,ac->kjcab", answer, np.eye(size))
+        by_loss = -(at**2)[..., None, None] * np.einsum("kja,kcb->kjcab", answer, lost)
         both = np.concatenate([by_direction, by_loss], axis=1)
-        both = (both + np.swapaxes(both, -1, -2)).reshape(len(s), -1, size, size)
+        both = (both + np.swapaxes(both, -1, -2)).reshape(len(at), -1, size, size)
         square = np.einsum("kja,kjb->kjab", answer, answer)
-        shapes = [both, -2 * s[..., None] * (frequency**2)[:, None, None] * square]
+        shapes = [both, -2 * at[..., None] * (frequency**2)[:, None, None] * square]
         if infinite_added_mass is None:
-            shapes.append(s[..., None] * (entries + np.swapaxes(np.triu(entries, 1), -1, -2)))
+            shapes.append(at[..., None] * (entries + np.swapaxes(np.triu(entries, 1), -1, -2)))
         return flat(np.concatenate(shapes, axis=1)).T
 
-    def fitted(ratio: float) -> Radiation:
-        first = _start(omega_rad_s, size, oscillators, ratio)
+    def fitted(ratio: float, share: float) -> Radiation:
+        radiates = np.einsum("kaa->ka", damped).max(axis=1) >= share
+        first = _start(omega_rad_s[radiates], size, oscillators, ratio)
         if infinite_added_mass is None:  # which the data hardly show: stay near the last one's
             first = np.concatenate([first, limit[upper]])
             found = least_squares(left, first, jac=slopes, max_nfev=_FEW_STEPS)
         else:
             found = least_squares(left, first, jac=slopes, method="lm", max_nfev=_MOST_STEPS)
         direction, frequency, loss, free = parts(found.x)
-        error = float(np.linalg.norm(found.fun) / np.linalg.norm(flat(wanted(free)[:, None])))
-        return Radiation(free * scale, direction * unit, frequency, loss, error)
+        whole = slice(None)
+        error = np.linalg.norm(left(found.x, whole)) / np.linalg.norm(
+            flat(wanted(free, whole)[:, None])
+        )
+        return Radiation(free * scale, direction * unit, frequency, loss, float(error))
 
-    best = fitted(_START_RATIOS[0])
-    for ratio in _START_RATIOS[1:]:
-        if best.error <= GOOD_FIT:
+    best = fitted(*_STARTS[0])
+    for start in _STARTS[1:]:
+        if best.error <= _BEST_FIT:
             break
-        best = min(best, fitted(ratio), key=lambda each: each.error)
+        best = min(best, fitted(*start), key=lambda each: each.error)
     return best
 
 
@@ -230,7 +245,10 @@ class LateralHull:
             for matrices in (hull.added_mass, hull.damping)
         )
         known = None if limit is None else _part(limit, degrees)
-        return fit_radiation(hull.frequency_rad_s, added, damping, known, oscillators)
+        omega = hull.frequency_rad_s
+        draughts = omega**2 * hull.known("mass_kg") / hull.known("hydrostatic")[_HEAVE, _HEAVE]
+        felt = slice(max(int(np.sum(draughts <= _MOST_DRAUGHTS)), _LEAST_FREQUENCIES))
+        return fit_radiation(omega[felt], added[felt], damping[felt], known, oscillators)
 
     def coupling(self) -> float:
         """Greatest mass or stiffness between the lateral degrees and the others.
