@@ -96,6 +96,9 @@ def pump_table(found: BenchFigures) -> RichTable:
         (heading, *in_one_unit([getattr(pump, name) for _, pump in pumps], "W"))
         for heading, name in (("power\nmean", "power_mean_w"), ("power\npeak", "power_peak_w"))
     ]
+    flows = iter(
+        like_largest([run.flow_peak_m3_s for run, _ in pumps if run.flow_peak_m3_s is not None])
+    )
     headings = (f"{heading} {unit}" for heading, unit, _ in columns)
     caption = "peaks of values every 50 ms; power that\nthe shaft draws, not what flows back"
     table = new_table("Pump", *headings, "level\npeak m", "flow peak\nm³/s", caption=caption)
@@ -104,7 +107,7 @@ def pump_table(found: BenchFigures) -> RichTable:
             run.name,
             *(cells[index] for _, _, cells in columns),
             f"{pump.level_peak_m:.2f}",
-            "" if run.flow_peak_m3_s is None else f"{run.flow_peak_m3_s:.3g}",
+            "" if run.flow_peak_m3_s is None else next(flows),
         )
     return table
 
@@ -117,8 +120,14 @@ def in_one_unit(values: Sequence[float], unit: str) -> tuple[str, list[str]]:
     """
     largest = max(values, default=0.0)
     prefix, scale = next((each for each in _PREFIXES if largest >= each[1]), _PREFIXES[-1])
-    digits = 2 if largest < scale else max(0, 2 - math.floor(math.log10(largest / scale)))
-    return prefix + unit, [f"{value / scale:.{digits}f}" for value in values]
+    return prefix + unit, like_largest([value / scale for value in values])
+
+
+def like_largest(values: Sequence[float], digits: int = 3) -> list[str]:
+    """Values of a column, not negative, with the decimals that give the largest so many digits."""
+    largest = max(values, default=0.0)
+    places = max(0, digits - 1 - math.floor(math.log10(max(largest, 1.0))))
+    return [f"{value:.{places}f}" for value in values]
 
 
 def _percent(share: float | None) -> str:

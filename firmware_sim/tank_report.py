@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from rich.table import Table
 
 from firmware_sim.prediction import Expected, Loading
-from firmware_sim.report_tables import in_one_unit
+from firmware_sim.report_tables import in_one_unit, like_largest
 from utank_hil.analysis.motion.statistics import Interval
 from utank_hil.analysis.tank_filling import Filling
 from utank_hil.analysis.tank_sizing import TankCost
@@ -104,13 +104,14 @@ def filling_table(found: Sequence[Filling], present_m: float, sea: str) -> Table
         f"no tank in {sea}; *: bound by the tank's height"
     )
     table = new_table("Filling", *figures, names=("load t",), caption=caption)
-    for each in found:
+    waters_t = like_largest([each.water_t for each in found], 4)
+    for each, water_t in zip(found, waters_t, strict=True):
         table.add_row(
             f"{each.displacement_t:.5g}",
             f"{each.gm_m:.2f}",
             f"{each.roll_period_s:.1f}",
             f"{'' if each.tuned else '* '}{each.level_m:.2f}",
-            f"{each.water_t:.4g}",
+            water_t,
             f"{each.water_period_s:.1f}",
             f"{each.gm_loss_m:.2f}",
             less(each.passive_below_no_tank),

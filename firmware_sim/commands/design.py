@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 PICTURE, FIGURES, SWEEP = "tank.png", "tank.json", "tank_sweep.png"
 GMS = (0.6, 0.8, 1.0, 1.2, 1.4, 1.6)
 DISPLACEMENTS = (0.85, 1.0, 1.15)
+LOADINGS = 5.0  #: Times the file's GM or displacement at most: more is another unit. Chosen.
 """Loadings that filling is advised for by default, over those of the file."""
 
 Ship = Annotated[Path, common.argument("Ship, tank and pump: a file of configs/ships.")]
@@ -161,13 +162,20 @@ def filling(
     path = scenario or usual_scenario(loaded, vessel)
     if path is None:
         common.fail(f"{vessel}: no shipped scenario has this ship: name a sea with --scenario")
-    for name, values in (("--gm", gm), ("--displacement", displacement)):
-        if any(not 0 < value < math.inf for value in values or ()):
-            common.fail(f"{name}: must be above 0")
     ship, (chosen, waves) = loaded.ship, sea_of(path, loaded)
     if not ship.displacement_n > 0:
         common.fail(f"{vessel}: ship.displacement_t is needed to tell GM from stiffness: state it")
     own_t, own_m = ship.displacement_n / 9806.65, ship.stiffness_nm_rad / ship.displacement_n
+    for name, values, own, unit in (
+        ("--gm", gm, own_m, "metres"),
+        ("--displacement", displacement, own_t, "tonnes"),
+    ):
+        for value in values or ():
+            if not 1 / LOADINGS <= value / own <= LOADINGS:
+                common.fail(
+                    f"{name} {value:g}: the file has {own:.3g}, and a loading 1/{LOADINGS:g} to "
+                    f"{LOADINGS:g} times that; state it in {unit}"
+                )
     loads_t = displacement or [share * own_t for share in DISPLACEMENTS]
     gms_m = gm or [share * own_m for share in GMS]
     loadings = [(load_t, gm_m) for load_t in sorted(loads_t) for gm_m in sorted(gms_m)]

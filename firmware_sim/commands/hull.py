@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from utank_hil.base.parameters import ParameterError
-from utank_hil.console.common import Json, argument, fail, option, print_json
+from utank_hil.console.common import Json, argument, fail, option, print_json, why_not_writable
 from utank_hil.console.terminal import Terminal, notes, rows_table, say_note, shown
 
 if TYPE_CHECKING:
@@ -65,6 +65,8 @@ def hull(
             fail(f"{names} is needed, and not both")
     if out.suffix.lower() != ".nc":
         fail(f"--out {out}: its suffix must be .nc")
+    if reason := why_not_writable(out.parent, (out.name,)):
+        fail(f"{reason}; choose another place with --out")
     loading = Loading(gm, gravity, roll_period, gyration, displacement, density)
     try:
         side, said = read_mesh(mesh, draught, trim, scale)

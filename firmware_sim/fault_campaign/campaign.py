@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -227,6 +227,7 @@ def _each_setup(rows: Any) -> Any:
 class Campaign(Section):
     """Requirements and rows."""
 
+    noun: ClassVar = "fault campaign"
     #: Earliest start of the faults; they begin up to a second later, see `fault_at_s`.
     fault_s: FaultTime
     arm_s: FaultTime  #: Time at which the operator arms.

@@ -12,6 +12,7 @@ waterline and block.
 
 import io
 import math
+import warnings
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
@@ -61,7 +62,7 @@ def read_mesh(
 
     cpt.set_logging("ERROR")  # its checks of single panels say less than ours
     if not path.is_file():
-        raise MeshError("there is no such file")
+        raise MeshError("is a folder" if path.is_dir() else "there is no such file")
     if path.suffix in _BY_MESHIO and find_spec("meshio") is None:
         raise MeshError(f"{path.suffix} needs meshio: pip install meshio")
     if path.suffix not in FORMATS:
@@ -71,7 +72,8 @@ def read_mesh(
             source: Any = io.StringIO(content.read().decode("latin-1"))
         if path.suffix in _BY_MESHIO:  # they may be binary, and meshio asks the file for its size
             source = str(path)
-        mesh = cpt.load_mesh(source, file_format=path.suffix).merged()
+        with warnings.catch_warnings(action="ignore"):  # of numpy on a file without panels
+            mesh = cpt.load_mesh(source, file_format=path.suffix).merged()
     except MemoryError:
         raise
     except Exception as error:  # whatever the formats' readers raise

@@ -62,6 +62,9 @@ def own(tmp_path: Path) -> Path:
         _write(folder / f"{name}.yaml", {"name": name} | content)
     _write(folder / "law.yaml", LAW)
     _write(folder / "scenario.yaml", SCENARIO)
+    grid = {"hs_m": [1.0, 2.0]}
+    study = {"name": "seas", "scenario": "scenario.yaml", "simulation": "linear", "grid": grid}
+    _write(folder / "hours.yaml", study)
     _write(folder / "study.yaml", {"name": "seas", "scenario": "scenario.yaml", "grid": {}})
     (folder / "swan.spec").write_text("SWAN   1    Swan standard spectral file\n$   of a model\n")
     (folder / "out" / "bench.rrd").write_bytes(b"RRF2\0\0\0\x00\xff\xfe\xff" * 9)
@@ -113,6 +116,34 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
      ("--duct-below-cg", "900 m", "in metres")),
     ("a roll damping in per cent", f"init '{{own}}/new' {YACHT} --draught 2.6 --roll-damping 5",
      ("--roll-damping",)),
+    ("a scenario for the device's ship",
+     "conform motion --bus vcan7 --ship '{own}/scenario.yaml'",
+     ("scenario.yaml: is a scenario, and a ship is wanted",)),
+    ("a scenario for the sea's ship",
+     "identify sea '{own}/out/bench.rrd' --ship '{own}/scenario.yaml'",
+     ("is a scenario, and a ship is wanted",)),
+    ("a scenario as the fault table", "faults '{own}/scenario.yaml'",
+     ("is a scenario, and a fault campaign is wanted",)),
+    ("a sea from its end to its beginning",
+     "identify sea '{own}/out/bench.rrd' --ship '{own}/opv.yaml' --from 100 --to 50",
+     ("--from 100 is not before --to 50",)),
+    ("a decay from no time", "identify decay '{own}/out/bench.rrd' --from nan",
+     ("--from must be a number of seconds",)),
+    ("signals as frames", "export '{own}/out/bench.rrd' --to '{own}/out/bench.log'",
+     ("holds signals and no frames", "bench --frames")),
+    ("a folder as a mesh", "hull '{own}/out' --draught 4 --gm 1 --roll-period 10",
+     ("is a folder",)),
+    ("a hull below a file",
+     "hull '{own}/out' --draught 4 --gm 1 --roll-period 10 --out '{own}/opv.yaml/hull.nc'",
+     ("opv.yaml: is not a folder", "--out")),
+    ("a GM in centimetres",
+     "design filling '{own}/opv.yaml' --gm 110 --scenario '{own}/gpc_sea.yaml'",
+     ("--gm 110", "the file has 1.1", "in metres")),
+    ("a load in kilograms",
+     "design filling '{own}/opv.yaml' --displacement 1900000 --scenario '{own}/gpc_sea.yaml'",
+     ("--displacement 1.9e+06", "the file has 1.9e+03", "in tonnes")),
+    ("a wave's height without its section", "campaign '{own}/hours.yaml' --out '{own}/hours'",
+     ("grid.hs_m: is not a known key; did you mean sea.hs_m?",)),
     ("a controller's word of the trade", "bench '{own}/scenario.yaml' --controller gpc",
      ("No such option", "--controller")),
 ]  # fmt: skip
@@ -124,6 +155,7 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
 def test_a_mistake_at_the_command_is_told(own: Path, words: str, named: tuple[str, ...]) -> None:
     law = {"kind": "gpc", "tuning": "auto"}
     _write(own / "gpc.yaml", LAW | {"law": law})
+    _write(own / "gpc_sea.yaml", SCENARIO | {"controllers": {"gpc": "gpc.yaml"}})
     code, said = said_of(*(each.format(own=own) for each in shlex.split(words)))
     assert code in (1, 2), said
     for each in named:

@@ -205,6 +205,6 @@ def test_filling_says_what_the_file_lacks_and_takes_no_other_sign(tmp_path: Path
     assert "ship.displacement_t is needed" in lacks.stderr
     open_tank = filled(tmp_path, roof="")
     assert "tank.headroom_m is needed" in open_tank.stderr
-    assert "--gm: must be above 0" in filled(tmp_path, "--gm", "-1").stderr
+    assert "--gm -1: the file has" in filled(tmp_path, "--gm", "-1").stderr
     table = filled(tmp_path, "--gm", "0.9", "--displacement", "1900").stdout
     assert "1.70 m in the file" in table

@@ -8,7 +8,7 @@ from typing import Annotated, TypeVar
 
 import typer
 
-from utank_hil.base.between import ALWAYS, Between, between
+from utank_hil.base.between import ALWAYS, Between
 from utank_hil.console import common
 from utank_hil.console.terminal import notes, say_note, shown
 from utank_hil.telemetry import signal_files
@@ -67,9 +67,7 @@ def export(
         common.fail(
             f"--channel is for logs of the bus, which may hold several; {SUFFIX} are of one"
         )
-    part_s = between(from_s, until_s)
-    if not part_s[0] < part_s[1]:
-        common.fail("--from must be before --until")
+    part_s = common.chosen_part(from_s, until_s, "--until")
     said: list[str] = []
     try:
         if kind in BUS_SUFFIXES:
@@ -108,9 +106,9 @@ def _frames(
         entries = entries_of(FrameLog(recording).blocks(said.append))
         yield from frames_of(signal_files.part_of_entries(entries, between_s), said)
     elif suffix == ".rrd" or signal_files.is_table(recording):
-        beside = recording.with_suffix(SUFFIX)
-        hint = f": give {beside}" if suffix == ".rrd" and beside.exists() else ""
-        raise ValueError(f"{recording}: holds signals and no frames{hint}")
+        beside = [*recording.parent.glob(f"*{SUFFIX}")] if suffix == ".rrd" else []
+        hint = " or ".join(sorted(map(str, beside))) or f"a {SUFFIX} file, as bench --frames writes"
+        raise ValueError(f"{recording}: holds signals and no frames: give {hint}")
     else:
         yield from BusLog(recording, channel, between_s).frames(said)
 

@@ -16,7 +16,7 @@ from typer.core import TyperGroup
 
 from utank_hil.assembly import retuning_task
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.between import ALWAYS, between
+from utank_hil.base.between import ALWAYS
 from utank_hil.base.finite import finite
 from utank_hil.base.provenance import describe
 from utank_hil.base.text_files import TextFileError, refuse_device
@@ -230,9 +230,7 @@ def identify_log(
     from utank_hil.pictures.identification import draw_identification
     from utank_hil.telemetry.signal_files import even_rows, is_table
 
-    for option, value in (("--from", from_s), ("--to", to_s)):
-        if value is not None and not math.isfinite(value):
-            common.fail(f"{option} must be a number of seconds, got {value}")
+    part_s = common.chosen_part(from_s, to_s)
     loaded = common.load(config, ControllerConfig, allow_code=True)  # Code is refused, not run.
     try:
         refuse_device(log)  # before seconds of a design
@@ -242,7 +240,6 @@ def identify_log(
     content = read_controller(config)
     out = common.prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
     measured, sample_time_s = task.design.predictor.measured, task.design.predictor.sample_time_s
-    part_s = between(from_s, to_s)
     name, signals = read_run(
         log,
         ("time_s", "pressure_command_pa", *measured),

@@ -10,7 +10,7 @@ import typer
 
 from utank_hil.analysis.motion.wave_slope import BAND_RAD_S, beam_sea, wave_slope
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.between import Between, between
+from utank_hil.base.between import Between
 from utank_hil.base.provenance import describe
 from utank_hil.commands.identify_test import read_run, refuse
 from utank_hil.configuration import Vessel
@@ -51,7 +51,7 @@ def sea(
     from utank_hil.pictures.identification import draw_waves
 
     vessel = common.load(ship, Vessel)
-    part_s = between(from_s, to_s)
+    part_s = common.chosen_part(from_s, to_s)
     name, columns = read_run(log, NEEDED, part_s, channel=channel, run=run)
     try:
         roll_rad, level_m = _samples(columns, part_s)

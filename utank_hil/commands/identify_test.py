@@ -13,7 +13,7 @@ from utank_hil.analysis.loop.margins import PERIOD_SCALES
 from utank_hil.analysis.motion.decay import RollDecay, roll_decay
 from utank_hil.analysis.motion.inclining import inclining
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.between import ALWAYS, Between, between
+from utank_hil.base.between import ALWAYS, Between
 from utank_hil.base.provenance import describe
 from utank_hil.configuration import Vessel
 from utank_hil.console import common
@@ -46,10 +46,8 @@ def decay(
     """
     from utank_hil.pictures.identification import draw_decay
 
-    if from_s is not None and to_s is not None and from_s >= to_s:
-        common.fail(f"--from {from_s:g} is not before --to {to_s:g}")
+    low_s, high_s = common.chosen_part(from_s, to_s)
     vessel = None if ship is None else common.load(ship, Vessel)
-    low_s, high_s = between(from_s, to_s)
     _, columns = read_run(record, ("time_s", "roll_rad"), (low_s, high_s))
     time_s, roll_rad = columns["time_s"], columns["roll_rad"]
     part = (time_s >= low_s) & (time_s <= high_s)

@@ -12,12 +12,16 @@ from pydantic import BaseModel
 
 
 def instead_of(model: type[BaseModel], location: tuple[str | int, ...]) -> str:
-    """Return advice for an unknown key of a model: the one it resembles, or all, if they are few.
+    """Return advice for an unknown key of a model: the one it resembles, one of a section, or all.
 
     `location` is the key as a validation error gives it, with the kinds of sections chosen by kind.
     """
     *parents, written = location
-    near = nearest(str(written), sorted(known_keys(model, parents)))
+    known = sorted(known_keys(model, parents))
+    near = nearest(str(written), known)
+    below = [name for name in known if not near and written in known_keys(model, (*parents, name))]
+    if len(below) == 1:
+        near = f"{below[0]}.{written}"
     return f"; did you mean {near}?" if near else _keys(model, parents)
 
 

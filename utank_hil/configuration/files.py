@@ -228,7 +228,7 @@ class _Reader:
             strange = [name for name in own if name not in known and not nearest(name, known)]
             open_ended = not key and model.model_config.get("extra") != "forbid"
             noun, wanted = "" if key else _kind(part, dict(_nouns())), getattr(model, "noun", "")
-            if wanted == "controller" and "controllers" in part:  # its model may not be loaded
+            if "controller" in (noun, wanted) and "controllers" in part:  # its model is not loaded
                 noun = "scenario"
             another = noun and wanted and noun != wanted
             few = len(strange) <= len(own) - len(strange)

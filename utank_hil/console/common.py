@@ -5,6 +5,7 @@ import errno
 import fcntl
 import io
 import json
+import math
 import os
 import sys
 import tempfile
@@ -19,6 +20,7 @@ import typer
 from pydantic import BaseModel
 from typer.core import TyperGroup
 
+from utank_hil.base.between import ALWAYS, Between
 from utank_hil.base.finite import finite
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import headline
@@ -120,6 +122,17 @@ def fail(message: object, code: ExitCode = ExitCode.USAGE) -> NoReturn:
     """Print an error and end."""
     notes.say(why(message), red="error:")
     raise typer.Exit(code)
+
+
+def chosen_part(from_s: float | None, to_s: float | None, to: str = "--to") -> Between:
+    """The part that `--from` and `to` name; end where it is empty or a time is no number."""
+    for name, value in (("--from", from_s), (to, to_s)):
+        if value is not None and not math.isfinite(value):
+            fail(f"{name} must be a number of seconds, got {value}")
+    low_s, high_s = ALWAYS[0] if from_s is None else from_s, ALWAYS[1] if to_s is None else to_s
+    if not low_s < high_s:
+        fail(f"--from {low_s:g} is not before {to} {high_s:g}")
+    return low_s, high_s
 
 
 def chosen_run(file: Path, runs: Mapping[str, Any], run: str | None) -> str:
