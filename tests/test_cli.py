@@ -331,6 +331,7 @@ def test_bench_whose_results_can_not_be_written_prints_them_all_the_same(tmp_pat
     for name in ("picture", "recording"):
         assert f"the {name} could not be written: No space left" in said(result)
     assert (tmp_path / "bench.json").is_file()
+    assert "utank-hil monitor" not in result.stdout  # there is nothing to watch
 
 
 @pytest.mark.parametrize("command", ["design", "identify"])

@@ -107,7 +107,8 @@ def bench(
         common.print_json(found.as_json(files, about))
     else:
         _print(result, found, files)
-        following = (("monitor", out), *_run_next(found, scenario))
+        shown = [("monitor", out)] if "recording" in files else []
+        following = (*shown, *_run_next(found, scenario))
         terminal.Terminal().lead_on(*following, allow_code=allow_code)
     if failures:
         common.fail("; ".join(failures))

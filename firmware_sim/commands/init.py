@@ -190,14 +190,18 @@ def _with_usual_hull(ship: StarterShip) -> tuple[StarterShip, Any, float | None]
 def _written(project: StarterProject, data: Any | None, folder: Path) -> dict[str, Path]:
     if reason := why_not_writable(folder):  # written last: a refusal leaves no files behind
         fail(f"{reason}; name another folder")
-    files = {file: folder / file for file in FILES}
-    for file, path in files.items():
-        write_whole(path, project.texts[file])
-    if data is not None:
-        from firmware_sim.hull.compute import write_hull
+    files = {file: folder / file for file in (*FILES, *(() if data is None else (HULL,)))}
+    try:
+        for file in FILES:
+            write_whole(files[file], project.texts[file])
+        if data is not None:
+            from firmware_sim.hull.compute import write_hull
 
-        files[HULL] = folder / HULL
-        write_hull(files[HULL], data)
+            write_hull(files[HULL], data)
+    except OSError as error:
+        for path in files.values():  # half a project would be in the way of the next one
+            path.unlink(missing_ok=True)
+        fail(error)
     return files
 
 

@@ -1,14 +1,18 @@
 """``utank-hil init``: from a ship's dimensions to a project that is ready for the bench."""
 
+import errno
 import json
 import math
+import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
+import typer
 from typer.testing import CliRunner, Result
 
 from firmware_sim import prediction
@@ -220,6 +224,26 @@ def test_files_that_are_there_stay(tmp_path: Path) -> None:
     assert done.exit_code == ExitCode.USAGE
     assert "ship.yaml: is there already" in done.stderr
     assert (tmp_path / "ship.yaml").read_text() == "mine\n"
+
+
+def test_a_full_disk_leaves_no_half_of_a_project(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    module = sys.modules["firmware_sim.commands.init"]
+    write = module.write_whole
+
+    def full(path: Path, text: str) -> None:
+        if path.name == "scenario.yaml":
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        write(path, text)
+
+    monkeypatch.setattr(module, "write_whole", full)
+    project = SimpleNamespace(texts=dict.fromkeys(module.FILES, "text"))
+    with pytest.raises(typer.Exit) as ended:
+        module._written(cast(Any, project), None, tmp_path / "new")
+    assert ended.value.exit_code == 2
+    assert "scenario.yaml: No space left" in "".join(capsys.readouterr().err.split("\n"))
+    assert [*tmp_path.glob("new/*")] == []
 
 
 def test_what_is_being_done_names_the_ship_by_its_folder(
