@@ -6,6 +6,7 @@ not depend on machine or present. Every frame that it returns is compared byte b
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -33,21 +34,31 @@ class LoopFigures(NamedTuple):
     phase_margin_rad: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LawVerdict:
     """The law that answered recorded frames, and its distance from the one designed today."""
 
     why_not_recorded: str  #: Why the law designed here answered; empty if the recorded one did.
     #: Differences between the recorded law and the one designed here; they fail no replay.
     differences: list[ValueDifference]
-    #: loops: of the recorded law and of that designed here; None where the laws are equal, or a
-    #: loop can't be judged.
-    loops: tuple[LoopFigures, LoopFigures] | None
+    laws: tuple[BuiltLaw, BuiltLaw]  #: The one that answered, and the one designed here.
+    config: ControllerConfig
 
     @property
     def deviation(self) -> float:
         """Largest relative deviation in any array of the design; 0 if the designs are equal."""
         return max((each.deviation for each in self.differences), default=0.0)
+
+    @cached_property
+    def loops(self) -> tuple[LoopFigures, LoopFigures] | None:
+        """Loops of the recorded law and the one designed here, a second's work for each.
+
+        None where the laws are equal, or a loop can't be judged.
+        """
+        if not self.differences or self.why_not_recorded:
+            return None
+        recorded, here = (loop_figures(law, self.config) for law in self.laws)
+        return None if recorded is None or here is None else (recorded, here)
 
 
 def loop_figures(law: BuiltLaw, config: ControllerConfig) -> LoopFigures | None:
@@ -131,11 +142,7 @@ def replay_log(
         explained=explained,
     )
     apart = law_differences(log.head, designed)
-    loops = None
-    if apart and not why_not:
-        recorded, here = loop_figures(law, config), loop_figures(designed, config)
-        loops = None if recorded is None or here is None else (recorded, here)
-    verdict = LawVerdict(why_not, apart, loops)
+    verdict = LawVerdict(why_not, apart, (law, designed), config)
     return ReplayedLog(result, causes(log.head, config, folder), verdict)
 
 
