@@ -57,3 +57,11 @@ def test_a_kernel_waits_for_what_another_process_compiles():
             waiting.result(timeout=0.5)
         fcntl.flock(of_another, fcntl.LOCK_UN)
         assert waiting.result(timeout=60.0) == 21.0
+
+
+def test_a_lock_that_is_never_released_stops_no_kernel(monkeypatch):
+    monkeypatch.setattr(jit, "MOST_WAITS", 4)
+    compiled = njit()(lambda number: 5 * number)
+    with ThreadPoolExecutor(1) as thread, open(jit.__file__, "rb") as of_another:
+        fcntl.flock(of_another, fcntl.LOCK_EX)
+        assert thread.submit(compiled, 7.0).result(timeout=60.0) == 35.0

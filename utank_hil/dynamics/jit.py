@@ -6,6 +6,7 @@ from contextlib import suppress
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
+from threading import Event
 from typing import IO, Any, Final, TypeVar
 
 import numba
@@ -16,6 +17,7 @@ from utank_hil.base import elementary
 F = TypeVar("F", bound=Callable[..., Any])
 SOURCES: Final = [Path(elementary.__file__), *sorted(Path(__file__).parent.rglob("*.py"))]
 """Files of what a kernel may call, beside the kernels in its own folder."""
+MOST_WAITS: Final = 1200  #: For another process, 50 ms each; the plant's kernel takes 16 s.
 _turn: list[IO[bytes]] = []  # The locked file while a kernel is compiled.
 
 
@@ -51,8 +53,7 @@ def _compile_in_turn(compiled: Any) -> None:
             with open(__file__, "rb") as file:
                 _turn.append(file)
                 try:
-                    with suppress(OSError):  # A file system without locks: each compiles.
-                        fcntl.flock(file, fcntl.LOCK_EX)
+                    _await_lock(file)
                     return load_or_compile(signature)
                 finally:
                     _turn.clear()
@@ -60,6 +61,19 @@ def _compile_in_turn(compiled: Any) -> None:
                         fcntl.flock(file, fcntl.LOCK_UN)  # A forked process has the file, too.
 
     compiled.compile = in_turn
+
+
+def _await_lock(file: IO[bytes]) -> None:
+    """Lock a file, or end without: whoever may read it may lock it, and must stop no start."""
+    for _ in range(MOST_WAITS):
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            Event().wait(0.05)
+        except OSError:  # A file system without locks: each compiles.
+            return
+        else:
+            return
 
 
 @cache
