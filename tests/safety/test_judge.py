@@ -200,6 +200,39 @@ def test_unprotected_motion_is_trusted_beside_a_second_sensor_that_agrees_and_is
         assert (shares[0], shares[-1]) == (1.0, share)
 
 
+def test_the_bus_carries_what_was_heard_and_what_was_sent():
+    safety = Safety(SafetyLimits(), 250_000)
+    for tick in range(1, 203):
+        seen = replace(MEASURED, now_ns=tick * TICK_NS, frames=5 * tick)
+        safety.judge(seen, replace(OWN, frames_sent=2 * tick))
+    assert safety.situation.bus_load == pytest.approx(700 * 143 / 250_000)
+
+
+def test_without_monitors_nothing_is_found_and_the_timers_run_all_the_same():
+    safety, since_ms = Safety(SafetyLimits(), 250_000), []
+    for tick, roll_rad in enumerate((0.0, 0.4, -0.4, 0.3, 0.3)):
+        motions = (MotionSample(roll_rad),)
+        safety.judge(replace(MEASURED, now_ns=tick * TICK_NS, motions=motions), OWN)
+        since_ms.append(safety.situation.rolled_over_ms)
+    assert since_ms[1:] == [0.0, 0.0, 10.0, 20.0]
+    assert since_ms[0] > 1e9
+    assert safety.situation.found == 0
+
+
+def test_what_the_twin_says_is_unknown_without_monitors():
+    bare = Safety(SafetyLimits(), 250_000)
+    rolls = bare.passive_roll_rad, bare.passive_roll_rms_rad, bare.roll_rms_rad
+    assert all(map(math.isnan, rolls))
+    monitors = new_monitors()
+    safety = Safety(SafetyLimits(), 250_000, monitors)
+    monitors.twin.update(0.1, 0.0, 0.0, 5e4)
+    monitors.twin.update(0.1, 0.0, 0.0, 5e4)
+    twin = monitors.twin
+    assert safety.passive_roll_rad == twin.roll_rad != 0.0
+    assert safety.passive_roll_rms_rad == twin.rms_rad > 0.0
+    assert safety.roll_rms_rad == twin.ship_rms_rad != twin.rms_rad
+
+
 def test_what_is_awaited_at_the_start_is_told_after_ten_seconds():
     safety, started_ns = Safety(SafetyLimits(), 250_000), 3 * 10**9
     safety.judge(replace(MEASURED, now_ns=started_ns, tank_age_ms=1e6), OWN)

@@ -223,10 +223,10 @@ class PassiveTwin:
     def _righting_nm(self, roll_rad: float) -> float:
         since = heel = abs(roll_rad)
         piece = self._pieces[0]
-        if heel > self._piece_rad:
+        if heel > self._piece_rad:  # pragma: no mutate: both pieces meet there
             index = min(int(heel / self._piece_rad), len(self._pieces) - 1)
             piece, since = self._pieces[index], heel - index * self._piece_rad
         value = 0.0
         for coefficient in piece:
             value = value * since + coefficient
-        return value if roll_rad >= 0 else -value
+        return value if roll_rad >= 0 else -value  # pragma: no mutate: at zero it is zero
