@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import pytest
 from cantools.database.can import Database
+from hypothesis import given
+from hypothesis import strategies as st
 from situations import situation
 
 from utank_hil.canbus import Fault
@@ -41,9 +43,17 @@ def test_people_read_what_happened_and_what_to_do():
     assert fault_text(Fault.NONE) == "NONE"
 
 
-def test_of_several_conditions_the_first_of_the_table_is_named():
-    assert judging.first(0b10100) == judging.CONDITIONS[2]
-    assert judging.first(0) is None
+@given(st.integers(0, (1 << len(judging.CONDITIONS)) - 1))
+def test_of_several_conditions_the_first_of_the_table_is_named_and_all_their_faults(bits):
+    hold = [each for place, each in enumerate(judging.CONDITIONS) if bits >> place & 1]
+    assert judging.first(bits) == (hold[0] if hold else None)
+    assert judging.faults(bits) == {fault for fault, _ in hold}
+
+
+def test_each_condition_has_its_own_bit():
+    for place, (fault, _) in enumerate(judging.CONDITIONS):
+        assert judging.first(1 << place) is judging.CONDITIONS[place]
+        assert judging.faults(1 << place) == {fault}
 
 
 def test_a_code_without_a_row_has_its_name_alone():

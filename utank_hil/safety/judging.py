@@ -77,7 +77,7 @@ def standing(situation: Situation, limits: SafetyLimits) -> int:
 
 def first(bits: int) -> Coded | None:
     """The first condition of the table among these bits."""
-    return CONDITIONS[(bits & -bits).bit_length() - 1] if bits else None
+    return CONDITIONS[(bits ^ bits - 1).bit_length() - 1] if bits else None
 
 
 def first_ending(bits: int) -> Coded | None:
@@ -113,7 +113,6 @@ def faults(bits: int) -> set[Fault]:
     """Faults of all these conditions."""
     found = set()
     while bits:
-        bit = bits & -bits
-        bits ^= bit
-        found.add(CONDITIONS[bit.bit_length() - 1][0])
+        found.add(CONDITIONS[(bits ^ bits - 1).bit_length() - 1][0])
+        bits &= bits - 1
     return found

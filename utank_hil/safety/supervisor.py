@@ -31,7 +31,7 @@ RESET_WITHIN_MS: Final = 500
 """How long a reset waits for the causes to go: the drive's own fault goes by the reset itself."""
 DEPARTURES: Final = 2.0
 """More often out of operation enabled, a drive counts as out of it. It falls by one each second."""
-_NEVER_NS: Final = 1 << 62
+_NEVER_NS: Final = 1 << 62  # pragma: no mutate: any time that never comes
 
 
 class Supervisor:
