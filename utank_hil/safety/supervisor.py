@@ -8,7 +8,6 @@ ready, so neither a restart nor a fault is ever followed by pressure on its own.
 What counts as a fault, and what it does, is the table in `utank_hil.safety.faults`.
 """
 
-import math
 from typing import Final
 
 from utank_hil.canbus.enumerations import DriveState, Fault, Mode
@@ -41,6 +40,14 @@ class Supervisor:
     lasts, in FAULT after a reset was refused. Else either is NONE.
     """
 
+    #: rolled_over_ms, drive_out_ms, arming_ms: timers, as in `Situation`.
+    rolled_over_ms: float
+    drive_out_ms: float
+    arming_ms: float
+    standing: int
+    """Conditions that hold, bits of `judging.standing`; without those of a drive that is to be off.
+    """
+
     def __init__(self, limits: SafetyLimits) -> None:
         self.limits = limits
         self.mode = Mode.INIT
@@ -52,17 +59,11 @@ class Supervisor:
         #: Whether only `MonitorThresholds.degraded_share` of the pressure is allowed.
         self.degraded = False
         self.raised = self.reset_refused_by = Fault.NONE
-        #: rolled_over_ms, drive_out_ms, arming_ms: timers, as in `Situation`.
-        self.rolled_over_ms = math.inf
-        self.drive_out_ms = self.arming_ms = 0.0
-        #: Conditions that hold, bits of `judging.standing`; without those of a drive that is to be
-        #: off.
-        self.standing = 0
         self._arming_since_ns: int | None = None
         self._reset_until_ns: int | None = None
         self._passive_until_ns = 0
-        self._enabling_until_ns = 0  # in PASSIVE
-        self._begin_noting(0)
+        self._enabling_until_ns = 0  # in PASSIVE  # pragma: no mutate: before any tick
+        self._begin_noting(0)  # pragma: no mutate: it begins anew with ACTIVE and PASSIVE
         self._rolled_over_ns = -_NEVER_NS
         self._zero_at_ns = _NEVER_NS  # the earliest end of those ramps that run
 
