@@ -421,3 +421,8 @@ def test_what_comes_next_is_what_this_machine_can_do(
     assert run == f"  utank-hil run {pd} --bus can3"
     allowed = invoke("check", pd, "--allow-code").stdout.splitlines()[-2:]
     assert allowed == [f"{bench:>{len(bench) + 2}} --allow-code", f"{run} --allow-code"]
+    own = {"kind": "python", "factory": "./own.py:Law", "measured": ["roll_rad"]}
+    content = yaml.safe_load(pd.read_text()) | {"law": own}
+    (tmp_path / "own.yaml").write_text(yaml.safe_dump(content))
+    (tmp_path / "scenario.yaml").write_text(f"controllers: {{mine: {pd.name}, own: own.yaml}}\n")
+    assert following(pd) == [run.strip()]  # the bench would ask for --allow-code

@@ -15,7 +15,7 @@ from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins, Robustness
 from utank_hil.analysis.loop.self_tuning import NoLawError, SelfTunedDesign
 from utank_hil.base.finite import finite
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.configuration.files import ConfigError, files_named, kind_of
+from utank_hil.configuration.files import ConfigError, files_named, kind_of, load_config
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.console import ship_report
 from utank_hil.console.admission import judge_law
@@ -325,15 +325,21 @@ def check(
     if not json_:
         following: dict[str, list[Command]] = {
             "ship": [("design", "tank", config)],
-            "controller": [*_bench_of(config), *run_command(config)],
+            "controller": [*_bench_of(config, allow_code=allow_code), *run_command(config)],
         }
         Terminal().lead_on(*following.get(kind, [("bench", config)]), allow_code=allow_code)
 
 
-def _bench_of(controller: Path) -> list[Command]:
+def _bench_of(controller: Path, *, allow_code: bool) -> list[Command]:
+    """Return the bench of the scenario beside a controller, if it names it and would run."""
     scenario = controller.parent / "scenario.yaml"
     try:
-        named = [each.resolve() for each in files_named(scenario).values()]
+        named = {key: file.resolve() for key, file in files_named(scenario).items()}
+        if controller.resolve() not in named.values():
+            return []
+        for key, file in named.items():
+            if key[:-1] == ("controllers",) and file != controller.resolve():
+                load_config(file, ControllerConfig, allow_code=allow_code)
     except ConfigError:
         return []
-    return [("bench", scenario)] if controller.resolve() in named else []
+    return [("bench", scenario)]
