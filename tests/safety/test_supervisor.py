@@ -362,6 +362,14 @@ def test_without_pressure_no_fault_is_latched_but_what_must_switch_the_drive_off
     assert bench.tick(command_pa=1e4, **sign).mode is not Mode.FAULT
 
 
+def test_a_pump_that_presses_in_passive_before_anything_was_armed_is_switched_off():
+    found = Finding.DRIVE_LOST | Finding.DRIVE_LAGS
+    supervisor = passive_bench().tick(requested_mode=Mode.PASSIVE, found=found)
+    assert (supervisor.mode, supervisor.demand) == (Mode.FAULT, Demand.ZERO)
+    assert supervisor.fault is Fault.DRIVE_NOT_FOLLOWING
+    assert not supervisor.drive_wanted
+
+
 def test_a_drive_that_was_out_before_arming_is_no_reason_to_refuse_it():
     bench = Bench()
     bench.tick()
@@ -401,8 +409,10 @@ def test_arming_is_given_up_when_the_drive_does_not_enable():
     bench = Bench()
     bench.tick()
     bench.tick(requested_mode=Mode.ACTIVE, armed=True, arm_edge=True)
-    for _ in range(200):
+    assert bench.supervisor.arming_ms == 0.0
+    for ticks in range(1, 201):
         bench.tick(requested_mode=Mode.ACTIVE, armed=True)
+        assert bench.supervisor.arming_ms == 10.0 * ticks
         assert bench.supervisor.arming
         assert bench.supervisor.mode is Mode.STANDBY
     bench.tick(requested_mode=Mode.ACTIVE, armed=True)
