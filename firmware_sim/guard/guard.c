@@ -32,6 +32,16 @@ static int32_t magnitude(int32_t value)
     return (value < 0) ? -value : value; /* no mutate: of 0 either way is 0 */
 }
 
+static int32_t lesser(int32_t one, int32_t other)
+{
+    return (other < one) ? other : one; /* no mutate: of two equal ones either */
+}
+
+static int32_t greater(int32_t one, int32_t other)
+{
+    return (other > one) ? other : one; /* no mutate: of two equal ones either */
+}
+
 static uint16_t longer(uint16_t lasted, bool holds)
 {
     uint16_t next = 0U;
@@ -290,14 +300,14 @@ static void note_command(struct guard *guard, int32_t command)
         guard->least[0] = 0;
         guard->most[0] = 0;
     }
-    guard->least[0] = (command < guard->least[0]) ? command : guard->least[0];
-    guard->most[0] = (command > guard->most[0]) ? command : guard->most[0];
+    guard->least[0] = lesser(guard->least[0], command);
+    guard->most[0] = greater(guard->most[0], command);
 }
 
 static bool is_off(const struct guard *guard, int32_t pressure, int32_t error)
 {
-    int32_t least = (guard->least[0] < guard->least[1]) ? guard->least[0] : guard->least[1];
-    int32_t most = (guard->most[0] > guard->most[1]) ? guard->most[0] : guard->most[1];
+    int32_t least = lesser(guard->least[0], guard->least[1]);
+    int32_t most = greater(guard->most[0], guard->most[1]);
     if (guard->parameters->torque_drive) {
         most = commanded(guard);
         least = -most;

@@ -95,7 +95,7 @@ class Supervisor:
                 else:  # it gets its time to get there
                     self._begin_noting(now_ns)
                     if enabled:
-                        self._enabling_until_ns = 0
+                        self._enabling_until_ns = 0  # pragma: no mutate: long ago
 
     def update(self, seen: Situation, standing: int) -> None:
         """Take one tick's situation and set `mode`, `fault`, `demand` and `drive_wanted`.

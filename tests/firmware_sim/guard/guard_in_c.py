@@ -15,6 +15,10 @@ SOURCES = sorted(SOURCE.glob("*.c"))
 FLAGS = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-ffreestanding")
 
 
+TRAPS = ("-fsanitize=undefined", "-fsanitize-undefined-trap-on-error")
+"""An index beyond its array, or a sum beyond its type, ends the process."""
+
+
 class _Message(ctypes.Structure):
     _fields_ = [
         ("can_id", ctypes.c_uint32),
@@ -54,7 +58,7 @@ class _Parameters(ctypes.Structure):
 @cache
 def library(folder: Path) -> ctypes.CDLL:
     out = folder / "guard.so"
-    words = ["cc", *FLAGS, "-O2", "-shared", "-fPIC", *SOURCES, "-o", out]
+    words = ["cc", *FLAGS, *TRAPS, "-O2", "-shared", "-fPIC", *SOURCES, "-o", out]
     subprocess.run([str(word) for word in words], check=True)
     found = ctypes.CDLL(str(out))
     found.guard_tick.restype = ctypes.c_uint8

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -280,11 +281,11 @@ def test_what_was_pressed_before_the_first_frame_is_no_edge(folder: Path, statio
 def test_a_limit_itself_is_no_reason(
     folder: Path, way: int, stream: Stream, name: str, unit: float, most: int, reason: Reason
 ) -> None:
-    for beyond in (0, 1):
+    for beyond, without in product((0, 1), ([], [Stream.COMMAND])):
         bench = Bench(folder)
         bench.run(4)
         bench.say(stream, **{name: way * unit * (most + beyond)})
-        assert bench.run(70) == reason * beyond
+        assert bench.run(90, without) == reason * beyond
 
 
 @pytest.mark.parametrize("way", [-1, 1])
@@ -340,6 +341,45 @@ def test_a_pump_that_stays_where_it_was_commanded_is_found_in_less_than_two_seco
 
 
 @pytest.mark.parametrize("way", [-1, 1])
+def test_a_command_that_is_old_is_none(folder: Path, way: int) -> None:
+    for after in range(30):  # wherever in its window
+        bench = Bench(folder)
+        bench.press(way * 10e3)
+        bench.run(after)
+        both = Reason.PRESSURE | Reason.SILENT
+        assert bench.run(140, without=[Stream.COMMAND]) & both == both
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+@pytest.mark.parametrize("stream", [Stream.DRIVE, Stream.PUMP])
+def test_between_zero_and_the_command_a_pump_may_press_as_it_likes(
+    folder: Path, way: int, stream: Stream
+) -> None:
+    ends = {250 + TABLE.error: 0, 251 + TABLE.error: 1, -TABLE.error: 0, -TABLE.error - 1: 1}
+    for counts, beyond in ends.items():
+        bench = Bench(folder)
+        bench.press(way * 2e3)
+        bench.say(stream, pressure_pa=8.0 * way * counts)
+        assert bench.run(130) == Reason.PRESSURE * beyond
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+@pytest.mark.parametrize(("every", "reason"), [(78, 0), (92, 0), (130, Reason.PRESSURE)])
+def test_a_pump_that_is_commanded_there_now_and_then_is_let_be(
+    folder: Path, way: int, every: int, reason: int
+) -> None:
+    """The last 30 to 60 ticks of commands count, and 60 without are too many."""
+    bench = Bench(folder, replace(TABLE, step=3000))
+    bench.press(way * 10e3)
+    for _ in range(12):
+        bench.say(Stream.COMMAND, pressure_pa=way * 10e3)
+        bench.run(2)
+        bench.say(Stream.COMMAND, pressure_pa=0.0)
+        found = bench.run(every - 2)
+        assert found == reason or every == 92
+
+
+@pytest.mark.parametrize("way", [-1, 1])
 @pytest.mark.parametrize(
     ("last", "asked", "lost", "bad"),
     [
@@ -361,6 +401,33 @@ def test_a_command_may_fall_at_once_and_grow_by_its_rate_up_to_its_limit(
     bench.senders[Stream.COMMAND].counter += lost
     bench.say(Stream.COMMAND, pressure_pa=8.0 * way * asked)
     assert bool(bench.run(2) & Reason.COMMANDED) is bad
+
+
+def test_a_pressure_that_is_old_is_none(folder: Path) -> None:
+    """It counts for ten ticks after it came."""
+    found = []
+    for ticks in range(44, 60):
+        bench = Bench(folder)
+        bench.run(4)
+        bench.say(Stream.PUMP, pressure_pa=8.0 * (TABLE.error + 1))
+        bench.run(ticks)
+        found.append(bench.run(20, without=[Stream.PUMP]))
+    assert found == [0] * 9 + [Reason.PRESSURE] * 7
+
+
+@pytest.mark.parametrize("holds", [Stream.ORDER, Stream.ORDER_2])
+def test_a_stop_that_one_station_holds_is_not_reset_at_the_other(
+    folder: Path, holds: Stream
+) -> None:
+    bench = Bench(folder, replace(TABLE, second_station=1))
+    bench.says[Stream.ORDER_2] = SOUND[Stream.ORDER]
+    bench.run(4)
+    bench.say(holds, stop=True)
+    assert bench.run(2) == Reason.STOP
+    resets = Stream.ORDER_2 if holds is Stream.ORDER else Stream.ORDER
+    bench.say(resets, reset=True)
+    bench.send(bench.senders[resets].frame(bench.says[resets]))
+    assert bench.tick() == Reason.STOP
 
 
 _FRAMES = st.tuples(st.sampled_from(list(Stream)), st.binary(min_size=6, max_size=6))
