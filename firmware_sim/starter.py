@@ -20,6 +20,7 @@ from utank_hil.configuration.ship_keys import WrittenShip, weather_criterion_per
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.roll_damping import HullForm, estimated_roll_damping
 from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.retuning.estimator import LEAST_PERIODS, EstimateSettings
 
 USUAL_DAMPING_RATIO: Final = 0.05
 """Damping ratio of a ship that nothing is known of. Chosen; no study."""
@@ -237,7 +238,7 @@ def make_starter(
         limits["level_m"] = usable_m
     slope = EFFECTIVE_SLOPE if effective_slope is None else float(f"{effective_slope:.2g}")
     sea = starter_sea(ship.length_m, ship.period_s, hs_m, tp_s, slope)
-    texts[CONTROLLER] = controller_file(ship.name, sea, limits)
+    texts[CONTROLLER] = controller_file(ship.name, written.roll_period_s, sea, limits)
     written_law = yaml.safe_load(texts[CONTROLLER])
     config = _valid(ControllerConfig, written_law | {"vessel": vessel})
     texts[SCENARIO] = scenario_file(ship.name, sea)
@@ -245,7 +246,7 @@ def make_starter(
     scenario = _valid(Scenario, yaml.safe_load(texts[SCENARIO]) | parts)
     expected_sea(vessel.ship, scenario.pooled_wave_moment())  # it rolls the ship
     assert isinstance(config.law, SelfTunedDesign)
-    law = config.law.tuned(config.design_plant)
+    law = config.law.tuned(config.design_plant, first=True)
     texts[README] = readme(ship.name)
     if effective_slope is not None:
         remark = "a usual form, see docs/dynamics.md; better: utank-hil hull MESH"
@@ -332,22 +333,27 @@ emulated: true
 """
 
 
-def controller_file(name: str, sea: dict[str, Any], limits: dict[str, float]) -> str:
-    """File of the controller: a law that is designed for the scenario's sea."""
+def controller_file(
+    name: str, roll_period_s: float, sea: dict[str, Any], limits: dict[str, float]
+) -> str:
+    """File of the controller: a law that is renewed under way."""
+    slope = number(sea["effective_slope"]["coefficient"])
     level = f"level_m: {number(limits['level_m'])}, " if limits else ""
     remark = "# level_m: beyond it the water in the duct would be too fast\n" if limits else ""
+    least_s = math.ceil(LEAST_PERIODS * roll_period_s)
+    record = f"record_s: {least_s}, " if least_s > EstimateSettings().record_s else ""
     return f"""\
-# A law that finds its numbers for ship, pump and sea, with all margins. Without the section sea it
-# expects no sea in particular. mean_power_w in W, beside it, bounds what the pump spends.
-# In a sea far from this one, as following waves at speed, it can roll the ship more, and ends in
-# ROLL_AMPLIFIED. Without sea, and with sea_estimate: {{renew: true}} below law, it is renewed for
-# the waves that the ship meets.
+# A law that finds its numbers for ship and pump, with all margins. It begins with no waves in
+# particular, and the tank's loss in those of the section sea. Ship and waves are estimated from the
+# motion, and the law is renewed for them, after ten minutes or so. mean_power_w in W, beside sea,
+# bounds what the pump spends.
 name: {json.dumps(f"{name}, self-tuned")}
 vessel: ship.yaml
 law:
   kind: self_tuned
   sea: {{kind: jonswap, hs_m: {number(sea["hs_m"])}, tp_s: {number(sea["tp_s"])}, \
-effective_slope: {number(sea["effective_slope"]["coefficient"])}}}
+effective_slope: {slope}}}
+sea_estimate: {{renew: true, {record}effective_slope: {slope}}}
 # the plan keeps the limits itself: the level barrier behind it acts late and hard
 {remark}limits: {{{level}brake_share: 1.0, sharpness: 4.0}}
 """

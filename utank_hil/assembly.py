@@ -110,7 +110,7 @@ def build_law(config: ControllerConfig) -> BuiltLaw:
             # an equation that was solved for another matrix than the one given
             warnings.simplefilter("error", RuntimeWarning)
             law = (
-                config.law.first(config.design_plant)
+                config.law.build(config.design_plant, first=True)
                 if config.renews and isinstance(config.law, SelfTunedDesign)
                 else config.law.build(config.design_plant)
             )

@@ -26,7 +26,7 @@ MEASURED = ("roll_rad", "roll_rate_rad_s", "level_m")
 @cache
 def first_law() -> ConstrainedLaw:
     assert isinstance(CONFIG.law, SelfTunedDesign)
-    law = CONFIG.law.first(PLANT).linear
+    law = CONFIG.law.build(PLANT, first=True).linear
     assert isinstance(law, ConstrainedLaw)
     return law
 

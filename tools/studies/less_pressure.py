@@ -83,7 +83,7 @@ def first_law() -> tuple[ConstrainedLaw, DesignPlant]:
     """The first law of the shipped self-tuning controller, and the ship of its file."""
     config = load_config(CONTROLLER, ControllerConfig)
     assert isinstance(config.law, SelfTunedDesign)
-    law = config.law.first(config.plant).linear
+    law = config.law.build(config.plant, first=True).linear
     assert isinstance(law, ConstrainedLaw)
     return law, config.plant
 

@@ -25,6 +25,8 @@ from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.analysis.tank_sizing import TankRoom
 from utank_hil.base.background import one_thread_each
 from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.control import SeaModel
+from utank_hil.sea import jonswap
 
 CONFIGS: Final = Path("configs")
 LOADS: Final = (0.85, 1.0, 1.15, 1.3)
@@ -35,14 +37,19 @@ Made = tuple[Scenario, ControllerConfig]
 
 
 def _offshore(displacement_t: float, hs_m: float | None, tp_s: float | None) -> Made:
-    """An offshore patrol vessel as `init` makes it."""
+    """An offshore patrol vessel as `init` makes it, with a law for its sea."""
     ship = StarterShip("OPV", 90.0, 14.0, displacement_t, 1.1, 10.5, 4.0)
     project = make_starter(ship, TankRoom.in_hull(90.0, 14.0), hs_m=hs_m, tp_s=tp_s)
     with tempfile.TemporaryDirectory() as folder:
         for file in FILES:
             (Path(folder) / file).write_text(project.texts[file])
         scenario = load_config(Path(folder) / SCENARIO, Scenario)
-    return scenario, scenario.controllers["self_tuned"]
+    waves = jonswap(project.sea["hs_m"], project.sea["tp_s"])
+    bands = tuple(waves.frequency_hz.tolist()), tuple(waves.density.tolist())
+    sea = SeaModel(*bands, effective_slope=project.sea["effective_slope"]["coefficient"])
+    law = SelfTunedDesign("self_tuned", sea)
+    config = scenario.controllers["self_tuned"]
+    return scenario, config.model_copy(update={"law": law, "sea_estimate": None})
 
 
 def _shipped(scenario: str, of_sea: str) -> Made:

@@ -203,7 +203,7 @@ def test_a_first_law_keeps_its_damping_on_other_loads_with_the_pump_at_its_limit
             found.append(closed_loop_radius(clipped, sampled, 1.0))
         return max(found)
 
-    first = SelfTunedDesign("self_tuned").first(PLANT).linear
+    first = SelfTunedDesign("self_tuned").build(PLANT, first=True).linear
     assert radius(first.unlimited()) < 1
     of_one_load = self_tuned(PLANT, unknown_sea(PLANT.ship)).law.unlimited()
     assert radius(of_one_load) > 1.001  # a limit cycle at 1.3

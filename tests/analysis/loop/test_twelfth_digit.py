@@ -45,7 +45,7 @@ def changed(value, rng):
 def gains_and_roll(design, plant, *, renews):
     """Gains of the linear law, and its roll in the broad sea of an unknown one."""
     starts = renews and isinstance(design, SelfTunedDesign)
-    law = design.first(plant) if starts else design.build(plant)
+    law = design.build(plant, first=True) if starts else design.build(plant)
     linear = getattr(law.linear, "unlimited", lambda: law.linear)()
     names = ("gain", "observer_gain")
     gains = [getattr(linear, name) for name in names if hasattr(linear, name)]

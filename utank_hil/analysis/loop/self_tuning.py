@@ -176,22 +176,22 @@ class SelfTunedDesign:
     def __post_init__(self) -> None:
         refuse("self-tuned design", range_problems(self))
 
-    def tuned(self, plant: DesignPlant) -> SelfTuned:
+    def tuned(self, plant: DesignPlant, *, first: bool = False) -> SelfTuned:
         """The design and its law for a plant that may be loaded otherwise.
 
-        Raises `NoLawError` as `self_tuned`.
+        The `first` law leads until ship and waves are known, and expects no sea in particular: one
+        for a beam sea amplifies the slow roll of following waves by up to 1.9, this one less. Of
+        `sea` it has what the plant takes from it, the tank's loss. Raises `NoLawError` as
+        `self_tuned`.
         """
-        return _tuned(self, plant, CLIPPED_PEAK if needs_plan(plant) else _PLANNED_PEAK)
+        peak = CLIPPED_PEAK if first or needs_plan(plant) else _PLANNED_PEAK
+        return _tuned(replace(self, sea=None) if first else self, plant, peak)
 
-    def build(self, plant: DesignPlant) -> BuiltLaw:
-        """Design the law for a plant."""
-        law = self.tuned(plant).law
-        return BuiltLaw(law.controller, _MEASURED, law)
-
-    def first(self, plant: DesignPlant) -> BuiltLaw:
-        """Design the law that leads until the ship is identified, clipped if it can be."""
-        law = _tuned(self, plant, CLIPPED_PEAK).law
-        return BuiltLaw(law.controller if needs_plan(plant) else law.clipped, _MEASURED, law)
+    def build(self, plant: DesignPlant, *, first: bool = False) -> BuiltLaw:
+        """Design the law for a plant, the `first` one clipped if it can be."""
+        law = self.tuned(plant, first=first).law
+        clips = first and not needs_plan(plant)
+        return BuiltLaw(law.clipped if clips else law.controller, _MEASURED, law)
 
 
 def needs_plan(plant: DesignPlant) -> bool:
