@@ -209,6 +209,13 @@ def test_a_first_law_keeps_its_damping_on_other_loads_with_the_pump_at_its_limit
     assert radius(of_one_load) > 1.001  # a limit cycle at 1.3
 
 
+def test_a_first_law_expects_no_sea_in_particular_whatever_its_section_says():
+    """One for a beam sea rolls the ship more in the slow roll of following waves."""
+    design, unknown = SelfTunedDesign("self_tuned", SEA), SelfTunedDesign("self_tuned")
+    assert design.tuned(PLANT, first=True) is unknown.tuned(PLANT, first=True)
+    assert design.tuned(PLANT).passive_roll_rad != unknown.tuned(PLANT).passive_roll_rad
+
+
 def test_on_another_load_the_plan_does_not_swing_the_water_from_limit_to_limit():
     """At 1.3 the plan of the file's ship rolled her 1.3 to 2.6 times the passive roll."""
     config = load_config(CONTROLLERS / "self_tuned.yaml", ControllerConfig)

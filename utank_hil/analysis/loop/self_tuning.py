@@ -168,7 +168,8 @@ class SelfTunedDesign:
     """A constrained law whose numbers follow from its ship and sea."""
 
     kind: Literal["self_tuned"]
-    #: Expected sea, of which spectrum and effective slope count; None for an unknown sea.
+    #: Expected sea, of which spectrum and effective slope count; None for an unknown sea. A law
+    #: that is renewed begins with the unknown sea, and the tank's loss in this one.
     sea: SeaModel | None = None
     #: Limit on the predicted mean power from pump to water; infinite for the least roll.
     mean_power_w: Annotated[float, Range(above=0, infinite=True)] = math.inf
