@@ -15,6 +15,7 @@ from firmware_sim.commands.bench import STORM
 from firmware_sim.figures import BenchFigures, figures
 from firmware_sim.prediction import SEEDS, Expected, Loading, other_loadings, predict
 from firmware_sim.scenario import Scenario
+from firmware_sim.starter import scenario_file
 from firmware_sim.tank_report import loading_table, percent, roll_rows
 from utank_hil.analysis.loop.margins import of_period
 from utank_hil.analysis.motion.statistics import Interval, PumpStatistics
@@ -90,11 +91,19 @@ def outside(expected: Expected, bench: BenchFigures) -> list[str]:
     ]
 
 
-def test_what_init_says_of_an_opv_is_what_its_bench_gives(tmp_path: Path) -> None:
+def test_what_init_says_of_an_opv_is_what_its_bench_gives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """It said 11 % below passive once, by a gentler law; the bench gave 50."""
+
+    def half_as_long(*about: Any) -> str:
+        return scenario_file(*about).replace("duration_s: 900", "duration_s: 480")
+
+    monkeypatch.setattr("firmware_sim.starter.scenario_file", half_as_long)
     expected = expected_of(project(tmp_path / "opv", OPV)["expected"])
     bench = bench_of(tmp_path / "opv")
     assert outside(expected, bench) == []
+    assert expected.window_s == 420.0
     gain = expected.active_below_passive
     assert gain is not None
     assert gain.half_width < 0.1  # else anything would be inside
