@@ -68,6 +68,7 @@ def test_recording_becomes_a_model_a_picture_and_a_configuration(accepted):
     assert config.vessel.ship.natural_frequency_rad_s == pytest.approx(2 * np.pi / 9.0, rel=0.01)
 
 
+@pytest.mark.usefixtures("read_here")
 def test_refused_model_leaves_reasons_and_nothing_of_an_earlier_acceptance(accepted, tmp_path):
     shutil.copytree(accepted[0] / "out", tmp_path / "out")
     write_recording(tmp_path / "log.rrd", COLUMNS, {"run": _rows(4.0)})

@@ -437,7 +437,8 @@ READERS = [
     Reader("a.nc", made_netcdf, load_directional, cost=16),
     Reader("moments.csv", made_moments, MomentTable.read, cost=0.4),
     Reader("sea.csv", made_components, read_components, cost=0.4),
-    *(Reader(name, made_law, read_system, cost=0.5) for name in ("law.json", "law.npz", "v73.mat")),
+    *(Reader(name, made_law, read_system, cost=0.5) for name in ("law.json", "law.npz")),
+    Reader("v73.mat", made_law, read_system, cost=5),  # A damaged head makes it one of those below.
     # A process of its own reads it, as scipy's reader may end with a segmentation fault.
     *(Reader(name, made_law, read_system, cost=200) for name in ("law.mat", "packed.mat")),
     Reader("a.fmu", made_fmu, fmu, cost=0.6),

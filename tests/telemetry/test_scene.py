@@ -97,6 +97,7 @@ def test_a_recording_has_pictures_in_time_and_words_on_a_change(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("read_here")
 def test_a_recording_opens_at_its_fault_or_else_at_most_roll(tmp_path):
     rows = _rows(20.0)
     calm, faulty = tmp_path / "calm.rrd", tmp_path / "faulty.rrd"

@@ -66,6 +66,7 @@ def test_the_ship_is_drawn_at_her_roll_with_water_and_pump(tmp_path, monkeypatch
             assert len(pixels(drawn, PUMP)[0]) > 200
 
 
+@pytest.mark.usefixtures("read_here")
 def test_what_can_not_be_drawn_is_named(tmp_path):
     rows = np.zeros((3, len(SIGNALS)))
     rows[:, SIGNALS.index("time_s")] = range(3)
