@@ -30,6 +30,9 @@ def report(
 
     runs = [run.parent if run.name == RECORDING else run for run in runs]
     page = out or (runs[0] / PAGE if runs[0].is_dir() else runs[0].with_suffix(".html"))
+    if out is None and len(runs) > 1:  # the page of the first run alone stays
+        first = runs[0].resolve()
+        page = first.with_name(f"{first.stem}-and-{len(runs) - 1}-more.html")
     try:
         written = write_report_page(page, *joined([_report(run) for run in runs]))
     except (OSError, ValueError) as error:

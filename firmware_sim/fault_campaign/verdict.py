@@ -292,8 +292,8 @@ def table(results: Sequence[Result], seeds: int) -> Table:
         drawn.add_column(heading, justify="right", no_wrap=True)
     drawn.caption = (
         "worst of the seeds; times after the fault, ≤ their limits; zero: of the drive's "
-        "set-point,\nor the end of the valve's following; variance of the roll over that of the "
-        "passive ship,\nor, in charge, of the sound one if that is more, ≤ 1.05"
+        "set-point, or the end of the valve's following; variance of the roll over that of the "
+        "passive ship, or, in charge, of the sound one if that is more, ≤ 1.05"
     )
     for result in results:
         said = " ".join((result.row.expect.reaction, *result.codes))

@@ -1,6 +1,7 @@
 """The report of a recording, read back from its page; that of a bench is in tests/firmware_sim."""
 
 import base64
+import importlib
 import io
 import json
 import math
@@ -22,7 +23,9 @@ from utank_hil.canbus.enumerations import AlarmState, Fault, Mode
 from utank_hil.cli import app
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.nodes.signals import SIGNALS
+from utank_hil.pictures import report_page
 from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict, write_report_page
+from utank_hil.reports import page as pages
 from utank_hil.reports import recording as of_recording
 from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.frame_log import EVENTS, ROWS, FrameLogWriter
@@ -252,3 +255,25 @@ def test_what_is_no_run_is_named(tmp_path: Path, name: str, expected: str) -> No
         write_page(tmp_path / name, tmp_path / "page.html")
     assert expected in str(caught.value)
     assert str(tmp_path / name) in str(caught.value)
+
+
+def test_a_page_of_several_runs_leaves_that_of_the_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        importlib.import_module("firmware_sim.commands.report"), "_report", lambda run: run
+    )
+    monkeypatch.setattr(pages, "joined", lambda runs: runs)
+
+    def written(file: Path, *runs: Path) -> Path:
+        file.write_text(" and ".join(each.name for each in runs))
+        return file
+
+    monkeypatch.setattr(report_page, "write_report_page", written)
+    for name in ("calm", "storm"):
+        (tmp_path / name).mkdir()
+        assert CliRunner().invoke(app, ["report", str(tmp_path / name)]).exit_code == 0
+    both = [str(tmp_path / name) for name in ("calm", "storm")]
+    assert CliRunner().invoke(app, ["report", *both]).exit_code == 0
+    assert (tmp_path / "calm" / "report.html").read_text() == "calm"
+    assert (tmp_path / "calm-and-1-more.html").read_text() == "calm and storm"
