@@ -103,6 +103,9 @@ def test_the_hour_by_file_and_time_is_the_hour_that_the_shipped_law_writes_out(t
     assert loaded(tmp_path, MEASURED) == shipped.sea
 
 
+TIMELESS = {key: value for key, value in MEASURED.items() if key != "time"}
+
+
 @pytest.mark.parametrize(
     ("sea", "key", "reason"),
     [
@@ -115,6 +118,7 @@ def test_the_hour_by_file_and_time_is_the_hour_that_the_shipped_law_writes_out(t
         ({**KINDS["ittc"], "frequency_hz": [0.1, 0.2]}, "law.sea.frequency_hz", "exclude each"),
         ({**MEASURED, "file": "nowhere.txt"}, "law.sea.file", "nowhere.txt can't be read"),
         ({**MEASURED, "time": "2019-02-10T05:45"}, "law.sea.time", "the nearest is of"),
+        (TIMELESS, "law.sea.time", "is required but missing: the file has 2019-02-06T00:40:00 to"),
     ],
 )
 def test_what_is_wrong_is_told_with_its_key(tmp_path, sea, key, reason):

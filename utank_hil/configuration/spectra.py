@@ -4,6 +4,7 @@ A scenario draws its waves from a spectrum; a law that foresees waves is designe
 """
 
 import math
+from contextlib import suppress
 from dataclasses import fields
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -115,6 +116,18 @@ class MeasuredSpectrum(Section):
     WAVEWATCH III, SWAN, ERA5, NDBC's netCDF, Spotter, Datawell."""
     time: datetime
     """Start of the record's hour as written in the file, UTC unless it names another zone."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _times_are_named(cls, content: Any) -> Any:
+        times: list[Any] = []
+        if isinstance(content, dict) and "file" in content and "time" not in content:
+            with suppress(OSError, TypeError, ValueError):  # said of the file itself
+                times = [*read_spectra(Path(content["file"]), place=content.get("place")).time]
+        if times:
+            reason = f"is required but missing: the file has {times[0]} to {times[-1]}"
+            raise ParameterError("", [("time", reason)])
+        return content
 
     @field_validator("file")
     @classmethod
