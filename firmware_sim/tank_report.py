@@ -105,9 +105,10 @@ def filling_table(found: Sequence[Filling], present_m: float, sea: str) -> Table
     )
     table = new_table("Filling", *figures, names=("load t",), caption=caption)
     waters_t = like_largest([each.water_t for each in found], 4)
-    for each, water_t in zip(found, waters_t, strict=True):
+    loads_t = like_largest([each.displacement_t for each in found], 4)
+    for each, load_t, water_t in zip(found, loads_t, waters_t, strict=True):
         table.add_row(
-            f"{each.displacement_t:.5g}",
+            load_t,
             f"{each.gm_m:.2f}",
             f"{each.roll_period_s:.1f}",
             f"{'' if each.tuned else '* '}{each.level_m:.2f}",

@@ -2,15 +2,20 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from rich.measure import Measurement
 from typer.testing import CliRunner
 
 from firmware_sim import prediction
+from firmware_sim.tank_report import filling_table
 from utank_hil.analysis import tank_sweep
 from utank_hil.analysis.loop.margins import PERIOD_SCALES
+from utank_hil.analysis.tank_filling import Filling
 from utank_hil.cli import app
+from utank_hil.console.terminal import Terminal
 
 pytestmark = pytest.mark.slow
 
@@ -208,3 +213,16 @@ def test_filling_says_what_the_file_lacks_and_takes_no_other_sign(tmp_path: Path
     assert "--gm -1: the file has" in filled(tmp_path, "--gm", "-1").stderr
     table = filled(tmp_path, "--gm", "0.9", "--displacement", "1900").stdout
     assert "1.70 m in the file" in table
+
+
+def test_loads_and_waters_of_a_large_ship_are_read_in_one_column() -> None:
+    found = [
+        Filling(load_t, 1.5, 28.0, 16.5, water_t, 27.5, 0.26, 0.01, 0.009, tuned=False)
+        for load_t, water_t in ((119000.0, 1925.0), (140000.0, 1930.0))
+    ]
+    table = filling_table(found, 9.2, "box in a beam sea")
+    assert [*table.columns[0].cells] == ["119000", "140000"]
+    small = [replace(each, water_t=each.water_t / 96.25) for each in found]
+    waters = [*filling_table(small, 9.2, "a sea").columns[4].cells]
+    assert waters == ["20.00", "20.05"]
+    assert Measurement.get(Terminal(width=200), Terminal(width=200).options, table).maximum <= 80
