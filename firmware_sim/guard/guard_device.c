@@ -18,7 +18,7 @@ static int32_t value_of(const struct guard_part *part, int64_t counts)
 {
     int64_t value = ((counts * part->times) + part->plus) / part->by;
     value = (value > MOST_VALUE) ? MOST_VALUE : value; /* no mutate: it is its bound, or beyond */
-    value = (value < -MOST_VALUE) ? -MOST_VALUE : value;
+    value = (value < -MOST_VALUE) ? -MOST_VALUE : value; /* no mutate: likewise */
     return (int32_t)value;
 }
 

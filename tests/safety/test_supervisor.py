@@ -370,6 +370,20 @@ def test_a_pump_that_presses_in_passive_before_anything_was_armed_is_switched_of
     assert not supervisor.drive_wanted
 
 
+def test_a_drive_that_was_out_is_excused_by_a_reset_that_is_refused_too():
+    bench = armed_bench()
+    for _ in range(6):
+        bench.tick(**{**ACTIVE, "drive_enabled": False})
+    assert bench.supervisor.fault is Fault.DRIVE_FAULT
+    assert bench.supervisor.standing & judging.DRIVE_OUT
+    bench.tick(link_lost=True, reset_edge=True)
+    for _ in range(60):
+        bench.tick(link_lost=True)
+    assert bench.supervisor.reset_refused_by is Fault.BUS_LOST
+    assert bench.tick(link_lost=True).drive_out_ms == 0.0
+    assert not bench.supervisor.standing & judging.DRIVE_OUT
+
+
 def test_a_drive_that_was_out_before_arming_is_no_reason_to_refuse_it():
     bench = Bench()
     bench.tick()
@@ -413,6 +427,7 @@ def test_arming_is_given_up_when_the_drive_does_not_enable():
     for ticks in range(1, 201):
         bench.tick(requested_mode=Mode.ACTIVE, armed=True)
         assert bench.supervisor.arming_ms == 10.0 * ticks
+        assert bench.supervisor.drive_wanted
         assert bench.supervisor.arming
         assert bench.supervisor.mode is Mode.STANDBY
     bench.tick(requested_mode=Mode.ACTIVE, armed=True)

@@ -265,6 +265,6 @@ class Supervisor:
             departures += 1.0
         self._departures = departures
         self._was_enabled = enabled
-        if enabled and departures <= DEPARTURES:
+        if enabled and departures <= DEPARTURES:  # pragma: no mutate: it is never just that
             self._drive_enabled_ns = now_ns
         self.drive_out_ms = (now_ns - self._drive_enabled_ns) / MILLISECOND_NS
