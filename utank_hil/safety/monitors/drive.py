@@ -94,7 +94,9 @@ class DriveFollowing:
         self, pressure_pa: float, level_rate_m_s: float, limit_pa: float, *, limited: bool
     ) -> int:
         expected_pa = self.expected_pa
+        # pragma: no mutate start: of zero both ways count alike
         along_pa = pressure_pa if expected_pa > 0 else -pressure_pa
+        # pragma: no mutate end
         outrun = limited and level_rate_m_s * expected_pa > 0
         if abs(expected_pa) > limit_pa and along_pa < -REVERSED_SHARE * limit_pa and not outrun:
             self._reversed_s += self._period_s
@@ -126,13 +128,13 @@ class Saturation:
         self._still_share = STILL_SHARE * thresholds.degraded_share
         self._side = 0.0
         self._held_s = self._limited_s = 0.0
-        self._found = False
+        self._found = False  # pragma: no mutate: the first update only tells the side
 
     def update(self, command_pa: float, *, drive_limited: bool, elapsed_s: float) -> int:
         """Take the command; return what was found."""
         share = self._still_share if self._found else FULL_SHARE
         held = drive_limited or abs(command_pa) >= share * self._limit_pa
-        side = math.copysign(1.0, command_pa)
+        side = math.copysign(1.0, command_pa)  # pragma: no mutate: its sign alone counts
         if held and side == self._side:
             self._held_s += elapsed_s
         else:

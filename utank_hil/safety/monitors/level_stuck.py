@@ -106,5 +106,7 @@ class LevelStuck:
         self._sway_rate_m_s = rate_m_s = rate_m_s + pushed / self._inertia * self._period_s
         self._swayed_m = swayed_m = swayed_m + rate_m_s * self._period_s
         other_m, most_m = moved_m - self._most_sway * swayed_m, BANDS * self._band_m
+        # pragma: no mutate start: it is never just that
         stuck = min(moved_m, other_m) > most_m or max(moved_m, other_m) < -most_m
+        # pragma: no mutate end
         return Finding.LEVEL_STUCK if stuck else 0

@@ -153,7 +153,7 @@ class Senders:
         self._foreign_per_s = FOREIGN_SHARE * frames_per_s
         self._foreign = 0
         self._excess = 0.0
-        self._now_s = 0.0
+        self._now_s = 0.0  # pragma: no mutate: differences of it count
         self._damaged_s = [-math.inf] * DAMAGED_FRAMES
 
     def begin(self, foreign: int) -> None:
