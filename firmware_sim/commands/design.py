@@ -180,7 +180,8 @@ def filling(
     gms_m = gm or [share * own_m for share in GMS]
     loadings = [(load_t, gm_m) for load_t in sorted(loads_t) for gm_m in sorted(gms_m)]
     try:
-        found = fillings(_plant(loaded), waves, loadings)
+        pump_pa = 0.0 if loaded.pump is None else loaded.pump.max_pressure_pa
+        found = fillings(_plant(loaded), waves, loadings, pump_pa)
     except ValueError as error:
         common.fail(f"{vessel}: {error}")
     out = common.prepare_out(out, ("filling.png", "filling.json"))

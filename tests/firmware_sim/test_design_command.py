@@ -172,6 +172,7 @@ name: light sea
 vessel: own.yaml
 sea: {kind: jonswap, hs_m: 0.3, tp_s: 9.0}
 controllers: {rest: {name: rest, vessel: own.yaml, law: {kind: passive}}}
+operator: []
 duration_s: 600
 settle_s: 60
 """
@@ -202,6 +203,17 @@ def test_filling_follows_the_roll_period_until_the_tank_ends(tmp_path: Path):
     assert levels == sorted(levels, reverse=True)  # a stiffer ship rolls faster
     assert [row["tuned"] for row in own] == [True, True, False]
     assert levels[0] > 2 * levels[1]
+
+
+def test_filling_leaves_room_for_the_level_that_the_pump_can_hold(tmp_path: Path):
+    pump = ",\n  headroom_m: 1.7}\npump: {max_pressure_pa: 6000, max_power_w: 30000"
+    rows = json.loads(filled(tmp_path, "--gm", "1.6", "--json", roof=pump).stdout)["fillings"]
+    alone = json.loads(filled(tmp_path, "--gm", "1.6", "--json").stdout)["fillings"]
+    held_m = 6000 / (2 * 1000 * 9.80665)
+    for row, without in zip(rows, alone, strict=True):
+        assert without["level_m"] < 0.35  # the least of a roof of 3.4 m
+        assert held_m + 0.4 > row["level_m"] > held_m + 0.2
+        assert not row["tuned"]
 
 
 def test_filling_says_what_the_file_lacks_and_takes_no_other_sign(tmp_path: Path):

@@ -62,12 +62,16 @@ def loaded(ship: RollShip, displacement_t: float, gm_m: float) -> RollShip:
 
 
 def fillings(
-    plant: DesignPlant, wave_moment: Harmonics, loadings: Iterable[tuple[float, float]]
+    plant: DesignPlant,
+    wave_moment: Harmonics,
+    loadings: Iterable[tuple[float, float]],
+    pump_pa: float = 0.0,
 ) -> tuple[Filling, ...]:
     """Return the best filling for each loading (displacement in t, GM in m) in the same waves.
 
-    `wave_moment` is in N m on the plant's ship. A level counts if its significant motion stays
-    within the reservoirs; where none does, the one of least roll is taken and is not `tuned`.
+    `wave_moment` is in N m on the plant's ship, `pump_pa` the pump's greatest pressure, 0 without
+    one. A level counts if its significant motion, and beside it what the pump can hold, stay within
+    the reservoirs; where none does, the one of least roll is taken and is not `tuned`.
 
     Raises `ValueError` if the ship has no displacement or the tank no roof.
     """
@@ -76,11 +80,17 @@ def fillings(
     roof_m = plant.tank.height_m + plant.tank.headroom_m
     if not np.isfinite(roof_m):
         raise ValueError("tank.headroom_m is needed, as the roof limits the filling: state it")
-    return tuple(_best(plant, wave_moment, roof_m, *loading) for loading in loadings)
+    held_m = pump_pa / (2 * plant.tank.density_kg_m3 * GRAVITY_M_S2)
+    return tuple(_best(plant, wave_moment, roof_m, held_m, *loading) for loading in loadings)
 
 
 def _best(
-    plant: DesignPlant, wave_moment: Harmonics, roof_m: float, displacement_t: float, gm_m: float
+    plant: DesignPlant,
+    wave_moment: Harmonics,
+    roof_m: float,
+    held_m: float,
+    displacement_t: float,
+    gm_m: float,
 ) -> Filling:
     ship = loaded(plant.ship, displacement_t, gm_m)
     scale = ship.stiffness_nm_rad / plant.ship.stiffness_nm_rad
@@ -90,7 +100,7 @@ def _best(
         tank = replace(plant.tank, height_m=share * roof_m, headroom_m=(1 - share) * roof_m)
         each = at_its_motion(None, replace(plant, ship=ship, tank=tank), (), waves)
         motion = motion_in_sea(None, each, (), waves)
-        full = 2 * motion.level_rms_m > tank.level_limit_m
+        full = 2 * motion.level_rms_m + held_m > tank.level_limit_m
         tried.append((full, motion.roll_rms_rad, tank))
     at = min(range(len(tried)), key=lambda k: tried[k][:2])
     full, roll_rad, tank = tried[at]
