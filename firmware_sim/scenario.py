@@ -8,7 +8,7 @@ from firmware_sim.voyage import unusual_loadings, unusual_sea, unusual_waypoints
 from utank_hil.base.parameters import Problem, refuse
 from utank_hil.canbus.profiles.guarded import guard_parts
 from utank_hil.configuration import Vessel
-from utank_hil.dynamics.hull.lateral import GOOD_FIT
+from utank_hil.dynamics.hull.radiation import GOOD_FIT
 
 
 def guard_problem(vessel: Vessel) -> str:

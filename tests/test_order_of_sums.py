@@ -19,8 +19,8 @@ DESIGNS = {
     *(f"utank_hil/control/{name}.py" for name in
       ("arx", "constrained/design", "constrained/foresight", "lqg_design", "optimal_tank",
        "predictive/design", "python_law", "sea_model")),
-    *(f"utank_hil/dynamics/{name}.py" for name in ("hull/hull_data", "hull/lateral",
-                                                   "roll_damping", "wrench")),
+    *(f"utank_hil/dynamics/{name}.py" for name in
+      ("hull/hull_data", "hull/lateral", "hull/radiation", "roll_damping", "wrench")),
     "utank_hil/retuning/redesign.py", "utank_hil/retuning/renewal.py",
     "utank_hil/sea/harmonics.py", "utank_hil/sea/measured.py", "utank_hil/sea/ndbc.py",
     "firmware_sim/comparison.py", "firmware_sim/model_limits.py", "firmware_sim/report_tables.py",

@@ -16,10 +16,11 @@ from utank_hil.base.tick import TICK_NS
 from utank_hil.configuration.hull_files.parts import Given
 from utank_hil.configuration.hull_files.reader import read_hull
 from utank_hil.dynamics import RollShip, Tank
-from utank_hil.dynamics.hull import lateral
 from utank_hil.dynamics.hull import lateral_kernel as kernel
+from utank_hil.dynamics.hull import radiation
 from utank_hil.dynamics.hull.hull_data import radiation_at
-from utank_hil.dynamics.hull.lateral import LateralHull, LateralModel, fit_radiation
+from utank_hil.dynamics.hull.lateral import LateralHull, LateralModel
+from utank_hil.dynamics.hull.radiation import fit_radiation
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.dynamics.wrench import tank_wrench, water_moments
@@ -138,10 +139,10 @@ def test_memory_of_surge_heave_and_pitch_is_the_radiation_of_the_data_to_one_per
 
 
 def test_a_start_from_which_the_fit_goes_astray_is_followed_by_another(monkeypatch):
-    starts = lateral._STARTS
-    monkeypatch.setattr(lateral, "_STARTS", ((10.0, 0.0),))
+    starts = radiation._STARTS
+    monkeypatch.setattr(radiation, "_STARTS", ((10.0, 0.0),))
     assert LateralHull(hull().data).radiation.error > 0.1
-    monkeypatch.setattr(lateral, "_STARTS", ((10.0, 0.0), *starts))
+    monkeypatch.setattr(radiation, "_STARTS", ((10.0, 0.0), *starts))
     assert LateralHull(hull().data).radiation.error < 0.005
 
 
