@@ -311,4 +311,5 @@ def _table(project: StarterProject, expected: Expected) -> Table:
         *roll_rows(expected),
     ]
     sea = f"a sea of {project.sea['hs_m']:g} m, {project.sea['tp_s']:g} s"
-    return rows_table(project.vessel.name, rows, caption=interval_words(expected, sea))
+    caption = f"{interval_words(expected, sea)}; by the first law: renewed, it leaves less roll"
+    return rows_table(project.vessel.name, rows, caption=caption)
