@@ -671,6 +671,13 @@ def test_a_time_beyond_the_processors_integers_is_refused_in_words(folder, capfd
         begun.one([("number", 244472, 135, 65389), ("number", 602173, 22, 32720)])
 
 
+def test_a_sea_along_an_axis_of_another_name_is_refused_in_words(folder, capfd):
+    reader = KINDS_OF_FILES["seas/era5file.nc"]
+    with trial(placed(reader, folder), reader.read, capfd, reader.streamed) as begun:
+        begun.one([("double", 69244, 32, 57656), ("double", 717954, 315, 53301),
+                   ("count", 6808, 95, 18743)])  # fmt: skip
+
+
 @pytest.mark.evidence
 @pytest.mark.timeout(0)
 @pytest.mark.parametrize("name", KINDS_OF_FILES)

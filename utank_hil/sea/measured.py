@@ -224,6 +224,8 @@ def _reader(path: Path) -> str:
 
 def _at_place(path: Path, content: Any, place: tuple[float, float] | None) -> Any:
     """Return the spectra of one place of a file's sites or grid."""
+    if other := sorted({*content.efth.dims} - {"time", "freq", "dir", "site", "lat", "lon"}):
+        raise ValueError(f"{path}: has spectra along {', '.join(other)}, not along lat and lon")
     axes = [axis for axis in ("site", "lat", "lon") if axis in content.efth.dims]
     if all(content.sizes[axis] == 1 for axis in axes):
         return content.isel(dict.fromkeys(axes, 0))
