@@ -671,11 +671,23 @@ def test_a_time_beyond_the_processors_integers_is_refused_in_words(folder, capfd
         begun.one([("number", 244472, 135, 65389), ("number", 602173, 22, 32720)])
 
 
-def test_a_sea_along_an_axis_of_another_name_is_refused_in_words(folder, capfd):
-    reader = KINDS_OF_FILES["seas/era5file.nc"]
+@pytest.mark.parametrize(
+    ("name", "mutations"),
+    [
+        ("seas/era5file.nc", [("double", 69244, 32, 57656), ("double", 717954, 315, 53301),
+                              ("count", 6808, 95, 18743)]),
+        ("seas/swanfile.spec", [("number", 19578, 236, 27887), ("swap", 288383, 102, 26574),
+                                ("flip", 389911, 192, 43982)]),
+        ("devices/dbc/sbgCan.dbc", [("number", 927101, 185, 33968), ("number", 693527, 235, 42656),
+                                    ("number", 598963, 169, 6209)]),
+        ("cases.parquet", [("double", 459508, 316, 57540), ("flip", 319600, 163, 35671)]),
+    ],
+    ids=["axis of another name", "more lines than there are", "signal beyond all", "column"],
+)  # fmt: skip
+def test_what_ten_million_found_is_refused_in_words(name, mutations, folder, capfd):
+    reader = KINDS_OF_FILES[name]
     with trial(placed(reader, folder), reader.read, capfd, reader.streamed) as begun:
-        begun.one([("double", 69244, 32, 57656), ("double", 717954, 315, 53301),
-                   ("count", 6808, 95, 18743)])  # fmt: skip
+        begun.one(mutations)
 
 
 @pytest.mark.evidence

@@ -145,9 +145,9 @@ def read_results(folder: Path) -> Results:
     place = folder / ABOUT
     try:
         about = json.loads(place.read_text(encoding="utf-8"))
-        keys, place = tuple(about["keys"]), folder / ROWS
-        cases = _table(folder / CASES).to_pylist()
-        own = {case["case"] for case in cases}
+        keys, place = tuple(about["keys"]), folder / CASES
+        cases = _table(place).to_pylist()
+        own, place = {case["case"] for case in cases}, folder / ROWS
         for row in Store(folder).rows().to_pylist():
             if row["case"] in own:  # a study that was changed leaves rows of its former cases
                 rows.setdefault(row["case"], []).append(row)

@@ -408,12 +408,20 @@ def _one_content(of: str, comes_with: dict[str, tuple[str, list[int]]]) -> dict[
     return {"from": selector, "in": sorted(both)}
 
 
+_DBC_SIZES: Final = re.compile(r"^\s*BO_ +\d+ +\S+ *: *(\d+)|:\s*(\d+)\s*\|\s*(\d+)\s*@", re.M)
+"""Length of a message; start and length of a signal."""
+_MOST_BITS: Final = 8 * 1785  #: Of the longest message of J1939's transport protocol.
+
+
 @cache
 def _dbc_layouts(file: str) -> dict[str, dict[str, Any]]:
     """Layouts of all messages of a DBC, as `MessageSection` has them, by their names."""
     from cantools.database.can import Database
 
     text = _text("dbc", file, DBC_ENCODINGS)
+    for numbers in _DBC_SIZES.finditer(text):  # the library makes room for what they say
+        if any(len(each) > 5 or int(each) > _MOST_BITS for each in numbers.groups() if each):
+            raise ValueError(f"dbc: {file} is no DBC: {numbers[0].strip()!r} is in no message")
     database = Database(strict=False)  # one message that does not fit spoils no other
     try:
         database.add_dbc_string(text)

@@ -6,6 +6,7 @@ Formats: WAVEWATCH III (netCDF, text), SWAN (netCDF, text), ERA5, NDBC's netCDF,
 (JSON) and Datawell (``.spt``). Spectra of one frequency and no direction are read by `load_ndbc`.
 """
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -129,6 +130,8 @@ _NETCDF: Final = {
 }  # Readers of netCDF files, by a variable that the file of the program has.
 _TEXT: Final = {"SWAN": "read_swan", "'WAVEWATCH": "read_ww3_station"}
 """Readers of ``.spec`` files, by their first word."""
+_COUNTS: Final = re.compile(rb"(?:LONLAT|LOCATIONS|[AR]FREQ|[NC]DIR)[^\n]*\n[^\n\d]*(\d{1,18})")
+"""Numbers of lines that follow, in SWAN's files."""
 _NEAR_DEG: Final = 0.5
 """Largest distance in latitude or longitude: the spacing of global wave models."""
 
@@ -211,9 +214,14 @@ def _reader(path: Path) -> str:
             return known[0]
         raise ValueError(f"{path}: holds none of {', '.join(_NETCDF)}; it has {found}")
     if suffix == ".spec":
-        with path.open(encoding="utf-8", errors="replace") as text:
-            first = text.readline(80).split()[:1]
+        whole = path.read_bytes()
+        first = whole[:80].split(b"\n")[0].decode("utf-8", "replace").split()[:1]
         reader = _TEXT.get(first[0]) if first else None
+        lines = whole.count(b"\n")
+        for count in _COUNTS.finditer(whole):  # the reader reads as many, also past the end
+            if int(count[1]) > lines:
+                said = f"{count[0].split()[0].decode()} says {int(count[1])}"
+                raise ValueError(f"{path}: {said}, and the file has {lines} lines")
         if reader is None:
             raise ValueError(f"{path}: does not begin as a file of SWAN or WAVEWATCH III does")
         return reader

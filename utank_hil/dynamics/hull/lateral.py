@@ -47,7 +47,7 @@ _MOST_DRAUGHTS = 3.5
 """Wave number times mean draught up to which radiation is fitted. At 3.5 a wave has 3 % of its
 pressure left there; shorter ones don't move a ship, and panel codes have irregular frequencies."""
 _LEAST_FREQUENCIES = 8  #: That are fitted, however short their waves.
-_MOST_FREQUENCIES = 64  #: In a fit: 525 of a file take 20 s and change nothing.
+_MOST_FREQUENCIES = 64  #: In a fit, whose time goes with their number.
 VERTICAL = np.array([0, 2, 4])  #: Surge, heave and pitch.
 _HEAVE = 2
 _MOST_COUPLING = 0.05
@@ -101,7 +101,8 @@ class LateralHull:
         )
         known = None if limit is None else _part(limit, degrees)
         omega = hull.frequency_rad_s
-        draughts = omega**2 * hull.known("mass_kg") / hull.known("hydrostatic")[_HEAVE, _HEAVE]
+        heave_n_m = hull.known("hydrostatic")[_HEAVE, _HEAVE]
+        draughts = omega**2 * hull.known("mass_kg") / (heave_n_m if heave_n_m > 0 else math.inf)
         count = max(int(np.sum(draughts <= _MOST_DRAUGHTS)), _LEAST_FREQUENCIES)
         felt = slice(None, count, math.ceil(count / _MOST_FREQUENCIES))
         return fit_radiation(omega[felt], added[felt], damping[felt], known, oscillators)
