@@ -4,7 +4,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from utank_hil.base.parameters import ParameterError
+import numpy as np
+
 from utank_hil.console.common import Json, argument, fail, option, print_json, why_not_writable
 from utank_hil.console.terminal import Terminal, notes, rows_table, say_note, shown
 
@@ -55,7 +56,7 @@ def hull(
     import capytaine  # noqa: F401, its absence is said before the work
 
     from firmware_sim.hull.compute import Loading, compute_hull, write_hull
-    from firmware_sim.hull.mesh import MeshError, read_mesh
+    from firmware_sim.hull.mesh import read_mesh
 
     for one, other, names in (
         (gm, gravity, "--gm or --gravity"),
@@ -72,12 +73,14 @@ def hull(
         side, said = read_mesh(mesh, draught, trim, scale)
         with notes.busy(f"{shown(mesh)}: {2 * side.nb_faces} panels, computing"):
             data, found, wrong = compute_hull(side, loading, str(out))
-    except (MeshError, ParameterError) as error:
+    except ValueError as error:
         fail(f"{mesh}: {error}")
     for text in (*said, *wrong):
         say_note(f"{mesh}: {text}")
     write_hull(out, data)
-    figures = hull_figures(found)
+    length_m, half_m, draught_m = map(float, np.ptp(side.vertices, axis=0))
+    sizes = {"length_m": length_m, "beam_m": 2 * half_m, "draught_m": draught_m}  # below water
+    figures = sizes | hull_figures(found)
     if json_:
         print_json({"file": str(out), "panels": 2 * side.nb_faces, **figures})
         return
@@ -88,6 +91,7 @@ def hull(
     )
     console = Terminal()
     console.table(rows_table(shown(mesh), rows))
+    console.say(f"written: {shown(out)}; in a ship's file ship: {{hull: {shown(out)}}}")
 
 
 def hull_figures(hull: "HullData") -> dict[str, float]:

@@ -33,6 +33,7 @@ _PANELS_A_WAVE: Final = 8
 _ENERGY_ERROR: Final = 0.1
 """Greatest difference of the two sides of Haskind's relation; coarse meshes have 3 %."""
 _SAME_MASS: Final = 0.03  #: Relative difference of displacements that are the same.
+_GYRATION_PER_BEAM: Final = (0.2, 0.8)  #: Plausible in roll; usual ships have about 0.4.
 _GYRATION: Final = 0.25  #: Radius of gyration in pitch and yaw per length.
 
 
@@ -71,6 +72,8 @@ def compute_hull(
     density = loading.density_kg_m3
     mass_kg, centre_m = density * float(still.volume), _gravity_centre(still, loading)
     still.center_of_mass = tuple(centre_m)
+    length_m, beam_m = (float(np.ptp(mesh.vertices[:, axis])) for axis in (0, 1))
+    _refuse_gyration(float(still.transversal_metacentric_height), loading, beam_m)
     cases = {
         "omega": [*omega, np.inf],
         "wave_direction": _HEADINGS_RAD,
@@ -98,8 +101,6 @@ def compute_hull(
         raise MeshError("radiates other energy than it takes from waves: is it a ship's hull?")
     data = data.sel(omega=[at for at in data["omega"].values if at not in wrong])
     found = hull_of_dataset(Path(name), data)
-    length_m = float(np.ptp(mesh.vertices[:, 0]))
-    beam_m = float(np.ptp(mesh.vertices[:, 1]))
     gyration = np.array([loading.gyration_m or 0.4 * beam_m, *[_GYRATION * length_m] * 2])
     inertia = mass_kg * np.diag(gyration**2)
     found = replace(found, mass_kg=mass_kg, gravity_centre_m=centre_m, inertia_kg_m2=inertia)
@@ -110,6 +111,20 @@ def compute_hull(
     said = [f"energy does not add up, irregular frequency or too coarse: {at:.3g} rad/s left out"
             for at in wrong]  # fmt: skip
     return data, found, said
+
+
+def _refuse_gyration(gm_m: float, loading: Loading, beam_m: float) -> None:
+    """Raise MeshError, before the long work, if period and GM are those of another beam."""
+    gyration_m, by = loading.gyration_m, ""
+    if loading.roll_period_s is not None:
+        gyration_m = loading.roll_period_s / (2 * math.pi) * math.sqrt(GRAVITY_M_S2 * gm_m)
+        by = f"with GM {gm_m:.3g} m and a roll period of {loading.roll_period_s:g} s "
+    least, most = _GYRATION_PER_BEAM
+    if gyration_m is not None and not least <= gyration_m / beam_m <= most:
+        raise MeshError(
+            f"{by}has a radius of gyration of {gyration_m:.3g} m on a beam of {beam_m:.3g} m; "
+            "0.4 of it is usual: check GM, period or gyration, and --scale (0.3048 for feet)"
+        )
 
 
 def usual_hull(form: HullForm, loading: Loading) -> tuple[Any, LateralHull]:

@@ -29,6 +29,7 @@ Panels = npt.NDArray[np.int64]
 
 FORMATS: Final = "WAMIT .gdf, HAMS .pnl, NEMOH .mar, HydroStar .hst; with meshio .stl, .obj, .ply"
 _BY_MESHIO: Final = (".stl", ".obj", ".ply")
+_KNOWN: Final = (".gdf", ".pnl", ".mar", ".hst", *_BY_MESHIO)
 _LENGTHS_M: Final = (3.0, 600.0)  #: Lengths of hulls: a model's, and more than the longest ship's.
 _UNITS: Final = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048, "km": 1e3}
 _TOLERANCE: Final = 1e-5  #: Distance per length up to which points are one, or lie in a plane.
@@ -63,22 +64,23 @@ def read_mesh(
     cpt.set_logging("ERROR")  # its checks of single panels say less than ours
     if not path.is_file():
         raise MeshError("is a folder" if path.is_dir() else "there is no such file")
-    if path.suffix in _BY_MESHIO and find_spec("meshio") is None:
-        raise MeshError(f"{path.suffix} needs meshio: pip install meshio")
-    if path.suffix not in FORMATS:
+    kind = path.suffix.lower()
+    if kind in _BY_MESHIO and find_spec("meshio") is None:
+        raise MeshError(f"{kind} needs meshio: pip install meshio")
+    if kind not in _KNOWN:
         raise MeshError(f"can't be read as panels by its name; known are {FORMATS}")
     try:
         with open_content(path, _LIMIT_BYTES) as content:
             source: Any = io.StringIO(content.read().decode("latin-1"))
-        if path.suffix in _BY_MESHIO:  # they may be binary, and meshio asks the file for its size
+        if kind in _BY_MESHIO:  # they may be binary, and meshio asks the file for its size
             source = str(path)
         with warnings.catch_warnings(action="ignore"):  # of numpy on a file without panels
-            mesh = cpt.load_mesh(source, file_format=path.suffix).merged()
+            mesh = cpt.load_mesh(source, file_format=kind).merged()
     except MemoryError:
         raise
     except Exception as error:  # whatever the formats' readers raise
         why = " ".join(str(error).split()) or type(error).__name__
-        higher = "; WAMIT's higher-order panels (IGDEF) are none" if path.suffix == ".gdf" else ""
+        higher = "; WAMIT's higher-order panels (IGDEF) are none" if kind == ".gdf" else ""
         raise MeshError(f"can't be read as panels: {why}; known are {FORMATS}{higher}") from error
     points = mesh.vertices * scale
     _refuse_size(points)
@@ -86,6 +88,10 @@ def read_mesh(
     turned = cpt.Mesh(points, mesh.faces, auto_check=False).translated_x(-midship_m)
     turned = turned.rotated_y(math.radians(trim_deg)).translated_x(midship_m)
     if draught_m is not None:
+        height_m = float(np.ptp(turned.vertices[:, 2]))
+        if draught_m > height_m:
+            raise MeshError(f"is {height_m:.4g} m high, and the draught {draught_m:g} m: check both"
+                            " units, --draught is in metres")  # fmt: skip
         turned = turned.translated_z(-float(turned.vertices[:, 2].min()) - draught_m)
     return _wetted(turned)
 
@@ -118,19 +124,21 @@ def _wetted(mesh: Any) -> tuple[Any, list[str]]:
     if highest < -near:
         raise MeshError(f"lies wholly below the water, up to z {highest:.4g} m: give --draught")
     wet = _cut(mesh, 2, near)
-    side = wet.vertices[:, 1]
-    if side.min() < -near and side.max() > near:
-        whole_m3, wet = abs(wet.volume), _cut(wet, 1, near)
-        if abs(2 * abs(wet.volume) - whole_m3) > _UNEQUAL * whole_m3:
-            raise MeshError(
-                f"displaces {abs(wet.volume):.4g} m3 to starboard of {whole_m3:.4g}: it must be "
-                "upright and the same on both sides of y = 0"
-            )
+    side, whole_m3 = wet.vertices[:, 1], abs(wet.volume)
+    is_whole = side.min() < -near and side.max() > near
+    if is_whole:
+        wet = _cut(wet, 1, near)
     if wet.vertices[:, 1].max() <= near:
         wet = wet.mirrored("xOz")
     points, panels = _joined(wet.vertices, wet.faces, near)
     _refuse_panels(points, panels, near)
     closed = cpt.Mesh(points, panels, auto_check=False)
+    side_m3 = abs(closed.volume)
+    if is_whole and abs(2 * side_m3 - whole_m3) > _UNEQUAL * whole_m3:
+        raise MeshError(
+            f"displaces {side_m3:.4g} m3 to starboard of {whole_m3:.4g}: it must be whole, upright "
+            "and the same on both sides of y = 0, its normals all outward"
+        )
     if closed.volume < 0:
         notes.append("normals pointed into the hull: turned")
         closed = cpt.Mesh(points, panels[:, ::-1], auto_check=False)

@@ -16,7 +16,13 @@ from firmware_sim.hull.compute import Loading, compute_hull, energy_errors, writ
 from firmware_sim.hull.mesh import MeshError, form_mesh
 from utank_hil.configuration.hull_files.parts import Given
 from utank_hil.configuration.hull_files.reader import read_hull
-from utank_hil.dynamics.hull.hull_data import HullData, excitation_at, free_roll, radiation_at
+from utank_hil.dynamics.hull.hull_data import (
+    HullData,
+    excitation_at,
+    free_roll,
+    radiation_at,
+    with_roll_period,
+)
 from utank_hil.dynamics.hull.lateral import LateralHull
 from utank_hil.dynamics.roll_damping import HullForm
 
@@ -144,6 +150,12 @@ def test_file_holds_the_ship_with_the_period_that_was_asked_for(tmp_path: Path) 
         ((6, 2), {}, "has too few panels: the largest has a radius of .* m: divide them"),
         ((16, 5), {"displacement_t": 1900}, "displaces 1.* t, and the ship has 1900 t: check"),
         ((16, 5), {"gm_m": None, "gravity_m": 4.0}, "centre of gravity must be below it"),
+        (
+            (16, 5),
+            {"roll_period_s": 480},
+            "480 s has a radius of gyration of 239 m on a beam of 12",
+        ),
+        ((16, 5), {"gyration_m": 1.5}, r"^has a radius of gyration of 1.5 m .*0\.3048 for feet"),
     ],
 )
 def test_what_does_not_belong_together_is_refused(panels, loading, reason: str) -> None:
@@ -153,7 +165,7 @@ def test_what_does_not_belong_together_is_refused(panels, loading, reason: str) 
 
 def test_period_that_added_mass_alone_exceeds_is_refused() -> None:
     with pytest.raises(ValueError, match=r"added mass alone rolls slower than 7\.2 s"):
-        computed(wigley(panels=(16, 5)), roll_period_s=7.2, gm_m=0.2)
+        with_roll_period(computed(wigley(panels=(16, 5)), gm_m=0.2), 7.2)
 
 
 FPSO = Given(density_kg_m3=1025.0, mass_kg=1025 * 97960.9, gravity_centre_m=(0.788631, 0.0, -1.0))

@@ -29,6 +29,7 @@ def test_mesh_becomes_a_ship_that_sways_on_the_bench(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     told = json.loads(done.stdout)
     assert told["panels"] == 112
+    assert [told[key] for key in ("length_m", "beam_m", "draught_m")] == pytest.approx([60, 12, 4])
     assert told["roll_period_s"] == pytest.approx(8.0)
     assert told["metacentric_height_m"] == pytest.approx(1.6)
     assert told["displacement_t"] == pytest.approx(1.025 * 4 / 9 * 60 * 12 * 4, rel=0.02)

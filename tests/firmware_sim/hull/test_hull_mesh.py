@@ -82,11 +82,14 @@ POINTS, PANELS = both_sides(wigley())
         (POINTS[:, [1, 0, 2]], PANELS[:, ::-1], "12 m along x and 60 m along y: x points forward"),
         (np.add(POINTS, (0, 0, 4)), PANELS, "lies above the water, from z 0 m up: give --draught"),
         (POINTS - [0, 0, 3], PANELS, "lies wholly below the water, up to z -3 m: give --draught"),
-        (np.add(POINTS, (0, 2, 0)), PANELS, "to starboard of 12.*: it must be upright"),
+        (np.add(POINTS, (0, 2, 0)), PANELS, "to starboard of 12.*: it must be whole, upright"),
         (POINTS, PANELS[1:300], "is open at .* edges, one near x .*: close it"),
         (POINTS, np.delete(PANELS, (95, 395), 0), "is open at 4 edges, one near x -1[0-9]"),
         (POINTS, np.where(np.isin(np.arange(600), (95, 395))[:, None], PANELS[:, ::-1], PANELS),
          "neighbours with opposite normals at 4 edges, one near x -1[0-9]"),
+        (POINTS, np.where(np.arange(600)[:, None] % 2, PANELS, PANELS[:, ::-1]), "opposite norm"),
+        (POINTS, np.where(np.arange(600)[:, None] < 300, PANELS, PANELS[:, ::-1]),
+         "638.* to starboard of .*e-1.*its normals all outward"),
         (np.concatenate([POINTS, [[0, 0, -1]]]),
          np.concatenate([PANELS, [[*PANELS[455][:2], 682, 682]]]), "more than two panels at 1"),
         (np.where(POINTS == -4, np.nan, POINTS), PANELS, "contains NaN"),
@@ -103,6 +106,8 @@ def test_what_is_no_hull_in_its_place_is_refused(points, panels, reason, tmp_pat
         ("none.gdf", None, "there is no such file"),
         ("text.gdf", "four\nlines\nof\ntext\n", r"as panels: [^(\\]*known are WAMIT .gdf.*IGDEF"),
         ("ship.step", "ISO-10303-21;", "can't be read as panels"),
+        ("ship", "1", "can't be read as panels by its name"),
+        ("ship.st", "1", "can't be read as panels by its name"),
     ],
 )
 def test_what_is_no_mesh_is_refused(name, content, reason, tmp_path: Path) -> None:
@@ -110,6 +115,17 @@ def test_what_is_no_mesh_is_refused(name, content, reason, tmp_path: Path) -> No
         (tmp_path / name).write_text(content)
     with pytest.raises(MeshError, match=reason):
         read_mesh(tmp_path / name)
+
+
+def test_a_suffix_in_capitals_is_the_same(tmp_path: Path) -> None:
+    side, _ = read_mesh(written(tmp_path / "WIGLEY.GDF", wigley()))
+    assert 2 * side.volume == pytest.approx(4 / 9 * 60 * 12 * 4, rel=0.005)
+
+
+def test_a_draught_above_the_deck_is_refused_by_its_value(tmp_path: Path) -> None:
+    file = written(tmp_path / "wigley.gdf", wigley())
+    with pytest.raises(MeshError, match=r"is 4 m high, and the draught 4000 m: .* in metres"):
+        read_mesh(file, draught_m=4000)
 
 
 def test_too_many_panels_are_refused(tmp_path: Path) -> None:
