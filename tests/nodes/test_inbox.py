@@ -321,6 +321,7 @@ def test_drive_status_without_a_state_is_as_if_it_had_not_come():
     line.say(status._replace(state=None, power_limited=False, command_echo=9))
     seen = line.seen
     assert (seen.drive_state, seen.drive_held_back) == (DriveState.OPERATION_ENABLED, True)
+    assert not seen.drive_at_speed
     assert (seen.drive_echo_ns, seen.drive_echo) == (heard_ns, 4)
 
 
@@ -386,9 +387,10 @@ def test_new_it_knows_nothing_and_trusts_nothing():
             assert getattr(seen, name) == 0, name
         assert {motion.heard_ns, seen.tank_ns, seen.valve_heard_ns} == {NEVER_HEARD_NS}
         assert seen.valve_opening == 1.0
-        for name in ("high_level", "drive_held_back", "drive_warns", "versions_match",
-                     "panel_matches", "protection_valid", "drive_fault", "valve_fault",
-                     "valve_following", "address_conflict", "claimed_twice"):  # fmt: skip
+        for name in ("high_level", "drive_held_back", "drive_at_speed", "drive_warns",
+                     "versions_match", "panel_matches", "protection_valid", "drive_fault",
+                     "valve_fault", "valve_following", "address_conflict",
+                     "claimed_twice"):  # fmt: skip
             assert getattr(seen, name) is False, name
 
 
@@ -455,6 +457,7 @@ def test_a_drive_at_its_power_or_speed_is_held_back(limited):
     for said in (True, False, True):
         line.say(status._replace(**{limited: said}))
         assert line.seen.drive_held_back is said
+        assert line.seen.drive_at_speed is (said and limited == "speed_limited")
     line.say(status._replace(pressure_limited=True, rate_limited=True))
     assert not line.seen.drive_held_back
 

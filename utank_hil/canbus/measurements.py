@@ -84,6 +84,7 @@ class Measurements:
     drive_fault: Final[bool]
     drive_warns: Final[bool]
     drive_held_back: Final[bool]  #: The drive says that its power or its speed is at the limit.
+    drive_at_speed: Final[bool]  #: Its speed, or it does not say which of them.
     power_w: Final[float]  #: Electric power that the drive takes.
     valve_opening: Final[float]
     valve_following: Final[bool]

@@ -42,7 +42,7 @@ class DriveHeard:
         self, routing: Routing, catalogue: Catalogue, *, pump: bool, canopen: CanopenDrive | None
     ) -> None:
         self.state: DriveState | None = None if pump else _ENABLED
-        self.held_back = self.warns = False
+        self.held_back = self.at_speed = self.warns = False
         self.power_w = 0.0
         self.echo: int | None = None
         self.echo_ns = self._heard_ns = NEVER_HEARD_NS if pump else ABSENT_NS
@@ -103,6 +103,7 @@ class DriveHeard:
         if status.state is None:  # as if the frame had not come
             return
         self.state = status.state
+        self.at_speed = status.speed_limited
         self.held_back = status.power_limited or status.speed_limited
         self._heard_ns = now_ns
         if status.command_echo != self.echo:
@@ -124,6 +125,7 @@ class DriveHeard:
             refused = bool(self._canopen.setup.problem)
         else:
             self.state, refused, self.held_back, self.warns, self.power_w = report
+            self.at_speed = self.held_back  # CiA 402 has one bit for all limits
             self._heard_ns = now_ns
         self._fault = DriveFault.INTERNAL if refused else _NO_DRIVE_FAULT
 

@@ -221,6 +221,7 @@ class Inbox:
             drive.faulty,
             drive.warns,
             drive.held_back,
+            drive.at_speed,
             drive.power_w,
             valve.opening,
             valve.follows,

@@ -247,6 +247,7 @@ class Monitors:
             own.level_rate_m_s,
             enabled=measured.drive_state is _DRIVE_ENABLED,
             limited=measured.drive_held_back,
+            at_speed=measured.drive_at_speed,
         )
 
     def _look_at_twin(self, measured: Measurements, own: OwnState) -> int:

@@ -31,11 +31,12 @@ def drive(command_pa, period_s):
 
 
 def update(
-    monitor, command_pa, pressure_pa, level_m=0.0, rate_m_s=0.0, *, enabled=True, limited=False
+    monitor, command_pa, pressure_pa, level_m=0.0, rate_m_s=0.0, *, enabled=True, limited=""
 ):
     return monitor.update(
-        command_pa, pressure_pa, level_m, rate_m_s, enabled=enabled, limited=limited
-    )
+        command_pa, pressure_pa, level_m, rate_m_s,
+        enabled=enabled, limited=limited != "", at_speed=limited == "speed",
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("changes_s", [0.05, 0.1, 0.3, 0.45])
@@ -99,35 +100,36 @@ def test_without_a_lag_it_is_the_command_before():
     ("expected_pa", "pressure_pa", "along_m_s", "limited", "found", "late_pa"),
     [
         # behind, ahead, at the bound and beyond it
-        (6000, 3000, 0, False, 0, 3000),
-        (6000, 2999, 0, False, LOST, 3001),
-        (6000, 9000, 0, False, 0, 3000),
-        (6000, 9001, 0, False, LOST, 3001),
+        (6000, 3000, 0, "", 0, 3000),
+        (6000, 2999, 0, "", LOST, 3001),
+        (6000, 9000, 0, "", 0, 3000),
+        (6000, 9001, 0, "", LOST, 3001),
         # a third of the bound the other way is reversed, if the bound itself is to be seen
-        (6000, -1000, 0, False, LOST, 7000),
-        (6000, -1001, 0, False, LOST | REVERSED, 7001),
-        (3001, -1001, 0, False, LOST | REVERSED, 4002),
-        (3000, -1001, 0, False, LOST, 4001),
-        # water that outruns the rotor explains it, of a drive that says that it is limited
-        (6000, -4000, 0.1, False, LOST | REVERSED, 10000),
-        (6000, -4000, 0, True, LOST | REVERSED, 10000),
-        (6000, -4000, -0.1, True, LOST | REVERSED, 10000),
-        (6000, -4000, 0.1, True, 0, 0),
-        (1, -4000, 0.1, True, 0, 0),
+        (6000, -1000, 0, "", LOST, 7000),
+        (6000, -1001, 0, "", LOST | REVERSED, 7001),
+        (3001, -1001, 0, "", LOST | REVERSED, 4002),
+        (3000, -1001, 0, "", LOST, 4001),
+        # water that outruns the rotor explains it, of a drive that says that it is at its speed
+        (6000, -4000, 0.1, "", LOST | REVERSED, 10000),
+        (6000, -4000, 0.1, "power", LOST | REVERSED, 10000),
+        (6000, -4000, 0, "speed", LOST | REVERSED, 10000),
+        (6000, -4000, -0.1, "speed", LOST | REVERSED, 10000),
+        (6000, -4000, 0.1, "speed", 0, 0),
+        (1, -4000, 0.1, "speed", 0, 0),
         # which may stay behind, up to the bound the other way, and not run ahead
-        (6000, 0, 0, True, 0, 0),
-        (6000, -2999, 0, True, 0, 0),
-        (6000, -3000, 0, True, LOST | REVERSED, 9000),
-        (6000, 5000, 0, True, 0, 0),
-        (6000, 8999, 0, True, 0, 0),
-        (6000, 9000, 0, True, 0, 3000),
-        (6000, 9001, 0, True, LOST, 3001),
-        (6000, 9001, 0.1, True, LOST, 3001),
+        (6000, 0, 0, "power", 0, 0),
+        (6000, -2999, 0, "power", 0, 0),
+        (6000, -3000, 0, "power", LOST | REVERSED, 9000),
+        (6000, 5000, 0, "power", 0, 0),
+        (6000, 8999, 0, "power", 0, 0),
+        (6000, 9000, 0, "power", 0, 3000),
+        (6000, 9001, 0, "power", LOST, 3001),
+        (6000, 9001, 0.1, "power", LOST, 3001),
         # with none expected both ways are the same
-        (0, 3000, 0, False, 0, 3000),
-        (0, 3001, 0, False, LOST, 3001),
-        (0, 3001, 0.1, True, LOST, 3001),
-        (0, 2000, 0, True, 0, 0),
+        (0, 3000, 0, "", 0, 3000),
+        (0, 3001, 0, "", LOST, 3001),
+        (0, 3001, 0.1, "power", LOST, 3001),
+        (0, 2000, 0, "power", 0, 0),
     ],
 )
 def test_what_is_found_of_a_pressure_that_stays(
@@ -167,8 +169,8 @@ def test_each_comes_after_its_time_and_anew_after_every_good_sample(period_s, fo
 def test_what_the_water_explained_is_not_counted_once_it_does_not():
     monitor = drive(6000, 0.05)
     for _ in range(10):
-        assert update(monitor, 6000, -4000, 0.0, 0.1, limited=True) == 0
-    found = [update(monitor, 6000, -4000, limited=True) for _ in range(3)]
+        assert update(monitor, 6000, -4000, 0.0, 0.1, limited="speed") == 0
+    found = [update(monitor, 6000, -4000, limited="speed") for _ in range(3)]
     assert found == [0, 0, REVERSED]
 
 

@@ -1,11 +1,13 @@
 """The drive against a pump that swings as in waves, with the figures of the first ship."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from moving_ship import CONFIG, FINDINGS, THRESHOLDS
 
+from utank_hil.dynamics.pump import AT_REST, pump_step
 from utank_hil.safety.monitors.drive import DriveFollowing
 from utank_hil.safety.monitors.finding import Finding
 
@@ -29,7 +31,13 @@ def drive_findings(actual, seconds=30.0, limited=False, along_m_s=0.0):
             right += (late - right) * (1 - math.exp(-0.01 / LAG_S))
         rate_m_s = math.copysign(along_m_s, right) * math.copysign(1.0, along_m_s)
         found = monitor.update(
-            command, actual(t, right), 0.0, rate_m_s, enabled=True, limited=limited
+            command,
+            actual(t, right),
+            0.0,
+            rate_m_s,
+            enabled=True,
+            limited=limited,
+            at_speed=limited,
         )
         for finding in FINDINGS:
             if found & finding:
@@ -73,11 +81,11 @@ def off_findings(pressure_pa, level_m=0.0, seconds=3.0, limited=False):
     """First findings of a drive that held 40 kPa and is switched off at zero."""
     monitor = DriveFollowing(LAG_S, THRESHOLDS, STEP_S)
     for _ in range(60):
-        assert not monitor.update(40e3, 40e3, 0.0, 0.0, enabled=True, limited=False)
+        assert not monitor.update(40e3, 40e3, 0.0, 0.0, enabled=True, limited=False, at_speed=False)
     first: dict[int, float] = {}
     for k in range(1, round(seconds / STEP_S)):
         t = k * STEP_S
-        off = {"enabled": False, "limited": limited}
+        off = {"enabled": False, "limited": limited, "at_speed": limited}
         found = monitor.update(0.0, pressure_pa(t), level_m, 0.0, **off)
         for finding in FINDINGS:
             if found & finding:
@@ -109,11 +117,41 @@ def test_a_pressure_that_is_late_again_and_again_is_judged_by_what_comes_in_betw
     found = []
     for k in range(60):
         pressure_pa = 0.0 if k % 3 else math.nan
-        found.append(monitor.update(20e3, pressure_pa, 0.0, 0.0, enabled=True, limited=False))
+        found.append(
+            monitor.update(20e3, pressure_pa, 0.0, 0.0, enabled=True, limited=False, at_speed=False)
+        )
     first = next(k for k, each in enumerate(found) if each & Finding.DRIVE_LOST)
     assert first < 30
     assert all(each & Finding.DRIVE_LOST for each in found[first:])
-    held = {"enabled": True, "limited": False}
+    held = {"enabled": True, "limited": False, "at_speed": False}
     assert monitor.update(20e3, math.nan, 0.0, 0.0, **held) & Finding.DRIVE_LOST
     assert not monitor.update(20e3, 20e3, 0.0, 0.0, **held)
     assert not monitor.update(20e3, math.nan, 0.0, 0.0, **held)
+
+
+@pytest.mark.parametrize("phase_rad", [0.0, 0.8, 1.6])
+def test_a_motor_at_its_power_presses_along_and_hides_no_wrong_sign(phase_rad):
+    """The pump of `dynamics` in water that swings, its power too small for all of the pressure."""
+    pump = replace(CONFIG.vessel.pump, max_power_w=6e5)
+    sound, wrong = (DriveFollowing(LAG_S, THRESHOLDS, STEP_S) for _ in range(2))
+    state, found_s, seconds_at_power = AT_REST, [], 0.0
+    for k in range(2000):
+        t = k * 0.01
+        command_pa, flow_m3_s = 45e3 * math.sin(0.6 * t), 25.0 * math.sin(0.6 * t + phase_rad)
+        state = pump_step(state, command_pa, flow_m3_s, 0.01, pump.coefficients)
+        if k % 5:
+            continue
+        drive = {
+            "enabled": True,
+            "limited": state.limited,
+            "at_speed": abs(state.speed_rad_s) >= 0.999 * pump.max_speed_rad_s,
+        }
+        assert not drive["at_speed"]
+        seconds_at_power += STEP_S * state.limited
+        assert not sound.update(command_pa, state.pressure_pa, 0.0, flow_m3_s, **drive)
+        pressure_pa = -state.pressure_pa if 3.0 <= t < 3.5 else state.pressure_pa
+        if wrong.update(command_pa, pressure_pa, 0.0, flow_m3_s, **drive) & Finding.PUMP_SIGN:
+            found_s.append(t)
+    assert found_s[0] == pytest.approx(3.1)
+    assert found_s[-1] < 3.5  # and over, once the sign was right again
+    assert seconds_at_power > 3.0

@@ -31,8 +31,9 @@ class DriveFollowing:
     Of a drive that is off none is expected but what the water makes of a rotor that turns freely.
 
     A drive that says it is limited in power or speed may stay behind the command. It may oppose it
-    only while the water flows the way of the command: a rotor at its greatest speed brakes water
-    that outruns it.
+    only at its greatest speed, while the water flows the way of the command: the rotor brakes water
+    that outruns it. Limited in power alone the motor still drives the rotor the way of the command,
+    and water that outruns it soon has it at its greatest speed.
 
     `lag_s` is the pressure's time constant, `period_s` the time between two updates; `expected_pa`
     is the model's pressure, `late_pa` how far the measured one is off, where that is judged.
@@ -62,6 +63,7 @@ class DriveFollowing:
         *,
         enabled: bool,
         limited: bool,
+        at_speed: bool,
     ) -> int:
         """Take the command that leaves now and the newest pressure; return what was found.
 
@@ -69,7 +71,7 @@ class DriveFollowing:
         is late again and again is judged by what it sends in between. `level_m` and its rate are
         those of the starboard side: how far the water is off, and the way it flows. `enabled` says
         whether the drive is in operation enabled, `limited` whether it says that its power or its
-        speed is at the limit.
+        speed is at the limit, `at_speed` whether that may be its speed.
         """
         if enabled is not self._enabled:
             self._enabled = enabled
@@ -87,17 +89,15 @@ class DriveFollowing:
             limit_pa += self._free_pa_m * abs(level_m)
         self._settled_s += self._period_s
         if self._settled_s >= SETTLED_S and pressure_pa == pressure_pa:
-            self._found = self._judge(pressure_pa, level_rate_m_s, limit_pa, limited=limited)
+            outrun = at_speed and level_rate_m_s * self.expected_pa > 0
+            self._found = self._judge(pressure_pa, limit_pa, limited=limited, outrun=outrun)
         return self._found
 
-    def _judge(
-        self, pressure_pa: float, level_rate_m_s: float, limit_pa: float, *, limited: bool
-    ) -> int:
+    def _judge(self, pressure_pa: float, limit_pa: float, *, limited: bool, outrun: bool) -> int:
         expected_pa = self.expected_pa
         # pragma: no mutate start: of zero both ways count alike
         along_pa = pressure_pa if expected_pa > 0 else -pressure_pa
         # pragma: no mutate end
-        outrun = limited and level_rate_m_s * expected_pa > 0
         if abs(expected_pa) > limit_pa and along_pa < -REVERSED_SHARE * limit_pa and not outrun:
             self._reversed_s += self._period_s
         else:
