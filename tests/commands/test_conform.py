@@ -2,6 +2,7 @@
 
 import json
 import re
+from inspect import getsource as source
 
 import pytest
 import yaml
@@ -16,7 +17,12 @@ from utank_hil.canbus.profiles.drive_plan import Place
 from utank_hil.commands import conform as command
 from utank_hil.configuration.device_sections import DriveSection
 from utank_hil.console.common import new_app
+from utank_hil.console.terminal import Terminal
+from utank_hil.nodes.commissioning import checks as commissioning
+from utank_hil.nodes.commissioning import conformance
 
+SAID = re.compile(r'Check\((?:"\w+"|f"{name}_ms"), "([^"]+)"')
+"""What a check is of, as it stands in the code."""
 SHIP = "configs/ships/thesis_first.yaml"
 
 
@@ -63,6 +69,19 @@ def ship(tmp_path):
     path = tmp_path / "ship.yaml"
     path.write_text(yaml.safe_dump(content | {"devices": {"pump": PROFILE}}), encoding="utf-8")
     return path
+
+
+def test_checks_are_a_table_at_80_columns(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    names = {each for kind in (conformance, commissioning) for each in SAID.findall(source(kind))}
+    assert "frames of wrong length, checksum or order" in names
+    assert "pump pressure at rest" in names
+    check = {"measured": 1880.0, "expected": 1000.0, "tolerance": 150.0, "unit": "ms",
+             "verdict": "pass"}  # fmt: skip
+    command.print_checks(Terminal(), "motion of opv", [check | {"what": each} for each in names])
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == len(names) + 5
+    assert sum("1880 ms │ 1000 ± 150 │ pass" in line for line in lines) == len(names)
 
 
 @pytest.mark.parametrize(("identity", "code"), [(0x22, 0), (0x23, 1)])

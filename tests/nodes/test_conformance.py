@@ -65,7 +65,7 @@ def sensor_trial(sign=1, rate_sign=1, every=1, repeats=False, silent=False):
         ({"rate_sign": -1}, {"roll_rate"}),
         ({"repeats": True}, {"silence"}),
         ({"every": 2}, {"rate", "jitter"}),
-        ({"silent": True}, {"rate", "jitter", "gap", "usable"}),
+        ({"silent": True}, {"heard"}),
     ],
 )
 def test_a_sensor_conforms_or_what_is_wrong_is_named(changes, wrong):
@@ -140,6 +140,23 @@ def test_a_drive_that_runs_on_is_found():
     line = TrialLine()
     line.watches = line.stops = False
     assert failed(line.run()) == {"quick_stop_ms", "lost_controller_ms", "lost_controller_off"}
+
+
+def test_a_drive_that_stops_by_itself_has_no_time_to_stop():
+    """As one does whose controller's heartbeat is late; its speed then falls before the stop."""
+    line = TrialLine()
+    turn = line._turn
+
+    def trips():
+        if line.speed > 500:
+            line.node.sdo[0x6041].raw = 0x0250
+        turn()
+
+    line._turn = trips
+    assert failed(line.run()) == {"quick_stop_stays", "lost_controller_stays"}
+    (check, _) = [each for each in line.trial.checks if not each.passed]
+    assert "status word 0x0250" in check.remedy
+    assert "raise heartbeat_ms" in check.remedy
 
 
 def test_a_drive_whose_identity_can_be_written_is_found():

@@ -167,13 +167,14 @@ def _print(record: dict[str, Any], path: Path, config: Path, *, code: bool) -> N
 def print_checks(console: Terminal, title: str, checks: list[dict[str, Any]]) -> None:
     """Print the checks of a record as a table, and the remedies of those that failed."""
     table = Table(title=title)
-    for heading in ("check", "measured", "expected", "unit", "verdict"):
+    for heading in ("check", "measured", "expected", "verdict"):
         table.add_column(heading, justify="right" if "ed" in heading else "left", no_wrap=True)
     for check in checks:
-        measured = "none" if check["measured"] is None else f"{check['measured']:.3g}"
-        expected = f"{check['expected']:.3g} ± {check['tolerance']:.2g}"
+        unit = "" if check["unit"] == "1" else f" {check['unit']}"
+        measured = "none" if check["measured"] is None else f"{check['measured']:.4g}{unit}"
+        expected = f"{check['expected']:.4g} ± {check['tolerance']:.3g}"
         verdict = "pass" if check["verdict"] == "pass" else Text("FAIL", "red")
-        table.add_row(check["what"], measured, expected, check["unit"], verdict)
+        table.add_row(check["what"], measured, expected, verdict)
     console.table(table)
     for check in checks:
         if check["verdict"] != "pass":

@@ -124,7 +124,7 @@ def judge_rest(
         ]  # fmt: skip
         noise = math.sqrt(precision.times_needed(rest, plan.of_noise) / plan.most_times)
         checks.append(
-            Check("noise", "noise at rest, by what the longest pulses average", noise, 0.0, 1.0,
+            Check("noise", "noise at rest, by what pulses average", noise, 0.0, 1.0,
                   "1", "Take gauges and a pressure sensor with less noise by this factor, "
                   "or filter it where it is measured.")
         )  # fmt: skip

@@ -134,7 +134,13 @@ class SensorTrial(Trial):
         yield from self._wait(BACK_S, lambda: bool(self._heard))
         rejected, lost, self._heard = self._rejected(), self._device.lost, []
         yield from self._wait(self._listen_s)
-        self._judge_pace()
+        if self._heard:
+            self._judge_pace()
+        else:
+            remedy = (
+                "Look at power, bus, bit rate, and its identifiers or node: utank-hil bus --ship."
+            )
+            self._flag("heard", "whole measurements come", remedy, right=False)
         self.checks += [
             Check("rejected", "frames of wrong length, checksum or order",
                   self._rejected() - rejected, 0.0, 0.0, "1",
@@ -260,7 +266,7 @@ class ValveTrial(SensorTrial):
         remedy = "Set opening_time_s of the ship's valve."
         yield from self._way("way_ms", "from its fail position to the other end", 0.0, remedy)
         self._told, self._speaks = fails, False
-        what = "to its fail position, from the last command"
+        what = "to its fail position, without commands"
         remedy = "It must go there by itself: spring, own timeout, 1016h and 1029h."
         yield from self._way("silence_ms", what, SILENCE_MS, remedy)
 
@@ -377,6 +383,12 @@ class DriveTrial(Trial):
             return
         self._pushes = True
         yield from self._wait(TURN_S)
+        if self._state is not _ENABLED:
+            self._pushes, self._word = False, canbus.ControlWord.DISABLE_VOLTAGE
+            remedy = (f"It stopped by itself, {self._drive.words}: read its fault; raise "
+                      "heartbeat_ms where this computer or the bus was late.")  # fmt: skip
+            self._flag(f"{name}_stays", "it stays enabled for a second", remedy, right=False)
+            return
         speed_rad_s = self._speed_rad_s
         turns = speed_rad_s * self._target > 0
         remedy = "Look at the sign of pressure_pa_per_unit or speed_rad_s_per_unit, and the echo."
