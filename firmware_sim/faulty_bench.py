@@ -2,8 +2,15 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
-from firmware_sim.fault_injection import bench_parts
+from firmware_sim.fault_injection.bench_parts import (
+    Bench,
+    BreakableLaw,
+    FaultyBus,
+    FaultyNode,
+    LawFailure,
+)
 from firmware_sim.fault_injection.kinds import AnyFault, place_all
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import ShipSide, build_ship_side
@@ -11,7 +18,6 @@ from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.base.arrays import FloatArray
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
-from utank_hil.control.interface import Controller
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.panel import TimedAction
 from utank_hil.retuning import Retuner
@@ -49,38 +55,34 @@ class FaultyBench:
         commissioned: bool = True,
         tapped: Tap = lambda controller: controller,
     ) -> None:
-        self._law = law or build_law(config)
-        self._config, self._trace, self._seed = config, trace, seed
-        self._sink, self._sink_every = sink, sink_every
-        self._retuner, self._estimating = retuner, estimating
-        self._commissioned = commissioned
-        self.ship: ShipSide = build_ship_side(scenario, seed, script, config)
-        self._law_failures = bench_parts.LawFailures()
+        law, self._failures, self._seed = law or build_law(config), set[LawFailure](), seed
+        if retuner is None:
+            # a self-tuning controller exchanges its laws: a fault of one would not follow
+            sound = law.controller
+            law = replace(law, controller=lambda: BreakableLaw(sound(), self._failures))
+        self._new_node = partial(
+            build_controller_node,
+            config,
+            law,
+            retuner=retuner,
+            estimating=estimating,
+            sink=sink,
+            sink_every=sink_every,
+            commissioned=commissioned,
+        )
         self._tapped = tapped
-        self._controller = bench_parts.FaultyNode(self._new_controller())
+        self.ship: ShipSide = build_ship_side(scenario, seed, script, config)
+        self._controller = FaultyNode(self._new_controller())
         #: Sensors, drive, valve, panel and controller, as far as the ship has them.
-        self.nodes = {node.name: bench_parts.FaultyNode(node) for node in self.ship.nodes}
+        self.nodes = {node.name: FaultyNode(node) for node in self.ship.nodes}
         self.nodes["controller"] = self._controller
-        self.bus = bench_parts.FaultyBus(config.bit_rate, seed)
+        self.bus = FaultyBus(config.bit_rate, seed)
         more = len(config.vessel.foreign.buses) - 1
         joined = with_more(self.bus, more, config.bit_rate)
         self.lockstep = Lockstep(list(self.nodes.values()), joined, trace)
 
     def _new_controller(self) -> Node:
-        def controller() -> Controller:
-            return bench_parts.BreakableLaw(self._law.controller(), self._law_failures)
-
-        # a self-tuning controller exchanges its laws: a fault of one would not follow
-        law = self._law if self._retuner else replace(self._law, controller=controller)
-        self.node = build_controller_node(
-            self._config,
-            law,
-            retuner=self._retuner,
-            estimating=self._estimating,
-            sink=self._sink,
-            sink_every=self._sink_every,
-            commissioned=self._commissioned,
-        )
+        self.node = self._new_node()
         return self._tapped(self.node)
 
     def restart_controller(self) -> None:
@@ -93,16 +95,11 @@ class FaultyBench:
 
     def place(self, faults: Sequence[AnyFault]) -> None:
         """Place faults, whose times count from now."""
-        bench = bench_parts.Bench(
-            self.nodes,
-            self.ship.plant,
-            self.ship.drive,
-            self.ship.valve,
-            self.ship.vessel.version,
-            self.bus,
-            self._law_failures,
-            self.restart_controller,
-        )
+        ship = self.ship
+        bench = Bench(
+            self.nodes, ship.plant, ship.drive, ship.valve, ship.vessel.version,
+            self.bus, self._failures, self.restart_controller,
+        )  # fmt: skip
         place_all(faults, bench, self.lockstep.now_ns, self._seed)
         if bench.joining:
             self.join(bench.joining)

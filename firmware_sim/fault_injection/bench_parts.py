@@ -260,36 +260,25 @@ class FaultyBus:
 LEANING_PA: Final = 1e4  #: Answer of a law that leans to one side. Chosen; no study.
 
 
-@dataclass(slots=True)
-class LawFailures:
-    """Failures of the laws on a bench: exception, NaN, negated output, one-sided output.
-
-    They are separate from the law, because a restarted controller creates a new one.
-    """
-
-    raises: bool = False
-    answers_nan: bool = False
-    opposite: bool = False
-    leans: bool = False
+LawFailure = Literal["raises", "answers_nan", "opposite", "leans"]
 
 
 class BreakableLaw:
-    """Controller that can be made to fail; `fails` is read at each step."""
+    """Controller that fails as `fails` says at each step, whichever law a restart has created."""
 
-    def __init__(self, law: Controller, fails: LawFailures) -> None:
-        self._law = law
-        self._fails = fails
+    def __init__(self, law: Controller, fails: set[LawFailure]) -> None:
+        self._law, self._fails = law, fails
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Return the law's answer, or the failure's."""
         answer, fails = self._law.step(y, reference), self._fails
-        if fails.raises:
+        if "raises" in fails:
             raise ArithmeticError("injected")
-        if fails.answers_nan:
+        if "answers_nan" in fails:
             return np.full_like(answer, np.nan)
-        if fails.leans:
+        if "leans" in fails:
             return np.full_like(answer, LEANING_PA)
-        return -answer if fails.opposite else answer
+        return -answer if "opposite" in fails else answer
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._law, name)
@@ -304,9 +293,8 @@ class Bench:
     drive: "PumpDrive | CanopenPumpDrive | None"
     valve: "ValveNode | None"
     version: int
-    bus: FaultyBus | None = None  #: Simulated bus; None on a real one.
-    #: Failures of the running controller's law; None if the controller is another process.
-    law: LawFailures | None = None
+    bus: FaultyBus | None = None  #: Simulated bus, where a fault of it may be placed.
+    law: set[LawFailure] = field(default_factory=set)  #: Failures of the controller's law.
     #: Function that replaces the controller by a new one.
     restart: Callable[[], None] | None = None
     joining: list[Node] = field(default_factory=list)

@@ -9,9 +9,8 @@ from pydantic import AfterValidator
 
 from firmware_sim.fault_injection.bench_parts import NEVER_NS, Bench, Span, Spoil, Spoiled
 from utank_hil.base.parameters import Problem, Range
-from utank_hil.canbus import Address, Frame, load_catalogue
+from utank_hil.canbus import Address, load_catalogue
 from utank_hil.canbus.catalogue import NamedMessage
-from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.configuration import Section
 from utank_hil.configuration.error_words import nearest
 
@@ -49,15 +48,8 @@ def sent_by_nodes() -> list[str]:
     return [each.codec.name for each in load_catalogue().messages if each.source in NODE_OF]
 
 
-def _all_messages() -> list[str]:
-    return [each.codec.name for each in load_catalogue().messages]
-
-
 MessageName = Annotated[str, one_of("message of an emulated node", sent_by_nodes)]
-AnyMessageName = Annotated[str, one_of("message", _all_messages)]
 NodeName = Annotated[str, one_of("node", lambda: list(NODE_OF.values()))]
-
-
 FaultTime = Annotated[float, Range(least=0, most=LONGEST_FAULT_S)]
 FaultSpan = Annotated[float, Range(above=0, most=LONGEST_FAULT_S)]
 
@@ -76,8 +68,10 @@ class Fault(Section, ABC):
     for_s: FaultSpan | None = None
 
     def node_names(self) -> tuple[str, ...]:
-        """Nodes that must be emulated for this fault."""
-        return self.needs
+        """Nodes that must be emulated: those of the kind, its own, the sender of its message."""
+        own, message = getattr(self, "node", None), getattr(self, "message", None)
+        sender = message and NODE_OF[load_catalogue().named(message).source]
+        return (*self.needs, *filter(None, (own, sender)))
 
     @property
     def beyond_commands(self) -> bool:
@@ -114,17 +108,13 @@ class MessageFault(Fault):
         """Message in the catalogue."""
         return load_catalogue().named(self.message)
 
-    def node_names(self) -> tuple[str, ...]:
-        """Name of the sender."""
-        return (NODE_OF[self.named.source],)
-
     @abstractmethod
     def _spoil(self, seed: int) -> Spoil:
         """Return the function that spoils a frame."""
 
     def _place(self, bench: Bench, span: Span, seed: int) -> None:
-        _, source, codec = self.named
-        node = bench.nodes[NODE_OF[source]]
+        codec = self.named.codec
+        node = bench.nodes[self.node_names()[0]]
         device = getattr(node.node, "devices", {}).get(codec.can_id)
         if device is None or not self.of_frames:
             spoiled = Spoiled(span, self._spoil(seed), codec.can_id)
@@ -134,20 +124,10 @@ class MessageFault(Fault):
             node.spoiled.append(Spoiled(span, self._spoil(seed), each.can_ids[-1]))
 
 
-def whole_cycles(by_s: float, cycle_ns: int) -> int:
-    """Delay in whole cycles, rounded up, at least one."""
-    return max(1, -(-round(by_s * SECOND_NS) // cycle_ns))
-
-
 def one_in(every: int) -> Callable[[], bool]:
     """Return a function that is true at its first call, and at one in `every` from then on."""
     calls = count()
     return lambda: next(calls) % every == 0
-
-
-def intact(named: NamedMessage, frame: Frame) -> Any:
-    """Content of a frame; None if another fault has damaged it."""
-    return named.codec.decode(frame.data) if len(frame.data) == FRAME_BYTES else None
 
 
 def signal_problems(

@@ -10,9 +10,9 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 
 from firmware_sim.fault_injection.bench_parts import Spoil
-from firmware_sim.fault_injection.fault import MessageFault, intact, one_in
+from firmware_sim.fault_injection.fault import MessageFault, one_in
 from utank_hil.base.parameters import Range
-from utank_hil.canbus import Frame
+from utank_hil.canbus import Frame, load_catalogue
 from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.canbus.e2e import data_ids, profile2_crc
 
@@ -38,13 +38,7 @@ class Frozen(MessageFault):
     kind: Literal["frozen"]
 
     def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        first: list[Frame] = []
-
-        def freeze(frame: Frame, _: float) -> Iterable[Frame]:
-            first.append(frame) if not first else None
-            return first[:1]
-
-        return freeze
+        return _repeats(1)
 
 
 class Replayed(MessageFault):
@@ -55,16 +49,20 @@ class Replayed(MessageFault):
     frames: Annotated[int, Field(ge=2)]  #: Number of frames that are repeated.
 
     def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        kept: list[Frame] = []
-        again = cycle(kept)  # begins when all are kept
+        return _repeats(self.frames)
 
-        def replay(frame: Frame, _: float) -> Iterable[Frame]:
-            if len(kept) == self.frames:
-                return (next(again),)
-            kept.append(frame)
-            return (frame,)
 
-        return replay
+def _repeats(count: int) -> Spoil:
+    kept: list[Frame] = []
+    again = cycle(kept)  # begins when all are kept
+
+    def repeat(frame: Frame, _: float) -> Iterable[Frame]:
+        if len(kept) == count:
+            return (next(again),)
+        kept.append(frame)
+        return (frame,)
+
+    return repeat
 
 
 class Doubled(MessageFault):
@@ -113,8 +111,8 @@ class Counter(MessageFault):
         def count(frame: Frame, _: float) -> Iterable[Frame]:
             if not sends():
                 return ()
-            message = intact(self.named, frame)
-            if message is None:
+            message = load_catalogue().decoded(frame)
+            if message is None:  # another fault has damaged it
                 return (frame,)
             counter.append(frame.data[1] & 15 if not counter else counter.pop() + self.step)
             return (Frame(codec.can_id, codec.encode(message, counter[0] & 15)),)

@@ -1,8 +1,9 @@
 """Faults of nodes, pump, drive, valve and law."""
 
+from functools import partial
 from typing import Annotated, Literal
 
-from firmware_sim.fault_injection.bench_parts import Bench, Span, Spoiled
+from firmware_sim.fault_injection.bench_parts import Bench, LawFailure, Span, Spoiled
 from firmware_sim.fault_injection.fault import Fault, NodeName, one_of
 from utank_hil.base.elementary import exp
 from utank_hil.base.parameters import Finite, NotNegative, Range
@@ -16,10 +17,6 @@ class NodeFault(Fault):
     """Fault of a node."""
 
     node: NodeName
-
-    def node_names(self) -> tuple[str, ...]:
-        """Name of the node."""
-        return (self.node,)
 
 
 class Silenced(NodeFault):
@@ -169,9 +166,8 @@ class Valve(Fault):
 
     def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         name, broken = ("stuck", True) if self.fails == "stuck" else ("powered", False)
-        node = bench.nodes["valve"]
-        node.at(span.begin_ns, lambda: setattr(bench.valve, name, broken))
-        node.at(span.end_ns, lambda: setattr(bench.valve, name, not broken))
+        for time_ns, value in zip(span, (broken, not broken), strict=True):
+            bench.nodes["valve"].at(time_ns, partial(setattr, bench.valve, name, value))
 
 
 class Law(Fault):
@@ -183,9 +179,9 @@ class Law(Fault):
     replayable = False
     needs = ("controller",)
     kind: Literal["law"]
-    fails: Literal["raises", "answers_nan", "opposite", "leans"]  #: Kind of failure.
+    fails: LawFailure  #: Kind of failure.
 
     def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         node = bench.nodes["controller"]
-        node.at(span.begin_ns, lambda: setattr(bench.law, self.fails, True))
-        node.at(span.end_ns, lambda: setattr(bench.law, self.fails, False))
+        node.at(span.begin_ns, partial(bench.law.add, self.fails))
+        node.at(span.end_ns, partial(bench.law.discard, self.fails))

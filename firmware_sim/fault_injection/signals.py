@@ -3,7 +3,7 @@
 import random
 from abc import abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import IntEnum
 from typing import Annotated, Any, ClassVar, Literal, get_type_hints
 
@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from firmware_sim.fault_injection import fault
 from firmware_sim.fault_injection.bench_parts import Spoil
 from utank_hil.base.parameters import Finite, Positive, refuse
-from utank_hil.canbus import Frame
+from utank_hil.canbus import Frame, load_catalogue
 from utank_hil.canbus.catalogue import NamedMessage
 from utank_hil.canbus.codec import field_kind
 
@@ -62,8 +62,8 @@ def _altered(named: NamedMessage, change: Callable[[Any, float], Any]) -> Spoil:
     codec = named.codec
 
     def alter(frame: Frame, since_s: float) -> Iterable[Frame]:
-        message = fault.intact(named, frame)
-        if message is None:
+        message = load_catalogue().decoded(frame)
+        if message is None:  # another fault has damaged it
             return (frame,)
         data = codec.encode(change(message, since_s), frame.data[1] & 15)
         return (Frame(codec.can_id, data),)
@@ -166,8 +166,8 @@ class Late(SignalFault):
     by_s: fault.FaultSpan  #: Delay, rounded up to whole cycles of the message.
 
     def _change(self, seed: int) -> Change:  # noqa: ARG002
-        cycles = fault.whole_cycles(self.by_s, self.named.codec.cycle_ns)
-        line: deque[Sequence[Any]] = deque(maxlen=cycles + 1)
+        cycles = -(-round(self.by_s * fault.SECOND_NS) // self.named.codec.cycle_ns)
+        line: deque[Sequence[Any]] = deque(maxlen=max(1, cycles) + 1)
 
         def delay(values: Sequence[Any], _: float) -> Sequence[Any]:
             line.append(values)
@@ -198,6 +198,12 @@ def value_of(hint: Any, written: float | bool | str | None) -> Any:
     return int(written)
 
 
+def values_of(kind: type, written: Mapping[str, Any]) -> dict[str, Any]:
+    """Signals' values of a message from their configuration."""
+    hints = get_type_hints(kind)
+    return {name: value_of(hints[name], value) for name, value in written.items()}
+
+
 class Value(fault.MessageFault):
     """The signals have fixed values; an empty value means "not available"."""
 
@@ -211,8 +217,7 @@ class Value(fault.MessageFault):
         return self
 
     def _spoil(self, seed: int) -> Spoil:  # noqa: ARG002
-        hints = get_type_hints(self.named.kind)
-        values = {name: value_of(hints[name], written) for name, written in self.values.items()}
+        values = values_of(self.named.kind, self.values)
         speaks = fault.one_in(self.every)
         return _altered(
             self.named, lambda message, _: message._replace(**values) if speaks() else message

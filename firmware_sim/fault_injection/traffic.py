@@ -17,13 +17,13 @@ from firmware_sim.fault_injection.bench_parts import (
 from firmware_sim.fault_injection.fault import (
     NODE_OF,
     SECOND_NS,
-    AnyMessageName,
     Fault,
     FaultSpan,
     MessageName,
     NodeName,
+    one_of,
 )
-from firmware_sim.fault_injection.signals import value_of, value_problems
+from firmware_sim.fault_injection.signals import value_problems, values_of
 from utank_hil.base.parameters import refuse
 from utank_hil.canbus import Frame, Station, load_catalogue
 from utank_hil.canbus.codec import FRAME_BYTES
@@ -67,12 +67,6 @@ class Disturbed(BusFault):
             refuse("", [("by_s", "is for does: delays, which needs it")])
         return self
 
-    def node_names(self) -> tuple[str, ...]:
-        """Names of the required nodes, with the sender of the message."""
-        if self.message is None:
-            return self.needs
-        return (*self.needs, NODE_OF[load_catalogue().named(self.message).source])
-
     def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         assert bench.bus is not None
         can_id = None if self.message is None else load_catalogue().named(self.message).codec.can_id
@@ -88,10 +82,6 @@ class BitErrors(BusFault):
     node: NodeName | None = None
     """Node with the broken transceiver; without it the frames of all nodes are concerned."""
 
-    def node_names(self) -> tuple[str, ...]:
-        """Names of the required nodes, with that of the broken transceiver."""
-        return self.needs if self.node is None else (*self.needs, self.node)
-
     def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         assert bench.bus is not None
         names = list(bench.nodes)
@@ -106,20 +96,26 @@ class BitErrors(BusFault):
         bench.bus.cut_off = lambda time_ns, of: report("bus-off", time_ns, of)
 
 
-class _Flooder:
-    """Node that occupies a share of the bus with consecutive frames."""
+class _Deaf:
+    """Base of nodes that only send, during a span."""
 
-    period_ns = 1_000_000
+    hears: frozenset[int] = frozenset()
 
-    def __init__(self, name: str, frame: Frame, span: Span, per_s: float) -> None:
-        self.name = name
-        self._frame, self._span = frame, span
-        self._per_tick = per_s * self.period_ns / SECOND_NS
-        self._due = 0.0
-        self.hears: frozenset[int] = frozenset()
+    def __init__(self, name: str, span: Span, period_ns: int) -> None:
+        self.name, self.period_ns, self._span = name, period_ns, span
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Ignore the frame."""
+
+
+class _Flooder(_Deaf):
+    """Node that occupies a share of the bus with consecutive frames."""
+
+    def __init__(self, name: str, frame: Frame, span: Span, per_s: float) -> None:
+        super().__init__(name, span, 1_000_000)
+        self._frame = frame
+        self._per_tick = per_s * self.period_ns / SECOND_NS
+        self._due = 0.0
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Send the frames that are due."""
@@ -163,32 +159,21 @@ class Flood(Fault):
         bench.joining.append(_Flooder(f"flood {len(bench.joining)}", frame, span, per_s))
 
     def node_names(self) -> tuple[str, ...]:
-        """Names of the required nodes: in lockstep the controller counts other formats."""
+        """None, or the controller, which counts frames of other formats."""
         return () if self.format == "extended" else ("controller",)
 
 
-class _Sender:
+class _Sender(_Deaf):
     """Node that sends one message in its cycle, or once if it has none."""
-
-    hears: frozenset[int] = frozenset()
 
     def __init__(self, name: str, fault: "Impostor", span: Span) -> None:
         kind, _, codec = load_catalogue().named(fault.message)
-        self.name = name
-        self.period_ns = codec.cycle_ns or 10_000_000
-        self._once = not codec.cycle_ns
-        self._span, self._codec = span, codec
+        super().__init__(name, span, codec.cycle_ns or 10_000_000)
+        self._codec, self._ahead = codec, fault.ahead
         self._counter = fault.ahead - 1
-        self._ahead = fault.ahead
         self.heard = Spoiled(Span(-NEVER_NS), self._follow, codec.can_id)
-        hints = kind.__annotations__
-        self._message = kind(
-            **{field: value_of(hints[field], value) for field, value in fault.values.items()}
-        )
+        self._message = kind(**values_of(kind, fault.values))
         self._done = False
-
-    def receive(self, frame: Frame, now_ns: int) -> None:
-        """Ignore the frame."""
 
     def _follow(self, frame: Frame, after_s: float) -> Iterable[Frame]:  # noqa: ARG002
         """Note the counter of the real sender's frame, up to the first own frame."""
@@ -198,7 +183,7 @@ class _Sender:
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Send the message when due."""
-        if not self._span.holds(now_ns) or (self._once and self._done):
+        if not self._span.holds(now_ns) or (self._done and not self._codec.cycle_ns):
             return ()
         self._done = True
         self._counter = (self._counter + 1) & 15
@@ -209,7 +194,9 @@ class Impostor(Fault):
     """A second node also sends a message, in the right cycle and with a correct CRC."""
 
     kind: Literal["impostor"]
-    message: AnyMessageName
+    message: Annotated[
+        str, one_of("message", lambda: [each.codec.name for each in load_catalogue().messages])
+    ]
     values: dict[str, float | bool | str | None]
     ahead: Annotated[int, Field(ge=0, le=15)] = 1
     """Lead of its first counter over the real sender's last one."""
@@ -225,6 +212,10 @@ class Impostor(Fault):
         problems += [(f"values.{name}", "is required but missing") for name in missing]
         refuse("", problems)
         return self
+
+    def node_names(self) -> tuple[str, ...]:
+        """None: nobody else need send the message."""
+        return ()
 
     def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         sender = _Sender(f"impostor {len(bench.joining)}", self, span)
