@@ -2,10 +2,9 @@
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 from can import CanError
@@ -29,21 +28,16 @@ from utank_hil.console.terminal import Terminal, progress_bar, shown
 
 if TYPE_CHECKING:
     from firmware_sim.fault_campaign.campaign import Campaign, Row
-    from firmware_sim.fault_campaign.trial import Outcome, Window
+    from firmware_sim.fault_campaign.trial import Window
     from firmware_sim.fault_campaign.verdict import Result
 
 CAMPAIGN = CONFIGS / "faults" / "campaign.yaml"
 ROLLS_IN_CHARGE: Final = 5  #: Rolls over which an own ship with its law is compared. Chosen.
 
 
-class _End(NamedTuple):
-    """Why the rows ended early, and the exit code that says so."""
-
-    why: str
-    code: ExitCode
-
-
-INTERRUPTED: Final = _End("interrupted", ExitCode.INTERRUPTED)
+End = tuple[str, ExitCode]
+"""Why the rows ended early, and the exit code that says so."""
+INTERRUPTED: Final[End] = ("interrupted", ExitCode.INTERRUPTED)
 
 
 def faults(
@@ -80,8 +74,9 @@ def faults(
     # imported late: `--help` needs none of it
     from firmware_sim.fault_campaign.campaign import Campaign
     from firmware_sim.fault_campaign.junit import write_junit
+    from firmware_sim.fault_campaign.runner import run_rows
     from firmware_sim.fault_campaign.trial import Window
-    from firmware_sim.fault_campaign.verdict import as_json, judged
+    from firmware_sim.fault_campaign.verdict import as_json, judged, write_recordings
     from utank_hil.runners import stop_on_signals
 
     whole = load(campaign, Campaign)
@@ -95,15 +90,24 @@ def faults(
         out = prepare_out(out, [f"{row.id}.rrd" for row in chosen])
     options = {"seeds": seeds, "full": full, "rows": names, "scenario": str(scenario or "")}
     about = describe("faults", loaded, out or Path(), options=options, seed=1)
-    began, end = time.monotonic(), None
+    began, files = time.monotonic(), dict[str, Path]()
+    end: End | None = None
     with stop_on_signals() as stopped:
-        outcomes = _run(loaded, chosen, seeds, window, stopped, recorded=out is not None)
+        with progress_bar(MofNCompleteColumn()) as bar:
+            task = bar.add_task("faults", total=len(chosen) * seeds)
+            outcomes = run_rows(
+                loaded, chosen, range(1, seeds + 1), window,
+                lambda done: bar.update(task, completed=done), stopped, recorded=out is not None,
+            )  # fmt: skip
         results = [judged(loaded, row, outcomes[row.id]) for row in chosen if outcomes[row.id]]
         if out is not None:
-            results, end = _recorded(results, outcomes, out, about)
+            try:
+                files = write_recordings(out, outcomes, about)
+            except OSError as error:
+                end = why(error), ExitCode.USAGE
         ended_early = any(len(outcomes[row.id]) < seeds for row in chosen)
         if ended_early:
-            end = _End(KILLED, ExitCode.SYSTEM)
+            end = KILLED, ExitCode.SYSTEM
         if stopped():
             end = INTERRUPTED
     on_bus: list[dict[str, Any]] = []
@@ -111,8 +115,9 @@ def faults(
         on_bus, end = _run_live(live, bus)
     begun = {each.row.id for each in results} | {each["id"] for each in on_bus}
     left = [name for name in (*(row.id for row in chosen), *live) if name not in begun]
-    not_run |= dict.fromkeys(left, "needs a live bus: --bus" if end is None else end.why)
-    content = as_json(results, not_run, about, on_bus)
+    not_run |= dict.fromkeys(left, "needs a live bus: --bus" if end is None else end[0])
+    recorded = {name: shown(file) for name, file in files.items()}
+    content = as_json(results, not_run, about, on_bus, recorded)
     if json_:
         print_json(content)
     else:
@@ -127,9 +132,9 @@ def faults(
     if junit is not None:
         write_junit(junit, content)
     if end is INTERRUPTED:
-        raise typer.Exit(end.code)
+        raise typer.Exit(end[1])
     if end is not None:
-        fail(end.why, end.code)
+        fail(*end)
     if content["failed"]:
         raise typer.Exit(ExitCode.REFUSED)
 
@@ -140,9 +145,19 @@ def _chosen(
     """Rows to run, live rows, and why others are not run; end where a name or all is none."""
     from firmware_sim.live_faults.rows import ROWS
 
-    asked = loaded.chosen(names)
-    too_long = [row.id for row in asked if row.long and not (full or names)]
-    chosen = [row for row in asked if row.id not in too_long]
+    kept, asked = {row.id for row in loaded.rows}, loaded.chosen(names)
+    not_run = {
+        each.id: f"{each.fault}: shown by {each.elsewhere}"
+        for each in loaded.shown_elsewhere(names)
+    }
+    not_run |= {
+        row.id: f"needs a ship, nodes and counters as of setup {row.fault.setup}"
+        for row in whole.chosen(names)
+        if row.id not in kept
+    }
+    if not (full or names):
+        not_run |= {row.id: "takes long: --full or --rows" for row in asked if row.long}
+    chosen = [row for row in asked if row.id not in not_run]
     live = [name for name in ROWS if not names or name.startswith(tuple(names))]
     for name in names:
         if not (
@@ -155,47 +170,7 @@ def _chosen(
         fail("--rows: live rows need --bus")
     if names and not (chosen or live):
         fail("--rows: nothing to run: tests show all of them, or the ship has none of these nodes")
-    not_run = _not_to_run(whole, loaded, names)
-    return chosen, live, not_run | dict.fromkeys(too_long, "takes long: --full or --rows")
-
-
-def _run(
-    campaign: "Campaign",
-    rows: Sequence["Row"],
-    seeds: int,
-    window: "Window",
-    stopped: Callable[[], bool],
-    *,
-    recorded: bool,
-) -> "dict[str, list[Outcome]]":
-    """Run rows in lockstep, with the progress of their trials."""
-    from firmware_sim.fault_campaign.runner import run_rows
-
-    with progress_bar(MofNCompleteColumn()) as bar:
-        task = bar.add_task("faults", total=len(rows) * seeds)
-
-        def progress(done: int) -> None:
-            bar.update(task, completed=done)
-
-        numbers = range(1, seeds + 1)
-        return run_rows(campaign, rows, numbers, window, progress, stopped, recorded=recorded)
-
-
-def _recorded(
-    results: list["Result"],
-    outcomes: "Mapping[str, Sequence[Outcome]]",
-    folder: Path,
-    about: Mapping[str, Any],
-) -> tuple[list["Result"], _End | None]:
-    """Write the recordings; return the results with their names, or why there are none."""
-    from firmware_sim.fault_campaign.verdict import write_recordings
-
-    try:
-        files = write_recordings(folder, outcomes, about)
-    except OSError as error:
-        return results, _End(why(error), ExitCode.USAGE)
-    kept = {name: shown(file) for name, file in files.items()}
-    return [replace(each, recording=kept.get(each.row.id, "")) for each in results], None
+    return chosen, live, not_run
 
 
 def _open_once(bus: str) -> None:
@@ -207,7 +182,7 @@ def _open_once(bus: str) -> None:
         fail(f"--bus {bus}: {why(error)}", ExitCode.NO_BUS)
 
 
-def _run_live(names: Sequence[str], bus: str) -> tuple[list[dict[str, Any]], _End | None]:
+def _run_live(names: Sequence[str], bus: str) -> tuple[list[dict[str, Any]], End | None]:
     """Run live rows; return the results, and what ended them early."""
     from firmware_sim.live_faults.rows import ROWS, as_json
 
@@ -222,8 +197,8 @@ def _run_live(names: Sequence[str], bus: str) -> tuple[list[dict[str, Any]], _En
         return found, INTERRUPTED
     except (OSError, CanError) as error:
         if getattr(error, "filename", None) is not None:
-            return found, _End(why(error), ExitCode.USAGE)
-        return found, _End(f"--bus {bus}: {why(error)}", ExitCode.NO_BUS)
+            return found, (why(error), ExitCode.USAGE)
+        return found, (f"--bus {bus}: {why(error)}", ExitCode.NO_BUS)
     return found, None
 
 
@@ -247,20 +222,6 @@ def _window(campaign: "Campaign") -> "Window":
     ship = campaign.setups[COMMON].scenario.vessel.ship
     rolls_s = ROLLS_IN_CHARGE * 2 * math.pi / ship.natural_frequency_rad_s
     return Window(600.0, max(20.0, round(rolls_s)))
-
-
-def _not_to_run(whole: "Campaign", loaded: "Campaign", names: Sequence[str]) -> dict[str, str]:
-    """Why each row of these names is none of this campaign: tests show it, or the ship can't."""
-    kept = {row.id for row in loaded.rows}
-    shown = {
-        each.id: f"{each.fault}: shown by {each.elsewhere}"
-        for each in loaded.shown_elsewhere(names)
-    }
-    return shown | {
-        row.id: f"needs a ship, nodes and counters as of setup {row.fault.setup}"
-        for row in whole.chosen(names)
-        if row.id not in kept
-    }
 
 
 def _print(results: Sequence["Result"], live: Sequence[dict[str, Any]], seeds: int) -> None:

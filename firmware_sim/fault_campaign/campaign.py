@@ -51,6 +51,12 @@ class Requirement(Section):
     reaction: str = ""
     elsewhere: str = ""  #: Test or document that verifies it, where no row of the campaign does.
 
+    @property
+    def text(self) -> str:
+        """What is required, in one line."""
+        parts = (self.fault, self.found_by, self.within, self.reaction)
+        return f"{self.id}: " + "; ".join(filter(None, parts))
+
 
 class Setup(Section):
     """Ship in a sea with one of the scenario's controllers."""
@@ -74,25 +80,20 @@ class Setup(Section):
         """Scenario with the setup's changes applied."""
         scenario, own = self.scenario, self.scenario.vessel
         weight_n = self.displacement_n or own.ship.displacement_n
-        vessel = own.model_copy(
-            update={
-                "redundancy": self.redundancy,
-                "ship": replace(own.ship, displacement_n=weight_n),
-                "least_gm_m": self.least_gm_m or own.least_gm_m,
-                "devices": self.devices or own.devices,
-            }
-        )
+        changed = {
+            "redundancy": self.redundancy,
+            "ship": replace(own.ship, displacement_n=weight_n),
+            **self._given("least_gm_m", "devices"),
+        }
+        vessel = own.model_copy(update=changed)
+        changed = {"vessel": vessel, **self._given("sea_estimate", "delay_s")}
         controllers = {
-            name: config.model_copy(
-                update={
-                    "vessel": vessel,
-                    "sea_estimate": self.sea_estimate or config.sea_estimate,
-                    "delay_s": self.delay_s or config.delay_s,
-                }
-            )
-            for name, config in scenario.controllers.items()
+            name: config.model_copy(update=changed) for name, config in scenario.controllers.items()
         }
         return scenario.model_copy(update={"vessel": vessel, "controllers": controllers})
+
+    def _given(self, *names: str) -> dict[str, Any]:
+        return {name: value for name in names if (value := getattr(self, name)) is not None}
 
     @property
     def config(self) -> ControllerConfig:
@@ -101,12 +102,8 @@ class Setup(Section):
 
     def scenario_of(self, fault_s: float) -> Scenario:
         """Scenario with the ship's parameters that apply from the fault on."""
-        scenario = self.equipped
-        if not self.actual_ship:
-            return scenario
-        return scenario.model_copy(
-            update={"actual_ship": self.actual_ship, "actual_from_s": fault_s}
-        )
+        later = {"actual_ship": self.actual_ship, "actual_from_s": fault_s}
+        return self.equipped.model_copy(update=later if self.actual_ship else None)
 
     @model_validator(mode="after")
     def _known(self) -> "Setup":
@@ -253,12 +250,11 @@ class Campaign(Section):
         ]
         vessels = {name: setup.equipped.vessel for name, setup in self.setups.items()}
         for place, row in enumerate(self.rows):
-            if row.fault.setup not in vessels:
-                known_setups = ", ".join(vessels)
-                problems.append((f"rows.{place}.fault.setup", f"must be one of {known_setups}"))
-                continue
-            key = f"rows.{place}.fault.inject"
-            problems += missing_nodes(vessels[row.fault.setup], row.fault.inject, key)
+            key, vessel = f"rows.{place}.fault", vessels.get(row.fault.setup)
+            if vessel is None:
+                problems.append((f"{key}.setup", f"must be one of {', '.join(vessels)}"))
+            else:
+                problems += missing_nodes(vessel, row.fault.inject, f"{key}.inject")
         met = {name for row in self.rows for name in row.meets}
         problems += [
             (f"requirements.{place}", "is shown by no row: add one, or say `elsewhere`")
@@ -278,9 +274,7 @@ class Campaign(Section):
 
     def chosen(self, names: Sequence[str]) -> list[Row]:
         """Rows whose name, or requirement, begins with one of the names; all rows without names."""
-        return [
-            row for row in self.rows if any(_begins(own, names) for own in (row.id, *row.meets))
-        ]
+        return [row for row in self.rows if _begin((row.id, *row.meets), names)]
 
     def on(self, scenario: Scenario, controller: str) -> "Campaign":
         """Campaign with another ship in the place of that of the setup `COMMON`.
@@ -317,16 +311,11 @@ class Campaign(Section):
 
     def asked_by(self, row: Row) -> str:
         """Text of the requirement that a row meets."""
-        texts = []
-        for each in self.requirements:
-            if each.id in row.meets:
-                parts = [each.fault, each.found_by, each.within, each.reaction]
-                texts.append(f"{each.id}: " + "; ".join(part for part in parts if part))
-        return " | ".join(texts)
+        return " | ".join(each.text for each in self.requirements if each.id in row.meets)
 
     def shown_elsewhere(self, names: Sequence[str]) -> list[Requirement]:
         """Requirements with these names, or all, that tests verify and no row does."""
-        return [each for each in self.requirements if each.elsewhere and _begins(each.id, names)]
+        return [each for each in self.requirements if each.elsewhere and _begin((each.id,), names)]
 
 
 def _resized(row: Row, by: Ratios, first: DrivePlan | None, own: DrivePlan | None) -> Row:
@@ -334,20 +323,16 @@ def _resized(row: Row, by: Ratios, first: DrivePlan | None, own: DrivePlan | Non
     inject = tuple(resized(each, by) for each in row.fault.inject)
     if first is not None and own is not None:
         inject = tuple(renumbered(each, first, own) for each in inject)
-    counts_from = {
-        key: value * by.range.get(key, 1.0) for key, value in row.limit.counts_from.items()
+    fault, expect, limit = row.fault, row.expect, row.limit
+    counts_from = {key: value * by.range.get(key, 1.0) for key, value in limit.counts_from.items()}
+    roll = None if fault.hardwired_stop else limit.roll
+    changed = {"counts_from": counts_from, "beside_stop": True, "roll": roll}
+    parts = {
+        "fault": fault.model_copy(update={"inject": inject}),
+        "expect": expect.model_copy(update={"codes": expect.codes + expect.elsewhere}),
+        "limit": limit.model_copy(update=changed),
     }
-    limit: dict[str, Any] = {"counts_from": counts_from, "beside_stop": True}
-    codes = row.expect.codes + row.expect.elsewhere
-    if row.fault.hardwired_stop:
-        limit["roll"] = None
-    return row.model_copy(
-        update={
-            "fault": row.fault.model_copy(update={"inject": inject}),
-            "expect": row.expect.model_copy(update={"codes": codes}),
-            "limit": row.limit.model_copy(update=limit),
-        }
-    )
+    return row.model_copy(update=parts)
 
 
 def _uncounted(vessel: Vessel, faults: Sequence[AnyFault]) -> bool:
@@ -355,5 +340,5 @@ def _uncounted(vessel: Vessel, faults: Sequence[AnyFault]) -> bool:
     return any(not getattr(vessel.devices, role).protection.counters for role in roles)
 
 
-def _begins(own: str, names: Sequence[str]) -> bool:
-    return not names or own.startswith(tuple(names))
+def _begin(own: Sequence[str], names: Sequence[str]) -> bool:
+    return not names or any(each.startswith(tuple(names)) for each in own)

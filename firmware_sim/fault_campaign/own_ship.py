@@ -6,7 +6,7 @@ of a CANopen drive have the ship's own node numbers.
 """
 
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.fault_injection.nodes import LostIdentifier, Pump
@@ -17,6 +17,17 @@ from utank_hil.configuration import ControllerConfig
 
 PRESSURE: Final = "pressure_pa"
 LEVELS: Final = ("port_level_m", "starboard_level_m", "level_m")
+LIMITS: Final = {**dict.fromkeys(LEVELS, "level_m"), PRESSURE: "pressure_pa"}
+NOISES: Final = {
+    **dict.fromkeys(LEVELS, "level_noise_m"),
+    PRESSURE: "pressure_noise_pa",
+    "roll_rad": "roll_noise_rad",
+    "roll_rate_rad_s": "roll_rate_noise_rad_s",
+}
+SIZES: Final = {
+    Pump: "plus_pa", Noise: "deviation", Offset: "by", Spikes: "by", Drift: "by_per_s",
+}  # fmt: skip
+"""Field with the size of a fault, by its kind."""
 
 
 class Ratios(NamedTuple):
@@ -30,36 +41,27 @@ def ratios(
     first: tuple[Scenario, ControllerConfig], other: tuple[Scenario, ControllerConfig]
 ) -> Ratios:
     """The ratios of two ships, each with a scenario and its controller."""
-    limits, their_limits = first[1].limits, other[1].limits
-    noise, their_noise = first[0].sensors, other[0].sensors
     return Ratios(
-        dict.fromkeys(LEVELS, their_limits.level_m / limits.level_m)
-        | {PRESSURE: their_limits.pressure_pa / limits.pressure_pa},
-        dict.fromkeys(LEVELS, _ratio(their_noise.level_noise_m, noise.level_noise_m))
-        | {
-            PRESSURE: _ratio(their_noise.pressure_noise_pa, noise.pressure_noise_pa),
-            "roll_rad": _ratio(their_noise.roll_noise_rad, noise.roll_noise_rad),
-            "roll_rate_rad_s": _ratio(
-                their_noise.roll_rate_noise_rad_s, noise.roll_rate_noise_rad_s
-            ),
-        },
+        _ratios(LIMITS, first[1].limits, other[1].limits),
+        _ratios(NOISES, first[0].sensors, other[0].sensors),
     )
+
+
+def _ratios(names: Mapping[str, str], first: Any, other: Any) -> dict[str, float]:
+    """The ratios of some fields; 1 where either ship's is zero, as that of a noise may be."""
+    sizes = {key: (getattr(first, name), getattr(other, name)) for key, name in names.items()}
+    return {key: theirs / own if theirs and own else 1.0 for key, (own, theirs) in sizes.items()}
 
 
 def resized(fault: AnyFault, by: Ratios) -> AnyFault:
     """A fault as large for the other ship as it is for the first."""
-    if isinstance(fault, Pump):
-        return fault.model_copy(update={"plus_pa": fault.plus_pa * by.range[PRESSURE]})
-    if isinstance(fault, Noise):
-        size = fault.deviation * by.noise.get(fault.signals[0], 1.0)
-        return fault.model_copy(update={"deviation": size})
-    if isinstance(fault, Offset | Spikes):
-        size = fault.by * by.range.get(fault.signals[0], 1.0)
-        return fault.model_copy(update={"by": size})
-    if isinstance(fault, Drift):
-        size = fault.by_per_s * by.range.get(fault.signals[0], 1.0)
-        return fault.model_copy(update={"by_per_s": size})
-    return fault
+    field = SIZES.get(type(fault))
+    if field is None:
+        return fault
+    ratio_of = by.noise if isinstance(fault, Noise) else by.range
+    (signal, *_) = getattr(fault, "signals", (PRESSURE,))
+    size = getattr(fault, field) * ratio_of.get(signal, 1.0)
+    return fault.model_copy(update={field: size})
 
 
 def renumbered(fault: AnyFault, first: DrivePlan, own: DrivePlan) -> AnyFault:
@@ -70,8 +72,3 @@ def renumbered(fault: AnyFault, first: DrivePlan, own: DrivePlan) -> AnyFault:
         number = fault.id_11bit - node + numbers.get(node, node)
         return fault.model_copy(update={"id_11bit": number})
     return fault
-
-
-def _ratio(theirs: float, first: float) -> float:
-    """A ratio of noises; 1 where either sensor has none."""
-    return theirs / first if theirs and first else 1.0

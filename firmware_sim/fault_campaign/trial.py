@@ -13,12 +13,14 @@ import traceback
 from collections.abc import Callable
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, TypeVar, cast, get_args
 
 import numpy as np
 
 from firmware_sim.fault_campaign.campaign import Campaign, Row, Setup, StatusFlag
 from firmware_sim.fault_campaign.watch import BusLog, Heard, Watch, first_difference
+from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.plant import Plant
 from firmware_sim.ship_side import build_ship_side
@@ -45,6 +47,7 @@ SAMPLE_NS: Final = SAMPLE_TICKS * TICK_NS
 _LOOK_S: Final = 0.1  # Interval in s at which Ctrl-C is checked while a copy works.
 REARMED_S: Final = 20.0
 """Time in s after the fault for which the campaign's first sea checks that nothing arms again."""
+WHOLE_S: Final = 600.0  #: Time in s over which the roll is to be compared.
 COMMANDS_NS: Final = 40_000_000  #: Two cycles of PUMP_CMD.
 FLAGS: Final = get_args(StatusFlag)
 
@@ -54,8 +57,8 @@ class Window:
     """Time after the fault over which the roll is compared with the passive ship's."""
 
     #: Time for rows that end with the pump off, after which the ship alone is integrated.
-    stopped_s: float = 600.0
-    running_s: float = 600.0  #: Time for rows whose controller stays in charge.
+    stopped_s: float = WHOLE_S
+    running_s: float = WHOLE_S  #: Time for rows whose controller stays in charge.
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,40 +100,29 @@ class Outcome:
     rows: FloatArray | None = None  #: Recording with columns `COLUMNS`, if asked for.
 
 
+@dataclass
 class Sea:
-    """All rows of one setup in the waves of one seed.
+    """All rows of one setup in the waves of one seed."""
 
-    A `patient` bench runs on for `REARMED_S` after the pump is off. `stopped` says whether to end
-    early, with an `InterruptedError`.
-    """
+    campaign: Campaign
+    setup: Setup
+    law: BuiltLaw
+    seed: int
+    window: Window
+    recorded: bool = False
+    patient: bool = False  #: Whether a bench runs on for `REARMED_S` after the pump is off.
+    #: Whether to end early, with an `InterruptedError`.
+    stopped: Callable[[], bool] = lambda: False
 
-    def __init__(
-        self,
-        campaign: Campaign,
-        setup: Setup,
-        law: BuiltLaw,
-        seed: int,
-        window: Window,
-        *,
-        recorded: bool = False,
-        patient: bool = False,
-        stopped: Callable[[], bool] = lambda: False,
-    ) -> None:
-        self._stopped = stopped
-        self._campaign, self._setup, self._law = campaign, setup, law
-        self._seed, self._window = seed, window
-        self._patient, self._recorded = patient, recorded
-        self._fault_s = campaign.fault_at_s(seed)
+    def __post_init__(self) -> None:
+        self._fault_s = self.campaign.fault_at_s(self.seed)
         self._fault_ns = round(self._fault_s * SECOND_NS)
         #: Ship under way, up to the fault, and the log of its bus.
         self._underway = self._start()
         self._underway[0].run(self._fault_ns)
-        self._reference: list[Heard] = []
-        self._passive: dict[bool, FloatArray] = {}
-        self._sound: FloatArray = np.zeros(0)
 
     def _start(self) -> tuple[FaultyBench, BusLog]:
-        log, config = BusLog(), self._setup.config
+        log, config = BusLog(), self.setup.config
         work = estimator_work(config)
         self._rows: list[FloatArray] = []
 
@@ -138,47 +130,45 @@ class Sea:
             self._rows.append(np.array([*row, *true_values(bench.ship.plant)]))
 
         bench = FaultyBench(
-            self._setup.scenario_of(self._fault_s),
+            self.setup.scenario_of(self._fault_s),
             config,
-            self._law,
-            seed=self._seed,
-            script=(TimedAction(self._campaign.arm_s, Action.ARM),),
+            self.law,
+            seed=self.seed,
+            script=(TimedAction(self.campaign.arm_s, Action.ARM),),
             trace=log,
-            sink=record if self._recorded else None,
+            sink=record if self.recorded else None,
             sink_every=SAMPLE_TICKS,
             estimating=work and SimulatedRetuner(work[0]),
-            commissioned=self._setup.commissioned,
+            commissioned=self.setup.commissioned,
         )
         log.node = bench.node
         return bench, log
 
+    def _copied(self, work: Callable[[], T]) -> T:
+        return in_a_copy(work, self.stopped)
+
     def prepare(self, rows: list[Row]) -> None:
         """Simulate the references of the rows: the bus without a fault, and the passive ship."""
         followed_s = max((row.fault.followed_s for row in rows if row.fault.on_bus), default=0.0)
-        end_ns = self._fault_ns + round(followed_s * SECOND_NS)
-        _, log = self._underway
-        running_s = self._window.running_s
-        running_ns = round(running_s * SECOND_NS) if running_s < Window().running_s else 0
-        frames, self._sound = in_a_copy(
-            lambda: self._without_fault(end_ns, self._fault_ns + running_ns), self._stopped
-        )
+        running_s = self.window.running_s if self.window.running_s < WHOLE_S else 0.0
+        frames, self._sound = self._copied(lambda: self._without_fault(followed_s, running_s))
+        log = self._underway[1]
         log.frames += frames
         self._reference, log.frames = (
             log.frames,
             [each for each in log.frames if each[0] < self._fault_ns],
         )
         longest_s = max(
-            self._window.stopped_s,
-            self._window.running_s,
-            REARMED_S if self._patient else 0.0,
+            self.window.stopped_s,
+            self.window.running_s,
+            REARMED_S if self.patient else 0.0,
             *(max(row.fault.followed_s, row.limit.roll_window_s or 0.0) for row in rows),
         )
-        for enabled in (False, True):
-            self._passive[enabled] = in_a_copy(
-                lambda enabled=enabled: self._passive_roll(longest_s, enabled=enabled),  # type: ignore[misc]
-                self._stopped,
-            )
-        self._cut = in_a_copy(lambda: self._cut_roll(longest_s), self._stopped)
+        self._passive = [
+            self._copied(partial(self._passive_roll, longest_s, enabled=enabled))
+            for enabled in (False, True)
+        ]
+        self._cut = self._copied(lambda: self._cut_roll(longest_s))
 
     def _cut_roll(self, seconds: float) -> FloatArray:
         """Roll of the sound ship if its pump is off from the fault on: no stop is sooner."""
@@ -186,15 +176,15 @@ class Sea:
         plant.drive_pump(0.0, enabled=False)
         return _rolls(plant, self._fault_ns, self._fault_ns + round(seconds * SECOND_NS))
 
-    def _without_fault(self, end_ns: int, roll_end_ns: int) -> tuple[list[Heard], FloatArray]:
-        """Frames until a time, and the roll until another or the same."""
+    def _without_fault(self, seconds: float, roll_s: float) -> tuple[list[Heard], FloatArray]:
+        """Frames for a time, and the roll for another or the same."""
         bench, log = self._underway
-        frames = log.frames
-        known, rolls = len(frames), []
+        known, rolls = len(log.frames), []
+        end_ns, roll_end_ns = (self._fault_ns + round(s * SECOND_NS) for s in (seconds, roll_s))
         for time_ns in range(self._fault_ns, max(end_ns, roll_end_ns), SAMPLE_NS):
             bench.run(time_ns + SAMPLE_NS)
             rolls.append(bench.ship.plant.roll_rad)
-        return [heard for heard in frames[known:] if heard[0] < end_ns], np.array(rolls)
+        return [heard for heard in log.frames[known:] if heard[0] < end_ns], np.array(rolls)
 
     def _passive_roll(
         self, seconds: float, *, enabled: bool, opening: float | None = None
@@ -203,8 +193,8 @@ class Sea:
 
         The valve is in its fail position, or stuck at `opening`.
         """
-        scenario = self._setup.scenario_of(self._fault_s)
-        plant = build_ship_side(scenario, self._seed, ()).plant
+        scenario = self.setup.scenario_of(self._fault_s)
+        plant = build_ship_side(scenario, self.seed, ()).plant
         valve = scenario.vessel.valve
         if opening is not None and valve is not None:
             plant.set_valve_loss(valve.loss(scenario.vessel.tank, opening))
@@ -216,31 +206,34 @@ class Sea:
         """Run a row in a copy of this process."""
         reference = self._reference
         if row.fault.operator and row.fault.inject:
-            reference = in_a_copy(lambda: self._operated(row), self._stopped)
-        return in_a_copy(lambda: self._outcome(row, reference), self._stopped)
+            reference = self._copied(lambda: self._operated(row))
+        return self._copied(lambda: self._outcome(row, reference))
+
+    def _watched(self, row: Row, faults: tuple[AnyFault, ...]) -> tuple[FaultyBench, BusLog, Watch]:
+        bench, log = self._start() if row.fault.from_start else self._underway
+        watch = Watch(bench, row, self._degraded_most(bench))
+        bench.place(faults)
+        bench.join([watch])
+        return bench, log, watch
 
     def _operated(self, row: Row) -> list[Heard]:
-        bench, log = self._start() if row.fault.from_start else self._underway
-        bench.join([Watch(bench, row)])
+        bench, log, _ = self._watched(row, ())
         bench.run(bench.lockstep.now_ns + round(row.fault.followed_s * SECOND_NS))
         return log.frames
 
     def _outcome(self, row: Row, reference: list[Heard]) -> Outcome:
-        bench, log = self._start() if row.fault.from_start else self._underway
+        bench, log, watch = self._watched(row, row.fault.inject)
         start_ns, refused = bench.lockstep.now_ns, bench.ship.refused_commands
-        watch = Watch(bench, row, self._degraded_most(bench))
-        bench.place(row.fault.inject)
-        bench.join([watch])
         watched_ns = alone_ns = start_ns + round(row.fault.followed_s * SECOND_NS)
         bench.run(watched_ns)
-        if self._patient and self._stopped_at(bench):
+        if self.patient and _stopped_at(bench):
             alone_ns = max(watched_ns, start_ns + round(REARMED_S * SECOND_NS))
             bench.run(alone_ns)
-        stopped = self._stopped_at(bench)
+        stopped = _stopped_at(bench)
         times, was_active = times_of(row, watch, log, start_ns), "active" in watch.first_ns
         refused = bench.ship.refused_commands - refused
         steepest_pa_s = log.steepest_pa_s(start_ns)
-        window_s = self._window.stopped_s if stopped else self._window.running_s
+        window_s = self.window.stopped_s if stopped else self.window.running_s
         window_s = max(row.limit.roll_window_s or window_s, (alone_ns - start_ns) / SECOND_NS)
         end_ns = start_ns + round(window_s * SECOND_NS)
         if stopped:  # nothing acts on the ship any more: it is integrated alone
@@ -250,16 +243,12 @@ class Sea:
         passive = self._passive_beside(bench, (end_ns - self._fault_ns) / SECOND_NS, stopped)
         passive = passive[start_ns // SAMPLE_NS : end_ns // SAMPLE_NS]
         sound = (self._cut if stopped else self._sound)[: len(passive)]
-        compared = not row.fault.from_start and len(sound) == len(passive)
-        short = window_s < Window().running_s
-        compared = compared and (row.limit.beside_stop if stopped else short)
-        wire = ""
-        if row.fault.on_bus:
-            difference = first_difference(reference, log.frames, watched_ns)
-            wire = "" if difference is None else _words(*difference, start_ns)
+        compared = row.limit.beside_stop if stopped else window_s < WHOLE_S
+        compared = compared and not row.fault.from_start and len(sound) == len(passive)
+        differs = first_difference(reference, log.frames, watched_ns) if row.fault.on_bus else None
         return Outcome(
             row.id,
-            self._seed,
+            self.seed,
             **times,
             mode=bench.node.mode.name,
             code=watch.code.name,
@@ -273,7 +262,7 @@ class Sea:
             passive_variance=float(passive.var()),
             sound_variance=float(sound.var()) if compared else math.nan,
             window_s=window_s,
-            wire=wire,
+            wire=_words(*differs, start_ns) if differs else "",
             rows=self._recorded_rows(start_ns),
         )
 
@@ -281,28 +270,30 @@ class Sea:
         """Rows from `RECORDED_S` before the fault on, if asked for."""
         first_s = start_ns / SECOND_NS - RECORDED_S
         kept = [each for each in self._rows if each[0] >= first_s]
-        return np.array(kept) if self._recorded and kept else None
+        return np.array(kept) if kept else None
 
     def _passive_beside(self, bench: FaultyBench, seconds: float, stopped: bool) -> FloatArray:
         """Roll of the passive ship with pump and valve in the final state of a bench."""
-        enabled = self._pump_enabled(bench)
-        valve, own = bench.ship.valve, self._setup.equipped.vessel.valve
+        enabled = _pump_enabled(bench)
+        valve, own = bench.ship.valve, self.setup.equipped.vessel.valve
         if stopped and valve is not None and own is not None and valve.opening != own.fail_opening:
             return self._passive_roll(seconds, enabled=enabled, opening=valve.opening)
         return self._passive[enabled]
 
     def _degraded_most(self, bench: FaultyBench) -> tuple[float, int]:
         """Permitted pressure in Pa while it is halved, and the time in ns to ramp down to it."""
-        monitors, limits = bench.node.safety.monitors, self._setup.config.limits
+        monitors, limits = bench.node.safety.monitors, self.setup.config.limits
         share = 1.0 if monitors is None else monitors.thresholds.degraded_share
         ramp_s = (1 - share) * limits.pressure_pa / limits.rate_pa_s
         return share * limits.pressure_pa, round(ramp_s * SECOND_NS) + COMMANDS_NS
 
-    def _stopped_at(self, bench: FaultyBench) -> bool:
-        return not self._pump_enabled(bench) and bench.node.mode is not Mode.ACTIVE
 
-    def _pump_enabled(self, bench: FaultyBench) -> bool:
-        return bench.ship.drive is not None and bench.ship.drive.enabled
+def _stopped_at(bench: FaultyBench) -> bool:
+    return not _pump_enabled(bench) and bench.node.mode is not Mode.ACTIVE
+
+
+def _pump_enabled(bench: FaultyBench) -> bool:
+    return bench.ship.drive is not None and bench.ship.drive.enabled
 
 
 def _rolls(plant: Plant, begin_ns: int, end_ns: int, step_ns: int = SAMPLE_NS) -> FloatArray:

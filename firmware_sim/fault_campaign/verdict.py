@@ -14,6 +14,7 @@ from firmware_sim.fault_campaign.campaign import Campaign, Row, Setup
 from firmware_sim.fault_campaign.campaign import Reaction as Asked
 from firmware_sim.fault_campaign.trial import COLUMNS, FLAGS, Outcome
 from utank_hil.canbus import PumpCommand, load_catalogue
+from utank_hil.console.terminal import new_table
 from utank_hil.safety.faults import FAULTS, Reaction
 
 STOP_ZERO_MS: Final = 250.0  #: Latest zero pressure in ms after a stop was triggered.
@@ -61,7 +62,6 @@ class Result:
     window_s: float  #: Time over which `roll_ratio` was computed.
     problems: tuple[str, ...]  #: Reasons for failure; empty if passed.
     outcomes: tuple[Outcome, ...] = field(repr=False)
-    recording: str = ""  #: File that holds the first seed.
 
     @property
     def passed(self) -> bool:
@@ -89,7 +89,6 @@ class Result:
             "roll_limit": limit.roll,
             "roll_window_s": None if math.isnan(self.window_s) else self.window_s,
             "seeds": len(self.outcomes),
-            "recording": self.recording or None,
         }
 
 
@@ -100,13 +99,12 @@ def judged(campaign: Campaign, row: Row, outcomes: Sequence[Outcome]) -> Result:
     found = [_reaction_ms(row, each) for each in sound]
     ends = row.expect.latched or row.expect.reaction == "drive"
     zero = [each.zero for each in sound] if ends and not row.fault.hardwired_stop else []
-    zero_limit_ms = row.limit.zero_ms
-    if zero_limit_ms is None and zero and row.expect.latched:
-        limits = (_zero_limit_ms(row, each) for each in sound)
-        zero_limit_ms = max((limit for limit in limits if limit is not None), default=None)
+    limits = (_zero_limit_ms(row, each) for each in sound if zero and row.expect.latched)
+    zero_limit_ms = max(filter(None, limits), default=row.limit.zero_ms)
     problems = [f"seed {each.seed}: {each.error}" for each in outcomes if each.error]
-    for each in sound:
-        problems += [f"seed {each.seed}: {why}" for why in _problems(row, setup, each)]
+    problems += [
+        f"seed {each.seed}: {why}" for each in sound for why in _problems(row, setup, each)
+    ]
     passive = sum(each.passive_variance for each in sound)
     without_fault = sum(each.sound_variance for each in sound)
     least, whose = max((passive, "passive"), (without_fault, "sound"))  # NaN is not larger
@@ -219,10 +217,10 @@ def _ended_wrongly(row: Row, outcome: Outcome) -> Iterator[str]:
 
 
 def _named_in_time(row: Row, outcome: Outcome) -> bool:
-    if outcome.alarm is None:
-        return False
-    latest_ms = max(row.limit.found_ms or 0.0, _reaction_ms(row, outcome) or 0.0) + ALARM_MS
-    return row.expect.reaction == "refuse" or outcome.alarm <= latest_ms
+    if outcome.alarm is None or row.expect.reaction == "refuse":
+        return outcome.alarm is not None
+    found_ms = max(row.limit.found_ms or 0.0, _reaction_ms(row, outcome) or 0.0)
+    return outcome.alarm <= found_ms + ALARM_MS
 
 
 def _unsaid(row: Row, outcome: Outcome) -> Iterator[str]:
@@ -267,10 +265,15 @@ def as_json(
     results: Sequence[Result],
     not_run: Mapping[str, str],
     about: Mapping[str, Any],
-    live: Sequence[dict[str, Any]] = (),
+    live: Sequence[dict[str, Any]],
+    recorded: Mapping[str, str],
 ) -> dict[str, Any]:
-    """Return all results, also of `live` rows, and why others were not run, for `json.dumps`."""
-    rows = [*(result.as_json() for result in results), *live]
+    """All results, also of `live` rows, and why others were not run, for `json.dumps`.
+
+    `recorded` has the files with the first seed of rows.
+    """
+    rows = [result.as_json() | {"recording": recorded.get(result.row.id)} for result in results]
+    rows += live
     failed = sum(row["verdict"] == "fail" for row in rows)
     return {
         "rows": rows,
@@ -286,26 +289,22 @@ def table(results: Sequence[Result], seeds: int) -> Table:
 
     A row that lacks some of the seeds says how many it has.
     """
-    drawn = Table(title="Faults")
-    drawn.add_column("row\n  reaction, alarms", no_wrap=True)
-    for heading in ("found\nms", "zero\nms", "roll\nvar.", ""):
-        drawn.add_column(heading, justify="right", no_wrap=True)
-    drawn.caption = (
+    caption = (
         "worst of the seeds; times after the fault, ≤ their limits; zero: of the drive's "
         "set-point, or the end of the valve's following; variance of the roll over that of the "
         "passive ship, or, in charge, of the sound one if that is more, ≤ 1.05"
     )
+    figures = ("found\nms", "zero\nms", "roll\nvar.", "")
+    drawn = new_table("Faults", *figures, names=["row\n  reaction, alarms"], caption=caption)
     for result in results:
         said = " ".join((result.row.expect.reaction, *result.codes))
-        found = _over(result.found_ms, result.row.limit.found_ms)
-        zero = _over(result.zero_ms, result.zero_limit_ms)
         verdict = Text("pass", "green") if result.passed else Text("fail", "red")
         if len(result.outcomes) < seeds:
             verdict.append(f"\n{len(result.outcomes)} of {seeds}", "default")
         drawn.add_row(
             "\n  ".join([result.row.id, *wrap(said, 40)]),
-            found,
-            zero,
+            _over(result.found_ms, result.row.limit.found_ms),
+            _over(result.zero_ms, result.zero_limit_ms),
             "" if math.isnan(result.roll_ratio) else f"{result.roll_ratio:.2f}",
             verdict,
         )

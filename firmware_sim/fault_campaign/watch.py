@@ -8,15 +8,12 @@ from firmware_sim.fault_campaign.campaign import Row
 from firmware_sim.faulty_bench import FaultyBench
 from utank_hil import canbus
 from utank_hil.base.tick import TICK_NS
-from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.safety.situation import Demand
 
 Heard = tuple[int, int, bytes]  #: Time in ns, identifier and data of a frame on the bus.
 
-_COMMANDS = canbus.load_catalogue().codec(canbus.PumpCommand)
-_STATUS = canbus.load_catalogue().codec(canbus.ControllerStatus)
-_ALARMS = canbus.load_catalogue().codec(canbus.Alarm)
+_CATALOGUE = canbus.load_catalogue()
 ROUNDING_PA = 8.0
 """Resolution of the pressure in PUMP_CMD: each of two commands is rounded by half of it."""
 JITTER_S = 0.002  #: Extra delay of a command in s on a loaded bus of 250 kbit/s: four frames.
@@ -37,21 +34,14 @@ class BusLog:
     def __call__(self, time_ns: int, sender: str, frame: canbus.Frame) -> None:
         """Record a frame."""
         self.frames.append((time_ns, frame.can_id, frame.data))
-        if sender != "controller" or len(frame.data) != FRAME_BYTES:
-            return
-        if frame.can_id == _COMMANDS.can_id:
-            command = _COMMANDS.decode(frame.data)
-            if command is not None:
-                cut = self.node.safety.supervisor.demand is Demand.ZERO
-                self.commands.append((time_ns, command.pressure_pa, cut))
-        elif frame.can_id == _STATUS.can_id:
-            status = _STATUS.decode(frame.data)
-            if status is not None:
-                self.shown.append((time_ns, status))
-        elif frame.can_id == _ALARMS.can_id:
-            alarm = _ALARMS.decode(frame.data)
-            if alarm is not None and alarm.code:
-                self.told.append((time_ns, alarm.code))
+        message = _CATALOGUE.decoded(frame) if sender == "controller" else None
+        if isinstance(message, canbus.PumpCommand):
+            cut = self.node.safety.supervisor.demand is Demand.ZERO
+            self.commands.append((time_ns, message.pressure_pa, cut))
+        elif isinstance(message, canbus.ControllerStatus):
+            self.shown.append((time_ns, message))
+        elif isinstance(message, canbus.Alarm) and message.code:
+            self.told.append((time_ns, message.code))
 
     def commanded_until(self, since_ns: int) -> int:
         """Time in ns of the last command other than zero."""
@@ -97,9 +87,8 @@ class Watch:
         self, bench: FaultyBench, row: Row, degraded_most: tuple[float, int] = (math.inf, 0)
     ) -> None:
         self._bench = bench
-        limit = row.limit
-        self._within_ns = math.inf if limit.found_ms is None else limit.found_ms * 1e6
-        self._counts_from = limit.counts_from
+        self._within_ns = (row.limit.found_ms or math.inf) * 1e6
+        self._counts_from = row.limit.counts_from
         self._codes = {canbus.Fault[name] for name in row.expect.codes}
         self._script = sorted(row.fault.operator, key=lambda timed: timed.time_s)
         self._degraded_most = degraded_most
@@ -135,15 +124,13 @@ class Watch:
 
     def _apart(self, name: str) -> float:
         """Deviation of a received value from the truth, or of the ship from upright."""
-        plant, drive = self._bench.ship.plant, self._bench.ship.drive
+        ship, node = self._bench.ship, self._bench.node
         if name == "over_roll_rad":
-            return abs(plant.roll_rad)
+            return abs(ship.plant.roll_rad)
         if name == "pressure_pa":
-            measured_pa = self._bench.node.measured.pressure_pa
-            return abs(measured_pa - drive.setpoint_pa) if drive is not None else 0.0
-        node = self._bench.node
+            return abs(node.measured.pressure_pa - ship.drive.setpoint_pa) if ship.drive else 0.0
         source = node.motion if name in node.motion.__slots__ else node.measured
-        return abs(float(getattr(source, name)) - float(getattr(plant, name)))
+        return abs(float(getattr(source, name)) - float(getattr(ship.plant, name)))
 
     def tick(self, now_ns: int) -> Iterable[canbus.Frame]:
         """Observe one tick."""

@@ -51,17 +51,20 @@ class LiveLog:
     modes: list[tuple[float, Mode | None]] = field(default_factory=list)
     states: list[tuple[float, DriveState | None]] = field(default_factory=list)
 
-    @property
-    def held_up_s(self) -> float:
-        """Longest gap in s of either stream beyond its cycle."""
-        return max(
-            _longest_gap_s(self.stream(name), -math.inf, math.inf) - cycle_s
-            for name, cycle_s in CYCLES_S.items()
-        )
-
     def stream(self, name: Stream) -> list[float]:
         """Times of one of the streams."""
         return self.commands if name == "commands" else self.motions
+
+    def held_up_s(
+        self, begin_s: float = -math.inf, end_s: float = math.inf, silences: Stream | None = None
+    ) -> float:
+        """Longest gap in s beyond its cycle, overlapping a span, of a stream that goes on."""
+        return max(
+            max((b - a for a, b in pairwise(self.stream(name)) if b > begin_s and a < end_s),
+                default=0.0) - cycle_s
+            for name, cycle_s in CYCLES_S.items()
+            if name != silences
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,22 +101,12 @@ def times_of(
          if t > fault_s and state is not DriveState.OPERATION_ENABLED), None,
     )  # fmt: skip
     judged_s = found_s if judged == "found" else zero_s
-    until_s = end_s if judged_s is None else judged_s
-    held_up_s = max(
-        _longest_gap_s(log.stream(name), begin_s, until_s) - cycle_s
-        for name, cycle_s in CYCLES_S.items()
-        if name != silences
+    held_up_s = log.held_up_s(begin_s, end_s if judged_s is None else judged_s, silences)
+    found_ms, zero_ms = (
+        None if time_s is None else round(1e3 * (time_s - begin_s), 1)
+        for time_s in (found_s, zero_s)
     )
-
-    def after(time_s: float | None) -> float | None:
-        return None if time_s is None else round(1e3 * (time_s - begin_s), 1)
-
-    return LiveTimes(after(found_s), after(zero_s), round(1e3 * held_up_s, 1))
-
-
-def _longest_gap_s(times_s: list[float], begin_s: float, end_s: float) -> float:
-    """Longest gap in s between frames of a stream that overlaps a span of time."""
-    return max((b - a for a, b in pairwise(times_s) if b > begin_s and a < end_s), default=0.0)
+    return LiveTimes(found_ms, zero_ms, round(1e3 * held_up_s, 1))
 
 
 STORM: Final = CONFIGS / "scenarios" / "storm.yaml"
@@ -128,6 +121,7 @@ _RECENT_S: Final = 0.5
 """Largest age in s of the last CTRL_STATUS of a controller in charge: five cycles."""
 _LOOK_S: Final = 0.002  # Polling interval in s: a fifth of the shortest message cycle.
 _EXTENDED_MASK: Final = 0x1FFFFFFF
+_CATALOGUE: Final = load_catalogue()
 
 
 Later = tuple[float, Callable[[], None]] | None
@@ -144,20 +138,13 @@ class LiveBench:
     def __init__(self, bus: str, folder: Path) -> None:
         SocketCanPort(bus).close()  # fails with the reason and the remedy
         self.bus = bus
-        catalogue = load_catalogue()
-        self._status = catalogue.receiver(ControllerStatus)
-        self._drive = catalogue.receiver(DriveStatus1)
         self.log = LiveLog()
-        self._streams = {
-            catalogue.codec(PumpCommand).can_id: self.log.commands,
-            catalogue.codec(SensorMotion).can_id: self.log.motions,
-        }
-        heard = (self._status.can_id, self._drive.can_id, *self._streams)
+        kinds = (ControllerStatus, DriveStatus1, PumpCommand, SensorMotion)
         # python-can directly, because our port drops the kernel's time of a frame
         self._bus = SocketcanBus(
             bus,
-            can_filters=[{"can_id": each, "can_mask": _EXTENDED_MASK, "extended": True}
-                         for each in heard],
+            can_filters=[{"can_id": _CATALOGUE.codec(kind).can_id, "can_mask": _EXTENDED_MASK,
+                          "extended": True} for kind in kinds],
         )  # fmt: skip
         self.mode: Mode | None = None
         self.fault = ""
@@ -189,20 +176,20 @@ class LiveBench:
     def look(self) -> None:
         """Read the pending frames."""
         time.sleep(_LOOK_S)
-        for message in self._heard():
-            time_s = message.timestamp
-            frame = Frame(message.arbitration_id, bytes(message.data))
-            if frame.can_id in self._streams:
-                self._streams[frame.can_id].append(time_s)
-            elif frame.can_id == self._status.can_id:
-                status = self._status.accept(frame)
-                if status is not None:
-                    self.mode, self._status_s = status.mode, time_s
-                    self.fault = "" if status.fault is None else status.fault.name
-                    self.log.modes.append((time_s, status.mode))
-            elif (drive := self._drive.accept(frame)) is not None:
-                self.state, self.pressure_pa = drive.state, drive.pressure_pa
-                self.log.states.append((time_s, drive.state))
+        for heard in self._heard():
+            time_s = heard.timestamp
+            message = _CATALOGUE.decoded(Frame(heard.arbitration_id, bytes(heard.data)))
+            if isinstance(message, PumpCommand):
+                self.log.commands.append(time_s)
+            elif isinstance(message, SensorMotion):
+                self.log.motions.append(time_s)
+            elif isinstance(message, ControllerStatus):
+                self.mode, self._status_s = message.mode, time_s
+                self.fault = "" if message.fault is None else message.fault.name
+                self.log.modes.append((time_s, message.mode))
+            elif isinstance(message, DriveStatus1):
+                self.state, self.pressure_pa = message.state, message.pressure_pa
+                self.log.states.append((time_s, message.state))
 
     def _heard(self) -> Iterator[can.Message]:
         """Yield messages since the last call; none while the interface is down."""

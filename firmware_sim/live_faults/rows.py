@@ -95,7 +95,7 @@ def in_charge(bus: str) -> Iterator[LiveBench]:
                 bench.wait_in_charge()
             except LiveError:
                 ended = any(each.poll() is not None for each in (bench.controller, bench.ship))
-                if start == STARTS or ended or bench.log.held_up_s <= HELD_UP_S:
+                if start == STARTS or ended or bench.log.held_up_s() <= HELD_UP_S:
                     raise
             else:
                 yield bench
@@ -118,23 +118,18 @@ def run_live(row: LiveRow, bus: str) -> tuple[list[str], LiveTimes]:
 
 def attempted(row: LiveRow, bus: str) -> tuple[list[str], LiveTimes]:
     """Run a row once; return its problems, and the times."""
-    problems = []
-    times = LiveTimes(None, None, 0.0)
-    end = ""
     try:
         with in_charge(bus) as bench:
             fault_s = time.time()
             end_s = bench.watch(row.act(bench))
             times = times_of(bench.log, fault_s, end_s, silences=row.silences, judged=row.judged)
-            end = f"; at the end {bench.mode!r}, {bench.fault or 'no fault'}, {bench.state!r}"
-            if bench.in_charge:
-                problems.append("in charge again in the end")
+            problems = ["in charge again in the end"] if bench.in_charge else []
     except LiveError as error:
-        problems.append(str(error))
+        return [str(error)], LiveTimes(None, None, 0.0)
     judged_ms = times.found_ms if row.judged == "found" else times.zero_ms
-    if not problems and judged_ms is None:
-        missing = "was not found" if row.judged == "found" else "the drive went on"
-        problems.append(missing + end)
+    end = f"; at the end {bench.mode!r}, {bench.fault or 'no fault'}, {bench.state!r}"
+    if judged_ms is None and not problems:
+        problems.append(("was not found" if row.judged == "found" else "the drive went on") + end)
     elif judged_ms is not None and judged_ms > row.within_ms:
         problems.append(f"after {judged_ms:.0f} ms, {row.within_ms:.0f} allowed{end}")
     return problems, times
