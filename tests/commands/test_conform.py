@@ -71,17 +71,25 @@ def ship(tmp_path):
     return path
 
 
-def test_checks_are_a_table_at_80_columns(monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("of", "name", "figures", "shown"),
+    [
+        (conformance, "frames of wrong length, checksum or order", (1880.0, 1000.0, 150.0, "ms"),
+         "1880 ms │ 1000 ± 150 │ pass"),
+        (commissioning, "heel by levels and pressure, less roll", (0.0031, 0.0, 0.03, "deg/s"),
+         "0.003 deg/s │ 0 ± 0.03 │ pass"),
+    ],
+)  # fmt: skip
+def test_checks_are_a_table_at_80_columns(of, name, figures, shown, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
-    names = {each for kind in (conformance, commissioning) for each in SAID.findall(source(kind))}
-    assert "frames of wrong length, checksum or order" in names
-    assert "pump pressure at rest" in names
-    check = {"measured": 1880.0, "expected": 1000.0, "tolerance": 150.0, "unit": "ms",
-             "verdict": "pass"}  # fmt: skip
-    command.print_checks(Terminal(), "motion of opv", [check | {"what": each} for each in names])
+    names = set(SAID.findall(source(of)))
+    assert name in names
+    check = dict(zip(("measured", "expected", "tolerance", "unit"), figures, strict=True))
+    checks = [check | {"what": each, "verdict": "pass"} for each in names]
+    command.print_checks(Terminal(), "motion of opv", checks)
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == len(names) + 5
-    assert sum("1880 ms │ 1000 ± 150 │ pass" in line for line in lines) == len(names)
+    assert sum(shown in " ".join(line.split()) for line in lines) == len(names)
 
 
 @pytest.mark.parametrize(("identity", "code"), [(0x22, 0), (0x23, 1)])

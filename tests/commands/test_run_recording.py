@@ -10,17 +10,22 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 from ports import QuietBus
 from typer.testing import CliRunner
 
+from utank_hil.canbus import Fault, Mode
 from utank_hil.cli import app
 from utank_hil.commands import recording as module
 from utank_hil.commands import run as command
 from utank_hil.commands.recording import RecordingSummary, RunRecording
+from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.signals import SIGNALS
+from utank_hil.runners import LoopStatistics
 from utank_hil.telemetry.ring import RowReader
 from utank_hil.telemetry.run_log import RunLogTask, read_run_log
 
@@ -248,3 +253,14 @@ def children_of(run: int) -> list[int]:
     return sorted(
         int(child) for child in children if spawned in Path(f"/proc/{child}/cmdline").read_bytes()
     )
+
+
+@pytest.mark.parametrize("rows", [0, 3])
+def test_a_run_that_ended_before_its_first_tick_waits_for_nothing(rows: int, capsys) -> None:
+    law = SimpleNamespace(events=(), error="", fallbacks=0)
+    node = SimpleNamespace(mode=Mode.INIT, fault=Fault.NONE, law=law)
+    summary = RecordingSummary(file="log/run.frames", rows=rows)
+    command._print_summary("mine", cast(ControllerNode, node), LoopStatistics(), summary)
+    said = capsys.readouterr().out
+    assert "ended in INIT\n" in said
+    assert ("utank-hil report" in said) is (rows > 0)

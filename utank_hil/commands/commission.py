@@ -1,5 +1,6 @@
 """``utank-hil commission``: signs, zeros and scales at the quay, before anything may be armed."""
 
+import math
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Annotated, Any, Final, NoReturn
@@ -164,6 +165,10 @@ def _print(record: dict[str, Any], path: Path, config: Path, *, code: bool) -> N
         console.lead_on(following, allow_code=code)
 
 
+def _rounded(value: float, places: int) -> str:
+    return f"{round(value, places) + 0.0:g}"
+
+
 def print_checks(console: Terminal, title: str, checks: list[dict[str, Any]]) -> None:
     """Print the checks of a record as a table, and the remedies of those that failed."""
     table = Table(title=title)
@@ -171,8 +176,10 @@ def print_checks(console: Terminal, title: str, checks: list[dict[str, Any]]) ->
         table.add_column(heading, justify="right" if "ed" in heading else "left", no_wrap=True)
     for check in checks:
         unit = "" if check["unit"] == "1" else f" {check['unit']}"
-        measured = "none" if check["measured"] is None else f"{check['measured']:.4g}{unit}"
-        expected = f"{check['expected']:.4g} ± {check['tolerance']:.3g}"
+        found, off = check["measured"], check["tolerance"]
+        places = max(1 - math.floor(math.log10(off)), 0) if off else 4  # two digits of what it may
+        measured = "none" if found is None else f"{_rounded(found, places)}{unit}"
+        expected = f"{_rounded(check['expected'], places)} ± {_rounded(off, places)}"
         verdict = "pass" if check["verdict"] == "pass" else Text("FAIL", "red")
         table.add_row(check["what"], measured, expected, verdict)
     console.table(table)

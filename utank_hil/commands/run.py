@@ -341,10 +341,9 @@ def _print_summary(
     console.table(timing_table({name: statistics}))
     for event in node.law.events:
         console.say(f"{(event.time_ns - node.start_ns) * 1e-9:8.1f} s {event_text(event)}")
-    what = (
-        "waiting for" if node.mode is canbus.Mode.INIT else "fault"
-    )  # INIT waits; that is no fault
-    console.say(f"ended in {node.mode.name}, {what} {fault_text(node.fault)}")
+    what = "waiting for" if node.mode is canbus.Mode.INIT else "fault"  # INIT waits; that is none
+    why = "" if node.fault is canbus.Fault.NONE else f", {what} {fault_text(node.fault)}"
+    console.say(f"ended in {node.mode.name}{why}")
     if node.law.error:
         console.say(node.law.error, red="the law failed:")
     if node.law.fallbacks:
@@ -352,7 +351,7 @@ def _print_summary(
     if recording is None:
         return
     _tell(console, recording)
-    if recording.file is not None and recording.error is None:
+    if recording.file is not None and recording.error is None and recording.rows != 0:
         console.lead_on(("report", Path(recording.file)))
 
 

@@ -110,8 +110,8 @@ def judge_rest(
         _rate_zero("roll_rate_zero", "roll rate at rest", mean["roll_rate_rad_s"]),
         _gauge_zero("port", mean["port_level_m"], -starboard_m, volume_m / 2),
         _gauge_zero("starboard", mean["starboard_level_m"], starboard_m, volume_m / 2),
-        Check("high_level_switches", "high-level switches open", 1 - mean["high_level"], 1.0, 0.0,
-              "of the time", "Check the switches and their wiring: low water leaves both open."),
+        Check("high_level_switches", "high-level switches open, share", 1 - mean["high_level"],
+              1.0, 0.0, "1", "Check the switches and their wiring: low water leaves both open."),
     ]  # fmt: skip
     if plan is not None:
         level_m = (rest["starboard_level_m"] - rest["port_level_m"]) / 2
@@ -135,7 +135,7 @@ def judge_rest(
                   "Set the pressure sensor's zero; both its sides are to be full of water.")
         )  # fmt: skip
     checks.append(
-        Check("water_heel", "heel by levels and pressure, less the roll", heel_deg - roll_deg, 0.0,
+        Check("water_heel", "heel by levels and pressure, less roll", heel_deg - roll_deg, 0.0,
               WATER_HEEL_DEG, "deg", "Set the zeros of motion sensor, gauges and pressure sensor.")
     )  # fmt: skip
     if "roll_2_rad" in rest:

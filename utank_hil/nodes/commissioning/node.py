@@ -179,7 +179,7 @@ class CommissioningNode:
             " of devices.pump in the ship's file to what is safe."
         )
         return Check(
-            "stop_ms", "pump: from a stop to a fifth of its pressure", stopped_ms(shares, PRESSED),
+            "stop_ms", "pump: a stop to a fifth of its pressure", stopped_ms(shares, PRESSED),
             0.0, self._stop_within_ms, "ms", remedy,
         )  # fmt: skip
 
