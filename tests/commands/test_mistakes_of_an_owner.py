@@ -144,9 +144,33 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
      ("--displacement 1.9e+06", "the file has 1.9e+03", "in tonnes")),
     ("a wave's height without its section", "campaign '{own}/hours.yaml' --out '{own}/hours'",
      ("grid.hs_m: is not a known key; did you mean sea.hs_m?",)),
+    ("a bracket that is never closed", "check '{own}/open.yaml'",
+     ("open.yaml", "line 3, column 6: the bracket or quote that opens in line 2, column 6 is not")),
+    ("a quote that is never closed", "check '{own}/quote.yaml'",
+     ("quote.yaml", "the bracket or quote that opens in line 1, column 7 is not closed")),
+    ("two files in one", "check '{own}/two.yaml'",
+     ("two.yaml", "line 2", "a second document (---) begins", "take that line out")),
+    ("a star before a name", "check '{own}/star.yaml'",
+     ("star.yaml", "line 1, column 7", "put a text that begins with * in quotes")),
+    ("a folder for a law", "check '{own}/folder.yaml'",
+     ("controllers.mine: must be a mapping", "'out'", "the name of a file that ends with .yaml")),
+    ("a mesh as hull data", "check '{own}/mesh.yaml'",
+     ("ship.hull", "hull.stl is of no known kind", "of a mesh `utank-hil hull` computes a .nc")),
+    ("a spreadsheet as a decay", "identify decay '{own}/decay.xlsx'",
+     ("decay.xlsx", "it is a spreadsheet: save it as .csv")),
     ("a controller's word of the trade", "bench '{own}/scenario.yaml' --controller gpc",
      ("No such option", "--controller")),
 ]  # fmt: skip
+
+
+HALF_WRITTEN = {
+    "open.yaml": "name: mine\nsea: {kind: jonswap, hs_m: 3\nplant: roll\n",
+    "quote.yaml": 'name: "mine\nship: {gm_m: 1}\n',
+    "two.yaml": "name: mine\n---\nname: other\n",
+    "star.yaml": "name: *mine\n",
+    "mesh.yaml": "name: mine\nship: {hull: ./hull.stl}\ntank: {}\n",
+    "decay.xlsx": "PK\x03\x04",
+}
 
 
 @pytest.mark.parametrize(
@@ -155,6 +179,9 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
 def test_a_mistake_at_the_command_is_told(own: Path, words: str, named: tuple[str, ...]) -> None:
     law = {"kind": "gpc", "tuning": "auto"}
     _write(own / "gpc.yaml", LAW | {"law": law})
+    _write(own / "folder.yaml", SCENARIO | {"controllers": {"mine": "out"}})
+    for name, text in HALF_WRITTEN.items():
+        (own / name).write_text(text, encoding="utf-8")
     _write(own / "gpc_sea.yaml", SCENARIO | {"controllers": {"gpc": "gpc.yaml"}})
     code, said = said_of(*(each.format(own=own) for each in shlex.split(words)))
     assert code in (1, 2), said

@@ -145,6 +145,37 @@ def test_what_is_refused(tmp_path, devices, reason):
 
 
 @pytest.mark.parametrize(
+    ("signal", "meant"),
+    [("attitude.Roll", "did you mean attitude.ROLL?"), ("attitude.ROL", "did you mean attitude.RO"),
+     ("ROLL_ANGLE", "write MESSAGE.SIGNAL")],
+)  # fmt: skip
+def test_a_signal_of_nearly_that_name_is_named(tmp_path, signal, meant):
+    motion = SBG | {"signals": {"roll_rad": {"from": signal}}}
+    assert f"signals.roll_rad: {signal!r} is no signal of messages: {meant}" in problems(
+        tmp_path, {"motion": motion}
+    )
+
+
+@pytest.mark.parametrize(
+    ("scale", "why"),
+    [(2.5e-4, ""), (0.25, "counts 1.64e+04 m in steps of 0.25, where 4.88 is usual"),
+     (2.5e-7, "counts 0.0164 m in steps of 2.5e-07, where 4.88 is usual")],
+)  # fmt: skip
+def test_gauges_scaled_in_another_unit_are_warned_of(tmp_path, scale, why):
+    names = ("port_level_m", "starboard_level_m")
+    fields = {name: {"start": 16 * k, "bits": 16} for k, name in enumerate(names)}
+    levels = {
+        "profile": "", "messages": {"m": {"id": 5, "bytes": 4, "signals": fields}},
+        "signals": {name: {"from": f"m.{name}", "scale": scale, "offset": -3} for name in names},
+        "high_level_m": 4.6, "cycle_ms": 20, "age_ms": 100, "protection": {"unchanged_ms": 2000},
+        "accept_unprotected": True,
+    }  # fmt: skip
+    warned = dict(ship(tmp_path, {"levels": levels}).warnings())
+    said = [warned.get(f"devices.levels.signals.{name}.scale", "") for name in names]
+    assert [words.startswith(why) and bool(words) is bool(why) for words in said] == [True, True]
+
+
+@pytest.mark.parametrize(
     "content", [b"\x01", b'VERSION "', b"BO_ 99999999999999999999 A: 8 B\n", b"SG_ : 1", bytes(9)]
 )
 def test_a_damaged_dbc_is_refused_by_its_name(tmp_path, content):
@@ -153,6 +184,18 @@ def test_a_damaged_dbc_is_refused_by_its_name(tmp_path, content):
     assert re.search(
         r"theirs\.dbc (is no DBC|has no message)", problems(tmp_path, {"motion": motion})
     )
+
+
+def test_a_message_of_nearly_that_name_is_named(tmp_path):
+    (tmp_path / "theirs.dbc").write_text(
+        'VERSION ""\nBO_ 5 EKF_EULER: 8 X\n SG_ R : 0|8@1+ (1,0) [0|0] "" X\n'
+    )
+    motion = SBG | {"dbc": "./theirs.dbc", "messages": {"a": "EKF_EULR"}}
+    assert "has no message EKF_EULR; did you mean EKF_EULER?" in problems(
+        tmp_path, {"motion": motion}
+    )
+    motion["messages"] = {"a": "ATTITUDE"}
+    assert "has no message ATTITUDE; it has EKF_EULER" in problems(tmp_path, {"motion": motion})
 
 
 def test_a_motion_signal_without_unit_is_refused(tmp_path):

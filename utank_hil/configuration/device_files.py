@@ -22,6 +22,7 @@ from utank_hil.canbus.profiles.drive_plan import (
     TORQUE,
     Place,
 )
+from utank_hil.configuration.error_words import nearest
 from utank_hil.configuration.yaml_text import parse_yaml
 
 OF_AN_EDS: Final = "EDS "  #: Begins the name of a device whose layouts were read from an EDS.
@@ -65,7 +66,7 @@ class Eds:
         try:
             parser.read_string(_text("eds", file, ENCODINGS), Path(file).name)
         except Error as error:
-            raise ValueError(f"eds: {file} is no EDS: {error.message}") from error
+            raise ValueError(f"eds: {file} is no EDS: {' '.join(error.message.split())}") from error
         self._sections = {name.upper(): dict(parser[name]) for name in parser.sections()}
 
     def entry(self, place: Place) -> dict[str, str] | None:
@@ -368,7 +369,11 @@ def _with_dbc(content: dict[str, Any]) -> dict[str, Any]:
     messages: dict[str, dict[str, Any]] = {}
     for name, (of, changes) in _named(content, "dbc", ".+").items():
         if of not in layouts:
-            raise ValueError(f"messages: {file} has no message {of}")
+            near = nearest(of, list(layouts))
+            raise ValueError(
+                f"messages: {file} has no message {of}"
+                + (f"; did you mean {near}?" if near else f"; it has {', '.join(layouts)[:200]}")
+            )
         layout = dict(layouts[of])
         if layout["bytes"] > FRAME_BYTES:
             raise ValueError(

@@ -1,7 +1,7 @@
 """One sensor in section ``devices`` of a ship's file, and what the controller hears of it."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Final
 
 from pydantic import Field, model_validator
@@ -34,7 +34,9 @@ from utank_hil.configuration.device_sections import (
     SourceAddress,
     unit_of,
 )
+from utank_hil.configuration.error_words import nearest
 
+_COARSE: Final = 0.02  #: Greatest step of a value, by its usual size.
 LEAST_AGE_CYCLES: Final = 2.0  #: One lost frame must not end the run.
 OPTIONAL: Final = (*SWITCHES, "flow_m3_s", "is_open", "is_shut", "reset", "passive")
 UNPROTECTED: Final[dict[type[tuple[Any, ...]], str]] = {
@@ -150,9 +152,14 @@ class DeviceSection(CanopenSection):
         yield from self._message_problems()
         yield from self._cycle_problems()
         yield from self._signal_problems(kind)
-        for place, (key, path) in enumerate(self._paths()):
+        known = [f"{name}.{each}" for name, said in self.messages.items() for each in said.signals]
+        for key, path in self._paths():
             if self._field(path) is None:
-                yield key, f"{path!r} is no signal of messages: write MESSAGE.SIGNAL (no. {place})"
+                near = {each.lower(): each for each in known}.get(
+                    path.lower(), nearest(path, known)
+                )
+                meant = f"did you mean {near}?" if near else "write MESSAGE.SIGNAL"
+                yield key, f"{path!r} is no signal of messages: {meant}"
         for crc in self.protection.crcs:
             said = self.messages.get(crc.message)
             if said is None:
@@ -284,6 +291,21 @@ class DeviceSection(CanopenSection):
         if layout is None or layout.real:
             return 0.0
         return abs(layout.scale * self._factor(signal, layout))
+
+    def unusual(self, sizes: Mapping[str, float]) -> Iterator[Problem]:
+        """Values whose counts are too coarse, or end too soon, for their usual `sizes`."""
+        for name, size in sizes.items():
+            if name not in self.signals or not (step := self.step(name)):
+                continue
+            layout = self._field(self.signals[name].from_)
+            most = step * 2.0 ** (layout.bits if layout is not None else 64)
+            if step > _COARSE * size or most < size:
+                unit = unit_of(name)
+                why = (
+                    f"counts {most:.3g} {unit} in steps of {step:.3g}, where {size:.3g} is usual: "
+                    f"the scale is {unit} of one count"
+                )
+                yield f"signals.{name}.scale", why
 
     def _wake(self, bus: int) -> Frame | None:
         """What starts a CANopen node (CiA 301), or has an address claimed anew (J1939-81)."""

@@ -195,6 +195,8 @@ def _remedy(wanted: str, value: Any) -> str:
     if wanted == _NUMBER and isinstance(value, dict) and len(value) == 1:
         (number,) = value.values()
         return f": write {number:g} alone" if isinstance(number, int | float) else ""
+    if wanted == _MAPPING and isinstance(value, str):
+        return ", or the name of a file that ends with .yaml"
     if wanted not in (_NUMBER, _WHOLE) or not isinstance(value, str):
         return ""
     if re.fullmatch(r"\s*[-+]?\d+,\d+\s*", value):

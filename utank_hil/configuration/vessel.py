@@ -226,6 +226,12 @@ class Vessel(Section):
         found = vessel_warnings(self.ship, self.tank, self.pump, self.valve)
         if self.devices is not None and self.pump is not None:
             found += self.devices.pump.unusual(self.pump)
+        if self.devices is not None:
+            level_m = self.tank.height_m
+            sizes = {"roll_rad": 0.35, "roll_rate_rad_s": 0.2, "port_level_m": level_m,
+                     "starboard_level_m": level_m}  # fmt: skip
+            for role, device in self.devices.devices().items():
+                found += ((f"devices.{role}.{key}", why) for key, why in device.unusual(sizes))
         if self.least_gm_m is not None:
             gm_m = self.ship.stiffness_nm_rad / self.ship.displacement_n
             if not 0.05 * gm_m <= self.least_gm_m <= gm_m:  # 0.15 m of 3 m to all of it

@@ -56,6 +56,13 @@ _Loader.add_implicit_resolver(
 _Loader.add_constructor(_INT, lambda _, node: int(node.value))
 
 
+_OPENED: Final = ("flow", "quoted scalar")
+
+
+def _at(mark: yaml.Mark | None) -> str:
+    return "" if mark is None else f" in line {mark.line + 1}, column {mark.column + 1}"
+
+
 def parse_yaml(text: str) -> tuple[Any, list[Finding]]:
     """Return the content of a text, and its keys that are written twice or are no names.
 
@@ -65,9 +72,15 @@ def parse_yaml(text: str) -> tuple[Any, list[Finding]]:
     try:
         return deepcopy(_parsed(text))
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        place = "" if mark is None else f" in line {mark.line + 1}, column {mark.column + 1}"
-        raise YamlError(f"is not valid YAML{place}: {_in_words(error.problem or '')}") from error
+        mark, opens = error.problem_mark, error.context_mark
+        if opens is not None and any(each in (error.context or "") for each in _OPENED):
+            raise YamlError(
+                f"is not valid YAML{_at(mark)}: the bracket or quote that opens{_at(opens)} is not "
+                "closed before: close it, and put commas between its values"
+            ) from error
+        raise YamlError(
+            f"is not valid YAML{_at(mark)}: {_in_words(error.problem or '')}"
+        ) from error
     except yaml.YAMLError as error:
         raise YamlError(f"is not valid YAML: {error}") from error
     except RecursionError:
@@ -93,6 +106,10 @@ def _in_words(problem: str) -> str:
             "this line or the one above is no key and value; a colon and a space part the two, as "
             "in hs_m: 3, and a text with a colon needs quotes"
         )
+    if "another document" in problem:
+        return "a second document (---) begins: a file holds one, so take that line out"
+    if "undefined alias" in problem:
+        return f"{problem}: put a text that begins with * in quotes"
     if "<block" not in problem:  # its word for lines indented alike
         return problem
     if "'-'" in problem or "sequence" in problem:

@@ -40,7 +40,10 @@ def read_hull(path: Path, given: Given | None = None) -> HullData:
     known = Given() if given is None else given
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
-        kinds = "Capytaine .nc, WAMIT .1, NEMOH Nemoh.cal, AQWA .AH1, ShipX .re7, MSS .mat"
+        kinds = (
+            "Capytaine .nc, WAMIT .1, NEMOH Nemoh.cal, AQWA .AH1, ShipX .re7, MSS .mat; of a mesh "
+            "`utank-hil hull` computes a .nc"
+        )
         raise ValueError(f"{path} is of no known kind; known are {kinds}")
     try:
         hull = reader(path, known)

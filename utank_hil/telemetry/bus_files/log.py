@@ -196,7 +196,9 @@ class BusLog:
         source = source_of(self.path)
         if source is None:
             begin = next(iter(_begin(self.path)), "")
-            what = f"it begins with {begin[:60]!r}" if begin else "it is empty"
+            what = f"it begins with {begin[:20]!r}" if begin else "it is empty"
+            if self.path.suffix.lower() in (".xlsx", ".xls", ".ods"):
+                what = "it is a spreadsheet: save it as .csv"
             raise BusLogError(
                 f"{self.path}: is no log of the bus, such as {READ}: {what}; a recording is .rrd "
                 "or .frames, a table .csv or .parquet"
