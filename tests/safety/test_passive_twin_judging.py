@@ -109,6 +109,16 @@ def test_at_the_start_twice_as_much_is_left_alone_and_less_from_period_to_period
     assert found.index(True) + 200 == first_s + 15
 
 
+def test_at_the_start_as_much_more_than_sixty_percent_is_left_alone():
+    twin = twin_of((0.0, 0.0), (0.0, 0.0))
+    twin._forget()
+    twin._power, twin._twin_power = (0.1 * 2.4) ** 2, 0.01
+    found = judged(twin, 300)  # the record tells nothing against it
+    # 1.6 + 1 e^(-t / 6 periods) < 2.4, and then the patience
+    first = next(k for k in range(1, 999) if (1 - SHARE) ** k < 0.8)
+    assert found.index(True) + 1 == first + 15
+
+
 def test_little_roll_is_not_judged():
     for least_rad, found in ((0.0999, True), (0.1, False), (0.12, False)):
         twin = twin_of((0.1**2, 0.05**2), (0.1**2, 0.05**2), least_rad)
@@ -212,3 +222,15 @@ def test_what_the_pump_has_made_obeys_the_equations_of_ship_and_tank(way, change
     times_s = step_s * np.arange(1, 801)
     made = scipy.integrate.solve_ivp(slopes, (0, 8.0), np.zeros(4), t_eval=times_s, rtol=1e-8)
     assert np.abs(np.array(rolls) - made.y[0]).max() < 0.01 * np.abs(made.y[0]).max()
+
+
+def test_a_ship_that_is_taken_over_has_nothing_of_the_other_ones_losses():
+    lossy = replace(FIRST.ship, quadratic_damping_nms2_rad2=2e10)
+    twin = PassiveTwin(lossy, replace(FIRST.tank, quadratic_loss=2.0), STEP_S, 0.01)
+    twin._made[:4] = 0.1
+    twin.update(0.2, 0.15, 0.6, 0.0)
+    assert (twin._effort[1:] != 0.0).all()
+    twin.take(FIRST.ship, replace(FIRST.tank, quadratic_loss=0.0))
+    twin._made[:4] = 0.0  # of a pump that has done nothing
+    twin.update(0.2, 0.15, 0.6, 0.0)
+    assert twin.roll_rad == 0.2

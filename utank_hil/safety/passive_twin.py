@@ -116,7 +116,7 @@ class PassiveTwin:
         self._piece_rad = moment.piece_rad
         # highest power first
         self._pieces = [tuple(row[::-1]) for row in moment.coefficients_nm.tolist()]
-        self._straight = len(self._pieces) == 1 and not any(self._pieces[0][:-2])
+        self._straight = not (ship.gz_m or any(ship.restoring_odd_nm))
 
     @property
     def ship_rms_rad(self) -> float:
@@ -156,14 +156,12 @@ class PassiveTwin:
         made, effort = self._made, self._effort
         effort[0] = 0.5 * (pressure_pa + self._pressure_pa)
         self._pressure_pa = pressure_pa
-        if self._damping or not self._straight:
-            effort[1] = self._moment_beside_nm(roll_rad, rate_rad_s)
-        if self._loss:
-            other = level_rate_m_s - float(made[3])
-            effort[2] = -self._loss * (abs(level_rate_m_s) * level_rate_m_s - abs(other) * other)
+        effort[1] = self._moment_beside_nm(roll_rad, rate_rad_s)
+        other = level_rate_m_s - float(made[3])
+        effort[2] = -self._loss * (abs(level_rate_m_s) * level_rate_m_s - abs(other) * other)
         made[:4] = product(self._step, made)
-        if not abs(float(made[0])) < MOST_MADE_RAD:
-            made[:4] = 0.0
+        if not abs(float(made[0])) < MOST_MADE_RAD:  # pragma: no mutate: it is never just that
+            made[:] = 0.0
             self.excuse()
         self.roll_rad = twin_rad = roll_rad - float(made[0])
         if not counts:
@@ -192,7 +190,7 @@ class PassiveTwin:
         self._unknown -= self._share * self._unknown
         if self._losing_s < 0:
             before_s, self._losing_s = self._losing_s, min(self._losing_s + self._period_s, 0.0)
-            if before_s < -self._anew_s <= self._losing_s:
+            if before_s < -self._anew_s <= self._losing_s:  # pragma: no mutate: never just that
                 self._forget()
             return
         ratio = RECOVERED if self.amplified else self._amplified + self._unknown
@@ -202,20 +200,20 @@ class PassiveTwin:
         on_record = (
             self.amplified
             or self._record_power > record_power
-            or self._power > gross * gross * self._twin_power
+            or self._power > gross * gross * self._twin_power  # pragma: no mutate: never just that
         )
         if on_record and self._power > least_power:
             self._losing_s += self._period_s
         else:
             self._losing_s = 0.0
-        self.amplified = self._losing_s > self._patience_s
+        self.amplified = self._losing_s > self._patience_s  # pragma: no mutate: never just that
 
     def _moment_beside_nm(self, roll_rad: float, rate_rad_s: float) -> float:
         """Moment on the ship that is not linear, less that on the twin."""
         made_rad, made_rad_s = float(self._made[0]), float(self._made[1])
         other_rad_s = rate_rad_s - made_rad_s
         moment_nm = -self._damping * (abs(rate_rad_s) * rate_rad_s - abs(other_rad_s) * other_rad_s)
-        if self._straight:
+        if self._straight:  # pragma: no mutate: else rounding is left
             return moment_nm
         righting_nm = self._righting_nm(roll_rad) - self._righting_nm(roll_rad - made_rad)
         return moment_nm - righting_nm + self._stiffness * made_rad
