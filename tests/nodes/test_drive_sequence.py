@@ -138,6 +138,17 @@ def test_a_drive_that_is_off_only_now_and_then_does_not_obey(every):
     assert words[-1] is C.DISABLE_VOLTAGE
 
 
+@pytest.mark.parametrize(("rests", "word"), [(9, C.DISABLE_VOLTAGE), (10, C.QUICK_STOP)])
+def test_a_drive_that_was_at_rest_for_ten_commands_may_brake_for_half_a_second_again(rests, word):
+    sequence = DriveSequence()
+    # one each 20 ms, from 0 to 500 ms
+    words = {sequence.next_word(S.OPERATION_ENABLED, wanted=False) for _ in range(26)}
+    assert words == {C.QUICK_STOP}
+    for _ in range(rests):
+        sequence.next_word(S.SWITCH_ON_DISABLED, wanted=False)
+    assert sequence.next_word(S.OPERATION_ENABLED, wanted=False) is word
+
+
 def test_a_drive_whose_cause_lasts_gets_an_edge_for_each_request():
     sequence = DriveSequence()
     for _ in range(3):

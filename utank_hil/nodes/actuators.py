@@ -39,7 +39,7 @@ RESETS: Final = 5
 cause lasts another edge is needed later, so the bit is taken back."""
 
 
-_TOWARDS_ENABLED = {
+_TOWARDS_ENABLED: Final[dict[DriveState | None, ControlWord]] = {
     DriveState.SWITCH_ON_DISABLED: ControlWord.SHUTDOWN,
     DriveState.READY_TO_SWITCH_ON: ControlWord.SWITCH_ON,
     DriveState.SWITCHED_ON: ControlWord.ENABLE_OPERATION,
@@ -74,7 +74,7 @@ class DriveSequence:
             return ControlWord.FAULT_RESET
         self._resets_left = 0
         word = ControlWord.DISABLE_VOLTAGE
-        if wanted and state is not None:
+        if wanted:
             word = _TOWARDS_ENABLED.get(state, word)
         elif state in _STOPPING:
             word = ControlWord.QUICK_STOP
