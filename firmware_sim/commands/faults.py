@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 from can import CanError
@@ -29,7 +29,7 @@ from utank_hil.console.terminal import Terminal, progress_bar, shown
 if TYPE_CHECKING:
     from firmware_sim.fault_campaign.campaign import Campaign, Row
     from firmware_sim.fault_campaign.trial import Window
-    from firmware_sim.fault_campaign.verdict import Result
+    from firmware_sim.fault_campaign.verdict import Verdict
 
 CAMPAIGN = CONFIGS / "faults" / "campaign.yaml"
 ROLLS_IN_CHARGE: Final = 5  #: Rolls over which an own ship with its law is compared. Chosen.
@@ -110,14 +110,16 @@ def faults(
             end = KILLED, ExitCode.SYSTEM
         if stopped():
             end = INTERRUPTED
-    on_bus: list[dict[str, Any]] = []
+    on_bus: list[Verdict] = []
     if bus is not None and end is None:
         on_bus, end = _run_live(live, bus)
-    begun = {each.row.id for each in results} | {each["id"] for each in on_bus}
+    begun = {each["id"] for each in (*results, *on_bus)}
     left = [name for name in (*(row.id for row in chosen), *live) if name not in begun]
     not_run |= dict.fromkeys(left, "needs a live bus: --bus" if end is None else end[0])
-    recorded = {name: shown(file) for name, file in files.items()}
-    content = as_json(results, not_run, about, on_bus, recorded)
+    for each in results:
+        file = files.get(each["id"])
+        each["recording"] = None if file is None else shown(file)
+    content = as_json([*results, *on_bus], not_run, about)
     if json_:
         print_json(content)
     else:
@@ -182,11 +184,11 @@ def _open_once(bus: str) -> None:
         fail(f"--bus {bus}: {why(error)}", ExitCode.NO_BUS)
 
 
-def _run_live(names: Sequence[str], bus: str) -> tuple[list[dict[str, Any]], End | None]:
+def _run_live(names: Sequence[str], bus: str) -> "tuple[list[Verdict], End | None]":
     """Run live rows; return the results, and what ended them early."""
     from firmware_sim.live_faults.rows import ROWS, as_json
 
-    found: list[dict[str, Any]] = []
+    found: list[Verdict] = []
     try:
         with progress_bar(MofNCompleteColumn()) as bar:
             task = bar.add_task(f"on {bus}", total=len(names))
@@ -224,15 +226,15 @@ def _window(campaign: "Campaign") -> "Window":
     return Window(600.0, max(20.0, round(rolls_s)))
 
 
-def _print(results: Sequence["Result"], live: Sequence[dict[str, Any]], seeds: int) -> None:
+def _print(results: "list[Verdict]", live: "list[Verdict]", seeds: int) -> None:
     from firmware_sim.fault_campaign.verdict import table
 
     console = Terminal()
     if results:
         console.table(table(results, seeds))
     for result in results:
-        for problem in result.problems:
-            console.say(problem, red=f"{result.row.id}:")
+        for problem in result["problems"]:
+            console.say(problem, red=f"{result['id']}:")
     for row in live:
         took = row["zero_ms"] if row["limit_ms"] is None else row["found_ms"]
         limit = row["zero_limit_ms"] if row["limit_ms"] is None else row["limit_ms"]

@@ -20,9 +20,6 @@ POLL_S: Final = 0.1  #: Interval in s of the progress display and the check for 
 ROWS_A_TASK: Final = 30
 """Most rows that share one ship under way: few enough for the cores to end together."""
 
-Progress = Callable[[int], None]  #: Callback that takes the number of completed trials.
-
-
 _laws: dict[str, BuiltLaw] = {}
 
 
@@ -57,14 +54,15 @@ def run_rows(
     rows: Sequence[Row],
     seeds: Sequence[int],
     window: Window,
-    progress: Progress,
+    progress: Callable[[int], None],
     stopped: Callable[[], bool],
     *,
     recorded: bool = False,
 ) -> dict[str, list[Outcome]]:
     """Run rows in the seas of some seeds.
 
-    `stopped` says whether to end early; `recorded`, whether the outcomes of the first seed have
+    `progress` takes the number of completed trials; `stopped` says whether to end early;
+    `recorded`, whether the outcomes of the first seed have
     recordings. There is a process for each core. The outcomes of a row are in the order of the
     seeds, and incomplete after an early end or a killed process.
     """
@@ -74,30 +72,26 @@ def run_rows(
     for row in rows:
         by_setup[row.fault.setup].append(row)
     futures: list[Future[list[Outcome]]] = []
-    outcomes: list[Outcome] = []
+    found: dict[str, list[Outcome]] = {row.id: [] for row in rows}
     common = campaign, window, recorded, done, stop
     with suppress(BrokenProcessPool), WorkerPool(len(os.sched_getaffinity(0)), common) as pool:
         for seed in seeds:
             for setup, its in by_setup.items():
                 tasks = -(-len(its) // ROWS_A_TASK)
-                futures += [
-                    pool.submit(_do, setup, seed, its[n::tasks], seed == seeds[0])
-                    for n in range(tasks)
-                ]
+                for n in range(tasks):
+                    work = setup, seed, its[n::tasks], seed == seeds[0]
+                    futures.append(pool.submit(_do, *work))
         while not all(future.done() for future in futures):
             time.sleep(POLL_S)
-            failed = any(
-                each.done() and not each.cancelled() and each.exception() for each in futures
-            )
-            stop.value = stopped() or failed
-            if stop.value:  # a task that has begun still builds its setup first
-                for future in futures:
-                    future.cancel()
+            done_so_far = (each for each in futures if each.done() and not each.cancelled())
+            stop.value = stopped() or any(each.exception() for each in done_so_far)
+            for future in futures if stop.value else ():
+                future.cancel()  # a task that has begun still builds its setup first
             progress(done.value)
         ended = (future for future in futures if not future.cancelled())
-        for done_together in whole_first(ended):
-            outcomes += done_together
-    found: dict[str, list[Outcome]] = {row.id: [] for row in rows}
-    for each in sorted(outcomes, key=lambda each: seeds.index(each.seed)):
-        found[each.row].append(each)
+        for outcomes in whole_first(ended):
+            for outcome in outcomes:
+                found[outcome.row].append(outcome)
+    for outcomes in found.values():
+        outcomes.sort(key=lambda outcome: seeds.index(outcome.seed))
     return found

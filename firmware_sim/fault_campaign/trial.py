@@ -5,10 +5,9 @@ row continues in a copy of the process.
 """
 
 import math
+import multiprocessing
 import os
 import pickle
-import select
-import signal
 import traceback
 from collections.abc import Callable
 from concurrent.futures.process import BrokenProcessPool
@@ -349,32 +348,31 @@ def in_a_copy(work: Callable[[], T], stopped: Callable[[], bool] = lambda: False
     Raises `InterruptedError` if `stopped` became true first, `BrokenProcessPool` if the copy was
     killed, and `RuntimeError` if the function failed, with its traceback.
     """
-    reading, writing = os.pipe()
-    parent_pid = os.getpid()
-    child = os.fork()
-    if child == 0:
+    copies, parent_pid = multiprocessing.get_context("fork"), os.getpid()
+    reading, writing = copies.Pipe(duplex=False)
+
+    def run() -> None:
+        end_with(parent_pid)
         try:
-            end_with(parent_pid)
-            try:
-                told = pickle.dumps((True, work()))
-            except Exception:  # raised again by the parent
-                told = pickle.dumps((False, traceback.format_exc()))
-            with os.fdopen(writing, "wb") as pipe:
-                pipe.write(told)
-        finally:
-            os._exit(0)
-    os.close(writing)
-    with os.fdopen(reading, "rb") as pipe:
-        while not select.select([pipe], [], [], _LOOK_S)[0]:
+            told = pickle.dumps((True, work()))
+        except Exception:  # raised again by the parent
+            told = pickle.dumps((False, traceback.format_exc()))
+        writing.send_bytes(told)
+
+    copy = copies.Process(target=run)
+    copy.start()
+    writing.close()
+    try:
+        while not reading.poll(_LOOK_S):
             if stopped():
-                os.kill(child, signal.SIGKILL)
-                os.waitpid(child, 0)
                 raise InterruptedError
-        told = pipe.read()
-    os.waitpid(child, 0)
-    if not told:
-        raise BrokenProcessPool("a copy of the process was killed")
-    done, answer = pickle.loads(told)
+        done, answer = pickle.loads(reading.recv_bytes())
+    except EOFError:
+        raise BrokenProcessPool("a copy of the process was killed") from None
+    finally:
+        copy.kill()
+        copy.join()
+        reading.close()
     if not done:
         raise RuntimeError(answer)
     return cast(T, answer)

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from textwrap import wrap
 from typing import Any, Final
@@ -45,55 +44,17 @@ _TIME_OF: Final[dict[Asked, str]] = {
 _GO_ON: Final = ("halve", "alarm", "note", "none")  # Reactions after which control continues.
 
 
-@dataclass(frozen=True, slots=True)
-class Result:
-    """Verdict on a row over all seeds; times are the worst of them, None where there is none."""
-
-    row: Row
-    requirement: str
-    #: found_ms, zero_ms: start of the required reaction, and final zero of the drive's set-point.
-    found_ms: float | None
-    zero_ms: float | None
-    zero_limit_ms: float | None
-    codes: tuple[str, ...]
-    wire: str  #: First frame that the fault changed, in the first seed.
-    #: Roll variance divided by that of the passive ship, or, if larger, of the ship without fault.
-    roll_ratio: float
-    window_s: float  #: Time over which `roll_ratio` was computed.
-    problems: tuple[str, ...]  #: Reasons for failure; empty if passed.
-    outcomes: tuple[Outcome, ...] = field(repr=False)
-
-    @property
-    def passed(self) -> bool:
-        """Whether the row passed."""
-        return not self.problems
-
-    def as_json(self) -> dict[str, Any]:
-        """Result for `json.dumps`: None where a time does not apply."""
-        limit = self.row.limit
-        return {
-            "id": self.row.id,
-            "meets": list(self.row.meets),
-            "requirement": self.requirement,
-            "reaction": self.row.expect.reaction,
-            "found_ms": self.found_ms,
-            "zero_ms": self.zero_ms,
-            "limit_ms": limit.found_ms,
-            "counted_from": limit.counts_from or None,
-            "zero_limit_ms": self.zero_limit_ms,
-            "verdict": "pass" if self.passed else "fail",
-            "problems": list(self.problems),
-            "codes": list(self.codes),
-            "wire": self.wire,
-            "roll_ratio": None if math.isnan(self.roll_ratio) else round(self.roll_ratio, 6),
-            "roll_limit": limit.roll,
-            "roll_window_s": None if math.isnan(self.window_s) else self.window_s,
-            "seeds": len(self.outcomes),
-        }
+Verdict = dict[str, Any]
+"""A row of the campaign as ``--json`` has it: None where a time does not apply."""
 
 
-def judged(campaign: Campaign, row: Row, outcomes: Sequence[Outcome]) -> Result:
-    """Judge a row by its outcomes, one per seed."""
+def judged(campaign: Campaign, row: Row, outcomes: Sequence[Outcome]) -> Verdict:
+    """Judge a row by its outcomes, one per seed; times are the worst of them.
+
+    ``found_ms`` is the start of the required reaction, ``zero_ms`` the final zero of the drive's
+    set-point, ``wire`` the first frame that the fault changed, in the first seed, ``roll_ratio``
+    the roll variance over that of the passive ship, or, if larger, of the ship without fault.
+    """
     setup = campaign.setups[row.fault.setup]
     sound = [each for each in outcomes if not each.error]
     found = [_reaction_ms(row, each) for each in sound]
@@ -111,19 +72,26 @@ def judged(campaign: Campaign, row: Row, outcomes: Sequence[Outcome]) -> Result:
     ratio = sum(each.variance for each in sound) / least if least else math.nan
     if row.limit.roll is not None and not ratio <= row.limit.roll:
         problems.append(f"rolls {ratio:.2f} times the {whose} ship's variance")
-    return Result(
-        row,
-        campaign.asked_by(row),
-        _worst(found),
-        _worst(zero),
-        zero_limit_ms,
-        tuple(sorted({each.code for each in sound if each.code != "NONE"})),
-        next((each.wire for each in sound), ""),
-        ratio,
-        max((each.window_s for each in sound), default=math.nan),
-        tuple(problems),
-        tuple(outcomes),
-    )
+    window_s = max((each.window_s for each in sound), default=math.nan)
+    return {
+        "id": row.id,
+        "meets": list(row.meets),
+        "requirement": campaign.asked_by(row),
+        "reaction": row.expect.reaction,
+        "found_ms": _worst(found),
+        "zero_ms": _worst(zero),
+        "limit_ms": row.limit.found_ms,
+        "counted_from": row.limit.counts_from or None,
+        "zero_limit_ms": zero_limit_ms,
+        "verdict": "fail" if problems else "pass",
+        "problems": problems,
+        "codes": sorted({each.code for each in sound if each.code != "NONE"}),
+        "wire": next((each.wire for each in sound), ""),
+        "roll_ratio": None if math.isnan(ratio) else round(ratio, 6),
+        "roll_limit": row.limit.roll,
+        "roll_window_s": None if math.isnan(window_s) else window_s,
+        "seeds": len(outcomes),
+    }
 
 
 def _worst(times_ms: Sequence[float | None]) -> float | None:
@@ -262,18 +230,9 @@ def write_recordings(
 
 
 def as_json(
-    results: Sequence[Result],
-    not_run: Mapping[str, str],
-    about: Mapping[str, Any],
-    live: Sequence[dict[str, Any]],
-    recorded: Mapping[str, str],
+    rows: Sequence[Verdict], not_run: Mapping[str, str], about: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """All results, also of `live` rows, and why others were not run, for `json.dumps`.
-
-    `recorded` has the files with the first seed of rows.
-    """
-    rows = [result.as_json() | {"recording": recorded.get(result.row.id)} for result in results]
-    rows += live
+    """All rows, and why others were not run, for `json.dumps`."""
     failed = sum(row["verdict"] == "fail" for row in rows)
     return {
         "rows": rows,
@@ -284,7 +243,7 @@ def as_json(
     }
 
 
-def table(results: Sequence[Result], seeds: int) -> Table:
+def table(rows: Sequence[Verdict], seeds: int) -> Table:
     """Table with two lines a row, what was found above what is asked for.
 
     A row that lacks some of the seeds says how many it has.
@@ -296,16 +255,15 @@ def table(results: Sequence[Result], seeds: int) -> Table:
     )
     figures = ("found\nms", "zero\nms", "roll\nvar.", "")
     drawn = new_table("Faults", *figures, names=["row\n  reaction, alarms"], caption=caption)
-    for result in results:
-        said = " ".join((result.row.expect.reaction, *result.codes))
-        verdict = Text("pass", "green") if result.passed else Text("fail", "red")
-        if len(result.outcomes) < seeds:
-            verdict.append(f"\n{len(result.outcomes)} of {seeds}", "default")
+    for row in rows:
+        verdict = Text(row["verdict"], "green" if row["verdict"] == "pass" else "red")
+        if row["seeds"] < seeds:
+            verdict.append(f"\n{row['seeds']} of {seeds}", "default")
         drawn.add_row(
-            "\n  ".join([result.row.id, *wrap(said, 40)]),
-            _over(result.found_ms, result.row.limit.found_ms),
-            _over(result.zero_ms, result.zero_limit_ms),
-            "" if math.isnan(result.roll_ratio) else f"{result.roll_ratio:.2f}",
+            "\n  ".join([row["id"], *wrap(" ".join((row["reaction"], *row["codes"])), 40)]),
+            _over(row["found_ms"], row["limit_ms"]),
+            _over(row["zero_ms"], row["zero_limit_ms"]),
+            "" if row["roll_ratio"] is None else f"{row['roll_ratio']:.2f}",
             verdict,
         )
     return drawn

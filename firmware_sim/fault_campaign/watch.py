@@ -92,7 +92,6 @@ class Watch:
         self._codes = {canbus.Fault[name] for name in row.expect.codes}
         self._script = sorted(row.fault.operator, key=lambda timed: timed.time_s)
         self._degraded_most = degraded_most
-        self._degraded_ns: int | None = None
         self._start_ns: int | None = None
         self._noted = self._count()
         now_ns = bench.lockstep.now_ns
@@ -106,7 +105,7 @@ class Watch:
         #: it held until detection, or for the row's deadline.
         self.over_ns: int | None = None
         #: Last time at which the drive's set-point was not zero, or the valve followed.
-        self.pressed_ns = now_ns - TICK_NS
+        self.pressed_ns = self._undegraded_ns = now_ns - TICK_NS
         self.code = canbus.Fault.NONE  #: First latched fault; while there is none, the fault shown.
         self.armed_again = self._waited = False
         self.beyond_share_pa = 0.0  #: Largest excess of the drive's set-point over `degraded_most`.
@@ -117,8 +116,7 @@ class Watch:
 
     def _count(self) -> int:
         """Number of frames that the controller refused or missed so far."""
-        node = self._bench.node
-        inbox = node.inbox
+        inbox = self._bench.node.inbox
         streams = sum(sum(each.rejected.values()) + each.lost for each in inbox.watched)
         return streams + inbox.foreign + inbox.discarded
 
@@ -140,25 +138,24 @@ class Watch:
         while self._script and now_ns - self._start_ns >= self._script[0].time_s * 1e9:
             ship.panel.press(self._script.pop(0).action)
         supervisor = node.safety.supervisor
-        mode = supervisor.mode
+        mode, active = supervisor.mode, supervisor.mode is canbus.Mode.ACTIVE
         if mode is canbus.Mode.FAULT and "found" not in first_ns:
             first_ns["found"], self.code = now_ns, supervisor.fault
-        elif mode is canbus.Mode.ACTIVE:
-            self.armed_again |= "found" in first_ns
-            first_ns.setdefault("active", now_ns)
-            if supervisor.degraded:
-                first_ns.setdefault("halved", now_ns)
-        self._look_at_share(now_ns, degraded=mode is canbus.Mode.ACTIVE and supervisor.degraded)
+        self.armed_again |= active and "found" in first_ns
+        self._look_at_share(now_ns, degraded=active and supervisor.degraded)
         if "found" not in first_ns and (node.fault is not canbus.Fault.NONE or self._waited):
             self.code = node.fault
         self._waited = mode is canbus.Mode.INIT  # a fault that delayed INIT and is over is no fault
-        if "noted" not in first_ns and self._count() > self._noted:
-            first_ns["noted"] = now_ns
-        if now_ns % (10 * TICK_NS) == 0 and node.safety.alarms.codes & self._codes:
-            first_ns.setdefault("alarm", now_ns)
-        if (ship.drive is not None and ship.drive.setpoint_pa != 0.0) or (
-            ship.valve is not None and ship.valve.following
+        listed = now_ns % (10 * TICK_NS) == 0
+        for name, holds in (
+            ("active", active),
+            ("halved", active and supervisor.degraded),
+            ("noted", "noted" not in first_ns and self._count() > self._noted),
+            ("alarm", listed and not node.safety.alarms.codes.isdisjoint(self._codes)),
         ):
+            if holds:
+                first_ns.setdefault(name, now_ns)
+        if (ship.drive and ship.drive.setpoint_pa) or (ship.valve and ship.valve.following):
             self.pressed_ns = now_ns
         self._look_at_difference(now_ns)
         self.rolls.append(ship.plant.roll_rad)
@@ -178,10 +175,7 @@ class Watch:
         """Update the excess of the drive's set-point over the halved pressure limit."""
         drive, (most_pa, within_ns) = self._bench.ship.drive, self._degraded_most
         if not degraded or drive is None:
-            self._degraded_ns = None
-            return
-        if self._degraded_ns is None:
-            self._degraded_ns = now_ns
-        if now_ns - self._degraded_ns > within_ns:
+            self._undegraded_ns = now_ns
+        elif now_ns - self._undegraded_ns > within_ns + TICK_NS:
             beyond_pa = abs(drive.setpoint_pa) - most_pa - ROUNDING_PA
             self.beyond_share_pa = max(self.beyond_share_pa, beyond_pa)

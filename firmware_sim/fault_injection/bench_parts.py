@@ -71,10 +71,8 @@ class FaultyNode:
         self.spoiled: list[Spoiled] = []  #: Faults of its frames, applied in order.
         self.hangs: list[Span] = []  #: Spans in which it neither ticks nor receives.
         self.deaf: list[Span] = []  #: Spans in which it receives nothing.
-        #: Spans in which the bus is unreachable, with the reason.
-        self.cut_off: list[tuple[Span, str]] = []
-        #: Spans in which its interface reports a warning in every tick and still carries frames.
-        self.warned: list[tuple[Span, str]] = []
+        #: Spans in which its interface reports an error in every tick, with its text.
+        self.reported: list[tuple[Span, str]] = []
         self._actions: list[tuple[int, Callable[[], object]]] = []
 
     def at(self, time_ns: int, action: Callable[[], object]) -> None:
@@ -84,10 +82,7 @@ class FaultyNode:
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Pass on a frame, unless a fault blocks it."""
-        for span in (*self.hangs, *self.deaf):
-            if span.holds(now_ns):
-                return
-        if not any(span.holds(now_ns) for span, _ in self.cut_off):
+        if not any(span.holds(now_ns) for span in (*self.hangs, *self.deaf)):
             self.node.receive(frame, now_ns)
 
     def other_frames(self, count: int) -> None:
@@ -107,12 +102,10 @@ class FaultyNode:
             self._actions.pop(0)[1]()
         if any(span.holds(now_ns) for span in self.hangs):
             return ()
-        cut_off = [reason for span, reason in self.cut_off if span.holds(now_ns)]
-        for reason in (*cut_off, *(why for span, why in self.warned if span.holds(now_ns))):
-            self.link_error(now_ns, reason)
+        for span, reason in self.reported:
+            if span.holds(now_ns):
+                self.link_error(now_ns, reason)
         frames = list(self.node.tick(now_ns))
-        if cut_off:
-            return ()
         for spoiled in self.spoiled:
             frames = [out for frame in frames for out in spoiled.frames(frame, now_ns)]
         return frames
@@ -153,8 +146,8 @@ class Disturbance:
 class FaultyBus:
     """Simulated bus with faults.
 
-    `warn` and `cut_off` take time and sender, when it becomes error-passive and while it is off the
-    bus.
+    `link_error` takes time, sender and reason, when it becomes error-passive and while it is off
+    the bus; `hear_others` is called with each `OtherFrame` that was carried.
     """
 
     def __init__(self, bit_rate: int = 250_000, seed: int = 1) -> None:
@@ -170,15 +163,13 @@ class FaultyBus:
         self._held: list[tuple[int, int, int, Frame]] = []
         self._held_count = 0
         self._swapped: dict[int, Arrived] = {}
-        self.warn: Callable[[int, int], None] = lambda *_: None
-        self.cut_off: Callable[[int, int], None] = lambda *_: None
-        #: Function called with each `OtherFrame` that was carried.
+        self.link_error: Callable[[int, int, str], None] = lambda *_: None
         self.hear_others: Callable[[OtherFrame], None] = lambda _: None
 
     def queue(self, sender: int, frame: Frame, now_ns: int) -> None:
         """Queue a frame as in `SimulatedBus`, preceded by its attempts that will fail."""
         if now_ns < self._off_until_ns.get(sender, 0):
-            self.cut_off(now_ns, sender)
+            self.link_error(now_ns, sender, "bus-off")
             return
         for span, share, of in self.bit_errors:
             if of in (None, sender) and span.holds(now_ns):
@@ -193,19 +184,16 @@ class FaultyBus:
         arrived = self._bus.carry_until(before_ns)
         if self.bit_errors:
             arrived = [each for each in arrived if self._count_errors(*each)]
-        others = [each for each in arrived if isinstance(each[2], OtherFrame)]
-        if others:
-            for _, _, frame in others:
-                self.hear_others(OtherFrame(*frame))
-            arrived = [each for each in arrived if not isinstance(each[2], OtherFrame)]
+        for _, _, frame in arrived:
+            if isinstance(frame, OtherFrame):
+                self.hear_others(frame)
+        arrived = [each for each in arrived if not isinstance(each[2], OtherFrame)]
         if self.disturbances:
             arrived = [out for each in arrived for out in self._disturbed(each)]
-        if self._held:
-            while self._held and self._held[0][0] < before_ns:
-                time_ns, _, sender, frame = heappop(self._held)
-                arrived.append((time_ns, sender, frame))
-            arrived.sort(key=lambda each: each[0])
-        return arrived
+        while self._held and self._held[0][0] < before_ns:
+            time_ns, _, sender, frame = heappop(self._held)
+            arrived.append((time_ns, sender, frame))
+        return sorted(arrived, key=lambda each: each[0])
 
     def _count_errors(self, time_ns: int, sender: int, frame: Frame) -> bool:
         """Update the error counter; return whether the frame was transmitted."""
@@ -217,7 +205,7 @@ class FaultyBus:
             return True
         self.error_counts[sender] = count + 8
         if count < PASSIVE <= count + 8:
-            self.warn(time_ns, sender)
+            self.link_error(time_ns, sender, "error-passive on sending")
         if count + 8 >= OFF:
             self._off_until_ns[sender] = max(
                 (
@@ -228,7 +216,7 @@ class FaultyBus:
                 default=time_ns,  # the fault ended during its last attempts
             )
             self.error_counts[sender] = 0
-            self.cut_off(time_ns, sender)
+            self.link_error(time_ns, sender, "bus-off")
         return False
 
     def _disturbed(self, arrived: Arrived) -> list[Arrived]:

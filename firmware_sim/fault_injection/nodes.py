@@ -100,7 +100,10 @@ class Link(NodeFault):
 
     def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         node = bench.nodes[self.node]
-        (node.warned if self.warns else node.cut_off).append((span, self.reason))
+        node.reported.append((span, self.reason))
+        if not self.warns:
+            node.deaf.append(span)
+            node.spoiled.insert(0, Spoiled(span, lambda *_: ()))
 
 
 class Pump(Fault):

@@ -88,12 +88,11 @@ class BitErrors(BusFault):
         sender = None if self.node is None else names.index(self.node)
         bench.bus.bit_errors.append((span, self.share, sender))
 
-        def report(reason: str, time_ns: int, of: int) -> None:
+        def report(time_ns: int, of: int, reason: str) -> None:
             if of < len(names):
                 bench.nodes[names[of]].link_error(time_ns, reason)
 
-        bench.bus.warn = lambda time_ns, of: report("error-passive on sending", time_ns, of)
-        bench.bus.cut_off = lambda time_ns, of: report("bus-off", time_ns, of)
+        bench.bus.link_error = report
 
 
 class _Deaf:

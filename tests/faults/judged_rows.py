@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 from firmware_sim.fault_campaign.campaign import Campaign
 from firmware_sim.fault_campaign.trial import FLAGS, Outcome
@@ -19,7 +20,8 @@ GOOD = Outcome(
 
 
 def verdict(row, *outcomes):
-    return judged(CAMPAIGN, ROWS[row], outcomes)
+    told = judged(CAMPAIGN, ROWS[row], outcomes)
+    return SimpleNamespace(**told, passed=told["verdict"] == "pass", told=told, outcomes=outcomes)
 
 
 def said(row, outcome):
