@@ -77,6 +77,23 @@ def test_arm_by_touch_is_held_and_stop_is_not(at: tuple[Bench, Opened]) -> None:
     shows(seen, "STANDBY")
 
 
+def test_stop_acts_once_and_before_the_finger_is_lifted(at: tuple[Bench, Opened]) -> None:
+    made, seen = at
+    arms(seen)
+    told, mouse = len(made.said), seen.page.mouse
+    seen.page.locator("#stop").hover()
+    mouse.down()
+    shows(seen, "STANDBY")
+    mouse.move(5, 5)  # it slides off
+    mouse.up()
+    assert made.said[told:].count("page: stop") == 1
+    seen.page.locator("#stop").click()
+    made.wait(f"said[{told}:].count('page: stop') == 2")
+    seen.page.locator("#stop").focus()
+    seen.page.keyboard.press("Enter")
+    made.wait(f"said[{told}:].count('page: stop') == 3")
+
+
 def test_a_finger_arms_and_a_tap_stops(browser: Browser, running: tuple[Bench, str]) -> None:
     made, url = running
     made.ship.mode, made.ship.alarms = Mode.STANDBY, {}

@@ -219,7 +219,10 @@ for (const end of ["pointerup", "pointerleave", "pointercancel", "blur"]) arm.ad
 window.addEventListener("blur", release);
 arm.addEventListener("contextmenu", (event) => event.preventDefault());
 
-for (const button of all("[data-action]")) button.addEventListener("click", () => press(button.dataset.action));
+at("stop").addEventListener("pointerdown", () => press("stop")); // A finger may slide off before it is lifted.
+for (const button of all("[data-action]")) button.addEventListener("click", (event) => {
+  if (button.id !== "stop" || event.detail === 0) press(button.dataset.action); // 0: by a key.
+});
 for (const button of all("nav button")) button.addEventListener("click", () => showPage(button.dataset.page));
 at("palette").addEventListener("click", () => {
   const next = view.PALETTES.indexOf(document.documentElement.dataset.palette) + 1;
