@@ -124,7 +124,7 @@ def _hull_problems(scenario: ScenarioContent) -> list[Problem]:
             (f"voyage.{index}.ship.{key}", reason) for key in point.ship if key not in HEELED
         ]
     given = {"effective_slope", "roll_moment_table"} & scenario.sea.model_fields_set
-    problems += [(f"sea.{key}", "and hull exclude each other: remove one") for key in given]
+    problems += [(f"sea.{key}", "remove it: the hull data of the ship say so") for key in given]
     try:
         hull = scenario.hull.hull
         LateralModel(hull, scenario.sailing_ship, scenario.vessel.tank, scenario.six)

@@ -322,6 +322,7 @@ def test_ship_of_a_hull_file_rolls_as_the_hull_does() -> None:
 def test_figure_that_is_given_goes_before_the_hull_s() -> None:
     own = Vessel.model_validate(hull_vessel(hull=HULL)).ship
     vessel = Vessel.model_validate(hull_vessel(hull=HULL, roll_period_s=9.0, damping_ratio=0.04))
+    assert not any("viscous" in each for each in vessel.assumptions)
     ship = vessel.ship
     assert 2 * math.pi / ship.natural_frequency_rad_s == pytest.approx(9.0)
     assert ship.stiffness_nm_rad == own.stiffness_nm_rad

@@ -239,7 +239,9 @@ def hull_words(hull: HullFile, written: frozenset[str]) -> list[str]:
     given = [key for keys in _PAIRS for key in keys if key in written]
     words = f"ship: of {hull.file}: {', '.join(taken) or 'nothing'}"
     words += f"; given: {', '.join(given)}" if given else ""
-    return [words, *(f"ship: {hull.file}: {note}" for note in hull.hull.data.notes)]
+    damped = not written.isdisjoint(_PAIRS[3])
+    notes = [each for each in hull.hull.data.notes if not (damped and "viscous" in each)]
+    return [words, *(f"ship: {hull.file}: {note}" for note in notes)]
 
 
 def in_written_key(problem: Problem, written: Collection[str]) -> Problem:
