@@ -13,10 +13,11 @@ ship's stability that a heel and another load cannot be distinguished (`_LEAST_S
 The remaining choice is how far the law trusts ship and sea. The added noise of the slope is the
 least that makes it stable on all ships of the grid, times `_MORE_NOISE`. A filter on its
 innovations then gives it the least cost in the expected sea under the robustness requirements, a
-convex problem (`innovation_filter`). Where that misses a margin, the law without it is taken. On an
-identified ship a Kalman filter without the added noise predicts the waves for the plan at the
-limits. On another load that swings the water from limit to limit, so there the plan takes the
-robust law's estimate, and stays within `_LEEWAY` of what that law commands.
+convex problem (`innovation_filter`). Where that misses a margin, the next greater weight on
+pressure is tried; where it does there, too, the law without it is taken. On an identified ship a
+Kalman filter without the added noise predicts the waves for the plan at the limits. On another load
+that swings the water from limit to limit, so there the plan takes the robust law's estimate, and
+stays within `_LEEWAY` of what that law commands.
 """
 
 import math
@@ -108,6 +109,7 @@ class SelfTuned:
 
     design: ConstrainedDesign
     law: ConstrainedLaw  #: The law of `design` with a filter on its innovations.
+    filtered: bool  #: False where the one with a filter missed a margin.
     robustness: Robustness
     passive_roll_rad: float
     prediction: Prediction  #: In the expected sea.
@@ -129,14 +131,21 @@ def self_tuned(
     law has the margins, or the sea does not roll the ship.
     """
     search, gentlest_w = _Search(plant, sea, sample_time_s, loads_peak), math.inf
-    first = search.least_cost()
+    first, plain = search.least_cost(), list[SelfTuned]()
     for power in range(_MOST_STEPS + 1):
         found = search.best(first * _COSTLIER**power)
         if found is None:
             continue
-        if found.prediction.power_w <= mean_power_w:
+        if found.prediction.power_w > mean_power_w:
+            gentlest_w = found.prediction.power_w
+            continue
+        if found.filtered:
             return found
-        gentlest_w = found.prediction.power_w
+        plain.append(found)
+        if len(plain) > 1:
+            break
+    if plain:
+        return min(plain, key=lambda each: each.prediction.roll_rad)
     if gentlest_w == math.inf:
         raise NoLawError("no constrained law has all margins on this ship: choose another tank")
     raise NoLawError(
@@ -278,7 +287,8 @@ class _Search:
                     if not judged.failures():
                         law = self._planned(search, design, linear, costlier)
                         prediction = search.prediction(linear)
-                        return SelfTuned(design, law, judged, self._roll_rad, prediction)
+                        filtered = linear is not start
+                        return SelfTuned(design, law, filtered, judged, self._roll_rad, prediction)
                 if not bears:
                     return None  # the gain decides, which is the same with more noise
             noise *= _MORE_NOISE
