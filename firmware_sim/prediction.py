@@ -1,4 +1,4 @@
-"""Prediction of a scenario: the bench's ship, sea, pump and law, without bus and nodes.
+"""Prediction of a scenario: the bench's ship, sea, pump and laws, without bus and nodes.
 
 The plant is that of the bench, with all its limits and losses; sensors' noise, level observer,
 limiter and delay are those of `loop_simulation`. What the nodes add (steps of the frames, monitors,
@@ -6,9 +6,9 @@ the time until the pump is armed) is left out, and most of a bench's time with i
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -27,15 +27,24 @@ from utank_hil.analysis.motion.statistics import (
     pump_statistics,
     rms_batches,
 )
+from utank_hil.assembly import build_law, retuner_work
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.tick import TICK_NS
+from utank_hil.canbus import Verdict
+from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, DesignPlant
 from utank_hil.nodes.signals import ROW_TICKS
+from utank_hil.retuning import MotionEstimate, RenewedLaw, ShipFigures
+from utank_hil.sea import SlopeSpectrum
 
 SEEDS: Final = (1001, 1002, 1003, 1004)  #: Draws of the sea; a scenario's own is rarely one.
 ROLLS: Final = 60  #: Rolls of the ship in each draw.
 BATCHES: Final = 3
 """Batches of a draw: of 20 rolls, the least for which `compare` gives an interval."""
+_BANDS: Final = 400  #: Of the waves that a law is renewed for.
+
+Laws = tuple[BuiltLaw | None, ...]
+"""The law of a bench, or the first one and the renewed one; None where there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +73,35 @@ class Expected:
             name: value._asdict() if isinstance(value, Interval) else value
             for name, value in asdict(self).items()
         }
+
+
+class Peaks(NamedTuple):
+    """What is asked of a pump and its tank at most."""
+
+    pressure_pa: float
+    level_m: float
+    flow_m3_s: float
+    power_w: float
+
+
+def peaks(found: Sequence[Expected]) -> Peaks | None:
+    """Peaks over all laws; None without one that moves a pump."""
+    each = [
+        (of.pump.pressure_peak_pa, of.pump.level_peak_m, of.flow_peak_m3_s, of.pump.power_peak_w)
+        for of in found
+        if of.pump is not None and of.flow_peak_m3_s is not None
+    ]
+    return Peaks(*map(max, zip(*each, strict=True))) if each else None
+
+
+def as_json(found: Sequence[Expected]) -> dict[str, Any]:
+    """Figures of `predict` for JSON: the first law's, ``renewed`` ones, and peaks over both."""
+    first, *renewed = [each.as_json() for each in found]
+    most = peaks(found)
+    return first | {
+        "renewed": renewed[0] if renewed else None,
+        "peaks": None if most is None else most._asdict(),
+    }
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,12 +147,48 @@ class PlantInLoop:
         self._plant.advance(self._now_ns)
 
 
-def predict(
-    scenario: Scenario, plant: DesignPlant, law: BuiltLaw | None, seeds: tuple[int, ...] = SEEDS
-) -> Expected:
-    """Predict a bench: without tank, with it passive and, given a law of a pump, active.
+def laws_of(scenario: Scenario, config: ControllerConfig) -> Laws:
+    """Design the law of a controller; where it is renewed, the renewed one of the scenario, too.
 
-    `plant` gives limits and delay of the law, `seeds` draw the sea.
+    That is what the renewal designs for the configured ship, identified, in the scenario's waves,
+    known exactly. Raises `ParameterError` as `build_law`.
+    """
+    first = build_law(config)
+    if not config.renews:
+        return (first,)
+    from utank_hil.identification.motion_fit import BAND, TOP_RAD_S  # here: scipy.optimize
+    from utank_hil.retuning.renewal import PERIOD_DEVIATION, STIFFNESS_DEVIATION
+
+    ship, waves = config.vessel.ship, scenario.pooled_wave_moment()
+    low, high = (end * ship.natural_frequency_rad_s for end in BAND)
+    edges = np.linspace(low, max(high, TOP_RAD_S), _BANDS + 1)
+    slope = np.square(waves.amplitude / ship.stiffness_nm_rad) / 2
+    density = np.histogram(waves.frequency_rad_s, edges, weights=slope)[0] / np.diff(edges)
+    found = ShipFigures(
+        ship.stiffness_nm_rad,
+        ship.inertia_kg_m2,
+        ship.damping_nms_rad,
+        STIFFNESS_DEVIATION,
+        PERIOD_DEVIATION,
+    )
+    spectrum = SlopeSpectrum((edges[1:] + edges[:-1]) / 2, density)
+    work = retuner_work(config)
+    assert work is not None
+    answer = work.compute(MotionEstimate(Verdict.GOOD, Verdict.GOOD, found, spectrum))
+    if not isinstance(answer, RenewedLaw):
+        return first, None
+    return first, BuiltLaw(answer.law.controller, first.measured, answer.law)
+
+
+def predict(
+    scenario: Scenario,
+    plant: DesignPlant,
+    *laws: BuiltLaw | None,
+    seeds: tuple[int, ...] = SEEDS,
+) -> tuple[Expected, ...]:
+    """Predict a bench by each law: without tank, with it passive and, with a pump's law, active.
+
+    `plant` gives limits and delay of the laws, `seeds` draw the sea.
     """
     period_s = 2 * math.pi / scenario.ship_at(0.0).natural_frequency_rad_s
     settle = round(scenario.settle_s / RECORD_S)
@@ -151,25 +225,29 @@ def predict(
     found = Expected(
         window_s, of_a_bench(bare), of_a_bench(passive), passive_below_no_tank=below(passive, bare)
     )
-    if law is None:
-        return found
-    runs = {seed: active_run(scenario, plant, law, seed, count) for seed in seeds}
-    active = rms(lambda seed: (runs[seed][0]["roll_rad"], runs[seed][1].capsized_s))
-    if active is None:
-        return found
-    roll, level, flow, pressure, power = (
-        np.concatenate([record[name][settle:] for record, _ in runs.values()])
-        for name in ("roll_rad", "level_m", "flow_m3_s", "pressure_pa", "power_w")
-    )
-    return replace(
-        found,
-        active_rad=of_a_bench(active),
-        active_below_passive=below(active, passive),
-        mean_power_w=of_a_bench(batch_means(np.maximum(power, 0.0), BATCHES * len(seeds))),
-        pump=pump_statistics(pressure, power, level),
-        flow_peak_m3_s=float(np.abs(flow).max()),
-        roll_peak_rad=float(np.abs(roll).max()),
-    )
+
+    def by(law: BuiltLaw | None) -> Expected:
+        if law is None:
+            return found
+        runs = {seed: active_run(scenario, plant, law, seed, count) for seed in seeds}
+        active = rms(lambda seed: (runs[seed][0]["roll_rad"], runs[seed][1].capsized_s))
+        if active is None:
+            return found
+        roll, level, flow, pressure, power = (
+            np.concatenate([record[name][settle:] for record, _ in runs.values()])
+            for name in ("roll_rad", "level_m", "flow_m3_s", "pressure_pa", "power_w")
+        )
+        return replace(
+            found,
+            active_rad=of_a_bench(active),
+            active_below_passive=below(active, passive),
+            mean_power_w=of_a_bench(batch_means(np.maximum(power, 0.0), BATCHES * len(seeds))),
+            pump=pump_statistics(pressure, power, level),
+            flow_peak_m3_s=float(np.abs(flow).max()),
+            roll_peak_rad=float(np.abs(roll).max()),
+        )
+
+    return tuple(map(by, laws))
 
 
 def other_loadings(
@@ -183,7 +261,7 @@ def other_loadings(
     if scenario.hull is not None or scenario.fmu is not None:
         return ()
     return tuple(
-        Loading(scale, own if scale == 1 else predict(loaded(scenario, scale), plant, law))
+        Loading(scale, own if scale == 1 else predict(loaded(scenario, scale), plant, law)[0])
         for scale in PERIOD_SCALES
     )
 

@@ -1,13 +1,13 @@
 """Properties of a tank as tables, for `init` and `design`."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from rich.table import Table
 
-from firmware_sim.prediction import Expected, Loading
+from firmware_sim.prediction import Expected, Loading, peaks
 from firmware_sim.report_tables import in_one_unit, like_largest
-from utank_hil.analysis.motion.statistics import Interval
+from utank_hil.analysis.motion.statistics import Interval, PumpStatistics
 from utank_hil.analysis.tank_filling import Filling
 from utank_hil.analysis.tank_sizing import TankCost
 from utank_hil.analysis.tank_sweep import SweptTank
@@ -17,7 +17,7 @@ from utank_hil.control.optimal_tank import TankFigures
 
 Rows = list[tuple[str, str]]
 
-_NEEDS = ("pressure RMS, at most", "level, flow at most", "shaft power mean", "  at most")
+_LAWS = ("first law", "renewed")
 
 
 def cost_rows(cost: TankCost) -> Rows:
@@ -48,27 +48,33 @@ def figure_rows(figures: TankFigures) -> Rows:
     ]
 
 
-def roll_rows(found: Expected) -> Rows:
-    """Rows of expected roll, and of what the pump does for it: the words of a bench."""
-    pump, mean_w, flow_m3_s = found.pump, found.mean_power_w, found.flow_peak_m3_s
-    rows = [
-        ("roll RMS without tank", _degrees(found.without_tank_rad)),
-        ("  passive tank", _degrees(found.passive_rad)),
-        ("  below no tank", percent(found.passive_below_no_tank)),
-        ("  active tank", _degrees(found.active_rad)),
-        ("  below passive", percent(found.active_below_passive)),
-    ]
-    if pump is None or mean_w is None or flow_m3_s is None:
-        return [*rows, *((text, "") for text in _NEEDS)]
-    unit, (mean, width) = in_one_unit(mean_w, "W")
-    pressures = f"{pump.pressure_rms_pa / 1e3:.1f}, {pump.pressure_peak_pa / 1e3:.1f} kPa"
-    needs = (
-        pressures,
-        f"{pump.level_peak_m:.2f} m, {three_digits(flow_m3_s)} m³/s",
-        f"{mean} ± {width} {unit}",
-        power_words(pump.power_peak_w),
-    )
-    return [*rows, *zip(_NEEDS, needs, strict=True)]
+def roll_rows(found: Sequence[Expected]) -> Rows:
+    """Rows of expected roll, and of what the pump does for it: the words of a bench.
+
+    `found` is of one law, or of the first and the renewed one; peaks are those over both.
+    """
+    first, most = found[0], peaks(found)
+
+    def of_each(text: str, words: Callable[[Expected], str]) -> Rows:
+        if len(found) == 1:
+            return [(text, words(first))]
+        return [(f"{text}, {law}", words(of)) for law, of in zip(_LAWS, found, strict=True)]
+
+    most_words = ("",) * 3
+    if most is not None:
+        flow = f"{most.level_m:.2f} m, {three_digits(most.flow_m3_s)} m³/s"
+        most_words = f"{most.pressure_pa / 1e3:.1f} kPa", flow, power_words(most.power_w)
+    return [
+        ("roll RMS without tank", _degrees(first.without_tank_rad)),
+        ("  passive tank", _degrees(first.passive_rad)),
+        ("  below no tank", percent(first.passive_below_no_tank)),
+        *of_each("  active tank", lambda of: _degrees(of.active_rad)),
+        *of_each("  below passive", lambda of: percent(of.active_below_passive)),
+        *of_each("pressure RMS", lambda of: _kilopascals(of.pump)),
+        *of_each("shaft power mean", lambda of: _watts(of.mean_power_w)),
+        *zip(("pressure at most", "level, flow at most", "shaft power at most"), most_words,
+             strict=True),
+    ]  # fmt: skip
 
 
 def interval_words(found: Expected, scenario: str) -> str:
@@ -152,6 +158,17 @@ def percent(share: Interval | None) -> str:
     if share is None:
         return ""
     return f"{round(share.mean, 2) + 0.0:.0%} ± {share.half_width:.0%}"  # no -0%
+
+
+def _kilopascals(pump: PumpStatistics | None) -> str:
+    return "" if pump is None else f"{pump.pressure_rms_pa / 1e3:.1f} kPa"
+
+
+def _watts(power_w: Interval | None) -> str:
+    if power_w is None:
+        return ""
+    unit, (mean, width) = in_one_unit(power_w, "W")
+    return f"{mean} ± {width} {unit}"
 
 
 def _degrees(angle_rad: Interval | None, unit: str = "°") -> str:

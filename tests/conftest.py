@@ -117,7 +117,7 @@ def few_rolls(monkeypatch):
     """
     from firmware_sim import prediction
 
-    monkeypatch.setattr(prediction.predict, "__defaults__", (prediction.SEEDS[:1],))
+    monkeypatch.setitem(prediction.predict.__kwdefaults__, "seeds", prediction.SEEDS[:1])
     monkeypatch.setattr(prediction, "ROLLS", 4)
     monkeypatch.setattr(prediction, "PERIOD_SCALES", (1.0, 1.3))
 

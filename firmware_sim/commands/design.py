@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,19 +17,20 @@ from utank_hil.analysis.tank_filling import fillings
 from utank_hil.analysis.tank_response import expected_sea, roll_curves
 from utank_hil.analysis.tank_sizing import moving, tank_cost, with_duct_loss
 from utank_hil.analysis.tank_sweep import sweep_tank
+from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import describe
 from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.console import common
 from utank_hil.console.ship_report import order_words
 from utank_hil.console.terminal import Terminal, new_table, notes
-from utank_hil.control import BuiltLaw, DesignPlant, PumpLimits
+from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.control.optimal_tank import best_passive_tank, tank_figures
 from utank_hil.dynamics.tank import Tank
 from utank_hil.sea import Harmonics
 
 if TYPE_CHECKING:
-    from firmware_sim.prediction import Expected
+    from firmware_sim.prediction import Expected, Laws
 
 
 PICTURE, FIGURES, SWEEP = "tank.png", "tank.json", "tank_sweep.png"
@@ -89,9 +91,9 @@ def tank(
     out = common.prepare_out(out, (PICTURE, FIGURES, SWEEP))
     with notes.busy(f"{loaded.name}: a law for each tank, and what a bench would give"):
         benches = {key: _bench(chosen, loaded, each, waves) for key, each in tanks.items()}
-        found = {key: predict(*bench) for key, bench in benches.items()}
-        _, plant, law = benches["present"]
-        loadings = other_loadings(*benches["present"], found["present"])
+        found = {key: predict(bench, plant, *laws) for key, (bench, plant, laws) in benches.items()}
+        bench, plant, (law, *_) = benches["present"]
+        loadings = other_loadings(bench, plant, law, found["present"][0])
     # a scenario of `init` begins with the ship's name
     title = name if name.startswith(loaded.name) else f"{loaded.name}: {name}"
     about = describe("design tank", loaded, out, options=context.params, scenario=chosen)
@@ -110,7 +112,7 @@ def tank(
     files = _keep(figures, out / PICTURE, out / FIGURES, json_=json_, **more)
     if json_:
         return
-    console.table(_table(loaded, tanks, found, interval_words(found["present"], name)))
+    console.table(_table(loaded, tanks, found, interval_words(found["present"][0], name)))
     if loaded.pump is not None and law is None:
         console.say("no self-tuned law has all margins with this tank", yellow="not active:")
     if loaded.pump is not None:
@@ -206,14 +208,15 @@ def _plant(vessel: Vessel) -> DesignPlant:
 
 def _bench(
     scenario: Scenario, vessel: Vessel, tank: Tank, waves: Harmonics
-) -> "tuple[Scenario, DesignPlant, BuiltLaw | None]":
-    """Scenario with a tank, its plant, and the self-tuned law for it, if there is one."""
+) -> "tuple[Scenario, DesignPlant, Laws]":
+    """Scenario with a tank, its plant, and the self-tuned laws for it, if there are any."""
+    from firmware_sim.prediction import laws_of
     from utank_hil.analysis.loop.self_tuning import NoLawError, SelfTunedDesign
 
     vessel = vessel.model_copy(update={"tank": tank})
     scenario = scenario.model_copy(update={"vessel": vessel})
     if vessel.pump is None:
-        return scenario, _plant(vessel), None
+        return scenario, _plant(vessel), (None,)
     own: list[ControllerConfig] = [
         each for each in scenario.controllers.values() if isinstance(each.law, SelfTunedDesign)
     ]
@@ -221,24 +224,29 @@ def _bench(
     config = own[0] if own else ControllerConfig.model_validate(content)
     design = config.law if own else SelfTunedDesign("self_tuned", expected_sea(vessel.ship, waves))
     config = config.model_copy(update={"vessel": vessel, "law": design})
-    assert isinstance(design, SelfTunedDesign)
     try:
-        return scenario, config.plant, design.build(config.design_plant)
-    except NoLawError:
-        return scenario, config.plant, None
+        return scenario, config.plant, laws_of(scenario, config)
+    except ParameterError as error:
+        if not isinstance(error.__cause__, NoLawError):
+            raise
+        return scenario, config.plant, (None,) * (1 + config.renews)
 
 
-def _figures(vessel: Vessel, tank: Tank, found: "Expected | None") -> dict[str, Any]:
+def _figures(vessel: Vessel, tank: Tank, found: "Sequence[Expected] | None") -> dict[str, Any]:
+    from firmware_sim.prediction import as_json
 
     return {
         **asdict(tank_figures(vessel.ship, moving(vessel.ship, tank))),
         **asdict(tank_cost(vessel.ship, tank)),
-        "expected": None if found is None else found.as_json(),
+        "expected": None if found is None else as_json(found),
     }
 
 
 def _table(
-    vessel: Vessel, tanks: dict[str, Tank], found: dict[str, "Expected"], caption: str = ""
+    vessel: Vessel,
+    tanks: dict[str, Tank],
+    found: "dict[str, tuple[Expected, ...]]",
+    caption: str = "",
 ) -> Table:
     from firmware_sim.tank_report import cost_rows, figure_rows, roll_rows
 

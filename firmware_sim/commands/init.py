@@ -1,7 +1,7 @@
 """``utank-hil init``: a starter project for a user's ship."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -10,14 +10,13 @@ from typing import Annotated, Any, Final
 import typer
 from rich.table import Table
 
-from firmware_sim.prediction import Expected, predict
+from firmware_sim.prediction import Expected, as_json, laws_of, predict
 from firmware_sim.scenario import Scenario
 from firmware_sim.starter import FILES, HULL, SCENARIO, StarterProject, StarterShip, make_starter
 from firmware_sim.tank_report import cost_rows, interval_words, roll_rows
 from utank_hil.analysis.loop.sea_response import CalmSeaError
 from utank_hil.analysis.loop.self_tuning import NoLawError
 from utank_hil.analysis.tank_sizing import TankImpossibleError, TankRoom, tank_cost
-from utank_hil.assembly import build_law
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.whole_file import write_whole
 from utank_hil.console.common import (
@@ -160,11 +159,11 @@ def _tell(ship: StarterShip, project: StarterProject, files: dict[str, Path], js
     scenario = load(files[SCENARIO], Scenario)
     (config,) = scenario.controllers.values()
     with notes.busy(f"{project.vessel.name}: what a bench of its scenario would give"):
-        expected = predict(scenario, config.plant, build_law(config))
+        expected = predict(scenario, config.plant, *laws_of(scenario, config))
     little = _little_help(project, expected, config.safety.roll_limit_rad)
     if json_:
         figures = {"possible": True, "little_help": little, **_as_json(project)}
-        figures["expected"] = expected.as_json()
+        figures["expected"] = as_json(expected)
         figures["files"] = {Path(file).stem: str(path) for file, path in files.items()}
         print_json(figures)
     else:
@@ -208,7 +207,7 @@ def _written(project: StarterProject, data: Any | None, folder: Path) -> dict[st
 def _print(
     ship: StarterShip,
     project: StarterProject,
-    expected: Expected,
+    expected: Sequence[Expected],
     little: str | None,
     files: dict[str, Path],
 ) -> None:
@@ -225,16 +224,21 @@ def _print(
     console.lead_on(*((command, files[file]) for command, file in steps))
 
 
-def _little_help(project: StarterProject, found: Expected, limit_rad: float) -> str | None:
-    if found.active_rad is None or found.without_tank_rad is None:
+def _little_help(
+    project: StarterProject, found: Sequence[Expected], limit_rad: float
+) -> str | None:
+    active_rad = [each.active_rad.mean for each in found if each.active_rad is not None]
+    without_rad = found[0].without_tank_rad
+    if not active_rad or without_rad is None:
         return None  # a ship that capsizes has no roll to compare with
-    if found.roll_peak_rad is not None and found.roll_peak_rad > limit_rad:
+    peak_rad = max(each.roll_peak_rad or 0.0 for each in found)
+    if peak_rad > limit_rad:
         return (
-            f"with the law the ship rolls to {math.degrees(found.roll_peak_rad):.0f} degrees in "
+            f"with the law the ship rolls to {math.degrees(peak_rad):.0f} degrees in "
             f"this sea, and from {math.degrees(limit_rad):.0f} on the pump is off (HEEL_LIMIT): "
             "then it has the passive tank's roll. Try a lower --hs, more room, or --gm-loss"
         )
-    less = 1 - found.active_rad.mean / found.without_tank_rad.mean
+    less = 1 - min(active_rad) / without_rad.mean
     if less >= WORTH_IT:
         return None
     period_s = 2 * math.pi / project.vessel.ship.natural_frequency_rad_s
@@ -293,7 +297,7 @@ def _as_json(project: StarterProject) -> dict[str, Any]:
     }
 
 
-def _table(project: StarterProject, expected: Expected) -> Table:
+def _table(project: StarterProject, expected: Sequence[Expected]) -> Table:
     sized, demand, law = project.sized, project.demand, project.law
     ship, tank, duct_m = project.vessel.ship, project.vessel.tank, project.sized.duct_height_m
     heights = (duct_m, duct_m + tank.height_m, duct_m + tank.height_m + tank.headroom_m)
@@ -311,5 +315,4 @@ def _table(project: StarterProject, expected: Expected) -> Table:
         *roll_rows(expected),
     ]
     sea = f"a sea of {project.sea['hs_m']:g} m, {project.sea['tp_s']:g} s"
-    caption = f"{interval_words(expected, sea)}; by the first law: renewed, it leaves less roll"
-    return rows_table(project.vessel.name, rows, caption=caption)
+    return rows_table(project.vessel.name, rows, caption=interval_words(expected[0], sea))

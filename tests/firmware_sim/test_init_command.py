@@ -65,7 +65,7 @@ def test_project_is_valid_and_its_law_is_let_on_the_bus(
     project: Project, ship: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # how good the figures are, `test_prediction.py` judges
-    monkeypatch.setattr(prediction.predict, "__defaults__", (prediction.SEEDS[:1],))
+    monkeypatch.setitem(prediction.predict.__kwdefaults__, "seeds", prediction.SEEDS[:1])
     monkeypatch.setattr(prediction, "ROLLS", 30)
     folder, told = project(ship)
     vessel = load_config(folder / "ship.yaml", Vessel)
@@ -168,7 +168,7 @@ def test_a_sea_in_which_the_pump_is_switched_off_is_said(
     of_pilot_boat = Expected(
         840.0, Interval(0.29, 0.06), Interval(0.2, 0.05), Interval(0.19, 0.05), roll_peak_rad=0.6
     )
-    monkeypatch.setattr("firmware_sim.commands.init.predict", lambda *_: of_pilot_boat)
+    monkeypatch.setattr("firmware_sim.commands.init.predict", lambda *_: (of_pilot_boat,))
     said = json.loads(run(tmp_path, PATROL, "--json").stdout)["little_help"]
     assert "the ship rolls to 34 degrees in this sea, and from 20 on the pump is off (HEEL" in said
 

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,19 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from firmware_sim.bench import run_in_turn
+from firmware_sim.bench import BenchResult, run_in_turn
 from firmware_sim.commands.bench import STORM
 from firmware_sim.figures import BenchFigures, figures
-from firmware_sim.prediction import SEEDS, Expected, Loading, other_loadings, predict
+from firmware_sim.prediction import (
+    SEEDS,
+    Expected,
+    Loading,
+    as_json,
+    laws_of,
+    other_loadings,
+    predict,
+)
+from firmware_sim.run import RECORD_S
 from firmware_sim.scenario import Scenario
 from firmware_sim.starter import scenario_file
 from firmware_sim.tank_report import loading_table, percent, roll_rows
@@ -21,6 +31,7 @@ from utank_hil.analysis.loop.margins import of_period
 from utank_hil.analysis.motion.statistics import Interval, PumpStatistics
 from utank_hil.assembly import build_law
 from utank_hil.base.arrays import FloatArray
+from utank_hil.canbus import RetuningState
 from utank_hil.cli import app
 from utank_hil.configuration import load_config
 
@@ -46,47 +57,80 @@ def project(folder: Path, words: str) -> dict[str, Any]:
     return found
 
 
-def bench_of(folder: Path) -> BenchFigures:
+def bench_of(folder: Path) -> BenchResult:
     """Bench of a project, with the seed of its scenario."""
     scenario = load_config(folder / "scenario.yaml", Scenario)
     (config,) = scenario.controllers.values()
-    return figures(run_in_turn(scenario, scenario.seed, {"self_tuned": build_law(config)}))
+    return run_in_turn(scenario, scenario.seed, {"self_tuned": build_law(config)})
 
 
 def expected_of(told: dict[str, Any]) -> Expected:
-    """What a command said, from its JSON."""
+    """What a command said of one law, from its JSON."""
     read = {
         name: Interval(**value) if isinstance(value, dict) and "half_width" in value else value
         for name, value in told.items()
+        if name not in ("renewed", "peaks")
     }
     pump = read.pop("pump")
     return Expected(**read, pump=pump and PumpStatistics(**pump))
 
 
-def predicted(folder: Path) -> Expected:
+def predicted(folder: Path) -> dict[str, Any]:
     """What is expected of a project whose files may have been changed."""
     scenario = load_config(folder / "scenario.yaml", Scenario)
     (config,) = scenario.controllers.values()
-    return predict(scenario, config.plant, build_law(config))
+    return as_json(predict(scenario, config.plant, *laws_of(scenario, config)))
 
 
-def outside(expected: Expected, bench: BenchFigures) -> list[str]:
-    """Figures of a bench that are outside the interval stated for them."""
-    passive, active = bench.runs
+def part(result: BenchResult, begin_s: float, end_s: float) -> BenchFigures:
+    """Figures of a bench from one time to another."""
+    bare = result.without_tank_rad[: round(end_s / RECORD_S)]
+    return figures(replace(result, settle_s=begin_s, end_s=end_s, without_tank_rad=bare))
+
+
+def renewed_at(result: BenchResult) -> float:
+    """Time from which a renewed law was in charge, by the bench's log; its end if there was none.
+
+    Laws on trial are in charge. None was taken back.
+    """
+    events = result.runs[1].events
+    assert not {event.state for event in events} & {RetuningState.REFUSED, RetuningState.UNDONE}
+    trials = [event.time_ns * 1e-9 for event in events if event.state is RetuningState.TRIAL]
+    return RECORD_S * round(min([*trials, result.end_s]) / RECORD_S)
+
+
+def outside(told: dict[str, Any], result: BenchResult) -> list[str]:
+    """Figures of a bench that are outside the interval stated for them.
+
+    Those of the pump are of the law that was in charge.
+    """
+    first, whole, then_s = expected_of(told), figures(result), renewed_at(result)
+    passive = whole.runs[0]
     assert passive.roll is not None
-    assert active.roll is not None
-    assert active.pump is not None
-    pairs = {
-        "no tank": (expected.without_tank_rad, bench.no_tank.rms_rad),
-        "passive": (expected.passive_rad, passive.roll.rms_rad),
-        "below no tank": (expected.passive_below_no_tank, passive.roll_below_no_tank),
-        "active": (expected.active_rad, active.roll.rms_rad),
-        "below passive": (expected.active_below_passive, active.roll_below_passive),
-        "mean power": (expected.mean_power_w, active.pump.power_mean_w),
-    }
+    triples = [
+        ("no tank", first.without_tank_rad, whole.no_tank.rms_rad),
+        ("passive", first.passive_rad, passive.roll.rms_rad),
+        ("below no tank", first.passive_below_no_tank, passive.roll_below_no_tank),
+    ]
+    parts = {"first": (first, whole)}
+    if then_s < result.end_s:
+        renewed = expected_of(told["renewed"])
+        parts = {
+            "first": (first, part(result, result.settle_s, then_s)),
+            "renewed": (renewed, part(result, then_s, result.end_s)),
+        }
+    for name, (expected, bench) in parts.items():
+        active = bench.runs[1]
+        assert active.roll is not None
+        assert active.pump is not None
+        triples += [
+            (f"{name}: active", expected.active_rad, active.roll.rms_rad),
+            (f"{name}: below passive", expected.active_below_passive, active.roll_below_passive),
+            (f"{name}: mean power", expected.mean_power_w, active.pump.power_mean_w),
+        ]
     return [
         f"{name}: {value} is not {interval}"
-        for name, (interval, value) in pairs.items()
+        for name, interval, value in triples
         if interval is None or value is None or abs(value - interval.mean) > interval.half_width
     ]
 
@@ -100,13 +144,16 @@ def test_what_init_says_of_an_opv_is_what_its_bench_gives(
         return scenario_file(*about).replace("duration_s: 900", "duration_s: 480")
 
     monkeypatch.setattr("firmware_sim.starter.scenario_file", half_as_long)
-    expected = expected_of(project(tmp_path / "opv", OPV)["expected"])
-    bench = bench_of(tmp_path / "opv")
-    assert outside(expected, bench) == []
+    told = project(tmp_path / "opv", OPV)["expected"]
+    result = bench_of(tmp_path / "opv")
+    assert outside(told, result) == []
+    assert renewed_at(result) == result.end_s
+    expected, bench = expected_of(told), figures(result)
     assert expected.window_s == 420.0
     gain = expected.active_below_passive
     assert gain is not None
     assert gain.half_width < 0.1  # else anything would be inside
+    assert told["renewed"]["active_below_passive"]["mean"] > gain.mean
     active, pump = bench.runs[1], expected.pump
     assert pump is not None
     assert active.pump is not None
@@ -129,15 +176,15 @@ def test_a_pump_that_is_too_weak_is_expected_to_do_less(tmp_path: Path) -> None:
     ship.write_text(text)
     expected = predicted(tmp_path / "opv")
     assert outside(expected, bench_of(tmp_path / "opv")) == []
-    assert expected.active_below_passive is not None
-    assert expected.active_below_passive.mean < told["active_below_passive"]["mean"] - 0.1
+    for weak, strong in ((expected, told), (expected["renewed"], told["renewed"])):
+        assert weak["active_below_passive"]["mean"] < strong["active_below_passive"]["mean"] - 0.1
 
 
 @pytest.mark.evidence
 @pytest.mark.parametrize("words", SHIPS.values(), ids=SHIPS)
 def test_what_init_says_is_what_the_bench_gives(words: str, tmp_path: Path) -> None:
     told = project(tmp_path / "ship", words)["expected"]
-    assert outside(expected_of(told), bench_of(tmp_path / "ship")) == []
+    assert outside(told, bench_of(tmp_path / "ship")) == []
 
 
 @pytest.fixture
@@ -148,7 +195,7 @@ def short(monkeypatch: pytest.MonkeyPatch) -> Scenario:
 
 
 def test_without_a_law_the_tank_is_passive(short: Scenario) -> None:
-    found = predict(short, next(iter(short.controllers.values())).plant, None)
+    (found,) = predict(short, next(iter(short.controllers.values())).plant, None)
     assert (found.active_rad, found.active_below_passive, found.pump) == (None, None, None)
     assert found.passive_rad is not None
     assert found.without_tank_rad is not None
@@ -162,7 +209,7 @@ def test_a_ship_that_capsizes_has_no_roll(short: Scenario, monkeypatch: pytest.M
         return np.ones(count), 12.0 if seed == SEEDS[-1] else math.inf
 
     monkeypatch.setattr("firmware_sim.prediction.roll_without_tank", capsizing)
-    found = predict(short, next(iter(short.controllers.values())).plant, None)
+    (found,) = predict(short, next(iter(short.controllers.values())).plant, None)
     assert (found.without_tank_rad, found.passive_below_no_tank) == (None, None)
     assert found.passive_rad is not None
 
@@ -171,12 +218,12 @@ def test_another_loading_is_the_same_tank_on_a_softer_ship_in_the_same_waves(
     short: Scenario,
 ) -> None:
     plant = next(iter(short.controllers.values())).plant
-    own = predict(short, plant, None)
+    (own,) = predict(short, plant, None)
     found = {each.period_scale: each.expected for each in other_loadings(short, plant, None, own)}
     assert found[1.0] is own
     ship = of_period(short.vessel.ship, 1.3)
     vessel = short.vessel.model_copy(update={"ship": ship})
-    assert found[1.3] == predict(short.model_copy(update={"vessel": vessel}), plant, None)
+    assert (found[1.3],) == predict(short.model_copy(update={"vessel": vessel}), plant, None)
     assert found[1.3] != own
 
 
@@ -195,7 +242,37 @@ def test_an_interval_of_power_has_no_more_digits_than_its_mean():
     pump = PumpStatistics(3.1e3, 7.3e3, 3.87e3, 19.8e3, 0.58)
     roll, power = Interval(0.02, 0.002), Interval(3870.0, 594.0)
     found = Expected(840.0, roll, roll, roll, mean_power_w=power, pump=pump, flow_peak_m3_s=1.82)
-    assert dict(roll_rows(found))["shaft power mean"] == "3.87 ± 0.59 kW"
+    assert dict(roll_rows([found]))["shaft power mean"] == "3.87 ± 0.59 kW"
+
+
+def test_a_pump_to_order_does_for_both_laws():
+    roll = Interval(0.02, 0.002)
+    first = Expected(
+        840.0, roll, roll, roll, mean_power_w=Interval(450.0, 70.0), flow_peak_m3_s=0.69,
+        pump=PumpStatistics(1.3e3, 4.5e3, 450.0, 4.4e3, 0.52),
+    )  # fmt: skip
+    renewed = Expected(
+        840.0, roll, roll, Interval(0.01, 0.001), mean_power_w=Interval(730.0, 90.0),
+        flow_peak_m3_s=0.81, pump=PumpStatistics(1.7e3, 6.2e3, 730.0, 7.8e3, 0.47),
+    )  # fmt: skip
+    rows = dict(roll_rows([first, renewed]))
+    assert rows["pressure at most"] == "6.2 kPa"
+    assert rows["level, flow at most"] == "0.52 m, 0.81 m³/s"
+    assert rows["shaft power at most"] == "7.8 kW"
+    assert rows["shaft power mean, first law"] == "450 ± 70 W"
+    assert rows["shaft power mean, renewed"] == "730 ± 90 W"
+    told = as_json([first, renewed])
+    most = {"pressure_pa": 6.2e3, "level_m": 0.52, "flow_m3_s": 0.81, "power_w": 7.8e3}
+    assert told["peaks"] == most
+    assert told["active_rad"]["mean"] == 0.02
+    assert told["renewed"]["active_rad"]["mean"] == 0.01
+    passive = as_json([Expected(840.0, roll, roll)])
+    assert (passive["renewed"], passive["peaks"]) == (None, None)
+
+
+def test_a_law_that_is_not_renewed_is_foretold_alone(short: Scenario) -> None:
+    (law,) = laws_of(short, short.controllers["gpc"])
+    assert law is not None
 
 
 def test_a_share_of_nothing_has_no_sign():

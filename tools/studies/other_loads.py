@@ -94,7 +94,7 @@ def sailed(name: str, draws: int, heights: Sequence[float]) -> list[dict[str, An
             case = loaded(_higher(scenario, height), load)
             row: dict[str, Any] = {"ship": name, "height": height, "roll period": load}
             for law, built in laws.items():
-                found = predict(case, config.plant, built, seeds)
+                (found,) = predict(case, config.plant, built, seeds=seeds)
                 passive, active = found.passive_rad, found.active_rad
                 row["passive, degrees"] = math.nan if passive is None else math.degrees(passive[0])
                 row[law] = math.nan if active is None else math.degrees(active[0])
