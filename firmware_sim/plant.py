@@ -229,39 +229,71 @@ class Plant:
         self._state[kernel.VALVE_LOSS] = LOCKED if tight else loss_pa_per_m2_s2
 
     def _show(self) -> None:
-        """Show the state as plain numbers: reading elements of an array one by one costs more."""
+        """Show what every tick reads as plain numbers; elements of an array cost more."""
         values: list[float] = self._state.tolist()
         self._values = values
-        self.roll_rad = values[kernel.ROLL]  #: Roll angle, positive to starboard.
-        self.roll_rate_rad_s = values[kernel.ROLL_RATE]
-        #: Starboard level above still water; the port level is its negative.
-        self.level_m = values[kernel.LEVEL]
-        #: Flow through the duct to starboard.
-        self.flow_m3_s = values[kernel.LEVEL_RATE] * self._area_m2
+        roll, roll_rate, level, level_rate, speed, _, _, pressure, _, power = values[
+            : kernel.LIMITED
+        ]
+        self.roll_rad = roll  #: Roll angle, positive to starboard.
+        self.roll_rate_rad_s = roll_rate
+        self.level_m = level  #: Starboard level above still water; the port level is its negative.
+        self.flow_m3_s = level_rate * self._area_m2  #: Flow through the duct to starboard.
         #: Pressure rise across the pump; positive raises the starboard level.
-        self.pressure_pa = values[kernel.PRESSURE]
-        self.pump_speed_rad_s = values[kernel.SPEED]  #: Speed of the pump's rotor.
-        #: Shaft power; negative when the water drives the motor.
-        self.pump_power_w = values[kernel.POWER]
-        self.pump_energy_j = values[kernel.SHAFT_WORK]  #: Work of the shaft since the start.
-        #: Work of the waves since the start, in a frame that sways with the ship.
-        self.wave_work_j = values[kernel.WAVE_WORK]
-        #: Work of the pump's pressure on the water since the start.
-        self.pump_work_j = values[kernel.PUMP_WORK]
+        self.pressure_pa = pressure
+        self.pump_speed_rad_s = speed  #: Speed of the pump's rotor.
+        self.pump_power_w = power  #: Shaft power; negative when the water drives the motor.
+
+    @property
+    def pump_energy_j(self) -> float:
+        """Work of the shaft since the start."""
+        return self._values[kernel.SHAFT_WORK]
+
+    @property
+    def wave_work_j(self) -> float:
+        """Work of the waves since the start, in a frame that sways with the ship."""
+        return self._values[kernel.WAVE_WORK]
+
+    @property
+    def pump_work_j(self) -> float:
+        """Work of the pump's pressure on the water since the start."""
+        return self._values[kernel.PUMP_WORK]
+
+    @property
+    def losses_j(self) -> float:
+        """Energy lost in damping of ship and water, valve and strikes since the start."""
         parts = (kernel.DAMPED, kernel.DAMPED_STRIKING, kernel.STRUCK)
-        #: Energy lost in damping of ship and water, valve and strikes since the start.
-        self.losses_j = sum([values[part] for part in parts])
-        #: Number of strikes of the water on a limit of its level since the start.
-        self.strikes = int(values[kernel.SUMMED][STRIKES])
-        #: Greatest angular impulse of a strike on the ship.
-        self.max_strike_impulse_nms = values[kernel.SUMMED][MAX_IMPULSE]
-        #: Time since the start at which the ship capsized; infinite if it did not.
-        self.capsized_s = values[kernel.CAPSIZED]
-        self.wave_moment_nm = values[kernel.MOMENT_NOW]  #: Roll moment of the waves.
-        #: Lateral acceleration of the ship's centre of gravity, positive to starboard.
-        self.lateral_m_s2 = GRAVITY_M_S2 * values[kernel.SWAY_NOW]
-        #: Downward acceleration of the tank by heave and pitch; 0 if the ship does not.
-        self.heave_m_s2 = values[kernel.HEAVE_NOW]
+        return sum([self._values[part] for part in parts])
+
+    @property
+    def strikes(self) -> int:
+        """Number of strikes of the water on a limit of its level since the start."""
+        return int(self._values[kernel.SUMMED][STRIKES])
+
+    @property
+    def max_strike_impulse_nms(self) -> float:
+        """Greatest angular impulse of a strike on the ship."""
+        return self._values[kernel.SUMMED][MAX_IMPULSE]
+
+    @property
+    def capsized_s(self) -> float:
+        """Time since the start at which the ship capsized; infinite if it did not."""
+        return self._values[kernel.CAPSIZED]
+
+    @property
+    def wave_moment_nm(self) -> float:
+        """Roll moment of the waves."""
+        return self._values[kernel.MOMENT_NOW]
+
+    @property
+    def lateral_m_s2(self) -> float:
+        """Lateral acceleration of the ship's centre of gravity, positive to starboard."""
+        return GRAVITY_M_S2 * self._values[kernel.SWAY_NOW]
+
+    @property
+    def heave_m_s2(self) -> float:
+        """Downward acceleration of the tank by heave and pitch; 0 if the ship does not."""
+        return self._values[kernel.HEAVE_NOW]
 
     @property
     def pressure_limited(self) -> bool:

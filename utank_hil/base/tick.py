@@ -35,3 +35,8 @@ def is_whole_ticks(time_s: float) -> bool:
     """Whether a time is a whole number of ticks, one or more."""
     ticks = time_s / TICK_S
     return round(ticks) >= 1 and abs(ticks - round(ticks)) <= 1e-6
+
+
+NEVER_NS: Final = 1 << 61
+"""Time after every other, or with a minus before it. Compiled, differences from it are numbers
+without an object, as they are below 2**62."""

@@ -3,7 +3,7 @@
 from typing import Final
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.tick import TICK_S
+from utank_hil.base.tick import NEVER_NS, TICK_S
 from utank_hil.canbus import (
     Catalogue,
     ControlWord,
@@ -131,7 +131,6 @@ class CommandEcho:
             self.heard_ns = now_ns
 
 
-_ABSENT_NS: Final = 1 << 62  #: As never.
 STALE_MS: Final = 100.0
 """Where the valve stands is not known from an older report: VALVE_SILENT, and no more."""
 
@@ -171,7 +170,7 @@ class ValveCommander:
         self._followed_ns = self._at_place_ns = 0
         self._heard = False
         # a valve of another maker sends none: where it stands is what tells
-        self._echo = CommandEcho() if plan is None else CommandEcho(_ABSENT_NS)
+        self._echo = CommandEcho() if plan is None else CommandEcho(NEVER_NS)
 
     def ask(self, loss: float) -> None:
         """Take the loss that the law wants, in Pa per (m/s)^2 of dh/dt."""
@@ -270,7 +269,7 @@ class Actuators:
         self._sequence = DriveSequence()
         self._commands = catalogue.transmitter(PumpCommand)
         self.cycle_ns = self._commands.cycle_ns  #: Time from one command to the next.
-        self._echo = CommandEcho() if pump else CommandEcho(_ABSENT_NS)
+        self._echo = CommandEcho() if pump else CommandEcho(NEVER_NS)
 
     @property
     def limiting(self) -> bool:

@@ -3,6 +3,7 @@
 import math
 from typing import Final
 
+from utank_hil.base.tick import NEVER_NS
 from utank_hil.canbus import (
     Catalogue,
     DriveFault,
@@ -28,7 +29,7 @@ _NO_DRIVE_FAULT: Final = DriveFault.NONE
 _VALVE_FOLLOWS: Final = ValveState.FOLLOWING
 _VALVE_FAULT: Final = ValveState.FAULT
 _NO_VALVE_FAULT: Final = ValveFault.NONE
-ABSENT_NS: Final = 1 << 62
+ABSENT_NS: Final = NEVER_NS
 """Time of receipt of what is not on board: it is never late."""
 
 

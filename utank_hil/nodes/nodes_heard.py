@@ -53,6 +53,7 @@ class NodesHeard:
             claims = catalogue.receiver(AddressClaim, address)
             take = partial(self._take_claim, address, claims.can_id)
             routing.accept(claims.can_id, claims.accept, take)
+        self._find_oldest()
 
     @property
     def beats(self) -> Iterable[int]:
@@ -61,8 +62,8 @@ class NodesHeard:
 
     def matches(self, now_ns: int) -> bool:
         """Whether all have confirmed their versions of late."""
-        matched_ns = min(self._matched_ns.values(), default=ABSENT_NS)
-        return now_ns - matched_ns <= VERSION_NS and now_ns - self._strange_ns > STRANGE_NS
+        oldest_ns, strange_ns = self._oldest_ns, self._strange_ns
+        return now_ns - oldest_ns <= VERSION_NS and now_ns - strange_ns > STRANGE_NS
 
     def own_address_used(self, now_ns: int) -> bool:
         """Whether another node has sent from the controller's address of late."""
@@ -93,6 +94,10 @@ class NodesHeard:
             self._strange_ns = NEVER_HEARD_NS if matches else now_ns
             return
         self._matched_ns[can_id] = now_ns if matches else NEVER_HEARD_NS
+        self._find_oldest()
+
+    def _find_oldest(self) -> None:
+        self._oldest_ns = min(self._matched_ns.values(), default=ABSENT_NS)
 
     def _take_claim(self, address: int, can_id: int, claim: AddressClaim, now_ns: int) -> None:
         self._stations.started(address)

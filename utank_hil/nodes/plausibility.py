@@ -3,12 +3,13 @@
 import math
 from typing import Any, Final
 
+from utank_hil.base.tick import NEVER_NS
 from utank_hil.canbus import Quality, Receiver, SensorMotion
 from utank_hil.canbus.measurements import MotionSample
 from utank_hil.canbus.profiles.device import ProfiledDevice
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
-NEVER_HEARD_NS: Final = -(1 << 62)
+NEVER_HEARD_NS: Final = -NEVER_NS
 """Time of receipt of what was never heard."""
 MILLISECOND_NS: Final = 1_000_000
 USABLE: Final = (Quality.GOOD, Quality.DEGRADED)
@@ -27,7 +28,7 @@ class SpikeGate:
         self._spike = spike
         self._most_per_ns = most_per_s * 1e-9
         self._value = 0.0
-        self._value_ns = -(1 << 62)
+        self._value_ns = NEVER_HEARD_NS
         self._in_a_row = 0
 
     def passes(self, value: float, now_ns: int) -> bool:

@@ -20,8 +20,6 @@ _CRC_BITS: Final = 15
 _CRC_POLYNOMIAL: Final = 0x4599
 _HEADER_BITS: Final = 39
 _SHORT_HEADER_BITS: Final = 19
-Row = list[tuple["Row", int]]
-"""Of one state of the stuffing rule, by byte: the row of the next state, and the stuff bits."""
 # State of the stuffing rule: 5 * (last bit) + (number of equal bits so far, 0 to 4).
 _STATES: Final = 10
 
@@ -40,15 +38,10 @@ def _after_bits(state: int, bits: int, length: int) -> tuple[int, int]:
     return state, stuffed
 
 
-def _stuffing_rows() -> list[Row]:
-    rows: list[Row] = [[] for _ in range(_STATES)]
-    # rows share the same few pairs, so that they stay in the cache
-    pairs = [[(row, stuffed) for stuffed in range(3)] for row in rows]
-    for state, row in enumerate(rows):
-        for byte in range(256):
-            following, stuffed = _after_bits(state, byte, 8)
-            row.append(pairs[following][stuffed])
-    return rows
+def _stuffing_tables() -> tuple[bytes, bytes]:
+    """By 256 times the state plus the byte: the next state, and the stuff bits."""
+    after = [_after_bits(state, byte, 8) for state in range(_STATES) for byte in range(256)]
+    return bytes(state for state, _ in after), bytes(stuffed for _, stuffed in after)
 
 
 def _crc(register: int, bits: int, length: int) -> int:
@@ -58,15 +51,17 @@ def _crc(register: int, bits: int, length: int) -> int:
     return register
 
 
-_ROWS: Final = _stuffing_rows()
+_TABLES: Final = _stuffing_tables()
+_AFTER: Final = _TABLES[0]
+_STUFFED: Final = _TABLES[1]
 # The CRC is held left-aligned in 16 bits, as two bytes; these tables advance them by one byte.
-_CRC_HIGH: Final = [_crc(0, byte, 8) >> 7 for byte in range(256)]
-_CRC_LOW: Final = [_crc(0, byte, 8) << 1 & 0xFF for byte in range(256)]
+_CRC_HIGH: Final = bytes(_crc(0, byte, 8) >> 7 for byte in range(256))
+_CRC_LOW: Final = bytes(_crc(0, byte, 8) << 1 & 0xFF for byte in range(256))
 
 
 @lru_cache(maxsize=4096)
-def _after_header(can_id: int, length: int) -> tuple[int, int, Row, int]:
-    """Return CRC and row after the DLC, and the frame's bits except later stuff bits."""
+def _after_header(can_id: int, length: int) -> tuple[int, int, int, int]:
+    """Return CRC and state after the DLC, and the frame's bits except later stuff bits."""
     if not 0 <= can_id < 1 << 29 and not STANDARD <= can_id <= STANDARD | LONGEST_STANDARD_ID:
         raise ValueError(f"can_id {can_id:#x}: not a 29-bit identifier")
     if length > 8:
@@ -79,7 +74,7 @@ def _after_header(can_id: int, length: int) -> tuple[int, int, Row, int]:
     state, stuffed = _after_bits(0, header, bits)
     plain = bits + 8 * length + _CRC_BITS + _AFTER_CRC_BITS
     crc = _crc(0, header, bits)
-    return crc >> 7, crc << 1 & 0xFF, _ROWS[state], plain + stuffed
+    return crc >> 7, crc << 1 & 0xFF, state, plain + stuffed
 
 
 def frame_bits(frame: Frame) -> int:
@@ -89,18 +84,18 @@ def frame_bits(frame: Frame) -> int:
     raised if the identifier has more than 29 bits or there are more than 8 bytes.
     """
     can_id, data = frame
-    crc_high, crc_low, row, bits = _after_header(can_id, len(data))
+    crc_high, crc_low, state, bits = _after_header(can_id, len(data))
     for byte in data:
         index = crc_high ^ byte
         crc_high = _CRC_HIGH[index] ^ crc_low
         crc_low = _CRC_LOW[index]
-        row, stuffed = row[byte]
-        bits += stuffed
-    row, stuffed = row[crc_high]
-    bits += stuffed
+        place = state << 8 | byte
+        state = _AFTER[place]
+        bits += _STUFFED[place]
+    place = state << 8 | crc_high
+    bits += _STUFFED[place]
     # seven bits are left; padding with the complement of the last one adds no stuff bit
-    _, stuffed = row[crc_low | ~crc_low >> 1 & 1]
-    return bits + stuffed
+    return bits + _STUFFED[_AFTER[place] << 8 | crc_low | ~crc_low >> 1 & 1]
 
 
 class SimulatedBus:

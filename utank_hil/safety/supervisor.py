@@ -10,6 +10,7 @@ What counts as a fault, and what it does, is the table in `utank_hil.safety.faul
 
 from typing import Final
 
+from utank_hil.base.tick import NEVER_NS
 from utank_hil.canbus.enumerations import DriveState, Fault, Mode
 from utank_hil.canbus.measurements import Measurements
 from utank_hil.safety import judging
@@ -30,7 +31,6 @@ RESET_WITHIN_MS: Final = 500
 """How long a reset waits for the causes to go: the drive's own fault goes by the reset itself."""
 DEPARTURES: Final = 2.0
 """More often out of operation enabled, a drive counts as out of it. It falls by one each second."""
-_NEVER_NS: Final = 1 << 62  # pragma: no mutate: any time that never comes
 
 
 class Supervisor:
@@ -64,8 +64,8 @@ class Supervisor:
         self._passive_until_ns = 0
         self._enabling_until_ns = 0  # in PASSIVE  # pragma: no mutate: before any tick
         self._begin_noting(0)  # pragma: no mutate: it begins anew with ACTIVE and PASSIVE
-        self._rolled_over_ns = -_NEVER_NS
-        self._zero_at_ns = _NEVER_NS  # the earliest end of those ramps that run
+        self._rolled_over_ns = -NEVER_NS
+        self._zero_at_ns = NEVER_NS  # the earliest end of those ramps that run
 
     @property
     def arming(self) -> bool:
@@ -211,7 +211,7 @@ class Supervisor:
             self.mode = _ACTIVE
             self.demand = Demand.CONTROL
             self.fault = Fault.NONE
-            self._zero_at_ns = _NEVER_NS
+            self._zero_at_ns = NEVER_NS
         else:
             found = judging.first(self.standing & judging.GIVING_UP)
             if found is not None:

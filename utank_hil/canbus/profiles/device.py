@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Final, Generic
 
-from utank_hil.base.tick import TICK_NS
+from utank_hil.base.tick import NEVER_NS, TICK_NS
 from utank_hil.canbus.endpoints import Acceptance, Rejection
 from utank_hil.canbus.enumerations import Quality, Switch
 from utank_hil.canbus.frame import Frame
@@ -93,7 +93,7 @@ class Stamp:
 
 
 STATUS_CYCLES: Final = 3  #: A status that is older by this many cycles says nothing.
-LONG_AGO: Final = -(1 << 62)
+LONG_AGO: Final = -NEVER_NS
 _SLOPE_NS: Final = round(SLOPE_S * 1e9)
 _new: Final = tuple.__new__
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
