@@ -70,7 +70,7 @@ _Get = Callable[[Measurements, MotionSample, LevelObserver], float]
 def _received(name: str) -> _Get:
     """Getter of a signal as it was received, of the motion sensor in use if it is one of its."""
     get: Callable[[object], float] = attrgetter(name)
-    if name in MotionSample.__slots__:
+    if hasattr(MotionSample(), name):
         return lambda _, motion, __: get(motion)
     return lambda measured, _, __: get(measured)
 

@@ -127,7 +127,7 @@ class Watch:
             return abs(ship.plant.roll_rad)
         if name == "pressure_pa":
             return abs(node.measured.pressure_pa - ship.drive.setpoint_pa) if ship.drive else 0.0
-        source = node.motion if name in node.motion.__slots__ else node.measured
+        source = node.motion if hasattr(node.motion, name) else node.measured
         return abs(float(getattr(source, name)) - float(getattr(ship.plant, name)))
 
     def tick(self, now_ns: int) -> Iterable[canbus.Frame]:

@@ -12,12 +12,12 @@ import math
 import random
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from controller_bench import CATALOGUE, LIMITS, MS, VERSION, ControllerBench
+from values import changed
 
 from firmware_sim.drive import PumpDrive
 from firmware_sim.scenario_sections import DriveLimits
@@ -83,11 +83,11 @@ class Table(ControllerBench):
         judge, update = safety.judge, safety.supervisor.update
 
         def judged(measured, own):
-            return judge(replace(measured, **self.measured), replace(own, **self.own))
+            return judge(changed(measured, **self.measured), changed(own, **self.own))
 
         def updated(situation, standing):
             if self.found or self.spare_age_ms:
-                situation = replace(
+                situation = changed(
                     situation, found=self.found, motion_spare_age_ms=self.spare_age_ms
                 )
                 standing = judging.standing(situation, SAFETY)

@@ -1,11 +1,11 @@
 """The level's rate is right whatever share of the tank's frames is lost, repeated or bad."""
 
 import math
-from dataclasses import replace
 from itertools import count
 
 import pytest
 from controller_bench import CATALOGUE, MS, VESSEL, ControllerBench, ToyLaw
+from values import changed
 
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import Frame, Quality, SensorPump, SensorTank, Switch
@@ -132,6 +132,6 @@ def test_a_pressure_counts_for_a_tenth_of_a_second(age_ns, pressure_pa, monkeypa
     monkeypatch.setattr(type(bench.level), "predict", lambda _, each: predicted.append(each))
     later_ns = bench.now_ns + 10**9
     bench.node._estimate_level(
-        replace(bench.node.measured, now_ns=later_ns, pressure_pa=7e3, pump_age_ms=age_ns / MS)
+        changed(bench.node.measured, now_ns=later_ns, pressure_pa=7e3, pump_age_ms=age_ns / MS)
     )
     assert predicted == [pressure_pa]

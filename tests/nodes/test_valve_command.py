@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,6 +11,7 @@ import pytest
 from controller_bench import CATALOGUE, ControllerBench, ToyLaw, new_monitors
 from hypothesis import given
 from hypothesis import strategies as st
+from values import changed
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.tick import TICK_S
@@ -396,7 +397,7 @@ def test_a_valve_that_is_silent_is_not_one_that_does_not_follow():
     valve._told = 0.0  # as if it had been commanded to shut
     for late_ms in range(10, 2000, 10):
         report = valve.observe(
-            replace(measured, now_ns=measured.valve_heard_ns + late_ms * 1_000_000)
+            changed(measured, now_ns=measured.valve_heard_ns + late_ms * 1_000_000)
         )
     assert report.age_ms > 1900
     assert report.off_ms == 0.0

@@ -4,8 +4,9 @@ Names are flat: `motion_age_ms` is the age of the motion sensor's sample, `valve
 the valve's report, `drive_enabled` the drive's state.
 """
 
-from dataclasses import fields, replace
 from typing import Any
+
+from values import changed
 
 from utank_hil.canbus.enumerations import DriveState, Mode
 from utank_hil.canbus.measurements import Measurements, MotionSample
@@ -34,8 +35,8 @@ WELL = Situation(
 )  # fmt: skip
 
 _OF_MOTION = {"motion_age_ms": "age_ms", "roll_rad": "roll_rad", "motion_valid": "valid"}
-_OF_VALVE = {f"valve_{each.name}": each.name for each in fields(ValveReport)}
-_PARTS = tuple({each.name for each in fields(part)} for part in (Situation, OwnState, Measurements))
+_OF_VALVE = {f"valve_{name}": name for name in vars(ValveReport())}
+_PARTS = tuple(set(vars(part)) for part in (WELL, OWN, MEASURED))
 
 
 def situation(now_ns=0, **changes):
@@ -53,11 +54,11 @@ def situation(now_ns=0, **changes):
         else:
             part = next(part for part, names in zip(parts, _PARTS, strict=True) if name in names)
             part[name] = value
-    sample = replace(MotionSample(), **motion)
-    return replace(
+    sample = changed(MotionSample(), **motion)
+    return changed(
         WELL,
-        measured=replace(MEASURED, motions=(sample,), **parts[2]),
-        own=replace(OWN, valve=ValveReport(**valve), **parts[1]),
+        measured=changed(MEASURED, motions=(sample,), **parts[2]),
+        own=changed(OWN, valve=ValveReport(**valve), **parts[1]),
         motion=sample,
         **parts[0],
     )
@@ -70,5 +71,5 @@ def look(supervisor, now_ns, **changes):
         supervisor.drive_out_ms = changes["drive_out_ms"]
     supervisor.count(seen.measured, seen.motion.roll_rad, seen.own.command_pa)
     timers = ("rolled_over_ms", "drive_out_ms", "arming_ms")
-    seen = replace(seen, **{name: getattr(supervisor, name) for name in timers})
+    seen = changed(seen, **{name: getattr(supervisor, name) for name in timers})
     supervisor.update(seen, judging.standing(seen, supervisor.limits))

@@ -8,6 +8,7 @@ from controller_bench import VESSEL, new_monitors
 from hypothesis import given
 from hypothesis import strategies as st
 from situations import MEASURED, OWN
+from values import changed
 
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus.enumerations import Fault
@@ -79,8 +80,8 @@ class Table:
     def tick(self):
         self.now_ns += TICK_NS
         age_ms = (self.now_ns - self.sample.heard_ns) / MS
-        motions = (replace(self.sample, age_ms=age_ms),)
-        self.safety.judge(replace(MEASURED, now_ns=self.now_ns, motions=motions), OWN)
+        motions = (changed(self.sample, age_ms=age_ms),)
+        self.safety.judge(changed(MEASURED, now_ns=self.now_ns, motions=motions), OWN)
 
     def measure(self, roll_rad, seconds=TICK_S):
         for _ in range(round(seconds / TICK_S)):
@@ -138,7 +139,7 @@ def test_a_roll_that_is_not_measured_any_more_is_no_heel():
 def test_a_motion_sensor_that_is_silent_is_left_for_one_that_is_not(first_ms, second_ms, used):
     safety = Safety(SafetyLimits(), 250_000)
     motions = MotionSample(0.1, age_ms=first_ms), MotionSample(0.2, age_ms=second_ms)
-    judgement = safety.judge(replace(MEASURED, motions=motions), OWN)
+    judgement = safety.judge(changed(MEASURED, motions=motions), OWN)
     assert judgement.motion == used
     assert safety.situation.motion.roll_rad == motions[used].roll_rad
     assert safety.situation.motion_spare_age_ms == motions[1 - used].age_ms
@@ -148,14 +149,14 @@ def test_the_second_motion_sensor_is_left_for_the_first_one_that_is_back():
     safety, used = Safety(SafetyLimits(), 250_000), []
     for first_ms, second_ms in ((1e9, 0.0), (0.0, 0.0), (0.0, 1e9), (0.0, 0.0)):
         motions = MotionSample(0.1, age_ms=first_ms), MotionSample(0.2, age_ms=second_ms)
-        used.append(safety.judge(replace(MEASURED, motions=motions), OWN).motion)
+        used.append(safety.judge(changed(MEASURED, motions=motions), OWN).motion)
     assert used == [1, 1, 0, 0]
 
 
 def test_the_judgement_bounds_the_pressure_by_what_is_in_doubt():
     """All of it; half, alone without protection; what she stands, by her monitors' thresholds."""
     motions = MotionSample(), MotionSample()
-    of_one, of_two = replace(MEASURED, motions=motions[:1]), replace(MEASURED, motions=motions)
+    of_one, of_two = changed(MEASURED, motions=motions[:1]), changed(MEASURED, motions=motions)
     bare, bought = (
         Safety(SafetyLimits(), 250_000),
         Safety(SafetyLimits(), 250_000, unprotected=True),
@@ -184,7 +185,7 @@ def test_unprotected_motion_is_trusted_beside_a_second_sensor_that_agrees_and_is
     for age_ms, share in ((limit_ms, 1.0), (math.nextafter(limit_ms, math.inf), 0.5)):
         safety = Safety(SafetyLimits(), 250_000, unprotected=True)
         motions = MotionSample(), MotionSample(age_ms=age_ms)
-        assert safety.judge(replace(MEASURED, motions=motions), OWN).share == share
+        assert safety.judge(changed(MEASURED, motions=motions), OWN).share == share
     for unprotected, share in ((False, 1.0), (True, 0.5)):
         monitors = Monitors(
             DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures(), 250_000,
@@ -195,7 +196,7 @@ def test_unprotected_motion_is_trusted_beside_a_second_sensor_that_agrees_and_is
         for tick in range(100):
             now_ns = tick * TICK_NS
             motions = MotionSample(heard_ns=now_ns), MotionSample(0.05, heard_ns=now_ns)
-            seen = replace(MEASURED, now_ns=now_ns, motions=motions)
+            seen = changed(MEASURED, now_ns=now_ns, motions=motions)
             shares.append(safety.judge(seen, OWN).share)
         assert (shares[0], shares[-1]) == (1.0, share)
 
@@ -203,8 +204,8 @@ def test_unprotected_motion_is_trusted_beside_a_second_sensor_that_agrees_and_is
 def test_the_bus_carries_what_was_heard_and_what_was_sent():
     safety = Safety(SafetyLimits(), 250_000)
     for tick in range(1, 203):
-        seen = replace(MEASURED, now_ns=tick * TICK_NS, frames=5 * tick)
-        safety.judge(seen, replace(OWN, frames_sent=2 * tick))
+        seen = changed(MEASURED, now_ns=tick * TICK_NS, frames=5 * tick)
+        safety.judge(seen, changed(OWN, frames_sent=2 * tick))
     assert safety.situation.bus_load == pytest.approx(700 * 143 / 250_000)
 
 
@@ -212,7 +213,7 @@ def test_without_monitors_nothing_is_found_and_the_timers_run_all_the_same():
     safety, since_ms = Safety(SafetyLimits(), 250_000), []
     for tick, roll_rad in enumerate((0.0, 0.4, -0.4, 0.3, 0.3)):
         motions = (MotionSample(roll_rad),)
-        safety.judge(replace(MEASURED, now_ns=tick * TICK_NS, motions=motions), OWN)
+        safety.judge(changed(MEASURED, now_ns=tick * TICK_NS, motions=motions), OWN)
         since_ms.append(safety.situation.rolled_over_ms)
     assert since_ms[1:] == [0.0, 0.0, 10.0, 20.0]
     assert since_ms[0] > 1e9
@@ -235,7 +236,7 @@ def test_what_the_twin_says_is_unknown_without_monitors():
 
 def test_what_is_awaited_at_the_start_is_told_after_ten_seconds():
     safety, started_ns = Safety(SafetyLimits(), 250_000), 3 * 10**9
-    safety.judge(replace(MEASURED, now_ns=started_ns, tank_age_ms=1e6), OWN)
+    safety.judge(changed(MEASURED, now_ns=started_ns, tank_age_ms=1e6), OWN)
     for since_ns in (0, QUIET_START_NS - 1):
         assert safety.update_alarms([], started_ns + since_ns) == []
     told = safety.update_alarms([], started_ns + QUIET_START_NS)

@@ -10,6 +10,7 @@ import pytest
 from controller_bench import CATALOGUE, VERSION
 from controller_bench import VESSEL as SHIPPED
 from monitors.moving_ship import FINDINGS, MovingShip
+from values import changed
 
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import (
@@ -53,9 +54,9 @@ class Table:
         values = {"tank_age_ms": 0.0, "pump_age_ms": 0.0, **self.values, **changes}
         motion = {name: values.pop(name) for name in OF_MOTION if name in values}
         seen = self.inbox.snapshot(self.now_ns)
-        sample = replace(seen.motions[0], age_ms=motion_age_ms, **motion)
-        seen = replace(seen, motions=(sample,), **values)
-        return replace(seen, level_m=(seen.starboard_level_m - seen.port_level_m) / 2)
+        sample = changed(seen.motions[0], age_ms=motion_age_ms, **motion)
+        seen = changed(seen, motions=(sample,), **values)
+        return changed(seen, level_m=(seen.starboard_level_m - seen.port_level_m) / 2)
 
     @property
     def roll_rad(self):

@@ -37,6 +37,7 @@ def is_whole_ticks(time_s: float) -> bool:
     return round(ticks) >= 1 and abs(ticks - round(ticks)) <= 1e-6
 
 
-NEVER_NS: Final = 1 << 61
-"""Time after every other, or with a minus before it. Compiled, differences from it are numbers
-without an object, as they are below 2**62."""
+LONG_AGO_NS: Final = -(1 << 61)
+NEVER_NS: Final = (1 << 62) - 1
+"""Times before and after every other. Compiled, they and their distance from a time are numbers
+without an object; from the year 2043 on that distance is one, and slower."""

@@ -1,10 +1,9 @@
 """What a controller has measured, as plain values.
 
-Their fields are `Final`: they are written once, and the type check refuses to write them again.
-A frozen dataclass takes ten times as long to make, and a named tuple thrice as long to read.
+They are written once: the type check refuses to write them again, and so does Python where they are
+compiled. A dataclass or a named tuple takes several times as long to make or to read there.
 """
 
-from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from utank_hil.canbus.enumerations import DriveState, Mode
@@ -14,16 +13,19 @@ MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 """Names of what a law may measure, of `MotionSample` or of `Measurements`."""
 
 
-@dataclass(slots=True, eq=False)
 class MotionSample:
     """The last good sample of one motion sensor; zero before the first."""
 
-    roll_rad: Final[float] = 0.0
-    roll_rate_rad_s: Final[float] = 0.0
-    heard_ns: Final[int] = 0  #: Time of receipt.
-    age_ms: Final[float] = 0.0  #: Time since then.
-    valid: Final[bool] = True  #: The sensor's messages arrive intact and in order.
-    discarded: Final[int] = 0  #: Samples so far that were no motion of a ship.
+    def __init__(
+        self, roll_rad: float = 0.0, roll_rate_rad_s: float = 0.0, heard_ns: int = 0,
+        age_ms: float = 0.0, valid: bool = True, discarded: int = 0,
+    ) -> None:  # fmt: skip
+        self.roll_rad: Final = roll_rad
+        self.roll_rate_rad_s: Final = roll_rate_rad_s
+        self.heard_ns: Final = heard_ns  #: Time of receipt.
+        self.age_ms: Final = age_ms  #: Time since then.
+        self.valid: Final = valid  #: The sensor's messages arrive intact and in order.
+        self.discarded: Final = discarded  #: Samples so far that were no motion of a ship.
 
 
 class Wishes(NamedTuple):
@@ -46,7 +48,6 @@ class RetuningOrder(NamedTuple):
     forbidden: bool = False  #: Retuning is forbidden, or was for a moment.
 
 
-@dataclass(slots=True, eq=False)
 class Measurements:
     """Everything that was received, plausible, with its age, at one tick.
 
@@ -54,53 +55,78 @@ class Measurements:
     is negative: it is never late. The first five fields are those of `Wishes`.
     """
 
-    armed: Final[bool]
-    stop: Final[bool]
-    arm_edge: Final[bool]
-    reset_edge: Final[bool]
-    passive_edge: Final[bool]
-    now_ns: Final[int]  #: Time of the tick.
-    requested_mode: Final[Mode]
-    panel_age_ms: Final[float]
-    panel_matches: Final[bool]  #: The panel in command runs this catalogue and configuration.
-    motions: Final[tuple[MotionSample, ...]]  #: Of the one or two motion sensors.
-    #: port_level_m, starboard_level_m: above still water.
-    port_level_m: Final[float]
-    starboard_level_m: Final[float]
-    level_m: Final[float]  #: Starboard up: half the difference of the two gauges.
-    tank_ns: Final[int]  #: Time of receipt of the levels.
-    tank_cycles: Final[int]  #: Cycles of their message since the first.
-    tank_age_ms: Final[float]
-    levels_discarded: Final[int]  #: Samples of the gauges that were no motion of water.
-    high_level: Final[bool]  #: A high-level switch is closed or broken.
-    pressure_pa: Final[float]  #: Across the pump.
-    pump_age_ms: Final[float]
-    drive_state: Final[DriveState | None]
-    drive_age_ms: Final[float]
-    #: drive_echo_ns, drive_echo: command counter that the drive's status sends back, and when it
-    #: first came; of the valve likewise.
-    drive_echo_ns: Final[int]
-    drive_echo: Final[int | None]
-    drive_fault: Final[bool]
-    drive_warns: Final[bool]
-    drive_held_back: Final[bool]  #: The drive says that its power or its speed is at the limit.
-    drive_at_speed: Final[bool]  #: Its speed, or it does not say which of them.
-    power_w: Final[float]  #: Electric power that the drive takes.
-    valve_opening: Final[float]
-    valve_following: Final[bool]
-    valve_fault: Final[bool]
-    valve_echo_ns: Final[int]
-    valve_echo: Final[int | None]
-    valve_heard_ns: Final[int]  #: Time of receipt of the last status with an opening.
-    hardwired_stop: Final[bool]  #: The stop loop is, or was since the last look, open or broken.
-    hardwired_age_ms: Final[float]
-    versions_match: Final[bool]  #: Of drive, sensors and valve, with the controller's.
-    protection_valid: Final[bool]  #: Messages of gauges and drive arrive intact and in order.
-    address_conflict: Final[bool]  #: Another node sent with the controller's address.
-    claimed_twice: Final[bool]  #: A node claimed the address of another.
-    link_lost: Final[bool]  #: The bus could not be read or written in the last command cycle.
-    frames: Final[int]  #: Frames so far, of any kind.
-    foreign: Final[int]  #: Those that are not in the catalogue.
-    #: Points of a forecast of the waves by their time of receipt, also those that are too old.
-    forecast: "Final[tuple[tuple[int, ForecastPoints], ...]]" = ()
-    forecast_age_ms: Final[float] = 0.0
+    def __init__(
+        self, armed: bool, stop: bool, arm_edge: bool, reset_edge: bool, passive_edge: bool,
+        now_ns: int, requested_mode: Mode, panel_age_ms: float, panel_matches: bool,
+        motions: tuple[MotionSample, ...], port_level_m: float, starboard_level_m: float,
+        level_m: float, tank_ns: int, tank_cycles: int, tank_age_ms: float, levels_discarded: int,
+        high_level: bool, pressure_pa: float, pump_age_ms: float, drive_state: DriveState | None,
+        drive_age_ms: float, drive_echo_ns: int, drive_echo: int | None, drive_fault: bool,
+        drive_warns: bool, drive_held_back: bool, drive_at_speed: bool, power_w: float,
+        valve_opening: float, valve_following: bool, valve_fault: bool, valve_echo_ns: int,
+        valve_echo: int | None, valve_heard_ns: int, hardwired_stop: bool,
+        hardwired_age_ms: float, versions_match: bool, protection_valid: bool,
+        address_conflict: bool, claimed_twice: bool, link_lost: bool,
+        frames: int, foreign: int, forecast: "tuple[tuple[int, ForecastPoints], ...]" = (),
+        forecast_age_ms: float = 0.0,
+    ) -> None:  # fmt: skip
+        self.armed: Final = armed
+        self.stop: Final = stop
+        self.arm_edge: Final = arm_edge
+        self.reset_edge: Final = reset_edge
+        self.passive_edge: Final = passive_edge
+        self.now_ns: Final = now_ns  #: Time of the tick.
+        self.requested_mode: Final = requested_mode
+        self.panel_age_ms: Final = panel_age_ms
+        #: The panel in command runs this catalogue and configuration.
+        self.panel_matches: Final = panel_matches
+        self.motions: Final = motions  #: Of the one or two motion sensors.
+        #: port_level_m, starboard_level_m: above still water.
+        self.port_level_m: Final = port_level_m
+        self.starboard_level_m: Final = starboard_level_m
+        self.level_m: Final = level_m  #: Starboard up: half the difference of the two gauges.
+        self.tank_ns: Final = tank_ns  #: Time of receipt of the levels.
+        self.tank_cycles: Final = tank_cycles  #: Cycles of their message since the first.
+        self.tank_age_ms: Final = tank_age_ms
+        #: Samples of the gauges that were no motion of water.
+        self.levels_discarded: Final = levels_discarded
+        self.high_level: Final = high_level  #: A high-level switch is closed or broken.
+        self.pressure_pa: Final = pressure_pa  #: Across the pump.
+        self.pump_age_ms: Final = pump_age_ms
+        self.drive_state: Final = drive_state
+        self.drive_age_ms: Final = drive_age_ms
+        #: drive_echo_ns, drive_echo: command counter that the drive's status sends back, and when
+        #: it first came; of the valve likewise.
+        self.drive_echo_ns: Final = drive_echo_ns
+        self.drive_echo: Final = drive_echo
+        self.drive_fault: Final = drive_fault
+        self.drive_warns: Final = drive_warns
+        #: The drive says that its power or its speed is at the limit.
+        self.drive_held_back: Final = drive_held_back
+        #: Its speed, or it does not say which of them.
+        self.drive_at_speed: Final = drive_at_speed
+        self.power_w: Final = power_w  #: Electric power that the drive takes.
+        self.valve_opening: Final = valve_opening
+        self.valve_following: Final = valve_following
+        self.valve_fault: Final = valve_fault
+        self.valve_echo_ns: Final = valve_echo_ns
+        self.valve_echo: Final = valve_echo
+        #: Time of receipt of the last status with an opening.
+        self.valve_heard_ns: Final = valve_heard_ns
+        #: The stop loop is, or was since the last look, open or broken.
+        self.hardwired_stop: Final = hardwired_stop
+        self.hardwired_age_ms: Final = hardwired_age_ms
+        #: Of drive, sensors and valve, with the controller's.
+        self.versions_match: Final = versions_match
+        #: Messages of gauges and drive arrive intact and in order.
+        self.protection_valid: Final = protection_valid
+        #: Another node sent with the controller's address.
+        self.address_conflict: Final = address_conflict
+        self.claimed_twice: Final = claimed_twice  #: A node claimed the address of another.
+        #: The bus could not be read or written in the last command cycle.
+        self.link_lost: Final = link_lost
+        self.frames: Final = frames  #: Frames so far, of any kind.
+        self.foreign: Final = foreign  #: Those that are not in the catalogue.
+        #: Points of a forecast of the waves by their time of receipt, also those that are too old.
+        self.forecast: Final = forecast
+        self.forecast_age_ms: Final = forecast_age_ms

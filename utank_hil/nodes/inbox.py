@@ -192,13 +192,18 @@ class Inbox:
         stations, hardwired, nodes = self.stations, self.hardwired, self._nodes
         levels, drive, valve = self._levels, self._drive, self._valve
         forecast = self._forecast
-        wishes = stations.take(now_ns)  # first of all: who is in command may change
+        # first of all: who is in command may change
+        armed, stop, arm_edge, reset_edge, passive_edge = stations.take(now_ns)
         motions = tuple([sensor.sample(now_ns) for sensor in self.motions])
         hardwired_age_ms = 0.0
         if self._hardwired_declared:
             hardwired_age_ms = (now_ns - hardwired.heard_ns) / MILLISECOND_NS
         return Measurements(
-            *wishes,
+            armed,
+            stop,
+            arm_edge,
+            reset_edge,
+            passive_edge,
             now_ns,
             stations.requested_mode,
             (now_ns - stations.heard_ns) / MILLISECOND_NS,

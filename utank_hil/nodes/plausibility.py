@@ -3,13 +3,13 @@
 import math
 from typing import Any, Final
 
-from utank_hil.base.tick import NEVER_NS
+from utank_hil.base.tick import LONG_AGO_NS
 from utank_hil.canbus import Quality, Receiver, SensorMotion
 from utank_hil.canbus.measurements import MotionSample
 from utank_hil.canbus.profiles.device import ProfiledDevice
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
-NEVER_HEARD_NS: Final = -NEVER_NS
+NEVER_HEARD_NS: Final = LONG_AGO_NS
 """Time of receipt of what was never heard."""
 MILLISECOND_NS: Final = 1_000_000
 USABLE: Final = (Quality.GOOD, Quality.DEGRADED)

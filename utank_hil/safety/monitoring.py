@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Collection, Iterable
 from typing import Final
 
-from utank_hil.base.tick import NEVER_NS, TICK_NS, TICK_S
+from utank_hil.base.tick import LONG_AGO_NS, TICK_NS, TICK_S
 from utank_hil.canbus import PassiveTwin as PassiveTwinMessage
 from utank_hil.canbus import Quality
 from utank_hil.canbus.enumerations import DriveState
@@ -128,7 +128,7 @@ class Monitors:
         self._judges_from_ns = 0
         self._longest_gap_s = max(GAP_PERIODS * thresholds.tank_period_s, LATE_ROUND_S)
         self._unwatched_s = 0.0
-        self._wrong_ns = -NEVER_NS
+        self._wrong_ns = LONG_AGO_NS
         # a wrong sign is not seen where the roll passes through zero
         self._doubted_ns = round(thresholds.tank_period_s * 1e9)
         #: Whether the water was seen to move as roll and pressure push it, and is watched since.

@@ -10,7 +10,7 @@ What counts as a fault, and what it does, is the table in `utank_hil.safety.faul
 
 from typing import Final
 
-from utank_hil.base.tick import NEVER_NS
+from utank_hil.base.tick import LONG_AGO_NS, NEVER_NS
 from utank_hil.canbus.enumerations import DriveState, Fault, Mode
 from utank_hil.canbus.measurements import Measurements
 from utank_hil.safety import judging
@@ -64,7 +64,7 @@ class Supervisor:
         self._passive_until_ns = 0
         self._enabling_until_ns = 0  # in PASSIVE  # pragma: no mutate: before any tick
         self._begin_noting(0)  # pragma: no mutate: it begins anew with ACTIVE and PASSIVE
-        self._rolled_over_ns = -NEVER_NS
+        self._rolled_over_ns = LONG_AGO_NS
         self._zero_at_ns = NEVER_NS  # the earliest end of those ramps that run
 
     @property

@@ -6,18 +6,13 @@ from collections.abc import Callable, Sequence
 from hmac import compare_digest
 from typing import Any, Final
 
+from utank_hil.base.tick import LONG_AGO_NS
 from utank_hil.canbus.cmac import cmac
 from utank_hil.canbus.endpoints import Rejection
 from utank_hil.canbus.enumerations import Mode, ValveFault, ValveState
 from utank_hil.canbus.frame import Frame
 from utank_hil.canbus.messages import OperatorCommand, ValveStatus
-from utank_hil.canbus.profiles.device import (
-    LONG_AGO,
-    CalledTaker,
-    MessageHeard,
-    ProfiledDevice,
-    hear,
-)
+from utank_hil.canbus.profiles.device import CalledTaker, MessageHeard, ProfiledDevice, hear
 from utank_hil.canbus.profiles.device_plan import FIELDS, DevicePlan
 
 
@@ -60,7 +55,7 @@ class ProfiledPanel(ProfiledDevice[OperatorCommand]):
 
     def __init__(self, plan: DevicePlan[OperatorCommand], key: bytes = b"") -> None:
         super().__init__(plan)
-        self._key, self._said, self._tried_ns = key, b"", LONG_AGO
+        self._key, self._said, self._tried_ns = key, b"", LONG_AGO_NS
         self.nonce = os.urandom(PROOF)  #: The challenge; the next follows from it by the key.
         self.proved = plan.authentication is None
         self._wrong = 0  # proofs in succession

@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Final, Generic
 
-from utank_hil.base.tick import NEVER_NS, TICK_NS
+from utank_hil.base.tick import LONG_AGO_NS, TICK_NS
 from utank_hil.canbus.endpoints import Acceptance, Rejection
 from utank_hil.canbus.enumerations import Quality, Switch
 from utank_hil.canbus.frame import Frame
@@ -93,7 +93,6 @@ class Stamp:
 
 
 STATUS_CYCLES: Final = 3  #: A status that is older by this many cycles says nothing.
-LONG_AGO: Final = -NEVER_NS
 _SLOPE_NS: Final = round(SLOPE_S * 1e9)
 _new: Final = tuple.__new__
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
@@ -152,7 +151,7 @@ class MessageHeard(HeardMessage):
         #: Whether it says of the device that it is well, or at least that it lives.
         self.status: bool = bool(plan.conditions) or not (self.needed or plan.counter is None)
         self.bit = bit if self.needed else 0
-        self.came_ns = self.good_ns = LONG_AGO
+        self.came_ns = self.good_ns = LONG_AGO_NS
         self.old_ns = STATUS_CYCLES * plan.cycle_ns  #: Age from which its status says nothing.
 
     def is_another(self, data: bytes) -> bool:
@@ -189,7 +188,7 @@ class ProfiledDevice(Generic[T]):
         self._values: list[float] = [math.nan] * len(FIELDS[plan.kind])
         self._tank = plan.kind is SensorTank
         self._moved = False
-        self._changed_ns = self._delivered_ns = LONG_AGO
+        self._changed_ns = self._delivered_ns = LONG_AGO_NS
         self._past: deque[tuple[int, float]] = deque()  # times and rolls, of `SLOPE_S` and before
         self.named = plan.name_id is None
         self.proved = True  #: Whether what it orders counts; all, but of a panel that has a key.
@@ -237,7 +236,7 @@ class ProfiledDevice(Generic[T]):
             message.good_ns = now_ns
             for condition in message.conditions:
                 if not condition.holds(data):
-                    message.good_ns = LONG_AGO
+                    message.good_ns = LONG_AGO_NS
                     break
         stamp = message.stamp
         if stamp is not None and not stamp.passes(data, now_ns):
