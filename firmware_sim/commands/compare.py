@@ -72,13 +72,14 @@ def _table(reference: Path, found: list["Comparison"]) -> Table:
     table = new_table(
         f"{shown(Path(found[0].source))} against {shown(reference)}",
         *("first", "this", "difference", "%", "pairs"),
-        names=("run", *found[0].parameters, "figure"),
+        names=("run",),
         caption="difference ± half width of its 95 % interval" if intervals else None,
     )
     for each in found:
+        for words in (each.run, *(f"{name} {value}" for name, value in each.parameters.items())):
+            table.add_row(words)
         for name, figure in each.figures.items():
-            values = map(str, each.parameters.values())
-            table.add_row(each.run, *values, *_cells(name, figure))
+            table.add_row(*_cells(name, figure))
     return table
 
 
@@ -87,7 +88,7 @@ def _cells(name: str, figure: "Difference") -> list[str]:
     scale, said = _SCALES.get(unit, (1.0, ""))
     width = "" if figure.half_width is None else f" ± {scale * figure.half_width:.3g}"
     return [
-        f"{words} {said}" if said else name,
+        "  " + (f"{words} {said}" if said else name).replace("_", " "),
         f"{scale * figure.reference:.4g}",
         f"{scale * figure.value:.4g}",
         f"{scale * figure.difference:+.3g}{width}",

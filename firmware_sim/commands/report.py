@@ -15,7 +15,9 @@ def report(
     runs: Annotated[
         list[Path], argument("Folders of benches and campaigns, logs of `utank-hil run` (.frames).")
     ],
-    out: Annotated[Path | None, option("The page; beside the first run if not given.")] = None,
+    out: Annotated[
+        Path | None, option("The page, or a folder for it; beside the first run if not given.")
+    ] = None,
     json_: Json = False,
 ) -> None:
     """Write one HTML page of one or several runs: it needs no network and prints well.
@@ -29,11 +31,14 @@ def report(
     from utank_hil.reports.page import joined
 
     runs = [run.parent if run.name == RECORDING else run for run in runs]
+    if out is not None and (out.is_dir() or not (out.suffix or out.exists())):
+        out /= PAGE
     page = out or (runs[0] / PAGE if runs[0].is_dir() else runs[0].with_suffix(".html"))
     if out is None and len(runs) > 1:  # the page of the first run alone stays
         first = runs[0].resolve()
         page = first.with_name(f"{first.stem}-and-{len(runs) - 1}-more.html")
     try:
+        page.parent.mkdir(parents=True, exist_ok=True)
         written = write_report_page(page, *joined([_report(run) for run in runs]))
     except (OSError, ValueError) as error:
         fail(error)

@@ -225,6 +225,14 @@ def test_a_recording_of_another_version_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("one_pixel")
+def test_a_folder_for_the_page_is_made(recording: Path, tmp_path: Path) -> None:
+    for out in (tmp_path, tmp_path / "new" / "pages"):
+        done = CliRunner().invoke(app, ["report", str(recording), "--out", str(out), "--json"])
+        assert json.loads(done.stdout)["page"] == str(out / "report.html")
+        assert (out / "report.html").stat().st_size > 1000
+
+
+@pytest.mark.usefixtures("one_pixel")
 def test_a_full_disk_is_said_with_the_page_and_leaves_no_half_of_it(
     recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

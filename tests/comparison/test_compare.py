@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +14,12 @@ from firmware_sim.campaign.driver import batch_of
 from firmware_sim.campaign.simulations import run_batch
 from firmware_sim.campaign.store import Store
 from firmware_sim.campaign.study import load_study
-from firmware_sim.commands.compare import compare
-from firmware_sim.comparison import batch_count, difference
+from firmware_sim.commands.compare import _table, compare
+from firmware_sim.comparison import Comparison, Difference, batch_count, difference
 from utank_hil.analysis.motion.statistics import batch_means, rms_batches
 from utank_hil.canbus.enumerations import Mode
 from utank_hil.console.common import new_app
+from utank_hil.console.terminal import Terminal
 from utank_hil.telemetry.recording import write_recording
 
 APP = new_app()
@@ -215,8 +217,26 @@ def test_table_of_a_bench_fits_eighty_columns(tmp_path, monkeypatch):
     for n in (1, 2):
         recorded(Path(f"{n}.rrd"), waves(n, 2400.0))
     done = CliRunner().invoke(APP, ["1.rrd", "2.rrd"])
-    assert "┃ figure " in done.stdout
+    assert "│   roll rms ° " in done.stdout
     assert "± half width of its 95 % interval" in done.stdout
+
+
+def test_table_of_long_names_and_wide_intervals_fits_eighty_columns(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    of = Difference(2777.0, 3919.0, 1142.0, 1234.5, 12, paired=True)
+    figures = {"roll_rms_rad": replace(of, reference=0.0274, value=0.0355, difference=0.00815,
+                                       half_width=0.00123), "pressure_rms_pa": of}  # fmt: skip
+    each = Comparison("out/two", "self_tuned", figures, {"sea.hs_m": 3.5, "seed": 7})
+    Terminal().table(_table(Path("out/one"), [each]))
+    lines = capsys.readouterr().out.splitlines()
+    shown = [" ".join(line.replace("│", " ").split()) for line in lines[4:9]]
+    assert shown == [
+        "self_tuned",
+        "sea.hs_m 3.5",
+        "seed 7",
+        "roll rms ° 1.57 2.034 +0.467 ± 0.0705 +29.7% 12",
+        "pressure rms kPa 2.777 3.919 +1.14 ± 1.23 +41.1% 12",
+    ]
 
 
 @pytest.mark.usefixtures("read_here")
@@ -273,6 +293,6 @@ def test_campaigns_in_the_same_waves_are_paired_and_their_passive_tank_is_the_sa
     unpaired = found(strong, other)["comparisons"][0]["figures"]["roll_rms_rad"]
     assert not unpaired["paired"]
     done = CliRunner().invoke(APP, [str(strong), str(weak)])
-    assert "pressure_peak kPa" in done.stdout
+    assert "pressure peak kPa" in done.stdout
     done = CliRunner().invoke(APP, [str(strong), str(recorded(tmp_path / "a.rrd", waves(1, 60.0)))])
     assert "name things of one kind" in done.output
