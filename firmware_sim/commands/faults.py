@@ -22,6 +22,7 @@ from utank_hil.console.common import (
     prepare_out,
     print_json,
     why,
+    why_not_writable,
 )
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, progress_bar, shown
@@ -86,6 +87,8 @@ def faults(
     if bus is not None and live:
         _open_once(bus)  # before minutes of other rows
     window = Window() if full else Window(60.0, 20.0) if scenario is None else _window(loaded)
+    if junit is not None and (reason := why_not_writable(junit.parent, (junit.name,))):
+        fail(f"{reason}; choose another place with --junit")  # before minutes of rows
     if out is not None:
         out = prepare_out(out, [f"{row.id}.rrd" for row in chosen])
     options = {"seeds": seeds, "full": full, "rows": names, "scenario": str(scenario or "")}

@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from firmware_sim.fault_campaign.own_ship import Ratios, ratios, renumbered, resized
 from firmware_sim.fault_injection.fault import FaultSpan, FaultTime, one_of
 from firmware_sim.fault_injection.kinds import AnyFault
+from firmware_sim.fault_injection.nodes import Law
 from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_problems import foreign_role, missing_nodes
 from utank_hil.base.parameters import Finite, Positive, refuse
@@ -24,6 +25,8 @@ from utank_hil.retuning import EstimateSettings
 COMMON: Final = "pump"  #: Setup of rows that name none.
 LONG_S: Final = 300.0
 """Follow-up time in s above which a row takes more than a minute of CPU time per sea."""
+_AT_A_SAMPLE: Final = ("raises", "answers_nan")  #: Failures of a law that show at its next sample.
+_LATE_MS: Final = 20.0  #: Beyond that sample, as on the first ship.
 _PHASES: Final = 100  # Number of ticks in a second, the slowest message cycle.
 _PHASE_STRIDE: Final = 37  # Ticks from one seed's fault to the next one's: coprime to 100 and to 5.
 
@@ -326,7 +329,9 @@ def _resized(row: Row, by: Ratios, first: DrivePlan | None, own: DrivePlan | Non
     fault, expect, limit = row.fault, row.expect, row.limit
     counts_from = {key: value * by.range.get(key, 1.0) for key, value in limit.counts_from.items()}
     roll = None if fault.hardwired_stop else limit.roll
-    changed = {"counts_from": counts_from, "beside_stop": True, "roll": roll}
+    changed: dict[str, Any] = {"counts_from": counts_from, "beside_stop": True, "roll": roll}
+    if any(isinstance(each, Law) and each.fails in _AT_A_SAMPLE for each in inject):
+        changed["found_ms"] = max(limit.found_ms or 0.0, 1e3 * by.sample_s + _LATE_MS)
     parts = {
         "fault": fault.model_copy(update={"inject": inject}),
         "expect": expect.model_copy(update={"codes": expect.codes + expect.elsewhere}),

@@ -1,8 +1,8 @@
 """The faults of a campaign, as large for another ship as for the first.
 
 Offsets, drifts and spikes of levels and pressures, and pressures that the pump adds, keep their
-share of the law's limits. Noise is as many times that of the sensor. Rolls and times stay. Frames
-of a CANopen drive have the ship's own node numbers.
+share of the law's limits. Noise is as many times that of the sensor. Rolls and times stay, but for
+that of a law's sample. Frames of a CANopen drive have the ship's own node numbers.
 """
 
 from collections.abc import Mapping
@@ -14,6 +14,7 @@ from firmware_sim.fault_injection.signals import Drift, Noise, Offset, Spikes
 from firmware_sim.scenario import Scenario
 from utank_hil.canbus.profiles.drive_plan import DrivePlan
 from utank_hil.configuration import ControllerConfig
+from utank_hil.configuration.laws import sample_time
 
 PRESSURE: Final = "pressure_pa"
 LEVELS: Final = ("port_level_m", "starboard_level_m", "level_m")
@@ -35,6 +36,7 @@ class Ratios(NamedTuple):
 
     range: Mapping[str, float]
     noise: Mapping[str, float]
+    sample_s: float  #: Sample time of the other ship's law.
 
 
 def ratios(
@@ -44,7 +46,14 @@ def ratios(
     return Ratios(
         _ratios(LIMITS, first[1].limits, other[1].limits),
         _ratios(NOISES, first[0].sensors, other[0].sensors),
+        _sample_s(other[1]),
     )
+
+
+def _sample_s(config: ControllerConfig) -> float:
+    """Sample time of a law; a law that finds its own takes 0.1 over the roll frequency."""
+    given = sample_time(config.law)
+    return 0.1 / config.vessel.ship.natural_frequency_rad_s if given is None else given[1]
 
 
 def _ratios(names: Mapping[str, str], first: Any, other: Any) -> dict[str, float]:

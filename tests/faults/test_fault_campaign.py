@@ -35,7 +35,7 @@ from firmware_sim.live_faults.bench import LiveTimes
 from firmware_sim.scenario import Scenario
 from utank_hil.assembly import build_law
 from utank_hil.canbus import Fault, Mode
-from utank_hil.configuration import ConfigError, load_config
+from utank_hil.configuration import ConfigError, ControllerConfig, load_config
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.configuration.files import problems_in_words
 from utank_hil.console.common import KILLED
@@ -520,6 +520,12 @@ def test_a_row_that_fails_is_told_by_the_exit_code(found_ms, late, monkeypatch):
     assert ("allowed" in done.output) is late
 
 
+def test_a_place_for_the_junit_file_that_is_none_is_told_before_the_rows(tmp_path):
+    done = invoke("--rows", GOOD.row, "--junit", str(tmp_path))
+    assert done.exit_code == ExitCode.USAGE
+    assert f"{tmp_path}: is a folder; choose another place with --junit" in done.stderr
+
+
 @pytest.mark.usefixtures("_vcan7")
 def test_live_rows_are_run_on_a_bus_alone_and_all_stands_in_the_junit_file(tmp_path, monkeypatch):
     monkeypatch.setattr(runner, "run_rows", lambda *_, **__: {GOOD.row: [GOOD]})
@@ -721,6 +727,17 @@ def test_a_fault_is_as_large_for_another_ship_as_for_the_first():
         here, there = (getattr(each[name].fault.inject[0], key) for each in (rows, moved))
         assert there / here == pytest.approx(getattr(limits[1], limit) / getattr(limits[0], limit))
     assert moved["roll-spike"].fault == rows["roll-spike"].fault
+    # the next sample of a law may be later: 0.1 over 0.25 rad/s where it finds its own time
+    law = load_config(Path("configs/controllers/self_tuned.yaml"), ControllerConfig)
+    heavy = replace(law.vessel.ship, inertia_kg_m2=law.vessel.ship.stiffness_nm_rad / 0.25**2)
+    vessel = law.vessel.model_copy(update={"ship": heavy})
+    own = {"own": law.model_copy(update={"vessel": vessel})}
+    late = CAMPAIGN.on(ship.model_copy(update={"vessel": vessel, "controllers": own}), "own")
+    found_ms = {row.id: row.limit.found_ms for row in late.rows}
+    assert [found_ms[name] for name in ("law-raises", "law-answers-nan", "law-opposite")] == (
+        pytest.approx([420.0, 420.0, 90e3])
+    )
+    assert moved["law-raises"].limit.found_ms == 220.0
     # what another ship may be told and roll does not count on the first one
     assert moved["law-opposite"].expect.codes == ("ROLL_AMPLIFIED", "HEEL_LIMIT")
     assert rows["law-opposite"].expect.codes == ("ROLL_AMPLIFIED",)
