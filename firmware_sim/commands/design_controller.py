@@ -48,7 +48,7 @@ def controller(
     if not isinstance(law, Design):
         common.fail(
             f"{config}: law.kind: a {law.kind} law has no weight to trade: take "
-            "{kind: gpc, tuning: auto} in its place, in a copy of the file"
+            "{kind: gpc, tuning: auto} in its place, in a copy of the file without sea_estimate"
         )
     vessel = loaded.vessel
     path = scenario or usual_scenario(vessel, config)
