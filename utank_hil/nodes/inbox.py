@@ -299,7 +299,8 @@ class Inbox:
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take one frame from the bus; load and foreign frames are those of the own bus alone."""
-        key: Any = frame[0]  # by its name, or as a new object for the dictionary, it takes longer
+        fields: Any = frame  # by its name, or as a new object for the dictionary, it takes longer
+        key: Any = fields[0]
         can_id: int = key
         self.frames += can_id < OTHER_BUS
         taker = self._takers.get(key)

@@ -33,11 +33,12 @@ class HeardMessage(Acceptance):
     def passes(self, data: bytes) -> bool:
         """Judge the next frame."""
         self.heard += 1
-        if not self.intact(data):
-            whole = len(data) == self.length
-            return self._reject(Rejection.CRC if whole else Rejection.LENGTH)
+        if len(data) != self.length:
+            return self._reject(Rejection.LENGTH)
+        if self._crc is not None and not self.intact(data):
+            return self._reject(Rejection.CRC)
         if self._counter is None:
-            return self._drain()
+            return self._drain() if self._bucket or not self.valid else True
         return self._follows(self._counter.raw(data) % self._counts)  # it may have a sign
 
 
@@ -145,7 +146,7 @@ class MessageHeard(HeardMessage):
         super().__init__(plan)
         self.signals: tuple[SignalPlan, ...] = plan.signals
         self.conditions: tuple[ConditionPlan, ...] = plan.conditions
-        self._only: ConditionPlan | None = plan.only
+        self.only: ConditionPlan | None = plan.only
         self.stamp = None if plan.stamp is None else Stamp(plan.stamp, plan.stamp_us, late_ms)
         self.needed: bool = bool(plan.signals) or plan.stamp is not None
         #: Whether it says of the device that it is well, or at least that it lives.
@@ -156,7 +157,7 @@ class MessageHeard(HeardMessage):
 
     def is_another(self, data: bytes) -> bool:
         """Whether a frame of its identifier has another content."""
-        only = self._only
+        only = self.only
         return only is not None and len(data) == self.length and not only.holds(data)
 
 
@@ -230,7 +231,7 @@ class ProfiledDevice(Generic[T]):
     def take(self, message: MessageHeard, frame: Frame, now_ns: int) -> None:
         """Take a frame of one of its messages."""
         data = frame[1]  # by its name it takes ten times as long
-        if message.is_another(data) or not message.passes(data):
+        if (message.only is not None and message.is_another(data)) or not message.passes(data):
             return
         if message.status:
             message.good_ns = now_ns

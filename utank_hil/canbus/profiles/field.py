@@ -71,13 +71,12 @@ class Field:
 
     def raw(self, data: bytes) -> int:
         """Counts of the signal, with their sign."""
-        word = 0
-        if self.big_endian:
-            for place in range(self._first, self._end):
-                word = word << 8 | data[place]
-        else:
-            for place in range(self._first, self._end, -1):
-                word = word << 8 | data[place]
+        place, end = self._first, self._end
+        word, step = data[place], -1 if end < place else 1
+        place += step
+        while place != end:
+            word = word << 8 | data[place]
+            place += step
         raw = word >> self._spare & self._mask
         return raw - self._mask - 1 if raw >= self._half else raw
 
