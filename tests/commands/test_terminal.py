@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.table import Table
 
-from utank_hil.console.terminal import Terminal, new_table, shown
+from utank_hil.console.terminal import Terminal, new_table, shown, timing_table
+from utank_hil.runners import LoopStatistics
 
 CELLS = {"passive": ("2.08", "4.04"), "gpc": ("1.54", "")}
 
@@ -100,3 +101,18 @@ def test_a_list_s_long_words_go_on_below_themselves() -> None:
         *reason.split(), "x" * 40
     ]  # fmt: skip
     assert max(map(len, lines)) <= 60
+
+
+def test_deadlines_of_a_law_with_a_long_name_fit_80_columns() -> None:
+    loop = LoopStatistics(ticks=40_993, overruns=9600, skipped=17_338)
+    for late_us, lasts_us in ((229, 2163), (413_019, 217_580)):
+        loop.lateness.add(1000 * late_us)
+        loop.duration.add(1000 * lasts_us)
+    said = io.StringIO()
+    console = Terminal(file=said, width=80)
+    console.table(timing_table({"My yacht, self-tuned": loop}))
+    rows = [line.replace("│", " ").split() for line in said.getvalue().splitlines() if "│" in line]
+    assert rows[0] == ["My", "yacht,", "self-tuned"]
+    assert [row[-1] for row in rows[1:]] == ["9600", "17338"]
+    assert rows[1][-2] == "40993"
+    assert [row[:2] for row in rows[1:]] == [["wake-up", "late"], ["tick", "lasts"]]
