@@ -199,8 +199,10 @@ class PassiveTwin:
         gross = self._gross + self._unknown
         on_record = (
             self.amplified
+            # pragma: no mutate start: it is never just that
             or self._record_power > record_power
-            or self._power > gross * gross * self._twin_power  # pragma: no mutate: never just that
+            or self._power > gross * gross * self._twin_power
+            # pragma: no mutate end
         )
         if on_record and self._power > least_power:
             self._losing_s += self._period_s
@@ -222,7 +224,8 @@ class PassiveTwin:
         since = heel = abs(roll_rad)
         piece = self._pieces[0]
         if heel > self._piece_rad:  # pragma: no mutate: both pieces meet there
-            index = min(int(heel / self._piece_rad), len(self._pieces) - 1)
+            last = len(self._pieces) - 1  # pragma: no mutate: the last two are one polynomial
+            index = min(int(heel / self._piece_rad), last)
             piece, since = self._pieces[index], heel - index * self._piece_rad
         value = 0.0
         for coefficient in piece:
