@@ -80,8 +80,6 @@ class AlarmList:
     def update(self, active: Active, mode: Mode, now_ns: int) -> None:
         """Take the faults whose cause is there."""
         entries = self._entries
-        if not active and not entries:
-            return
         for code, gravity in active.items():
             entry = entries.get(code)
             if (
@@ -152,7 +150,7 @@ class AlarmList:
         self._new.append(AlarmEvent(now_ns, entry.code, state, mode))
         self._order = sorted(
             self._entries.values(),
-            key=lambda each: (each.state not in _UNACCEPTED, _URGENCY.get(each.code, 0)),
+            key=lambda each: (each.state not in _UNACCEPTED, _URGENCY[each.code]),
         )
         self.unaccepted = any(each.state in _UNACCEPTED for each in self._order)
 

@@ -125,9 +125,8 @@ class TankEquation:
     over that at which a sign is found wrong. `level_gain`, see the module, and `late_s`, the motion
     sensor's delay, are with the constant within +-z and the sway that speak most for sound sensors.
     All three are NaN as long as the push, or the roll, is too small to tell. `obeyed` says whether
-    reversed motion or swapped gauges now leave far more than sound sensors do, `settled` whether
-    the filters have forgotten their start, the first one or that after a gap, `water_moves` whether
-    the level moves as one that swings by more than its noise at w0.
+    reversed motion or swapped gauges now leave far more than sound sensors do, `water_moves`
+    whether the level moves as one that swings by more than its noise at w0.
     """
 
     def __init__(
@@ -203,7 +202,7 @@ class TankEquation:
         self._wait = -1
         if self._band is not None:
             self._band.begun = False
-        self.settled = self.obeyed = self.water_moves = False
+        self.obeyed = self.water_moves = False
         self._sound, self._reversed, self._swapped, self._pump_reversed, self._quarter_late = (
             Misfit() for _ in range(5)
         )
@@ -216,6 +215,11 @@ class TankEquation:
         self._still = self._level_still = 0
         self._roll_rad = self._level_m = math.inf
         self.doubt = self.level_gain = self.late_s = math.nan
+
+    @property
+    def settled(self) -> bool:
+        """Whether the filters have forgotten their start, the first one or that after a gap."""
+        return self._wait == 0
 
     def _forget_lead(self) -> None:
         """Begin anew with what leads the roll."""
@@ -270,7 +274,6 @@ class TankEquation:
         self.slope_push = of_roll + of_level
         if self._wait > self._band_wait:
             self._wait -= 1
-            self.settled = self.settled or self._wait == 0
             return 0
         rate_m_s = level.rate
         loss = self._loss + self._quadratic_loss * abs(rate_m_s)
@@ -285,7 +288,6 @@ class TankEquation:
             )
         if self._wait > 0:
             self._wait -= 1
-            self.settled = self.settled or self._wait == 0
             return 0
         self._lead = self._late_keep * self._lead + lead * rate
         self._d = self._late_keep * self._d + rate
