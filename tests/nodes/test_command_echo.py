@@ -53,3 +53,11 @@ def test_before_the_first_command_there_is_none():
     echo.heard(None, 7)
     echo.heard(1, 8)
     assert echo.heard_ns == 6
+
+
+def test_a_status_of_before_the_first_command_is_no_echo_of_it():
+    echo = CommandEcho()
+    echo.heard(1, 5)
+    echo.sent(1)
+    echo.heard(1, 5)
+    assert echo.heard_ns == NEVER_HEARD_NS

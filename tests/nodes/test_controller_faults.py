@@ -404,3 +404,10 @@ def test_law_that_answers_too_few_or_too_many_commands_stops_the_pump(answer):
     assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.INTERNAL)
     assert bench.pressure_pa == 0.0
     assert bench.node.law.error.startswith("ValueError: zip() argument 2 is ")
+
+
+def test_a_drive_that_has_never_sent_a_command_back_is_silent():
+    bench = ControllerBench()
+    bench.hear = lambda frames: None
+    bench.run(1000)
+    assert (bench.node.mode, bench.node.fault) == (Mode.INIT, Fault.DRIVE_SILENT)

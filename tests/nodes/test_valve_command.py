@@ -195,6 +195,20 @@ def test_a_valve_that_has_not_been_heard_is_silent_and_not_at_fault():
     assert bench.node.fault is Fault.VALVE_SILENT
 
 
+def test_a_valve_that_has_never_sent_a_command_back_is_silent():
+    bench = ValveBench()
+    bench.echoes = False
+    bench.run(500)
+    assert (bench.node.mode, bench.node.fault) == (Mode.INIT, Fault.VALVE_SILENT)
+
+
+def test_a_law_that_asks_for_less_than_no_loss_opens_the_valve():
+    bench = throttling()
+    bench.law.loss = -1.0
+    bench.run(1000)
+    assert bench.told[-1][:2] == (1.0, ValveControl.FOLLOW)
+
+
 @pytest.mark.parametrize("silent", ["motion", "tank"])
 def test_what_ramps_the_pump_down_sends_the_valve_to_its_fail_position_at_once(silent):
     bench = throttling()
@@ -434,6 +448,7 @@ def test_with_a_drive_of_another_maker_the_last_frames_stop_both():
     stops = Frame(0, bytes((2, 5)))
     actuators = bench.node.actuators
     actuators.command_pa = 5e3
+    actuators.request_reset()  # of a fault that there is not
     actuators.drive = SimpleNamespace(stop=lambda: [stops])
     first, *rest = actuators.stop()
     assert first is stops

