@@ -3,12 +3,13 @@
 import math
 import re
 from itertools import pairwise
+from types import SimpleNamespace
 
 import pytest
 
 from tests.nodes.canopen_peers import Line
-from utank_hil.base.tick import TICK_NS
-from utank_hil.canbus import ControlWord, DriveState
+from utank_hil.canbus import ControlWord, DriveState, Frame
+from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.device import hear
 from utank_hil.nodes.canopen_drive import CanopenDrive, state_of
 
@@ -54,7 +55,7 @@ def test_what_is_wrong_is_refused_by_name(tweak, words):
     line = Line(tweak=tweak).run(400)
     assert not line.drive.setup.done
     assert re.search(rf"node 5: {words}", line.drive.words), line.drive.words
-    assert {report for _, report in line.reports} == {None}
+    assert [report for _, report in line.reports] == [None]  # once
     assert line.node.nmt.state != "OPERATIONAL"
 
 
@@ -136,9 +137,12 @@ def test_who_only_hears_a_drive_gets_its_reports():
 
 
 def test_the_controller_beats_with_each_command_and_stops_the_node():
-    line = Line().run(400)
-    frames = line.drive.follow(0.0, ControlWord.SHUTDOWN)
+    line = Line()
+    (beat,) = line.drive.follow(0.0, ControlWord.SHUTDOWN)  # of a drive that is not configured yet
+    assert beat.can_id & 0x7FF == 0x77F
+    frames = line.run(400).drive.follow(0.0, ControlWord.SHUTDOWN)
     assert [each.can_id & 0x7FF for each in frames] == [0x77F, 0x80, 0x205]
+    assert len(frames[-1].data) == 4  # control word and target torque
     *_, last = line.drive.stop()
     assert last.data == bytes((2, 5))
 
@@ -151,12 +155,31 @@ def test_marks_change_the_target_by_three_counts_at_most():
     assert all((b - a) % 4 == 1 for a, b in pairwise(counts))
 
 
+def test_a_target_beyond_what_its_bits_hold_is_the_greatest_of_its_sign():
+    line = Line().run(400)
+    for side in (1, -1) * 4:
+        data = line.drive.follow(side * 1e9, ControlWord.ENABLE_OPERATION)[-1].data
+        counts = side * int.from_bytes(data[2:], "little", signed=True)
+        assert 0x7FFF - 7 <= counts <= 0x7FFF
+
+
+# mask and value of each state, IEC 61800-7-201 (CiA 402), status word
+STATES = {
+    DriveState.NOT_READY_TO_SWITCH_ON: (0x4F, 0x00),
+    DriveState.SWITCH_ON_DISABLED: (0x4F, 0x40),
+    DriveState.READY_TO_SWITCH_ON: (0x6F, 0x21),
+    DriveState.SWITCHED_ON: (0x6F, 0x23),
+    DriveState.OPERATION_ENABLED: (0x6F, 0x27),
+    DriveState.QUICK_STOP_ACTIVE: (0x6F, 0x07),
+    DriveState.FAULT_REACTION_ACTIVE: (0x4F, 0x0F),
+    DriveState.FAULT: (0x4F, 0x08),
+}
+
+
 def test_states_are_those_of_the_status_word():
-    assert state_of(0x0250) is DriveState.SWITCH_ON_DISABLED
-    assert state_of(0x0637) is DriveState.OPERATION_ENABLED
-    assert state_of(0x0028) is DriveState.FAULT
-    assert state_of(0x0061) is None
-    assert TICK_NS == 10 * MS
+    for word in range(0x400):
+        states = [state for state, (mask, value) in STATES.items() if word & mask == value]
+        assert state_of(word) is (states[0] if states else None)
 
 
 def powered_anew(line):
@@ -204,20 +227,95 @@ def test_a_drive_whose_power_went_while_it_ran_is_configured_anew():
     assert line.reports[-1][1].state is DriveState.SWITCH_ON_DISABLED
 
 
+def test_the_loop_sets_the_target_while_it_is_enabled_and_begins_anew_after():
+    asked, resets = [], []
+    loop = SimpleNamespace(step=lambda *given: asked.append(given) or 2e3,
+                           reset=lambda: resets.append(len(asked)))  # fmt: skip
+    line, targets = Line(loop=loop).run(400), []
+    line.drive.follow = lambda target, word: targets.append(target) or []
+    for age_ms in (100.0, 101.0):  # the last pressure may have ended long ago
+        measured = SimpleNamespace(pump_age_ms=age_ms, pressure_pa=7e3)
+        line.drive.command(5e3, ControlWord.ENABLE_OPERATION, measured, 0.5)
+    assert asked == [
+        (5e3, 7e3, 17.1 * 0.5, 0.0),
+        (5e3, pytest.approx(math.nan, nan_ok=True), 8.55, 0),
+    ]
+    assert (targets, resets) == ([2e3, 2e3], [])
+    for word in set(ControlWord) - {ControlWord.ENABLE_OPERATION}:
+        line.drive.command(5e3, word, measured, 0.5)
+    assert resets == [2] * len(targets[2:])
+    line.drive.stop()
+    assert set(targets[2:]) == {0.0}
+
+
 def test_a_drive_that_runs_on_after_stops_has_its_node_stopped():
     line = Line().run(400)
     line.node.sdo[0x6041].raw = 0x237
     line.run(2, ControlWord.ENABLE_OPERATION)
     assert line.drive.state is DriveState.OPERATION_ENABLED
-    stops = [frame.data for _ in range(6)
-             for frame in line.drive.command(0.0, ControlWord.QUICK_STOP, None, 0.0)
-             if frame.can_id & 0x7FF == 0]  # fmt: skip
-    assert stops == [bytes((2, 5))] * 3
+
+    def told_the_node(word):
+        return [frame.data for _ in range(6)
+                for frame in line.drive.command(0.0, word, None, 0.0)
+                if frame.can_id & 0x7FF == 0]  # fmt: skip
+
+    assert told_the_node(ControlWord.ENABLE_OPERATION) == []
+    assert told_the_node(ControlWord.QUICK_STOP) == [bytes((2, 5))] * 3
+
+
+def reports_of(line, beat, status):
+    """Reports after a heartbeat and a status word, in which nothing was commanded."""
+    before = len(line.reports)
+    for can_id, data in ((0x705, bytes((beat,))), (0x185, status.to_bytes(6, "little"))):
+        line.drive.takers[can_id | STANDARD].take(Frame(can_id | STANDARD, data), line.now_ns)
+    return [report for _, report in line.reports[before:]]
+
+
+def test_what_is_no_state_of_a_node_in_operation_that_was_configured_does_not_count():
+    assert reports_of(Line(), 5, 0x0637) == []
+    line = Line().run(400)
+    assert reports_of(line, 5, 0x0661) == []
+    assert reports_of(line, 127, 0x0637) == []
+    assert [each.state for each in reports_of(line, 5, 0x0637)] == [DriveState.OPERATION_ENABLED]
+
+
+@pytest.mark.parametrize(
+    ("bit", "says"), [(7, (False, True)), (11, (True, False)), (9, (False,) * 2)]
+)
+def test_bits_of_the_status_word_say_that_it_is_at_a_limit_or_warns(bit, says):
+    (report,) = reports_of(Line().run(400), 5, 0x0037 | 1 << bit)
+    assert (report.held_back, report.warns) == says
+
+
+def test_an_echo_is_as_old_as_the_command_that_comes_back():
+    line = Line().run(400)  # a command each 20 ms; what SYNC asks for is of the one before
+    assert line.drive.echo_ns == 3960 * MS
+    newest = line.drive.follow(0.0, ControlWord.SHUTDOWN)[-1]
+    line.drive._heard(int.from_bytes(newest.data, "little"))
+    assert line.drive.echo_ns == 3990 * MS  # the tick before
+
+
+@pytest.mark.parametrize("longer", [-1, 1])
+def test_a_frame_of_another_length_says_nothing(longer):
+    line = Line().run(400)
+    drive, reports = line.drive, len(line.reports)
+    # status word of operation enabled, a speed, a boot-up
+    for can_id, data in ((0x185, b"\x37\x06\0\0\0\0"), (0x285, bytes(range(7))), (0x705, b"\0")):
+        data = data[:longer] if longer < 0 else data + b"\0"
+        drive.takers[can_id | STANDARD].take(Frame(can_id | STANDARD, data), line.now_ns)
+    assert (drive.state, drive.speed_rad_s) == (DriveState.SWITCH_ON_DISABLED, 0.0)
+    assert len(line.reports) == reports
+    assert drive.setup.done
 
 
 def test_a_speed_that_came_long_ago_is_none():
     line = Line().run(400)
     assert line.drive.speed_rad_s == 0.0
+    line.node.set_data(0x606C, 0, (500).to_bytes(4, "little"))
+    line.node.set_data(0x6077, 0, (10).to_bytes(2, "little"))
+    line.run(6)
+    assert line.drive.speed_rad_s == 0.5
+    assert line.reports[-1][1].power_w == pytest.approx(0.5 * 10 * 80 * 0.4 * 6.22)
     line.node.tpdo[2].enabled = False
     line.run(30)
     assert line.reports[-1][0] > line.now_ns - 60 * MS
@@ -245,3 +343,21 @@ def test_an_emergency_of_the_drive_is_in_its_words_until_it_is_over():
     line.node.emcy.reset()
     line.run(2)
     assert "emergency" not in line.drive.words
+
+
+def test_its_words_are_its_status_and_a_mode_that_it_was_not_put_in():
+    line = Line().run(400)
+    assert line.drive.words == "node 5: status word 0x0250"
+    assert not line.reports[-1][1].refused
+    line.node.set_data(0x6061, 0, bytes((3,)))
+    line.run(4)
+    assert line.drive.words == "node 5: status word 0x0250, mode 3 and not 4"
+    assert line.reports[-1][1].refused
+
+
+def test_an_emergency_while_it_is_configured_is_in_its_words_until_it_is_started():
+    line = Line().run(2)
+    line.node.emcy.send(0x2310, 0x02)
+    assert line.run(2).drive.words.endswith("emergency 2310h, register 0x02")
+    assert not line.drive.setup.done
+    assert "emergency" not in line.run(400).drive.words

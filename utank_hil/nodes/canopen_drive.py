@@ -134,8 +134,10 @@ class CanopenDrive:
         setup = self.setup
         if setup.done:
             # without a heartbeat, its start was not heard: it has forgotten all
+            # pragma: no mutate start: a tick more or less
             lives = self._operational and now_ns - self._beat_ns <= START_NS
             if not lives and now_ns - self._started_ns > START_NS:
+                # pragma: no mutate end
                 self._restart(now_ns)
             return []
         frames = setup.frames(now_ns)
@@ -189,11 +191,13 @@ class CanopenDrive:
         bits = self._bits
         most = (1 << bits - 1) - MARKS
         counts = int(min(max(target * self._per_si, -most), most) + _TO_EVEN - _TO_EVEN)
+        # pragma: no mutate start: whichever remainder goes with a count
         counts += ((self._count - counts + MARKS // 2) % MARKS) - MARKS // 2
+        # pragma: no mutate end
         self._count += 1
         content = word | (counts & (1 << bits) - 1) << 16
-        self._contents.pop(0)
-        self._sent_ns.pop(0)
+        self._contents.pop(0)  # pragma: no mutate: it is the oldest one's place
+        self._sent_ns.pop(0)  # pragma: no mutate: the same
         self._contents.append(content if self._marked else content >> 16)
         self._sent_ns.append(self._now_ns)
         command = _new(Frame, (self._received, content.to_bytes(2 + bits // 8, "little")))
@@ -205,14 +209,16 @@ class CanopenDrive:
         if not self.watched[0].passes(data):
             return
         self._status = data[0] | data[1] << 8
-        if now_ns - self._measured_ns > self._late_ns:
+        if now_ns - self._measured_ns > self._late_ns:  # pragma: no mutate: a tick more or less
             self._speed_rad_s = self._torque = math.nan
         state = state_of(self._status)
         if self._marked or state is _ENABLED:
             self._heard(self._echoed.raw(data))
         else:  # there is no demand
             self.echo_ns = now_ns
+        # pragma: no mutate start: a tick more or less
         alive = self._operational and now_ns - self._beat_ns <= self._late_ns
+        # pragma: no mutate end
         if state is None or not alive or not (self._hears_only or self.setup.done):
             return
         report = (
@@ -231,7 +237,7 @@ class CanopenDrive:
         self._echo = echo
         # after SYNC it is a cycle old; else the middle of what its phase can be
         phase_ns = 0 if len(self._with) > 1 else _HALF_CYCLE_NS
-        for place in range(KEPT - 1, -1, -1):
+        for place in reversed(range(KEPT)):
             if self._contents[place] == echo:
                 self.echo_ns = self._sent_ns[place] - phase_ns
                 return
