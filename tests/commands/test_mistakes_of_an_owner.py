@@ -156,6 +156,8 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
      ("controllers.mine: must be a mapping", "'out'", "the name of a file that ends with .yaml")),
     ("a mesh as hull data", "check '{own}/mesh.yaml'",
      ("ship.hull", "hull.stl is of no known kind", "of a mesh `utank-hil hull` computes a .nc")),
+    ("a frame log as a bus", "bus '{own}/run.frames'",
+     ("run.frames", "it is a frame log: utank-hil export makes a .log of it")),
     ("a spreadsheet as a decay", "identify decay '{own}/decay.xlsx'",
      ("decay.xlsx", "it is a spreadsheet: save it as .csv")),
     ("a controller's word of the trade", "bench '{own}/scenario.yaml' --controller gpc",
@@ -170,6 +172,7 @@ HALF_WRITTEN = {
     "star.yaml": "name: *mine\n",
     "mesh.yaml": "name: mine\nship: {hull: ./hull.stl}\ntank: {}\n",
     "decay.xlsx": "PK\x03\x04",
+    "run.frames": "UTANKHIL frames 1",
 }
 
 

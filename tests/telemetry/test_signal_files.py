@@ -14,6 +14,9 @@ from others import field_case
 from pyarrow import parquet
 
 from utank_hil.base.text_files import TextFileError
+from utank_hil.nodes.signals import SIGNALS
+from utank_hil.telemetry.frame_log import LAYOUT, ROWS, BlockSink, FrameLogWriter, Kind
+from utank_hil.telemetry.run_log import _packed
 from utank_hil.telemetry.signal_files import even_rows, read_signals, require
 
 PATH = Path("theirs.csv")
@@ -247,3 +250,28 @@ def test_uneven_times_are_refused_with_the_line_and_the_remedy(time_s, said):
     with pytest.raises(TextFileError, match=r"theirs\.csv: ") as error:
         even_rows(PATH, table(time_s), 0.2)
     assert said in str(error.value)
+
+
+@pytest.mark.parametrize("devices", [None, {"motion": {"bus": "can1"}}])
+def test_what_devices_of_other_makers_measured_is_read_from_the_run_s_telemetry(devices, tmp_path):
+    """No frame of the catalogue says it; the telemetry has a row every 50 ms."""
+    file = tmp_path / "run.frames"
+    about = {"configuration": {"vessel": {"devices": devices}}}
+    rows = np.full((6, len(SIGNALS)), np.nan)
+    rows[:, SIGNALS.index("time_s")] = 0.05 * np.arange(6)
+    rows[:, SIGNALS.index("roll_rad")] = 0.01 * np.arange(6)
+    with FrameLogWriter(file, {"about": about, "columns": SIGNALS}) as log:
+        sink = BlockSink(log)
+        for now_ns in range(0, 300_000_000, 10_000_000):
+            frame = LAYOUT.pack(0x132, bytes(8), Kind.RECEIVED, now_ns)
+            sink.write(frame + LAYOUT.pack(0, b"", Kind.TICK, now_ns), now_ns)
+        sink.flush()
+        log.append(ROWS, _packed(rows))
+    (columns,) = read_signals(file, names=("time_s", "roll_rad")).values()
+    if devices is None:
+        assert "roll_rad" not in columns
+        return
+    np.testing.assert_allclose(columns["time_s"], 0.01 * np.arange(30), atol=1e-12)
+    np.testing.assert_allclose(columns["roll_rad"], 0.01 * (np.arange(30) // 5), atol=1e-12)
+    part = read_signals(file, names=("time_s", "roll_rad"), between_s=(0.1, 0.2))["run"]
+    assert part["roll_rad"][0] == pytest.approx(0.02)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -20,10 +20,11 @@ from utank_hil.base.between import ALWAYS, Between
 from utank_hil.base.whole_file import errors_name, left_whole
 from utank_hil.telemetry.bus_files.log import BusLog, source_of
 from utank_hil.telemetry.bus_logs import LoggedController
-from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
+from utank_hil.telemetry.frame_log import SUFFIX, FrameLog, FrameLogError
 from utank_hil.telemetry.logged_signals import Columns, signal_parts, signal_table
 from utank_hil.telemetry.recording_reader import read_recording
 from utank_hil.telemetry.replay import Entry, entries_of
+from utank_hil.telemetry.run_log import read_run_log
 from utank_hil.telemetry.units import column_of
 
 TABLE_SUFFIXES: Final = (".csv", ".parquet")
@@ -82,13 +83,40 @@ def logged_parts(
     `between_s` counts from the first record.
     """
     if text_files.kind_of(path) == SUFFIX:
-        entries = part_of_entries(entries_of(FrameLog(path).blocks(note)), between_s)
+        log = FrameLog(path)
+        entries = part_of_entries(entries_of(log.blocks(note)), between_s)
+        if _has_bought_devices(log.head):
+            yield from _with_rows(signal_parts(entries), path, between_s)
+            return
     else:
         notes: list[str] = []
         entries = LoggedController(BusLog(path, channel, between_s), notes).entries()
         if note is not None and notes:
             note("; ".join(notes))
     yield from signal_parts(entries)
+
+
+def _has_bought_devices(head: Mapping[str, Any]) -> bool:
+    """Whether frames of other makers, which the catalogue does not decode, are in a log."""
+    configuration = head.get("about", {}).get("configuration")
+    vessel = configuration.get("vessel") if isinstance(configuration, dict) else None
+    return isinstance(vessel, dict) and vessel.get("devices") is not None
+
+
+def _with_rows(parts: Iterable[Columns], path: Path, between_s: Between) -> Iterator[Columns]:
+    """What no frame of the catalogue says, by the telemetry of the run, held between its rows."""
+    try:
+        rows = read_run_log(path).signals
+    except FrameLogError:  # of a bench, whose recording has it
+        yield from parts
+        return
+    times_s = rows["time_s"] - max(between_s[0], 0.0)
+    for part in parts:
+        at = np.searchsorted(times_s, part["time_s"], "right") - 1
+        for name in part.keys() & rows.keys() - {"time_s"}:
+            if np.isnan(part[name]).all():
+                part[name] = np.where(at >= 0, rows[name][at], np.nan)
+        yield part
 
 
 def is_table(path: Path) -> bool:

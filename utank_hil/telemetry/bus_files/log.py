@@ -199,6 +199,8 @@ class BusLog:
             what = f"it begins with {begin[:20]!r}" if begin else "it is empty"
             if self.path.suffix.lower() in (".xlsx", ".xls", ".ods"):
                 what = "it is a spreadsheet: save it as .csv"
+            elif self.path.suffix == ".frames":
+                what = "it is a frame log: utank-hil export makes a .log of it"
             raise BusLogError(
                 f"{self.path}: is no log of the bus, such as {READ}: {what}; a recording is .rrd "
                 "or .frames, a table .csv or .parquet"
