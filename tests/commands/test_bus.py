@@ -32,6 +32,16 @@ def test_the_table_fits_in_80_columns(monkeypatch):
     assert "node 5: operational" in done.stdout
 
 
+def test_the_longest_message_and_a_gap_of_minutes_fit_in_80_columns(monkeypatch, tmp_path):
+    monkeypatch.setenv("COLUMNS", "80")
+    path = tmp_path / "claims.log"
+    claim = "18EEFF80#8000000000000000"
+    path.write_text(f"(10.000000) can0 {claim}\n(128.820000) can0 {claim}\n")
+    (row,) = [line for line in invoke(path).stdout.splitlines() if "18EEFF80" in line]
+    assert row.split()[1::2] == ["18EEFF80", "ADDRESS_CLAIM_CONTROLLER", "CONTROLLER",
+                                 "0.008", "118820", "8"]  # fmt: skip
+
+
 def test_json_is_one_object():
     told = json.loads(invoke(log(), "--json").stdout)
     assert len(told["messages"]) == 26

@@ -111,9 +111,9 @@ def _as_json(census: BusCensus, problems: list[tuple[str, str]]) -> dict[str, An
 
 def _print(census: BusCensus, problems: list[tuple[str, str]], *, compared: bool) -> None:
     console = Terminal()
-    table = new_table(None, "frames/s", "gap ms", "bytes", names=("identifier", "message", "node"))
+    table = new_table(None, "frames/s", "gap ms", "bytes", names=("id", "message", "node"))
     for row in census.rows():
-        figures = f"{row['rate_hz']:.4g}", f"{row['longest_gap_ms']:.4g}"
+        figures = f"{row['rate_hz']:.4g}", f"{row['longest_gap_ms']:.0f}"
         lengths = ",".join(map(str, row["bytes"]))
         table.add_row(row["id"], row["message"], row["node"], *figures, lengths)
     console.table(table)
