@@ -67,6 +67,8 @@ def test_only_a_healthy_node_says_that_the_loop_is_shut(quality):
     heard = line.say(quality=quality)
     assert heard.stop is not usable
     assert heard.heard_ns == (2 if usable else 1)
+    # what a frame said counts once; an open loop, in every tick until it is shut
+    assert [heard.take_stop() for _ in range(3)] == [True, not usable, not usable]
 
 
 def test_a_damaged_frame_says_nothing():

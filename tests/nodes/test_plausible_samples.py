@@ -10,11 +10,12 @@ from controller_bench import CATALOGUE, VESSEL
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.canbus import Frame, Quality, SensorMotion, SensorTank
+from utank_hil.canbus import Frame, Quality, SensorMotion, SensorTank, Switch
 from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.device import ProfiledDevice
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.control import DesignPlant
+from utank_hil.nodes.levels_heard import LevelsHeard
 from utank_hil.nodes.plausibility import LevelGates, MotionSensor, SampleClock, SpikeGate
 from utank_hil.safety.monitors.thresholds import SensorFigures, thresholds_of
 
@@ -154,3 +155,11 @@ def test_the_time_of_a_sample_is_its_receipt_or_what_its_counter_says():
     assert [after - before for before, after in pairwise(times)] == [60, 20, 20, 60]
     source.lost += 2
     assert clock.time_ns(1120 * MS) // MS - times[-1] == 60
+
+
+@pytest.mark.parametrize(("thresholds", "kept_m", "discarded"), [(APART, 1.0, 1), (None, 32.0, 0)])
+def test_levels_that_jump_are_discarded_where_there_are_thresholds(thresholds, kept_m, discarded):
+    heard = LevelsHeard(CATALOGUE.receiver(SensorTank), 100.0, thresholds)
+    for level_m in (1.0, 32.0):
+        heard.take(SensorTank(level_m, -level_m, Switch.OFF, Switch.OFF, Quality.GOOD), S)
+    assert (heard.port_m, heard.starboard_m, heard.discarded) == (kept_m, -kept_m, discarded)

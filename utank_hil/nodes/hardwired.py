@@ -28,7 +28,7 @@ class HardwiredHeard:
     def accept(self, frame: Frame) -> HardwiredInputs | None:
         """Return the message of a frame, None if it is rejected; hear its stop."""
         inputs = self.receiver.accept(frame)
-        heard = inputs or self.receiver.intact(frame)
+        heard = self.receiver.intact(frame)
         if heard is not None and heard.stop_loop is not _OFF:
             self.stop = self._stop_heard = True
         return inputs
