@@ -69,6 +69,29 @@ def test_a_frame_of_the_station_that_watches_arms_nothing_in_its_tick():
     assert (wishes.armed, wishes.arm_edge) == (False, False)
 
 
+def test_a_station_that_is_switched_on_does_not_disarm():
+    bench = Bench()
+    bench.drive_at(20e3)
+    bench.second = IDLE
+    bench.run(1000)
+    assert bench.node.mode is Mode.ACTIVE
+
+
+def test_a_stop_before_any_accepted_frame_is_one():
+    orders = Bench().node.inbox.stations.orders[Station.OPERATOR]
+    orders.overhear(IDLE._replace(stop=True, arm=True, mode_request=Mode.ACTIVE))
+    assert orders.take() == (False, True, False, False, False)
+
+
+@pytest.mark.parametrize(("redundancy", "accepted"), [(SECOND, 1), (Redundancy(), 0)])
+def test_a_station_that_is_not_declared_accepts_no_alarm(redundancy, accepted):
+    bench = Bench(redundancy)
+    bench.second = IDLE
+    bench.run(400)
+    bench.second_is(acknowledge=True)
+    assert len(bench.node.inbox.stations.take_accepted()) == accepted
+
+
 @pytest.mark.parametrize("taken", [False, True])
 def test_stop_counts_from_any_station(taken):
     for first in (False, True):

