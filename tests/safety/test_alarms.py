@@ -504,3 +504,11 @@ def test_what_refused_an_arming_is_an_alarm_as_long_as_it_would_refuse_another()
     bench.node.commissioned = True
     bench.run(11_000)
     assert [event.state for event in bench.told] == [ACTIVE, RECTIFIED]
+
+
+def test_an_alarm_is_raised_254_times_at_most_that_fit_its_byte():
+    """255 is what is not available."""
+    alarms = AlarmList()
+    for times in range(1, 300):
+        alarms.raise_anew(Fault.ROLL_AMPLIFIED, Mode.ACTIVE, 0)
+        assert alarms.next_message(0)[4] == min(times, 254)
