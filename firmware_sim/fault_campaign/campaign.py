@@ -73,7 +73,6 @@ class Setup(Section):
     #: displacement_n, least_gm_m: values that replace the vessel's.
     displacement_n: Positive | None = None
     least_gm_m: Positive | None = None
-    level_noise_m: Positive | None = None  #: Of its gauges, and of their figures.
     sea_estimate: EstimateSettings | None = None  #: Settings that replace the controller's.
     devices: DevicesSection | None = None  #: Devices that replace the vessel's.
     delay_s: Positive | None = None  #: Delay that the law is made for, instead of its own.
@@ -90,15 +89,11 @@ class Setup(Section):
             **self._given("least_gm_m", "devices"),
         }
         vessel = own.model_copy(update=changed)
-        noise = self._given("level_noise_m")
         changed = {"vessel": vessel, **self._given("sea_estimate", "delay_s")}
         controllers = {
-            name: config.model_copy(update=changed | {"sensors": replace(config.sensors, **noise)})
-            for name, config in scenario.controllers.items()
+            name: config.model_copy(update=changed) for name, config in scenario.controllers.items()
         }
-        sensors = replace(scenario.sensors, **noise)
-        changed = {"vessel": vessel, "sensors": sensors, "controllers": controllers}
-        return scenario.model_copy(update=changed)
+        return scenario.model_copy(update={"vessel": vessel, "controllers": controllers})
 
     def _given(self, *names: str) -> dict[str, Any]:
         return {name: value for name in names if (value := getattr(self, name)) is not None}
