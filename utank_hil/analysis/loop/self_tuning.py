@@ -14,10 +14,10 @@ The remaining choice is how far the law trusts ship and sea. The added noise of 
 least that makes it stable on all ships of the grid, times `_MORE_NOISE`. A filter on its
 innovations then gives it the least cost in the expected sea under the robustness requirements, a
 convex problem (`innovation_filter`). Where that misses a margin, the next greater weight on
-pressure is tried; where it does there, too, the law without it is taken. On an identified ship a
-Kalman filter without the added noise predicts the waves for the plan at the limits. On another load
-that swings the water from limit to limit, so there the plan takes the robust law's estimate, and
-stays within `_LEEWAY` of what that law commands.
+pressure is tried, and of that law and the one without a filter the one of less predicted roll is
+taken. On an identified ship a Kalman filter without the added noise predicts the waves for the plan
+at the limits. On another load that swings the water from limit to limit, so there the plan takes
+the robust law's estimate, and stays within `_LEEWAY` of what that law commands.
 """
 
 import math
@@ -131,7 +131,7 @@ def self_tuned(
     law has the margins, or the sea does not roll the ship.
     """
     search, gentlest_w = _Search(plant, sea, sample_time_s, loads_peak), math.inf
-    first, plain = search.least_cost(), list[SelfTuned]()
+    first, within = search.least_cost(), list[SelfTuned]()
     for power in range(_MOST_STEPS + 1):
         found = search.best(first * _COSTLIER**power)
         if found is None:
@@ -139,13 +139,11 @@ def self_tuned(
         if found.prediction.power_w > mean_power_w:
             gentlest_w = found.prediction.power_w
             continue
-        if found.filtered:
-            return found
-        plain.append(found)
-        if len(plain) > 1:
-            break
-    if plain:
-        return min(plain, key=lambda each: each.prediction.roll_rad)
+        within.append(found)
+        if found.filtered or len(within) > 1:
+            return min(within, key=lambda each: each.prediction.roll_rad)
+    if within:
+        return within[0]
     if gentlest_w == math.inf:
         raise NoLawError("no constrained law has all margins on this ship: choose another tank")
     raise NoLawError(
