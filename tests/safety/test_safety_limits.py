@@ -62,6 +62,7 @@ def test_no_threshold_is_beyond_what_switches_a_protection_off(name):
 def test_no_noise_is_so_great_that_the_monitors_are_as_good_as_switched_off(name, most):
     """Degrees in the place of radians: a wrong sign of the rate took a minute to be found."""
     assert getattr(SensorFigures(**{name: most}), name) == most
-    for value in (0, math.nextafter(most, math.inf), math.nan):
+    usual = getattr(SensorFigures(), name)  # a thousandth of it is a figure in another unit
+    for value in (0, 1e-3 * usual, math.nextafter(most, math.inf), math.nan):
         with pytest.raises(ValueError, match=name):
             SensorFigures(**{name: value})

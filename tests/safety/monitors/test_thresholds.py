@@ -100,9 +100,10 @@ def test_degraded_is_half_of_what_takes_her_to_her_roll_limit():
 def test_sensors_are_as_their_makers_say_within_their_ranges():
     assert astuple(SensorFigures()) == (2e-4, 5e-4, 0.005)
     assert astuple(SensorFigures(2e-3, 1e-2, 0.05)) == (2e-3, 1e-2, 0.05)
-    least = (1e-9, 1e-9, 1e-9)
+    least = (1e-6, 1e-6, 1e-4)
     assert astuple(SensorFigures(*least)) == least
-    for figures in ((2.1e-3, 5e-4, 5e-3), (2e-4, 1.05e-2, 5e-3), (2e-4, 5e-4, 0.051)):
+    below = ((9e-7, 5e-4, 5e-3), (2e-4, 9e-7, 5e-3), (2e-4, 5e-4, 9e-5))
+    for figures in (*below, (2.1e-3, 5e-4, 5e-3), (2e-4, 1.05e-2, 5e-3), (2e-4, 5e-4, 0.051)):
         with pytest.raises(ValueError, match="must be"):
             SensorFigures(*figures)
     for index in range(3):

@@ -36,13 +36,16 @@ class SensorFigures:
     """Noise of the sensors as their makers state it, standard deviations of one sample.
 
     Ten to twenty times the default at most, at which wrong signs are still found within seconds.
+    Below the least, a figure is in another unit.
 
     Raises `ValueError` if a figure is out of its range.
     """
 
-    roll_noise_rad: Annotated[float, Range(above=0, most=2e-3)] = 2e-4  #: Noise of the roll.
-    roll_rate_noise_rad_s: Annotated[float, Range(above=0, most=1e-2)] = 5e-4  #: Noise of its rate.
-    level_noise_m: Annotated[float, Range(above=0, most=0.05)] = 0.005  #: Noise of a level gauge.
+    roll_noise_rad: Annotated[float, Range(least=1e-6, most=2e-3)] = 2e-4  #: Noise of the roll.
+    #: Noise of its rate.
+    roll_rate_noise_rad_s: Annotated[float, Range(least=1e-6, most=1e-2)] = 5e-4
+    #: Noise of a level gauge.
+    level_noise_m: Annotated[float, Range(least=1e-4, most=0.05)] = 0.005
 
     def __post_init__(self) -> None:
         refuse("sensors", range_problems(self))
