@@ -27,10 +27,7 @@ _MODE_BITS: Final = sum({1 << each.number - 1 for each in drive_plan.MODES.value
 
 
 class CanopenPumpDrive(CanopenNode):
-    """The drive of a ship's file on the plant's pump.
-
-    Rotor and water are those of `dynamics.pump`, and the plant gets the pressure.
-    """
+    """The drive of a ship's file on the plant's pump, with the rotor of `dynamics.pump`."""
 
     name = "drive"
     period_ns = TICK_NS

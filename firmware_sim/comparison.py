@@ -186,10 +186,7 @@ class Record:
 
 
 def read_record(path: Path) -> Record:
-    """Read a recording, a log of the bus or a table.
-
-    Raises `ValueError` if the file is none of these, or has no roll, or times that do not rise.
-    """
+    """Read a recording, bus log or table; `ValueError` for others, no roll, or times that fall."""
     runs = read_signals(path)
     for columns in runs.values():
         require(path, columns, "time_s", "roll_rad")

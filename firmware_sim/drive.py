@@ -120,10 +120,7 @@ ROUNDING_PA = 4.0
 
 
 class PumpDrive:
-    """Pump drive with CiA 402 states.
-
-    `configuration_version` is sent in the heartbeat; the controller compares it with its own.
-    """
+    """Pump drive with CiA 402 states; its heartbeat has `configuration_version`."""
 
     name = "drive"
     period_ns = TICK_NS

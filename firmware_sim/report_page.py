@@ -92,11 +92,7 @@ def bench_page(
 
 
 def read_bench(folder: Path) -> Report:
-    """Return the page of a bench from its files.
-
-    Raises `OSError, ValueError` if a file is missing or invalid, and `KeyError` if it is of another
-    version.
-    """
+    """The page of a bench; `OSError, ValueError` for bad files, `KeyError` for other versions."""
     content = json.loads((folder / FIGURES).read_text(encoding="utf-8"))
     try:
         found = TypeAdapter(BenchFigures).validate_python(content)

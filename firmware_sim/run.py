@@ -230,10 +230,7 @@ def frame_log(job: Job, desks: Tapped, block_ns: int) -> Iterator[Tap]:
 
 
 def run_lockstep(job: Job, watch: Watch | None = None) -> Run:
-    """Run in simulated time, with the scenario's faults unless the run is passive.
-
-    The same job gives the same rows, bit for bit.
-    """
+    """Run in simulated time, the passive run without faults: same job, same rows, bit for bit."""
     retuner, estimating = (work and SimulatedRetuner(work[0]) for work in works_of(job.controller))
     desks = Tapped(retuner, estimating, wanted=job.frames is not None)
     log, truth_log, bench = job.log_of(SIGNALS), job.log_of(TRUTH), None

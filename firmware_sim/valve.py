@@ -43,10 +43,7 @@ _AT_END: Final = 1e-3
 
 
 class ValveNode:
-    """Valve with its actuator.
-
-    `configuration_version` is sent in the heartbeat; the controller compares it with its own.
-    """
+    """Valve with its actuator; its heartbeat has `configuration_version`."""
 
     name = "valve"
     period_ns = TICK_NS

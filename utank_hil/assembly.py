@@ -84,10 +84,7 @@ _GETTERS: Final[dict[str, _Get]] = {
 
 
 def measure_of(names: tuple[str, ...]) -> Measure:
-    """Function that picks the named signals as a measurement vector, shape (m,).
-
-    Raises `ValueError` if a law can't measure one of them.
-    """
+    """Picks the named signals as a vector, shape (m,); `ValueError` if no law can measure one."""
     for name in names:
         if name not in _GETTERS:
             raise ValueError(f"no measurement {name!r}; there are {', '.join(_GETTERS)}")

@@ -224,10 +224,7 @@ class Batch:
 
 
 def run_batch(batch: Batch) -> list[Row]:
-    """Return the rows of all cases; a failed case gives one row with the reason.
-
-    Raises `OtherCodeError` if the code is not that of the campaign any more.
-    """
+    """Rows of all cases, one with the reason for a failed one; `OtherCodeError` for other code."""
     if code_digest() != batch.code:
         raise OtherCodeError(
             "the code has changed since the campaign began: begin it anew in another folder"

@@ -19,10 +19,7 @@ SeaOption = Annotated[
 
 
 def sea_of(path: Path, vessel: Vessel) -> "tuple[Scenario, Harmonics]":
-    """Scenario of the vessel, and the roll moment of its sea in N m.
-
-    One of another ship gives its sea alone.
-    """
+    """Scenario of the vessel, and its sea's moment in N m; of another ship the sea alone."""
     from utank_hil.analysis.loop.sea_response import CalmSeaError
 
     scenario = common.load(path, Scenario, allow_code=True)  # laws are not built from it

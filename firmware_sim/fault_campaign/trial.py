@@ -305,10 +305,7 @@ def _rolls(plant: Plant, begin_ns: int, end_ns: int, step_ns: int = SAMPLE_NS) -
 
 
 def times_of(row: Row, watch: Watch, log: BusLog, start_ns: int) -> dict[str, Any]:
-    """Times in `Outcome` of a row whose fault began at `start_ns`.
-
-    Earlier detection counts as in time.
-    """
+    """Times in `Outcome` of a row whose fault began at `start_ns`; earlier counts as in time."""
     begin_ns = start_ns
     if row.fault.from_start:
         begin_ns = watch.first_ns.get("active", start_ns)

@@ -244,10 +244,7 @@ def as_json(
 
 
 def table(rows: Sequence[Verdict], seeds: int) -> Table:
-    """Table with two lines a row, what was found above what is asked for.
-
-    A row that lacks some of the seeds says how many it has.
-    """
+    """Table with two lines a row, found above asked; a row tells where it lacks seeds."""
     caption = (
         "worst of the seeds; times after the fault, ≤ their limits; zero: of the drive's "
         "set-point, or the end of the valve's following; variance of the roll over that of the "

@@ -177,10 +177,7 @@ class Late(SignalFault):
 
 
 def value_of(hint: Any, written: float | bool | str | None) -> Any:
-    """Signal's value from its configuration: a number, a name of its table, or None.
-
-    Raises `ValueError` if the signal cannot have this value.
-    """
+    """Signal's value by a number, a name of its table, or None; `ValueError` if it can't be."""
     kind = field_kind(hint)
     if isinstance(written, str):
         members = getattr(kind, "__members__", {})

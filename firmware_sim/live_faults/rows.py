@@ -82,10 +82,7 @@ ROWS: Final = {
 
 @contextmanager
 def in_charge(bus: str) -> Iterator[LiveBench]:
-    """Yield a bench with its controller in charge, after several starts if needed.
-
-    Raises `LiveError` if no start succeeded.
-    """
+    """Yield a bench with its controller in charge, or `LiveError` after several starts."""
     for start in range(1, STARTS + 1):
         with (
             tempfile.TemporaryDirectory() as folder,
@@ -103,10 +100,7 @@ def in_charge(bus: str) -> Iterator[LiveBench]:
 
 
 def run_live(row: LiveRow, bus: str) -> tuple[list[str], LiveTimes]:
-    """Run a row on an interface; return its problems, none where it passed, and the times.
-
-    Raises `OSError` if the interface cannot be used.
-    """
+    """Run a row on an interface; return its problems, none where it passed, and the times."""
     for attempt in range(1, ATTEMPTS + 1):
         problems, times = attempted(row, bus)
         if not problems or times.held_up_ms <= 1e3 * HELD_UP_S:

@@ -64,10 +64,7 @@ class TankImpossibleError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class TankRoom:
-    """Room for a U-tube tank across the ship.
-
-    Raises `ValueError` if a length is not positive.
-    """
+    """Room for a U-tube tank across the ship; `ValueError` if a length is not positive."""
 
     breadth_m: Positive  #: Across the ship, between the outer walls of the reservoirs.
     height_m: Positive  #: From the duct's bottom to the reservoirs' roof.

@@ -124,10 +124,7 @@ def _given(value: Any) -> Any:
 
 
 def _plain(value: Any, folder: Path, files: dict[str, Path]) -> Any:
-    """A value as a file in a folder can hold it, and the `files` in it.
-
-    Keys at infinity are left out, which says the same.
-    """
+    """A value as a file in a folder can hold it, without keys at infinity, and its `files`."""
     if isinstance(value, Mapping):
         return {
             name: _plain(each, folder, files)

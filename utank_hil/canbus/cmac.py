@@ -28,10 +28,7 @@ class KeyFileError(OSError):
 
 
 def read_key(file: Path) -> bytes:
-    """The key in a file of 32 hexadecimal digits that only its owner may read.
-
-    KeyFileError names file and remedy.
-    """
+    """A file's key, 32 hexadecimal digits that only its owner may read; KeyFileError tells more."""
 
     def refused(reason: str) -> KeyFileError:
         return KeyFileError(errno.EACCES, reason, str(file))

@@ -320,10 +320,7 @@ class DeviceSection(CanopenSection):
     def plan(
         self, kind: type[tuple[Any, ...]], name: str, bus: int, *, silent: bool = False
     ) -> DevicePlan[Any]:
-        """The device as the inbox hears it, on the interface of this number.
-
-        Nothing is sent to it on a `silent` interface.
-        """
+        """The device as the inbox hears it on an interface; nothing is sent on a `silent` one."""
         assert self.age_ms is not None
         cycle_ms, guards, claim = self.period_ms(), self.protection, None
         steps = () if silent or self.canopen_profile is None else tuple(self._steps())

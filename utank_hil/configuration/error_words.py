@@ -132,10 +132,7 @@ _LONGEST = 60  #: Characters of a value that fit on a line.
 
 
 def words_for(error: Any, model: type[BaseModel]) -> str:
-    """Describe an error of validation, one of `ValidationError.errors`, for the reader of a file.
-
-    `model` is that of the whole configuration.
-    """
+    """Describe an error of `ValidationError.errors` of the whole configuration, a `model`."""
     kind, value, context = error["type"], error["input"], error.get("ctx", {})
     if kind == "missing":
         *parents, key = error["loc"]

@@ -99,10 +99,7 @@ def located(error: ParameterError, path: Path | str, key: str = "") -> ConfigErr
 
 
 def files_named(path: Path | str) -> dict[Key, Path]:
-    """Return the files that a configuration file names, by the keys of their content.
-
-    ConfigError is raised if one of them can't be read.
-    """
+    """Files that a configuration names, by keys; ConfigError if one can't be read."""
     reader = _Reader(path)
     if reader.problems:
         raise ConfigError(reader.problems)

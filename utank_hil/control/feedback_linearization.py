@@ -116,10 +116,7 @@ class FeedbackLinearization(FeedbackLinearizationDesign):
             refuse("feedback linearization", [("shift_rad_m", reason)])
 
     def pressure_pa(self, state: FloatArray, target_rad: float = 0.0) -> float:
-        """Linearizing pressure, before reduction, for a target of the output.
-
-        `state` is roll, roll rate, level and level rate, shape (4,).
-        """
+        """Linearizing pressure, before reduction, for a target of the output and `STATES`."""
         _, phi_ddot, _, h_ddot = self.model.derivative(state).tolist()  # without the pump
         output, rate, drift = self._output(state.tolist(), phi_ddot, h_ddot)
         w = self.frequency_rad_s
@@ -163,10 +160,7 @@ class FeedbackLinearization(FeedbackLinearizationDesign):
 
 
 def level_brake(model: RollModel, damping_ratio: float) -> float:
-    """Pump pressure per level rate, in Pa s/m, against the flow, that damps the zero dynamics.
-
-    `damping_ratio` is the resulting zeta_h.
-    """
+    """Pressure per level rate, in Pa s/m, against the flow, that gives the zero dynamics zeta_h."""
     c, tank = model.coefficients, model.tank
     frequency = math.sqrt(GRAVITY_M_S2 / (tank.height_m + tank.lz_m))
     inertia = (c.inertia * c.level_inertia - c.coupling * c.coupling) / (c.inertia * c.area)

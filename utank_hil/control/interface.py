@@ -214,17 +214,11 @@ class BuiltLaw:
 
 
 class LawDesign(Protocol):
-    """Parameters of a law: a frozen dataclass that a configuration file can hold.
-
-    Its field `kind` is a ``Literal`` of the names by which a file selects it.
-    """
+    """Parameters of a law: a frozen dataclass that files select by ``Literal`` names, `kind`."""
 
     @property
     def kind(self) -> Any:
         """Name of the law in a configuration file."""
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
-        """Design the law for a plant.
-
-        ValueError is raised if a parameter does not suit the plant; a `ParameterError` names it.
-        """
+        """Design the law; ValueError if a parameter does not suit, named by a `ParameterError`."""

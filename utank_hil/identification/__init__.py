@@ -1,7 +1,4 @@
-"""Identification of ship and tank from recorded inputs and outputs.
-
-No CAN, clocks or files: arrays in, models out.
-"""
+"""Identification of ship and tank from records: arrays in, models out; no CAN, clocks or files."""
 
 from utank_hil.identification.disturbance import disturbance_basis as disturbance_basis
 from utank_hil.identification.disturbance import (

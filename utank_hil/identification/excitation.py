@@ -51,10 +51,7 @@ def random_pulses(
 def prbs(
     duration_s: float, limits: PumpLimits, seed: int, clock_s: float = 1.0, *, sample_time_s: float
 ) -> FloatArray:
-    """Pseudo-random binary signal of full pressure, with a random sign every `clock_s`.
-
-    Parameters, result and errors as `random_pulses`.
-    """
+    """Pseudo-random binary signal: a random sign every `clock_s`; else as `random_pulses`."""
     samples = _samples(duration_s, sample_time_s)
     clock = _samples(clock_s, sample_time_s)
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], samples // clock + 1)
@@ -97,10 +94,7 @@ def chirp(
     *,
     sample_time_s: float,
 ) -> FloatArray:
-    """Linear chirp: a sine with a frequency that rises from one end of a band to the other.
-
-    Result and errors are those of `multisine`.
-    """
+    """Linear chirp: a sine that rises from one end of a band to the other; see `multisine`."""
     low, high = _band(band_rad_s, sample_time_s)
     times_s = [k * sample_time_s for k in range(_samples(duration_s, sample_time_s))]
     rise = 0.5 * (high - low) / duration_s

@@ -189,10 +189,7 @@ class Fit:
 
 
 def fit(regression: LagRegression) -> Fit:
-    """Return the least-squares solution, of minimum norm if it is not unique.
-
-    IdentificationError is raised if there are no more rows than columns.
-    """
+    """Solve, with minimum norm; IdentificationError if there are no more rows than columns."""
     if regression.rows <= regression.columns:
         raise IdentificationError(
             f"{regression.rows} usable rows cannot determine {regression.columns} coefficients "

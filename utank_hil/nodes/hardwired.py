@@ -14,11 +14,7 @@ _OFF: Final = Switch.OFF
 
 
 class HardwiredHeard:
-    """What HARDWIRED_INPUTS says.
-
-    `stop` says whether the stop loop is open or broken, `high_level` whether a switch is closed or
-    broken.
-    """
+    """HARDWIRED_INPUTS: `stop` loop open or broken, `high_level` switch closed or broken."""
 
     def __init__(self, receiver: Receiver[HardwiredInputs]) -> None:
         self.receiver = receiver

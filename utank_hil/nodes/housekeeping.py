@@ -9,11 +9,7 @@ NANOSECONDS = 1e-9
 
 
 class Housekeeping:
-    """Address claim and heartbeat of one node.
-
-    `configuration_version` is the hash of the configuration, to be equal on all nodes before
-    arming.
-    """
+    """Address claim and heartbeat of a node; all must have one `configuration_version` to arm."""
 
     def __init__(self, address: Address, catalogue: Catalogue, configuration_version: int) -> None:
         self._claim = catalogue.transmitter(AddressClaim, address)

@@ -285,10 +285,7 @@ def answer_bytes(answer: Answer) -> bytes:
 
 
 def read_answer(data: bytes) -> Answer:
-    """Decode what `answer_bytes` encoded.
-
-    Raises `ValueError` if `data` is anything else.
-    """
+    """Decode what `answer_bytes` encoded; `ValueError` for anything else."""
     try:
         message: _Message = _DECODER.decode(data)
     except RecursionError as error:

@@ -23,10 +23,7 @@ NOISE_FLOOR: Final = WindowStatistics(1e-4, 100.0, 100.0)
 
 
 class MovingWindow:
-    """Roll and pressure of the latest `length` samples, as running sums.
-
-    `samples` counts from the start or the last `clear`.
-    """
+    """Sums of roll and pressure of the latest `length` samples; `samples` counts since `clear`."""
 
     def __init__(self, samples: int) -> None:
         self._length = samples

@@ -23,10 +23,7 @@ _MOST: Final = 4096  #: A plant turns each of them at each tick.
 
 
 def read_components(file: Path, heading_rad: float = BEAM_RAD) -> Sea:
-    """Read the waves of a file; `heading_rad` is that of all where the file has none.
-
-    ValueError names the line or the column, and the remedy.
-    """
+    """Read waves, `heading_rad` where the file has none; ValueError names place and remedy."""
     try:
         columns = read_number_table(file)
     except OSError as error:

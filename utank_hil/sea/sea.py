@@ -206,11 +206,7 @@ class Sea:
     def roll_moment(
         self, stiffness_nm_rad: float, effective_slope: EffectiveSlope | None = None
     ) -> Harmonics:
-        """Wave moment on roll in N m.
-
-        `stiffness_nm_rad` is the restoring stiffness k1 of the ship; by default the effective slope
-        is the true one.
-        """
+        """Wave moment on roll in N m, of the ship's stiffness; by default of the true slope."""
         slope = effective_slope or EffectiveSlope()
         moment = slope.moment(self.omega_rad_s, self.heading_rad, stiffness_nm_rad)
         return self.harmonics(self.amplitude_m * moment)

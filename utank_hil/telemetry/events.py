@@ -1,7 +1,4 @@
-"""The ring of events of retuning and alarms: a record is the JSON text of one event.
-
-A write takes some twenty microseconds.
-"""
+"""The ring of events of retuning and alarms, as JSON; a write takes some twenty microseconds."""
 
 import json
 from dataclasses import asdict, replace

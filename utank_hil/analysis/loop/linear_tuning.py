@@ -126,10 +126,7 @@ def scaled_law(
 def first_law(
     plant: DesignPlant, slope_rad: float, peak_rad_s: float, kind: LinearKind = "lqg"
 ) -> LinearDesign:
-    """Find the law of `scaled_law` with the greatest weights at which it has the required margins.
-
-    Raises `NoLawError` if no weights do.
-    """
+    """Law of `scaled_law` with the greatest weights that keep all margins, else `NoLawError`."""
     design = scaled_law(kind, plant, slope_rad, peak_rad_s)
     failures: tuple[str, ...] = ()
     for trial in range(MOST_TRIALS):
@@ -183,10 +180,7 @@ class AutoDesign:
     sea: SeaModel | None = None
 
     def tuned(self, plant: DesignPlant) -> LinearDesign:
-        """Numbers of the law for a plant.
-
-        Raises `NoLawError` as `auto_tuned`.
-        """
+        """Numbers of the law for a plant, or `NoLawError` as of `auto_tuned`."""
         return auto_tuned(self.kind, plant, self.sea or unknown_sea(plant.ship))[1]
 
     def build(self, plant: DesignPlant) -> BuiltLaw:

@@ -266,10 +266,7 @@ class _Search:
         return costlier
 
     def best(self, costlier: float) -> SelfTuned | None:
-        """The law of least predicted cost with all margins, or None.
-
-        `costlier` is a factor on the scaled weight of the pressure.
-        """
+        """Law of least predicted cost with all margins, or None; `costlier` scales pressure."""
         noise = _MORE_NOISE * self._least_noise(costlier)
         for _ in range(_MORE_NOISES):
             design = self._design(noise, costlier)

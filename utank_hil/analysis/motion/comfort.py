@@ -169,10 +169,7 @@ def apparent_gravity(
     height_m: float,
     starboard_m: float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
-    """Lateral and vertical apparent gravity, by the equation of the module docstring.
-
-    Arguments as for `comfort`; both results in m/s^2, shape (n,).
-    """
+    """Lateral and vertical apparent gravity of the module's equation, m/s^2, as of `comfort`."""
     acceleration = np.gradient(roll_rate_rad_s, step_s)
     square = np.square(roll_rate_rad_s)
     lateral = GRAVITY_M_S2 * np.sin(roll_rad) - height_m * acceleration + starboard_m * square

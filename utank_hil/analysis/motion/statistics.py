@@ -37,10 +37,7 @@ def significant_amplitude(signal: FloatArray) -> float | None:
 
 
 def roll_statistics(roll_rad: FloatArray) -> RollStatistics:
-    """Statistics of a roll record, shape (n,).
-
-    Raises `ValueError` if the record is empty.
-    """
+    """Statistics of a roll record, shape (n,); `ValueError` if it is empty."""
     if roll_rad.size == 0:
         raise ValueError("roll record is empty: run longer than the time left out at its start")
     return RollStatistics(

@@ -91,10 +91,7 @@ class GuardPart:
 
 
 def guard_parts(foreign: ForeignDevices) -> tuple[GuardPart, ...]:
-    """Return the rows of all devices.
-
-    ValueError is raised with each device that the guard can't judge, and why.
-    """
+    """Return the rows of all devices; ValueError names each that can't be judged, and why."""
     plans = _plans(foreign)
     problems = [
         f"devices.{plan.name} {reason}"

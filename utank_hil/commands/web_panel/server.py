@@ -89,10 +89,7 @@ class PageServer(ThreadingHTTPServer):
         self.shutdown()
 
     def next_state(self, number: int) -> tuple[int, bytes]:
-        """Wait for a state after that of a number; return its number and its JSON.
-
-        TimeoutError is raised if none comes.
-        """
+        """Wait for the state after a number; return its number and JSON, or raise TimeoutError."""
         with self._changed:
             if not self._changed.wait_for(lambda: self.number > number, _PATIENCE_S):
                 raise TimeoutError

@@ -58,10 +58,7 @@ def read_hull(path: Path, given: Given | None = None) -> HullData:
 
 
 def completed(hull: HullData, given: Given) -> HullData:
-    """Return a hull with what a user knows besides, where it lacks that.
-
-    `ValueError` is raised where the hull has another figure.
-    """
+    """Return a hull with what a user knows where it lacks that; `ValueError` where it differs."""
     mass = hull.mass_kg if given.mass_kg is None else given.mass_kg
     inertia = None
     if given.gyration_m is not None:

@@ -138,10 +138,7 @@ class ConstrainedLaw:
         )
 
     def previewed(self, least_ahead_s: float = 0.0) -> "ConstrainedLaw":
-        """Return the law that takes forecasts of the waves, of `least_ahead_s` or more.
-
-        ValueError is raised if the law has no model of the waves.
-        """
+        """The law that takes forecasts of waves; ValueError if it has no model of them."""
         from scipy.linalg import block_diag
 
         if self.waves is None:
@@ -364,10 +361,7 @@ class ConstrainedController:
         return product(self._interpolation, plan) + steady_pa
 
     def _rises_too_far(self, state: FloatArray, plan: FloatArray) -> float:
-        """Rise of the level to starboard in the next sample where a plan passes the level's limit.
-
-        Zero where it does not: then nothing has to be braked.
-        """
+        """Rise to starboard in the next sample beyond the level's limit; zero if it is within."""
         levels = product(self._levels_state, state) + product(self._levels_plan, plan)
         if float(np.abs(levels).max()) <= self._programme.level_m:
             return 0.0

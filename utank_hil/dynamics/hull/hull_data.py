@@ -227,10 +227,7 @@ def wave_number(omega_rad_s: FloatArray, depth_m: float, gravity_m_s2: float) ->
 
 
 def radiation_at(hull: HullData, omega_rad_s: float) -> tuple[FloatArray, FloatArray]:
-    """Return added mass and damping, shape (6, 6), between the frequencies of the data.
-
-    ValueError is raised if the frequency lies outside of the data.
-    """
+    """Added mass and damping, shape (6, 6), interpolated; ValueError outside of the data."""
     grid = hull.frequency_rad_s
     _inside(hull, "frequency_rad_s", grid, omega_rad_s)
     return _between(grid, hull.added_mass, omega_rad_s), _between(grid, hull.damping, omega_rad_s)

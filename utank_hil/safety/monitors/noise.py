@@ -40,10 +40,7 @@ class Noise:
 
 
 class SecondDifference:
-    """What three samples in a row leave of a signal that is smooth.
-
-    White noise of deviation s leaves sqrt(6) s.
-    """
+    """What three samples in a row leave of a smooth signal; white noise s leaves sqrt(6) s."""
 
     def __init__(self) -> None:
         self.restart()
