@@ -10,7 +10,12 @@ import pytest
 
 from utank_hil.analysis.loop.innovation_filter import InnovationFilter
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
-from utank_hil.analysis.loop.margins import closed_loop_radius, of_period, robustness
+from utank_hil.analysis.loop.margins import (
+    closed_loop_eigenvalues,
+    closed_loop_radius,
+    of_period,
+    robustness,
+)
 from utank_hil.analysis.loop.sea_response import at_its_motion, at_work, moment_of, motion_in_sea
 from utank_hil.analysis.loop.self_tuning import (
     CLIPPED_PEAK,
@@ -207,6 +212,27 @@ def test_a_first_law_keeps_its_damping_on_other_loads_with_the_pump_at_its_limit
     assert radius(first.unlimited()) < 1
     of_one_load = self_tuned(PLANT, unknown_sea(PLANT.ship)).law.unlimited()
     assert radius(of_one_load) > 1.001  # a limit cycle at 1.3
+
+
+@pytest.mark.parametrize("name", ["self_tuning", "naval_self_tuning", "patti_b_self_tuning"])
+def test_with_any_share_of_the_pressure_a_first_law_damps_the_passive_ships_motions(name):
+    config = load_config(CONTROLLERS / f"{name}.yaml", ControllerConfig)
+    plant, law = config.plant, config.law.tuned(config.design_plant, first=True).law
+    linear, step_s = law.unlimited(), law.sample_time_s
+    gains = np.vstack([linear.gain, law.gentler])
+
+    def least_damping_1_s(model, gain):
+        """Of the motions faster than the changes of a heel."""
+        less = LQGLaw(linear.model, gain[None], linear.observer_gain)
+        poles = np.log(closed_loop_eigenvalues(less, model, 1.0).astype(complex)) / step_s
+        w = plant.ship.natural_frequency_rad_s
+        return -max(pole.real for pole in poles if 0.5 * w < abs(pole.imag) < 3 * w)
+
+    model = sample(pump_model(plant.ship, plant.tank, MEASURED), step_s, plant.delay_s, plant.lag_s)
+    passive = least_damping_1_s(model, 0 * gains[0])
+    for lower, upper in itertools.pairwise(gains):
+        for part in (0.0, 0.3, 0.5, 0.7, 1.0):
+            assert least_damping_1_s(model, part * upper + (1 - part) * lower) > passive
 
 
 def test_a_first_law_expects_no_sea_in_particular_whatever_its_section_says():

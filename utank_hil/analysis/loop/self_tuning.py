@@ -279,8 +279,9 @@ class _Search:
                     if not (bears := self._bears_shares(linear)):
                         continue
                     judged = robustness(linear, self._plant, _MEASURED, with_delay_margin=False)
-                    if not judged.failures():
-                        law = self._planned(search, design, linear, costlier)
+                    if judged.failures():
+                        continue
+                    if law := self._planned(search, design, linear, costlier):
                         prediction = search.prediction(linear)
                         filtered = linear is not start
                         return SelfTuned(design, law, filtered, judged, self._roll_rad, prediction)
@@ -291,14 +292,18 @@ class _Search:
 
     def _planned(
         self, search: InnovationFilter, design: ConstrainedDesign, linear: LQGLaw, costlier: float
-    ) -> ConstrainedLaw:
-        """The law that plans at the limits, and within them commands what the linear law does."""
+    ) -> ConstrainedLaw | None:
+        """The law that plans at the limits, and within them commands what the linear law does.
+
+        None if it is for a ship loaded otherwise and with less pressure misses a margin.
+        """
         if self._loads_peak is None:
             return self._design(0.0, costlier).law(self._plant).following(linear)
         planner = design.law(self._plant)
         gains = self._gentler(search, design, linear)
-        if gains is not None:
-            gains = np.hstack([np.zeros((len(gains), len(planner.model.A))), gains])
+        if gains is None:
+            return None
+        gains = np.hstack([np.zeros((len(gains), len(planner.model.A))), gains])
         leeway = None if needs_plan(self._plant) else _LEEWAY
         return replace(planner.following(linear), gentler=gains, leeway=leeway)
 
@@ -336,18 +341,30 @@ class _Search:
     def _gentler(
         self, search: InnovationFilter, design: ConstrainedDesign, law: LQGLaw
     ) -> FloatArray | None:
-        """Gains for less pressure (`GentleController`), or None if one misses a margin."""
-        gains = []
-        for share in SHARES[1:]:
+        """Gains for less pressure (`GentleController`), or None if one misses a margin.
+
+        Gains that less pressure makes best, else shares of the law's. The passive ship is the limit
+        of less pressure: where it does not stand a hard case, a gain for less need not.
+        """
+        shares, feedback = np.array(SHARES[1:]), design.law(self._plant).unlimited().gain.shape[1]
+        best: FloatArray = np.multiply.outer(shares, law.gain[0])
+        shared = best.copy()
+        for row, share in zip(best, shares, strict=True):
             costly = replace(design, pressure_weight_rad2=design.pressure_weight_rad2 / share**2)
-            gain = costly.law(self._plant).unlimited().gain
-            gain = np.hstack([gain, share * law.gain[:, gain.shape[1] :]])
-            less = LQGLaw(law.model, gain, law.observer_gain)
-            stands = all(closed_loop_radius(less, *case) < 1 for case in self._hard_cases)
-            if not (stands and search.peak_sensitivity(less) <= PEAK_SENSITIVITY):
-                return None
-            gains.append(gain[0])
-        return np.array(gains)
+            row[:feedback] = costly.law(self._plant).unlimited().gain[0]
+        hard = [
+            (case, max(1.0, float(np.abs(np.linalg.eigvals(case[0].A)).max())))
+            for case in self._hard_cases
+        ]
+        for gains in (best, shared):
+            less = [LQGLaw(law.model, gain[None], law.observer_gain) for gain in gains]
+            if all(
+                search.peak_sensitivity(each) <= PEAK_SENSITIVITY
+                and all(closed_loop_radius(each, *case) < radius for case, radius in hard)
+                for each in less
+            ):
+                return gains
+        return None
 
     def _design(self, knob: float, costlier: float) -> ConstrainedDesign:
         limits, roll = self._plant.limits, self._roll_rad
