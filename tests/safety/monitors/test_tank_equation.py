@@ -159,6 +159,29 @@ def test_pressure_of_the_wrong_sign_is_found_within_a_period():
     assert found[Finding.PUMP_SIGN] <= T
 
 
+@pytest.mark.parametrize("wrong", [Finding.WATER_SIGN, Finding.PUMP_SIGN])
+def test_of_two_signs_that_may_be_wrong_the_one_that_explains_more_is_named(wrong):
+    """A pump that pushes as the measured roll does: either sign explains the water, but for noise.
+
+    The other one leaves 2 (p - x) more of it.
+    """
+    ship = MovingShip(math.radians(3.0), frequency_rad_s=0.5)
+    x = TANK.width_m * (9.80665 - (TANK.height_m + TANK.lz_m) * ship.w**2) * ship.roll
+    p = 1.03 * x
+    length = 2 * TANK.height_m + TANK.width_m * TANK.reservoir_area_m2 / TANK.duct_area_m2
+    w0 = math.sqrt(2 * 9.80665 / length)
+    answer = length * (w0**2 - ship.w**2 + 2j * TANK.damping_ratio * w0 * ship.w)
+    ship.pressure = 1000 * p
+    ship.level = (p - x if wrong == Finding.WATER_SIGN else x - p) / answer
+    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    found = set()
+    for k in range(400):
+        t = k * STEP_S
+        bits = equation.update(ship.roll_rad(t), ship.level_m(t), ship.pressure_pa(t))
+        found.add(bits & (Finding.WATER_SIGN | Finding.PUMP_SIGN) if t > 20 else 0)
+    assert found == {0, wrong}
+
+
 def test_levels_that_stand_still_are_found_within_five_seconds():
     ship = MovingShip()
     for shift_s in (0.0, 1.0, 2.0, 3.0, 4.0):

@@ -353,12 +353,12 @@ class TankEquation:
         if self._band is not None:  # a part of a wave tells less: as an average of as many samples
             filled = math.sqrt(self._sound.weight * (1 - self._keep))
         best = min([other for other, *_ in judged], default=0.0)
-        for other, power, uu, finding in judged:
+        for other, power, uu, finding in sorted(judged, reverse=True):
             least_uu = most_uu if self._band is None else min(uu, most_uu)
             doubt = filled * self._excess(sound, other, power, least_uu)
             clearly = 1.0 if finding == Finding.MOTION_LATE else self._clearly
             if moves and doubt > 1 and other <= clearly * best:
-                found |= finding
+                found = found & Finding.MOTION_LATE | finding  # of two signs that which leaves less
             if not self.doubt >= doubt:
                 self.doubt = doubt
             if finding == Finding.WATER_SIGN and self._excess(other, sound, power, uu) > 1:
