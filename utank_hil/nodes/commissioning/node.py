@@ -131,7 +131,7 @@ class CommissioningNode:
         end = begin + round(self._pulses_s / ROW_S)
         record, plan, stroke = self.moved, self._plan, self._stroke
         rows = len(record.get("roll_rad", ()))
-        if plan is not None and (whole or rows >= begin + plan.period_s / ROW_S):
+        if plan is not None and (whole or rows >= end):  # a part of them shows wrong scales
             pulses = {name: column[begin:end] for name, column in record.items()}
             derived = self._of_derived()
             checks += judge_pulses(self.rest, pulses, self._plant, plan, ROW_S, derived)
