@@ -20,7 +20,7 @@ def hull(
         Path,
         argument(
             "Panels of the hull, x forward, z up: WAMIT .gdf, HAMS .pnl, NEMOH .mar, "
-            "HydroStar .hst; with meshio .stl, .obj, .ply. Whole, or one side of y = 0."
+            "HydroStar .hst, .stl, .obj, .ply. Whole, or one side of y = 0."
         ),
     ],
     out: Annotated[Path, option("The netCDF file to write.", metavar="FILE")] = Path("hull.nc"),

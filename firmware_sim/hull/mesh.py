@@ -27,7 +27,7 @@ from utank_hil.dynamics.roll_damping import HullForm
 
 Panels = npt.NDArray[np.int64]
 
-FORMATS: Final = "WAMIT .gdf, HAMS .pnl, NEMOH .mar, HydroStar .hst; with meshio .stl, .obj, .ply"
+FORMATS: Final = "WAMIT .gdf, HAMS .pnl, NEMOH .mar, HydroStar .hst, .stl, .obj, .ply"
 _BY_MESHIO: Final = (".stl", ".obj", ".ply")
 _KNOWN: Final = (".gdf", ".pnl", ".mar", ".hst", *_BY_MESHIO)
 _LENGTHS_M: Final = (3.0, 600.0)  #: Lengths of hulls: a model's, and more than the longest ship's.
@@ -66,7 +66,7 @@ def read_mesh(
         raise MeshError("is a folder" if path.is_dir() else "there is no such file")
     kind = path.suffix.lower()
     if kind in _BY_MESHIO and find_spec("meshio") is None:
-        raise MeshError(f"{kind} needs meshio: pip install meshio")
+        raise MeshError(f"{kind} needs meshio: pip install 'utank-hil[hulls]'")
     if kind not in _KNOWN:
         raise MeshError(f"can't be read as panels by its name; known are {FORMATS}")
     try:

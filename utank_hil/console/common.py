@@ -250,6 +250,7 @@ EXTRA_OF: Final = {
     "cryptography": "keys",
     "distributed": "cluster",
     "fmpy": "models",
+    "meshio": "hulls",
     **dict.fromkeys(("clarabel", "control", "jinja2", "matplotlib", "numba"), "bench"),
     **dict.fromkeys(("pyarrow", "rerun", "rerun_cli"), "viewer"),
 }  #: Packages that are not needed to run the controller, and the extra that installs each.

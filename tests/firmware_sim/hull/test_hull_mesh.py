@@ -42,7 +42,7 @@ def test_formats_that_may_be_binary_go_to_meshio_as_files(
     file = tmp_path / f"hull.{kind}"
     file.write_bytes(b"\xff\x00")
     monkeypatch.setattr("firmware_sim.hull.mesh.find_spec", lambda _: None)
-    with pytest.raises(MeshError, match="needs meshio: pip install meshio"):
+    with pytest.raises(MeshError, match=r"needs meshio: pip install 'utank-hil\[hulls\]'"):
         read_mesh(file)
     asked: list[object] = []
 
