@@ -229,6 +229,23 @@ def test_wrong_use_ends_with_code_2_and_an_error(arguments):
     assert re.search("error", result.stderr, re.IGNORECASE) or "Usage" in result.stderr
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("bench", "--out", ""),
+        ("campaign", CONFIGS / "studies" / "storm_seeds.yaml", "--out="),
+        ("identify", "sea", "a.csv", "--out", ""),
+    ],
+)
+def test_a_folder_of_no_letters_is_not_the_present_one(arguments, tmp_path, monkeypatch):
+    """As a script has it whose variable is empty."""
+    monkeypatch.chdir(tmp_path)
+    result = invoke(app, *arguments)
+    assert result.exit_code == 2
+    assert "--out is empty; name a folder" in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
 STORM_ALL = CONFIGS / "scenarios" / "storm_all.yaml"
 """Several laws, none of which takes long to design."""
 

@@ -11,6 +11,7 @@ with quietly_interruptible():
     from functools import cache
     from importlib.metadata import EntryPoint, entry_points
     from importlib.util import find_spec
+    from itertools import pairwise
     from pathlib import Path
     from typing import Any
 
@@ -18,7 +19,7 @@ with quietly_interruptible():
     from typer.core import TyperCommand, TyperGroup
 
     import utank_hil.console.single_thread  # noqa: F401, first: it must run before numpy loads
-    from utank_hil.console.common import Version, failures_named, new_app
+    from utank_hil.console.common import Version, fail, failures_named, new_app
     from utank_hil.console.exit_codes import ExitCode
     from utank_hil.console.terminal import notes
 
@@ -65,6 +66,8 @@ class _Unloaded(TyperCommand):
     """A command that stands in a list; its module is imported once the command is parsed."""
 
     def make_context(self, info_name: Any, args: Any, parent: Any = None, **extra: Any) -> Any:
+        if "--out=" in args or ("--out", "") in pairwise(args):
+            fail("--out is empty; name a folder or file")  # a path of no letters is where one is
         return loaded(str(self.name)).make_context(info_name, args, parent, **extra)
 
 

@@ -197,7 +197,7 @@ def _run_live(names: Sequence[str], bus: str) -> "tuple[list[Verdict], End | Non
             task = bar.add_task(f"on {bus}", total=len(names))
             for name in names:
                 found.append(as_json(name, ROWS[name], bus))
-                bar.advance(task)
+                bar.update(task, advance=1)
     except KeyboardInterrupt:  # of SIGTERM, too
         return found, INTERRUPTED
     except (OSError, CanError) as error:

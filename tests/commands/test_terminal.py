@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.table import Table
 
-from utank_hil.console.terminal import Terminal, new_table, shown, timing_table
+from utank_hil.console import terminal
+from utank_hil.console.terminal import Terminal, new_table, progress_bar, shown, timing_table
 from utank_hil.runners import LoopStatistics
 
 CELLS = {"passive": ("2.08", "4.04"), "gpc": ("1.54", "")}
@@ -116,3 +117,17 @@ def test_deadlines_of_a_law_with_a_long_name_fit_80_columns() -> None:
     assert [row[-1] for row in rows[1:]] == ["9600", "17338"]
     assert rows[1][-2] == "40993"
     assert [row[:2] for row in rows[1:]] == [["wake-up", "late"], ["tick", "lasts"]]
+
+
+def test_where_no_terminal_is_progress_is_a_line_each_half_minute(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now_s = [100.0]
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: now_s[0])
+    with progress_bar() as bar:
+        task = bar.add_task("faults", total=147)
+        for now_s[0], done in ((129.0, 20), (130.0, 21), (131.0, 22), (159.0, 60), (161.0, 147)):
+            bar.update(task, completed=done)
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.splitlines() == ["faults 14 %", "faults 100 %"]

@@ -4,6 +4,7 @@ import os
 import re
 import shlex
 import textwrap
+import time
 from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
@@ -171,11 +172,24 @@ def timing_table(loops: "dict[str, LoopStatistics]") -> Table:
     return table
 
 
-def progress_bar(*columns: "str | ProgressColumn") -> "Progress":
-    """A bar with what these columns say before the remaining time; on a terminal only."""
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+SAY_S: Final = 30.0  #: Between two lines of progress where no terminal shows a bar.
 
-    return Progress(
+
+def progress_bar(*columns: "str | ProgressColumn") -> "Progress":
+    """A bar with what these columns say before the remaining time; without a terminal, lines."""
+    from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+    class Told(Progress):
+        said_s = time.monotonic()
+
+        def update(self, task_id: TaskID, **changes: Any) -> None:
+            super().update(task_id, **changes)
+            if self.disable and time.monotonic() - self.said_s >= SAY_S:
+                self.said_s = time.monotonic()
+                done = (f"{it.description.strip()} {it.percentage:.0f} %" for it in self.tasks)
+                notes.say(", ".join(done))
+
+    return Told(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         *columns,
