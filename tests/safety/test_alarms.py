@@ -16,7 +16,9 @@ from utank_hil.canbus import (
     Switch,
 )
 from utank_hil.canbus.events import AlarmEvent
-from utank_hil.safety.alarms import GONE_NS, AlarmList, Gravity
+from utank_hil.safety.alarms import GONE_NS, AlarmList, Gravity, active_faults, gravest
+from utank_hil.safety.faults import Reaction
+from utank_hil.safety.judging import CONDITIONS
 
 SECOND_NS = 1_000_000_000
 HIGH, SILENT = Fault.LEVEL_LIMIT, Fault.TANK_SILENT
@@ -91,6 +93,85 @@ def test_a_cause_that_comes_back_alarms_again():
     table.run(1, HIGH)
     assert table.list.unaccepted
     assert table.list.next_message(table.now_ns).times_raised == 1
+
+
+def test_a_cause_has_gone_after_ten_seconds_and_not_before():
+    alarms = AlarmList()
+    alarms.update({HIGH: Gravity.NOTHING}, Mode.STANDBY, 0)
+    for now_ns, state in ((10 * SECOND_NS - 1, ACTIVE), (10 * SECOND_NS, RECTIFIED)):
+        alarms.update({}, Mode.STANDBY, now_ns)
+        assert alarms.next_message(now_ns).state is state
+
+
+@pytest.mark.parametrize("raised_anew", [True, False])
+@pytest.mark.parametrize(("less_grave_s", "alarms_again"), [(9.9, False), (10.0, True)])
+def test_what_is_less_grave_for_ten_seconds_or_raised_anew_alarms_when_it_is_grave_again(
+    raised_anew, less_grave_s, alarms_again
+):
+    alarms = AlarmList()
+    alarms.update({SILENT: Gravity.ENDS}, Mode.ACTIVE, 0)
+    if raised_anew:
+        alarms.raise_anew(SILENT, Mode.STANDBY, SECOND_NS)
+    for seconds in (5.0, less_grave_s):
+        alarms.update({SILENT: Gravity.NOTHING}, Mode.STANDBY, round(seconds * SECOND_NS))
+    alarms.next_message(0)
+    alarms.accept(None, Mode.STANDBY, 0)
+    alarms.update({SILENT: Gravity.ENDS}, Mode.ACTIVE, 11 * SECOND_NS)
+    assert alarms.unaccepted == (alarms_again or raised_anew)
+
+
+def test_alarms_are_sent_one_after_the_other_from_the_most_urgent_on():
+    alarms = AlarmList()
+    assert alarms.next_message(0) == Alarm(NORMAL, Fault.NONE, 0, 0, 0, 0.0)
+    alarms = AlarmList()
+    faults = [SILENT, Fault.NOISE, HIGH]
+    alarms.update(dict.fromkeys(faults, Gravity.NOTHING), Mode.STANDBY, 0)
+    sent = [alarms.next_message(0).code for _ in range(4)]
+    assert sent == [HIGH, SILENT, Fault.NOISE, HIGH]
+
+
+@pytest.mark.parametrize(
+    ("code", "most"),
+    [(HIGH, Gravity.ENDS), (Fault.MOTION_SILENT, Gravity.ENDS), (Fault.NOISE, Gravity.NOTHING),
+     (Fault.DRIVE_WARNING, Gravity.NOTHING), (Fault.PUMP_SENSOR_SILENT, Gravity.ENDS)],
+)  # fmt: skip
+def test_the_most_that_a_fault_may_do_is_the_gravest_of_its_reactions(code, most):
+    """Of the table in docs/safety.md."""
+    assert gravest(code) is most
+
+
+def bits(*codes, reaction=None):
+    return sum(
+        1 << place
+        for place, (code, condition) in enumerate(CONDITIONS)
+        if code in codes and reaction in (None, condition.reaction)
+    )
+
+
+@pytest.mark.parametrize(
+    ("mode", "fault", "standing", "active"),
+    [
+        # a ramp ends control, and says nothing where there is none
+        (Mode.ACTIVE, Fault.NONE, bits(Fault.MOTION_SILENT, reaction=Reaction.RAMP),
+         {Fault.MOTION_SILENT: Gravity.ENDS}),
+        (Mode.PASSIVE, Fault.NONE, bits(Fault.MOTION_SILENT, reaction=Reaction.RAMP), {}),
+        (Mode.ACTIVE, Fault.NONE, bits(SILENT, reaction=Reaction.HALVE), {SILENT: Gravity.HALVES}),
+        (Mode.STANDBY, Fault.NONE, bits(SILENT, reaction=Reaction.HALVE), {}),
+        # a stop counts everywhere, in INIT but for what is awaited
+        (Mode.PASSIVE, Fault.NONE, bits(HIGH), {HIGH: Gravity.ENDS}),
+        (Mode.INIT, Fault.NONE, bits(HIGH, Fault.DRIVE_SILENT), {HIGH: Gravity.ENDS}),
+        (Mode.STANDBY, Fault.NONE, bits(Fault.DRIVE_SILENT), {Fault.DRIVE_SILENT: Gravity.ENDS}),
+        (Mode.INIT, Fault.DRIVE_SILENT, 0, {Fault.DRIVE_SILENT: Gravity.NOTHING}),
+        # what is latched, and a second one beside it
+        (Mode.FAULT, HIGH, 0, {HIGH: Gravity.ENDS}),
+        (Mode.FAULT, HIGH, bits(SILENT), {HIGH: Gravity.ENDS, SILENT: Gravity.ENDS}),
+        (Mode.STANDBY, HIGH, 0, {}),
+        (Mode.ACTIVE, Fault.NONE, bits(Fault.NOISE), {Fault.NOISE: Gravity.NOTHING}),
+    ],
+)  # fmt: skip
+def test_what_is_active_in_each_mode(mode, fault, standing, active):
+    """By the first list of docs/safety.md, *Alarms*."""
+    assert active_faults(mode, fault, standing) == active
 
 
 def test_a_cause_that_comes_with_each_roll_alarms_once():

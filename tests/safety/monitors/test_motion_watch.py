@@ -106,6 +106,41 @@ def test_a_sensor_of_20_hz_is_as_noisy_as_its_samples(cycle_s, noise, found):
     assert set(seen[100:]) == {found}
 
 
+def test_samples_that_are_not_equally_far_apart_are_no_noise():
+    """A roll of 0.3 rad at 10 s, sound; a sample after 60 and 90 ms in turn, looks are each 50 ms.
+
+    Its second difference by equal steps would be up to 0.03 s times the rate, 6 mrad.
+    """
+    watch, w, due_ticks, seen = MotionWatch(THRESHOLDS, 0.04), 2 * math.pi / 10, 0, set()
+    sample = MotionSample()
+    for tick in range(3000):
+        if tick >= due_ticks:
+            now_s = tick * TICK_S
+            roll_rad, rate_rad_s = 0.3 * math.sin(w * now_s), 0.3 * w * math.cos(w * now_s)
+            sample = MotionSample(roll_rad, rate_rad_s, round(1e9 * now_s) + 1)
+            due_ticks = tick + (6, 9)[tick % 15 // 6 % 2]
+        watch.turn(sample, TICK_S)
+        if tick % 5 == 4:
+            watch.update(sample, 0.05, stale=False)
+            seen.add(watch.found)
+    assert seen <= {0, Finding.DRIFT}
+
+
+def test_the_rate_after_a_gap_counts_for_the_whole_gap():
+    """As long as the roll of that sample is away from the one before."""
+    watch = MotionWatch(LOOSE, 0.1)
+    for tick, (roll_rad, rate_rad_s, heard) in enumerate(
+        [(0.0, 0.0, 1)] * 10 + [(0.02, 0.2, 2)] * 10 + [(0.02, 0.0, 3)] * 10
+    ):
+        sample = MotionSample(roll_rad, rate_rad_s, heard * 100_000_000)
+        watch.turn(sample, TICK_S)
+        if tick % 10 == 0:
+            watch.update(sample, 0.1, stale=False)
+            # a trapezoid has half of it on either side
+            due_rad = {0: 0.0, 10: 0.02 - 0.01, 20: 0.02 - 0.02}[tick]
+            assert watch.motion.unexplained_rad == pytest.approx(due_rad, abs=3e-4)
+
+
 def found_dead(samples, period_s=10.0, *, water_moves=True):
     """Time of the samples, 50 ms apart, until they are found to repeat themselves."""
     watch = MotionWatch(replace(LOOSE, tank_period_s=period_s))

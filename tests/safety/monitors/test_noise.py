@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from moving_ship import THRESHOLDS
+from scipy import stats
 
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.safety.monitors.noise import (
@@ -107,3 +108,61 @@ def test_the_gauges_of_a_shipped_ship_hide_no_roll(name):
     like_roll, whole = most_pushes_of_noise(found.gauge_push_m2_s2, samples)
     assert like_roll < found.least_roll_push_m2_s2
     assert whole < STILL_PUSHES * found.least_roll_push_m2_s2
+
+
+@pytest.mark.parametrize("steps_s", [(0.05, 0.05), (0.04, 0.1), (0.1, 0.04)])
+def test_the_second_difference_of_uneven_steps_leaves_no_line_and_noise_as_that_of_even_ones(
+    steps_s,
+):
+    """Noise in each of the three samples counts by its weight: 1, -2, 1 make the square root of 6.
+
+    A weight is what a sample of one among zeros leaves.
+    """
+
+    def left(*samples):
+        bend = SecondDifference()
+        assert bend.update_after(samples[0], 7.0) == 0.0
+        assert bend.update_after(samples[1], steps_s[0]) == 0.0
+        return bend.update_after(samples[2], steps_s[1])
+
+    at = 0.0, steps_s[0], sum(steps_s)
+    assert left(*(3.0 - 2.0 * each for each in at)) == pytest.approx(0.0, abs=1e-12)
+    weights = np.array([left(1.0, 0.0, 0.0), left(0.0, 1.0, 0.0), left(0.0, 0.0, 1.0)])
+    assert np.linalg.norm(weights) == pytest.approx(math.sqrt(6))
+    assert weights @ at == pytest.approx(0.0, abs=1e-12)
+    assert weights[2] > 0
+    if steps_s[0] == steps_s[1]:
+        assert weights == pytest.approx([1.0, -2.0, 1.0])
+
+
+def test_after_a_gap_three_samples_are_needed_again():
+    bend = SecondDifference()
+    for k in range(3):
+        bend.update_after(k**2, 0.1)
+    bend.restart()
+    assert [bend.update_after(k**2, 0.1) for k in (9, 11)] == [0.0, 0.0]
+    assert bend.update_after(14, 0.1) != 0.0
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.0])
+def test_at_its_frequency_the_filter_leaves_one_over_twice_the_damping_ratio(ratio):
+    found, w = DerivativeFilter(1.3, 0.01, ratio), 1.3
+    assert (found.value, found.update(0.0)) == (0.0, 0.0)
+    values, bends = [], []
+    for k in range(1, 5000):
+        bends.append(found.update(math.sin(w * 0.01 * k)))
+        values.append(found.value)
+    assert max(values[-1000:]) == pytest.approx(1 / (2 * ratio), rel=1e-3)
+    assert max(bends[-1000:]) == pytest.approx(w**2 / (2 * ratio), rel=1e-2)
+
+
+@pytest.mark.parametrize("samples", [5, 20, 43])
+def test_most_of_the_noise_is_that_of_its_distribution(samples):
+    """A part in phase is normal, a mean square chi-squared with two degrees a sample (scipy)."""
+    tail = stats.norm.sf(5.4)
+    like_roll, whole = most_pushes_of_noise(0.1, samples)
+    assert like_roll == pytest.approx(stats.norm.isf(tail) * 1.2 * 0.1 / math.sqrt(samples))
+    mean_square = stats.chi2.isf(tail, 2 * samples) / (2 * samples)
+    assert whole == pytest.approx(
+        4 * 0.1 * math.sqrt(mean_square), rel=0.005 if samples > 5 else 0.02
+    )

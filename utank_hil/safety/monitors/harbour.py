@@ -53,6 +53,7 @@ WRONG_ANSWERS: Final = 2
 """In a row: after more a tank of this kind is used up."""
 LASTS_S: Final = 10.0
 """For so long what has been found lasts: it is latched by then, and can be reset after."""
+NO_MARK: Final = (math.nan, 0.0)  # pragma: no mutate: before a first heel no time counts
 
 
 class HarbourWatch:
@@ -77,13 +78,11 @@ class HarbourWatch:
         self._settled_s = SETTLED_PERIODS * tank.roll_period_s
         self._apart_s = TREND_PERIODS * tank.roll_period_s
         self._shut_s = self._moved_s = 0.0
-        self._marks = (math.nan, 0.0), (math.nan, 0.0)  # mean heels while shut, and when
+        self._marks = NO_MARK, NO_MARK  # mean heels while shut, and when
         self._heel_rad = self._trend_rad_s = self._level_m = math.nan  # as a pumping began
         self._least_loss = LEAST_LOSS * tank.throttle_loss
-        self._begin_m, self._travel_m = math.nan, 0.0  # unknown where it starts with an open valve
-        self._fast_m = self._mean_m = math.nan
+        self._begin_travel(math.nan)  # unknown where it starts with an open valve
         self._too_little = self._too_much = 0
-        self._told = 0
         self._told_s = 0.0
 
     def balance_pa(self, level_m: float, roll_rad: float) -> float:
@@ -134,7 +133,7 @@ class HarbourWatch:
             self._heel_rad, self._level_m = self._mean.heel_rad, level_m
             before_rad, before_s = self._marks[0]
             self._trend_rad_s = (self._heel_rad - before_rad) / (self._shut_s - before_s)
-            self._marks = (math.nan, 0.0), (math.nan, 0.0)
+            self._marks = NO_MARK, NO_MARK
             self._shut_s = self._moved_s = 0.0
             self._begin_travel(level_m)
         driving_pa = measured.pressure_pa - self._tank.balance_pa(level_m, roll_rad)

@@ -47,8 +47,7 @@ class SecondDifference:
 
     def restart(self) -> None:
         """Begin anew after a gap."""
-        self._last = self._before = math.nan
-        self._step_s = 0.0
+        self._last = self._before = self._step_s = math.nan
 
     def update(self, value: float) -> float:
         """Take the next sample; return the second difference, zero as long as there is none."""
@@ -61,7 +60,7 @@ class SecondDifference:
 
         What is left of the line through the last two; scaled so that white noise leaves as much.
         """
-        ratio = step_s / self._step_s if self._step_s else math.nan
+        ratio = step_s / self._step_s
         bend = value - self._last - ratio * (self._last - self._before)
         self._before, self._last, self._step_s = self._last, value, step_s
         if bend != bend:

@@ -91,8 +91,10 @@ class Misfit:
     def least(self, most_share: float, most_zero: float) -> float:
         """Return the least sum for a share from 0 to `most_share` and a zero up to `most_zero`."""
         e, u, eu, uu, weight = self._e, self._u, self._eu, self.uu, self.weight
+        # pragma: no mutate start: u has no mean, so that they hardly depend on one another
         share = zero = 0.0
-        for _ in range(2):  # u has no mean, so that they hardly depend on one another
+        for _ in range(2):
+            # pragma: no mutate end
             zero = within((e + share * u) / weight, most_zero)
             if uu > 0.0:
                 share = min(max((zero * u - eu) / uu, 0.0), most_share)
