@@ -3,8 +3,6 @@ import math
 import numpy as np
 import pytest
 from controller_bench import CATALOGUE, LIMITS, MS, VERSION, ControllerBench
-from hypothesis import given
-from hypothesis import strategies as st
 
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import (
@@ -280,80 +278,6 @@ def test_law_that_raises_stops_the_pump_until_the_operator_resets():
     bench.run(20)
     assert bench.law.calls[:1] == ["reset"]
     assert bench.node.mode is Mode.STANDBY
-
-
-orders = st.builds(
-    OperatorCommand,
-    mode_request=st.sampled_from([Mode.STANDBY, Mode.PASSIVE, Mode.ACTIVE, Mode.ACTIVE, None]),
-    arm=st.booleans(),
-    stop=st.sampled_from([False, False, False, True]),
-    reset=st.booleans(),
-    acknowledge=st.booleans(),
-)
-events = st.one_of(
-    orders,
-    st.floats(-80e3, 80e3),
-    st.sampled_from([SensorMotion, SensorTank, SensorPump, DriveStatus1, OperatorCommand]),
-    st.just("all well"),
-    st.builds(
-        SensorTank,
-        port_level_m=st.floats(-4, 4),
-        starboard_level_m=st.floats(-4, 4),
-        port_high=st.sampled_from([Switch.OFF, Switch.OFF, Switch.ON, None]),
-        starboard_high=st.just(Switch.OFF),
-        quality=st.sampled_from([*Quality, None]),
-    ),
-)
-
-STOP_CLASS = {
-    Fault.BUS_LOST, Fault.ADDRESS_CONFLICT, Fault.VERSION_MISMATCH, Fault.DRIVE_FAULT,
-    Fault.DRIVE_SILENT, Fault.LEVEL_LIMIT, Fault.INTERNAL, Fault.OVERRUN, Fault.BUS_OVERLOAD,
-}  # fmt: skip
-
-
-@given(st.lists(st.tuples(events, st.integers(1, 40)), max_size=15))
-def test_pressure_only_while_armed_and_never_faster_than_the_rate_limit(history):
-    bench = ControllerBench(START_NS)
-    bench.arm()
-    bench.law.answer_pa = 40e3
-    bench.run(300)
-    modes: list[Mode] = []  # since the last command
-    for event, ticks in history:
-        if isinstance(event, OperatorCommand):
-            bench.order_is(**event._asdict())
-        elif isinstance(event, float):
-            bench.law.answer_pa = event
-        elif isinstance(event, SensorTank):
-            bench.tank = event
-        elif isinstance(event, type):
-            bench.silent.add(event)
-        else:
-            bench.silent.clear()
-            bench.tank = SensorTank(0.0, 0.0, Switch.OFF, Switch.OFF, Quality.GOOD)
-        for _ in range(ticks):
-            before, mode_before, count = bench.pressure_pa, bench.node.mode, len(bench.commands)
-            bench.tick()
-            mode, fault, pressure_pa = bench.node.mode, bench.node.fault, bench.pressure_pa
-            modes.append(mode)
-            assert abs(pressure_pa) <= LIMITS.pressure_pa
-            if mode is Mode.ACTIVE and mode_before is not Mode.ACTIVE:
-                assert bench.order.arm
-            if len(bench.commands) == count:
-                continue
-            if mode in (Mode.INIT, Mode.STANDBY):
-                assert pressure_pa == 0.0
-            if abs(pressure_pa - before) > LIMITS.rate_pa_s * 0.02 + 8:
-                # only a cut may be faster
-                assert pressure_pa == 0.0
-                off = bench.tank.port_high is Switch.OFF and bench.tank.starboard_high is Switch.OFF
-                assert (
-                    bench.order.stop
-                    or fault in STOP_CLASS
-                    or (mode is Mode.FAULT and (not off or DriveStatus1 in bench.silent))
-                    or fault is Fault.MOTION_SILENT  # what its ramp left after 200 ms
-                    or Mode.INIT in modes  # disarmed, and then not even ready
-                )
-            modes.clear()
 
 
 def test_a_law_that_fails_gives_no_pressure_in_that_very_tick(monkeypatch):

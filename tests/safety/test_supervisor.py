@@ -1,9 +1,6 @@
-import math
 from itertools import product
 
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
 from situations import look, situation
 
 from utank_hil.base.tick import TICK_NS
@@ -844,71 +841,6 @@ def test_a_lost_panel_forbids_arming_at_once():
     late = {**ACTIVE, "panel_age_ms": 700, "arm_edge": True}
     assert not bench.tick(**late).arming
     assert bench.supervisor.fault is Fault.OPERATOR_SILENT
-
-
-ages = st.sampled_from([0, 20, 35, 65, 105, 1005, 5005])
-observations = st.builds(
-    dict,
-    motion_age_ms=ages,
-    tank_age_ms=ages,
-    pump_age_ms=ages,
-    drive_age_ms=ages,
-    echo_age_ms=ages,
-    panel_age_ms=ages | st.just(math.inf),
-    drive_enabled=st.booleans(),
-    drive_fault=st.booleans(),
-    link_lost=st.booleans(),
-    high_level=st.booleans(),
-    roll_rad=st.floats(-1, 1),
-    requested_mode=st.sampled_from([Mode.STANDBY, Mode.PASSIVE, Mode.ACTIVE]),
-    arm_edge=st.booleans(),
-    passive_edge=st.booleans(),
-    armed=st.booleans(),
-    stop=st.booleans(),
-    reset_edge=st.booleans(),
-)
-WISHES: list[dict[str, object]] = [
-    ACTIVE, {**ACTIVE, "arm_edge": True}, ARMING, {"requested_mode": Mode.PASSIVE}, {},
-    {"reset_edge": True}, {"requested_mode": Mode.PASSIVE, "passive_edge": True},
-]  # fmt: skip
-signs = st.sampled_from(SIGNS).map(lambda row: row[2])
-mostly_healthy = st.one_of(
-    observations,
-    # healthy but for at most one sign, whatever the operator wants
-    st.builds(
-        lambda wishes, sign: {**wishes, **sign},
-        st.sampled_from(WISHES),
-        st.just({}) | st.just({}) | signs,
-    ),
-)
-
-
-# the way into INIT, STANDBY, arming, ACTIVE, the ramp of PASSIVE: what follows meets each of them
-WAY_IN: list[dict[str, object]] = [{}, ARMING, ACTIVE, {"command_pa": 1e4}]
-histories = st.builds(
-    lambda steps, rest: WAY_IN[:steps] + rest,
-    st.integers(0, len(WAY_IN)),
-    st.lists(mostly_healthy, max_size=60),
-)
-
-
-@given(histories)
-@example([*WAY_IN[:2], {**ACTIVE, "high_level": True}])
-def test_control_only_while_armed_fresh_and_after_an_edge(history):
-    supervisor = Supervisor(SafetyLimits())
-    edge_since_disarmed = False
-    for index, changes in enumerate(history):
-        look(supervisor, index * TICK_NS, **changes)
-        seen = situation(**changes)
-        edge_since_disarmed |= seen.measured.arm_edge
-        if supervisor.demand is Demand.CONTROL:
-            assert supervisor.mode is Mode.ACTIVE
-            assert edge_since_disarmed
-            assert seen.measured.armed
-            assert not seen.measured.stop
-            assert not conditions_in(seen, Reaction.STOP, Reaction.RAMP)
-        elif not supervisor.arming:
-            edge_since_disarmed = False
 
 
 DEGRADING = ("DRIFT", "VOLUME", "UNWATCHED")
