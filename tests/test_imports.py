@@ -78,9 +78,16 @@ def test_controllers_process_loads_nothing_heavy(source):
     assert loaded_by(source) == ""
 
 
-def test_scipy_is_loaded_with_the_first_design():
+@pytest.mark.parametrize(
+    "source", [COMMAND, CATALOGUE, "import utank_hil.telemetry.viewer, utank_hil.pictures"]
+)
+def test_scipy_is_loaded_with_the_first_design(source):
     """It takes a third of a command's start."""
-    assert loaded_by(COMMAND, ("scipy",)) == ""
+    assert loaded_by(source, (*HEAVY, "scipy")) == ""
+
+
+def test_the_package_of_the_bus_reads_no_catalogue_before_it_is_asked_for():
+    assert loaded_by("import utank_hil.canbus", ("cantools", "can")) == ""
 
 
 def test_margins_are_judged_without_anything_heavy_because_run_does_it_first():

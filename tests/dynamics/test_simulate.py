@@ -1,5 +1,3 @@
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -238,15 +236,6 @@ def test_a_pressure_s_hold_must_be_whole_steps():
 def test_batches_of_unequal_lengths_are_refused():
     with pytest.raises(ValueError, match="one per run"):
         simulate_batch(MODEL, 1.0, np.zeros((2, 4)), wave=WaveMoment(np.ones((3, 1)), [1.0], [0.0]))
-
-
-def test_importing_dynamics_brings_no_compiler_or_plotting():
-    code = (
-        "import sys, utank_hil.dynamics; "
-        "print([m for m in ('numba', 'control', 'matplotlib', 'scipy') if m in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
 
 
 def test_the_sea_s_harmonics_are_taken_as_they_are():

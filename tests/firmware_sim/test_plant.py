@@ -385,11 +385,14 @@ def test_water_strikes_its_limits_as_in_the_adaptive_integration() -> None:
 
 @pytest.mark.parametrize("valve", [0.0, 3e4])
 def test_work_of_waves_and_pump_is_energy_and_losses_strikes_included(valve: float) -> None:
-    vessel = VESSEL.model_copy(update={"tank": LOSSY})
-    plant = Plant(vessel.ship, LOSSY, vessel.pump, irregular(4.0))
+    ship = replace(
+        VESSEL.ship, quadratic_damping_nms2_rad2=2e8, restoring_odd_nm=(-1e8,), wind_moment_nm=5e6
+    )
+    vessel = VESSEL.model_copy(update={"tank": LOSSY, "ship": ship})
+    plant = Plant(ship, LOSSY, vessel.pump, irregular(4.0))
     plant.advance(0)
     plant.set_valve_loss(valve)
-    for tick in range(20_000):
+    for tick in range(60_000):
         plant.drive_pump(40e3 * math.sin(0.55 * tick * 0.01), enabled=tick % 3000 < 2000)
         plant.advance((tick + 1) * TICK_NS)
     assert plant.strikes > 5 or valve

@@ -1,7 +1,5 @@
 """The picture of a bench, read back pixel by pixel, and what loading it must not load."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import matplotlib.image
@@ -109,15 +107,3 @@ def test_more_runs_than_colours_are_refused(tmp_path):
     for number in (0, len(COLORS) + 1):
         with pytest.raises(ValueError, match=f"got {number}"):
             draw_bench([curve("a", 10.0, 0.1, 5.0)] * number, tmp_path / "a.png", "None")
-
-
-def test_the_controller_process_can_import_the_ring_without_rerun_or_matplotlib():
-    code = """
-import sys
-import utank_hil.telemetry.ring, utank_hil.telemetry.run_log, utank_hil.telemetry.viewer
-heavy = {"rerun", "matplotlib", "numba", "control", "scipy", "pyarrow"} & set(sys.modules)
-assert not heavy, heavy
-import utank_hil.pictures
-assert "matplotlib" not in sys.modules
-"""
-    subprocess.run([sys.executable, "-W", "error", "-c", code], check=True)

@@ -4,14 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shipped_designs import LQG_ROLL_RATE_LEVEL
 
 from utank_hil.analysis.loop.linear_tuning import (
     LINEAR_KINDS,
     AutoDesign,
     _Search,
     auto_tuned,
-    scaled,
 )
 from utank_hil.analysis.loop.margins import robustness
 from utank_hil.analysis.loop.sea_response import motion_in_sea
@@ -90,13 +88,6 @@ def test_a_sea_without_waves_is_refused():
 
     with pytest.raises(NoLawError, match="does not roll"):
         auto_tuned("lqg", PLANT, Still())
-
-
-def test_scaling_all_weights_of_an_lqg_law_scales_its_state_weight():
-    tenfold = scaled(LQG_ROLL_RATE_LEVEL, 10.0)
-    np.testing.assert_allclose(
-        tenfold.state_weight, 10 * np.array(LQG_ROLL_RATE_LEVEL.state_weight)
-    )
 
 
 def written(folder, law):

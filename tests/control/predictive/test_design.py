@@ -1,8 +1,5 @@
 """From ship, tank and sea to a law: the model in it, the parameters, the refusals."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -122,16 +119,3 @@ def test_bad_designs_are_refused():
         PredictiveDesign("dpc", PREDICTOR, 20, 30, first_output=5)
     with pytest.raises(ValueError, match="GPC needs an output_weight"):
         PredictiveDesign("gpc", PREDICTOR, 20, 30).law(DesignPlant(SHIP, TANK))
-
-
-@pytest.mark.slow
-def test_designing_brings_no_plotting_and_no_compiler_into_the_process():
-    code = (
-        "import sys\n"
-        "from utank_hil.configuration import ControllerConfig, load_config\n"
-        "config = load_config('configs/controllers/gpc.yaml', ControllerConfig)\n"
-        "config.law.build(config.plant).controller()\n"
-        "print([m for m in ('matplotlib', 'control', 'numba', 'rerun') if m in sys.modules])\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
