@@ -156,6 +156,20 @@ def test_clients_that_have_gone_without_a_word_keep_no_place(
         assert first.recv(1) == b""
 
 
+def test_the_end_with_clients_is_quiet(caplog: pytest.LogCaptureFixture) -> None:
+    """One of them waits, and one has asked for more than it reads."""
+    port = free_port()
+    with ExitStack() as stack:
+        outlet = read_outlet(f"modbus://127.0.0.1:{port}")
+        with Outward([outlet], os.getpid(), print):
+            for asked in (READ, READ * 200_000):
+                client = stack.enter_context(socket.create_connection(("127.0.0.1", port), 5))
+                client.setblocking(False)
+                client.send(asked)
+            time.sleep(0.2)
+    assert caplog.messages == []
+
+
 def test_a_port_in_use_is_said_and_the_rest_goes_on(listener: socket.socket) -> None:
     said: list[str] = []
     with socket.create_server(("127.0.0.1", 0)) as other:

@@ -128,6 +128,8 @@ class ModbusServer:
         server.close()
         for client in self._clients:
             client.transport.abort()
+        while self._clients:  # else Python 3.11 prints that each was cancelled
+            await asyncio.sleep(0)
 
     async def _answer(self, reader: StreamReader, client: StreamWriter) -> None:
         """Answer a client until it goes, or sends what is no Modbus."""
