@@ -56,6 +56,15 @@ def test_a_seapath_as_recorded():
     assert value("psxn", "good", quality) is True
 
 
+def test_sentences_of_others_on_the_line_are_passed_by():
+    """Of an AIS receiver, as AIVDM/AIVDO Protocol Decoding (gpsd) has them."""
+    aivdm = (
+        b"!AIVDM,1,1,,B,177KQJ5000G?tO`K>RA1wUbN0TKH,0*5C\r\n",
+        b"!AIVDM,2,1,3,B,55P5TL01VIaAL@7WKO@mBplU@<PDhh000000001S;AJ::4A80?4i@E53,0*3E\r\n",
+    )
+    assert read(SEAPATH, *aivdm, SEAPATH) == read(SEAPATH) * 2
+
+
 @pytest.mark.parametrize(
     ("said", "roll_deg"),
     [(b"$PSXN,23,0.30,-0.97,298.57,0.13*1B\r\n", 0.30),  # pynmea2, test_proprietary

@@ -26,7 +26,7 @@ SENTENCES: Final = {
     EM3000: "EM Attitude 3000",
 }  # fmt: skip
 
-_TEXT: Final = rb"[$:][ -#%-9;-~]{1,117}\r?\n"
+_TEXT: Final = rb"(?:[$:][ -#%-9;-~]{1,117}|![ -#%-~]{1,117})\r?\n"  # ! of AIS has colons, too
 _HEAD: Final = rb"[\x00\x90-\xaf]\x90"
 _BINARY: Final = _HEAD + rb"[\x00-\xff]{8}"
 _NEXT: Final = re.compile(_TEXT + b"|" + _BINARY)
@@ -82,7 +82,7 @@ def _em3000(record: bytes) -> Frame:
     return Frame(EM3000, _PARTS.pack(status, roll, pitch, heave))
 
 
-_READ: Final[dict[bytes, Callable[[bytes], Frame | None]]] = {b"$": _psxn, b":": _tss1}
+_READ: Final[dict[bytes, Callable[[bytes], Frame | None]]] = {b"$": _psxn, b"!": _psxn, b":": _tss1}
 
 
 class SentenceReader:
