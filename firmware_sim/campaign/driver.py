@@ -75,7 +75,7 @@ class Driver:
         for case in self.loaded.cases:
             groups.setdefault(case.group, []).append(case.name)
         self._stopping = Stopping(self.loaded.study.stop, groups)
-        self._stopping.add(self.store.rows().to_pylist())
+        self._stopping.add(row for row in self.store.rows().to_pylist() if row["case"] in done)
         self._waiting = deque(case for case in missing.values() if self._stopping.needs(case.name))
         self.count = Count(len(self._waiting))
 

@@ -23,7 +23,7 @@ from typer.testing import CliRunner
 
 from firmware_sim.campaign import simulations
 from firmware_sim.campaign.driver import Driver, batch_of
-from firmware_sim.campaign.simulations import FAILED, LOST, OK, run_batch
+from firmware_sim.campaign.simulations import FAILED, LOST, OK, failed_row, run_batch
 from firmware_sim.campaign.store import METRICS, Results, Store, read_results
 from firmware_sim.campaign.summary import figure, summary, units_of
 from firmware_sim.campaign.tables import pairs_table, runs_table
@@ -89,6 +89,18 @@ def test_a_case_that_kills_each_process_is_lost_alone(tmp_path):
     rows = read_results(tmp_path / "out").rows
     status = {case.seed: rows[case.name][0]["status"] for case in loaded.cases}
     assert status == {1: OK, 2: LOST, 3: OK, 4: OK}
+
+
+def test_a_lost_case_is_tried_again_where_others_were_enough_for_the_interval(tmp_path):
+    stop = {"metric": "roll_below_passive", "half_width": 0.9, "least": 4}
+    loaded = small(tmp_path, grid={"seed": [1, 2, 3, 4, 5, 6, 7]}, stop=stop)
+    store = Store(tmp_path / "out")
+    store.begin(loaded, {"keys": loaded.keys}, resume=False)
+    lost, *others = loaded.cases[:5]
+    store.write([failed_row(lost.name, LOST, "killed"), *run_batch(batch_of(loaded, others))])
+    with in_one_process():
+        Driver(loaded, store, lambda _: None).run(1)
+    assert lost.name in store.done()
 
 
 @pytest.mark.parametrize(("number", "status"), [(errno.ENOSPC, LOST), (errno.ENOENT, FAILED)])
