@@ -300,6 +300,38 @@ def test_a_page_that_takes_nothing_more_leaves_its_place(monkeypatch: pytest.Mon
         raise AssertionError("the page still has its place")
 
 
+def test_connections_that_the_system_refused_a_thread_keep_no_place(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(server, "MOST_CONNECTIONS", 20)
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with (
+        ours,
+        theirs,
+        socket.create_server(("127.0.0.1", 0)) as listening,
+        server.PageServer(listening, theirs, "token") as served,
+    ):
+        address = listening.getsockname()
+        threading.Thread(target=served.serve_forever, daemon=True).start()
+
+        def answer() -> bytes:
+            with socket.create_connection(address, 5) as client:
+                client.sendall(b"GET / HTTP/1.1\r\n\r\n")
+                try:
+                    return client.recv(12)
+                except ConnectionResetError:
+                    return b""
+
+        def refused(_: threading.Thread) -> None:
+            raise RuntimeError("can't start new thread")
+
+        with monkeypatch.context() as without_room:
+            without_room.setattr(threading.Thread, "start", refused)
+            assert {answer() for _ in range(25)} == {b""}
+        assert answer() == b"HTTP/1.1 403"
+        served.shutdown()
+
+
 def test_a_browser_leaves_out_the_port_of_http() -> None:
     class Listening(socket.socket):
         def getsockname(self) -> tuple[str, int]:

@@ -77,7 +77,6 @@ class PageServer(ThreadingHTTPServer):
         self._state = b""
         self.number = 0
         self.pages = threading.BoundedSemaphore(MOST_PAGES)
-        self._room = threading.BoundedSemaphore(MOST_CONNECTIONS)
 
     def follow(self) -> None:
         """Take the panel's states until it ends."""
@@ -105,15 +104,8 @@ class PageServer(ThreadingHTTPServer):
         return ""
 
     def verify_request(self, *_: Any) -> bool:
-        """Whether there is room for one more connection."""
-        return self._room.acquire(blocking=False)
-
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """Serve one connection."""
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            self._room.release()
+        """Whether there is room for one more connection: each has a thread, beside two."""
+        return threading.active_count() <= MOST_CONNECTIONS + 2
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Leave a browser that has gone unmentioned."""
