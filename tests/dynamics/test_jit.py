@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures import TimeoutError as NotDone
 
 import pytest
-from numba.core.caching import CacheImpl
+from numba.core.caching import CacheImpl, IndexDataCacheFile
 
 from utank_hil.dynamics import jit
 from utank_hil.dynamics.jit import njit
@@ -24,6 +24,17 @@ def test_what_can_not_be_kept_is_compiled_all_the_same(monkeypatch, *, kept):
     compiled = njit()(twice)
     assert compiled(21.0) == 42.0
     assert (compiled.stats.cache_path is not None) is kept
+
+
+def test_a_cache_that_another_user_shares_with_nobody_is_none(monkeypatch):
+    """As root leaves one with umask 077 in the folder of a checkout's owner."""
+
+    def unreadable(cache):
+        raise PermissionError(13, "Permission denied", cache._index_path)
+
+    monkeypatch.setattr(IndexDataCacheFile, "_load_index", unreadable)
+    compiled = njit()(lambda number: 7 * number)
+    assert (compiled(3.0), compiled(3)) == (21.0, 21)
 
 
 def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(tmp_path, monkeypatch):

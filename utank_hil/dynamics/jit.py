@@ -10,6 +10,7 @@ from threading import Event
 from typing import IO, Any, Final, TypeVar
 
 import numba
+from numba.core.caching import NullCache
 from numba.core.compiler_lock import global_compiler_lock
 
 from utank_hil.base import elementary
@@ -25,8 +26,9 @@ def njit(**options: Any) -> Callable[[F], F]:
     """Decorate as `numba.njit` and cache the compiled code for the next process.
 
     The cache is beside the source, in the user's cache folder, or in ``NUMBA_CACHE_DIR``. With a
-    read-only installation and a user without a home there is none, and every process compiles.
-    Of processes that need a kernel at once, one compiles and the others wait for it.
+    read-only installation and a user without a home, or where what it holds can't be read, there is
+    none, and every process compiles. Of processes that need a kernel at once, one compiles and the
+    others wait for it.
     """
 
     def decorate(function: F) -> F:
@@ -44,7 +46,14 @@ def njit(**options: Any) -> Callable[[F], F]:
 
 
 def _compile_in_turn(compiled: Any) -> None:
-    load_or_compile = compiled.compile
+    load_and_compile = compiled.compile
+
+    def load_or_compile(signature: Any) -> Any:
+        try:
+            return load_and_compile(signature)
+        except PermissionError:  # The cache is another user's, who shares it with nobody.
+            compiled._cache = NullCache()
+            return load_and_compile(signature)
 
     def in_turn(signature: Any) -> Any:
         with global_compiler_lock:
