@@ -50,10 +50,7 @@ class Comparison:
 
 
 def difference(reference: FloatArray, values: FloatArray, *, paired: bool) -> Difference:
-    """Difference of the means of values paired by index, or of independent ones (Welch).
-
-    Shapes are (n,) and (m,), and equal if paired.
-    """
+    """Difference of means, of values `paired` by index, or of independent ones (Welch)."""
     count, width = min(len(reference), len(values)), None
     if count > 1 and np.ptp(reference) == 0 == np.ptp(values):
         width = 0.0
@@ -203,11 +200,7 @@ def read_record(path: Path) -> Record:
 
 
 def compare_records(reference: Path, others: list[Path]) -> list[Comparison]:
-    """Compare recordings with the first one, run by run.
-
-    Raises `CompareError` if the recordings share no run, or the runs share no column. Raises
-    `ValueError` if a file is not a recording.
-    """
+    """Compare runs with the first's; CompareError if none is shared, ValueError for others."""
     first = read_record(reference)
     return [each for other in others for each in _records_compared(first, read_record(other))]
 

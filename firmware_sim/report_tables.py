@@ -113,11 +113,7 @@ def pump_table(found: BenchFigures) -> RichTable:
 
 
 def in_one_unit(values: Sequence[float], unit: str) -> tuple[str, list[str]]:
-    """Values of a column in the unit that gives the largest at most three integer digits.
-
-    The values are not negative and in the unit without a prefix. Returns the unit with its prefix,
-    and the cells.
-    """
+    """Prefixed unit and cells of a column, not negative: at most three integer digits."""
     largest = max(values, default=0.0)
     prefix, scale = next((each for each in _PREFIXES if largest >= each[1]), _PREFIXES[-1])
     return prefix + unit, like_largest([value / scale for value in values])

@@ -111,10 +111,7 @@ class Run:
 
     @property
     def events(self) -> tuple[RetuningEvent, ...]:
-        """Events of retuning on the time of the rows, to within one row.
-
-        The controller has its own clock; the changes of state are known on both.
-        """
+        """Events of retuning on the time of the rows, to within one, by the changes of state."""
         time_s, state = self.column("time_s"), self.column("retuning")
         if not self.retuning:
             return ()

@@ -112,10 +112,7 @@ def _torque_report(plan: DrivePlan, pump: Pump) -> tuple[int, Callable[[Frame], 
 
 
 def external_drive(plant: Plant, vessel: Vessel | None = None) -> ExternalNode:
-    """Node that imposes the pressure of DRIVE_STATUS_1, or a drive's torque, in each of its states.
-
-    Without a report the rotor turns freely.
-    """
+    """Node that imposes DRIVE_STATUS_1's pressure or a drive's torque; free without a report."""
 
     def act(pressure_pa: float | None) -> None:
         if pressure_pa is None:
@@ -347,11 +344,7 @@ def build_ship_side(
     script: tuple[TimedAction, ...],
     controller: ControllerConfig | None = None,
 ) -> ShipSide:
-    """Build the emulated ship and its nodes.
-
-    `seed` is that of sea and sensor noise. The guard of a scenario has the limits of `controller`,
-    by default the scenario's first.
-    """
+    """Build ship and nodes; the guard has the limits of `controller`, by default the first."""
     vessel, catalogue = scenario.vessel, load_catalogue()
     plant = plant_of(scenario, seed)
     version = vessel.version

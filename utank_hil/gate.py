@@ -63,11 +63,7 @@ class JudgedLaw:
 
 
 def judge(config: ControllerConfig, *, with_delay_margin: bool = True) -> JudgedLaw:
-    """Design the law of a configuration and judge its loop.
-
-    `with_delay_margin` is as in `margins`. Raises `ParameterError` if the law can't be designed or
-    its margins can't be computed; the problems are named by their keys in the configuration.
-    """
+    """Design a law and judge its loop; `ParameterError` names the key of what is wrong."""
     law = build_law(config)
     step_s = _step_time_s(law)
     if law.linear is None:

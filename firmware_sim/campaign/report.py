@@ -49,11 +49,7 @@ def _label(parameters: dict[str, Any]) -> str | float:
 
 
 def campaign_report(folder: Path) -> Report:
-    """Return the report of a campaign's folder.
-
-    Raises `OSError, ValueError` if a file of the campaign is missing or invalid, and `KeyError` if
-    it is of another version.
-    """
+    """Report of a campaign; `OSError, ValueError` for bad files, `KeyError` for other versions."""
     content = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
     groups, failed, study = content["groups"], content["failures"], content["configuration"]
     picture = ReportPicture((folder / PICTURE).read_bytes(), "Rolls of each run, with intervals")

@@ -23,11 +23,7 @@ def give_way(niceness: int) -> None:
 
 @contextmanager
 def one_thread_each() -> Iterator[None]:
-    """Processes started meanwhile keep their linear algebra to one thread.
-
-    More take cores from the loop, wait for one another on a busy machine and take twenty times as
-    long.
-    """
+    """Processes started meanwhile keep their linear algebra to one thread: more hinder the loop."""
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     try:

@@ -57,10 +57,7 @@ class BusPorts:
         self._ports[number].send(Frame(frame.can_id & (OTHER_BUS - 1), frame.data))
 
     def receive(self) -> Sequence[Frame]:
-        """Return the frames of all interfaces; see `Port.receive`.
-
-        An error is raised by the next call where frames of other interfaces came with it.
-        """
+        """Frames of all interfaces; an error beside frames is raised by the next call."""
         frames: list[Frame] = []
         if self._pending is None:
             for number, port in enumerate(self._ports):

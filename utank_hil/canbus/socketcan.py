@@ -125,10 +125,7 @@ class SocketCanPort:
         self._down = False
 
     def receive(self) -> Sequence[Frame]:
-        """Return received frames, at most `MAX_FRAMES_PER_CALL`; see `Port.receive`.
-
-        An error is raised by the next call where frames came with it: one of them may say stop.
-        """
+        """At most `MAX_FRAMES_PER_CALL` frames; an error beside some is raised by the next call."""
         frames = self._read() if self._pending is None else []
         if self._pending is not None:
             if not frames:

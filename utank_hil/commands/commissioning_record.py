@@ -56,10 +56,7 @@ def made_with(vessel: Vessel, file: Path, bus: str) -> dict[str, Any]:
 def make_record(
     config: ControllerConfig, file: Path, bus: str, checks: list[Check], ended: str
 ) -> dict[str, Any]:
-    """Return the record of a commissioning, ready for `json.dumps`.
-
-    `bus` is the interface on which it was done; `ended` says why it ended early, if it did.
-    """
+    """Record of a commissioning on a `bus`, for `json.dumps`; `ended` says why it ended early."""
     return {
         **made_with(config.vessel, file, bus),
         "controller": config.name,

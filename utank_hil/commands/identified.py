@@ -44,10 +44,7 @@ class IdentifiedShips:
     content: dict[str, Any]  #: Content of the controller's file, from `read_controller`.
 
     def write(self, found: ModelSummary) -> dict[str, Path]:
-        """Write vessel and controller, named by the time (UTC); return paths by both names.
-
-        Raises `ParameterError` if a file may not hold such a ship.
-        """
+        """Write vessel and controller, named by the time; `ParameterError` for no possible ship."""
         ship, tank = found.ship(self.vessel.ship), found.tank(self.vessel.tank)
         refuse("vessel", tank_problems(ship, tank))
         self.folder.mkdir(parents=True, exist_ok=True)

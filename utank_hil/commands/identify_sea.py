@@ -120,10 +120,7 @@ def _print(figures: Mapping[str, float], slope: float, files: Mapping[str, Path]
 
 
 def even_means(time_s: FloatArray, values: FloatArray) -> FloatArray:
-    """Return means over steps of `STEP_S`, shape (M,), from the first time on.
-
-    Gaps of up to `LONGEST_GAP_S` are filled by lines; ValueError names a longer one.
-    """
+    """Means over `STEP_S`, shape (M,); ValueError names a gap longer than `LONGEST_GAP_S`."""
     good = np.isfinite(values)
     if not good.any():
         raise ValueError("a column has no values")

@@ -124,11 +124,7 @@ def problems_in_words(
 
 
 def kind_of(path: Path | str, models: dict[str, type[BaseModel]]) -> str:
-    """Return the kind of a file: the one whose own keys, those of no other, occur most often.
-
-    `models` are by the names of the kinds. ConfigError is raised if the file can't be read, or its
-    keys decide for none of the kinds.
-    """
+    """Kind of a file by the keys that no other has; ConfigError if they decide for none."""
     reader = _Reader(path)
     if () in reader.unread:
         raise ConfigError(reader.problems)

@@ -54,10 +54,7 @@ _Length = Annotated[float, Range(above=0, most=1e4)]
 def weather_criterion_period_s(
     beam_m: float, draught_m: float, length_m: float, gm_m: float
 ) -> float:
-    """Return the roll period of the IS Code 2008 (part A, 2.3.4).
-
-    Breadth is moulded, draught the mean moulded one, length that at the waterline.
-    """
+    """Roll period, IS Code 2008 (part A, 2.3.4), by moulded beam, mean draught and waterline."""
     coefficient = 0.373 + 0.023 * beam_m / draught_m - 0.043 * length_m / 100
     return 2 * coefficient * beam_m / math.sqrt(gm_m)
 

@@ -28,11 +28,7 @@ _EXACT = 1e-7  # relative residual above which past outputs do not determine the
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ARX:
-    """Autoregressive model with exogenous input.
-
-    ValueError is raised if the shapes are inconsistent, a coefficient is not finite, or the sample
-    time is not positive.
-    """
+    """ARX model; ValueError for unlike shapes, no finite numbers, or no positive sample time."""
 
     alpha: FloatArray  #: shape (p, m, m): output coefficients alpha_1 ... alpha_p.
     #: shape (p + 1, m, r): input coefficients beta_0 ... beta_p; beta_0 acts at once.
@@ -123,11 +119,7 @@ class ARX:
         return cls(alpha, beta, sample_time_s)
 
     def predict(self, u: FloatArray, y: FloatArray) -> FloatArray:
-        """Predict each sample of a record from the measured samples before it.
-
-        `u` has shape (N, r), `y` and the result have shape (N, m). Samples before the record are
-        taken as zero.
-        """
+        """Predict each sample of a record, (N, r) and (N, m), by those before it, zero at first."""
         u, y = self._record(u, y)
         predicted: FloatArray = u @ self.beta[0].T
         for i in range(1, min(self.order, len(y) - 1) + 1):

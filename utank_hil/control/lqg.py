@@ -266,10 +266,7 @@ interpolated."""
 
 
 class GentleController(LQGController):
-    """Stepping of an `LQGLaw` of one command, with a gain for each share of the pressure.
-
-    `gains`, shape (len(SHARES) - 1, n), are those for the shares below one.
-    """
+    """Stepping of an `LQGLaw`, with `gains`, (len(SHARES) - 1, n), for the shares below one."""
 
     def __init__(self, law: LQGLaw, gains: FloatArray) -> None:
         super().__init__(law)

@@ -60,11 +60,7 @@ class PythonDesign:
         refuse("python", problems)
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
-        """Call the factory and check that its result is a controller.
-
-        ParameterError is raised if the factory cannot be imported or called, or its controller
-        cannot be stepped.
-        """
+        """Call the factory; ParameterError if it can't be, or makes no controller that steps."""
         make = partial(_call, self.factory, dict(self.parameters), plant)
         controller = make()
         _try_out(controller, len(self.measured))

@@ -25,11 +25,7 @@ from utank_hil.dynamics.sampling import LinearModel, state_space_response
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StateSpaceLaw:
-    """A law given by its matrices.
-
-    ValueError is raised if the model is not discrete, its shapes are inconsistent, or a number is
-    not finite.
-    """
+    """A discrete law by its matrices; ValueError for unlike shapes or no finite numbers."""
 
     #: From the m measured outputs to the r commands; discrete, ``dt`` in seconds. D is the direct
     #: gain on the newest measurement. The sign is the law's own: u = -K y has D = -K.

@@ -207,10 +207,7 @@ def righting_range(model: RollModel) -> RightingRange:
 
 
 def greatest_held_pa(model: RollModel, most_pa: float, within_rad: float) -> float:
-    """Return the greatest held pressure, up to `most_pa`, with a heel of `within_rad` at most.
-
-    Steady moments are left out, and the pressure must be raised slowly.
-    """
+    """Greatest slowly raised pressure with a heel of `within_rad`, without steady moments."""
     model = upright(model)
 
     def is_held(pressure_pa: float) -> bool:

@@ -215,11 +215,7 @@ def pump_coast(state: PumpState, flow: float, step_s: float, c: PumpCoefficients
 
 
 def compile_pump(compiler: Callable[[Any], Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Return compiled `pump_step` and `pump_coast`.
-
-    The compiler, such as that of `utank_hil.dynamics.jit.njit`, compiles the functions in a
-    separate namespace, callees first.
-    """
+    """Compile `pump_step` and `pump_coast` in a separate namespace, callees first, as `njit`."""
     # from its source: of what mypyc has compiled there is no code to compile again
     spec = spec_from_loader(_CURVE.stem, SourceFileLoader(_CURVE.stem, str(_CURVE)))
     assert spec is not None

@@ -156,10 +156,7 @@ def noise_covariance(a: FloatArray, noise: FloatArray, time_s: float) -> FloatAr
 
 
 def state_space_response(system: "StateSpace | LinearModel", points: ComplexArray) -> ComplexArray:
-    """Transfer function C (p I - A)^-1 B + D of a model at complex points s (or z).
-
-    The points have shape (N,), the result (N, outputs, inputs).
-    """
+    """C (p I - A)^-1 B + D at complex points s (or z), shape (N,); (N, outputs, inputs)."""
     a, b, c, d = system.A, system.B, system.C, system.D
     points = np.asarray(points, dtype=np.complex128)
     unit, b_complex = np.eye(len(a)), b.astype(np.complex128)

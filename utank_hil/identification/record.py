@@ -35,11 +35,7 @@ def stacked_record(u: FloatArray, y: FloatArray) -> tuple[FloatArray, int]:
 
 
 def channel_scale(z: FloatArray, outputs: int) -> FloatArray:
-    """Root mean square of each channel, shape (q,), to scale pascals and radians alike.
-
-    IdentificationError is raised if the record has no finite row, a channel is constant or far out
-    of range, or an output is clipped.
-    """
+    """RMS of each channel, (q,); IdentificationError for an empty, constant or clipped one."""
     good = z[np.isfinite(z[:, 0])]
     if len(good) == 0:
         raise IdentificationError("the record has no row without a gap")

@@ -30,10 +30,7 @@ def draw_identification(
     title: str,
     about: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Draw held-out roll and its prediction, responses and residuals.
-
-    `record`, shape (N, 1 + m), is the record that `found` was identified from.
-    """
+    """Draw held-out roll, prediction, responses and residuals of a `record`, shape (N, 1 + m)."""
     measured = task.design.predictor.measured
     roll, arx = measured.index("roll_rad"), found.okid.arx
     step_s = arx.sample_time_s

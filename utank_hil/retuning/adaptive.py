@@ -231,10 +231,7 @@ class AdaptiveController(LawExchange):
 
 
 def gains(law: LinearLaw) -> tuple[float, float]:
-    """Sums of a law's absolute gains on past commands and on outputs.
-
-    They are those of the law's matrices in observer form, which take many ticks to compute.
-    """
+    """Sums of a law's absolute gains on commands and outputs (observer form); takes many ticks."""
     share, inner = (law.share, law.law) if isinstance(law, WashoutLaw) else (0.0, law)
     assert isinstance(inner, PredictiveLaw)
     outputs = (1 - share) * _sum(inner.output_gains) + share * inner.output_gains.shape[2]
@@ -279,9 +276,6 @@ def make_pulses(settings: RetuningSettings, plant: DesignPlant, sample_time_s: f
 
 
 def bearable(pulses: Pulses, roll_rad: float) -> float:
-    """Part of the pulses with which a ship that rolls `roll_rad` RMS rolls `MOST_ADDED` times that.
-
-    Waves and pulses are independent, so mean squares add up.
-    """
+    """Part of the pulses that raises `roll_rad` RMS to `MOST_ADDED` times, as squares add up."""
     added_rad = math.sqrt(MOST_ADDED * MOST_ADDED - 1) * max(LEAST_ROLL_RAD, roll_rad)
     return min(1.0, added_rad / max(pulses.roll_rad, 1e-12))

@@ -72,10 +72,7 @@ class ShipFigures:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionEstimate:
-    """Estimate of waves and ship from the latest part of the motion record.
-
-    Raises `ValueError` if the waves have more bands than the loop can read between two ticks.
-    """
+    """Waves and ship by the latest motion; `ValueError` for more bands than the loop can read."""
 
     #: of_sea, of_ship: whether the estimate of waves and ship is good, and if not, why.
     of_sea: Verdict

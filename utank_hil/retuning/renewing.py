@@ -300,10 +300,7 @@ def _reason(now: MotionEstimate, law: MonitoredLaw) -> str:
 
 
 def sea_difference(now: SlopeSpectrum, then: SlopeSpectrum) -> float:
-    """Return the root mean square difference of amplitudes, relative to the amplitudes `then`.
-
-    It is 0 for equal seas and 0.2 for waves a fifth higher.
-    """
+    """RMS difference of amplitudes over those `then`: 0 for equal seas, 0.2 for a fifth more."""
     before = then.slope_density(now.omega_rad_s)
     apart = float(np.sum(np.square(np.sqrt(now.density) - np.sqrt(before))))
     energy = float(np.sum(before))

@@ -58,10 +58,7 @@ RetuneFunction = Callable[[Any], Answer]  #: Function from a request to an answe
 
 
 class Work(NamedTuple):
-    """One kind of work of the retuner's process: a function and the type of its requests.
-
-    `most_numbers` is the number of array elements of the longest request.
-    """
+    """Work of the retuner: function, type of requests, `most_numbers` in arrays of the longest."""
 
     compute: RetuneFunction
     request: Any
@@ -149,11 +146,7 @@ class Mailbox:
         self._words[3] = now_ns
 
     def post(self, number: int, data: bytes) -> None:
-        """Replace the message.
-
-        `number` differs from the last message's and from 0. A message longer than the capacity
-        raises a ValueError.
-        """
+        """Replace the message by one of a new number, not 0; ValueError if it is too long."""
         if len(data) > len(self._bytes):
             raise ValueError(f"{len(data)} bytes are too long for a mailbox of {len(self._bytes)}")
         self._bytes[: len(data)] = data
@@ -207,10 +200,7 @@ class Desk:
         self._answers.beat(now_ns)
 
     def serve(self) -> bool:
-        """Answer the open request in the worker and return whether there was one.
-
-        An exception becomes a refusal, with its traceback on standard error.
-        """
+        """Answer an open request, if there is one; an exception is a refusal, told on stderr."""
         number = self._requests.number
         data = self._requests.read(number) if number != self._answers.number else None
         if data is None:

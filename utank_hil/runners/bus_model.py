@@ -132,10 +132,7 @@ class SimulatedBus:
             self._free_ns = now_ns
 
     def carry_until(self, before_ns: int) -> list[tuple[int, int, Frame]]:
-        """Advance the bus, and return the frames that ended before `before_ns`, oldest first.
-
-        Each comes with the time of its last bit in ns and its sender.
-        """
+        """Advance the bus; end (ns), sender and frame of all that ended before, oldest first."""
         arrived = []
         waiting, in_flight = self._waiting, self._in_flight
         while in_flight is not None or (waiting and self._free_ns < before_ns):

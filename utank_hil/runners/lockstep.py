@@ -49,10 +49,7 @@ class Lockstep:
         self._group = self._group.joined_by(nodes, self.now_ns)
 
     def run_until(self, time_ns: int) -> None:
-        """Run every event before `time_ns`, in one call or in many.
-
-        ValueError is raised if it is in the past, NodeError if a node raises, which ends the run.
-        """
+        """Run every event before `time_ns`; ValueError if past, NodeError if a node raises."""
         if time_ns < self.now_ns:
             raise ValueError(f"time_ns {time_ns}: the run is at {self.now_ns} already")
         group, bus, trace = self._group, self.bus, self._trace

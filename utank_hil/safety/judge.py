@@ -212,10 +212,7 @@ class Safety:
             self._start_ns = now_ns
 
     def update_alarms(self, accepted: list[int | None], now_ns: int) -> list[AlarmEvent]:
-        """Raise, accept and rectify alarms; return what became of them.
-
-        `accepted` are the codes that an operator has accepted, where None stands for all.
-        """
+        """Update alarms; return what became of them. `accepted` are codes, None for all."""
         supervisor, alarms = self.supervisor, self.alarms
         mode = supervisor.mode
         quiet = self._start_ns is None or now_ns - self._start_ns < QUIET_START_NS

@@ -50,11 +50,7 @@ class MeasuredSpectra:
         return (self[index] for index in range(len(self)))
 
     def __getitem__(self, index: int) -> Spectrum:
-        """Return the spectrum at a position.
-
-        Missing bands at either end of the grid count as zero. A missing band in between raises a
-        ValueError, because its energy is unknown.
-        """
+        """Spectrum at a position: zero beyond its bands, ValueError for one missing between."""
         frequency_hz, density = self._bands(index)
         if np.isnan(density).any():
             gap = frequency_hz[np.isnan(density)][0]

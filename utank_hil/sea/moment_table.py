@@ -31,11 +31,7 @@ class MomentTable:
 
     @classmethod
     def read(cls, file: Path) -> "MomentTable":
-        """Read a table.
-
-        ValueError is raised if the file can't be read, a column is missing, a value is no number,
-        or the pairs of frequency and heading are no complete grid from 0 to 180 degrees.
-        """
+        """Read a table; ValueError unless a complete grid of headings from 0 to 180 degrees."""
         try:
             columns = read_number_table(file)
         except OSError as error:

@@ -52,10 +52,7 @@ def wavenumber_rad_m(omega_rad_s: FloatArray) -> FloatArray:
 def encounter_frequency(
     omega_rad_s: FloatArray, heading_rad: FloatArray | float, speed_m_s: float
 ) -> FloatArray:
-    """Signed encounter frequency in rad/s; arguments broadcast.
-
-    It is negative where the ship overtakes the wave, which then passes from bow to stern.
-    """
+    """Signed encounter frequency, rad/s, broadcast; negative where the ship overtakes the wave."""
     omega = np.asarray(omega_rad_s, dtype=float)
     return (
         omega

@@ -90,11 +90,7 @@ class Spread:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spectrum:
-    """Wave spectrum at a fixed point (earth frame).
-
-    ValueError is raised if the shapes differ, the frequencies do not increase, or a value is not
-    finite.
-    """
+    """Wave spectrum at a fixed point; ValueError unless finite, alike and rising in frequency."""
 
     #: shape (F,): centre frequencies of the bands, positive and increasing, F > 1.
     frequency_hz: FloatArray
@@ -222,10 +218,7 @@ class SlopeSpectrum:
         return 2 * math.pi / float(self.omega_rad_s[peak]) if self.density[peak] > 0 else math.nan
 
     def slope_density(self, omega_rad_s: FloatArray) -> FloatArray:
-        """One-sided density of the effective wave slope in rad^2 per rad/s, at other frequencies.
-
-        It is linear between the centres, and zero outside of the bands.
-        """
+        """Density of the slope, rad^2 per rad/s: linear between centres, zero beyond the bands."""
         return np.interp(omega_rad_s, self.omega_rad_s, self.density, left=0.0, right=0.0)
 
     def elevation_density(self, effective_slope: float) -> FloatArray:
@@ -247,10 +240,7 @@ PHILLIPS = 8.1e-3  # Equilibrium-range constant of Pierson and Moskowitz (1964).
 
 
 def ittc_density(omega_rad_s: FloatArray, hs_m: float, tp_s: float) -> FloatArray:
-    """ITTC two-parameter spectrum (Bretschneider; modified Pierson-Moskowitz), ITTC 1978.
-
-    Returns S(omega) in m^2 s/rad at the angular frequencies, zero or more, of any shape.
-    """
+    """ITTC two-parameter spectrum (Bretschneider), ITTC 1978, in m^2 s/rad, of any shape."""
     _require_positive(hs_m=hs_m, tp_s=tp_s)
     peak = 2 * math.pi / tp_s
     ratio = np.asarray(omega_rad_s, dtype=float) / peak

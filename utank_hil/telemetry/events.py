@@ -47,10 +47,7 @@ class EventWriter(RingWriter):
         super().__init__(RingKind.EVENTS, 1, _LONGEST_BYTES, _SLOTS)
 
     def write_event(self, event: Event, start_ns: int) -> None:
-        """Append one event without blocking; reasons that are too long are cut.
-
-        `start_ns` is the time of the first telemetry row, from which readers count.
-        """
+        """Append an event, long reasons cut, without blocking; `start_ns` is of the first row."""
         if isinstance(event, RetuningEvent) and sum(map(len, event.reasons)) > _LONGEST:
             event = replace(event, reasons=("; ".join(event.reasons)[:_LONGEST] + " ...",))
         content = asdict(event) | {"time_ns": event.time_ns - start_ns, "start_ns": start_ns}

@@ -181,10 +181,7 @@ class BlockSink:
 
 
 class FrameLog:
-    """A frame log, read block by block, from part `path` on; its parts are read as one.
-
-    Raises `FrameLogError` if it is no frame log, or its head is incomplete.
-    """
+    """A frame log from part `path` on, block by block; `FrameLogError` if it is none."""
 
     def __init__(self, path: Path) -> None:
         first, number = whole_of(path)

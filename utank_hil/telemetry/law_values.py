@@ -48,10 +48,7 @@ def law_values(controller: object) -> Values:
 
 
 def restored(controller: Part, values: Values) -> Part:
-    """Return a copy of a controller at rest whose `law_values` are `values`.
-
-    LawValuesError is raised if the controller has other arrays, or arrays of other shapes.
-    """
+    """A copy of a resting controller with `values`; LawValuesError for arrays unlike its own."""
     own = law_values(controller)
     for name in dict.fromkeys((*values, *own)):
         there, here = values.get(name), own.get(name)

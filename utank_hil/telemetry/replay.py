@@ -51,10 +51,7 @@ class LawVerdict:
 
     @cached_property
     def loops(self) -> tuple[LoopFigures, LoopFigures] | None:
-        """Loops of the recorded law and the one designed here, a second's work for each.
-
-        None where the laws are equal, or a loop can't be judged.
-        """
+        """Loops of the recorded law and the designed one, None if equal or not to be judged."""
         if not self.differences or self.why_not_recorded:
             return None
         recorded, here = (loop_figures(law, self.config) for law in self.laws)

@@ -78,10 +78,7 @@ def logged_parts(
     channel: str | None,
     between_s: Between = ALWAYS,
 ) -> Iterator[Columns]:
-    """Yield the table of a frame log or a log of the bus by parts, as `signal_parts` does.
-
-    `between_s` counts from the first record.
-    """
+    """Yield a log's table by parts as `signal_parts`; `between_s` is since its first record."""
     if text_files.kind_of(path) == SUFFIX:
         log = FrameLog(path)
         entries = part_of_entries(entries_of(log.blocks(note)), between_s)

@@ -193,10 +193,7 @@ def _where(step: int, size: float, name: str) -> str:
 def _slope(
     answers: Iterable[tuple[FloatArray, ...]], name: str, size: float, most_samples: int
 ) -> tuple[FloatArray, bool]:
-    """Response per unit of an impulse until it has decayed, and whether it is that of a linear law.
-
-    `answers` are the responses to half the impulse, to minus half of it, and to all of it.
-    """
+    """Response per unit impulse until decay, and if linear, by half, minus half and all of it."""
     slopes: list[FloatArray] = []
     peak, deviation, loud = 0.0, 0.0, 0  # loud: the last sample that was not quiet
     for up, down, full in answers:

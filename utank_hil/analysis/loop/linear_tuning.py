@@ -147,11 +147,7 @@ def _failures(design: LinearDesign, plant: DesignPlant) -> tuple[str, ...]:
 def auto_tuned(
     kind: LinearKind, plant: DesignPlant, sea: SlopeDensity
 ) -> tuple[float, LinearDesign]:
-    """Find the law of a kind with all margins that costs least of those tried.
-
-    Returns the predicted cost, over that with the passive tank, and the law. Raises `NoLawError` if
-    no law has the margins, or the sea does not roll the ship.
-    """
+    """Cost over passive, and law, of the cheapest tried with all margins; else `NoLawError`."""
     search = _Search(kind, plant, sea)
     best, factors = search.start, [1.0] * len(_STEPS)
     for size in range(_SIZES):

@@ -150,10 +150,7 @@ def run_law(
 def sensed_noise(
     noise: SensorNoise | None, ticks: int, seed: int, sample_time_s: float
 ) -> tuple[FloatArray, list[int]]:
-    """Noise of `Signals` at the ticks at which a law's loop senses, shape (n, 5), and these.
-
-    The level's rate is not measured and has none.
-    """
+    """Noise of `Signals` where a loop senses, (n, 5), and its ticks; the level's rate has none."""
     shown = sensed_at(_ticks("sample_time_s", sample_time_s), ticks)
     size = noise or SensorNoise()
     sizes = np.array([size.roll_rad, size.roll_rate_rad_s, size.level_m, 0.0, size.pressure_pa])

@@ -100,11 +100,7 @@ class Interval(NamedTuple):
 
 
 def mean_interval(values: npt.ArrayLike) -> Interval:
-    """Mean of independent, roughly normal values with its interval of 95 % (Student's t).
-
-    `values`, shape (n,), are two or more, for a paired comparison the differences. Raises
-    `ValueError` if there are fewer.
-    """
+    """Mean of independent normal values, (n,), with its 95 % interval (t); two or more."""
     return clustered_interval(values, range(np.size(values)))
 
 

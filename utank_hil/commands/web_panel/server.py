@@ -238,10 +238,7 @@ def serve(listening: socket.socket, link: socket.socket, token: str) -> None:
 
 
 class ServerProcess:
-    """The process of a server on an address, and the panel's end of the link to it.
-
-    `port` 0 takes a free one. OSError is raised if the address can't be had.
-    """
+    """A server's process (port 0 takes a free one) and the link to it; OSError without address."""
 
     def __init__(self, host: str, port: int) -> None:
         with socket.create_server((host, port)) as listening:

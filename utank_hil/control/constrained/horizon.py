@@ -67,10 +67,7 @@ class Predictions(NamedTuple):
 
 
 def predictions(model: LinearModel, knots: tuple[int, ...], samples: int) -> Predictions:
-    """Predict the outputs over a horizon, with the same bits on every processor.
-
-    Raises ValueError if the knots are out of their range, or the model has several inputs.
-    """
+    """Predict the outputs with the same bits everywhere; ValueError for knots out of range."""
     if not knots or knots[0] != 0 or np.any(np.diff(knots) < 1) or knots[-1] >= samples:
         raise ValueError(
             f"knots must increase from 0 and stay below the horizon of {samples} samples, "

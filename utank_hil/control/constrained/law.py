@@ -159,10 +159,7 @@ class ConstrainedLaw:
         )
 
     def foreseeing(self, samples: int) -> LQGLaw:
-        """Linear law where a perfect forecast of so many samples stands for the estimate's waves.
-
-        ValueError is raised if the law takes no forecasts.
-        """
+        """Linear law by a perfect forecast of so many samples; ValueError if it takes none."""
         if self.foresight is None:
             raise ValueError("the law takes no forecasts: it is not previewed")
         n, at = len(self.model.A), np.arange(samples)

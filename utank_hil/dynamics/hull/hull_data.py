@@ -256,11 +256,7 @@ def excitation_at(hull: HullData, omega_rad_s: float, heading_deg: float) -> Com
 
 
 def free_roll(hull: HullData) -> FreeRoll:
-    """Return the free roll of the ship at rest.
-
-    ValueError is raised if mass, inertia, centre of gravity, restoring or a frequency is not in the
-    data, or the ship is not stable upright.
-    """
+    """The free roll of the ship at rest; ValueError if a figure lacks or she is not stable."""
     ship = hull.about_gravity_centre()
     stiffness = float(ship.known("hydrostatic")[3, 3])
     if stiffness <= 0:

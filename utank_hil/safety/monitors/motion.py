@@ -36,10 +36,7 @@ TRIAL_S: Final = 30.0
 
 
 class RollAgainstRate:
-    """Compares the roll with its integrated rate.
-
-    `unexplained_rad` is the leaky sum of the roll's moves that the rate does not account for.
-    """
+    """Compares roll and integrated rate: `unexplained_rad` is the leaky sum of what is left."""
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
         self._limit_rad = thresholds.drift_rad

@@ -140,11 +140,7 @@ class Stream:
 
 
 class Senders:
-    """All messages that the controller hears, and the frames that are none of them.
-
-    Every second message is looked at in one call, the others in the next. `frames_per_s` fill the
-    bus.
-    """
+    """All messages heard, half of them a call, and other frames; `frames_per_s` fill the bus."""
 
     def __init__(self, streams: Sequence[Stream], frames_per_s: float) -> None:
         self._due, self._later = tuple(streams[::2]), tuple(streams[1::2])

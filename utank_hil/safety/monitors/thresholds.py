@@ -96,11 +96,7 @@ class MonitorThresholds:
 def thresholds_of(
     plant: DesignPlant, roll_limit_rad: float, sensors: SensorFigures, *, of_hull: bool = False
 ) -> MonitorThresholds:
-    """The thresholds for a ship.
-
-    `roll_limit_rad` is the largest roll under control: nothing moves faster than a roll of this
-    amplitude at 2 w0.
-    """
+    """The thresholds: nothing moves faster than the greatest controlled roll does at 2 w0."""
     tank, limits = plant.tank, plant.limits
     frequency_rad_s = tank.natural_frequency_rad_s
     fastest_rad_s = 2 * frequency_rad_s
