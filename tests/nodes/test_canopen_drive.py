@@ -7,10 +7,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from tests.nodes.canopen_peers import Line
+from tests.nodes.canopen_peers import PROFILE, PUMP, Line
 from utank_hil.canbus import ControlWord, DriveState, Frame
 from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.device import hear
+from utank_hil.control.pressure_loop import PressureLoop
+from utank_hil.nodes.actuators_heard import DriveHeard
 from utank_hil.nodes.canopen_drive import CanopenDrive, state_of
 
 MS = 1_000_000
@@ -229,7 +231,7 @@ def test_a_drive_whose_power_went_while_it_ran_is_configured_anew():
 
 def test_the_loop_sets_the_target_while_it_is_enabled_and_begins_anew_after():
     asked, resets = [], []
-    loop = SimpleNamespace(step=lambda *given: asked.append(given) or 2e3,
+    loop = SimpleNamespace(most_speed_rad_s=28.0, step=lambda *given: asked.append(given) or 2e3,
                            reset=lambda: resets.append(len(asked)))  # fmt: skip
     line, targets = Line(loop=loop).run(400), []
     line.drive.follow = lambda target, word: targets.append(target) or []
@@ -285,6 +287,29 @@ def test_what_is_no_state_of_a_node_in_operation_that_was_configured_does_not_co
 def test_bits_of_the_status_word_say_that_it_is_at_a_limit_or_warns(bit, says):
     (report,) = reports_of(Line().run(400), 5, 0x0037 | 1 << bit)
     assert (report.held_back, report.warns) == says
+
+
+@pytest.mark.parametrize(
+    ("share", "limited", "at_speed"),
+    [(0.8, True, False), (-0.8, True, False), (0.95, True, True), (-0.95, True, True),
+     (0.95, False, False), (None, True, True)],
+)  # fmt: skip
+def test_its_limit_is_one_of_speed_where_the_rotor_turns_as_fast(share, limited, at_speed):
+    """One bit of the status word is for all limits; a rotor of unknown speed may be at its own."""
+    line = Line(loop=PressureLoop(PUMP, 0.02, 0.05, torque=True))
+    heard = DriveHeard(SimpleNamespace(takers={}, watched=()), None, pump=True, canopen=line.drive)
+    line.run(400)
+    status = 0x0037 | limited << 11
+    if share is not None:
+        counts = round(share * PUMP.max_speed_rad_s / PROFILE["speed_rad_s_per_unit"])
+        data = counts.to_bytes(4, "little", signed=True) + bytes(2) + bytes((4,))
+        line.drive.takers[0x285 | STANDARD].take(Frame(0x285 | STANDARD, data), line.now_ns)
+    for can_id, data in ((0x705, b"\x05"), (0x185, status.to_bytes(6, "little"))):
+        line.drive.takers[can_id | STANDARD].take(Frame(can_id | STANDARD, data), line.now_ns)
+    if share is None:
+        line.drive._speed_rad_s = math.nan
+        line.drive.deliver((DriveState.OPERATION_ENABLED, False, limited, False, 0.0), line.now_ns)
+    assert (heard.held_back, heard.at_speed) == (limited, at_speed)
 
 
 def test_an_echo_is_as_old_as_the_command_that_comes_back():

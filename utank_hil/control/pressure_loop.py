@@ -50,7 +50,7 @@ class PressureLoop:
         self._late = max(1, round(delay_s / cycle_s))
         self._most_pa = pump.max_pressure_rate_pa_s * cycle_s
         self._inertia = pump.coefficients.inertia
-        self._most_speed, self._most_torque = self._c.max_speed, self._c.max_torque
+        self.most_speed_rad_s, self._most_torque = self._c.max_speed, self._c.max_torque
         self.reset()
 
     def reset(self) -> None:
@@ -74,7 +74,7 @@ class PressureLoop:
         proportional_pa = self._per_s * self._lag_s * error_pa
         correction_pa = self._correction_pa + self._per_s * cycle_s * error_pa
         demanded = pump_speed(self._reference_pa + correction_pa + proportional_pa, flow_m3_s, c)
-        speed = min(max(demanded, -self._most_speed), self._most_speed)
+        speed = min(max(demanded, -self.most_speed_rad_s), self.most_speed_rad_s)
         target = limited = speed
         if self._torque:
             acceleration = (speed - self._speed_rad_s) / cycle_s

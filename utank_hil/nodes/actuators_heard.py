@@ -121,12 +121,13 @@ class DriveHeard:
         self.power_w = status.bus_voltage_v * status.current_a
 
     def _take_report(self, report: DriveReport | None, now_ns: int) -> None:
+        drive = self._canopen
+        assert drive is not None
         if report is None:  # configured, or refused
-            assert self._canopen is not None
-            refused = bool(self._canopen.setup.problem)
+            refused = bool(drive.setup.problem)
         else:
             self.state, refused, self.held_back, self.warns, self.power_w = report
-            self.at_speed = self.held_back  # CiA 402 has one bit for all limits
+            self.at_speed = self.held_back and drive.at_speed  # CiA 402 has one bit for all limits
             self._heard_ns = now_ns
         self._fault = DriveFault.INTERNAL if refused else _NO_DRIVE_FAULT
 

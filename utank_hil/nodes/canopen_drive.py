@@ -20,6 +20,7 @@ KEPT: Final = 16  #: Commands that an echo is looked for among: those of a third
 MARKS: Final = 4
 """The lowest two bits of the target count the commands: 3 of 1000 of the rated torque."""
 LATE_BEATS: Final = 2  #: Heartbeats that may be missing, as a consumer by CiA 301 takes them.
+FAST: Final = 0.9  #: Of the greatest speed, which a drive at it reaches within its ripple.
 IGNORED: Final = 3
 """Commands to stop after which a drive that still runs is stopped by network management: they may
 be lost, and 6007h brakes it all the same."""
@@ -73,6 +74,7 @@ class CanopenDrive:
     ) -> None:
         self._hears_only = hears_only
         self._plan, self._loop, self._area_m2 = plan, loop, area_m2
+        self._fast_rad_s = FAST * loop.most_speed_rad_s if loop else 0.0
         self.deliver: Callable[[DriveReport | None, int], None] = nobody
         self.setup = CanopenSetup(plan.bus, plan.node, plan.steps())
         tag = plan.bus << BUS_SHIFT | STANDARD
@@ -178,6 +180,11 @@ class CanopenDrive:
     def speed_rad_s(self) -> float:
         """Speed of the rotor by the last PDO; NaN before the first, and if that is long ago."""
         return self._speed_rad_s
+
+    @property
+    def at_speed(self) -> bool:
+        """Whether the rotor may turn at its greatest speed, to which the status word has no bit."""
+        return not abs(self._speed_rad_s) < self._fast_rad_s  # so if it is not known
 
     @property
     def state(self) -> DriveState | None:
