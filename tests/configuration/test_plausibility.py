@@ -9,6 +9,7 @@ import yaml
 from firmware_sim.scenario import Scenario
 from utank_hil.configuration import ConfigError, ControllerConfig, Vessel, load_config
 from utank_hil.configuration.yaml_text import parse_yaml
+from utank_hil.dynamics.nonlinear import RollModel, steady_heel
 
 CONFIGS = Path("configs").resolve()
 SHIPS = {path.stem: parse_yaml(path.read_text())[0] for path in CONFIGS.glob("ships/*.yaml")}
@@ -233,6 +234,43 @@ def test_limit_of_the_stability_that_nothing_watches_is_warned_of(tmp_path, sect
     refused, warned = told(tmp_path, controller, ControllerConfig)
     assert refused == {}
     assert ("vessel.least_gm_m" not in warned) == watched
+
+
+@pytest.mark.parametrize(
+    ("name", "noise_m", "pressure_pa", "warned"),
+    [
+        ("patti_b_constrained_gpc", 0.001, 20e3, False),
+        ("patti_b_constrained_gpc", 0.005, 20e3, True),
+        ("patti_b_constrained_gpc", 0.005, 1.5e3, False),  # held for ever, it does no harm
+        ("gpc", 0.05, 50e3, False),
+        ("naval_constrained_gpc", 0.02, 20e3, False),
+    ],
+)
+def test_gauges_too_noisy_for_a_pump_that_is_strong_for_its_ship_are_warned_of(
+    tmp_path, name, noise_m, pressure_pa, warned
+):
+    """What the water weighs that moves 48 times the noise: 2 rho g of it, held by the pump."""
+    sensors, limits = {"level_noise_m": noise_m}, {"pressure_pa": pressure_pa}
+    content = controller(name, sensors=sensors, limits=limits)
+    _, found = told(tmp_path, content, ControllerConfig)
+    assert ("sensors.level_noise_m" in found) == warned
+    loaded = load_config(tmp_path / "changed.yaml", ControllerConfig)
+    model = RollModel(loaded.vessel.ship, loaded.vessel.tank)
+    unseen_pa = min(2 * loaded.vessel.tank.density_kg_m3 * 9.80665 * 48 * noise_m, pressure_pa)
+    heel = steady_heel(model, unseen_pa)
+    most_rad = loaded.safety.roll_limit_rad / 4
+    assert (heel is None or abs(heel.roll_rad) > most_rad) == warned
+    if warned:  # either remedy is one
+        words = found["sensors.level_noise_m"]
+        fine_m, weak_pa = (
+            float(words.split(before)[1].split()[0]) for before in ("gauges of ", "pressure_pa to ")
+        )
+        for change in (
+            {"sensors": {"level_noise_m": fine_m}},
+            {"limits": {"pressure_pa": weak_pa}},
+        ):
+            content = controller(name, **{"sensors": sensors, "limits": limits, **change})
+            assert "sensors.level_noise_m" not in told(tmp_path, content, ControllerConfig)[1]
 
 
 def controller(name, **changes):

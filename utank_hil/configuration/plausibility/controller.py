@@ -11,11 +11,15 @@ from typing import Any, Final
 from utank_hil.base.parameters import Problem
 from utank_hil.control import SeaModel
 from utank_hil.dynamics import GRAVITY_M_S2
+from utank_hil.dynamics.nonlinear import RollModel, greatest_held_pa
+from utank_hil.safety.monitors.level_stuck import way_until_found_m
 
 _PERIODS: Final = (0.2, 5.0)
 """Range of a period of waves or of a wanted motion per the ship's roll period."""
 _RATIOS: Final = (0.005, 3.0)
 """Damping ratios that a law may want of a motion, or see in a sea's peak."""
+STUCK_SHARE: Final = 0.25
+"""Of the roll limit, by which water may heel that is moved unseen: the share of the roll budget."""
 
 
 def controller_warnings(config: Any) -> Iterator[Problem]:
@@ -73,6 +77,36 @@ def controller_warnings(config: Any) -> Iterator[Problem]:
         sea = _of(config, key)
         if isinstance(sea, SeaModel):
             yield from _of_sea(key, sea, roll_rad_s, tank.width_m)
+    if pump is not None and config.vessel.valve is None:  # behind a valve levels are not judged
+        yield from _of_gauges(config)
+
+
+def _of_gauges(config: Any) -> Iterator[Problem]:
+    """Gauges too noisy for a pump that is strong for its ship.
+
+    While both stand still, the pump may move the water until the monitor finds that. Held there,
+    the water may heel the ship by a part of its roll limit.
+    """
+    tank, most_pa, noise_m = (
+        config.vessel.tank, config.limits.pressure_pa, config.sensor_figures.level_noise_m,
+    )  # fmt: skip
+    heel_rad = STUCK_SHARE * config.safety.roll_limit_rad
+    held_pa = greatest_held_pa(RollModel(config.vessel.ship, tank), most_pa, heel_rad)
+    pa_per_m = 2 * tank.density_kg_m3 * GRAVITY_M_S2
+    way_m = way_until_found_m(noise_m)
+    if held_pa >= min(most_pa, pa_per_m * way_m):
+        return
+    # from rest the pump swings it to twice the level that it holds
+    turn = math.acos(max(1 - pa_per_m * way_m / most_pa, -1.0))
+    fine_m = held_pa / pa_per_m / way_until_found_m(1.0)
+    reason = (
+        f"is {noise_m:g}: levels that stand still are found once the water has moved "
+        f"{way_m:.2g} m, after {turn / tank.natural_frequency_rad_s:.2g} s of the greatest "
+        f"pressure; held there, it heels the ship beyond {heel_rad:.2g} rad, a quarter of "
+        f"safety.roll_limit_rad: use gauges of {math.floor(1e4 * fine_m) / 1e4:g} m or less, or "
+        f"set limits.pressure_pa to {math.floor(held_pa):g} or less"
+    )
+    yield "sensors.level_noise_m", reason
 
 
 def _of_sea(key: str, sea: SeaModel, roll_rad_s: float, width_m: float) -> Iterator[Problem]:

@@ -16,7 +16,7 @@ from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.noise import Noise
 from utank_hil.safety.monitors.sway import most_sway
 from utank_hil.safety.monitors.tank_equation import roll_push_at_natural_frequency
-from utank_hil.safety.monitors.thresholds import MonitorThresholds
+from utank_hil.safety.monitors.thresholds import STILL, MonitorThresholds
 
 SMOOTH_S: Final = 2.0
 LASTS_S: Final = 30.0
@@ -51,6 +51,11 @@ class Volume:
 
 
 BANDS: Final = 16.0  #: Movement of the water that counts, in bands. Chosen; no study.
+
+
+def way_until_found_m(level_noise_m: float) -> float:
+    """Way of the water, out of the level's balance, from which a stuck level is found."""
+    return BANDS * STILL * level_noise_m
 
 
 class LevelStuck:

@@ -20,6 +20,8 @@ UNCONFIRMED_HEEL_DEG: Final = 0.25
 """Steady heel by a pressure that does little harm, whichever way it presses."""
 NOISE_LIMIT: Final = 5.0
 """Noise, in the figures of the sensors, from which a signal counts as degraded."""
+STILL: Final = 3.0
+"""In the noise of a gauge: a level that stays within this of a value does not move."""
 DEGRADED_SHARE: Final = 0.5
 """Of the greatest pressure, or of that which would take the ship to its roll limit if it was held:
 nobody knows whether it presses the right way, and a step heels it up to twice as far at first."""
@@ -119,7 +121,7 @@ def thresholds_of(
         level_noise_m=3.75 * sensors.level_noise_m,  # in the sum of both
         drift_rad=6 * drift_s,
         roll_still_rad=5 * roll_s,
-        level_still_m=3 * sensors.level_noise_m,
+        level_still_m=STILL * sensors.level_noise_m,
         volume_m=max(0.03 * tank.height_m, 6 * sensors.level_noise_m),
         least_roll_push_m2_s2=roll_push_m2_s2,
         least_pump_push_m2_s2=0.1 * limits.pressure_pa / tank.density_kg_m3,
