@@ -53,10 +53,9 @@ class Entry:
 
 
 class CanopenNode:
-    """What every node does; `entries` is its object dictionary.
+    """What every node does, by its object dictionary `entries`.
 
-    `written_pdo` counts the PDOs that were taken; `lost_controller` is set while the heartbeat that
-    1016h names has ended.
+    `lost_controller` is set while the heartbeat that 1016h names has ended.
     """
 
     def __init__(
@@ -66,7 +65,6 @@ class CanopenNode:
         self._tag = bus << BUS_SHIFT | STANDARD
         self.state = NetworkState.BOOT_UP
         self._out: list[Frame] = []
-        self.written_pdo = 0
         self.lost_controller = False
         self._beat_ns: dict[int, int] = {}  # of other nodes, from their first heartbeat on
         self._next_beat_ns = 0
@@ -198,7 +196,6 @@ class CanopenNode:
         for entry in entries:
             entry.value = int.from_bytes(data[at : at + entry.size], "little")
             at += entry.size
-        self.written_pdo += 1
         self.taken(now_ns)
 
     def _send_pdos(self, kinds: range, indices: Iterable[int]) -> None:

@@ -71,10 +71,6 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
     # a ship from its papers
     ("a GM in centimetres", "init {here}/a --length 90 --beam 14 --displacement 2800 --gm 110 "
      "--roll-period 10", ("gm", "metres")),
-    ("a displacement in kilograms", "init {here}/a --length 90 --beam 14 "
-     "--displacement 2800000 --gm 1.1 --roll-period 10", ("displacement", "tonnes")),
-    ("a beam over the length", "init {here}/a --length 14 --beam 90 --displacement 2800 --gm 1.1 "
-     "--roll-period 10", ("beam",)),
     ("no stability", "init {here}/a --length 90 --beam 14 --displacement 2800 --gm -1", ("gm",)),
     ("neither draught nor period", f"init {{here}}/a {' '.join(SHIP)}",
      ("roll-period", "draught")),
@@ -109,9 +105,6 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
     ("a duration with its unit", "bench --duration 5min", ("--duration", "number")),
     ("a length with its unit", "init {here}/a --length 90m --beam 14 --displacement 2800 --gm 1.1",
      ("--length", "number")),
-    ("a ship to the fault table", "faults --scenario {here}/used/ship.yaml",
-     ("ship.yaml",)),
-    ("a report of a table", "report {here}/table.csv", ("table.csv",)),
     ("a controller to the tank's", f"design tank {{configs}}/{GPC}", ("is a controller", "ship")),
     ("results that are not there", "compare {here}/out1 {here}/out2", ("out1", "bench")),
     ("results into a file", f"bench {{configs}}/{STORM} --out {{here}}/table.csv",

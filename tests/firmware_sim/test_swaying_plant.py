@@ -25,7 +25,6 @@ from utank_hil.configuration.hull_files.parts import Given
 from utank_hil.configuration.hull_files.reader import read_hull
 from utank_hil.dynamics.hull.hull_data import free_roll, radiation_at
 from utank_hil.dynamics.hull.lateral import LateralHull
-from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.runners import Lockstep, SimulatedBus
 from utank_hil.sea import Harmonics, Sea, jonswap
@@ -61,26 +60,6 @@ def test_swaying_plant_equals_an_adaptive_integration() -> None:
     plant = Plant(ship, VESSEL.tank, None, SteadyWaves(MOMENT, LATERAL))
     assert advanced(plant, 60) == pytest.approx(expected, abs=1e-6)
     assert plant.lateral_m_s2 == pytest.approx(9.80665 * float(LATERAL.at(60.0)), rel=1e-6)
-
-
-def test_its_small_motion_is_that_of_the_linear_equations() -> None:
-    small = [Harmonics(1e-5 * each.amplitude, FREQUENCY, each.phase_rad)
-             for each in (MOMENT, LATERAL)]  # fmt: skip
-    mass, damping, stiffness = coupled_matrices(VESSEL.ship, VESSEL.tank)
-    a = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(mass, stiffness),
-                                                  -np.linalg.solve(mass, damping)]])  # fmt: skip
-    order = [0, 2, 1, 3]  # roll, its rate, level, its rate
-    a = a[np.ix_(order, order)]
-    of_moment = np.concatenate([[0.0, 0.0], np.linalg.solve(mass, [1.0, 0.0])])[order]
-    of_sway = RollModel(VESSEL.ship, VESSEL.tank).derivative(np.zeros(4), sway_m_s2=1e-5) / 1e-5
-
-    def slopes(t, x):
-        moment_nm, slope = (float(each.at(t)) for each in small)
-        return a @ x + of_moment * moment_nm + of_sway * 9.80665 * slope
-
-    expected = solve_ivp(slopes, (0, 60), [0.0] * 4, "DOP853", rtol=1e-10, atol=1e-16).y[:, -1]
-    found = advanced(Plant(VESSEL.ship, VESSEL.tank, None, SteadyWaves(*small)), 60)
-    assert found == pytest.approx(expected, rel=1e-4, abs=1e-10)
 
 
 def test_work_less_losses_is_the_change_of_energy_in_a_swaying_ship() -> None:

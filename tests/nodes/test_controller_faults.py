@@ -96,8 +96,6 @@ def test_without_good_motion_samples_pressure_is_zero_within_250_ms(fault):
         (lambda b: setattr(b, "drive_fault", DriveFault.STALL), Fault.DRIVE_FAULT, 120),
         (lambda b: (setattr(b, "drive_follows", False),
                     setattr(b, "drive_state", DriveState.SWITCHED_ON)), Fault.DRIVE_FAULT, 80),
-        (lambda b: (setattr(b, "drive_follows", False),
-                    setattr(b, "drive_state", DriveState.FAULT)), Fault.DRIVE_FAULT, 40),
         (lambda b: setattr(b, "tank", b.tank._replace(port_high=Switch.ON)), Fault.LEVEL_LIMIT, 40),
         (lambda b: setattr(b, "tank", b.tank._replace(starboard_high=None)), Fault.LEVEL_LIMIT, 40),
         (lambda b: setattr(b, "tank", b.tank._replace(port_high=Switch.ON, quality=Quality.BAD)),

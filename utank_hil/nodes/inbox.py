@@ -91,7 +91,6 @@ class Inbox:
             self._hear_pressure()
         if drive is None and foreign.pump is not None:
             drive = CanopenDrive(foreign.pump, hears_only=True)
-        self.canopen_drive = drive
         self._drive = DriveHeard(routing, catalogue, pump=pump, canopen=drive)
         self._valve = ValveHeard()
         if valve:

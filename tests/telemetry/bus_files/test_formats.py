@@ -72,29 +72,20 @@ def test_lines_of_candump(tmp_path, line, expected):
         ("(1.6) can0 123#01_9", "can't have 1 bytes"),
         ("(1.6)  can0  123   [3]  01 02", "has 2 of 3 bytes"),
         ("garbage", "is no frame as candump writes it"),
-    ],
-)
-def test_a_line_that_is_not_understood_is_counted_with_its_reason(tmp_path, line, why):
-    frames, (note,) = read(tmp_path, f"(1.5) can0 123#01\n{line}\n(1.7) can0 123#02\n")
-    assert len(frames) == 2
-    assert "a.log: 1 line is not understood and left out, the first line 2" in note
-    assert why in note
-
-
-@pytest.mark.parametrize(
-    ("line", "why"),
-    [
         ("0.6 CANFD 1 Rx", "ends before its identifier"),
         ("0.6 1 SENSOR_MOTION Rx d 1 00", "'SENSOR_MOTION' is no identifier"),
         ("0.6 1 100 d 1 00", "says neither Rx nor Tx"),
         ("0.6 1 100 Rx", "is no frame, such as"),
     ],
 )
-def test_an_asc_line_that_is_not_understood_is_counted_with_its_reason(tmp_path, line, why):
-    text = f"{ASC}0.5 1 100 Rx d 1 00\n{line}\n0.7 1 100 Rx d 1 00\n"
-    frames, (note,) = read(tmp_path, text, "a.asc")
+def test_a_line_that_is_not_understood_is_counted_with_its_reason(tmp_path, line, why):
+    text = f"(1.5) can0 123#01\n{line}\n(1.7) can0 123#02\n"
+    if line.startswith("0.6"):
+        text = f"{ASC}0.5 1 100 Rx d 1 00\n{line}\n0.7 1 100 Rx d 1 00\n"
+    frames, (note,) = read(tmp_path, text, "a.log")
     assert len(frames) == 2
-    assert "1 line is not understood and left out" in note
+    first = text[: text.index(line)].count("\n") + 1
+    assert f"a.log: 1 line is not understood and left out, the first line {first}" in note
     assert why in note
 
 
