@@ -221,7 +221,7 @@ def predict(
         return of_a_bench(1 - ratio * (1 + change))
 
     bare = rms(lambda seed: roll_without_tank(scenario, seed, count))
-    passive = rms(lambda seed: _passive(scenario, seed, count))
+    passive = rms(lambda seed: passive_run(scenario, seed, count))
     found = Expected(
         window_s, of_a_bench(bare), of_a_bench(passive), passive_below_no_tank=below(passive, bare)
     )
@@ -276,7 +276,7 @@ def loaded(scenario: Scenario, scale: float) -> Scenario:
     return scenario.model_copy(update={"vessel": vessel, "actual_ship": actual})
 
 
-def _passive(scenario: Scenario, seed: int, count: int) -> tuple[FloatArray, float]:
+def passive_run(scenario: Scenario, seed: int, count: int) -> tuple[FloatArray, float]:
     """Roll with the pump at zero pressure every `RECORD_S`, shape (count,), and `capsized_s`."""
     plant, roll = plant_of(scenario, seed), np.empty(count)
     for row in range(count):

@@ -46,6 +46,7 @@ PARTS: Final = {
     "share_of_possible": Part("python -m tools.studies.share_of_possible --seeds 8 --json", 6),
     "preview_worth": Part("python -m tools.studies.preview_worth --seeds 12 --json", 10),
     "renewed_seas": Part("python -m tools.studies.renewed_seas --seeds 3 --json", 30),
+    "unseen_seeds": Part("python -m tools.studies.unseen_seeds --json", 60),
     "ten_hulls": Part("python -m tools.studies.ten_hulls --json", 15),
     "turning": Part("python -m tools.studies.turning --json", 1),
     "less_pressure": Part("python -m tools.studies.less_pressure --json", 12),

@@ -28,7 +28,8 @@ from utank_hil.base.background import one_thread_each
 from utank_hil.base.tick import TICK_S
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import DesignPlant
-from utank_hil.control.constrained.law import ConstrainedLaw
+from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
+from utank_hil.control.lqg import GentleController
 from utank_hil.retuning.estimate import ShipFigures
 from utank_hil.retuning.renewing import Effort
 from utank_hil.sea import EffectiveSlope, Sea, ittc
@@ -48,11 +49,18 @@ FIRST_SEED: Final = 300
 
 
 class Learning:
-    """The clipped law with the share that pays; `of_command` takes the share after the clipping."""
+    """A law with the share that pays; `of_command` takes the share after the clipping."""
 
-    def __init__(self, law: ConstrainedLaw, plant: DesignPlant, *, of_command: bool) -> None:
+    def __init__(
+        self,
+        controller: GentleController | ConstrainedController,
+        plant: DesignPlant,
+        *,
+        of_command: bool = False,
+    ) -> None:
         self._of_command = of_command
-        self._law, self._most_pa = law.clipped(), plant.limits.pressure_pa
+        self._law, self._most_pa = controller, plant.limits.pressure_pa
+        self._use = controller.use if isinstance(controller, GentleController) else controller.allow
         self.sample_time_s = self._law.sample_time_s
         self.effort = Effort(ShipFigures.of(plant.ship).roll_period_s / self.sample_time_s)
         self._twin = plant.sampled(("roll_rad",), self.sample_time_s)
@@ -68,7 +76,7 @@ class Learning:
         """Take a measurement and return the command."""
         self.effort.update(float(y[0]), float(y[0] - (self._twin.C @ self._made)[0]))
         share = self.effort.share
-        self._law.use(1.0 if self._of_command else share)
+        self._use(1.0 if self._of_command else share)
         clipped = np.clip(self._law.step(y, reference), -self._most_pa, self._most_pa)
         return share * clipped if self._of_command else clipped
 
@@ -100,7 +108,7 @@ def roll_over_passive(
     moment = waves.roll_moment(plant.ship.stiffness_nm_rad, EffectiveSlope(0.5))
     count = round(seconds / TICK_S)
     passive = passive_motion(loaded.ship, loaded.tank, moment, TICK_S, count + 1)
-    controller = Learning(law, plant, of_command=way == OF_COMMAND)
+    controller = Learning(law.clipped(), plant, of_command=way == OF_COMMAND)
     run = simulate_loop(loaded, passive, controller, MEASURED, seed=seed)
     squares = np.square(np.column_stack([run.motion[:count, 0], passive[:count, 0]]))
     size = round(WINDOW_S / TICK_S)
