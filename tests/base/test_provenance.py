@@ -258,6 +258,27 @@ def test_kernels_of_an_older_processor_are_said():
     assert there["blas"].endswith("openblas Nehalem")
 
 
+def test_kernels_are_said_of_a_library_in_a_folder_of_any_name(tmp_path):
+    """Of spaces, and of letters that are none in UTF-8."""
+    folder = os.fsencode(tmp_path) + b"/Schiff \xd6l 2"
+    os.mkdir(folder)
+    code = f"""
+import ctypes, os, shutil
+import numpy
+from utank_hil.base import provenance
+mapped = open("/proc/self/maps", "rb").read().splitlines()
+library = next(line.split(maxsplit=5)[-1] for line in mapped if b"openblas" in line)
+shutil.copy(library, {folder!r})
+copy = ctypes.CDLL(os.fsdecode(os.path.join({folder!r}, os.path.basename(library))))
+lines = provenance._lines
+provenance._lines = lambda path: [line for line in lines(path) if "Schiff" in line]
+print(provenance._blas_core())
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert machine()["blas"].endswith(f"openblas {done.stdout.strip()}")
+
+
 def test_a_log_that_says_nothing_of_its_machine_is_none_of_another():
     assert kernels({"platform": "Linux", "cpus": 2}) == ""
     assert machine()["libm"] in kernels(machine())

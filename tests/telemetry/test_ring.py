@@ -396,6 +396,18 @@ def test_a_ring_that_is_being_closed_is_not_removed_by_another_that_begins(monke
     assert not (SHM / ring.name).exists()
 
 
+def test_a_writer_may_have_any_name():
+    """Linux cuts it after 15 bytes, in a letter too."""
+    name = Path("/proc/self/comm")
+    before = name.read_bytes()
+    name.write_bytes(b") Schiff-Schl\xc3")
+    try:
+        with RowWriter(("a",)) as writer, RowReader(writer.name) as reader:
+            assert reader.writer_lives
+    finally:
+        name.write_bytes(before.rstrip())
+
+
 def test_a_ring_whose_segment_was_removed_meanwhile_closes_quietly():
     """systemd-logind removes those of a user who logs out, whatever still runs (RemoveIPC)."""
     code = """

@@ -171,7 +171,8 @@ def kernels(of: dict[str, Any]) -> str:
 
 def _blas_core() -> str:
     """Kind of processor whose kernels OpenBLAS runs; empty for another library."""
-    for path in {line.split()[-1] for line in _lines("/proc/self/maps") if "openblas" in line}:
+    lines = (line for line in _lines("/proc/self/maps") if "openblas" in line)
+    for path in {line.split(maxsplit=5)[-1] for line in lines}:  # it may have spaces
         library = ctypes.CDLL(path)
         for name in _CORE_NAMES:
             if hasattr(library, name):
@@ -183,4 +184,4 @@ def _blas_core() -> str:
 
 def _lines(path: str) -> list[str]:
     file = Path(path)
-    return file.read_text().splitlines() if file.exists() else []
+    return os.fsdecode(file.read_bytes()).split("\n") if file.exists() else []

@@ -268,11 +268,11 @@ def _reserve(name: str, size: int) -> None:
 def _process_start(pid: int) -> int | None:
     """Return a living process's start in clock ticks since boot, as pids are reused; else None."""
     try:
-        status = Path(f"/proc/{pid}/stat").read_text()
+        status = Path(f"/proc/{pid}/stat").read_bytes()
     except (FileNotFoundError, ProcessLookupError):
         return None
-    fields = status.rpartition(")")[2].split()  # The command name may hold spaces and parentheses.
-    return None if fields[0] in "ZX" else int(fields[19])
+    fields = status.rpartition(b")")[2].split()  # The command's name may hold anything.
+    return None if fields[0] in b"ZX" else int(fields[19])
 
 
 def _remove_if_orphaned(name: str) -> None:
