@@ -85,3 +85,12 @@ def test_a_command_that_ends_early_leaves_no_empty_folder(tmp_path: Path) -> Non
     ended(tmp_path / "held" / "deep", "b.txt")
     left = sorted(str(each.relative_to(tmp_path)) for each in tmp_path.rglob("*"))
     assert left == ["held", "held/deep", "held/deep/b.txt", "mine"]
+
+
+def test_a_folder_whose_name_no_result_can_hold_is_refused_first(tmp_path: Path) -> None:
+    """As one of an old disk, in ISO 8859-1."""
+    folder = os.fsdecode(os.fsencode(tmp_path) + b"/Schl\xfcssel")
+    result = CliRunner().invoke(app, [folder])
+    assert result.exit_code == 2
+    assert "is no UTF-8 here" in result.stderr
+    assert not os.path.exists(folder)

@@ -207,6 +207,8 @@ def prepare_out(folder: Path, files: Collection[str], *, keep: bool = True) -> P
     folder is the first of ``NAME-2``, ``NAME-3``, ... without. With `keep` false it is `folder`.
     """
     first = folder if folder.name else folder.resolve()
+    if str(folder).encode(errors="replace") != os.fsencode(folder):
+        fail(f"{folder}: is no UTF-8 here, as results need; choose another folder with --out")
     for number in count(2):
         if reason := why_not_writable(folder, files):
             fail(f"{reason}; choose another folder with --out")
