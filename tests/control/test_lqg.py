@@ -42,18 +42,6 @@ def test_gain_of_the_thesis_weights_on_the_ship_is_that_of_python_control():
     assert law.sample_time_s == 0.2
 
 
-def test_gain_is_where_value_iteration_ends():
-    model, rng = random_model(3), np.random.default_rng(3)
-    q, r, n = positive(rng, 5), positive(rng, 2), 0.05 * rng.normal(size=(5, 2))
-    a, b = model.A, model.B
-    value, gain = np.zeros((5, 5)), np.zeros((2, 5))
-    for _ in range(500):
-        gain = np.linalg.solve(r + b.T @ value @ b, b.T @ value @ a + n.T)
-        closed = a - b @ gain
-        value = closed.T @ value @ closed + q + gain.T @ r @ gain - n @ gain - gain.T @ n.T
-    np.testing.assert_allclose(design_lqr(model, q, r, n).gain, gain, rtol=1e-9)
-
-
 def test_innovation_is_white_on_the_nominal_model_and_has_the_foretold_covariance():
     model, rng = random_model(1), np.random.default_rng(1)
     process, measurement = 0.01 * positive(rng, 5), 0.1 * positive(rng, 3)

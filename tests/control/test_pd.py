@@ -9,7 +9,7 @@ from rolling_ship import SHIP, TANK
 from utank_hil.analysis.loop.margins import closed_loop_response, margins
 from utank_hil.base.ordered_sums import product
 from utank_hil.control import DesignPlant
-from utank_hil.control.gain import PD_MEASURED, GainLaw, PDDesign, design_pd
+from utank_hil.control.gain import PD_MEASURED, PDDesign, design_pd
 from utank_hil.control.optimal_tank import passive_optimum, ship_ratios
 from utank_hil.dynamics.linear import coupled_matrices, pump_model
 
@@ -74,17 +74,6 @@ def test_delay_and_lag_of_the_pump_are_harmless():
     assert found.radius < 1
     assert found.peak_sensitivity < 2
     assert found.delay_margin_s > 0.2
-
-
-def test_gain_law_answers_the_newest_measurement_less_its_reference():
-    law = GainLaw(np.array([[1.0, -2.0]]), 0.1)
-    controller = law.controller()
-    assert controller.step(np.array([3.0, 1.0])) == [-1.0]
-    assert controller.step(np.array([3.0, 1.0]), np.array([3.0, 0.0])) == [2.0]
-    z = np.exp(1j * np.array([0.1, 1.0]))
-    a, b, c, d, _ = law.matrices()
-    for point, response in zip(z, law.response(z), strict=True):
-        np.testing.assert_allclose(response, c @ np.linalg.solve(point * np.eye(2) - a, b) + d)
 
 
 @pytest.mark.parametrize("sample_time_s", [-1.0, 0.0, np.nan])

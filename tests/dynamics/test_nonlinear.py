@@ -111,21 +111,6 @@ def test_linearized_it_is_the_linear_model():
     np.testing.assert_allclose(model.derivative(np.zeros(4), 0.0, 1.0), system.B[:, 1], rtol=1e-12)
 
 
-def test_small_angles_simulate_as_the_linear_model():
-    from control import forced_response
-
-    ship = replace(THESIS_SHIP, damping_nms_rad=4.87e7)
-    tank = replace(THESIS_TANK, damping_ratio=0.1)
-    size = 1e-4
-    time = np.linspace(0, 60, 601)
-    run = simulate_reference(RollModel(ship, tank), 60.0, (size, 0, -8 * size, 0), samples=601)
-    linear = forced_response(
-        coupled_model(ship, tank), time, np.zeros((2, 601)), [size, 0, -8 * size, 0]
-    )
-    difference = np.abs(run.state.T - linear.states).max(axis=1)
-    assert np.all(difference < 1e-5 * np.abs(linear.states).max(axis=1))
-
-
 @pytest.mark.parametrize("name", PAIRS)
 def test_it_balances_the_six_degree_forces_in_roll(name):
     ship, tank = PAIRS[name]

@@ -14,7 +14,6 @@ from utank_hil.canbus import (
     Frame,
     OperatorCommand,
     PumpCommand,
-    SensorMotion,
     load_catalogue,
 )
 from utank_hil.configuration import load_config
@@ -162,19 +161,16 @@ class Listener:
     """Every frame on the bus with its time; what it meant, decoded apart from the nodes."""
 
     def __init__(self):
-        self.frames: list[tuple[int, str, Frame]] = []
         self.commands: list[tuple[int, PumpCommand]] = []
         self.states: list[tuple[int, DriveState | None]] = []
         self.orders: list[tuple[int, OperatorCommand]] = []
-        self.motion_ns: list[int] = []
         self._decode = {
-            CATALOGUE.receiver(message).can_id: (CATALOGUE.receiver(message), message)
-            for message in (PumpCommand, DriveStatus1, OperatorCommand, SensorMotion)
+            CATALOGUE.receiver(message).can_id: CATALOGUE.receiver(message)
+            for message in (PumpCommand, DriveStatus1, OperatorCommand)
         }
 
     def __call__(self, time_ns, sender, frame):
-        self.frames.append((time_ns, sender, frame))
-        receiver, kind = self._decode.get(frame.can_id, (None, None))
+        receiver = self._decode.get(frame.can_id)
         message = None if receiver is None else receiver.accept(frame)
         if isinstance(message, PumpCommand) and sender == "controller":
             self.commands.append((time_ns, message))
@@ -182,15 +178,6 @@ class Listener:
             self.states.append((time_ns, message.state))
         elif isinstance(message, OperatorCommand):
             self.orders.append((time_ns, message))
-        elif kind is SensorMotion and message is not None:
-            self.motion_ns.append(time_ns)
-
-    def bytes(self):
-        """The whole trace."""
-        return b"".join(
-            b"%d %s %x %s\n" % (time_ns, sender.encode(), frame.can_id, frame.data.hex().encode())
-            for time_ns, sender, frame in self.frames
-        )
 
 
 class FaultBench:
