@@ -13,7 +13,7 @@ from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.device import hear
 from utank_hil.control.pressure_loop import PressureLoop
 from utank_hil.nodes.actuators_heard import DriveHeard
-from utank_hil.nodes.canopen_drive import CanopenDrive, state_of
+from utank_hil.nodes.canopen_drive import CanopenDrive, DriveReport, state_of
 
 MS = 1_000_000
 
@@ -310,6 +310,32 @@ def test_its_limit_is_one_of_speed_where_the_rotor_turns_as_fast(share, limited,
         line.drive._speed_rad_s = math.nan
         line.drive.deliver((DriveState.OPERATION_ENABLED, False, limited, False, 0.0), line.now_ns)
     assert (heard.held_back, heard.at_speed) == (limited, at_speed)
+
+
+def test_who_hears_it_takes_its_frames_and_watches_both_its_messages():
+    """No age tells of the silence of the second one."""
+    line, routing = Line(), SimpleNamespace(takers={}, watched=("another",))
+    heard = DriveHeard(routing, None, pump=True, canopen=line.drive)
+    assert set(routing.takers) == set(line.drive.takers)
+    assert heard.watched == line.drive.watched
+    assert routing.watched == ("another", *line.drive.watched)
+    assert heard.slow == (0x285 | STANDARD,)
+    assert heard.words == line.drive.words == "node 5: status word 0x0000"
+    nobody = DriveHeard(SimpleNamespace(takers={}, watched=()), None, pump=False, canopen=None)
+    assert (nobody.watched, nobody.slow, nobody.native, nobody.words) == ((), (), False, "")
+
+
+def test_a_drive_in_another_mode_or_refused_is_at_fault():
+    line = Line()
+    heard = DriveHeard(SimpleNamespace(takers={}, watched=()), None, pump=True, canopen=line.drive)
+    for refused in (True, False):
+        report = DriveReport(DriveState.SWITCHED_ON, refused, False, False, 7.0)
+        line.drive.deliver(report, 5 + refused)
+        assert (heard.faulty, heard.heard_ns, heard.power_w) == (refused, 5 + refused, 7.0)
+    for problem in ("node 5: another drive", ""):
+        line.drive.setup.problem = problem
+        line.drive.deliver(None, 9)
+        assert (heard.faulty, heard.heard_ns) == (bool(problem), 5)
 
 
 def test_an_echo_is_as_old_as_the_command_that_comes_back():

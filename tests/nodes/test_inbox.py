@@ -451,6 +451,38 @@ def test_what_the_valve_says_is_kept_with_the_echo_of_the_last_status():
     assert say(0.5, 3).valve_heard_ns == line.now_ns
 
 
+@pytest.mark.parametrize(
+    ("state", "fault", "faulty"),
+    [
+        (ValveState.FOLLOWING, ValveFault.NONE, False),
+        (ValveState.FAULT, ValveFault.NONE, True),
+        (ValveState.FOLLOWING, ValveFault.INTERNAL, True),
+        (ValveState.FOLLOWING, None, True),
+    ],
+)
+def test_a_valve_is_at_fault_by_its_state_or_its_fault(state, fault, faulty):
+    line = listening(valve=True)
+    flags = [False] * (len(ValveStatus._fields) - 5)
+    status = ValveStatus(0.4, state, fault, 3, None, *flags)
+    line.hear(CATALOGUE.transmitter(ValveStatus).frame(status))
+    assert line.seen.valve_fault is faulty
+
+
+def test_a_drive_is_not_heard_before_both_its_messages_came():
+    line = Line()
+    line.say(GOOD[DriveStatus1])
+    assert line.seen.drive_age_ms > 1e12
+    line.say(GOOD[DriveStatus2])
+    assert line.seen.drive_age_ms < 1.0
+    kinds = (DriveStatus1, DriveStatus2)
+    watched = [each.can_id for each in line.inbox._drive.watched]
+    assert watched == [CATALOGUE.codec(kind).can_id for kind in kinds]
+    echo_ns = line.seen.drive_echo_ns
+    line.say(GOOD[DriveStatus1])  # the same echo again is none
+    assert line.seen.drive_echo_ns == echo_ns
+    assert line.inbox._drive.words.startswith("drive: state 39 (OPERATION_ENABLED) in DRIVE_ST")
+
+
 @pytest.mark.parametrize("limited", ["power_limited", "speed_limited"])
 def test_a_drive_at_its_power_or_speed_is_held_back(limited):
     line, status = Line(), GOOD[DriveStatus1]

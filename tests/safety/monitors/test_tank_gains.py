@@ -7,8 +7,14 @@ from dataclasses import replace
 import pytest
 from moving_ship import SHIP, TANK, THRESHOLDS
 
+from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.monitors.tank_equation import DerivativeFilter, TankEquation
+from utank_hil.safety.monitors.tank_equation import (
+    Band,
+    DerivativeFilter,
+    TankEquation,
+    roll_push_at_natural_frequency,
+)
 
 STEP_S = 0.05
 G = 9.80665
@@ -115,3 +121,116 @@ def test_the_filter_begins_at_rest_and_follows_a_straight_line_two_time_constant
         assert begun.value == pytest.approx(5.0 + 3.0 * (t - 1.0 + fades * (1.0 + t)))
         assert begun.rate == pytest.approx(3.0 * (1 - fades * (1 + 2.0 * t)))
         assert bend == pytest.approx(3.0 * fades * 4.0 * t)
+
+
+def test_a_roll_at_w0_pushes_by_gravity_less_what_the_water_is_carried_along():
+    """Thesis (2.19): g L - L (H + Lz) w0^2 per roll."""
+    due = G * TANK.width_m - TANK.width_m * (TANK.height_m + TANK.lz_m) * W0**2
+    assert roll_push_at_natural_frequency(SHIP, TANK) == pytest.approx(due)
+
+
+def test_the_band_begins_at_rest_lets_w0_pass_and_nothing_of_twice_that():
+    w, step_s = 0.9, 0.05
+    band = Band(w, step_s, 2)
+    for value in (5.0, -3.0):
+        assert [band.update((value, 2 * value)) for _ in range(50)] == [
+            pytest.approx([value, 2 * value]) for _ in range(50)
+        ]
+        band.begun = False
+    for times, gain in ((1.0, 0.75 / abs(1 - 1 / 1.3**2 + 1j / 1.3)), (2.0, 0.0)):
+        band.begun = False
+        found = [band.update((math.sin(times * w * step_s * k), 0.0)) for k in range(3000)]
+        most = max(each[0] for each in found[-500:])
+        assert most == pytest.approx(gain, abs=5e-3)
+        assert {each[1] for each in found} == {0.0}
+
+
+@pytest.mark.parametrize("of_hull", [False, True])
+@pytest.mark.parametrize("valve", [False, True])
+def test_after_a_restart_it_is_as_a_new_one(of_hull, valve):
+    """Whatever it saw before, a heel and a level that stand still among that."""
+    thresholds = replace(THRESHOLDS, of_hull=of_hull)
+    used, fresh = (TankEquation(SHIP, TANK, thresholds, STEP_S, valve=valve) for _ in range(2))
+    for k in range(900):
+        used.update(0.2 + 0.1 * math.sin(W * k * STEP_S), 1.0, 9e3, held_pa=-7e3)
+    used.restart()
+    names = "doubt", "level_gain", "late_s", "obeyed", "water_moves", "slope_push", "settled"
+    for k in range(1200):
+        now = 0.1 * math.sin(W * k * STEP_S), 0.4 * math.cos(W * k * STEP_S), 3e3
+        found = [each.update(*now, held_pa=1e3) for each in (used, fresh)]
+        assert found[0] == found[1]
+        for name in names:
+            assert getattr(used, name) == pytest.approx(getattr(fresh, name), nan_ok=True)
+
+
+@pytest.mark.parametrize(("of_hull", "settled", "memory"), [(False, 6.0, 0.4), (True, 8.5, 0.44)])
+def test_it_says_nothing_until_a_quarter_of_its_memory_has_filled(of_hull, settled, memory):
+    """After its filters have settled; a memory of tau holds 1 - exp(-t / tau)."""
+    equation = TankEquation(SHIP, TANK, replace(EXACT, of_hull=of_hull), STEP_S)
+    first = found = 0
+    while equation.level_gain != equation.level_gain:
+        assert found == 0
+        found = equation.update(
+            0.1 * math.sin(W * first * STEP_S), 0.4 * math.cos(W * first * STEP_S), 0.0
+        )
+        first += 1
+    wait_s = settled / (2 * W0) + math.log(4 / 3) * memory * EXACT.tank_period_s
+    assert first * STEP_S == pytest.approx(wait_s, abs=3 * STEP_S)
+
+
+def test_a_roll_that_is_still_is_found_after_a_quarter_of_a_period():
+    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    found_s = next(
+        k * STEP_S
+        for k in range(2000)
+        if equation.update(0.0, math.cos(W0 * k * STEP_S), 30e3 * math.sin(W0 * k * STEP_S))
+        & Finding.ROLL_STUCK
+    )
+    wait_s = 6.0 / (2 * W0) + 0.25 * THRESHOLDS.tank_period_s
+    assert found_s == pytest.approx(wait_s, abs=3 * STEP_S)
+
+
+@pytest.mark.parametrize(("share", "moves"), [(0.95, False), (1.05, True)])
+def test_water_moves_as_one_that_swings_at_w0_by_more_than_the_gauges_noise(share, moves):
+    """The filters leave 1 / (1 + 1/4) of what swings at w0."""
+    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    still_m = THRESHOLDS.level_still_m * share * 1.25
+    seen = {-1: False, 1: False}
+    for k in range(1200):
+        equation.update(0.0, still_m * math.sin(W0 * k * STEP_S), 0.0)
+        if k > 600:
+            seen[1 if math.cos(W0 * k * STEP_S - 2 * math.atan(0.5)) > 0 else -1] |= (
+                equation.water_moves
+            )
+    assert seen == {-1: moves, 1: moves}
+
+
+def test_the_slope_push_is_that_of_roll_and_level_together():
+    roll, level = 0.1 + 0j, 0.3j
+    mass, damping, stiffness = (each[0] for each in coupled_matrices(SHIP, TANK))
+    still = replace(SHIP, quadratic_damping_nms2_rad2=0.0)
+    equation = TankEquation(still, TANK, THRESHOLDS, STEP_S)
+    moment = sum(
+        (s - W * W * m + 1j * W * d) * each
+        for m, d, s, each in zip(mass, damping, stiffness, (roll, level), strict=True)
+    )
+    tau_s = 3 * 2 * math.pi / W0  # of the mean that is taken off
+    due = abs(G * TANK.width_m / SHIP.stiffness_nm_rad * FILTERED * moment)
+    due *= W * tau_s / math.hypot(1.0, W * tau_s)
+    most = 0.0
+    for k in range(4000):
+        turn = cmath.exp(1j * W * k * STEP_S)
+        equation.update((roll * turn).real, (level * turn).real, 0.0)
+        most = max(most, abs(equation.slope_push)) if k > 3000 else 0.0
+    assert most == pytest.approx(due, rel=0.02)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("share", "judged"), [(0.88, True), (0.92, False)])
+def test_a_level_over_nine_tenths_of_the_tank_is_not_judged_on_either_side(side, share, judged):
+    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    for _ in range(600):
+        equation.update(0.0, 0.0, 0.0)
+    assert equation.settled
+    equation.update(0.0, side * share * TANK.level_limit_m, 0.0)
+    assert equation.settled == judged

@@ -183,16 +183,18 @@ class MotionWatch:
 
     def __init__(self, thresholds: MonitorThresholds, cycle_s: float = TICK_S) -> None:
         self._half_s = 0.5 * cycle_s
-        self._slow = cycle_s > SLOW_CYCLE_S
-        self._bent_ns = 0
+        self._slow = cycle_s > SLOW_CYCLE_S  # pragma: no mutate: just that serves as either
+        self._bent_ns = 0  # pragma: no mutate: long ago
         self.motion = RollAgainstRate(thresholds)
         self.rate_noise = Noise(math.sqrt(6) * thresholds.rate_noise_rad_s)
         self._rate_bend = SecondDifference()
         self._spikes = SpikeCount()
+        # pragma: no mutate start: of the first sample nothing is told, and it is heard later
         self._last_roll_rad = self._last_rate_rad_s = 0.0
+        self._heard_ns = 0
+        # pragma: no mutate end
         self._dead_s = max(DEAD_PERIODS * thresholds.tank_period_s, DEAD_S)
         self._repeated_s = 0.0
-        self._heard_ns = 0
         self._waited_s = self._turned_rad = 0.0
         self.found = 0  #: Bits of `Finding`.
 

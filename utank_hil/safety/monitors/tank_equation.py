@@ -199,16 +199,18 @@ class TankEquation:
 
     def restart(self) -> None:
         """Begin anew after a gap."""
-        self._wait = -1
+        self._wait = -1  # pragma: no mutate: below zero
         if self._band is not None:
             self._band.begun = False
         self.obeyed = self.water_moves = False
         self._sound, self._reversed, self._swapped, self._pump_reversed, self._quarter_late = (
             Misfit() for _ in range(5)
         )
+        # pragma: no mutate start: one more is little beside hundreds of samples
         self._xx = self._pp = self._vv = self._both = 0.0
         self._level_both = self._push_sum = self._slope_both = 0.0
         self._slope_lead = self._late_uu = 0.0
+        # pragma: no mutate end
         self._slope.restart()
         self.slope_push = 0.0
         self._forget_lead()
