@@ -1,4 +1,4 @@
-"""The shipped adaptive scenarios, whole, in lockstep."""
+"""The shipped scenarios, whole, in lockstep, and what the adaptive laws do in theirs."""
 
 from dataclasses import replace
 from functools import cache
@@ -54,6 +54,16 @@ def test_retuned_after_the_loading_changed_the_ship_rolls_a_third_less(controlle
     assert run.retuning[-1].found.roll_period_s == pytest.approx(true_s, rel=0.005)
     assert true_s == pytest.approx(7.5, rel=1e-4)
     assert run.refused_commands == 0
+
+
+@pytest.mark.evidence
+@pytest.mark.parametrize("name", sorted(each.name for each in SCENARIOS.glob("*.yaml")))
+def test_no_shipped_law_ends_its_scenario_in_a_fault(name: str) -> None:
+    for controller in scenario(name).controllers:
+        run = run_of(name, controller)
+        ended = (run.column("mode") == Mode.FAULT).any()
+        # PD rolls the ship more than the passive tank: the page of results says so
+        assert ended == ((name, controller) == ("storm_all.yaml", "pd")), controller
 
 
 @pytest.mark.evidence
