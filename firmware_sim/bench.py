@@ -2,6 +2,7 @@
 
 import math
 import multiprocessing
+import os
 import pickle
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -183,7 +184,9 @@ def run_bench(
             )
             raise ParameterError("", [(f"controllers.{job.name}.law", why)]) from error
     started = time.monotonic()
-    workers = 2 if options.channel is not None or not options.real_time else 1
+    workers = 1 if options.channel is None else 2
+    if not options.real_time:
+        workers = len(os.sched_getaffinity(0))
     with stop_on_signals() as stopped:
         board = _Board(multiprocessing.get_context("spawn"), len(jobs))
         runs: list[Run] = []

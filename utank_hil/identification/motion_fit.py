@@ -193,7 +193,7 @@ class _Record:
             ship.stiffness_nm_rad * stiffness,
             ship.damping_nms_rad * damping,
         )
-        found = self.likelihood(theta)
+        found, of_waves = self.likelihood(theta), self.spectrum.covariance()
         # A ship in error changes the spectrum, and the stiffness that it is relative to.
         by_ship = np.array(
             [
@@ -203,7 +203,7 @@ class _Record:
         )
         by_ship = (by_ship / _STEP[:, None]).T
         by_ship[:, 0] -= 2
-        log_covariance = found.covariance + by_ship @ covariance @ by_ship.T
+        log_covariance = of_waves + by_ship @ covariance @ by_ship.T
         density = np.exp(found.mean) / stiffness**2
         energy = density.sum()
         noise = self._moment(theta)[1] / stiffness**2

@@ -65,7 +65,6 @@ class LogSpectrum(NamedTuple):
     #: Log-likelihood of the estimates over all spectra, without its constants.
     log_likelihood: float
     mean: FloatArray  #: shape (F,): logarithm of the density at the mode.
-    covariance: FloatArray  #: shape (F, F): covariance of the logarithm.
 
 
 class SmoothSpectrum:
@@ -82,6 +81,7 @@ class SmoothSpectrum:
         self._prior += _TINY * np.eye(len(place))
         self._tapers = tapers
         self._warm: FloatArray | None = None
+        self._last: tuple[FloatArray, FloatArray]
 
     def restart(self) -> None:
         """Start the next search from the estimates, not from the last spectrum."""
@@ -109,9 +109,8 @@ class SmoothSpectrum:
             log_density = log_density + step / max(1.0, longest)
             if longest < _CONVERGED:
                 break
-        self._warm = log_density + level
+        self._warm, self._last = log_density + level, (factor, root)
         total = np.exp(self._warm) + noise
-        explained = solve_triangular(factor, root[:, None] * prior, lower=True)
         return LogSpectrum(
             float(
                 -tapers * np.sum(np.log(total) + estimate / total)
@@ -119,5 +118,11 @@ class SmoothSpectrum:
                 - np.log(factor.diagonal()).sum()
             ),
             self._warm,
-            prior - explained.T @ explained,
         )
+
+    def covariance(self) -> FloatArray:
+        """Covariance of the logarithm that was found last, shape (F, F)."""
+        factor, root = self._last
+        explained = solve_triangular(factor, root[:, None] * self._prior, lower=True)
+        covariance: FloatArray = self._prior - explained.T @ explained
+        return covariance
