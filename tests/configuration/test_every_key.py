@@ -63,9 +63,6 @@ NOT_TOLD: Final = {
     # ten times a ripple at the quay is a sea, and ten times a container heavy cargo
     "heel_removal.sea.hs_m": {10},
     **{f"heel_removal.voyage.{at}.ship.offset_moment_nm": {10} for at in range(1, 6)},
-    # ten times a fine gauge is a usual one
-    "patti_b_self_tuning.sensors.level_noise_m": {10},
-    "patti_b_constrained_gpc.sensors.level_noise_m": {10},
     # emulated gauges are as noisy as one wants to try
     "patti_b.sensors.level_noise_m": {0.001, 10, 60, 1000},
     # small ships in a small sea: three to eight times its height is a usual sea
