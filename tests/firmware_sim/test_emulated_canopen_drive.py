@@ -298,6 +298,23 @@ def test_what_is_lost_ends_at_zero_pressure(lost, fault, within_ms):
     assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, fault)
 
 
+@pytest.mark.slow
+def test_a_controller_that_dies_leaves_the_drive_braking():
+    bench = Bench(DRIVE | {"mode": "velocity"}).pressing()
+    bench.lost = lambda sender, can_id: sender == len(bench.ship.nodes)
+    assert bench.until_zero() <= 130
+
+
+@pytest.mark.slow
+def test_four_of_five_lost_commands_end_at_zero():
+    bench = Bench(DRIVE | {"mode": "torque"}).pressing()
+    numbers = iter(range(10_000))
+    bench.lost = lambda sender, can_id: can_id == 0x205 and next(numbers) % 5 != 4
+    bench.rolls(0.12)
+    assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.DRIVE_SILENT)
+    assert bench.until_zero() <= 250
+
+
 def test_the_drive_of_the_page_is_configured():
     page = Path("docs/devices.md").read_text(encoding="utf-8")
     (written,) = (each for each in page.split("```yaml\n") if each.startswith("devices:\n  pump"))
