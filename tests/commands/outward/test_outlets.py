@@ -170,6 +170,22 @@ def test_the_end_with_clients_is_quiet(caplog: pytest.LogCaptureFixture) -> None
     assert caplog.messages == []
 
 
+def test_the_server_ends_after_an_answer_that_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(*_: object) -> bytes:
+        raise RuntimeError("an answer that fails")
+
+    monkeypatch.setattr(registers, "reply", failing)
+    monkeypatch.setattr(registers, "values", lambda _: {})
+    address = ("127.0.0.1", free_port())
+    server = registers.ModbusServer(address, None)  # type: ignore[arg-type]
+    with socket.create_connection(address, 5) as client:
+        client.settimeout(5)
+        client.sendall(READ)
+        assert client.recv(64) == b""  # its connection is closed, not left open
+        server.close()
+    assert not server._thread.is_alive()
+
+
 def test_a_port_in_use_is_said_and_the_rest_goes_on(listener: socket.socket) -> None:
     said: list[str] = []
     with socket.create_server(("127.0.0.1", 0)) as other:

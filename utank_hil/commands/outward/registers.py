@@ -136,15 +136,17 @@ class ModbusServer:
         self._clients.append(client)
         if len(self._clients) > _MOST_CLIENTS:  # One whose end was not heard must keep no place.
             self._clients.pop(0).transport.abort()
-        with suppress(OSError, asyncio.IncompleteReadError):
-            while True:
-                head = await reader.readexactly(_HEAD_BYTES)
-                transaction, protocol, length, device = unpack(">HHHB", head)
-                if protocol != 0 or not 2 <= length <= _MOST_BYTES:
-                    break
-                answer = reply(await reader.readexactly(length - 1), self._values)
-                client.write(pack(">HHHB", transaction, 0, len(answer) + 1, device) + answer)
-                await client.drain()
-        if client in self._clients:
-            self._clients.remove(client)
-        client.close()
+        try:
+            with suppress(OSError, asyncio.IncompleteReadError):
+                while True:
+                    head = await reader.readexactly(_HEAD_BYTES)
+                    transaction, protocol, length, device = unpack(">HHHB", head)
+                    if protocol != 0 or not 2 <= length <= _MOST_BYTES:
+                        break
+                    answer = reply(await reader.readexactly(length - 1), self._values)
+                    client.write(pack(">HHHB", transaction, 0, len(answer) + 1, device) + answer)
+                    await client.drain()
+        finally:  # or the end would wait for it for ever
+            if client in self._clients:
+                self._clients.remove(client)
+            client.close()
