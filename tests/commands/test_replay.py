@@ -22,6 +22,9 @@ from utank_hil.telemetry.replay import entries_of
 pytestmark = pytest.mark.slow
 
 COMMANDS = load_catalogue().codec(PumpCommand)
+#: In Pa/rad. It shares no factor with the steps of roll and pressure on the bus: with -1.5e5 a roll
+#: that stands asks for a pressure exactly between two steps, and the last bit decides which is sent.
+GAIN = -151_234.5
 WIDE = {"TERM": "dumb", "COLUMNS": "300", "NO_COLOR": "1"}
 
 
@@ -31,7 +34,7 @@ def invoke(command: Any, *words: object) -> Result:
     return CliRunner(env=WIDE).invoke(app, [str(word) for word in words])
 
 
-def controller(folder: Path, gain: float = -1.5e5) -> Path:
+def controller(folder: Path, gain: float = GAIN) -> Path:
     """A law in matrices, in a data file, on a machine that may be busy."""
     system = {"A": [[0.5]], "B": [[1.0]], "C": [[gain]], "D": [[2 * gain]], "dt": 0.1}
     (folder / "law.json").write_text(json.dumps(system))
@@ -103,14 +106,14 @@ def test_a_run_in_real_time_is_replayed_bit_for_bit(folder: Path) -> None:
 def test_the_last_bit_of_a_gain_is_named_even_where_no_frame_shows_it(
     folder: Path, tmp_path: Path
 ) -> None:
-    other = controller(tmp_path, float(np.nextafter(-1.5e5, 0)))
+    other = controller(tmp_path, float(np.nextafter(GAIN, 0)))
     result = invoke(replay, log_of(folder), "--config", other, "--json")
     assert result.exit_code == 0
     found = json.loads(result.stdout)
     assert found["exact"]
     assert not found["law"]["recorded_law_ran"]
     assert found["law"]["why_not"] == "another configuration was named"
-    assert ["-150000.0", "-149999.99999999997"] in [
+    assert ["-151234.5", "-151234.49999999997"] in [
         [each["recorded"], each["designed"]] for each in found["law"]["differences"]
     ]
     assert all(each["deviation"] < 2e-16 for each in found["law"]["differences"])
@@ -142,7 +145,7 @@ def test_a_recorded_law_answers_though_another_would_be_designed_here(
 
 def test_another_gain_is_named_by_tick_message_and_signal(folder: Path, tmp_path: Path) -> None:
     # of the other sign: on a busy machine a few commands come, all of them at the rate's limit
-    other = controller(tmp_path, 1.5e5)
+    other = controller(tmp_path, -GAIN)
     result = invoke(replay, log_of(folder), "--config", other, "--json")
     assert result.exit_code == 1
     found = json.loads(result.stdout)
