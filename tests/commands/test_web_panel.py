@@ -10,7 +10,7 @@ import statistics
 import threading
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -298,6 +298,37 @@ def test_a_page_that_takes_nothing_more_leaves_its_place(monkeypatch: pytest.Mon
             if served.pages.acquire(blocking=False):
                 return
         raise AssertionError("the page still has its place")
+
+
+def test_requests_that_come_in_drops_leave_their_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "_PATIENCE_S", 0.8)
+    monkeypatch.setattr(server, "MOST_CONNECTIONS", 20)
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with (
+        ours,
+        theirs,
+        socket.create_server(("127.0.0.1", 0)) as listening,
+        server.PageServer(listening, theirs, "token") as served,
+    ):
+        address = listening.getsockname()
+        host = f"{address[0]}:{address[1]}"
+        threading.Thread(target=served.serve_forever, daemon=True).start()
+        body = f"POST /token/order HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\n"
+        begun = (b"", b"GET / HTTP/1.1\r\n", f"{body}Content-Length: 200\r\n\r\n".encode())
+        slow = [socket.create_connection(address, 5) for _ in range(30)]
+        for number, each in enumerate(slow):
+            each.sendall(begun[number % 3])
+        for _ in range(12):  # 2.4 s
+            for each in slow:
+                with suppress(OSError):  # It is closed.
+                    each.sendall(b"x")
+            time.sleep(0.2)
+        with socket.create_connection(address, 5) as client:
+            client.sendall(f"GET /token/ HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
+            assert client.recv(15) == b"HTTP/1.1 200 OK"
+        for each in slow:
+            each.close()
+        served.shutdown()
 
 
 def test_connections_that_the_system_refused_a_thread_keep_no_place(

@@ -4,6 +4,7 @@ Each page holds one stream of the panel's states (server-sent events) and answer
 process tells the panel of answers that are not late, and hands on orders. It ends with the panel.
 """
 
+import io
 import multiprocessing
 import os
 import secrets
@@ -34,7 +35,7 @@ MOST_CONNECTIONS: Final = 64  #: Four pages with six each, and as many again tha
 MOST_BYTES: Final = 256  #: Length of an order; the longest has some fifty bytes.
 LATE: Final = 700_000_000 // SHOW_NS
 """States behind the newest at which what a page shows is old: with the way there less than 1 s."""
-_PATIENCE_S: Final = 5.0  #: Time that a request may take to come, and a state to leave.
+_PATIENCE_S: Final = 5.0  #: Time that a whole request may take to come, and a state to leave.
 _END_S: Final = 2.0  #: Time for the process to end.
 _HEADERS: Final = {
     "Cache-Control": "no-store",
@@ -111,6 +112,22 @@ class PageServer(ThreadingHTTPServer):
         """Leave a browser that has gone unmentioned."""
 
 
+class _InTime(socket.SocketIO):
+    """What comes on a connection until a time; TimeoutError after it, however little came."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        super().__init__(connection, "r")
+        self.connection, self.until_s = connection, 0.0
+
+    def readinto(self, buffer: Any) -> int | None:
+        """Read some bytes."""
+        self.connection.settimeout(max(self.until_s - time.monotonic(), 1e-3))
+        try:
+            return super().readinto(buffer)
+        finally:
+            self.connection.settimeout(_PATIENCE_S)  # For the answer.
+
+
 class _Page(BaseHTTPRequestHandler):
     """Requests of one connection."""
 
@@ -118,6 +135,18 @@ class _Page(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     timeout = _PATIENCE_S
     disable_nagle_algorithm = True  # An order must not wait for an acknowledgement.
+
+    def setup(self) -> None:
+        """Read from the connection until a time."""
+        super().setup()
+        self.rfile.close()
+        self._incoming = _InTime(self.connection)
+        self.rfile = io.BufferedReader(self._incoming)
+
+    def handle_one_request(self) -> None:
+        """Take a request that is whole in time, and answer it."""
+        self._incoming.until_s = time.monotonic() + _PATIENCE_S
+        super().handle_one_request()
 
     def do_GET(self) -> None:
         """Answer with a file of the page, or with the stream of states."""
