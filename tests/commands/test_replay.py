@@ -22,8 +22,8 @@ from utank_hil.telemetry.replay import entries_of
 pytestmark = pytest.mark.slow
 
 COMMANDS = load_catalogue().codec(PumpCommand)
-#: In Pa/rad. It shares no factor with the steps of roll and pressure on the bus: with -1.5e5 a roll
-#: that stands asks for a pressure exactly between two steps, and the last bit decides which is sent.
+#: In Pa/rad. It shares no factor with the steps of roll and pressure on the bus: with -1.5e5 a
+#: roll that stands asks for a pressure between two steps, and the last bit decides which is sent.
 GAIN = -151_234.5
 WIDE = {"TERM": "dumb", "COLUMNS": "300", "NO_COLOR": "1"}
 
