@@ -3,7 +3,7 @@
 from typing import Final
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.tick import NEVER_NS, TICK_S
+from utank_hil.base.tick import NEVER_NS
 from utank_hil.canbus import (
     Catalogue,
     ControlWord,
@@ -155,7 +155,7 @@ class ValveCommander:
         self._tank = tank
         self._sender = catalogue.transmitter(ValveCommand)
         self._timeout_s, self._most_off = timeout_s, most_off
-        self._most_step = TICK_S / valve.opening_time_s
+        self._most_per_ns = 1e-9 / valve.opening_time_s
         self._level_period_s = catalogue.codec(SensorTank).cycle_ns * 1e-9
         self._inertia_pa_s2_m = tank.density_kg_m3 * tank.effective_length_m
         self._asked = valve.fail_opening
@@ -198,9 +198,10 @@ class ValveCommander:
             self._followed_ns = now_ns
         if not self._heard:  # it may stand anywhere at first, and runs from there
             self._heard = measured.valve_heard_ns > NEVER_HEARD_NS
-            self._expected = opening
-        step = self._told - self._expected
-        self._expected += min(max(step, -self._most_step), self._most_step)
+            self._expected, self._looked_ns = opening, now_ns
+        step, most = self._told - self._expected, self._most_per_ns * (now_ns - self._looked_ns)
+        self._looked_ns = now_ns
+        self._expected += min(max(step, -most), most)
         age_ms = (now_ns - measured.valve_heard_ns) / MILLISECOND_NS
         # pragma: no mutate start: a tick more or less, and it is never just that far off
         unknown = age_ms > STALE_MS  # others judge that

@@ -58,10 +58,11 @@ BOATS_TANK = Tank(2.016, 0.4392, 0.1297, 0.06215, lz_m=0.28, damping_ratio=0.1, 
 BOATS_LIMITS = PumpLimits(pressure_pa=3505.0, rate_pa_s=7e3, level_m=0.35)
 
 
-def found_on_a_boat(roll_rms_rad, *, sign=1.0, minutes=10.0):
+def found_on_a_boat(roll_rms_rad, *, sign=1.0, minutes=10.0, noise_m=0.005):
     """What is found of a boat of 8 m in waves about her roll period, by noisy gauges."""
     plant = DesignPlant(BOAT, BOATS_TANK, limits=BOATS_LIMITS)
-    equation = TankEquation(BOAT, BOATS_TANK, thresholds_of(plant, 0.35, SensorFigures()), STEP_S)
+    thresholds = thresholds_of(plant, 0.35, SensorFigures(level_noise_m=noise_m))
+    equation = TankEquation(BOAT, BOATS_TANK, thresholds, STEP_S)
     random = np.random.default_rng(1)
     a, b = state_matrices(BOAT, BOATS_TANK)
     w = BOATS_TANK.natural_frequency_rad_s * random.uniform(0.7, 1.3, 40)
@@ -73,7 +74,7 @@ def found_on_a_boat(roll_rms_rad, *, sign=1.0, minutes=10.0):
     motion = (np.exp(1j * np.multiply.outer(t, w)) @ moved).real
     motion *= roll_rms_rad / motion[:, 0].std()
     motion *= [sign, 1.0]
-    motion += random.normal(size=motion.shape) * [2e-4, 0.005 / math.sqrt(2)]
+    motion += random.normal(size=motion.shape) * [2e-4, noise_m / math.sqrt(2)]
     found = 0
     for roll_rad, level_m in motion.tolist():
         found |= equation.update(roll_rad, level_m, 0.0)
@@ -86,8 +87,10 @@ def test_a_boat_is_sound_whatever_the_noise_of_its_gauges_looks_like(roll_deg):
     assert found_on_a_boat(math.radians(roll_deg)) == 0
 
 
-def test_a_boat_that_rolls_tells_a_wrong_sign():
-    assert found_on_a_boat(math.radians(1.2), sign=-1.0, minutes=1.0) & Finding.WATER_SIGN
+@pytest.mark.parametrize(("roll_deg", "noise_m"), [(1.2, 0.005), (0.4, 0.001)])
+def test_a_boat_that_rolls_tells_a_wrong_sign(roll_deg, noise_m):
+    found = found_on_a_boat(math.radians(roll_deg), sign=-1.0, minutes=1.0, noise_m=noise_m)
+    assert found & Finding.WATER_SIGN
 
 
 ZEROS = (math.radians(0.3), 0.044, 870.0)

@@ -176,6 +176,7 @@ def test_it_says_nothing_until_a_quarter_of_its_memory_has_filled(of_hull, settl
         first += 1
     wait_s = settled / (2 * W0) + math.log(4 / 3) * memory * EXACT.tank_period_s
     assert first * STEP_S == pytest.approx(wait_s, abs=3 * STEP_S)
+    assert equation.settled
 
 
 def test_a_roll_that_is_still_is_found_after_a_quarter_of_a_period():
