@@ -68,6 +68,11 @@ def ellipse(**section):
     return Ellipse(found), heard
 
 
+def test_a_status_with_a_sign_counts_by_its_bits():
+    status = ConditionPlan(Field(0, 8, 1, signed=True), (1 << 64) - 1, frozenset([0xFE, 0xFF]))
+    assert [status.holds(bytes([each])) for each in (0xFE, 0xFF, 0x7F)] == [True, True, False]
+
+
 def test_an_ellipse_as_cantools_encodes_it():
     sensor, heard = ellipse()
     for k in range(20):

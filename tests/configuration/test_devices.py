@@ -4,6 +4,7 @@ import math
 import re
 from pathlib import Path
 
+import cantools
 import pytest
 import yaml
 from others import others_file
@@ -11,7 +12,7 @@ from others import others_file
 from utank_hil.canbus import Address, Frame, Quality, SensorMotion, load_catalogue
 from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.device import ProfiledDevice
-from utank_hil.canbus.profiles.device_plan import ForeignDevices
+from utank_hil.canbus.profiles.device_plan import ForeignDevices, MessageEncoder
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.configuration.device_files import shipped_profiles
 from utank_hil.configuration.devices import DevicesSection
@@ -333,9 +334,15 @@ BO_ 256 IMU: 8 S
  SG_ YAW m2 : 8|16@1- (0.001,0) [0|0] "rad/s" X
 BO_ 257 LONG: 20 S
  SG_ FAR : 100|16@1- (0.001,0) [0|0] "rad" X
+BO_ 258 NEST: 8 S
+ SG_ BOOK M : 0|8@1+ (1,0) [0|0] "" X
+ SG_ PAGE m1M : 8|8@1+ (1,0) [0|0] "" X
+ SG_ ANGLE m2 : 16|16@1- (0.001,0) [0|0] "rad" X
 BA_DEF_ BO_ "GenMsgCycleTime" INT 0 10000;
 BA_DEF_DEF_ "GenMsgCycleTime" 0;
 BA_ "GenMsgCycleTime" BO_ 256 20;
+SG_MUL_VAL_ 258 PAGE BOOK 1-1;
+SG_MUL_VAL_ 258 ANGLE PAGE 2-2;
 """
 
 
@@ -358,6 +365,16 @@ def test_contents_that_share_an_identifier_are_told_apart(tmp_path):
     assert heard == [(pytest.approx(0.25), pytest.approx(-0.04), Quality.GOOD)]
 
 
+def test_what_is_encoded_of_a_shared_identifier_has_its_selector(tmp_path):
+    """An emulated device, and a valve's command: cantools reads the right content."""
+    plan = ship(tmp_path, {"motion": inertial(tmp_path)}).foreign.motions[0]
+    theirs = cantools.database.load_file(tmp_path / "theirs.dbc")
+    said = {}
+    for each in plan.messages:
+        said |= theirs.decode_message(256, MessageEncoder(each).frame([0.25, -0.04], 0).data)
+    assert said == {"PAGE": 1, "ANGLE": 0.25, "TURN": -0.04}
+
+
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
@@ -365,6 +382,14 @@ def test_contents_that_share_an_identifier_are_told_apart(tmp_path):
         ({"messages": {"a": "IMU"}, "signals": {"roll_rad": {"from": "a.ANGLE"},
           "roll_rate_rad_s": {"from": "a.TURN"}}}, "of IMU do not come together: name IMU for eac"),
         ({"messages": {"a": {"id": 5}, "b": "IMU"}}, "messages names messages of the file"),
+        # ANGLE is another thing's bits where BOOK is not 1
+        ({"messages": {"a": "NEST", "b": "IMU"}}, "PAGE of NEST, .* is not in every frame itself"),
+        ({"messages": {name: {"of": "IMU", "cycle_ms": 30} for name in "ab"}},
+         "cycle_ms: is 30, and cycle_ms 10"),
+        # of PAGE's eight bits: one that can't be, one with a sign, a mask with none of them
+        ({"valid_when": [{"from": "a.PAGE", "mask": 3, "in": [0, 4]}]}, "in has 4, and the bits"),
+        ({"valid_when": [{"from": "a.PAGE", "in": [-1]}]}, "in has -1, and .* without sign"),
+        ({"valid_when": [{"from": "a.PAGE", "mask": 0x300, "in": [0]}]}, "0x300 has none of the"),
     ],
 )  # fmt: skip
 def test_what_a_dbc_does_not_give_is_refused(tmp_path, changes, reason):

@@ -80,6 +80,9 @@ def test_an_alarm_names_the_device_that_the_ship_has_and_its_message():
     said = inbox.received(Fault.TANK_SILENT)
     assert said == "levels: inputs 0x187 on can2, 2 with wrong length"
     assert inbox.received(Fault.PROTECTION) == said
+    inbox.receive(Frame(gauges, bytes((0, 0, 5, 0, 0, 0))), 1)  # 6150h: not valid, under range
+    said = inbox.received(Fault.TANK_SILENT)
+    assert said.endswith(", 2 with wrong length, status 0x5 (mask 0x7) is not valid")
     motion = CATALOGUE.transmitter(SensorMotion, Address.SENSORS)
     number = motion.can_id
     assert inbox.received(Fault.MOTION_SILENT) == (
@@ -93,6 +96,28 @@ def test_an_alarm_names_the_device_that_the_ship_has_and_its_message():
     assert "SENSOR_PUMP" in inbox.received(Fault.PUMP_SENSOR_SILENT)
     assert "DRIVE_STATUS_1" in inbox.received(Fault.DRIVE_SILENT)
     assert "OPERATOR_CMD" in inbox.received(Fault.OPERATOR_SILENT)
+
+
+def test_an_alarm_says_why_whole_frames_do_not_count():
+    """PGN 61481 of source 0x21, as a sensor that hangs sends it, after another has its address."""
+    guards = {"n2k_name": 5, "unchanged_ms": 100}
+    ssi2 = {
+        "profile": "j1939_ssi2", "source": 0x21, "accept_unprotected": True, "protection": guards,
+        "signals": {"roll_rate_rad_s": {"source": "derived"}},
+    }  # fmt: skip
+    inbox = Inbox(CATALOGUE, 7, foreign=DevicesSection(motion=ssi2).foreign())
+
+    def slopes(frames):
+        for k in range(frames):
+            data = (250 << 15).to_bytes(3, "little") * 2 + bytes(2)
+            inbox.receive(Frame(0x18F02921, data), (k + 1) * 10_000_000)
+        return inbox.received(Fault.MOTION_SILENT)
+
+    said = slopes(2)
+    assert said.startswith("motion: address 0x21 not claimed by 0x5; motion: slope 0x")
+    inbox.receive(Frame(0x18EEFF21, (5).to_bytes(8, "little")), 1)
+    assert slopes(11).startswith("motion: slope 0x")
+    assert slopes(12).startswith("motion: says the same for too long (unchanged_ms); motion: slo")
 
 
 def test_a_canopen_drive_is_named_and_its_frames():

@@ -1,7 +1,7 @@
 """Profiles that are shipped, and layouts out of a maker's DBC or EDS."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from configparser import ConfigParser, Error
 from contextlib import suppress
 from functools import cache
@@ -383,14 +383,14 @@ def _with_dbc(content: dict[str, Any]) -> dict[str, Any]:
         comes_with = layout.pop("comes_with")
         used = {each: comes_with[each] for each in comes_with if f"{name}.{each}" in meant}
         if used:
-            layout["only"] = _one_content(of, used)
+            layout["only"] = _one_content(of, used, comes_with)
         if "cycle_ms" in content:  # a file's is a placeholder
             del layout["cycle_ms"]
         if "source" in content and layout["format"] == "29bit":  # so are source and priority
             layout["pgn"] = layout.pop("id") >> 8 & 0x3FFFF
         messages[name] = _otherwise(layout, changes)
     cycles_ms = [each["cycle_ms"] for each in messages.values() if each.get("cycle_ms")]
-    if len(cycles_ms) == len(messages):
+    if len(cycles_ms) == len(messages) and "cycle_ms" not in rest:
         rest["cycle_ms"] = max(cycles_ms)
     return {"profile": f"{OF_A_DBC}{Path(str(file)).name}", **rest, "messages": messages}
 
@@ -403,9 +403,16 @@ def _words(value: Any) -> Iterator[str]:
             yield from _words(each)
 
 
-def _one_content(of: str, comes_with: dict[str, tuple[str, list[int]]]) -> dict[str, Any]:
+def _one_content(
+    of: str, comes_with: dict[str, tuple[str, list[int]]], selectors: Container[str]
+) -> dict[str, Any]:
     """What tells the frames of a multiplexed message that have all of these signals."""
     (selector, counts), *others = comes_with.values()
+    if selector in selectors:
+        raise ValueError(
+            f"messages: {selector} of {of}, which tells its contents apart, is not in every frame "
+            "itself: set the device to send this in a message of its own"
+        )
     both = set(counts).intersection(*(each for _, each in others))
     if not both or any(name != selector for name, _ in others):
         said = ", ".join(comes_with)

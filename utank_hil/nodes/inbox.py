@@ -285,6 +285,7 @@ class Inbox:
             heard = [each for each in self.watched if any(each.rejected.values())]
         if isinstance(source, ProfiledDevice):
             parts = [each.words for each in self._routing.setups if each.device is source]
+            parts.append(source.words)
             heard = source.watched
         elif source is not None:
             heard = (source,)

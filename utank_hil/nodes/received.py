@@ -2,6 +2,7 @@
 
 from utank_hil.canbus import Catalogue
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
+from utank_hil.canbus.profiles.device import MessageHeard
 from utank_hil.canbus.profiles.device_plan import ForeignDevices
 from utank_hil.safety.monitors.senders import Heard
 
@@ -17,4 +18,5 @@ def message_words(heard: Heard, catalogue: Catalogue, foreign: ForeignDevices) -
     parts = [f"{device}: {name} {number}{bus and f' on {bus}'}"]
     parts += ["never heard"] * (not heard.heard)
     parts += [f"{count} with {why.value}" for why, count in heard.rejected.items() if count]
-    return ", ".join(parts)
+    parts.append(heard.unwell if isinstance(heard, MessageHeard) else "")
+    return ", ".join(filter(None, parts))

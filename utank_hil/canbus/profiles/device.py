@@ -154,6 +154,7 @@ class MessageHeard(HeardMessage):
         self.bit = bit if self.needed else 0
         self.came_ns = self.good_ns = LONG_AGO_NS
         self.old_ns = STATUS_CYCLES * plan.cycle_ns  #: Age from which its status says nothing.
+        self.unwell = ""  #: What its last status said instead of what is valid.
 
     def is_another(self, data: bytes) -> bool:
         """Whether a frame of its identifier has another content."""
@@ -217,6 +218,16 @@ class ProfiledDevice(Generic[T]):
         return now_ns - self._delivered_ns > SILENT_NS
 
     @property
+    def words(self) -> str:
+        """Why what it measures does not count, though its frames are right; else empty."""
+        claim = self.plan.name_id
+        if claim is not None and not self.named:
+            return f"{self.plan.name}: address {claim[0] & 0xFF:#x} not claimed by {claim[1]:#x}"
+        judged = self._changed_ns > LONG_AGO_NS
+        stands = judged and 0 < self._unchanged_ns < self._delivered_ns - self._changed_ns
+        return f"{self.plan.name}: says the same for too long (unchanged_ms)" if stands else ""
+
+    @property
     def lost(self) -> int:
         """Measurements missing by a counter."""
         lost = 0
@@ -234,10 +245,12 @@ class ProfiledDevice(Generic[T]):
         if (message.only is not None and message.is_another(data)) or not message.passes(data):
             return
         if message.status:
-            message.good_ns = now_ns
+            message.good_ns, message.unwell = now_ns, ""
             for condition in message.conditions:
                 if not condition.holds(data):
                     message.good_ns = LONG_AGO_NS
+                    said = condition.field.raw(data) & condition.mask
+                    message.unwell = f"status {said:#x} (mask {condition.mask:#x}) is not valid"
                     break
         stamp = message.stamp
         if stamp is not None and not stamp.passes(data, now_ns):

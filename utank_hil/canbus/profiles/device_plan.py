@@ -105,6 +105,9 @@ class MessageEncoder:
             good = min(condition.allowed)
             status = condition.mask & ~good if missing else good
             word = condition.field.put_counts(word, status, plan.length, condition.mask)
+        if plan.only is not None:
+            only = plan.only
+            word = only.field.put_counts(word, min(only.allowed), plan.length, only.mask)
         if plan.stamp is not None:
             stamp = round(now_ns / (1e3 * plan.stamp_us))
             word = plan.stamp.put_counts(word, stamp, plan.length)

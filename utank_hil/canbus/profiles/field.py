@@ -156,7 +156,7 @@ class ConditionPlan:
     __slots__ = ("_least", "allowed", "field", "mask")
 
     def __init__(self, field: Field, mask: int, allowed: frozenset[int]) -> None:
-        self.field, self.mask, self.allowed = field, mask, allowed
+        self.field, self.mask, self.allowed = field, mask & (1 << field.bits) - 1, allowed
         self._least = min(allowed)  # of most devices the only one
 
     def holds(self, data: bytes) -> bool:
