@@ -11,6 +11,7 @@ from tests.nodes.canopen_peers import PROFILE, PUMP, Line
 from utank_hil.canbus import ControlWord, DriveState, Frame
 from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.device import hear
+from utank_hil.configuration.device_sections import DriveSection
 from utank_hil.control.pressure_loop import PressureLoop
 from utank_hil.nodes.actuators_heard import DriveHeard
 from utank_hil.nodes.canopen_drive import CanopenDrive, DriveReport, state_of
@@ -279,6 +280,9 @@ def test_what_is_no_state_of_a_node_in_operation_that_was_configured_does_not_co
     assert reports_of(line, 5, 0x0661) == []
     assert reports_of(line, 127, 0x0637) == []
     assert [each.state for each in reports_of(line, 5, 0x0637)] == [DriveState.OPERATION_ENABLED]
+    assert line.drive.setup.done
+    assert reports_of(line, 0, 0x0637) == []  # it boots up: all that it was told is gone
+    assert not line.drive.setup.done
 
 
 @pytest.mark.parametrize(
@@ -412,3 +416,51 @@ def test_an_emergency_while_it_is_configured_is_in_its_words_until_it_is_started
     assert line.run(2).drive.words.endswith("emergency 2310h, register 0x02")
     assert not line.drive.setup.done
     assert "emergency" not in line.run(400).drive.words
+
+
+class Told:
+    """A configured drive of a plan, by hand-made frames."""
+
+    def __init__(self, **changes):
+        plan = DriveSection(**(PROFILE | changes)).plan(0, PUMP)
+        self.drive, self.power_w = CanopenDrive(plan), math.nan
+        self.drive.setup.done = True
+        self.drive.deliver = lambda report, _: setattr(self, "power_w", report[-1])
+
+    def take(self, cob, data, now_ns):
+        self.drive.takers[cob | STANDARD].take(Frame(cob | STANDARD, data), now_ns)
+
+    def command(self, target, now_ns):
+        self.take(0x705, b"\x05", now_ns)
+        self.drive.frames(now_ns)
+        return self.drive.follow(target, ControlWord.ENABLE_OPERATION)[-1].data[2:]
+
+    def echo_ns(self, status, demand, now_ns):
+        self.take(0x185, status.to_bytes(2, "little") + demand, now_ns)
+        return self.drive.echo_ns
+
+
+@pytest.mark.parametrize("mode", ["torque", "velocity"])
+@pytest.mark.parametrize(("synchronous", "older_ms"), [(True, 0), (False, 10)])
+def test_an_echo_by_the_demand_is_as_old_as_the_command_and_the_phase(mode, synchronous, older_ms):
+    """Without SYNC nobody knows when in its cycle of 20 ms the drive took the demand."""
+    told = Told(mode=mode, echo="demand", synchronous=synchronous)
+    first, second = told.command(2e3, 100 * MS), told.command(3e3, 120 * MS)
+    assert first != second
+    enabled, switched_on, now_ns = 0x0637, 0x0633, 130 * MS
+    assert told.echo_ns(enabled, first, now_ns) == (100 - older_ms) * MS
+    assert told.echo_ns(enabled, second, now_ns) == (120 - older_ms) * MS
+    # what was never commanded, or is held on, is no newer echo
+    for demand in (bytes(len(second)), second):
+        assert told.echo_ns(enabled, demand, now_ns + 90 * MS) == (120 - older_ms) * MS
+    # off it has no demand, and need not have one
+    assert told.echo_ns(switched_on, bytes(len(second)), now_ns + 99 * MS) == now_ns + 99 * MS
+
+
+@pytest.mark.parametrize(("mode", "known"), [("torque", True), ("velocity", False)])
+def test_the_power_is_known_where_the_torque_is_in_newton_metres(mode, known):
+    told = Told(mode=mode, echo="demand")
+    demand = told.command(0.0, 0)
+    told.take(0x285, (500).to_bytes(4, "little") + b"\x0a\0" + b"\x04", 0)
+    told.echo_ns(0x0637, demand, 1)
+    assert math.isfinite(told.power_w) is known
