@@ -196,6 +196,29 @@ def test_levels_that_stand_still_are_found_within_five_seconds():
         assert found_after(ship, stick)[Finding.LEVEL_STUCK] - shift_s <= 5.0
 
 
+@pytest.mark.parametrize("shift_s", [0.0, 1.0, 2.5, 4.0, 6.0, 8.0])
+def test_levels_that_stand_still_are_not_called_swapped(shift_s):
+    """Whichever moment of a swing they stop at, under a pump that takes off half the roll's push.
+
+    Levels that do not move have no sign.
+    """
+    ship = MovingShip(math.radians(2.0))
+    push = TANK.width_m * (9.80665 - (TANK.height_m + TANK.lz_m) * ship.w**2) * ship.roll
+    length = 2 * TANK.height_m + TANK.width_m * TANK.reservoir_area_m2 / TANK.duct_area_m2
+    w0 = math.sqrt(2 * 9.80665 / length)
+    ship.pressure = -0.5 * 1000 * push
+    answer = length * (w0**2 - ship.w**2 + 2j * TANK.damping_ratio * w0 * ship.w)
+    ship.level = 0.5 * push / answer
+    at_m = ship.level_m(FAULT_S + shift_s)
+
+    def stick(t, roll, level, pressure):
+        return roll, at_m if t >= FAULT_S + shift_s else level, pressure
+
+    found = found_after(ship, stick, 20.0)
+    assert found[Finding.LEVEL_STUCK] - shift_s <= 3.0
+    assert Finding.WATER_SIGN not in found
+
+
 @pytest.mark.parametrize("stands_deg", [0.0, 1.4])
 @pytest.mark.parametrize("pressure_pa", [0.0, 10e3])
 def test_a_roll_that_stands_still_with_its_rate_is_told_by_the_water(pressure_pa, stands_deg):
