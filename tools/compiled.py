@@ -220,7 +220,10 @@ def _compiled(sources: list[Path], include: list[str]) -> bytes:
 
 
 def _run(arguments: list[str]) -> None:
-    subprocess.run([CC, *arguments], check=True, capture_output=True, text=True)
+    subprocess.run(
+        [CC, *arguments], check=True, capture_output=True, text=True, errors="replace",
+        env=os.environ | {"LC_ALL": "C"},  # in which an error is called one
+    )  # fmt: skip
 
 
 def main() -> None:

@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -77,12 +78,16 @@ def test_a_library_that_does_not_load_leaves_plain_python_with_a_line(
     assert ("plain Python runs" in said and name in said) == (wanted != "0")
 
 
-@pytest.mark.parametrize("compiler", ["no-such-compiler", "false"])
-def test_without_a_compiler_that_works_one_line_is_said(compiler):
+@pytest.mark.parametrize("compiler", ["no-such-compiler", "false", "latin-1"])
+def test_without_a_compiler_that_works_one_line_is_said(tmp_path, compiler):
+    if compiler == "latin-1":
+        compiler = str(tmp_path / "cc")
+        Path(compiler).write_text("#!/bin/sh\nprintf 'x.c: \\351rreur\\n' >&2; exit 1\n")
+        Path(compiler).chmod(0o755)
     code = (
         "from pathlib import Path; import tools.compiled as made;"
         f"made.current_library = lambda: None; made.CC = {compiler!r};"
-        "made.build = lambda: made._run([]) if made.CC == 'false' else 1 / 0; made.main()"
+        "made.build = lambda: 1 / 0 if 'no-such' in made.CC else made._run([]); made.main()"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert len(done.stdout.splitlines()) == 1
