@@ -13,7 +13,8 @@ import subprocess
 import sysconfig
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import redirect_stdout
+from contextlib import redirect_stdout, suppress
+from ctypes import CDLL
 from io import StringIO
 from pathlib import Path
 from typing import Final
@@ -147,7 +148,9 @@ def build() -> Path:
     """Compile into the library of the present source, if there is none; return it."""
     made = current_library()
     if made is not None and made.stat().st_mtime > Path(__file__).stat().st_mtime:
-        return made
+        with suppress(OSError):  # one of a newer C library does not load here
+            CDLL(str(made))
+            return made
     source = source_digest()
     FOLDER.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:
@@ -155,6 +158,7 @@ def build() -> Path:
         new = FOLDER / name_of_library(source, content)
         with left_whole(whole := new.with_name(f".{os.getpid()}-{new.name}")):
             whole.write_bytes(content)
+            CDLL(str(whole))
             whole.rename(new)
     for older in FOLDER.glob(f"*{SUFFIX}"):
         if older != new:

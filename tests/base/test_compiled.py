@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import tools.compiled
 from tools.compiled import PATTERNS
 from utank_hil.base import compiled
 
@@ -93,6 +94,20 @@ def test_without_a_compiler_that_works_one_line_is_said(tmp_path, compiler):
     assert len(done.stdout.splitlines()) == 1
     assert "plain Python runs" in done.stdout
     assert not done.stderr
+
+
+def test_a_library_that_does_not_load_is_made_anew_and_one_made_so_is_not_kept(
+    tmp_path, monkeypatch
+):
+    for module in (compiled, tools.compiled):
+        monkeypatch.setattr(module, "FOLDER", tmp_path)
+    before = tmp_path / compiled.name_of_library(compiled.source_digest(), b"of another machine")
+    before.write_bytes(b"of another machine")
+    monkeypatch.setattr(tools.compiled, "c_sources", lambda scratch: ([], []))
+    monkeypatch.setattr(tools.compiled, "_compiled", lambda *_: b"no library")
+    with pytest.raises(OSError, match="file too short"):
+        tools.compiled.build()
+    assert list(tmp_path.iterdir()) == [before]
 
 
 def test_no_module_that_is_compiled_has_a_dataclass_that_its_own_init_could_not_fill():
