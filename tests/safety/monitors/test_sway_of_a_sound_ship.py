@@ -38,7 +38,7 @@ def swaying(share, w, slope_rad, pressure_pa, effective):
     return (*q, pressure)
 
 
-def found_in(ship, phasors, w, sign=1.0, noise_share=1.0, thresholds=THRESHOLDS):
+def found_in(ship, phasors, w, sign=1.0, noise_share=1.0, thresholds=THRESHOLDS, gauges=1.0):
     equation = TankEquation(ship, TANK, thresholds, STEP_S)
     stuck = LevelStuck(ship, TANK, thresholds, STEP_S)
     noise = np.random.default_rng(1)
@@ -48,6 +48,7 @@ def found_in(ship, phasors, w, sign=1.0, noise_share=1.0, thresholds=THRESHOLDS)
         roll, level, pressure = np.array(at) + noise_share * noise.standard_normal(3) * [
             2e-4, 0.0035, 100.0
         ]  # fmt: skip
+        level *= gauges
         found = equation.update(sign * roll, level, pressure)
         found |= stuck.update(sign * roll, level, pressure, equation.slope_push)
         for finding in FINDINGS:
@@ -94,6 +95,12 @@ def test_reversed_motion_sensor_is_found_within_two_roll_periods(
     phasors = swaying(share, w, slope_rad, pressure_pa, effective=0.7)
     found = found_in(UNSTATED, phasors, w, sign=-1.0, thresholds=thresholds)
     assert found[Finding.WATER_SIGN] <= 2 * T
+
+
+def test_swapped_gauges_of_a_ship_that_sways_in_a_long_swell_are_not_called_stuck():
+    phasors = swaying(1.0, 0.3, 0.035, 10e3, effective=0.7)
+    found = found_in(UNSTATED, phasors, 0.3, gauges=-1.0)
+    assert found[Finding.WATER_SIGN] < found[Finding.LEVEL_STUCK]
 
 
 def wide_hull(share, w, slope_rad, pressure_pa):

@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from moving_ship import FINDINGS, SHIP, TANK, THRESHOLDS, MovingShip
+from moving_ship import CONFIG, FINDINGS, SHIP, TANK, THRESHOLDS, MovingShip
 
 from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.dynamics import RollShip, Tank
@@ -251,6 +251,60 @@ def test_delay_of_two_seconds_is_found_and_of_100_ms_is_not():
 
     assert found_after(ship, late(2.0))[Finding.MOTION_LATE] <= 2 * T
     assert not found_after(ship, late(0.1))
+
+
+@pytest.mark.parametrize("pressure_pa", [0.0, 5e3])
+@pytest.mark.parametrize("share", [0.31, 0.34])
+def test_a_roll_late_by_a_third_of_a_period_is_not_called_reversed(share, pressure_pa):
+    """Reversed it would explain the water better than as it is, and a quarter late better still."""
+    ship = MovingShip(math.radians(2.0), pressure_pa)
+    late = found_after(ship, lambda t, roll, *rest: (ship.roll_rad(t - share * T), *rest))
+    assert late[Finding.MOTION_LATE] <= 0.5 * T
+    assert Finding.WATER_SIGN not in late
+
+
+def test_water_that_obeyed_a_sensor_does_so_no_longer_once_that_is_wrong_or_says_too_little():
+    ship = MovingShip(math.radians(1.0), 0.0)
+    for wrong in (-1.0, 0.1):
+        equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+        for k in range(900):
+            t = k * STEP_S
+            now = wrong if t > 60 else 1.0
+            equation.update(now * ship.roll_rad(t), abs(now) * ship.level_m(t), 0.0)
+            if k == 600:
+                assert equation.obeyed
+        assert not equation.obeyed
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+def test_a_small_list_is_no_stuck_level_whatever_the_zeros(way):
+    """Where the pump is weak the list alone is enough to be judged by."""
+    plant = replace(CONFIG.plant, limits=replace(CONFIG.plant.limits, pressure_pa=2e3))
+    thresholds = thresholds_of(plant, 0.35, SensorFigures())
+    push = 9.80665 * TANK.width_m * math.radians(0.4)
+    equation = TankEquation(SHIP, TANK, thresholds, STEP_S)
+    for _ in range(900):
+        level_m = (push + way * thresholds.zero_push_m2_s2) / (2 * 9.80665)
+        assert not equation.update(math.radians(0.4), level_m, 0.0)
+    assert math.isfinite(equation.level_gain)
+
+
+def test_a_delay_is_judged_after_a_whole_period_and_another_one_after_gauges_that_jumped():
+    """In a part of a wave a heel looks like a delay, and so does a jump."""
+    ship, equation = (
+        MovingShip(math.radians(2.0), 5e3),
+        TankEquation(SHIP, TANK, THRESHOLDS, STEP_S),
+    )
+    told_s = []
+    for k in range(600):
+        t = k * STEP_S
+        jump_m = 1.0 if k == 400 else 0.0
+        equation.update(ship.roll_rad(t), ship.level_m(t) + jump_m, ship.pressure_pa(t))
+        if math.isfinite(equation.late_s):
+            told_s.append(t)
+    settled_s, jumped_s = 6 * T / (4 * math.pi), 40.0
+    assert told_s[0] - settled_s == pytest.approx(T, abs=3 * STEP_S)
+    assert min(t for t in told_s if t > jumped_s) - jumped_s == pytest.approx(T, abs=3 * STEP_S)
 
 
 def test_no_delay_is_judged_by_little_more_than_the_least_push():

