@@ -70,6 +70,8 @@ class CanopenNode:
         self._next_beat_ns = 0
         self._sent = [index for index in pdos if index >= 0x1800]
         self._next_event_ns = dict.fromkeys(self._sent, 0)
+        for kind, size in ((2, 1), (3, 2), (4, 4), (5, 1), (6, 2), (7, 4)):
+            entries[Place(kind)] = Entry(0, size)  # types, which fill gaps of a PDO
         entries[Place(0x1000)] = Entry(0, 4)
         entries[Place(0x1001)] = Entry(0, 1)
         entries[Place(0x1016)] = Entry(1, 1)
@@ -178,7 +180,8 @@ class CanopenNode:
                 what = self.entries.get(Place(value >> 16, value >> 8 & 0xFF))
                 if what is None or 8 * what.size != value & 0xFF:
                     return Abort.NOT_TO_BE_MAPPED
-        if place.subindex == 1 and value & ~DISABLED != self._pdos.get(place.number, value):
+        cob = self._pdos.get(place.number, -1) if place.subindex == 1 else -1
+        if cob >= 0 and value & ~DISABLED != cob:
             return Abort.VALUE_OUT_OF_RANGE
         entry.value = value
         return None

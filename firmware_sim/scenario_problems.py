@@ -11,6 +11,7 @@ from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.scenario_content import HEELED, OF_HULL, SAILED, SWAY, ScenarioContent
 from firmware_sim.voyage import moment_problems, waypoint_problems
 from utank_hil.base.parameters import ParameterError, Problem
+from utank_hil.base.tick import TICK_NS
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.configuration.plausibility import tank_problems
 from utank_hil.dynamics.hull.lateral import LateralModel
@@ -74,6 +75,7 @@ def whole_problems(scenario: ScenarioContent) -> list[Problem]:
     """Problems of ship, sea, voyage and faults together, of a scenario whose sections are right."""
     return [
         *_ship_problems(scenario),
+        *_device_problems(scenario),
         *_sea_problems(scenario),
         *_voyage_problems(scenario),
         *_fault_problems(scenario),
@@ -204,6 +206,17 @@ def _ship_problems(scenario: ScenarioContent) -> list[Problem]:
     if scenario.actual_ship:
         ships["actual_ship"] = scenario.sailing_ship
     return [(key, why) for key, ship in ships.items() for why in _heel_problems(scenario, ship)]
+
+
+def _device_problems(scenario: ScenarioContent) -> list[Problem]:
+    foreign = scenario.vessel.foreign
+    reason = "must be 10 or more in a scenario: no emulated device sends twice in a tick"
+    plans = (*foreign.motions, foreign.levels, foreign.pump_sensor, foreign.valve, foreign.panel)
+    return [
+        (f"vessel.devices.{plan.name}.cycle_ms", f"{reason}; on board it may be less")
+        for plan in plans
+        if plan is not None and any(each.cycle_ns < TICK_NS for each in plan.messages)
+    ]
 
 
 def _heel_problems(scenario: ScenarioContent, ship: RollShip) -> list[str]:

@@ -57,8 +57,8 @@ def _said(message: tuple[Any, ...]) -> tuple[float, ...]:
 class ForeignFrames:
     """Encodes what a device of the plan sends, but for the heartbeat that its node sends itself.
 
-    On a `line` of sentences the frames are those that the controller reads in these.
-    ValueError is raised if a cycle is no whole number of ticks: an emulated device has no other.
+    On a `line` of sentences the frames are those that the controller reads in these. Each leaves
+    with the first tick at which it is due, so a cycle must not be shorter than a tick.
     """
 
     def __init__(
@@ -69,15 +69,12 @@ class ForeignFrames:
         *,
         line: bool = False,
     ) -> None:
-        for each in plan.messages:
-            if each.cycle_ns % TICK_NS:
-                raise ValueError(
-                    f"devices.{plan.name}: a cycle of {each.cycle_ns / 1e6:g} ms can't be "
-                    f"emulated, only whole multiples of {TICK_NS / 1e6:g} ms"
-                )
         self.plan = plan
         self.server = CanopenSensor(plan) if plan.steps else None
         self.hears = frozenset[int]() if self.server is None else self.server.hears
+        self._claim, self._claims = plan.name_id, True
+        if plan.name_id is not None and plan.wake is not None:
+            self.hears |= {plan.wake.can_id}
         #: Faults of what it measures: they spoil its message as the catalogue's node would send it.
         self.spoiled: list[Any] = []
         self._native, self._codec = native, codec
@@ -91,9 +88,10 @@ class ForeignFrames:
         ]
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Take what is asked of a CANopen node."""
+        """Take what is asked of a CANopen node, or a request of its address claim."""
         if self.server is not None:
             self.server.receive(frame, now_ns)
+        self._claims |= self.plan.wake is not None and frame.can_id == self.plan.wake.can_id
 
     def swap(self) -> None:
         """Put another CANopen node of the same kind in its place."""
@@ -101,8 +99,12 @@ class ForeignFrames:
             self.server.swap()
 
     def tick(self, now_ns: int) -> list[Frame]:
-        """What a CANopen node sends by itself."""
-        return [] if self.server is None else self.server.tick(now_ns)
+        """What a CANopen node sends by itself, and an address claim at its start and on request."""
+        frames = [] if self.server is None else self.server.tick(now_ns)
+        if self._claims and self._claim is not None:
+            frames.append(Frame(self._claim[0], self._claim[1].to_bytes(8, "little")))
+        self._claims = False
+        return frames
 
     @property
     def measures(self) -> bool:
@@ -113,7 +115,7 @@ class ForeignFrames:
         """The frames that are due in this tick."""
         frames: list[Frame] = []
         if self.spoiled:
-            if tick % (self.plan.cycle_ns // TICK_NS) == 0:
+            if _due(tick, self.plan.cycle_ns):
                 self._kept = self._spoil(message, now_ns)
             if self._kept is None:
                 return frames
@@ -122,7 +124,7 @@ class ForeignFrames:
         measured = [signal.place for each in self.plan.messages for signal in each.signals]
         missing = any(math.isnan(values[place]) for place in measured)
         for each in self._encoders:
-            if tick % (each.plan.cycle_ns // TICK_NS) == 0:
+            if _due(tick, each.plan.cycle_ns):
                 frame = each.frame(values, now_ns, missing=missing)
                 frames += [frame] if self._reader is None else self._read(frame)
         return frames
@@ -139,6 +141,10 @@ class ForeignFrames:
         for each in self.spoiled:
             native = [out for frame in native for out in each.frames(frame, now_ns)]
         return self._codec.decode(native[-1].data) if native else None
+
+
+def _due(tick: int, cycle_ns: int) -> bool:
+    return tick * TICK_NS // cycle_ns != (tick - 1) * TICK_NS // cycle_ns
 
 
 NOISE_BLOCK = 4096  #: Number of random values drawn at once. Chosen; no study.

@@ -86,10 +86,22 @@ def test_the_short_form_of_an_array_and_a_gap_in_a_pdo(tmp_path):
     begin, end = SENSOR.index("[1A00]"), SENSOR.index("[6020]")
     found = Eds(written(tmp_path, SENSOR[:begin] + COMPACT + SENSOR[end:])).sent(1)
     starts = {name: layout["start"] for name, layout in found["signals"].items()}
-    assert starts == {"6020h:0": 0, "2100h:1": 24}
+    assert starts == {"6020h:0": 0, "gap 2": 16, "2100h:1": 24}
     assert (found["bytes"], found["cob"]) == (7, 0x180)
     lely = Eds(str(others_file("devices/eds/lely-simple.eds"))).sent(1)
     assert list(lely["signals"]) == ["4001h:0"]
+
+
+def test_a_gap_in_a_pdo_is_in_what_is_written_and_read_back(tmp_path):
+    begin, end = SENSOR.index("[1A00]"), SENSOR.index("[6020]")
+    path = written(tmp_path, SENSOR[:begin] + COMPACT + SENSOR[end:])
+    found, _ = device(eds=path, canopen_profile=410, **MOTION)
+    steps = found.plan.steps
+    mapping = [step.value for step in steps if step.place.number == 0x1A00]
+    assert mapping == [0, 0x60200010, 0x00050008, 0x21000120, 3]
+    assert Place(5) not in [step.place for step in steps]  # a type has nothing to be read
+    (message,) = found.plan.messages
+    assert message.length == 7
 
 
 def test_two_gauges_by_a_makers_eds_as_canopen_sends_them():

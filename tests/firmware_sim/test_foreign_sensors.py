@@ -7,19 +7,23 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
 from bought_devices import LEVELS, SBG
 from pydantic import TypeAdapter
 
+from firmware_sim.canopen_node import CanopenSensor
 from firmware_sim.fault_injection.bench_parts import FaultyNode
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node
-from utank_hil.canbus import Mode, Quality
-from utank_hil.canbus.frame import BUS_SHIFT
+from utank_hil.canbus import Frame, Mode, Quality
+from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.profiles.device import ProfiledDevice
-from utank_hil.configuration import load_config
+from utank_hil.canbus.profiles.drive_plan import Place
+from utank_hil.configuration import ConfigError, load_config
 from utank_hil.configuration.devices import DevicesSection
+from utank_hil.nodes.canopen_setup import CanopenSetup
 from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.runners import Lockstep, SimulatedBus
 from utank_hil.runners.lockstep import with_more
@@ -94,12 +98,38 @@ def test_alone_without_counter_or_checksum_it_has_half_the_pressure():
     assert set(shares) == {0.5}
 
 
-def test_a_cycle_that_is_no_whole_tick_is_refused():
-    foreign = DevicesSection(motion=SBG | {"cycle_ms": 5, "age_ms": 20}).foreign()
-    from firmware_sim.sensors import ForeignFrames
+def with_motion(tmp_path, **motion):
+    def read(path):
+        return yaml.safe_load(Path("configs", path).read_text())
 
-    with pytest.raises(ValueError, match="5 ms can't be emulated"):
-        ForeignFrames(foreign.motions[0], None, None)
+    law = {"name": "PD", "law": read("controllers/pd.yaml")["law"], "vessel": "ship.yaml"}
+    files = {
+        "ship": read("ships/thesis_first.yaml") | {"devices": {"motion": SBG | motion}},
+        "law": law,
+        "calm": read("scenarios/still_water.yaml")
+        | {"vessel": "ship.yaml", "controllers": {"pd": "law.yaml"}},
+    }
+    for name, content in files.items():
+        (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump(content))
+    return load_config(tmp_path / "calm.yaml", Scenario)
+
+
+def test_a_cycle_shorter_than_a_tick_is_refused_where_it_would_be_emulated(tmp_path):
+    with pytest.raises(ConfigError, match=r"devices\.motion\.cycle_ms: must be 10 or more"):
+        with_motion(tmp_path, cycle_ms=5, age_ms=20)
+
+
+def test_a_cycle_that_is_no_whole_tick_has_its_pace(tmp_path):
+    """Of 40 Hz each frame leaves 0 or 5 ms late: 0, 30, 50, 80 ms and on."""
+    scenario = with_motion(tmp_path, cycle_ms=25, age_ms=60)
+    node = build_ship_side(scenario, 1, scenario.operator).sensors
+    attitude = STANDARD | 0x132 | 1 << BUS_SHIFT
+    came = [
+        k * 10
+        for k in range(100)
+        if any(frame.can_id == attitude for frame in node.tick(k * SECOND_NS // 100))
+    ]
+    assert came == [10 * math.ceil(2.5 * k) for k in range(40)]
 
 
 @pytest.mark.parametrize(
@@ -145,6 +175,51 @@ def test_faults_of_a_message_are_those_of_the_device_that_stands_for_it(device, 
         assert after[0].roll_rad == pytest.approx(before[-1].roll_rad + 0.25, abs=2e-3)
     if fault["kind"] == "frozen":
         assert len({m.roll_rad for m in after}) == 1
+
+
+def test_an_emulated_sensor_claims_its_address_at_its_start_and_when_asked(tmp_path):
+    """SAE J1939-81: PGN 60928 to all, from its source, with the NAME; asked for by PGN 59904."""
+    name = 0xC050820000A0F35C
+    motion = {"profile": "j1939_ssi2", "source": 0x5C, "bus": "can1", "cycle_ms": 10}
+    scenario = with_motion(tmp_path, **motion, protection={"n2k_name": name})
+    node = build_ship_side(scenario, 1, scenario.operator).sensors
+    asks = Frame(0x18EA5CFE | 1 << BUS_SHIFT, b"\x00\xee\x00")
+    assert asks.can_id in node.hears
+    came = []
+    for k in range(20):
+        if k == 10:
+            node.receive(asks, k * SECOND_NS // 100)
+        sent = node.tick(k * SECOND_NS // 100)
+        came += [(k, each.data) for each in sent if each.can_id == 0x18EEFF5C | 1 << BUS_SHIFT]
+    assert came == [(k, name.to_bytes(8, "little")) for k in (0, 10)]
+
+
+def test_an_emulated_node_maps_objects_of_any_number_and_gaps():
+    """CiA 404 has its process values in 9130h: bit 31 of the mapping is no bit of a COB-ID."""
+    gap = {"start": 32, "bits": 8, "object": "0005h"}
+    fields = {
+        name: {"start": start, "bits": 32, "object": f"9130h:{part}"}
+        for part, (name, start) in enumerate((("A", 0), ("B", 32)), 1)
+    }
+    messages = {"a": {"cob": 0x180, "pdo": 1, "bytes": 5, "signals": {"A": fields["A"], "G": gap}},
+                "b": {"cob": 0x280, "pdo": 2, "signals": fields}}  # fmt: skip
+    levels = {
+        "profile": "", "node": 12, "canopen_profile": 404, "messages": messages, "cycle_ms": 20,
+        "signals": {"port_level_m": {"from": "a.A", "scale": 1e-4},
+                    "starboard_level_m": {"from": "b.B", "scale": 1e-4}},
+        "high_level_m": 4.0, "age_ms": 60, "accept_unprotected": True,
+        "protection": {"unchanged_ms": 2000},
+    }  # fmt: skip
+    plan = DevicesSection(levels=levels).foreign().levels
+    setup, node = CanopenSetup(0, 12, plan.steps), CanopenSensor(plan)
+    for k in range(100):
+        for frame in setup.frames(k * SECOND_NS // 100):
+            node.receive(frame, 0)
+        for frame in node.tick(0):
+            if frame.can_id in setup.takers:
+                setup.takers[frame.can_id].take(frame, 0)
+    assert (setup.problem, setup.done) == ("", True)
+    assert [node.entries[Place(0x1A00, n)].value for n in (1, 2)] == [0x91300120, 0x00050008]
 
 
 def test_a_native_node_has_no_identity_to_change():

@@ -98,6 +98,13 @@ def test_an_alarm_names_the_device_that_the_ship_has_and_its_message():
     assert "OPERATOR_CMD" in inbox.received(Fault.OPERATOR_SILENT)
 
 
+def test_contents_of_one_identifier_have_their_own_names():
+    levels = LEVELS | {"messages": {"other": {"cob": "0x180", "bytes": 6}}}
+    said = Inbox(CATALOGUE, 7, foreign=DevicesSection(levels=levels).foreign())
+    both = "levels: inputs 0x187 on can2, never heard; levels: other 0x187 on can2, never heard"
+    assert said.received(Fault.TANK_SILENT) == both
+
+
 def test_an_alarm_says_why_whole_frames_do_not_count():
     """PGN 61481 of source 0x21, as a sensor that hangs sends it, after another has its address."""
     guards = {"n2k_name": 5, "unchanged_ms": 100}

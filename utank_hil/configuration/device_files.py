@@ -149,15 +149,19 @@ class Eds:
                 raise self._error(Place(index, subindex), "has no value, and is mapped")
             if start + bits > 64:
                 raise self._error(Place(index, subindex), "ends beyond the 8 bytes of a frame")
-            if place.number >= 0x1000:  # below it is a type, and fills a gap
+            called = str(place)
+            signed = real = False
+            if place.number >= 0x1000:
                 kind = self._type(place)
+                signed, real = kind in _SIGNED, kind in _REAL
                 if _BITS[kind] != bits:
                     reason = f"maps {bits} bits of {place}, which has {_BITS[kind]}"
                     raise self._error(Place(index, subindex), reason)
-                signals[str(place)] = {
-                    "start": start, "bits": bits, "signed": kind in _SIGNED, "real": kind in _REAL,
-                    "object": str(place),
-                }  # fmt: skip
+            else:  # a type, which fills a gap
+                called = f"gap {subindex}"
+            signals[called] = {
+                "start": start, "bits": bits, "signed": signed, "real": real, "object": str(place),
+            }  # fmt: skip
             start += bits
         return signals, start
 
@@ -261,7 +265,7 @@ def place_of(written: str) -> Place:
     """An object as a file writes it; ValueError if it is none."""
     index, _, subindex = written.partition(":")
     place = Place(int(index.removesuffix("h"), 16), int(subindex or "0", 0))
-    if not (0x1000 <= place.number <= 0xFFFF and 0 <= place.subindex <= 0xFF):
+    if not (0 < place.number <= 0xFFFF and 0 <= place.subindex <= 0xFF):
         raise ValueError(written)
     return place
 

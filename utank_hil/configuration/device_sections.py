@@ -28,6 +28,7 @@ def _whole(value: Any) -> Any:
 
 _WHOLE: Final = BeforeValidator(_whole)
 Whole = Annotated[int, Range(least=-(1 << 63), most=(1 << 64) - 1), _WHOLE]
+Name64 = Annotated[int, Range(least=0, most=(1 << 64) - 1), _WHOLE]
 Id29 = Annotated[int, Range(least=0, most=LONGEST_ID), _WHOLE]
 Id11 = Annotated[int, Range(least=0, most=LONGEST_STANDARD_ID), _WHOLE]
 Pgn = Annotated[int, Range(least=0, most=0x3FFFF), _WHOLE]
@@ -198,7 +199,7 @@ class ProtectionSection(_Part):
     crcs: tuple[CrcSection, ...] = ()  #: Checksums.
     stamps: tuple[StampSection, ...] = ()  #: The device's own times.
     unchanged_ms: Cycle | None = None  #: Content that has been the same for longer is not used.
-    n2k_name: Whole | None = None
+    n2k_name: Name64 | None = None
     """NAME that the device claims its source address with, SAE J1939-81."""
 
 

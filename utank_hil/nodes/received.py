@@ -13,10 +13,13 @@ def message_words(heard: Heard, catalogue: Catalogue, foreign: ForeignDevices) -
     if not device:
         known = catalogue.by_id[heard.can_id]
         device, name = known.source.name.lower(), known.codec.name
+    if isinstance(heard, MessageHeard):
+        name = heard.name  # several may have one identifier
     bus, digits = foreign.buses[heard.can_id >> BUS_SHIFT], 3 if heard.can_id & STANDARD else 8
     number = f"0x{heard.can_id & STANDARD - 1:0{digits}X}"
     parts = [f"{device}: {name} {number}{bus and f' on {bus}'}"]
     parts += ["never heard"] * (not heard.heard)
     parts += [f"{count} with {why.value}" for why, count in heard.rejected.items() if count]
-    parts.append(heard.unwell if isinstance(heard, MessageHeard) else "")
-    return ", ".join(filter(None, parts))
+    if isinstance(heard, MessageHeard) and heard.unwell:
+        parts.append(heard.unwell)
+    return ", ".join(parts)

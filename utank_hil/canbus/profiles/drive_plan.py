@@ -212,7 +212,8 @@ def pdo_steps(
     free = "the device's mapping is fixed, or it can't map this: choose another echo or signal"
     for place, bits in entries:
         remedy = f"{bits} bits of it are to be mapped: choose another mode, echo or signal"
-        yield Step(place, 0, remedy, equal_bits=0, writes=False, size=bits // 8)
+        if place.number >= 0x1000:  # below it is a type, and fills a gap
+            yield Step(place, 0, remedy, equal_bits=0, writes=False, size=bits // 8)
     mapping, which = index + 0x200, DISABLED | LONGEST_ID
     yield Step(Place(index, 1), cob | DISABLED, "", which, needed=False)
     if entries:
