@@ -9,7 +9,7 @@ import pytest
 import yaml
 from others import others_file
 
-from utank_hil.canbus import Address, Frame, Quality, SensorMotion, load_catalogue
+from utank_hil.canbus import Address, Frame, Quality, Rejection, SensorMotion, load_catalogue
 from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.device import ProfiledDevice
 from utank_hil.canbus.profiles.device_plan import ForeignDevices, MessageEncoder
@@ -363,6 +363,16 @@ def test_contents_that_share_an_identifier_are_told_apart(tmp_path):
         data = bytes((page,)) + counts.to_bytes(2, "little", signed=True) + bytes(5)
         found.takers[STANDARD | 256].take(Frame(STANDARD | 256, data), 0)
     assert heard == [(pytest.approx(0.25), pytest.approx(-0.04), Quality.GOOD)]
+
+
+def test_a_short_frame_counts_against_its_own_content_alone(tmp_path):
+    """One that counts for both has twice the pace, as of two senders."""
+    found = ProfiledDevice(ship(tmp_path, {"motion": inertial(tmp_path)}).foreign.motions[0])
+    for data in (bytes(7), bytes((1, *[0] * 6)), bytes((1,)), bytes((2, 0))):
+        found.takers[STANDARD | 256].take(Frame(STANDARD | 256, data), 0)
+    assert [(each.heard, each.rejected[Rejection.LENGTH]) for each in found.watched] == [
+        (1, 1), (2, 2),
+    ]  # fmt: skip
 
 
 def test_what_is_encoded_of_a_shared_identifier_has_its_selector(tmp_path):

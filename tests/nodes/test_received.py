@@ -78,8 +78,11 @@ def test_an_alarm_names_the_device_that_the_ship_has_and_its_message():
     for data in (bytes(5), bytes(6), bytes(7)):
         inbox.receive(Frame(gauges, data), 1)
     said = inbox.received(Fault.TANK_SILENT)
-    assert said == "levels: inputs 0x187 on can2, 2 with wrong length"
-    assert inbox.received(Fault.PROTECTION) == said
+    # and no current in both: below the 3.6 mA of NAMUR NE 43
+    why, _, frames = said.partition("; ")
+    assert why == "levels: port_level_m, starboard_level_m not available, or out of range"
+    assert frames == "levels: inputs 0x187 on can2, 2 with wrong length"
+    assert inbox.received(Fault.PROTECTION) == frames
     inbox.receive(Frame(gauges, bytes((0, 0, 5, 0, 0, 0))), 1)  # 6150h: not valid, under range
     said = inbox.received(Fault.TANK_SILENT)
     assert said.endswith(", 2 with wrong length, status 0x5 (mask 0x7) is not valid")
@@ -103,6 +106,23 @@ def test_contents_of_one_identifier_have_their_own_names():
     said = Inbox(CATALOGUE, 7, foreign=DevicesSection(levels=levels).foreign())
     both = "levels: inputs 0x187 on can2, never heard; levels: other 0x187 on can2, never heard"
     assert said.received(Fault.TANK_SILENT) == both
+
+
+def test_a_status_that_is_silent_is_told():
+    """Ten cycles of an Ellipse's values and stamps; its status, 0x102, with the first alone."""
+    inbox = Inbox(CATALOGUE, 7, foreign=DevicesSection(motion=SBG).foreign())
+    own = 1 << BUS_SHIFT | STANDARD
+    for k in range(10):
+        stamp = (10_000 * (k + 1)).to_bytes(4, "little")
+        inbox.receive(Frame(own | 0x102, bytes((0x11, *[0] * 5))), 0) if not k else None
+        for number, data in (
+            (0x120, stamp + b"\x23\x02\0\0"), (0x122, bytes(6)), (0x130, stamp), (0x132, bytes(6)),
+        ):  # fmt: skip
+            inbox.receive(Frame(own | number, data), 10_000_000 * k)
+    said = inbox.received(Fault.MOTION_SILENT).split("; ")
+    assert [each for each in said if "status" in each] == [
+        "motion: status 0x102 on can1, too late for a status"
+    ]
 
 
 def test_an_alarm_says_why_whole_frames_do_not_count():

@@ -158,9 +158,9 @@ class MessageHeard(HeardMessage):
         self.unwell = ""  #: What its last status said instead of what is valid.
 
     def is_another(self, data: bytes) -> bool:
-        """Whether a frame of its identifier has another content."""
+        """Whether a frame of its identifier, however long, has another content."""
         only = self.only
-        return only is not None and len(data) == self.length and not only.holds(data)
+        return only is not None and not only.holds(data.ljust(self.length, b"\0"))
 
 
 class ProfiledDevice(Generic[T]):
@@ -224,6 +224,11 @@ class ProfiledDevice(Generic[T]):
         claim = self.plan.name_id
         if claim is not None and not self.named:
             return f"{self.plan.name}: address {claim[0] & 0xFF:#x} not claimed by {claim[1]:#x}"
+        placed = {signal.place for each in self._needed for signal in each.signals}
+        missing = [FIELDS[self._kind][place] for place in sorted(placed)
+                   if math.isnan(self._values[place])]  # fmt: skip
+        if missing and self._delivered_ns > LONG_AGO_NS:
+            return f"{self.plan.name}: {', '.join(missing)} not available, or out of range"
         judged = self._changed_ns > LONG_AGO_NS
         stands = judged and 0 < self._unchanged_ns < self._delivered_ns - self._changed_ns
         return f"{self.plan.name}: says the same for too long (unchanged_ms)" if stands else ""
@@ -283,7 +288,8 @@ class ProfiledDevice(Generic[T]):
             values[1] = self._slope_rad_s(values[0], now_ns)
         usable = self.named and self._changes(now_ns)
         for message in self._status:
-            usable = usable and now_ns - message.good_ns <= message.old_ns
+            if now_ns - message.good_ns > message.old_ns:
+                usable, message.unwell = False, message.unwell or "too late for a status"
         content = self._content(usable)
         if content is not None:
             self.deliver(_new(self._kind, content), now_ns)
