@@ -114,15 +114,16 @@ RECORDED = json.loads((Path(__file__).parent / "data/swaying_ships.json").read_t
 every 0.1 s, with their self-tuned laws in charge from 5 s on."""
 
 
-def found_in_record(name, sign=1.0):
-    """All that is found in a record of a ship, and the greatest doubt."""
+def found_in_record(name, sign=1.0, start_s=0.0):
+    """All that is found in a record of a ship from some time on, and the greatest doubt."""
     at = RECORDED[name]
     equation = TankEquation(
         RollShip(**at["ship"]), Tank(**at["tank"]), replace(OF_HULL, **at["thresholds"]), STEP_S
     )
     found, doubt = 0, 0.0
+    signals = "roll_1e-4_rad", "level_mm", "pressure_100_pa"
     for roll, level, pressure in zip(
-        at["roll_1e-4_rad"], at["level_mm"], at["pressure_100_pa"], strict=True
+        *(at[each][round(start_s / STEP_S) :] for each in signals), strict=True
     ):
         found |= equation.update(sign * 1e-4 * roll, 1e-3 * level, 100.0 * pressure)
         doubt = max(doubt, equation.doubt) if equation.doubt == equation.doubt else doubt
@@ -135,6 +136,13 @@ def test_short_waves_that_sway_a_wide_hull_are_no_fault(name):
     assert not found
     assert doubt < 0.8
     assert found_in_record(name, sign=-1.0)[0] & Finding.WATER_SIGN
+
+
+def test_the_first_part_of_a_wave_tells_less_than_all_of_it():
+    """The worst start of twenty."""
+    found, doubt = found_in_record("bulk carrier, 200 m", start_s=4.0)
+    assert not found
+    assert doubt < 0.8
 
 
 @pytest.mark.parametrize("name", RECORDED)

@@ -263,6 +263,21 @@ def test_a_roll_late_by_a_third_of_a_period_is_not_called_reversed(share, pressu
     assert Finding.WATER_SIGN not in late
 
 
+def test_half_a_period_after_the_start_a_roll_of_a_degree_is_obeyed():
+    """Until then a quarter of the pressure is left."""
+    ship, equation = (
+        MovingShip(math.radians(1.0), 0.0),
+        TankEquation(SHIP, TANK, THRESHOLDS, STEP_S),
+    )
+    begun_s = 0.0
+    for k in range(600):
+        t = k * STEP_S
+        equation.update(ship.roll_rad(t), ship.level_m(t), 0.0)
+        if not equation.settled:
+            begun_s = t
+        assert equation.obeyed or t - begun_s < 0.5 * T
+
+
 def test_water_that_obeyed_a_sensor_does_so_no_longer_once_that_is_wrong_or_says_too_little():
     ship = MovingShip(math.radians(1.0), 0.0)
     for wrong in (-1.0, 0.1):

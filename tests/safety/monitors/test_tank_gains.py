@@ -56,10 +56,23 @@ def equation_of(x, p, gain_x=1.0, gain_p=1.0, *, valve=False, held=0.0):
 )  # fmt: skip
 def test_a_gain_of_roll_or_pump_is_found_and_judged_by_its_sign(valve, gain, found):
     """The other push is three times as large, so that the level's own gain is sound."""
-    _, said = equation_of(3.0, 9j, gain_x=gain, valve=valve)
-    assert said & ~Finding.MOTION_LATE == found * Finding.WATER_SIGN
-    _, said = equation_of(9j, 3.0, gain_p=gain, valve=valve)
-    assert said & ~Finding.MOTION_LATE == found * Finding.PUMP_SIGN
+    for gains, sign in (
+        ((3.0, 9j, gain, 1.0), Finding.WATER_SIGN), ((9j, 3.0, 1.0, gain), Finding.PUMP_SIGN)
+    ):  # fmt: skip
+        equation, said = equation_of(*gains, valve=valve)
+        assert said & ~Finding.MOTION_LATE == found * sign
+        assert (equation.doubt > 1) is bool(found)
+
+
+@pytest.mark.parametrize(
+    ("valve", "gain", "obeys"),
+    [(False, 1.0, True), (False, 0.27, True), (False, 0.23, False), (False, -1.0, False),
+     (True, 0.52, True), (True, 0.48, False)],
+)  # fmt: skip
+def test_water_obeys_a_roll_by_as_far_as_it_would_contradict_one_of_the_wrong_sign(
+    valve, gain, obeys
+):
+    assert equation_of(3.0, 0.0, gain, valve=valve)[0].obeyed is obeys
 
 
 @pytest.mark.parametrize(

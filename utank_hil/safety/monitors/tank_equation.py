@@ -361,8 +361,7 @@ class TankEquation:
             clearly = 1.0 if finding == Finding.MOTION_LATE else self._clearly
             if moves and doubt > 1 and other <= clearly * best:
                 found = found & Finding.MOTION_LATE | finding  # of two signs that which leaves less
-            if not self.doubt >= doubt:
-                self.doubt = doubt
+            self.doubt = max(doubt, self.doubt)  # of NaN it is the first one
             if finding == Finding.WATER_SIGN and self._excess(other, sound, power, uu) > 1:
                 self.obeyed = True
         if enough_both:
