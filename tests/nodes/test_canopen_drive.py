@@ -13,6 +13,7 @@ from utank_hil.canbus.frame import STANDARD
 from utank_hil.canbus.profiles.device import hear
 from utank_hil.configuration.device_sections import DriveSection
 from utank_hil.control.pressure_loop import PressureLoop
+from utank_hil.dynamics.pump_curve import pump_pressure
 from utank_hil.nodes.actuators_heard import DriveHeard
 from utank_hil.nodes.canopen_drive import CanopenDrive, DriveReport, state_of
 
@@ -293,27 +294,57 @@ def test_bits_of_the_status_word_say_that_it_is_at_a_limit_or_warns(bit, says):
     assert (report.held_back, report.warns) == says
 
 
+def at_limit(line, limited=True):
+    """What is heard of a drive whose status word has, or lacks, the bit of a limit."""
+    heard = DriveHeard(SimpleNamespace(takers={}, watched=()), None, pump=True, canopen=line.drive)
+    status = 0x0037 | limited << 11
+    for can_id, data in ((0x705, b"\x05"), (0x185, status.to_bytes(6, "little"))):
+        line.drive.takers[can_id | STANDARD].take(Frame(can_id | STANDARD, data), line.now_ns)
+    return heard.held_back, heard.at_speed
+
+
 @pytest.mark.parametrize(
     ("share", "limited", "at_speed"),
     [(0.8, True, False), (-0.8, True, False), (0.95, True, True), (-0.95, True, True),
-     (0.95, False, False), (None, True, True)],
+     (0.95, False, False)],
 )  # fmt: skip
 def test_its_limit_is_one_of_speed_where_the_rotor_turns_as_fast(share, limited, at_speed):
-    """One bit of the status word is for all limits; a rotor of unknown speed may be at its own."""
-    line = Line(loop=PressureLoop(PUMP, 0.02, 0.05, torque=True))
-    heard = DriveHeard(SimpleNamespace(takers={}, watched=()), None, pump=True, canopen=line.drive)
-    line.run(400)
-    status = 0x0037 | limited << 11
+    """One bit of the status word is for all limits."""
+    line = Line(loop=PressureLoop(PUMP, 0.02, 0.05, torque=True)).run(400)
+    counts = round(share * PUMP.max_speed_rad_s / PROFILE["speed_rad_s_per_unit"])
+    data = counts.to_bytes(4, "little", signed=True) + bytes(2) + bytes((4,))
+    line.drive.takers[0x285 | STANDARD].take(Frame(0x285 | STANDARD, data), line.now_ns)
+    assert at_limit(line, limited) == (limited, at_speed)
+
+
+@pytest.mark.parametrize("flow_m3_s", [80.0, -80.0])
+@pytest.mark.parametrize(
+    ("share", "at_speed"), [(0.85, False), (0.95, True), (-0.95, False), (None, False)]
+)
+def test_a_speed_that_is_not_told_is_that_of_the_pressure_at_the_flow(share, at_speed, flow_m3_s):
+    """Water outruns the rotor that turns its way; a reversed pump is told by its pressure."""
+    line = Line(loop=PressureLoop(PUMP, 0.02, 0.05, torque=True)).run(400)
+    pressure_pa = 0.0
     if share is not None:
-        counts = round(share * PUMP.max_speed_rad_s / PROFILE["speed_rad_s_per_unit"])
-        data = counts.to_bytes(4, "little", signed=True) + bytes(2) + bytes((4,))
-        line.drive.takers[0x285 | STANDARD].take(Frame(0x285 | STANDARD, data), line.now_ns)
-    for can_id, data in ((0x705, b"\x05"), (0x185, status.to_bytes(6, "little"))):
-        line.drive.takers[can_id | STANDARD].take(Frame(can_id | STANDARD, data), line.now_ns)
-    if share is None:
-        line.drive._speed_rad_s = math.nan
-        line.drive.deliver((DriveState.OPERATION_ENABLED, False, limited, False, 0.0), line.now_ns)
-    assert (heard.held_back, heard.at_speed) == (limited, at_speed)
+        speed = math.copysign(share * PUMP.max_speed_rad_s, share * flow_m3_s)
+        pressure_pa = pump_pressure(speed, flow_m3_s, PUMP.coefficients)
+        assert (pressure_pa * flow_m3_s < 0) is True  # so at any of these speeds: outrun
+    age_ms = 0.0 if share is not None else math.inf  # of a sensor that is silent nothing is known
+    seen = SimpleNamespace(pump_age_ms=age_ms, pressure_pa=pressure_pa)
+    line.now_ns += 200 * MS  # its second PDO is late
+    line.drive.command(10e3, ControlWord.ENABLE_OPERATION, seen, flow_m3_s / 17.1)
+    line.drive._speed_rad_s = math.nan
+    assert at_limit(line) == (True, at_speed)
+
+
+def test_a_measured_pdo_that_is_cut_short_is_damage():
+    """Else nobody would know that speed, torque and mode are no longer told."""
+    line = Line().run(400)
+    heard = DriveHeard(SimpleNamespace(takers={}, watched=()), None, pump=True, canopen=line.drive)
+    assert heard.valid
+    for _ in range(5):
+        line.drive.takers[0x285 | STANDARD].take(Frame(0x285 | STANDARD, bytes(6)), line.now_ns)
+    assert not heard.valid
 
 
 def test_who_hears_it_takes_its_frames_and_watches_both_its_messages():

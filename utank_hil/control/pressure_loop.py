@@ -60,6 +60,10 @@ class PressureLoop:
         self._references = [0.0] * self._late
         self._speeds = [0.0] * self._late
 
+    def speed_rad_s(self, pressure_pa: float, flow_m3_s: float) -> float:
+        """The rotor's speed that makes a pressure at a flow."""
+        return pump_speed(pressure_pa, flow_m3_s, self._c)
+
     def step(
         self, wanted_pa: float, measured_pa: float, flow_m3_s: float, speed_rad_s: float
     ) -> float:

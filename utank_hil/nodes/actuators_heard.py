@@ -74,7 +74,10 @@ class DriveHeard:
 
     @property
     def valid(self) -> bool:
-        """Whether the native drive's frames arrive intact and in order."""
+        """Whether the drive's frames arrive intact and in order; of a native one the first's."""
+        if self._canopen is not None:
+            status, measured = self._canopen.watched
+            return status.valid and measured.valid
         return self._first is None or self._first.valid
 
     @property

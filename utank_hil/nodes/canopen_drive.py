@@ -114,7 +114,8 @@ class CanopenDrive:
         self.echo_ns = self._beat_ns = self._measured_ns = self._now_ns = NEVER_HEARD_NS
         self._operational = False
         self._started_ns = NEVER_HEARD_NS
-        self._speed_rad_s = self._torque = math.nan
+        self._speed_rad_s = self._torque = self._pressure_pa = math.nan
+        self._flow_m3_s = 0.0
         self._mode: int = plan.mode.number
         self._mode_shown = self._mode
         self._status = self._ignored = 0
@@ -156,12 +157,11 @@ class CanopenDrive:
         """The next command, with heartbeat and SYNC of the controller."""
         target = 0.0
         if self._loop is not None and word is _ENABLE:
+            self._flow_m3_s = self._area_m2 * rate_m_s
             stale = measured.pump_age_ms > STALE_MS
+            self._pressure_pa = math.nan if stale else measured.pressure_pa
             target = self._loop.step(
-                pressure_pa,
-                math.nan if stale else measured.pressure_pa,
-                self._area_m2 * rate_m_s,
-                self._speed_rad_s,
+                pressure_pa, self._pressure_pa, self._flow_m3_s, self._speed_rad_s
             )
         elif self._loop is not None:
             self._loop.reset()
@@ -183,8 +183,16 @@ class CanopenDrive:
 
     @property
     def at_speed(self) -> bool:
-        """Whether the rotor may turn at its greatest speed, to which the status word has no bit."""
-        return not abs(self._speed_rad_s) < self._fast_rad_s  # so if it is not known
+        """Whether the rotor may turn at its greatest speed, to which the status word has no bit.
+
+        Where the drive tells no speed, it is that which the measured pressure takes at the present
+        flow, and has to turn the way of the water: only there the water can outrun the rotor.
+        """
+        speed_rad_s, loop = self._speed_rad_s, self._loop
+        if loop is not None and not math.isfinite(speed_rad_s):
+            speed_rad_s = loop.speed_rad_s(self._pressure_pa, self._flow_m3_s)
+            return speed_rad_s * math.copysign(1.0, self._flow_m3_s) >= self._fast_rad_s
+        return not abs(speed_rad_s) < self._fast_rad_s  # so if it is not known
 
     @property
     def state(self) -> DriveState | None:
