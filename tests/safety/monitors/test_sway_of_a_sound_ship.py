@@ -103,6 +103,24 @@ def test_swapped_gauges_of_a_ship_that_sways_in_a_long_swell_are_not_called_stuc
     assert found[Finding.WATER_SIGN] < found[Finding.LEVEL_STUCK]
 
 
+@pytest.mark.parametrize("times", [0.5, 0.7])
+@pytest.mark.parametrize("pressure_pa", [0.0, -8e3, -20e3])
+@pytest.mark.parametrize("thresholds", [THRESHOLDS, OF_HULL])
+def test_no_sway_takes_from_the_gain_of_the_level_or_makes_the_motion_late(
+    times, pressure_pa, thresholds
+):
+    """Both are told as they speak most for sound sensors: not below 1, and not above 0."""
+    w = times * TANK.natural_frequency_rad_s
+    phasors = swaying(1.0, w, 0.04, pressure_pa, effective=0.6)
+    equation, told = TankEquation(UNSTATED, TANK, thresholds, STEP_S), 0
+    for k in range(900):
+        equation.update(*((each * cmath.exp(1j * w * k * STEP_S)).real for each in phasors))
+        assert not equation.level_gain < 1.0
+        assert not equation.late_s > 0.0
+        told += equation.late_s == equation.late_s
+    assert told > 300
+
+
 def wide_hull(share, w, slope_rad, pressure_pa):
     """Her roll moment per sway falls with the frequency: 0 at 1.65 w0, then of the other sign."""
     times = w / TANK.natural_frequency_rad_s

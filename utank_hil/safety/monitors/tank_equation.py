@@ -391,5 +391,5 @@ class TankEquation:
         """
         push, spread = math.sqrt(power), self._of_sway * math.sqrt(uu)
         far, near = self._far * push + spread, self._unexplained * push + spread
-        ratio = worse / (self._clearly * better + 1e-30)
+        ratio = worse / max(self._clearly * better, 1e-30)
         return max((worse - better) / (far * far), min(ratio, worse / (near * near)))
