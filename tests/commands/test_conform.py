@@ -13,13 +13,14 @@ from tests.firmware_sim.drive_bench import VESSEL, calm_plant
 from tests.nodes.canopen_peers import PROFILE
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import socketcan
-from utank_hil.canbus.profiles.drive_plan import Place
+from utank_hil.canbus.profiles.drive_plan import NetworkState, Place
 from utank_hil.commands import conform as command
 from utank_hil.configuration.device_sections import DriveSection
 from utank_hil.console.common import new_app
 from utank_hil.console.terminal import Terminal
 from utank_hil.nodes.commissioning import checks as commissioning
 from utank_hil.nodes.commissioning import conformance
+from utank_hil.runners import NodeError
 
 SAID = re.compile(r'Check\((?:"\w+"|f"{name}_ms"), "([^"]+)"')
 """What a check is of, as it stands in the code."""
@@ -51,7 +52,11 @@ def drive(monkeypatch):
         def run(self, ended):
             now_ns = 0
             while not ended():
-                for frame in self.trial.tick(now_ns):
+                try:
+                    frames = self.trial.tick(now_ns)
+                except Exception as error:  # as the loop takes them
+                    raise NodeError(f"{error}") from error
+                for frame in frames:
                     made.receive(frame, now_ns)
                 for frame in made.tick(now_ns):
                     self.trial.receive(frame, now_ns)
@@ -104,6 +109,15 @@ def test_the_record_says_what_was_seen(drive, ship, tmp_path, identity, code):
     assert record["passed"] is (code == 0)
     assert record["checks"][0]["name"] == "set_up"
     assert ("1018h:2 is 0x23, not 0x22" in record["checks"][0]["remedy"]) is bool(code)
+
+
+def test_where_nobody_can_answer_it_ends_before_the_pump_turns(drive, ship, tmp_path, monkeypatch):
+    monkeypatch.setattr(command.select, "select", lambda read, *_: (read, [], []))
+    record = tmp_path / "r"
+    done = invoke("pump", "--bus", "can0", "--ship", ship, "--record", record)
+    assert (done.exit_code, record.exists()) == (2, False)
+    assert "the input has ended: use --hand-s" in done.stderr
+    assert drive.state is NetworkState.PRE_OPERATIONAL  # as it started
 
 
 def test_the_table_has_the_remedy(drive, ship, tmp_path):

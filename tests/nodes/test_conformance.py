@@ -136,6 +136,14 @@ def test_a_drive_of_another_stack_conforms_and_is_left_stopped():
     assert 70 <= times_ms["lost_controller_ms"] <= 130
 
 
+def test_no_pump_turns_before_somebody_has_said_so():
+    """Not after hours either: who was asked may have gone."""
+    trial = DriveTrial(DriveSection(**PROFILE).plan(0, PUMP), PUMP, lambda what: lambda: False)
+    for hour in range(24):
+        trial.tick(hour * 3600 * 10**9)
+    assert (trial.done, trial.checks) == (False, [])
+
+
 def test_a_drive_that_runs_on_is_found():
     line = TrialLine()
     line.watches = line.stops = False

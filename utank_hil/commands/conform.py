@@ -52,9 +52,12 @@ def conform(
     path = record or Path(f"{device}.conformance.json")
     if reason := common.why_not_writable(path.parent, (path.name,)):
         common.fail(f"{reason}; choose another place with --record")
-    trial, silent = trial_of(vessel, device, ship, asks(hand_s), seconds)
+    nobody: list[bool] = []
+    trial, silent = trial_of(vessel, device, ship, asks(hand_s, nobody), seconds)
     with opened(lambda: SocketCanPort(channel, standard=True, receive_only=silent)) as (port, stop):
-        RealTimeLoop([trial], port).run(lambda: trial.done or stop())
+        RealTimeLoop([trial], port).run(lambda: trial.done or bool(nobody) or stop())
+    if nobody:
+        common.fail("the input has ended: use --hand-s where nobody is there")
     if not trial.done:
         common.fail("ended before all was checked; there is no record", ExitCode.INTERRUPTED)
     passed, checks = all(each.passed for each in trial.checks), listed(trial.checks)
@@ -99,8 +102,11 @@ def trial_of(
     return conformance.SensorTrial(plan, ask, seconds, key), silent
 
 
-def asks(hand_s: float | None) -> conformance.Ask:
-    """Ask on the terminal; a step is done at Enter, or after so many seconds."""
+def asks(hand_s: float | None, nobody: list[bool]) -> conformance.Ask:
+    """Ask on the terminal; a step is done at Enter, or after so many seconds.
+
+    Where the input has ended, `nobody` is filled.
+    """
 
     def ask(what: str) -> Callable[[], bool]:
         if hand_s is not None:
@@ -112,9 +118,10 @@ def asks(hand_s: float | None) -> conformance.Ask:
         def entered() -> bool:
             if not select.select([sys.stdin], [], [], 0)[0]:
                 return False
-            if not sys.stdin.readline():
-                common.fail("the input has ended: use --hand-s where nobody is there")
-            return True
+            line = sys.stdin.readline()
+            if not line:
+                nobody.append(True)
+            return bool(line)
 
         return entered
 

@@ -27,7 +27,6 @@ LOST_SHARE: Final = 1e-3  #: As of BUS_DEGRADED.
 TURNED_SHARE: Final = 0.25
 """Of the roll: its integrated rate may differ by so much, for a sensor that is tilted by hand."""
 BACK_S: Final = 5.0  #: For a device to measure again after its power is back.
-PATIENCE_S: Final = 3600.0  #: For a person.
 GOOD: Final = (canbus.Quality.GOOD, canbus.Quality.DEGRADED)
 MOVES: Final[dict[type[tuple[Any, ...]], tuple[tuple[str, float, str, str], ...]]] = {
     canbus.SensorMotion: (
@@ -92,7 +91,9 @@ class Trial(ABC):
             yield self._frames()
 
     def _by_hand(self, what: str) -> Script:
-        yield from self._wait(PATIENCE_S, self._ask(what))
+        done = self._ask(what)
+        while not done():  # however long: nothing may turn that nobody waits for
+            yield self._frames()
 
     def _configure(self, setup: CanopenSetup) -> Script:
         yield from self._wait(CONFIGURED_S, lambda: setup.done or bool(setup.problem))
