@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from little_room import little_room
 from typer.testing import CliRunner
@@ -79,6 +80,16 @@ def test_a_results_file_that_does_not_fit_ends_any_command_in_words(
         app(["design", "tank", SHIP, "--out", str(tmp_path)], standalone_mode=False)
     assert ended.value.code == ExitCode.USAGE
     assert capsys.readouterr().err.split() == f"error: {tmp_path}/tank.png: File too large".split()
+
+
+def test_a_run_too_long_for_the_memory_is_refused_in_words(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(SystemExit) as ended, failures_named():
+        np.empty((1 << 52, 32))
+    assert ended.value.code == ExitCode.SYSTEM
+    said = " ".join(capsys.readouterr().err.split())
+    assert said.startswith("error: too little memory for this: Unable to allocate 1.00 EiB")
 
 
 def test_other_errors_are_those_of_the_program() -> None:

@@ -288,6 +288,8 @@ def failures_named() -> Iterator[None]:
         reason, code = f"this needs {name}, which is not installed: {install}", ExitCode.USAGE
     except BrokenExecutor:
         reason, code = KILLED, ExitCode.SYSTEM
+    except MemoryError as error:
+        reason, code = f"too little memory for this: {error}".rstrip(": "), ExitCode.SYSTEM
     except OSError as error:
         if error.filename is None and error.errno != errno.ENOSPC:
             raise

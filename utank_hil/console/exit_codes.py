@@ -51,9 +51,9 @@ class ExitCode(IntEnum):
     )
     SYSTEM = (
         7,
-        "`run`, `commission`, `panel`, `bench`, `faults`",
-        "The system refused what the command needs, such as a process or shared memory, or a "
-        "process of it was killed. `bench` and `faults` keep what there is. Starting again may "
+        "all",
+        "The system refused what the command needs, such as a process or memory, or a process of "
+        "it was killed. `bench` and `faults` keep what there is. Starting again may "
         "help.",
     )
     INTERRUPTED = (
