@@ -28,6 +28,7 @@ from utank_hil.canbus import (
     DriveState,
     DriveStatus2,
     Fault,
+    Frame,
     Heartbeat,
     Mode,
     NodeState,
@@ -41,6 +42,7 @@ from utank_hil.canbus import (
     ShipEstimate,
     Switch,
 )
+from utank_hil.canbus.frame import STANDARD
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import EstimateFigures, RetuningEvent
 from utank_hil.retuning.law_exchange import LawExchange
@@ -692,3 +694,57 @@ def test_telemetry_has_a_row_of_so_many_ticks(every):
     longest_us = [20, *range(19, 0, -every)][: 20 // every]
     assert 1e6 * bench.column("wakeup_lateness_s") == pytest.approx(longest_us)
     assert 1e6 * bench.column("tick_duration_s") == pytest.approx(5.0)
+
+
+class PlayedDrive:
+    """A drive of another maker, each kind of frame of it, and how it was commanded."""
+
+    def __init__(self):
+        self.echo_ns, self.asked = START_NS, []
+
+    def frames(self, now_ns):
+        return [Frame(0x601 | STANDARD, b"setup")]
+
+    def command(self, *asked):
+        self.asked.append(asked)
+        return [Frame(0x201 | STANDARD, b"command")]
+
+    def stop(self):
+        return [Frame(0x201 | STANDARD, b"stop")]
+
+
+def test_devices_of_other_makers_are_woken_configured_commanded_and_stopped(monkeypatch):
+    bench = ControllerBench(START_NS)
+    node, drive = bench.node, PlayedDrive()
+    node.actuators.drive = drive
+    wake, sensor = Frame(0 | STANDARD, b"wake"), Frame(0x602 | STANDARD, b"sensor")
+    monkeypatch.setattr(node.inbox, "wakes", lambda _: [wake])
+    monkeypatch.setattr(node.inbox, "setups", lambda _: [sensor])
+    for tick in range(200):
+        drive.echo_ns = bench.now_ns
+        bench.tank = bench.tank._replace(port_level_m=-0.002 * tick, starboard_level_m=0.002 * tick)
+        bench.tick()
+    sent = [frame.data for frame in bench.sent if frame.can_id & STANDARD]
+    assert {data: sent.count(data) for data in sent} == {
+        b"wake": 2, b"sensor": 200, b"setup": 200, b"command": 100,  # each second, tick, cycle
+    }  # fmt: skip
+    pressure_pa, word, measured, rate_m_s = drive.asked[-1]
+    assert (pressure_pa, word) == (0.0, ControlWord.DISABLE_VOLTAGE)
+    assert measured.now_ns == bench.now_ns - 2 * TICK_NS
+    assert rate_m_s == bench.level.rate_m_s > 0.1
+    assert [frame.data for frame in node.stop(bench.now_ns)] == [b"stop"]
+
+
+def test_a_drive_of_another_maker_that_echoes_no_command_is_silent():
+    bench = ControllerBench(START_NS)
+    drive = bench.node.actuators.drive = PlayedDrive()
+    while bench.node.mode is not Mode.ACTIVE:
+        drive.echo_ns = bench.now_ns
+        bench.order_is(mode_request=Mode.ACTIVE, arm=bench.ms > 400)
+        bench.drive_state = DriveState.OPERATION_ENABLED
+        bench.tick()
+    drive.echo_ns = bench.now_ns
+    bench.run(100)
+    assert bench.node.mode is Mode.ACTIVE
+    bench.run(20)
+    assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.DRIVE_SILENT)
