@@ -80,6 +80,37 @@ def test_a_device_by_its_profile_is_expected_like_a_node():
     assert "motion slope PGN 61481" in problem[1]
 
 
+def test_contents_of_one_identifier_and_a_status_that_is_not_valid_are_named():
+    page = {"start": 0, "bits": 8}
+    pages = {
+        name: {"id": 0x18FF5A21, "format": "29bit", "only": {"from": "PAGE", "in": [number]},
+               "signals": {"PAGE": page, "A": {"start": 8, "bits": 16, "signed": True}}}
+        for name, number in (("values", 1), ("state", 2))
+    }  # fmt: skip
+    value = {"from": "values.A", "scale": 1e-4}
+    theirs = {
+        "profile": "", "messages": pages, "cycle_ms": 20, "age_ms": 60, "accept_unprotected": True,
+        "signals": {"roll_rad": value, "roll_rate_rad_s": value},
+        "protection": {"unchanged_ms": 2000},
+        "valid_when": [{"from": "state.A", "mask": 3, "in": [3]}],
+    }  # fmt: skip
+    ship = scenario({"motion": theirs})
+    messages, _ = traffic(ship)
+    found = census(messages, ship.vessel)
+    assert found.problems() == []
+    (shown,) = (row["message"] for row in found.rows() if row["node"] == "motion")
+    assert shown == "values, state PGN 65370"
+    ill = [
+        each._replace(data=b"\x02\x01" + bytes(6)) if each.number == 0x18FF5A21 else each
+        for each in messages
+        if each.number != 0x18FF5A21 or each.data[0] == 2
+    ]
+    assert census(ill, ship.vessel).problems() == [
+        ("missing", "motion values PGN 65370 18FF5A21 was not heard"),
+        ("wrong", "motion state PGN 65370 18FF5A21: status 0x1 (mask 0x3) is not valid"),
+    ]
+
+
 def test_a_device_of_the_ships_file_has_its_name_in_the_table_and_its_remedy():
     gauges = {
         "profile": "cia404_levels",

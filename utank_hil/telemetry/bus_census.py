@@ -7,6 +7,7 @@ from typing import Any, Final
 from utank_hil.canbus import Address, Frame, HardwiredInputs, Heartbeat, Rejection, load_catalogue
 from utank_hil.canbus.frame import BUS_SHIFT, OTHER_BUS, STANDARD
 from utank_hil.canbus.line_names import LINES
+from utank_hil.canbus.profiles.device import MessageHeard
 from utank_hil.canbus.sentences import SENTENCES
 from utank_hil.configuration import Vessel
 from utank_hil.nodes.inbox import Inbox
@@ -148,9 +149,10 @@ class BusCensus:
             for can_id, seen in sorted(self._seen.items())
         ]
 
-    def _who(self, can_id: int) -> tuple[str, str]:
-        """Who sends an identifier, and which message it is."""
+    def _who(self, can_id: int, content: str = "") -> tuple[str, str]:
+        """Who sends an identifier, and which message it is, or has this content."""
         device, name, _ = self._devices.get(can_id, ("", "", False))
+        name = content or name
         if can_id in self._catalogue.by_id:
             known = self._catalogue.by_id[can_id]
             return device or known.source.name, str(known.codec.name)
@@ -193,11 +195,13 @@ class BusCensus:
     def _message_problems(self, heard: Any) -> list[tuple[str, str]]:
         bare = heard.can_id & (OTHER_BUS - 1)
         device, _, silent = self._devices.get(bare, ("", "", False))
-        what = " ".join(filter(None, (device, self._who(bare)[1], written(bare))))
+        # several contents may share an identifier
+        content = heard.name if isinstance(heard, MessageHeard) else ""
+        what = " ".join(filter(None, (device, self._who(bare, content)[1], written(bare))))
         if not heard.heard:
             why = f"; controller or utank-hil conform {device} must configure it before it sends"
             return [("missing", f"{what} was not heard" + (why if silent else ""))]
-        found = []
+        found = [("wrong", f"{what}: {heard.unwell}")] if content and heard.unwell else []
         for reason in Rejection:
             if heard.rejected[reason]:
                 kind = "double" if reason is Rejection.REPEATED else "wrong"

@@ -205,8 +205,9 @@ class ForeignDevices:
         for plan in (*self.motions, self.levels, self.pump_sensor, self.valve, self.panel):
             if plan is not None:
                 for each in filter(None, (*plan.messages, plan.command)):
-                    of = plan.name, each.name, bool(plan.steps)
-                    found |= dict.fromkeys(each.can_ids, of)
+                    device, others, _ = found.get(each.can_ids[0], ("", "", False))
+                    name = f"{others}, {each.name}" if device == plan.name else each.name
+                    found |= dict.fromkeys(each.can_ids, (plan.name, name, bool(plan.steps)))
         if self.pump is not None:
             own = self.pump.bus << BUS_SHIFT | STANDARD | self.pump.node
             for name, cob in (("RPDO1", RECEIVED_1), ("TPDO1", SENT_1), ("TPDO2", SENT_2)):
