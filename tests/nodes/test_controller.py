@@ -748,3 +748,10 @@ def test_a_drive_of_another_maker_that_echoes_no_command_is_silent():
     assert bench.node.mode is Mode.ACTIVE
     bench.run(20)
     assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.DRIVE_SILENT)
+
+
+def test_a_drive_that_has_never_sent_a_command_back_is_silent(monkeypatch):
+    bench = ControllerBench(START_NS)
+    monkeypatch.setattr(bench, "hear", lambda _: None)
+    bench.run(500)
+    assert (bench.node.mode, bench.node.fault) == (Mode.INIT, Fault.DRIVE_SILENT)

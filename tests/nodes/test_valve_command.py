@@ -33,6 +33,7 @@ from utank_hil.canbus import (
     ValveStatus,
 )
 from utank_hil.configuration import Vessel, load_config
+from utank_hil.configuration.devices import DevicesSection
 from utank_hil.control.interface import PRESSURE, VALVE
 from utank_hil.dynamics.valves import Valve
 from utank_hil.nodes.actuators import ValveCommander
@@ -467,3 +468,39 @@ def test_with_a_drive_of_another_maker_the_last_frames_stop_both():
     bench.hear(rest)
     assert bench.control is ValveControl.FAIL_POSITION
     assert actuators.command_pa == 0
+
+
+def test_a_valve_by_cia_401_is_told_open_or_shut_with_the_controllers_heartbeat():
+    """It is open without power, and sends no command back: where it stands is what tells."""
+    profile = {"profile": "cia401_valve", "node": 9, "age_ms": 700, "accept_unprotected": True}
+    inverted = {"opening": {"sign": -1, "offset": -1}}
+    plan = DevicesSection(valve=profile | {"commands": inverted}).foreign().valve
+    commander = ValveCommander(DUCT, TANK, CATALOGUE, 0.05, plan)
+    outputs = []
+    for opening in (0.0, 0.3, 0.7, 1.0):
+        commander.ask(DUCT.loss(TANK, opening))
+        beat, told = commander.frames(0, faulted=False, follow=True)
+        assert (beat.can_id & 0x7FF, beat.data) == (0x77F, b"\x05")
+        assert told.can_id & 0x7FF == 0x209
+        outputs.append(told.data[0])
+    assert outputs == [1, 1, 0, 0]
+    measured = ValveBench().node.inbox.snapshot(10**9)
+    # a valve of one bit is expected where that bit sends it
+    commander.ask(DUCT.loss(TANK, 0.3))
+    commander.frames(0, faulted=False, follow=True)
+    for seconds, opening in ((1, 1.0), (2, 0.0), (9, 0.0)):
+        now_ns = seconds * 10**9
+        heard = {"valve_heard_ns": now_ns, "valve_opening": opening, "valve_following": True}
+        report = commander.observe(changed(measured, now_ns=now_ns, **heard))
+    assert report.echo_age_ms < 0
+    assert report.off_ms == 0.0
+
+
+def test_a_valve_is_commanded_at_the_time_of_the_tick(monkeypatch):
+    bench, times_ns = ValveBench(), []
+    monkeypatch.setattr(
+        bench.node.actuators.valve, "frames", lambda now_ns, **_: times_ns.append(now_ns) or []
+    )
+    bench.run(40)
+    bench.node.stop(bench.now_ns)
+    assert times_ns == [0, 20_000_000, 20_000_000]
