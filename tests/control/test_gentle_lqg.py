@@ -66,14 +66,14 @@ def test_between_two_shares_the_command_is_between_theirs(share: float) -> None:
         controller.step(y)
         controller.applied(np.zeros(1))
     commands = []
-    rows = list(SHARES)
+    rows = [*SHARES, 0.0]
     for each in (share, *rows):
         controller.use(each)
         memory = controller._memory.copy()
         commands.append(float(controller._advance[-1] @ memory))
     given_, of_rows = commands[0], commands[1:]
-    inside = min(max(share, SHARES[-1]), 1.0)
-    expected = np.interp(inside, rows[::-1], of_rows[::-1])
+    assert of_rows[-1] == 0.0
+    expected = np.interp(share, rows[::-1], of_rows[::-1])
     assert given_ == pytest.approx(float(expected), rel=1e-9, abs=1e-6)
 
 

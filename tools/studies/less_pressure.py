@@ -31,7 +31,7 @@ from utank_hil.control import DesignPlant
 from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
 from utank_hil.control.lqg import GentleController
 from utank_hil.retuning.estimate import ShipFigures
-from utank_hil.retuning.renewing import Effort
+from utank_hil.retuning.renewing import LIMITED_EFFORT, Effort
 from utank_hil.sea import EffectiveSlope, Sea, ittc
 
 CONTROLLER: Final = Path("configs/controllers/self_tuning.yaml")
@@ -65,23 +65,30 @@ class Learning:
         self.effort = Effort(ShipFigures.of(plant.ship).roll_period_s / self.sample_time_s)
         self._twin = plant.sampled(("roll_rad",), self.sample_time_s)
         self._made = np.zeros(len(self._twin.A))
+        self._asked_pa = self._applied_pa = 0.0
 
     def reset(self) -> None:
         """Forget everything."""
         self._law.reset()
         self.effort.clear()
+        self._asked_pa = self._applied_pa = 0.0
         self._made[:] = 0.0
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take a measurement and return the command."""
-        self.effort.update(float(y[0]), float(y[0] - (self._twin.C @ self._made)[0]))
+        limited = abs(self._applied_pa - self._asked_pa) > LIMITED_EFFORT * self._most_pa
+        passive_rad = float(y[0] - (self._twin.C @ self._made)[0])
+        self.effort.update(float(y[0]), passive_rad, limited=limited)
         share = self.effort.share
         self._use(1.0 if self._of_command else share)
         clipped = np.clip(self._law.step(y, reference), -self._most_pa, self._most_pa)
-        return share * clipped if self._of_command else clipped
+        asked = share * clipped if self._of_command else clipped
+        self._asked_pa = float(asked[0])
+        return asked
 
     def applied(self, u: FloatArray) -> None:
         """Take the mean of the commands since the last step."""
+        self._applied_pa = float(u[0])
         self._law.applied(u)
         self._made = self._twin.A @ self._made + self._twin.B @ u
 

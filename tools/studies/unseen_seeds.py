@@ -44,7 +44,7 @@ from utank_hil.configuration import ControllerConfig, Vessel, load_config
 from utank_hil.control import BuiltLaw
 from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
 
-FIRST_SEED: Final = 3001
+FIRST_SEED: Final = 4001
 SETTLE_S: Final = 60.0
 WINDOW_S: Final = 600.0
 BOUND_TICKS: Final = 20

@@ -261,8 +261,9 @@ def _weight(name: str, values: npt.ArrayLike, size: int) -> FloatArray:
 
 
 SHARES: Final = (1.0, 0.5, 0.25, 0.12, 0.05)
-"""Shares for which there are gains, by factors of about two; between two of them the gain is
-interpolated."""
+"""Shares for which there are gains, by factors of about two; between two of them, and from the last
+to none, the gain is interpolated."""
+_POINTS: Final = (*SHARES, 0.0)
 
 
 class GentleController(LQGController):
@@ -271,14 +272,14 @@ class GentleController(LQGController):
     def __init__(self, law: LQGLaw, gains: FloatArray) -> None:
         super().__init__(law)
         ahead = self._advance[: law.gain.shape[1]]
-        self._rows = -product(np.vstack([law.gain, gains]), ahead)
+        self._rows = -product(np.vstack([law.gain, gains, np.zeros_like(law.gain)]), ahead)
 
     def use(self, share: float) -> None:
-        """Take the gain for a share, at least the last of `SHARES` and at most 1."""
-        share = min(max(share, SHARES[-1]), SHARES[0])
+        """Take the gain for a share from 0 to 1."""
+        share = min(max(share, 0.0), SHARES[0])
         lower = 1
-        while share < SHARES[lower]:
+        while share < _POINTS[lower]:
             lower += 1
         upper = lower - 1
-        part = (SHARES[upper] - share) / (SHARES[upper] - SHARES[lower])
+        part = (_POINTS[upper] - share) / (_POINTS[upper] - _POINTS[lower])
         self._advance[-1] = (1.0 - part) * self._rows[upper] + part * self._rows[lower]

@@ -48,9 +48,12 @@ AWAY: Final = 5.0
 that is unstable on the ship doubles the roll in a second or two. A sudden large heel ends a trial
 too; the law is tried again later.
 """
-LEAST_EFFORT: Final = 0.05
-"""Least share: the pump's effect is computed, so it needs no more to be known. With 0.25 a ship
-loaded to 1.3 times its period rolled 1.10 times the passive roll in short waves, with 0.05 1.05."""
+LEAST_EFFORT: Final = 0.005
+"""Least share: the pump's effect is computed, so it needs no more to be known."""
+LIMITED_EFFORT: Final = 0.05
+"""Least share, of gain and of pressure, after limits have changed the command by more than that.
+What they make of the roll counts as the law's, and a smaller share would leave it as it is: then
+the share that pays seems to be ever smaller."""
 FIRST_EFFORT: Final = 0.5
 """Share before anything is known: a quarter of the power, three quarters of most of the gain."""
 MEMORY_PERIODS: Final = 8.0
@@ -82,11 +85,16 @@ class Effort:
     def clear(self) -> None:
         """Forget everything."""
         self.share = FIRST_EFFORT
-        self._twin_rad = self._made_rad = self._together = self._made_square = 0.0
+        self._twin_rad = self._made_rad = self._together = self._made_square = self._limited = 0.0
 
-    def update(self, roll_rad: float, passive_roll_rad: float) -> None:
-        """Take a sample; with an unknown passive roll the share goes to one."""
+    def update(self, roll_rad: float, passive_roll_rad: float, *, limited: bool) -> None:
+        """Take a sample; with an unknown passive roll the share goes to one.
+
+        `limited` if limits have changed the last command (`LIMITED_EFFORT`).
+        """
         best, part = 1.0, self._part
+        self._limited = 1.0 if limited else (1.0 - part) * self._limited
+        least = LEAST_EFFORT + self._limited * (LIMITED_EFFORT - LEAST_EFFORT)
         if math.isfinite(roll_rad + passive_roll_rad):
             twin, made = passive_roll_rad - self._twin_rad, roll_rad - passive_roll_rad
             made -= self._made_rad
@@ -96,7 +104,7 @@ class Effort:
             self._made_square += part * (made * made - self._made_square)
             if self._made_square > 0.0:
                 best = -self.share * self._together / self._made_square
-        self.share += EFFORT_PACE * part * (min(max(best, LEAST_EFFORT), 1.0) - self.share)
+        self.share += EFFORT_PACE * part * (min(max(best, least), 1.0) - self.share)
 
 
 class RenewingController(LawExchange):
@@ -124,6 +132,7 @@ class RenewingController(LawExchange):
         self._configured = self._ship = ship
         self.effort = Effort(ship.roll_period_s / self.sample_time_s)
         self._allowed = 1.0
+        self._asked_pa = 0.0
         self._latest: MotionEstimate | None = None
         self._seen: ShipFigures | None = None
         self._due = ""
@@ -151,9 +160,12 @@ class RenewingController(LawExchange):
         if not self._engaged:
             self.effort.clear()
         elif self._fresh and self._shared:
-            self.effort.update(self._roll_rad, self._passive_roll_rad)
+            changed_pa = abs(self._applied_pa - self._asked_pa)
+            limited = changed_pa > LIMITED_EFFORT * self._limits.pressure_pa
+            self.effort.update(self._roll_rad, self._passive_roll_rad, limited=limited)
         allowed_pa = self._allowed * self._limits.pressure_pa
-        return np.array([min(max(command, -allowed_pa), allowed_pa)])
+        self._asked_pa = min(max(command, -allowed_pa), allowed_pa)
+        return np.array([self._asked_pa])
 
     def reset(self) -> None:
         """Reset all laws; a law on trial is dropped."""
