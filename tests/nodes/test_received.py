@@ -141,9 +141,11 @@ def test_an_alarm_says_why_whole_frames_do_not_count():
         return inbox.received(Fault.MOTION_SILENT)
 
     said = slopes(2)
-    assert said.startswith("motion: address 0x21 not claimed by 0x5; motion: slope 0x")
+    assert said.startswith(
+        "motion: address 0x21 not claimed by 0x5; motion: slope PGN 61481 of 0x21"
+    )
     inbox.receive(Frame(0x18EEFF21, (5).to_bytes(8, "little")), 1)
-    assert slopes(11).startswith("motion: slope 0x")
+    assert slopes(11).startswith("motion: slope PGN 61481 of 0x21")
     assert slopes(12).startswith("motion: says the same for too long (unchanged_ms); motion: slo")
 
 

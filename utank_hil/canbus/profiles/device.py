@@ -144,7 +144,7 @@ class MessageHeard(HeardMessage):
 
     def __init__(self, plan: MessagePlan, late_ms: float, bit: int) -> None:
         super().__init__(plan)
-        self.name = plan.name
+        self.name, self.of_group = plan.name, len(plan.can_ids) > 1  # by PGN, of any priority
         self.signals: tuple[SignalPlan, ...] = plan.signals
         self.conditions: tuple[ConditionPlan, ...] = plan.conditions
         self.only: ConditionPlan | None = plan.only
