@@ -118,6 +118,8 @@ def init(
         "duct_below_cg_m": duct_below_cg,
     }
     ship_name = name or folder.resolve().name.replace("_", " ")
+    if not " ".join(ship_name.split()).isprintable():
+        fail(f"--name: {ascii(ship_name)} has letters that can't be written; give another name")
     with _at_options():
         ship = StarterShip(
             ship_name, length, beam, displacement, gm, roll_period, draught, roll_damping

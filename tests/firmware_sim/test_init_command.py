@@ -3,6 +3,7 @@
 import errno
 import json
 import math
+import os
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -216,6 +217,14 @@ def test_period_or_draught_is_needed(tmp_path: Path) -> None:
     done = run(tmp_path, ship)
     assert done.exit_code == ExitCode.USAGE
     assert "--roll-period: is needed, or else the draught" in done.stderr
+
+
+@pytest.mark.parametrize("name", ["Bell\a", "Gro\x9fe", os.fsdecode(b"Gr\xf6\xdfe")])
+def test_a_name_that_no_file_can_hold_is_refused(tmp_path: Path, name: str) -> None:
+    done = run(tmp_path, PATROL, "--name", name)
+    assert done.exit_code == ExitCode.USAGE
+    assert f"--name: {ascii(name)} has letters that can't be written" in done.stderr
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_files_that_are_there_stay(tmp_path: Path) -> None:
