@@ -1,7 +1,7 @@
 """``utank-hil init``: a starter project for a user's ship."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -108,9 +108,7 @@ def init(
     **Example:** utank-hil init patrol --length 63 --beam 9.5 --displacement 1900
     --gm 0.9 --roll-period 9.5
     """
-    for path in (folder / file for file in (*FILES, *([HULL] * hull))):
-        if path.exists():
-            fail(f"{path}: is there already; name another folder, or remove it")
+    _refuse_former(folder / file for file in (*FILES, *([HULL] * hull)))
     given = {
         "breadth_m": tank_breadth,
         "height_m": tank_height,
@@ -119,7 +117,7 @@ def init(
     }
     ship_name = name or folder.resolve().name.replace("_", " ")
     if not " ".join(ship_name.split()).isprintable():
-        fail(f"--name: {ascii(ship_name)} has letters that can't be written; give another name")
+        fail(f"--name: {ship_name!a} has letters that can't be written; give another name")
     with _at_options():
         ship = StarterShip(
             ship_name, length, beam, displacement, gm, roll_period, draught, roll_damping
@@ -143,6 +141,12 @@ def init(
         fail(f"--tp: {error}")
     files = _written(project, data, folder)
     _tell(ship, project, files, json_)
+
+
+def _refuse_former(files: Iterable[Path]) -> None:
+    for path in files:
+        if path.exists():
+            fail(f"{path}: is there already; name another folder, or remove it")
 
 
 def _room(length: float, beam: float, given: dict[str, float | None]) -> TankRoom:
@@ -192,6 +196,7 @@ def _written(project: StarterProject, data: Any | None, folder: Path) -> dict[st
     if reason := why_not_writable(folder):  # written last: a refusal leaves no files behind
         fail(f"{reason}; name another folder")
     files = {file: folder / file for file in (*FILES, *(() if data is None else (HULL,)))}
+    _refuse_former(files.values())  # of another that began since
     try:
         for file in FILES:
             write_whole(files[file], project.texts[file])

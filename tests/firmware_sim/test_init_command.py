@@ -22,7 +22,7 @@ from firmware_sim.commands.init import init
 from firmware_sim.figures import figures
 from firmware_sim.prediction import Expected
 from firmware_sim.scenario import Scenario
-from firmware_sim.starter import StarterShip
+from firmware_sim.starter import StarterProject, StarterShip, make_starter
 from utank_hil.analysis.motion.statistics import Interval
 from utank_hil.analysis.tank_sizing import usable_level_m
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
@@ -223,7 +223,7 @@ def test_period_or_draught_is_needed(tmp_path: Path) -> None:
 def test_a_name_that_no_file_can_hold_is_refused(tmp_path: Path, name: str) -> None:
     done = run(tmp_path, PATROL, "--name", name)
     assert done.exit_code == ExitCode.USAGE
-    assert f"--name: {ascii(name)} has letters that can't be written" in done.stderr
+    assert f"--name: {name!a} has letters that can't be written" in done.stderr
     assert list(tmp_path.iterdir()) == []
 
 
@@ -233,6 +233,23 @@ def test_files_that_are_there_stay(tmp_path: Path) -> None:
     assert done.exit_code == ExitCode.USAGE
     assert "ship.yaml: is there already" in done.stderr
     assert (tmp_path / "ship.yaml").read_text() == "mine\n"
+
+
+def test_of_two_at_once_the_later_leaves_the_files_of_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = tmp_path / "controller.yaml"
+
+    def made(*ship: Any) -> StarterProject:
+        other.write_text("the other's\n")
+        return make_starter(*ship)
+
+    monkeypatch.setattr("firmware_sim.commands.init.make_starter", made)
+    done = run(tmp_path, PATROL)
+    assert done.exit_code == ExitCode.USAGE
+    assert "controller.yaml: is there already" in done.stderr
+    assert [*tmp_path.iterdir()] == [other]
+    assert other.read_text() == "the other's\n"
 
 
 def test_a_full_disk_leaves_no_half_of_a_project(
