@@ -33,8 +33,9 @@ def test_a_receive_only_bus_can_not_command():
         DevicesSection(pump=PROFILE | {"bus": "can1"}, receive_only=["can1"])
 
 
-def test_what_is_required_adds_to_the_profile_or_takes_away():
-    section = DevicesSection(pump=PROFILE | {"require": {"0x6007": None, "0x1400:5": 60}})
+@pytest.mark.parametrize("lacks", ["0x6007", "6007h", "0x6007:0"])
+def test_what_is_required_adds_to_the_profile_or_takes_away(lacks):
+    section = DevicesSection(pump=PROFILE | {"require": {lacks: None, "0x1400:5": 60}})
     plan = section.foreign(PUMP).pump
     assert dict(plan.require) == {Place(0x605A): 2, Place(0x605E): 2, Place(0x1400, 5): 60}
 

@@ -234,6 +234,12 @@ def test_a_drive_that_cannot_be_led_is_refused(name, reason):
         drive(name)
 
 
+@pytest.mark.parametrize("require", [[1], 5, "0x6007"])
+def test_what_is_required_is_a_mapping_with_an_eds_too(require):
+    with pytest.raises(ValueError, match=r"require\n.*valid dictionary"):
+        drive("maxon-epos4_50_15_node1.dcf", node=1, mode="cyclic_torque", require=require)
+
+
 def test_what_a_drives_file_lacks_is_said_before_the_quay():
     with pytest.raises((ParameterError, ValueError), match="without mode torque: choose cyclic_"):
         drive("maxon-epos4_50_15_node1.dcf", node=1)

@@ -157,6 +157,24 @@ def test_the_time_of_a_sample_is_its_receipt_or_what_its_counter_says():
     assert clock.time_ns(1120 * MS) // MS - times[-1] == 60
 
 
+@pytest.mark.parametrize(("counts", "apart_ns"), [("values.N", 10 * MS), ("state.N", 0)])
+def test_a_counter_dates_the_samples_of_its_own_message_alone(counts, apart_ns):
+    number = {"start": 0, "bits": 4}
+    signals = {"N": number, "A": {"start": 8, "bits": 16, "signed": True, "unit": "mrad"},
+               "B": {"start": 8, "bits": 16, "signed": True, "unit": "mrad/s"}}  # fmt: skip
+    messages = {"values": {"id": 1, "bytes": 3, "signals": signals},
+                "state": {"id": 2, "bytes": 1, "signals": {"N": number}}}  # fmt: skip
+    theirs = {
+        "profile": "", "messages": messages, "cycle_ms": 10, "age_ms": 40,
+        "signals": {"roll_rad": {"from": "values.A"}, "roll_rate_rad_s": {"from": "values.B"}},
+        "protection": {"counters": [counts]}, "accept_unprotected": True,
+    }  # fmt: skip
+    plan = DevicesSection(motion=theirs).foreign().motions[0]
+    clock = SampleClock(ProfiledDevice(plan))
+    first_ns = clock.time_ns(5 * S)
+    assert clock.time_ns(5 * S) - first_ns == apart_ns
+
+
 @pytest.mark.parametrize(("thresholds", "kept_m", "discarded"), [(APART, 1.0, 1), (None, 32.0, 0)])
 def test_levels_that_jump_are_discarded_where_there_are_thresholds(thresholds, kept_m, discarded):
     heard = LevelsHeard(CATALOGUE.receiver(SensorTank), 100.0, thresholds)

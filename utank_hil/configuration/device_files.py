@@ -255,9 +255,10 @@ def _lacking(eds: Eds, content: dict[str, Any]) -> Iterator[str]:
             ways = place == echo or place == mode.target
             remedy = "choose another echo or mode" if ways else "take another drive or firmware"
             yield f"there is no {place}, which the controller needs: {remedy}"
-    for name, value in content["require"].items():
+    required = content["require"]
+    for name, value in required.items() if isinstance(required, dict) else ():
         with suppress(ValueError):  # no object: refused elsewhere
-            if value is not None and eds.entry(place_of(name)) is None:
+            if value is not None and eds.entry(place_of(str(name))) is None:
                 yield f"there is no {name}: set it to null in require, the maker's own in its place"
 
 

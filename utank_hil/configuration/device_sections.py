@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
@@ -218,6 +219,16 @@ REQUIRE: Final = {"0x6007": 3, "0x605A": 2, "0x605E": 2}
 """Quick stop where the controller's heartbeat ends or the node is stopped; it brakes on its ramp,
 then the drive switches off; so it does at a fault. CiA 402-2; 35 EDS of seven makers."""
 
+
+def _required(given: dict[str, Any]) -> dict[str, Any]:
+    """`REQUIRE` and what a file gives, whose objects may be written in another way."""
+    named = set()
+    for written in given:
+        with suppress(ValueError):  # no object: refused elsewhere
+            named.add(place_of(str(written)))
+    return {key: value for key, value in REQUIRE.items() if place_of(key) not in named} | given
+
+
 _TORQUES: Final = (100, 3000)
 """Counts of the target torque at the pump's greatest pressure: ten times the torque that is needed,
 in steps of 1 %, to a drive that gives three times its rated one for a while."""
@@ -258,7 +269,7 @@ class DriveSection(CanopenSection):
         if content.get("profile", NATIVE) == NATIVE:
             return content
         given = content.get("require", {})
-        content = content | {"require": REQUIRE | given if isinstance(given, dict) else given}
+        content = content | {"require": _required(given) if isinstance(given, dict) else given}
         return drive_with_eds(content) if "eds" in content else content
 
     @property

@@ -181,7 +181,10 @@ class ProfiledDevice(Generic[T]):
         self._needed = [each for each in messages if each.needed]
         self._status = [each for each in messages if each.status]
         #: Whether a counter or a stamp tells a new measurement.
-        self.counts = any(each.counter or each.stamp for each in plan.messages)
+        self.counts = any(
+            each.needed and (of.counter or of.stamp)
+            for each, of in zip(messages, plan.messages, strict=True)
+        )
         self._all = sum(each.bit for each in messages)
         self._here = 0  # bits of the messages that a measurement has so far
         self._kind: Any = plan.kind
