@@ -64,7 +64,7 @@ class Instant:
     def failure(self) -> str:
         return ""
 
-    def stop(self) -> dict[str, int]:
+    def stop(self, _say: object) -> dict[str, int]:
         return {"rows": 5, "lost": 2}
 
 
@@ -179,7 +179,7 @@ def test_recorder_that_fails_on_the_way_is_told_with_its_file(
     class Failing(Instant):
         error = "the recorder ended with code 1"
 
-        def stop(self) -> dict[str, int]:
+        def stop(self, _say: object) -> dict[str, int]:
             return {}
 
     monkeypatch.setattr(module, "Beside", Failing)

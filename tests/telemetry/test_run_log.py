@@ -17,6 +17,7 @@ from utank_hil.canbus.events import AlarmEvent, RetuningEvent
 from utank_hil.commands import recording
 from utank_hil.commands.recording import record
 from utank_hil.nodes.signals import SIGNALS
+from utank_hil.runners import beside
 from utank_hil.runners.beside import Beside
 from utank_hil.telemetry.events import EventWriter
 from utank_hil.telemetry.frame_log import (
@@ -191,12 +192,24 @@ def test_a_killed_recorder_leaves_all_but_the_last_second(tmp_path):
             if time.monotonic() - begin_s > 2.0:
                 break
         os.kill(recorder.pid, signal.SIGKILL)
-        assert recorder.stop() == {}
+        assert recorder.stop(print) == {}
         assert recorder.error == "the recorder ended with code -9"
     left = records_of(file)
     assert run.records.startswith(left.tobytes())
     assert left["time_ns"][-1] > (number - 150) * TICK_NS  # half a second more for the machine
     assert read_run_log(file).rows[-1, 0] > (number - 150) / 100
+
+
+@pytest.mark.slow
+def test_a_recorder_that_hangs_is_named_while_it_is_waited_for(tmp_path, monkeypatch):
+    monkeypatch.setattr(beside, "END_S", 1.5)
+    said = []
+    with rings() as run:
+        recorder = Beside("the recorder", record, run.task(tmp_path / "a.frames"))
+        os.kill(recorder.pid, signal.SIGSTOP)
+    assert recorder.stop(said.append) == {}
+    assert said == ["waiting up to 1.5 s for the recorder to end"]
+    assert recorder.error == "the recorder did not end and was killed"
 
 
 @pytest.mark.slow
@@ -208,7 +221,7 @@ def test_the_recorder_ends_with_its_rings_or_their_writer_and_says_what_it_wrote
         run.feed(range(20, 30))
     report = RunLogReport(rows=30, lost=0, records_lost=0, parts=1)
     said = {name: getattr(report, name) for name in ("rows", "lost", "records_lost", "parts")}
-    assert recorder.stop() == recorder.stop() == said | {"error": None}
+    assert recorder.stop(print) == recorder.stop(print) == said | {"error": None}
     assert recorder.error == ""
     assert records_of(tmp_path / "a.frames").tobytes() == run.records
 

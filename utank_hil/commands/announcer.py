@@ -20,7 +20,7 @@ from utank_hil.canbus.events import AlarmEvent, RetuningEvent
 from utank_hil.commands.identified import IdentifiedShips
 from utank_hil.commands.lines import Lines
 from utank_hil.commands.outward.outlets import Outlet, Outward
-from utank_hil.console.terminal import shown
+from utank_hil.console.terminal import notes, shown
 from utank_hil.runners.beside import Beside, ready
 from utank_hil.safety.faults import FAULTS
 from utank_hil.telemetry.events import Event, EventReader, EventWriter, event_text
@@ -107,7 +107,7 @@ class Announcer:
         self._writer.close()
         self._writer = None
         if self._process is not None:
-            self._process.stop()
+            self._process.stop(notes.say)
             self.error = self._process.error or self.error
 
 

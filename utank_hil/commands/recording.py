@@ -13,6 +13,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.whole_file import claimed_files
 from utank_hil.commands.lines import Lines
 from utank_hil.console.common import why_not_writable
+from utank_hil.console.terminal import notes
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.runners.beside import Beside, ready
 from utank_hil.telemetry.frame_log import SUFFIX, frame_ring
@@ -141,7 +142,7 @@ class RunRecording:
             ring.close()
         recorder, self._recorder = self._recorder, None
         if recorder is not None:
-            self.summary = replace(self.summary, **recorder.stop())
+            self.summary = replace(self.summary, **recorder.stop(notes.say))
             self.summary.error = recorder.error or self.summary.error
 
     def _close_records(self) -> None:

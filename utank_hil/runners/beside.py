@@ -14,8 +14,9 @@ from utank_hil.runners.stopping import SIGNALS, signals_waiting
 
 _READY: Final = b"ready"
 _NICENESS: Final = 5  #: Below what controls, above idle.
-_START_S, _END_S = 30.0, 30.0
+_START_S, END_S = 30.0, 15.0
 """Times for a process to start, and to end what it has to do, on a busy machine."""
+_SILENT_S: Final = 1.0  #: Wait for an end of which nothing is said.
 
 
 class Beside:
@@ -61,11 +62,15 @@ class Beside:
         self.error = f"{self._what} ended with code {self._process.exitcode}"
         return self.error
 
-    def stop(self) -> dict[str, Any]:
+    def stop(self, say: Callable[[str], None]) -> dict[str, Any]:
         """Wait for the end and return the last message, {} without one; idempotent."""
         if self._heard.closed:
             return self._last
-        self._process.join(_END_S)
+        self._process.join(_SILENT_S)
+        if self._process.is_alive():
+            with suppress(OSError, SystemExit):  # The output is full or gone (Rich's SystemExit).
+                say(f"waiting up to {END_S:g} s for {self._what} to end")
+            self._process.join(END_S - _SILENT_S)
         if self._process.is_alive():
             self._kill()
             self.error = f"{self._what} did not end and was killed"
