@@ -115,8 +115,9 @@ class CanopenSetup:
                 if written.abort:
                     said = f", and writing it gave {cia.abort_words(written.abort)}"
                 got = yield step.place, cia.read_request(step.place)
-            # only its length counts, and a process value need not be readable
-            unread = not step.equal_bits and got.value is None
+            # only its length counts, and a process value need not be readable, but has to be there
+            there = got.abort != cia.Abort.NO_OBJECT
+            unread = not step.equal_bits and got.value is None and there
             if step.needed and not unread and not self._kept(step, got):
                 raise _Refused(self._words(step, got) + said + f": {step.remedy}")
 
