@@ -65,8 +65,7 @@ class ControllerNode:
 
     name = "controller"
     period_ns = TICK_NS
-    measured: Measurements  #: Of the last tick, as the next.
-    judgement: Judgement
+    judgement: Judgement  #: Judgement of the last tick.
 
     def __init__(
         self,
@@ -97,6 +96,8 @@ class ControllerNode:
             drive=actuators.drive,
             key=settings.key,
         )
+        #: As of the last tick; before the first nothing is heard.
+        self.measured: Measurements = self.inbox.snapshot(0)
         if monitors is not None:
             monitors.watch(self.inbox.watched, self.inbox.expected)
         self.level = LevelObserver(settings.tank, self.inbox.tank_cycle_ns * NANOSECONDS)
