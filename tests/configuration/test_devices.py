@@ -116,6 +116,9 @@ def test_a_change_of_a_device_voids_the_commissioning(tmp_path):
          "byte 6 is not in attitude, which has 6"),
         ({"motion": SBG | {"messages": {"attitude": {"only": {"from": "YAW", "in": [1]}}}}},
          "'YAW' is no signal of attitude"),
+        ({"motion": SBG | {"messages": {
+            "attitude": {"only": {"from": "ROLL", "mask": 1, "in": [2]}}}}},
+         "messages.attitude.only: in has 2, and the bits of ROLL that count are 0x1"),
         ({"motion": SSI2 | {"source": 0x80}}, "motion.source: is the address of controller"),
         ({"motion": SBG | {"messages": {"attitude": {"id": MOTION, "format": "29bit"}}}},
          f"{MOTION:#x} is a native node's on this bus"),

@@ -195,7 +195,7 @@ class _Told(NamedTuple):
 
     def failures(self, port: canbus.Port) -> None:
         for error in port.take_errors() if isinstance(port, BusPorts) else ():
-            self.lines.say(f"a sensor's bus fails: {error}")
+            self.lines.say(f"a device's bus fails: {error}")
         if failure := self.recording.failure():
             self.lines.say(f"not recorded any longer: {failure}")
         if self.announcer is not None and (failure := self.announcer.failure()):

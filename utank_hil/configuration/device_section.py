@@ -160,14 +160,19 @@ class DeviceSection(CanopenSection):
                 )
                 meant = f"did you mean {near}?" if near else "write MESSAGE.SIGNAL"
                 yield key, f"{path!r} is no signal of messages: {meant}"
-        for each in self.valid_when:
-            layout = self._field(each.from_)
+        conditions = [("valid_when", each, self._field(each.from_)) for each in self.valid_when]
+        conditions += [
+            (f"messages.{name}.only", said.only, said.signals.get(said.only.from_))
+            for name, said in self.messages.items()
+            if said.only is not None
+        ]
+        for key, each, layout in conditions:
             bits = -1 if layout is None else each.mask & (1 << layout.bits) - 1
             if not bits:
-                yield "valid_when", f"mask {each.mask:#x} has none of the bits of {each.from_}"
+                yield key, f"mask {each.mask:#x} has none of the bits of {each.from_}"
             elif odd := [value for value in each.in_ if layout is not None and value & ~bits]:
                 reason = f"in has {odd[0]}, and the bits of {each.from_} that count are {bits:#x}"
-                yield "valid_when", f"{reason}: it never is (values are without sign)"
+                yield key, f"{reason}: it never is (values are without sign)"
         for crc in self.protection.crcs:
             said = self.messages.get(crc.message)
             if said is None:
