@@ -280,6 +280,16 @@ def test_half_a_period_after_the_start_a_roll_of_a_degree_is_obeyed():
         assert equation.obeyed or t - begun_s < 0.5 * T
 
 
+@pytest.mark.parametrize("pressure_pa", [0.0, 5e3])
+@pytest.mark.parametrize("frequency_rad_s", [0.45, 0.75])
+def test_a_reversed_roll_is_not_called_late_as_well(pressure_pa, frequency_rad_s):
+    """A quarter of a period late it would explain the water better than now, reversed best."""
+    ship = MovingShip(math.radians(2.0), pressure_pa, frequency_rad_s)
+    found = found_after(ship, lambda _, roll, *rest: (-roll, *rest), 30.0)
+    assert found[Finding.WATER_SIGN] <= T
+    assert Finding.MOTION_LATE not in found
+
+
 def test_water_that_obeyed_a_sensor_does_so_no_longer_once_that_is_wrong_or_says_too_little():
     ship = MovingShip(math.radians(1.0), 0.0)
     for wrong in (-1.0, 0.1):
