@@ -13,6 +13,7 @@ from utank_hil.canbus import (
     Fault,
     Mode,
     SensorMotion,
+    SensorTank,
     Switch,
 )
 from utank_hil.canbus.events import AlarmEvent
@@ -556,6 +557,19 @@ def test_a_switch_that_closes_between_two_statuses_alarms(mode, phase_ms):
     assert [(event.code, event.state) for event in bench.told] == [(HIGH, ACTIVE)]
     bench.run(11_000)
     assert [event.state for event in bench.told] == [ACTIVE, RECTIFIED]
+
+
+@pytest.mark.parametrize("phase_ms", range(0, 100, 10))
+def test_what_halves_the_pressure_between_two_statuses_alarms(phase_ms):
+    bench = Told()
+    bench.drive_at(10e3)
+    bench.run(1000 + phase_ms)
+    bench.silent = {SensorTank}
+    bench.run(120)
+    bench.silent = set()
+    bench.run(200)
+    assert bench.node.mode is Mode.ACTIVE
+    assert [(event.code, event.state) for event in bench.told] == [(Fault.TANK_SILENT, ACTIVE)]
 
 
 def test_what_is_latched_and_reset_between_two_statuses_alarms():
