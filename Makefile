@@ -1,9 +1,9 @@
 # utank-hil: `make bench` sets up and runs the main job, `make test` sets up and passes the tests.
 VENV := .venv
-PYTHON := $(VENV)/bin/python
+PYTHON := python3
 READY := $(VENV)/.ready
 # of 12,500 files most are never imported: those that are, are compiled then
-PIP := $(PYTHON) -m pip install --quiet --disable-pip-version-check --no-compile
+PIP := $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --no-compile
 # a worker on each core and one more, as some tests wait; one that has nothing left takes half of
 # what another still has
 PARALLEL := $(VENV)/bin/pytest -n $(shell expr $$(nproc) + 1) --dist worksteal
@@ -22,7 +22,8 @@ OLDER := NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR" OPENBLAS
 .PHONY: help setup compiled bench test test-bus test-host test-older test-fast test-all mutants coverage evidence thesis search check format benchmark site sbom wheel docs lock clean
 
 help:
-	@echo "make setup      virtual environment with everything pinned in requirements.lock"
+	@echo "make setup      virtual environment with everything pinned in requirements.lock; of another"
+	@echo "                interpreter: make setup PYTHON=python3.13"
 	@echo "make bench      the main job: a controller quiets a rolling ship, table, picture, recording"
 	@echo "make test       lint, types and the tests, those on a real CAN bus included: eight to 13 minutes"
 	@echo "make test-fast  the quick tests, without CAN: three minutes"
@@ -33,7 +34,7 @@ help:
 	@echo "make compiled   simulations in 0.4 of the time, until the source changes; 'make bench' does it,"
 	@echo "                too: a minute of processor time, with gcc and python3-dev"
 	@echo "make evidence   for a release: the measurements in docs/evidence that it has not, a day;"
-	@echo "                $(PYTHON) -m tools.evidence --list shows them"
+	@echo "                $(VENV)/bin/python -m tools.evidence --list shows them"
 	@echo "make thesis     figures and printed numbers of the source thesis made anew, out/thesis: four minutes"
 	@echo "make search     the property tests with new random examples, until one fails or they end"
 	@echo "make check      lint, format, strict types, layers of the packages, generated documents"
@@ -48,10 +49,10 @@ help:
 setup: $(READY)
 
 $(READY): requirements.lock pyproject.toml
-	@command -v python3 >/dev/null || { echo "python3 is missing: apt-get install python3 python3-venv" >&2; exit 1; }
-	@python3 -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' \
-		|| { echo "python3 3.11 or newer with venv is needed: apt-get install python3 python3-venv" >&2; exit 1; }
-	python3 -m venv $(VENV)
+	@command -v $(PYTHON) >/dev/null || { echo "$(PYTHON) is missing: apt-get install python3 python3-venv" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' \
+		|| { echo "$(PYTHON): 3.11 or newer with venv is needed: apt-get install python3 python3-venv" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
 	$(PIP) --require-hashes -r requirements.lock
 	$(PIP) --no-deps --no-build-isolation -e .
 	@touch $@
@@ -61,14 +62,14 @@ bench: compiled
 
 # plain Python runs where this fails
 compiled: setup
-	-@$(PYTHON) -m tools.compiled
+	-@$(VENV)/bin/python -m tools.compiled
 
 check: setup
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
 	$(VENV)/bin/lint-imports --no-logo
-	$(PYTHON) -m tools.documents.write --check
+	$(VENV)/bin/python -m tools.documents.write --check
 
 # the bus needs a core of its own: what runs beside it gives way to its processes
 test: setup
@@ -95,10 +96,10 @@ test-all: test
 	tools/vcan --uml $(VENV)/bin/pytest -m evidence tests/socketcan/test_service.py
 
 evidence: setup
-	$(PYTHON) -m tools.evidence
+	$(VENV)/bin/python -m tools.evidence
 
 thesis: setup
-	$(PYTHON) -m tools.thesis
+	$(VENV)/bin/python -m tools.thesis
 
 # of which tests those are, [tool.mutmut] says; `mutmut show NAME` prints a mutant that lives
 mutants: setup
@@ -120,7 +121,7 @@ format: setup
 
 benchmark: setup
 	@for name in $(basename $(notdir $(wildcard tools/benchmarks/*.py))); do \
-		echo; echo "== $$name"; $(PYTHON) -m tools.benchmarks.$$name || exit 1; done
+		echo; echo "== $$name"; $(VENV)/bin/python -m tools.benchmarks.$$name || exit 1; done
 
 # the site of README, docs/ and docstrings; a link that leads nowhere is an error
 site: setup
@@ -130,18 +131,18 @@ site: setup
 # the parts of an installation without extras
 sbom: setup
 	@mkdir -p out
-	$(PYTHON) -m tools.sbom > out/sbom.json
+	$(VENV)/bin/python -m tools.sbom > out/sbom.json
 	@echo "out/sbom.json"
 
 # for a ship's PC, with the lock of what runs there
 wheel: setup
-	$(PYTHON) -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w dist .
-	$(PYTHON) -m tools.sbom --extra viewer --lock > dist/requirements.txt
-	$(PYTHON) -m tools.sbom --extra bench --lock > dist/requirements-bench.txt
+	$(VENV)/bin/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w dist .
+	$(VENV)/bin/python -m tools.sbom --extra viewer --lock > dist/requirements.txt
+	$(VENV)/bin/python -m tools.sbom --extra bench --lock > dist/requirements-bench.txt
 	@ls dist/*
 
 docs: setup
-	$(PYTHON) -m tools.documents.write
+	$(VENV)/bin/python -m tools.documents.write
 
 lock: setup
 	$(COMPILE) --extra dev pyproject.toml -o requirements.lock
