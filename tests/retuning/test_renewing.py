@@ -369,6 +369,20 @@ def test_a_law_that_only_rolls_the_ship_more_loses_its_pressure_and_gets_it_back
     assert rig.controller.effort.share == FIRST_EFFORT
 
 
+@pytest.mark.parametrize(("ship", "plans"), [(None, False), (NEARLY, True)])
+def test_a_law_that_plans_is_tried_with_all_of_the_pressure(
+    ship: ShipFigures | None, plans: bool
+) -> None:
+    rig = Rig(renewed())
+    rig.passive = lambda k: 0.2
+    rig.run(1000)
+    rig.controller.note(estimate(ship=ship))
+    rig.run_until(TRYING)
+    assert rig.controller.effort.share == pytest.approx(1.0 if plans else LEAST_EFFORT, abs=0.1)
+    rig.run(1, RetuningOrder(undo=True))
+    assert rig.controller.effort.share == pytest.approx(FIRST_EFFORT, rel=0.01)
+
+
 def test_no_command_exceeds_what_is_allowed() -> None:
     rig = Rig(None)
     rig.wave = lambda k: 5.0

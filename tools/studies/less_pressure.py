@@ -31,7 +31,7 @@ from utank_hil.control import DesignPlant
 from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
 from utank_hil.control.lqg import GentleController
 from utank_hil.retuning.estimate import ShipFigures
-from utank_hil.retuning.renewing import LIMITED_EFFORT, Effort
+from utank_hil.retuning.renewing import FIRST_EFFORT, LIMITED_EFFORT, Effort
 from utank_hil.sea import EffectiveSlope, Sea, ittc
 
 CONTROLLER: Final = Path("configs/controllers/self_tuning.yaml")
@@ -63,6 +63,8 @@ class Learning:
         self._use = controller.use if isinstance(controller, GentleController) else controller.allow
         self.sample_time_s = self._law.sample_time_s
         self.effort = Effort(ShipFigures.of(plant.ship).roll_period_s / self.sample_time_s)
+        self._first_share = FIRST_EFFORT if isinstance(controller, GentleController) else 1.0
+        self.effort.clear(self._first_share)
         self._twin = plant.sampled(("roll_rad",), self.sample_time_s)
         self._made = np.zeros(len(self._twin.A))
         self._asked_pa = self._applied_pa = 0.0
@@ -70,7 +72,7 @@ class Learning:
     def reset(self) -> None:
         """Forget everything."""
         self._law.reset()
-        self.effort.clear()
+        self.effort.clear(self._first_share)
         self._asked_pa = self._applied_pa = 0.0
         self._made[:] = 0.0
 

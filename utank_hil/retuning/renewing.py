@@ -82,9 +82,9 @@ class Effort:
         self._part = 1.0 / (MEMORY_PERIODS * samples)
         self.clear()
 
-    def clear(self) -> None:
-        """Forget everything."""
-        self.share = FIRST_EFFORT
+    def clear(self, share: float = FIRST_EFFORT) -> None:
+        """Forget everything, and begin with a share."""
+        self.share = share
         self._twin_rad = self._made_rad = self._together = self._made_square = self._limited = 0.0
 
     def update(self, roll_rad: float, passive_roll_rad: float, *, limited: bool) -> None:
@@ -238,6 +238,11 @@ class RenewingController(LawExchange):
         service = MonitoredLaw(controller, ChangeMonitor(ship), found, self._asked)
         return WarmUp(service, self._history)
 
+    def _put_on_trial(self, law: MonitoredLaw) -> None:
+        super()._put_on_trial(law)
+        if self._shared and isinstance(law.controller, ConstrainedController):
+            self.effort.clear(1.0)  # a plan for less pressure has another phase, and may be worse
+
     def _check_trial(self) -> None:
         before, now = self._baseline, self._trial_window.statistics
         passive_rad = max(before.passive_roll_rad, now.passive_roll_rad)
@@ -291,6 +296,8 @@ class RenewingController(LawExchange):
         self._finish(RetuningState.RETUNED, self._on_trial())
 
     def _finish(self, state: RetuningState, *reasons: str) -> None:
+        if self.laws.on_trial is not None or state is RetuningState.UNDONE:
+            self.effort.clear()
         if state in _AT_REST_AFTER:
             self._not_before_ns = self._now_ns + RETRY_NS
         super()._finish(state, *reasons)
