@@ -110,6 +110,9 @@ class CanopenPumpDrive(CanopenNode):
         connected = self.state is drive_plan.NetworkState.OPERATIONAL and not self.lost_controller
         if self._connected and not connected and self.enabled:
             self._abort_connection()
+        failed = self.entries[drive_plan.Place(0x1001)].value
+        if connected and failed and states.state is not DriveState.FAULT:
+            self.emergency(0)  # the controller is heard again
         self._connected = connected
         self._own_pa = pressure_pa = self._turn()
         broken = None if plant.power_cut else plant.broken_pump

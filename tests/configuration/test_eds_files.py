@@ -9,7 +9,8 @@ import pytest
 from others import others_file
 
 from tests.canbus.test_profiles import device
-from tests.nodes.canopen_peers import PROFILE, Wire
+from tests.canopen_nodes import Wire
+from tests.nodes.canopen_peers import PROFILE
 from utank_hil.base.parameters import ParameterError
 from utank_hil.canbus import Frame, Quality
 from utank_hil.canbus.frame import STANDARD

@@ -13,8 +13,9 @@ from firmware_sim.fault_injection.bench_parts import FaultyNode
 from firmware_sim.fault_injection.nodes import Pump
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
+from tests.canopen_nodes import dictionary
 from tests.firmware_sim.drive_bench import VESSEL, calm_plant
-from tests.nodes.canopen_peers import PROFILE, dictionary
+from tests.nodes.canopen_peers import PROFILE
 from utank_hil.assembly import build_controller_node
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import ControlWord, DriveState, Fault, Frame, Mode

@@ -14,7 +14,7 @@ from firmware_sim.bench import BenchOptions, run_bench
 from firmware_sim.figures import mark_of
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
-from tests.nodes.canopen_peers import Wire, valve_dictionary
+from tests.canopen_nodes import Wire, valve_dictionary
 from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.canbus import Fault, Frame, Mode, OperatorCommand, Rejection, load_catalogue
 from utank_hil.canbus.cmac import KeyFileError

@@ -427,7 +427,7 @@ def test_an_emergency_of_the_drive_is_in_its_words_until_it_is_over():
     assert "emergency" not in line.drive.words
     line.node.emcy.send(0x2310, 0x02)  # continuous over current, as canopen sends it
     line.run(2)
-    assert line.drive.words.endswith("emergency 2310h, register 0x02")
+    assert line.drive.words.endswith("emergency 2310h (current), register 0x02")
     line.node.emcy.reset()
     line.run(2)
     assert "emergency" not in line.drive.words
@@ -446,7 +446,7 @@ def test_its_words_are_its_status_and_a_mode_that_it_was_not_put_in():
 def test_an_emergency_while_it_is_configured_is_in_its_words_until_it_is_started():
     line = Line().run(2)
     line.node.emcy.send(0x2310, 0x02)
-    assert line.run(2).drive.words.endswith("emergency 2310h, register 0x02")
+    assert line.run(2).drive.words.endswith("emergency 2310h (current), register 0x02")
     assert not line.drive.setup.done
     assert "emergency" not in line.run(400).drive.words
 

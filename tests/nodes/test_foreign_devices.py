@@ -7,7 +7,7 @@ import canopen
 import pytest
 from others import others_file
 
-from tests.nodes.canopen_peers import Wire
+from tests.canopen_nodes import Wire
 from utank_hil.canbus import Address, Fault, Frame, Heartbeat, NodeState, load_catalogue
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.profiles.device import SILENT_NS
@@ -265,16 +265,27 @@ def test_another_device_at_the_node_is_found_after_it_was_swapped():
     assert "another serial number" in gauges.inbox.received(Fault.TANK_SILENT)
 
 
-def test_an_emergency_of_a_sensor_is_in_its_alarm_until_it_is_over():
-    gauges = Gauges()
+@pytest.mark.parametrize("told", [True, False])
+def test_an_emergency_of_a_sensor_is_an_alarm_until_it_is_over(told):
+    """As canopen sends it, CiA 301 7.2.7; also of a sensor that is told nothing."""
+    gauges = Gauges({} if told else AS_IT_IS)
     gauges.run(200)
-    gauges.node.emcy.send(0x5000, 0x81)  # device hardware, as canopen sends it
-    gauges.run(4)
-    said = gauges.inbox.received(Fault.TANK_SILENT)
-    assert said == "node 7: emergency 5000h, register 0x81; " + INPUTS
+    gauges.node.emcy.send(0x5000, 0x81)
+    assert gauges.run(4).device_error
+    said = "node 7: emergency 5000h (hardware), register 0x81"
+    assert gauges.inbox.received(Fault.DEVICE_ERROR) == f"levels: {said}"
+    if told:
+        assert gauges.inbox.received(Fault.TANK_SILENT) == f"{said}; {INPUTS}"
+    gauges.node.emcy.reset(0x80)  # one is over, and another left
+    assert gauges.run(4).device_error
     gauges.node.emcy.reset()
+    assert not gauges.run(4).device_error
+    assert gauges.inbox.received(Fault.DEVICE_ERROR) == ""
+    gauges.node.emcy.send(0x5000, 0x81)
     gauges.run(4)
-    assert gauges.inbox.received(Fault.TANK_SILENT) == INPUTS
+    gauges.wire.said.append((0x707, b"\0"))  # it starts anew, well
+    gauges.node.nmt.state = "PRE-OPERATIONAL"
+    assert gauges.run(200).device_error != told
 
 
 def test_a_name_is_asked_for_until_it_is_told():

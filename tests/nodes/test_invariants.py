@@ -283,6 +283,7 @@ BEGIN_AND_END: dict[str, tuple[Callable[[Table], None], Callable[[Table], None]]
     "valve elsewhere": judged("own", valve=ValveReport(off_ms=1e3)),
     "little stability": judged("own", gm_low=True),
     "forecast silent": judged("measured", forecast_age_ms=1e3),
+    "device reports an error": judged("measured", device_error=True),
     "forecast contradicted": judged("own", doubts_forecast=True),
     "law at its own limit": judged("own", law_passed_limit=True),
     "found, stops": found(Reaction.STOP),

@@ -24,7 +24,7 @@ MEASURED = Measurements(
     valve_echo_ns=0, valve_echo=None,
     valve_heard_ns=0, hardwired_stop=False, hardwired_age_ms=0.0, versions_match=True,
     protection_valid=True, address_conflict=False, claimed_twice=False, link_lost=False, frames=0,
-    foreign=0,
+    foreign=0, device_error=False,
 )  # fmt: skip
 """Everything heard just now, and all well."""
 OWN = OwnState(commissioned=True)

@@ -118,6 +118,7 @@ def test_late_ticks_and_a_roll_that_was_beyond_its_limit_hold_at_theirs():
         ("law_passed_limit", Fault.HEEL_LIMIT, Reaction.WARN),
         ("gm_low", Fault.STABILITY_LOW, Reaction.WARN),
         ("drive_warns", Fault.DRIVE_WARNING, Reaction.WARN),
+        ("device_error", Fault.DEVICE_ERROR, Reaction.WARN),
         ("doubts_forecast", Fault.FORECAST_IGNORED, Reaction.WARN),
         ("commissioned", Fault.NOT_COMMISSIONED, Reaction.REFUSE),
     ],

@@ -82,6 +82,7 @@ class Fault(IntEnum):
     DRIVE_WARNING = 40
     NODE_SILENT = 41
     FORECAST_IGNORED = 42
+    DEVICE_ERROR = 43
 
 
 class RetuningState(IntEnum):

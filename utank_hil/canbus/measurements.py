@@ -67,7 +67,8 @@ class Measurements:
         valve_echo: int | None, valve_heard_ns: int, hardwired_stop: bool,
         hardwired_age_ms: float, versions_match: bool, protection_valid: bool,
         address_conflict: bool, claimed_twice: bool, link_lost: bool,
-        frames: int, foreign: int, forecast: "tuple[tuple[int, ForecastPoints], ...]" = (),
+        frames: int, foreign: int, device_error: bool,
+        forecast: "tuple[tuple[int, ForecastPoints], ...]" = (),
         forecast_age_ms: float = 0.0,
     ) -> None:  # fmt: skip
         self.armed: Final = armed
@@ -127,6 +128,7 @@ class Measurements:
         self.link_lost: Final = link_lost
         self.frames: Final = frames  #: Frames so far, of any kind.
         self.foreign: Final = foreign  #: Those that are not in the catalogue.
+        self.device_error: Final = device_error  #: A CANopen device reports an emergency.
         #: Points of a forecast of the waves by their time of receipt, also those that are too old.
         self.forecast: Final = forecast
         self.forecast_age_ms: Final = forecast_age_ms

@@ -129,7 +129,8 @@ class CanopenDrive:
         said = f"node {self._plan.node}: status word {self._status:#06x}"
         if self._mode_shown != self._plan.mode.number:
             said += f", mode {self._mode_shown} and not {self._plan.mode.number}"
-        return f"{said}, {self.setup.emergency}" if self.setup.emergency else said
+        emergency = self.setup.emergency.words
+        return f"{said}, {emergency}" if emergency else said
 
     def frames(self, now_ns: int) -> list[Frame]:
         """What the drive's configuration needs in this tick, usually nothing."""
@@ -145,7 +146,7 @@ class CanopenDrive:
             return []
         frames = setup.frames(now_ns)
         if setup.done:
-            self._started_ns, setup.emergency = now_ns, ""
+            self._started_ns = now_ns
         if setup.problem != self._told:
             self._told = setup.problem
             self.deliver(None, now_ns)

@@ -23,20 +23,38 @@ class _Refused(Exception):
     pass
 
 
+class Emergency(Taker):
+    """The last emergency of a node, in words; empty if it is over."""
+
+    def __init__(self, bus: int, node: int) -> None:
+        self.can_id = bus << BUS_SHIFT | STANDARD | cia.EMERGENCY + node
+        self._node, self.words = node, ""
+
+    @property
+    def node_words(self) -> str:
+        """The words with the node's number."""
+        return self.words and f"node {self._node}: {self.words}"
+
+    def take(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
+        """Take an emergency message."""
+        said = cia.emergency_words(frame.data)
+        self.words = self.words if said is None else said
+
+
 class CanopenSetup:
     """The start of one node by its steps: `done`, or the `problem` that it was refused for.
 
-    `takers` has, by identifier, what takes its answers, and its emergencies, of which `emergency`
-    is the last.
+    `takers` has, by identifier, what takes its answers, and its emergencies.
     """
 
     def __init__(self, bus: int, node: int, steps: Iterable[cia.Step]) -> None:
         self._node, self._steps = node, tuple(steps)
         self._tag = bus << BUS_SHIFT | STANDARD
-        self.problem = self.emergency = ""
+        self.problem = ""
+        self.emergency = Emergency(bus, node)
         self.takers: dict[int, Taker] = {
             self._tag | cia.SDO_ANSWER + node: CalledTaker(self._take_answer),
-            self._tag | cia.EMERGENCY + node: CalledTaker(self._take_emergency),
+            self.emergency.can_id: self.emergency,
         }
         self.restart(0)
 
@@ -70,14 +88,10 @@ class CanopenSetup:
         if self._request is None:
             if self._talk is None:
                 return []
-            self.done, self.problem = True, ""
+            self.done, self.problem, self.emergency.words = True, "", ""
             return [self.order(cia.NodeCommand.START)]
         self._asked_ns = now_ns
         return [Frame(self._tag | cia.SDO_REQUEST + self._node, self._request[1])]
-
-    def _take_emergency(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
-        said = cia.emergency_words(frame.data)
-        self.emergency = self.emergency if said is None else said
 
     def _take_answer(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
         """Take what the node's server says; what was not asked for is nothing."""
@@ -148,7 +162,7 @@ class SensorSetup:
     def __init__(self, device: ProfiledDevice[Any]) -> None:
         plan = device.plan
         assert plan.node is not None
-        self.device, self._node = device, plan.node
+        self.device = device
         self.setup = CanopenSetup(plan.bus, plan.node, plan.steps)
         beat = plan.bus << BUS_SHIFT | STANDARD | cia.HEARTBEAT + plan.node
         hears_beat = beat, CalledTaker(self._take_heartbeat)
@@ -160,8 +174,7 @@ class SensorSetup:
     @property
     def words(self) -> str:
         """What is wrong with the sensor, by its own words; else empty."""
-        emergency = self.setup.emergency
-        return self.setup.problem or (emergency and f"node {self._node}: {emergency}")
+        return self.setup.problem or self.setup.emergency.node_words
 
     def frames(self, now_ns: int) -> list[Frame]:
         """What the configuration needs in this tick, usually nothing."""

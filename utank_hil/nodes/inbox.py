@@ -91,6 +91,8 @@ class Inbox:
             self._hear_pressure()
         if drive is None and foreign.pump is not None:
             drive = CanopenDrive(foreign.pump, hears_only=True)
+        if drive is not None:
+            routing.emergencies.append(("pump", drive.setup.emergency))
         self._drive = DriveHeard(routing, catalogue, pump=pump, canopen=drive)
         self._valve = ValveHeard()
         if valve:
@@ -242,6 +244,7 @@ class Inbox:
             now_ns <= self._link_lost_until_ns,
             self.frames,
             self.foreign,
+            self._routing.device_error,
             () if forecast is None else forecast.points,
             0.0 if forecast is None else (now_ns - forecast.heard_ns) / MILLISECOND_NS,
         )
@@ -273,6 +276,9 @@ class Inbox:
         """Node, message and value that a fault was last judged by, in words."""
         if code in _OF_DRIVE:
             return self._drive.words
+        if code is Fault.DEVICE_ERROR:
+            said = [(name, each) for name, each in self._routing.emergencies if each.words]
+            return "; ".join(f"{name}: {each.node_words}" for name, each in said)
         source, parts = self._sources.get(code), [self._received.get(code, "")]
         heard: Sequence[Heard] = ()
         if code is Fault.MOTION_SILENT:

@@ -5,7 +5,7 @@ from typing import Any, TypeVar
 
 from utank_hil.canbus import Frame, Receiver
 from utank_hil.canbus.profiles.device import ProfiledDevice, Taker, hear
-from utank_hil.nodes.canopen_setup import SensorSetup
+from utank_hil.nodes.canopen_setup import Emergency, SensorSetup
 from utank_hil.safety.monitors.senders import Heard
 
 _M = TypeVar("_M", bound=tuple[Any, ...])
@@ -30,6 +30,7 @@ class Routing:
         self.watched: list[Heard] = []  #: Counters of every message that is heard.
         self.setups: list[SensorSetup] = []  #: Sensors that are configured by SDO.
         self.takers: dict[int, Taker] = {}  #: What takes the frames of an identifier.
+        self.emergencies: list[tuple[str, Emergency]] = []  #: Of CANopen devices, by their names.
         self._sources: list[ProfiledDevice[Any]] = []
 
     def subscribe(self, receiver: Receiver[_M], handle: Callable[[_M, int], None]) -> Receiver[_M]:
@@ -51,11 +52,22 @@ class Routing:
             return
         source.deliver = handle
         self._sources.append(source)
-        if source.plan.steps:
+        plan = source.plan
+        if plan.steps:
             self.setups.append(SensorSetup(source))
+            self.emergencies.append((plan.name, self.setups[-1].setup.emergency))
+        elif plan.node is not None:  # it is heard, and told nothing
+            emergency = Emergency(plan.bus, plan.node)
+            hear(self.takers, emergency.can_id, emergency)
+            self.emergencies.append((plan.name, emergency))
         for can_id, taker in source.takers.items():
             hear(self.takers, can_id, taker)
         self.watched += source.watched
+
+    @property
+    def device_error(self) -> bool:
+        """Whether a CANopen device reports an error."""
+        return any(emergency.words for _, emergency in self.emergencies)
 
     def configures(self, now_ns: int) -> list[Frame]:
         """What CANopen sensors are configured with in this tick."""

@@ -316,6 +316,11 @@ FAULTS: Final = (
          "Command: bus, its cable and load. Sensor: the drive's pressure feedback.",
          Condition(_WARN, "a warning bit in the last DRIVE_STATUS_2",
              lambda seen, _: seen.measured.drive_warns)),
+    _row(Fault.DEVICE_ERROR, "A CANopen device reports an error of its own (EMCY).",
+         "Look the code up in the device's manual and remove the cause. It is over when the "
+         "device says so (code 0000h) or starts anew.",
+         Condition(_WARN, "an emergency message of a CANopen drive, sensor or valve, not over yet",
+             lambda seen, _: seen.measured.device_error)),
     _row(Fault.FORECAST_IGNORED, "The forecast of the waves is not used: it is late, missing, of "
          "other versions, or the ship moves otherwise. The law goes on without it.",
          "Check the preview station: supply, bus, the quality and heartbeat that it sends, and "

@@ -59,12 +59,25 @@ def abort_words(code: int) -> str:
     return f"abort code {code:#010x}" + (f", {known[code]}" if code in known else "")
 
 
+_EMERGENCIES: Final = {
+    1: "generic", 2: "current", 3: "voltage", 4: "temperature", 5: "hardware", 6: "software",
+    7: "additional modules", 8: "monitoring", 9: "external", 0xF: "of the device or its functions",
+}  # fmt: skip
+"""Kinds of errors by the first digit of their code."""
+
+
 def emergency_words(data: bytes) -> str | None:
-    """What an emergency message (CiA 301 7.2.7) says; empty: all is over; None: it is none."""
+    """What an emergency message (CiA 301 7.2.7) says; empty: all is over; None: it is none.
+
+    Code 0000h ends one error; others that are left stand in the error register.
+    """
     if len(data) != 8:
         return None
-    code = int.from_bytes(data[:2], "little")
-    return f"emergency {code:04X}h, register {data[2]:#04x}" if code else ""
+    code, register = int.from_bytes(data[:2], "little"), data[2]
+    if not code | register:
+        return ""
+    kind = _EMERGENCIES.get(code >> 12, "")
+    return f"emergency {code:04X}h{kind and f' ({kind})'}, register {register:#04x}"
 
 
 class Place(NamedTuple):
