@@ -86,6 +86,10 @@ class ForeignFrames:
             for each in plan.messages
             if not plan.steps or each.can_ids[0] != own | plan.bus << BUS_SHIFT
         ]
+        sent: dict[int, list[int]] = {}
+        for encoder in self._encoders:
+            if encoder.plan.counts_all:
+                encoder.sent = sent.setdefault(encoder.plan.can_ids[0], encoder.sent)
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take what is asked of a CANopen node, or a request of its address claim."""

@@ -78,19 +78,26 @@ class Acceptance:
 
     def _follows(self, counter: int) -> bool:
         """Whether a whole frame with this counter is accepted."""
-        counts = self._counts
+        steps = self._steps(counter)
+        if steps < 1:
+            return self._reject(Rejection.SEQUENCE if steps else Rejection.REPEATED)
+        self.lost += steps - 1
+        return self._drain()
+
+    def _steps(self, counter: int) -> int:
+        """Take a counter: by how many it is on; 0 if it is repeated, -1 out of sequence."""
+        counts, steps = self._counts, 1
         following = (counter + 1) % counts
         if self._expected != _NO_COUNTER:
             steps = (following - self._expected) % counts
-            if 0 < steps <= MAX_LOST + 1:
-                self.lost += steps - 1
-            else:
+            if not 0 < steps <= MAX_LOST + 1:
                 self._run = self._run + 1 if counter == self._candidate else 1
                 self._candidate = following
                 if self._run < RESYNC_FRAMES:
-                    return self._reject(Rejection.SEQUENCE if steps else Rejection.REPEATED)
-        self._expected = following
-        return self._drain()
+                    return -1 if steps else 0
+                steps = 1
+        self._expected, self._run = following, 0
+        return steps
 
     def _drain(self) -> bool:
         self._run = 0

@@ -430,6 +430,7 @@ class DeviceSection(CanopenSection):
             None if only is None else ConditionPlan(
                 fields[f"{name}.{only.from_}"], only.mask, frozenset(only.in_)
             ),
+            guards.counts == "identifier",
         )  # fmt: skip
 
     def can_ids(self) -> frozenset[int]:

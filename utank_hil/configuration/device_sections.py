@@ -197,6 +197,9 @@ class ProtectionSection(_Part):
     """What tells frames that are wrong, old or not the device's."""
 
     counters: tuple[str, ...] = ()  #: Signals that count the frames of their message.
+    counts: Literal["message", "identifier"] = "message"
+    """Of an identifier with several contents: whether a counter counts the frames of one of them,
+    or all of the identifier."""
     crcs: tuple[CrcSection, ...] = ()  #: Checksums.
     stamps: tuple[StampSection, ...] = ()  #: The device's own times.
     unchanged_ms: Cycle | None = None  #: Content that has been the same for longer is not used.

@@ -30,6 +30,14 @@ class HeardMessage(Acceptance):
             return False
         return self._crc is None or self._crc.of(data) == data[self._crc.byte]
 
+    def counts_on(self, data: bytes) -> None:
+        """Let the counter run on by a frame of another content, which it counts, too.
+
+        What is missing before that frame is missed by its own message.
+        """
+        if self._counter is not None and self.intact(data):
+            self._steps(self._counter.raw(data) % self._counts)
+
     def passes(self, data: bytes) -> bool:
         """Judge the next frame."""
         self.heard += 1
@@ -148,6 +156,7 @@ class MessageHeard(HeardMessage):
         self.signals: tuple[SignalPlan, ...] = plan.signals
         self.conditions: tuple[ConditionPlan, ...] = plan.conditions
         self.only: ConditionPlan | None = plan.only
+        self.counts_all: bool = plan.counts_all
         self.stamp = None if plan.stamp is None else Stamp(plan.stamp, plan.stamp_us, late_ms)
         self.needed: bool = bool(plan.signals) or plan.stamp is not None
         #: Whether it says of the device that it is well, or at least that it lives.
@@ -251,7 +260,11 @@ class ProfiledDevice(Generic[T]):
     def take(self, message: MessageHeard, frame: Frame, now_ns: int) -> None:
         """Take a frame of one of its messages."""
         data = frame[1]  # by its name it takes ten times as long
-        if (message.only is not None and message.is_another(data)) or not message.passes(data):
+        if message.only is not None and message.is_another(data):
+            if message.counts_all:
+                message.counts_on(data)
+            return
+        if not message.passes(data):
             return
         if message.status:
             message.good_ns, message.unwell = now_ns, ""

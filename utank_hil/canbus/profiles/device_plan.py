@@ -85,6 +85,7 @@ class MessagePlan:
     stamp: Field | None = None
     stamp_us: float = 1.0
     only: ConditionPlan | None = None  #: Other frames of the identifier are none of this message.
+    counts_all: bool = False  #: Whether the counter counts those, too.
 
 
 class MessageEncoder:
@@ -92,7 +93,7 @@ class MessageEncoder:
 
     def __init__(self, plan: MessagePlan) -> None:
         self.plan = plan
-        self._count = 0
+        self.sent = [0]  #: Frames so far; shared by contents that are counted together.
 
     def frame(self, values: Sequence[float], now_ns: int, *, missing: bool = False) -> Frame:
         """The next frame, of values by their places; the status says whether any is `missing`."""
@@ -112,8 +113,8 @@ class MessageEncoder:
             stamp = round(now_ns / (1e3 * plan.stamp_us))
             word = plan.stamp.put_counts(word, stamp, plan.length)
         if plan.counter is not None:
-            self._count += 1
-            word = plan.counter.put_counts(word, self._count, plan.length)
+            self.sent[0] += 1
+            word = plan.counter.put_counts(word, self.sent[0], plan.length)
         data = word.to_bytes(plan.length, "little")
         if plan.crc is not None:
             at = plan.crc.byte

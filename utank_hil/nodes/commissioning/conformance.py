@@ -148,7 +148,8 @@ class SensorTrial(Trial):
                   "Compare the profile's layout with the device's; look for a second sender."),
             Check("lost", "measurements lost by the counter",
                   (self._device.lost - lost) / max(len(self._heard), 1), 0.0, LOST_SHARE, "1",
-                  "Look at cables, termination and load: utank-hil bus."),
+                  "Look at cables, termination and load: utank-hil bus. A counter of all "
+                  "contents of an identifier has counts: identifier in protection."),
         ]  # fmt: skip
         remedy = "Compare n2k_name, or identity."
         self._flag("name", "the device is who it is to be", remedy, right=self._device.named)
