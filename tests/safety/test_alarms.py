@@ -353,6 +353,14 @@ def test_refused_arming_and_refused_reset_are_told_with_their_reasons():
         (Fault.DRIVE_FAULT, ACTIVE, Mode.FAULT),
         (Fault.DRIVE_FAULT, None, Mode.FAULT),
     ]
+    # and one that is not refused is no event
+    bench.drive_fault = DriveFault.NONE
+    bench.order_is(reset=False)
+    bench.run(100)
+    bench.order_is(reset=True)
+    bench.run(300)
+    assert bench.node.mode is Mode.STANDBY
+    assert len(told) == 2
 
 
 def test_accepting_counts_for_what_was_sent():

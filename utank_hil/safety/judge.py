@@ -201,9 +201,9 @@ class Safety:
             self._passing[supervisor.fault] = Gravity.ENDS
         self._mode_before = mode
         if mode is not _ACTIVE:
-            if standing & judging.STOPPING:
+            if standing & judging.STOPPING:  # pragma: no mutate: of none none are kept
                 self._passing |= dict.fromkeys(stopping_faults(mode, standing), Gravity.ENDS)
-        elif supervisor.degraded:  # what stops it is latched
+        elif standing & judging.HALVING:  # what stops it is latched  # pragma: no mutate: likewise
             halving = judging.faults(standing & judging.HALVING)
             self._passing |= dict.fromkeys(halving, Gravity.HALVES)
         if supervisor.raised is not _NO_FAULT:
