@@ -64,10 +64,8 @@ def firmware_sim(
     ship_side.load_compiled_code(loaded, seed)
     ship = ship_side.build_ship_side(loaded, seed, loaded.operator)
     log = MemoryLog(len(TRUTH), -(-round(length_s * SECOND_NS) // RECORD_NS))
-    try:
+    with common.failing(ValueError, at="--without"):
         nodes = ship.without([name.strip() for name in without.split(",") if name.strip()])
-    except ValueError as error:
-        fail(f"--without: {error}")
     statistics = runners.LoopStatistics()
     emulated = ", ".join(node.name for node in nodes if node.name in ship_side.NODE_NAMES)
     emulated = emulated or "no node, nothing is sent"

@@ -58,12 +58,10 @@ def campaign(
     folder = common.OUT / study.stem if out is None else out
     common.prepare_out(folder, FILES, keep=False)
     store = Store(folder)
-    try:
+    with common.failing(StoreError):
         store.begin(loaded, _about(loaded, folder, context.params), resume=resume)
         interrupted = _run(loaded, store, workers or len(os.sched_getaffinity(0)), scheduler)
         results = read_results(folder)
-    except StoreError as error:
-        common.fail(error)
     groups = summary(results)
     failed = failures(results)
     content = {**results.about, "interrupted": interrupted, "groups": groups, "failures": failed}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from rich.table import Table
 
-from utank_hil.console.common import Json, argument, fail, print_json
+from utank_hil.console.common import Json, argument, fail, failing, print_json
 from utank_hil.console.terminal import Terminal, new_table, shown
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def compare(
     campaigns in the same waves. What one study varies it compares itself (utank-hil campaign).
     """
     from firmware_sim.campaign.store import ABOUT
-    from firmware_sim.comparison import CompareError, compare_campaigns, compare_records
+    from firmware_sim.comparison import compare_campaigns, compare_records
     from firmware_sim.report_page import RECORDING
 
     places = [reference, *others]
@@ -47,13 +47,11 @@ def compare(
             wanted = f"{RECORDING} or {ABOUT}" if place.is_dir() else "such file"
             named = "name a folder of `bench` or `campaign`, or a file"
             fail(f"{place}: there is no {wanted}; {named}")
-    try:
+    with failing(ValueError):
         if all(campaigns):
             found = compare_campaigns(reference, others)
         else:
             found = compare_records(files[0], files[1:])
-    except (CompareError, ValueError) as error:
-        fail(error)
     if json_:
         print_json({"reference": str(reference), "comparisons": [asdict(each) for each in found]})
         return

@@ -1,6 +1,5 @@
 """``utank-hil design``: a tank beside the best passive one, and how far to fill it."""
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -11,7 +10,7 @@ import typer
 from rich.table import Table
 
 from firmware_sim.commands.design_controller import controller
-from firmware_sim.commands.sea_choice import SeaOption, sea_of, usual_scenario
+from firmware_sim.commands.sea_choice import SeaOption, keep, sea_of, usual_scenario
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis.tank_filling import fillings
 from utank_hil.analysis.tank_response import expected_sea, roll_curves
@@ -19,7 +18,6 @@ from utank_hil.analysis.tank_sizing import moving, tank_cost, with_duct_loss
 from utank_hil.analysis.tank_sweep import sweep_tank
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import describe
-from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.console import common
 from utank_hil.console.ship_report import order_words
@@ -66,19 +64,15 @@ def tank(
     from utank_hil.pictures.tank import draw_sweep, draw_tank
 
     loaded = common.load(vessel, Vessel)
-    try:
+    with common.failing(ValueError):
         best = best_passive_tank(loaded.ship, loaded.tank)
         if loaded.tank.quadratic_loss:
             best = with_duct_loss(loaded.ship, best)
-    except ValueError as error:
-        common.fail(error)
     tanks = {"present": loaded.tank, "best": best}
     path = scenario or usual_scenario(loaded, vessel)
     console = Terminal()
     figures: dict[str, Any] = {"vessel": loaded.name, "scenario": None}
-    if path is None:
-        if sweep:
-            common.fail(f"{vessel}: no shipped scenario has this ship: name a sea with --scenario")
+    if path is None and not sweep:
         figures |= {name: _figures(loaded, each, None) for name, each in tanks.items()}
         if json_:
             common.print_json(figures)
@@ -86,7 +80,7 @@ def tank(
         console.table(_table(loaded, tanks, {}))
         console.say("Name a sea with --scenario for the roll to be expected.")
         return
-    chosen, waves = sea_of(path, loaded)
+    chosen, waves = sea_of(path, loaded, vessel)
     name = chosen.name
     out = common.prepare_out(out, (PICTURE, FIGURES, SWEEP))
     with notes.busy(f"{loaded.name}: a law for each tank, and what a bench would give"):
@@ -109,7 +103,7 @@ def tank(
     others = sweep_tank(_plant(loaded), waves) if sweep else ()
     figures |= {"scenario": name, "sweep": [asdict(each) for each in others]}
     more = {"sweep": draw_sweep(others, out / SWEEP, title, about)} if sweep else {}
-    files = _keep(figures, out / PICTURE, out / FIGURES, json_=json_, **more)
+    files = keep(figures, out / PICTURE, out / FIGURES, json_=json_, **more)
     if json_:
         return
     console.table(_table(loaded, tanks, found, interval_words(found["present"][0], name)))
@@ -122,17 +116,6 @@ def tank(
     if sweep:
         console.table(sweep_table(others))
     console.files(files)
-
-
-def _keep(
-    figures: dict[str, Any], picture: Path, file: Path, *, json_: bool, **more: Path
-) -> dict[str, Path]:
-    files = {"picture": picture, "figures": file, **more}
-    figures["files"] = {key: str(path) for key, path in files.items()}
-    write_whole(file, json.dumps(figures, indent=2) + "\n")
-    if json_:
-        common.print_json(figures)
-    return files
 
 
 def filling(
@@ -162,9 +145,7 @@ def filling(
 
     loaded = common.load(vessel, Vessel)
     path = scenario or usual_scenario(loaded, vessel)
-    if path is None:
-        common.fail(f"{vessel}: no shipped scenario has this ship: name a sea with --scenario")
-    ship, (chosen, waves) = loaded.ship, sea_of(path, loaded)
+    ship, (chosen, waves) = loaded.ship, sea_of(path, loaded, vessel)
     if not ship.displacement_n > 0:
         common.fail(f"{vessel}: ship.displacement_t is needed to tell GM from stiffness: state it")
     own_t, own_m = ship.displacement_n / 9806.65, ship.stiffness_nm_rad / ship.displacement_n
@@ -181,18 +162,16 @@ def filling(
     loads_t = displacement or [share * own_t for share in DISPLACEMENTS]
     gms_m = gm or [share * own_m for share in GMS]
     loadings = [(load_t, gm_m) for load_t in sorted(loads_t) for gm_m in sorted(gms_m)]
-    try:
+    with common.failing(ValueError, at=vessel):
         pump_pa = 0.0 if loaded.pump is None else loaded.pump.max_pressure_pa
         found = fillings(_plant(loaded), waves, loadings, pump_pa)
-    except ValueError as error:
-        common.fail(f"{vessel}: {error}")
     out = common.prepare_out(out, ("filling.png", "filling.json"))
     about = describe("design filling", loaded, out, options=context.params, scenario=chosen)
     title = f"{loaded.name}: filling for {chosen.name}"
     draw_filling(found, out / "filling.png", title, about)
     figures = about | {"vessel": loaded.name, "scenario": chosen.name}
     figures["fillings"] = [asdict(each) for each in found]
-    files = _keep(figures, out / "filling.png", out / "filling.json", json_=json_)
+    files = keep(figures, out / "filling.png", out / "filling.json", json_=json_)
     if not json_:
         console = Terminal()
         console.table(filling_table(found, loaded.tank.height_m, chosen.name))
@@ -200,7 +179,6 @@ def filling(
 
 
 def _plant(vessel: Vessel) -> DesignPlant:
-
     limits, pump = PumpLimits(**vessel.default_limits), vessel.pump
     lag_s = 0.0 if pump is None else pump.lag_s
     return DesignPlant(vessel.ship, vessel.tank, lag_s=lag_s, limits=limits)

@@ -1,6 +1,5 @@
 """``utank-hil design controller``: a law's roll against its robustness and pressure."""
 
-import json
 import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final
@@ -9,9 +8,8 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from firmware_sim.commands.sea_choice import SeaOption, sea_of, usual_scenario
+from firmware_sim.commands.sea_choice import SeaOption, keep, sea_of, usual_scenario
 from utank_hil.base.provenance import describe
-from utank_hil.base.whole_file import write_whole
 from utank_hil.configuration import ControllerConfig
 from utank_hil.console import common
 from utank_hil.console.terminal import Terminal, new_table, progress_bar
@@ -51,32 +49,21 @@ def controller(
             "{kind: gpc, tuning: auto} in its place, in a copy of the file without sea_estimate"
         )
     vessel = loaded.vessel
-    path = scenario or usual_scenario(vessel, config)
-    if path is None:
-        common.fail(f"no shipped scenario is for {vessel.name}: name a sea with --scenario")
-    sea, waves = sea_of(path, vessel)
+    sea, waves = sea_of(scenario or usual_scenario(vessel, config), vessel, config)
     out = common.prepare_out(out, (PICTURE, FIGURES))
     with progress_bar() as bar:
         task = bar.add_task("designing", total=1.0)
         result = trade(
             law, loaded.plant, waves, progress=lambda done: bar.update(task, completed=done)
         )
-    files = {"picture": out / PICTURE, "figures": out / FIGURES}
     title = f"{loaded.name}: {vessel.name} in {sea.name}"
     limits = loaded.limits
     about = describe("design controller", loaded, out, options=context.params, scenario=sea)
-    draw_trade(result, files["picture"], title, limits.pressure_pa, limits.level_m, about)
-    figures = {
-        **about,
-        "name": loaded.name,
-        "vessel": vessel.name,
-        "scenario": sea.name,
-        **_as_json(result),
-        "files": {name: str(path) for name, path in files.items()},
-    }
-    write_whole(files["figures"], json.dumps(figures, indent=2) + "\n")
+    draw_trade(result, out / PICTURE, title, limits.pressure_pa, limits.level_m, about)
+    figures = about | {"name": loaded.name, "vessel": vessel.name, "scenario": sea.name}
+    figures |= _as_json(result)
+    files = keep(figures, out / PICTURE, out / FIGURES, json_=json_)
     if json_:
-        common.print_json(figures)
         return
     console = Terminal()
     console.table(_trade_table(result, title))

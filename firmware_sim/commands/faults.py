@@ -12,18 +12,8 @@ from rich.progress import MofNCompleteColumn
 
 from utank_hil.base.provenance import describe
 from utank_hil.base.shipped import CONFIGS
-from utank_hil.console.common import (
-    KILLED,
-    Json,
-    argument,
-    fail,
-    load,
-    option,
-    prepare_out,
-    print_json,
-    why,
-    why_not_writable,
-)
+from utank_hil.console import common
+from utank_hil.console.common import KILLED, argument, fail, load, option, why
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, progress_bar, shown
 
@@ -60,7 +50,7 @@ def faults(
         str | None, option("SocketCAN interface for the live rows, such as vcan0.")
     ] = None,
     junit: Annotated[Path | None, option("Write the result as JUnit XML, too.")] = None,
-    json_: Json = False,
+    json_: common.Json = False,
 ) -> None:
     """Inject each fault of the fault table and judge what becomes of it.
 
@@ -87,10 +77,10 @@ def faults(
     if bus is not None and live:
         _open_once(bus)  # before minutes of other rows
     window = Window() if full else Window(60.0, 20.0) if scenario is None else _window(loaded)
-    if junit is not None and (reason := why_not_writable(junit.parent, (junit.name,))):
-        fail(f"{reason}; choose another place with --junit")  # before minutes of rows
+    if junit is not None:
+        common.require_writable(junit, "--junit")  # before minutes of rows
     if out is not None:
-        out = prepare_out(out, [f"{row.id}.rrd" for row in chosen])
+        out = common.prepare_out(out, [f"{row.id}.rrd" for row in chosen])
     options = {"seeds": seeds, "full": full, "rows": names, "scenario": str(scenario or "")}
     about = describe("faults", loaded, out or Path(), options=options, seed=1)
     began, files = time.monotonic(), dict[str, Path]()
@@ -124,7 +114,7 @@ def faults(
         each["recording"] = None if file is None else shown(file)
     content = as_json([*results, *on_bus], not_run, about)
     if json_:
-        print_json(content)
+        common.print_json(content)
     else:
         _print(results, on_bus, seeds)
         count = len(content["rows"])
@@ -181,10 +171,8 @@ def _chosen(
 def _open_once(bus: str) -> None:
     from utank_hil.canbus.socketcan import SocketCanPort
 
-    try:
+    with common.failing(OSError, at=f"--bus {bus}", code=ExitCode.NO_BUS):
         SocketCanPort(bus).close()
-    except OSError as error:
-        fail(f"--bus {bus}: {why(error)}", ExitCode.NO_BUS)
 
 
 def _run_live(names: Sequence[str], bus: str) -> "tuple[list[Verdict], End | None]":

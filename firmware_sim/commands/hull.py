@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from utank_hil.console.common import Json, argument, fail, option, print_json, why_not_writable
+from utank_hil.console import common
+from utank_hil.console.common import argument, fail, option
 from utank_hil.console.terminal import Terminal, notes, rows_table, say_note, shown
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def hull(
         float | None, option("In t, to check that of the mesh.", **_POSITIVE)
     ] = None,
     density: Annotated[float, option("Of the water, kg/m3.", min=900, max=1100)] = 1025.0,
-    json_: Json = False,
+    json_: common.Json = False,
 ) -> None:
     """Compute what waves do to a hull, for `ship: {hull: FILE}`.
 
@@ -66,15 +67,12 @@ def hull(
             fail(f"{names} is needed, and not both")
     if out.suffix.lower() != ".nc":
         fail(f"--out {out}: its suffix must be .nc")
-    if reason := why_not_writable(out.parent, (out.name,)):
-        fail(f"{reason}; choose another place with --out")
+    common.require_writable(out, "--out")
     loading = Loading(gm, gravity, roll_period, gyration, displacement, density)
-    try:
+    with common.failing(ValueError, at=mesh):
         side, said = read_mesh(mesh, draught, trim, scale)
         with notes.busy(f"{shown(mesh)}: {2 * side.nb_faces} panels, computing"):
             data, found, wrong = compute_hull(side, loading, str(out))
-    except ValueError as error:
-        fail(f"{mesh}: {error}")
     for text in (*said, *wrong):
         say_note(f"{mesh}: {text}")
     write_hull(out, data)
@@ -82,7 +80,7 @@ def hull(
     sizes = {"length_m": length_m, "beam_m": 2 * half_m, "draught_m": draught_m}  # below water
     figures = sizes | hull_figures(found)
     if json_:
-        print_json({"file": str(out), "panels": 2 * side.nb_faces, **figures})
+        common.print_json({"file": str(out), "panels": 2 * side.nb_faces, **figures})
         return
     rows = (
         (words.replace("_", " "), f"{value:.4g} {unit.replace('ratio', '')}")

@@ -19,15 +19,8 @@ from utank_hil.analysis.loop.self_tuning import NoLawError
 from utank_hil.analysis.tank_sizing import TankImpossibleError, TankRoom, tank_cost
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.whole_file import write_whole
-from utank_hil.console.common import (
-    Json,
-    argument,
-    fail,
-    load,
-    option,
-    print_json,
-    why_not_writable,
-)
+from utank_hil.console import common
+from utank_hil.console.common import argument, fail, option
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.ship_report import order_words
 from utank_hil.console.terminal import Terminal, notes, rows_table, shown
@@ -98,7 +91,7 @@ def init(
             "--hull",
         ),
     ] = False,
-    json_: Json = False,
+    json_: common.Json = False,
 ) -> None:
     """Write a starter project for your ship: tank, pump, law, sea.
 
@@ -134,7 +127,7 @@ def init(
             project = make_starter(ship, room, gm_loss, hs, tp, slope)
     except (TankImpossibleError, NoLawError) as error:
         if json_:
-            print_json({"possible": False, "reason": str(error)})
+            common.print_json({"possible": False, "reason": str(error)})
         notes.say(str(error), red="no tank:")
         raise typer.Exit(ExitCode.REFUSED) from None
     except CalmSeaError as error:
@@ -162,7 +155,7 @@ def _room(length: float, beam: float, given: dict[str, float | None]) -> TankRoo
 
 def _tell(ship: StarterShip, project: StarterProject, files: dict[str, Path], json_: bool) -> None:
     """Predict what a bench of the project would give, and print all that is known of it."""
-    scenario = load(files[SCENARIO], Scenario)
+    scenario = common.load(files[SCENARIO], Scenario)
     (config,) = scenario.controllers.values()
     with notes.busy(f"{project.vessel.name}: what a bench of its scenario would give"):
         expected = predict(scenario, config.plant, *laws_of(scenario, config))
@@ -171,7 +164,7 @@ def _tell(ship: StarterShip, project: StarterProject, files: dict[str, Path], js
         figures = {"possible": True, "little_help": little, **_as_json(project)}
         figures["expected"] = as_json(expected)
         figures["files"] = {Path(file).stem: str(path) for file, path in files.items()}
-        print_json(figures)
+        common.print_json(figures)
     else:
         _print(ship, project, expected, little, files)
 
@@ -193,7 +186,7 @@ def _with_usual_hull(ship: StarterShip) -> tuple[StarterShip, Any, float | None]
 
 
 def _written(project: StarterProject, data: Any | None, folder: Path) -> dict[str, Path]:
-    if reason := why_not_writable(folder):  # written last: a refusal leaves no files behind
+    if reason := common.why_not_writable(folder):  # written last: a refusal leaves no files behind
         fail(f"{reason}; name another folder")
     files = {file: folder / file for file in (*FILES, *(() if data is None else (HULL,)))}
     _refuse_former(files.values())  # of another that began since

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from utank_hil.console.common import Json, argument, fail, option, print_json
+from utank_hil.console.common import Json, argument, fail, failing, option, print_json
 from utank_hil.console.terminal import notes, say_note, shown
 from utank_hil.telemetry.frame_log import SUFFIX
 
@@ -37,11 +37,9 @@ def report(
     if out is None and len(runs) > 1:  # the page of the first run alone stays
         first = runs[0].resolve()
         page = first.with_name(f"{first.stem}-and-{len(runs) - 1}-more.html")
-    try:
+    with failing(OSError, ValueError):
         page.parent.mkdir(parents=True, exist_ok=True)
         written = write_report_page(page, *joined([_report(run) for run in runs]))
-    except (OSError, ValueError) as error:
-        fail(error)
     if json_:
         print_json({"page": str(written), "bytes": written.stat().st_size})
     else:

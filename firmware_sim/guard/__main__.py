@@ -7,7 +7,7 @@ import typer
 
 from firmware_sim.guard.parameters import guard_parameters
 from utank_hil.configuration import ControllerConfig
-from utank_hil.console.common import fail, failures_named, load
+from utank_hil.console.common import failing, failures_named, load
 
 
 def main(config: Annotated[Path, typer.Argument(help="Controller.")]) -> None:
@@ -15,10 +15,8 @@ def main(config: Annotated[Path, typer.Argument(help="Controller.")]) -> None:
 
     Example: python -m firmware_sim.guard configs/controllers/gpc.yaml > guard_parameters.h
     """
-    try:
+    with failing(ValueError, at=config):
         print(guard_parameters(load(config, ControllerConfig, allow_code=True)).header, end="")
-    except ValueError as error:
-        fail(f"{config}: {error}")
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from utank_hil.canbus.line_names import DEFAULT_BIT_RATE, LINES, SLCAN
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.configuration.files import ConfigError, kind_of
 from utank_hil.configuration.vessel import Vessel
-from utank_hil.console.common import Json, argument, fail, load, option, print_json
+from utank_hil.console.common import Json, argument, failing, load, option, print_json
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.telemetry.bus_census import BusCensus
@@ -48,13 +48,10 @@ def bus(
         Path(place).exists() or bool(Path(place).suffix)
     )
     census = BusCensus(rate, vessel, interface if log else place)
-    try:
+    code = ExitCode.USAGE if log else ExitCode.NO_BUS
+    with failing(BusLogError, TextFileError), failing(OSError, code=code):
         for message in BusLog(Path(place), channel).frames() if log else _heard(place, seconds):
             census.take(message)
-    except (BusLogError, TextFileError) as error:
-        fail(error)
-    except OSError as error:
-        fail(error, ExitCode.USAGE if log else ExitCode.NO_BUS)
     problems = census.problems()
     if json_:
         print_json(_as_json(census, problems))
@@ -67,10 +64,8 @@ def bus(
 def _ship(path: Path | None) -> tuple[Vessel | None, int | None]:
     if path is None:
         return None, None
-    try:
+    with failing(ConfigError):
         kind = kind_of(path, {"controller": ControllerConfig, "ship": Vessel})
-    except ConfigError as error:
-        fail(error)
     if kind == "ship":
         return load(path, Vessel), None
     config = load(path, ControllerConfig)

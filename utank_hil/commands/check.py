@@ -17,9 +17,9 @@ from utank_hil.base.finite import finite
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.configuration.files import ConfigError, files_named, kind_of, load_config
 from utank_hil.configuration.vessel import Vessel
-from utank_hil.console import ship_report
+from utank_hil.console import common, ship_report
 from utank_hil.console.admission import judge_law
-from utank_hil.console.common import AllowCode, Json, argument, fail, load, print_json, warnings_of
+from utank_hil.console.common import argument, failing, load
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Command, Terminal, new_table, run_command
 from utank_hil.control import BuiltLaw
@@ -269,8 +269,8 @@ GROUP = "utank_hil.collections"
 
 def check(
     config: Annotated[Path, argument("Controller, scenario or ship.")],
-    json_: Json = False,
-    allow_code: AllowCode = False,
+    json_: common.Json = False,
+    allow_code: common.AllowCode = False,
 ) -> None:
     """Validate a controller, scenario or ship file; design the laws and print their margins.
 
@@ -283,10 +283,8 @@ def check(
     loaded: BaseModel
     pumped: dict[str, Vessel | ControllerConfig]
     collections = {point.name: point.load() for point in entry_points(group=GROUP)}
-    try:
+    with failing(ConfigError):
         kind = kind_of(config, {"controller": ControllerConfig, "ship": Vessel, **collections})
-    except ConfigError as error:
-        fail(error)
     if kind == "ship":
         loaded = ship = load(config, Vessel)
         content, pumped = ship_report.ship_json(ship), {"": ship}
@@ -315,8 +313,8 @@ def check(
     ]
     content["accepted"] = content.get("accepted", True) and not held
     if json_:
-        unusual = [str(warning) for warning in warnings_of(loaded, config)]
-        print_json({"kind": kind, **content, "warnings": unusual})
+        unusual = [str(warning) for warning in common.warnings_of(loaded, config)]
+        common.print_json({"kind": kind, **content, "warnings": unusual})
     else:
         for reason in held:
             Terminal().say(reason, red="refused:")

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Annotated, Any, Final, NoReturn
 
 import typer
-from rich.table import Table
 from rich.text import Text
 
 from utank_hil.assembly import build_commissioning_node
@@ -20,7 +19,7 @@ from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.console import common
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.loops import opened, scheduled
-from utank_hil.console.terminal import Terminal, notes, shown
+from utank_hil.console.terminal import Terminal, new_table, notes, shown
 from utank_hil.nodes.commissioning.node import CommissioningNode, Stage
 from utank_hil.runners import LoopStatistics, RealTimeLoop
 from utank_hil.safety.faults import fault_text
@@ -55,11 +54,9 @@ def commission(
     if other := why_other_bit_rate(channel, loaded.bit_rate):
         common.fail(f"{config}: bit_rate: {other}")
     path = record or commissioning_record.record_path(config)
-    reason = commissioning_record.why_not_replaceable(path) or common.why_not_writable(
-        path.parent, (path.name,)
-    )
-    if reason:
+    if reason := commissioning_record.why_not_replaceable(path):
         common.fail(f"{reason}; choose another place with --record")
+    common.require_writable(path, "--record")
     statistics = LoopStatistics()
     with ExitStack() as stack:
         bus = opened(lambda: open_port(channel, loaded.vessel.foreign))
@@ -74,10 +71,8 @@ def commission(
             elif event.state is AlarmState.ACTIVE_UNACKNOWLEDGED:  # it says nothing of here and now
                 lines.say("  not armed: wait until this asks for it")
 
-        try:
+        with common.failing(ValueError, at=f"{config}: vessel"):
             node = build_commissioning_node(loaded, statistics=statistics, event_sink=tell)
-        except ValueError as error:
-            common.fail(f"{config}: vessel: {error}")
         guide = Guide(node, lines)
         notes.say(
             f"{loaded.name} on {channel}: about {node.duration_s:.0f} s; Ctrl-C ends it, and then "
@@ -171,9 +166,8 @@ def _rounded(value: float, places: int) -> str:
 
 def print_checks(console: Terminal, title: str, checks: list[dict[str, Any]]) -> None:
     """Print the checks of a record as a table, and the remedies of those that failed."""
-    table = Table(title=title)
-    for heading in ("check", "measured", "expected", "verdict"):
-        table.add_column(heading, justify="right" if "ed" in heading else "left", no_wrap=True)
+    table = new_table(title, "measured", "expected", names=("check",))
+    table.add_column("verdict", no_wrap=True)
     for check in checks:
         unit = "" if check["unit"] == "1" else f" {check['unit']}"
         found, off = check["measured"], check["tolerance"]

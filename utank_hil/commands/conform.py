@@ -50,8 +50,7 @@ def conform(
 
     vessel = common.load(ship, Vessel)
     path = record or Path(f"{device}.conformance.json")
-    if reason := common.why_not_writable(path.parent, (path.name,)):
-        common.fail(f"{reason}; choose another place with --record")
+    common.require_writable(path, "--record")
     nobody: list[bool] = []
     trial, silent = trial_of(vessel, device, ship, asks(hand_s, nobody), seconds)
     with opened(lambda: SocketCanPort(channel, standard=True, receive_only=silent)) as (port, stop):

@@ -69,7 +69,7 @@ def export(
         )
     part_s = common.chosen_part(from_s, until_s, "--until")
     said: list[str] = []
-    try:
+    with common.failing(OSError, ValueError):
         if kind in BUS_SUFFIXES:
             frames = _frames(recording, channel, part_s, said)
             if part_s != ALWAYS:
@@ -88,8 +88,6 @@ def export(
             if part_s != ALWAYS:
                 parts = _some(to, (part for part in parts if len(part["time_s"])))
             count, unit = signal_files.export_parts(to, parts), "rows"
-    except (OSError, ValueError) as error:
-        common.fail(error)
     for text in said:
         say_note(text)
     if json_:

@@ -232,11 +232,13 @@ def identify_log(
 
     part_s = common.chosen_part(from_s, to_s)
     loaded = common.load(config, ControllerConfig, allow_code=True)  # Code is refused, not run.
-    try:
+    with common.failing(TextFileError):
         refuse_device(log)  # before seconds of a design
-    except TextFileError as error:
-        common.fail(error)
-    task = _task(loaded, config, order)
+    settings = loaded.retuning
+    order = order or (120 if settings is None else settings.order)
+    period_range_s = ANY_PERIOD_S if settings is None else settings.roll_period_range_s
+    with common.failing(ValueError, at=config):
+        task = retuning_task(loaded, order, period_range_s)
     content = read_controller(config)
     out = common.prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
     measured, sample_time_s = task.design.predictor.measured, task.design.predictor.sample_time_s
@@ -248,12 +250,10 @@ def identify_log(
         channel=channel,
         run=run,
     )
-    try:
+    with common.failing(OSError, ValueError):
         if is_table(log):
             signals, part_s = even_rows(log, signals, sample_time_s, part_s), ALWAYS
         record = logged_samples(signals, measured, sample_time_s, part_s)
-    except (OSError, ValueError) as error:
-        common.fail(error)
     try:
         found = identify(record, task)
     except IdentificationError as error:
@@ -272,18 +272,6 @@ def identify_log(
         print_report(Terminal(), found, task, answer, files)
     if not isinstance(answer, Candidate):
         raise typer.Exit(ExitCode.REFUSED)
-
-
-def _task(loaded: ControllerConfig, config: Path, order: int | None) -> RetuningTask:
-    """What is identified and designed, as the configuration's retuning does it if it has one."""
-    settings = loaded.retuning
-    if order is None:
-        order = 120 if settings is None else settings.order
-    period_range_s = ANY_PERIOD_S if settings is None else settings.roll_period_range_s
-    try:
-        return retuning_task(loaded, order, period_range_s)
-    except ValueError as error:
-        common.fail(f"{config}: {error}")
 
 
 class _LogUnlessNamed(TyperGroup):

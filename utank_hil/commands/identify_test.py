@@ -131,13 +131,11 @@ def read_run(
     """Name and columns of a run, by default the last; it ends the command without the `needed`."""
     from utank_hil.telemetry.signal_files import read_signals, require
 
-    try:
+    with common.failing(OSError, ValueError):
         names = (*needed, *also)
         runs = read_signals(path, say_note, channel=channel, names=names, between_s=between_s)
         name = common.chosen_run(path, runs, run)
         require(path, runs[name], *needed)
-    except (OSError, ValueError) as error:
-        common.fail(error)
     return name, runs[name]
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from utank_hil.canbus.events import AlarmEvent
-from utank_hil.console.common import fail
+from utank_hil.console.common import failing
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.telemetry.events import event_text
 
@@ -57,10 +57,8 @@ class Lines:
 @contextlib.contextmanager
 def printed_lines() -> Iterator[Lines]:
     """Yield lines while a loop runs; the command fails if no process can be started."""
-    try:
+    with failing(OSError, at="no process to print on the terminal", code=ExitCode.SYSTEM):
         lines = Lines()
-    except OSError as error:
-        fail(f"no process to print on the terminal: {error}", ExitCode.SYSTEM)
     try:
         yield lines
     finally:

@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Final
 
-from utank_hil.console.common import Json, argument, fail, print_json
+from utank_hil.console.common import Json, argument, fail, failing, print_json
 from utank_hil.console.terminal import notes, say_note
 from utank_hil.telemetry.frame_log import SUFFIX
 
@@ -52,7 +52,7 @@ def monitor(
     if source is not None and source.startswith(LIVE):
         watch(source, json_=json_)
         return
-    try:
+    with failing(OSError, ValueError):
         if source is None or source.isdecimal():
             os.nice(_NICENESS)  # A loop may run on this machine.
             with LiveStream(
@@ -72,8 +72,6 @@ def monitor(
             runs, events = {"run": log.rows}, {"run": log.events}
             write_recording(shown, log.columns, runs, events, log.about)
             watch(shown, highlight_s([log.signals]), json_=json_)
-    except (OSError, ValueError) as error:
-        fail(error)
 
 
 def watch(

@@ -289,6 +289,5 @@ def _server(listen: str) -> ServerProcess:
     try:
         return ServerProcess(address, int(port))
     except OSError as error:
-        common.fail(
-            f"--listen {listen}: {common.why(error)}; port 0 takes a free one", ExitCode.SYSTEM
-        )
+        why = common.why(error)
+        common.fail(f"--listen {listen}: {why}; port 0 takes a free one", ExitCode.SYSTEM)

@@ -97,10 +97,8 @@ def run(
     **Example:** utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
     """
     loaded = common.load(config, ControllerConfig, allow_code=allow_code)
-    try:
+    with common.failing(ValueError, at="--outward"):
         outlets = [read_outlet(each) for each in outward or ()]
-    except ValueError as error:
-        common.fail(f"--outward: {error}")
     law = admit(loaded, config)
     if other := why_other_bit_rate(bus, loaded.bit_rate):
         common.fail(f"{config}: bit_rate: {other}")
@@ -108,7 +106,9 @@ def run(
     _warn(loaded, refused)
     statistics = LoopStatistics()
     with _refusals_named(), ExitStack() as stack:
-        manager = _service_manager(stack)
+        unreached = "NOTIFY_SOCKET: the service manager can't be reached"
+        with common.failing(OSError, at=unreached, code=ExitCode.SYSTEM):
+            manager = stack.enter_context(ServiceManager())
         port, stop = stack.enter_context(opened(lambda: open_port(bus, loaded.vessel.foreign)))
         _refuse_beside_another(port, bus)
         announcer, recording = _outputs(
@@ -165,14 +165,6 @@ def _warn(loaded: ControllerConfig, refused: str) -> None:
         notes.say(refused, yellow="arming will be refused:")
 
 
-def _service_manager(stack: ExitStack) -> ServiceManager:
-    try:
-        return stack.enter_context(ServiceManager())
-    except OSError as error:
-        what = "the service manager can't be reached"
-        common.fail(f"NOTIFY_SOCKET: {what}: {error}", ExitCode.SYSTEM)
-
-
 def _desks(stack: ExitStack, loaded: ControllerConfig) -> tuple[Desk | None, Desk | None]:
     desks = stack.enter_context(retuner_process(loaded))
     if any(desk is not None and not desk.alive for desk in desks):
@@ -225,10 +217,9 @@ def _refuse_beside_another(port: canbus.Port, bus: str) -> None:
 @contextmanager
 def _in_real_time(name: str, manager: ServiceManager) -> Iterator[None]:
     with scheduled(f"{name}; Ctrl-C ends it."):
-        try:
+        silent = "NOTIFY_SOCKET: the manager does not answer"
+        with common.failing(OSError, at=silent, code=ExitCode.SYSTEM):
             manager.ready(name)
-        except OSError as error:
-            common.fail(f"NOTIFY_SOCKET: the manager does not answer: {error}", ExitCode.SYSTEM)
         try:
             yield
         finally:

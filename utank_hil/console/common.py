@@ -124,6 +124,23 @@ def fail(message: object, code: ExitCode = ExitCode.USAGE) -> NoReturn:
     raise typer.Exit(code)
 
 
+@contextmanager
+def failing(
+    *kinds: type[Exception], at: object = "", code: ExitCode = ExitCode.USAGE
+) -> Iterator[None]:
+    """End the command at an error of these kinds; `at` is the place that it does not name."""
+    try:
+        yield
+    except kinds as error:
+        fail(f"{at}: {why(error)}" if at else error, code)
+
+
+def require_writable(file: Path, option: str) -> None:
+    """Make the folder of a file, or end before anything is computed in vain."""
+    if reason := why_not_writable(file.parent, (file.name,)):
+        fail(f"{reason}; choose another place with {option}")
+
+
 def chosen_part(from_s: float | None, to_s: float | None, to: str = "--to") -> Between:
     """The part that `--from` and `to` name; end where it is empty or a time is no number."""
     for name, value in (("--from", from_s), (to, to_s)):

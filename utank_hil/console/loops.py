@@ -5,7 +5,7 @@ from contextlib import closing, contextmanager
 from typing import TypeVar
 
 from utank_hil.canbus import Port
-from utank_hil.console.common import fail
+from utank_hil.console.common import failing
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import notes
 from utank_hil.runners import real_time_scheduling, stop_on_signals
@@ -16,10 +16,8 @@ PortT = TypeVar("PortT", bound=Port)
 @contextmanager
 def opened(opens: Callable[[], PortT]) -> Iterator[tuple[PortT, Callable[[], bool]]]:
     """Yield a port, and what says whether to stop; the command ends if the bus can't be had."""
-    try:
+    with failing(OSError, code=ExitCode.NO_BUS):
         port = opens()
-    except OSError as error:
-        fail(error, ExitCode.NO_BUS)
     with closing(port), stop_on_signals() as stop:
         yield port, stop
 
