@@ -22,6 +22,9 @@
 #define FAULT 0x08U
 #define ENABLE 0x0FU /* control word by which it may press */
 
+#define ACTIVE 3U   /* request of the mode in which the law presses */
+#define ASKS 0x08U  /* beside arm, stop and reset: whether it is asked for */
+
 static int32_t word(const uint8_t *data, uint32_t place)
 {
     return (int32_t)data[place] + (int32_t)data[place + 1U] * 256;
@@ -95,17 +98,18 @@ static void take_order(struct guard *guard, uint8_t bits, uint32_t station, bool
 {
     const uint8_t arm = (uint8_t)(bits & 1U);
     const bool stop = (bits & 2U) != 0U;
+    const bool asks = (bits & ASKS) != 0U;
     const uint8_t reset = (uint8_t)((bits >> 2) & 1U);
     if (stop) {
         guard->stop_heard = true;
     }
-    if (stop || ((arm == 0U) && (guard->arm_bit[station] == 1U))) {
+    if (stop || (((arm == 0U) || (!asks)) && (guard->arm_bit[station] == 1U))) {
         guard->armed = false;
     }
     if (counts) {
         const bool may = (station == 0U) || guard->parameters->second_station;
         if (may) {
-            if ((arm == 1U) && (guard->arm_bit[station] == 0U) && (!stop)) {
+            if ((arm == 1U) && (guard->arm_bit[station] == 0U) && asks && (!stop)) {
                 guard->armed = true;
             }
             if ((reset == 1U) && (guard->reset_bit[station] == 0U)) {
@@ -201,7 +205,7 @@ static void take_device(struct guard *guard, uint32_t stream)
     const bool whole = guard_device_whole(guard, stream);
     const int32_t *values = guard->values[stream];
     const uint32_t word_402 = (uint32_t)values[0];
-    uint32_t bits = 0U;
+    uint32_t bits = ASKS; /* its arm is that of ACTIVE */
     uint32_t place;
     switch (stream) {
     case GUARD_COMMAND:
@@ -237,7 +241,9 @@ void guard_receive(struct guard *guard, uint32_t can_id, const uint8_t *data, ui
         if (guard_intact(data, guard->parameters->messages[stream].data_ids[counter])) {
             const uint8_t cycles = guard_accepted(&guard->streams[stream], counter);
             if ((stream == GUARD_ORDER) || (stream == GUARD_ORDER_2)) {
-                take_order(guard, data[2], stream - GUARD_ORDER, cycles != 0U);
+                const uint8_t asks = ((data[1] >> 4) == ACTIVE) ? ASKS : 0U;
+                take_order(guard, (uint8_t)((data[2] & 7U) | asks), stream - GUARD_ORDER,
+                           cycles != 0U);
             } else if (stream == GUARD_HARDWIRED) {
                 take_hardwired(guard, data, cycles);
             } else if (cycles != 0U) {

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from firmware_sim.guard.devices_heard import OLDEST, DevicesHeard
 from firmware_sim.guard.parameters import GuardParameters
 from utank_hil.base.tick import TICK_NS
-from utank_hil.canbus import Frame
+from utank_hil.canbus import Frame, Mode
 from utank_hil.canbus.e2e import profile2_crc
 from utank_hil.canbus.profiles.guarded import Stream
 
@@ -53,6 +53,7 @@ HEEL_TICKS: Final = 6000
 HEEL_SCALE: Final = 4096
 NO_TORQUE: Final = (0x00, 0x40, 0x21, 0x23, 0x08)  #: CiA 402 states.
 ENABLE: Final = 0x0F
+ASKS: Final = 0x08  #: Beside arm, stop and reset: whether ACTIVE is asked for.
 
 
 class Reason(IntFlag):
@@ -106,7 +107,8 @@ class Guard:
         cycles = self._accepted(stream, data[1] & 15)
         w1, w2 = int.from_bytes(data[2:4], "little"), int.from_bytes(data[4:6], "little")
         if stream in (Stream.ORDER, Stream.ORDER_2):
-            self._order(stream, data[2], counts=cycles > 0)
+            asks = ASKS if data[1] >> 4 == Mode.ACTIVE else 0
+            self._order(stream, data[2] & 7 | asks, counts=cycles > 0)
         elif stream == Stream.HARDWIRED:
             is_open = data[2] & 3 != 0
             self._loop_open |= is_open
@@ -187,22 +189,22 @@ class Guard:
             self._age[stream] = 0
         elif stream == Stream.ORDER:
             bits = sum(1 << place for place, value in enumerate(values[:3]) if value)
-            self._order(stream, bits, counts=whole)
+            self._order(stream, bits | ASKS, counts=whole)
         else:
             self._take_values(stream, values, whole=whole)
 
     def _order(self, stream: int, byte: int, *, counts: bool) -> None:
         """Obey a stop and a disarm of any whole frame, arm and reset of one that counts."""
         station = stream - Stream.ORDER
-        arm, stop, reset = byte & 1, byte >> 1 & 1, byte >> 2 & 1
+        arm, stop, reset, asks = byte & 1, byte >> 1 & 1, byte >> 2 & 1, byte & ASKS
         had_arm, _, had_reset = self._bits[station]
         if stop:
             self._stop_heard = True
-        if stop or (not arm and had_arm == 1):
+        if stop or (not (arm and asks) and had_arm == 1):
             self._armed = False
         if counts:
             if station == 0 or self.parameters.second_station:
-                if arm and had_arm == 0 and not stop:
+                if arm and had_arm == 0 and asks and not stop:
                     self._armed = True
                 if reset and had_reset == 0:
                     self._reset = True

@@ -128,6 +128,8 @@ def test_it_allows_once_all_was_heard_and_what_is_armed_may_press(bench: Bench) 
         (Stream.HARDWIRED, {"stop_loop": Switch.ON}, Reason.STOP, 1),
         (Stream.HARDWIRED, {"stop_loop": None}, Reason.STOP, 1),
         (Stream.ORDER, {"arm": False}, Reason.DISARMED, 122),
+        (Stream.ORDER, {"mode_request": Mode.PASSIVE}, Reason.DISARMED, 122),
+        (Stream.ORDER, {"mode_request": None}, Reason.DISARMED, 122),
         (Stream.COMMAND, {"pressure_pa": 20_500.0}, Reason.COMMANDED, 1),
         (Stream.COMMAND, {"pressure_pa": -10e3}, Reason.COMMANDED, 1),
         (Stream.DRIVE, {"pressure_pa": -4e3}, Reason.PRESSURE, 62),
@@ -234,6 +236,29 @@ def test_a_disarm_out_of_sequence_acts_and_no_frame_out_of_sequence_arms(bench: 
     sender = CATALOGUE.transmitter(OperatorCommand)
     sender.counter = bench.senders[Stream.ORDER].counter + 8
     bench.send(sender.frame(SOUND[Stream.ORDER]))
+    assert bench.run(124) == Reason.DISARMED
+
+
+def test_a_mode_that_is_asked_for_again_with_the_arm_bit_held_arms_nothing(bench: Bench) -> None:
+    """As the controller, docs/safety.md: arming needs a rising edge of the arm bit."""
+    bench.press(10e3)
+    for mode in (Mode.STANDBY, Mode.ACTIVE):
+        bench.say(Stream.ORDER, mode_request=mode)
+        assert bench.run(4) == 0
+    assert bench.run(124) == Reason.DISARMED
+    bench.say(Stream.COMMAND, pressure_pa=0.0)
+    for stream in (Stream.DRIVE, Stream.PUMP):
+        bench.say(stream, pressure_pa=0.0)
+    bench.say(Stream.ORDER, mode_request=Mode.PASSIVE, arm=False)
+    bench.run(100)
+    bench.say(Stream.ORDER, reset=True)
+    assert bench.run(4) == 0
+    # nor does the bit in another mode, whichever comes after it
+    bench.say(Stream.ORDER, arm=True, reset=False)
+    bench.run(4)
+    bench.say(Stream.ORDER, mode_request=Mode.ACTIVE)
+    bench.run(4)
+    bench.say(Stream.COMMAND, pressure_pa=500.0)
     assert bench.run(124) == Reason.DISARMED
 
 
