@@ -24,7 +24,8 @@ MOST_NM = 200e3
 NM_PER_UNIT = 80.0 * PITCH_M * AREA_M2  # by the ship's file: 80 Pa of pressure a count
 RAD_S_PER_UNIT = 1e-3
 RESERVOIR_M2 = 17.11
-STEP_S = 1e-3
+SPEED_LOOP_RAD_S = 30.0
+STEP_S = 2e-3
 READY, ON, RUNS, STOPS, OFF = 0x0231, 0x0233, 0x0237, 0x0217, 0x0250
 REACTS, FAULT = 0x021F, 0x0218
 WAY_UP = {(OFF, 0x06): READY, (READY, 0x07): ON, (ON, 0x0F): RUNS}
@@ -36,21 +37,23 @@ STATES = {"INITIALISING": 0, "STOPPED": 4, "OPERATIONAL": 5, "PRE-OPERATIONAL": 
 class Motor:
     """The node on a network of canopen; `step` is called for the time that passes."""
 
-    def __init__(self, network):
-        self.network, self.node = network, canopen.LocalNode(NODE, dictionary())
+    def __init__(self, network, *, torque=True):
+        self.network, self.node = network, canopen.LocalNode(NODE, dictionary(torque=torque))
+        self._in_nm = torque
+        self._beats = isinstance(network, Wire)  # on a bus canopen sends heartbeats by itself
         network.add_node(self.node)
         network.subscribe(0, self._on_network_command)
         network.subscribe(0x80, self._on_sync)
         self.node.add_write_callback(self._on_write)
         self.now_s = 0.0
         self.flow_m3_s = 0.0
-        self.speed_rad_s = self.load_nm = self.target_nm = 0.0
+        self.speed_rad_s = self.load_nm = self.target = 0.0
         self.state = OFF
         self.commands = 0
         self.drops = self.deaf = self.mute = False
         self.first_dropped_s = math.inf
         self._watched, self._patience_s, self._beat_s = 0, math.inf, math.inf
-        self._beat_due_s, self._lost = 0.0, False
+        self._period_s, self._beat_due_s, self._lost = 0.0, 0.0, False
         self.operational = False
         network.send_message(0x700 + NODE, b"\0")
         self.node.nmt.state = "PRE-OPERATIONAL"
@@ -65,6 +68,7 @@ class Motor:
                 self.deaf = True
             case ["mute"]:
                 self.mute = True
+                self.node.nmt.stop_heartbeat()
             case ["emcy", code]:
                 self.node.emcy.send(int(code, 16), 0x81)
             case ["trip", code]:
@@ -87,10 +91,9 @@ class Motor:
             self._turn()
         if self.state in (STOPS, REACTS) and abs(self._slip_m_s()) < PITCH_M * AT_REST_RAD_S:
             self.state = OFF if self.state == STOPS else FAULT
-        period_s = self.node.sdo[0x1017].raw * 1e-3
-        if period_s and self.now_s >= self._beat_due_s and not self.mute:
+        if self._beats and self._period_s and self.now_s >= self._beat_due_s and not self.mute:
             self.network.send_message(0x700 + NODE, bytes([STATES[self.node.nmt.state]]))
-            self._beat_due_s = self.now_s + period_s
+            self._beat_due_s = self.now_s + self._period_s
 
     @property
     def pressure_pa(self):
@@ -108,7 +111,10 @@ class Motor:
         self.load_nm = AREA_M2 * past_m_s * drag
         torque_nm = 0.0
         if self.state == RUNS:
-            torque_nm = self.target_nm
+            torque_nm = self.target
+            if not self._in_nm:  # its own speed loop
+                behind_rad_s = self.target - self.speed_rad_s
+                torque_nm = self.load_nm + SPEED_LOOP_RAD_S * INERTIA_KG_M2 * behind_rad_s
         elif self.state in (STOPS, REACTS):
             torque_nm = -1e6 * slip_m_s
         torque_nm = min(max(torque_nm, -MOST_NM), MOST_NM)
@@ -117,6 +123,8 @@ class Motor:
     def _on_write(self, index, subindex, data, **_):
         if index == 0x6060:
             self.node.set_data(0x6061, 0, data)
+        elif index == 0x1017:
+            self._period_s = int.from_bytes(data, "little") * 1e-3
         elif index == 0x1016 and subindex == 1:
             value = int.from_bytes(data, "little")
             if self._watched:
@@ -156,8 +164,9 @@ class Motor:
         for variable in pdo.map:
             self.node.set_data(variable.index, 0, variable.get_data())
         word = self.node.sdo[0x6040].raw
-        raw = self.node.sdo[0x6071].raw
-        self.target_nm = ((raw ^ 0x8000) - 0x8000) * NM_PER_UNIT
+        index, half = (0x6071, 1 << 15) if self._in_nm else (0x60FF, 1 << 31)
+        raw = (self.node.sdo[index].raw ^ half) - half
+        self.target = raw * (NM_PER_UNIT if self._in_nm else RAD_S_PER_UNIT)
         if self.state == FAULT:
             self.state = OFF if word & 0x80 else FAULT
         elif self.state in (RUNS, STOPS) and word & 0x06 == 0x02:
@@ -180,7 +189,10 @@ class Motor:
             if pdo.enabled and pdo.trans_type == 1:
                 for variable in pdo.map:
                     index = variable.index
-                    variable.raw = values.get(index, self.node.sdo[index].raw)
+                    if index in values:
+                        variable.raw = values[index]
+                    else:
+                        variable.set_data(self.node.get_data(index, 0))
                 pdo.transmit()
 
 
@@ -189,9 +201,9 @@ class MotorNode:
 
     name = "canopen motor"
 
-    def __init__(self, frame_of, period_ns, flow):
+    def __init__(self, frame_of, period_ns, flow, *, torque=True):
         self.wire = Wire()
-        self.motor = Motor(self.wire)
+        self.motor = Motor(self.wire, torque=torque)
         self._frame_of, self.period_ns, self._flow = frame_of, period_ns, flow
         self.killed = self.unplugged = False
 
@@ -249,7 +261,7 @@ def main():
     then_s = time.monotonic()
     print("ready", flush=True)
     while True:
-        ready, _, _ = select.select([network.bus, flow.bus, sys.stdin], [], [], 0.005)
+        ready, _, _ = select.select([network.bus, flow.bus, sys.stdin], [], [], 0.01)
         if sys.stdin in ready:
             words = sys.stdin.readline()
             if not words:

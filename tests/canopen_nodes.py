@@ -67,8 +67,8 @@ def valve_dictionary():
     return found
 
 
-def dictionary():
-    """Object dictionary of a drive in torque mode."""
+def dictionary(*, torque=True):
+    """Object dictionary of a drive in torque mode, or of one that knows nothing of torque."""
     found, entry, record = objects()
     entry(0x1000, 0, 4, 0x20192, "ro")
     entry(0x1017, 0, 2, 0)
@@ -84,12 +84,13 @@ def dictionary():
             index + 0x200,
             {0: (1, 1, "rw"), 1: (4, 0x60410010, "rw"), **dict.fromkeys(range(2, 9), (4, 0, "rw"))},
         )
-    for index, size in ((0x6007, 2), (0x605A, 2), (0x605E, 2), (0x6040, 2), (0x6071, 2),
-                        (0x6060, 1)):  # fmt: skip
+    target = (0x6071, 2) if torque else (0x60FF, 4)
+    for index, size in ((0x6007, 2), (0x605A, 2), (0x605E, 2), (0x6040, 2), target, (0x6060, 1)):
         entry(index, 0, size, 0)
     entry(0x6041, 0, 2, 0x250, "ro")
     entry(0x6061, 0, 1, 0, "ro")
     entry(0x606C, 0, 4, 0, "ro")
-    entry(0x6077, 0, 2, 0, "ro")
-    entry(0x6502, 0, 4, 1 << 3, "ro")
+    if torque:
+        entry(0x6077, 0, 2, 0, "ro")
+    entry(0x6502, 0, 4, 1 << 3 if torque else 1 << 2, "ro")
     return found

@@ -10,7 +10,7 @@ from others import others_file
 
 from tests.canbus.test_profiles import device
 from tests.canopen_nodes import Wire
-from tests.nodes.canopen_peers import PROFILE
+from tests.nodes.canopen_peers import PROFILE, PUMP
 from utank_hil.base.parameters import ParameterError
 from utank_hil.canbus import Frame, Quality
 from utank_hil.canbus.frame import STANDARD
@@ -233,6 +233,17 @@ def test_a_drives_identity_is_that_of_its_file():
 def test_a_drive_that_cannot_be_led_is_refused(name, reason):
     with pytest.raises((ParameterError, ValueError), match=reason):
         drive(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "vendor"), [("trinamic-TMCM-1240.dcf", 0x286), ("faulhaber-605.3150.68-B.eds", 0x147)]
+)
+def test_a_drive_without_any_torque_object_is_led_by_its_speed(name, vendor):
+    require = dict.fromkeys(("0x6007", "0x605A", "0x605E"))
+    found = drive(name, node=1, mode="velocity", require=require)
+    assert found.pump.identity[0] == vendor
+    assert not list(found.pump.problems())
+    assert [place.number for place, _ in found.pump.plan(0, PUMP).measured] == [0x606C, 0x6061]
 
 
 @pytest.mark.parametrize("require", [[1], 5, "0x6007"])

@@ -30,29 +30,43 @@ PRESSED_PA, STOPPED_PA = 20e3, 2.5e3  # the second is a twentieth of the greates
 
 
 @cache
-def config():
+def config(torque):
     loaded = load_config(Path("configs/controllers/gpc.yaml"), ControllerConfig)
-    changes = {"devices": DevicesSection(pump=DRIVE), "emulated": False}
+    drive = DRIVE if torque else DRIVE | {"mode": "velocity"}
+    changes = {"devices": DevicesSection(pump=drive), "emulated": False}
     return loaded.model_copy(update={"vessel": loaded.vessel.model_copy(update=changes)})
 
 
 class Bench:
     """Ship and controller with a drive of another maker on a bus of its own."""
 
-    def __init__(self, scenario, build, *actions):
-        controller = config()
+    def __init__(self, scenario, build, *actions, torque=True):
+        controller = config(torque)
         scenario = scenario.model_copy(update={"vessel": controller.vessel})
         self.ship = build_ship_side(scenario, 1, tuple(TimedAction(*each) for each in actions))
         self.node, tag = build(controller), 1 << BUS_SHIFT | STANDARD
         self.drive = MotorNode(
             lambda can_id, data: Frame(tag | can_id, data), TICK_NS,
-            lambda: self.ship.plant.flow_m3_s,
+            lambda: self.ship.plant.flow_m3_s, torque=torque,
         )  # fmt: skip
         self.motor = self.drive.motor
+        rest = self.ship.without(["drive"]) if torque else self._pressed()
         self.run = Lockstep(
-            [*self.ship.without(["drive"]), self.drive, self.node],
+            [*rest, self.drive, self.node],
             with_more(SimulatedBus(), 1, 250_000),
         )
+
+    def _pressed(self):
+        """Nodes without the drive, and the ship with the pressure of the motor's pump."""
+        tick = self.ship.sensors.tick
+
+        def ticks(now_ns):
+            self.ship.plant.advance(now_ns)
+            self.ship.plant.impose_pressure(self.motor.pressure_pa)
+            return tick(now_ns)
+
+        self.ship.sensors.tick = ticks
+        return [node for node in self.ship.nodes if node.name != "drive"]
 
     def to(self, seconds):
         rolls = []
@@ -70,8 +84,11 @@ class Bench:
         return (self.run.now_ns - begin_ns) / 1e6
 
 
-def at_sea(action=Action.ARM):
-    return Bench(STORM, lambda each: build_controller_node(each, commissioned=True), (5.0, action))
+def at_sea(action=Action.ARM, *, torque=True):
+    return Bench(
+        STORM, lambda each: build_controller_node(each, commissioned=True), (5.0, action),
+        torque=torque,
+    )  # fmt: skip
 
 
 def under_pressure():
@@ -82,7 +99,9 @@ def under_pressure():
     return bench
 
 
-def test_it_passes_the_commissioning():
+@pytest.mark.parametrize("torque", [True, False])
+def test_it_passes_the_commissioning(torque):
+    """A drive for speed has no object of torque at all."""
     quay = Scenario.model_validate(
         {
             "name": "quay", "vessel": STORM.vessel, "controllers": STORM.controllers,
@@ -90,7 +109,7 @@ def test_it_passes_the_commissioning():
             "duration_s": 300.0, "settle_s": 0.0, "operator": (TimedAction(30.0, Action.ARM),),
         }
     )  # fmt: skip
-    bench = Bench(quay, build_commissioning_node, (REST_S + 6, Action.ARM))
+    bench = Bench(quay, build_commissioning_node, (REST_S + 6, Action.ARM), torque=torque)
     while bench.node.stage is not Stage.DONE:
         assert bench.run.now_ns < 200 * SECOND
         bench.run.run_until(bench.run.now_ns + SECOND)
@@ -102,8 +121,9 @@ def test_it_passes_the_commissioning():
 
 
 @pytest.mark.slow
-def test_the_ship_rolls_less_for_minutes_and_a_stop_stops_it():
-    bench, passive = at_sea(), at_sea(Action.PASSIVE)
+@pytest.mark.parametrize("torque", [True, False])
+def test_the_ship_rolls_less_for_minutes_and_a_stop_stops_it(torque):
+    bench, passive = at_sea(torque=torque), at_sea(Action.PASSIVE, torque=torque)
     roll, without = bench.to(60), passive.to(60)  # both settle
     roll, without = bench.to(240), passive.to(240)
     assert (bench.node.mode, passive.node.mode) == (Mode.ACTIVE, Mode.PASSIVE)

@@ -250,7 +250,8 @@ def _lacking(eds: Eds, content: dict[str, Any]) -> Iterator[str]:
         others_said = f"choose {' or '.join(others)}" if others else "take another drive"
         yield f"{MODES_SUPPORTED} is {able:#x}, without mode {content['mode']}: {others_said}"
     echo = mode.demand if content.get("echo") == "demand" else CONTROL_WORD
-    for place in (CONTROL_WORD, echo, mode.target, STATUS_WORD, SPEED, TORQUE, HEARTBEAT_PRODUCER):
+    needs = (CONTROL_WORD, echo, mode.target, STATUS_WORD, SPEED, HEARTBEAT_PRODUCER)
+    for place in (*needs, *[TORQUE] * mode.torque):
         if eds.entry(place) is None:
             ways = place == echo or place == mode.target
             remedy = "choose another echo or mode" if ways else "take another drive or firmware"

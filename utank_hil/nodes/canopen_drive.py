@@ -93,8 +93,9 @@ class CanopenDrive:
         self._echoed = Field(16, 8 * sent - 16, sent)
         scale = plan.speed_rad_s_per_unit
         self._speed = Field(0, 32, measured, signed=True, scale=scale)
-        self._torque_field = Field(32, 16, measured, signed=True, scale=1 / plan.units_per_si)
-        self._mode_field = Field(48, 8, measured, signed=True)
+        if self._in_nm:
+            self._torque_field = Field(32, 16, measured, signed=True, scale=1 / plan.units_per_si)
+        self._mode_field = Field(8 * measured - 8, 8, measured, signed=True)
         cycle_ns = cia.COMMAND_MS * MILLISECOND_NS
         self.watched = tuple(
             HeardMessage(MessagePlan("", (tag | cob + plan.node,), length, cycle_ns))

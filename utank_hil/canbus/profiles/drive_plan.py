@@ -274,8 +274,8 @@ class DrivePlan:
 
     @property
     def measured(self) -> tuple[tuple[Place, int], ...]:
-        """Entries of the PDO with speed, torque and mode."""
-        return (SPEED, 32), (TORQUE, 16), (MODE_SHOWN, 8)
+        """Entries of the PDO with speed, torque in a torque mode, and mode."""
+        return (SPEED, 32), *[(TORQUE, 16)] * self.mode.torque, (MODE_SHOWN, 8)
 
     def steps(self) -> Iterator[Step]:
         """What is compared, written and read back, in this order."""
