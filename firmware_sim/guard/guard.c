@@ -315,7 +315,7 @@ static bool is_off(const struct guard *guard, int32_t pressure, int32_t error)
     int32_t least = lesser(guard->least[0], guard->least[1]);
     int32_t most = greater(guard->most[0], guard->most[1]);
     if (guard->parameters->torque_drive) {
-        most = commanded(guard);
+        most = (guard->unarmed > RELEASE) ? 0 : commanded(guard);
         least = -most;
     }
     return (pressure < (least - error)) || (pressure > (most + error));
@@ -330,6 +330,7 @@ uint8_t guard_tick(struct guard *guard)
     bool off = false;
     bool drive_heard;
     bool live;
+    bool pressing;
     for (index = 0U; index < GUARD_STREAMS; index++) {
         guard->streams[index].age = longer(guard->streams[index].age, true);
         guard->same[index] = longer(guard->same[index], true);
@@ -346,6 +347,11 @@ uint8_t guard_tick(struct guard *guard)
            || ((guard->drive_state != NOT_READY) && (guard->drive_state != DISABLED)
                && (guard->drive_state != READY) && (guard->drive_state != SWITCHED_ON)
                && (guard->drive_state != FAULT));
+    guard->unarmed = longer(guard->unarmed, !guard->armed);
+    pressing = live && (guard->command != 0);
+    if (limits->torque_drive && (guard->unarmed > RELEASE)) {
+        pressing = false; /* enabled without pressure, as in PASSIVE; what it presses tells */
+    }
     /* A drive may say that it is off and press: what it does counts. Off, its rotor turns freely. */
     if ((!drive_heard) || (!live)) {
         error += (magnitude(guard->level) * limits->free_rotor) / 2000;
@@ -357,7 +363,6 @@ uint8_t guard_tick(struct guard *guard)
         off = true;
     }
     guard->off_command = longer(guard->off_command, off);
-    guard->unarmed = longer(guard->unarmed, live && (guard->command != 0) && (!guard->armed));
     guard->high = longer(guard->high, guard->tank_high || guard->hardwired_high
                                           || (magnitude(guard->level) > limits->level));
     guard->rolled = longer(guard->rolled, (magnitude(guard->roll) > limits->roll)
@@ -365,8 +370,8 @@ uint8_t guard_tick(struct guard *guard)
     if (guard->stop_heard || guard->loop_open || guard->stop_bit[0] || guard->stop_bit[1]) {
         reasons |= GUARD_STOP;
     }
-    reasons |= (guard->unarmed > RELEASE) ? GUARD_DISARMED : 0U;
-    reasons |= (live && (guard->command != 0) && silent(guard)) ? GUARD_SILENT : 0U;
+    reasons |= (pressing && (guard->unarmed > RELEASE)) ? GUARD_DISARMED : 0U;
+    reasons |= (pressing && silent(guard)) ? GUARD_SILENT : 0U;
     reasons |= (live && guard->bad_command) ? GUARD_COMMANDED : 0U;
     reasons |= (guard->off_command > FOLLOW) ? GUARD_PRESSURE : 0U;
     reasons |= (guard->high > PERSIST) ? GUARD_LEVEL : 0U;

@@ -38,7 +38,7 @@
 /* Reasons to cut, as bits; none allows. */
 #define GUARD_WAITING 1U   /* not every message was heard since power-up */
 #define GUARD_STOP 2U      /* a station's stop, or the stop loop */
-#define GUARD_DISARMED 4U  /* pressure commanded that no operator has armed */
+#define GUARD_DISARMED 4U  /* pressure commanded long after a disarm, or never armed */
 #define GUARD_SILENT 8U    /* a message too old under pressure */
 #define GUARD_COMMANDED 16U /* a command beyond its limit of pressure or rate */
 #define GUARD_PRESSURE 32U /* the pump presses otherwise than commanded */
@@ -121,8 +121,8 @@ struct guard {
     int32_t least[2]; /* of the commands in this window and the last, and zero */
     int32_t most[2];
     uint16_t window;
-    uint16_t unarmed; /* how long each condition has lasted */
-    uint16_t off_command;
+    uint16_t unarmed; /* since a disarm */
+    uint16_t off_command; /* how long each condition has lasted */
     uint16_t high;
     uint16_t rolled;
     uint8_t drive_state;

@@ -236,17 +236,19 @@ class Guard:
             self._heel += abs(away) // HEEL_TICKS * (1 if away > 0 else -1)
         heard = self._age[Stream.DRIVE] <= limits.messages[Stream.DRIVE].patience
         live = not heard or self._state not in NO_TORQUE
+        self._unarmed = _longer(self._unarmed, not self._armed)
+        pressing = live and self._command != 0
+        if limits.torque_drive and self._unarmed > RELEASE:
+            pressing = False  # enabled without pressure, as in PASSIVE; what it presses tells
         error = limits.error
         # a drive may say that it is off and press: what it does counts; off, its rotor turns freely
         if not (heard and live):
             error += abs(self._level) * limits.free_rotor // 2000
         off = heard and self._is_off(self._drive_pa, error)
         off |= self._age[Stream.PUMP] <= FRESH and self._is_off(self._pump_pa, error)
-        pressing = live and self._command != 0
         high = any(self._switches.values()) or abs(self._level) > limits.level
         rolled = abs(self._roll) > limits.roll or abs(self._rate) > limits.roll_rate
         self._off = _longer(self._off, off)
-        self._unarmed = _longer(self._unarmed, pressing and not self._armed)
         self._high = _longer(self._high, high)
         self._rolled = _longer(self._rolled, rolled)
         heeled = abs(self._heel) > limits.heel * HEEL_SCALE
@@ -254,7 +256,7 @@ class Guard:
         stop = self._stop_heard or self._loop_open or any(bits[1] for bits in self._bits)
         holds = {
             Reason.STOP: stop,
-            Reason.DISARMED: self._unarmed > RELEASE,
+            Reason.DISARMED: pressing and self._unarmed > RELEASE,
             Reason.SILENT: pressing and silent,
             Reason.COMMANDED: live and self._bad_command,
             Reason.PRESSURE: self._off > FOLLOW,
@@ -290,7 +292,8 @@ class Guard:
         """Whether a pressure is off all commands of half a second, and off zero."""
         least, most = min(self._least), max(self._most)
         if self.parameters.torque_drive:
-            least, most = -self._commanded, self._commanded
+            most = 0 if self._unarmed > RELEASE else self._commanded
+            least = -most
         return not least - error <= pressure <= most + error
 
 

@@ -5,13 +5,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from device_ship import PUMP, scenario_of
 
 from firmware_sim.fault_injection.nodes import Pump, Silenced
 from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.guard.reference import Reason
 from firmware_sim.scenario import Scenario
-from utank_hil.canbus import Mode
+from utank_hil.canbus import DriveState, Mode
 from utank_hil.configuration import load_config
+from utank_hil.nodes.panel import Action, TimedAction
 
 SECOND = 1_000_000_000
 
@@ -33,6 +35,22 @@ def test_it_lets_a_healthy_controller_be() -> None:
         assert guard.guard.reasons == 0
     assert found.node.mode is Mode.ACTIVE
     assert abs(found.ship.plant.pressure_pa) > 100
+
+
+@pytest.mark.parametrize("devices", [{}, {"pump": PUMP}])
+def test_it_lets_a_drive_be_that_holds_zero_pressure_in_passive(devices: dict[str, Any]) -> None:
+    """Whatever the drive is told, and also where nobody is at the panel any more."""
+    scenario = scenario_of(devices)
+    script = TimedAction(1.0, Action.ARM), TimedAction(4.0, Action.DISARM)
+    found = FaultyBench(scenario, scenario.controllers["gpc"], seed=1, script=script)
+    found.run(8 * SECOND)
+    found.place([Silenced(kind="hangs", node="panel")])
+    for second in range(9, 19):
+        found.run(second * SECOND)
+        guard = found.ship.guard
+        assert guard is not None
+        assert (found.node.mode, guard.guard.reasons) == (Mode.PASSIVE, 0)
+    assert found.node.measured.drive_state is DriveState.OPERATION_ENABLED
 
 
 @pytest.mark.evidence("fault1", "fault2", "fault3")
