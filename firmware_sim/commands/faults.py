@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -15,15 +15,16 @@ from utank_hil.base.shipped import CONFIGS
 from utank_hil.console import common
 from utank_hil.console.common import KILLED, argument, fail, load, option, why
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import Terminal, progress_bar, shown
+from utank_hil.console.terminal import Terminal, progress_bar, say_note, shown
 
 if TYPE_CHECKING:
     from firmware_sim.fault_campaign.campaign import Campaign, Row
-    from firmware_sim.fault_campaign.trial import Window
+    from firmware_sim.fault_campaign.trial import Outcome, Window
     from firmware_sim.fault_campaign.verdict import Verdict
 
 CAMPAIGN = CONFIGS / "faults" / "campaign.yaml"
 ROLLS_IN_CHARGE: Final = 5  #: Rolls over which an own ship with its law is compared. Chosen.
+CALM_DEG: Final = 1.0  #: RMS roll in which the monitors find all in time (docs/monitors.md).
 
 
 End = tuple[str, ExitCode]
@@ -124,6 +125,8 @@ def faults(
             f"roll compared over {window.stopped_s:g} s, "
             f"in charge over {window.running_s:g} s; {time.monotonic() - began:.0f} s."
         )
+    if scenario is not None and content["failed"] and (calm := _calm(outcomes)):
+        say_note(f"{scenario}: {calm}")
     if junit is not None:
         write_junit(junit, content)
     if end is INTERRUPTED:
@@ -205,6 +208,18 @@ def _on(campaign: "Campaign", path: Path) -> "Campaign":
     if not ship.controllers:
         fail(f"{path}: controllers: one is needed that is to find the faults")
     return campaign.on(ship, next(iter(ship.controllers)))
+
+
+def _calm(outcomes: "Mapping[str, Sequence[Outcome]]") -> str:
+    """What may have failed rows of an own ship: a sea in which she hardly rolls."""
+    rolls = [one.passive_variance for each in outcomes.values() for one in each if not one.error]
+    roll_deg = math.degrees(math.sqrt(max(rolls, default=math.inf)))
+    if roll_deg >= CALM_DEG:
+        return ""
+    return (
+        f"with the pump off she rolls {roll_deg:.2g} degrees RMS in this sea: below "
+        f"{CALM_DEG:g} wrong signals show late, try a sea that rolls her more"
+    )
 
 
 def _window(campaign: "Campaign") -> "Window":

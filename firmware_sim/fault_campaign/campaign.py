@@ -6,8 +6,17 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from firmware_sim.fault_campaign.own_ship import Ratios, ratios, renumbered, resized
+from firmware_sim.fault_campaign.own_ship import (
+    GAP_S,
+    Ratios,
+    ratios,
+    renumbered,
+    resized,
+    stretched,
+    thresholds,
+)
 from firmware_sim.fault_injection.fault import FaultSpan, FaultTime, one_of
+from firmware_sim.fault_injection.frames import Lost
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.fault_injection.nodes import Law
 from firmware_sim.scenario import Scenario
@@ -21,10 +30,19 @@ from utank_hil.configuration.devices import DevicesSection
 from utank_hil.nodes.panel import TimedAction
 from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.retuning import EstimateSettings
+from utank_hil.safety.monitoring import GAP_PERIODS
 
 COMMON: Final = "pump"  #: Setup of rows that name none.
 LONG_S: Final = 300.0
 """Follow-up time in s above which a row takes more than a minute of CPU time per sea."""
+TIME_OF: Final[dict["Reaction", str]] = {
+    "stop": "found",
+    "ramp": "found",
+    "halve": "halved",
+    "alarm": "alarm",
+    "note": "noted",
+    "drive": "zero",
+}  #: Field of `Outcome` with the start of each reaction.
 _AT_A_SAMPLE: Final = ("raises", "answers_nan")  #: Failures of a law that show at its next sample.
 _LATE_MS: Final = 20.0  #: Beyond that sample, as on the first ship.
 _PHASES: Final = 100  # Number of ticks in a second, the slowest message cycle.
@@ -167,6 +185,9 @@ class Limit(Section):
     found_ms: Positive | None = None
     halved_ms: Positive | None = None
     zero_ms: Positive | None = None
+    #: What `found_ms` follows from: another ship has her own. The times of such a row's faults go
+    #: with the tank's period, too.
+    follows: Literal["roll_budget", "tank_period"] | None = None
     #: Deviation from which times count, because the fault is invisible before it: the first
     #: deviation of a received value from the truth; a lasting deviation of the pump's pressure from
     #: its set-point; or the first roll of this size (`over_roll_rad`).
@@ -303,12 +324,15 @@ class Campaign(Section):
         vessels = {name: setup.equipped.vessel for name, setup in setups.items()}
         own = setups[COMMON]
         by = ratios((common.scenario, common.config), (own.scenario, own.config))
+        # gaps that keep the water of so large a ship from being judged are silence
+        gapless = GAP_PERIODS * thresholds(own.config).tank_period_s >= GAP_S
         rows = tuple(
             _resized(row, by, theirs.get(row.fault.setup), drive)
             for row in self.rows
             if (vessel := vessels.get(row.fault.setup)) is not None
             and not missing_nodes(vessel, row.fault.inject)
             and not (row.expect.reaction == "note" and _uncounted(vessel, row.fault.inject))
+            and not (gapless and _gaps(row))
         )
         return self.model_copy(update={"setups": setups, "rows": rows})
 
@@ -327,17 +351,31 @@ def _resized(row: Row, by: Ratios, first: DrivePlan | None, own: DrivePlan | Non
     if first is not None and own is not None:
         inject = tuple(renumbered(each, first, own) for each in inject)
     fault, expect, limit = row.fault, row.expect, row.limit
+    found_ms = None if limit.follows == "roll_budget" else limit.found_ms
+    times: dict[str, Any] = {"inject": inject}
+    if limit.follows == "tank_period":
+        found_ms = found_ms and by.period * found_ms
+        inject = tuple(stretched(each, by) for each in inject)
+        times = {"inject": inject, "followed_s": by.period * fault.followed_s}
     counts_from = {key: value * by.range.get(key, 1.0) for key, value in limit.counts_from.items()}
     roll = None if fault.hardwired_stop else limit.roll
-    changed: dict[str, Any] = {"counts_from": counts_from, "beside_stop": True, "roll": roll}
+    changed: dict[str, Any] = {
+        "found_ms": found_ms, "counts_from": counts_from, "beside_stop": True, "roll": roll
+    }  # fmt: skip
     if any(isinstance(each, Law) and each.fails in _AT_A_SAMPLE for each in inject):
-        changed["found_ms"] = max(limit.found_ms or 0.0, 1e3 * by.sample_s + _LATE_MS)
+        changed["found_ms"] = max(found_ms or 0.0, 1e3 * by.sample_s + _LATE_MS)
     parts = {
-        "fault": fault.model_copy(update={"inject": inject}),
+        "fault": fault.model_copy(update=times),
         "expect": expect.model_copy(update={"codes": expect.codes + expect.elsewhere}),
         "limit": limit.model_copy(update=changed),
     }
     return row.model_copy(update=parts)
+
+
+def _gaps(row: Row) -> bool:
+    return row.limit.follows == "tank_period" and any(
+        isinstance(each, Lost) for each in row.fault.inject
+    )
 
 
 def _uncounted(vessel: Vessel, faults: Sequence[AnyFault]) -> bool:

@@ -17,7 +17,8 @@ from typing import Any, Final, TypeVar, cast, get_args
 
 import numpy as np
 
-from firmware_sim.fault_campaign.campaign import Campaign, Row, Setup, StatusFlag
+from firmware_sim.fault_campaign.campaign import TIME_OF, Campaign, Row, Setup, StatusFlag
+from firmware_sim.fault_campaign.own_ship import MOST_S
 from firmware_sim.fault_campaign.watch import BusLog, Heard, Watch, first_difference
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.faulty_bench import FaultyBench
@@ -47,6 +48,7 @@ _LOOK_S: Final = 0.1  # Interval in s at which Ctrl-C is checked while a copy wo
 REARMED_S: Final = 20.0
 """Time in s after the fault for which the campaign's first sea checks that nothing arms again."""
 WHOLE_S: Final = 600.0  #: Time in s over which the roll is to be compared.
+AWAITED_NS: Final = 2 * SECOND_NS  #: Longer than a ramp to zero, whose end is to be seen.
 COMMANDS_NS: Final = 40_000_000  #: Two cycles of PUMP_CMD.
 FLAGS: Final = get_args(StatusFlag)
 
@@ -72,6 +74,7 @@ class Outcome:
     halved: float | None = None
     noted: float | None = None
     alarm: float | None = None
+    full: float | None = None  #: Last time with all of the pressure before a latched fault in ms.
     zero: float | None = None  #: Final stop of drive or valve in ms.
     commanded: float = 0.0  #: Last command with a pressure other than zero in ms.
     #: mode, code: final mode, and the fault that was latched or shown.
@@ -223,10 +226,12 @@ class Sea:
     def _outcome(self, row: Row, reference: list[Heard]) -> Outcome:
         bench, log, watch = self._watched(row, row.fault.inject)
         start_ns, refused = bench.lockstep.now_ns, bench.ship.refused_commands
-        watched_ns = alone_ns = start_ns + round(row.fault.followed_s * SECOND_NS)
+        watched_ns = start_ns + round(row.fault.followed_s * SECOND_NS)
         bench.run(watched_ns)
+        self._await(row, bench, watch, start_ns)
+        alone_ns = bench.lockstep.now_ns
         if self.patient and _stopped_at(bench):
-            alone_ns = max(watched_ns, start_ns + round(REARMED_S * SECOND_NS))
+            alone_ns = max(alone_ns, start_ns + round(REARMED_S * SECOND_NS))
             bench.run(alone_ns)
         stopped = _stopped_at(bench)
         times, was_active = times_of(row, watch, log, start_ns), "active" in watch.first_ns
@@ -264,6 +269,22 @@ class Sea:
             wire=_words(*differs, start_ns) if differs else "",
             rows=self._recorded_rows(start_ns),
         )
+
+    def _await(self, row: Row, bench: FaultyBench, watch: Watch, start_ns: int) -> None:
+        """Follow on what is not found yet, until its time is over: a slow ship shows it late."""
+        event, limit = TIME_OF.get(row.expect.reaction), row.limit
+        most_ms = limit.found_ms or (limit.follows and 1e3 * MOST_S)
+        if event not in ("found", "halved", "alarm") or not most_ms:
+            return
+        last_ns = start_ns + round(self.window.stopped_s * SECOND_NS) - AWAITED_NS - SECOND_NS
+        known = watch.first_ns
+        while event not in known and (now_ns := bench.lockstep.now_ns) < last_ns:
+            begin_ns = watch.over_ns if limit.counts_from else known.get("active", start_ns)
+            if begin_ns is not None and now_ns - begin_ns > 1e6 * most_ms:
+                return
+            bench.run(now_ns + SECOND_NS)
+            if event in known:
+                bench.run(now_ns + AWAITED_NS + SECOND_NS)
 
     def _recorded_rows(self, start_ns: int) -> FloatArray | None:
         """Rows from `RECORDED_S` before the fault on, if asked for."""

@@ -9,8 +9,8 @@ from typing import Any, Final
 from rich.table import Table
 from rich.text import Text
 
-from firmware_sim.fault_campaign.campaign import Campaign, Row, Setup
-from firmware_sim.fault_campaign.campaign import Reaction as Asked
+from firmware_sim.fault_campaign.campaign import TIME_OF, Campaign, Row, Setup
+from firmware_sim.fault_campaign.own_ship import RollBudget
 from firmware_sim.fault_campaign.trial import COLUMNS, FLAGS, Outcome
 from utank_hil.canbus import PumpCommand, load_catalogue
 from utank_hil.console.terminal import new_table
@@ -33,14 +33,6 @@ STATUS_MS: Final = 200.0
 """Two cycles of CTRL_STATUS in ms: a shorter state need not appear in one."""
 ALARM_MS: Final = 100.0  #: Period in ms at which the list of alarms is updated and checked.
 COMMAND: Final = load_catalogue().codec(PumpCommand).name
-_TIME_OF: Final[dict[Asked, str]] = {
-    "stop": "found",
-    "ramp": "found",
-    "halve": "halved",
-    "alarm": "alarm",
-    "note": "noted",
-    "drive": "zero",
-}  #: Field of `Times` with the start of each reaction.
 _GO_ON: Final = ("halve", "alarm", "note", "none")  # Reactions after which control continues.
 
 
@@ -60,6 +52,8 @@ def judged(campaign: Campaign, row: Row, outcomes: Sequence[Outcome]) -> Verdict
     found = [_reaction_ms(row, each) for each in sound]
     ends = row.expect.latched or row.expect.reaction == "drive"
     zero = [each.zero for each in sound] if ends and not row.fault.hardwired_stop else []
+    known = [each for one in sound if (each := _found_limit_ms(row, setup, one)) is not None]
+    limit_ms = min(known, default=row.limit.found_ms)
     limits = (_zero_limit_ms(row, each) for each in sound if zero and row.expect.latched)
     zero_limit_ms = max(filter(None, limits), default=row.limit.zero_ms)
     problems = [f"seed {each.seed}: {each.error}" for each in outcomes if each.error]
@@ -80,7 +74,7 @@ def judged(campaign: Campaign, row: Row, outcomes: Sequence[Outcome]) -> Verdict
         "reaction": row.expect.reaction,
         "found_ms": _worst(found),
         "zero_ms": _worst(zero),
-        "limit_ms": row.limit.found_ms,
+        "limit_ms": limit_ms,
         "counted_from": row.limit.counts_from or None,
         "zero_limit_ms": zero_limit_ms,
         "verdict": "fail" if problems else "pass",
@@ -103,8 +97,15 @@ def _reaction_ms(row: Row, outcome: Outcome) -> float | None:
     """Start of the required reaction in ms; zero where arming was refused."""
     if row.fault.from_start and row.expect.latched and not outcome.was_active:
         return 0.0 if outcome.code != "NONE" else None
-    time = _TIME_OF.get(row.expect.reaction)
+    time = TIME_OF.get(row.expect.reaction)
     return None if time is None else getattr(outcome, time)
+
+
+def _found_limit_ms(row: Row, setup: Setup, outcome: Outcome) -> float | None:
+    """Deadline in ms for the reaction; of an own ship by her roll budget, where it follows that."""
+    if row.limit.found_ms is not None or row.limit.follows is None:
+        return row.limit.found_ms
+    return 1e3 * RollBudget.of(setup.config).found_s(1e-3 * (outcome.full or 0.0))
 
 
 def _zero_limit_ms(row: Row, outcome: Outcome) -> float | None:
@@ -125,7 +126,7 @@ def _zero_limit_ms(row: Row, outcome: Outcome) -> float | None:
 
 
 def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
-    yield from _late(row, outcome)
+    yield from _late(row, setup, outcome)
     yield from _unsaid(row, outcome)
     yield from _ended_wrongly(row, outcome)
     reaction = row.expect.reaction
@@ -140,14 +141,14 @@ def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
         yield "the fault did not reach the bus"
 
 
-def _late(row: Row, outcome: Outcome) -> Iterator[str]:
-    limit = row.limit
+def _late(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
+    limit, allowed_ms = row.limit, _found_limit_ms(row, setup, outcome)
     found_ms = _reaction_ms(row, outcome)
     if row.expect.reaction not in ("none", "refuse"):
         if found_ms is None:
             yield "was not found"
-        elif limit.found_ms is not None and found_ms > limit.found_ms:
-            yield f"found after {found_ms:.0f} ms, {limit.found_ms:.0f} allowed"
+        elif allowed_ms is not None and found_ms > allowed_ms:
+            yield f"found after {found_ms:.0f} ms, {allowed_ms:.0f} allowed"
     if limit.halved_ms is not None:
         halved = [each for each in (outcome.halved, outcome.found) if each is not None]
         if min(halved, default=math.inf) > limit.halved_ms:

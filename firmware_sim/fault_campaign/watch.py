@@ -97,7 +97,8 @@ class Watch:
         now_ns = bench.lockstep.now_ns
         #: First time at which the controller was in charge ("active"), latched a fault ("found"),
         #: halved the pressure ("halved"), rejected, missed or discarded a frame ("noted"), or
-        #: raised one of the row's alarms ("alarm").
+        #: raised one of the row's alarms ("alarm"). The last time in charge with all of the
+        #: pressure, before a fault was latched ("full").
         self.first_ns: dict[str, int] = {}
         if bench.node.mode is canbus.Mode.ACTIVE:
             self.first_ns["active"] = now_ns
@@ -143,6 +144,8 @@ class Watch:
             first_ns["found"], self.code = now_ns, supervisor.fault
         self.armed_again |= active and "found" in first_ns
         self._look_at_share(now_ns, degraded=active and supervisor.degraded)
+        if active and not supervisor.degraded and "found" not in first_ns:
+            first_ns["full"] = now_ns
         if "found" not in first_ns and (node.fault is not canbus.Fault.NONE or self._waited):
             self.code = node.fault
         self._waited = mode is canbus.Mode.INIT  # a fault that delayed INIT and is over is no fault

@@ -520,6 +520,20 @@ def test_a_row_that_fails_is_told_by_the_exit_code(found_ms, late, monkeypatch):
     assert ("allowed" in done.output) is late
 
 
+@pytest.mark.parametrize(
+    ("roll_deg", "found_ms", "said"), [(0.9, 1e6, True), (1.1, 1e6, False), (0.9, 500.0, False)]
+)
+def test_a_row_that_fails_in_a_calm_says_so_of_an_own_ship(roll_deg, found_ms, said, monkeypatch):
+    variance = math.radians(roll_deg) ** 2
+    outcome = replace(GOOD, found=found_ms, variance=variance, passive_variance=variance)
+    monkeypatch.setattr(runner, "run_rows", lambda *_, **__: {GOOD.row: [outcome]})
+    asked = "--rows", GOOD.row, "--seeds", "1"
+    done = invoke(*asked, "--scenario", "configs/scenarios/storm.yaml")
+    assert done.exit_code == (ExitCode.REFUSED if found_ms > 1e4 else ExitCode.OK)
+    assert ("rolls 0.9 degrees RMS in this sea" in " ".join(done.stderr.split())) is said
+    assert "in this sea" not in invoke(*asked).stderr
+
+
 def test_a_place_for_the_junit_file_that_is_none_is_told_before_the_rows(tmp_path):
     done = invoke("--rows", GOOD.row, "--junit", str(tmp_path))
     assert done.exit_code == ExitCode.USAGE
@@ -760,6 +774,58 @@ def test_a_fault_is_as_large_for_another_ship_as_for_the_first():
         for row in CAMPAIGN.on(ship.model_copy(update={"sensors": quiet}), "constrained").rows
     }["noise-10-fold"]
     assert row.fault.inject[0].deviation == pytest.approx(0.001)
+
+
+def on_ship(scenario, **tank):
+    """The campaign on a scenario's ship, with another tank."""
+    vessel = scenario.vessel.model_copy(update={"tank": replace(scenario.vessel.tank, **tank)})
+    name, law = next(iter(scenario.controllers.items()))
+    moved = scenario.model_copy(
+        update={"vessel": vessel, "controllers": {name: law.model_copy(update={"vessel": vessel})}}
+    )
+    return {row.id: row for row in CAMPAIGN.on(moved, name).rows}
+
+
+def test_times_that_follow_from_the_first_ships_tank_follow_from_another_ships():
+    setup = CAMPAIGN.setups["pump"]
+    first, scenario = setup.scenario.vessel.tank, setup.scenario
+    longer = 1.44 * first.effective_length_m - 2 * first.height_m  # 1.2 times its period
+    width_m = longer * first.duct_area_m2 / first.reservoir_area_m2
+    moved = on_ship(scenario, width_m=width_m)
+    gaps = [each.at_s for each in moved["pump-sensor-gaps"].fault.inject]
+    assert gaps == pytest.approx([1.2 * (2 + 4 * n) for n in range(10)])
+    assert moved["pump-sensor-gaps"].fault.inject[9].for_s == pytest.approx(0.84)
+    assert moved["roll-2-s-late"].fault.inject[0].by_s == pytest.approx(2.4)
+    for name, found_s in (
+        ("pump-sensor-gaps", 48.0), ("roll-2-s-late", 36.0), ("law-opposite", 108.0),
+        ("levels-swapped", 12.84), ("both-signs-flipped", 12.84),
+    ):  # fmt: skip
+        assert moved[name].limit.found_ms == pytest.approx(1e3 * found_s)
+    # what a bus, a sensor's figures or a person gives stays
+    for name in ("roll-100-ms-late", "roll-drift-slow", "tank-silent", "panel-silent"):
+        assert moved[name].fault == ROWS[name].fault
+        assert moved[name].limit.found_ms == ROWS[name].limit.found_ms
+    # a twentieth of 18 s or more is a silence that ends control
+    slow = on_ship(scenario, width_m=4 * width_m)
+    assert "pump-sensor-gaps" in moved
+    assert "pump-sensor-gaps" not in slow
+
+
+def test_a_gauge_is_off_by_more_than_another_ships_water_may():
+    scenario = CAMPAIGN.setups["pump"].scenario
+    first = scenario.vessel.tank
+    assert ROWS["level-offset"].fault.inject[0].by == 0.25  # 1.7 times 3 % of 4.88 m
+    deep = on_ship(scenario, height_m=2 * first.height_m)
+    assert deep["level-offset"].fault.inject[0].by == pytest.approx(0.5)
+    assert deep["zeros-off"].fault == ROWS["zeros-off"].fault
+
+
+def test_what_shows_late_is_followed_until_its_time_is_over():
+    row = ROWS["roll-stuck"]
+    short = row.model_copy(update={"fault": row.fault.model_copy(update={"followed_s": 0.05})})
+    outcome = outcome_of(short)
+    assert outcome.found == outcome_of(row).found
+    assert verdict("roll-stuck", outcome).passed
 
 
 def test_an_own_ship_with_its_law_is_compared_over_five_rolls():
