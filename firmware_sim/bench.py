@@ -9,14 +9,15 @@ from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
-from multiprocessing.context import SpawnContext
 from pathlib import Path
 from typing import Any, Final
 
 from firmware_sim.run import (
     RECORD_S,
+    Board,
     Job,
     Run,
+    Watch,
     join,
     roll_without_tank,
     run_controller,
@@ -41,7 +42,6 @@ POLL_S: Final = 0.1
 """Interval of the progress display and the check for Ctrl-C in s; no deadline depends on it."""
 BEGIN_AFTER_NS: Final = 200_000_000
 """Time in ns from both sides being ready to their common first tick: 20 polls of each side."""
-READY_POLL_S: Final = 0.01  #: Polling interval of each side in s: one tick.
 
 LEAST_REACH: Final = 0.5
 """Least share of the longest run that a run must reach to shorten the window compared."""
@@ -99,36 +99,8 @@ class BenchOptions:
     frames: Path | None = None  #: Folder for a frame log of each run in simulated time.
 
 
-class _Board:
-    """Shared memory through which the bench and the processes of its runs communicate."""
-
-    def __init__(self, context: SpawnContext, runs: int) -> None:
-        self.done_s = [context.Value("d", 0.0, lock=False) for _ in range(runs)]
-        self.stop = context.Value("b", False, lock=False)
-        self.ready = context.Value("i", 0)
-        self.begin_ns = context.Value("q", 0, lock=False)
-
-
-class _Watch:
-    def __init__(self, board: _Board, index: int) -> None:
-        self._board = board
-        self._done_s = board.done_s[index]
-
-    def stopped(self, done_s: float) -> bool:
-        self._done_s.value = done_s
-        return bool(self._board.stop.value)
-
-    def begin_ns(self) -> int:
-        board = self._board
-        with board.ready.get_lock():
-            board.ready.value += 1
-        while not board.begin_ns.value and not board.stop.value:
-            time.sleep(READY_POLL_S)
-        return int(board.begin_ns.value)
-
-
 def _call(function: Callable[..., Any], index: int, *arguments: object) -> Any:
-    return function(*arguments, _Watch(shared(), index))
+    return function(*arguments, Watch(shared(), index))
 
 
 def jobs_of(
@@ -188,7 +160,7 @@ def run_bench(
     if not options.real_time:
         workers = len(os.sched_getaffinity(0))
     with stop_on_signals() as stopped:
-        board = _Board(multiprocessing.get_context("spawn"), len(jobs))
+        board = Board(multiprocessing.get_context("spawn"), len(jobs))
         runs: list[Run] = []
         killed = False
         try:
@@ -260,7 +232,7 @@ def _run_all(
     pool: WorkerPool,
     jobs: list[Job],
     options: BenchOptions,
-    board: _Board,
+    board: Board,
     stopped: Callable[[], bool],
     progress: Progress,
 ) -> Iterable[Run]:

@@ -8,7 +8,7 @@ from firmware_sim.drive import DriveStates
 from utank_hil.base.elementary import exp
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import ControlWord, DriveFault, DriveState, Frame
-from utank_hil.canbus.profiles import drive_plan
+from utank_hil.canbus.profiles import drive_plan as cia
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.pump_curve import pump_load, pump_pressure, pump_speed
 
@@ -23,7 +23,7 @@ STEPS: Final = 2  #: Of the rotor in a tick: its load is integrated implicitly.
 HEARTBEAT_LOST: Final = 0x8130  #: Emergency code by CiA 301.
 INTERNAL_ERROR: Final = 0x6100
 _VOLTAGE, _REMOTE, _AT_LIMIT = 1 << 4, 1 << 9, 1 << 11
-_MODE_BITS: Final = sum({1 << each.number - 1 for each in drive_plan.MODES.values()})
+_MODE_BITS: Final = sum({1 << each.number - 1 for each in cia.MODES.values()})
 
 
 class CanopenPumpDrive(CanopenNode):
@@ -32,7 +32,7 @@ class CanopenPumpDrive(CanopenNode):
     name = "drive"
     period_ns = TICK_NS
 
-    def __init__(self, plant: "Plant", pump: Pump, plan: drive_plan.DrivePlan) -> None:
+    def __init__(self, plant: "Plant", pump: Pump, plan: cia.DrivePlan) -> None:
         self._plant, self._pump, self._c, self._plan = plant, pump, pump.coefficients, plan
         self._per_nm = self._per_rad_s = plan.units_per_si
         if plan.mode.torque:
@@ -40,30 +40,30 @@ class CanopenPumpDrive(CanopenNode):
         else:  # per mille of the greatest
             self._per_nm = 1000 / pump.max_torque_nm
         entries = {
-            drive_plan.CONTROL_WORD: Entry(0, 2, writable=True),
-            drive_plan.STATUS_WORD: Entry(0, 2),
-            drive_plan.MODE: Entry(0, 1, writable=True),
-            drive_plan.MODE_SHOWN: Entry(0, 1),
-            drive_plan.MODES_SUPPORTED: Entry(_MODE_BITS, 4),
-            drive_plan.SPEED: Entry(0, 4),
-            drive_plan.TORQUE: Entry(0, 2),
-            drive_plan.Place(0x6007): Entry(1, 2, writable=True),
-            drive_plan.Place(0x605A): Entry(2, 2, writable=True),
-            drive_plan.Place(0x605E): Entry(2, 2, writable=True),
-            drive_plan.Place(0x1018): Entry(4, 1),
+            cia.CONTROL_WORD: Entry(0, 2, writable=True),
+            cia.STATUS_WORD: Entry(0, 2),
+            cia.MODE: Entry(0, 1, writable=True),
+            cia.MODE_SHOWN: Entry(0, 1),
+            cia.MODES_SUPPORTED: Entry(_MODE_BITS, 4),
+            cia.SPEED: Entry(0, 4),
+            cia.TORQUE: Entry(0, 2),
+            cia.Place(0x6007): Entry(1, 2, writable=True),
+            cia.Place(0x605A): Entry(2, 2, writable=True),
+            cia.Place(0x605E): Entry(2, 2, writable=True),
+            cia.Place(0x1018): Entry(4, 1),
         }
-        for mode in drive_plan.MODES.values():
+        for mode in cia.MODES.values():
             entries[mode.target] = Entry(0, mode.bits // 8, writable=True)
             entries[mode.demand] = Entry(0, mode.bits // 8)
         for subindex in range(1, 5):
             given = plan.identity[subindex - 1] if subindex <= len(plan.identity) else None
-            entries[drive_plan.Place(0x1018, subindex)] = Entry(given or 0, 4)
+            entries[cia.Place(0x1018, subindex)] = Entry(given or 0, 4)
         for place, _ in plan.require:
             entries.setdefault(place, Entry(0, 4, writable=True))
-        cobs = {0x1400: drive_plan.RECEIVED_1, 0x1800: drive_plan.SENT_1, 0x1801: drive_plan.SENT_2}
+        cobs = {0x1400: cia.RECEIVED_1, 0x1800: cia.SENT_1, 0x1801: cia.SENT_2}
         pdos = {index: cob + plan.node for index, cob in cobs.items()}
         super().__init__(plan.node, plan.bus, entries, pdos)
-        entries[drive_plan.Place(0x1000)].value = 2 << 16 | drive_plan.PROFILE  # servo drive
+        entries[cia.Place(0x1000)].value = 2 << 16 | cia.PROFILE  # servo drive
         self._states = DriveStates()
         self._speed_rad_s = self._torque_nm = self._own_pa = 0.0
         self._limited = self._connected = False
@@ -94,7 +94,7 @@ class CanopenPumpDrive(CanopenNode):
     def taken(self, now_ns: int) -> None:  # noqa: ARG002
         """Follow the control word."""
         faulted = self._states.state is DriveState.FAULT
-        self._states.command(control_word(self.entries[drive_plan.CONTROL_WORD].value))
+        self._states.command(control_word(self.entries[cia.CONTROL_WORD].value))
         if faulted and self._states.state is not DriveState.FAULT:
             self.emergency(0)
 
@@ -104,13 +104,13 @@ class CanopenPumpDrive(CanopenNode):
         plant.advance(now_ns)
         if plant.power_cut:
             states.command(ControlWord.DISABLE_VOLTAGE)
-        entries[drive_plan.MODE_SHOWN].value = entries[drive_plan.MODE].value
+        entries[cia.MODE_SHOWN].value = entries[cia.MODE].value
         stopped = abs(plant.pressure_pa) < STOPPED_SHARE * self._pump.max_pressure_pa
         states.tick(stopped=stopped)
-        connected = self.state is drive_plan.NetworkState.OPERATIONAL and not self.lost_controller
+        connected = self.state is cia.NetworkState.OPERATIONAL and not self.lost_controller
         if self._connected and not connected and self.enabled:
             self._abort_connection()
-        failed = self.entries[drive_plan.Place(0x1001)].value
+        failed = self.entries[cia.Place(0x1001)].value
         if connected and failed and states.state is not DriveState.FAULT:
             self.emergency(0)  # the controller is heard again
         self._connected = connected
@@ -124,7 +124,7 @@ class CanopenPumpDrive(CanopenNode):
 
     def _abort_connection(self) -> None:
         """React as 6007h says."""
-        code = self.entries[drive_plan.Place(0x6007)].value
+        code = self.entries[cia.Place(0x6007)].value
         if code == 1:
             self._states.trip(DriveFault.COMMAND_TIMEOUT)
         elif code in (2, 3):
@@ -135,14 +135,8 @@ class CanopenPumpDrive(CanopenNode):
     def _turn(self) -> float:
         """Turn the rotor for a tick; return the pressure."""
         c, flow_m3_s, step_s = self._c, self._plant.flow_m3_s, TICK_S / STEPS
-        mode = next(
-            (
-                m
-                for m in drive_plan.MODES.values()
-                if m.number == self.entries[drive_plan.MODE].value
-            ),
-            None,
-        )
+        number = self.entries[cia.MODE].value
+        mode = next((each for each in cia.MODES.values() if each.number == number), None)
         aim, target = None, 0.0
         if self._states.stopping:  # its ramp ends where the water turns the rotor
             aim = pump_speed(0.0, flow_m3_s, c)
@@ -172,13 +166,13 @@ class CanopenPumpDrive(CanopenNode):
     def _show(self) -> None:
         entries = self.entries
         if not self.enabled:
-            for mode in drive_plan.MODES.values():
+            for mode in cia.MODES.values():
                 entries[mode.demand].value = 0
         bits = _REMOTE | _VOLTAGE * self._powered | _AT_LIMIT * self._limited
-        entries[drive_plan.STATUS_WORD].value = self._states.state | bits
+        entries[cia.STATUS_WORD].value = self._states.state | bits
         for place, value in (
-            (drive_plan.SPEED, self._speed_rad_s * self._per_rad_s),
-            (drive_plan.TORQUE, self._torque_nm * self._per_nm),
+            (cia.SPEED, self._speed_rad_s * self._per_rad_s),
+            (cia.TORQUE, self._torque_nm * self._per_nm),
         ):
             entries[place].value = math.floor(value + 0.5) & (1 << 8 * entries[place].size) - 1
 

@@ -6,32 +6,15 @@ from typing import Any
 
 from utank_hil.canbus import Frame
 from utank_hil.canbus.frame import BUS_SHIFT, LONGEST_ID, STANDARD
+from utank_hil.canbus.profiles import drive_plan as cia
 from utank_hil.canbus.profiles.device_plan import DevicePlan
-from utank_hil.canbus.profiles.drive_plan import (
-    ASYNCHRONOUS,
-    DISABLED,
-    EMERGENCY,
-    HEARTBEAT,
-    NMT,
-    RECEIVED_1,
-    SDO_ANSWER,
-    SDO_REQUEST,
-    SYNC,
-    Abort,
-    NetworkState,
-    NodeCommand,
-    Place,
-    parts,
-    refusal,
-    value_answer,
-    written_answer,
-)
+from utank_hil.canbus.profiles.drive_plan import NetworkState, Place
 
 MS_NS = 1_000_000
 _STATES: dict[int, NetworkState] = {
-    NodeCommand.START: NetworkState.OPERATIONAL,
-    NodeCommand.STOP: NetworkState.STOPPED,
-    NodeCommand.PRE_OPERATIONAL: NetworkState.PRE_OPERATIONAL,
+    cia.NodeCommand.START: NetworkState.OPERATIONAL,
+    cia.NodeCommand.STOP: NetworkState.STOPPED,
+    cia.NodeCommand.PRE_OPERATIONAL: NetworkState.PRE_OPERATIONAL,
     0x81: NetworkState.BOOT_UP,  # reset of the application
     0x82: NetworkState.BOOT_UP,  # and of the communication
 }
@@ -79,7 +62,7 @@ class CanopenNode:
         entries[Place(0x1017)] = Entry(0, 2, writable=True)
         for index, cob in pdos.items():
             entries[Place(index, 1)] = Entry(cob, 4, writable=True)
-            entries[Place(index, 2)] = Entry(ASYNCHRONOUS, 1, writable=True)
+            entries[Place(index, 2)] = Entry(cia.ASYNCHRONOUS, 1, writable=True)
             entries[Place(index + 0x200)] = Entry(0, 1, writable=True)
             for subindex in range(1, 9):
                 entries[Place(index + 0x200, subindex)] = Entry(0, 4, writable=True)
@@ -90,8 +73,8 @@ class CanopenNode:
     @property
     def hears(self) -> frozenset[int]:
         """Identifiers that the node takes; heartbeats are those of any node."""
-        own = (NMT, SYNC, RECEIVED_1 + self.node, SDO_REQUEST + self.node)
-        beats = (HEARTBEAT + node for node in range(1, 128) if node != self.node)
+        own = (cia.NMT, cia.SYNC, cia.RECEIVED_1 + self.node, cia.SDO_REQUEST + self.node)
+        beats = (cia.HEARTBEAT + node for node in range(1, 128) if node != self.node)
         return frozenset(self._tag | cob for cob in (*own, *beats))
 
     def receive(self, frame: Frame, now_ns: int) -> None:
@@ -99,15 +82,15 @@ class CanopenNode:
         cob, data = frame.can_id & 0x7FF, frame.data
         if frame.can_id != self._tag | cob:
             return
-        if cob == NMT and len(data) == 2 and data[1] in (0, self.node):
+        if cob == cia.NMT and len(data) == 2 and data[1] in (0, self.node):
             self.state = _STATES.get(data[0], self.state)
-        elif cob == SYNC:
+        elif cob == cia.SYNC:
             self._send_pdos(range(1, 241), self._sent)
-        elif cob == SDO_REQUEST + self.node and len(data) == 8:
+        elif cob == cia.SDO_REQUEST + self.node and len(data) == 8:
             if self.state in (NetworkState.OPERATIONAL, NetworkState.PRE_OPERATIONAL):
-                self._say(SDO_ANSWER + self.node, self._serve(data))
-        elif cob > HEARTBEAT:
-            self._beat_ns[cob - HEARTBEAT] = now_ns
+                self._say(cia.SDO_ANSWER + self.node, self._serve(data))
+        elif cob > cia.HEARTBEAT:
+            self._beat_ns[cob - cia.HEARTBEAT] = now_ns
         elif self.state is NetworkState.OPERATIONAL and (
             0x1400 in self._pdos and cob == self.entries[Place(0x1400, 1)].value
         ):  # a PDO that is disabled has another identifier
@@ -120,12 +103,12 @@ class CanopenNode:
         late_ns = (consumed & 0xFFFF) * MS_NS
         self.lost_controller = came_ns is not None and 0 < late_ns < now_ns - came_ns
         if self.state is NetworkState.BOOT_UP:
-            self._say(HEARTBEAT + self.node, bytes((NetworkState.BOOT_UP,)))
+            self._say(cia.HEARTBEAT + self.node, bytes((NetworkState.BOOT_UP,)))
             self.state = NetworkState.PRE_OPERATIONAL
         cycle_ns = self.entries[Place(0x1017)].value * MS_NS
         if cycle_ns and now_ns >= self._next_beat_ns:
             self._next_beat_ns = now_ns + cycle_ns
-            self._say(HEARTBEAT + self.node, bytes((self.state,)))
+            self._say(cia.HEARTBEAT + self.node, bytes((self.state,)))
         for index in self._sent:
             timer_ns = self.entries[Place(index, 5)].value * MS_NS
             if timer_ns and now_ns >= self._next_event_ns[index]:
@@ -143,7 +126,9 @@ class CanopenNode:
     def emergency(self, code: int) -> None:
         """Send an emergency message; 0 says that errors are over."""
         self.entries[Place(0x1001)].value = int(code != 0)
-        self._say(EMERGENCY + self.node, code.to_bytes(2, "little") + bytes((code != 0, *[0] * 5)))
+        self._say(
+            cia.EMERGENCY + self.node, code.to_bytes(2, "little") + bytes((code != 0, *[0] * 5))
+        )
 
     def taken(self, now_ns: int) -> None:
         """A PDO was taken into the entries."""
@@ -152,37 +137,39 @@ class CanopenNode:
         self._out.append(Frame(self._tag | cob, data))
 
     def _serve(self, data: bytes) -> bytes:
-        command, place, value, size = parts(data)
+        command, place, value, size = cia.parts(data)
         entry = self.entries.get(place)
         if entry is None:
             known = any(each.number == place.number for each in self.entries)
-            return refusal(place, Abort.NO_SUBINDEX if known else Abort.NO_OBJECT)
-        if command == 0x40:
-            return value_answer(place, entry.value, entry.size)
+            return cia.sdo(
+                cia.ABORT, place, cia.Abort.NO_SUBINDEX if known else cia.Abort.NO_OBJECT
+            )
+        if command == cia.READ:
+            return cia.sdo(0x43 | (4 - entry.size) << 2, place, entry.value)
         if command & 0xE2 != 0x22:
-            return refusal(place, Abort.COMMAND_UNKNOWN)
+            return cia.sdo(cia.ABORT, place, cia.Abort.COMMAND_UNKNOWN)
         abort = self._write(place, entry, value, size if command & 1 else entry.size)
-        return refusal(place, abort) if abort else written_answer(place)
+        return cia.sdo(cia.ABORT if abort else cia.WRITTEN, place, abort or 0)
 
-    def _write(self, place: Place, entry: Entry, value: int, size: int) -> Abort | None:
+    def _write(self, place: Place, entry: Entry, value: int, size: int) -> cia.Abort | None:
         if not entry.writable:
-            return Abort.READ_ONLY
+            return cia.Abort.READ_ONLY
         if size != entry.size:
-            return Abort.WRONG_LENGTH
+            return cia.Abort.WRONG_LENGTH
         if place.number - 0x200 in self._pdos:
             if not place.subindex:
                 mapping = [self.entries.get(Place(place.number, n + 1)) for n in range(value)]
                 if sum(64 if each is None else each.value & 0xFF for each in mapping) > 64:
-                    return Abort.TOO_LONG_A_PDO
+                    return cia.Abort.TOO_LONG_A_PDO
             elif self.entries[Place(place.number)].value:
-                return Abort.NOT_IN_THIS_STATE
+                return cia.Abort.NOT_IN_THIS_STATE
             else:
                 what = self.entries.get(Place(value >> 16, value >> 8 & 0xFF))
                 if what is None or 8 * what.size != value & 0xFF:
-                    return Abort.NOT_TO_BE_MAPPED
+                    return cia.Abort.NOT_TO_BE_MAPPED
         cob = self._pdos.get(place.number, -1) if place.subindex == 1 else -1
-        if cob >= 0 and value & ~DISABLED != cob:
-            return Abort.VALUE_OUT_OF_RANGE
+        if cob >= 0 and value & ~cia.DISABLED != cob:
+            return cia.Abort.VALUE_OUT_OF_RANGE
         entry.value = value
         return None
 
@@ -206,7 +193,7 @@ class CanopenNode:
             return
         for index in indices:
             cob = self.entries[Place(index, 1)].value
-            if cob & DISABLED or self.entries[Place(index, 2)].value not in kinds:
+            if cob & cia.DISABLED or self.entries[Place(index, 2)].value not in kinds:
                 continue
             entries = self._mapped(index + 0x200)
             content = b"".join(each.value.to_bytes(each.size, "little") for each in entries)

@@ -4,11 +4,13 @@ In simulated time, or in real time: in one process, or in two on a real bus.
 """
 
 import math
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from multiprocessing.context import SpawnContext
 from pathlib import Path
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -44,15 +46,41 @@ SECOND_NS: Final = 1_000_000_000
 RECORD_NS: Final = ROW_TICKS * TICK_NS
 RECORD_S: Final = RECORD_NS / SECOND_NS
 COLUMNS: Final = (*SIGNALS, *TRUTH[1:])
+READY_POLL_S: Final = 0.01  #: Polling interval of each side in s: one tick.
 FRAME_BLOCK_NS: Final = 10 * SECOND_NS
 """Time span of a block in a frame log in simulated time: each block waits for the disk."""
 
 
-class Watch(Protocol):
-    """Observer of a run under way."""
+class Board:
+    """Shared memory through which the bench and the processes of its runs communicate."""
+
+    def __init__(self, context: SpawnContext, runs: int) -> None:
+        self.done_s = [context.Value("d", 0.0, lock=False) for _ in range(runs)]
+        self.stop = context.Value("b", False, lock=False)
+        self.ready = context.Value("i", 0)
+        self.begin_ns = context.Value("q", 0, lock=False)
+
+
+class Watch:
+    """The bench's view of a run, and its start where there is one process for each side."""
+
+    def __init__(self, board: Board, index: int) -> None:
+        self._board = board
+        self._done_s = board.done_s[index]
 
     def stopped(self, done_s: float) -> bool:
         """Record the progress; return whether the run shall end now."""
+        self._done_s.value = done_s
+        return bool(self._board.stop.value)
+
+    def begin_ns(self) -> int:
+        """Report that this side is ready; return the common start on the monotonic clock."""
+        board = self._board
+        with board.ready.get_lock():
+            board.ready.value += 1
+        while not board.begin_ns.value and not board.stop.value:
+            time.sleep(READY_POLL_S)
+        return int(board.begin_ns.value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,13 +302,6 @@ def side_by_side(shown_rows: FloatArray, truth: FloatArray, shift_s: float = 0.0
     return np.hstack([truth[shown, :1], shown_rows[nearest[shown], 1:], truth[shown, 1:]])
 
 
-class Meeting(Watch, Protocol):
-    """Watch of a run in two processes, which synchronizes their start."""
-
-    def begin_ns(self) -> int:
-        """Report that this side is ready; return the common start on the monotonic clock."""
-
-
 def run_in_one_process(job: Job, watch: Watch | None = None) -> Run:
     """Run with all nodes in one loop, without a bus."""
     ship, truth, truth_log = _ship_of(job)
@@ -291,19 +312,19 @@ def run_in_one_process(job: Job, watch: Watch | None = None) -> Run:
     return join(job.name, ship_run(ship, truth, truth_log), its)
 
 
-def run_ship(job: Job, channel: str, meeting: Meeting) -> ShipRun:
+def run_ship(job: Job, channel: str, watch: Watch) -> ShipRun:
     """Run the ship's side on a SocketCAN interface."""
     ship, truth, truth_log = _ship_of(job)
     nodes: list[runners.Node] = [*ship.nodes, truth]
-    _run_loop(job, nodes, channel, runners.LoopStatistics(), meeting, meeting.begin_ns)
+    _run_loop(job, nodes, channel, runners.LoopStatistics(), watch)
     return ship_run(ship, truth, truth_log)
 
 
-def run_controller(job: Job, channel: str, meeting: Meeting) -> ControllerRun:
+def run_controller(job: Job, channel: str, watch: Watch) -> ControllerRun:
     """Run the controller's side on a SocketCAN interface."""
     statistics = runners.LoopStatistics()
     with _real_time_controller(job, statistics) as (controller, log, node):
-        _run_loop(job, [node], channel, statistics, meeting, meeting.begin_ns)
+        _run_loop(job, [node], channel, statistics, watch)
     return controller_run(controller, log, statistics)
 
 
@@ -350,7 +371,6 @@ def _run_loop(
     channel: str | None,
     statistics: runners.LoopStatistics,
     watch: Watch | None,
-    begin_ns: Callable[[], int] | None = None,
 ) -> None:
     foreign = job.controller.vessel.foreign
     port = None if channel is None else ship_port(channel, nodes, foreign)
@@ -362,8 +382,8 @@ def _run_loop(
 
     try:
         with runners.real_time_scheduling():
-            if begin_ns is not None:  # called last: from here on nothing is loaded or built
-                runners.MonotonicClock().sleep_until(begin_ns())
+            if port is not None and watch is not None:  # last: from here on nothing is built
+                runners.MonotonicClock().sleep_until(watch.begin_ns())
             loop.run(stop, job.ticks * TICK_NS)
     finally:
         if port is not None:

@@ -3,7 +3,7 @@
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -95,6 +95,8 @@ class Driver:
                     one_thread_each(),
                     WorkerPool(workers, None) as pool,
                 ):
+                    while self._suspected:  # one at a time: that shows which kills its process
+                        self._compute_alone(pool, self._suspected.popleft())
                     self._compute(pool, AHEAD * workers)
         finally:
             self._write()
@@ -105,24 +107,10 @@ class Driver:
 
         with Client(scheduler, timeout=CONNECT_S) as client:
             workers = len(client.scheduler_info(n_workers=-1)["workers"])
-            executor = client.get_executor(pure=False)
-            sent: dict[Future[list[Row]], list[Case]] = {}
-            while True:
-                while len(sent) < AHEAD * max(1, workers) and (cases := self._next()):
-                    sent[executor.submit(self.work, batch_of(self.loaded, cases))] = cases
-                if not sent:
-                    return
-                for future in wait(sent, return_when=FIRST_COMPLETED).done:
-                    cases = sent.pop(future)
-                    try:
-                        rows = future.result()
-                    except KilledWorker:  # Dask has tried it on several workers
-                        rows = [failed_row(case.name, LOST, KILLED) for case in cases]
-                    self._take(rows)
+            # Dask has tried a batch that kills its worker on several
+            self._compute(client.get_executor(pure=False), AHEAD * max(1, workers), KilledWorker)
 
-    def _compute(self, pool: WorkerPool, most: int) -> None:
-        while self._suspected:  # one at a time, which shows the batch that kills its process
-            self._compute_alone(pool, self._suspected.popleft())
+    def _compute(self, pool: Executor, most: int, *killed: type[Exception]) -> None:
         sent: dict[Future[list[Row]], list[Case]] = {}
         try:
             while True:
@@ -131,7 +119,10 @@ class Driver:
                 if not sent:
                     return
                 for future in wait(sent, return_when=FIRST_COMPLETED).done:
-                    self._take(future.result())
+                    try:
+                        self._take(future.result())
+                    except killed:
+                        self._lose(sent[future])
                     del sent[future]
         except BrokenProcessPool:
             self._suspected += sent.values()
@@ -141,10 +132,13 @@ class Driver:
         try:
             self._take(pool.submit(self.work, batch_of(self.loaded, cases)).result())
         except BrokenProcessPool:
-            self._take([failed_row(case.name, LOST, KILLED) for case in cases])
+            self._lose(cases)
             raise
 
-    def _submit(self, pool: WorkerPool, cases: list[Case]) -> Future[list[Row]]:
+    def _lose(self, cases: list[Case]) -> None:
+        self._take([failed_row(case.name, LOST, KILLED) for case in cases])
+
+    def _submit(self, pool: Executor, cases: list[Case]) -> Future[list[Row]]:
         try:
             return pool.submit(self.work, batch_of(self.loaded, cases))
         except BrokenProcessPool:

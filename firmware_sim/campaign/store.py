@@ -17,8 +17,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from firmware_sim.campaign.metrics import METRICS as METRICS
 from firmware_sim.campaign.simulations import LOST, Row
+from firmware_sim.campaign.study import METRICS as METRICS
 from firmware_sim.campaign.study import LoadedStudy
 from utank_hil.base.whole_file import errors_name, left_whole
 

@@ -17,15 +17,9 @@ from utank_hil.configuration.error_words import nearest
 SECOND_NS: Final = 1_000_000_000
 LONGEST_FAULT_S: Final = 86_400.0  #: Latest time of a fault: a day, the longest run of a scenario.
 
-NODE_OF: Final = {
-    Address.SENSORS: "sensors",
-    Address.DRIVE: "drive",
-    Address.VALVE: "valve",
+NODE_OF: Final[dict[Address, str]] = {
+    **{each: each.name.lower() for each in Address if each is not Address.OPERATOR_2},
     Address.OPERATOR: "panel",
-    Address.SENSORS_2: "sensors_2",
-    Address.HARDWIRED: "hardwired",
-    Address.PREVIEW: "preview",
-    Address.CONTROLLER: "controller",
 }  #: Name of the emulated node at an address.
 
 

@@ -22,7 +22,7 @@ import numpy as np
 import yaml
 
 from firmware_sim.bench import jobs_of
-from firmware_sim.run import join, run_controller, run_ship
+from firmware_sim.run import Watch, join, run_controller, run_ship
 from firmware_sim.scenario import Scenario
 from tools.printing import command_line, show
 from tools.vcan_launcher.linux import can_is_usable, create_vcan
@@ -45,7 +45,7 @@ PATIENT: Final = {"overruns_in_ten": None, "long_overrun_ms": 1000, **dict.fromk
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class Start(Watch):
     """The time at which both sides begin."""
 
     at_ns: int

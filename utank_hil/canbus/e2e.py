@@ -16,7 +16,7 @@ So eight bytes take four table look-ups: byte 1 with the data ID and all constan
 message, bytes 2 to 7 in pairs in the tables `WORD_TABLES`.
 """
 
-from functools import reduce
+from functools import cache, reduce
 from operator import xor
 from typing import Final
 
@@ -25,15 +25,17 @@ DATA_ID_COUNT: Final = 16
 _COUNTER_BITS: Final = (0x06, 0x03, 0x0A, 0x11)
 
 
-def _shifted(crc: int) -> int:
-    """Advance the CRC register by one byte of zeros."""
+@cache
+def crc_table(polynomial: int) -> bytes:
+    """Register of a CRC-8 after each byte, from a register of zero."""
+    table = list(range(256))
     for _ in range(8):
-        crc = ((crc << 1) ^ POLYNOMIAL) & 0xFF if crc & 0x80 else crc << 1
-    return crc
+        table = [((crc << 1) ^ polynomial) & 0xFF if crc & 0x80 else crc << 1 for crc in table]
+    return bytes(table)
 
 
 #: Contribution of the last byte to the CRC register.
-_BYTE_TABLE: Final = bytes(_shifted(crc) for crc in range(256))
+_BYTE_TABLE: Final = crc_table(POLYNOMIAL)
 
 
 def crc8(data: bytes) -> int:

@@ -1,8 +1,6 @@
 """``utank-hil replay``: gives recorded inputs to the controller again."""
 
-import json
 import math
-import sys
 from contextlib import nullcontext
 from dataclasses import asdict
 from itertools import groupby
@@ -16,7 +14,16 @@ from utank_hil.base.finite import finite
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import kernels, machine
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.console.common import AllowCode, Channel, Json, argument, fail, load, option
+from utank_hil.console.common import (
+    AllowCode,
+    Channel,
+    Json,
+    argument,
+    fail,
+    load,
+    option,
+    print_json,
+)
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, say_note
 from utank_hil.telemetry.bus_files.log import BusLog
@@ -93,7 +100,7 @@ def replay(
         content = _as_json(result, why, cut, law, elsewhere)
         if explained is not None:
             content["explained"] = [number._asdict() for number in numbers]
-        sys.stdout.write(json.dumps(content) + "\n")
+        print_json(content)
     else:
         console = Terminal()
         if elsewhere:

@@ -10,18 +10,8 @@ from typing import Any, Final
 
 from utank_hil.base.text_files import open_content
 from utank_hil.canbus import profiles
-from utank_hil.canbus.profiles.drive_plan import (
-    CONTROL_WORD,
-    DISABLED,
-    HEARTBEAT_PRODUCER,
-    MODES,
-    MODES_SUPPORTED,
-    PROFILE,
-    SPEED,
-    STATUS_WORD,
-    TORQUE,
-    Place,
-)
+from utank_hil.canbus.profiles import drive_plan as cia
+from utank_hil.canbus.profiles.drive_plan import MODES, Place
 from utank_hil.configuration.error_words import nearest
 from utank_hil.configuration.yaml_text import parse_yaml
 
@@ -116,7 +106,7 @@ class Eds:
         if found is None:
             raise self._error(Place(settings, 1), f"has no value: {name} is not in this device")
         cob, relative = found
-        if cob & DISABLED:
+        if cob & cia.DISABLED:
             reason = f"has bit 31: {name} is off as delivered. Turn it on in device and file"
             raise self._error(Place(settings, 1), reason)
         kind = self.number(Place(settings, 2))
@@ -230,8 +220,8 @@ def drive_with_eds(content: dict[str, Any]) -> dict[str, Any]:
     _same_node(eds, content)
     rest = {key: value for key, value in content.items() if key != "eds"}
     kind = eds.number(Place(0x1000)) & 0xFFFF
-    if kind != PROFILE:
-        raise ValueError(f"eds: {eds.file}: 1000h:0 says profile {kind}; a drive has {PROFILE}")
+    if kind != cia.PROFILE:
+        raise ValueError(f"eds: {eds.file}: 1000h:0 says profile {kind}; a drive has {cia.PROFILE}")
     if eds.entry(Place(0x1016, 1)) is None:
         reason = "the drive would run on after the controller's end. Take one that watches it"
         raise ValueError(f"eds: {eds.file}: there is no 1016h (heartbeat consumer): {reason}")
@@ -242,16 +232,23 @@ def drive_with_eds(content: dict[str, Any]) -> dict[str, Any]:
 
 def _lacking(eds: Eds, content: dict[str, Any]) -> Iterator[str]:
     """What the controller would refuse at its start, since the drive's file has it otherwise."""
-    mode, able = MODES.get(str(content.get("mode"))), eds.number(MODES_SUPPORTED)
+    mode, able = MODES.get(str(content.get("mode"))), eds.number(cia.MODES_SUPPORTED)
     if mode is None:
         return  # refused elsewhere
     if able and not able >> mode.number - 1 & 1:
         others = [name for name, each in MODES.items() if able >> each.number - 1 & 1]
         others_said = f"choose {' or '.join(others)}" if others else "take another drive"
-        yield f"{MODES_SUPPORTED} is {able:#x}, without mode {content['mode']}: {others_said}"
-    echo = mode.demand if content.get("echo") == "demand" else CONTROL_WORD
-    needs = (CONTROL_WORD, echo, mode.target, STATUS_WORD, SPEED, HEARTBEAT_PRODUCER)
-    for place in (*needs, *[TORQUE] * mode.torque):
+        yield f"{cia.MODES_SUPPORTED} is {able:#x}, without mode {content['mode']}: {others_said}"
+    echo = mode.demand if content.get("echo") == "demand" else cia.CONTROL_WORD
+    needs = (
+        cia.CONTROL_WORD,
+        echo,
+        mode.target,
+        cia.STATUS_WORD,
+        cia.SPEED,
+        cia.HEARTBEAT_PRODUCER,
+    )
+    for place in (*needs, *[cia.TORQUE] * mode.torque):
         if eds.entry(place) is None:
             ways = place == echo or place == mode.target
             remedy = "choose another echo or mode" if ways else "take another drive or firmware"

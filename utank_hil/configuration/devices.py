@@ -13,21 +13,13 @@ from utank_hil.canbus.catalogue import load_catalogue
 from utank_hil.canbus.enumerations import Address
 from utank_hil.canbus.frame import BUS_SHIFT, MOST_BUSES, STANDARD, Frame
 from utank_hil.canbus.line_names import LINES
+from utank_hil.canbus.profiles import drive_plan as cia
 from utank_hil.canbus.profiles.acting import PROOF
 from utank_hil.canbus.profiles.device_plan import (
     COMMANDS,
     Authentication,
     DevicePlan,
     ForeignDevices,
-)
-from utank_hil.canbus.profiles.drive_plan import (
-    HEARTBEAT,
-    HEARTBEAT_CONSUMER,
-    SDO_ANSWER,
-    SENT_1,
-    SENT_2,
-    NetworkState,
-    Step,
 )
 from utank_hil.canbus.profiles.field import SignalPlan
 from utank_hil.configuration.device_section import NATIVE_NODE, DeviceSection
@@ -50,7 +42,7 @@ from utank_hil.dynamics.valves import Valve
 from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.safety.safety_limits import SafetyLimits
 
-_OF_DRIVE: Final = (SENT_1, SENT_2, SDO_ANSWER)
+_OF_DRIVE: Final = (cia.SENT_1, cia.SENT_2, cia.SDO_ANSWER)
 """What the controller itself has the drive send, by function (CiA 301)."""
 MOST_CYCLE_MS: Final = 50.0
 """The monitors look at motion and levels every 50 ms and take a gap of 100 ms as a loss: below 20
@@ -131,7 +123,9 @@ class ValveSection(DeviceSection):
             signals.append(SignalPlan(place, field, factor, each.offset, each.sign, -1e300, 1e300))
         told = next(each for each in plan.messages if each.name == self.told)
         tag = bus << BUS_SHIFT | STANDARD
-        beat = Frame(tag | HEARTBEAT + self.controller_node, bytes((NetworkState.OPERATIONAL,)))
+        beat = Frame(
+            tag | cia.HEARTBEAT + self.controller_node, bytes((cia.NetworkState.OPERATIONAL,))
+        )
         return replace(
             plan,
             messages=tuple(each for each in plan.messages if each is not told),
@@ -139,11 +133,11 @@ class ValveSection(DeviceSection):
             beat=beat if plan.steps else None,
         )
 
-    def _steps(self) -> Iterator[Step]:
+    def _steps(self) -> Iterator[cia.Step]:
         yield from super()._steps()
         consumed = self.controller_node << 16 | self.heartbeat_ms
         remedy = "a valve that does not watch the controller's heartbeat stays where it is"
-        yield Step(HEARTBEAT_CONSUMER, consumed, f"{remedy}: take another one")
+        yield cia.Step(cia.HEARTBEAT_CONSUMER, consumed, f"{remedy}: take another one")
 
 
 class PanelSection(DeviceSection):

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any, Final, Generic, TypeVar
 
+from utank_hil.canbus.e2e import crc_table
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD, Frame
 from utank_hil.canbus.messages import (
     OperatorCommand,
@@ -51,23 +51,11 @@ class Crc8:
 
     def of(self, data: bytes) -> int:
         """The checksum that belongs into the frame."""
-        register, table = self.start, _table(self.polynomial)
+        register, table = self.start, crc_table(self.polynomial)
         for place, byte in enumerate(data):
             if place != self.byte:
                 register = table[register ^ byte]
         return register ^ self.final
-
-
-@cache
-def _table(polynomial: int) -> bytes:
-    """The register after each byte, from a register of zero."""
-    after = []
-    for register in range(256):
-        for _ in range(8):
-            register = (register << 1) ^ (polynomial if register & 0x80 else 0)
-            register &= 0xFF
-        after.append(register)
-    return bytes(after)
 
 
 @dataclass(frozen=True, slots=True)

@@ -99,32 +99,22 @@ class Answer(NamedTuple):
     abort: int = 0
 
 
+READ, WRITTEN, ABORT = 0x40, 0x60, 0x80
+"""Commands of SDO frames: a client's request of a value, a server's answers to a write request."""
+
+
 def read_request(place: Place) -> bytes:
     """Request of an entry's value."""
-    return _sdo(0x40, place, 0)
+    return sdo(READ, place, 0)
 
 
 def write_request(place: Place, value: int, size: int) -> bytes:
     """Request to write an entry of one to four bytes, expedited."""
-    return _sdo(0x23 | (4 - size) << 2, place, value & (1 << 8 * size) - 1)
+    return sdo(0x23 | (4 - size) << 2, place, value & (1 << 8 * size) - 1)
 
 
-def value_answer(place: Place, value: int, size: int) -> bytes:
-    """A server's answer to `read_request`, expedited."""
-    return _sdo(0x43 | (4 - size) << 2, place, value)
-
-
-def written_answer(place: Place) -> bytes:
-    """A server's answer to `write_request`."""
-    return _sdo(0x60, place, 0)
-
-
-def refusal(place: Place, abort: int) -> bytes:
-    """A server's abort."""
-    return _sdo(0x80, place, abort)
-
-
-def _sdo(command: int, place: Place, value: int) -> bytes:
+def sdo(command: int, place: Place, value: int) -> bytes:
+    """An SDO frame, CiA 301 7.2.4.3, expedited."""
     head = bytes((command, place.number & 0xFF, place.number >> 8, place.subindex))
     return head + value.to_bytes(4, "little")
 
@@ -141,9 +131,9 @@ def answer(data: bytes) -> Answer | None:
     if len(data) != 8:
         return None
     command, place, value, size = parts(data)
-    if command == 0x80:
+    if command == ABORT:
         return Answer(place, abort=int.from_bytes(data[4:8], "little"))
-    if command == 0x60:
+    if command == WRITTEN:
         return Answer(place)
     # an entry longer than four bytes (no expedited bit) is none that is asked for
     return Answer(place, value, size) if command & 0xE2 == 0x42 else None

@@ -11,7 +11,7 @@ from typing import Any, Final
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus.frame import BUS_SHIFT, STANDARD
 from utank_hil.canbus.line_names import LINES
-from utank_hil.canbus.profiles import drive_plan
+from utank_hil.canbus.profiles import drive_plan as cia
 from utank_hil.canbus.profiles.device import STATUS_CYCLES
 from utank_hil.canbus.profiles.device_plan import Crc8, DevicePlan, ForeignDevices, MessagePlan
 from utank_hil.canbus.profiles.field import Field, SignalPlan
@@ -164,14 +164,14 @@ def _rows(plan: DevicePlan[Any], stream: Stream) -> Iterator[GuardPart]:
                 yield _row(message, stream, MOVES, field, old)
 
 
-def _drive_rows(plan: drive_plan.DrivePlan) -> Iterator[GuardPart]:
+def _drive_rows(plan: cia.DrivePlan) -> Iterator[GuardPart]:
     own = plan.bus << BUS_SHIFT | STANDARD | plan.node
     for stream, cob, entries in (
-        (Stream.COMMAND, drive_plan.RECEIVED_1, plan.received),
-        (Stream.DRIVE, drive_plan.SENT_1, plan.sent),
+        (Stream.COMMAND, cia.RECEIVED_1, plan.received),
+        (Stream.DRIVE, cia.SENT_1, plan.sent),
     ):
         length = sum(bits for _, bits in entries) // 8
-        message = MessagePlan("", (own + cob,), length, drive_plan.COMMAND_MS * 1_000_000)
+        message = MessagePlan("", (own + cob,), length, cia.COMMAND_MS * 1_000_000)
         yield _row(message, stream, 0, Field(0, 8, length), 1)  # all that counts of the word
 
 
