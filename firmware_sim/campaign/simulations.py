@@ -5,7 +5,7 @@ import json
 import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from typing import Final
 
@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from firmware_sim.bench import run_in_turn
-from firmware_sim.campaign.study import Content, as_text, changed, code_digest
+from firmware_sim.campaign.study import METRICS, Content, as_text, changed, code_digest
 from firmware_sim.figures import LEAST_ROLL_RAD, NO_TANK, bare_figures, run_figures
 from firmware_sim.prediction import active_run, noise_of
 from firmware_sim.run import RECORD_S, roll_without_tank
@@ -36,7 +36,6 @@ from utank_hil.nodes.signals import ROW_TICKS
 Row = dict[str, str | float]
 Laws = Mapping[str, BuiltLaw]
 CAPSIZED: Final = "capsized"
-_NO_VALVE: Final = "vessel.valve is moved by simulation: bus alone: take that"
 _NO_FIGURE: Final = math.nan
 _LEVEL, _LEVEL_RATE = STATES.index("level_m"), STATES.index("level_rate_m_s")
 
@@ -66,6 +65,11 @@ def rows_of(simulation: str, scenario: Scenario, seed: int, laws: Laws) -> list[
         return _on_the_bus(scenario, seed, laws)
     if scenario.faults:
         raise ValueError("faults befall bus and nodes, which simulation: bus alone has: take that")
+    if scenario.vessel.valve:
+        raise ValueError("vessel.valve is moved by simulation: bus alone: take that")
+    for name, law in laws.items():
+        if law.commands != (PRESSURE,):
+            raise ValueError(f"controllers.{name} moves a valve: take simulation: bus")
     records = {"linear": _linear, "nonlinear": _nonlinear}[simulation](scenario, seed, laws)
     return _judged(scenario, list(records))
 
@@ -79,10 +83,8 @@ def _on_the_bus(scenario: Scenario, seed: int, laws: Laws) -> list[Row]:
             continue
         mark = "" if run.mark is None else run.mark.word
         row = _row(run.name, mark, run.roll, run.pump, run.strikes)
-        row["roll_below_no_tank"] = _number(run.roll_below_no_tank)
-        row["roll_below_passive"] = _number(run.roll_below_passive)
-        row["active_share"] = _number(run.active_share)
-        rows.append(row)
+        shares = ("roll_below_no_tank", "roll_below_passive", "active_share")
+        rows.append(row | {key: _number(getattr(run, key)) for key in shares})
     return rows
 
 
@@ -118,21 +120,15 @@ def _row(
     pump: statistics.PumpStatistics | None = None,
     strikes: float = _NO_FIGURE,
 ) -> Row:
-    row: Row = {
-        "run": name,
-        "mark": mark,
+    row: Row = {"run": name, "mark": mark, **dict.fromkeys(METRICS, _NO_FIGURE)}
+    row |= {
         "roll_rms_rad": roll.rms_rad,
         "roll_significant_rad": _number(roll.significant_rad),
         "roll_max_rad": roll.maximum_rad,
-        "roll_below_no_tank": _NO_FIGURE,
-        "roll_below_passive": _NO_FIGURE,
         "strikes": float(strikes),
-        "active_share": _NO_FIGURE,
     }
-    for key in ("level_peak_m", "pressure_rms_pa", "pressure_peak_pa", "power_mean_w",
-                "power_peak_w"):  # fmt: skip
-        row[key] = _NO_FIGURE if pump is None else getattr(pump, key)
-    return row
+    pumped = {} if pump is None else asdict(pump)
+    return row | {key: value for key, value in pumped.items() if key in METRICS}
 
 
 def _number(value: float | None) -> float:
@@ -144,8 +140,6 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
     ship, tank = scenario.ship_at(0.0), scenario.vessel.tank
     later = scenario.actual_ship and scenario.actual_from_s > 0
     changes = later or scenario.voyage or len(scenario.sea.spectra) > 1
-    if scenario.vessel.valve:
-        raise ValueError(_NO_VALVE)
     for wrong, why in (
         (changes, "keeps ship, course and sea"),
         (ship.heeling_moment_nm, "knows no steady heel"),
@@ -165,8 +159,6 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
     yield _Record(PASSIVE, passive[:-1, 0], passive[:-1, _LEVEL], at_rest, at_rest)
     for name, controller in scenario.controllers.items():
         law, plant = laws[name], controller.plant
-        if law.commands != (PRESSURE,):
-            raise ValueError(f"controllers.{name} moves a valve: take simulation: bus")
         run = simulate_loop(
             DesignPlant(ship, tank, plant.delay_s, plant.lag_s, plant.limits),
             in_ticks,
@@ -183,8 +175,6 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
 
 def _nonlinear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
     """Simulate the bench's plant with law, limiter, level observer and sensor noise."""
-    if scenario.vessel.valve:
-        raise ValueError(_NO_VALVE)
     count = round(scenario.duration_s / RECORD_S)
     at_rest, own = np.zeros(count), DesignPlant(scenario.vessel.ship, scenario.vessel.tank)
     roll_rad, capsized_s = roll_without_tank(scenario, seed, count)
@@ -193,8 +183,6 @@ def _nonlinear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
     passive = next(iter(plants.values()), own)
     for name, plant in {PASSIVE: passive, **plants}.items():
         law = laws[name] if name in laws else PassiveDesign().build(plant)
-        if law.commands != (PRESSURE,):
-            raise ValueError(f"controllers.{name} moves a valve: take simulation: bus")
         kept, ship = active_run(scenario, plant, law, seed, count)
         roll, level, pressure, power = (
             kept[key] for key in ("roll_rad", "level_m", "pressure_pa", "power_w")

@@ -63,9 +63,7 @@ class Stopping:
             by_case.setdefault(row["case"], []).append(row)
         for name, of_case in by_case.items():
             if name in self._group_of:
-                self._figures[name] = figures_of(
-                    (row for row in of_case if row["run"]), self._stop.metric
-                )
+                self._figures[name] = figures_of(of_case, self._stop.metric)
         for group in {self._group_of[name] for name in by_case if name in self._group_of}:
             self._judge(group)
 

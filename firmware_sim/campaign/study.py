@@ -114,6 +114,8 @@ _EVERY: Final = "*"
 class OverrideError(ValueError):
     """Error for a key that the scenario does not have; the message begins with a verb."""
 
+    key: str  #: The override that names it, in `changed`.
+
 
 def changed(content: Content, values: Mapping[str, Any]) -> Content:
     """Return a copy of a scenario's content with other values at some dotted keys.
@@ -125,9 +127,12 @@ def changed(content: Content, values: Mapping[str, Any]) -> Content:
     """
     new: Content = values.get(WHOLE, content)
     for key, value in values.items():
-        if key != WHOLE:
-            for path in list(_paths(new, key.split("."))):
+        try:
+            for path in [] if key == WHOLE else list(_paths(new, key.split("."))):
                 new = _with(new, path, value)
+        except OverrideError as error:
+            error.key = key
+            raise
     return new
 
 
@@ -306,7 +311,8 @@ def load_study(path: Path, *, allow_code: bool = False) -> LoadedStudy:
         try:
             content = changed(study.scenario, values)
         except OverrideError as error:
-            raise ConfigError([_at_override(path, study, values, str(error))]) from error
+            refused = ConfigProblem(path, _place(study, error.key), str(error))
+            raise ConfigError([refused]) from error
         cases.append(
             Case(
                 index,
@@ -401,14 +407,3 @@ def _place(study: Study, key: str) -> str:
             places["random.table"] = study.random.samples_drawn()[0]
     places |= {f"cases.{index}": each for index, each in enumerate(study.cases)}
     return next((f"{name}.{key}" for name, keys in places.items() if key in keys), key)
-
-
-def _at_override(path: Path, study: Study, values: Content, reason: str) -> ConfigProblem:
-    so_far = {}
-    for key, value in values.items():
-        so_far[key] = value
-        try:
-            changed(study.scenario, so_far)
-        except OverrideError as error:
-            return ConfigProblem(path, _place(study, key), str(error))
-    return ConfigProblem(path, "", reason)

@@ -120,10 +120,8 @@ def bench(
 def _write_fmu(path: Path, scenario: "Scenario", fmu: Path, seed: int) -> None:
     from firmware_sim.fmu_export import write_fmu
 
-    try:
+    with common.failing(OSError), common.failing(ValueError, at=path):
         write_fmu(scenario, fmu, seed)
-    except (OSError, ValueError) as error:
-        common.fail(f"{path}: {error}" if isinstance(error, ValueError) else error)
     terminal.notes.say(f"{terminal.shown(fmu)}: FMI 2 for co-simulation, with its source")
 
 
