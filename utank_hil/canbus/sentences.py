@@ -7,6 +7,8 @@ A frame has no more than the profiles take of a sentence.
 import re
 import struct
 from collections.abc import Callable, Iterator
+from functools import reduce
+from operator import xor
 from typing import Final
 
 from utank_hil.canbus.frame import STANDARD, Frame
@@ -42,12 +44,9 @@ _PARTS: Final = struct.Struct("<Bhhh")  #: Status, roll, pitch, heave of the lat
 _ANGLES: Final = struct.Struct("<ii")
 
 
-def _checksum(body: bytes) -> int:
-    """NMEA 0183: exclusive or of all bytes between ``$`` and ``*``."""
-    result = 0
-    for byte in body:
-        result ^= byte
-    return result
+def checksum(body: bytes) -> str:
+    """NMEA 0183: exclusive or of all bytes between ``$`` and ``*``, two hexadecimal digits."""
+    return f"{reduce(xor, body, 0):02X}"
 
 
 def _psxn(sentence: bytes) -> Frame | None:
@@ -56,7 +55,7 @@ def _psxn(sentence: bytes) -> Frame | None:
         return None
     spoilt = Frame(STANDARD | int(sentence[6:8], 16), b"")
     found = _PSXN.fullmatch(sentence)
-    if found is None or _checksum(found[1]) != int(found[4], 16):
+    if found is None or checksum(found[1]) != found[4].decode().upper():
         return spoilt
     fields = found[3].split(b",")
     if len(fields) != 4 or not all(not each or _NUMBER.fullmatch(each) for each in fields):
@@ -135,7 +134,7 @@ def sentence(frame: Frame) -> bytes:
         quality = can_id == PSXN_QUALITY
         body = ",".join(str(min(each, 2)) for each in data) if quality else _said_psxn(data)
         said = f"PSXN,{can_id & 0xFF:02x},{body}".encode()
-        return b"$%b*%02X\r\n" % (said, _checksum(said))
+        return b"$%b*%b\r\n" % (said, checksum(said).encode())
     if can_id not in (TSS1, EM3000):
         raise ValueError(f"{can_id & ~STANDARD:#x} stands for no sentence")
     status, roll, pitch, heave = _PARTS.unpack(data)

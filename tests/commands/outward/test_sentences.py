@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from utank_hil.canbus import AlarmState, Fault, Mode
 from utank_hil.canbus.events import AlarmEvent
+from utank_hil.canbus.sentences import checksum
 from utank_hil.commands.outward.alerts import (
     Alerts,
     Framing,
     alert_command,
-    checksum,
     sentence,
     text_field,
     title,
@@ -77,14 +77,14 @@ def event(code: Fault, state: AlarmState | None) -> AlarmEvent:
 
 def command(letter: str, identifier: str, *, manufacturer: str = "", flag: str = "C") -> str:
     body = f"BNACN,120000.00,{manufacturer},{identifier},1,{letter},{flag}"
-    return f"${body}*{checksum(body)}\r\n"
+    return f"${body}*{checksum(body.encode())}\r\n"
 
 
 def test_the_checksum_is_that_of_published_sentences() -> None:
     # a sentence and a tag block as receivers of others give them
-    assert checksum("HEHDT,119.9,T") == "2F"
+    assert checksum(b"HEHDT,119.9,T") == "2F"
     block = "g:1-2-73874,n:157036,s:r003669945,c:1241544035"
-    assert checksum(block) == "4A"
+    assert checksum(block.encode()) == "4A"
 
 
 @pytest.mark.parametrize("row", FAULTS, ids=lambda row: row.code.name)
@@ -219,7 +219,7 @@ def test_datagrams_of_61162_450_carry_source_line_and_group() -> None:
         for line in datagram[6:].decode().splitlines():
             _, block, text = line.split("\\")
             content, _, digits = block.partition("*")
-            assert int(digits, 16) == int(checksum(content), 16)
+            assert int(digits, 16) == int(checksum(content.encode()), 16)
             assert text.startswith("$U0ALC")
             blocks.append(content)
     assert blocks == [

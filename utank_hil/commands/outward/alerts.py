@@ -8,13 +8,12 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from functools import reduce
 from itertools import chain
-from operator import xor
 from typing import Final
 
 from utank_hil.canbus import AlarmState, Fault
 from utank_hil.canbus.events import AlarmEvent
+from utank_hil.canbus.sentences import checksum
 from utank_hil.safety.alarms import Gravity, gravest
 from utank_hil.safety.faults import FAULTS
 
@@ -28,15 +27,10 @@ _SENTENCE: Final = re.compile(r"\$([^$*!\\\r\n]*)\*([0-9A-Fa-f]{2})")
 _LINE: Final = re.compile(r"\\([^\\\r\n]*)\*([0-9A-Fa-f]{2})\\(.*)")
 
 
-def checksum(text: str) -> str:
-    """Exclusive or of the characters between $ and *, two hexadecimal digits."""
-    return f"{reduce(xor, text.encode('ascii'), 0):02X}"
-
-
 def sentence(formatter: str, fields: Sequence[str]) -> str:
     """Return a whole sentence; ValueError if it is longer than the standard allows."""
     body = ",".join((TALKER + formatter, *fields))
-    whole = f"${body}*{checksum(body)}\r\n"
+    whole = f"${body}*{checksum(body.encode())}\r\n"
     if len(whole) > LONGEST:
         raise ValueError(f"a sentence of {len(whole)} characters: {whole!r}")
     return whole
@@ -66,7 +60,7 @@ def alert_command(line: str) -> tuple[str, str, str, str] | None:
     else is None.
     """
     found = _SENTENCE.fullmatch(line.strip())
-    if found is None or checksum(found[1]) != found[2].upper():
+    if found is None or checksum(found[1].encode()) != found[2].upper():
         return None
     fields = found[1].split(",")
     if len(fields) != 7 or fields[0][2:] != "ACN" or fields[6] != "C":
@@ -91,7 +85,7 @@ class Framing:
             self._line = self._line % 999 + 1
             group = f"g:{number}-{len(message)}-{self._group}," if len(message) > 1 else ""
             block = f"{group}s:{SOURCE},n:{self._line}"
-            lines.append(f"\\{block}*{checksum(block)}\\{each}")
+            lines.append(f"\\{block}*{checksum(block.encode())}\\{each}")
         return TOKEN + "".join(lines).encode("ascii")
 
     def lines(self, datagram: bytes) -> Iterator[str]:
@@ -105,7 +99,7 @@ class Framing:
                 continue
             if tagged is None and not self._header:
                 yield line
-            elif tagged is not None and checksum(tagged[1]) == tagged[2].upper():
+            elif tagged is not None and checksum(tagged[1].encode()) == tagged[2].upper():
                 yield tagged[3]
 
 
