@@ -26,6 +26,7 @@ from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.parameters import NotNegative, Problem, Range, refuse
 from utank_hil.base.text_files import kind_of
 from utank_hil.configuration import Section
+from utank_hil.configuration.files import readable
 from utank_hil.configuration.spectra import (
     IttcSpectrum,
     JonswapSpectrum,
@@ -69,15 +70,8 @@ class _AnySea(Section):
     starboard."""
     speed_m_s: Speed = 0.0
     effective_slope: EffectiveSlope = EffectiveSlope()
-    roll_moment_table: Path | None = None
+    roll_moment_table: Annotated[Path, readable(MomentTable.read)] | None = None
     """Roll moment against frequency and heading (`MomentTable`), instead of the effective slope."""
-
-    @field_validator("roll_moment_table")
-    @classmethod
-    def _readable_table(cls, file: Path | None) -> Path | None:
-        if file is not None:
-            MomentTable.read(file)
-        return file
 
     @model_validator(mode="after")
     def _slope_or_table(self) -> Self:
@@ -336,15 +330,9 @@ class ComponentsSea(_GivenWaves):
     """Waves one by one, of a record (`utank-hil identify sea`) or another program."""
 
     kind: Literal["components"]
-    file: Path
+    file: Annotated[Path, readable(read_components)]
     """CSV: `omega_rad_s`, `amplitude_m`, `phase_rad` at the ship at the start, and, if not all come
     from `heading_deg`, `heading_deg`."""
-
-    @field_validator("file")
-    @classmethod
-    def _readable(cls, file: Path) -> Path:
-        read_components(file)
-        return file
 
     def sea(self, seed: int) -> Sea:  # noqa: ARG002, nothing is drawn
         """The waves of the file; they do not depend on the seed."""

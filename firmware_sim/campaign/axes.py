@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import numpy as np
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from utank_hil.base.parameters import Finite, Positive, Range, refuse
 from utank_hil.base.text_files import lines_of, open_text
 from utank_hil.configuration import Section
+from utank_hil.configuration.files import readable
 from utank_hil.configuration.spectra import read_spectra, utc
 
 Value = Any  #: Number, text, time, truth value, or content of a file that the study names.
@@ -48,15 +49,9 @@ class Counted(Section):
 class Hours(Section):
     """Times of the records in a measured file."""
 
-    hours_of: Path
+    hours_of: Annotated[Path, readable(read_spectra)]
     since: datetime = datetime.min
     until: datetime = datetime.max
-
-    @field_validator("hours_of")
-    @classmethod
-    def _readable(cls, file: Path) -> Path:
-        read_spectra(file)
-        return file
 
     def values(self) -> list[str]:
         """The times in the notation of a scenario."""

@@ -7,12 +7,12 @@ Every error carries the file and key where the wrong value was written.
 """
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Final, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from utank_hil.base.parameters import ParameterError, Problem
 from utank_hil.base.text_files import open_text, refuse_device
@@ -35,6 +35,16 @@ class Section(BaseModel):
     def warnings(self) -> list[Problem]:
         """Return what is unusual but usable in the section, by keys within it."""
         return []
+
+
+def readable(read: Callable[[Path], object]) -> AfterValidator:
+    """Return the validator of a data file that a function must be able to read."""
+
+    def checked(file: Path) -> Path:
+        read(file)
+        return file
+
+    return AfterValidator(checked)
 
 
 @dataclass(frozen=True, slots=True)
