@@ -21,7 +21,7 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.base.parameters import Finite, Positive, Range, range_problems, refuse
+from utank_hil.base.parameters import Checked, Finite, Positive, Range, refuse
 from utank_hil.control.optimal_tank import best_passive_tank, ship_ratios
 from utank_hil.dynamics import GRAVITY_M_S2, RollShip, Tank
 from utank_hil.dynamics.pump import Pump
@@ -63,16 +63,13 @@ class TankImpossibleError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class TankRoom:
+class TankRoom(Checked, owner="tank room"):
     """Room for a U-tube tank across the ship; `ValueError` if a length is not positive."""
 
     breadth_m: Positive  #: Across the ship, between the outer walls of the reservoirs.
     height_m: Positive  #: From the duct's bottom to the reservoirs' roof.
     length_m: Positive  #: Along the ship.
     duct_below_cg_m: Finite = 0.0  #: Depth of the duct's centre below the ship's centre of gravity.
-
-    def __post_init__(self) -> None:
-        refuse("tank room", range_problems(self))
 
     @classmethod
     def in_hull(cls, length_m: float, beam_m: float) -> "TankRoom":

@@ -1,8 +1,9 @@
 """Ranges of parameters: each stands once, at its field, and holds in code and in files alike.
 
-A dataclass annotates its fields (``inertia_kg_m2: Positive``) and hands its `range_problems`, and
-what else must hold, to `refuse`. Where a file is read, each field is checked by the same annotation
-before the dataclass is made: so every wrong number of a file is found at once.
+A dataclass annotates its fields (``inertia_kg_m2: Positive``) and is `Checked`, or hands its
+`range_problems`, and what else must hold, to `refuse`. Where a file is read, each field is checked
+by the same annotation before the dataclass is made: so every wrong number of a file is found at
+once.
 """
 
 import math
@@ -11,10 +12,7 @@ from dataclasses import dataclass, fields
 from functools import lru_cache
 from itertools import repeat
 from types import UnionType
-from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin, get_type_hints
-
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
+from typing import Annotated, Any, ClassVar, Union, get_args, get_origin, get_type_hints
 
 Problem = tuple[str, str]
 """Dotted name of a parameter, empty for all of them together, and what is wrong with it."""
@@ -112,11 +110,11 @@ SampleTime = Annotated[float, Range(least=1e-3, most=10)]
 """From a fast drive's to a large ship's; beyond, no ship rolls so fast or so slowly."""
 
 
-def range_problems(instance: "DataclassInstance") -> list[Problem]:
+def range_problems(instance: Any) -> list[Problem]:
     """Every number in a dataclass's parameters that lies outside the `Range` of its annotation."""
     return [
         problem
-        for name, hint in _annotations(type(instance)).items()
+        for name, hint in _annotations(instance.__class__).items()
         for problem in _outside(name, hint, getattr(instance, name))
     ]
 
@@ -143,6 +141,23 @@ def refuse(owner: str, problems: list[Problem]) -> None:
     """Raise a `ParameterError` if there is any problem."""
     if problems:
         raise ParameterError(owner, problems)
+
+
+class Checked:
+    """A dataclass that is checked as it is made: its ranges, and what else `_problems` finds."""
+
+    __slots__ = ()
+    _owner: ClassVar[str]
+
+    def __init_subclass__(cls, owner: str = "") -> None:
+        if owner:  # a dataclass with slots is a second class, made without it
+            cls._owner = owner
+
+    def __post_init__(self) -> None:
+        refuse(self._owner, [*range_problems(self), *self._problems()])
+
+    def _problems(self) -> list[Problem]:
+        return []
 
 
 @lru_cache(maxsize=256)

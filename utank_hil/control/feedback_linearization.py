@@ -40,7 +40,7 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.elementary import sine_cosine
-from utank_hil.base.parameters import NotNegative, Positive, SampleTime, range_problems, refuse
+from utank_hil.base.parameters import Checked, NotNegative, Positive, Problem, SampleTime, refuse
 from utank_hil.base.tick import TICK_S
 from utank_hil.control.gain import slope_at_rest
 from utank_hil.control.interface import BuiltLaw, DesignPlant, Memoryless
@@ -48,7 +48,7 @@ from utank_hil.dynamics import GRAVITY_M_S2, STATES, RollModel, RollShip, Tank
 
 
 @dataclass(frozen=True, slots=True)
-class FeedbackLinearizationDesign:
+class FeedbackLinearizationDesign(Checked, owner="feedback linearization"):
     """Parameters of the law."""
 
     frequency_rad_s: Positive  #: w of the linear response of the output s.
@@ -62,12 +62,11 @@ class FeedbackLinearizationDesign:
     level_damping_ratio: NotNegative = 0.0  #: zeta_h; 0 for the exact linear response.
     kind: Literal["feedback_linearization"] = "feedback_linearization"
 
-    def __post_init__(self) -> None:
-        problems = range_problems(self)
-        if not self.soft_level_m < self.hard_level_m:
-            reason = f"must be below hard_level_m, got {self.soft_level_m} and {self.hard_level_m}"
-            problems.append(("soft_level_m", reason))
-        refuse("feedback linearization", problems)
+    def _problems(self) -> list[Problem]:
+        if self.soft_level_m < self.hard_level_m:
+            return []
+        reason = f"must be below hard_level_m, got {self.soft_level_m} and {self.hard_level_m}"
+        return [("soft_level_m", reason)]
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Design the law for a plant; it does not include the plant's delay and lag."""

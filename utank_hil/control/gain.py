@@ -15,7 +15,7 @@ import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.ordered_sums import product
-from utank_hil.base.parameters import Range, SampleTime, range_problems, refuse
+from utank_hil.base.parameters import Checked, Problem, Range, SampleTime
 from utank_hil.control.interface import BuiltLaw, Controller, DesignPlant, Memoryless
 from utank_hil.control.optimal_tank import passive_optimum, ship_ratios
 from utank_hil.dynamics import RollShip, Tank, coupled_matrices
@@ -26,18 +26,16 @@ STEP: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class GainLaw:
+class GainLaw(Checked, owner="gain law"):
     """Constant feedback of the measured outputs, u(k) = -K y(k-1), with K of shape (r, m)."""
 
     gain: FloatArray
     sample_time_s: SampleTime
 
-    def __post_init__(self) -> None:
-        problems = range_problems(self)
-        if self.gain.ndim != 2 or not np.isfinite(self.gain).all():
-            reason = f"must be a matrix of finite numbers, got {self.gain.tolist()}"
-            problems.append(("gain", reason))
-        refuse("gain law", problems)
+    def _problems(self) -> list[Problem]:
+        if self.gain.ndim == 2 and np.isfinite(self.gain).all():
+            return []
+        return [("gain", f"must be a matrix of finite numbers, got {self.gain.tolist()}")]
 
     def controller(self) -> "GainController":
         """A new steppable controller."""
@@ -93,14 +91,11 @@ def slope_at_rest(controller: Callable[[], Controller], inputs: int) -> GainLaw:
 
 
 @dataclass(slots=True, eq=False)
-class PassiveController(Memoryless):
+class PassiveController(Memoryless, Checked, owner="passive"):
     """Zero pressure for each of `inputs` pumps, for any measurement."""
 
     inputs: Annotated[int, Range(least=1)] = 1
     sample_time_s: SampleTime = 0.2
-
-    def __post_init__(self) -> None:
-        refuse("passive", range_problems(self))
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:  # noqa: ARG002
         """Return zero pressure, shape (r,)."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Final, NamedTuple, Protocol, runtime_checkable
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
-from utank_hil.base.parameters import NotNegative, Range, Share, range_problems, refuse
+from utank_hil.base.parameters import Checked, NotNegative, Range, Share
 from utank_hil.dynamics import LinearModel, RollShip, Tank
 from utank_hil.dynamics.linear import pump_model
 from utank_hil.dynamics.sampling import sample
@@ -16,7 +16,7 @@ _Limit = Annotated[float, Range(above=0, infinite=True)]
 
 
 @dataclass(frozen=True, slots=True)
-class PumpLimits:
+class PumpLimits(Checked, owner="pump limit"):
     """Limits on the pump's command."""
 
     pressure_pa: _Limit = 50e3  #: Greatest pressure, either way.
@@ -30,15 +30,12 @@ class PumpLimits:
     #: Time ahead at which the level is judged: delay and lag of the pump.
     lookahead_s: NotNegative = 0.25
 
-    def __post_init__(self) -> None:
-        refuse("pump limit", range_problems(self))
-
 
 _LIMITS: Final = PumpLimits()
 
 
 @dataclass(frozen=True, slots=True)
-class DesignPlant:
+class DesignPlant(Checked, owner="design plant"):
     """A ship with its tank, delay, lag and limits."""
 
     ship: RollShip
@@ -50,9 +47,6 @@ class DesignPlant:
     valve: ValveRange | None = None  #: Range of the tank's valve, if any.
     #: The tank in small motions, where `tank` has the linear loss of its working level, else None.
     calm: Tank | None = None
-
-    def __post_init__(self) -> None:
-        refuse("design plant", range_problems(self))
 
     @property
     def tanks(self) -> tuple[Tank, ...]:

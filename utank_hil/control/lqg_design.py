@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from utank_hil.base.parameters import NotNegative, Positive, range_problems, refuse
+from utank_hil.base.parameters import Checked, NotNegative, Positive, Problem
 from utank_hil.control.interface import BuiltLaw, DesignPlant, LinearLaw
 from utank_hil.control.lqg import LQGLaw, design_lqg, design_lqr
 from utank_hil.control.predictive.design import Predictor, washed, wave_plant, weight_problems
@@ -19,7 +19,7 @@ from utank_hil.dynamics.linear import STATES
 
 
 @dataclass(frozen=True, slots=True)
-class LQGDesign:
+class LQGDesign(Checked, owner="LQG design"):
     """Parameters of an LQG law."""
 
     predictor: Predictor  #: Parameters of the Kalman filter. Its `order` is not used.
@@ -31,14 +31,10 @@ class LQGDesign:
     washout_rad_s: NotNegative = 0.0
     kind: Literal["lqg"] = "lqg"
 
-    def __post_init__(self) -> None:
-        problems = range_problems(self)
+    def _problems(self) -> list[Problem]:
         if len(self.state_weight) != len(STATES):
-            reason = f"must have {len(STATES)} numbers, got {self.state_weight}"
-            problems.append(("state_weight", reason))
-        else:
-            problems += weight_problems("state_weight", self.state_weight)
-        refuse("LQG design", problems)
+            return [("state_weight", f"must have {len(STATES)} numbers, got {self.state_weight}")]
+        return weight_problems("state_weight", self.state_weight)
 
     def law(self, plant: DesignPlant) -> LinearLaw:
         """Design the law for a plant."""

@@ -17,7 +17,7 @@ from typing import Annotated
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
-from utank_hil.base.parameters import Finite, NotNegative, Range, range_problems, refuse
+from utank_hil.base.parameters import Checked, Finite, NotNegative, Range
 from utank_hil.dynamics import GRAVITY_M_S2, RollShip, Tank, coupled_matrices
 
 _WAVES = np.geomspace(0.05, 5.0, 4000)
@@ -25,16 +25,13 @@ _WAVES = np.geomspace(0.05, 5.0, 4000)
 
 
 @dataclass(frozen=True, slots=True)
-class ShipTankRatios:
+class ShipTankRatios(Checked, owner="ship and tank"):
     """Ratios that determine the roll response, besides frequency and damping of the water."""
 
     mass_ratio: Annotated[float, Range(above=0, below=1)]  #: mu, between 0 and 1.
     coupling_ratio: Finite  #: G1.
     roll_damping_ratio: NotNegative = 0.0  #: xi_phi of the ship without its tank.
     static_coupling: Finite | None = None  #: c of an existing tank; f^2 by default.
-
-    def __post_init__(self) -> None:
-        refuse("ship and tank", range_problems(self))
 
 
 @dataclass(frozen=True, slots=True)

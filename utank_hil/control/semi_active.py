@@ -23,13 +23,7 @@ from typing import Final, Literal
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray, plausible
-from utank_hil.base.parameters import (
-    NotNegative,
-    ParameterError,
-    SampleTime,
-    range_problems,
-    refuse,
-)
+from utank_hil.base.parameters import Checked, NotNegative, ParameterError, SampleTime
 from utank_hil.control.interface import (
     PRESSURE,
     VALVE,
@@ -58,7 +52,7 @@ def throttled(valve: ValveRange, pressure_pa: float, flow_m_s: float) -> float:
 
 
 @dataclass(slots=True, eq=False)
-class OnOffValve:
+class OnOffValve(Checked, owner="on-off valve"):
     """Energy law with a valve that is open or shut."""
 
     valve: ValveRange
@@ -67,9 +61,6 @@ class OnOffValve:
     threshold_rad_m_s2: NotNegative = 0.0
     sample_time_s: SampleTime = 0.1
     _shut: bool = field(default=False, init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        refuse("on-off valve", range_problems(self))
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:  # noqa: ARG002
         """Loss, shape (1,), for `y` = (roll, roll rate, level, level rate)."""
@@ -119,15 +110,12 @@ class ClippedValve:
 
 
 @dataclass(frozen=True, slots=True)
-class OnOffValveDesign:
+class OnOffValveDesign(Checked, owner="on-off valve"):
     """The on-off valve as a law of a configuration; parameters as in `OnOffValve`."""
 
     threshold_rad_m_s2: NotNegative = 0.0
     sample_time_s: SampleTime = 0.1
     kind: Literal["valve_on_off"] = "valve_on_off"
-
-    def __post_init__(self) -> None:
-        refuse("on-off valve", range_problems(self))
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Design the law for a plant."""

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.ordered_sums import orthogonal_triangle, product, solved
-from utank_hil.base.parameters import Finite, Problem, Range, range_problems, refuse
+from utank_hil.base.parameters import Checked, Finite, Problem, Range
 from utank_hil.dynamics.tank import IRREGULAR
 
 RollLimit = Annotated[float, Range(above=0, most=0.7)]
@@ -32,7 +32,7 @@ _MOST = 1e30  # Far beyond any ship; it keeps the results of designs finite.
 
 
 @dataclass(frozen=True, slots=True)
-class RollShip:
+class RollShip(Checked, owner="ship"):
     """A ship in roll alone, without its tank water.
 
     The restoring moment is ``k1 phi + k3 phi^3 + k5 phi^5 + ...`` or, if `gz_m` is given, the
@@ -65,10 +65,7 @@ class RollShip:
     #: monitors allow for every share up to `MOST_SWAY`.
     sway_of_slope: Annotated[float, Range(least=0, most=MOST_SWAY)] | None = None
 
-    def __post_init__(self) -> None:
-        refuse("ship", [*range_problems(self), *self._lever_problems()])
-
-    def _lever_problems(self) -> list[Problem]:
+    def _problems(self) -> list[Problem]:
         if not self.gz_m:
             return []
         problems = []

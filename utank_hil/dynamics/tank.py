@@ -12,15 +12,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Annotated
 
-from utank_hil.base.parameters import (
-    Finite,
-    NotNegative,
-    Positive,
-    Range,
-    Share,
-    range_problems,
-    refuse,
-)
+from utank_hil.base.parameters import Checked, Finite, NotNegative, Positive, Range, Share
 
 GRAVITY_M_S2 = 9.80665  # Standard gravity (ISO 80000-3).
 SWING = 8 / (3 * math.pi)
@@ -30,7 +22,7 @@ IRREGULAR = math.sqrt(8 / math.pi)
 
 
 @dataclass(frozen=True, slots=True)
-class Tank:
+class Tank(Checked, owner="tank"):
     """Geometry and losses of a U-tube tank."""
 
     width_m: Positive  #: Duct length L, the distance between the reservoirs' centre lines.
@@ -48,9 +40,6 @@ class Tank:
     headroom_m: Annotated[float, Range(above=0, infinite=True)] = math.inf
     #: Coefficient of restitution of the level at its limits: 0 plastic, 1 elastic.
     restitution: Share = 0.0
-
-    def __post_init__(self) -> None:
-        refuse("tank", range_problems(self))
 
     @property
     def effective_length_m(self) -> float:

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from utank_hil.base.parameters import Positive, Problem, Range, range_problems, refuse
+from utank_hil.base.parameters import Checked, Positive, Problem, Range
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 AIR_DENSITY_KG_M3 = 1.225  # ISO 2533, at sea level
@@ -37,7 +37,7 @@ class ValveRange:
 
 
 @dataclass(frozen=True, slots=True)
-class Valve:
+class Valve(Checked, owner="valve"):
     """Valve of a semi-active tank, with its actuator."""
 
     #: "duct": a gate in the duct. "air": an orifice in the air pipe between the reservoirs.
@@ -52,13 +52,12 @@ class Valve:
     #: Coefficient of an air valve, see `air_valve_loss`.
     discharge_coefficient: Annotated[float, Range(above=0, most=1)] = 0.6
 
-    def __post_init__(self) -> None:
-        problems = range_problems(self)
+    def _problems(self) -> list[Problem]:
         if self.kind == "air" and self.pipe_area_m2 is None:
-            problems.append(("pipe_area_m2", "is required but missing: kind is air"))
+            return [("pipe_area_m2", "is required but missing: kind is air")]
         if self.kind == "duct" and self.pipe_area_m2 is not None:
-            problems.append(("pipe_area_m2", "is for kind: air; a gate in the duct has its area"))
-        refuse("valve", problems)
+            return [("pipe_area_m2", "is for kind: air; a gate in the duct has its area")]
+        return []
 
     @property
     def fail_opening(self) -> float:

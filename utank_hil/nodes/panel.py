@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from utank_hil import canbus
-from utank_hil.base.parameters import NotNegative, range_problems, refuse
+from utank_hil.base.parameters import Checked, NotNegative
 from utank_hil.base.tick import TICK_NS
 from utank_hil.nodes.housekeeping import Housekeeping
 from utank_hil.nodes.stations import ADDRESSES
@@ -46,7 +46,7 @@ _EDGES = (Action.RESET, Action.ACCEPT, Action.TAKE, Action.RETUNE, Action.UNDO)
 
 
 @dataclass(frozen=True, slots=True)
-class TimedAction:
+class TimedAction(Checked, owner="action"):
     """A button press at a time after the panel first receives the status of a ready controller.
 
     The panel's own start is no reference: a controller that starts later would miss the rising edge
@@ -55,9 +55,6 @@ class TimedAction:
 
     time_s: NotNegative
     action: Action
-
-    def __post_init__(self) -> None:
-        refuse("action", range_problems(self))
 
 
 class OperatorPanel:

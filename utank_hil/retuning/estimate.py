@@ -11,7 +11,7 @@ from typing import Annotated, Final
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.elementary import exp, log
-from utank_hil.base.parameters import Range, range_problems, refuse
+from utank_hil.base.parameters import Checked, Range
 from utank_hil.canbus import Verdict
 from utank_hil.canbus.events import ModelSummary
 from utank_hil.dynamics.ship import RollShip
@@ -24,7 +24,7 @@ SIGNIFICANT: Final = 3.0  #: Number of standard deviations from which a differen
 
 
 @dataclass(frozen=True, slots=True)
-class ShipFigures:
+class ShipFigures(Checked, owner="ship"):
     """A ship in roll, without tank water, and the uncertainty of its figures.
 
     Raises `ValueError` if stiffness or inertia is too small for the loop to compute with, or any
@@ -38,9 +38,6 @@ class ShipFigures:
     #: period.
     stiffness_deviation: Annotated[float, Range(least=0, most=1e3)] = 0.0
     period_deviation: Annotated[float, Range(least=0, most=1e3)] = 0.0
-
-    def __post_init__(self) -> None:
-        refuse("ship", range_problems(self))
 
     @classmethod
     def of(cls, ship: RollShip) -> "ShipFigures":

@@ -11,7 +11,7 @@ from typing import Annotated, Final
 
 import numpy as np
 
-from utank_hil.base.parameters import Range, range_problems, refuse
+from utank_hil.base.parameters import Checked, Range
 from utank_hil.canbus import SeaEstimate, ShipEstimate, Verdict
 from utank_hil.dynamics import GRAVITY_M_S2, RollShip, Tank, coupled_matrices
 from utank_hil.retuning.answer import Refusal
@@ -35,7 +35,7 @@ GM_DEVIATIONS: Final = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class EstimateSettings:
+class EstimateSettings(Checked, owner="sea estimate"):
     """Settings of the estimate of waves and ship: section ``sea_estimate`` of a controller.
 
     Raises `ValueError` if a value is out of its range.
@@ -49,9 +49,6 @@ class EstimateSettings:
     #: Whether a self-tuned law is redesigned when the estimated waves or ship differ from those
     #: that the present law was designed for.
     renew: bool = False
-
-    def __post_init__(self) -> None:
-        refuse("sea estimate", range_problems(self))
 
     @property
     def samples(self) -> int:

@@ -36,7 +36,7 @@ import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.elementary import angles_of, each, exp, log, phasors, sines_cosines, sizes
-from utank_hil.base.parameters import NotNegative, Range, range_problems, refuse
+from utank_hil.base.parameters import Checked, NotNegative, Range
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea.harmonics import Harmonics
 from utank_hil.sea.spectrum import Spectrum
@@ -71,7 +71,7 @@ MOST_SLOPE_SHARE: Final = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class EffectiveSlope:
+class EffectiveSlope(Checked, owner="effective slope"):
     """Ratio r of effective to true wave slope.
 
     r = coefficient * exp(-k depth) * sinc(k ``|sin(heading)|`` beam / 2), sinc(x) = sin(x) / x.
@@ -81,9 +81,6 @@ class EffectiveSlope:
     coefficient: Annotated[float, Range(least=0, most=MOST_SLOPE_SHARE)] = 1.0
     depth_m: NotNegative = 0.0  #: Depth for the Smith effect, usually half the draught.
     beam_m: NotNegative = 0.0  #: Beam over which the slope is averaged; much shorter waves cancel.
-
-    def __post_init__(self) -> None:
-        refuse("effective slope", range_problems(self))
 
     def factor(self, wavenumber_rad_m: FloatArray, heading_rad: FloatArray) -> FloatArray:
         """Return the ratio r per component."""

@@ -42,7 +42,7 @@ from utank_hil.analysis.loop.margins import (
 )
 from utank_hil.analysis.loop.sea_response import SlopeDensity
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.parameters import Range, range_problems, refuse
+from utank_hil.base.parameters import Checked, Range
 from utank_hil.base.tick import TICK_S
 from utank_hil.control import BuiltLaw, ConstrainedDesign, DesignPlant, LQGLaw, PumpLimits, SeaModel
 from utank_hil.control.constrained.law import ConstrainedLaw
@@ -171,7 +171,7 @@ def cost_weights(passive_rad: float, limits: PumpLimits) -> tuple[float, float, 
 
 
 @dataclass(frozen=True, slots=True)
-class SelfTunedDesign:
+class SelfTunedDesign(Checked, owner="self-tuned design"):
     """A constrained law whose numbers follow from its ship and sea."""
 
     kind: Literal["self_tuned"]
@@ -180,9 +180,6 @@ class SelfTunedDesign:
     sea: SeaModel | None = None
     #: Limit on the predicted mean power from pump to water; infinite for the least roll.
     mean_power_w: Annotated[float, Range(above=0, infinite=True)] = math.inf
-
-    def __post_init__(self) -> None:
-        refuse("self-tuned design", range_problems(self))
 
     def tuned(self, plant: DesignPlant, *, first: bool = False) -> SelfTuned:
         """The design and its law for a plant that may be loaded otherwise.

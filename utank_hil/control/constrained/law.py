@@ -22,7 +22,7 @@ import numpy as np
 
 from utank_hil.base.arrays import MOST_MEASURED, ComplexArray, FloatArray
 from utank_hil.base.ordered_sums import product
-from utank_hil.base.parameters import Positive, Range, range_problems, refuse
+from utank_hil.base.parameters import Checked, Positive, Problem, Range
 from utank_hil.control.constrained.foresight import foreseen
 from utank_hil.control.constrained.horizon import Horizon, PlanProgramme, condense
 from utank_hil.control.constrained.preview import Foresight, Preview, Waves
@@ -41,7 +41,7 @@ _FOLLOWED = 0.02  # over the greatest pressure; a mean command this near the pla
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ConstrainedLaw:
+class ConstrainedLaw(Checked, owner="constrained law"):
     """Parameters of a `ConstrainedController`; a linear law while no limit is active.
 
     ValueError is raised if a value is out of its range, or the power is limited and no level is
@@ -73,9 +73,8 @@ class ConstrainedLaw:
     #: the greatest pressure; None for any difference.
     leeway: Annotated[float, Range(above=0)] | None = None
 
-    def __post_init__(self) -> None:
-        problems = range_problems(self)
-        outputs = len(self.model.C)
+    def _problems(self) -> list[Problem]:
+        problems, outputs = [], len(self.model.C)
         if self.level_output is not None and not 0 <= self.level_output < outputs:
             reason = f"must be one of the {outputs} outputs, 0 to {outputs - 1}"
             problems.append(("level_output", f"{reason}, got {self.level_output}"))
@@ -85,7 +84,7 @@ class ConstrainedLaw:
                 "level_output, or set power_w to infinity"
             )
             problems.append(("limits.power_w", reason))
-        refuse("constrained law", problems)
+        return problems
 
     @property
     def sample_time_s(self) -> float:

@@ -15,14 +15,7 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray, plausible
 from utank_hil.base.elementary import exp, log
-from utank_hil.base.parameters import (
-    NotNegative,
-    Positive,
-    Problem,
-    SampleTime,
-    range_problems,
-    refuse,
-)
+from utank_hil.base.parameters import Checked, NotNegative, Positive, Problem, SampleTime
 from utank_hil.base.tick import TICK_S
 from utank_hil.control.gain import slope_at_rest
 from utank_hil.control.interface import BuiltLaw, Controller, DesignPlant
@@ -37,7 +30,7 @@ _LEVEL_RATE = STATES.index("level_rate_m_s")
 
 
 @dataclass(frozen=True, slots=True)
-class ErrorDynamics:
+class ErrorDynamics(Checked, owner="error dynamics"):
     """Wanted error dynamics and their Lyapunov function e' P e / 2.
 
     With e = (phi - y_d, phi'), the wanted dynamics e'' + 2 zeta w e' + w^2 e = 0 and ::
@@ -50,9 +43,6 @@ class ErrorDynamics:
     frequency_rad_s: Positive  #: w.
     damping_ratio: Positive  #: zeta.
     q: Positive  #: Factor of Q = q I.
-
-    def __post_init__(self) -> None:
-        refuse("error dynamics", range_problems(self))
 
     @property
     def gains(self) -> tuple[float, float]:
@@ -129,7 +119,7 @@ def _gauss(distance: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class FuzzyLaw(ABC):
+class FuzzyLaw(Checked, ABC, owner="fuzzy law"):
     """Parameters of every adaptive fuzzy law."""
 
     error: ErrorDynamics
@@ -139,9 +129,6 @@ class FuzzyLaw(ABC):
     #: Pump pressure per level rate against the flow (`level_brake`); 0 for the thesis's law.
     brake_pa_s_m: NotNegative = 0.0
     sample_time_s: SampleTime = TICK_S
-
-    def __post_init__(self) -> None:
-        refuse("fuzzy law", self._problems())
 
     def build(self, plant: DesignPlant) -> BuiltLaw:  # noqa: ARG002, its gain is a parameter
         """Return the law, the same for any plant; its initial form has a slope at rest."""
@@ -155,8 +142,7 @@ class FuzzyLaw(ABC):
 
     def _problems(self) -> list[Problem]:
         """Find errors in the parameters; laws add the conditions of their proofs."""
-        problems = range_problems(self)
-        inputs = len(self.ranges)
+        problems, inputs = [], len(self.ranges)
         if not 2 <= inputs <= len(STATES):
             reason = f"must be those of at least roll and roll rate of {', '.join(STATES)}"
             problems.append(("ranges", f"{reason}, got {inputs} numbers"))
