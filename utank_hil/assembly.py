@@ -328,7 +328,7 @@ def retuner_work(config: ControllerConfig) -> Work | None:
 
         assert isinstance(design, SelfTunedDesign)
         renewal = RenewalTask(config.plant, sample_time_of(config.plant), design.mean_power_w)
-        return Work(partial(renew, task=renewal), MotionEstimate, 3 * MOST_BANDS)
+        return Work(partial(renew, task=renewal), MotionEstimate, 2 * MOST_BANDS)
     if settings is None:
         return None
     from utank_hil.retuning.redesign import LEAST_GAIN, retune

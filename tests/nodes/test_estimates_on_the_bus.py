@@ -28,7 +28,7 @@ from utank_hil.sea import SlopeSpectrum
 
 STORM = Path(__file__).resolve().parents[2] / "configs" / "scenarios" / "storm.yaml"
 OMEGA = np.linspace(0.2, 2.0, 50)
-WAVES = SlopeSpectrum(OMEGA, 1e-3 * np.exp(-OMEGA), 1e-4 * np.exp(-OMEGA))
+WAVES = SlopeSpectrum(OMEGA, 1e-3 * np.exp(-OMEGA))
 SHIP = ShipFigures(1e9, 2e9, 5e7, 0.02, 0.01)
 FOUND = MotionEstimate(Verdict.GOOD, Verdict.GOOD, SHIP, WAVES, 0.05, 3.2, 9.1, 1200.0)
 

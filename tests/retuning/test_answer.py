@@ -67,7 +67,7 @@ def test_an_estimate_crosses_bit_for_bit(told: bool) -> None:
     sent = MotionEstimate(Verdict.RECORD_SHORT, Verdict.MOTION_SMALL)
     if told:
         omega = np.linspace(0.2, 2.0, 50)
-        waves = SlopeSpectrum(omega, np.exp(-omega), 0.1 * np.exp(-omega))
+        waves = SlopeSpectrum(omega, np.exp(-omega))
         ship = ShipFigures(1e9, 2e9, 5e7, 0.02, 0.01)
         sent = MotionEstimate(Verdict.GOOD, Verdict.UNCERTAIN, ship, waves, 0.05, 3.2, 9.1, 1200.0)
     came = read_answer(answer_bytes(sent))

@@ -18,8 +18,7 @@ MOMENT_NM = wave_moment_nm(jonswap(4.0, 10.0), 1300.0, seed=3)
 
 
 def request(motion: FloatArray, known: RollShip = SHIP) -> EstimateRequest:
-    record = np.column_stack([np.zeros(len(motion)), motion])
-    return EstimateRequest(ShipFigures.of(known), record)
+    return EstimateRequest(ShipFigures.of(known), motion)
 
 
 def test_ship_and_sea_are_told_while_the_pump_works():

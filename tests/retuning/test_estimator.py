@@ -14,7 +14,7 @@ from utank_hil.retuning.estimator import OUTDATED, SAMPLE_TIME_S, metacentric_he
 from utank_hil.sea import SlopeSpectrum
 
 OMEGA = np.linspace(0.2, 2.0, 50)
-WAVES = SlopeSpectrum(OMEGA, np.exp(-OMEGA), 0.1 * np.exp(-OMEGA))
+WAVES = SlopeSpectrum(OMEGA, np.exp(-OMEGA))
 GOOD = MotionEstimate(Verdict.GOOD, Verdict.GOOD, SHIP, WAVES, 0.05, 3.2, 9.1, 1200.0)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.1)
 WEIGHT_N = 1e8
@@ -34,9 +34,8 @@ class Motion:
     def run(self, duration_s: float, *, fresh: bool = True) -> None:
         for _ in range(round(duration_s / SAMPLE_TIME_S)):
             time_s = self.count * SAMPLE_TIME_S
-            found = self.estimator.sample(
-                round(time_s * 1e9), 1e3, (0.1 * time_s, 0.2, 0.3), fresh=fresh
-            )
+            motion = (0.1 * time_s, 0.2, 0.3)
+            found = self.estimator.sample(round(time_s * 1e9), motion, fresh=fresh)
             if found is not None:
                 self.came.append((time_s, found))
             self.count += 1
@@ -50,10 +49,10 @@ def test_it_asks_once_an_interval_for_the_latest_record_and_shows_what_came():
     times_s = [time_s for time_s, _ in motion.came]
     assert times_s == pytest.approx([61.2, *(120.2 + 60 * k for k in range(6))], abs=0.5)
     first, last = motion.desk.records[0], motion.desk.records[-1]
-    assert first.record.shape == (301, 4)
-    assert last.record.shape == (1500, 4)
+    assert first.record.shape == (301, 3)
+    assert last.record.shape == (1500, 3)
     assert first.ship == ShipFigures(1e9, 2e9, 5e7)
-    assert first.record[-1].tolist() == pytest.approx([1e3, 6.0, 0.2, 0.3])
+    assert first.record[-1].tolist() == pytest.approx([6.0, 0.2, 0.3])
     figures = motion.estimator.figures
     assert (figures.sea.verdict, figures.ship.verdict) == (Verdict.GOOD, Verdict.GOOD)
     assert figures.sea[1:5] == (3.2, 9.1, WAVES.rms_rad, 0.05)
@@ -80,7 +79,7 @@ def test_what_is_not_new_is_a_gap():
     motion.run(30.0)
     motion.run(31.0, fresh=False)
     record = motion.desk.records[0].record
-    assert np.isnan(record[160:, 1:]).all()
+    assert np.isnan(record[160:]).all()
     assert np.isfinite(record[:139]).all()
 
 

@@ -34,7 +34,7 @@ def slope(omega: np.ndarray) -> np.ndarray:
 
 def estimated(ship: ShipFigures = SHIP, factor: float = 1.0) -> MotionEstimate:
     density = factor * slope(OMEGA)
-    waves = SlopeSpectrum(OMEGA, density, 0.1 * density)
+    waves = SlopeSpectrum(OMEGA, density)
     return MotionEstimate(Verdict.GOOD, Verdict.GOOD, ship, waves, 0.05, 4.0, 10.0, 1200.0)
 
 
@@ -94,7 +94,7 @@ def test_the_works_of_a_configuration_hold_the_renewal_and_its_power_budget() ->
     work, estimating = works_of(CONFIG.model_copy(update={"law": law}))
     assert estimating is not None
     assert work.compute.keywords["task"].mean_power_w == 2e5  # type: ignore[attr-defined]  # partial
-    waves = SlopeSpectrum(*(np.arange(1.0, 1 + MOST_BANDS),) * 3)
+    waves = SlopeSpectrum(*(np.arange(1.0, 1 + MOST_BANDS),) * 2)
     Desk(work).submit(1, replace(estimated(), waves=waves), 0)  # the widest estimate fits
     assert works_of(load_config(CONTROLLERS / "self_tuned.yaml", ControllerConfig)) == (None, None)
 

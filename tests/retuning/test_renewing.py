@@ -65,7 +65,7 @@ def renewed(hs_m: float = 3.0, tp_s: float = 10.0, **settings: float) -> Renewed
 
 
 def estimate(height: float = 1.0, ship: ShipFigures | None = None) -> MotionEstimate:
-    waves = SlopeSpectrum(OMEGA, height**2 * 1e-3 * np.exp(-OMEGA), 1e-4 * np.ones_like(OMEGA))
+    waves = SlopeSpectrum(OMEGA, height**2 * 1e-3 * np.exp(-OMEGA))
     of_ship = Verdict.UNCERTAIN if ship is None else Verdict.GOOD
     return MotionEstimate(
         Verdict.UNCERTAIN, of_ship, ship or SHIP, waves, 0.05, 3.0 * height, 10.0, 1200.0

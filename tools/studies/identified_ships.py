@@ -191,9 +191,9 @@ def figures_of(plant: DesignPlant) -> FloatArray:
 def motion_estimate(record: ShipRecord, part: slice) -> MotionEstimate:
     """The controller's estimate from a part of a record."""
     config = shipped()
-    rows = np.column_stack([record.command_pa, record.motion])[part]
     task = EstimateTask(config.plant, SAMPLE_TIME_S, SLOPE)
-    return estimate(EstimateRequest(ShipFigures.of(config.plant.ship), rows), task)
+    request = EstimateRequest(ShipFigures.of(config.plant.ship), record.motion[part])
+    return estimate(request, task)
 
 
 def by_okid(record: ShipRecord, outputs: tuple[str, ...], order: int) -> dict[str, Any]:

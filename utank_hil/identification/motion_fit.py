@@ -212,7 +212,7 @@ class _Record:
             fitted,
             np.sqrt(covariance.diagonal()),
             math.sqrt(gradient @ covariance @ gradient),
-            SlopeSpectrum(self.omega, density, density * np.sqrt(log_covariance.diagonal())),
+            SlopeSpectrum(self.omega, density),
             0.5 * math.sqrt(density @ log_covariance @ density) / energy,
             float(density[density > noise].sum() / energy),
             log_likelihood,

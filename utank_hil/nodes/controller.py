@@ -241,7 +241,6 @@ class ControllerNode:
         motion = measured.motions[judgement.motion]
         estimate = estimator.sample(
             measured.now_ns,
-            measured.pressure_pa,
             (motion.roll_rad, motion.roll_rate_rad_s, measured.level_m),
             fresh=is_fresh(measured, motion),
         )

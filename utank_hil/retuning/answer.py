@@ -48,7 +48,7 @@ OVERHEAD_BYTES: Final = 4096
 """Allowance for names, tags and shapes; a renewed law's, the largest, take some 600 bytes."""
 LONGEST_BYTES: Final = OVERHEAD_BYTES + max(
     8 * (MOST_ORDER * (1 + _MOST_OUTPUTS) + MOST_SAMPLES * _MOST_OUTPUTS),
-    8 * max(MOST_NUMBERS, 3 * MOST_BANDS),
+    8 * max(MOST_NUMBERS, 2 * MOST_BANDS),
     4 * _MOST_REASONS * _MOST_CHARACTERS,  # A character has up to four bytes.
 )  #: Length of the longest answer that can be read.
 

@@ -97,7 +97,7 @@ class EstimateRequest:
     """Request for an estimate."""
 
     ship: ShipFigures  #: The known ship.
-    record: FloatArray  #: shape (N, 4): latest samples, columns `estimator.COLUMNS`; gaps are NaN.
+    record: FloatArray  #: shape (N, 3): latest samples, columns `estimator.COLUMNS`; gaps are NaN.
 
 
 class ChangeMonitor:

@@ -19,7 +19,7 @@ from utank_hil.retuning.estimate import EstimateRequest, MotionEstimate, ShipFig
 from utank_hil.retuning.law_bank import SampleHistory
 from utank_hil.retuning.retuner import Retuner
 
-COLUMNS: Final = ("pressure_pa", "roll_rad", "roll_rate_rad_s", "level_m")
+COLUMNS: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 """Columns of the motion record."""
 SAMPLE_TIME_S: Final = 0.2
 """Sample time of the record; its Nyquist frequency is six times `motion_fit.TOP_RAD_S`."""
@@ -133,8 +133,8 @@ class Estimator:
         self._ship, self._tank = ship, tank
         self._least_gm_m = least_gm_m
         self._low = False
-        self._history = SampleHistory(settings.samples, len(COLUMNS) - 1)
-        self._motion = np.zeros(len(COLUMNS) - 1)
+        self._history = SampleHistory(settings.samples, len(COLUMNS))
+        self._motion = np.zeros(len(COLUMNS))
         self._known = ShipFigures.of(ship)
         self._number = 0
         self._due_ns: int | None = None
@@ -146,21 +146,15 @@ class Estimator:
         self.figures = EstimateFigures()
 
     def sample(
-        self,
-        now_ns: int,
-        pressure_pa: float,
-        motion: tuple[float, float, float],
-        *,
-        fresh: bool,
+        self, now_ns: int, motion: tuple[float, float, float], *, fresh: bool
     ) -> MotionEstimate | None:
         """Take a sample every `SAMPLE_TIME_S`; return a new estimate if there is one.
 
         When the last estimate has become outdated, one that says only OUTDATED is returned.
-        `pressure_pa` is measured across the pump; `motion` is roll, roll rate and level; `fresh`
-        says whether all values are new measurements.
+        `motion` is roll, roll rate and level; `fresh` says whether all are new measurements.
         """
         self._motion[:] = motion
-        self._history.add(pressure_pa, self._motion, fresh=fresh)
+        self._history.add(0.0, self._motion, fresh=fresh)  # whatever the pump does
         if self._due_ns is None:
             self._due_ns = now_ns + self._every_ns
             self._since_ns = now_ns
@@ -171,7 +165,7 @@ class Estimator:
             self._due_ns = now_ns + self._every_ns
             self._number += 1
             self._asked_ns = now_ns
-            record = self._history.record(self._history.capacity)
+            record = self._history.record(self._history.capacity)[:, 1:]
             self._desk.submit(self._number, EstimateRequest(self._known, record), now_ns)
         self._grow_old(now_ns)
         outdated = self.figures.sea.verdict is Verdict.OUTDATED

@@ -15,7 +15,7 @@ from utank_hil.control import DesignPlant
 from utank_hil.identification.motion_fit import KNOWN_SPREAD, MotionFit, fit_motion
 from utank_hil.retuning.answer import Refusal, RenewedLaw
 from utank_hil.retuning.estimate import EstimateRequest, MotionEstimate, ShipFigures
-from utank_hil.retuning.estimator import COLUMNS, LEAST_PERIODS
+from utank_hil.retuning.estimator import LEAST_PERIODS
 from utank_hil.sea import SlopeSpectrum
 
 TAIL_SHARE: Final = 0.15
@@ -120,10 +120,9 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
     loading changed meanwhile and the half counts. If the motion does not identify the ship, the
     waves are based on the known one, and uncertain if another ship explains the motion far better.
     """
-    known, record = request.ship, request.record
     period_s = 2 * np.pi / task.plant.ship.natural_frequency_rad_s
     least = round(LEAST_PERIODS * period_s / task.sample_time_s)
-    motion = _without_gaps(record[:, [COLUMNS.index(name) for name in _MOTION]])
+    motion = _without_gaps(request.record)
     if motion is None or len(motion) < least:
         return MotionEstimate(Verdict.RECORD_SHORT, Verdict.RECORD_SHORT)
     if not np.ptp(motion, axis=0).all():
@@ -138,7 +137,7 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
     contradicted = False
     if of_ship is not Verdict.GOOD:
         likeliest = fit.log_likelihood
-        plant = dataclasses.replace(task.plant, ship=known.ship(task.plant.ship))
+        plant = dataclasses.replace(task.plant, ship=request.ship.ship(task.plant.ship))
         fit = fit_motion(motion, plant, task.sample_time_s, KNOWN_SPREAD)
         contradicted = likeliest - fit.log_likelihood > CONTRADICTED
     if fit.clear < LEAST_CLEAR:
@@ -164,9 +163,6 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
         2 * np.pi / float(waves.omega_rad_s[np.argmax(elevation)]) if beam else math.nan,
         len(motion) * task.sample_time_s,
     )
-
-
-_MOTION: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 
 
 def _identified(fit: MotionFit, task: EstimateTask) -> bool:

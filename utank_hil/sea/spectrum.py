@@ -180,8 +180,6 @@ class SlopeSpectrum:
     #: shape (F,): centres of the bands: encounter frequencies, positive and equally spaced, F > 1.
     omega_rad_s: FloatArray
     density: FloatArray  #: shape (F,): one-sided density in rad^2 per rad/s, zero or more.
-    #: shape (F,): standard deviation of each density, by default zero.
-    deviation: FloatArray | None = None
 
     def __post_init__(self) -> None:
         omega, density = self.omega_rad_s, self.density
@@ -193,13 +191,8 @@ class SlopeSpectrum:
         steps = np.diff(omega)
         if not (omega[0] > 0 and steps[0] > 0 and np.allclose(steps, steps[0], rtol=1e-6)):
             raise ValueError("slope spectrum omega_rad_s must be positive and equally spaced")
-        for name, values in (("density", density), ("deviation", self.deviation)):
-            if values is not None and not (
-                values.shape == omega.shape and np.isfinite(values).all() and np.all(values >= 0)
-            ):
-                raise ValueError(
-                    f"slope spectrum {name} must be finite, zero or more, one per frequency"
-                )
+        if not (np.isfinite(density).all() and np.all(density >= 0)):
+            raise ValueError("slope spectrum density must be finite and zero or more")
 
     @property
     def band_rad_s(self) -> float:
@@ -210,12 +203,6 @@ class SlopeSpectrum:
     def rms_rad(self) -> float:
         """Root mean square of the effective slope."""
         return math.sqrt(float(self.density.sum()) * self.band_rad_s)
-
-    @property
-    def tp_s(self) -> float:
-        """Encounter period of the greatest density; nan without energy."""
-        peak = int(np.argmax(self.density))
-        return 2 * math.pi / float(self.omega_rad_s[peak]) if self.density[peak] > 0 else math.nan
 
     def slope_density(self, omega_rad_s: FloatArray) -> FloatArray:
         """Density of the slope, rad^2 per rad/s: linear between centres, zero beyond the bands."""
