@@ -93,11 +93,15 @@ class ClippedValve:
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Loss, shape (1,), for the pump law's measurements `y`."""
+        return self._wanted(y, reference)[1:]
+
+    def _wanted(self, y: FloatArray, reference: FloatArray | None) -> FloatArray:
+        """The pump law's pressure, and the loss that replaces it."""
         y = plausible(y)
         flow = float(y[-1])
         pressure = float(self._pump.step(y[: self._measured], reference)[0])
         self._flow = abs(flow) * flow
-        return np.array([throttled(self._valve, pressure, flow)])
+        return np.array([pressure, throttled(self._valve, pressure, flow)])
 
     def applied(self, u: FloatArray) -> None:
         """Pass the actual pressure of the valve to the pump law."""
@@ -177,14 +181,10 @@ class PumpWithValve(ClippedValve):
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Pressure and loss, shape (2,), for the pump law's measurements and the level rate."""
-        y = plausible(y)
-        flow = float(y[-1])
-        pressure = float(self._pump.step(y[: self._measured], reference)[0])
-        loss = throttled(self._valve, pressure, flow)
-        self._flow = abs(flow) * flow
-        if pressure * flow < 0:
-            pressure += loss * self._flow
-        return np.array([pressure, loss])
+        wanted = self._wanted(y, reference)
+        if wanted[0] * self._flow < 0:
+            wanted[0] += wanted[1] * self._flow
+        return wanted
 
     def applied(self, u: FloatArray) -> None:
         """Pass the joint pressure of pump and valve to the pump law."""

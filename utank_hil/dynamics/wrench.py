@@ -46,28 +46,16 @@ def water_moments(tank: Tank, level_m: npt.ArrayLike) -> WaterMoments:
     reservoir), so every integral over its mass is a polynomial in the level h.
     """
     h = np.asarray(level_m, dtype=np.float64)
-    rho, at, ap = tank.density_kg_m3, tank.reservoir_area_m2, tank.duct_area_m2
-    length, height, lx, lz = tank.width_m, tank.height_m, tank.lx_m, tank.lz_m
-    zero = np.zeros_like(h)
-    mass = rho * (2 * at * height + ap * length)
+    zero, lx, mass = np.zeros_like(h), tank.lx_m, tank.water_kg
+    above = tank.height_m - tank.lz_m  # from the centre of gravity up to the still level
+    flow = tank.density_kg_m3 * tank.reservoir_area_m2  # per dh/dt, along the whole streamline
 
     # These are integrals of y, z, y^2, z^2, y z over the mass; those of x follow from x = lx.
-    first_y = rho * at * length * h
-    first_z = rho * (at * (2 * lz * height - height * height - h * h) + ap * length * lz)
-    square_y = rho * (at * length * length * height / 2 + ap * length * length * length / 12)
-    square_z = rho * (
-        at
-        * (
-            2 * height * height * height / 3
-            - 2 * lz * height * height
-            + 2 * lz * lz * height
-            + 2 * (height - lz) * h * h
-        )
-        + ap * length * lz * lz
-    )
-    product_yz = rho * at * length * (lz - height) * h
-    slope_y, slope_z = rho * at * length, -2 * rho * at * h
-    slope_zz, slope_yz = 4 * rho * at * (height - lz) * h, rho * at * length * (lz - height)
+    slope_y, slope_z = tank.across_kg, -2 * flow * h
+    first_y, first_z = slope_y * h, tank.water_lever_kgm - flow * h * h
+    square_y, at_rest = tank.water_squares_kg_m2
+    square_z = at_rest + 2 * flow * above * h * h
+    slope_yz, slope_zz = -slope_y * above, 4 * flow * above * h
 
     inertia = np.empty((*h.shape, 3, 3))
     inertia[..., 0, 0] = square_y + square_z
@@ -75,14 +63,13 @@ def water_moments(tank: Tank, level_m: npt.ArrayLike) -> WaterMoments:
     inertia[..., 2, 2] = mass * lx * lx + square_y
     inertia[..., 0, 1] = inertia[..., 1, 0] = -lx * first_y
     inertia[..., 0, 2] = inertia[..., 2, 0] = -lx * first_z
-    inertia[..., 1, 2] = inertia[..., 2, 1] = -product_yz
+    inertia[..., 1, 2] = inertia[..., 2, 1] = -slope_yz * h
     inertia_slope = np.zeros((*h.shape, 3, 3))
     inertia_slope[..., 0, 0] = inertia_slope[..., 1, 1] = slope_zz
     inertia_slope[..., 0, 1] = inertia_slope[..., 1, 0] = -lx * slope_y
     inertia_slope[..., 0, 2] = inertia_slope[..., 2, 0] = -lx * slope_z
     inertia_slope[..., 1, 2] = inertia_slope[..., 2, 1] = -slope_yz
 
-    flow = rho * at  # The mass flow per dh/dt is the same along the whole streamline.
     return WaterMoments(
         mass_kg=mass,
         first_kgm=np.stack([zero + mass * lx, first_y, zero + first_z], axis=-1),
@@ -90,8 +77,9 @@ def water_moments(tank: Tank, level_m: npt.ArrayLike) -> WaterMoments:
         first_curvature_kg_m=np.array([0.0, 0.0, -2 * flow]),
         inertia_kgm2=inertia,
         inertia_slope_kgm=inertia_slope,
-        swirl_kgm=flow
-        * np.stack([zero - length * (height + lz), 2 * lx * h, zero + length * lx], axis=-1),
+        swirl_kgm=np.stack(
+            [zero + tank.swirl_kgm, 2 * flow * lx * h, zero + slope_y * lx], axis=-1
+        ),
         swirl_slope_kg=np.array([0.0, 2 * flow * lx, 0.0]),
     )
 

@@ -22,10 +22,10 @@ from utank_hil.canbus import (
     SensorTank,
     ValveStatus,
 )
-from utank_hil.canbus.frame import OTHER_BUS, STANDARD
+from utank_hil.canbus.frame import BUS_SHIFT, OTHER_BUS, STANDARD
 from utank_hil.canbus.measurements import Measurements
 from utank_hil.canbus.profiles.acting import ProfiledPanel, ProfiledValve
-from utank_hil.canbus.profiles.device import ProfiledDevice
+from utank_hil.canbus.profiles.device import MessageHeard, ProfiledDevice
 from utank_hil.canbus.profiles.device_plan import NO_FOREIGN_DEVICES, ForeignDevices
 from utank_hil.nodes.actuators_heard import ABSENT_NS, DriveHeard, ValveHeard
 from utank_hil.nodes.canopen_drive import CanopenDrive
@@ -34,7 +34,6 @@ from utank_hil.nodes.hardwired import HardwiredHeard
 from utank_hil.nodes.levels_heard import LevelsHeard
 from utank_hil.nodes.nodes_heard import NodesHeard
 from utank_hil.nodes.plausibility import MILLISECOND_NS, NEVER_HEARD_NS, USABLE, MotionSensor
-from utank_hil.nodes.received import message_words
 from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.nodes.routing import Routing
 from utank_hil.nodes.stations import ADDRESSES, Stations
@@ -295,7 +294,7 @@ class Inbox:
             heard = source.watched
         elif source is not None:
             heard = (source,)
-        parts += [message_words(each, self._catalogue, self._foreign) for each in heard]
+        parts += [_message_words(each, self._catalogue, self._foreign) for each in heard]
         return "; ".join(filter(None, parts))
 
     def other_frames(self, count: int) -> None:
@@ -322,3 +321,23 @@ class Inbox:
         if pump.quality in USABLE and math.isfinite(pump.pressure_pa):
             self._pressure_pa = pump.pressure_pa
             self._pressure_ns = now_ns
+
+
+def _message_words(heard: Heard, catalogue: Catalogue, foreign: ForeignDevices) -> str:
+    """Who sends a message, its name, identifier and bus, and how often it was rejected, and why."""
+    device, name, _ = foreign.said().get(heard.can_id, ("", "", False))
+    if not device:
+        known = catalogue.by_id[heard.can_id]
+        device, name = known.source.name.lower(), known.codec.name
+    bus, digits = foreign.buses[heard.can_id >> BUS_SHIFT], 3 if heard.can_id & STANDARD else 8
+    number = f"0x{heard.can_id & STANDARD - 1:0{digits}X}"
+    if isinstance(heard, MessageHeard):
+        name = heard.name  # several may have one identifier
+        if heard.of_group:
+            number = f"PGN {heard.can_id >> 8 & 0x3FFFF} of 0x{heard.can_id & 0xFF:02X}"
+    parts = [f"{device}: {name} {number}{bus and f' on {bus}'}"]
+    parts += ["never heard"] * (not heard.heard)
+    parts += [f"{count} with {why.value}" for why, count in heard.rejected.items() if count]
+    if isinstance(heard, MessageHeard) and heard.unwell:
+        parts.append(heard.unwell)
+    return ", ".join(parts)

@@ -44,7 +44,8 @@ def _stuffing_tables() -> tuple[bytes, bytes]:
     return bytes(state for state, _ in after), bytes(stuffed for _, stuffed in after)
 
 
-def _crc(register: int, bits: int, length: int) -> int:
+def _crc(bits: int, length: int) -> int:
+    register = 0
     for position in range(length - 1, -1, -1):
         feedback = (bits >> position ^ register >> (_CRC_BITS - 1)) & 1
         register = (register << 1 & 0x7FFF) ^ (_CRC_POLYNOMIAL * feedback)
@@ -55,8 +56,8 @@ _TABLES: Final = _stuffing_tables()
 _AFTER: Final = _TABLES[0]
 _STUFFED: Final = _TABLES[1]
 # The CRC is held left-aligned in 16 bits, as two bytes; these tables advance them by one byte.
-_CRC_HIGH: Final = bytes(_crc(0, byte, 8) >> 7 for byte in range(256))
-_CRC_LOW: Final = bytes(_crc(0, byte, 8) << 1 & 0xFF for byte in range(256))
+_CRC_HIGH: Final = bytes(_crc(byte, 8) >> 7 for byte in range(256))
+_CRC_LOW: Final = bytes(_crc(byte, 8) << 1 & 0xFF for byte in range(256))
 
 
 @lru_cache(maxsize=4096)
@@ -73,7 +74,7 @@ def _after_header(can_id: int, length: int) -> tuple[int, int, int, int]:
         bits = _HEADER_BITS
     state, stuffed = _after_bits(0, header, bits)
     plain = bits + 8 * length + _CRC_BITS + _AFTER_CRC_BITS
-    crc = _crc(0, header, bits)
+    crc = _crc(header, bits)
     return crc >> 7, crc << 1 & 0xFF, state, plain + stuffed
 
 

@@ -57,8 +57,8 @@ class EventWriter(RingWriter):
 class EventReader(RingReader):
     """A reading end."""
 
-    def __init__(self, name: str, place: int | None = None) -> None:
-        super().__init__(name, place, RingKind.EVENTS)
+    def __init__(self, name: str) -> None:
+        super().__init__(name, RingKind.EVENTS)
         #: Time of the first telemetry row on the writer's monotonic clock, set by the first event.
         self.start_ns = 0
 

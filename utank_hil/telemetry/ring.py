@@ -154,12 +154,12 @@ class RingWriter(Closing):
 
 
 class RingReader(Closing):
-    """Reading end with its own cursor, from `place` of another reader or the oldest slot on.
+    """Reading end with its own cursor, from the oldest slot on.
 
     Raises `RingError` if there is no such ring, or it is not of this version and `kind`.
     """
 
-    def __init__(self, name: str, place: int | None = None, kind: RingKind | None = None) -> None:
+    def __init__(self, name: str, kind: RingKind | None = None) -> None:
         self.name = name
         descriptor = _opened(name)
         try:
@@ -192,7 +192,7 @@ class RingReader(Closing):
         self._slots: int = slots
         self._writer_start: int = start
         #: Number of slots read or lost, counted from the first that was ever written.
-        self.place: int = max(0, self._words[_COUNT] - slots) if place is None else place
+        self.place: int = max(0, self._words[_COUNT] - slots)
 
     def read(self) -> list[bytes]:
         """Return what was written since the last call, by slot, oldest first; never blocks."""
@@ -307,8 +307,8 @@ class RowWriter(RingWriter):
 class RowReader(RingReader):
     """Reading end of a ring of rows; `about` is their origin, None if unknown."""
 
-    def __init__(self, name: str, place: int | None = None) -> None:
-        super().__init__(name, place, RingKind.ROWS)
+    def __init__(self, name: str) -> None:
+        super().__init__(name, RingKind.ROWS)
         columns, about = self.content.get("columns"), self.content.get("about")
         if not isinstance(columns, list) or self._stride != 8 * len(columns) + 8:
             raise RingError(f"{name!r} is a damaged telemetry ring: {columns} are its columns")
