@@ -75,19 +75,10 @@ def fit_ship(
 ) -> ShipFit:
     """Fit ship and tank to the result of OKID.
 
-    ValueError is raised if outputs or inputs do not match the model. IdentificationError is raised
+    The `result` is of one input `u`, shape (N,), gaps included. The `plant` has the initial values,
+    which parameters that are not fitted keep; `measured` are the outputs of the model, names of
+    `STATES`. ValueError is raised if outputs or inputs do not match the model, IdentificationError
     if no ship can be fitted.
-
-    Parameters
-    ----------
-    result : OkidResult
-        Result with one input.
-    u : array_like, shape (N,)
-        Input of the identification, gaps included.
-    plant : DesignPlant
-        Initial values; parameters that are not fitted keep these.
-    measured : tuple of str
-        Outputs of the model, names in `utank_hil.dynamics.linear.STATES`.
     """
     arx, ship, tank = result.arx, plant.ship, plant.tank
     if (arx.outputs, arx.inputs) != (len(measured), 1):

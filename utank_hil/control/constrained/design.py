@@ -62,26 +62,11 @@ def sea_plant(
     """Sampled model of ship, tank, drive, waves and a slowly varying heeling moment.
 
     The waves are white noise through the shaping filter of a `SeaModel`, with a moment that is
-    linear between two samples.
+    linear between two samples. The noises and the heel are those of `ConstrainedDesign`.
 
-    Parameters
-    ----------
-    pressure_noise_pa_rt_s : float
-        Root of the two-sided density of a white pressure disturbance, which stands for model
-        errors.
-    slope_noise_rad_rt_s : float
-        Root of the two-sided density of a white roll moment, per roll stiffness.
-    heel_std_rad, heel_time_s : float
-        Standard deviation and time constant of the heeling moment, per roll stiffness.
-
-    Returns
-    -------
-    model : LinearModel
-        From the pump's command to `STATES`. States: `STATES` (less the direct effect of the
-        command), lag and past commands, waves, and last the heel.
-    process_covariance : ndarray, shape (n, n)
-    row, noise : ndarray, shape (n,)
-        Those of `Waves`.
+    Returns the model from the pump's command to `STATES`, its process covariance, shape (n, n), and
+    row and noise of `Waves`, shape (n,). Its states are `STATES` (less the direct effect of the
+    command), lag and past commands, waves, and last the heel.
     """
     a, b = state_matrices(plant.ship, plant.tank)
     pressure, slope = b[:, :1], b[:, 1:] * plant.ship.stiffness_nm_rad

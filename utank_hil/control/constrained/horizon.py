@@ -103,28 +103,13 @@ def condense(
     terminal: FloatArray | None = None,
     correction: FloatArray | None = None,
 ) -> Horizon:
-    """Compute cost and predictions of a plan.
+    """Compute cost and predictions of a plan for a discrete model of one input and outputs y.
 
-    ValueError is raised if the knots or a weight are out of their range.
-
-    Parameters
-    ----------
-    model : LinearModel
-        Discrete, one input, outputs y.
-    knots : tuple of int
-        Increasing, from 0; the last one below `samples`.
-    samples : int
-        N.
-    output_weight : ndarray, shape (m,)
-        Diagonal of W, zero or more.
-    input_weight : float
-        Q, positive.
-    first_output : int
-        Outputs before y(k + first_output) have no weight.
-    terminal : ndarray, shape (t, n), optional
-        L.
-    correction : ndarray, shape (n,), optional
-        From the state to an addition to each sample's command, which does not depend on commands.
+    The `knots` increase from 0 and stay below the `samples`, N. `output_weight`, shape (m,), is the
+    diagonal of W, zero or more, `input_weight` is Q, positive; outputs before y(k + `first_output`)
+    have no weight. `terminal` is L, shape (t, n). `correction`, shape (n,), leads from the state to
+    an addition to each sample's command, which does not depend on commands. ValueError is raised if
+    the knots or a weight are out of their range.
     """
     weights = np.append(output_weight, input_weight)
     if not (np.isfinite(weights).all() and np.min(output_weight) >= 0 and input_weight > 0):
@@ -205,17 +190,8 @@ class ActiveSetSolver:
     active set of the last solution, and allocates no memory during a solution (DAQP: Arnström,
     Bemporad, Axehill, IEEE Transactions on Automatic Control 67 (2022) 4362-4369).
 
-    `hessian` is H, shape (n, n), positive definite, and `rows` is G, shape (m, n). ValueError is
-    raised if the programme cannot be set up.
-
-    Parameters
-    ----------
-    hessian : ndarray, shape (n, n)
-        H, positive definite.
-    rows : ndarray, shape (m, n)
-        G.
-    iteration_limit : int
-        Limit on the iterations of a solution.
+    `hessian` is H, shape (n, n), positive definite, and `rows` is G, shape (m, n);
+    `iteration_limit` is that of a solution. ValueError is raised if the programme cannot be set up.
     """
 
     def __init__(self, hessian: FloatArray, rows: FloatArray, iteration_limit: int) -> None:
@@ -257,16 +233,10 @@ class ActiveSetSolver:
 
 
 class PlanProgramme:
-    """Programme of a horizon within limits.
+    """Programme of a horizon in Pa, with j knots, within limits.
 
-    Parameters
-    ----------
-    horizon : Horizon
-        In Pa; j knots.
-    level_output : int or None
-        Index of the level among the outputs; None leaves the level free.
-    level_penalty : float
-        Cost of a metre above the limit, in the unit of the horizon's cost.
+    `level_output` is the index of the level among the outputs; None leaves the level free.
+    `level_penalty` is the cost of a metre above the limit, in the unit of the horizon's cost.
     """
 
     def __init__(
@@ -346,16 +316,9 @@ class PlanProgramme:
     ) -> FloatArray | None:
         """Return the best plan in Pa, shape (j,), or None if the iteration limit was reached.
 
-        Parameters
-        ----------
-        gradient : ndarray, shape (j,)
-            f, per Pa.
-        low, high : ndarray, shape (j,)
-            Bounds of the plan.
-        last : float
-            The last sent command, less the steady part.
-        levels : ndarray, shape (l,)
-            Levels at the samples `held` with the steady command alone.
+        `gradient` is f, per Pa; the plan is within `low` and `high`, all of shape (j,). `last` is
+        the last sent command, less the steady part; `levels`, shape (l,), are those at the samples
+        `held` with the steady command alone.
         """
         unit, knots = self._unit_pa, self._knots
         lower, upper = self._lower, self._upper

@@ -203,12 +203,8 @@ class ConstrainedLaw(Checked, owner="constrained law"):
 class ConstrainedController:
     """Stepping of a `ConstrainedLaw`.
 
-    Attributes
-    ----------
-    limited : bool
-        Whether a limit changed the last plan.
-    fallbacks : int
-        Number of programmes that reached their iteration limit.
+    `limited` says whether a limit changed the last plan; `fallbacks` is the number of programmes
+    that reached their iteration limit.
     """
 
     def __init__(self, law: ConstrainedLaw) -> None:

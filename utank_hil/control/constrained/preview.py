@@ -68,12 +68,8 @@ class Foresight(NamedTuple):
 class Preview:
     """The forecast that the next plan of a controller knows.
 
-    Attributes
-    ----------
-    doubt : float
-        Mean square of the forecasts' differences from the estimate, over the expected one.
-    doubted : bool
-        Whether forecasts are ignored, as they do not agree with the motion.
+    `doubt` is the mean square of the forecasts' differences from the estimate, over the expected
+    one; they are ignored, `doubted`, while they do not agree with the motion.
     """
 
     def __init__(self, foresight: Foresight, sample_time_s: float) -> None:
