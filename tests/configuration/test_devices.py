@@ -440,3 +440,13 @@ def test_the_way_of_a_valve_with_switches_and_what_a_panel_of_a_bit_is_told(tmp_
     beats = DevicesSection(valve=ON_OFF, pump=DRIVE).foreign(found.pump)
     assert beats.valve.beat is None  # the drive's command brings it
     assert plan.beat == Frame(STANDARD | 0x77F, b"\x05")
+
+
+@pytest.mark.parametrize("first", [SBG, {}])
+def test_the_age_of_the_slower_of_two_sensors_is_allowed(first):
+    """Either may be the one in use."""
+    slow = SSI2 | {"bus": "can2", "cycle_ms": 50, "age_ms": 150}
+    ages = DevicesSection(motion=first, motion_2=slow).default_ages()
+    assert (ages["motion_age_ms"], ages["motion_spare_age_ms"]) == (150, 300)
+    ages = DevicesSection(motion=slow, motion_2=first).default_ages()
+    assert ages["motion_age_ms"] == 150

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -228,3 +229,44 @@ def test_a_native_node_has_no_identity_to_change():
     bench = SimpleNamespace(nodes={"drive": FaultyNode(drive)})
     with pytest.raises(ValueError, match="no CANopen device"):
         fault_of({"kind": "replaced", "node": "drive"}).place(bench, 0, 0)
+
+
+def test_a_slow_sensor_of_another_maker_takes_the_place_of_a_fast_one_that_is_gone():
+    """J1939 at 20 Hz beside an Ellipse at 100 Hz, each on a bus of its own."""
+    slow = {"profile": "j1939_ssi2", "source": 0x20, "bus": "can2", "accept_unprotected": True,
+            "cycle_ms": 50, "age_ms": 150}  # fmt: skip
+    scenario = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
+    changes = {
+        "devices": DevicesSection(motion=SBG, motion_2=slow),
+        "redundancy": Redundancy(second_motion_sensor=True),
+    }
+    vessel = scenario.vessel.model_copy(update=changes)
+    config = scenario.controllers["gpc"]
+    safety = replace(config.safety, **vessel.default_safety)
+    config = config.model_copy(update={"vessel": vessel, "safety": safety})
+    ship = build_ship_side(scenario.model_copy(update={"vessel": vessel}), 1, scenario.operator)
+    node = build_controller_node(config, commissioned=True)
+    gone = []
+    run = Lockstep(
+        [Silent(each, gone) if each is ship.sensors else each for each in ship.nodes] + [node],
+        with_more(SimulatedBus(), 2, 250_000),
+    )
+    run.run_until(20 * SECOND_NS)
+    assert (node.mode, node.fault) == (Mode.ACTIVE, 0)
+    gone += vessel.foreign.motions[0].messages
+    for k in range(100):
+        run.run_until(run.now_ns + SECOND_NS // 10)
+        assert (node.mode, node.fault) == (Mode.ACTIVE, 0), k
+    assert node.measured.motions[0].age_ms > 9000
+
+
+class Silent:
+    """A node that sends none of some messages any more."""
+
+    def __init__(self, node, gone):
+        self._node, self._gone = node, gone
+        self.name, self.period_ns, self.receive = node.name, node.period_ns, node.receive
+
+    def tick(self, now_ns):
+        out = {can_id for each in self._gone for can_id in each.can_ids}
+        return [frame for frame in self._node.tick(now_ns) if frame.can_id not in out]

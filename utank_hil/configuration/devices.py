@@ -316,7 +316,9 @@ class DevicesSection(Section):
             "valve_age_ms": self.valve.age_ms,
         }
         both = [each.age_ms for each in (self.motion, self.motion_2) if each.age_ms is not None]
-        if both:
+        if both:  # either may be the one in use
+            first_ms = self.motion.age_ms or SafetyLimits().motion_age_ms
+            ages["motion_age_ms"] = max(first_ms, *both)
             ages["motion_spare_age_ms"] = max(SafetyLimits().motion_spare_age_ms, 2 * max(both))
         return {name: age_ms for name, age_ms in ages.items() if age_ms is not None}
 
