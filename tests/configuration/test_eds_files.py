@@ -83,6 +83,14 @@ def test_a_motion_sensor_by_its_eds_as_canopen_sends_it(tmp_path):
     assert heard == [(0, (pytest.approx(-0.1234), 0.25, Quality.GOOD))]
 
 
+def test_keys_that_are_indented_are_read(tmp_path):
+    """As an editor leaves them; nothing in CiA 306 continues a value in another line."""
+    lines = SENSOR.splitlines()
+    inset = "\n".join(f"\t {line}" if line.startswith("Def") else line for line in lines)
+    assert Eds(written(tmp_path, inset)).sent(1) == Eds(written(tmp_path)).sent(1)
+    assert Eds(written(tmp_path, inset)).sent(1)["cycle_ms"] == 20
+
+
 def test_the_short_form_of_an_array_and_a_gap_in_a_pdo(tmp_path):
     begin, end = SENSOR.index("[1A00]"), SENSOR.index("[6020]")
     found = Eds(written(tmp_path, SENSOR[:begin] + COMPACT + SENSOR[end:])).sent(1)

@@ -29,6 +29,7 @@ _BITS: Final = {
 _LONG_ID: Final = 1 << 29  #: In the identifier of a PDO: it has 29 bits.
 _MOST_MAPPED: Final = 64  #: Objects of a PDO, by CiA 301: one a bit.
 _TIMED: Final = (254, 255)  #: Types of a PDO that its event timer sends.
+_INDENT: Final = re.compile(r"^[ \t]+", re.MULTILINE)
 _NODE: Final = re.compile(r"^\$NODEID\s*\+?\s*|\s*\+\s*\$NODEID$", re.IGNORECASE)
 
 
@@ -54,7 +55,10 @@ class Eds:
             interpolation=None, delimiters=("=",), inline_comment_prefixes=(";", "#")
         )
         try:
-            parser.read_string(_text("eds", file, ENCODINGS), Path(file).name)
+            text = _INDENT.sub(
+                "", _text("eds", file, ENCODINGS)
+            )  # no value goes on in another line
+            parser.read_string(text, Path(file).name)
         except Error as error:
             raise ValueError(f"eds: {file} is no EDS: {' '.join(error.message.split())}") from error
         self._sections = {name.upper(): dict(parser[name]) for name in parser.sections()}
