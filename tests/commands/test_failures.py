@@ -92,7 +92,26 @@ def test_a_run_too_long_for_the_memory_is_refused_in_words(
     assert said.startswith("error: too little memory for this: Unable to allocate 1.00 EiB")
 
 
+def test_a_library_that_the_memory_does_not_hold_is_said_in_words(tmp_path: Path) -> None:
+    """Of the loader, as it says it: SciPy is mapped with too little address space."""
+    code = (
+        "import numpy, resource\n"
+        "from utank_hil.console.common import failures_named\n"
+        "held = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (held + (1 << 20), -1))\n"
+        "with failures_named():\n"
+        "    import scipy.linalg\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == ExitCode.SYSTEM, done.stderr
+    assert done.stderr.startswith("error: too little memory for this")
+
+
 def test_other_errors_are_those_of_the_program() -> None:
+    with pytest.raises(ImportError, match="no such name"), failures_named():
+        raise ImportError("no such name")
     with pytest.raises(OSError, match="reset"), failures_named():
         raise OSError(errno.ECONNRESET, "reset")
 

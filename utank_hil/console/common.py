@@ -307,6 +307,10 @@ def failures_named() -> Iterator[None]:
         reason, code = KILLED, ExitCode.SYSTEM
     except MemoryError as error:
         reason, code = f"too little memory for this: {error}".rstrip(": "), ExitCode.SYSTEM
+    except ImportError as error:
+        if "failed to map segment" not in f"{error} {error.__cause__}":  # the loader's words
+            raise
+        reason, code = "too little memory for this: a library can't be loaded", ExitCode.SYSTEM
     except OSError as error:
         if error.filename is None and error.errno != errno.ENOSPC:
             raise
