@@ -106,7 +106,7 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
     ("a self-tuned law to trade", "design controller '{own}/law.yaml'",
      ("law.yaml", "has no weight to trade", "kind: gpc")),
     ("a scenario to the panel", "panel '{own}/scenario.yaml' --bus vcan7",
-     ("scenario.yaml", "a ship is wanted")),
+     ("scenario.yaml", "a ship is wanted, such as its", "opv.yaml")),
     ("a project below a file", f"init '{{own}}/opv.yaml/new' {YACHT} --roll-period 7",
      ("opv.yaml/new", "name another folder")),
     ("a draught in decimetres", f"init '{{own}}/new' {YACHT} --draught 26",

@@ -244,7 +244,10 @@ class _Reader:
                 self.problems.append(ConfigProblem(where, at_name, f"names {file}, which {why}"))
             else:
                 if another:
-                    why = f"is a {noun}, and a {wanted} is wanted"
+                    place = {"ship": "vessel", "controller": "controllers"}.get(wanted)
+                    named = [each for at, each in self.origins.items() if at[:1] == (place,)]
+                    its = f", such as its {named[0]}" if named else ""
+                    why = f"is a {noun}, and a {wanted} is wanted{its}"
                 self.problems.append(ConfigProblem(file, "", why))
             self.unread.add(key)
 
