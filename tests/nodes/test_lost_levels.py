@@ -135,3 +135,16 @@ def test_a_pressure_counts_for_a_tenth_of_a_second(age_ns, pressure_pa, monkeypa
         changed(bench.node.measured, now_ns=later_ns, pressure_pa=7e3, pump_age_ms=age_ns / MS)
     )
     assert predicted == [pressure_pa]
+
+
+def test_a_level_that_is_only_just_due_is_not_missing_yet():
+    """It comes every 20 ms, before the tick of its time."""
+    bench = ControllerBench()
+    bench.pump = bench.pump._replace(pressure_pa=20e3)
+    bench.run(400)
+    bench.silent.add(SensorTank)
+    levels_m = [bench.level.level_m]
+    for _ in range(2):
+        bench.tick()
+        levels_m.append(bench.level.level_m)
+    assert levels_m[0] == levels_m[1] < levels_m[2]

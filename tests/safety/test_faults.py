@@ -3,6 +3,7 @@
 import itertools
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from cantools.database.can import Database
@@ -42,6 +43,49 @@ def test_people_read_what_happened_and_what_to_do():
         assert row.happened.endswith(".")
         assert row.remedy.endswith(".")
     assert fault_text(Fault.NONE) == "NONE"
+
+
+def documented():
+    """Fault, reaction, and whether it keeps the controller in INIT, by docs/safety.md."""
+    lines = Path("docs/safety.md").read_text(encoding="utf-8").splitlines()
+    begin = lines.index("| fault | found by | reaction | keeps the controller in INIT |") + 2
+    name = ""
+    for line in itertools.takewhile(str, lines[begin:]):
+        fault, _, reaction, waits = (cell.strip() for cell in line.split("|")[1:-1])
+        name = fault.split(" ")[0] or name
+        yield name, reaction, waits == "yes"
+
+
+def test_what_each_condition_does_is_what_the_documentation_says():
+    found = [
+        (
+            fault.name,
+            each.reaction.value.format(zero_within_ms=each.zero_within_ms),
+            each.awaited is not None,
+        )
+        for fault, each in judging.CONDITIONS
+    ]
+    assert found == list(documented())
+
+
+def test_in_init_it_waits_for_the_bus_then_sensors_drive_valve_versions_and_wires():
+    waits, left = [], judging.AWAITED
+    while (first := judging.first_awaited(left)) is not None:
+        waits.append(first[0].name)
+        left &= ~(1 << judging.CONDITIONS.index(first))
+    assert waits == [
+        "BUS_LOST", "ADDRESS_CONFLICT", "MOTION_SILENT", "TANK_SILENT", "PUMP_SENSOR_SILENT",
+        "DRIVE_SILENT", "VALVE_SILENT", "VERSION_MISMATCH", "HARDWIRED_SILENT",
+    ]  # fmt: skip
+
+
+def test_passive_is_ended_by_a_pump_that_presses_against_zero_and_by_the_hard_wired_stop():
+    ending = judging.faults(judging.ENDING_PASSIVE)
+    assert ending == {Fault.HARDWIRED_STOP, Fault.SIGN_FLIP, Fault.DRIVE_NOT_FOLLOWING}
+    assert judging.ENDING_PASSIVE.bit_count() == 3
+    assert judging.faults(judging.DRIVE_OUT) == {Fault.DRIVE_FAULT}
+    assert count(drive_out_ms=41.0) == judging.DRIVE_OUT.bit_count() == 1
+    assert judging.standing(situation(drive_out_ms=41.0), LIMITS) == judging.DRIVE_OUT
 
 
 @given(st.integers(0, (1 << len(judging.CONDITIONS)) - 1))

@@ -248,3 +248,50 @@ def test_a_level_over_nine_tenths_of_the_tank_is_not_judged_on_either_side(side,
     assert equation.settled
     equation.update(0.0, side * share * TANK.level_limit_m, 0.0)
     assert equation.settled == judged
+
+
+@pytest.mark.parametrize(("of_hull", "left"), [(False, 0.5), (True, 1.0)])
+def test_errors_of_the_model_may_leave_half_a_push_and_of_a_hull_with_the_band_all_of_it(
+    of_hull, left
+):
+    """A fifth more is one fifth over the threshold, if the true sign leaves far less."""
+    equation = TankEquation(SHIP, TANK, replace(EXACT, of_hull=of_hull), STEP_S)
+    for push in (0.5, 3.0):
+        worse = 1.2 * (left * push) ** 2
+        assert equation._excess(worse, worse / 4, push * push, 0.0) == pytest.approx(1.2)
+
+
+@pytest.mark.parametrize(("of_hull", "per_share"), [(False, 0.0), (True, 0.1)])
+def test_a_share_of_sway_that_is_not_constant_leaves_three_tenths_of_the_slopes_push(
+    of_hull, per_share
+):
+    """And of a hull, whose sway is known less well around w0, a tenth of the share besides."""
+    sways = replace(SHIP, sway_of_slope=None)  # by up to all of the slope
+    equation = TankEquation(sways, TANK, replace(EXACT, of_hull=of_hull), STEP_S)
+    for k in range(2400):
+        roll_rad = 0.1 * math.sin(W / 2 * k * STEP_S)
+        equation.update(roll_rad, 0.1 * roll_rad, 0.0)
+    share = equation._sound.share
+    assert share > 0.3
+    assert equation._of_sway == pytest.approx(0.3 + per_share * share)
+
+
+def test_a_level_that_stands_at_a_crest_has_a_sign_for_a_tenth_of_a_period():
+    equation, found = equation_of(3.0, 0.0, -1.0)
+    assert found & Finding.WATER_SIGN
+    roll_rad, level_m = equation._roll.last, equation._level.last
+    told = [equation.update(roll_rad, level_m, 0.0) & Finding.WATER_SIGN > 0 for _ in range(40)]
+    stands = 0.1 * EXACT.tank_period_s / STEP_S
+    assert all(told[: round(0.75 * stands)])  # its stop leaves less of the sign as well
+    assert not any(told[round(stands) + 2 :])
+
+
+def test_without_the_band_a_sign_counts_in_full_before_the_memory_is_full():
+    """A gain of -1 leaves (1 + 1)^2 of the push's square, of which the model may leave 1 / 2^2."""
+    equation, k = TankEquation(SHIP, TANK, EXACT, STEP_S), 0
+    roll_rad, answer = 3.0 / PUSH, -3.0 / ANSWER
+    while math.isnan(equation.doubt):
+        turn = cmath.exp(1j * W * k * STEP_S)
+        equation.update((roll_rad * turn).real, (answer * turn).real, 0.0)
+        k += 1
+    assert equation.doubt == pytest.approx(16, rel=0.05)
