@@ -14,8 +14,6 @@ from hypothesis import strategies as st
 from test_combined_faults import FAULTS, NODE_OF, faults_of, ship
 
 from firmware_sim.faulty_bench import FaultyBench
-from firmware_sim.guard.parameters import guard_parameters
-from firmware_sim.guard.reference import GuardNode
 from utank_hil.assembly import build_law
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import Address, ControllerStatus, Mode, OperatorCommand, Station
@@ -183,8 +181,7 @@ def run(which, warm_ms, steps):
         scenario, config, law, seed=1, script=(),
         tapped=lambda node: Judged(node, config.limits),
     )  # fmt: skip
-    guard = GuardNode(guard_parameters(config))
-    bench.join([second, guard])
+    bench.join([second])
     panels = {Station.OPERATOR: bench.ship.panel, Station.OPERATOR_2: second}
     now_ns = 500 * MS
     bench.run(now_ns)

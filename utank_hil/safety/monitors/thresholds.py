@@ -92,7 +92,7 @@ class MonitorThresholds:
     degraded_share: float  #: Share while a sensor or the drive is in doubt.
     #: Root mean square of the roll below which it is not compared with the twin's.
     amplified_roll_rad: float
-    of_hull: bool = False  #: Whether hull data say that the ship may be a wide one that sways.
+    of_hull: bool  #: Whether hull data say that the ship may be a wide one that sways.
 
 
 def thresholds_of(
