@@ -75,6 +75,8 @@ class Motor:
                 self.node.emcy.send(int(code, 16), 0x81)
                 self.state = REACTS
             case ["well"]:
+                if self.mute:
+                    self.node.nmt.start_heartbeat(round(self._period_s * 1e3))
                 self.drops = self.deaf = self.mute = False
                 self.node.emcy.reset()
             case _:
