@@ -10,14 +10,14 @@ from utank_hil.retuning.renewing import FIRST_EFFORT, LEAST_EFFORT, LIMITED_EFFO
 SAMPLES = 60
 
 
-def ended(made_with_all: complex, periods: int = 60) -> float:
+def ended(made_with_all: complex, periods: int = 60, *, plans: bool = False) -> float:
     """Share in the end, where the whole command adds this phasor to a passive roll of one."""
     effort = Effort(SAMPLES)
     for n in range(periods * SAMPLES):
         turn = np.exp(2j * np.pi * n / SAMPLES)
         passive_rad = float(turn.real)
         made_rad = effort.share * float((made_with_all * turn).real)
-        effort.update(passive_rad + made_rad, passive_rad, limited=False)
+        effort.update(passive_rad + made_rad, passive_rad, limited=False, plans=plans)
     return effort.share
 
 
@@ -33,6 +33,18 @@ def ended(made_with_all: complex, periods: int = 60) -> float:
 )
 def test_it_ends_at_the_share_of_the_least_roll(made: complex, best: float) -> None:
     assert ended(made) == pytest.approx(best, rel=0.04)
+
+
+@pytest.mark.parametrize(
+    ("made", "share"),
+    [
+        (-0.5 + 0.7j, 1.0),  # |1 + made|^2 is 0.74; the least would be at 0.68
+        (-0.5 + 1.2j, 2 * 0.5 / 1.69),  # |1 + made|^2 is 1.69: where |1 + s made| is one again
+        (0.3 + 0.0j, LEAST_EFFORT),
+    ],
+)
+def test_a_law_that_plans_has_all_while_the_ship_rolls_less(made: complex, share: float) -> None:
+    assert ended(made, 120, plans=True) == pytest.approx(share, rel=0.08)
 
 
 def test_a_law_that_helps_again_comes_back() -> None:

@@ -63,7 +63,8 @@ class Learning:
         self._use = controller.use if isinstance(controller, GentleController) else controller.allow
         self.sample_time_s = self._law.sample_time_s
         self.effort = Effort(ShipFigures.of(plant.ship).roll_period_s / self.sample_time_s)
-        self._first_share = FIRST_EFFORT if isinstance(controller, GentleController) else 1.0
+        self._plans = isinstance(controller, ConstrainedController)
+        self._first_share = 1.0 if self._plans else FIRST_EFFORT
         self.effort.clear(self._first_share)
         self._twin = plant.sampled(("roll_rad",), self.sample_time_s)
         self._made = np.zeros(len(self._twin.A))
@@ -80,7 +81,7 @@ class Learning:
         """Take a measurement and return the command."""
         limited = abs(self._applied_pa - self._asked_pa) > LIMITED_EFFORT * self._most_pa
         passive_rad = float(y[0] - (self._twin.C @ self._made)[0])
-        self.effort.update(float(y[0]), passive_rad, limited=limited)
+        self.effort.update(float(y[0]), passive_rad, limited=limited, plans=self._plans)
         share = self.effort.share
         self._use(1.0 if self._of_command else share)
         clipped = np.clip(self._law.step(y, reference), -self._most_pa, self._most_pa)

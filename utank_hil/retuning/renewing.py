@@ -75,6 +75,9 @@ class Effort:
     twin's makes d wrong by as much as its answer to the pump differs: in short waves, loaded to 1.3
     times its roll period, it gets less pressure than would pay.
 
+    A law that plans within its share does not do the same on a smaller scale: its plans come out
+    with another phase. It gets all of the pressure while the ship rolls less than the twin.
+
     `samples` are those of a roll period.
     """
 
@@ -87,10 +90,13 @@ class Effort:
         self.share = share
         self._twin_rad = self._made_rad = self._together = self._made_square = self._limited = 0.0
 
-    def update(self, roll_rad: float, passive_roll_rad: float, *, limited: bool) -> None:
+    def update(
+        self, roll_rad: float, passive_roll_rad: float, *, limited: bool, plans: bool = False
+    ) -> None:
         """Take a sample; with an unknown passive roll the share goes to one.
 
-        `limited` if limits have changed the last command (`LIMITED_EFFORT`).
+        `limited` if limits have changed the last command (`LIMITED_EFFORT`), `plans` if the law
+        plans within its share.
         """
         best, part = 1.0, self._part
         self._limited = 1.0 if limited else (1.0 - part) * self._limited
@@ -104,6 +110,8 @@ class Effort:
             self._made_square += part * (made * made - self._made_square)
             if self._made_square > 0.0:
                 best = -self.share * self._together / self._made_square
+                if plans and best > 0.5 * self.share:  # the mean square is below the twin's
+                    best = 1.0
         self.share += EFFORT_PACE * part * (min(max(best, least), 1.0) - self.share)
 
 
@@ -162,7 +170,9 @@ class RenewingController(LawExchange):
         elif self._fresh and self._shared:
             changed_pa = abs(self._applied_pa - self._asked_pa)
             limited = changed_pa > LIMITED_EFFORT * self._limits.pressure_pa
-            self.effort.update(self._roll_rad, self._passive_roll_rad, limited=limited)
+            plans = isinstance(controller, ConstrainedController)
+            roll_rad, passive_rad = self._roll_rad, self._passive_roll_rad
+            self.effort.update(roll_rad, passive_rad, limited=limited, plans=plans)
         allowed_pa = self._allowed * self._limits.pressure_pa
         self._asked_pa = min(max(command, -allowed_pa), allowed_pa)
         return np.array([self._asked_pa])
