@@ -188,12 +188,12 @@ def run(which, warm_ms, steps):
     panels[Station.OPERATOR].press(Action.ARM)
     now_ns += warm_ms * MS
     bench.run(now_ns)
-    modes, flooded = {bench.node.mode}, False
+    modes, senders = {bench.node.mode}, {"flood", "impostor"}
     for step, wait_ms in steps:
         if isinstance(step, dict):
-            if step["kind"] != "flood" or not flooded:  # two have one name
+            if step["kind"] in senders or step["kind"] not in ("flood", "impostor"):
                 bench.place(FAULTS.validate_python([step]))
-            flooded |= step["kind"] == "flood"
+            senders.discard(step["kind"])  # two would have one name
         else:
             station, action = step
             if not panels[station].why_not(action, now_ns):
