@@ -367,7 +367,7 @@ class NotedSamples:
         self.times_ns: list[int] = []
         self.fresh: list[bool] = []
 
-    def sample(self, now_ns, pressure_pa, motion, *, fresh):
+    def sample(self, now_ns, motion, *, fresh):
         self.times_ns.append(now_ns)
         self.fresh.append(fresh)
 

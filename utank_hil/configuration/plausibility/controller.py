@@ -31,6 +31,7 @@ def controller_warnings(config: Any) -> Iterator[Problem]:
     height_m = tank.level_limit_m
     full = f"a reservoir is full or empty at {height_m:.3g} m"
     most_pa = 0.0 if pump is None else pump.max_pressure_pa
+    most_pa_s = 0.0 if pump is None else pump.max_pressure_rate_pa_s
     gives = f"the pump gives {most_pa:g} Pa"
     share = "it is a share of critical damping, 10 % is 0.10"
     rows: list[tuple[str, float, float, float, str]] = [
@@ -38,6 +39,7 @@ def controller_warnings(config: Any) -> Iterator[Problem]:
         ("limits.pressure_pa", most_pa, 0.05, math.inf, gives),
         ("limits.rate_pa_s", config.limits.pressure_pa / roll_s, 1, math.inf,
          f"{rolls}, and the pressure needs longer to its limit"),
+        ("limits.rate_pa_s", most_pa_s, 0, 1, "the pump's pressure changes no faster"),
         ("law.frequency_rad_s", roll_rad_s, *_PERIODS, rolls),
         ("law.damping_ratio", 1, *_RATIOS, share),
         ("law.level_damping_ratio", 1, *_RATIOS, share),
