@@ -269,25 +269,25 @@ static uint16_t younger(const struct guard *guard, uint32_t first, uint32_t seco
 }
 
 /* Whether a message that is awaited is older than its patience. */
+static bool old(const struct guard *guard, uint32_t index)
+{
+    const uint16_t patience = guard->parameters->messages[index].patience;
+    return (patience != 0U) && (guard->streams[index].age > patience);
+}
+
+/* Of two that stand for each other, whether both are, or the first where no second is awaited. */
+static bool both_old(const struct guard *guard, uint32_t first, uint32_t second)
+{
+    const bool waits = guard->parameters->messages[second].patience != 0U;
+    return old(guard, first) && ((!waits) || old(guard, second));
+}
+
 static bool silent(const struct guard *guard)
 {
-    bool found = false;
-    uint32_t index;
-    for (index = 0U; index < GUARD_STREAMS; index++) {
-        const uint16_t patience = guard->parameters->messages[index].patience;
-        uint16_t age = guard->streams[index].age;
-        if (index == GUARD_MOTION) {
-            age = younger(guard, GUARD_MOTION, GUARD_MOTION_2);
-        } else if ((index == GUARD_ORDER) && guard->parameters->second_station) {
-            age = younger(guard, GUARD_ORDER, GUARD_ORDER_2);
-        } else {
-            /* its own age */
-        }
-        if ((patience != 0U) && (age > patience)) {
-            found = true;
-        }
-    }
-    return found;
+    return old(guard, GUARD_COMMAND) || old(guard, GUARD_DRIVE)
+           || both_old(guard, GUARD_MOTION, GUARD_MOTION_2) || old(guard, GUARD_TANK)
+           || old(guard, GUARD_PUMP) || both_old(guard, GUARD_ORDER, GUARD_ORDER_2)
+           || old(guard, GUARD_HARDWIRED);
 }
 
 static int32_t commanded(const struct guard *guard)

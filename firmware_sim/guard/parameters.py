@@ -107,15 +107,17 @@ def guard_parameters(config: ControllerConfig) -> GuardParameters:
         raise ValueError("the ship has no pump: there is nothing to guard")
     parts = guard_parts(vessel.foreign)
     unchanged = unchanged_ticks(vessel.foreign)
+    first_ms, second_ms = safety.motion_ages_ms
+    second_station = vessel.redundancy.second_station
     patience_ms = (
         150.0,
         safety.drive_age_ms + 140,
-        safety.motion_age_ms + 300,
-        0.0,  # of either motion sensor
+        first_ms + 300,
+        second_ms + 300 if vessel.redundancy.second_motion_sensor else 0.0,
         safety.tank_age_ms + 1200,
         safety.pump_age_ms + 1200,
         safety.panel_age_armed_ms + 1200,
-        0.0,  # of either station
+        safety.panel_age_armed_ms + 1200 if second_station else 0.0,
         safety.hardwired_age_ms + 150 if vessel.redundancy.hardwired_inputs else 0.0,
     )
     thresholds = thresholds_of(config.plant, safety.roll_limit_rad, config.sensors)
@@ -138,7 +140,7 @@ def guard_parameters(config: ControllerConfig) -> GuardParameters:
         roll=round(safety.roll_limit_rad / ROLL_RAD),
         roll_rate=min(round(thresholds.roll_most_rad_s / RATE_RAD_S), MOST_RATE),
         heel=round(safety.heel_limit_rad / ROLL_RAD),
-        second_station=int(vessel.redundancy.second_station),
+        second_station=int(second_station),
         torque_drive=int(vessel.foreign.pump is not None),
         parts=parts,
     )

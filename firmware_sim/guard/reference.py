@@ -216,14 +216,14 @@ class Guard:
 
     @property
     def _silent(self) -> bool:
-        ages = list(self._age)
-        ages[Stream.MOTION] = self._younger(Stream.MOTION, Stream.MOTION_2)
-        if self.parameters.second_station:
-            ages[Stream.ORDER] = self._younger(Stream.ORDER, Stream.ORDER_2)
-        return any(
+        old = [
             each.patience and age > each.patience
-            for each, age in zip(self.parameters.messages, ages, strict=True)
-        )
+            for each, age in zip(self.parameters.messages, self._age, strict=True)
+        ]
+        for first, second in ((Stream.MOTION, Stream.MOTION_2), (Stream.ORDER, Stream.ORDER_2)):
+            waits = self.parameters.messages[second].patience
+            old[first], old[second] = old[first] and (not waits or old[second]), False
+        return any(old)
 
     def tick(self) -> int:
         """Return the reasons to cut, 0 if the drive's power may stay on; called every 10 ms."""

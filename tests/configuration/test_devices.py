@@ -17,6 +17,7 @@ from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.configuration.device_files import shipped_profiles
 from utank_hil.configuration.devices import DevicesSection
 from utank_hil.configuration.files import ConfigError, load_config
+from utank_hil.safety.safety_limits import SafetyLimits
 
 MOTION = load_catalogue().codec(SensorMotion, Address.SENSORS).can_id
 SHIP = Path("configs/ships/thesis_first.yaml").resolve()
@@ -443,10 +444,11 @@ def test_the_way_of_a_valve_with_switches_and_what_a_panel_of_a_bit_is_told(tmp_
 
 
 @pytest.mark.parametrize("first", [SBG, {}])
-def test_the_age_of_the_slower_of_two_sensors_is_allowed(first):
-    """Either may be the one in use."""
+def test_each_of_two_sensors_is_allowed_its_own_age(first):
     slow = SSI2 | {"bus": "can2", "cycle_ms": 50, "age_ms": 150}
-    ages = DevicesSection(motion=first, motion_2=slow).default_ages()
-    assert (ages["motion_age_ms"], ages["motion_spare_age_ms"]) == (150, 300)
-    ages = DevicesSection(motion=slow, motion_2=first).default_ages()
-    assert ages["motion_age_ms"] == 150
+    for motion, motion_2, allowed in ((first, slow, (40, 150)), (slow, first, (150, 40))):
+        ages = DevicesSection(motion=motion, motion_2=motion_2).default_ages()
+        assert SafetyLimits(**ages).motion_ages_ms == allowed
+    ages = DevicesSection(motion=SBG, motion_2={}).default_ages()
+    limits = SafetyLimits(**ages | {"motion_age_ms": 500})  # one key of a file for both
+    assert limits.motion_ages_ms == (500, 500)

@@ -113,19 +113,13 @@ def test_levels_without_switches_say_by_themselves_that_they_are_high():
 
 
 @pytest.mark.parametrize(
-    ("motions", "spare_age_ms", "finding", "alone"),
-    [
-        (1, 0.0, 0, True),
-        (2, 10.0, 0, False),
-        (2, 10.0, Finding.SENSORS_DISAGREE, True),
-        (2, 500.0, 0, True),
-    ],
+    ("second", "finding", "alone"),
+    [(False, 0, True), (True, 0, False), (True, Finding.SENSORS_DISAGREE, True)],
 )
-def test_an_unprotected_sensor_alone_costs_half_the_pressure(motions, spare_age_ms, finding, alone):
+def test_an_unprotected_sensor_alone_costs_half_the_pressure(second, finding, alone):
     for unprotected in (False, True):
         safety = Safety(SafetyLimits(), 250_000, unprotected=unprotected)
-        found = safety._alone(finding, spare_age_ms, second=motions == 2)
-        assert found is (alone and unprotected)
+        assert safety._alone(finding, second=second) is (alone and unprotected)
 
 
 def test_noise_of_a_sensor_of_20_hz_is_that_of_its_samples():

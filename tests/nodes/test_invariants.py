@@ -87,9 +87,7 @@ class Table(ControllerBench):
 
         def updated(situation, standing):
             if self.found or self.spare_age_ms:
-                situation = changed(
-                    situation, found=self.found, motion_spare_age_ms=self.spare_age_ms
-                )
+                situation = changed(situation, found=self.found, spare_age_ms=self.spare_age_ms)
                 standing = judging.standing(situation, SAFETY)
             safety.situation = situation
             update(situation, standing)

@@ -29,9 +29,9 @@ MEASURED = Measurements(
 """Everything heard just now, and all well."""
 OWN = OwnState(commissioned=True)
 WELL = Situation(
-    measured=MEASURED, own=OWN, motion=MotionSample(), motion_spare_age_ms=0.0, found=0,
-    heel_rad=0.0, tick_late_ms=0.0, overruns_in_ten=0, bus_load=0.0, rolled_over_ms=1e9,
-    drive_out_ms=0.0, arming_ms=0.0,
+    measured=MEASURED, own=OWN, motion=MotionSample(), motion_limit_ms=40.0, spare_age_ms=0.0,
+    spare_limit_ms=100.0, found=0, heel_rad=0.0, tick_late_ms=0.0, overruns_in_ten=0, bus_load=0.0,
+    rolled_over_ms=1e9, drive_out_ms=0.0, arming_ms=0.0,
 )  # fmt: skip
 
 _OF_MOTION = {"motion_age_ms": "age_ms", "roll_rad": "roll_rad", "motion_valid": "valid"}

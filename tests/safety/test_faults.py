@@ -108,7 +108,7 @@ def test_a_code_without_a_row_has_its_name_alone():
 LIMITS = SafetyLimits()
 LIMITED = {
     "motion_age_ms": [LIMITS.motion_age_ms],
-    "motion_spare_age_ms": [LIMITS.motion_spare_age_ms],
+    "spare_age_ms": [LIMITS.motion_spare_age_ms],
     "hardwired_age_ms": [LIMITS.hardwired_age_ms],
     "tank_age_ms": [LIMITS.tank_degraded_age_ms, LIMITS.tank_age_ms],
     "pump_age_ms": [LIMITS.pump_degraded_age_ms, LIMITS.pump_age_ms],

@@ -14,6 +14,7 @@ from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus.enumerations import Fault
 from utank_hil.canbus.measurements import MotionSample
 from utank_hil.control.interface import DesignPlant
+from utank_hil.safety import judging
 from utank_hil.safety.judge import HEEL_TIME_CONSTANT_S, QUIET_START_NS, Lateness, Safety
 from utank_hil.safety.monitoring import Monitors
 from utank_hil.safety.monitors.senders import BusLoad
@@ -142,7 +143,7 @@ def test_a_motion_sensor_that_is_silent_is_left_for_one_that_is_not(first_ms, se
     judgement = safety.judge(changed(MEASURED, motions=motions), OWN)
     assert judgement.motion == used
     assert safety.situation.motion.roll_rad == motions[used].roll_rad
-    assert safety.situation.motion_spare_age_ms == motions[1 - used].age_ms
+    assert safety.situation.spare_age_ms == motions[1 - used].age_ms
 
 
 def test_the_second_motion_sensor_is_left_for_the_first_one_that_is_back():
@@ -151,6 +152,29 @@ def test_the_second_motion_sensor_is_left_for_the_first_one_that_is_back():
         motions = MotionSample(0.1, age_ms=first_ms), MotionSample(0.2, age_ms=second_ms)
         used.append(safety.judge(changed(MEASURED, motions=motions), OWN).motion)
     assert used == [1, 1, 0, 0]
+
+
+@pytest.mark.parametrize("used", [0, 1])
+def test_each_of_two_motion_sensors_is_judged_by_its_own_age(used):
+    """What was a fast one's silence is found as soon as without the slow one."""
+    limits = SafetyLimits(motion_age_ms=40.0, motion_2_age_ms=150.0)
+    allowed_ms = limits.motion_ages_ms
+    for place, limit_ms in ((used, allowed_ms[used]), (1 - used, max(100, allowed_ms[1 - used]))):
+        for age_ms, found in ((limit_ms, False), (math.nextafter(limit_ms, math.inf), True)):
+            safety = Safety(limits, 250_000, unprotected=True)
+            for ages_ms in ([1e9, 0.0] if used else [0.0, 1e9], [0.0, 0.0]):
+                motions = tuple(MotionSample(age_ms=each) for each in ages_ms)
+                safety.judge(changed(MEASURED, motions=motions), OWN)
+            ages_ms = [1e9, 1e9] if place == used else [0.0, 0.0]
+            ages_ms[place] = age_ms
+            motions = tuple(MotionSample(age_ms=each) for each in ages_ms)
+            judgement = safety.judge(changed(MEASURED, motions=motions), OWN)
+            assert judgement.motion == used
+            standing = judging.standing(safety.situation, limits)
+            reacts = judging.RAMPING if place == used else judging.WARNING
+            assert (Fault.MOTION_SILENT in judging.faults(standing & reacts)) is found
+            if place != used:
+                assert judgement.share == (0.5 if found else 1.0)
 
 
 def test_the_judgement_bounds_the_pressure_by_what_is_in_doubt():
@@ -166,7 +190,7 @@ def test_the_judgement_bounds_the_pressure_by_what_is_in_doubt():
     judgement = bought.judge(of_one, OWN)
     assert judgement.unconfirmed_share is None
     assert (judgement.mode, judgement.fault) == (bought.supervisor.mode, bought.supervisor.fault)
-    assert bought.situation.motion_spare_age_ms == 0.0
+    assert bought.situation.spare_age_ms == 0.0
     for pump in (True, False):
         monitors = new_monitors()
         monitors.thresholds = replace(

@@ -11,6 +11,7 @@ from utank_hil.safety.safety_limits import SafetyLimits
 # name: default, most
 LIMITS = {
     "motion_age_ms": (40, 1000),
+    "motion_2_age_ms": (None, 1000),
     "motion_spare_age_ms": (100, 1000),
     "hardwired_age_ms": (150, 1000),
     "tank_age_ms": (1000, 1000),

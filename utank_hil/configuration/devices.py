@@ -309,17 +309,16 @@ class DevicesSection(Section):
 
     def default_ages(self) -> dict[str, float]:
         """Limits of age where the controller's file says nothing, by `SafetyLimits`' names."""
+        native_ms = SafetyLimits().motion_age_ms
+        first_ms, second_ms = (each.age_ms or native_ms for each in (self.motion, self.motion_2))
         ages = {
             "motion_age_ms": self.motion.age_ms,
+            # where they are equal one key of the controller's file is for both
+            "motion_2_age_ms": second_ms if second_ms != first_ms else None,
             "tank_degraded_age_ms": self.levels.age_ms,
             "pump_degraded_age_ms": self.pump_sensor.age_ms,
             "valve_age_ms": self.valve.age_ms,
         }
-        both = [each.age_ms for each in (self.motion, self.motion_2) if each.age_ms is not None]
-        if both:  # either may be the one in use
-            first_ms = self.motion.age_ms or SafetyLimits().motion_age_ms
-            ages["motion_age_ms"] = max(first_ms, *both)
-            ages["motion_spare_age_ms"] = max(SafetyLimits().motion_spare_age_ms, 2 * max(both))
         return {name: age_ms for name, age_ms in ages.items() if age_ms is not None}
 
     def noise(self, role: str, value: str) -> float:

@@ -77,7 +77,7 @@ class RunningLaw:
         self._engaged = self._interrupted = False
         self._measure = measure
         self._commands = commands
-        self._limits = limits
+        self._limits, self._motion_ages_ms = limits, limits.motion_ages_ms
         self._allow = law.allow if isinstance(law, Plans) else None
         self._foresees = law if isinstance(law, Foresees) else None
         self._ends = law if isinstance(law, EndsByItself) else None
@@ -169,7 +169,7 @@ class RunningLaw:
                 return
             motion = measured.motions[judgement.motion]
             if self._allow is not None:
-                self._watch(measured, motion)
+                self._watch(measured, motion, judgement)
                 self._allow(self.share(judgement))
             self._answer(measured, motion, judgement, level, take_order)
         except (Exception, SystemExit) as error:
@@ -237,10 +237,10 @@ class RunningLaw:
             self.failed = self._raised = False
             self._forget()
 
-    def _watch(self, measured: Measurements, motion: MotionSample) -> None:
+    def _watch(self, measured: Measurements, motion: MotionSample, judgement: Judgement) -> None:
         """Count what a law that plans has watched; it learns nothing in a gap."""
-        limits = self._limits
-        if motion.age_ms > limits.motion_age_ms or measured.tank_age_ms > limits.tank_age_ms:
+        limits, oldest_ms = self._limits, self._motion_ages_ms[judgement.motion]
+        if motion.age_ms > oldest_ms or measured.tank_age_ms > limits.tank_age_ms:
             self._forget()
         else:
             self._watched_share += self._watched_step

@@ -206,12 +206,13 @@ FAULTS: Final = (
     _row(Fault.MOTION_SILENT, "No usable measurement comes from the motion sensor.",
          "Check the sensor's supply and bus connection, and what it sends: its "
          "quality, and values that jump, which are discarded.",
-         Condition(_RAMP, "last good sample older than {motion_age_ms:g} ms",
-             lambda seen, limits: seen.motion.age_ms > limits.motion_age_ms,
+         Condition(_RAMP, "last good sample older than {motion_age_ms:g} ms, that of a second "
+             "sensor than is allowed of it",
+             lambda seen, _: seen.motion.age_ms > seen.motion_limit_ms,
              zero_within_ms=200, awaited=3),  # 250 after the sample, of which 40 ms are allowed
          Condition(_WARN, "one of two motion sensors: last good sample older than "
              "{motion_spare_age_ms:g} ms",
-             lambda seen, limits: seen.motion_spare_age_ms > limits.motion_spare_age_ms)),
+             lambda seen, _: seen.spare_age_ms > seen.spare_limit_ms)),
     _row(Fault.SENSORS_DISAGREE, "The two motion sensors disagree.",
          "Compare both with the horizon and a plumb line; mend or replace the one that is wrong.",
          _found(_RAMP, "roll apart by half a degree for 0.3 s, or their rates by as much at 2 w0",

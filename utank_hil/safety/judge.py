@@ -95,6 +95,8 @@ class Safety:
         unprotected: bool = False,
     ) -> None:
         self._silent_ms = [1e3 * SILENT_CYCLES * cycle_s for cycle_s in motion_cycles_s]
+        self._oldest_ms = limits.motion_ages_ms
+        self._spare_oldest_ms = [max(limits.motion_spare_age_ms, each) for each in self._oldest_ms]
         self._unprotected = unprotected
         self.supervisor = Supervisor(limits)
         self.monitors = monitors
@@ -135,19 +137,22 @@ class Safety:
         second = len(motions) == 2
         if second:
             self._leave_silent_sensor(motions)
-        motion = motions[self._motion]
+        used = self._motion
+        motion = motions[used]
         if motion.age_ms <= HEEL_AGE_MS:
             self._heel.update(motion.roll_rad)
         found = 0
         if monitors is not None:
-            found = monitors.update(measured, own, self._motion)
+            found = monitors.update(measured, own, used)
         supervisor.count(measured, motion.roll_rad, own.command_pa)
-        spare_age_ms = motions[1 - self._motion].age_ms if second else 0.0
+        spare_age_ms = motions[1 - used].age_ms if second else 0.0
         self.situation = situation = Situation(
             measured,
             own,
             motion,
+            self._oldest_ms[used],
             spare_age_ms,
+            self._spare_oldest_ms[1 - used],
             found,
             self._heel.heel_rad,
             self._lateness.late_ms,
@@ -159,7 +164,8 @@ class Safety:
         )
         supervisor.update(situation, judging.standing(situation, supervisor.limits))
         self._note_causes(now_ns)
-        alone = self._alone(found, spare_age_ms, second=second)
+        heard = second and spare_age_ms <= situation.spare_limit_ms
+        alone = self._alone(found, second=heard)
         unconfirmed_share, passive_roll_rad = None, math.nan
         if monitors is not None:
             passive_roll_rad = monitors.twin.roll_rad
@@ -170,20 +176,16 @@ class Safety:
             supervisor.fault,
             supervisor.demand,
             supervisor.drive_wanted,
-            self._motion,
+            used,
             self._degraded_share if supervisor.degraded or alone else 1.0,
             unconfirmed_share,
             supervisor.standing,
             passive_roll_rad,
         )
 
-    def _alone(self, found: int, spare_age_ms: float, *, second: bool) -> bool:
-        """Whether unprotected motion is used that no second sensor confirms."""
-        if not self._unprotected:
-            return False
-        if not second or found & Finding.SENSORS_DISAGREE:
-            return True
-        return spare_age_ms > self.supervisor.limits.motion_spare_age_ms
+    def _alone(self, found: int, *, second: bool) -> bool:
+        """Whether unprotected motion is used that no `second` sensor, which is heard, confirms."""
+        return self._unprotected and (not second or found & Finding.SENSORS_DISAGREE != 0)
 
     def _leave_silent_sensor(self, motions: tuple[MotionSample, ...]) -> None:
         """Use the other motion sensor if this one is silent, and that one is not."""

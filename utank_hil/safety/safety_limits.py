@@ -35,8 +35,10 @@ class SafetyLimits:
 
     #: Longest age of the motion sensor's last good sample while armed.
     motion_age_ms: _Silence = 40.0
+    #: The same of the second motion sensor; None: that of the first.
+    motion_2_age_ms: _Silence | None = None
     #: Age of the last good sample of the motion sensor that is not in use, where there are two,
-    #: from which it is an alarm.
+    #: from which it is an alarm; no less than the age that is allowed while it is in use.
     motion_spare_age_ms: _Silence = 100.0
     #: Longest age of the hard-wired inputs, where there are such.
     hardwired_age_ms: _Silence = 150.0
@@ -67,6 +69,12 @@ class SafetyLimits:
     long_overrun_ms: _Silence = 50.0  #: One tick this late cuts the pressure.
     #: So many late ticks among the last ten end in a ramp to zero; None: they are not judged.
     overruns_in_ten: Annotated[int, Range(least=1, most=10)] | None = 3
+
+    @property
+    def motion_ages_ms(self) -> tuple[float, float]:
+        """Longest age of either motion sensor's last good sample while armed."""
+        second_ms = self.motion_2_age_ms
+        return self.motion_age_ms, self.motion_age_ms if second_ms is None else second_ms
 
     def __post_init__(self) -> None:
         refuse("safety", range_problems(self))

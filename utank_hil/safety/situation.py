@@ -76,15 +76,16 @@ class Situation:
 
     def __init__(
         self, measured: Measurements, own: OwnState, motion: MotionSample,
-        motion_spare_age_ms: float, found: int, heel_rad: float, tick_late_ms: float,
-        overruns_in_ten: int, bus_load: float, rolled_over_ms: float, drive_out_ms: float,
-        arming_ms: float,
+        motion_limit_ms: float, spare_age_ms: float, spare_limit_ms: float, found: int,
+        heel_rad: float, tick_late_ms: float, overruns_in_ten: int, bus_load: float,
+        rolled_over_ms: float, drive_out_ms: float, arming_ms: float,
     ) -> None:  # fmt: skip
         self.measured: Final = measured
         self.own: Final = own
         self.motion: Final = motion  #: The sensor in use.
-        #: Age of the other sensor's sample; zero without one.
-        self.motion_spare_age_ms: Final = motion_spare_age_ms
+        self.motion_limit_ms: Final = motion_limit_ms  #: Longest age of its sample.
+        self.spare_age_ms: Final = spare_age_ms  #: Of the other sensor's sample; zero without one.
+        self.spare_limit_ms: Final = spare_limit_ms  #: Longest age of that.
         self.found: Final = found  #: What the monitors found, bits of `Finding`.
         self.heel_rad: Final = heel_rad  #: Low-pass of the roll over a minute.
         self.tick_late_ms: Final = tick_late_ms  #: Lateness of this tick.

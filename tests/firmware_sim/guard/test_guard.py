@@ -42,6 +42,16 @@ from utank_hil.configuration import ControllerConfig, load_config
 CATALOGUE = load_catalogue()
 PATTI = load_config("configs/controllers/patti_b_constrained_gpc.yaml", ControllerConfig)
 TABLE = guard_parameters(PATTI)
+PAIRS = replace(PATTI.vessel.redundancy, second_motion_sensor=True, second_station=True)
+OF_TWO = guard_parameters(
+    PATTI.model_copy(
+        update={
+            "vessel": PATTI.vessel.model_copy(update={"redundancy": PAIRS}),
+            "safety": replace(PATTI.safety, motion_2_age_ms=150.0),
+        }
+    )
+)
+"""With a second station and a second, slower motion sensor."""
 OFF = Switch.OFF
 SOUND: dict[Stream, Any] = {
     Stream.COMMAND: PumpCommand(0.0, ControlWord.ENABLE_OPERATION, 0.05),
@@ -272,7 +282,7 @@ def test_a_mode_that_is_asked_for_again_with_the_arm_bit_held_arms_nothing(bench
 
 def test_a_second_station_arms_only_where_it_is_declared(folder: Path) -> None:
     for declared in (0, 1):
-        bench = Bench(folder, replace(TABLE, second_station=declared))
+        bench = Bench(folder, OF_TWO if declared else TABLE)
         bench.says[Stream.ORDER_2] = SOUND[Stream.ORDER]
         bench.run(4)
         bench.say(Stream.ORDER_2, arm=True)
@@ -281,9 +291,29 @@ def test_a_second_station_arms_only_where_it_is_declared(folder: Path) -> None:
         assert bench.run(130) == (0 if declared else Reason.DISARMED)
 
 
+def test_of_two_motion_sensors_each_is_judged_by_its_own_age(folder: Path) -> None:
+    patience = [OF_TWO.messages[each].patience for each in (Stream.MOTION, Stream.MOTION_2)]
+    assert patience == [34, 45]
+    both = [Stream.MOTION, Stream.MOTION_2]
+    for lost, after in (([], patience[1]), (both[1:], patience[0])):  # the slow one gone before
+        bench = Bench(folder, OF_TWO)
+        bench.says[Stream.MOTION_2] = SOUND[Stream.MOTION]
+        bench.press(500.0)
+        assert bench.run(100, lost) == 0  # the last frame is two ticks old
+        assert bench.run(after - 2, both) == 0
+        assert bench.run(1, both) == Reason.SILENT
+
+
+def test_a_second_motion_sensor_that_is_not_declared_stands_for_none(folder: Path) -> None:
+    bench = Bench(folder)
+    bench.says[Stream.MOTION_2] = SOUND[Stream.MOTION]
+    bench.press(500.0)
+    assert bench.run(TABLE.messages[Stream.MOTION].patience + 4, [Stream.MOTION]) == Reason.SILENT
+
+
 @pytest.mark.parametrize("station", [Stream.ORDER, Stream.ORDER_2])
 def test_what_was_pressed_before_the_first_frame_is_no_edge(folder: Path, station: Stream) -> None:
-    bench = Bench(folder, replace(TABLE, second_station=1))
+    bench = Bench(folder, OF_TWO)
     bench.says[station] = SOUND[Stream.ORDER]._replace(arm=True, reset=True)
     bench.send(
         CATALOGUE.transmitter(HardwiredInputs).frame(
@@ -292,7 +322,7 @@ def test_what_was_pressed_before_the_first_frame_is_no_edge(folder: Path, statio
     )
     assert bench.tick() & Reason.STOP
     assert bench.run(10) == Reason.STOP | Reason.WAITING
-    bench = Bench(folder, replace(TABLE, second_station=1))
+    bench = Bench(folder, OF_TWO)
     bench.says[station] = SOUND[Stream.ORDER]._replace(arm=True)
     bench.run(4)
     bench.say(Stream.COMMAND, pressure_pa=500.0)
@@ -453,7 +483,7 @@ def test_a_pressure_that_is_old_is_none(folder: Path) -> None:
 def test_a_stop_that_one_station_holds_is_not_reset_at_the_other(
     folder: Path, holds: Stream
 ) -> None:
-    bench = Bench(folder, replace(TABLE, second_station=1))
+    bench = Bench(folder, OF_TWO)
     bench.says[Stream.ORDER_2] = SOUND[Stream.ORDER]
     bench.run(4)
     bench.say(holds, stop=True)
@@ -481,7 +511,7 @@ _STEPS = st.one_of(
 def test_any_frames_are_judged_alike_in_both(
     folder: Path, steps: list[tuple[str, Any]], second: int
 ) -> None:
-    bench = Bench(folder, replace(TABLE, second_station=second))
+    bench = Bench(folder, OF_TWO if second else TABLE)
     bench.run(4)
     for kind, what in steps:
         if kind == "sound":
