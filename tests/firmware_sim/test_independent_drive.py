@@ -195,3 +195,15 @@ def test_an_emergency_alarms_and_stops_nothing():
     bench.motor.tell("well")
     bench.to(bench.run.now_ns / SECOND + 1)
     assert not bench.node.measured.device_error
+
+
+def test_an_emergency_after_another_is_told_too():
+    """Else the alarm of the first would hide it for as long as it lasts, and ten seconds more."""
+    bench, told = under_pressure(), []
+    bench.node.telemetry.tell = lambda event, _: told.append((event.code, event.received))
+    for words in ("emcy 8130", "emcy 4210", "well", "emcy 8130", "emcy 4210"):
+        bench.motor.tell(words)
+        bench.to(bench.run.now_ns / SECOND + 1)
+    kinds = ("8130h (monitoring)", "4210h (temperature)")
+    said = [f"pump: node 5: emergency {kind}, register 0x81" for kind in kinds]
+    assert told == [(Fault.DEVICE_ERROR, each) for each in said]

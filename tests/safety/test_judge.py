@@ -11,7 +11,7 @@ from situations import MEASURED, OWN
 from values import changed
 
 from utank_hil.base.tick import TICK_NS, TICK_S
-from utank_hil.canbus.enumerations import Fault
+from utank_hil.canbus.enumerations import AlarmState, Fault
 from utank_hil.canbus.measurements import MotionSample
 from utank_hil.control.interface import DesignPlant
 from utank_hil.safety import judging
@@ -256,6 +256,23 @@ def test_what_the_twin_says_is_unknown_without_monitors():
     assert safety.passive_roll_rad == twin.roll_rad != 0.0
     assert safety.passive_roll_rms_rad == twin.rms_rad > 0.0
     assert safety.roll_rms_rad == twin.ship_rms_rad != twin.rms_rad
+
+
+def test_each_error_of_a_device_is_told_once_while_the_alarm_lasts():
+    safety, now_ns, told = Safety(SafetyLimits(), 250_000), QUIET_START_NS, []
+    safety.update_alarms([], 0)
+    for seconds, errors in (
+        (0, ["a"]), (1, ["a", "b"]), (2, ["b"]), (3, []), (4, ["a"]), (5, ["c"]),
+        *((6 + n, [f"{n}"]) for n in range(7)), (15, []), (26, []), (27, ["a"]),
+    ):  # fmt: skip
+        now_ns = QUIET_START_NS + seconds * 10**9
+        seen = changed(MEASURED, now_ns=now_ns, device_error=bool(errors))
+        safety.judge(seen, OWN)
+        events = safety.update_alarms([], now_ns, errors)
+        raised = Fault.DEVICE_ERROR, AlarmState.ACTIVE_UNACKNOWLEDGED
+        told += [seconds for each in events if (each.code, each.state) == raised]
+    # eight, a flood of them is not; and once more after the alarm's cause had gone
+    assert told == [0, 1, 5, 6, 7, 8, 9, 10, 27]
 
 
 def test_what_is_awaited_at_the_start_is_told_after_ten_seconds():

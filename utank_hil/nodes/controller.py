@@ -266,7 +266,7 @@ class ControllerNode:
         if self._status_schedule.due(now_ns):
             self.telemetry.renew_slow()
             accepted = self.inbox.stations.take_accepted()
-            for event in safety.update_alarms(accepted, now_ns):
+            for event in safety.update_alarms(accepted, now_ns, self.inbox.errors):
                 received = self.inbox.received(event.code)
                 self.telemetry.tell(replace(event, received=received), self.start_ns)
             frames.append(self._alarm_frames.frame(safety.alarms.next_message(now_ns)))

@@ -262,6 +262,11 @@ class Inbox:
         """What CANopen sensors are configured with in this tick."""
         return self._routing.configures(now_ns)
 
+    @property
+    def errors(self) -> list[str]:
+        """Errors that devices of other makers report, in words."""
+        return self._routing.errors
+
     def wakes(self, now_ns: int) -> list[Frame]:
         """What is to be sent to devices of other makers that are silent."""
         return self._routing.wakes(now_ns)
@@ -276,8 +281,7 @@ class Inbox:
         if code in _OF_DRIVE:
             return self._drive.words
         if code is Fault.DEVICE_ERROR:
-            said = [(name, each) for name, each in self._routing.emergencies if each.words]
-            return "; ".join(f"{name}: {each.node_words}" for name, each in said)
+            return "; ".join(self._routing.errors)
         source, parts = self._sources.get(code), [self._received.get(code, "")]
         heard: Sequence[Heard] = ()
         if code is Fault.MOTION_SILENT:

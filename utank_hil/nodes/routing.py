@@ -69,6 +69,11 @@ class Routing:
         """Whether a CANopen device reports an error."""
         return any(emergency.words for _, emergency in self.emergencies)
 
+    @property
+    def errors(self) -> list[str]:
+        """Device, node, code and register of each that reports an error."""
+        return [f"{name}: {each.node_words}" for name, each in self.emergencies if each.words]
+
     def configures(self, now_ns: int) -> list[Frame]:
         """What CANopen sensors are configured with in this tick."""
         frames: list[Frame] = []

@@ -77,6 +77,11 @@ class AlarmList:
         """What is in the list."""
         return frozenset(self._entries)
 
+    def is_active(self, code: Fault) -> bool:
+        """Whether the cause of an alarm in the list is there, or was within `GONE_NS`."""
+        entry = self._entries.get(code)
+        return entry is not None and entry.state is not AlarmState.RECTIFIED_UNACKNOWLEDGED
+
     def update(self, active: Active, mode: Mode, now_ns: int) -> None:
         """Take the faults whose cause is there."""
         entries = self._entries

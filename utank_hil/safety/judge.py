@@ -1,6 +1,7 @@
 """From measurements to judgement: what the controller may do with the pump, and why not."""
 
 import math
+from collections.abc import Collection
 from typing import Final
 
 from utank_hil.base.tick import TICK_NS, TICK_S
@@ -27,6 +28,8 @@ HEEL_AGE_MS: Final = 100.0
 SILENT_CYCLES: Final = 2.5
 """Two samples of a motion sensor are missing: the other sensor is used, before the first one counts
 as silent."""
+MOST_ERRORS: Final = 8
+"""So many errors of devices are told while the alarm of the first one lasts."""
 QUIET_START_NS: Final = 10_000_000_000
 """What is awaited at the start is an alarm only when it has not come by then."""
 _TEN: Final = 10
@@ -110,6 +113,7 @@ class Safety:
         self._start_ns: int | None = None
         self._alarming = False
         self._passing: dict[Fault, Gravity] = {}
+        self._errors: set[str] = set()
         self._mode_before = _INIT
         self._refused_by = _NO_FAULT
 
@@ -213,14 +217,24 @@ class Safety:
         if self._start_ns is None:
             self._start_ns = now_ns
 
-    def update_alarms(self, accepted: list[int | None], now_ns: int) -> list[AlarmEvent]:
-        """Update alarms; return what became of them. `accepted` are codes, None for all."""
+    def update_alarms(
+        self, accepted: list[int | None], now_ns: int, errors: Collection[str] = ()
+    ) -> list[AlarmEvent]:
+        """Update alarms; return what became of them. `accepted` are codes, None for all.
+
+        `errors` are those that devices report now, in words: each is an alarm of its own.
+        """
         supervisor, alarms = self.supervisor, self.alarms
         mode = supervisor.mode
         quiet = self._start_ns is None or now_ns - self._start_ns < QUIET_START_NS
         self._alarming = self._alarming or mode is not _INIT or not quiet
         for code in accepted:
             alarms.accept(code, mode, now_ns)
+        if not alarms.is_active(Fault.DEVICE_ERROR):
+            self._errors.clear()
+        elif len(self._errors) < MOST_ERRORS and not self._errors.issuperset(errors):
+            alarms.raise_anew(Fault.DEVICE_ERROR, mode, now_ns)
+        self._errors.update(errors)
         active = self._passing
         if self._alarming:
             now = active_faults(mode, supervisor.fault, supervisor.standing)
